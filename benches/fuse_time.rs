@@ -26,7 +26,7 @@ fn write_channel(path: &Path, seed: u64) {
     }
     let mut wav = WavFile::new(File::create(path).unwrap(), PcmFormat::F32Le, 1, RATE).unwrap();
     (0..SECONDS).for_each(|_| wav.write_bytes(&second).unwrap());
-    wav.finish().unwrap();
+    wav.finish(&[]).unwrap();
 }
 
 fn main() {

@@ -45,7 +45,7 @@ fn write_inputs(folder: &Path) {
     let wav = File::create(folder.join("in.wav")).unwrap();
     let mut wav = WavFile::new(wav, PcmFormat::S16Le, 2, 24_000).unwrap();
     (0..BYTES / 4 / integers.len()).for_each(|_| wav.write_bytes(&integers).unwrap());
-    wav.finish().unwrap();
+    wav.finish(&[]).unwrap();
     std::fs::write(folder.join("bank.json"), bank()).unwrap();
 }
 

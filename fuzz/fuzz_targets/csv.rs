@@ -14,7 +14,7 @@ fn frames(bytes: &[u8], most: usize) -> Option<Vec<u64>> {
             );
             return None;
         }
-        assert!(some.len() % reader.channels() == 0 && some.len() <= most * reader.channels());
+        assert!(some.len() % reader.header().channels == 0 && some.len() <= most * reader.header().channels);
         if some.is_empty() {
             return Some(all);
         }

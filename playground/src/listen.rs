@@ -14,6 +14,7 @@ use hybank::spec::{SignalSpec, Spec};
 use hybank::units::{FastPeriods, Hertz, Seconds};
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
+use std::io::Read;
 
 /// Rates at which browsers play; a bank of another rate is played slower or faster, at [`USUAL_RATE`].
 const PLAYABLE: std::ops::RangeInclusive<f64> = 8e3..=192e3;
@@ -169,10 +170,11 @@ fn recording(spec: &Spec, file: &[u8]) -> Result<Signal, Refusal> {
     let rate = Hertz(f64::from(header.rate));
     let most = (MOST_SECONDS * rate.0) as usize;
     // One frame more tells whether the recording goes on.
-    let mut bytes = vec![0; (most + 1) * header.frame_bytes()];
-    let filled = reader.frames().fill(&mut bytes).map_err(Refusal::new)?;
+    let mut bytes = Vec::new();
+    let longest = ((most + 1) * header.frame_bytes()) as u64;
+    reader.by_ref().take(longest).read_to_end(&mut bytes).map_err(Refusal::new)?;
     let format = header.layout.format;
-    let all = bytes[..filled].chunks_exact(header.frame_bytes()).map(|frame| format.decode(frame));
+    let all = bytes.chunks_exact(header.frame_bytes()).map(|frame| format.decode(frame));
     let samples: Vec<f64> = all.take(most).map(|x| if x.is_finite() { x } else { 0.0 }).collect();
     if samples.is_empty() {
         return Err(Refusal::new("the recording has no samples"));
@@ -183,7 +185,7 @@ fn recording(spec: &Spec, file: &[u8]) -> Result<Signal, Refusal> {
     Ok(Signal {
         samples: analog.usual_samples(spec.ratio),
         analog,
-        text: recording_text(spec, header.channels, filled > most * header.frame_bytes()),
+        text: recording_text(spec, header.channels, bytes.len() / header.frame_bytes() > most),
     })
 }
 

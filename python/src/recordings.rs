@@ -3,7 +3,7 @@
 use crate::errors::{HybankError, refused};
 use hybank::io::wav::WavReader;
 use hybank::io::{SigmfMeta, StreamHeader, is_sigmf, sigmf_files};
-use hybank::runtime::{Input, Isa, PcmFormat, PcmFrames, SampleLayout};
+use hybank::runtime::{Input, Isa, PcmFormat, PcmFrames};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use std::fs::File;
@@ -82,8 +82,8 @@ impl Recording {
         let reader = WavReader::new(file, &name).map_err(refused)?;
         let wav = reader.header();
         let bytes = wav.data_bytes.unwrap_or(u64::MAX).min(size.saturating_sub(wav.data_offset));
-        let header =
-            StreamHeader { rate: Some(wav.rate.into()), ..StreamHeader::real(wav.layout, wav.channels) };
+        let real = StreamHeader::real(wav.layout, wav.channels);
+        let header = StreamHeader { rate: Some(wav.rate.into()), ..real };
         let frames = bytes / header.frame_bytes() as u64;
         Ok(Self { data: path.clone(), path, offset: wav.data_offset, header, frames })
     }
@@ -97,9 +97,7 @@ impl Recording {
                 "{name}: frames were lost (core:global_index jumps); fuse the recording with `hybank fuse`, which fills them"
             )));
         }
-        let layout = SampleLayout::packed(meta.format(&name).map_err(refused)?);
-        let real = StreamHeader::real(layout, meta.global.num_channels.unwrap_or(1));
-        let header = StreamHeader { is_complex: meta.is_complex(), rate: meta.global.sample_rate, ..real };
+        let header = meta.stream_header(&name).map_err(refused)?;
         let size =
             File::open(&data).and_then(|file| file.metadata()).map_err(|error| system(&data, error))?;
         let frames = size.len() / header.frame_bytes() as u64;

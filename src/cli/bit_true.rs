@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::bank_file::{is_dash, name};
-use super::output::Bits;
+use super::output::{Bits, begin_samples};
 use super::print::print_json;
 use super::say::{say, warn};
 use crate::bank::Bank;
@@ -68,7 +68,7 @@ impl BitTrueArgs {
         let model = BitTrue::new(job.bank, words)
             .map_err(|error| Failure::Input(format!("{}: {error}", name(job.bank_path))))?;
         let header = OutputHeader { container: Container::Wav, format, is_complex: false, rate: job.rate };
-        let output = SampleWriter::create(job.output, header, job.force).map_err(Failure::running)?;
+        let output = begin_samples(job.output, header, job.force).map_err(Failure::running)?;
         let skip = if job.keep_latency { 0 } else { job.bank.latency };
         let mut run = Run::new(model, output, format, skip, job.bank);
         let frames = run.all(reader)?;

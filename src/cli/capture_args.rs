@@ -7,8 +7,8 @@ use crate::io::{Coding, ReadOptions};
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(super) struct CaptureArgs {
     /// Sample format of captures: wav, or a raw format as in ffmpeg (s16le, f32le, ..; with c before it for
-    /// complex samples: cf32, cs16). SigMF recordings, .csv, .npy, .mat (x.mat:name
-    /// for one variable of several), and in builds with audio .flac, .mp3, .aiff and .ogg state their own
+    /// complex samples: cf32, cs16). SigMF recordings, .csv, .npy, .mat (x.mat:name for one variable of
+    /// several) and .flac state their own
     #[arg(long, value_name = "FORMAT", default_value = "wav", value_parser = coding)]
     format: Coding,
     /// Interleaved channels of each raw capture [default: 1 each, or all in a single capture]

@@ -10,7 +10,7 @@ use super::follow::Follow;
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
 use super::journal::{Journal, JournalArgs};
-use super::output::{Bits, check_files, precision};
+use super::output::{Bits, begin_samples, check_files, precision};
 use super::run::{RunReport, ThreadArgs, algorithms, carried, complete, print_report};
 use super::say::say_understood;
 use super::track::TrackArgs;
@@ -19,7 +19,7 @@ use super::watch::{UNWATCHED, Watch};
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{
-    BLOCK_BYTES, Container, MultiReader, OutputHeader, PcmFrames, Placement, ReadOptions, SampleWriter,
+    BLOCK_BYTES, Container, MultiReader, OutputHeader, PcmFrames, Placement, ReadOptions,
 };
 use crate::overview::counted;
 use crate::pipeline::{Ending, FileOutputs, Pipeline, Settings, Warning, run as run_pipeline};
@@ -275,7 +275,7 @@ impl Args {
         let mask = self.gaps.begin_mask(self.force)?;
         let (container, format) = (Container::Wav, self.bits.format());
         let header = OutputHeader { container, format, is_complex, rate };
-        let samples = SampleWriter::create(&self.output, header, self.force);
+        let samples = begin_samples(&self.output, header, self.force);
         let log = self.track.begin_log(self.force)?;
         Ok(FileOutputs::new(samples.map_err(Failure::running)?, mask).with_log(log).with_peak(format))
     }

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use crate::bank::Bank;
-use crate::io::MultiReader;
+use crate::io::{MultiReader, StreamHeader, is_same_rate};
 use std::path::{Path, PathBuf};
 
 /// `-` may be given once.
@@ -34,30 +34,29 @@ pub(super) fn check_channels(bank: &Bank, path: &Path, reader: &MultiReader) -> 
 /// # Errors
 /// Inputs whose rates differ, or are not the bank's 1 / (M h).
 pub(super) fn output_rate(bank: &Bank, reader: &MultiReader) -> Result<f64, Failure> {
-    let rates = reader.headers().map(|(name, header)| (name, header.rate));
-    match input_rate(bank, rates)? {
+    match input_rate(bank, reader.headers())? {
         Some(rate) if bank.is_normalised() => Ok(rate * bank.ratio as f64),
         _ => Ok(1.0 / bank.fast_period.0),
     }
 }
 
-/// The common rate of the inputs, where they say it: 1 / (M h), to the hertz that a header can say, or any
-/// for a bank in normalised time.
+/// The common rate of the inputs, where they state it: 1 / (M h), or any for a bank in normalised time.
 fn input_rate<'a>(
     bank: &Bank,
-    inputs: impl Iterator<Item = (&'a str, Option<f64>)>,
+    inputs: impl Iterator<Item = (&'a str, &'a StreamHeader)>,
 ) -> Result<Option<f64>, Failure> {
-    let mut inputs = inputs.filter_map(|(name, rate)| Some((name, rate?)));
-    let Some((first, rate)) = inputs.next() else {
+    let mut inputs = inputs.filter_map(|(name, header)| Some((name, header, header.rate?)));
+    let Some((first, header, rate)) = inputs.next() else {
         return Ok(None);
     };
-    if let Some((name, other)) = inputs.find(|&(_, other)| !same_rate(other, rate)) {
+    let differs = |other: f64, error: f64| !is_same_rate(other, rate, error.max(header.rate_error));
+    if let Some((name, _, other)) = inputs.find(|(_, other, rate)| differs(*rate, other.rate_error)) {
         return Err(Failure::Input(format!(
             "{name}: the sample rate is {other} Hz, but {first} has {rate} Hz; all channels need the same rate"
         )));
     }
     let wanted = 1.0 / bank.slow_period().0;
-    if !bank.is_normalised() && !same_rate(rate, wanted) {
+    if !bank.is_normalised() && header.other_rate(wanted).is_some() {
         return Err(Failure::Input(format!(
             "{first}: the sample rate is {rate} Hz, but the bank is designed for slow channels of {wanted} Hz; \
              record at that rate or design a bank for this one"
@@ -66,7 +65,25 @@ fn input_rate<'a>(
     Ok(Some(rate))
 }
 
-/// Equal to the hertz, or to nine digits.
-fn same_rate(a: f64, b: f64) -> bool {
-    (a - b).abs() <= f64::max(0.5, 1e-9 * b)
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bank::SynthesisFilters;
+    use crate::io::{PcmFormat, SampleLayout};
+    use crate::units::Seconds;
+
+    #[test]
+    fn a_rate_four_percent_off_is_another_rate() {
+        let taps = SynthesisFilters::Fir(vec![vec![1.0]; 2]);
+        let bank = Bank { fast_period: Seconds(0.05), ..Bank::bare(taps, 2) };
+        let header = |rate| StreamHeader {
+            rate: Some(rate),
+            ..StreamHeader::real(SampleLayout::packed(PcmFormat::F32Le), 1)
+        };
+        let rate = |a: f64, b: f64| input_rate(&bank, [("a", &header(a)), ("b", &header(b))].into_iter()).ok();
+        assert_eq!(rate(10.0, 10.0), Some(Some(10.0)));
+        for (a, b) in [(10.4, 10.4), (10.0, 10.4), (10.4, 10.0)] {
+            assert_eq!(rate(a, b), None, "{a} {b}");
+        }
+    }
 }

@@ -2,9 +2,11 @@
 
 use super::Failure;
 use super::bank_file::is_dash;
-use super::say::name_leftovers;
+use super::say::{name_leftovers, warn};
 use crate::files::refuse_overlaps;
-use crate::io::{Container, PcmFormat, SampleWriter, is_pipe, is_sigmf, mat_variable, sigmf_files};
+use crate::io::{
+    Container, IoError, OutputHeader, PcmFormat, SampleWriter, is_pipe, is_sigmf, mat_variable, sigmf_files,
+};
 use crate::runtime::Precision;
 use std::path::Path;
 
@@ -45,6 +47,17 @@ impl Bits {
 pub(super) fn precision(format: PcmFormat) -> Precision {
     use PcmFormat::{F64Be, F64Le, S32Be, S32Le};
     if matches!(format, F64Be | F64Le | S32Be | S32Le) { Precision::Double } else { Precision::Single }
+}
+
+/// Begins an output of samples, and says what its header cannot.
+pub(super) fn begin_samples(
+    path: &Path,
+    header: OutputHeader,
+    force: bool,
+) -> Result<SampleWriter, IoError> {
+    let writer = SampleWriter::create(path, header, force)?;
+    writer.warning().into_iter().for_each(warn);
+    Ok(writer)
 }
 
 /// Encoded formats, which are not written.

@@ -30,8 +30,5 @@ pub(super) fn say_understood(spec: Option<&Spec>) {
 
 /// Names the unfinished files that killed runs left beside `outputs`.
 pub(super) fn name_leftovers(outputs: &[&Path]) {
-    for left in leftovers(outputs) {
-        let (path, process) = (left.path.display(), left.process);
-        warn(&format!("{path}: an unfinished output of process {process}, which no longer runs; remove it"));
-    }
+    leftovers(outputs).iter().for_each(|left| warn(&left.to_string()));
 }

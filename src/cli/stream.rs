@@ -6,7 +6,7 @@ use super::follow::Follow;
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
 use super::journal::{Journal, JournalArgs};
-use super::output::{check_files, precision};
+use super::output::{begin_samples, check_files, precision};
 use super::run::{RunReport, ThreadArgs, algorithms, carried, complete, print_report};
 use super::say::say_line;
 use super::say::say_understood;
@@ -17,7 +17,7 @@ use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{
     BLOCK_BYTES, Coding, Container, MultiReader, OutputHeader, PcmFormat, Placement, ReadOptions,
-    SampleWriter, is_self_describing,
+    is_self_describing,
 };
 use crate::pipeline::{Ending, FileOutputs, Pipeline, Settings, Warning, run as run_pipeline};
 use crate::runtime::{Algorithm, Options, Plan};
@@ -250,7 +250,7 @@ impl Args {
         let mask = self.gaps.begin_mask(self.force)?;
         let header =
             OutputHeader { container: self.container(), format: self.output_format(), is_complex, rate };
-        let samples = SampleWriter::create(&self.output, header, self.force);
+        let samples = begin_samples(&self.output, header, self.force);
         let log = self.track.begin_log(self.force)?;
         Ok(FileOutputs::new(samples.map_err(Failure::running)?, mask).with_log(log))
     }

@@ -36,13 +36,13 @@ pub fn remove_unfinished() -> Vec<String> {
 }
 
 /// For whoever gives names, until it is done.
-pub(super) fn names_given() -> MutexGuard<'static, Vec<String>> {
+fn names_given() -> MutexGuard<'static, Vec<String>> {
     NAMED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A file that is written under a hidden name beside its target and gets its name by
 /// [`AtomicFile::commit`]; if it is dropped before, it is removed. The hidden name is
-/// `.NAME.PROCESS-NUMBER.part`; an existing file of that name is never changed.
+/// `.NAME.HOST-PROCESS-NUMBER.part`; an existing file of that name is never changed.
 #[derive(Debug)]
 pub struct AtomicFile {
     file: Option<File>,
@@ -54,7 +54,7 @@ pub struct AtomicFile {
 
 /// How a file got its name; this determines how to undo it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Placed {
+enum Placed {
     /// The name was free.
     New,
     /// The hidden name is now that of the file that was replaced.
@@ -102,18 +102,8 @@ impl AtomicFile {
     /// # Errors
     /// [`FileError::Exists`] if a file appeared under the name and must not be replaced, or the system's
     /// refusal to store the bytes or to give the name; then no file remains.
-    pub fn commit(mut self) -> Result<(), FileError> {
-        self.seal()?;
-        let mut named = names_given();
-        let placed = if self.replace {
-            fs::rename(&self.beside, &self.target).map(|()| Placed::Replaced)
-        } else {
-            place::rename_new(&self.beside, &self.target).map(|()| Placed::New)
-        };
-        let placed = placed.map_err(|error| self.refused(error))?;
-        named.push(self.name.clone());
-        self.keep(placed);
-        Ok(())
+    pub fn commit(self) -> Result<(), FileError> {
+        commit_all(vec![self])
     }
 
     /// Brings the bytes to the disk and closes the file, which has no name yet; later writes fail. Sets of
@@ -126,9 +116,13 @@ impl AtomicFile {
         place::sync_and_close(file).map_err(FileError::system(&self.name, "write it to the end"))
     }
 
-    /// Gives the file, sealed before, its name in a way that can be undone if the system allows.
-    pub(super) fn place(&mut self) -> Result<Placed, FileError> {
+    /// Gives the file, sealed before, its name: in a way that can be undone if the system allows, unless it
+    /// is the last of its set.
+    fn place(&mut self, is_last: bool) -> Result<Placed, FileError> {
         let placed = match place::rename_new(&self.beside, &self.target) {
+            Err(error) if self.replace && is_last && error.kind() == io::ErrorKind::AlreadyExists => {
+                fs::rename(&self.beside, &self.target).map(|()| Placed::Replaced)
+            }
             Err(error) if self.replace && error.kind() == io::ErrorKind::AlreadyExists => self.exchange(),
             other => other.map(|()| Placed::New),
         };
@@ -149,7 +143,7 @@ impl AtomicFile {
     }
 
     /// Takes the name back; what was replaced gets its own again, unless it is gone.
-    pub(super) fn undo(mut self, placed: Placed) {
+    fn undo(mut self, placed: Placed) {
         // The failure that led here is reported; a second one adds nothing.
         match placed {
             Placed::New => drop(fs::remove_file(&self.target)),
@@ -162,7 +156,7 @@ impl AtomicFile {
     }
 
     /// Makes the new name final.
-    pub(super) fn keep(mut self, placed: Placed) {
+    fn keep(mut self, placed: Placed) {
         if placed != Placed::Exchanged {
             self.forget();
         }
@@ -212,6 +206,31 @@ impl Seek for AtomicFile {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.file()?.seek(to)
     }
+}
+
+/// Renames several files to their final names: all of them or, as far as the file system allows, none. The
+/// documentation of [this module](super) describes the limits.
+///
+/// # Errors
+/// As [`AtomicFile::commit`], for the first file that fails; the others are taken back.
+pub fn commit_all(mut files: Vec<AtomicFile>) -> Result<(), FileError> {
+    // Late disk errors occur here, before the first file gets its name.
+    files.iter_mut().try_for_each(AtomicFile::seal)?;
+    let mut named = names_given();
+    let mut placed = Vec::with_capacity(files.len());
+    let last = files.len().saturating_sub(1);
+    for (k, mut file) in files.into_iter().enumerate() {
+        match file.place(k == last) {
+            Ok(how) => placed.push((file, how)),
+            Err(error) => {
+                placed.into_iter().rev().for_each(|(file, how)| file.undo(how));
+                return Err(error);
+            }
+        }
+    }
+    named.extend(placed.iter().map(|(file, _)| file.name.clone()));
+    placed.into_iter().for_each(|(file, how)| file.keep(how));
+    Ok(())
 }
 
 fn unfinished<R>(change: impl FnOnce(&mut BTreeSet<PathBuf>) -> R) -> R {
@@ -343,7 +362,7 @@ mod tests {
     #[test]
     fn hidden_names_of_others_are_left_alone() {
         let folder = tempfile::tempdir().unwrap();
-        let stale = folder.path().join(format!(".out.wav.{}-0.part", std::process::id()));
+        let stale = hidden::beside(&folder.path().join("out.wav"), std::process::id(), 0).unwrap();
         fs::write(&stale, "not ours").unwrap();
         let target = folder.path().join("out.wav");
         AtomicFile::create(&target, false).unwrap().commit().unwrap();
@@ -446,5 +465,57 @@ mod tests {
         let beside = file.beside.clone();
         file.commit().unwrap();
         assert!(unfinished(|files| !files.contains(&beside)));
+    }
+
+
+    fn file(folder: &Path, name: &str, replace: bool) -> AtomicFile {
+        let mut file = AtomicFile::create(&folder.join(name), replace).unwrap();
+        file.write_all(b"new").unwrap();
+        file
+    }
+
+    fn content(folder: &Path) -> Vec<(String, String)> {
+        let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap());
+        let pair = |entry: fs::DirEntry| {
+            let text = fs::read_to_string(entry.path()).unwrap_or_else(|_| "folder".into());
+            (entry.file_name().to_string_lossy().into_owned(), text)
+        };
+        let mut content: Vec<_> = entries.map(pair).collect();
+        content.sort();
+        content
+    }
+
+    fn pairs(pairs: &[(&str, &str)]) -> Vec<(String, String)> {
+        pairs.iter().map(|&(name, text)| (name.to_owned(), text.to_owned())).collect()
+    }
+
+    #[test]
+    fn all_appear() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("b"), "old").unwrap();
+        commit_all(vec![file(folder.path(), "a", true), file(folder.path(), "b", true)]).unwrap();
+        assert_eq!(content(folder.path()), pairs(&[("a", "new"), ("b", "new")]));
+    }
+
+    #[test]
+    fn none_appears_if_one_is_taken_meanwhile() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = ["a", "b", "c"].map(|name| file(folder.path(), name, false));
+        fs::write(folder.path().join("c"), "another's").unwrap();
+        assert!(matches!(commit_all(files.into()), Err(FileError::Exists { .. })));
+        assert_eq!(content(folder.path()), pairs(&[("c", "another's")]));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_was_replaced_comes_back_if_one_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("a"), "old").unwrap();
+        let files = ["a", "b"].map(|name| file(folder.path(), name, true));
+        // A folder is not replaced by a file.
+        fs::create_dir(folder.path().join("b")).unwrap();
+        fs::write(folder.path().join("b/inside"), "").unwrap();
+        assert!(commit_all(files.into()).is_err());
+        assert_eq!(content(folder.path()), pairs(&[("a", "old"), ("b", "folder")]));
     }
 }

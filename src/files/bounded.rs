@@ -34,14 +34,6 @@ pub fn read_text(path: &Path, bound: Bound) -> Result<String, FileError> {
     text_in(read_bytes(path, bound)?, &path.display().to_string())
 }
 
-/// The text of a stream called `name`.
-///
-/// # Errors
-/// As [`read_text`].
-pub fn text_of(stream: impl Read, name: &str, bound: Bound) -> Result<String, FileError> {
-    text_in(bytes_of(stream, name, bound)?, name)
-}
-
 /// The bytes of a stream called `name`.
 ///
 /// # Errors
@@ -76,13 +68,13 @@ mod tests {
 
     #[test]
     fn what_never_ends_is_refused_with_bound_and_remedy() {
-        let error = text_of(std::io::repeat(7), "endless", BOUND).unwrap_err().to_string();
+        let error = bytes_of(std::io::repeat(7), "endless", BOUND).unwrap_err().to_string();
         assert_eq!(error, "endless: longer than 4 bytes, the most that a test may have; write a shorter one");
-        assert_eq!(text_of(&b"1234"[..], "fits", BOUND).unwrap(), "1234");
+        assert_eq!(bytes_of(&b"1234"[..], "fits", BOUND).unwrap(), b"1234");
     }
 
     #[test]
     fn what_is_no_text_says_where() {
-        assert!(text_of(&b"ab\xff"[..], "x", BOUND).unwrap_err().to_string().contains("byte 2"));
+        assert!(text_in(b"ab\xff".to_vec(), "x").unwrap_err().to_string().contains("byte 2"));
     }
 }

@@ -1,20 +1,45 @@
 //! Names of unfinished files, and the unfinished files that killed runs have left.
 
 use std::collections::BTreeSet;
+use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 /// Characters of the target's name in that of the unfinished file, so that this is not too long for the
 /// file system.
-const NAME_PART: usize = 60;
+const NAME_PART: usize = 48;
+/// Characters of the name of the host in it.
+const HOST_PART: usize = 16;
 
-/// An unfinished file whose process no longer runs.
+/// An unfinished file whose process does not run on this host.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Leftover {
     /// The file.
     pub path: PathBuf,
     /// The process that wrote it.
     pub process: u32,
+    /// The host of that process, as in the name of the file; `None` for this one.
+    pub host: Option<String>,
 }
+
+/// The file, whose it is, and what to do. Of the processes of another host nothing is known.
+impl fmt::Display for Leftover {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (path, process) = (self.path.display(), self.process);
+        write!(f, "{path}: an unfinished output of process {process}")?;
+        match &self.host {
+            None => write!(f, ", which no longer runs; remove it"),
+            Some(host) => write!(f, " on the host {host}; remove it if that run has ended"),
+        }
+    }
+}
+
+/// The name of this host, in letters and digits: other hosts may write to the same folder.
+static HOST: LazyLock<String> = LazyLock::new(|| {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let letter = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+    name.trim().chars().take(HOST_PART).map(letter).collect()
+});
 
 /// `.NAME.`, the beginning of the names of all unfinished files of `target`.
 fn beginning(target: &Path) -> Option<String> {
@@ -22,13 +47,14 @@ fn beginning(target: &Path) -> Option<String> {
     Some(format!(".{}.", name.chars().take(NAME_PART).collect::<String>()))
 }
 
-/// `.NAME.PROCESS-NUMBER.part` beside `target`.
+/// `.NAME.HOST-PROCESS-NUMBER.part` beside `target`.
 pub(super) fn beside(target: &Path, process: u32, number: u32) -> Option<PathBuf> {
-    Some(target.with_file_name(format!("{}{process}-{number}.part", beginning(target)?)))
+    Some(target.with_file_name(format!("{}{}-{process}-{number}.part", beginning(target)?, *HOST)))
 }
 
-/// The unfinished files beside `targets` whose processes no longer run: such a run was killed before it
-/// could remove them. An output may be a link; then its folder is that of the file it leads to.
+/// The unfinished files beside `targets` whose processes do not run on this host: such a run was killed
+/// before it could remove them, or it is that of another host. An output may be a link; then its folder is
+/// that of the file it leads to.
 pub fn leftovers(targets: &[&Path]) -> Vec<Leftover> {
     let mut searches: Vec<(PathBuf, BTreeSet<String>)> = Vec::new();
     for target in targets {
@@ -48,9 +74,10 @@ pub fn leftovers(targets: &[&Path]) -> Vec<Leftover> {
 
 fn in_folder(folder: &Path, names: &BTreeSet<String>) -> Vec<Leftover> {
     let leftover = |name: String| {
-        let (beginning, process) = writer(&name)?;
-        (names.contains(beginning) && !is_running(process))
-            .then(|| Leftover { path: folder.join(&name), process })
+        let (beginning, host, process) = writer(&name)?;
+        let host = (host != *HOST).then(|| host.to_owned());
+        (names.contains(beginning) && (host.is_some() || !is_running(process)))
+            .then(|| Leftover { path: folder.join(&name), process, host })
     };
     names_in(folder).into_iter().filter_map(leftover).collect()
 }
@@ -72,12 +99,13 @@ fn names_in(_: &Path) -> Vec<String> {
     Vec::new()
 }
 
-/// Splits the name of an unfinished file into `.NAME.` and the process that wrote it.
-fn writer(name: &str) -> Option<(&str, u32)> {
-    let (process, number) = name.strip_suffix(".part")?.rsplit_once('-')?;
-    let start = process.rfind('.')? + 1;
+/// Splits the name of an unfinished file into `.NAME.` and the host and the process that wrote it.
+fn writer(name: &str) -> Option<(&str, &str, u32)> {
+    let (rest, number) = name.strip_suffix(".part")?.rsplit_once('-')?;
+    let (rest, process) = rest.rsplit_once('-')?;
+    let start = rest.rfind('.')? + 1;
     number.parse::<u32>().ok()?;
-    Some((&name[..start], process[start..].parse().ok()?))
+    Some((&name[..start], &rest[start..], process.parse().ok()?))
 }
 
 fn is_running(process: u32) -> bool {
@@ -93,10 +121,10 @@ mod tests {
     fn names_are_taken_apart() {
         for target in ["out.wav", "a-b.7-1.part", &"x".repeat(250)] {
             let path = beside(Path::new(target), 4321, 7).unwrap();
-            let (name, process) = writer(path.to_str().unwrap()).unwrap();
-            assert_eq!((name, process), (beginning(Path::new(target)).unwrap().as_str(), 4321));
+            let want = beginning(Path::new(target)).unwrap();
+            assert_eq!(writer(path.to_str().unwrap()), Some((want.as_str(), HOST.as_str(), 4321)));
         }
-        for name in [".out.wav.12.part", ".out.wav.12-0", "12-0.part", ".out.wav.x-0.part", ".out.12-x.part"]
+        for name in [".out.wav.h-12.part", ".out.wav.h-12-0", "h-12-0.part", ".out.h-x-0.part", ".out.h-12-x.part"]
         {
             assert_eq!(writer(name), None, "{name}");
         }
@@ -118,6 +146,15 @@ mod tests {
         ] {
             std::fs::write(file, "").unwrap();
         }
-        assert_eq!(leftovers(&[&path("out"), &path("none/out")]), [Leftover { path: stale, process: dead }]);
+        let mine = Leftover { path: stale, process: dead, host: None };
+        assert_eq!(leftovers(&[&path("out"), &path("none/out")]), [mine.clone()]);
+        assert!(mine.to_string().ends_with("which no longer runs; remove it"));
+        // A process of another host may run: its number says nothing here.
+        let theirs = path(&format!(".out.elsewhere-{dead}-0.part"));
+        std::fs::write(&theirs, "").unwrap();
+        let found = leftovers(&[&path("out")]);
+        let said: Vec<String> = found.iter().map(ToString::to_string).collect();
+        assert!(found.len() == 2 && found.contains(&mine));
+        assert!(said.iter().any(|s| s.ends_with("on the host elsewhere; remove it if that run has ended")));
     }
 }

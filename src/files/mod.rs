@@ -27,15 +27,13 @@ mod error;
 mod hidden;
 mod identity;
 mod place;
-mod set;
 #[cfg(all(unix, feature = "signals"))]
 pub(crate) mod signals;
 
-pub use atomic::{AtomicFile, remove_unfinished};
-pub use bounded::{Bound, bytes_of, read_bytes, read_text, text_in, text_of};
+pub use atomic::{AtomicFile, commit_all, remove_unfinished};
+pub use bounded::{Bound, bytes_of, read_bytes, read_text, text_in};
 pub use error::FileError;
 pub use hidden::{Leftover, leftovers};
 pub use identity::{is_same_file, refuse_overlaps};
-pub use set::commit_all;
 #[cfg(all(unix, feature = "signals"))]
 pub use signals::remove_unfinished_on_signals;

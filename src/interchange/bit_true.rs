@@ -39,15 +39,17 @@ impl BitTrue {
     /// Of a bank with integer taps; the history is zero.
     ///
     /// # Errors
-    /// [`ExportError::NoIntegers`], [`ExportError::Offset`], [`ExportError::Accumulator`] for taps whose
-    /// sums of 32-bit samples may not fit 64 bits.
+    /// [`ExportError::Words`] for sizes out of range, [`ExportError::NoIntegers`], [`ExportError::Offset`],
+    /// [`ExportError::Accumulator`] for taps whose sums of 32-bit samples may not fit 64 bits.
     pub fn new(bank: &Bank, words: WordSizes) -> Result<Self, ExportError> {
+        let sizes = [("the accumulator", words.accumulator, 64), ("the outputs", words.output, 32)];
+        if let Some((word, bits, most)) = sizes.into_iter().find(|(_, bits, most)| !(2..=*most).contains(bits)) {
+            return Err(ExportError::Words { word, bits, most });
+        }
         let integers = bank.fixed_point.as_ref().ok_or(ExportError::NoIntegers { format: "bit-true" })?;
         let taps = integer_taps(bank, integers)?;
         let history = vec![0; taps.channels * taps.lags];
         let fraction_bits = integers.fraction_bits;
-        let words =
-            WordSizes { accumulator: words.accumulator.clamp(2, 64), output: words.output.clamp(2, 32) };
         Ok(Self { taps, fraction_bits, words, history, newest: 0, wraps: 0, saturated: 0 })
     }
 

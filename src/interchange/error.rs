@@ -31,6 +31,16 @@ pub enum ExportError {
         /// Largest sum of the moduli of a phase.
         sum: u64,
     },
+    /// A word that the model does not have.
+    #[error("{bits} bits for {word}; give 2 to {most}")]
+    Words {
+        /// The word: that of the accumulator or of the outputs.
+        word: &'static str,
+        /// Its bits.
+        bits: u32,
+        /// The most bits.
+        most: u32,
+    },
     /// The bank is no sum of sections.
     #[error("no second-order sections: {0}")]
     NoSections(&'static str),

@@ -1,12 +1,14 @@
 //! FIR taps that other tools wrote.
 
 use super::layout::PolyphaseTaps;
+use crate::io::table::Table;
+use crate::io::{ArrayHeader, IoError, npy_header};
 
 /// Headings of the table that [`export`](super::export) writes.
 const HEADINGS: [&str; 4] = ["channel", "phase", "lag", "value"];
 
-/// Longest header of an array whose shape is looked at; those of taps have a hundred bytes.
-const LONGEST_HEADER: usize = 1 << 16;
+/// Bytes of a table that are parsed at a time.
+const BUFFER: usize = 1 << 16;
 
 /// Why a file holds no taps.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -37,29 +39,44 @@ pub enum TapsError {
     Empty,
 }
 
-/// `f_i[n]`, one list per channel, from comma-separated values: one column per channel and one row per tap
-/// at the fast rate, headings or not; or the table that [`export`](super::export) writes.
+/// `f_i[n]`, one list per channel, from a table: one column per channel and one row per tap at the fast rate,
+/// headings or not; or the table that [`export`](super::export) writes.
 ///
 /// # Errors
 /// [`TapsError`] with the line of the first cell that is wrong.
 pub fn taps_of_csv(bytes: &[u8]) -> Result<Vec<Vec<f64>>, TapsError> {
-    let mut reader = csv::ReaderBuilder::new().has_headers(false).trim(csv::Trim::All).from_reader(bytes);
-    let mut rows = Vec::new();
+    let mut table = Table::new(bytes, "", "a table of taps", BUFFER);
+    let mut rows: Vec<Vec<f64>> = Vec::new();
     let mut is_polyphase = false;
-    for (index, record) in reader.records().enumerate() {
-        let record = record.map_err(|error| TapsError::Broken(error.to_string()))?;
-        if index == 0 && record.iter().all(|cell| cell.parse::<f64>().is_err()) {
-            is_polyphase = record.iter().zip(HEADINGS).filter(|(cell, known)| cell == known).count() == 4;
+    let mut width = None;
+    loop {
+        let cells = table.cells().map_err(broken)?;
+        if cells.is_empty() {
+            break;
+        }
+        let is_first = width.is_none();
+        if *width.get_or_insert(cells.len()) != cells.len() {
+            return Err(broken(table.fault(&format!("{} cells, unlike the lines before", cells.len()))));
+        }
+        if is_first && cells.iter().all(|cell| cell.parse::<f64>().is_err()) {
+            is_polyphase = cells.iter().zip(HEADINGS).filter(|(cell, known)| cell == known).count() == 4;
             continue;
         }
-        let line = record.position().map_or(index as u64 + 1, csv::Position::line);
-        let number = |(column, text): (usize, &str)| match text.parse::<f64>() {
+        let number = |(column, text): (usize, &String)| match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(TapsError::NoNumber { line, column: column + 1, text: text.to_owned() }),
+            _ => Err(TapsError::NoNumber { line: table.line, column: column + 1, text: text.clone() }),
         };
-        rows.push(record.iter().enumerate().map(number).collect::<Result<Vec<f64>, _>>()?);
+        rows.push(cells.iter().enumerate().map(number).collect::<Result<_, _>>()?);
     }
     if is_polyphase { of_entries(&rows) } else { columns(&rows) }
+}
+
+/// What the reader of a table or of an array says, without a name of the file.
+fn broken(error: IoError) -> TapsError {
+    match error {
+        IoError::Malformed { problem, .. } => TapsError::Broken(problem),
+        other => TapsError::Broken(other.to_string()),
+    }
 }
 
 fn columns(rows: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, TapsError> {
@@ -100,47 +117,32 @@ fn interleaved([channels, ratio, lags]: [usize; 3], values: Vec<f64>) -> Vec<Vec
 /// # Errors
 /// [`TapsError`] for other arrays and other files.
 pub fn taps_of_npy(bytes: &[u8]) -> Result<Vec<Vec<f64>>, TapsError> {
-    let broken =
-        |error: &dyn std::fmt::Display| TapsError::Broken(format!("no NumPy array of reals: {error}"));
-    if !fits(bytes) {
-        return Err(broken(&"its shape has more entries than the file has bytes"));
+    let no_array = |problem: &str| TapsError::Broken(format!("no NumPy array of reals: {problem}"));
+    let mut rest = bytes;
+    let ArrayHeader { format, is_complex, shape, is_column_major, .. } =
+        npy_header(&mut rest, "").map_err(broken)?;
+    if is_complex || !format.is_float() {
+        return Err(no_array("its numbers are neither f8 nor f4"));
     }
-    let array = npyz::NpyFile::new(bytes).map_err(|error| broken(&error))?;
-    let shape = array.shape().to_vec();
-    let is_fortran = array.order() == npyz::Order::Fortran;
-    let values: Vec<f64> = match array.try_data::<f64>() {
-        Ok(data) => data.collect::<Result<_, _>>().map_err(|error| broken(&error))?,
-        Err(array) => {
-            let data = array.try_data::<f32>().map_err(|_| broken(&"its numbers are neither f8 nor f4"))?;
-            data.map(|x| x.map(f64::from)).collect::<Result<_, _>>().map_err(|error| broken(&error))?
-        }
-    };
+    let count = shape.iter().try_fold(1, |product: usize, &size| product.checked_mul(size.try_into().ok()?));
+    let values = count.and_then(|count| rest.get(..count.checked_mul(format.bytes())?));
+    let values = values.ok_or_else(|| no_array("its shape has more entries than the file"))?;
+    let values: Vec<f64> =
+        values.chunks_exact(format.bytes()).map(|number| format.decode(number)).collect();
     if values.iter().any(|value| !value.is_finite()) {
         return Err(TapsError::Broken("a tap is not finite".to_owned()));
     }
-    let sizes: Vec<usize> = shape.iter().map(|&size| size as usize).collect();
     if values.is_empty() {
         return Err(TapsError::Empty);
     }
+    let sizes: Vec<usize> = shape.iter().map(|&size| size as usize).collect();
     match (sizes[..].try_into(), &sizes[..]) {
-        (Ok(sizes), _) if !is_fortran => Ok(interleaved(sizes, values)),
+        (Ok(sizes), _) if !is_column_major => Ok(interleaved(sizes, values)),
         (_, &[channels, taps]) => {
-            let at =
-                |i: usize, n: usize| if is_fortran { values[n * channels + i] } else { values[i * taps + n] };
-            Ok((0..channels).map(|i| (0..taps).map(|n| at(i, n)).collect()).collect())
+            let (along, across) = if is_column_major { (channels, 1) } else { (1, taps) };
+            let tap = |i: usize, n: usize| values[i * across + n * along];
+            Ok((0..channels).map(|i| (0..taps).map(|n| tap(i, n)).collect()).collect())
         }
         _ => Err(TapsError::Shape { shape }),
     }
-}
-
-/// Whether the shape in the header of an array has no more entries than `bytes`. The reader multiplies its
-/// sizes without a check.
-fn fits(bytes: &[u8]) -> bool {
-    let header = String::from_utf8_lossy(&bytes[..bytes.len().min(LONGEST_HEADER)]);
-    let shape = header.split_once("'shape'").and_then(|(_, rest)| rest.split_once('(')?.1.split_once(')'));
-    let sizes =
-        shape.map_or("", |(sizes, _)| sizes).split(',').map(str::trim).filter(|size| !size.is_empty());
-    let mut entries = sizes.map(|size| size.trim_end_matches('L').parse::<usize>().ok());
-    let product = entries.try_fold(1, |product: usize, size| product.checked_mul(size?.max(1)));
-    product.is_some_and(|entries| entries <= bytes.len())
 }

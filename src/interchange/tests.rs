@@ -134,3 +134,18 @@ fn arrays_are_read_in_both_orders() {
     let cut = npy(&[2, 3], npyz::Order::C, &[1.0; 6]);
     assert!(matches!(taps_of_npy(&cut[..cut.len() - 3]), Err(TapsError::Broken(_))));
 }
+
+#[test]
+fn words_out_of_range_are_refused_and_not_clamped() {
+    let bank = integers(4, vec![vec![1, 2, 3], vec![-4, 5, -6]]);
+    for (accumulator, output, part) in [
+        (65, 16, "65 bits for the accumulator; give 2 to 64"),
+        (1, 16, "1 bits for the accumulator"),
+        (32, 33, "33 bits for the outputs; give 2 to 32"),
+        (32, 0, "0 bits for the outputs"),
+    ] {
+        let error = BitTrue::new(&bank, WordSizes { accumulator, output }).unwrap_err().to_string();
+        assert!(error.contains(part), "{error}");
+    }
+    assert!(BitTrue::new(&bank, WordSizes { accumulator: 64, output: 2 }).is_ok());
+}

@@ -4,7 +4,7 @@
 
 use super::dropouts::Dropouts;
 use super::lost::{Dropout, LostInInput};
-use super::timestamps::Segment;
+use super::timestamps::Break;
 use super::{PcmFormat, PcmFrames, SampleLayout, StreamHeader};
 use std::collections::VecDeque;
 
@@ -40,7 +40,8 @@ pub(super) struct AlignedInput {
     used: usize,
     /// No block will follow.
     ended: bool,
-    segments: VecDeque<Segment>,
+    /// The breaks ahead, in their order.
+    breaks: VecDeque<Break>,
     dropouts: Dropouts,
     /// Frames of the input that are over.
     frames: u64,
@@ -56,7 +57,7 @@ impl AlignedInput {
             block: Block::default(),
             used: 0,
             ended: false,
-            segments: [Segment::Frames(u64::MAX)].into(),
+            breaks: VecDeque::new(),
             dropouts: Dropouts::default(),
             frames: 0,
             view: View::Read,
@@ -65,8 +66,8 @@ impl AlignedInput {
     }
 
     /// Sets the lost frames; to be called before the first frame is used.
-    pub(super) fn lose(&mut self, segments: VecDeque<Segment>, lost: LostInInput) {
-        self.segments = segments;
+    pub(super) fn lose(&mut self, breaks: VecDeque<Break>, lost: LostInInput) {
+        self.breaks = breaks;
         self.dropouts = Dropouts::new(lost.dropouts, self.header.channels);
     }
 
@@ -75,19 +76,19 @@ impl AlignedInput {
         self.dropouts.add(dropout)
     }
 
-    /// `lost` frames were left out before frame `frame` of the input, and no segment begins later. True if
-    /// that frame has been used; then they are lost from now on, so that later frames are in time.
+    /// `lost` frames were left out before frame `frame` of the input. True if that frame has been used; then,
+    /// or if a known break lies later, they are lost after these, so that later frames are in time.
     pub(super) fn leave_out(&mut self, frame: u64, lost: u64) -> bool {
-        if lost == 0 {
-            return false;
+        if lost > 0 {
+            let known = self.breaks.back().map_or(self.frames, |last| last.frame);
+            self.breaks.push_back(Break { frame: frame.max(known), lost });
         }
-        let Some(Segment::Frames(rest)) = self.segments.pop_back() else { return false };
-        let known: u64 = self.segments.iter().map(Segment::frames).sum();
-        let ahead = frame.saturating_sub(self.frames + known).min(rest);
-        self.segments.extend((ahead > 0).then_some(Segment::Frames(ahead)));
-        self.segments.push_back(Segment::Lost(lost));
-        self.segments.push_back(Segment::Frames(rest - ahead));
-        frame < self.frames
+        lost > 0 && frame < self.frames
+    }
+
+    /// The break at the next frame.
+    fn at_break(&self) -> Option<Break> {
+        self.breaks.front().copied().filter(|next| next.frame == self.frames)
     }
 
     /// Takes the next block when the last one is used up, and returns the used one.
@@ -133,30 +134,28 @@ impl AlignedInput {
     }
 
     /// True if timestamps or lost frames lie beyond the frames so far.
-    pub(super) fn has_unreached_segments(&self) -> bool {
-        self.segments.len() > 1
+    pub(super) fn has_unreached_breaks(&self) -> bool {
+        !self.breaks.is_empty()
     }
 
     /// Frames that are at hand and alike.
     pub(super) fn ready(&self) -> usize {
-        let (frames, most) = match self.segments.front() {
-            Some(&Segment::Lost(count)) => (clamp(count), LOST_FRAMES),
-            Some(&Segment::Frames(count)) if !self.dropouts.any() => {
-                (self.left().min(clamp(count)), usize::MAX)
-            }
-            Some(&Segment::Frames(count)) => (self.left().min(clamp(count)), LOST_FRAMES),
-            None => (0, 0),
-        };
-        frames.min(most).min(clamp(self.dropouts.until_change()))
+        let change = clamp(self.dropouts.until_change());
+        if let Some(Break { lost, .. }) = self.at_break() {
+            return clamp(lost).min(LOST_FRAMES).min(change);
+        }
+        let until_break = self.breaks.front().map_or(usize::MAX, |next| clamp(next.frame - self.frames));
+        let most = if self.dropouts.any() { LOST_FRAMES } else { usize::MAX };
+        self.left().min(until_break).min(most).min(change)
     }
 
     /// Makes `frames` frames visible: at most those that are ready, or any number once the input is over.
     pub(super) fn prepare(&mut self, frames: usize) {
-        self.view = match self.segments.front() {
+        self.view = match self.at_break() {
             _ if self.is_over() => View::Over,
-            Some(Segment::Lost(_)) => View::Lost,
-            _ if !self.dropouts.any() => View::Read,
-            _ => View::Dropouts,
+            Some(_) => View::Lost,
+            None if self.dropouts.any() => View::Dropouts,
+            None => View::Read,
         };
         match self.view {
             View::Read => {}
@@ -183,18 +182,16 @@ impl AlignedInput {
     /// Advances by `frames` frames.
     pub(super) fn advance(&mut self, frames: usize) {
         self.dropouts.advance(frames as u64);
-        if self.view == View::Over {
-            return;
-        }
-        if self.view != View::Lost {
-            self.used += frames * self.header.frame_bytes();
-            self.frames += frames as u64;
-        }
-        if let Some(Segment::Lost(count) | Segment::Frames(count)) = self.segments.front_mut() {
-            *count -= (*count).min(frames as u64);
-            if *count == 0 {
-                self.segments.pop_front();
+        match (self.view, self.breaks.front_mut()) {
+            (View::Over, _) => {}
+            (View::Lost, next) => next.into_iter().for_each(|next| next.lost -= frames as u64),
+            (View::Read | View::Dropouts, _) => {
+                self.used += frames * self.header.frame_bytes();
+                self.frames += frames as u64;
             }
+        }
+        while self.at_break().is_some_and(|next| next.lost == 0) {
+            self.breaks.pop_front();
         }
     }
 
@@ -223,7 +220,7 @@ mod tests {
     /// Frames of big-endian 16-bit samples 0, 1, 2, ..
     fn input(
         channels: usize,
-        segments: &[Segment],
+        breaks: &[(u64, u64)],
         dropouts: &[(usize, std::ops::Range<u64>)],
     ) -> AlignedInput {
         let layout = SampleLayout::packed(PcmFormat::S16Be);
@@ -233,7 +230,7 @@ mod tests {
             frames: frames.clone(),
         };
         let lost = LostInInput { dropouts: dropouts.iter().map(dropout).collect(), ..LostInInput::default() };
-        input.lose(segments.iter().copied().collect(), lost);
+        input.lose(breaks.iter().map(|&(frame, lost)| Break { frame, lost }).collect(), lost);
         input
     }
 
@@ -266,7 +263,7 @@ mod tests {
 
     #[test]
     fn lost_frames_and_invalid_samples_come_out_as_nan_however_they_are_cut() {
-        let segments = [Segment::Lost(2), Segment::Frames(3), Segment::Lost(2893), Segment::Frames(u64::MAX)];
+        let breaks = [(0, 2), (3, 2893)];
         // Frames 2, 3, 4 of time are frames 0, 1, 2 of the input; 2898 is its frame 3.
         let dropouts = [(1, 0..3), (0, 4..2899), (1, 2898..2900), (1, 2899..2901)];
         let mut want = vec![None; 4];
@@ -274,14 +271,14 @@ mod tests {
         want.extend(vec![None; 2 * 2893]);
         want.extend([None, None, Some(8), None, Some(10), None, Some(12), Some(13)]);
         for (block, step) in [(1, 1), (2, 3), (5, 1000), (7, usize::MAX)] {
-            assert_eq!(run(input(2, &segments, &dropouts), 7, block, step), want, "{block} {step}");
+            assert_eq!(run(input(2, &breaks, &dropouts), 7, block, step), want, "{block} {step}");
         }
     }
 
     #[test]
     fn frames_left_out_may_become_known_during_the_run() {
         // Three frames are used, a break before frame 5 is reported in time and one before frame 6 late.
-        let mut live = input(1, &[Segment::Frames(u64::MAX)], &[]);
+        let mut live = input(1, &[], &[]);
         let bytes: Vec<u8> = (0..9i16).flat_map(i16::to_be_bytes).collect();
         let _ = live.refill(Block { filled: bytes.len(), bytes });
         live.end();
@@ -309,16 +306,16 @@ mod tests {
 
     #[test]
     fn an_input_that_ends_early_leaves_later_timestamps_unreached() {
-        let mut short = input(1, &[Segment::Frames(9), Segment::Lost(4), Segment::Frames(u64::MAX)], &[]);
+        let mut short = input(1, &[(9, 4)], &[]);
         assert_eq!(
-            run(input(1, &[Segment::Frames(3), Segment::Lost(1)], &[]), 3, 2, 9),
+            run(input(1, &[(3, 1)], &[]), 3, 2, 9),
             [Some(0), Some(1), Some(2), None]
         );
         let _ = short.refill(Block { bytes: vec![0; 4], filled: 4 });
         short.end();
         short.prepare(2);
         short.advance(2);
-        assert!(short.is_over() && short.has_unreached_segments() && short.seen() == 2);
+        assert!(short.is_over() && short.has_unreached_breaks() && short.seen() == 2);
         // From here on all frames are lost.
         short.prepare(5);
         assert_eq!(short.view(5).frames(), 5);

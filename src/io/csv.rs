@@ -1,136 +1,72 @@
 //! Captures as text: one line per frame, one column per channel.
 //!
-//! Cells are separated by commas, semicolons, tabs or spaces. Lines that begin with `#` and empty lines are
-//! skipped. A first line with a cell that is no number is a heading; if its first cell names the time, that
-//! column is no channel and gives the rate. An empty cell is a missing sample.
+//! A first line with a cell that is no number is a heading; if its first cell names the time, that column is
+//! no channel and gives the rate. An empty cell is a missing sample.
 
+use super::capture::{Blocks, Capture};
+use super::table::{Table, number};
 use super::{IoError, PcmFormat, SampleLayout, StreamHeader};
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, Read};
 
-/// Longest line.
-const LONGEST_LINE: u64 = 1 << 20;
 /// Frames of a read.
 const BLOCK_FRAMES: usize = 1024;
-/// Lines from whose times the rate is computed.
+/// Most lines from whose times the rate is computed.
 const TIMED_LINES: usize = 1 << 16;
+/// Lines at the end of these among which one is written with all digits.
+const LAST_TIMES: usize = 16;
+/// Bytes that are read at a time: those of [`TIMED_LINES`] in a file, or what has come through a pipe.
+const BUFFER: usize = TIMED_LINES * 64;
 
 /// Reads frames from a table of numbers.
 #[derive(Debug)]
 pub struct CsvReader<R> {
-    lines: Lines<R>,
-    separator: Separator,
+    table: Table<R>,
     /// The first column is the time.
     is_timed: bool,
-    channels: usize,
-    rate: Option<f64>,
+    header: StreamHeader,
     /// Frames that were read for the header.
     ahead: Vec<f64>,
     given: usize,
-    /// Frames as bytes that the last read did not take.
-    bytes: Vec<u8>,
-}
-
-/// Lines with their numbers.
-#[derive(Debug)]
-struct Lines<R> {
-    reader: BufReader<R>,
-    file: String,
-    number: u64,
-}
-
-/// What stands between two cells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Separator {
-    Char(char),
-    Spaces,
-}
-
-impl Separator {
-    /// Of a line: the first of `;`, tab and `,` that it has.
-    fn of(line: &str) -> Self {
-        [';', '\t', ','].into_iter().find(|&c| line.contains(c)).map_or(Self::Spaces, Self::Char)
-    }
-
-    fn cells(self, line: &str) -> Vec<&str> {
-        match self {
-            Self::Char(c) => line.split(c).map(|cell| cell.trim().trim_matches('"')).collect(),
-            Self::Spaces => line.split_whitespace().collect(),
-        }
-    }
+    blocks: Blocks,
 }
 
 impl<R: Read> CsvReader<R> {
-    /// Reads the first lines; `file` is the name in error messages.
+    /// Reads the first lines; `file` is the name in error messages. Of a table with a column of time these
+    /// are the lines that have come with the second one, and the rate is theirs.
     ///
     /// # Errors
     /// [`IoError::Malformed`] with the line of the first cell that is wrong.
     pub fn new(inner: R, file: &str) -> Result<Self, IoError> {
-        let mut lines = Lines { reader: BufReader::new(inner), file: file.to_owned(), number: 0 };
-        let Some(mut line) = lines.next()? else {
-            return Err(lines.fault("there are no lines; give one column per channel and one line per frame"));
-        };
-        let separator = Separator::of(&line);
-        let cells = separator.cells(&line);
-        let mut unit = None;
-        if cells.iter().any(|cell| number(cell).is_none()) {
-            unit = cells.first().and_then(|heading| time_unit(heading));
-            let width = cells.len();
-            match lines.next()? {
-                Some(next) => line = next,
-                None => return Ok(Self::empty(lines, separator, width - usize::from(unit.is_some()))),
-            }
+        let mut table = Table::new(inner, file, "a table of samples", BUFFER);
+        let headings = table.cells()?;
+        if headings.is_empty() {
+            return Err(table.fault("there are no lines; give one column per channel and one line per frame"));
         }
-        let width = separator.cells(&line).len();
-        let channels = width - usize::from(unit.is_some());
-        if channels == 0 {
-            return Err(lines.fault("the only column is the time; give one more per channel"));
-        }
+        let is_heading = headings.iter().any(|cell| number(cell).is_none());
+        let unit = if is_heading { time_unit(&headings[0]) } else { None };
+        let first = if is_heading { table.cells()? } else { headings.clone() };
+        // A table of headings alone is empty.
+        let width = if first.is_empty() { headings.len() } else { first.len() };
         let is_timed = unit.is_some();
-        let mut reader = Self {
-            lines,
-            separator,
-            is_timed,
-            channels,
-            rate: None,
-            ahead: Vec::new(),
-            given: 0,
-            bytes: Vec::new(),
-        };
-        let first = reader.frame_of(&line)?;
-        reader.ahead.extend(&first[usize::from(is_timed)..]);
-        if let Some(unit) = unit {
-            reader.read_times(first[0], unit)?;
+        let channels = width - usize::from(is_timed);
+        if channels == 0 {
+            return Err(table.fault("the only column is the time; give one more per channel"));
+        }
+        let header = StreamHeader::real(SampleLayout::packed(PcmFormat::F64Le), channels);
+        let mut reader = Self { table, is_timed, header, ahead: Vec::new(), given: 0, blocks: Blocks::default() };
+        if !first.is_empty() {
+            let numbers = reader.table.numbers(&first)?;
+            reader.ahead.extend(&numbers[usize::from(is_timed)..]);
+            if let Some(unit) = unit {
+                reader.read_times(numbers[0], &first[0], unit)?;
+            }
         }
         Ok(reader)
     }
 
-    fn empty(lines: Lines<R>, separator: Separator, channels: usize) -> Self {
-        Self {
-            lines,
-            separator,
-            is_timed: false,
-            channels,
-            rate: None,
-            ahead: Vec::new(),
-            given: 0,
-            bytes: Vec::new(),
-        }
-    }
-
-    /// Columns that are channels.
-    pub fn channels(&self) -> usize {
-        self.channels
-    }
-
-    /// Frames per second, if a column holds the time.
-    pub fn rate(&self) -> Option<f64> {
-        self.rate
-    }
-
     /// As the header of an input.
-    pub(super) fn stream_header(&self) -> StreamHeader {
-        let real = StreamHeader::real(SampleLayout::packed(PcmFormat::F64Le), self.channels);
-        StreamHeader { rate: self.rate, ..real }
+    pub fn header(&self) -> StreamHeader {
+        self.header
     }
 
     /// Puts the next frames into `frames`, at most `most` and none only at the end.
@@ -139,119 +75,92 @@ impl<R: Read> CsvReader<R> {
     /// [`IoError::Malformed`] with line and column, or the system's refusal.
     pub fn fill(&mut self, frames: &mut Vec<f64>, most: usize) -> Result<(), IoError> {
         frames.clear();
-        let room = most.max(1) * self.channels;
+        let room = most.max(1) * self.header.channels;
         let known = self.ahead.len().min(self.given + room);
         frames.extend(&self.ahead[self.given..known]);
         self.given = known;
         // A live table is handed on line by line.
-        while frames.is_empty() || (frames.len() < room && !self.lines.reader.buffer().is_empty()) {
-            let Some(line) = self.lines.next()? else { break };
-            let frame = self.frame_of(&line)?;
+        while frames.is_empty() || (frames.len() < room && self.table.is_more_at_hand()) {
+            let Some((_, frame)) = self.frame()? else { break };
             frames.extend(&frame[usize::from(self.is_timed)..]);
         }
         Ok(())
     }
 
-    /// The numbers of a line, the time among them.
-    fn frame_of(&self, line: &str) -> Result<Vec<f64>, IoError> {
-        let cells = self.separator.cells(line);
-        let width = self.channels + usize::from(self.is_timed);
+    /// The next line: its first cell, and its numbers with the time among them.
+    fn frame(&mut self) -> Result<Option<(String, Vec<f64>)>, IoError> {
+        let mut cells = self.table.cells()?;
+        if cells.is_empty() {
+            return Ok(None);
+        }
+        let width = self.header.channels + usize::from(self.is_timed);
         if cells.len() != width {
-            return Err(self.lines.fault(&format!(
-                "{} cells, but the lines before have {width}; one column per channel",
-                cells.len()
+            let count = cells.len();
+            return Err(self.table.fault(&format!(
+                "{count} cells, but the lines before have {width}; one column per channel"
             )));
         }
-        let cell = |(column, &cell): (usize, &&str)| {
-            number(cell).ok_or_else(|| {
-                let shown: String = cell.chars().take(20).collect();
-                self.lines.fault(&format!(
-                    "column {}: \"{shown}\" is no number; decimals have a point, cells are separated by , ; tab or space",
-                    column + 1
-                ))
-            })
-        };
-        cells.iter().enumerate().map(cell).collect()
+        let numbers = self.table.numbers(&cells)?;
+        Ok(Some((cells.swap_remove(0), numbers)))
     }
 
-    /// Reads ahead, and computes the rate from equal steps of time.
-    fn read_times(&mut self, begin: f64, unit: f64) -> Result<(), IoError> {
-        let mut times = vec![begin];
-        while times.len() < TIMED_LINES {
-            let Some(line) = self.lines.next()? else { break };
-            let frame = self.frame_of(&line)?;
+    /// Reads ahead, and computes the rate from equal steps of time, with its error from their last digits.
+    fn read_times(&mut self, begin: f64, text: &str, unit: f64) -> Result<(), IoError> {
+        let (mut times, mut digits) = (vec![begin], vec![last_digit(text)]);
+        while times.len() < TIMED_LINES && (times.len() < 2 || self.table.is_more_at_hand()) {
+            let Some((text, frame)) = self.frame()? else { break };
             times.push(frame[0]);
+            digits.push(last_digit(&text));
             self.ahead.extend(&frame[1..]);
         }
         let steps = (times.len() - 1) as f64;
         if steps < 1.0 {
             return Ok(());
         }
-        let step = (times[times.len() - 1] - begin) / steps;
+        let length = times[times.len() - 1] - begin;
+        let step = length / steps;
         // Times are rounded, but a line that is left out makes a step of two.
         let is_even = |pair: &[f64]| (pair[1] - pair[0] - step).abs() <= 0.75 * step;
         if !(step > 0.0 && times.windows(2).all(is_even)) {
             return Err(self
-                .lines
+                .table
                 .fault("the times before are not evenly spaced; leave out the column, or repair it"));
         }
-        self.rate = Some(1.0 / (step * unit));
+        let rate = 1.0 / (step * unit);
+        // Both ends are rounded by half of the last digit. Some writers leave out zeros at the end, and some
+        // write fewer digits as the time grows.
+        let digit = digits.iter().rev().take(LAST_TIMES).copied().fold(f64::INFINITY, f64::min);
+        (self.header.rate, self.header.rate_error) = (Some(rate), rate * digit / length);
         Ok(())
     }
 }
 
-/// Numbers as `f64le`. An error of this reader holds an [`IoError`].
+impl<R: Read> Capture for CsvReader<R> {
+    fn stream_header(&self) -> StreamHeader {
+        self.header
+    }
+}
+
+/// Numbers as `f64le`.
 impl<R: Read> Read for CsvReader<R> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        if self.bytes.is_empty() {
+        let mut blocks = std::mem::take(&mut self.blocks);
+        let count = blocks.read(bytes, |block| {
             let mut frames = Vec::new();
-            self.fill(&mut frames, BLOCK_FRAMES).map_err(io::Error::other)?;
-            self.bytes.extend(frames.iter().flat_map(|x| x.to_le_bytes()));
-        }
-        let count = bytes.len().min(self.bytes.len());
-        bytes[..count].copy_from_slice(&self.bytes[..count]);
-        self.bytes.drain(..count);
-        Ok(count)
+            self.fill(&mut frames, BLOCK_FRAMES)?;
+            block.extend(frames.iter().flat_map(|x| x.to_le_bytes()));
+            Ok::<_, IoError>(())
+        });
+        self.blocks = blocks;
+        count
     }
 }
 
-impl<R: Read> Lines<R> {
-    /// The next line that holds cells.
-    fn next(&mut self) -> Result<Option<String>, IoError> {
-        loop {
-            let mut bytes = Vec::new();
-            let read = (&mut self.reader).take(LONGEST_LINE + 1).read_until(b'\n', &mut bytes);
-            self.number += 1;
-            match read.map_err(IoError::system(&self.file, "read the samples"))? {
-                0 => return Ok(None),
-                length if length as u64 > LONGEST_LINE => {
-                    return Err(
-                        self.fault(&format!("longer than {LONGEST_LINE} bytes; write one line per frame"))
-                    );
-                }
-                _ => {}
-            }
-            let text = String::from_utf8(bytes)
-                .map_err(|_| self.fault("it is not UTF-8; this is no table of numbers"))?;
-            let text = text.trim_start_matches('\u{feff}').trim();
-            if !text.is_empty() && !text.starts_with('#') {
-                return Ok(Some(text.to_owned()));
-            }
-        }
-    }
-
-    fn fault(&self, problem: &str) -> IoError {
-        IoError::Malformed {
-            file: self.file.clone(),
-            kind: "a table of samples",
-            problem: format!("line {}: {problem}", self.number),
-        }
-    }
-}
-
-/// The number in a cell; an empty one is a missing sample.
-fn number(cell: &str) -> Option<f64> {
-    if cell.is_empty() { Some(f64::NAN) } else { cell.parse().ok() }
+/// The value of a unit of the last digit of a decimal number: 0.001 for `2.125`, 1e-6 for `4.2e-5`.
+fn last_digit(number: &str) -> f64 {
+    let (mantissa, exponent) = number.split_once(['e', 'E']).unwrap_or((number, "0"));
+    let decimals = mantissa.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    10f64.powi(exponent.parse::<i32>().unwrap_or(0).saturating_sub(decimals as i32))
 }
 
 /// The unit in seconds of a heading that names the time.
@@ -278,9 +187,9 @@ mod tests {
         let (mut all, mut some) = (Vec::new(), Vec::new());
         loop {
             reader.fill(&mut some, 3).map_err(|error| error.to_string())?;
-            assert!(some.len() <= 3 * reader.channels());
+            assert!(some.len() <= 3 * reader.header().channels);
             if some.is_empty() {
-                return Ok((reader.channels(), reader.rate(), all));
+                return Ok((reader.header().channels, reader.header().rate, all));
             }
             all.extend(&some);
         }
@@ -336,5 +245,44 @@ mod tests {
             assert!(message.starts_with("x.csv: not a table") && message.contains(part), "{message}");
         }
         assert_eq!(read("a,b\n").unwrap(), (2, None, vec![]));
+    }
+    /// Gives one line at a time, as a pipe whose writer is live does, and counts them.
+    struct Live(std::rc::Rc<std::cell::Cell<usize>>);
+
+    impl Read for Live {
+        fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+            let k = self.0.get();
+            self.0.set(k + 1);
+            let line = if k == 0 { "t,x\n".to_owned() } else { format!("{:.6},{k}\n", k as f64 / 24e3) };
+            bytes[..line.len()].copy_from_slice(line.as_bytes());
+            Ok(line.len())
+        }
+    }
+
+    #[test]
+    fn live_lines_with_their_times_are_handed_on_one_by_one() {
+        let lines = std::rc::Rc::new(std::cell::Cell::new(0));
+        let mut reader = CsvReader::new(Live(lines.clone()), "x.csv").unwrap();
+        // The headings and two lines: the least that tells a rate.
+        assert_eq!(lines.get(), 3);
+        let header = reader.header();
+        let rate = header.rate.unwrap();
+        assert!((rate - 24e3).abs() <= header.rate_error && header.rate_error < 0.05 * rate, "{header:?}");
+        let mut frames = Vec::new();
+        for (read, want) in [(3, vec![1.0, 2.0]), (4, vec![3.0]), (5, vec![4.0])] {
+            reader.fill(&mut frames, 1000).unwrap();
+            assert_eq!((lines.get(), &frames), (read, &want));
+        }
+    }
+
+    #[test]
+    fn the_last_digits_of_the_times_bound_the_error_of_the_rate() {
+        for (number, digit) in [("2.125", 1e-3), ("4.2e-5", 1e-6), ("17", 1.0), ("-1E3", 1e3), ("nan", 1.0)] {
+            assert!((last_digit(number) / digit - 1.0).abs() < 1e-12, "{number}");
+        }
+        let table: String = (0..240).map(|k| format!("{:.6},0\n", f64::from(k) / 24e3)).collect();
+        let header = CsvReader::new(format!("t,x\n{table}").as_bytes(), "x.csv").unwrap().header();
+        let error = (header.rate.unwrap() - 24e3).abs();
+        assert!(error > 0.0 && error <= header.rate_error && header.rate_error < 3.0, "{header:?}");
     }
 }

@@ -1,94 +1,37 @@
-//! Reads whole frames from a byte stream that may be split anywhere.
+//! Whole frames of an input as its consumer sees them: time-interleaved converters as channels, or only one
+//! channel. Counts what was tolerated.
 
+use super::capture::{Capture, InputSource};
+use super::{InputFault, IoError, StreamHeader};
 use std::io::{self, Read};
 
-/// Returns whole frames of `frame` bytes and keeps the rest of an incomplete one for the next call.
+/// Cuts a byte stream, which may come in pieces of any size, into whole frames of `frame` bytes.
 #[derive(Debug)]
-pub struct FrameReader<R> {
+struct FrameReader<R> {
     inner: R,
     frame: usize,
-    /// Bytes that may still be taken; `None` until the end.
-    left: Option<u64>,
-    /// The beginning of a frame that was cut.
+    /// The beginning of a frame whose rest has not come.
     carry: Vec<u8>,
     ended: bool,
 }
 
 impl<R: Read> FrameReader<R> {
-    /// Reads frames of `frame` bytes (at least 1), at most `limit` bytes in all if given.
-    pub fn new(inner: R, frame: usize, limit: Option<u64>) -> Self {
-        let frame = frame.max(1);
-        Self { inner, frame, left: limit, carry: Vec::with_capacity(frame), ended: false }
+    fn new(inner: R, frame: usize) -> Self {
+        Self { inner, frame, carry: Vec::with_capacity(frame), ended: false }
     }
 
-    /// Fills `bytes` with as many whole frames as it holds or the stream still has; returns the
-    /// bytes filled, a multiple of the frame, short only at the end.
-    ///
-    /// # Errors
-    /// The errors of the underlying reader.
-    pub fn fill(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+    /// One read, which may give no whole frame. Puts whole frames into `bytes`, which holds one at least, and
+    /// gives how many bytes they have.
+    fn read_some(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         let capacity = bytes.len() / self.frame * self.frame;
-        let mut filled = 0;
-        while filled < capacity && !self.ended {
-            filled += self.read_whole(&mut bytes[filled..capacity])?;
-        }
-        Ok(filled)
-    }
-
-    /// Waits for at least one whole frame and returns the bytes of one read; 0 only at the end.
-    ///
-    /// # Errors
-    /// The errors of the underlying reader.
-    pub fn take_ready(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        let capacity = bytes.len() / self.frame * self.frame;
-        let mut filled = 0;
-        while filled == 0 && capacity > 0 && !self.ended {
-            filled = self.read_whole(&mut bytes[..capacity])?;
-        }
-        Ok(filled)
-    }
-
-    /// Makes `count` >= 1 frames in a row one, before anything is read.
-    pub fn group(&mut self, count: usize) {
-        self.frame *= count;
-    }
-
-    /// What the bytes come from.
-    pub(super) fn inner_mut(&mut self) -> &mut R {
-        &mut self.inner
-    }
-
-    /// Bytes a frame.
-    pub fn frame_bytes(&self) -> usize {
-        self.frame
-    }
-
-    /// Bytes of a last frame that was cut, known at the end.
-    pub fn cut_bytes(&self) -> usize {
-        if self.ended { self.carry.len() } else { 0 }
-    }
-
-    /// Bytes that were promised but did not come, known at the end.
-    pub fn missing_bytes(&self) -> u64 {
-        if self.ended { self.left.unwrap_or(0) } else { 0 }
-    }
-
-    /// True once the stream, or its promised length, is used up.
-    pub fn ended(&self) -> bool {
-        self.ended
-    }
-
-    /// One read, which may give no whole frame; whole frames into `bytes` (a multiple of the frame), the
-    /// rest into the carry.
-    pub(super) fn read_whole(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         let carried = self.carry.len();
         bytes[..carried].copy_from_slice(&self.carry);
-        let room = bytes.len() - carried;
-        let want = self.left.map_or(room, |left| room.min(usize::try_from(left).unwrap_or(room)));
-        let got = read_once(&mut self.inner, &mut bytes[carried..carried + want])?;
-        if let Some(left) = &mut self.left {
-            *left -= got as u64;
-        }
+        let got = loop {
+            match self.inner.read(&mut bytes[carried..capacity]) {
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                other => break other?,
+            }
+        };
         self.ended = got == 0;
         let whole = (carried + got) / self.frame * self.frame;
         self.carry.clear();
@@ -97,12 +40,96 @@ impl<R: Read> FrameReader<R> {
     }
 }
 
-fn read_once(reader: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
-    loop {
-        match reader.read(bytes) {
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            other => return other,
+/// The frames of an opened input.
+pub(super) struct InputFrames {
+    source: InputSource,
+    name: String,
+    frames: FrameReader<Box<dyn Capture>>,
+    stored: StreamHeader,
+    /// As the consumer sees them.
+    pub(super) header: StreamHeader,
+}
+
+impl InputFrames {
+    /// Opens the input and reads its header.
+    ///
+    /// # Errors
+    /// [`IoError`]: those of the input, or a header that does not fit the settings.
+    pub(super) fn open(source: &InputSource) -> Result<Self, IoError> {
+        let capture = source.open()?;
+        let stored = capture.stream_header();
+        let header = source.chosen(stored)?;
+        let frames = FrameReader::new(capture, stored.frame_bytes().max(1) * source.turn());
+        Ok(Self { source: source.clone(), name: source.name(), frames, stored, header })
+    }
+
+    pub(super) fn capture(&mut self) -> &mut dyn Capture {
+        &mut *self.frames.inner
+    }
+
+    /// True once the input is over.
+    pub(super) fn ended(&self) -> bool {
+        self.frames.ended
+    }
+
+    /// One read into `bytes`, which become a block. Gives the bytes of the whole frames that came; there may
+    /// be none.
+    pub(super) fn read_some(&mut self, bytes: &mut Vec<u8>) -> Result<usize, IoError> {
+        bytes.resize(self.source.block.max(self.frames.frame), 0);
+        let filled = self.frames.read_some(bytes).map_err(IoError::reading(&self.name))?;
+        Ok(self.source.arrange(&mut bytes[..filled], &self.stored))
+    }
+
+    /// What was tolerated; complete at the end.
+    pub(super) fn faults(&self) -> Vec<InputFault> {
+        let (missing_bytes, bytes) = (self.frames.inner.missing_bytes(), self.frames.carry.len());
+        let truncated = (missing_bytes > 0).then_some(InputFault::Truncated { missing_bytes });
+        let cut = (bytes > 0).then_some(InputFault::CutFrame { bytes });
+        truncated.into_iter().chain(cut).collect()
+    }
+}
+
+impl InputSource {
+    /// As the consumer sees an input that states `header`: time-interleaved converters as channels, or the
+    /// only channel that is read.
+    pub(super) fn chosen(&self, header: StreamHeader) -> Result<StreamHeader, IoError> {
+        let unfit = |problem| Err(IoError::unfit(&self.name())(problem));
+        let channels = header.channels;
+        if let Some(only) = self.only {
+            if only >= channels {
+                let channel = only + 1;
+                return unfit(format!("--channel {channel}: it has {channels} channels, counted from 1"));
+            }
+            return Ok(StreamHeader { channels: 1, ..header });
         }
+        let converters = self.turn();
+        if self.turns.is_some() && channels != 1 {
+            return unfit(format!(
+                "{channels} channels, but converters that take turns share one; read it without --interleaved, or \
+                 extract that channel first"
+            ));
+        }
+        Ok(StreamHeader {
+            channels: channels * converters,
+            rate: header.rate.map(|rate| rate / converters as f64),
+            rate_error: header.rate_error / converters as f64,
+            promised: header.promised.map(|samples| samples / converters as u64),
+            ..header
+        })
+    }
+
+    /// Puts the samples of whole frames, which are stored as `header` says, into the order of the channels,
+    /// or keeps those of the only one. Gives the bytes that remain.
+    fn arrange(&self, frames: &mut [u8], header: &StreamHeader) -> usize {
+        let sample = header.layout.container * header.parts();
+        self.turns.iter().for_each(|turns| turns.reorder(frames, sample));
+        let Some(only) = self.only.filter(|_| header.channels > 1) else { return frames.len() };
+        let count = frames.len() / header.frame_bytes();
+        for k in 0..count {
+            let from = k * header.frame_bytes() + only * sample;
+            frames.copy_within(from..from + sample, k * sample);
+        }
+        count * sample
     }
 }
 
@@ -128,34 +155,18 @@ mod tests {
         for frame in [1, 3, 8] {
             for step in 1..20 {
                 for buffer in [frame, 2 * frame + 1, 64] {
-                    let mut reader = FrameReader::new(Dripping(&data, step), frame, None);
+                    let mut reader = FrameReader::new(Dripping(&data, step), frame);
                     let mut all = Vec::new();
                     let mut bytes = vec![0; buffer];
-                    loop {
-                        let n = reader.take_ready(&mut bytes).unwrap();
+                    while !reader.ended {
+                        let n = reader.read_some(&mut bytes).unwrap();
                         assert_eq!(n % frame, 0);
-                        if n == 0 {
-                            break;
-                        }
                         all.extend_from_slice(&bytes[..n]);
                     }
                     assert_eq!(all, data[..100 / frame * frame]);
-                    assert_eq!(reader.cut_bytes(), 100 % frame);
+                    assert_eq!(reader.carry.len(), 100 % frame);
                 }
             }
         }
-    }
-
-    #[test]
-    fn fill_is_short_only_at_the_end_and_limits_hold() {
-        let data = [7u8; 50];
-        let mut reader = FrameReader::new(Dripping(&data, 7), 4, Some(30));
-        let mut bytes = [0; 16];
-        assert_eq!(reader.fill(&mut bytes).unwrap(), 16);
-        assert_eq!(reader.fill(&mut bytes).unwrap(), 12);
-        assert_eq!((reader.cut_bytes(), reader.missing_bytes()), (2, 0));
-        let mut short = FrameReader::new(Dripping(&data, 7), 4, Some(60));
-        assert_eq!(short.fill(&mut [0; 100]).unwrap(), 48);
-        assert_eq!((short.cut_bytes(), short.missing_bytes()), (2, 10));
     }
 }

@@ -1,11 +1,13 @@
-//! One input of several: its source, its frames in the order of time, and what was tolerated.
+//! One input of several: its thread, its frames in the order of time, and what was tolerated.
 
 use super::aligned_input::{AlignedInput, Block};
-use super::input_thread::{InputSource, Message, read};
+use super::capture::InputSource;
+use super::frames::InputFrames;
 use super::lost::{Dropout, Entry, LostInInput};
 use super::notes::InputNotes;
 use super::stall::Wait;
-use super::timestamps::{Timestamp, Timestamps, lost_between};
+use super::timestamps::{Timestamp, lost_between};
+use super::wav::WavChunk;
 #[cfg(target_os = "linux")]
 use super::{Coding, stdin_reader::StdinReader};
 use super::{InputFault, IoError, StreamHeader};
@@ -15,13 +17,46 @@ use std::thread;
 /// Number of blocks in the pool of each input.
 pub(super) const BLOCKS: usize = 4;
 
+/// What the thread of an input sends.
+pub(super) enum Message {
+    /// The header, and what the input says besides its samples; always the first message.
+    Header { header: StreamHeader, notes: Box<InputNotes> },
+    /// Whole frames.
+    Frames { bytes: Vec<u8>, filled: usize },
+    /// The end, with the faults that were tolerated; always last.
+    End { faults: Vec<InputFault>, chunks: Vec<WavChunk> },
+}
+
+/// Sends all messages of an input until its end, or until the receiver is gone. Blocks to fill come from
+/// `pool`.
+fn send_all(source: &InputSource, messages: &Sender<Result<Message, IoError>>, pool: &Receiver<Vec<u8>>) {
+    let end = || -> Result<Message, IoError> {
+        let mut frames = InputFrames::open(source)?;
+        let notes = frames.capture().notes().in_turns(source.turn());
+        let notes = Box::new(notes.map_err(IoError::unfit(&source.name()))?);
+        let _ = messages.send(Ok(Message::Header { header: frames.header, notes }));
+        while let Ok(mut bytes) = pool.recv() {
+            let mut filled = 0;
+            while filled == 0 && !frames.ended() {
+                filled = frames.read_some(&mut bytes)?;
+            }
+            if filled == 0 || messages.send(Ok(Message::Frames { bytes, filled })).is_err() {
+                break;
+            }
+        }
+        // A pipe may stay open after the samples.
+        let chunks = if source.path.is_file() { frames.capture().chunks_after() } else { Vec::new() };
+        Ok(Message::End { faults: frames.faults(), chunks })
+    };
+    // If the receiver is gone, the message is not needed.
+    let _ = messages.send(end());
+}
+
 /// One input on the side of the consumer.
 pub(super) struct Input {
     pub(super) name: String,
     pub(super) aligned: AlignedInput,
     source: Source,
-    /// When its frames were taken, as far as the input itself knows.
-    timestamps: Timestamps,
     live: Live,
     /// What it says besides its samples.
     pub(super) notes: InputNotes,
@@ -56,7 +91,7 @@ impl Input {
             return Self::on_thread(source);
         }
         let stdin = StdinReader::new(&source)?;
-        Ok(Self::new(source.name(), stdin.header, Source::Stdin(Box::new(stdin))))
+        Ok(Self::new(source.name(), stdin.frames.header, Source::Stdin(Box::new(stdin))))
     }
 
     /// The only input.
@@ -66,8 +101,9 @@ impl Input {
     }
 
     pub(super) fn on_thread(source: InputSource) -> Result<Self, IoError> {
-        let (name, header) = (source.name(), source.raw_header());
-        Self::on_thread_of(name, header, move |messages, pool| read(source, messages, pool))
+        // Until the header comes, the channels are those of the settings.
+        let header = source.chosen(source.raw_header())?;
+        Self::on_thread_of(source.name(), header, move |messages, pool| send_all(&source, &messages, &pool))
     }
 
     /// An input whose messages a new thread sends, with a pool of blocks to fill.
@@ -95,7 +131,6 @@ impl Input {
             name,
             aligned,
             source,
-            timestamps: Timestamps::default(),
             live: Live::default(),
             notes: InputNotes::default(),
             faults: Vec::new(),
@@ -134,9 +169,8 @@ impl Input {
 
     fn take(&mut self, message: Message) {
         match message {
-            Message::Header { header, timestamps, notes } => {
+            Message::Header { header, notes } => {
                 self.aligned = AlignedInput::new(header);
-                self.timestamps = timestamps;
                 self.notes = *notes;
             }
             Message::Frames { bytes, filled } => {
@@ -172,7 +206,7 @@ impl Input {
 
     /// The input's own timestamps go together with dropouts given beside it, but not with other timestamps.
     pub(super) fn take_timestamps(&mut self, lost: &mut LostInInput) -> Result<(), IoError> {
-        if self.timestamps.is_empty() {
+        if self.notes.timestamps.is_empty() {
             return Ok(());
         }
         if !lost.timestamps.is_empty() {
@@ -180,7 +214,7 @@ impl Input {
                 self.timing_fault("it has captures of its own; leave out the lines with sample_start".into())
             );
         }
-        lost.timestamps = std::mem::take(&mut self.timestamps);
+        lost.timestamps = self.notes.timestamps.clone();
         Ok(())
     }
 
@@ -209,11 +243,11 @@ impl Input {
     }
 
     pub(super) fn timing_fault(&self, problem: String) -> IoError {
-        IoError::Lost { file: self.name.clone(), problem }
+        IoError::unfit(&self.name)(problem)
     }
 
     pub(super) fn faults(&self) -> impl Iterator<Item = InputFault> {
-        let beyond = self.aligned.is_over() && self.aligned.has_unreached_segments();
+        let beyond = self.aligned.is_over() && self.aligned.has_unreached_breaks();
         let late = (self.live.late > 0).then_some(InputFault::LateLostLines { lines: self.live.late });
         let unrated = self.notes.sigmf.is_some() && self.aligned.header.rate.is_none();
         let unrated = unrated.then_some(InputFault::NoRate);

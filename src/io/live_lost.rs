@@ -60,7 +60,7 @@ impl LiveLines {
 
     /// An error about a line.
     pub(super) fn fault(&self, number: usize, problem: impl std::fmt::Display) -> IoError {
-        IoError::Lost { file: self.file.clone(), problem: format!("line {number}: {problem}") }
+        IoError::unfit(&self.file)(format!("line {number}: {problem}"))
     }
 }
 
@@ -75,8 +75,7 @@ fn read(path: &PathBuf, name: &str, lines: &Sender<Result<LostLine, IoError>>) {
         let line = next_line(&mut reader, name, number);
         let is_last = !matches!(line, Some(Ok(_)));
         let is_blank = matches!(&line, Some(Ok(text)) if text.trim().is_empty());
-        let fault =
-            |problem| IoError::Lost { file: name.to_owned(), problem: format!("line {number}: {problem}") };
+        let fault = |problem| IoError::unfit(name)(format!("line {number}: {problem}"));
         let parsed = line.filter(|_| !is_blank).map(|line| LostLine::parse(&line?, number).map_err(fault));
         if parsed.is_some_and(|line| lines.send(line).is_err()) || is_last {
             return;
@@ -85,7 +84,7 @@ fn read(path: &PathBuf, name: &str, lines: &Sender<Result<LostLine, IoError>>) {
 }
 
 fn next_line(reader: &mut impl BufRead, name: &str, number: usize) -> Option<Result<String, IoError>> {
-    let fault = |problem| IoError::Lost { file: name.to_owned(), problem };
+    let fault = |problem| IoError::unfit(name)(problem);
     let mut line = Vec::new();
     match reader.take(LONGEST_LINE + 1).read_until(b'\n', &mut line) {
         Err(error) => Some(Err(IoError::system(name, "read it")(error))),

@@ -126,7 +126,7 @@ impl LostSamples {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`IoError::File`] if it cannot be read or is too long, [`IoError::Lost`] for a line that is neither
+    /// [`IoError::File`] if it cannot be read or is too long, [`IoError::Unfit`] for a line that is neither
     /// of the two kinds.
     pub fn read(path: &Path) -> Result<Self, IoError> {
         Self::parse(&read_text(path, LOST_FILE)?, &path.display().to_string())
@@ -135,7 +135,7 @@ impl LostSamples {
     /// As [`LostSamples::read`], from text; `file` is the name in error messages.
     ///
     /// # Errors
-    /// [`IoError::Lost`] for a line that is neither of the two kinds.
+    /// [`IoError::Unfit`] for a line that is neither of the two kinds.
     pub fn parse(text: &str, file: &str) -> Result<Self, IoError> {
         let mut lost = Self { file: file.to_owned(), timestamps: Vec::new(), dropouts: Vec::new() };
         for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
@@ -216,7 +216,7 @@ impl LostSamples {
 
     /// An error about this file.
     pub(super) fn fault(&self, problem: String) -> IoError {
-        IoError::Lost { file: self.file.clone(), problem }
+        IoError::unfit(&self.file)(problem)
     }
 }
 

@@ -5,21 +5,21 @@
 //! [`PcmFormat`]s; the full scale of integer formats is 1.0.
 
 mod aligned_input;
-#[cfg(feature = "audio")]
-mod audio;
+mod array;
+mod capture;
 mod csv;
 mod dropouts;
 mod error;
 mod fault;
+#[cfg(feature = "flac")]
+mod flac;
 mod frames;
 mod input;
-mod input_thread;
-mod kind;
 mod live_lost;
 mod lost;
 mod mat;
+mod mat_element;
 mod multi_reader;
-mod not_wav;
 mod notes;
 mod npy;
 mod pipe;
@@ -30,29 +30,30 @@ mod stall;
 #[cfg(target_os = "linux")]
 mod stdin_reader;
 mod stream_header;
+pub(crate) mod table;
 mod tar;
 mod timestamps;
 mod turns;
 pub mod wav;
 
 pub use crate::runtime::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
+pub use array::{ArrayHeader, ArrayReader};
+pub use capture::is_self_describing;
 pub use csv::CsvReader;
 pub use error::IoError;
 pub use fault::{InputFault, InputWarning};
-pub use frames::FrameReader;
-pub use kind::is_self_describing;
 pub use live_lost::LiveLost;
 pub use lost::LostSamples;
-pub use mat::{MatArray, MatReader, mat_variable};
+pub use mat::{mat_variable, open_mat};
 pub use multi_reader::{Arrival, MultiReader};
 pub use notes::{OutputNotes, Placement};
-pub use npy::NpyHeader;
+pub use npy::npy_header;
 pub use pipe::{Stdout, Watched, is_output_stalled, is_pipe, stderr, stdout};
 pub use read_options::{BLOCK_BYTES, ReadOptions, Until};
 pub use sample_writer::{Container, OutputHeader, SampleWriter};
 pub use sigmf::{SigmfAnnotation, SigmfCapture, SigmfGlobal, SigmfMeta, is_sigmf, sigmf_files};
 pub use stall::{Stall, StallWatch};
-pub use stream_header::{Coding, StreamHeader};
+pub use stream_header::{Coding, StreamHeader, is_same_rate};
 pub use tar::{TarFile, tar_files};
 pub use timestamps::{MAX_LOST, MAX_LOST_AT_ONCE};
 pub use turns::Turns;

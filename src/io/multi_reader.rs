@@ -5,14 +5,13 @@
 //! consumer. If the consumer is slow, reading stops, and so do the writers of the pipes.
 
 use super::aligned_input::AlignedInput;
+use super::capture::InputSource;
 use super::input::{BLOCKS, Input, too_many_lost};
-use super::input_thread::InputSource;
 use super::live_lost::{LiveLines, LiveLost};
 use super::lost::{Entry, LostInInput, LostLine, LostSamples};
 use super::notes::{OutputNotes, Placement};
 use super::pipe::refuse_shared_pipes;
 use super::stall::Wait;
-use super::timestamps::Segment;
 use super::{InputWarning, IoError, PcmFrames, ReadOptions, StallWatch, StreamHeader, Until};
 use crossbeam_channel::Receiver;
 use std::path::PathBuf;
@@ -117,7 +116,7 @@ impl MultiReader {
     /// Waits until every input has a frame.
     ///
     /// # Errors
-    /// The system's refusal to read one of them, [`IoError::ReaderDied`], or [`IoError::Lost`] for a line of
+    /// The system's refusal to read one of them, [`IoError::ReaderDied`], or [`IoError::Unfit`] for a line of
     /// [`ReadOptions::live_lost`] that is malformed or does not fit the inputs.
     pub fn wait(&mut self) -> Result<Arrival, IoError> {
         for i in 0..self.inputs.len() {
@@ -218,9 +217,9 @@ impl MultiReader {
     fn refuse_some_complex(&self) -> Result<(), IoError> {
         let find = |is_complex| self.headers().find(move |(_, header)| header.is_complex == is_complex);
         match (find(true), find(false)) {
-            (Some((complex, _)), Some((real, _))) => {
-                Err(IoError::SomeComplex { complex: complex.to_owned(), real: real.to_owned() })
-            }
+            (Some((complex, _)), Some((real, _))) => Err(IoError::unfit(complex)(format!(
+                "complex samples, and {real} holds real ones; give all channels in one of the two ways"
+            ))),
             _ => Ok(()),
         }
     }
@@ -239,13 +238,13 @@ impl MultiReader {
         }
         let origin = inputs.iter().filter_map(|(_, lost)| lost.timestamps.beginning()).min().unwrap_or(0);
         for (input, lost) in inputs {
-            let segments = lost.timestamps.segments(origin);
-            let segments = segments.map_err(|problem| input.timing_fault(problem))?;
-            let frames = segments.iter().map(Segment::lost).fold(0, u64::saturating_add);
+            let breaks = lost.timestamps.breaks(origin);
+            let breaks = breaks.map_err(|problem| input.timing_fault(problem))?;
+            let frames = breaks.iter().map(|next| next.lost).fold(0, u64::saturating_add);
             if frames > max_lost {
                 return Err(input.timing_fault(too_many_lost(frames, max_lost)));
             }
-            input.aligned.lose(segments, lost);
+            input.aligned.lose(breaks, lost);
         }
         self.origin = origin;
         Ok(())

@@ -36,10 +36,17 @@ pub(super) struct InputNotes {
     pub(super) sigmf: Option<Box<SigmfMeta>>,
     /// When its frames were taken.
     pub(super) timestamps: Timestamps,
-    /// Samples per frame of converters that take turns, or 1.
+    /// Samples per frame of time-interleaved converters, or 1.
     pub(super) turn: usize,
     /// Chunks of a WAV file.
     pub(super) chunks: Vec<WavChunk>,
+}
+
+impl InputNotes {
+    /// The same notes where `turn` samples of the input are a frame.
+    pub(super) fn in_turns(self, turn: usize) -> Result<Self, String> {
+        Ok(Self { timestamps: self.timestamps.in_turns(turn)?, turn, ..self })
+    }
 }
 
 /// Where the frames of the inputs are in the output.
@@ -143,7 +150,7 @@ struct Axis<'a> {
 impl Axis<'_> {
     /// The output sample of an input sample, unless it is before the file.
     fn place(&self, sample: u64) -> Option<u64> {
-        let frame = sample.checked_sub(self.offset)? / self.input.turn.max(1) as u64;
+        let frame = sample.checked_sub(self.offset)? / self.input.turn as u64;
         let time = self.input.timestamps.time_of(frame, self.origin);
         time.checked_mul(self.placement.ratio)?.checked_add(self.placement.shift)
     }

@@ -1,124 +1,66 @@
-//! Captures as NumPy arrays (.npy).
+//! NumPy arrays (.npy): captures, and the header of any other.
 //!
-//! Source: NumPy, *NEP 1: a simple file format for NumPy arrays*, versions 1 to 3. Of two axes the shorter
-//! one holds the channels, and the rows do if both are equal: `(N, T)` as the Python package has it,
-//! `(T, N)` as sound files have it. Integers have the full scale 1.0, as in every other format.
+//! Source: NumPy, *NEP 1: a simple file format for NumPy arrays*, versions 1 to 3. Integers have the full
+//! scale 1.0, as in every other format of captures.
 
-use super::{IoError, PcmFormat, SampleLayout, StreamHeader};
-use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use super::array::{ArrayHeader, ArrayReader};
+use super::{IoError, PcmFormat};
+use std::io::{self, Read, Seek};
 
 /// Longest header; those of arrays of numbers have a hundred bytes.
 const LONGEST_HEADER: usize = 1 << 16;
-/// Maximum number of channels, the same as in a WAV header.
-const MOST_CHANNELS: u64 = 65_535;
-/// Bytes of all channels together that are read at a time, where each channel lies by itself.
-const PLANAR_BYTES: usize = 1 << 20;
 
-/// What the header of an array says.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct NpyHeader {
-    /// Sample format of one number.
-    pub format: PcmFormat,
-    /// Each sample is two numbers.
-    pub is_complex: bool,
-    /// Channels.
-    pub channels: usize,
-    /// Samples of each channel.
-    pub frames: u64,
-    /// The samples of a channel follow each other; otherwise those of a frame do.
-    pub is_planar: bool,
-    /// Where the numbers begin.
-    pub offset: u64,
+const KIND: &str = "a NumPy array of samples";
+
+/// Opens an array of samples called `file`. The rate is not in it.
+///
+/// # Errors
+/// [`IoError::Malformed`] for other files and for arrays that are no captures.
+pub(super) fn open_npy<R: Read + Seek>(mut reader: R, file: &str) -> Result<ArrayReader<R>, IoError> {
+    let header = npy_header(&mut reader, file)?;
+    ArrayReader::new(header, reader, None, IoError::malformed(file, KIND))
 }
 
-impl NpyHeader {
-    /// Reads the header of an array called `file`.
-    ///
-    /// # Errors
-    /// [`IoError::Malformed`] for other files and for arrays that are no captures.
-    pub fn read(reader: &mut impl Read, file: &str) -> Result<Self, IoError> {
-        let fault = |problem: String| malformed(file, problem);
-        let mut start = [0; 8];
-        exact(reader, &mut start, file)?;
-        if start[..6] != *b"\x93NUMPY" {
-            return Err(fault("it does not begin with \\x93NUMPY; save it with numpy.save".into()));
-        }
-        let size = if start[6] == 1 { 2 } else { 4 };
-        let mut length = [0; 4];
-        exact(reader, &mut length[..size], file)?;
-        let length = u32::from_le_bytes(length) as usize;
-        if !(1..=3).contains(&start[6]) || length > LONGEST_HEADER {
-            let version = start[6];
-            return Err(fault(format!(
-                "version {version} with a header of {length} bytes is unknown; save it again"
-            )));
-        }
-        let mut text = vec![0; length];
-        exact(reader, &mut text, file)?;
-        let offset = (8 + size + length) as u64;
-        Self::parse(&String::from_utf8_lossy(&text), offset).map_err(fault)
+/// Reads the header of an array called `file`, up to its first number.
+///
+/// # Errors
+/// [`IoError::Malformed`] for other files and for arrays of anything but numbers.
+pub fn npy_header(reader: &mut impl Read, file: &str) -> Result<ArrayHeader, IoError> {
+    let fault = || IoError::malformed(file, KIND);
+    let mut exact = |bytes: &mut [u8]| {
+        reader.read_exact(bytes).map_err(|error| match error.kind() {
+            io::ErrorKind::UnexpectedEof => fault()("it ends inside its header; copy it again".into()),
+            _ => IoError::system(file, "read the header")(error),
+        })
+    };
+    let mut start = [0; 8];
+    exact(&mut start)?;
+    if start[..6] != *b"\x93NUMPY" {
+        return Err(fault()("it does not begin with \\x93NUMPY; save it with numpy.save".into()));
     }
-
-    /// From the text of the header, a Python dictionary.
-    fn parse(text: &str, offset: u64) -> Result<Self, String> {
-        let descr = quoted(value(text, "descr")?);
-        // Complex numbers of 8 bytes are two of 4.
-        let parts = [("<c8", "<f4"), (">c8", ">f4"), ("<c16", "<f8"), (">c16", ">f8")];
-        let part = parts.iter().find(|(complex, _)| *complex == descr).map(|(_, part)| *part);
-        let (format, is_complex) = (format(part.unwrap_or(descr))?, part.is_some());
-        let is_fortran = value(text, "fortran_order")?.starts_with("True");
-        let shape = shape(value(text, "shape")?)?;
-        let (rows, columns) = match shape[..] {
-            [samples] => (1, samples),
-            [rows, columns] => (rows, columns),
-            _ => {
-                return Err(format!(
-                    "it has {} axes; give (samples), (channels, samples) or (samples, channels)",
-                    shape.len()
-                ));
-            }
-        };
-        let rows_are_channels = rows <= columns;
-        let (channels, frames) = if rows_are_channels { (rows, columns) } else { (columns, rows) };
-        if !(1..=MOST_CHANNELS).contains(&channels) {
-            return Err(format!(
-                "the shape {shape:?} has {channels} channels; it may be 1 to {MOST_CHANNELS}"
-            ));
-        }
-        if frames.checked_mul(channels * 2 * format.bytes() as u64).is_none_or(|bytes| bytes > 1 << 62) {
-            return Err(format!("the shape {shape:?} has more numbers than any disk; the file is damaged"));
-        }
-        let channels = channels as usize;
-        let is_planar = channels > 1 && rows_are_channels != is_fortran;
-        Ok(Self { format, is_complex, channels, frames, is_planar, offset })
+    let (version, size) = (start[6], if start[6] == 1 { 2 } else { 4 });
+    let mut length = [0; 4];
+    exact(&mut length[..size])?;
+    let length = u32::from_le_bytes(length) as usize;
+    if !(1..=3).contains(&version) || length > LONGEST_HEADER {
+        return Err(fault()(format!(
+            "version {version} with a header of {length} bytes is unknown; save it again"
+        )));
     }
-
-    /// As the header of an input. The rate is not in the file.
-    pub fn stream_header(&self) -> StreamHeader {
-        let real = StreamHeader::real(SampleLayout::packed(self.format), self.channels);
-        StreamHeader { is_complex: self.is_complex, promised: Some(self.frames), ..real }
-    }
-
-    /// Bytes of all numbers.
-    pub fn data_bytes(&self) -> u64 {
-        self.frames * (self.channels * self.sample_bytes()) as u64
-    }
-
-    fn sample_bytes(&self) -> usize {
-        if self.is_complex { 2 * self.format.bytes() } else { self.format.bytes() }
-    }
+    let mut text = vec![0; length];
+    exact(&mut text)?;
+    parse(&String::from_utf8_lossy(&text), (8 + size + length) as u64).map_err(fault())
 }
 
-fn malformed(file: &str, problem: String) -> IoError {
-    IoError::Malformed { file: file.to_owned(), kind: "a NumPy array of samples", problem }
-}
-
-fn exact(reader: &mut impl Read, bytes: &mut [u8], file: &str) -> Result<(), IoError> {
-    reader.read_exact(bytes).map_err(|error| match error.kind() {
-        io::ErrorKind::UnexpectedEof => malformed(file, "it ends inside its header; copy it again".into()),
-        _ => IoError::system(file, "read the header")(error),
-    })
+/// From the text of the header, a Python dictionary.
+fn parse(text: &str, offset: u64) -> Result<ArrayHeader, String> {
+    let descr = quoted(value(text, "descr")?);
+    // Complex numbers of 8 bytes are two of 4.
+    let parts = [("<c8", "<f4"), (">c8", ">f4"), ("<c16", "<f8"), (">c16", ">f8")];
+    let part = parts.iter().find(|(complex, _)| *complex == descr).map(|(_, part)| *part);
+    let is_column_major = value(text, "fortran_order")?.starts_with("True");
+    let (format, is_complex) = (format(part.unwrap_or(descr))?, part.is_some());
+    Ok(ArrayHeader { format, is_complex, shape: shape(value(text, "shape")?)?, is_column_major, offset })
 }
 
 /// What follows a key of the dictionary.
@@ -164,81 +106,19 @@ fn shape(text: &str) -> Result<Vec<u64>, String> {
     sizes.map(size).collect()
 }
 
-/// Frames of an array in which each channel lies by itself, from a file.
-#[derive(Debug)]
-pub(super) struct PlanarReader {
-    file: File,
-    header: NpyHeader,
-    /// The next frame to read.
-    next: u64,
-    /// Whole frames, and how much of them has been given.
-    frames: Vec<u8>,
-    given: usize,
-}
-
-impl PlanarReader {
-    /// The numbers after the header of `file`, which must have them all.
-    pub(super) fn new(file: File, header: NpyHeader, name: &str) -> Result<Self, IoError> {
-        let known = file.metadata().map_err(IoError::system(name, "read its size"))?;
-        let wanted = header.offset + header.data_bytes();
-        if !known.is_file() {
-            let problem =
-                "its channels follow each other, which a pipe cannot give; save the transposed array";
-            return Err(malformed(name, problem.into()));
-        }
-        if known.len() < wanted {
-            let problem =
-                format!("its shape needs {wanted} bytes, but there are {}; copy it again", known.len());
-            return Err(malformed(name, problem));
-        }
-        Ok(Self { file, header, next: 0, frames: Vec::new(), given: 0 })
-    }
-
-    /// Reads the next frames of all channels.
-    fn refill(&mut self) -> io::Result<()> {
-        let NpyHeader { channels, frames, offset, .. } = self.header;
-        let size = self.header.sample_bytes();
-        let most = (PLANAR_BYTES / (channels * size)).max(1) as u64;
-        let count = (frames - self.next).min(most) as usize;
-        let mut samples = vec![0; count * size];
-        self.frames.resize(count * channels * size, 0);
-        self.given = 0;
-        for channel in 0..channels {
-            let first = offset + (channel as u64 * frames + self.next) * size as u64;
-            self.file.seek(SeekFrom::Start(first))?;
-            self.file.read_exact(&mut samples)?;
-            let slots = self.frames.chunks_exact_mut(channels * size);
-            for (frame, sample) in slots.zip(samples.chunks_exact(size)) {
-                frame[channel * size..][..size].copy_from_slice(sample);
-            }
-        }
-        self.next += count as u64;
-        Ok(())
-    }
-}
-
-impl Read for PlanarReader {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        if self.given == self.frames.len() {
-            self.refill()?;
-        }
-        let count = bytes.len().min(self.frames.len() - self.given);
-        bytes[..count].copy_from_slice(&self.frames[self.given..][..count]);
-        self.given += count;
-        Ok(count)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Cursor;
 
-    fn header(descr: &str, fortran: &str, shape: &str) -> Result<NpyHeader, String> {
+    fn open(descr: &str, fortran: &str, shape: &str) -> Result<ArrayReader<Cursor<Vec<u8>>>, String> {
         let text = format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': {shape}, }}  \n");
         let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
         bytes.extend((text.len() as u16).to_le_bytes());
         bytes.extend(text.bytes());
-        NpyHeader::read(&mut &bytes[..], "x.npy").map_err(|error| error.to_string())
+        // As many numbers as the small shapes need.
+        bytes.resize(bytes.len() + 100, 0);
+        open_npy(Cursor::new(bytes), "x.npy").map_err(|error| error.to_string())
     }
 
     #[test]
@@ -253,10 +133,11 @@ mod tests {
             ("False", "(1, 5)", 1, 5, false),
             ("False", "(5, 1)", 1, 5, false),
         ] {
-            let found = header("<f4", fortran, shape).unwrap();
+            let found = open("<f4", fortran, shape).unwrap();
+            let header = found.header();
             assert_eq!(
-                (found.channels, found.frames, found.is_planar),
-                (channels, frames, is_planar),
+                (header.channels, header.promised, found.is_planar),
+                (channels, Some(frames), is_planar),
                 "{shape}"
             );
         }
@@ -273,13 +154,13 @@ mod tests {
             ("<f4", "(2, 99999999999999999999)", "no number"),
             ("<f4", "7", "no shape"),
         ] {
-            let message = header(descr, "False", shape).unwrap_err();
+            let message = open(descr, "False", shape).unwrap_err();
             assert!(message.starts_with("x.npy: not a NumPy array") && message.contains(part), "{message}");
         }
         for bytes in
             [&b"RIFFxxxx"[..], b"\x93NUM", b"\x93NUMPY\x01\x00\x40\x00{'descr'", b"\x93NUMPY\x09\x00\0\0\0\0"]
         {
-            assert!(NpyHeader::read(&mut { bytes }, "x.npy").is_err());
+            assert!(npy_header(&mut { bytes }, "x.npy").is_err());
         }
     }
 }

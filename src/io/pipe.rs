@@ -157,8 +157,10 @@ pub(super) fn refuse_shared_pipes(paths: &[PathBuf]) -> Result<(), IoError> {
     let pipes: Vec<_> = paths.iter().filter(|path| is_pipe(path)).collect();
     for (i, second) in pipes.iter().enumerate() {
         if let Some(first) = pipes[..i].iter().find(|first| is_same_file(first, second)) {
-            let (first, second) = (first.display().to_string(), second.display().to_string());
-            return Err(IoError::SharedPipe { first, second });
+            return Err(IoError::unfit(&second.display().to_string())(format!(
+                "the same pipe as {}, each byte of which only one of them would get; give each channel a pipe of its own",
+                first.display()
+            )));
         }
     }
     Ok(())

@@ -1,8 +1,9 @@
 //! Writes one channel of samples to standard output or a FIFO, or to a file or SigMF recording that appears
 //! only when it is complete.
 
+use super::sigmf::malformed;
 use super::wav::{WavFile, stream_header};
-use super::{IoError, OutputNotes, PcmFormat, SigmfMeta, Stdout, is_pipe};
+use super::{IoError, OutputNotes, PcmFormat, SigmfMeta, Stdout, is_pipe, is_same_rate};
 use crate::files::{AtomicFile, is_same_file};
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -48,6 +49,7 @@ pub struct SampleWriter {
     target: Target,
     name: String,
     notes: OutputNotes,
+    warning: Option<String>,
 }
 
 impl SampleWriter {
@@ -59,27 +61,34 @@ impl SampleWriter {
     /// [`IoError`] for files that exist or cannot be created, for samples or rates that WAV cannot hold,
     /// and for a standard output that is a terminal.
     pub fn create(path: &Path, header: OutputHeader, replace: bool) -> Result<Self, IoError> {
-        let OutputHeader { container, format, is_complex, rate } = header;
-        let channels = if is_complex { 2 } else { 1 };
         let to_stdout = path.as_os_str() == "-";
         let is_stream = to_stdout || is_fifo(path);
         let name = if to_stdout { "standard output".into() } else { path.display().to_string() };
         let refused = || IoError::system(&name, "write it");
-        let target = match container {
+        let mut warning = None;
+        let target = match header.container {
             _ if is_sigmf_meta(path) => sigmf_target(path, header, replace)?,
-            Container::Wav if is_stream => {
-                let header = stream_header(format, channels, wav_rate(&name, rate)?).map_err(refused())?;
-                stream_target(path, &header).map_err(refused())?
-            }
             Container::Wav => {
-                let rate = wav_rate(&name, rate)?;
-                let file = AtomicFile::create(path, replace)?;
-                Target::Wav(WavFile::new(file, format, channels, rate).map_err(refused())?)
+                let OutputHeader { format, is_complex, rate, .. } = header;
+                let (channels, hertz) = (if is_complex { 2 } else { 1 }, wav_rate(&name, rate)?);
+                warning = rounding(&name, rate, hertz);
+                if is_stream {
+                    let header = stream_header(format, channels, hertz).map_err(refused())?;
+                    stream_target(path, &header).map_err(refused())?
+                } else {
+                    let file = AtomicFile::create(path, replace)?;
+                    Target::Wav(WavFile::new(file, format, channels, hertz).map_err(refused())?)
+                }
             }
             Container::Raw if is_stream => stream_target(path, &[]).map_err(refused())?,
             Container::Raw => Target::Raw(AtomicFile::create(path, replace)?),
         };
-        Ok(Self { target, name, notes: OutputNotes::default() })
+        Ok(Self { target, name, notes: OutputNotes::default(), warning })
+    }
+
+    /// What the header cannot say exactly.
+    pub fn warning(&self) -> Option<&str> {
+        self.warning.as_deref()
     }
 
     /// The files that an output of this name has: none for `-`, two for a SigMF recording.
@@ -118,7 +127,7 @@ impl SampleWriter {
     pub fn finish(self) -> Result<Vec<AtomicFile>, IoError> {
         let refused = IoError::system(&self.name, "write it");
         match self.target {
-            Target::Wav(file) => Ok(vec![file.finish_with(&self.notes.chunks).map_err(refused)?]),
+            Target::Wav(file) => Ok(vec![file.finish(&self.notes.chunks).map_err(refused)?]),
             Target::Raw(file) => Ok(vec![file]),
             Target::Stream(mut stream) => stream.flush().map(|()| Vec::new()).map_err(refused),
             Target::Sigmf { data, mut meta, header } => {
@@ -155,7 +164,7 @@ fn sigmf_text(file: &str, header: OutputHeader, mut notes: OutputNotes) -> Resul
         meta.captures = notes.captures;
     }
     let fault =
-        |error: serde_json::Error| IoError::Sigmf { file: file.to_owned(), problem: error.to_string() };
+        |error: serde_json::Error| malformed(file, error.to_string());
     let annotations = notes.annotations.iter().map(serde_json::to_value).collect::<Result<_, _>>();
     meta.annotations = annotations.map_err(fault)?;
     Ok(serde_json::to_string_pretty(&meta).map_err(fault)? + "\n")
@@ -164,9 +173,18 @@ fn sigmf_text(file: &str, header: OutputHeader, mut notes: OutputNotes) -> Resul
 /// The nearest rate that a WAV header can state.
 fn wav_rate(file: &str, rate: f64) -> Result<u32, IoError> {
     if rate > f64::from(u32::MAX) {
-        return Err(IoError::WavRate { file: file.to_owned(), rate });
+        return Err(IoError::unfit(file)(format!(
+            "the rate of {rate} Hz does not fit a WAV header; give the output a name that ends in sigmf-meta, or write \
+             raw samples with `hybank stream`"
+        )));
     }
     Ok(rate.round().max(1.0) as u32)
+}
+
+/// That the header of an output called `file` states another rate than its own.
+fn rounding(file: &str, rate: f64, hertz: u32) -> Option<String> {
+    (!is_same_rate(f64::from(hertz), rate, 0.0))
+        .then(|| format!("{file}: WAV headers hold whole hertz: {rate} Hz is written as {hertz} Hz"))
 }
 
 /// Standard output (`-`) or a FIFO for samples; refuses a terminal.
@@ -178,4 +196,24 @@ fn stream_target(path: &Path, header: &[u8]) -> io::Result<Target> {
     let mut stream = if to_stdout { Stdout::for_samples()? } else { Stdout::fifo(path)? };
     stream.write_all(header)?;
     Ok(Target::Stream(stream))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rate_that_the_header_rounds_is_a_warning() {
+        let folder = tempfile::tempdir().unwrap();
+        let warning = |name: &str, rate: f64| {
+            let header =
+                OutputHeader { container: Container::Wav, format: PcmFormat::F32Le, is_complex: false, rate };
+            let writer = SampleWriter::create(&folder.path().join(name), header, false).unwrap();
+            writer.warning().map(str::to_owned)
+        };
+        assert_eq!(warning("x.wav", 48_000.000_01), None);
+        assert_eq!(warning("x.sigmf-meta", 10.4), None);
+        let said = warning("x.wav", 10.4).unwrap();
+        assert!(said.ends_with("x.wav: WAV headers hold whole hertz: 10.4 Hz is written as 10 Hz"), "{said}");
+    }
 }

@@ -3,13 +3,16 @@
 //! Real or complex samples, one or several interleaved channels. If `core:global_index` increases by more
 //! than `core:sample_start` between captures, samples were lost.
 
+use super::capture::{Capture, open_file};
+use super::notes::InputNotes;
 use super::tar::{TarFile, tar_files};
 use super::timestamps::{Timestamp, Timestamps};
-use super::{IoError, PcmFormat};
+use super::{IoError, PcmFormat, SampleLayout, StreamHeader};
 use crate::files::{Bound, read_text};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use std::io::{Read, Seek, SeekFrom};
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom, Take};
 use std::path::{Component, Path, PathBuf};
 
 /// Maximum number of interleaved channels, the same as in a WAV header.
@@ -119,7 +122,7 @@ impl SigmfMeta {
     /// Reads a metadata file.
     ///
     /// # Errors
-    /// [`IoError::File`] if it cannot be read or is too long, [`IoError::Sigmf`] if it is malformed.
+    /// [`IoError::File`] if it cannot be read or is too long, [`IoError::Malformed`] if it is malformed.
     pub fn read(path: &Path) -> Result<Self, IoError> {
         Self::parse(&read_text(path, META_FILE)?, &path.display().to_string())
     }
@@ -127,9 +130,9 @@ impl SigmfMeta {
     /// As [`SigmfMeta::read`], from text; `file` is the name in error messages.
     ///
     /// # Errors
-    /// [`IoError::Sigmf`] if it is malformed, including its data type and captures.
+    /// [`IoError::Malformed`] if it is malformed, including its data type and captures.
     pub fn parse(text: &str, file: &str) -> Result<Self, IoError> {
-        let fault = |problem| IoError::Sigmf { file: file.to_owned(), problem };
+        let fault = |problem| malformed(file, problem);
         let meta: Self = serde_json::from_str(text).map_err(|error| fault(error.to_string()))?;
         meta.format(file)?;
         meta.timestamps(file)?;
@@ -152,17 +155,16 @@ impl SigmfMeta {
     /// The format of the numbers of the data type.
     ///
     /// # Errors
-    /// [`IoError::Sigmf`] for types that no [`PcmFormat`] covers.
+    /// [`IoError::Malformed`] for types that no [`PcmFormat`] covers.
     pub fn format(&self, file: &str) -> Result<PcmFormat, IoError> {
         PcmFormat::ALL
             .into_iter()
             .find(|&format| self.global.datatype.strip_prefix(['r', 'c']) == Some(datatype(format).as_str()))
-            .ok_or_else(|| IoError::Sigmf {
-                file: file.to_owned(),
-                problem: format!(
-                    "core:datatype is {}; use ri8, ru8, ri16_le, ri32_le, rf32_le, rf64_le, their _be forms, or complex ones (cf32_le)",
-                    self.global.datatype
-                ),
+            .ok_or_else(|| {
+                let datatype = &self.global.datatype;
+                malformed(file, format!(
+                    "core:datatype is {datatype}; use ri8, ru8, ri16_le, ri32_le, rf32_le, rf64_le, their _be forms, or complex ones (cf32_le)",
+                ))
             })
     }
 
@@ -171,9 +173,19 @@ impl SigmfMeta {
         self.global.datatype.starts_with('c')
     }
 
+    /// The format of the frames; how many there are is not said.
+    ///
+    /// # Errors
+    /// As [`SigmfMeta::format`].
+    pub fn stream_header(&self, file: &str) -> Result<StreamHeader, IoError> {
+        let layout = SampleLayout::packed(self.format(file)?);
+        let real = StreamHeader::real(layout, self.global.num_channels.unwrap_or(1));
+        Ok(StreamHeader { is_complex: self.is_complex(), rate: self.global.sample_rate, ..real })
+    }
+
     /// When the frames of the sample file were taken.
     pub(super) fn timestamps(&self, file: &str) -> Result<Timestamps, IoError> {
-        let fault = |problem| IoError::Sigmf { file: file.to_owned(), problem };
+        let fault = |problem| malformed(file, problem);
         if !self.captures.is_sorted_by_key(|capture| capture.sample_start) {
             return Err(fault("the captures are not in the order of their core:sample_start".into()));
         }
@@ -190,6 +202,68 @@ impl SigmfMeta {
         let before = || fault(format!("a capture begins before core:offset {offset}"));
         let timestamps = timestamps.collect::<Option<Vec<_>>>().ok_or_else(before)?;
         Timestamps::new(timestamps).map_err(fault)
+    }
+}
+
+pub(super) fn malformed(file: &str, problem: String) -> IoError {
+    IoError::malformed(file, "a SigMF recording")(problem)
+}
+
+/// A recording, which reads as its samples.
+pub(super) struct SigmfReader<R> {
+    meta: Box<SigmfMeta>,
+    header: StreamHeader,
+    timestamps: Timestamps,
+    samples: R,
+}
+
+impl SigmfReader<File> {
+    /// Opens the recording that the name of either of its files means.
+    pub(super) fn open(path: &Path) -> Result<Self, IoError> {
+        let (meta_path, _) = file_pair(path, None);
+        let meta = SigmfMeta::read(&meta_path)?;
+        let (_, data_path) = file_pair(path, Some(&meta));
+        let file = open_file(&data_path)?;
+        let bytes = file.metadata().ok().filter(|data| data.is_file()).map(|data| data.len());
+        Self::new(meta, &meta_path.display().to_string(), file, bytes)
+    }
+}
+
+impl SigmfReader<Take<File>> {
+    /// Opens the only recording of an archive.
+    pub(super) fn open_archive(path: &Path) -> Result<Self, IoError> {
+        let (mut archive, file) = (open_file(path)?, path.display().to_string());
+        let (meta, name, data) = archived(&mut archive, &file)?;
+        let sought = archive.seek(SeekFrom::Start(data.offset));
+        sought.map_err(IoError::system(&file, "read the samples"))?;
+        Self::new(meta, &name, archive.take(data.size), Some(data.size))
+    }
+}
+
+impl<R> SigmfReader<R> {
+    /// Of `samples`, of `bytes` bytes if that is known, with their metadata, called `name`.
+    fn new(meta: SigmfMeta, name: &str, samples: R, bytes: Option<u64>) -> Result<Self, IoError> {
+        let header = meta.stream_header(name)?;
+        let promised = bytes.map(|bytes| bytes / header.frame_bytes() as u64);
+        let (header, timestamps) = (StreamHeader { promised, ..header }, meta.timestamps(name)?);
+        Ok(Self { meta: Box::new(meta), header, timestamps, samples })
+    }
+}
+
+impl<R: Read> Read for SigmfReader<R> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.samples.read(bytes)
+    }
+}
+
+impl<R: Read> Capture for SigmfReader<R> {
+    fn stream_header(&self) -> StreamHeader {
+        self.header
+    }
+
+    fn notes(&self) -> InputNotes {
+        let (sigmf, timestamps) = (Some(self.meta.clone()), self.timestamps.clone());
+        InputNotes { sigmf, timestamps, ..InputNotes::default() }
     }
 }
 
@@ -210,7 +284,7 @@ fn is_file_name(name: &str) -> bool {
 }
 
 /// The two files of a recording, given either of them.
-pub(super) fn file_pair(path: &Path, meta: Option<&SigmfMeta>) -> (PathBuf, PathBuf) {
+fn file_pair(path: &Path, meta: Option<&SigmfMeta>) -> (PathBuf, PathBuf) {
     let data = match meta.and_then(|meta| meta.global.dataset.as_ref()) {
         Some(name) => path.with_file_name(name),
         None => path.with_extension("sigmf-data"),
@@ -229,12 +303,12 @@ pub fn sigmf_files(path: &Path) -> [PathBuf; 2] {
 
 /// The metadata of the only recording in an archive called `file`, the name of it for messages, and where
 /// the samples are.
-pub(super) fn archived(
+fn archived(
     archive: &mut (impl Read + Seek),
     file: &str,
 ) -> Result<(SigmfMeta, String, TarFile), IoError> {
     let files = tar_files(archive, file)?;
-    let fault = |problem: String| IoError::Sigmf { file: file.to_owned(), problem };
+    let fault = |problem: String| malformed(file, problem);
     let metas: Vec<_> = files.iter().filter(|file| file.name.ends_with(".sigmf-meta")).collect();
     let [meta] = metas[..] else {
         let count = metas.len();

@@ -44,6 +44,15 @@ impl FromStr for Coding {
     }
 }
 
+/// Relative difference up to which two rates are the same. Specs state periods with six or seven digits, and
+/// within the length of a filter a difference this small moves no sample.
+const SAME_RATE: f64 = 1e-6;
+
+/// True if two rates in hertz, stated with errors of at most `error`, are the same.
+pub fn is_same_rate(a: f64, b: f64, error: f64) -> bool {
+    (a - b).abs() <= error + SAME_RATE * b.abs()
+}
+
 /// The format of an input's frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StreamHeader {
@@ -55,6 +64,8 @@ pub struct StreamHeader {
     pub is_complex: bool,
     /// Frames per second, if the input states it.
     pub rate: Option<f64>,
+    /// Hertz by which the stated rate may differ from the true one, as WAV headers hold whole hertz.
+    pub rate_error: f64,
     /// Number of frames according to the header.
     pub promised: Option<u64>,
 }
@@ -62,7 +73,17 @@ pub struct StreamHeader {
 impl StreamHeader {
     /// Real samples of which nothing else is known.
     pub fn real(layout: SampleLayout, channels: usize) -> Self {
-        Self { layout, channels, is_complex: false, rate: None, promised: None }
+        Self { layout, channels, is_complex: false, rate: None, rate_error: 0.0, promised: None }
+    }
+
+    /// The same stream at a rate that its header had to round to whole hertz.
+    pub(super) fn at_whole_hertz(self, rate: u32) -> Self {
+        Self { rate: Some(f64::from(rate)), rate_error: 0.5, ..self }
+    }
+
+    /// The stated rate, if it is not `wanted`.
+    pub fn other_rate(&self, wanted: f64) -> Option<f64> {
+        self.rate.filter(|&rate| !is_same_rate(rate, wanted, self.rate_error))
     }
 
     /// Numbers per sample.
@@ -84,6 +105,18 @@ impl StreamHeader {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_headers_in_whole_hertz_may_be_half_a_hertz_off() {
+        let header = StreamHeader::real(SampleLayout::packed(PcmFormat::U8), 1);
+        let exact = |rate| StreamHeader { rate: Some(rate), ..header };
+        assert_eq!(header.other_rate(10.0), None);
+        assert_eq!(exact(10.4).other_rate(10.0), Some(10.4));
+        assert_eq!(exact(10.000_009).other_rate(10.0), None);
+        assert_eq!(exact(250e6 + 300.0).other_rate(250e6), Some(250_000_300.0));
+        assert_eq!(header.at_whole_hertz(10).other_rate(10.4), None);
+        assert_eq!(header.at_whole_hertz(10).other_rate(10.6), Some(10.0));
+    }
 
     #[test]
     fn complex_formats_have_the_names_of_their_parts() {

@@ -47,8 +47,7 @@ pub fn tar_files(archive: &mut (impl Read + Seek), file: &str) -> Result<Vec<Tar
             Err(error) if error.raw_os_error().is_some() => return Err(system(error)),
             Err(error) => format!("{error}; copy the archive again, or pack the recording with tar"),
         };
-        let problem = format!("byte {offset}: {problem}");
-        return Err(IoError::Malformed { file: file.to_owned(), kind: "a SigMF archive (tar)", problem });
+        return Err(IoError::malformed(file, "a SigMF archive (tar)")(format!("byte {offset}: {problem}")));
     }
     Ok(files)
 }

@@ -23,25 +23,11 @@ impl Timestamp {
     }
 }
 
-/// Frames that follow each other, or a break.
+/// `lost` frames were lost before frame `frame` of the input; none where only its number is given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Segment {
-    /// So many frames were lost.
-    Lost(u64),
-    /// So many follow each other; `u64::MAX` to the end.
-    Frames(u64),
-}
-
-impl Segment {
-    /// Frames that are in the input.
-    pub(super) fn frames(&self) -> u64 {
-        if let Self::Frames(frames) = *self { frames } else { 0 }
-    }
-
-    /// Frames that were lost.
-    pub(super) fn lost(&self) -> u64 {
-        if let Self::Lost(frames) = *self { frames } else { 0 }
-    }
+pub(super) struct Break {
+    pub(super) frame: u64,
+    pub(super) lost: u64,
 }
 
 /// Timestamps in their order; without any the frames follow each other from the first to the last.
@@ -99,23 +85,17 @@ impl Timestamps {
         index.saturating_sub(origin)
     }
 
-    /// Frames and breaks in their order, with time counted from `origin`, which is not later than
-    /// the beginning.
-    pub(super) fn segments(&self, origin: u64) -> Result<VecDeque<Segment>, String> {
-        let mut segments = VecDeque::new();
-        let first = Timestamp { frame: 0, index: origin };
-        let mut last = Timestamp { frame: 0, index: self.beginning().unwrap_or(origin) };
-        let mut add = |frames, lost| {
-            segments.extend((frames > 0).then_some(Segment::Frames(frames)));
-            segments.extend((lost > 0).then_some(Segment::Lost(lost)));
-        };
-        add(0, lost_between(first, last)?);
-        for &timestamp in &self.0 {
-            add(timestamp.frame - last.frame, lost_between(last, timestamp)?);
-            last = timestamp;
+    /// The breaks in their order, with time counted from `origin`, which is not later than the beginning.
+    pub(super) fn breaks(&self, origin: u64) -> Result<VecDeque<Break>, String> {
+        let beginning = Timestamp { frame: 0, index: self.beginning().unwrap_or(origin) };
+        let mut last = Timestamp { frame: 0, index: origin };
+        let mut breaks = VecDeque::new();
+        for next in std::iter::once(beginning).chain(self.0.iter().copied()) {
+            breaks.push_back(Break { frame: next.frame, lost: lost_between(last, next)? });
+            last = next;
         }
-        segments.push_back(Segment::Frames(u64::MAX));
-        Ok(segments)
+        breaks.retain(|b| b.frame > 0 || b.lost > 0);
+        Ok(breaks)
     }
 }
 
@@ -145,24 +125,23 @@ mod tests {
         Timestamps::new(pairs.iter().map(|&(frame, index)| Timestamp { frame, index }).collect())
     }
 
-    fn segments(pairs: &[(u64, u64)], origin: u64) -> Vec<Segment> {
-        timestamps(pairs).unwrap().segments(origin).unwrap().into()
+    /// Frames, and how many were lost before them.
+    fn breaks(pairs: &[(u64, u64)], origin: u64) -> Vec<(u64, u64)> {
+        let breaks = timestamps(pairs).unwrap().breaks(origin).unwrap();
+        breaks.into_iter().map(|Break { frame, lost }| (frame, lost)).collect()
     }
 
     #[test]
     fn breaks_lie_where_the_count_jumps() {
-        use Segment::{Frames, Lost};
-        let rest = Frames(u64::MAX);
-        assert_eq!(segments(&[], 7), [rest]);
-        assert_eq!(segments(&[(0, 100)], 100), [rest]);
-        assert_eq!(segments(&[(0, 100)], 98), [Lost(2), rest]);
+        assert_eq!(breaks(&[], 7), []);
+        assert_eq!(breaks(&[(0, 100)], 100), []);
+        assert_eq!(breaks(&[(0, 100)], 98), [(0, 2)]);
         // Two late, two lost after three, then up to 3000.
-        let want = [Lost(2), Frames(3), Lost(2), Frames(2), Lost(2893), rest];
-        assert_eq!(segments(&[(0, 100), (3, 105), (5, 3000)], 98), want);
+        assert_eq!(breaks(&[(0, 100), (3, 105), (5, 3000)], 98), [(0, 2), (3, 2), (5, 2893)]);
         // What stands before the first timestamp lies directly before it.
-        assert_eq!(segments(&[(4, 14), (6, 17)], 8), [Lost(2), Frames(4), Frames(2), Lost(1), rest]);
+        assert_eq!(breaks(&[(4, 14), (6, 17)], 8), [(0, 2), (4, 0), (6, 1)]);
         // Lost at the very beginning, said twice.
-        assert_eq!(segments(&[(0, 5), (0, 6)], 5), [Lost(1), rest]);
+        assert_eq!(breaks(&[(0, 5), (0, 6)], 5), [(0, 1)]);
         assert_eq!(timestamps(&[(4, 14)]).unwrap().beginning(), Some(10));
     }
 
@@ -193,6 +172,6 @@ mod tests {
             let fault = timestamps(pairs).unwrap_err();
             assert!(fault.contains(part), "{fault}");
         }
-        assert!(timestamps(&[(0, u64::MAX)]).unwrap().segments(0).unwrap_err().contains("mistake"));
+        assert!(timestamps(&[(0, u64::MAX)]).unwrap().breaks(0).unwrap_err().contains("mistake"));
     }
 }

@@ -86,6 +86,13 @@ fn the_samples_of_a_sigmf_recording_are_an_input_too() {
     assert_eq!(desk.read("samples.bin"), bytes(&frames(10)));
 }
 
+/// As the names of unfinished files have it.
+#[cfg(target_os = "linux")]
+fn host() -> String {
+    let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap();
+    name.trim().chars().take(16).map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn what_a_killed_run_left_is_named() {
@@ -104,7 +111,7 @@ fn what_a_killed_run_left_is_named() {
         let hidden = |process: u32| {
             let path = desk.path(output);
             let name = path.file_name().unwrap().to_str().unwrap();
-            path.with_file_name(format!(".{name}.{process}-0.part"))
+            path.with_file_name(format!(".{name}.{}-{process}-0.part", host()))
         };
         let (stale, alive) = (hidden((1 << 22) + 1), hidden(std::process::id()));
         [&stale, &alive].into_iter().for_each(|path| fs::write(path, "half").unwrap());

@@ -27,11 +27,7 @@ pub(super) fn refuse_existing(path: &Path, force: bool) -> Result<(), Failure> {
 /// Names the unfinished files that killed runs left beside `outputs`.
 pub(super) fn name_leftovers(outputs: &[&Path]) {
     for left in hybank::files::leftovers(outputs) {
-        failure::say(&format!(
-            "hybank-ibr: warning: {}: an unfinished output of process {}, which no longer runs; remove it\n",
-            left.path.display(),
-            left.process
-        ));
+        failure::say(&format!("hybank-ibr: warning: {left}\n"));
     }
 }
 

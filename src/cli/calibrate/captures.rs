@@ -73,12 +73,10 @@ fn check_channels(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
     )))
 }
 
-/// The captures have the slow rate of the spec, to the hertz; any for a spec in normalised time.
+/// The captures have the slow rate of the spec, as far as they state it; any for a spec in normalised time.
 fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
     let wanted = (spec.fast_period * spec.ratio as f64).rate().0;
-    let differs = |rate: f64| (rate - wanted).abs() > f64::max(0.5, 1e-9 * wanted);
-    let wrong =
-        reader.headers().find_map(|(name, header)| Some((name, header.rate.filter(|&rate| differs(rate))?)));
+    let wrong = reader.headers().find_map(|(name, header)| Some((name, header.other_rate(wanted)?)));
     match wrong {
         Some((name, rate)) if !spec.is_normalised() => Err(Failure::Input(format!(
             "{name}: the sample rate is {rate} Hz, but the spec says {wanted} Hz; record at that rate or correct the spec"

@@ -8,6 +8,7 @@ use super::bank_file::{is_dash, name, refuse_overlap, write_bytes};
 use super::capture_args::CaptureArgs;
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading};
 use super::picture_format::PictureFormat;
+use crate::io::is_same_rate;
 use crate::measure::{
     Comparison, MeasureError, Measurement, Settings, Window, compare, measure, measure_complex,
 };
@@ -241,7 +242,7 @@ impl Args {
     fn compared(&self, capture: &CaptureFile, path: &Path) -> Result<ReferenceReport, Failure> {
         let reference =
             CaptureFile::read(path, Reading::channel(None, MOST_MEASURED))?.trimmed(path, self.skip)?;
-        if (reference.rate.0 - capture.rate.0).abs() > 1e-9 * capture.rate.0 {
+        if !is_same_rate(reference.rate.0, capture.rate.0, 0.0) {
             return Err(Failure::Input(format!(
                 "{}: the sample rate is {}, but {} has {}; a comparison needs one rate, resample one of them",
                 name(path),

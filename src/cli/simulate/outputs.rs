@@ -1,6 +1,6 @@
 //! The files of a simulation and their rates.
 
-use crate::io::Container;
+use crate::io::{Container, is_same_rate};
 use crate::spec::Spec;
 use crate::units::Hertz;
 use std::path::{Path, PathBuf};
@@ -83,7 +83,7 @@ impl Rates {
                 u32::MAX
             ));
         }
-        let uneven = [slow, fast].into_iter().filter(|rate| (rate - rate.round()).abs() > 1e-6 * rate);
+        let uneven = [slow, fast].into_iter().filter(|rate| !is_same_rate(rate.round(), *rate, 0.0));
         let warning =
             |rate: f64| format!("WAV headers hold whole hertz: {rate} Hz is written as {} Hz", rate.round());
         let warnings = uneven.map(warning).collect();

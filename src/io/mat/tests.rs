@@ -1,9 +1,7 @@
 //! Files that SciPy wrote (`tools/mat_fixtures.py`), and what is wrong with others.
 
 use super::*;
-use crate::io::{PcmFormat, StreamHeader};
-use std::io::{Cursor, Read};
-use std::path::Path;
+use crate::io::StreamHeader;
 
 fn bytes(name: &str) -> Vec<u8> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/mat");
@@ -11,11 +9,11 @@ fn bytes(name: &str) -> Vec<u8> {
 }
 
 fn read(bytes: &[u8], wanted: Option<&str>) -> Result<(StreamHeader, Vec<f64>), String> {
-    let array =
-        MatArray::read(&mut Cursor::new(bytes), wanted, "x.mat").map_err(|error| error.to_string())?;
-    let header = array.stream_header();
+    let mut reader =
+        open_mat(&mut Cursor::new(bytes), wanted, "x.mat").map_err(|error| error.to_string())?;
+    let header = reader.header();
     let mut frames = Vec::new();
-    MatReader::new(array).read_to_end(&mut frames).unwrap();
+    reader.read_to_end(&mut frames).unwrap();
     assert_eq!(frames.len() as u64, header.frame_bytes() as u64 * header.promised.unwrap());
     let format = header.layout.format;
     Ok((header, frames.chunks_exact(format.bytes()).map(|number| format.decode(number)).collect()))

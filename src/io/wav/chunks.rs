@@ -141,7 +141,10 @@ impl<'a, R: Read> Chunks<'a, R> {
         if self.read_some(bytes)? == bytes.len() {
             return Ok(());
         }
-        Err(IoError::TruncatedHeader { file: self.file.to_owned(), offset: self.offset, place })
+        let offset = self.offset;
+        Err(self.malformed(format!(
+            "the header ends at byte {offset} inside {place}; the file is truncated, record or copy it again"
+        )))
     }
 
     fn read_some(&mut self, bytes: &mut [u8]) -> Result<usize, IoError> {
@@ -159,18 +162,18 @@ impl<'a, R: Read> Chunks<'a, R> {
     }
 
     /// An error about a field.
-    pub(super) fn bad(&self, field: &'static str, offset: u64, value: u64, rule: &'static str) -> IoError {
-        IoError::BadField { file: self.file.to_owned(), field, offset, value, rule }
+    pub(super) fn bad(&self, field: &str, offset: u64, value: u64, rule: &str) -> IoError {
+        self.malformed(format!("{field} at byte {offset} is {value}; {rule}"))
+    }
+
+    /// An error about the file.
+    pub(super) fn malformed(&self, problem: String) -> IoError {
+        IoError::malformed(self.file, "a WAV file")(problem)
     }
 
     /// Where the next byte is.
     pub(super) fn offset(&self) -> u64 {
         self.offset
-    }
-
-    /// Name of the file, for error messages.
-    pub(super) fn file(&self) -> &str {
-        self.file
     }
 
     /// The source, placed at the first sample.

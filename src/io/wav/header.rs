@@ -4,9 +4,9 @@ use super::chunks::{Chunk, Chunks, Family};
 use crate::io::{IoError, PcmFormat, SampleLayout};
 use std::io::Read;
 
-const TAG_PCM: u16 = 1;
-const TAG_FLOAT: u16 = 3;
-const TAG_EXTENSIBLE: u16 = 0xFFFE;
+pub(super) const TAG_PCM: u16 = 1;
+pub(super) const TAG_FLOAT: u16 = 3;
+pub(super) const TAG_EXTENSIBLE: u16 = 0xFFFE;
 
 /// Chunks that say something about the recording; others hold positions in its samples, or are unknown.
 const NOTES: [&[u8; 4]; 3] = [b"bext", b"iXML", b"LIST"];
@@ -98,7 +98,8 @@ impl WavHeader {
                 _ => chunks.skip(chunk, 0)?,
             }
         }
-        Err(IoError::NoData { file: chunks.file().to_owned(), offset: chunks.offset() })
+        let offset = chunks.offset();
+        Err(chunks.malformed(format!("no data chunk after {offset} bytes of header; it holds no samples")))
     }
 
     fn assemble<R: Read>(
@@ -237,11 +238,11 @@ impl Fmt {
             (TAG_FLOAT, 4) if self.bits == 32 => PcmFormat::F32Le,
             (TAG_FLOAT, 8) if self.bits == 64 => PcmFormat::F64Le,
             _ => {
-                return Err(IoError::Encoding {
-                    file: chunks.file().to_owned(),
-                    tag: self.tag,
-                    bits: self.bits,
-                });
+                let (tag, bits) = (self.tag, self.bits);
+                return Err(chunks.malformed(format!(
+                    "samples are coded as format tag {tag:#06x} with {bits} bits; convert to integer PCM or float \
+                     first (for example: sox IN.wav -e float OUT.wav)"
+                )));
             }
         };
         Ok(SampleLayout { format, container })

@@ -2,17 +2,19 @@
 
 use super::chunks::Chunks;
 use super::header::{WavChunk, WavHeader};
-use crate::io::{FrameReader, InputFault, IoError, PcmFormat, SampleLayout};
-use std::io::{self, Chain, Cursor, Read};
+use crate::io::capture::Capture;
+use crate::io::notes::InputNotes;
+use crate::io::{IoError, PcmFormat, SampleLayout, StreamHeader};
+use std::io::{self, Chain, Cursor, Read, Take};
 
 /// Number of samples used to distinguish 24 high bits of 32 from 24 low ones.
 const JUSTIFICATION_SAMPLES: usize = 16384;
 
-/// A WAV source, positioned after its header.
+/// A WAV source, positioned after its header; it reads as the bytes of its samples.
 #[derive(Debug)]
 pub struct WavReader<R> {
     header: WavHeader,
-    frames: FrameReader<Chain<Cursor<Vec<u8>>, R>>,
+    data: Take<Chain<Cursor<Vec<u8>>, R>>,
 }
 
 impl<R: Read> WavReader<R> {
@@ -28,30 +30,43 @@ impl<R: Read> WavReader<R> {
         if header.justification_open && lies_low(&peeked) {
             header.layout = SampleLayout { format: PcmFormat::S24Le, container: 4 };
         }
-        let frames =
-            FrameReader::new(Cursor::new(peeked).chain(inner), header.frame_bytes(), header.data_bytes);
-        Ok(Self { header, frames })
+        let data = Cursor::new(peeked).chain(inner).take(header.data_bytes.unwrap_or(u64::MAX));
+        Ok(Self { header, data })
     }
 
     /// The header.
     pub fn header(&self) -> &WavHeader {
         &self.header
     }
+}
 
-    /// The frames.
-    pub fn frames(&mut self) -> &mut FrameReader<impl Read + use<R>> {
-        &mut self.frames
+impl<R: Read> Read for WavReader<R> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.data.read(bytes)
+    }
+}
+
+impl<R: Read> Capture for WavReader<R> {
+    fn stream_header(&self) -> StreamHeader {
+        let WavHeader { layout, channels, rate, data_bytes, .. } = self.header;
+        let promised = data_bytes.map(|bytes| bytes / self.header.frame_bytes() as u64);
+        StreamHeader { promised, ..StreamHeader::real(layout, channels).at_whole_hertz(rate) }
     }
 
-    /// What is said of the recording after the samples, once they have all been read. What is damaged there
-    /// is left out: the samples matter.
-    pub fn chunks_after(&mut self) -> Vec<WavChunk> {
+    fn missing_bytes(&self) -> u64 {
+        self.header.data_bytes.map_or(0, |_| self.data.limit())
+    }
+
+    fn notes(&self) -> InputNotes {
+        InputNotes { chunks: self.header.chunks.clone(), ..InputNotes::default() }
+    }
+
+    /// What is damaged there is left out: the samples matter.
+    fn chunks_after(&mut self) -> Vec<WavChunk> {
         let mut chunks = Vec::new();
-        let is_whole = self.frames.ended() && self.frames.missing_bytes() == 0;
-        let Some(data_bytes) = self.header.data_bytes.filter(|_| is_whole && self.header.is_riff) else {
-            return chunks;
-        };
-        let inner = self.frames.inner_mut();
+        let is_whole = self.data.limit() == 0 && self.header.is_riff;
+        let Some(data_bytes) = self.header.data_bytes.filter(|_| is_whole) else { return chunks };
+        let inner = self.data.get_mut();
         let mut pad = data_bytes % 2;
         let mut head = [0; 8];
         while io::copy(&mut inner.take(pad), &mut io::sink()).is_ok() && inner.read_exact(&mut head).is_ok() {
@@ -69,15 +84,6 @@ impl<R: Read> WavReader<R> {
             }
         }
         chunks
-    }
-
-    /// The tolerated faults; complete when the frames have ended.
-    pub fn faults(&self) -> Vec<InputFault> {
-        let missing_bytes = self.frames.missing_bytes();
-        let bytes = self.frames.cut_bytes();
-        let truncated = (missing_bytes > 0).then_some(InputFault::Truncated { missing_bytes });
-        let cut = (bytes > 0).then_some(InputFault::CutFrame { bytes });
-        truncated.into_iter().chain(cut).collect()
     }
 }
 

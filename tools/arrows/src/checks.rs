@@ -9,7 +9,6 @@ use std::path::Path;
 /// at its top; the other crates are rooms themselves.
 const CRATES: [(&str, &str); 5] = [
     ("hybank", "src"),
-    ("hybank_audio", "audio/src"),
     ("hybank_linalg", "linalg/src"),
     ("hybank_runtime", "runtime/src"),
     ("hybank_ibr", "ibr/src"),

@@ -1,7 +1,5 @@
-//! Data elements: a tag with type and size, and bytes; some of them compressed.
+//! Data elements of MATLAB files: a tag with type and size, and bytes.
 
-use miniz_oxide::inflate::stream::{InflateState, inflate};
-use miniz_oxide::{DataFormat, MZError, MZFlush, MZStatus};
 use std::io::{self, Read};
 
 /// Most bytes of the numbers of an array, which are held in memory.
@@ -97,6 +95,7 @@ impl Tag {
 pub(super) fn unreadable(error: io::Error) -> String {
     match error.kind() {
         io::ErrorKind::UnexpectedEof => "it ends inside a variable; copy it again".into(),
+        io::ErrorKind::InvalidInput => "its compressed bytes are damaged; copy it again".into(),
         _ => format!("cannot read it: {error}"),
     }
 }
@@ -163,47 +162,5 @@ impl Numbers {
             12 => i64::from_le_bytes(order.little(bytes)?) as f64,
             _ => u64::from_le_bytes(order.little(bytes)?) as f64,
         })
-    }
-}
-
-/// Compressed bytes (zlib), read as what they stand for.
-pub(super) struct Inflater<R> {
-    compressed: R,
-    state: Box<InflateState>,
-    input: Vec<u8>,
-    used: usize,
-}
-
-impl<R: Read> Inflater<R> {
-    pub(super) fn new(compressed: R) -> Self {
-        Self { compressed, state: InflateState::new_boxed(DataFormat::Zlib), input: Vec::new(), used: 0 }
-    }
-
-    fn refill(&mut self) -> io::Result<()> {
-        self.input.resize(1 << 14, 0);
-        let filled = fill(&mut self.compressed, &mut self.input)?;
-        self.input.truncate(filled);
-        self.used = 0;
-        Ok(())
-    }
-}
-
-impl<R: Read> Read for Inflater<R> {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        loop {
-            if self.used == self.input.len() {
-                self.refill()?;
-            }
-            let step = inflate(&mut self.state, &self.input[self.used..], bytes, MZFlush::None);
-            self.used += step.bytes_consumed;
-            let is_stuck = step.bytes_consumed == 0;
-            match step.status {
-                _ if step.bytes_written > 0 || bytes.is_empty() => return Ok(step.bytes_written),
-                Ok(MZStatus::StreamEnd) => return Ok(0),
-                Ok(_) | Err(MZError::Buf) if !is_stuck => {}
-                Ok(_) | Err(MZError::Buf) => return Err(io::ErrorKind::UnexpectedEof.into()),
-                Err(_) => return Err(io::Error::other("its compressed bytes are damaged; copy it again")),
-            }
-        }
     }
 }

@@ -1,8 +1,8 @@
 #!/bin/sh
-# Makes the recordings in fixtures/ with Python, ffmpeg and sox: 3,000 frames at 24 kHz, 1 kHz in the left channel
-# and 1.7 kHz in the right one, amplitude 16000 of 32768.
+# Makes tests/fixtures/two.flac with Python and ffmpeg: 3,000 frames at 24 kHz, 1 kHz in the left channel and 1.7 kHz
+# in the right one, amplitude 16000 of 32768.
 set -e
-cd "$(dirname "$0")/fixtures"
+cd "$(dirname "$0")/../tests/fixtures"
 python3 - <<'PY'
 import math, struct, wave
 with wave.open("two.wav", "wb") as out:
@@ -12,7 +12,4 @@ with wave.open("two.wav", "wb") as out:
         out.writeframes(struct.pack("<2h", *pair))
 PY
 ffmpeg -v error -y -bitexact -i two.wav -c:a flac -frame_size 512 two.flac
-ffmpeg -v error -y -bitexact -i two.wav -c:a libmp3lame -b:a 96k two.mp3
-ffmpeg -v error -y -bitexact -i two.wav -c:a libvorbis -q:a 5 two.ogg
-sox two.wav two.aiff
 rm two.wav
