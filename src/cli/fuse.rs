@@ -18,9 +18,7 @@ use super::turns::TurnArgs;
 use super::watch::{UNWATCHED, Watch};
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
-use crate::io::{
-    BLOCK_BYTES, Container, MultiReader, OutputHeader, PcmFrames, Placement, ReadOptions,
-};
+use crate::io::{BLOCK_BYTES, Container, MultiReader, OutputHeader, PcmFrames, Placement, ReadOptions};
 use crate::overview::counted;
 use crate::pipeline::{Ending, FileOutputs, Pipeline, Settings, Warning, run as run_pipeline};
 use crate::quantity::readable;

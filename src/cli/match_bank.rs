@@ -80,7 +80,8 @@ mod tests {
             rate: Some(rate),
             ..StreamHeader::real(SampleLayout::packed(PcmFormat::F32Le), 1)
         };
-        let rate = |a: f64, b: f64| input_rate(&bank, [("a", &header(a)), ("b", &header(b))].into_iter()).ok();
+        let rate =
+            |a: f64, b: f64| input_rate(&bank, [("a", &header(a)), ("b", &header(b))].into_iter()).ok();
         assert_eq!(rate(10.0, 10.0), Some(Some(10.0)));
         for (a, b) in [(10.4, 10.4), (10.0, 10.4), (10.4, 10.0)] {
             assert_eq!(rate(a, b), None, "{a} {b}");

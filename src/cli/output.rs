@@ -50,11 +50,7 @@ pub(super) fn precision(format: PcmFormat) -> Precision {
 }
 
 /// Begins an output of samples, and says what its header cannot.
-pub(super) fn begin_samples(
-    path: &Path,
-    header: OutputHeader,
-    force: bool,
-) -> Result<SampleWriter, IoError> {
+pub(super) fn begin_samples(path: &Path, header: OutputHeader, force: bool) -> Result<SampleWriter, IoError> {
     let writer = SampleWriter::create(path, header, force)?;
     writer.warning().into_iter().for_each(warn);
     Ok(writer)

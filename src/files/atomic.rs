@@ -467,7 +467,6 @@ mod tests {
         assert!(unfinished(|files| !files.contains(&beside)));
     }
 
-
     fn file(folder: &Path, name: &str, replace: bool) -> AtomicFile {
         let mut file = AtomicFile::create(&folder.join(name), replace).unwrap();
         file.write_all(b"new").unwrap();

@@ -76,8 +76,11 @@ fn in_folder(folder: &Path, names: &BTreeSet<String>) -> Vec<Leftover> {
     let leftover = |name: String| {
         let (beginning, host, process) = writer(&name)?;
         let host = (host != *HOST).then(|| host.to_owned());
-        (names.contains(beginning) && (host.is_some() || !is_running(process)))
-            .then(|| Leftover { path: folder.join(&name), process, host })
+        (names.contains(beginning) && (host.is_some() || !is_running(process))).then(|| Leftover {
+            path: folder.join(&name),
+            process,
+            host,
+        })
     };
     names_in(folder).into_iter().filter_map(leftover).collect()
 }
@@ -124,7 +127,8 @@ mod tests {
             let want = beginning(Path::new(target)).unwrap();
             assert_eq!(writer(path.to_str().unwrap()), Some((want.as_str(), HOST.as_str(), 4321)));
         }
-        for name in [".out.wav.h-12.part", ".out.wav.h-12-0", "h-12-0.part", ".out.h-x-0.part", ".out.h-12-x.part"]
+        for name in
+            [".out.wav.h-12.part", ".out.wav.h-12-0", "h-12-0.part", ".out.h-x-0.part", ".out.h-12-x.part"]
         {
             assert_eq!(writer(name), None, "{name}");
         }

@@ -43,7 +43,9 @@ impl BitTrue {
     /// [`ExportError::Accumulator`] for taps whose sums of 32-bit samples may not fit 64 bits.
     pub fn new(bank: &Bank, words: WordSizes) -> Result<Self, ExportError> {
         let sizes = [("the accumulator", words.accumulator, 64), ("the outputs", words.output, 32)];
-        if let Some((word, bits, most)) = sizes.into_iter().find(|(_, bits, most)| !(2..=*most).contains(bits)) {
+        if let Some((word, bits, most)) =
+            sizes.into_iter().find(|(_, bits, most)| !(2..=*most).contains(bits))
+        {
             return Err(ExportError::Words { word, bits, most });
         }
         let integers = bank.fixed_point.as_ref().ok_or(ExportError::NoIntegers { format: "bit-true" })?;

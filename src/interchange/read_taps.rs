@@ -127,8 +127,7 @@ pub fn taps_of_npy(bytes: &[u8]) -> Result<Vec<Vec<f64>>, TapsError> {
     let count = shape.iter().try_fold(1, |product: usize, &size| product.checked_mul(size.try_into().ok()?));
     let values = count.and_then(|count| rest.get(..count.checked_mul(format.bytes())?));
     let values = values.ok_or_else(|| no_array("its shape has more entries than the file"))?;
-    let values: Vec<f64> =
-        values.chunks_exact(format.bytes()).map(|number| format.decode(number)).collect();
+    let values: Vec<f64> = values.chunks_exact(format.bytes()).map(|number| format.decode(number)).collect();
     if values.iter().any(|value| !value.is_finite()) {
         return Err(TapsError::Broken("a tap is not finite".to_owned()));
     }

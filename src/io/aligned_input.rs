@@ -307,10 +307,7 @@ mod tests {
     #[test]
     fn an_input_that_ends_early_leaves_later_timestamps_unreached() {
         let mut short = input(1, &[(9, 4)], &[]);
-        assert_eq!(
-            run(input(1, &[(3, 1)], &[]), 3, 2, 9),
-            [Some(0), Some(1), Some(2), None]
-        );
+        assert_eq!(run(input(1, &[(3, 1)], &[]), 3, 2, 9), [Some(0), Some(1), Some(2), None]);
         let _ = short.refill(Block { bytes: vec![0; 4], filled: 4 });
         short.end();
         short.prepare(2);

@@ -117,9 +117,10 @@ fn check_length(file: &mut impl Seek, wanted: u64) -> Result<(), String> {
     match file.seek(SeekFrom::End(0)) {
         Ok(length) if length >= wanted => Ok(()),
         Ok(length) => Err(format!("its shape needs {wanted} bytes, but there are {length}; copy it again")),
-        Err(_) => Err(
-            "its channels follow each other, which a pipe cannot give; save the transposed array".to_owned()
-        ),
+        Err(_) => {
+            Err("its channels follow each other, which a pipe cannot give; save the transposed array"
+                .to_owned())
+        }
     }
 }
 

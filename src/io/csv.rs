@@ -53,7 +53,8 @@ impl<R: Read> CsvReader<R> {
             return Err(table.fault("the only column is the time; give one more per channel"));
         }
         let header = StreamHeader::real(SampleLayout::packed(PcmFormat::F64Le), channels);
-        let mut reader = Self { table, is_timed, header, ahead: Vec::new(), given: 0, blocks: Blocks::default() };
+        let mut reader =
+            Self { table, is_timed, header, ahead: Vec::new(), given: 0, blocks: Blocks::default() };
         if !first.is_empty() {
             let numbers = reader.table.numbers(&first)?;
             reader.ahead.extend(&numbers[usize::from(is_timed)..]);

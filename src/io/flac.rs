@@ -42,7 +42,9 @@ impl FlacReader {
         let block = self.flac.blocks().read_next_or_eof(numbers);
         let Some(block) = block.map_err(|error| refused(&self.name, self.frames, error))? else {
             return match self.header.promised.filter(|promised| *promised > self.frames) {
-                Some(promised) => Err(damaged_after(&self.name, self.frames, format!("its header promises {promised}"))),
+                Some(promised) => {
+                    Err(damaged_after(&self.name, self.frames, format!("its header promises {promised}")))
+                }
                 None => Ok(()),
             };
         };
@@ -156,7 +158,9 @@ mod tests {
             }
             let answer = read(path.path(), &bytes);
             seen[usize::from(answer.is_err())] += 1;
-            assert!(answer.is_ok_and(|(header, samples)| samples.len() % header.channels == 0) || seen[1] > 0);
+            assert!(
+                answer.is_ok_and(|(header, samples)| samples.len() % header.channels == 0) || seen[1] > 0
+            );
         }
         assert!(seen[0] > 5 && seen[1] > 50, "{seen:?}");
     }

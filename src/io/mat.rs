@@ -66,9 +66,7 @@ fn header(file: &mut (impl Read + Seek)) -> Result<Order, String> {
         "save it in MATLAB with save(\"x.mat\", \"x\", \"-v7\") or in Python with scipy.io.savemat";
     let mut bytes = [0; HEADER];
     if file.seek(SeekFrom::Start(0)).is_err() {
-        return Err(
-            "its variables are in any order, which a pipe cannot give; save it to a file".to_owned()
-        );
+        return Err("its variables are in any order, which a pipe cannot give; save it to a file".to_owned());
     }
     let filled = fill(file, &mut bytes).map_err(|error| format!("cannot read its header: {error}"))?;
     if bytes.starts_with(b"\x89HDF") || bytes.starts_with(b"MATLAB 7.3") {

@@ -163,8 +163,7 @@ fn sigmf_text(file: &str, header: OutputHeader, mut notes: OutputNotes) -> Resul
     if !notes.captures.is_empty() {
         meta.captures = notes.captures;
     }
-    let fault =
-        |error: serde_json::Error| malformed(file, error.to_string());
+    let fault = |error: serde_json::Error| malformed(file, error.to_string());
     let annotations = notes.annotations.iter().map(serde_json::to_value).collect::<Result<_, _>>();
     meta.annotations = annotations.map_err(fault)?;
     Ok(serde_json::to_string_pretty(&meta).map_err(fault)? + "\n")

@@ -303,10 +303,7 @@ pub fn sigmf_files(path: &Path) -> [PathBuf; 2] {
 
 /// The metadata of the only recording in an archive called `file`, the name of it for messages, and where
 /// the samples are.
-fn archived(
-    archive: &mut (impl Read + Seek),
-    file: &str,
-) -> Result<(SigmfMeta, String, TarFile), IoError> {
+fn archived(archive: &mut (impl Read + Seek), file: &str) -> Result<(SigmfMeta, String, TarFile), IoError> {
     let files = tar_files(archive, file)?;
     let fault = |problem: String| malformed(file, problem);
     let metas: Vec<_> = files.iter().filter(|file| file.name.ends_with(".sigmf-meta")).collect();

@@ -9,8 +9,7 @@ fn bytes(name: &str) -> Vec<u8> {
 }
 
 fn read(bytes: &[u8], wanted: Option<&str>) -> Result<(StreamHeader, Vec<f64>), String> {
-    let mut reader =
-        open_mat(&mut Cursor::new(bytes), wanted, "x.mat").map_err(|error| error.to_string())?;
+    let mut reader = open_mat(&mut Cursor::new(bytes), wanted, "x.mat").map_err(|error| error.to_string())?;
     let header = reader.header();
     let mut frames = Vec::new();
     reader.read_to_end(&mut frames).unwrap();

@@ -1,9 +1,9 @@
 //! Headers as they are found in the wild, hound as the oracle for the tame ones.
 
 use super::*;
+use crate::io::capture::Capture;
 use crate::io::{InputFault, IoError, PcmFormat, SampleLayout};
 use proptest::prelude::*;
-use crate::io::capture::Capture;
 use std::io::{self, Cursor, Read, Seek, SeekFrom, Write};
 
 /// Header and samples as f64, as far as there are whole frames.
