@@ -39,8 +39,8 @@ pub enum TapsError {
     Empty,
 }
 
-/// `f_i[n]`, one list per channel, from a table: one column per channel and one row per tap at the fast rate,
-/// headings or not; or the table that [`export`](super::export) writes.
+/// `f_i[n]`, one list per channel, from a table: one column per channel and one row per tap at the fast
+/// rate, headings or not; or the table that [`export`](super::export) writes.
 ///
 /// # Errors
 /// [`TapsError`] with the line of the first cell that is wrong.

@@ -76,8 +76,8 @@ impl AlignedInput {
         self.dropouts.add(dropout)
     }
 
-    /// `lost` frames were left out before frame `frame` of the input. True if that frame has been used; then,
-    /// or if a known break lies later, they are lost after these, so that later frames are in time.
+    /// `lost` frames were left out before frame `frame` of the input. True if that frame has been used;
+    /// then, or if a known break lies later, they are lost after these, so that later frames are in time.
     pub(super) fn leave_out(&mut self, frame: u64, lost: u64) -> bool {
         if lost > 0 {
             let known = self.breaks.back().map_or(self.frames, |last| last.frame);

@@ -1,7 +1,7 @@
 //! Captures as FLAC recordings, decoded by claxon, which checks the sums of every frame.
 //!
-//! A recording is read to its end or refused: what cannot be decoded is an error and never an unreported gap.
-//! Integers have the full scale 1.0 and keep all their bits.
+//! A recording is read to its end or refused: what cannot be decoded is an error and never an unreported
+//! gap. Integers have the full scale 1.0 and keep all their bits.
 
 use super::capture::{Blocks, Capture};
 use super::{IoError, PcmFormat, SampleLayout, StreamHeader};

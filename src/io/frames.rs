@@ -20,8 +20,8 @@ impl<R: Read> FrameReader<R> {
         Self { inner, frame, carry: Vec::with_capacity(frame), ended: false }
     }
 
-    /// One read, which may give no whole frame. Puts whole frames into `bytes`, which holds one at least, and
-    /// gives how many bytes they have.
+    /// One read, which may give no whole frame. Puts whole frames into `bytes`, which holds one at least,
+    /// and gives how many bytes they have.
     fn read_some(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         let capacity = bytes.len() / self.frame * self.frame;
         let carried = self.carry.len();

@@ -116,8 +116,8 @@ impl MultiReader {
     /// Waits until every input has a frame.
     ///
     /// # Errors
-    /// The system's refusal to read one of them, [`IoError::ReaderDied`], or [`IoError::Unfit`] for a line of
-    /// [`ReadOptions::live_lost`] that is malformed or does not fit the inputs.
+    /// The system's refusal to read one of them, [`IoError::ReaderDied`], or [`IoError::Unfit`] for a line
+    /// of [`ReadOptions::live_lost`] that is malformed or does not fit the inputs.
     pub fn wait(&mut self) -> Result<Arrival, IoError> {
         for i in 0..self.inputs.len() {
             while self.inputs[i].aligned.waits() {
