@@ -7,7 +7,7 @@ use std::path::Path;
 
 /// The crates that ARCHITECTURE.md names, each with its folder. `hybank` is divided into rooms, the modules
 /// at its top; the other crates are rooms themselves.
-const CRATES: [(&str, &str); 5] = [
+const CRATES: [(&str, &str); 4] = [
     ("hybank", "src"),
     ("hybank_linalg", "linalg/src"),
     ("hybank_runtime", "runtime/src"),
