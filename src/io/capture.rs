@@ -1,16 +1,12 @@
-//! Inputs of every kind as one: a header, and the bytes of interleaved frames.
+//! What every kind of input is: a header, and the bytes of interleaved frames.
 
-use super::csv::CsvReader;
-use super::mat::{mat_variable, open_mat};
-use super::notes::InputNotes;
-use super::npy::open_npy;
-use super::pipe::{stdin_file, widen_pipe};
-use super::sigmf::{SigmfReader, is_sigmf};
-use super::wav::{WavChunk, WavReader};
-use super::{Coding, IoError, PcmFormat, SampleLayout, StreamHeader, Turns};
+use super::sigmf::SigmfMeta;
+use super::timestamps::Timestamps;
+use super::wav::WavChunk;
+use super::{IoError, StreamHeader};
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// An opened input, which reads as the bytes of its frames. Each kind of input implements it once.
 pub(super) trait Capture: Read {
@@ -33,168 +29,28 @@ pub(super) trait Capture: Read {
     }
 }
 
-/// A kind of input.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Sigmf,
-    /// A SigMF recording in an archive.
-    Archive,
-    Csv,
-    Npy,
-    Mat,
-    Flac,
-    /// Another recording that would have to be decoded.
-    Encoded,
-    Raw,
-    Wav,
+/// What an input says.
+#[derive(Debug, Clone, Default)]
+pub(super) struct InputNotes {
+    /// The metadata of a SigMF recording.
+    pub(super) sigmf: Option<Box<SigmfMeta>>,
+    /// When its frames were taken.
+    pub(super) timestamps: Timestamps,
+    /// Samples per frame of time-interleaved converters, or 1.
+    pub(super) turn: usize,
+    /// Chunks of a WAV file.
+    pub(super) chunks: Vec<WavChunk>,
 }
 
-impl Kind {
-    /// Of an input of this name, which is of this coding if its name says nothing.
-    fn of(path: &Path, coding: Coding) -> Self {
-        let extension = path.extension().and_then(|extension| extension.to_str());
-        match extension.map(str::to_ascii_lowercase).as_deref() {
-            _ if is_sigmf(path) => Self::Sigmf,
-            Some("sigmf") => Self::Archive,
-            Some("csv") => Self::Csv,
-            Some("npy") => Self::Npy,
-            Some("flac") if cfg!(feature = "flac") => Self::Flac,
-            Some("flac" | "mp3" | "aif" | "aiff" | "aifc" | "ogg" | "oga" | "opus" | "m4a") => Self::Encoded,
-            _ if mat_variable(path).is_some() => Self::Mat,
-            Some("wav" | "wave") => Self::Wav,
-            _ if coding == Coding::Wav => Self::Wav,
-            _ => Self::Raw,
-        }
-    }
-}
-
-/// True for inputs that state their own format and channels whatever the [`Coding`] is: names that end in
-/// `.wav`, SigMF recordings and archives, tables, arrays, and recordings that are decoded.
-pub fn is_self_describing(path: &Path) -> bool {
-    Kind::of(path, Coding::Raw(PcmFormat::U8)) != Kind::Raw
-}
-
-/// An input to open, with its settings.
-#[derive(Debug, Clone)]
-pub(super) struct InputSource {
-    pub(super) path: PathBuf,
-    pub(super) coding: Coding,
-    /// Number of channels if the input has no header and is not time-interleaved.
-    pub(super) channels: usize,
-    /// The converters whose samples are time-interleaved in the input, if they are.
-    pub(super) turns: Option<Turns>,
-    /// The only channel to read, from 0.
-    pub(super) only: Option<usize>,
-    /// Bytes of a block.
-    pub(super) block: usize,
-}
-
-impl InputSource {
-    /// Name in messages to the user.
-    pub(super) fn name(&self) -> String {
-        if self.is_stdin() { "standard input".into() } else { self.path.display().to_string() }
-    }
-
-    pub(super) fn is_stdin(&self) -> bool {
-        self.path.as_os_str() == "-"
-    }
-
-    /// Samples in a row that belong to one frame.
-    pub(super) fn turn(&self) -> usize {
-        self.turns.as_ref().map_or(1, Turns::converters)
-    }
-
-    /// Opens the input and reads its header; raw samples have none, and are opened when they are read.
-    ///
-    /// # Errors
-    /// [`IoError`]: the system's refusal, or what is wrong with the header.
-    pub(super) fn open(&self) -> Result<Box<dyn Capture>, IoError> {
-        let (path, name) = (self.path.as_path(), self.name());
-        Ok(match Kind::of(path, self.coding) {
-            Kind::Sigmf => Box::new(SigmfReader::open(path)?),
-            Kind::Archive => Box::new(SigmfReader::open_archive(path)?),
-            Kind::Csv => Box::new(CsvReader::new(self.stream()?, &name)?),
-            Kind::Npy => Box::new(open_npy(open_file(path)?, &name)?),
-            Kind::Mat => {
-                let (file, variable) = mat_variable(path).unwrap_or_else(|| (path.to_owned(), None));
-                Box::new(open_mat(&mut open_file(&file)?, variable, &file.display().to_string())?)
-            }
-            #[cfg(feature = "flac")]
-            Kind::Flac => Box::new(super::flac::FlacReader::open(open_file(path)?, &name)?),
-            #[cfg(not(feature = "flac"))]
-            Kind::Flac => return Err(encoded(path)),
-            Kind::Encoded => return Err(encoded(path)),
-            Kind::Raw => Box::new(RawReader { source: self.clone(), bytes: None }),
-            Kind::Wav => Box::new(WavReader::new(self.stream()?, &name)?),
-        })
-    }
-
-    /// Standard input or the file.
-    fn stream(&self) -> Result<Box<dyn Read>, IoError> {
-        if self.is_stdin() {
-            return Ok(Box::new(stdin_file().map_err(IoError::system(&self.name(), "open it"))?));
-        }
-        let file = open_file(&self.path)?;
-        widen_pipe(&file);
-        Ok(Box::new(file))
+impl InputNotes {
+    /// The same notes where `turn` samples of the input are a frame.
+    pub(super) fn in_turns(self, turn: usize) -> Result<Self, String> {
+        Ok(Self { timestamps: self.timestamps.in_turns(turn)?, turn, ..self })
     }
 }
 
 pub(super) fn open_file(path: &Path) -> Result<File, IoError> {
     File::open(path).map_err(IoError::system(&path.display().to_string(), "open it"))
-}
-
-/// Why a recording that must be decoded is not read.
-fn encoded(path: &Path) -> IoError {
-    // A name that does not exist is the more useful message.
-    if let Err(error) = open_file(path) {
-        return error;
-    }
-    let file = path.display().to_string();
-    let flac = if cfg!(feature = "flac") { "" } else { "FLAC with the feature flac, " };
-    let problem = format!(
-        "hybank does not decode it: lossy formats do not keep time to the picosecond; give PCM ({flac}WAV, or a \
-         pipe: ffmpeg -i {file} -f wav -c:a pcm_f32le - | hybank fuse BANK.json -)"
-    );
-    IoError::Unfit { file, problem }
-}
-
-/// Raw samples. They are opened by the first read, since a FIFO waits for its writer.
-struct RawReader {
-    source: InputSource,
-    bytes: Option<Box<dyn Read>>,
-}
-
-impl Capture for RawReader {
-    fn stream_header(&self) -> StreamHeader {
-        self.source.raw_header()
-    }
-}
-
-impl InputSource {
-    /// The header of raw samples: as the settings say.
-    pub(super) fn raw_header(&self) -> StreamHeader {
-        let layout = SampleLayout::packed(self.coding.format().unwrap_or(PcmFormat::F32Le));
-        let channels = if self.turns.is_some() { 1 } else { self.channels };
-        StreamHeader { is_complex: self.coding.is_complex(), ..StreamHeader::real(layout, channels) }
-    }
-}
-
-impl Read for RawReader {
-    /// A WAV header at the beginning is an error: raw samples look like one by chance in one of 2^64 cases.
-    /// It is looked for in the first bytes that come; a header in pieces is not found.
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        if let Some(opened) = &mut self.bytes {
-            return opened.read(bytes);
-        }
-        let opened = self.bytes.insert(self.source.stream()?);
-        let count = opened.read(bytes)?;
-        if matches!(bytes[..count], [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'A', b'V', b'E', ..]) {
-            let problem = "it begins with a WAV header, but raw samples are expected; give --format wav";
-            return Err(IoError::unfit(&self.source.name())(problem.into()).into());
-        }
-        Ok(count)
-    }
 }
 
 /// Bytes that are made a block at a time and read in pieces.
@@ -220,27 +76,5 @@ impl Blocks {
         let count = (&self.bytes[self.given..]).read(into)?;
         self.given += count;
         Ok(count)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_a_wav_header_at_the_beginning_of_raw_samples_is_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let read = |bytes: &[u8]| {
-            let path = folder.path().join("x");
-            std::fs::write(&path, bytes).unwrap();
-            let coding = Coding::Raw(PcmFormat::U8);
-            let source = InputSource { path, coding, channels: 1, turns: None, only: None, block: 4096 };
-            io::copy(&mut source.open().unwrap(), &mut io::sink())
-        };
-        let header = b"RIFF\x24\0\0\0WAVEfmt ";
-        let error = read(header).unwrap_err().to_string();
-        assert!(error.contains("x: it begins with a WAV header"), "{error}");
-        assert_eq!(read(&header[1..]).unwrap(), 15);
-        assert_eq!(read(&[&b"0123"[..], header].concat()).unwrap(), 20);
     }
 }

@@ -1,7 +1,9 @@
 //! Whole frames of an input as its consumer sees them: time-interleaved converters as channels, or only one
 //! channel. Counts what was tolerated.
 
-use super::capture::{Capture, InputSource};
+use super::capture::{Capture, InputNotes};
+use super::open::InputSource;
+use super::wav::WavChunk;
 use super::{InputFault, IoError, StreamHeader};
 use std::io::{self, Read};
 
@@ -38,6 +40,16 @@ impl<R: Read> FrameReader<R> {
         self.carry.extend_from_slice(&bytes[whole..carried + got]);
         Ok(whole)
     }
+}
+
+/// What the thread of an input sends.
+pub(super) enum Message {
+    /// The header, and what the input says besides its samples; always the first message.
+    Header { header: StreamHeader, notes: Box<InputNotes> },
+    /// Whole frames.
+    Frames { bytes: Vec<u8>, filled: usize },
+    /// The end, with the faults that were tolerated; always last.
+    End { faults: Vec<InputFault>, chunks: Vec<WavChunk> },
 }
 
 /// The frames of an opened input.

@@ -1,13 +1,12 @@
 //! One input of several: its thread, its frames in the order of time, and what was tolerated.
 
 use super::aligned_input::{AlignedInput, Block};
-use super::capture::InputSource;
-use super::frames::InputFrames;
+use super::capture::InputNotes;
+use super::frames::{InputFrames, Message};
 use super::lost::{Dropout, Entry, LostInInput};
-use super::notes::InputNotes;
+use super::open::InputSource;
 use super::stall::Wait;
 use super::timestamps::{Timestamp, lost_between};
-use super::wav::WavChunk;
 #[cfg(target_os = "linux")]
 use super::{Coding, stdin_reader::StdinReader};
 use super::{InputFault, IoError, StreamHeader};
@@ -16,16 +15,6 @@ use std::thread;
 
 /// Number of blocks in the pool of each input.
 pub(super) const BLOCKS: usize = 4;
-
-/// What the thread of an input sends.
-pub(super) enum Message {
-    /// The header, and what the input says besides its samples; always the first message.
-    Header { header: StreamHeader, notes: Box<InputNotes> },
-    /// Whole frames.
-    Frames { bytes: Vec<u8>, filled: usize },
-    /// The end, with the faults that were tolerated; always last.
-    End { faults: Vec<InputFault>, chunks: Vec<WavChunk> },
-}
 
 /// Sends all messages of an input until its end, or until the receiver is gone. Blocks to fill come from
 /// `pool`.

@@ -22,10 +22,12 @@ mod mat_element;
 mod multi_reader;
 mod notes;
 mod npy;
+mod open;
 mod pipe;
 mod read_options;
 mod sample_writer;
 mod sigmf;
+mod sigmf_reader;
 mod stall;
 #[cfg(target_os = "linux")]
 mod stdin_reader;
@@ -38,7 +40,6 @@ pub mod wav;
 
 pub use crate::runtime::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
 pub use array::{ArrayHeader, ArrayReader};
-pub use capture::is_self_describing;
 pub use csv::CsvReader;
 pub use error::IoError;
 pub use fault::{InputFault, InputWarning};
@@ -48,6 +49,7 @@ pub use mat::{mat_variable, open_mat};
 pub use multi_reader::{Arrival, MultiReader};
 pub use notes::{OutputNotes, Placement};
 pub use npy::npy_header;
+pub use open::is_self_describing;
 pub use pipe::{Stdout, Watched, is_output_stalled, is_pipe, stderr, stdout};
 pub use read_options::{BLOCK_BYTES, ReadOptions, Until};
 pub use sample_writer::{Container, OutputHeader, SampleWriter};

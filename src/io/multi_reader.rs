@@ -5,11 +5,11 @@
 //! consumer. If the consumer is slow, reading stops, and so do the writers of the pipes.
 
 use super::aligned_input::AlignedInput;
-use super::capture::InputSource;
 use super::input::{BLOCKS, Input, too_many_lost};
 use super::live_lost::{LiveLines, LiveLost};
 use super::lost::{Entry, LostInInput, LostLine, LostSamples};
 use super::notes::{OutputNotes, Placement};
+use super::open::InputSource;
 use super::pipe::refuse_shared_pipes;
 use super::stall::Wait;
 use super::{InputWarning, IoError, PcmFrames, ReadOptions, StallWatch, StreamHeader, Until};

@@ -4,8 +4,8 @@
 //! the latency that is not dropped. Positions in the inputs are carried over by this rule, with lost frames
 //! counted.
 
-use super::sigmf::{SigmfAnnotation, SigmfCapture, SigmfMeta};
-use super::timestamps::Timestamps;
+use super::capture::InputNotes;
+use super::sigmf::{SigmfAnnotation, SigmfCapture};
 use super::wav::WavChunk;
 use serde_json::{Map, Value, json};
 
@@ -27,26 +27,6 @@ fn moved(chunk: &WavChunk, placement: Placement) -> WavChunk {
         chunk.bytes[TIME_REFERENCE].copy_from_slice(&samples.to_le_bytes());
     }
     chunk
-}
-
-/// What an input says.
-#[derive(Debug, Clone, Default)]
-pub(super) struct InputNotes {
-    /// The metadata of a SigMF recording.
-    pub(super) sigmf: Option<Box<SigmfMeta>>,
-    /// When its frames were taken.
-    pub(super) timestamps: Timestamps,
-    /// Samples per frame of time-interleaved converters, or 1.
-    pub(super) turn: usize,
-    /// Chunks of a WAV file.
-    pub(super) chunks: Vec<WavChunk>,
-}
-
-impl InputNotes {
-    /// The same notes where `turn` samples of the input are a frame.
-    pub(super) fn in_turns(self, turn: usize) -> Result<Self, String> {
-        Ok(Self { timestamps: self.timestamps.in_turns(turn)?, turn, ..self })
-    }
 }
 
 /// Where the frames of the inputs are in the output.

@@ -3,23 +3,18 @@
 //! Real or complex samples, one or several interleaved channels. If `core:global_index` increases by more
 //! than `core:sample_start` between captures, samples were lost.
 
-use super::capture::{Capture, open_file};
-use super::notes::InputNotes;
-use super::tar::{TarFile, tar_files};
 use super::timestamps::{Timestamp, Timestamps};
 use super::{IoError, PcmFormat, SampleLayout, StreamHeader};
 use crate::files::{Bound, read_text};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom, Take};
 use std::path::{Component, Path, PathBuf};
 
 /// Maximum number of interleaved channels, the same as in a WAV header.
 const MOST_CHANNELS: usize = 65_535;
 
 /// Maximum size of a metadata file.
-const META_FILE: Bound = Bound {
+pub(super) const META_FILE: Bound = Bound {
     bytes: 64 << 20,
     kind: "a SigMF metadata file",
     remedy: "give the file that was meant, or remove annotations from it",
@@ -209,64 +204,6 @@ pub(super) fn malformed(file: &str, problem: String) -> IoError {
     IoError::malformed(file, "a SigMF recording")(problem)
 }
 
-/// A recording, which reads as its samples.
-pub(super) struct SigmfReader<R> {
-    meta: Box<SigmfMeta>,
-    header: StreamHeader,
-    timestamps: Timestamps,
-    samples: R,
-}
-
-impl SigmfReader<File> {
-    /// Opens the recording that the name of either of its files means.
-    pub(super) fn open(path: &Path) -> Result<Self, IoError> {
-        let (meta_path, _) = file_pair(path, None);
-        let meta = SigmfMeta::read(&meta_path)?;
-        let (_, data_path) = file_pair(path, Some(&meta));
-        let file = open_file(&data_path)?;
-        let bytes = file.metadata().ok().filter(|data| data.is_file()).map(|data| data.len());
-        Self::new(meta, &meta_path.display().to_string(), file, bytes)
-    }
-}
-
-impl SigmfReader<Take<File>> {
-    /// Opens the only recording of an archive.
-    pub(super) fn open_archive(path: &Path) -> Result<Self, IoError> {
-        let (mut archive, file) = (open_file(path)?, path.display().to_string());
-        let (meta, name, data) = archived(&mut archive, &file)?;
-        let sought = archive.seek(SeekFrom::Start(data.offset));
-        sought.map_err(IoError::system(&file, "read the samples"))?;
-        Self::new(meta, &name, archive.take(data.size), Some(data.size))
-    }
-}
-
-impl<R> SigmfReader<R> {
-    /// Of `samples`, of `bytes` bytes if that is known, with their metadata, called `name`.
-    fn new(meta: SigmfMeta, name: &str, samples: R, bytes: Option<u64>) -> Result<Self, IoError> {
-        let header = meta.stream_header(name)?;
-        let promised = bytes.map(|bytes| bytes / header.frame_bytes() as u64);
-        let (header, timestamps) = (StreamHeader { promised, ..header }, meta.timestamps(name)?);
-        Ok(Self { meta: Box::new(meta), header, timestamps, samples })
-    }
-}
-
-impl<R: Read> Read for SigmfReader<R> {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        self.samples.read(bytes)
-    }
-}
-
-impl<R: Read> Capture for SigmfReader<R> {
-    fn stream_header(&self) -> StreamHeader {
-        self.header
-    }
-
-    fn notes(&self) -> InputNotes {
-        let (sigmf, timestamps) = (Some(self.meta.clone()), self.timestamps.clone());
-        InputNotes { sigmf, timestamps, ..InputNotes::default() }
-    }
-}
-
 /// The data type's name without its leading r.
 fn datatype(format: PcmFormat) -> String {
     let name = format.name();
@@ -284,7 +221,7 @@ fn is_file_name(name: &str) -> bool {
 }
 
 /// The two files of a recording, given either of them.
-fn file_pair(path: &Path, meta: Option<&SigmfMeta>) -> (PathBuf, PathBuf) {
+pub(super) fn file_pair(path: &Path, meta: Option<&SigmfMeta>) -> (PathBuf, PathBuf) {
     let data = match meta.and_then(|meta| meta.global.dataset.as_ref()) {
         Some(name) => path.with_file_name(name),
         None => path.with_extension("sigmf-data"),
@@ -299,32 +236,6 @@ pub fn sigmf_files(path: &Path) -> [PathBuf; 2] {
     // What a pipe holds can be read only once.
     let meta = meta.is_file().then(|| SigmfMeta::read(&meta).ok()).flatten();
     file_pair(path, meta.as_ref()).into()
-}
-
-/// The metadata of the only recording in an archive called `file`, the name of it for messages, and where
-/// the samples are.
-fn archived(archive: &mut (impl Read + Seek), file: &str) -> Result<(SigmfMeta, String, TarFile), IoError> {
-    let files = tar_files(archive, file)?;
-    let fault = |problem: String| malformed(file, problem);
-    let metas: Vec<_> = files.iter().filter(|file| file.name.ends_with(".sigmf-meta")).collect();
-    let [meta] = metas[..] else {
-        let count = metas.len();
-        return Err(fault(format!("it holds {count} recordings; extract the one that is meant (tar -xf)")));
-    };
-    let name = format!("{file} ({})", meta.name);
-    if meta.size > META_FILE.bytes {
-        let TarFile { size, .. } = meta;
-        return Err(fault(format!("{} has {size} bytes, more than {}", meta.name, META_FILE.bytes)));
-    }
-    let mut text = vec![0; meta.size as usize];
-    let sought = archive.seek(SeekFrom::Start(meta.offset));
-    sought.and_then(|_| archive.read_exact(&mut text)).map_err(IoError::system(file, "read it"))?;
-    let text = String::from_utf8(text).map_err(|_| fault(format!("{} is not UTF-8", meta.name)))?;
-    let parsed = SigmfMeta::parse(&text, &name)?;
-    let (_, data) = file_pair(Path::new(&meta.name), Some(&parsed));
-    let found = files.iter().find(|file| Path::new(&file.name) == data);
-    let found = found.ok_or_else(|| fault(format!("{} is not in it; pack both files", data.display())))?;
-    Ok((parsed, name, found.clone()))
 }
 
 /// True for the names of SigMF's two files.

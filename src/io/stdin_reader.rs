@@ -5,9 +5,8 @@
 //! a timeout.
 
 use super::IoError;
-use super::capture::InputSource;
-use super::frames::InputFrames;
-use super::input::Message;
+use super::frames::{InputFrames, Message};
+use super::open::InputSource;
 use super::stall::Wait;
 use crossbeam_channel::{Receiver, TryRecvError};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};

@@ -1,6 +1,6 @@
 //! Readers that die, converters in turn, and bounds of what may be lost.
 
-use super::super::input::Message;
+use super::super::frames::Message;
 use super::*;
 use crate::io::{Coding, InputFault, PcmFormat, Turns};
 use crossbeam_channel::Sender;

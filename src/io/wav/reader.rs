@@ -2,8 +2,7 @@
 
 use super::chunks::Chunks;
 use super::header::{WavChunk, WavHeader};
-use crate::io::capture::Capture;
-use crate::io::notes::InputNotes;
+use crate::io::capture::{Capture, InputNotes};
 use crate::io::{IoError, PcmFormat, SampleLayout, StreamHeader};
 use std::io::{self, Chain, Cursor, Read, Take};
 

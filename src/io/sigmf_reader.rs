@@ -1,0 +1,89 @@
+//! The samples of SigMF recordings, in two files or in an archive.
+
+use super::capture::{Capture, InputNotes, open_file};
+use super::sigmf::{META_FILE, SigmfMeta, file_pair, malformed};
+use super::tar::{TarFile, tar_files};
+use super::timestamps::Timestamps;
+use super::{IoError, StreamHeader};
+use crate::files::{bytes_of, text_in};
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom, Take};
+use std::path::Path;
+
+/// A recording, which reads as its samples.
+pub(super) struct SigmfReader<R> {
+    meta: Box<SigmfMeta>,
+    header: StreamHeader,
+    timestamps: Timestamps,
+    samples: R,
+}
+
+impl SigmfReader<File> {
+    /// Opens the recording that the name of either of its files means.
+    pub(super) fn open(path: &Path) -> Result<Self, IoError> {
+        let (meta_path, _) = file_pair(path, None);
+        let meta = SigmfMeta::read(&meta_path)?;
+        let (_, data_path) = file_pair(path, Some(&meta));
+        let file = open_file(&data_path)?;
+        let bytes = file.metadata().ok().filter(|data| data.is_file()).map(|data| data.len());
+        Self::new(meta, &meta_path.display().to_string(), file, bytes)
+    }
+}
+
+impl SigmfReader<Take<File>> {
+    /// Opens the only recording of an archive.
+    pub(super) fn open_archive(path: &Path) -> Result<Self, IoError> {
+        let (mut archive, file) = (open_file(path)?, path.display().to_string());
+        let (meta, name, data) = archived(&mut archive, &file)?;
+        let sought = archive.seek(SeekFrom::Start(data.offset));
+        sought.map_err(IoError::system(&file, "read the samples"))?;
+        Self::new(meta, &name, archive.take(data.size), Some(data.size))
+    }
+}
+
+impl<R> SigmfReader<R> {
+    /// Of `samples`, of `bytes` bytes if that is known, with their metadata, called `name`.
+    fn new(meta: SigmfMeta, name: &str, samples: R, bytes: Option<u64>) -> Result<Self, IoError> {
+        let header = meta.stream_header(name)?;
+        let promised = bytes.map(|bytes| bytes / header.frame_bytes() as u64);
+        let (header, timestamps) = (StreamHeader { promised, ..header }, meta.timestamps(name)?);
+        Ok(Self { meta: Box::new(meta), header, timestamps, samples })
+    }
+}
+
+impl<R: Read> Read for SigmfReader<R> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.samples.read(bytes)
+    }
+}
+
+impl<R: Read> Capture for SigmfReader<R> {
+    fn stream_header(&self) -> StreamHeader {
+        self.header
+    }
+
+    fn notes(&self) -> InputNotes {
+        let (sigmf, timestamps) = (Some(self.meta.clone()), self.timestamps.clone());
+        InputNotes { sigmf, timestamps, ..InputNotes::default() }
+    }
+}
+
+/// The metadata of the only recording in an archive called `file`, the name of it for messages, and where
+/// the samples are.
+fn archived(archive: &mut (impl Read + Seek), file: &str) -> Result<(SigmfMeta, String, TarFile), IoError> {
+    let files = tar_files(archive, file)?;
+    let fault = |problem: String| malformed(file, problem);
+    let metas: Vec<_> = files.iter().filter(|file| file.name.ends_with(".sigmf-meta")).collect();
+    let [meta] = metas[..] else {
+        let count = metas.len();
+        return Err(fault(format!("it holds {count} recordings; extract the one that is meant (tar -xf)")));
+    };
+    let name = format!("{file} ({})", meta.name);
+    archive.seek(SeekFrom::Start(meta.offset)).map_err(IoError::system(file, "read it"))?;
+    let text = text_in(bytes_of(archive.take(meta.size), &name, META_FILE)?, &name)?;
+    let parsed = SigmfMeta::parse(&text, &name)?;
+    let (_, data) = file_pair(Path::new(&meta.name), Some(&parsed));
+    let found = files.iter().find(|file| Path::new(&file.name) == data);
+    let found = found.ok_or_else(|| fault(format!("{} is not in it; pack both files", data.display())))?;
+    Ok((parsed, name, found.clone()))
+}
