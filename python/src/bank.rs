@@ -7,7 +7,7 @@ use crate::fuse::{self, Request};
 use crate::results::{Figures, Gamma};
 use crate::sources;
 use crate::stream::Stream;
-use hybank::bank::{self, BlockFilter, SynthesisFilters};
+use hybank::bank::{self, StateSpace, SynthesisFilters};
 use hybank::design;
 use hybank::files::AtomicFile;
 use hybank::interchange::{Format as Exported, export};
@@ -165,7 +165,7 @@ impl Bank {
     /// The matrices (a, b, c, d) of the bank per slow period: N inputs, M outputs.
     #[getter]
     fn ss<'py>(&self, py: Python<'py>) -> PyResult<Matrices<'py>> {
-        let BlockFilter { a, b, c, d } = self.block()?;
+        let StateSpace { a, b, c, d } = self.block()?;
         let (states, channels) = (a.len(), self.bank.channel_count());
         Ok((
             matrix(py, a, states)?,
@@ -280,7 +280,7 @@ impl Bank {
 
 impl Bank {
     /// The bank as a state space, if it is not too large for dense matrices.
-    fn block(&self) -> PyResult<BlockFilter> {
+    fn block(&self) -> PyResult<StateSpace> {
         let SynthesisFilters::Fir(taps) = &self.bank.filters else {
             let filters = design::filters::lifted(&self.bank.filters, self.bank.ratio).map_err(refused)?;
             return Ok(design::filters::to_block(&filters));

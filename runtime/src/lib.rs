@@ -54,11 +54,9 @@ mod history;
 mod parallel;
 mod pcm;
 mod plan;
-mod precision;
 mod sample;
 mod simd;
 mod state;
-mod state_space;
 mod stream;
 #[cfg(test)]
 mod tests;
@@ -69,15 +67,13 @@ pub use adapters::{Frames, Input, Interleaved, Output, PcmOutput, Planar, SplitO
 pub use algorithms::choice::{Algorithm, ParseAlgorithmError};
 pub use error::{BuildError, ProcessError, StateError, SwapError};
 pub use pcm::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
-pub use plan::{Options, Plan, PlanSummary};
-pub use precision::Precision;
+pub use plan::{Options, Plan, PlanSummary, Precision, StateSpace};
 pub use sample::Sample;
 pub use simd::Isa;
 #[doc(hidden)]
 pub use simd::multiply_add_chains;
 #[doc(hidden)]
 pub use state::STATE_COUNTS;
-pub use state_space::StateSpace;
 pub use stream::Stream;
 #[cfg(feature = "rayon")]
 pub use thread_pool::ThreadPool;

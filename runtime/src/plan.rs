@@ -5,8 +5,43 @@ use crate::algorithms::choice::{ChosenAlgorithm, check_recursive};
 use crate::algorithms::{Direct, Facts, OverlapSave, Recursive};
 use crate::engine::{Engine, Fir, Running};
 use crate::state::Digest;
-use crate::{Algorithm, BuildError, Isa, Precision, Sample, StateSpace};
+use crate::{Algorithm, BuildError, Isa, Sample};
 use std::sync::Arc;
+
+/// A filter in state space, one step per frame: x+ = a x + b u, y = c x + d u; u the N samples of a frame, y
+/// its M output samples. Row-major lists of rows.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct StateSpace {
+    /// n x n.
+    pub a: Vec<Vec<f64>>,
+    /// n x N.
+    pub b: Vec<Vec<f64>>,
+    /// M x n.
+    pub c: Vec<Vec<f64>>,
+    /// M x N.
+    pub d: Vec<Vec<f64>>,
+}
+
+/// Number type of the kernels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Precision {
+    /// Coefficients and sums in f32: error about 1e-7 of full scale.
+    #[default]
+    Single,
+    /// Coefficients and sums in f64, at half the speed.
+    Double,
+}
+
+impl Precision {
+    /// Bytes of a number.
+    pub(crate) fn bytes(self) -> f64 {
+        match self {
+            Self::Single => 4.0,
+            Self::Double => 8.0,
+        }
+    }
+}
 
 /// How a bank is made ready to run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,6 +63,7 @@ impl Default for Options {
 
 /// How a bank runs, for reports.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PlanSummary {
     /// `direct` or `overlap-save` (FIR), `parallel-form` (delay lines and second-order sections
     /// side by side) or `dense` (delay lines and any other states).
@@ -37,13 +73,16 @@ pub struct PlanSummary {
     /// Instruction set of the kernels.
     pub isa: String,
     /// F, frames of a transform, if the algorithm has one.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub transform: Option<usize>,
     /// B, frames of a block, of which a transform makes the outputs.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub block: Option<usize>,
     /// Output samples by which the algorithm is later than the bank's own latency.
     pub extra_latency: usize,
     /// Multiply-adds for each output sample; additions of transforms count as such. `None`
     /// for recursions.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub multiply_adds: Option<f64>,
 }
 

@@ -6,8 +6,8 @@ use crate::spec::{
 use crate::units::Seconds;
 
 use super::{
-    Bank, BankError, BankProblem, BlockFilter, CausalWitness, Certificate, DualWitness, FixedPoint, Gamma,
-    LowerProof, SynthesisFilters, TapSlopes,
+    Bank, BankError, BankProblem, CausalWitness, Certificate, DualWitness, FixedPoint, Gamma, LowerProof,
+    StateSpace, SynthesisFilters, TapSlopes,
 };
 
 /// Largest m0 in a bank file. `fuse` appends as many zeros to a recording; 16 million are 3 minutes at 96
@@ -280,7 +280,7 @@ fn check_finite(path: &str, values: &[f64]) -> Checked {
     }
 }
 
-fn check_block(block: &BlockFilter, ratio: usize, channels: usize) -> Checked {
+fn check_block(block: &StateSpace, ratio: usize, channels: usize) -> Checked {
     let n = block.a.len();
     check_matrix("state_space.a", &block.a, n, n, "a is n x n, n the number of states")?;
     check_matrix("state_space.b", &block.b, n, channels, "b is n x N, N the number of channels")?;

@@ -24,6 +24,8 @@ pub use proof::{CausalWitness, Certificate, DualWitness, LowerProof, Proof};
 pub use read::check_digest;
 pub use tap_slopes::TapSlopes;
 
+pub use crate::runtime::StateSpace;
+
 use crate::spec::{Method, Spec};
 use crate::units::{FastPeriods, Seconds};
 
@@ -71,22 +73,7 @@ pub enum SynthesisFilters {
     /// `taps[i][n]` = `f_i[n]` at the fast rate.
     Fir(Vec<Vec<f64>>),
     /// One block per slow period.
-    StateSpace(BlockFilter),
-}
-
-/// x+ = a x + b u, y = c x + d u; u the N slow samples of a period, y its M fast samples.
-/// Row-major lists of rows.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct BlockFilter {
-    /// n x n.
-    pub a: Vec<Vec<f64>>,
-    /// n x N.
-    pub b: Vec<Vec<f64>>,
-    /// M x n.
-    pub c: Vec<Vec<f64>>,
-    /// M x N.
-    pub d: Vec<Vec<f64>>,
+    StateSpace(StateSpace),
 }
 
 /// gamma = ||K|| in normalised time (h = 1), and its bounds; `None` if unknown.

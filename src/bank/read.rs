@@ -8,8 +8,8 @@ use crate::units::Seconds;
 
 use super::digest::{digest, is_digest};
 use super::{
-    Bank, BankError, BankProblem, BlockFilter, CausalWitness, Certificate, DualWitness, FORMAT, FixedPoint,
-    Gamma, LowerProof, Proof, SynthesisFilters, TapSlopes, VERSION,
+    Bank, BankError, BankProblem, CausalWitness, Certificate, DualWitness, FORMAT, FixedPoint, Gamma,
+    LowerProof, Proof, StateSpace, SynthesisFilters, TapSlopes, VERSION,
 };
 
 const KEYS: [&str; 14] = [
@@ -144,7 +144,7 @@ fn filters(top: &Fields<'_>, channels: &[Fields<'_>]) -> Result<SynthesisFilters
     }
     let fields = block.fields(&["a", "b", "c", "d"])?;
     let matrix = |key| fields.required(key, "a block filter has the four matrices a, b, c and d")?.matrix();
-    Ok(SynthesisFilters::StateSpace(BlockFilter {
+    Ok(SynthesisFilters::StateSpace(StateSpace {
         a: matrix("a")?,
         b: matrix("b")?,
         c: matrix("c")?,

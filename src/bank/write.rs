@@ -11,7 +11,7 @@ use crate::units::Seconds;
 use super::digest::digest;
 use super::read::parse;
 use super::{
-    Bank, BankError, BankProblem, BlockFilter, FORMAT, FixedPoint, Gamma, Proof, SynthesisFilters, VERSION,
+    Bank, BankError, BankProblem, FORMAT, FixedPoint, Gamma, Proof, StateSpace, SynthesisFilters, VERSION,
 };
 
 /// The file, key by key.
@@ -25,7 +25,7 @@ struct Document<'a> {
     latency: usize,
     method: Method,
     channels: Vec<Channel<'a>>,
-    state_space: Option<&'a BlockFilter>,
+    state_space: Option<&'a StateSpace>,
     #[serde(skip_serializing_if = "Option::is_none")]
     fixed_point: Option<&'a FixedPoint>,
     gamma: Gamma,

@@ -54,33 +54,11 @@ impl ThreadArgs {
     }
 }
 
-/// How the bank ran.
-#[derive(Debug, serde::Serialize)]
-struct PlanReport {
-    algorithm: &'static str,
-    numbers: &'static str,
-    isa: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    transform: Option<usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    block: Option<usize>,
-    extra_latency: usize,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    multiply_adds: Option<f64>,
-}
-
-impl From<PlanSummary> for PlanReport {
-    fn from(plan: PlanSummary) -> Self {
-        let PlanSummary { algorithm, numbers, isa, transform, block, extra_latency, multiply_adds } = plan;
-        Self { algorithm, numbers, isa, transform, block, extra_latency, multiply_adds }
-    }
-}
-
 /// What every command that fuses reports.
 #[derive(Debug, serde::Serialize)]
 pub(super) struct RunReport {
     /// How the bank ran.
-    plan: PlanReport,
+    plan: PlanSummary,
     channels: usize,
     ratio: usize,
     /// Output samples written.
@@ -110,7 +88,6 @@ impl RunReport {
         };
         let warnings = tolerated.into_iter().chain(outcome.warnings()).map(text).collect();
         let Outcome { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps } = outcome;
-        let plan = plan.into();
         Self { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps, warnings, reported: 0 }
     }
 

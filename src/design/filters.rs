@@ -1,7 +1,7 @@
 //! The synthesis filters as the matrix F(z) of their polyphase components, `f_i[p + j M] = F_j[p, i]`.
 
 use super::DesignError;
-use crate::bank::{Bank, BlockFilter, SynthesisFilters};
+use crate::bank::{self, Bank, SynthesisFilters};
 use crate::linalg::{CMat, Complex, Mat};
 use crate::lti::peak::{resonances, stable_poles};
 use crate::lti::{FrequencyResponse, StateSpace};
@@ -111,7 +111,7 @@ pub fn check_stable(bank: &Bank) -> Result<(), DesignError> {
     }
 }
 
-fn from_block(block: &BlockFilter, ratio: usize) -> Result<StateSpace, DesignError> {
+fn from_block(block: &bank::StateSpace, ratio: usize) -> Result<StateSpace, DesignError> {
     let (n, channels) = (block.a.len(), block.d.first().map_or(0, Vec::len));
     let a = matrix(&block.a, n, n)?;
     let b = matrix(&block.b, n, channels)?;
@@ -128,9 +128,9 @@ fn matrix(rows: &[Vec<f64>], r: usize, c: usize) -> Result<Mat, DesignError> {
 }
 
 /// A system as a bank holds it: lists of rows.
-pub fn to_block(system: &StateSpace) -> BlockFilter {
+pub fn to_block(system: &StateSpace) -> bank::StateSpace {
     let rows = |m: &Mat| m.row_iter().map(|row| row.iter().copied().collect()).collect();
-    BlockFilter { a: rows(system.a()), b: rows(system.b()), c: rows(system.c()), d: rows(system.d()) }
+    bank::StateSpace { a: rows(system.a()), b: rows(system.b()), c: rows(system.c()), d: rows(system.d()) }
 }
 
 #[cfg(test)]
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn unstable_recursions_are_refused_and_fir_banks_never_are() {
-        let block = |pole: f64| BlockFilter {
+        let block = |pole: f64| bank::StateSpace {
             a: vec![vec![pole]],
             b: vec![vec![1.0]],
             c: vec![vec![1.0]],
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn rows_of_unequal_lengths_are_refused() {
-        let block = BlockFilter {
+        let block = bank::StateSpace {
             a: vec![vec![0.5, 0.0], vec![0.0]],
             b: vec![vec![1.0], vec![1.0]],
             c: vec![vec![1.0, 1.0]],

@@ -109,7 +109,7 @@ pub fn analysis_gains(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Vec<f64>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bank::BlockFilter;
+    use crate::bank::StateSpace;
 
     /// The sum over 20,000 aliases on either side; the rest is below (0.5 / (2 pi 20,000))^3.
     #[test]
@@ -133,7 +133,7 @@ mod tests {
     #[test]
     fn a_recursion_has_the_impulse_response_of_its_closed_form() {
         // y[k] = sum_j 0.5^j x[k - j] at phase 0, the input itself at phase 1.
-        let block = BlockFilter {
+        let block = StateSpace {
             a: vec![vec![0.5]],
             b: vec![vec![0.5]],
             c: vec![vec![1.0], vec![0.0]],

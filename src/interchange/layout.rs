@@ -1,6 +1,6 @@
 //! The coefficients in the order in which every format has them.
 
-use crate::bank::BlockFilter;
+use crate::bank::StateSpace;
 
 /// FIR taps by channel, phase and lag.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,7 +51,7 @@ pub struct SparseBlock {
 
 impl SparseBlock {
     /// Of a bank's state-space filters.
-    pub fn new(block: &BlockFilter) -> Self {
+    pub fn new(block: &StateSpace) -> Self {
         let states = block.a.len();
         let row = |(left, right): (&Vec<f64>, &Vec<f64>)| {
             left.iter().chain(right).copied().enumerate().filter(|&(_, value)| value != 0.0).collect()

@@ -1,7 +1,7 @@
 //! Recursive banks as sections of second order.
 
 use super::ExportError;
-use crate::bank::{Bank, BlockFilter, SynthesisFilters};
+use crate::bank::{Bank, StateSpace, SynthesisFilters};
 use std::fmt::Write as _;
 
 /// The part `z^-delay (b0 + b1 z^-1 + b2 z^-2) / (1 + a1 z^-1 + a2 z^-2)` of a filter entry, z^-1 being one
@@ -63,7 +63,7 @@ struct Structure {
 }
 
 impl Structure {
-    fn of(block: &BlockFilter) -> Result<Self, ExportError> {
+    fn of(block: &StateSpace) -> Result<Self, ExportError> {
         let delayed = delayed_inputs(block);
         let poles = pole_blocks(block, &delayed).ok_or(ExportError::NoSections(
             "some of its poles nearly coincide, so that no sections side by side have its accuracy; npz and mat \
@@ -72,7 +72,7 @@ impl Structure {
         Ok(Self { delayed, poles })
     }
 
-    fn entry(&self, block: &BlockFilter, channel: usize, phase: usize) -> Vec<Section> {
+    fn entry(&self, block: &StateSpace, channel: usize, phase: usize) -> Vec<Section> {
         let section = |delay, b, a| Section { channel, phase, delay, b, a };
         let head = self.head(block, channel, phase);
         let pairs = head
@@ -90,7 +90,7 @@ impl Structure {
     }
 
     /// The taps of the delayed inputs, without delay first.
-    fn head(&self, block: &BlockFilter, channel: usize, phase: usize) -> Vec<f64> {
+    fn head(&self, block: &StateSpace, channel: usize, phase: usize) -> Vec<f64> {
         let mut taps = vec![block.d[phase][channel]];
         for (state, place) in self.delayed.iter().enumerate() {
             if let Some((_, delay)) = place.filter(|(of, _)| *of == channel) {
@@ -103,7 +103,7 @@ impl Structure {
 }
 
 /// Each state that holds one input, one coefficient being 1 and all others 0, d periods ago.
-fn delayed_inputs(block: &BlockFilter) -> Vec<Option<(usize, usize)>> {
+fn delayed_inputs(block: &StateSpace) -> Vec<Option<(usize, usize)>> {
     let n = block.a.len();
     let mut places = vec![None; n];
     // Each pass finds the states that follow those known so far.
@@ -134,7 +134,7 @@ enum Source {
 }
 
 /// The state or the input that a state repeats a period later.
-fn single_one(block: &BlockFilter, state: usize) -> Option<Source> {
+fn single_one(block: &StateSpace, state: usize) -> Option<Source> {
     let row = || block.a[state].iter().chain(&block.b[state]).enumerate().filter(|(_, x)| **x != 0.0);
     let (column, value) = row().next()?;
     let n = block.a.len();
@@ -143,7 +143,7 @@ fn single_one(block: &BlockFilter, state: usize) -> Option<Source> {
 }
 
 /// The states of poles, one or two each; `None` if more of them drive one another.
-fn pole_blocks(block: &BlockFilter, delayed: &[Option<(usize, usize)>]) -> Option<Vec<Block>> {
+fn pole_blocks(block: &StateSpace, delayed: &[Option<(usize, usize)>]) -> Option<Vec<Block>> {
     let own: Vec<usize> = (0..delayed.len()).filter(|&state| delayed[state].is_none()).collect();
     let drives = |i: usize, j: usize| i != j && (block.a[i][j] != 0.0 || block.a[j][i] != 0.0);
     let mut blocks = Vec::new();
@@ -163,12 +163,12 @@ fn pole_blocks(block: &BlockFilter, delayed: &[Option<(usize, usize)>]) -> Optio
 }
 
 impl Block {
-    fn a(&self, block: &BlockFilter, row: usize, column: usize) -> f64 {
+    fn a(&self, block: &StateSpace, row: usize, column: usize) -> f64 {
         block.a[self.states[row]][self.states[column]]
     }
 
     /// -tr A and det A; of one state -A and 0.
-    fn denominator(&self, block: &BlockFilter) -> [f64; 2] {
+    fn denominator(&self, block: &StateSpace) -> [f64; 2] {
         let a = |i, j| self.a(block, i, j);
         match self.states.len() {
             1 => [-a(0, 0), 0.0],
@@ -177,7 +177,7 @@ impl Block {
     }
 
     /// 0, c B and c (A - tr A) B; of one state 0, c B and 0.
-    fn numerator(&self, block: &BlockFilter, phase: usize, drive: &[f64]) -> [f64; 3] {
+    fn numerator(&self, block: &StateSpace, phase: usize, drive: &[f64]) -> [f64; 3] {
         let c = |i: usize| block.c[phase][self.states[i]];
         let a = |i, j| self.a(block, i, j);
         match drive {
@@ -193,7 +193,7 @@ impl Block {
     /// The coefficients B_d of a channel's input d periods ago, with d.
     fn drives(
         &self,
-        block: &BlockFilter,
+        block: &StateSpace,
         delayed: &[Option<(usize, usize)>],
         channel: usize,
     ) -> Vec<(usize, Vec<f64>)> {
@@ -211,7 +211,7 @@ impl Block {
 
 /// The state-space filters of sections: delay lines of the inputs, and for each pair of poles and each phase
 /// two states in observer form, which all channels drive.
-pub fn block_of_sections(sections: &[Section], channels: usize, ratio: usize) -> BlockFilter {
+pub fn block_of_sections(sections: &[Section], channels: usize, ratio: usize) -> StateSpace {
     let states = SectionStates::of(sections, channels);
     let mut block = states.undriven(ratio);
     for section in sections {
@@ -256,10 +256,10 @@ impl SectionStates {
     }
 
     /// Delay lines with their inputs, and poles that nothing drives yet.
-    fn undriven(&self, ratio: usize) -> BlockFilter {
+    fn undriven(&self, ratio: usize) -> StateSpace {
         let (n, channels) = (self.pair(self.poles.len()), self.lines.len());
         let zeros = |rows: usize, columns: usize| vec![vec![0.0; columns]; rows];
-        let mut block = BlockFilter {
+        let mut block = StateSpace {
             a: zeros(n, n),
             b: zeros(n, channels),
             c: zeros(ratio, n),
@@ -279,7 +279,7 @@ impl SectionStates {
     }
 
     /// Taps to the outputs of the delay line.
-    fn add_taps(&self, block: &mut BlockFilter, section: &Section) {
+    fn add_taps(&self, block: &mut StateSpace, section: &Section) {
         for (delay, b) in (section.delay..).zip(section.b) {
             match delay.checked_sub(1) {
                 None => block.d[section.phase][section.channel] += b,
@@ -292,7 +292,7 @@ impl SectionStates {
     }
 
     /// The numerator to the inputs of the pair. b0 is zero: the poles follow a delay.
-    fn drive_poles(&self, block: &mut BlockFilter, section: &Section) {
+    fn drive_poles(&self, block: &mut StateSpace, section: &Section) {
         let own = |pole: &(usize, [f64; 2])| *pole == (section.phase, section.a);
         let Some(pair) = self.poles.iter().position(own) else { return };
         for (state, b) in (self.pair(pair)..).zip(&section.b[1..]) {

@@ -240,7 +240,7 @@ fn decode_frame(parts: &[PcmFrames<'_>], k: usize, numbers: &mut Vec<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bank::BlockFilter;
+    use crate::bank::StateSpace;
     use crate::random::Random;
     use crate::runtime::{Options, Stream};
     use crate::units::Seconds;
@@ -336,7 +336,7 @@ mod tests {
     fn a_bank_without_states_forgets_at_once() {
         let fir = fir_bank(vec![vec![1.0; 2]; 2], 2);
         let d = vec![vec![0.5, 0.0], vec![0.25, 1.0]];
-        let filter = BlockFilter { a: vec![], b: vec![], c: vec![vec![], vec![]], d };
+        let filter = StateSpace { a: vec![], b: vec![], c: vec![vec![], vec![]], d };
         let bank = Bank { filters: SynthesisFilters::StateSpace(filter), ..fir };
         let mut filler = GapFiller::new(&bank, GapPolicy::Zero).unwrap();
         let mut mask = Vec::new();
@@ -357,7 +357,7 @@ mod tests {
         };
         let fir = fir_bank(random_taps(2, 7, &mut random), 3);
         let (b, c, d) = Default::default();
-        let filter = BlockFilter { a: vec![vec![0.5]], b, c, d };
+        let filter = StateSpace { a: vec![vec![0.5]], b, c, d };
         let recursion = Bank { filters: SynthesisFilters::StateSpace(filter), ..fir.clone() };
         for bank in [fir, recursion] {
             let mut want = samples.clone();

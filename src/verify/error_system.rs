@@ -10,7 +10,7 @@
 use super::ball::{self, Ball, Matrix};
 use super::slow_period::SlowPeriod;
 use crate::arithmetic::{DoubleDouble, Number};
-use crate::bank::{BlockFilter, SynthesisFilters};
+use crate::bank::{StateSpace, SynthesisFilters};
 use std::ops::Range;
 
 /// A filter bank in block form, exactly as the file has it.
@@ -58,7 +58,7 @@ impl<F: Number> BlockForm<F> {
         form
     }
 
-    fn from_block(block: &BlockFilter, ratio: usize) -> Self {
+    fn from_block(block: &StateSpace, ratio: usize) -> Self {
         let (states, channels) = (block.a.len(), block.d[0].len());
         let matrix = |rows: &[Vec<f64>], r, c| Matrix::from_fn(r, c, |i, j| Ball::from(rows[i][j]));
         Self {

@@ -2,7 +2,7 @@
 
 use crate::support::random::Random;
 use crate::support::{Desk, bytes, frames};
-use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
+use hybank::bank::{Bank, StateSpace, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
 use hybank::runtime::{Options, PcmOutput, Precision, Stream};
 use hybank::units::Seconds;
@@ -41,7 +41,7 @@ fn recursion(channels: usize, ratio: usize, states: usize) -> Bank {
     let mut matrix = |rows: usize, cols: usize, scale: f64| -> Vec<Vec<f64>> {
         (0..rows).map(|_| (0..cols).map(|_| scale * noise()).collect()).collect()
     };
-    let filter = BlockFilter {
+    let filter = StateSpace {
         // Rows that sum to less than 1 are stable.
         a: matrix(states, states, 0.9 / states as f64),
         b: matrix(states, channels, 1.0),

@@ -1,7 +1,7 @@
 //! Order reduction as a user meets it: banks of few states, proven, beside FIR banks of the same cost.
 
 use crate::support::specs::{alike, amplified, butterworth, thesis};
-use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
+use hybank::bank::{Bank, StateSpace, SynthesisFilters};
 use hybank::design::{Design, analyze, design};
 use hybank::spec::{DesignSpec, FilterSpec, Method, Reduction, Spec};
 use hybank::verify::verify;
@@ -12,7 +12,7 @@ fn reduced(mut spec: Spec, method: Method, reduction: Reduction) -> Design {
     design(&spec).unwrap()
 }
 
-fn block(bank: &Bank) -> &BlockFilter {
+fn block(bank: &Bank) -> &StateSpace {
     match &bank.filters {
         SynthesisFilters::StateSpace(block) => block,
         SynthesisFilters::Fir(_) => panic!("taps"),
@@ -20,7 +20,7 @@ fn block(bank: &Bank) -> &BlockFilter {
 }
 
 /// Numbers of the matrices that are not zero: multiply-adds per frame.
-fn cost(block: &BlockFilter) -> usize {
+fn cost(block: &StateSpace) -> usize {
     let all = [&block.a, &block.b, &block.c, &block.d];
     all.into_iter().flatten().flatten().filter(|x| **x != 0.0 && **x != 1.0).count()
 }

@@ -21,20 +21,17 @@ macro_rules! register {
     ($splat:ident $load:ident $store:ident $add:ident $sub:ident $mul:ident $fmadd:ident $fnmadd:ident) => {
         #[inline(always)]
         unsafe fn splat(value: Self::Sample) -> Self {
-            // SAFETY: the caller's.
-            Self(unsafe { $splat(value) })
+            Self($splat(value))
         }
 
         #[inline(always)]
         unsafe fn load(at: *const Self::Sample) -> Self {
-            // SAFETY: the caller's.
-            Self(unsafe { $load(at) })
+            Self($load(at))
         }
 
         #[inline(always)]
         unsafe fn store(self, at: *mut Self::Sample) {
-            // SAFETY: the caller's.
-            unsafe { $store(at, self.0) }
+            $store(at, self.0)
         }
 
         #[inline(always)]
@@ -91,14 +88,11 @@ impl Vector for Avx2F32 {
 
     #[inline(always)]
     unsafe fn broadcast<const D: usize>(at: *const f32) -> Self {
-        // SAFETY: the caller's.
-        Self(unsafe {
-            match D {
-                1 => _mm256_set1_ps(*at),
-                2 => _mm256_castpd_ps(_mm256_set1_pd(at.cast::<f64>().read_unaligned())),
-                4 => _mm256_broadcast_ps(&at.cast::<__m128>().read_unaligned()),
-                _ => _mm256_loadu_ps(at),
-            }
+        Self(match D {
+            1 => _mm256_set1_ps(*at),
+            2 => _mm256_castpd_ps(_mm256_set1_pd(at.cast::<f64>().read_unaligned())),
+            4 => _mm256_broadcast_ps(&at.cast::<__m128>().read_unaligned()),
+            _ => _mm256_loadu_ps(at),
         })
     }
 
@@ -125,14 +119,12 @@ impl Vector for Avx2F32 {
 
     #[inline(always)]
     unsafe fn store_frames<const P: usize, const D: usize>(sums: [Self; 4], out: *mut f32, hop: usize) {
-        // SAFETY: the caller's.
-        unsafe { store_frames_f32::<P, D>(sums.map(|sum| sum.0), out, hop) }
+        store_frames_f32::<P, D>(sums.map(|sum| sum.0), out, hop)
     }
 
     #[inline(always)]
     unsafe fn store_halves(sums: [Self; 4], out: [*mut f32; 2], hop: usize) {
-        // SAFETY: the caller's.
-        unsafe { Self::diagonal_halves(sums).store_two_halves(out, hop) }
+        Self::diagonal_halves(sums).store_two_halves(out, hop)
     }
 
     #[inline(always)]
@@ -142,77 +134,61 @@ impl Vector for Avx2F32 {
         coefficients: *const f32,
         steps: usize,
     ) -> Option<[[Self; R]; P]> {
-        // SAFETY: the caller's.
-        unsafe { tile_f32::<_, D, P, R>(Self, x, stride, coefficients, steps) }
+        tile_f32::<_, D, P, R>(Self, x, stride, coefficients, steps)
     }
 
     #[inline(always)]
     unsafe fn segments<const D: usize>(at: *const f32, hop: usize) -> Self {
-        // SAFETY: the caller's.
-        unsafe {
-            let s = |segment: usize| at.add(segment * hop);
-            Self(match D {
-                1 => _mm256_setr_ps(*s(0), *s(1), *s(2), *s(3), *s(4), *s(5), *s(6), *s(7)),
-                2 => {
-                    let low = _mm_loadh_pd(_mm_load_sd(s(0).cast()), s(1).cast());
-                    let high = _mm_loadh_pd(_mm_load_sd(s(2).cast()), s(3).cast());
-                    _mm256_castpd_ps(_mm256_set_m128d(high, low))
-                }
-                4 => _mm256_set_m128(_mm_loadu_ps(s(1)), _mm_loadu_ps(at)),
-                _ => _mm256_loadu_ps(at),
-            })
-        }
+        let s = |segment: usize| at.add(segment * hop);
+        Self(match D {
+            1 => _mm256_setr_ps(*s(0), *s(1), *s(2), *s(3), *s(4), *s(5), *s(6), *s(7)),
+            2 => {
+                let low = _mm_loadh_pd(_mm_load_sd(s(0).cast()), s(1).cast());
+                let high = _mm_loadh_pd(_mm_load_sd(s(2).cast()), s(3).cast());
+                _mm256_castpd_ps(_mm256_set_m128d(high, low))
+            }
+            4 => _mm256_set_m128(_mm_loadu_ps(s(1)), _mm_loadu_ps(at)),
+            _ => _mm256_loadu_ps(at),
+        })
     }
 
     #[inline(always)]
     unsafe fn broadcast_lane<const D: usize>(row: *const f32, n: usize) -> Self {
-        // SAFETY: the caller's.
-        Self(unsafe {
-            match D {
-                1 => _mm256_loadu_ps(row),
-                2 if n == 0 => _mm256_moveldup_ps(_mm256_loadu_ps(row)),
-                2 => _mm256_movehdup_ps(_mm256_loadu_ps(row)),
-                4 => _mm256_permutevar_ps(_mm256_loadu_ps(row), _mm256_set1_epi32(n as i32)),
-                _ => _mm256_set1_ps(*row.add(n)),
-            }
+        Self(match D {
+            1 => _mm256_loadu_ps(row),
+            2 if n == 0 => _mm256_moveldup_ps(_mm256_loadu_ps(row)),
+            2 => _mm256_movehdup_ps(_mm256_loadu_ps(row)),
+            4 => _mm256_permutevar_ps(_mm256_loadu_ps(row), _mm256_set1_epi32(n as i32)),
+            _ => _mm256_set1_ps(*row.add(n)),
         })
     }
 
     #[inline(always)]
     unsafe fn load_i16(at: *const u8) -> Self {
-        // SAFETY: the caller's.
-        Self(unsafe {
-            let wide = _mm256_cvtepi16_epi32(_mm_loadu_si128(at.cast()));
-            _mm256_mul_ps(_mm256_cvtepi32_ps(wide), _mm256_set1_ps(1.0 / 32768.0))
-        })
+        let wide = _mm256_cvtepi16_epi32(_mm_loadu_si128(at.cast()));
+        Self(_mm256_mul_ps(_mm256_cvtepi32_ps(wide), _mm256_set1_ps(1.0 / 32768.0)))
     }
 
     #[inline(always)]
     unsafe fn load_i32(at: *const u8) -> Self {
-        // SAFETY: the caller's.
-        Self(unsafe {
-            let wide = _mm256_loadu_si256(at.cast());
-            _mm256_mul_ps(_mm256_cvtepi32_ps(wide), _mm256_set1_ps(1.0 / 2147483648.0))
-        })
+        let wide = _mm256_loadu_si256(at.cast());
+        Self(_mm256_mul_ps(_mm256_cvtepi32_ps(wide), _mm256_set1_ps(1.0 / 2147483648.0)))
     }
 
     /// -32768.5 rounds to -32768, which fits, and 32767.5 to 32768, which does not.
     #[inline(always)]
     unsafe fn store_i16(self, at: *mut u8) -> u32 {
-        // SAFETY: the caller's.
-        unsafe {
-            let scaled = _mm256_mul_ps(self.0, _mm256_set1_ps(32768.0));
-            let low = _mm256_cmp_ps::<_CMP_LT_OQ>(scaled, _mm256_set1_ps(-32768.5));
-            let high = _mm256_cmp_ps::<_CMP_GE_OQ>(scaled, _mm256_set1_ps(32767.5));
-            let clipped = _mm256_movemask_ps(_mm256_or_ps(low, high));
-            let number = _mm256_and_ps(scaled, _mm256_cmp_ps::<_CMP_ORD_Q>(scaled, scaled));
-            // What is too small becomes the least i32, and what is too large would; packing saturates.
-            let wide = _mm256_cvtps_epi32(_mm256_min_ps(_mm256_set1_ps(32767.0), number));
-            let packed = _mm_packs_epi32(_mm256_castsi256_si128(wide), _mm256_extracti128_si256::<1>(wide));
-            _mm_storeu_si128(at.cast(), packed);
-            // Hardly ever is there anything to count.
-            if clipped == 0 { 0 } else { clipped.count_ones() }
-        }
+        let scaled = _mm256_mul_ps(self.0, _mm256_set1_ps(32768.0));
+        let low = _mm256_cmp_ps::<_CMP_LT_OQ>(scaled, _mm256_set1_ps(-32768.5));
+        let high = _mm256_cmp_ps::<_CMP_GE_OQ>(scaled, _mm256_set1_ps(32767.5));
+        let clipped = _mm256_movemask_ps(_mm256_or_ps(low, high));
+        let number = _mm256_and_ps(scaled, _mm256_cmp_ps::<_CMP_ORD_Q>(scaled, scaled));
+        // What is too small becomes the least i32, and what is too large would; packing saturates.
+        let wide = _mm256_cvtps_epi32(_mm256_min_ps(_mm256_set1_ps(32767.0), number));
+        let packed = _mm_packs_epi32(_mm256_castsi256_si128(wide), _mm256_extracti128_si256::<1>(wide));
+        _mm_storeu_si128(at.cast(), packed);
+        // Hardly ever is there anything to count.
+        if clipped == 0 { 0 } else { clipped.count_ones() }
     }
 }
 
@@ -223,11 +199,8 @@ impl Avx2F32 {
     /// As there.
     #[inline(always)]
     pub(super) unsafe fn store_two_halves(self, out: [*mut f32; 2], hop: usize) {
-        // SAFETY: the caller's.
-        unsafe {
-            store_pairs(low(self.0), out);
-            store_pairs(high(self.0), out.map(|out| out.add(hop)));
-        }
+        store_pairs(low(self.0), out);
+        store_pairs(high(self.0), out.map(|out| out.add(hop)));
     }
 }
 
@@ -251,13 +224,10 @@ impl Vector for Avx2F64 {
 
     #[inline(always)]
     unsafe fn broadcast<const D: usize>(at: *const f64) -> Self {
-        // SAFETY: the caller's.
-        Self(unsafe {
-            match D {
-                1 => _mm256_set1_pd(*at),
-                2 => _mm256_broadcast_pd(&at.cast::<__m128d>().read_unaligned()),
-                _ => _mm256_loadu_pd(at),
-            }
+        Self(match D {
+            1 => _mm256_set1_pd(*at),
+            2 => _mm256_broadcast_pd(&at.cast::<__m128d>().read_unaligned()),
+            _ => _mm256_loadu_pd(at),
         })
     }
 
@@ -269,17 +239,13 @@ impl Vector for Avx2F64 {
 
     #[inline(always)]
     unsafe fn store_frames<const P: usize, const D: usize>(sums: [Self; 4], out: *mut f64, hop: usize) {
-        // SAFETY: the caller's.
-        unsafe { store_frames_f64::<P, D>(sums.map(|sum| sum.0), out, hop) }
+        store_frames_f64::<P, D>(sums.map(|sum| sum.0), out, hop)
     }
 
     #[inline(always)]
     unsafe fn store_halves([a, b, c, d]: [Self; 4], out: [*mut f64; 2], _: usize) {
-        // SAFETY: the caller's.
-        unsafe {
-            let (even, odd) = (far_f64(a.0, c.0), far_f64(b.0, d.0));
-            store_both(_mm256_add_pd(even, _mm256_permute_pd::<0b0101>(odd)), out);
-        }
+        let (even, odd) = (far_f64(a.0, c.0), far_f64(b.0, d.0));
+        store_both(_mm256_add_pd(even, _mm256_permute_pd::<0b0101>(odd)), out);
     }
 
     #[inline(always)]
@@ -289,33 +255,26 @@ impl Vector for Avx2F64 {
         coefficients: *const f64,
         steps: usize,
     ) -> Option<[[Self; R]; P]> {
-        // SAFETY: the caller's.
-        unsafe { tile_f64::<_, D, P, R>(Self, x, stride, coefficients, steps) }
+        tile_f64::<_, D, P, R>(Self, x, stride, coefficients, steps)
     }
 
     #[inline(always)]
     unsafe fn segments<const D: usize>(at: *const f64, hop: usize) -> Self {
-        // SAFETY: the caller's.
-        unsafe {
-            let s = |segment: usize| at.add(segment * hop);
-            Self(match D {
-                1 => _mm256_setr_pd(*s(0), *s(1), *s(2), *s(3)),
-                2 => _mm256_set_m128d(_mm_loadu_pd(s(1)), _mm_loadu_pd(at)),
-                _ => _mm256_loadu_pd(at),
-            })
-        }
+        let s = |segment: usize| at.add(segment * hop);
+        Self(match D {
+            1 => _mm256_setr_pd(*s(0), *s(1), *s(2), *s(3)),
+            2 => _mm256_set_m128d(_mm_loadu_pd(s(1)), _mm_loadu_pd(at)),
+            _ => _mm256_loadu_pd(at),
+        })
     }
 
     #[inline(always)]
     unsafe fn broadcast_lane<const D: usize>(row: *const f64, n: usize) -> Self {
-        // SAFETY: the caller's.
-        Self(unsafe {
-            match D {
-                1 => _mm256_loadu_pd(row),
-                2 if n == 0 => _mm256_movedup_pd(_mm256_loadu_pd(row)),
-                2 => _mm256_permute_pd::<0b1111>(_mm256_loadu_pd(row)),
-                _ => _mm256_set1_pd(*row.add(n)),
-            }
+        Self(match D {
+            1 => _mm256_loadu_pd(row),
+            2 if n == 0 => _mm256_movedup_pd(_mm256_loadu_pd(row)),
+            2 => _mm256_permute_pd::<0b1111>(_mm256_loadu_pd(row)),
+            _ => _mm256_set1_pd(*row.add(n)),
         })
     }
 }

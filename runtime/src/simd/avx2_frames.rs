@@ -113,11 +113,8 @@ pub(super) fn high(x: __m256) -> __m128 {
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 pub(super) unsafe fn store_pairs(pairs: __m128, out: [*mut f32; 2]) {
-    // SAFETY: the caller's.
-    unsafe {
-        _mm_storel_pd(out[0].cast(), _mm_castps_pd(pairs));
-        _mm_storeh_pd(out[1].cast(), _mm_castps_pd(pairs));
-    }
+    _mm_storel_pd(out[0].cast(), _mm_castps_pd(pairs));
+    _mm_storeh_pd(out[1].cast(), _mm_castps_pd(pairs));
 }
 
 /// Both halves, each to a place of its own.
@@ -127,11 +124,8 @@ pub(super) unsafe fn store_pairs(pairs: __m128, out: [*mut f32; 2]) {
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 pub(super) unsafe fn store_both(halves: __m256d, out: [*mut f64; 2]) {
-    // SAFETY: the caller's.
-    unsafe {
-        _mm_storeu_pd(out[0], _mm256_castpd256_pd128(halves));
-        _mm_storeu_pd(out[1], _mm256_extractf128_pd::<1>(halves));
-    }
+    _mm_storeu_pd(out[0], _mm256_castpd256_pd128(halves));
+    _mm_storeu_pd(out[1], _mm256_extractf128_pd::<1>(halves));
 }
 
 /// [`Vector::store_frames`](super::vector::Vector::store_frames). Halves are stored as they are: a store
@@ -148,65 +142,62 @@ pub(super) unsafe fn store_frames_f32<const P: usize, const D: usize>(
 ) {
     let [a, b, c, d] = sums;
     let pairs = |a, b| _mm256_add_ps(a, _mm256_permute_ps::<0b10_11_00_01>(b));
-    // SAFETY: the caller's.
-    unsafe {
-        let at = |frame: usize| out.add(frame * hop);
-        match (P, D) {
-            (2, 1) => {
-                // Two frames in each half: 0 1 and 4 5, 2 3 and 6 7.
-                let (first, second) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
-                let quarters = [low(first), low(second), high(first), high(second)];
-                for (frames, quarter) in quarters.into_iter().enumerate() {
-                    if hop == 2 {
-                        _mm_storeu_ps(at(2 * frames), quarter);
-                    } else {
-                        store_pairs(quarter, [at(2 * frames), at(2 * frames + 1)]);
-                    }
+    let at = |frame: usize| out.add(frame * hop);
+    match (P, D) {
+        (2, 1) => {
+            // Two frames in each half: 0 1 and 4 5, 2 3 and 6 7.
+            let (first, second) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+            let quarters = [low(first), low(second), high(first), high(second)];
+            for (frames, quarter) in quarters.into_iter().enumerate() {
+                if hop == 2 {
+                    _mm_storeu_ps(at(2 * frames), quarter);
+                } else {
+                    store_pairs(quarter, [at(2 * frames), at(2 * frames + 1)]);
                 }
             }
-            (_, 1) => {
-                let (ab_low, ab_high) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
-                let (cd_low, cd_high) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
-                // Frames t and t + 4.
-                let frames = [
-                    _mm256_shuffle_ps::<0x44>(ab_low, cd_low),
-                    _mm256_shuffle_ps::<0xEE>(ab_low, cd_low),
-                    _mm256_shuffle_ps::<0x44>(ab_high, cd_high),
-                    _mm256_shuffle_ps::<0xEE>(ab_high, cd_high),
-                ];
-                for (t, both) in frames.into_iter().enumerate() {
-                    _mm_storeu_ps(at(t), low(both));
-                }
-                for (t, both) in frames.into_iter().enumerate() {
-                    _mm_storeu_ps(at(t + 4), high(both));
-                }
+        }
+        (_, 1) => {
+            let (ab_low, ab_high) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+            let (cd_low, cd_high) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+            // Frames t and t + 4.
+            let frames = [
+                _mm256_shuffle_ps::<0x44>(ab_low, cd_low),
+                _mm256_shuffle_ps::<0xEE>(ab_low, cd_low),
+                _mm256_shuffle_ps::<0x44>(ab_high, cd_high),
+                _mm256_shuffle_ps::<0xEE>(ab_high, cd_high),
+            ];
+            for (t, both) in frames.into_iter().enumerate() {
+                _mm_storeu_ps(at(t), low(both));
             }
-            (2, 2) if hop == 2 => _mm256_storeu_ps(out, pairs(a, b)),
-            (2, 2) => {
-                store_pairs(low(pairs(a, b)), [at(0), at(1)]);
-                store_pairs(high(pairs(a, b)), [at(2), at(3)]);
+            for (t, both) in frames.into_iter().enumerate() {
+                _mm_storeu_ps(at(t + 4), high(both));
             }
-            (_, 2) => {
-                let first = _mm256_castps_pd(pairs(a, b));
-                let last = _mm256_castps_pd(pairs(c, if P == 3 { c } else { d }));
-                // Frames 0 and 2, 1 and 3.
-                let even = _mm256_castpd_ps(_mm256_unpacklo_pd(first, last));
-                let odd = _mm256_castpd_ps(_mm256_unpackhi_pd(first, last));
-                for (t, frame) in [low(even), low(odd), high(even), high(odd)].into_iter().enumerate() {
-                    _mm_storeu_ps(at(t), frame);
-                }
+        }
+        (2, 2) if hop == 2 => _mm256_storeu_ps(out, pairs(a, b)),
+        (2, 2) => {
+            store_pairs(low(pairs(a, b)), [at(0), at(1)]);
+            store_pairs(high(pairs(a, b)), [at(2), at(3)]);
+        }
+        (_, 2) => {
+            let first = _mm256_castps_pd(pairs(a, b));
+            let last = _mm256_castps_pd(pairs(c, if P == 3 { c } else { d }));
+            // Frames 0 and 2, 1 and 3.
+            let even = _mm256_castpd_ps(_mm256_unpacklo_pd(first, last));
+            let odd = _mm256_castpd_ps(_mm256_unpackhi_pd(first, last));
+            for (t, frame) in [low(even), low(odd), high(even), high(odd)].into_iter().enumerate() {
+                _mm_storeu_ps(at(t), frame);
             }
-            _ => {
-                let quads = match P {
-                    3 => pairs(far_f32(a, c), far_f32(b, c)),
-                    _ => diagonal_quads_f32(sums),
-                };
-                if P == 4 && hop == 4 {
-                    return _mm256_storeu_ps(out, quads);
-                }
-                _mm_storeu_ps(at(0), low(quads));
-                _mm_storeu_ps(at(1), high(quads));
+        }
+        _ => {
+            let quads = match P {
+                3 => pairs(far_f32(a, c), far_f32(b, c)),
+                _ => diagonal_quads_f32(sums),
+            };
+            if P == 4 && hop == 4 {
+                return _mm256_storeu_ps(out, quads);
             }
+            _mm_storeu_ps(at(0), low(quads));
+            _mm_storeu_ps(at(1), high(quads));
         }
     }
 }
@@ -242,33 +233,30 @@ pub(super) unsafe fn store_frames_f64<const P: usize, const D: usize>(
     let frames = |first, last| {
         [_mm256_permute2f128_pd::<0x20>(first, last), _mm256_permute2f128_pd::<0x31>(first, last)]
     };
-    // SAFETY: the caller's.
-    unsafe {
-        let at = |frame: usize| out.add(frame * hop);
-        match (P, D) {
-            (2, 1) => {
-                // Frames 0 and 2, 1 and 3.
-                store_both(_mm256_unpacklo_pd(a, b), [at(0), at(2)]);
-                store_both(_mm256_unpackhi_pd(a, b), [at(1), at(3)]);
-            }
-            (_, 1) => {
-                // In order, because of the place after three.
-                let even = frames(_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
-                let odd = frames(_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
-                for (t, quad) in [even[0], odd[0], even[1], odd[1]].into_iter().enumerate() {
-                    _mm256_storeu_pd(at(t), quad);
-                }
-            }
-            (2, 2) if hop == 2 => _mm256_storeu_pd(out, pairs(a, b)),
-            (2, 2) => store_both(pairs(a, b), [at(0), at(1)]),
-            (_, 2) => {
-                let last = pairs(c, if P == 3 { c } else { d });
-                for (t, quad) in frames(pairs(a, b), last).into_iter().enumerate() {
-                    _mm256_storeu_pd(at(t), quad);
-                }
-            }
-            (3, _) => _mm256_storeu_pd(out, pairs(far_f64(a, c), far_f64(b, c))),
-            _ => _mm256_storeu_pd(out, diagonal_quads_f64(sums)),
+    let at = |frame: usize| out.add(frame * hop);
+    match (P, D) {
+        (2, 1) => {
+            // Frames 0 and 2, 1 and 3.
+            store_both(_mm256_unpacklo_pd(a, b), [at(0), at(2)]);
+            store_both(_mm256_unpackhi_pd(a, b), [at(1), at(3)]);
         }
+        (_, 1) => {
+            // In order, because of the place after three.
+            let even = frames(_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
+            let odd = frames(_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
+            for (t, quad) in [even[0], odd[0], even[1], odd[1]].into_iter().enumerate() {
+                _mm256_storeu_pd(at(t), quad);
+            }
+        }
+        (2, 2) if hop == 2 => _mm256_storeu_pd(out, pairs(a, b)),
+        (2, 2) => store_both(pairs(a, b), [at(0), at(1)]),
+        (_, 2) => {
+            let last = pairs(c, if P == 3 { c } else { d });
+            for (t, quad) in frames(pairs(a, b), last).into_iter().enumerate() {
+                _mm256_storeu_pd(at(t), quad);
+            }
+        }
+        (3, _) => _mm256_storeu_pd(out, pairs(far_f64(a, c), far_f64(b, c))),
+        _ => _mm256_storeu_pd(out, diagonal_quads_f64(sums)),
     }
 }

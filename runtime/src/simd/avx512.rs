@@ -20,16 +20,13 @@ pub(crate) struct Avx512F64(__m512d);
 #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma")]
 #[inline]
 unsafe fn store_quarters(x: __m512, out: *mut f32, hop: usize) {
-    // SAFETY: the caller's.
-    unsafe {
-        if hop == 4 {
-            return _mm512_storeu_ps(out, x);
-        }
-        _mm_storeu_ps(out, _mm512_castps512_ps128(x));
-        _mm_storeu_ps(out.add(hop), _mm512_extractf32x4_ps::<1>(x));
-        _mm_storeu_ps(out.add(2 * hop), _mm512_extractf32x4_ps::<2>(x));
-        _mm_storeu_ps(out.add(3 * hop), _mm512_extractf32x4_ps::<3>(x));
+    if hop == 4 {
+        return _mm512_storeu_ps(out, x);
     }
+    _mm_storeu_ps(out, _mm512_castps512_ps128(x));
+    _mm_storeu_ps(out.add(hop), _mm512_extractf32x4_ps::<1>(x));
+    _mm_storeu_ps(out.add(2 * hop), _mm512_extractf32x4_ps::<2>(x));
+    _mm_storeu_ps(out.add(3 * hop), _mm512_extractf32x4_ps::<3>(x));
 }
 
 /// Samples of a and b in turns: two registers.
@@ -82,33 +79,30 @@ unsafe fn store_frames_f32<const P: usize, const D: usize>(
 ) -> bool {
     let [a, b, c, d] = sums;
     let pairs = |a, b| _mm512_add_ps(a, _mm512_permute_ps::<0b10_11_00_01>(b));
-    // SAFETY: the caller's.
-    unsafe {
-        match (P, D) {
-            (2, 1) if hop == 2 => {
-                let [first, second] = zip_f32(a, b);
-                _mm512_storeu_ps(out, first);
-                _mm512_storeu_ps(out.add(16), second);
-            }
-            (2, 2) if hop == 2 => _mm512_storeu_ps(out, pairs(a, b)),
-            (4, 1) => {
-                let (ab, cd) = (zip_f32(a, b), zip_f32(c, d));
-                for half in 0..2 {
-                    let [first, second] = zip_pairs_f32(ab[half], cd[half]);
-                    store_quarters(first, out.add(8 * half * hop), hop);
-                    store_quarters(second, out.add((8 * half + 4) * hop), hop);
-                }
-            }
-            (4, 2) => {
-                let [first, second] = zip_pairs_f32(pairs(a, b), pairs(c, d));
-                store_quarters(first, out, hop);
-                store_quarters(second, out.add(4 * hop), hop);
-            }
-            (4, 4) => store_quarters(diagonal_quads_f32(sums), out, hop),
-            _ => return false,
+    match (P, D) {
+        (2, 1) if hop == 2 => {
+            let [first, second] = zip_f32(a, b);
+            _mm512_storeu_ps(out, first);
+            _mm512_storeu_ps(out.add(16), second);
         }
-        true
+        (2, 2) if hop == 2 => _mm512_storeu_ps(out, pairs(a, b)),
+        (4, 1) => {
+            let (ab, cd) = (zip_f32(a, b), zip_f32(c, d));
+            for half in 0..2 {
+                let [first, second] = zip_pairs_f32(ab[half], cd[half]);
+                store_quarters(first, out.add(8 * half * hop), hop);
+                store_quarters(second, out.add((8 * half + 4) * hop), hop);
+            }
+        }
+        (4, 2) => {
+            let [first, second] = zip_pairs_f32(pairs(a, b), pairs(c, d));
+            store_quarters(first, out, hop);
+            store_quarters(second, out.add(4 * hop), hop);
+        }
+        (4, 4) => store_quarters(diagonal_quads_f32(sums), out, hop),
+        _ => return false,
     }
+    true
 }
 
 #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma")]
@@ -142,37 +136,34 @@ unsafe fn store_frames_f64<const P: usize, const D: usize>(
     hop: usize,
 ) -> bool {
     let pairs = |a, b| _mm512_add_pd(a, _mm512_permute_pd::<0b0101_0101>(b));
-    // SAFETY: the caller's.
-    unsafe {
-        match (P, D) {
-            (2, 1) if hop == 2 => {
-                let [first, second] = zip_f64(a, b);
-                _mm512_storeu_pd(out, first);
-                _mm512_storeu_pd(out.add(8), second);
-            }
-            (2, 2) if hop == 2 => _mm512_storeu_pd(out, pairs(a, b)),
-            (4, 1) if hop == 4 => {
-                let (ab, cd) = (zip_f64(a, b), zip_f64(c, d));
-                for half in 0..2 {
-                    let [first, second] = zip_pairs_f64(ab[half], cd[half]);
-                    _mm512_storeu_pd(out.add(16 * half), first);
-                    _mm512_storeu_pd(out.add(16 * half + 8), second);
-                }
-            }
-            (4, 2) if hop == 4 => {
-                let [first, second] = zip_pairs_f64(pairs(a, b), pairs(c, d));
-                _mm512_storeu_pd(out, first);
-                _mm512_storeu_pd(out.add(8), second);
-            }
-            (4, 4) if hop == 4 => {
-                let two = |a, c| _mm512_add_pd(a, _mm512_permutex_pd::<0b01_00_11_10>(c));
-                let quads = _mm512_add_pd(two(a, c), _mm512_permutex_pd::<0b10_01_00_11>(two(b, d)));
-                _mm512_storeu_pd(out, quads);
-            }
-            _ => return false,
+    match (P, D) {
+        (2, 1) if hop == 2 => {
+            let [first, second] = zip_f64(a, b);
+            _mm512_storeu_pd(out, first);
+            _mm512_storeu_pd(out.add(8), second);
         }
-        true
+        (2, 2) if hop == 2 => _mm512_storeu_pd(out, pairs(a, b)),
+        (4, 1) if hop == 4 => {
+            let (ab, cd) = (zip_f64(a, b), zip_f64(c, d));
+            for half in 0..2 {
+                let [first, second] = zip_pairs_f64(ab[half], cd[half]);
+                _mm512_storeu_pd(out.add(16 * half), first);
+                _mm512_storeu_pd(out.add(16 * half + 8), second);
+            }
+        }
+        (4, 2) if hop == 4 => {
+            let [first, second] = zip_pairs_f64(pairs(a, b), pairs(c, d));
+            _mm512_storeu_pd(out, first);
+            _mm512_storeu_pd(out.add(8), second);
+        }
+        (4, 4) if hop == 4 => {
+            let two = |a, c| _mm512_add_pd(a, _mm512_permutex_pd::<0b01_00_11_10>(c));
+            let quads = _mm512_add_pd(two(a, c), _mm512_permutex_pd::<0b10_01_00_11>(two(b, d)));
+            _mm512_storeu_pd(out, quads);
+        }
+        _ => return false,
     }
+    true
 }
 
 /// [`Vector::store_frames`] group after group.
@@ -218,27 +209,21 @@ impl Vector for Avx512F32 {
 
     #[inline(always)]
     unsafe fn broadcast<const D: usize>(at: *const f32) -> Self {
-        // SAFETY: the caller's.
-        Self(unsafe {
-            match D {
-                1 => _mm512_set1_ps(*at),
-                2 => _mm512_castpd_ps(_mm512_set1_pd(at.cast::<f64>().read_unaligned())),
-                4 => _mm512_broadcast_f32x4(_mm_loadu_ps(at)),
-                _ => _mm512_broadcast_f32x8(_mm256_loadu_ps(at)),
-            }
+        Self(match D {
+            1 => _mm512_set1_ps(*at),
+            2 => _mm512_castpd_ps(_mm512_set1_pd(at.cast::<f64>().read_unaligned())),
+            4 => _mm512_broadcast_f32x4(_mm_loadu_ps(at)),
+            _ => _mm512_broadcast_f32x8(_mm256_loadu_ps(at)),
         })
     }
 
     #[inline(always)]
     unsafe fn frames<const D: usize>(at: *const f32, hop: usize) -> Self {
-        // SAFETY: the caller's.
-        Self(unsafe {
-            if D < 8 || hop == 8 {
-                return Self(_mm512_loadu_ps(at));
-            }
-            let first = _mm512_castps256_ps512(_mm256_loadu_ps(at));
-            _mm512_insertf32x8::<1>(first, _mm256_loadu_ps(at.add(hop)))
-        })
+        if D < 8 || hop == 8 {
+            return Self(_mm512_loadu_ps(at));
+        }
+        let first = _mm512_castps256_ps512(_mm256_loadu_ps(at));
+        Self(_mm512_insertf32x8::<1>(first, _mm256_loadu_ps(at.add(hop))))
     }
 
     #[inline(always)]
@@ -255,47 +240,38 @@ impl Vector for Avx512F32 {
 
     #[inline(always)]
     unsafe fn store_frames<const P: usize, const D: usize>(sums: [Self; 4], out: *mut f32, hop: usize) {
-        // SAFETY: the caller's.
-        unsafe {
-            if !store_frames_f32::<P, D>(sums.map(|sum| sum.0), out, hop) {
-                store_groups!(Avx2F32, sums, out, hop);
-            }
+        if !store_frames_f32::<P, D>(sums.map(|sum| sum.0), out, hop) {
+            store_groups!(Avx2F32, sums, out, hop);
         }
     }
 
     #[inline(always)]
     unsafe fn store_halves(sums: [Self; 4], out: [*mut f32; 2], hop: usize) {
         let halves = Self::diagonal_halves(sums);
-        // SAFETY: the caller's.
-        unsafe {
-            if hop == 2 {
-                let order = _mm512_setr_epi64(0, 2, 4, 6, 1, 3, 5, 7);
-                let both = Self(_mm512_castpd_ps(_mm512_permutexvar_pd(order, _mm512_castps_pd(halves.0))));
-                both.group(0).store(out[0]);
-                return both.group(1).store(out[1]);
-            }
-            for g in 0..2 {
-                let pairs = halves.group(g);
-                pairs.store_two_halves(out.map(|out| out.add(2 * g * hop)), hop);
-            }
+        if hop == 2 {
+            let order = _mm512_setr_epi64(0, 2, 4, 6, 1, 3, 5, 7);
+            let both = Self(_mm512_castpd_ps(_mm512_permutexvar_pd(order, _mm512_castps_pd(halves.0))));
+            both.group(0).store(out[0]);
+            return both.group(1).store(out[1]);
+        }
+        for g in 0..2 {
+            let pairs = halves.group(g);
+            pairs.store_two_halves(out.map(|out| out.add(2 * g * hop)), hop);
         }
     }
 
     #[inline(always)]
     unsafe fn add_halves(sums: *const f32, vectors: usize, out: *mut f32, hop: usize) {
-        // SAFETY: the caller's.
-        unsafe {
-            for pair in 0..vectors / 2 {
-                let from = sums.add(32 * pair);
-                let (u, v) = (_mm512_loadu_ps(from), _mm512_loadu_ps(from.add(16)));
-                let lower = _mm512_shuffle_f32x4::<0b10_00_10_00>(u, v);
-                let upper = _mm512_shuffle_f32x4::<0b11_01_11_01>(u, v);
-                store_quarters(_mm512_add_ps(lower, upper), out.add(4 * pair * hop), hop);
-            }
-            if vectors % 2 == 1 {
-                let last = vectors - 1;
-                Avx2F32::add_halves(sums.add(16 * last), 2, out.add(2 * last * hop), hop);
-            }
+        for pair in 0..vectors / 2 {
+            let from = sums.add(32 * pair);
+            let (u, v) = (_mm512_loadu_ps(from), _mm512_loadu_ps(from.add(16)));
+            let lower = _mm512_shuffle_f32x4::<0b10_00_10_00>(u, v);
+            let upper = _mm512_shuffle_f32x4::<0b11_01_11_01>(u, v);
+            store_quarters(_mm512_add_ps(lower, upper), out.add(4 * pair * hop), hop);
+        }
+        if vectors % 2 == 1 {
+            let last = vectors - 1;
+            Avx2F32::add_halves(sums.add(16 * last), 2, out.add(2 * last * hop), hop);
         }
     }
 }
@@ -331,45 +307,33 @@ impl Vector for Avx512F64 {
 
     #[inline(always)]
     unsafe fn broadcast<const D: usize>(at: *const f64) -> Self {
-        // SAFETY: the caller's.
-        Self(unsafe {
-            match D {
-                1 => _mm512_set1_pd(*at),
-                2 => _mm512_broadcast_f64x2(_mm_loadu_pd(at)),
-                _ => _mm512_broadcast_f64x4(_mm256_loadu_pd(at)),
-            }
+        Self(match D {
+            1 => _mm512_set1_pd(*at),
+            2 => _mm512_broadcast_f64x2(_mm_loadu_pd(at)),
+            _ => _mm512_broadcast_f64x4(_mm256_loadu_pd(at)),
         })
     }
 
     #[inline(always)]
     unsafe fn frames<const D: usize>(at: *const f64, hop: usize) -> Self {
-        // SAFETY: the caller's.
-        Self(unsafe {
-            if D < 4 || hop == 4 {
-                return Self(_mm512_loadu_pd(at));
-            }
-            let first = _mm512_castpd256_pd512(_mm256_loadu_pd(at));
-            _mm512_insertf64x4::<1>(first, _mm256_loadu_pd(at.add(hop)))
-        })
+        if D < 4 || hop == 4 {
+            return Self(_mm512_loadu_pd(at));
+        }
+        let first = _mm512_castpd256_pd512(_mm256_loadu_pd(at));
+        Self(_mm512_insertf64x4::<1>(first, _mm256_loadu_pd(at.add(hop))))
     }
 
     #[inline(always)]
     unsafe fn store_frames<const P: usize, const D: usize>(sums: [Self; 4], out: *mut f64, hop: usize) {
-        // SAFETY: the caller's.
-        unsafe {
-            if !store_frames_f64::<P, D>(sums.map(|sum| sum.0), out, hop) {
-                store_groups!(Avx2F64, sums, out, hop);
-            }
+        if !store_frames_f64::<P, D>(sums.map(|sum| sum.0), out, hop) {
+            store_groups!(Avx2F64, sums, out, hop);
         }
     }
 
     #[inline(always)]
     unsafe fn store_halves(sums: [Self; 4], out: [*mut f64; 2], hop: usize) {
         for g in 0..2 {
-            // SAFETY: the caller's.
-            unsafe {
-                Avx2F64::store_halves(sums.map(|sum| sum.group(g)), out.map(|out| out.add(g * hop)), hop)
-            };
+            Avx2F64::store_halves(sums.map(|sum| sum.group(g)), out.map(|out| out.add(g * hop)), hop);
         }
     }
 }

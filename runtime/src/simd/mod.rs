@@ -5,7 +5,7 @@
 //! dispatch   from an Isa to a function compiled for it
 //! vector     the vector trait, all that kernels know of an instruction set
 //! portable  avx2  avx512  neon      the trait for each set
-//! fir  recursion  transform  pcm  finite  peak      the kernels
+//! fir  recursion  transform (passes, product)  pcm  finite  peak      the kernels
 //! ```
 //!
 //! Each kernel is one body that is generic over the vector type, compiled once for each instruction set.
@@ -18,6 +18,7 @@
 //! or thread count. Only on an x86 processor without FMA (before 2013) the portable body rounds the product
 //! as well, because a fused multiply-add in software is forty times slower.
 #![allow(unsafe_code)]
+#![allow(unsafe_op_in_unsafe_fn, reason = "each unsafe function says what it asks for")]
 #![deny(clippy::undocumented_unsafe_blocks)]
 
 #[cfg(target_arch = "x86_64")]
@@ -34,9 +35,11 @@ mod fir;
 mod isa;
 #[cfg(target_arch = "aarch64")]
 mod neon;
+mod passes;
 mod pcm;
 mod peak;
 mod portable;
+mod product;
 mod recursion;
 mod transform;
 mod vector;

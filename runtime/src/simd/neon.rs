@@ -31,23 +31,18 @@ macro_rules! neon {
 
             #[inline(always)]
             unsafe fn splat(value: $sample) -> Self {
-                // SAFETY: the caller's.
-                Self(unsafe { [$dup(value); 2] })
+                Self([$dup(value); 2])
             }
 
             #[inline(always)]
             unsafe fn load(at: *const $sample) -> Self {
-                // SAFETY: the caller's.
-                Self(unsafe { [$load(at), $load(at.add($lanes / 2))] })
+                Self([$load(at), $load(at.add($lanes / 2))])
             }
 
             #[inline(always)]
             unsafe fn store(self, at: *mut $sample) {
-                // SAFETY: the caller's.
-                unsafe {
-                    $store(at, self.0[0]);
-                    $store(at.add($lanes / 2), self.0[1]);
-                }
+                $store(at, self.0[0]);
+                $store(at.add($lanes / 2), self.0[1]);
             }
 
             #[inline(always)]

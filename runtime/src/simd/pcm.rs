@@ -5,7 +5,6 @@ use super::fir::widths;
 use super::isa::Isa;
 use super::vector::Vector;
 use crate::pcm::PcmFormat;
-use std::marker::PhantomData;
 
 /// Lanes of a group.
 const GROUP: usize = 8;
@@ -13,17 +12,8 @@ const GROUP: usize = 8;
 /// Decodes samples from the first on as far as there is a fast way; returns how many. The caller does the
 /// rest.
 pub(crate) fn decode(isa: Isa, format: PcmFormat, bytes: &[u8], out: &mut [f32]) -> usize {
-    // SAFETY: the kernels ask nothing of their jobs.
-    unsafe {
-        match format {
-            PcmFormat::F32Le if cfg!(target_endian = "little") => {
-                compiled_narrow::<Decode<F32>>(isa)((bytes, out))
-            }
-            PcmFormat::S16Le => compiled_narrow::<Decode<S16>>(isa)((bytes, out)),
-            PcmFormat::S32Le => compiled_narrow::<Decode<S32>>(isa)((bytes, out)),
-            _ => 0,
-        }
-    }
+    // SAFETY: the kernel checks the lengths itself.
+    unsafe { compiled_narrow::<Decode>(isa)((format, bytes, out)) }
 }
 
 /// Encodes all samples; returns how many were clipped.
@@ -56,68 +46,39 @@ pub(crate) fn interleave(
     unsafe { compiled_narrow::<Interleave>(isa)(Rows { rows, stride, m, frames, out: out.as_mut_ptr() }) }
 }
 
-/// A format that has a fast way.
-trait Format {
-    /// Bytes per sample.
-    const BYTES: usize;
-    /// # Safety
-    /// As for [`Vector`]; a group of samples is at `at`.
-    unsafe fn load<V: Vector<Sample = f32>>(at: *const u8) -> V;
-}
-
-struct F32;
-struct S16;
-struct S32;
-
-impl Format for F32 {
-    const BYTES: usize = 4;
-
-    #[inline(always)]
-    unsafe fn load<V: Vector<Sample = f32>>(at: *const u8) -> V {
-        // SAFETY: the caller's; vectors need no alignment.
-        unsafe { V::load(at.cast()) }
-    }
-}
-
-impl Format for S16 {
-    const BYTES: usize = 2;
-
-    #[inline(always)]
-    unsafe fn load<V: Vector<Sample = f32>>(at: *const u8) -> V {
-        // SAFETY: the caller's.
-        unsafe { V::load_i16(at) }
-    }
-}
-
-impl Format for S32 {
-    const BYTES: usize = 4;
-
-    #[inline(always)]
-    unsafe fn load<V: Vector<Sample = f32>>(at: *const u8) -> V {
-        // SAFETY: the caller's.
-        unsafe { V::load_i32(at) }
-    }
-}
-
-/// Whole groups; the samples done.
-struct Decode<F>(PhantomData<F>);
-
-impl<F: Format> Kernel for Decode<F> {
-    type Sample = f32;
-    type Job<'a> = (&'a [u8], &'a mut [f32]);
-    type Output = usize;
-
-    #[inline(always)]
-    unsafe fn run<V: Vector<Sample = f32>>((bytes, out): Self::Job<'_>) -> usize {
+/// Decodes whole groups with `$load`, of a format of so many bytes; the samples done.
+macro_rules! groups {
+    ($out:ident, $bytes:ident, $size:literal, $at:ident => $load:expr) => {{
+        let (groups, _) = $out.as_chunks_mut::<GROUP>();
         let mut done = 0;
-        for (out, bytes) in
-            out.as_chunks_mut::<GROUP>().0.iter_mut().zip(bytes.chunks_exact(GROUP * F::BYTES))
-        {
-            // SAFETY: the caller's; both slices hold a group.
-            unsafe { F::load::<V>(bytes.as_ptr()).store(out.as_mut_ptr()) };
+        for (out, bytes) in groups.iter_mut().zip($bytes.as_chunks::<{ GROUP * $size }>().0) {
+            let $at = bytes.as_ptr();
+            // Both arrays hold a group.
+            $load.store(out.as_mut_ptr());
             done += GROUP;
         }
         done
+    }};
+}
+
+/// Whole groups; the samples done.
+struct Decode;
+
+impl Kernel for Decode {
+    type Sample = f32;
+    type Job<'a> = (PcmFormat, &'a [u8], &'a mut [f32]);
+    type Output = usize;
+
+    #[inline(always)]
+    unsafe fn run<V: Vector<Sample = f32>>((format, bytes, out): Self::Job<'_>) -> usize {
+        match format {
+            PcmFormat::F32Le if cfg!(target_endian = "little") => {
+                groups!(out, bytes, 4, at => V::load(at.cast()))
+            }
+            PcmFormat::S16Le => groups!(out, bytes, 2, at => V::load_i16(at)),
+            PcmFormat::S32Le => groups!(out, bytes, 4, at => V::load_i32(at)),
+            _ => 0,
+        }
     }
 }
 
@@ -138,8 +99,8 @@ impl Kernel for Encode {
         let (groups, last) = out.split_at_mut(2 * GROUP * blocks.len());
         let mut clipped = 0;
         for (samples, out) in blocks.iter().zip(groups.as_chunks_mut::<{ 2 * GROUP }>().0) {
-            // SAFETY: the caller's; both arrays hold a group.
-            clipped += u64::from(unsafe { V::load(samples.as_ptr()).store_i16(out.as_mut_ptr()) });
+            // Both arrays hold a group.
+            clipped += u64::from(V::load(samples.as_ptr()).store_i16(out.as_mut_ptr()));
         }
         clipped + encode_each(format, rest, last)
     }
@@ -179,17 +140,14 @@ impl Kernel for Interleave {
         let whole = frames.saturating_sub(usize::from(m == 3)) / GROUP * GROUP;
         for first in (0..whole).step_by(GROUP) {
             for (sample, width) in widths(m) {
-                // SAFETY: the caller's.
-                unsafe {
-                    let row = |p: usize| V::load(rows.add((sample + p.min(width - 1)) * stride + first));
-                    let block = [row(0), row(1), row(2), row(3)];
-                    let to = out.add(first * m + sample);
-                    match width {
-                        1 => block[0].store(to),
-                        2 => V::store_frames::<2, 1>(block, to, m),
-                        3 => V::store_frames::<3, 1>(block, to, m),
-                        _ => V::store_frames::<4, 1>(block, to, m),
-                    }
+                let row = |p: usize| V::load(rows.add((sample + p.min(width - 1)) * stride + first));
+                let block = [row(0), row(1), row(2), row(3)];
+                let to = out.add(first * m + sample);
+                match width {
+                    1 => block[0].store(to),
+                    2 => V::store_frames::<2, 1>(block, to, m),
+                    3 => V::store_frames::<3, 1>(block, to, m),
+                    _ => V::store_frames::<4, 1>(block, to, m),
                 }
             }
         }

@@ -23,8 +23,7 @@ impl Kernel for Chains {
 
     #[inline(always)]
     unsafe fn run<V: Vector<Sample = f32>>(iterations: u64) -> (u64, f32) {
-        // SAFETY: the caller's.
-        let splat = |value: f32| unsafe { V::splat(std::hint::black_box(value)) };
+        let splat = |value: f32| V::splat(std::hint::black_box(value));
         let (factor, term) = (splat(0.999), splat(1e-3));
         let mut sums = [splat(1.0); CHAINS];
         for _ in 0..iterations {

@@ -22,14 +22,12 @@ where
 
     #[inline(always)]
     unsafe fn load(at: *const T) -> Self {
-        // SAFETY: the caller's.
-        Self(unsafe { at.cast::<[T; L]>().read_unaligned() })
+        Self(at.cast::<[T; L]>().read_unaligned())
     }
 
     #[inline(always)]
     unsafe fn store(self, at: *mut T) {
-        // SAFETY: the caller's.
-        unsafe { at.cast::<[T; L]>().write_unaligned(self.0) }
+        at.cast::<[T; L]>().write_unaligned(self.0)
     }
 
     #[inline(always)]

@@ -152,22 +152,19 @@ impl<T: Element> Kernel for Body<T> {
 
     #[inline(always)]
     unsafe fn run<V: Vector<Sample = T>>(job: &Job<'_, T>) {
-        // SAFETY: the caller's, see `RecursionKernel::run`.
-        unsafe {
-            match &job.recursion.form {
-                Form::Sections(vectors) => {
-                    let whole = job.frames / STEP * STEP;
-                    for t in (0..whole).step_by(STEP) {
-                        sections::<V, STEP>(job, vectors, t);
-                    }
-                    for t in whole..job.frames {
-                        sections::<V, 1>(job, vectors, t);
-                    }
+        match &job.recursion.form {
+            Form::Sections(vectors) => {
+                let whole = job.frames / STEP * STEP;
+                for t in (0..whole).step_by(STEP) {
+                    sections::<V, STEP>(job, vectors, t);
                 }
-                Form::Dense(tiles) => {
-                    for t in 0..job.frames {
-                        dense::<V>(job, tiles, t);
-                    }
+                for t in whole..job.frames {
+                    sections::<V, 1>(job, vectors, t);
+                }
+            }
+            Form::Dense(tiles) => {
+                for t in 0..job.frames {
+                    dense::<V>(job, tiles, t);
                 }
             }
         }
@@ -186,11 +183,8 @@ unsafe fn sections<V: Vector, const T: usize>(
 {
     let states = job.recursion.states;
     for (v, vector) in vectors.iter().enumerate() {
-        // SAFETY: the caller's, see `RecursionKernel::run`.
-        unsafe {
-            let row = job.rows.add(t * states + 2 * v * V::LANES);
-            section_vector::<V, T>(vector, row, states, job.window.add(t * job.hop), job.hop);
-        }
+        let row = job.rows.add(t * states + 2 * v * V::LANES);
+        section_vector::<V, T>(vector, row, states, job.window.add(t * job.hop), job.hop);
     }
 }
 
@@ -205,33 +199,30 @@ unsafe fn section_vector<V: Vector, const T: usize>(
 ) where
     V::Sample: Default,
 {
-    // SAFETY: the caller's, see `RecursionKernel::run`.
-    unsafe {
-        let mut coefficients = vector.coefficients.as_ptr();
-        let [a11, a12] = [V::load(coefficients), V::load(coefficients.add(V::LANES))];
+    let mut coefficients = vector.coefficients.as_ptr();
+    let [a11, a12] = [V::load(coefficients), V::load(coefficients.add(V::LANES))];
+    coefficients = coefficients.add(2 * V::LANES);
+    let [a21, a22] = [V::load(coefficients), V::load(coefficients.add(V::LANES))];
+    let zero = V::splat(V::Sample::default());
+    let mut sums = [[zero; 2]; T];
+    for &place in &vector.inputs {
+        let mut input = window.add(place as usize);
         coefficients = coefficients.add(2 * V::LANES);
-        let [a21, a22] = [V::load(coefficients), V::load(coefficients.add(V::LANES))];
-        let zero = V::splat(V::Sample::default());
-        let mut sums = [[zero; 2]; T];
-        for &place in &vector.inputs {
-            let mut input = window.add(place as usize);
-            coefficients = coefficients.add(2 * V::LANES);
-            let [b1, b2] = [V::load(coefficients), V::load(coefficients.add(V::LANES))];
-            for [p, q] in &mut sums {
-                let u = V::splat(*input);
-                *p = u.mul_add(b1, *p);
-                *q = u.mul_add(b2, *q);
-                // May leave the window after the last frame, where nothing is read.
-                input = input.wrapping_add(hop);
-            }
+        let [b1, b2] = [V::load(coefficients), V::load(coefficients.add(V::LANES))];
+        for [p, q] in &mut sums {
+            let u = V::splat(*input);
+            *p = u.mul_add(b1, *p);
+            *q = u.mul_add(b2, *q);
+            // May leave the window after the last frame, where nothing is read.
+            input = input.wrapping_add(hop);
         }
-        let (mut p, mut q) = (V::load(row), V::load(row.add(V::LANES)));
-        for [b1u, b2u] in sums {
-            (p, q) = (p.mul_add(a11, q.mul_add(a12, b1u)), q.mul_add(a22, p.mul_add(a21, b2u)));
-            row = row.add(states);
-            p.store(row);
-            q.store(row.add(V::LANES));
-        }
+    }
+    let (mut p, mut q) = (V::load(row), V::load(row.add(V::LANES)));
+    for [b1u, b2u] in sums {
+        (p, q) = (p.mul_add(a11, q.mul_add(a12, b1u)), q.mul_add(a22, p.mul_add(a21, b2u)));
+        row = row.add(states);
+        p.store(row);
+        q.store(row.add(V::LANES));
     }
 }
 
@@ -239,14 +230,11 @@ unsafe fn section_vector<V: Vector, const T: usize>(
 #[inline(always)]
 unsafe fn dense<V: Vector>(job: &Job<'_, V::Sample>, tiles: &[ColumnTile<V::Sample>], t: usize) {
     for tile in tiles {
-        // SAFETY: the caller's, see `RecursionKernel::run`.
-        unsafe {
-            match tile.vectors {
-                1 => column_tile::<V, 1>(job, tile, t),
-                2 => column_tile::<V, 2>(job, tile, t),
-                4 => column_tile::<V, 4>(job, tile, t),
-                _ => column_tile::<V, 8>(job, tile, t),
-            }
+        match tile.vectors {
+            1 => column_tile::<V, 1>(job, tile, t),
+            2 => column_tile::<V, 2>(job, tile, t),
+            4 => column_tile::<V, 4>(job, tile, t),
+            _ => column_tile::<V, 8>(job, tile, t),
         }
     }
 }
@@ -260,22 +248,19 @@ unsafe fn column_tile<V: Vector, const R: usize>(
     V::Sample: Default,
 {
     let states = job.recursion.states;
-    // SAFETY: the caller's, see `RecursionKernel::run`.
-    unsafe {
-        let mut sums = [V::splat(V::Sample::default()); R];
-        let (x, window) = (job.rows.add(t * states), job.window.add(t * job.hop));
-        let mut column = tile.coefficients.as_ptr();
-        for &place in &tile.inputs {
-            add_column(&mut sums, V::splat(*window.add(place as usize)), column);
-            column = column.add(R * V::LANES);
-        }
-        for &j in &tile.columns {
-            add_column(&mut sums, V::splat(*x.add(j as usize)), column);
-            column = column.add(R * V::LANES);
-        }
-        for (r, sum) in sums.into_iter().enumerate() {
-            sum.store(x.add(states + tile.first + r * V::LANES));
-        }
+    let mut sums = [V::splat(V::Sample::default()); R];
+    let (x, window) = (job.rows.add(t * states), job.window.add(t * job.hop));
+    let mut column = tile.coefficients.as_ptr();
+    for &place in &tile.inputs {
+        add_column(&mut sums, V::splat(*window.add(place as usize)), column);
+        column = column.add(R * V::LANES);
+    }
+    for &j in &tile.columns {
+        add_column(&mut sums, V::splat(*x.add(j as usize)), column);
+        column = column.add(R * V::LANES);
+    }
+    for (r, sum) in sums.into_iter().enumerate() {
+        sum.store(x.add(states + tile.first + r * V::LANES));
     }
 }
 
@@ -283,7 +268,6 @@ unsafe fn column_tile<V: Vector, const R: usize>(
 #[inline(always)]
 unsafe fn add_column<V: Vector, const R: usize>(sums: &mut [V; R], value: V, column: *const V::Sample) {
     for (r, sum) in sums.iter_mut().enumerate() {
-        // SAFETY: the caller's, see `RecursionKernel::run`.
-        *sum = unsafe { value.mul_add(V::load(column.add(r * V::LANES)), *sum) };
+        *sum = value.mul_add(V::load(column.add(r * V::LANES)), *sum);
     }
 }

@@ -116,8 +116,7 @@ pub(crate) trait Vector: Copy {
     /// All lanes zero.
     #[inline(always)]
     unsafe fn zero() -> Self {
-        // SAFETY: the caller's.
-        unsafe { Self::splat(Self::Sample::default()) }
+        Self::splat(Self::Sample::default())
     }
 
     /// The lanes as an array, of which the first [`Vector::LANES`] mean something.
@@ -149,8 +148,7 @@ pub(crate) trait Vector: Copy {
     /// D samples from `at` in the lanes of every frame.
     #[inline(always)]
     unsafe fn broadcast<const D: usize>(at: *const Self::Sample) -> Self {
-        // SAFETY: the caller's.
-        unsafe { Self::from_fn(|l| *at.add(l % D)) }
+        Self::from_fn(|l| *at.add(l % D))
     }
 
     /// Frames of D lanes, the first at `at`: a group of them, then, if there is a second group, those that
@@ -158,8 +156,7 @@ pub(crate) trait Vector: Copy {
     #[inline(always)]
     unsafe fn frames<const D: usize>(at: *const Self::Sample, _hop: usize) -> Self {
         const { assert!(Self::GROUPS == 1) };
-        // SAFETY: the caller's.
-        unsafe { Self::load(at) }
+        Self::load(at)
     }
 
     /// For each two lanes: a0 + b1, a1 + b0.
@@ -237,8 +234,7 @@ pub(crate) trait Vector: Copy {
                 2 => phases[p / 2][2 * t + p % 2],
                 _ => phases[0][4 * t + p],
             };
-            // SAFETY: the caller's.
-            unsafe { *out.add(t * hop + p) = value };
+            *out.add(t * hop + p) = value;
         }
     }
 
@@ -248,8 +244,7 @@ pub(crate) trait Vector: Copy {
     unsafe fn store_halves(sums: [Self; 4], out: [*mut Self::Sample; 2], hop: usize) {
         let pairs = Self::diagonal_halves(sums).to_array();
         for (l, &value) in pairs.iter().enumerate().take(Self::LANES) {
-            // SAFETY: the caller's.
-            unsafe { *out[l / 2 % 2].add(l / 4 * hop + l % 2) = value };
+            *out[l / 2 % 2].add(l / 4 * hop + l % 2) = value;
         }
     }
 
@@ -259,12 +254,9 @@ pub(crate) trait Vector: Copy {
     #[inline(always)]
     unsafe fn add_halves(sums: *const Self::Sample, vectors: usize, out: *mut Self::Sample, hop: usize) {
         for index in 0..vectors * Self::GROUPS {
-            // SAFETY: the caller's.
-            unsafe {
-                let from = sums.add(index * Self::GROUP);
-                let outputs: [_; 4] = std::array::from_fn(|i| *from.add(i) + *from.add(4 + i));
-                out.add(index * hop).copy_from_nonoverlapping(outputs.as_ptr(), 4);
-            }
+            let from = sums.add(index * Self::GROUP);
+            let outputs: [_; 4] = std::array::from_fn(|i| *from.add(i) + *from.add(4 + i));
+            out.add(index * hop).copy_from_nonoverlapping(outputs.as_ptr(), 4);
         }
     }
 
@@ -283,35 +275,29 @@ pub(crate) trait Vector: Copy {
     /// Lanes of segments, D each: those of segment s from `at + s * hop` on.
     #[inline(always)]
     unsafe fn segments<const D: usize>(at: *const Self::Sample, hop: usize) -> Self {
-        // SAFETY: the caller's.
-        unsafe { Self::from_fn(|l| *at.add(l / D * hop + l % D)) }
+        Self::from_fn(|l| *at.add(l / D * hop + l % D))
     }
 
     /// Lane n of each segment of the vector at `row`, in all D lanes of the segment.
     #[inline(always)]
     unsafe fn broadcast_lane<const D: usize>(row: *const Self::Sample, n: usize) -> Self {
-        // SAFETY: the caller's.
-        unsafe { Self::from_fn(|l| *row.add(l / D * D + n)) }
+        Self::from_fn(|l| *row.add(l / D * D + n))
     }
 
     /// Samples from little-endian 16-bit integers, which are divided by 2^15.
     #[inline(always)]
     unsafe fn load_i16(at: *const u8) -> Self {
         let scale = Self::Sample::from(1.0 / 32768.0);
-        // SAFETY: the caller's.
-        let integer = |l: usize| i16::from_le(unsafe { at.cast::<i16>().add(l).read_unaligned() });
-        // SAFETY: the caller's.
-        unsafe { Self::from_fn(|l| Self::Sample::from_i32(integer(l).into()) * scale) }
+        let integer = |l: usize| i16::from_le(at.cast::<i16>().add(l).read_unaligned());
+        Self::from_fn(|l| Self::Sample::from_i32(integer(l).into()) * scale)
     }
 
     /// Samples from little-endian 32-bit integers, rounded to the nearest, which are divided by 2^31.
     #[inline(always)]
     unsafe fn load_i32(at: *const u8) -> Self {
         let scale = Self::Sample::from(1.0 / 2147483648.0);
-        // SAFETY: the caller's.
-        let integer = |l: usize| i32::from_le(unsafe { at.cast::<i32>().add(l).read_unaligned() });
-        // SAFETY: the caller's.
-        unsafe { Self::from_fn(|l| Self::Sample::from_i32(integer(l)) * scale) }
+        let integer = |l: usize| i32::from_le(at.cast::<i32>().add(l).read_unaligned());
+        Self::from_fn(|l| Self::Sample::from_i32(integer(l)) * scale)
     }
 
     /// Samples times 2^15 to the nearest little-endian 16-bit integers, ties to even; NaN becomes 0. Returns
@@ -322,8 +308,8 @@ pub(crate) trait Vector: Copy {
         for (l, value) in self.to_array().into_iter().enumerate().take(Self::LANES) {
             let scaled = (value.into() * 32768.0).round_ties_even();
             clipped += u32::from(!(-32768.0..=32767.0).contains(&scaled) && !scaled.is_nan());
-            // SAFETY: the caller's. The cast saturates.
-            unsafe { at.cast::<i16>().add(l).write_unaligned((scaled as i16).to_le()) };
+            // The cast saturates.
+            at.cast::<i16>().add(l).write_unaligned((scaled as i16).to_le());
         }
         clipped
     }

@@ -3,8 +3,8 @@
 
 use super::support::{FIR_ALGORITHMS, Noise, fir_bank, precise, random_taps, recursive_bank};
 use crate::{
-    Algorithm, BuildError, Interleaved, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision,
-    SampleLayout, StateSpace, Stream,
+    Algorithm, BuildError, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision, SampleLayout,
+    StateSpace, Stream,
 };
 
 /// Frames of a test: more than two batches of overlap-save with transforms of 64 frames.
@@ -133,7 +133,7 @@ fn offsets_are_subtracted_on_all_threads() {
     let plan = bank.plan(Options::default()).unwrap().with_offsets(&[0.3, -0.01]).unwrap();
     let [mut alone, mut together] = [vec![0f32; 80_000], vec![0f32; 80_000]];
     Stream::new(&plan).process(&x, &mut alone).unwrap();
-    let frames = Interleaved::new(&x, 2).unwrap();
+    let frames = crate::Interleaved::new(&x, 2).unwrap();
     Stream::new(&plan).run_parallel(&frames, &mut together[..], &pool).unwrap();
     assert!(alone == together);
 }

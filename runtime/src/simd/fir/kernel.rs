@@ -24,10 +24,7 @@ impl<T: Element, const D: usize, const P: usize> Kernel for Fir<T, D, P> {
         if const { D > group_lanes::<T>() } {
             unreachable!("a step is at most a group");
         }
-        // SAFETY: the caller's.
-        unsafe {
-            if const { P == 1 } { Single::<V, D>::new(job).run() } else { Phases::<V, D, P>::new(job).run() }
-        }
+        if const { P == 1 } { Single::<V, D>::new(job).run() } else { Phases::<V, D, P>::new(job).run() }
     }
 }
 

@@ -40,8 +40,7 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     /// As for [`Vector`].
     #[inline(always)]
     pub(super) unsafe fn new(job: &'a Job<'a, V::Sample>) -> Self {
-        // SAFETY: the caller's.
-        Self { job, chunk: Chunk::NONE, first: 0, waiting: 0, total: unsafe { V::zero() } }
+        Self { job, chunk: Chunk::NONE, first: 0, waiting: 0, total: V::zero() }
     }
 
     /// All frames.
@@ -52,8 +51,7 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     pub(super) unsafe fn run(&mut self) -> bool {
         for &Chunk { x, out, frames } in self.job.chunks {
             self.chunk = Chunk { x, out: out.wrapping_add(self.job.first), frames };
-            // SAFETY: the caller's.
-            unsafe { self.run_chunk() };
+            self.run_chunk();
         }
         self.total.finite()
     }
@@ -65,14 +63,13 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
         let mut first = 0;
         while left > 0 {
             let vectors = tile_size(left, Self::MOST);
-            // SAFETY: the caller's; the tiles are all within the job.
-            sized!(vectors, R => unsafe { self.tile::<R>(first) });
+            // The tiles are all within the job.
+            sized!(vectors, R => self.tile::<R>(first));
             first += vectors * Self::FRAMES;
             left -= vectors;
         }
         if const { Self::IN_PARTS } {
-            // SAFETY: the caller's.
-            unsafe { self.flush() };
+            self.flush();
         }
     }
 
@@ -83,28 +80,25 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
         if const { R > Self::MOST } {
             return;
         }
-        // SAFETY: the caller's.
-        unsafe {
-            // Where frames of a whole group follow each other the compiler can see it.
-            let hop = self.job.tiling.hop;
-            let sums = if const { V::GROUPS > 1 && D == V::GROUP } && hop == D {
-                self.multiply::<R>(first, D)
-            } else {
-                self.multiply::<R>(first, hop)
-            };
-            if const { !Self::IN_PARTS } {
-                // Where outputs follow each other too.
-                match self.job.out_hop {
-                    hop if hop == P => self.store(&sums, first, P),
-                    hop => self.store(&sums, first, hop),
-                }
-                self.check(&sums[0]);
-            } else {
-                self.flush();
-                self.check(&sums[0]);
-                (self.first, self.waiting) = (first, R);
-                self.reduce(&sums);
+        // Where frames of a whole group follow each other the compiler can see it.
+        let hop = self.job.tiling.hop;
+        let sums = if const { V::GROUPS > 1 && D == V::GROUP } && hop == D {
+            self.multiply::<R>(first, D)
+        } else {
+            self.multiply::<R>(first, hop)
+        };
+        if const { !Self::IN_PARTS } {
+            // Where outputs follow each other too.
+            match self.job.out_hop {
+                hop if hop == P => self.store(&sums, first, P),
+                hop => self.store(&sums, first, hop),
             }
+            self.check(&sums[0]);
+        } else {
+            self.flush();
+            self.check(&sums[0]);
+            (self.first, self.waiting) = (first, R);
+            self.reduce(&sums);
         }
     }
 
@@ -129,22 +123,19 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     /// The sums of a tile to their places in the output, in the order of frames.
     #[inline(always)]
     unsafe fn store<const R: usize>(&self, sums: &[[V; R]; P], first: usize, hop: usize) {
-        // SAFETY: the caller's.
-        unsafe {
-            let out = self.chunk.out.add(first * hop);
-            let sum = |p: usize, r: usize| sums[p.min(P - 1)][r];
-            let at = |r: usize| out.add(r * Self::FRAMES * hop);
-            for r in 0..R {
-                if const { P == 2 && D == 4 } {
-                    let next = (r + 1).min(R - 1);
-                    if r % 2 == 0 {
-                        let halves = [sum(0, r), sum(1, r), sum(0, next), sum(1, next)];
-                        V::store_halves(halves, [at(r), at(next)], hop);
-                    }
-                } else {
-                    let sums = [sum(0, r), sum(1, r), sum(2, r), sum(3, r)];
-                    V::store_frames::<P, D>(sums, at(r), hop);
+        let out = self.chunk.out.add(first * hop);
+        let sum = |p: usize, r: usize| sums[p.min(P - 1)][r];
+        let at = |r: usize| out.add(r * Self::FRAMES * hop);
+        for r in 0..R {
+            if const { P == 2 && D == 4 } {
+                let next = (r + 1).min(R - 1);
+                if r % 2 == 0 {
+                    let halves = [sum(0, r), sum(1, r), sum(0, next), sum(1, next)];
+                    V::store_halves(halves, [at(r), at(next)], hop);
                 }
+            } else {
+                let sums = [sum(0, r), sum(1, r), sum(2, r), sum(3, r)];
+                V::store_frames::<P, D>(sums, at(r), hop);
             }
         }
     }
@@ -153,27 +144,24 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     #[inline(always)]
     unsafe fn multiply<const R: usize>(&self, first: usize, hop: usize) -> [[V; R]; P] {
         let steps = self.job.tiling.steps;
-        // SAFETY: the caller's.
-        unsafe {
-            let mut x = self.chunk.x.add(first * hop);
-            let mut w = self.job.coefficients;
-            if let Some(sums) = V::tile::<D, P, R>(x, Self::stride(hop), w, steps) {
-                return sums;
-            }
-            let mut sums = [[V::zero(); R]; P];
-            // Two steps an iteration: half the loop's own work, and an end that is foreseen more often. The
-            // pointers may leave the slices after the last step, where nothing is read.
-            if steps % 2 == 1 {
-                Self::step(x, w, hop, &mut sums);
-                (x, w) = (x.wrapping_sub(D), w.wrapping_add(P * D));
-            }
-            for _ in 0..steps / 2 {
-                Self::step(x, w, hop, &mut sums);
-                Self::step(x.wrapping_sub(D), w.wrapping_add(P * D), hop, &mut sums);
-                (x, w) = (x.wrapping_sub(2 * D), w.wrapping_add(2 * P * D));
-            }
-            sums
+        let mut x = self.chunk.x.add(first * hop);
+        let mut w = self.job.coefficients;
+        if let Some(sums) = V::tile::<D, P, R>(x, Self::stride(hop), w, steps) {
+            return sums;
         }
+        let mut sums = [[V::zero(); R]; P];
+        // Two steps an iteration: half the loop's own work, and an end that is foreseen more often. The
+        // pointers may leave the slices after the last step, where nothing is read.
+        if steps % 2 == 1 {
+            Self::step(x, w, hop, &mut sums);
+            (x, w) = (x.wrapping_sub(D), w.wrapping_add(P * D));
+        }
+        for _ in 0..steps / 2 {
+            Self::step(x, w, hop, &mut sums);
+            Self::step(x.wrapping_sub(D), w.wrapping_add(P * D), hop, &mut sums);
+            (x, w) = (x.wrapping_sub(2 * D), w.wrapping_add(2 * P * D));
+        }
+        sums
     }
 
     /// One step: an input for each of R vectors, a vector of coefficients for each of P phases.
@@ -187,31 +175,28 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
         sums: &mut [[V; R]; P],
     ) {
         let stride = Self::stride(hop);
-        // SAFETY: the caller's.
-        unsafe {
-            // The smaller side waits in registers, the other one streams through a single one:
-            // together with the sums they just fit.
-            if const { P < R } {
-                let mut held = [V::zero(); P];
+        // The smaller side waits in registers, the other one streams through a single one:
+        // together with the sums they just fit.
+        if const { P < R } {
+            let mut held = [V::zero(); P];
+            for p in 0..P {
+                held[p] = V::broadcast::<D>(w.add(p * D));
+            }
+            for r in 0..R {
+                let input = V::frames::<D>(x.add(r * stride), hop);
                 for p in 0..P {
-                    held[p] = V::broadcast::<D>(w.add(p * D));
+                    sums[p][r] = input.mul_add(held[p], sums[p][r]);
                 }
+            }
+        } else {
+            let mut held = [V::zero(); R];
+            for r in 0..R {
+                held[r] = V::frames::<D>(x.add(r * stride), hop);
+            }
+            for p in 0..P {
+                let coefficient = V::broadcast::<D>(w.add(p * D));
                 for r in 0..R {
-                    let input = V::frames::<D>(x.add(r * stride), hop);
-                    for p in 0..P {
-                        sums[p][r] = input.mul_add(held[p], sums[p][r]);
-                    }
-                }
-            } else {
-                let mut held = [V::zero(); R];
-                for r in 0..R {
-                    held[r] = V::frames::<D>(x.add(r * stride), hop);
-                }
-                for p in 0..P {
-                    let coefficient = V::broadcast::<D>(w.add(p * D));
-                    for r in 0..R {
-                        sums[p][r] = held[r].mul_add(coefficient, sums[p][r]);
-                    }
+                    sums[p][r] = held[r].mul_add(coefficient, sums[p][r]);
                 }
             }
         }
@@ -228,8 +213,7 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
                 3 => (V::diagonal_halves([sum(0, r), sum(1, r), sum(2, r), sum(2, r)]), r),
                 _ => (V::diagonal_quads([sum(0, r), sum(1, r), sum(2, r), sum(3, r)]), r),
             };
-            // SAFETY: the caller's.
-            unsafe { reduced.store(self.job.scratch.add(index * V::LANES)) };
+            reduced.store(self.job.scratch.add(index * V::LANES));
         }
     }
 
@@ -240,39 +224,32 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
             return;
         }
         // What is known beforehand makes straight code; short filters notice.
-        // SAFETY: the caller's.
-        unsafe {
-            match (self.waiting == Self::MOST, self.job.out_hop) {
-                (true, hop) if hop == P => self.flush_vectors(Self::MOST, P),
-                (true, hop) => self.flush_vectors(Self::MOST, hop),
-                (false, hop) => self.flush_vectors(self.waiting, hop),
-            }
+        match (self.waiting == Self::MOST, self.job.out_hop) {
+            (true, hop) if hop == P => self.flush_vectors(Self::MOST, P),
+            (true, hop) => self.flush_vectors(Self::MOST, hop),
+            (false, hop) => self.flush_vectors(self.waiting, hop),
         }
         self.waiting = 0;
     }
 
     #[inline(always)]
     unsafe fn flush_vectors(&self, vectors: usize, hop: usize) {
-        // SAFETY: the caller's.
-        unsafe {
-            let out = self.chunk.out.add(self.first * hop);
-            if const { P > 2 } {
-                return V::add_halves(self.job.scratch, vectors, out, hop);
+        let out = self.chunk.out.add(self.first * hop);
+        if const { P > 2 } {
+            return V::add_halves(self.job.scratch, vectors, out, hop);
+        }
+        for (twos, g) in (0..vectors.div_ceil(2)).flat_map(|twos| (0..V::GROUPS).map(move |g| (twos, g))) {
+            // Two phases of a frame of one vector, and of one of the next.
+            let from = self.job.scratch.add((twos * V::GROUPS + g) * V::GROUP);
+            let outputs: [_; 4] = std::array::from_fn(|i| *from.add(i) + *from.add(4 + i));
+            let frame = out.add((2 * twos * V::GROUPS + g) * hop);
+            if V::GROUPS == 1 && hop == P && 2 * twos + 1 < vectors {
+                frame.copy_from_nonoverlapping(outputs.as_ptr(), 4);
+                continue;
             }
-            for (twos, g) in (0..vectors.div_ceil(2)).flat_map(|twos| (0..V::GROUPS).map(move |g| (twos, g)))
-            {
-                // Two phases of a frame of one vector, and of one of the next.
-                let from = self.job.scratch.add((twos * V::GROUPS + g) * V::GROUP);
-                let outputs: [_; 4] = std::array::from_fn(|i| *from.add(i) + *from.add(4 + i));
-                let frame = out.add((2 * twos * V::GROUPS + g) * hop);
-                if V::GROUPS == 1 && hop == P && 2 * twos + 1 < vectors {
-                    frame.copy_from_nonoverlapping(outputs.as_ptr(), 4);
-                    continue;
-                }
-                frame.copy_from_nonoverlapping(outputs.as_ptr(), 2);
-                if 2 * twos + 1 < vectors {
-                    frame.add(V::GROUPS * hop).copy_from_nonoverlapping(outputs[2..].as_ptr(), 2);
-                }
+            frame.copy_from_nonoverlapping(outputs.as_ptr(), 2);
+            if 2 * twos + 1 < vectors {
+                frame.add(V::GROUPS * hop).copy_from_nonoverlapping(outputs[2..].as_ptr(), 2);
             }
         }
     }

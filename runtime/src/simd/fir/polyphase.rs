@@ -156,15 +156,13 @@ unsafe fn remainder<T: Element>(
     let hop = group.width.next_power_of_two();
     let x = chunk.x.wrapping_add(chunk.frames * job.tiling.hop);
     let chunks = [Chunk { x, out: outputs.as_mut_ptr(), frames: job.tiling.vector }];
-    // SAFETY: the caller's; a vector has at most 16 frames, so the scratch holds them.
-    unsafe {
-        let finite = (group.kernel)(&Job { chunks: &chunks, first: 0, out_hop: hop, ..*job });
-        for (t, phases) in outputs.chunks_exact(hop).enumerate().take(left) {
-            let frame = room.add((segment.first + chunk.frames + t) * job.out_hop);
-            frame.add(group.first).copy_from_nonoverlapping(phases.as_ptr(), group.width);
-        }
-        finite
+    // A vector has at most 16 frames, so the scratch holds them.
+    let finite = (group.kernel)(&Job { chunks: &chunks, first: 0, out_hop: hop, ..*job });
+    for (t, phases) in outputs.chunks_exact(hop).enumerate().take(left) {
+        let frame = room.add((segment.first + chunk.frames + t) * job.out_hop);
+        frame.add(group.first).copy_from_nonoverlapping(phases.as_ptr(), group.width);
     }
+    finite
 }
 
 /// M phases in groups of 4, before them one of 3 if M is odd, after them one of 2 if that is not enough,

@@ -24,8 +24,7 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
     /// As for [`Vector`].
     #[inline(always)]
     pub(super) unsafe fn new(job: &'a Job<'a, V::Sample>) -> Self {
-        // SAFETY: the caller's.
-        Self { job, total: unsafe { V::zero() } }
+        Self { job, total: V::zero() }
     }
 
     /// All frames.
@@ -35,8 +34,7 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
     #[inline(always)]
     pub(super) unsafe fn run(&mut self) -> bool {
         for chunk in self.job.chunks {
-            // SAFETY: the caller's.
-            unsafe { self.chunk(chunk) };
+            self.chunk(chunk);
         }
         self.total.finite()
     }
@@ -53,19 +51,17 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
         let (mut first, mut left) = (0, frames / V::GROUP);
         while left > 0 {
             let blocks = tile_size(left, most);
-            // SAFETY: the caller's; the tiles are all within the chunk, and their sums within the scratch.
-            unsafe {
-                for q in 0..pairing.tiles {
-                    let x = x.add((first + q) * tiling.hop);
-                    let to = if D < V::GROUP { out.add(first) } else { scratch.add(q * D) };
-                    self.tiles(blocks * vectors, x, to);
-                }
-                if const { D == V::GROUP } {
-                    for block in 0..blocks {
-                        let sums = scratch.add(block * V::GROUP * D);
-                        let outputs = V::sum_frames::<D>(|t| V::load(sums.add(t * D)));
-                        self.store(block, blocks, outputs, out.add(first));
-                    }
+            // The tiles are all within the chunk, and their sums within the scratch.
+            for q in 0..pairing.tiles {
+                let x = x.add((first + q) * tiling.hop);
+                let to = if D < V::GROUP { out.add(first) } else { scratch.add(q * D) };
+                self.tiles(blocks * vectors, x, to);
+            }
+            if const { D == V::GROUP } {
+                for block in 0..blocks {
+                    let sums = scratch.add(block * V::GROUP * D);
+                    let outputs = V::sum_frames::<D>(|t| V::load(sums.add(t * D)));
+                    self.store(block, blocks, outputs, out.add(first));
                 }
             }
             first += blocks * V::GROUP;
@@ -86,31 +82,26 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
             keep_branch();
             self.total = self.total.add(outputs);
         }
-        // SAFETY: the caller's.
-        unsafe { outputs.store(out.add(block * V::GROUP)) };
+        outputs.store(out.add(block * V::GROUP));
     }
 
     /// At most two tiles of the same size.
     #[inline(always)]
     unsafe fn tiles(&mut self, vectors: usize, x: *const V::Sample, to: *mut V::Sample) {
         let Pairing { apart, tiles, .. } = self.job.tiling.pairing;
-        // SAFETY: the caller's.
-        unsafe {
-            if const { D < V::GROUP } {
-                return self.tile_of(vectors, x, to);
-            }
-            let parts = if vectors > V::SUMS { 2 } else { 1 };
-            let size = vectors / parts;
-            for first in (0..parts).map(|part| part * size) {
-                self.tile_of(size, x.add(first * Self::stride(apart)), to.add(first * tiles * V::GROUP));
-            }
+        if const { D < V::GROUP } {
+            return self.tile_of(vectors, x, to);
+        }
+        let parts = if vectors > V::SUMS { 2 } else { 1 };
+        let size = vectors / parts;
+        for first in (0..parts).map(|part| part * size) {
+            self.tile_of(size, x.add(first * Self::stride(apart)), to.add(first * tiles * V::GROUP));
         }
     }
 
     #[inline(always)]
     unsafe fn tile_of(&mut self, vectors: usize, x: *const V::Sample, to: *mut V::Sample) {
-        // SAFETY: the caller's.
-        sized!(vectors, R => unsafe { self.tile::<R>(x, to) });
+        sized!(vectors, R => self.tile::<R>(x, to));
     }
 
     /// R vectors, the newest step of whose first one is at `x`. Their outputs go to `to`, or if D fills a
@@ -123,32 +114,29 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
         }
         let Pairing { apart, blocks, pairs, singles, tiles } = self.job.tiling.pairing;
         let mut w = self.job.coefficients;
-        // SAFETY: the caller's. The pointers may leave the slices after the last step, where nothing is
-        // read.
-        unsafe {
-            let mut sums = [V::zero(); R];
-            for _ in 0..blocks {
-                Self::pairs(x, w, apart, apart, &mut sums);
-                (x, w) = (x.wrapping_sub(2 * apart * D), w.wrapping_add(2 * apart * D));
+        // The pointers may leave the slices after the last step, where nothing is read.
+        let mut sums = [V::zero(); R];
+        for _ in 0..blocks {
+            Self::pairs(x, w, apart, apart, &mut sums);
+            (x, w) = (x.wrapping_sub(2 * apart * D), w.wrapping_add(2 * apart * D));
+        }
+        Self::pairs(x, w, pairs, apart, &mut sums);
+        (x, w) = (x.wrapping_sub(pairs * D), w.wrapping_add(2 * pairs * D));
+        for _ in 0..singles {
+            let coefficient = V::broadcast::<D>(w);
+            for (r, sum) in sums.iter_mut().enumerate() {
+                *sum = V::load(x.add(r * Self::stride(apart))).mul_add(coefficient, *sum);
             }
-            Self::pairs(x, w, pairs, apart, &mut sums);
-            (x, w) = (x.wrapping_sub(pairs * D), w.wrapping_add(2 * pairs * D));
-            for _ in 0..singles {
-                let coefficient = V::broadcast::<D>(w);
-                for (r, sum) in sums.iter_mut().enumerate() {
-                    *sum = V::load(x.add(r * Self::stride(apart))).mul_add(coefficient, *sum);
-                }
-                (x, w) = (x.wrapping_sub(D), w.wrapping_add(D));
+            (x, w) = (x.wrapping_sub(D), w.wrapping_add(D));
+        }
+        if const { D == V::GROUP } {
+            for (r, sum) in sums.into_iter().enumerate() {
+                sum.store(to.add(r * tiles * V::GROUP));
             }
-            if const { D == V::GROUP } {
-                for (r, sum) in sums.into_iter().enumerate() {
-                    sum.store(to.add(r * tiles * V::GROUP));
-                }
-                return;
-            }
-            for block in 0..R / D {
-                self.store(block, R / D, V::sum_frames::<D>(|r| sums[block * D + r]), to);
-            }
+            return;
+        }
+        for block in 0..R / D {
+            self.store(block, R / D, V::sum_frames::<D>(|r| sums[block * D + r]), to);
         }
     }
 
@@ -162,20 +150,17 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
         sums: &mut [V; R],
     ) {
         let stride = Self::stride(apart);
-        // SAFETY: the caller's.
-        unsafe {
-            for _ in 0..count {
-                let (older, newer) = (V::broadcast::<D>(w), V::broadcast::<D>(w.add(D)));
-                sums[0] = V::load(x.sub(stride)).mul_add(older, sums[0]);
-                for r in 0..R {
-                    let input = V::load(x.add(r * stride));
-                    if r + 1 < R {
-                        sums[r + 1] = input.mul_add(older, sums[r + 1]);
-                    }
-                    sums[r] = input.mul_add(newer, sums[r]);
+        for _ in 0..count {
+            let (older, newer) = (V::broadcast::<D>(w), V::broadcast::<D>(w.add(D)));
+            sums[0] = V::load(x.sub(stride)).mul_add(older, sums[0]);
+            for r in 0..R {
+                let input = V::load(x.add(r * stride));
+                if r + 1 < R {
+                    sums[r + 1] = input.mul_add(older, sums[r + 1]);
                 }
-                (x, w) = (x.wrapping_sub(D), w.wrapping_add(2 * D));
+                sums[r] = input.mul_add(newer, sums[r]);
             }
+            (x, w) = (x.wrapping_sub(D), w.wrapping_add(2 * D));
         }
     }
 }

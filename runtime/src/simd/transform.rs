@@ -16,32 +16,30 @@
 //!
 //! Bits: all lanes do the same in the same order, whatever the instruction set.
 
-mod complex;
-mod passes;
-mod product;
-mod scatter;
-
 use super::dispatch::{Element, compiled_narrow};
 use super::isa::Isa;
+use super::passes::{Forward, ForwardJob, Inverse, InverseJob};
+use super::product::{Product, ProductJob, Scatter, ScatterJob};
 use super::vector::group_lanes;
 use crate::aligned::Aligned;
-pub(crate) use complex::row_samples;
-use passes::{Forward, ForwardJob, Inverse, InverseJob};
-use product::{Product, ProductJob};
-use scatter::{Scatter, ScatterJob};
 use std::f64::consts::TAU;
 
 /// The shortest transform: two passes of radix 4.
 pub(crate) const SHORTEST_TRANSFORM: usize = 16;
 
+/// Samples of a row: real and imaginary parts.
+pub(crate) const fn row_samples<T>() -> usize {
+    2 * group_lanes::<T>()
+}
+
 /// The length F of a transform, its factors, and which rows belong together.
 #[derive(Debug)]
 pub(crate) struct Transform<T: Element> {
-    len: usize,
+    pub(super) len: usize,
     /// exp(-2 pi i r j / L), r = 1, 2, 3, for 1 <= j < L / 4, for L = F, F / 4 ... > 4.
-    factors: Aligned<T>,
+    pub(super) factors: Aligned<T>,
     /// Rows of the frequencies f and F - f, for 0 <= f <= F / 2.
-    pairs: Vec<[u32; 2]>,
+    pub(super) pairs: Vec<[u32; 2]>,
 }
 
 impl<T: Element> Transform<T> {
@@ -61,6 +59,11 @@ impl<T: Element> Transform<T> {
         let place = |f: usize| row_of(f, len) as u32;
         let pairs = (0..=len / 2).map(|f| [place(f), place((len - f) % len)]).collect();
         Self { len, factors: Aligned::from_slice(&factors), pairs }
+    }
+
+    /// Samples of the rows of one group of lanes.
+    pub(super) fn plane(&self) -> usize {
+        self.len * row_samples::<T>()
     }
 
     /// Counts one transform: a multiply-add for each sample of a row in each level.
@@ -115,117 +118,12 @@ pub(crate) struct Frames<'a, T> {
 
 /// The kernels of one sample type.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct TransformKernel<T> {
+pub(crate) struct TransformKernel<T: Element> {
     /// By log2 D.
-    forward: [unsafe fn(&ForwardJob<T>); 4],
-    product: [for<'a> unsafe fn(&'a ProductJob<'a, T>); 4],
-    inverse: unsafe fn(&InverseJob<T>),
-    scatter: [unsafe fn(&ScatterJob<T>); 4],
-}
-
-impl<T: Element> TransformKernel<T> {
-    /// Transforms F frames of each segment, of which `depth` samples are lanes, to F rows.
-    ///
-    /// # Panics
-    /// If `depth` is no power of two up to a group, or a slice is too short: the last frame needs `depth`
-    /// samples.
-    pub(crate) fn forward(
-        &self,
-        transform: &Transform<T>,
-        depth: usize,
-        from: Segments<'_, T>,
-        rows: &mut [T],
-    ) {
-        let Segments { parts, stride, hop } = from;
-        assert!(depth.is_power_of_two() && depth <= group_lanes::<T>());
-        let needed = (transform.len - 1) * stride + (group_lanes::<T>() / depth - 1) * hop + depth;
-        assert!(parts.iter().all(|part| part.len() >= needed));
-        assert!(rows.len() >= transform.len * row_samples::<T>());
-        let job = ForwardJob {
-            parts: parts.map(<[T]>::as_ptr),
-            stride,
-            hop,
-            len: transform.len,
-            factors: transform.factors.as_ptr(),
-            rows: rows.as_mut_ptr(),
-        };
-        #[cfg(test)]
-        transform.count();
-        // SAFETY: the bounds are asserted above.
-        unsafe { self.forward[depth.ilog2() as usize](&job) };
-    }
-
-    /// F times the inverse transform, in place.
-    ///
-    /// # Panics
-    /// If there are less than F rows.
-    pub(crate) fn inverse(&self, transform: &Transform<T>, rows: &mut [T]) {
-        assert!(rows.len() >= transform.len * row_samples::<T>());
-        let factors = transform.factors.as_ptr_range().end;
-        #[cfg(test)]
-        transform.count();
-        let job = InverseJob { len: transform.len, factors, rows: rows.as_mut_ptr() };
-        // SAFETY: as above.
-        unsafe { (self.inverse)(&job) };
-    }
-
-    /// Brings rows to where they belong, `depth` lanes to a frame from each of its groups. Each frame is
-    /// written as whole lanes and what is too much overwritten by the next one, which also goes for what
-    /// follows the last one.
-    ///
-    /// # Panics
-    /// If slices do not fit: the last frame needs whole lanes.
-    pub(crate) fn scatter(&self, transform: &Transform<T>, depth: usize, rows: &[T], to: Frames<'_, T>) {
-        let plane = transform.len * row_samples::<T>();
-        let groups = rows.len() / plane;
-        assert!(depth.is_power_of_two() && depth <= group_lanes::<T>());
-        assert!(groups > 0 && rows.len() == groups * plane && (1..=transform.len).contains(&to.count));
-        let frames = 2 * group_lanes::<T>() / depth * to.count;
-        assert!((frames - 1) * to.stride + groups * depth <= to.samples.len());
-        let job = ScatterJob {
-            rows: rows[(transform.len - to.count) * row_samples::<T>()..].as_ptr(),
-            plane,
-            groups,
-            out: to.samples.as_mut_ptr(),
-            stride: to.stride,
-            count: to.count,
-        };
-        // SAFETY: as above.
-        unsafe { self.scatter[depth.ilog2() as usize](&job) };
-    }
-
-    /// Y(f) = H(f) X(f): from F rows for each `depth` channels to F rows for each group of phases.
-    ///
-    /// # Panics
-    /// If slices do not fit.
-    pub(crate) fn product(
-        &self,
-        transform: &Transform<T>,
-        depth: usize,
-        spectra: Spectra<'_, T>,
-        input: &[T],
-        output: &mut [T],
-    ) {
-        let row = row_samples::<T>();
-        let plane = transform.len * row;
-        let outputs = output.len() / plane;
-        assert!(depth.is_power_of_two() && depth <= group_lanes::<T>());
-        assert!(input.len() >= spectra.channels.div_ceil(depth) * plane && output.len() == outputs * plane);
-        assert!(spectra.rows.len() >= transform.pairs.len() * outputs * spectra.channels * row);
-        let job = ProductJob {
-            pairs: &transform.pairs,
-            channels: spectra.channels,
-            plane,
-            spectra: spectra.rows.as_ptr(),
-            input: input.as_ptr(),
-            output: output.as_mut_ptr(),
-            outputs,
-        };
-        #[cfg(test)]
-        super::work::add(2 * transform.pairs.len() * outputs * spectra.channels * row);
-        // SAFETY: as above; the pairs are rows below F, see `Transform::new`.
-        unsafe { self.product[depth.ilog2() as usize](&job) };
-    }
+    forward: [unsafe fn(ForwardJob<'_, T>); 4],
+    product: [unsafe fn(ProductJob<'_, T>); 4],
+    inverse: unsafe fn(InverseJob<'_, T>),
+    scatter: [unsafe fn(ScatterJob<'_, T>); 4],
 }
 
 /// A kernel for D = 1, 2, 4 and 8 lanes per segment.
@@ -249,5 +147,80 @@ impl<T: Element> TransformKernel<T> {
             inverse: compiled_narrow::<Inverse<T>>(isa),
             scatter: by_depth!(Scatter, isa),
         }
+    }
+
+    /// Transforms F frames of each segment, of which `depth` samples are lanes, to F rows.
+    ///
+    /// # Panics
+    /// If `depth` is no power of two up to a group, or a slice is too short: the last frame needs `depth`
+    /// samples.
+    pub(crate) fn forward(
+        &self,
+        transform: &Transform<T>,
+        depth: usize,
+        from: Segments<'_, T>,
+        rows: &mut [T],
+    ) {
+        assert!(depth.is_power_of_two() && depth <= group_lanes::<T>());
+        let needed = (transform.len - 1) * from.stride + (group_lanes::<T>() / depth - 1) * from.hop + depth;
+        assert!(from.parts.iter().all(|part| part.len() >= needed));
+        assert!(rows.len() >= transform.plane());
+        #[cfg(test)]
+        transform.count();
+        // SAFETY: the parts hold all frames of all segments, and `rows` the rows of the transform, as asserted.
+        unsafe { self.forward[depth.ilog2() as usize](ForwardJob { transform, from, rows }) };
+    }
+
+    /// F times the inverse transform, in place.
+    ///
+    /// # Panics
+    /// If there are less than F rows.
+    pub(crate) fn inverse(&self, transform: &Transform<T>, rows: &mut [T]) {
+        assert!(rows.len() >= transform.plane());
+        #[cfg(test)]
+        transform.count();
+        // SAFETY: `rows` holds the rows of the transform, as asserted.
+        unsafe { (self.inverse)(InverseJob { transform, rows }) };
+    }
+
+    /// Brings rows to where they belong, `depth` lanes to a frame from each of its groups. Each frame is
+    /// written as whole lanes and what is too much overwritten by the next one, which also goes for what
+    /// follows the last one.
+    ///
+    /// # Panics
+    /// If slices do not fit: the last frame needs whole lanes.
+    pub(crate) fn scatter(&self, transform: &Transform<T>, depth: usize, rows: &[T], to: Frames<'_, T>) {
+        let (plane, group) = (transform.plane(), group_lanes::<T>());
+        let groups = rows.len() / plane;
+        assert!(depth.is_power_of_two() && depth <= group);
+        assert!(groups > 0 && rows.len() == groups * plane && (1..=transform.len).contains(&to.count));
+        assert!((2 * group / depth * to.count - 1) * to.stride + groups * depth <= to.samples.len());
+        // SAFETY: there are `count` last rows in each group, and room for the lanes of all groups from each
+        // frame on, as asserted.
+        unsafe { self.scatter[depth.ilog2() as usize](ScatterJob { transform, rows, to }) };
+    }
+
+    /// Y(f) = H(f) X(f): from F rows for each `depth` channels to F rows for each group of phases.
+    ///
+    /// # Panics
+    /// If slices do not fit.
+    pub(crate) fn product(
+        &self,
+        transform: &Transform<T>,
+        depth: usize,
+        spectra: Spectra<'_, T>,
+        input: &[T],
+        output: &mut [T],
+    ) {
+        let (plane, row) = (transform.plane(), row_samples::<T>());
+        let outputs = output.len() / plane;
+        assert!(depth.is_power_of_two() && depth <= group_lanes::<T>());
+        assert!(input.len() >= spectra.channels.div_ceil(depth) * plane && output.len() == outputs * plane);
+        assert!(spectra.rows.len() >= transform.pairs.len() * outputs * spectra.channels * row);
+        #[cfg(test)]
+        super::work::add(2 * transform.pairs.len() * outputs * spectra.channels * row);
+        // SAFETY: the pairs are rows below F, see `Transform::new`, and all groups of inputs and outputs have F
+        // rows, and each pair its spectra, as asserted.
+        unsafe { self.product[depth.ilog2() as usize](ProductJob { transform, spectra, input, output }) };
     }
 }
