@@ -167,7 +167,8 @@ impl<T: Element> TransformKernel<T> {
         assert!(rows.len() >= transform.plane());
         #[cfg(test)]
         transform.count();
-        // SAFETY: the parts hold all frames of all segments, and `rows` the rows of the transform, as asserted.
+        // SAFETY: the parts hold all frames of all segments, and `rows` the rows of the transform, as
+        // asserted.
         unsafe { self.forward[depth.ilog2() as usize](ForwardJob { transform, from, rows }) };
     }
 
@@ -219,8 +220,8 @@ impl<T: Element> TransformKernel<T> {
         assert!(spectra.rows.len() >= transform.pairs.len() * outputs * spectra.channels * row);
         #[cfg(test)]
         super::work::add(2 * transform.pairs.len() * outputs * spectra.channels * row);
-        // SAFETY: the pairs are rows below F, see `Transform::new`, and all groups of inputs and outputs have F
-        // rows, and each pair its spectra, as asserted.
+        // SAFETY: the pairs are rows below F, see `Transform::new`, and all groups of inputs and outputs
+        // have F rows, and each pair its spectra, as asserted.
         unsafe { self.product[depth.ilog2() as usize](ProductJob { transform, spectra, input, output }) };
     }
 }
