@@ -64,10 +64,11 @@ mod tests;
 mod thread_pool;
 
 pub use adapters::{Frames, Input, Interleaved, Output, PcmOutput, Planar, SplitOutput, Zeros};
-pub use algorithms::choice::{Algorithm, ParseAlgorithmError};
+pub use algorithms::choice::{Algorithm, ParseAlgorithmError, Precision};
+pub use algorithms::recursive::StateSpace;
 pub use error::{BuildError, ProcessError, StateError, SwapError};
 pub use pcm::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
-pub use plan::{Options, Plan, PlanSummary, Precision, StateSpace};
+pub use plan::{Options, Plan, PlanSummary};
 pub use sample::Sample;
 pub use simd::Isa;
 #[doc(hidden)]

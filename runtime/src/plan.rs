@@ -5,43 +5,8 @@ use crate::algorithms::choice::{ChosenAlgorithm, check_recursive};
 use crate::algorithms::{Direct, Facts, OverlapSave, Recursive};
 use crate::engine::{Engine, Fir, Running};
 use crate::state::Digest;
-use crate::{Algorithm, BuildError, Isa, Sample};
+use crate::{Algorithm, BuildError, Isa, Precision, Sample, StateSpace};
 use std::sync::Arc;
-
-/// A filter in state space, one step per frame: x+ = a x + b u, y = c x + d u; u the N samples of a frame, y
-/// its M output samples. Row-major lists of rows.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct StateSpace {
-    /// n x n.
-    pub a: Vec<Vec<f64>>,
-    /// n x N.
-    pub b: Vec<Vec<f64>>,
-    /// M x n.
-    pub c: Vec<Vec<f64>>,
-    /// M x N.
-    pub d: Vec<Vec<f64>>,
-}
-
-/// Number type of the kernels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Precision {
-    /// Coefficients and sums in f32: error about 1e-7 of full scale.
-    #[default]
-    Single,
-    /// Coefficients and sums in f64, at half the speed.
-    Double,
-}
-
-impl Precision {
-    /// Bytes of a number.
-    pub(crate) fn bytes(self) -> f64 {
-        match self {
-            Self::Single => 4.0,
-            Self::Double => 8.0,
-        }
-    }
-}
 
 /// How a bank is made ready to run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,8 +8,8 @@
 
 use super::filter::phase_taps;
 use super::overlap_save::Shape;
+use crate::BuildError;
 use crate::simd::{SHORTEST_TRANSFORM, group_lanes};
-use crate::{BuildError, Precision};
 use std::fmt;
 use std::str::FromStr;
 
@@ -49,6 +49,26 @@ impl FromStr for Algorithm {
     fn from_str(name: &str) -> Result<Self, Self::Err> {
         let known = Self::ALL.into_iter().find(|algorithm| algorithm.name() == name);
         known.ok_or_else(|| ParseAlgorithmError(name.to_owned()))
+    }
+}
+
+/// Number type of the kernels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Precision {
+    /// Coefficients and sums in f32: error about 1e-7 of full scale.
+    #[default]
+    Single,
+    /// Coefficients and sums in f64, at half the speed.
+    Double,
+}
+
+impl Precision {
+    /// Bytes of a number.
+    pub(crate) fn bytes(self) -> f64 {
+        match self {
+            Self::Single => 4.0,
+            Self::Double => 8.0,
+        }
     }
 }
 

@@ -42,6 +42,7 @@ mod portable;
 mod product;
 mod recursion;
 mod transform;
+mod transform_kernel;
 mod vector;
 #[cfg(test)]
 pub(crate) mod work;
@@ -53,7 +54,6 @@ pub use isa::Isa;
 pub(crate) use pcm::{decode, encode, interleave};
 pub use peak::multiply_add_chains;
 pub(crate) use recursion::{ColumnTile, Form, Recursion, RecursionKernel, SectionVector};
-pub(crate) use transform::{
-    Frames, SHORTEST_TRANSFORM, Segments, Spectra, Transform, TransformKernel, row_samples,
-};
+pub(crate) use transform::{Frames, SHORTEST_TRANSFORM, Segments, Spectra, Transform, row_samples};
+pub(crate) use transform_kernel::TransformKernel;
 pub(crate) use vector::group_lanes;

@@ -1,7 +1,7 @@
 //! The passes of the transform and of its inverse over rows.
 //!
 //! Unsafe functions here run in code compiled for the instruction set of V. They read and write rows of the
-//! transform, whose number the checked calls of [`transform`](super::transform) assert.
+//! transform, whose number the checked calls of [`TransformKernel`](super::TransformKernel) assert.
 
 use super::dispatch::{Element, Kernel};
 use super::transform::{Segments, Transform, row_samples};

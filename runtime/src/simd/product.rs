@@ -1,7 +1,7 @@
 //! Rows times a matrix of spectra, frequency by frequency, and rows back to frames.
 //!
 //! Unsafe functions here run in code compiled for the instruction set of V, on slices whose lengths the
-//! checked calls of [`transform`](super::transform) assert.
+//! checked calls of [`TransformKernel`](super::TransformKernel) assert.
 
 use super::dispatch::{Element, Kernel};
 use super::passes::Complex;

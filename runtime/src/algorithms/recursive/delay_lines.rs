@@ -1,6 +1,6 @@
 //! What a state matrix is made of: states that are nothing but past inputs, and what is left.
 
-use crate::StateSpace;
+use super::StateSpace;
 use std::collections::BTreeMap;
 
 /// An input some frames ago: (channel, frames).

@@ -22,7 +22,22 @@ use crate::aligned::Aligned;
 use crate::history::History;
 use crate::simd::{FirKernel, Form, Polyphase, Recursion, RecursionKernel, Segment, all_finite};
 use crate::state::{Count, Numbers};
-use crate::{BuildError, Isa, StateSpace};
+use crate::{BuildError, Isa};
+
+/// A filter in state space, one step per frame: x+ = a x + b u, y = c x + d u; u the N samples of a frame, y
+/// its M output samples. Row-major lists of rows.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct StateSpace {
+    /// n x n.
+    pub a: Vec<Vec<f64>>,
+    /// n x N.
+    pub b: Vec<Vec<f64>>,
+    /// M x n.
+    pub c: Vec<Vec<f64>>,
+    /// M x N.
+    pub d: Vec<Vec<f64>>,
+}
 
 /// Frames per block. Blocks are counted from the beginning of the stream, so that cuts into calls do not
 /// change a bit.
