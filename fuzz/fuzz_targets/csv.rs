@@ -3,23 +3,24 @@
 
 use hybank::io::CsvReader;
 use libfuzzer_sys::fuzz_target;
+use std::io::Read;
 
-fn frames(bytes: &[u8], most: usize) -> Option<Vec<u64>> {
+fn frames(bytes: &[u8], most: usize) -> Option<Vec<u8>> {
     let mut reader = CsvReader::new(bytes, "fuzz.csv").ok()?;
-    let (mut all, mut some) = (Vec::new(), Vec::new());
+    let (mut all, mut some) = (Vec::new(), vec![0; most]);
     loop {
-        if let Err(error) = reader.fill(&mut some, most) {
-            assert!(
-                error.to_string().starts_with("fuzz.csv: not a table of samples that can be read: line ")
-            );
-            return None;
+        match reader.read(&mut some) {
+            Err(error) => {
+                let kind = "fuzz.csv: not a table of samples that can be read: line ";
+                assert!(error.to_string().starts_with(kind));
+                return None;
+            }
+            Ok(0) => break,
+            Ok(count) => all.extend(&some[..count]),
         }
-        assert!(some.len() % reader.header().channels == 0 && some.len() <= most * reader.header().channels);
-        if some.is_empty() {
-            return Some(all);
-        }
-        all.extend(some.iter().map(|x| x.to_bits()));
     }
+    assert!(all.len() % reader.header().frame_bytes() == 0);
+    Some(all)
 }
 
 fuzz_target!(|bytes: &[u8]| assert_eq!(frames(bytes, 1), frames(bytes, 7)));

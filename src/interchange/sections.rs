@@ -57,14 +57,21 @@ pub fn sections(bank: &Bank) -> Result<Vec<Section>, ExportError> {
 
 /// Which state is a delayed input, and which belong to poles.
 struct Structure {
-    /// For each state its channel and delay, if it is an input d >= 1 slow periods ago.
-    delayed: Vec<Option<(usize, usize)>>,
+    /// Of each state.
+    delayed: Vec<Option<DelayedInput>>,
     poles: Vec<Block>,
+}
+
+/// The input of a channel `delay` >= 1 slow periods ago.
+#[derive(Clone, Copy)]
+struct DelayedInput {
+    channel: usize,
+    delay: usize,
 }
 
 impl Structure {
     fn of(block: &StateSpace) -> Result<Self, ExportError> {
-        let delayed = delayed_inputs(block);
+        let delayed: Vec<_> = (0..block.a.len()).map(|state| delayed_input(block, state)).collect();
         let poles = pole_blocks(block, &delayed).ok_or(ExportError::NoSections(
             "some of its poles nearly coincide, so that no sections side by side have its accuracy; npz and mat \
              hold its matrices, and design --order gives fewer poles",
@@ -93,7 +100,7 @@ impl Structure {
     fn head(&self, block: &StateSpace, channel: usize, phase: usize) -> Vec<f64> {
         let mut taps = vec![block.d[phase][channel]];
         for (state, place) in self.delayed.iter().enumerate() {
-            if let Some((_, delay)) = place.filter(|(of, _)| *of == channel) {
+            if let Some(DelayedInput { delay, .. }) = place.filter(|input| input.channel == channel) {
                 taps.resize(taps.len().max(delay + 1), 0.0);
                 taps[delay] += block.c[phase][state];
             }
@@ -102,48 +109,27 @@ impl Structure {
     }
 }
 
-/// Each state that holds one input, one coefficient being 1 and all others 0, d periods ago.
-fn delayed_inputs(block: &StateSpace) -> Vec<Option<(usize, usize)>> {
+/// The input that a state holds, if all it does is to repeat it: each state on the way has one coefficient,
+/// which is 1.
+fn delayed_input(block: &StateSpace, state: usize) -> Option<DelayedInput> {
     let n = block.a.len();
-    let mut places = vec![None; n];
-    // Each pass finds the states that follow those known so far.
-    for _ in 0..n {
-        let mut is_new = false;
-        for state in 0..n {
-            let single = places[state].is_none().then(|| single_one(block, state)).flatten();
-            let place = match single {
-                Some(Source::Input(channel)) => Some((channel, 1)),
-                Some(Source::State(of)) => {
-                    places[of].map(|(channel, delay): (usize, usize)| (channel, delay + 1))
-                }
-                None => None,
-            };
-            is_new |= place.is_some();
-            places[state] = places[state].or(place);
+    let mut at = state;
+    for delay in 1..=n {
+        let mut row = block.a[at].iter().chain(&block.b[at]).enumerate().filter(|(_, x)| **x != 0.0);
+        let (column, value) = row.next()?;
+        if *value != 1.0 || row.next().is_some() {
+            return None;
         }
-        if !is_new {
-            break;
+        match column.checked_sub(n) {
+            Some(channel) => return Some(DelayedInput { channel, delay }),
+            None => at = column,
         }
     }
-    places
-}
-
-enum Source {
-    State(usize),
-    Input(usize),
-}
-
-/// The state or the input that a state repeats a period later.
-fn single_one(block: &StateSpace, state: usize) -> Option<Source> {
-    let row = || block.a[state].iter().chain(&block.b[state]).enumerate().filter(|(_, x)| **x != 0.0);
-    let (column, value) = row().next()?;
-    let n = block.a.len();
-    (row().count() == 1 && *value == 1.0)
-        .then(|| if column < n { Source::State(column) } else { Source::Input(column - n) })
+    None
 }
 
 /// The states of poles, one or two each; `None` if more of them drive one another.
-fn pole_blocks(block: &StateSpace, delayed: &[Option<(usize, usize)>]) -> Option<Vec<Block>> {
+fn pole_blocks(block: &StateSpace, delayed: &[Option<DelayedInput>]) -> Option<Vec<Block>> {
     let own: Vec<usize> = (0..delayed.len()).filter(|&state| delayed[state].is_none()).collect();
     let drives = |i: usize, j: usize| i != j && (block.a[i][j] != 0.0 || block.a[j][i] != 0.0);
     let mut blocks = Vec::new();
@@ -194,13 +180,13 @@ impl Block {
     fn drives(
         &self,
         block: &StateSpace,
-        delayed: &[Option<(usize, usize)>],
+        delayed: &[Option<DelayedInput>],
         channel: usize,
     ) -> Vec<(usize, Vec<f64>)> {
         let direct = self.states.iter().map(|&state| block.b[state][channel]).collect();
         let mut drives = vec![(0, direct)];
         for (of, place) in delayed.iter().enumerate() {
-            if let Some((_, delay)) = place.filter(|(source, _)| *source == channel) {
+            if let Some(DelayedInput { delay, .. }) = place.filter(|input| input.channel == channel) {
                 drives.push((delay, self.states.iter().map(|&state| block.a[state][of]).collect()));
             }
         }

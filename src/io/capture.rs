@@ -62,6 +62,11 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
+    /// Begins with a block that is there.
+    pub(super) fn new(bytes: Vec<u8>) -> Self {
+        Self { bytes, given: 0 }
+    }
+
     /// Reads on; `refill` puts the next block into an empty vector, and leaves it empty at the end.
     pub(super) fn read<E: Into<io::Error>>(
         &mut self,

@@ -24,9 +24,7 @@ pub struct CsvReader<R> {
     /// The first column is the time.
     is_timed: bool,
     header: StreamHeader,
-    /// Frames that were read for the header.
-    ahead: Vec<f64>,
-    given: usize,
+    /// The next frames; at first those that were read for the header.
     blocks: Blocks,
 }
 
@@ -53,14 +51,15 @@ impl<R: Read> CsvReader<R> {
             return Err(table.fault("the only column is the time; give one more per channel"));
         }
         let header = StreamHeader::real(SampleLayout::packed(PcmFormat::F64Le), channels);
-        let mut reader =
-            Self { table, is_timed, header, ahead: Vec::new(), given: 0, blocks: Blocks::default() };
+        let mut reader = Self { table, is_timed, header, blocks: Blocks::default() };
         if !first.is_empty() {
             let numbers = reader.table.numbers(&first)?;
-            reader.ahead.extend(&numbers[usize::from(is_timed)..]);
+            let mut ahead = Vec::new();
+            reader.encode(&numbers, &mut ahead);
             if let Some(unit) = unit {
-                reader.read_times(numbers[0], &first[0], unit)?;
+                reader.read_times(numbers[0], &first[0], unit, &mut ahead)?;
             }
+            reader.blocks = Blocks::new(ahead);
         }
         Ok(reader)
     }
@@ -68,24 +67,6 @@ impl<R: Read> CsvReader<R> {
     /// As the header of an input.
     pub fn header(&self) -> StreamHeader {
         self.header
-    }
-
-    /// Puts the next frames into `frames`, at most `most` and none only at the end.
-    ///
-    /// # Errors
-    /// [`IoError::Malformed`] with line and column, or the system's refusal.
-    pub fn fill(&mut self, frames: &mut Vec<f64>, most: usize) -> Result<(), IoError> {
-        frames.clear();
-        let room = most.max(1) * self.header.channels;
-        let known = self.ahead.len().min(self.given + room);
-        frames.extend(&self.ahead[self.given..known]);
-        self.given = known;
-        // A live table is handed on line by line.
-        while frames.is_empty() || (frames.len() < room && self.table.is_more_at_hand()) {
-            let Some((_, frame)) = self.frame()? else { break };
-            frames.extend(&frame[usize::from(self.is_timed)..]);
-        }
-        Ok(())
     }
 
     /// The next line: its first cell, and its numbers with the time among them.
@@ -105,14 +86,20 @@ impl<R: Read> CsvReader<R> {
         Ok(Some((cells.swap_remove(0), numbers)))
     }
 
+    /// Appends the samples of a line.
+    fn encode(&self, numbers: &[f64], bytes: &mut Vec<u8>) {
+        let samples = &numbers[usize::from(self.is_timed)..];
+        bytes.extend(samples.iter().flat_map(|x| x.to_le_bytes()));
+    }
+
     /// Reads ahead, and computes the rate from equal steps of time, with its error from their last digits.
-    fn read_times(&mut self, begin: f64, text: &str, unit: f64) -> Result<(), IoError> {
+    fn read_times(&mut self, begin: f64, text: &str, unit: f64, ahead: &mut Vec<u8>) -> Result<(), IoError> {
         let (mut times, mut digits) = (vec![begin], vec![last_digit(text)]);
         while times.len() < TIMED_LINES && (times.len() < 2 || self.table.is_more_at_hand()) {
             let Some((text, frame)) = self.frame()? else { break };
             times.push(frame[0]);
             digits.push(last_digit(&text));
-            self.ahead.extend(&frame[1..]);
+            self.encode(&frame, ahead);
         }
         let steps = (times.len() - 1) as f64;
         if steps < 1.0 {
@@ -142,14 +129,17 @@ impl<R: Read> Capture for CsvReader<R> {
     }
 }
 
-/// Numbers as `f64le`.
+/// Numbers as `f64le`. An error of this reader holds an [`IoError`].
 impl<R: Read> Read for CsvReader<R> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         let mut blocks = std::mem::take(&mut self.blocks);
         let count = blocks.read(bytes, |block| {
-            let mut frames = Vec::new();
-            self.fill(&mut frames, BLOCK_FRAMES)?;
-            block.extend(frames.iter().flat_map(|x| x.to_le_bytes()));
+            let most = BLOCK_FRAMES * self.header.frame_bytes();
+            // A live table is handed on line by line.
+            while block.is_empty() || (block.len() < most && self.table.is_more_at_hand()) {
+                let Some((_, frame)) = self.frame()? else { break };
+                self.encode(&frame, block);
+            }
             Ok::<_, IoError>(())
         });
         self.blocks = blocks;
@@ -183,17 +173,15 @@ fn time_unit(heading: &str) -> Option<f64> {
 mod tests {
     use super::*;
 
+    fn numbers(bytes: &[u8]) -> Vec<f64> {
+        bytes.chunks_exact(8).map(|number| f64::from_le_bytes(number.try_into().unwrap())).collect()
+    }
+
     fn read(text: &str) -> Result<(usize, Option<f64>, Vec<f64>), String> {
         let mut reader = CsvReader::new(text.as_bytes(), "x.csv").map_err(|error| error.to_string())?;
-        let (mut all, mut some) = (Vec::new(), Vec::new());
-        loop {
-            reader.fill(&mut some, 3).map_err(|error| error.to_string())?;
-            assert!(some.len() <= 3 * reader.header().channels);
-            if some.is_empty() {
-                return Ok((reader.header().channels, reader.header().rate, all));
-            }
-            all.extend(&some);
-        }
+        let mut bytes = Vec::new();
+        reader.read_to_end(&mut bytes).map_err(|error| error.to_string())?;
+        Ok((reader.header().channels, reader.header().rate, numbers(&bytes)))
     }
 
     #[test]
@@ -269,10 +257,10 @@ mod tests {
         let header = reader.header();
         let rate = header.rate.unwrap();
         assert!((rate - 24e3).abs() <= header.rate_error && header.rate_error < 0.05 * rate, "{header:?}");
-        let mut frames = Vec::new();
+        let mut bytes = [0; 1000];
         for (read, want) in [(3, vec![1.0, 2.0]), (4, vec![3.0]), (5, vec![4.0])] {
-            reader.fill(&mut frames, 1000).unwrap();
-            assert_eq!((lines.get(), &frames), (read, &want));
+            let count = reader.read(&mut bytes).unwrap();
+            assert_eq!((lines.get(), numbers(&bytes[..count])), (read, want));
         }
     }
 

@@ -6,17 +6,7 @@ use std::io;
 /// A fault of a file or stream; every sentence names the file, the place, the rule and the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum IoError {
-    /// The operating system refused.
-    #[error("{file}: cannot {action}: {source}")]
-    System {
-        /// Name of the file or stream.
-        file: String,
-        /// The action that failed, as an imperative phrase: `open it`.
-        action: &'static str,
-        /// The system's reason.
-        source: io::Error,
-    },
-    /// A file could not be read or written as a whole.
+    /// The operating system refused, or a file could not be read or written as a whole.
     #[error(transparent)]
     File(#[from] FileError),
     /// The thread that read an input ended before the input did. This is a bug of this program.
@@ -60,8 +50,8 @@ pub enum IoError {
 impl IoError {
     /// Wraps the system's refusal; for use with `map_err`.
     pub fn system(file: &str, action: &'static str) -> impl FnOnce(io::Error) -> Self {
-        let file = file.to_owned();
-        move |source| Self::System { file, action, source }
+        let error = FileError::system(file, action);
+        move |source| Self::File(error(source))
     }
 
     /// Names what is wrong with a file of this kind; for use with `map_err`.
@@ -78,16 +68,13 @@ impl IoError {
 
     /// An error of reading samples, which may hold one of these errors; for use with `map_err`.
     pub(super) fn reading(file: &str) -> impl FnOnce(io::Error) -> Self {
-        let file = file.to_owned();
-        move |error| match error.downcast::<Self>() {
-            Ok(error) => error,
-            Err(source) => Self::System { file, action: "read the samples", source },
-        }
+        let refused = Self::system(file, "read the samples");
+        move |error| error.downcast::<Self>().unwrap_or_else(refused)
     }
 
     /// True if the reader of a pipe went away, which ends a stream quietly.
     pub fn is_closed_pipe(&self) -> bool {
-        matches!(self, Self::System { source, .. } if source.kind() == io::ErrorKind::BrokenPipe)
+        matches!(self, Self::File(FileError::System { source, .. }) if source.kind() == io::ErrorKind::BrokenPipe)
     }
 }
 

@@ -90,8 +90,9 @@ impl Input {
     }
 
     pub(super) fn on_thread(source: InputSource) -> Result<Self, IoError> {
-        // Until the header comes, the channels are those of the settings.
-        let header = source.chosen(source.raw_header())?;
+        // Until the header comes, the channels are those of the settings; they may not fit these.
+        let settings = source.raw_header();
+        let header = source.chosen(settings).unwrap_or(settings);
         Self::on_thread_of(source.name(), header, move |messages, pool| send_all(&source, &messages, &pool))
     }
 

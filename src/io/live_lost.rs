@@ -18,7 +18,7 @@ const LONGEST_LINE: u64 = 4096;
 /// Lines must come before their samples: what a line says of samples that have been used comes too late, and
 /// is counted. The first line of an input with `sample_start` only begins its count; the following ones say
 /// what was left out since.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct LiveLost {
     file: String,
     lines: Receiver<Result<LostLine, IoError>>,
@@ -39,20 +39,6 @@ impl LiveLost {
         Ok(Self { file, lines })
     }
 
-    /// The lines to come.
-    pub(super) fn lines(&self) -> LiveLines {
-        LiveLines { file: self.file.clone(), lines: self.lines.clone() }
-    }
-}
-
-/// The receiving end.
-#[derive(Debug)]
-pub(super) struct LiveLines {
-    file: String,
-    lines: Receiver<Result<LostLine, IoError>>,
-}
-
-impl LiveLines {
     /// A line that is there.
     pub(super) fn next(&self) -> Result<Option<LostLine>, IoError> {
         self.lines.try_recv().ok().transpose()

@@ -6,7 +6,7 @@
 
 use super::aligned_input::AlignedInput;
 use super::input::{BLOCKS, Input, too_many_lost};
-use super::live_lost::{LiveLines, LiveLost};
+use super::live_lost::LiveLost;
 use super::lost::{Entry, LostInInput, LostLine, LostSamples};
 use super::notes::{OutputNotes, Placement};
 use super::open::InputSource;
@@ -39,7 +39,7 @@ pub struct MultiReader {
     stop: Receiver<()>,
     until: Until,
     stalls: Option<StallWatch>,
-    live: Option<LiveLines>,
+    live: Option<LiveLost>,
     max_lost: u64,
     /// Number of the earliest frame at the converter.
     origin: u64,
@@ -80,7 +80,7 @@ impl MultiReader {
             _ => paths.iter().map(|path| Input::on_thread(source(path))).collect::<Result<_, _>>()?,
         };
         let ReadOptions { until, max_lost, lost, .. } = options;
-        let (stalls, live) = (options.stalls.cloned(), options.live_lost.map(LiveLost::lines));
+        let (stalls, live) = (options.stalls.cloned(), options.live_lost.cloned());
         let mut reader =
             Self { inputs, stop, until, stalls, live, max_lost, origin: 0, ready: 0, consumed: 0 };
         for i in 0..paths.len() {

@@ -10,8 +10,8 @@ use super::wav::WavChunk;
 use serde_json::{Map, Value, json};
 
 /// Members of `global` that hold for the input's own files only.
-const OF_THE_FILE: [&str; 5] =
-    ["core:sha512", "core:trailing_bytes", "core:metadata_only", "core:collection", "core:extensions"];
+const OF_THE_FILE: [&str; 4] =
+    ["core:sha512", "core:trailing_bytes", "core:metadata_only", "core:collection"];
 
 /// Where the Broadcast Wave chunk counts the samples since midnight (EBU Tech 3285).
 const TIME_REFERENCE: std::ops::Range<usize> = 338..346;
@@ -66,9 +66,11 @@ impl OutputNotes {
             let Some(meta) = &input.sigmf else { continue };
             let axis = Axis { input, offset: meta.global.offset, origin, placement };
             if notes.captures.is_empty() {
-                let kept = meta.global.other.iter().filter(|(key, _)| !OF_THE_FILE.contains(&key.as_str()));
+                let kept = meta.global.other.iter().filter(|(key, value)| match key.as_str() {
+                    "core:extensions" => value.is_array(),
+                    key => !OF_THE_FILE.contains(&key),
+                });
                 notes.global = kept.map(|(key, value)| (key.clone(), value.clone())).collect();
-                notes.extensions(meta.global.other.get("core:extensions"));
                 notes.captures = axis.captures(&meta.captures);
             }
             for annotation in meta.annotations.iter().filter_map(|annotation| axis.annotation(annotation)) {
@@ -103,17 +105,6 @@ impl OutputNotes {
                 sample_count: Some(end - begin),
                 other,
             });
-        }
-    }
-
-    /// In the order that SigMF asks for.
-    pub(super) fn sort(&mut self) {
-        self.annotations.sort_by_key(|annotation| annotation.sample_start);
-    }
-
-    fn extensions(&mut self, extensions: Option<&Value>) {
-        if let Some(list @ Value::Array(_)) = extensions {
-            self.global.insert("core:extensions".into(), list.clone());
         }
     }
 }

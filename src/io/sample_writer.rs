@@ -158,7 +158,8 @@ fn sigmf_target(path: &Path, header: OutputHeader, replace: bool) -> Result<Targ
 fn sigmf_text(file: &str, header: OutputHeader, mut notes: OutputNotes) -> Result<String, IoError> {
     let OutputHeader { format, is_complex, rate, .. } = header;
     let mut meta = SigmfMeta::for_output(format, is_complex, rate);
-    notes.sort();
+    // The order that SigMF asks for.
+    notes.annotations.sort_by_key(|annotation| annotation.sample_start);
     meta.global.other = notes.global;
     if !notes.captures.is_empty() {
         meta.captures = notes.captures;
