@@ -75,5 +75,5 @@ fn sigmf_goes_in_and_out() {
     assert_eq!(written["global"]["core:sample_rate"], 48000.0);
     refused(&desk, &args, &["out.sigmf-meta", "--force"]);
     desk.write("a.sigmf-meta", meta(start, "cf32_le"));
-    refused(&desk, &[&args[..], &["--force"]].concat(), &["a.sigmf-meta holds complex samples"]);
+    refused(&desk, &[&args[..], &["--force"]].concat(), &["a.sigmf-meta: complex samples"]);
 }
