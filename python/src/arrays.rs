@@ -2,7 +2,7 @@
 
 use crate::errors::{HybankError, refused};
 use crate::formats::{Format, Number};
-use crate::samples::{Part, Samples};
+use crate::samples::Samples;
 use bytemuck::NoUninit;
 use hybank::memory::available_memory;
 use hybank::runtime::{Input, Interleaved, Isa, PcmFrames, Sample, SampleLayout};
@@ -140,21 +140,32 @@ impl<'py> Held<'py> {
         self.layout.frames
     }
 
-    /// The samples; of complex ones the real parts.
-    pub(crate) fn samples(&self) -> PyResult<Samples<'_>> {
+    /// The samples, or the real and the imaginary parts of complex ones.
+    pub(crate) fn parts(&self) -> PyResult<Vec<Samples<'_>>> {
+        (0..1 + usize::from(self.format.complex)).map(|part| self.part(part)).collect()
+    }
+
+    /// The samples, or one part of complex ones.
+    fn part(&self, part: usize) -> PyResult<Samples<'_>> {
         let layout = self.layout;
-        let is_interleaved = layout.order == Order::Frames;
+        let packed = SampleLayout::packed(self.format.number.format());
+        let lies = if self.format.complex { packed.part(part) } else { packed };
+        let (is_real, is_interleaved) = (!self.format.complex, layout.order == Order::Frames);
         Ok(match &self.numbers {
-            Numbers::F32(array) if self.format.complex => Samples::Part32(layout.parts(slice(array)?)),
-            Numbers::F64(array) if self.format.complex => Samples::Part64(layout.parts(slice(array)?)),
-            Numbers::F32(array) if is_interleaved => Samples::Interleaved32(layout.interleaved(array)?),
-            Numbers::F64(array) if is_interleaved => Samples::Interleaved64(layout.interleaved(array)?),
-            Numbers::F32(array) => Samples::Planar32(layout.rows(array)?),
-            Numbers::F64(array) => Samples::Planar64(layout.rows(array)?),
-            Numbers::I8(array) => Samples::Pcm(layout.pcm(array, self.format.number)?),
-            Numbers::U8(array) => Samples::Pcm(layout.pcm(array, self.format.number)?),
-            Numbers::I16(array) => Samples::Pcm(layout.pcm(array, self.format.number)?),
-            Numbers::I32(array) => Samples::Pcm(layout.pcm(array, self.format.number)?),
+            Numbers::F32(array) if is_real && is_interleaved => {
+                Samples::Interleaved32(layout.interleaved(array)?)
+            }
+            Numbers::F64(array) if is_real && is_interleaved => {
+                Samples::Interleaved64(layout.interleaved(array)?)
+            }
+            Numbers::F32(array) if is_real => Samples::Planar32(layout.rows(array)?),
+            Numbers::F64(array) if is_real => Samples::Planar64(layout.rows(array)?),
+            Numbers::F32(array) => Samples::Pcm(layout.pcm(array, lies)?),
+            Numbers::F64(array) => Samples::Pcm(layout.pcm(array, lies)?),
+            Numbers::I8(array) => Samples::Pcm(layout.pcm(array, lies)?),
+            Numbers::U8(array) => Samples::Pcm(layout.pcm(array, lies)?),
+            Numbers::I16(array) => Samples::Pcm(layout.pcm(array, lies)?),
+            Numbers::I32(array) => Samples::Pcm(layout.pcm(array, lies)?),
         })
     }
 
@@ -170,16 +181,14 @@ impl<'py> Held<'py> {
             return Err(PyMemoryError::new_err(text));
         }
         let mut frames = vec![0.0; count];
-        let mut samples = self.samples()?;
-        samples.select(part);
-        samples.load(Isa::detect(), 0, &mut frames);
+        self.part(part)?.load(Isa::detect(), 0, &mut frames);
         Ok(frames)
     }
 
     /// Lowest and highest value of a sample of integers; `None` for floats.
     pub(crate) fn rails(&self) -> Option<(f64, f64)> {
-        let pcm = self.format.number.pcm()?;
-        Some((-1.0, 1.0 - 2f64.powi(1 - 8 * pcm.bytes() as i32)))
+        let format = self.format.number.format();
+        (!format.is_float()).then(|| (-1.0, 1.0 - 2f64.powi(1 - 8 * format.bytes() as i32)))
     }
 }
 
@@ -229,10 +238,12 @@ impl Shape {
 impl Layout {
     /// Each channel.
     fn rows<'a, S: Element>(&self, array: &'a PyReadonlyArrayDyn<'_, S>) -> PyResult<Vec<&'a [S]>> {
-        let Self { channels, frames, order } = *self;
+        let Self { channels, order, .. } = *self;
         let Order::Slices { axis } = order else {
             let numbers = slice(array)?;
-            return Ok((0..channels).map(|i| &numbers[i * frames..(i + 1) * frames]).collect());
+            // Of complex samples twice as many numbers as frames.
+            let row = numbers.len() / channels.max(1);
+            return Ok((0..channels).map(|i| &numbers[i * row..(i + 1) * row]).collect());
         };
         let row = |i| array.as_array().index_axis_move(Axis(axis), i).to_slice();
         (0..channels).map(|i| row(i).ok_or_else(|| refused("a channel has gaps"))).collect()
@@ -245,23 +256,12 @@ impl Layout {
         Interleaved::new(slice(array)?, self.channels).map_err(refused)
     }
 
-    fn parts<'a, S>(&self, numbers: &'a [S]) -> Part<'a, S> {
-        let &Self { channels, frames, order } = self;
-        let (frame_step, channel_step) = if order == Order::Frames { (channels, 1) } else { (1, frames) };
-        Part { numbers, part: 0, frame_step, channel_step, channels, frames }
-    }
-
     fn pcm<'a, S: Element + NoUninit>(
         &self,
         array: &'a PyReadonlyArrayDyn<'_, S>,
-        number: Number,
+        layout: SampleLayout,
     ) -> PyResult<Vec<PcmFrames<'a>>> {
-        let Some(format) = number.pcm() else { return Ok(Vec::new()) };
-        let frames = |numbers, channels| PcmFrames {
-            layout: SampleLayout::packed(format),
-            channels,
-            bytes: bytemuck::cast_slice(numbers),
-        };
+        let frames = |numbers, channels| PcmFrames { layout, channels, bytes: bytemuck::cast_slice(numbers) };
         if self.order == Order::Frames {
             return Ok(vec![frames(slice(array)?, self.channels)]);
         }

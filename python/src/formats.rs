@@ -24,15 +24,40 @@ pub(crate) struct Format {
 }
 
 impl Number {
-    /// Integers as they lie in memory; `None` for floats.
-    pub(crate) fn pcm(self) -> Option<PcmFormat> {
+    /// As it lies in memory.
+    pub(crate) fn format(self) -> PcmFormat {
         let big = cfg!(target_endian = "big");
         match self {
-            Self::F32 | Self::F64 => None,
-            Self::I8 => Some(PcmFormat::S8),
-            Self::U8 => Some(PcmFormat::U8),
-            Self::I16 => Some(if big { PcmFormat::S16Be } else { PcmFormat::S16Le }),
-            Self::I32 => Some(if big { PcmFormat::S32Be } else { PcmFormat::S32Le }),
+            Self::F32 => {
+                if big {
+                    PcmFormat::F32Be
+                } else {
+                    PcmFormat::F32Le
+                }
+            }
+            Self::F64 => {
+                if big {
+                    PcmFormat::F64Be
+                } else {
+                    PcmFormat::F64Le
+                }
+            }
+            Self::I8 => PcmFormat::S8,
+            Self::U8 => PcmFormat::U8,
+            Self::I16 => {
+                if big {
+                    PcmFormat::S16Be
+                } else {
+                    PcmFormat::S16Le
+                }
+            }
+            Self::I32 => {
+                if big {
+                    PcmFormat::S32Be
+                } else {
+                    PcmFormat::S32Le
+                }
+            }
         }
     }
 
@@ -106,7 +131,7 @@ impl Format {
     }
 
     fn checked(self) -> PyResult<Self> {
-        if self.complex && self.number.pcm().is_some() {
+        if self.complex && !self.number.format().is_float() {
             return Err(HybankError::new_err("dtype: complex samples are floats; choose c8 or c16"));
         }
         Ok(self)

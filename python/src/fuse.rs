@@ -7,7 +7,7 @@ use crate::outputs::NewArray;
 use crate::results::FuseReport;
 use crate::signals::Signals;
 use hybank::bank::Bank;
-use hybank::pipeline::{self, GapPolicy, Whole, WholeSettings};
+use hybank::pipeline::{self, DroppedLatency, GapPolicy, Outcome, Settings};
 use hybank::runtime::{Algorithm, Options, Plan, ThreadPool};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -43,10 +43,9 @@ impl Request {
         Ok(Self { workers: workers(threads)?, gaps, algorithm: parse_algorithm(algorithm)?, keep_latency })
     }
 
-    /// As the command line chooses: the fastest, and direct where gaps are filled, so that outputs that no
-    /// gap affects have the same bits as without gaps.
-    fn algorithm(&self) -> Algorithm {
-        if self.gaps.is_some() { self.algorithm.without_added_latency() } else { self.algorithm }
+    fn settings(&self) -> Settings<'_> {
+        let dropped = if self.keep_latency { DroppedLatency::Added } else { DroppedLatency::All };
+        Settings { dropped, gaps: self.gaps, workers: self.workers.as_ref(), ..Settings::default() }
     }
 }
 
@@ -66,10 +65,15 @@ pub(crate) fn parse_algorithm(name: &str) -> PyResult<Algorithm> {
     name.parse().map_err(|error| HybankError::new_err(format!("algorithm: {error}")))
 }
 
-/// The bank made ready for outputs of a format.
-pub(crate) fn plan(bank: &Bank, format: Format, algorithm: Algorithm) -> PyResult<Plan> {
+/// The bank made ready for outputs of a format, in a run with `settings`.
+pub(crate) fn plan(
+    bank: &Bank,
+    format: Format,
+    algorithm: Algorithm,
+    settings: Settings<'_>,
+) -> PyResult<Plan> {
     let options = Options { precision: format.number.precision(), algorithm, ..Options::default() };
-    bank.plan(options).map_err(refused)
+    bank.plan(settings.options(options)).map_err(refused)
 }
 
 /// The output samples of an array, with the report.
@@ -83,68 +87,31 @@ pub(crate) fn fuse<'py>(
     let py = x.py();
     let held = Held::new(x, shape)?;
     let format = Format::of_output(held.format, dtype)?;
-    let plan = plan(bank, format, request.algorithm())?;
+    let settings = request.settings();
+    let plan = plan(bank, format, request.algorithm, settings)?;
     let mut array = NewArray::new(py, held.frames() * bank.ratio, format)?;
-    let (mut input, mut room) = (held.samples()?, array.room()?);
-    let settings = WholeSettings {
-        keep_latency: request.keep_latency,
-        gaps: request.gaps,
-        workers: request.workers.as_ref(),
-    };
-    let mut report = Report::default();
-    for part in 0..=usize::from(format.complex) {
-        input.select(part);
-        room.select(part);
-        let signals = Signals::new();
-        let stop = || signals.raised();
-        let whole = py.detach(|| pipeline::fuse_until(bank, &plan, &input, &mut room, settings, &stop));
-        report.add(whole.map_err(|error| signals.into_error().unwrap_or_else(|| refused(error)))?);
-    }
-    report.clipped = room.clipped();
+    let (parts, mut room) = (held.parts()?, array.room()?);
+    let signals = Signals::new();
+    let stop = || signals.raised();
+    let outcome = py.detach(|| pipeline::fuse(bank, &plan, &parts, &mut room, settings, &stop));
+    let outcome = outcome.map_err(|error| signals.into_error().unwrap_or_else(|| refused(error)))?;
+    let clipped = room.clipped();
     let y = array.finish()?;
-    Ok((y, report.finish(py, &plan, request.keep_latency)))
+    Ok((y, report(py, outcome, settings.dropped.samples(&plan), clipped)))
 }
 
-/// Counts of both parts of complex samples.
-#[derive(Default)]
-struct Report {
-    whole: Whole,
-    clipped: u64,
-}
-
-impl Report {
-    fn add(&mut self, whole: Whole) {
-        self.whole.replaced += whole.replaced;
-        self.whole.state_resets += whole.state_resets;
-        match (&mut self.whole.gaps, whole.gaps) {
-            (Some(all), Some(gaps)) => {
-                all.count += gaps.count;
-                all.missing += gaps.missing;
-                all.list.extend(gaps.list);
-            }
-            (all, gaps) => *all = gaps,
-        }
-        match (&mut self.whole.mask, whole.mask) {
-            (Some(all), Some(mask)) => all.iter_mut().zip(mask).for_each(|(mark, other)| *mark |= other),
-            (all, mask) => *all = mask,
-        }
-    }
-
-    fn finish(self, py: Python<'_>, plan: &Plan, keep_latency: bool) -> FuseReport {
-        let summary = plan.summary();
-        let mask = self.whole.mask;
-        let gaps = self.whole.gaps;
-        FuseReport {
-            algorithm: summary.algorithm.to_owned(),
-            numbers: summary.numbers.to_owned(),
-            isa: summary.isa,
-            latency_dropped: if keep_latency { plan.extra_latency() } else { plan.latency() },
-            clipped: self.clipped,
-            replaced: self.whole.replaced,
-            state_resets: self.whole.state_resets,
-            missing: gaps.as_ref().map(|gaps| gaps.missing),
-            gaps: gaps.map(|gaps| gaps.list.iter().map(|gap| (gap.channel, gap.first, gap.length)).collect()),
-            mask: mask.map(|mask| PyArray1::from_iter(py, mask.iter().map(|&mark| mark != 0)).unbind()),
-        }
+fn report(py: Python<'_>, outcome: Outcome, latency_dropped: usize, clipped: u64) -> FuseReport {
+    let Outcome { plan, gaps, mask, .. } = outcome;
+    FuseReport {
+        algorithm: plan.algorithm.to_owned(),
+        numbers: plan.numbers.to_owned(),
+        isa: plan.isa,
+        latency_dropped,
+        clipped,
+        replaced: outcome.replaced,
+        state_resets: outcome.state_resets,
+        missing: gaps.as_ref().map(|gaps| gaps.missing),
+        gaps: gaps.map(|gaps| gaps.list.iter().map(|gap| (gap.channel, gap.first, gap.length)).collect()),
+        mask: mask.map(|mask| PyArray1::from_iter(py, mask.iter().map(|&mark| mark != 0)).unbind()),
     }
 }

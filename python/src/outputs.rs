@@ -42,25 +42,30 @@ impl<'py> NewArray<'py> {
         Ok(Self { numbers, format })
     }
 
-    /// Room for the samples; for the real parts of complex ones.
+    /// Room for the samples; for the parts of complex ones once one of them is selected.
     pub(crate) fn room(&mut self) -> PyResult<Room<'_>> {
-        let (complex, pcm) = (self.format.complex, self.format.number.pcm());
+        let Format { number, complex } = self.format;
         let bytes: &mut [u8] = match &mut self.numbers {
             Numbers::F32(array) => {
                 let room = array.as_slice_mut().map_err(refused)?;
-                return Ok(if complex { Room::Part32(room, 0) } else { Room::F32(room) });
+                if !complex {
+                    return Ok(Room::F32(room));
+                }
+                bytemuck::cast_slice_mut(room)
             }
             Numbers::F64(array) => {
                 let room = array.as_slice_mut().map_err(refused)?;
-                return Ok(if complex { Room::Part64(room, 0) } else { Room::F64(room) });
+                if !complex {
+                    return Ok(Room::F64(room));
+                }
+                bytemuck::cast_slice_mut(room)
             }
             Numbers::I8(array) => bytemuck::cast_slice_mut(array.as_slice_mut().map_err(refused)?),
             Numbers::U8(array) => array.as_slice_mut().map_err(refused)?,
             Numbers::I16(array) => bytemuck::cast_slice_mut(array.as_slice_mut().map_err(refused)?),
             Numbers::I32(array) => bytemuck::cast_slice_mut(array.as_slice_mut().map_err(refused)?),
         };
-        let format = pcm.ok_or_else(|| refused("floats are not integers"))?;
-        Ok(Room::Pcm(PcmOutput::packed(format, bytes)))
+        Ok(Room::Pcm(PcmOutput::packed(number.format(), bytes)))
     }
 
     /// The array.
@@ -93,13 +98,13 @@ pub(crate) fn encode<'py>(
 ) -> PyResult<(Bound<'py, PyAny>, u64)> {
     let held = Held::new(y, Shape { axis: -1, channels: 1 })?;
     let mut array = NewArray::new(y.py(), held.frames(), Format::of_dtype(dtype)?)?;
-    let (samples, mut room) = (held.samples()?, array.room()?);
+    let (parts, mut room) = (held.parts()?, array.room()?);
     let (frames, is_single) = (held.frames(), held.format.number == Number::F32);
     let clipped = y.py().detach(|| {
         if is_single {
-            convert::<f32>(&samples, frames, &mut room);
+            convert::<f32>(&parts[0], frames, &mut room);
         } else {
-            convert::<f64>(&samples, frames, &mut room);
+            convert::<f64>(&parts[0], frames, &mut room);
         }
         room.clipped()
     });

@@ -8,7 +8,8 @@ use crate::fuse::{parse_algorithm, plan};
 use crate::outputs::NewArray;
 use crate::samples::{Room, Samples};
 use hybank::bank::Bank;
-use hybank::runtime::{self, Plan, ProcessError, STATE_COUNTS, StateError};
+use hybank::pipeline::Settings;
+use hybank::runtime::{self, Output, Plan, ProcessError, STATE_COUNTS, StateError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
 use std::fmt;
@@ -51,7 +52,8 @@ impl Stream {
         let format = dtype.map_or(Ok(default), Format::of_dtype)?;
         let shape = Shape { axis, channels: bank.channel_count() };
         shape.check()?;
-        let plan = plan(bank, format, parse_algorithm(algorithm)?.without_added_latency())?;
+        let algorithm_asked = parse_algorithm(algorithm)?.without_added_latency();
+        let plan = plan(bank, format, algorithm_asked, Settings::default())?;
         let streams = vec![runtime::Stream::new(&plan); 1 + usize::from(format.complex)];
         let state = Mutex::new(State { streams, clipped: 0, closed: false });
         Ok(Self { bank: Arc::clone(bank), asked: algorithm.to_owned(), plan, shape, format, state })
@@ -83,8 +85,8 @@ impl Stream {
         let held = Held::new(x, self.shape)?;
         self.check_parts(held.format)?;
         let mut array = NewArray::new(x.py(), held.frames() * self.plan.ratio(), self.format)?;
-        let (mut input, mut room) = (held.samples()?, array.room()?);
-        x.py().detach(|| self.lock().process(&mut input, &mut room)).map_err(refused)?;
+        let (parts, mut room) = (held.parts()?, array.room()?);
+        x.py().detach(|| self.lock().process(&parts, &mut room)).map_err(refused)?;
         array.finish()
     }
 
@@ -249,12 +251,13 @@ impl Stream {
 }
 
 impl State {
-    fn process(&mut self, input: &mut Samples<'_>, room: &mut Room<'_>) -> Result<(), StreamError> {
+    fn process(&mut self, parts: &[Samples<'_>], room: &mut Room<'_>) -> Result<(), StreamError> {
         self.check_open()?;
-        for (part, stream) in self.streams.iter_mut().enumerate() {
-            input.select(part);
-            room.select(part);
-            stream.run(input, room)?;
+        for (i, (stream, part)) in self.streams.iter_mut().zip(parts).enumerate() {
+            if parts.len() > 1 {
+                room.select(i);
+            }
+            stream.run(part, room)?;
         }
         self.clipped += room.clipped();
         Ok(())
@@ -262,8 +265,11 @@ impl State {
 
     fn flush(&mut self, room: &mut Room<'_>) -> Result<(), StreamError> {
         self.check_open()?;
+        let is_complex = self.streams.len() > 1;
         for (part, stream) in self.streams.iter_mut().enumerate() {
-            room.select(part);
+            if is_complex {
+                room.select(part);
+            }
             stream.flush(room)?;
         }
         self.clipped += room.clipped();

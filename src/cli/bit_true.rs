@@ -1,15 +1,15 @@
 //! `fuse --bit-true`: integer taps on the integers of the captures, as hardware has them.
 
 use super::Failure;
-use super::bank_file::{is_dash, name};
+use super::bank_file::name;
 use super::output::{Bits, begin_samples};
-use super::print::print_json;
-use super::say::{say, warn};
+use super::run::{Job, interrupted, print_report};
+use super::say::warn;
 use crate::bank::Bank;
 use crate::files::commit_all;
 use crate::interchange::{BitTrue, WordSizes};
 use crate::io::{Arrival, Container, MultiReader, OutputHeader, PcmFormat, PcmFrames, SampleWriter};
-use std::path::Path;
+use crate::pipeline::DroppedLatency;
 
 /// The options.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -22,20 +22,6 @@ pub(super) struct BitTrueArgs {
     /// Bits of the accumulator with --bit-true; sums that do not fit wrap around
     #[arg(long, value_name = "BITS", requires = "bit_true", default_value_t = 64, value_parser = clap::value_parser!(u8).range(8..=64))]
     accumulator: u8,
-}
-
-/// What is written where.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Job<'a> {
-    pub(super) bank: &'a Bank,
-    pub(super) bank_path: &'a Path,
-    pub(super) output: &'a Path,
-    /// Hertz of the output.
-    pub(super) rate: f64,
-    pub(super) keep_latency: bool,
-    pub(super) strict: bool,
-    pub(super) force: bool,
-    pub(super) json: bool,
 }
 
 /// How the words were used.
@@ -61,21 +47,22 @@ impl BitTrueArgs {
     }
 
     /// Fuses all that `reader` gives.
-    pub(super) fn fuse(self, job: Job<'_>, reader: &mut MultiReader) -> Result<(), Failure> {
+    pub(super) fn fuse(self, job: &Job<'_>, reader: &mut MultiReader) -> Result<(), Failure> {
+        let rate = job.output_rate(reader)?;
         let format = integer_format(reader)?;
         let bits = 8 * format.bytes() as u32;
         let words = WordSizes { accumulator: self.accumulator.into(), output: bits };
         let model = BitTrue::new(job.bank, words)
             .map_err(|error| Failure::Input(format!("{}: {error}", name(job.bank_path))))?;
-        let header = OutputHeader { container: Container::Wav, format, is_complex: false, rate: job.rate };
-        let output = begin_samples(job.output, header, job.force).map_err(Failure::running)?;
-        let skip = if job.keep_latency { 0 } else { job.bank.latency };
+        let header = OutputHeader { container: Container::Wav, format, is_complex: false, rate };
+        let output = begin_samples(job.output, header, job.args.force).map_err(Failure::running)?;
+        let skip = if job.dropped == DroppedLatency::All { job.bank.latency } else { 0 };
         let mut run = Run::new(model, output, format, skip, job.bank);
         let frames = run.all(reader)?;
         run.flush(job.bank.channel_count())?;
         let report = Report {
             samples: run.samples,
-            rate: job.rate.round() as u64,
+            rate: rate.round() as u64,
             frames,
             latency_dropped: skip,
             bits,
@@ -86,12 +73,12 @@ impl BitTrueArgs {
         };
         let warnings: Vec<String> =
             reader.warnings().iter().map(ToString::to_string).chain(report.warnings()).collect();
-        if let (Some(first), true) = (warnings.first(), job.strict) {
+        if let (Some(first), true) = (warnings.first(), job.args.strict) {
             return Err(Failure::Input(format!("{first} (an error because of --strict)")));
         }
         commit_all(run.output.finish().map_err(Failure::running)?).map_err(Failure::input)?;
         warnings.iter().for_each(|warning| warn(warning));
-        report.print(job)
+        if job.args.json { print_report(&report, job.output) } else { Ok(()) }
     }
 }
 
@@ -106,17 +93,6 @@ impl Report {
         });
         let outputs = (*saturated > 0).then(|| format!("{saturated} output samples saturated"));
         sums.into_iter().chain(outputs).collect()
-    }
-
-    fn print(&self, job: Job<'_>) -> Result<(), Failure> {
-        match (job.json, is_dash(job.output)) {
-            (false, _) => Ok(()),
-            (true, false) => print_json(self),
-            (true, true) => {
-                say(&(serde_json::to_string(self).map_err(Failure::input)? + "\n"));
-                Ok(())
-            }
-        }
     }
 }
 
@@ -178,12 +154,7 @@ impl Run {
                     reader.consume(count);
                 }
                 Arrival::End => return Ok(reader.consumed()),
-                Arrival::Stopped => {
-                    let frames = reader.consumed();
-                    return Err(Failure::Input(format!(
-                        "interrupted after {frames} frames; nothing was kept, run it again"
-                    )));
-                }
+                Arrival::Stopped => return Err(interrupted(reader.consumed())),
             }
         }
     }

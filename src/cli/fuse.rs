@@ -1,28 +1,19 @@
 //! `hybank fuse`: fuses slow recordings into one fast recording.
 
 use super::Failure;
-use super::bank_file::is_dash;
+use super::bank_file::{self, is_dash};
 use super::before_after::{BeforeAfter, BeforeAfterArgs};
-use super::bit_true::{BitTrueArgs, Job};
+use super::bit_true::BitTrueArgs;
 use super::capture_args::CaptureArgs;
-use super::file_kind::unreadable;
-use super::follow::Follow;
-use super::gaps::GapArgs;
-use super::interrupt::interrupts;
-use super::journal::{Journal, JournalArgs};
-use super::output::{Bits, begin_samples, check_files, precision};
-use super::run::{RunReport, ThreadArgs, algorithms, carried, complete, print_report};
+use super::observer::RunObserver;
+use super::output::Bits;
+use super::run::{Finished, Job, RunArgs, RunReport, interrupted, print_report};
 use super::say::say_understood;
-use super::track::TrackArgs;
-use super::turns::TurnArgs;
-use super::watch::{UNWATCHED, Watch};
-use super::{bank_file, match_bank};
 use crate::bank::Bank;
-use crate::io::{BLOCK_BYTES, Container, MultiReader, OutputHeader, PcmFrames, Placement, ReadOptions};
+use crate::io::{Container, MultiReader};
 use crate::overview::counted;
-use crate::pipeline::{Ending, FileOutputs, Pipeline, Settings, Warning, run as run_pipeline};
+use crate::pipeline::DroppedLatency;
 use crate::quantity::readable;
-use crate::runtime::{Algorithm, Options, Plan};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -56,37 +47,17 @@ pub(super) struct Args {
     /// Sample format of the output: integers of 16, 24 or 32 bits, floats of 32 or 64 bits
     #[arg(long, value_enum, default_value_t = Bits::F32)]
     bits: Bits,
-    /// Algorithm of FIR filters; auto: the fastest for the bank, and direct with --gaps
-    #[arg(long, value_parser = algorithms(), default_value_t = Algorithm::Auto)]
-    algorithm: Algorithm,
     /// Keep the bank's latency: the causal output, as `stream` gives it
     #[arg(long)]
     keep_latency: bool,
     #[command(flatten)]
     reading: CaptureArgs,
     #[command(flatten)]
-    turns: TurnArgs,
-    #[command(flatten)]
-    gaps: GapArgs,
-    #[command(flatten)]
-    track: TrackArgs,
-    #[command(flatten)]
-    threads: ThreadArgs,
-    #[command(flatten)]
     bit_true: BitTrueArgs,
     #[command(flatten)]
     before_after: BeforeAfterArgs,
     #[command(flatten)]
-    journal: JournalArgs,
-    /// Make every tolerated fault (unequal lengths, truncation, NaN, clipping) an error
-    #[arg(long)]
-    strict: bool,
-    /// Replace an existing output
-    #[arg(long)]
-    force: bool,
-    /// Print a report as one JSON object on standard output, or on standard error with `-o -`
-    #[arg(long)]
-    json: bool,
+    run: RunArgs,
 }
 
 /// The report of a run.
@@ -100,7 +71,7 @@ struct Report<'a> {
     frames: u64,
     /// Samples dropped at the beginning so that the output lines up with the inputs; with --keep-latency
     /// only those that the algorithm adds.
-    latency_dropped: u64,
+    latency_dropped: usize,
     /// Largest magnitude of the output, of full scale.
     peak: f64,
     /// Whether the captures agree with the spec of the bank.
@@ -119,54 +90,9 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check()?;
     let bank = bank_file::load(&args.bank)?;
     say_understood(bank.spec.as_ref());
-    let journal = args.journal.begin(args.force)?;
-    fuse(args, &bank, &journal).inspect_err(|failure| journal.fail(failure))
-}
-
-fn fuse(args: &Args, bank: &Bank, journal: &Journal) -> Result<(), Failure> {
-    let begin = Instant::now();
-    let Some(mut reader) = args.start_reader(bank, Some(journal))? else { return Err(interrupted(0)) };
-    match_bank::check_channels(bank, &args.bank, &reader)?;
-    let rate = match_bank::output_rate(bank, &reader)?;
-    if args.bit_true.is_wanted() {
-        return args.bit_true.fuse(args.job(bank, rate), &mut reader);
-    }
-    let plan = args.plan(bank)?;
-    let skip = if args.keep_latency { plan.extra_latency() } else { plan.latency() } as u64;
-    let is_complex = reader.is_complex();
-    let mut pipeline = args.pipeline(bank, &plan, (skip, rate), is_complex)?;
-    let mut outputs = args.outputs(rate, is_complex)?;
-    let is_watched = !is_complex && !args.track.is_wanted();
-    let mut watch = if is_watched { Watch::new(bank) } else { Watch::idle(UNWATCHED) };
-    let mut follow = Follow::new(journal.clone());
-    run_all(&mut pipeline, &mut reader, &mut outputs, |parts, pipeline| {
-        watch.observe(parts);
-        follow.step(parts, pipeline);
-    })?;
-    pipeline.settle(&mut outputs).map_err(Failure::running)?;
-    follow.step(&[], &pipeline);
-    let reported = pipeline.warnings().to_vec();
-    let frames = reader.consumed();
-    pipeline.flush(frames * bank.ratio as u64, &mut outputs).map_err(Failure::running)?;
-    let run = RunReport::new(pipeline.finish(), args.tolerated(&reader), "--bits 32f");
-    let watched = watch.finish();
-    let run = run.with_warnings(watched.warnings).with_reported(reported);
-    let seconds = begin.elapsed().as_secs_f64();
-    let shift = plan.latency() as u64 - skip;
-    let placement = Placement { ratio: bank.ratio as u64, shift, samples: run.samples };
-    outputs.annotate(carried(&reader, run.gaps(), bank, &args.output, placement)?);
-    let peak = outputs.peak().unwrap_or(0.0);
-    complete(outputs, &run, args.strict, journal)?;
-    let (measure, rate) = (args.measured(bank)?, rate.round() as u64);
-    let captures = &watched.verdict;
-    let report = Report { run: &run, rate, frames, latency_dropped: skip, peak, captures, seconds, measure };
-    journal.end(&report)?;
-    if args.json {
-        return print_report(&report, &args.output);
-    }
-    // Where samples or events go to standard output nothing else does.
-    let is_taken = [Some(args.output.as_path()), args.journal.report()].into_iter().flatten().any(is_dash);
-    if is_taken { Ok(()) } else { super::print(&report.text(&args.output)) }
+    let mut observer = args.run.observer.begin(args.run.force)?;
+    let job = args.job(&bank);
+    args.fuse(&job, &mut observer).inspect_err(|failure| observer.fail(failure))
 }
 
 impl Report<'_> {
@@ -192,120 +118,66 @@ impl Report<'_> {
 impl Args {
     /// Refuses impossible combinations of options, before any file is read.
     fn check(&self) -> Result<(), Failure> {
-        match_bank::check_stdin(&self.bank, &self.inputs)?;
-        self.gaps.check()?;
-        self.turns.check(self.inputs.len())?;
-        self.reading.check(self.turns.is_given())?;
+        self.reading.check(self.run.turns.is_given())?;
         self.before_after.check(&self.inputs, &self.output)?;
-        self.journal.check(&self.output, self.json || self.before_after.is_wanted())?;
-        let inputs = self.inputs.iter().map(PathBuf::as_path).chain([self.bank.as_path()]);
-        let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).chain(self.track.input()).collect();
-        self.track.check(self.algorithm)?;
-        let others = self.gaps.mask().into_iter().chain(self.journal.report()).chain(self.track.log());
-        check_files((&self.output, Container::Wav), &others.collect::<Vec<&Path>>(), &inputs)
+        let prints = self.before_after.is_wanted();
+        self.run.check(&self.bank, &self.inputs, (&self.output, Container::Wav), prints)
     }
 
-    /// `None` if an interrupt came first.
-    fn start_reader(&self, bank: &Bank, journal: Option<&Journal>) -> Result<Option<MultiReader>, Failure> {
-        let lost = self.gaps.lost_samples()?;
-        let turns = self.turns.turns(bank, &self.bank)?;
-        let block_bytes = self.threads.bytes(BLOCK_BYTES);
-        let stalls = journal.map(Journal::stall_watch);
-        let (turns, stalls) = (turns.as_ref(), stalls.as_ref());
-        let captures = self.reading.options(self.inputs.len(), bank.channel_count());
-        let files = ReadOptions { block_bytes, turns, stalls, ..captures };
-        let options = self.gaps.read_options(&lost, files);
-        MultiReader::start(&self.inputs, options, interrupts()).map_err(unreadable)
-    }
-
-    /// Reads the inputs once more, and the output.
-    fn measured(&self, bank: &Bank) -> Result<Option<BeforeAfter>, Failure> {
-        if !self.before_after.is_wanted() {
-            return Ok(None);
-        }
-        let Some(reader) = self.start_reader(bank, None)? else { return Err(interrupted(0)) };
-        self.before_after.measured(bank, reader, &self.output).map(Some)
-    }
-
-    fn plan(&self, bank: &Bank) -> Result<Plan, Failure> {
-        bank_file::plan(bank, self.options(), &self.bank)
-    }
-
-    fn options(&self) -> Options {
-        // Outputs that no gap affects must have the same bits as without gaps.
-        // Filters that follow delays change at single frames.
-        let direct = self.gaps.policy().is_some() || self.track.is_wanted();
-        let precision = precision(self.bits.format());
-        let algorithm = if direct { self.algorithm.without_added_latency() } else { self.algorithm };
-        Options { precision, algorithm, ..Options::default() }
-    }
-
-    fn job<'a>(&'a self, bank: &'a Bank, rate: f64) -> Job<'a> {
+    fn job<'a>(&'a self, bank: &'a Bank) -> Job<'a> {
         Job {
+            args: &self.run,
             bank,
             bank_path: &self.bank,
             output: &self.output,
-            rate,
-            keep_latency: self.keep_latency,
-            strict: self.strict,
-            force: self.force,
-            json: self.json,
+            container: Container::Wav,
+            format: self.bits.format(),
+            dropped: if self.keep_latency { DroppedLatency::Added } else { DroppedLatency::All },
+            is_live: false,
+            flush: true,
+            lossless: "--bits 32f",
         }
     }
 
-    /// That drops `skip` samples of an output of `rate` hertz.
-    fn pipeline(
-        &self,
-        bank: &Bank,
-        plan: &Plan,
-        (skip, rate): (u64, f64),
-        is_complex: bool,
-    ) -> Result<Pipeline, Failure> {
-        self.track.check_samples(is_complex)?;
-        let (format, gaps, workers) = (self.bits.format(), self.gaps.policy(), self.threads.workers()?);
-        let settings = Settings { format, is_complex, skip, gaps, workers };
-        let pipeline = Pipeline::new(bank, plan, settings).map_err(Failure::running)?;
-        self.track.followed(pipeline, (bank, &self.bank), self.options(), rate)
+    fn fuse(&self, job: &Job<'_>, observer: &mut RunObserver) -> Result<(), Failure> {
+        let begin = Instant::now();
+        let mut reader = self.start_reader(job, Some(observer))?;
+        if self.bit_true.is_wanted() {
+            return self.bit_true.fuse(job, &mut reader);
+        }
+        let rate = job.output_rate(&reader)?;
+        let progress = progress_bar(reader.promised_frames());
+        let finished = job.run(&job.plan()?, &mut reader, observer, &|frames| progress.inc(frames))?;
+        progress.finish_and_clear();
+        let seconds = begin.elapsed().as_secs_f64();
+        let measure = self.measured(job)?;
+        let Finished { report: run, frames, dropped: latency_dropped, peak, captures, .. } = &finished;
+        let (rate, frames, latency_dropped, peak) = (rate.round() as u64, *frames, *latency_dropped, *peak);
+        let report = Report { run, rate, frames, latency_dropped, peak, captures, seconds, measure };
+        observer.end(&report)?;
+        if self.run.json {
+            return print_report(&report, &self.output);
+        }
+        // Where samples or events go to standard output nothing else does.
+        let taken = [Some(self.output.as_path()), self.run.observer.report()];
+        if taken.into_iter().flatten().any(is_dash) {
+            return Ok(());
+        }
+        super::print(&report.text(&self.output))
     }
 
-    /// The outputs at their beginning, of `rate` hertz.
-    fn outputs(&self, rate: f64, is_complex: bool) -> Result<FileOutputs, Failure> {
-        let mask = self.gaps.begin_mask(self.force)?;
-        let (container, format) = (Container::Wav, self.bits.format());
-        let header = OutputHeader { container, format, is_complex, rate };
-        let samples = begin_samples(&self.output, header, self.force);
-        let log = self.track.begin_log(self.force)?;
-        Ok(FileOutputs::new(samples.map_err(Failure::running)?, mask).with_log(log).with_peak(format))
+    fn start_reader(&self, job: &Job<'_>, observer: Option<&RunObserver>) -> Result<MultiReader, Failure> {
+        let captures = self.reading.options(self.inputs.len(), job.bank.channel_count());
+        job.start_reader(&self.inputs, captures, observer)?.ok_or_else(|| interrupted(0))
     }
 
-    fn tolerated(&self, reader: &MultiReader) -> Vec<Warning> {
-        let names = || self.inputs.iter().map(|path| path.display().to_string()).collect();
-        let empty = (reader.consumed() == 0).then(|| Warning::Empty(names()));
-        reader.warnings().into_iter().map(Warning::Input).chain(empty).collect()
+    /// Reads the inputs once more, and the output.
+    fn measured(&self, job: &Job<'_>) -> Result<Option<BeforeAfter>, Failure> {
+        if !self.before_after.is_wanted() {
+            return Ok(None);
+        }
+        self.before_after.measured(job.bank, self.start_reader(job, None)?, &self.output).map(Some)
     }
-}
-
-/// Processes all frames.
-fn run_all(
-    pipeline: &mut Pipeline,
-    reader: &mut MultiReader,
-    outputs: &mut FileOutputs,
-    mut observe: impl FnMut(&[PcmFrames<'_>], &Pipeline),
-) -> Result<(), Failure> {
-    let progress = progress_bar(reader.promised_frames());
-    let ending = run_pipeline(reader, pipeline, outputs, |parts, pipeline| {
-        observe(parts, pipeline);
-        progress.inc(parts.iter().map(PcmFrames::frames).min().unwrap_or(0) as u64);
-    });
-    match ending.map_err(Failure::running)? {
-        Ending::Inputs => progress.finish_and_clear(),
-        Ending::Stopped => return Err(interrupted(reader.consumed())),
-    }
-    Ok(())
-}
-
-fn interrupted(frames: u64) -> Failure {
-    Failure::Input(format!("interrupted after {frames} frames; nothing was kept, run it again"))
 }
 
 /// Drawn on a terminal only.

@@ -60,17 +60,17 @@ impl GapArgs {
         Ok(())
     }
 
-    /// Reads the file of lost samples, if one is given.
-    pub(super) fn lost_samples(&self) -> Result<Lost, Failure> {
-        let read = self.lost().map(LostSamples::read).transpose().map_err(Failure::input)?;
-        Ok(Lost { read, live: None })
-    }
-
-    /// As [`GapArgs::lost_samples`], but begins to read a FIFO and waits for nothing.
-    pub(super) fn live_lost_samples(&self) -> Result<Lost, Failure> {
-        match self.lost().filter(|path| is_pipe(path)) {
-            None => self.lost_samples(),
-            Some(path) => Ok(Lost { read: None, live: Some(LiveLost::begin(path).map_err(Failure::input)?) }),
+    /// Reads the file of lost samples, if one is given; in a `live` run it begins to read a FIFO and waits
+    /// for nothing.
+    pub(super) fn lost_samples(&self, live: bool) -> Result<Lost, Failure> {
+        match self.lost() {
+            None => Ok(Lost { read: None, live: None }),
+            Some(path) if live && is_pipe(path) => {
+                Ok(Lost { read: None, live: Some(LiveLost::begin(path).map_err(Failure::input)?) })
+            }
+            Some(path) => {
+                Ok(Lost { read: Some(LostSamples::read(path).map_err(Failure::input)?), live: None })
+            }
         }
     }
 

@@ -1,21 +1,58 @@
-//! Code that `fuse` and `stream` share: options of the filters, the report, the end of a run.
-
-mod carried;
+//! How `fuse` and `stream` run a bank: their common options, the run from its plan to its files, the report.
 
 use super::Failure;
-use super::bank_file::is_dash;
-use super::gaps::say_gaps;
-use super::journal::Journal;
+use super::bank_file::{self, is_dash};
+use super::file_kind::unreadable;
+use super::gaps::{GapArgs, say_gaps};
+use super::interrupt::interrupts;
+use super::match_bank;
+use super::observer::{ObserverArgs, RunObserver};
+use super::output::{begin_samples, check_files, precision};
 use super::print::print_json;
 use super::say::{say, warn};
-use crate::pipeline::{FileOutputs, Gap, GapSummary, Outcome, Warning};
-use crate::runtime::{Algorithm, PlanSummary, ThreadPool};
-pub(super) use carried::carried;
+use super::track::{TrackArgs, TrackRecord};
+use super::turns::TurnArgs;
+use crate::bank::Bank;
+use crate::io::{
+    Arrival, BLOCK_BYTES, Container, MultiReader, OutputHeader, OutputNotes, PcmFormat, Placement,
+    ReadOptions, is_sigmf,
+};
+use crate::pipeline::{DroppedLatency, FileOutputs, GapSummary, Outcome, Pipeline, Settings, Warning};
+use crate::runtime::{Algorithm, Options, Plan, PlanSummary, ThreadPool};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// Options of the commands that fuse.
+#[derive(Debug, clap::Args)]
+pub(super) struct RunArgs {
+    /// Algorithm of FIR filters; auto is the fastest for the bank, and direct with --gaps, with --track, and
+    /// in `stream`, because overlap-save adds latency (--json says how much)
+    #[arg(long, value_parser = algorithms(), default_value_t = Algorithm::Auto)]
+    algorithm: Algorithm,
+    #[command(flatten)]
+    pub(super) turns: TurnArgs,
+    #[command(flatten)]
+    pub(super) gaps: GapArgs,
+    #[command(flatten)]
+    track: TrackArgs,
+    #[command(flatten)]
+    threads: ThreadArgs,
+    #[command(flatten)]
+    pub(super) observer: ObserverArgs,
+    /// Make every tolerated fault (unequal lengths, truncation, an incomplete last frame, NaN, clipping) an
+    /// error
+    #[arg(long)]
+    pub(super) strict: bool,
+    /// Replace an existing output
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Print a report as one JSON object on standard output, or on standard error if the samples are there
+    #[arg(long)]
+    pub(super) json: bool,
+}
 
 /// Reads `--algorithm`.
-pub(super) fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
+fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
     let names = Algorithm::ALL.map(|algorithm| {
         PossibleValue::new(algorithm.name()).help(match algorithm {
             Algorithm::Auto => "The fastest algorithm that suits the command",
@@ -30,7 +67,7 @@ pub(super) fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
 
 /// Threads of the filters.
 #[derive(Debug, Clone, Copy, clap::Args)]
-pub(super) struct ThreadArgs {
+struct ThreadArgs {
     /// Threads that filter (FIR banks only), 0 for one per processor. The result has the same bits with any
     /// number. More than one thread helps with many taps or channels; otherwise reading and writing take
     /// longer than filtering
@@ -40,7 +77,7 @@ pub(super) struct ThreadArgs {
 
 impl ThreadArgs {
     /// `None` if the calling thread does all.
-    pub(super) fn workers(self) -> Result<Option<ThreadPool>, Failure> {
+    fn workers(self) -> Result<Option<ThreadPool>, Failure> {
         if self.threads == 1 {
             return Ok(None);
         }
@@ -49,8 +86,262 @@ impl ThreadArgs {
     }
 
     /// Bytes of each input that are read at a time, for `bytes` with one thread: enough for all threads.
-    pub(super) fn bytes(self, bytes: usize) -> usize {
+    fn bytes(self, bytes: usize) -> usize {
         if self.threads == 1 { bytes } else { 8 * bytes }
+    }
+}
+
+impl RunArgs {
+    /// Refuses impossible combinations of options, before any file is read. The command `prints` on standard
+    /// output besides.
+    pub(super) fn check(
+        &self,
+        bank: &Path,
+        inputs: &[PathBuf],
+        (output, container): (&Path, Container),
+        prints: bool,
+    ) -> Result<(), Failure> {
+        match_bank::check_stdin(bank, inputs)?;
+        self.gaps.check()?;
+        self.turns.check(inputs.len())?;
+        self.observer.check(output, self.json || prints)?;
+        self.track.check(self.algorithm)?;
+        let inputs = inputs.iter().map(PathBuf::as_path).chain([bank]);
+        let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).chain(self.track.input()).collect();
+        let others = self.gaps.mask().into_iter().chain(self.observer.report()).chain(self.track.log());
+        check_files((output, container), &others.collect::<Vec<&Path>>(), &inputs)
+    }
+}
+
+/// A run: a bank, and what becomes of the outputs.
+pub(super) struct Job<'a> {
+    pub(super) args: &'a RunArgs,
+    pub(super) bank: &'a Bank,
+    pub(super) bank_path: &'a Path,
+    pub(super) output: &'a Path,
+    pub(super) container: Container,
+    pub(super) format: PcmFormat,
+    pub(super) dropped: DroppedLatency,
+    /// Samples are fused as they arrive: no algorithm may add latency, an interrupt ends the run in order,
+    /// and warnings come at once.
+    pub(super) is_live: bool,
+    /// The last samples are brought out by frames without a signal.
+    pub(super) flush: bool,
+    /// The option that keeps clipped samples.
+    pub(super) lossless: &'a str,
+}
+
+/// A run whose outputs are written.
+pub(super) struct Finished {
+    pub(super) report: RunReport,
+    /// Input frames read.
+    pub(super) frames: u64,
+    pub(super) is_interrupted: bool,
+    /// Output samples dropped at the beginning.
+    pub(super) dropped: usize,
+    /// Largest magnitude of the output, of full scale.
+    pub(super) peak: f64,
+    /// Whether the captures agree with the spec of the bank.
+    pub(super) captures: String,
+}
+
+impl Job<'_> {
+    /// Begins to read as `captures` says; `None` if an interrupt came first.
+    pub(super) fn start_reader(
+        &self,
+        inputs: &[PathBuf],
+        captures: ReadOptions<'_>,
+        observer: Option<&RunObserver>,
+    ) -> Result<Option<MultiReader>, Failure> {
+        let args = self.args;
+        let lost = args.gaps.lost_samples(self.is_live)?;
+        let turns = args.turns.turns(self.bank, self.bank_path)?;
+        let stalls = observer.map(RunObserver::stall_watch);
+        let block_bytes = args.threads.bytes(BLOCK_BYTES);
+        let files = ReadOptions { block_bytes, turns: turns.as_ref(), stalls: stalls.as_ref(), ..captures };
+        MultiReader::start(inputs, args.gaps.read_options(&lost, files), interrupts()).map_err(unreadable)
+    }
+
+    fn settings(&self) -> Settings<'static> {
+        let Self { args, dropped, .. } = *self;
+        Settings { dropped, gaps: args.gaps.policy(), is_retuned: args.track.is_wanted(), workers: None }
+    }
+
+    fn options(&self) -> Options {
+        let asked = self.args.algorithm;
+        let algorithm = if self.is_live { asked.without_added_latency() } else { asked };
+        let options = Options { precision: precision(self.format), algorithm, ..Options::default() };
+        self.settings().options(options)
+    }
+
+    /// The plan of the run.
+    pub(super) fn plan(&self) -> Result<Plan, Failure> {
+        bank_file::plan(self.bank, self.options(), self.bank_path)
+    }
+
+    /// The rate of the output in hertz, if the inputs fit the bank.
+    pub(super) fn output_rate(&self, reader: &MultiReader) -> Result<f64, Failure> {
+        match_bank::check_channels(self.bank, self.bank_path, reader)?;
+        match_bank::output_rate(self.bank, reader)
+    }
+
+    /// Fuses all frames and writes the outputs; `each` is told how many frames a step had.
+    pub(super) fn run(
+        &self,
+        plan: &Plan,
+        reader: &mut MultiReader,
+        observer: &mut RunObserver,
+        each: &dyn Fn(u64),
+    ) -> Result<Finished, Failure> {
+        let (rate, is_complex) = (self.output_rate(reader)?, reader.is_complex());
+        let workers = self.args.threads.workers()?;
+        let settings = Settings { workers: workers.as_ref(), ..self.settings() };
+        let pipeline = Pipeline::new(self.bank, plan, settings, self.format, is_complex);
+        let mut pipeline = pipeline.map_err(Failure::running)?;
+        let tracked = self.args.track.begin(self.args.force, observer.events())?;
+        if let Some(follower) = self.args.track.follower(self.bank, self.bank_path, rate)? {
+            let retuner = tracked.retuner(follower, self.bank, self.options()).map_err(Failure::running)?;
+            pipeline = pipeline.retuned_by(retuner).map_err(Failure::running)?;
+        }
+        let mut outputs = self.outputs(rate, is_complex)?;
+        observer.check_captures(self.bank, !is_complex && !self.args.track.is_wanted(), self.is_live);
+        let is_interrupted = self.all_frames(reader, &mut pipeline, &mut outputs, observer, each)?;
+        let outcome = self.drain(pipeline, reader.consumed(), &mut outputs)?;
+        let TrackRecord { log, warnings, .. } = tracked.take();
+        let checked = observer.checked();
+        let report = RunReport::new(outcome, self.tolerated(reader), self.lossless);
+        let report = report.with(checked.warnings, self.is_live, warnings);
+        let dropped = self.dropped.samples(plan);
+        let shift = (plan.latency() - dropped) as u64;
+        let placement = Placement { ratio: self.bank.ratio as u64, shift, samples: report.samples };
+        outputs.annotate(self.notes(reader, &report, placement)?);
+        let peak = outputs.peak();
+        self.complete(outputs.with_log(log), &report, observer)?;
+        let frames = reader.consumed();
+        Ok(Finished { report, frames, is_interrupted, dropped, peak, captures: checked.verdict })
+    }
+
+    /// The outputs at their beginning, of `rate` hertz.
+    fn outputs(&self, rate: f64, is_complex: bool) -> Result<FileOutputs, Failure> {
+        let Self { args, container, format, .. } = *self;
+        let mask = args.gaps.begin_mask(args.force)?;
+        let header = OutputHeader { container, format, is_complex, rate };
+        let samples = begin_samples(self.output, header, args.force).map_err(Failure::running)?;
+        Ok(FileOutputs::new(samples, mask, format))
+    }
+
+    /// Processes all frames; true if an interrupt ended them.
+    fn all_frames(
+        &self,
+        reader: &mut MultiReader,
+        pipeline: &mut Pipeline<'_>,
+        outputs: &mut FileOutputs,
+        observer: &mut RunObserver,
+        each: &dyn Fn(u64),
+    ) -> Result<bool, Failure> {
+        loop {
+            let count = match reader.wait().map_err(Failure::running)? {
+                Arrival::Frames(count) => count,
+                Arrival::End => return Ok(false),
+                Arrival::Stopped if self.is_live => return Ok(true),
+                Arrival::Stopped => return Err(interrupted(reader.consumed())),
+            };
+            let recordings = reader.frames();
+            pipeline.push(&recordings, &mut |block| outputs.write(block)).map_err(Failure::running)?;
+            observer.step(&recordings, pipeline);
+            drop(recordings);
+            reader.consume(count);
+            each(count as u64);
+        }
+    }
+
+    /// Brings out the last samples, if they are wanted, of a run of so many frames.
+    fn drain(
+        &self,
+        mut pipeline: Pipeline<'_>,
+        frames: u64,
+        outputs: &mut FileOutputs,
+    ) -> Result<Outcome, Failure> {
+        let samples = match self.is_live {
+            true => pipeline.samples() + (pipeline.plan().flush_frames() * self.bank.ratio) as u64,
+            false => frames * self.bank.ratio as u64,
+        };
+        if self.flush {
+            pipeline.flush(samples, &mut |block| outputs.write(block)).map_err(Failure::running)?;
+        }
+        pipeline.finish().map_err(Failure::running)
+    }
+
+    fn tolerated(&self, reader: &MultiReader) -> Vec<Warning> {
+        let names = || reader.headers().map(|(name, _)| name.to_owned()).collect();
+        let is_empty = !self.is_live && reader.consumed() == 0;
+        let empty = is_empty.then(|| Warning::Empty(names()));
+        reader.warnings().into_iter().map(Warning::Input).chain(empty).collect()
+    }
+
+    /// What of the inputs accompanies the output: metadata, gaps as annotations, the bank.
+    fn notes(
+        &self,
+        reader: &MultiReader,
+        report: &RunReport,
+        placement: Placement,
+    ) -> Result<OutputNotes, Failure> {
+        let mut notes = reader.notes(placement);
+        // Only this kind of output holds the rest.
+        if is_sigmf(self.output) {
+            notes.record_bank(&self.bank.digest().map_err(Failure::input)?);
+            for gap in report.gaps.iter().flat_map(|gaps| &gaps.list) {
+                let comment = format!("channel {}: {} samples missing", gap.channel, gap.length);
+                notes.annotate(placement, gap.first, gap.length, "gap", &comment);
+            }
+        }
+        Ok(notes)
+    }
+
+    /// Checks the run, renames the outputs to their final names, and then prints the warnings, so that a
+    /// warning that cannot be written loses no output.
+    fn complete(
+        &self,
+        outputs: FileOutputs,
+        report: &RunReport,
+        observer: &mut RunObserver,
+    ) -> Result<(), Failure> {
+        let judged = report.judge(self.args.strict);
+        if judged.is_ok() {
+            outputs.finish().map_err(Failure::running)?;
+        }
+        let are_said = observer.quiet();
+        report.gaps.iter().for_each(|gaps| say_gaps(gaps, are_said));
+        judged?;
+        report.warnings[..report.warnings.len() - report.reported].iter().for_each(|warning| warn(warning));
+        Ok(())
+    }
+}
+
+/// How an interrupt ends a run whose outputs are whole or absent.
+pub(super) fn interrupted(frames: u64) -> Failure {
+    Failure::Input(format!("interrupted after {frames} frames; nothing was kept, run it again"))
+}
+
+/// How the bank ran.
+#[derive(Debug, serde::Serialize)]
+struct PlanReport {
+    algorithm: &'static str,
+    numbers: &'static str,
+    isa: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    transform: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    block: Option<usize>,
+    extra_latency: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    multiply_adds: Option<f64>,
+}
+
+impl From<PlanSummary> for PlanReport {
+    fn from(plan: PlanSummary) -> Self {
+        let PlanSummary { algorithm, numbers, isa, transform, block, extra_latency, multiply_adds } = plan;
+        Self { algorithm, numbers, isa, transform, block, extra_latency, multiply_adds }
     }
 }
 
@@ -81,31 +372,22 @@ pub(super) struct RunReport {
 impl RunReport {
     /// Of an outcome and what was tolerated before; `lossless` is the option that would have kept clipped
     /// samples.
-    pub(super) fn new(outcome: Outcome, tolerated: Vec<Warning>, lossless: &str) -> Self {
+    fn new(outcome: Outcome, tolerated: Vec<Warning>, lossless: &str) -> Self {
         let text = |warning| match warning {
             Warning::Clipped(_) => format!("{warning}; {lossless} keeps them"),
             _ => warning.to_string(),
         };
         let warnings = tolerated.into_iter().chain(outcome.warnings()).map(text).collect();
-        let Outcome { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps } = outcome;
+        let Outcome { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps, .. } = outcome;
         Self { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps, warnings, reported: 0 }
     }
 
-    /// The gaps that were filled.
-    pub(super) fn gaps(&self) -> &[Gap] {
-        self.gaps.as_ref().map_or(&[], |gaps| &gaps.list)
-    }
-
-    /// With further warnings.
-    pub(super) fn with_warnings(mut self, more: Vec<String>) -> Self {
-        self.warnings.extend(more);
+    /// With those of the captures, and with those that were reported during the run.
+    fn with(mut self, captures: Vec<String>, are_reported: bool, reported: Vec<String>) -> Self {
+        self.reported = reported.len() + if are_reported { captures.len() } else { 0 };
+        self.warnings.extend(captures);
+        self.warnings.extend(reported);
         self
-    }
-
-    /// With warnings that were reported during the run.
-    pub(super) fn with_reported(mut self, reported: Vec<String>) -> Self {
-        self.reported = reported.len();
-        self.with_warnings(reported)
     }
 
     /// With `strict` the first warning is an error.
@@ -115,25 +397,6 @@ impl RunReport {
             _ => Ok(()),
         }
     }
-}
-
-/// Checks the run, renames the outputs to their final names, and then prints the warnings, so that a
-/// warning that cannot be written loses no output.
-pub(super) fn complete(
-    outputs: FileOutputs,
-    run: &RunReport,
-    strict: bool,
-    journal: &Journal,
-) -> Result<(), Failure> {
-    let judged = run.judge(strict);
-    if judged.is_ok() {
-        outputs.finish().map_err(Failure::running)?;
-    }
-    let are_said = journal.quiet();
-    run.gaps.iter().for_each(|gaps| say_gaps(gaps, are_said));
-    judged?;
-    run.warnings[..run.warnings.len() - run.reported].iter().for_each(|warning| warn(warning));
-    Ok(())
 }
 
 /// The report as one JSON object: on standard output, or on standard error where samples go to standard

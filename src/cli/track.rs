@@ -3,14 +3,18 @@
 
 use super::Failure;
 use super::bank_file::read_text;
+use super::event::{Event, Events};
 use crate::bank::Bank;
 use crate::files::AtomicFile;
-use crate::pipeline::{Pipeline, Retuned, Retuner, Retuning};
+use crate::io::IoError;
+use crate::pipeline::{Change, PipelineError, Retuner};
 use crate::quantity;
-use crate::runtime::{Algorithm, Options};
-use crate::track::{Change, DriftModel, FollowSettings, Followed, Follower, Guide, Reading};
+use crate::runtime::{Algorithm, Options, Stream};
+use crate::track::{self, DriftModel, FollowSettings, Followed, Follower, Guide, Logged, Reading};
 use crate::units::Seconds;
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Least frames of a measurement.
 const LEAST_FRAMES: usize = 256;
@@ -60,14 +64,6 @@ impl TrackArgs {
         Ok(())
     }
 
-    /// Refuses to follow the delays of complex samples.
-    pub(super) fn check_samples(&self, is_complex: bool) -> Result<(), Failure> {
-        if self.is_wanted() && is_complex {
-            return Err(Failure::Input("--track measures delays in real samples; these are complex".into()));
-        }
-        Ok(())
-    }
-
     /// The log.
     pub(super) fn log(&self) -> Option<&Path> {
         self.track_log.as_deref()
@@ -104,16 +100,9 @@ impl TrackArgs {
         matches!(self.kind(text), Ok(Kind::File(_))).then(|| Path::new(text))
     }
 
-    /// The pipeline with filters that follow the delays, if that is asked for; `rate` is that of the output.
-    pub(super) fn followed(
-        &self,
-        pipeline: Pipeline,
-        bank: (&Bank, &Path),
-        options: Options,
-        rate: f64,
-    ) -> Result<Pipeline, Failure> {
-        let (bank, path) = bank;
-        let Some(text) = self.track.as_deref() else { return Ok(pipeline) };
+    /// What follows the delays of the channels, if that is asked for; `rate` is that of the output.
+    pub(super) fn follower(&self, bank: &Bank, path: &Path, rate: f64) -> Result<Option<Follower>, Failure> {
+        let Some(text) = self.track.as_deref() else { return Ok(None) };
         let guide = match self.kind(text)? {
             Kind::Guide(guide) => guide,
             Kind::File(file) => {
@@ -132,14 +121,14 @@ impl TrackArgs {
             rate_change: wander * unit,
         };
         let follower = Follower::new(bank, guide, settings);
-        let follower = follower.map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
-        let retuner = Following { follower, bank: bank.clone() };
-        pipeline.retuned_by(bank, options, Box::new(retuner)).map_err(Failure::running)
+        follower.map(Some).map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
     }
 
-    /// Begins the log.
-    pub(super) fn begin_log(&self, force: bool) -> Result<Option<AtomicFile>, Failure> {
-        self.log().map(|path| AtomicFile::create(path, force)).transpose().map_err(Failure::input)
+    /// Begins the log; warnings go to `events`.
+    pub(super) fn begin(&self, force: bool, events: Events) -> Result<Tracked, Failure> {
+        let log = self.log().map(|path| AtomicFile::create(path, force)).transpose();
+        let record = TrackRecord { log: log.map_err(Failure::input)?, warnings: Vec::new() };
+        Ok(Tracked { record: Arc::new(Mutex::new(record)), events })
     }
 }
 
@@ -149,28 +138,60 @@ enum Kind {
     File(PathBuf),
 }
 
-/// The follower of delays as the pipeline sees it.
-struct Following {
-    follower: Follower,
-    bank: Bank,
+/// What is recorded of a run whose delays are followed.
+#[derive(Default)]
+pub(super) struct TrackRecord {
+    /// What is known of the delays, a line per measurement.
+    pub(super) log: Option<AtomicFile>,
+    /// All warnings, which were reported at once.
+    pub(super) warnings: Vec<String>,
 }
 
-impl Retuner for Following {
-    fn block_frames(&self) -> usize {
-        self.follower.block_frames()
+/// The record, which the thread that follows the delays writes.
+pub(super) struct Tracked {
+    record: Arc<Mutex<TrackRecord>>,
+    events: Events,
+}
+
+impl Tracked {
+    /// Starts the thread, whose filters are those of `bank` with `options`.
+    pub(super) fn retuner(
+        &self,
+        mut follower: Follower,
+        bank: &Bank,
+        options: Options,
+    ) -> Result<Retuner, PipelineError> {
+        let (bank, mut followed) = (bank.clone(), bank.clone());
+        let (record, events) = (Arc::clone(&self.record), self.events.clone());
+        Retuner::start(follower.block_frames(), &bank.offsets.clone(), move |samples| {
+            let Followed { changes, log, warnings } = follower.follow(samples);
+            let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+            warnings.iter().for_each(|text| events.report(Event::Warning { text: text.clone() }));
+            locked(&record).add(&log, warnings)?;
+            let change = |change: track::Change| {
+                followed.filters = bank.filters_at(&change.errors);
+                let (frame, shifts) = (change.frame as u64, change.shifts);
+                Ok(Change { frame, stream: Stream::new(&followed.plan(options)?), shifts })
+            };
+            changes.into_iter().map(change).collect()
+        })
     }
 
-    fn retune(&mut self, samples: &[Vec<f64>]) -> Retuned {
-        let Followed { changes, log, warnings } = self.follower.follow(samples);
-        let retuning = |Change { frame, errors, shifts }: Change| Retuning {
-            frame,
-            filters: self.bank.filters_at(&errors),
-            shifts,
-        };
-        Retuned {
-            changes: changes.into_iter().map(retuning).collect(),
-            record: serde_json::to_string(&log).unwrap_or_default(),
-            warnings: warnings.iter().map(ToString::to_string).collect(),
-        }
+    /// The record of a run that is over.
+    pub(super) fn take(self) -> TrackRecord {
+        std::mem::take(&mut locked(&self.record))
     }
+}
+
+impl TrackRecord {
+    fn add(&mut self, log: &Logged, warnings: Vec<String>) -> Result<(), IoError> {
+        self.warnings.extend(warnings);
+        let Some(file) = &mut self.log else { return Ok(()) };
+        let line = serde_json::to_string(log).unwrap_or_default();
+        writeln!(file, "{line}").map_err(IoError::system(file.name(), "write it"))
+    }
+}
+
+fn locked(record: &Mutex<TrackRecord>) -> MutexGuard<'_, TrackRecord> {
+    record.lock().unwrap_or_else(PoisonError::into_inner)
 }

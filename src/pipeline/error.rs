@@ -25,7 +25,13 @@ pub enum PipelineError {
     /// The thread that prepares changes of the filters cannot be started.
     #[error("no thread for the changes of the filters: {0}")]
     Thread(std::io::Error),
-    /// The caller of [`fuse_until`](super::fuse_until) stopped it.
+    /// The thread that prepares changes of the filters ended before its work was done.
+    #[error("the thread that follows the delays has died; the outputs would be those of old delays")]
+    RetunerDied,
+    /// Filters cannot change for complex samples.
+    #[error("delays are measured in real samples; these are complex")]
+    RetunedComplex,
+    /// The caller of [`fuse`](super::fuse) stopped it.
     #[error("the fusion was stopped")]
     Stopped,
 }

@@ -1,38 +1,29 @@
-//! Runs a bank on recordings or streams and writes its outputs. `hybank fuse` and `hybank stream` share
-//! this module.
+//! Runs a bank on recordings, streams or signals in memory.
 //!
 //! ```text
-//! MultiReader -> GapFiller -> runtime::Stream -> latency skip -> Output (samples and mask)
+//! Input -> GapFiller -> runtime::Stream -> latency dropped -> runtime::Output (samples and mask)
 //! ```
 //!
-//! A [`Pipeline`] takes frames as they arrive. It fills missing samples, runs the bank, drops the latency,
-//! and passes encoded samples to an [`Output`], with a mask of the samples that missing inputs affect.
-//! [`run`] processes all frames of a [`MultiReader`](crate::io::MultiReader). The result is an [`Outcome`]
-//! with counts and [`Warning`]s; nothing is printed. A [`Retuner`] changes the filters on the way. [`fuse`]
-//! does the same with a signal that is in memory.
+//! One loop (`fusion`) fills missing samples, runs the bank, drops the latency, and marks the samples that
+//! missing inputs affect. A [`Pipeline`] runs it on frames as they arrive and hands over encoded samples,
+//! for example to [`FileOutputs`]; a [`Retuner`] changes its filters on the way. [`fuse`] runs it on a
+//! signal in memory. Complex samples are two streams over the same frames; a sample with one part missing
+//! is missing. The result is an [`Outcome`] with counts and [`Warning`]s; nothing is printed.
 
-mod complex;
 mod error;
-mod gap;
+mod fusion;
 mod gaps;
-mod mask;
+mod offline;
 mod outcome;
 mod outputs;
-mod peak;
 mod retune;
-mod run;
-mod shifted;
-mod stage;
-mod streams;
-mod touch;
-mod whole;
+mod streaming;
 
 pub use error::PipelineError;
-pub use gap::Gap;
-pub use gaps::{GapFiller, GapPolicy};
-pub use outcome::{GapSummary, Outcome, Warning};
-pub use outputs::{Block, FileOutputs, Output};
-pub use retune::{Retuned, Retuner, Retuning};
-pub use run::{Ending, run};
-pub use streams::{Pipeline, Settings};
-pub use whole::{Whole, WholeSettings, fuse, fuse_until};
+pub use fusion::{DroppedLatency, Settings};
+pub use gaps::{Gap, GapPolicy, GapSummary, LISTED_GAPS};
+pub use offline::fuse;
+pub use outcome::{Outcome, Warning};
+pub use outputs::FileOutputs;
+pub use retune::{Change, Retuner};
+pub use streaming::{Block, Pipeline};

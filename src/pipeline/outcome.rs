@@ -1,6 +1,6 @@
 //! The result of a run.
 
-use super::Gap;
+use super::GapSummary;
 use crate::io::InputWarning;
 use crate::runtime::PlanSummary;
 use std::fmt;
@@ -16,7 +16,7 @@ pub struct Outcome {
     pub ratio: usize,
     /// Output samples.
     pub samples: u64,
-    /// Output samples that saturated; samples that were dropped with the latency do not count.
+    /// Output samples that a [`Pipeline`](super::Pipeline) had to saturate.
     pub clipped: u64,
     /// Input samples that were NaN or infinite and became 0.
     pub replaced: u64,
@@ -24,17 +24,9 @@ pub struct Outcome {
     pub state_resets: u64,
     /// Missing samples, if they were to be filled.
     pub gaps: Option<GapSummary>,
-}
-
-/// The gaps of a run.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
-pub struct GapSummary {
-    /// Number of gaps.
-    pub count: u64,
-    /// Number of missing samples.
-    pub missing: u64,
-    /// The gaps in the order of their ends, at most 65,536 of them.
-    pub list: Vec<Gap>,
+    /// One byte per output sample, 1 if a missing input affects it, if gaps were to be filled by
+    /// [`fuse`](super::fuse). A [`Pipeline`](super::Pipeline) hands the mask over with its samples.
+    pub mask: Option<Vec<u8>>,
 }
 
 /// A fault that was tolerated.

@@ -1,36 +1,9 @@
-//! Destinations of output samples.
+//! Files that take output samples.
 
-use super::PipelineError;
-use super::peak::peak;
+use super::{Block, PipelineError};
 use crate::files::{AtomicFile, commit_all};
 use crate::io::{IoError, OutputNotes, PcmFormat, SampleWriter};
 use std::io::Write;
-
-/// Output samples with their mask.
-#[derive(Debug, Clone, Copy)]
-pub struct Block<'a> {
-    /// Encoded samples.
-    pub samples: &'a [u8],
-    /// One byte per sample, 1 if a missing input affects it, else 0; `None` if gaps are not filled.
-    pub mask: Option<&'a [u8]>,
-}
-
-/// Takes output samples.
-pub trait Output {
-    /// Takes the next samples.
-    ///
-    /// # Errors
-    /// The errors of the destination.
-    fn write(&mut self, block: Block<'_>) -> Result<(), IoError>;
-
-    /// Takes a line for the log of a [`Retuner`](super::Retuner); by default it is dropped.
-    ///
-    /// # Errors
-    /// The errors of the destination.
-    fn log(&mut self, _line: &str) -> Result<(), IoError> {
-        Ok(())
-    }
-}
 
 /// Samples to a file or standard output, the mask to a file of its own. [`FileOutputs::finish`] makes all
 /// files appear together; before it no file is visible.
@@ -38,14 +11,15 @@ pub struct FileOutputs {
     samples: SampleWriter,
     mask: Option<AtomicFile>,
     log: Option<AtomicFile>,
-    /// The format of samples whose largest magnitude is wanted, and that magnitude.
-    peak: Option<(PcmFormat, f64)>,
+    format: PcmFormat,
+    /// The largest magnitude so far, of full scale.
+    peak: f64,
 }
 
 impl FileOutputs {
-    /// Writes samples to `samples`, and the mask to `mask` if given.
-    pub fn new(samples: SampleWriter, mask: Option<AtomicFile>) -> Self {
-        Self { samples, mask, log: None, peak: None }
+    /// Writes samples, encoded as `format`, to `samples`, and the mask to `mask` if given.
+    pub fn new(samples: SampleWriter, mask: Option<AtomicFile>, format: PcmFormat) -> Self {
+        Self { samples, mask, log: None, format, peak: 0.0 }
     }
 
     /// What is to accompany the samples.
@@ -53,19 +27,26 @@ impl FileOutputs {
         self.samples.annotate(notes);
     }
 
-    /// The same outputs with a log beside them.
+    /// The same outputs with a log beside them, which is whole.
     pub fn with_log(self, log: Option<AtomicFile>) -> Self {
         Self { log, ..self }
     }
 
-    /// The same outputs, which find the largest magnitude of their samples, encoded as `format`.
-    pub fn with_peak(self, format: PcmFormat) -> Self {
-        Self { peak: Some((format, 0.0)), ..self }
+    /// Takes the next samples.
+    ///
+    /// # Errors
+    /// The errors of the destination.
+    pub fn write(&mut self, block: Block<'_>) -> Result<(), IoError> {
+        if let (Some(file), Some(mask)) = (&mut self.mask, block.mask) {
+            file.write_all(mask).map_err(IoError::system(file.name(), "write it"))?;
+        }
+        self.peak = self.peak.max(peak(self.format, block.samples));
+        self.samples.write(block.samples)
     }
 
-    /// The largest magnitude so far, of full scale, if it is wanted.
-    pub fn peak(&self) -> Option<f64> {
-        self.peak.map(|(_, most)| most)
+    /// The largest magnitude so far, of full scale.
+    pub fn peak(&self) -> f64 {
+        self.peak
     }
 
     /// Completes the files and renames them to their final names.
@@ -81,27 +62,58 @@ impl FileOutputs {
     }
 }
 
-impl Output for FileOutputs {
-    fn write(&mut self, block: Block<'_>) -> Result<(), IoError> {
-        if let (Some(file), Some(mask)) = (&mut self.mask, block.mask) {
-            file.write_all(mask).map_err(IoError::system(file.name(), "write it"))?;
-        }
-        if let Some((format, most)) = &mut self.peak {
-            *most = most.max(peak(*format, block.samples));
-        }
-        self.samples.write(block.samples)
-    }
+/// Magnitude bits of floats: those of all but NaN are in the order of the magnitudes.
+const MAGNITUDE_32: u32 = u32::MAX >> 1;
+const MAGNITUDE_64: u64 = u64::MAX >> 1;
 
-    fn log(&mut self, line: &str) -> Result<(), IoError> {
-        let Some(file) = &mut self.log else { return Ok(()) };
-        writeln!(file, "{line}").map_err(IoError::system(file.name(), "write it"))
+/// The largest magnitude in `samples`, of full scale; 0 for none. The usual formats take one pass of whole
+/// vectors.
+fn peak(format: PcmFormat, samples: &[u8]) -> f64 {
+    match format {
+        PcmFormat::F32Le => {
+            let (values, _) = samples.as_chunks();
+            f32::from_bits(values.iter().map(|x| u32::from_le_bytes(*x) & MAGNITUDE_32).max().unwrap_or(0))
+                .into()
+        }
+        PcmFormat::F64Le => {
+            let (values, _) = samples.as_chunks();
+            f64::from_bits(values.iter().map(|x| u64::from_le_bytes(*x) & MAGNITUDE_64).max().unwrap_or(0))
+        }
+        PcmFormat::S16Le => {
+            let (values, _) = samples.as_chunks();
+            let most = values.iter().map(|x| i16::from_le_bytes(*x).unsigned_abs()).max().unwrap_or(0);
+            f64::from(most) / f64::from(1u16 << 15)
+        }
+        _ => {
+            let values = samples.chunks_exact(format.bytes());
+            values.map(|sample| format.decode(sample).abs()).fold(0.0, f64::max)
+        }
     }
 }
 
 #[cfg(test)]
-impl Output for Vec<u8> {
-    fn write(&mut self, block: Block<'_>) -> Result<(), IoError> {
-        self.extend_from_slice(block.samples);
-        Ok(())
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_peak_of_every_format_is_that_of_its_samples() {
+        let values = [0.0, 0.25, -0.75, 0.5, -0.125];
+        for format in [
+            PcmFormat::F32Le,
+            PcmFormat::F64Le,
+            PcmFormat::S16Le,
+            PcmFormat::S24Le,
+            PcmFormat::S32Le,
+            PcmFormat::U8,
+            PcmFormat::F32Be,
+        ] {
+            let mut bytes = vec![0; values.len() * format.bytes()];
+            for (slot, value) in bytes.chunks_exact_mut(format.bytes()).zip(values) {
+                format.encode(value, slot);
+            }
+            assert_eq!(peak(format, &bytes), 0.75, "{format:?}");
+            assert_eq!(peak(format, &[]), 0.0);
+        }
+        assert_eq!(peak(PcmFormat::S16Le, &i16::MIN.to_le_bytes()), 1.0);
     }
 }

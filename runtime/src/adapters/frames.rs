@@ -33,6 +33,10 @@ impl<I: Input + ?Sized> Input for Frames<'_, I> {
         self.input.in_memory().map(|samples| &samples[self.range.start * n..self.range.end * n])
     }
 
+    fn is_finite(&self, frames: Range<usize>) -> bool {
+        self.input.is_finite(self.range.start + frames.start..self.range.start + frames.end)
+    }
+
     fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
         self.input.load(isa, self.range.start + first, samples);
     }

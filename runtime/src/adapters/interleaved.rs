@@ -38,6 +38,11 @@ impl<S: Sample> Input for Interleaved<'_, S> {
         T::same(self.samples)
     }
 
+    fn is_finite(&self, frames: Range<usize>) -> bool {
+        let samples = &self.samples[frames.start * self.channels..frames.end * self.channels];
+        samples.iter().all(|sample| sample.to_f64().is_finite())
+    }
+
     fn load<T: Sample>(&self, _: Isa, first: usize, samples: &mut [T]) {
         convert(&self.samples[first * self.channels..][..samples.len()], samples);
     }

@@ -35,6 +35,11 @@ pub trait Input {
         None
     }
 
+    /// True if the samples of some frames are known to be neither NaN nor infinite; false where nobody looks.
+    fn is_finite(&self, _frames: Range<usize>) -> bool {
+        false
+    }
+
     /// Copies frames from frame `first` on to `samples`, frame after frame: `samples.len() / N` frames, all
     /// of which are there. NaN and infinity are copied as they are. `isa` is the instruction set for
     /// conversions.
@@ -45,6 +50,10 @@ pub trait Input {
 pub trait Output {
     /// Samples that fit.
     fn capacity(&self) -> usize;
+
+    /// From now on the real (0) or the imaginary (1) parts of complex samples are stored. An output for real
+    /// samples has part 0 only.
+    fn select(&mut self, _part: usize) {}
 
     /// Room for the samples of a range, if samples lie one after another in memory and are of type `T`. The
     /// kernels write them there; some may be written more than once.

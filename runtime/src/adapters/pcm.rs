@@ -5,30 +5,39 @@ use crate::pcm::for_pcm_format;
 use crate::sample::{Samples, SamplesMut};
 use crate::simd::{decode, encode};
 use crate::{Isa, PcmFormat, PcmFrames, Sample, SampleLayout};
+use std::ops::Range;
 
 /// Room for output samples as they lie in files and pipes. Those beyond the full scale of an integer format
 /// saturate.
 #[derive(Debug)]
 pub struct PcmOutput<'a> {
-    /// How samples are to be stored; bytes between samples stay as they are.
+    /// How samples, or the numbers of complex samples, are to be stored; bytes between them stay as they are.
     pub layout: SampleLayout,
     /// M samples per frame.
     pub bytes: &'a mut [u8],
     /// Samples that were clipped, added to by every call.
     pub clipped: u64,
+    /// The part of complex samples that is stored, see [`Output::select`].
+    part: Option<usize>,
 }
 
 impl<'a> PcmOutput<'a> {
     /// Room for samples that lie close together, none of them clipped so far.
     pub fn packed(format: PcmFormat, bytes: &'a mut [u8]) -> Self {
-        Self { layout: SampleLayout::packed(format), bytes, clipped: 0 }
+        Self { layout: SampleLayout::packed(format), bytes, clipped: 0, part: None }
     }
 
-    /// Room for one part of complex samples, which are pairs of those of this output: the real parts if
-    /// `part` is 0, the imaginary ones if it is 1. What is clipped is counted apart.
-    pub fn part(&mut self, part: usize) -> PcmOutput<'_> {
-        let start = (part * self.layout.container).min(self.bytes.len());
-        PcmOutput { layout: self.layout.part(), bytes: &mut self.bytes[start..], clipped: 0 }
+    /// Room for the first `samples` samples and for all others, and where what they clip is to be added.
+    pub fn split(&mut self, samples: usize) -> ([PcmOutput<'_>; 2], &mut u64) {
+        let (layout, part, size) = (self.layout, self.part, self.selected().0.container);
+        let (earlier, later) = self.bytes.split_at_mut(samples * size);
+        let half = |bytes| PcmOutput { layout, bytes, clipped: 0, part };
+        ([half(earlier), half(later)], &mut self.clipped)
+    }
+
+    /// How the selected samples lie, and the bytes before the first one.
+    fn selected(&self) -> (SampleLayout, usize) {
+        self.part.map_or((self.layout, 0), |part| (self.layout.part(), part * self.layout.container))
     }
 }
 
@@ -40,6 +49,10 @@ impl Input for [PcmFrames<'_>] {
 
     fn frames(&self) -> usize {
         self.iter().map(PcmFrames::frames).min().unwrap_or(0)
+    }
+
+    fn is_finite(&self, frames: Range<usize>) -> bool {
+        self.iter().all(|recording| recording.range(frames.clone()).is_finite())
     }
 
     fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
@@ -99,19 +112,25 @@ fn load_columns<T: Sample>(recording: &PcmFrames<'_>, first: usize, n: usize, sa
 
 impl Output for PcmOutput<'_> {
     fn capacity(&self) -> usize {
-        self.layout.containers(self.bytes.len())
+        let (layout, before) = self.selected();
+        layout.containers(self.bytes.len().saturating_sub(before))
+    }
+
+    fn select(&mut self, part: usize) {
+        self.part = Some(part);
     }
 
     fn store<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]) {
-        let SampleLayout { format, container } = self.layout;
-        let out = &mut self.bytes[first * container..];
+        let (layout, before) = self.selected();
+        let SampleLayout { format, container } = layout;
+        let out = &mut self.bytes[before + first * container..];
         self.clipped += match T::typed(samples) {
-            Samples::F32(samples) if self.layout.is_packed() => encode(isa, format, samples, out),
-            Samples::F64(samples) if self.layout.is_packed() && format.bytes() < 4 => {
+            Samples::F32(samples) if layout.is_packed() => encode(isa, format, samples, out),
+            Samples::F64(samples) if layout.is_packed() && format.bytes() < 4 => {
                 encode_by_scratch(isa, format, samples, out)
             }
             // Formats that hold more digits than f32, and samples apart.
-            _ => encode_each(self.layout, samples, out),
+            _ => encode_each(layout, samples, out),
         };
     }
 }
@@ -127,10 +146,7 @@ impl SplitOutput for PcmOutput<'_> {
         samples: usize,
         with: impl FnOnce(&mut Self::Half<'h>, &mut Self::Half<'h>) -> R,
     ) -> R {
-        let Self { layout, bytes, clipped } = self;
-        let (earlier, later) = bytes.split_at_mut(samples * layout.container);
-        let half = |bytes| PcmOutput { layout: *layout, bytes, clipped: 0 };
-        let (mut earlier, mut later) = (half(earlier), half(later));
+        let ([mut earlier, mut later], clipped) = self.split(samples);
         let result = with(&mut earlier, &mut later);
         *clipped += earlier.clipped + later.clipped;
         result
@@ -154,7 +170,11 @@ fn encode_by_scratch<T: Sample>(isa: Isa, format: PcmFormat, samples: &[T], out:
 fn encode_each<T: Sample>(layout: SampleLayout, samples: &[T], out: &mut [u8]) -> u64 {
     let mut clipped = 0;
     for_pcm_format!(layout.format, FORMAT => {
-        let mut put = |(slot, value): (&mut [u8], &T)| clipped += u64::from(FORMAT.encode(value.to_f64(), slot));
+        let mut put = |(slot, value): (&mut [u8], &T)| {
+            // As packed ones: formats of few digits are rounded to f32 first.
+            let value = if FORMAT.bytes() < 4 { f64::from(value.to_f64() as f32) } else { value.to_f64() };
+            clipped += u64::from(FORMAT.encode(value, slot));
+        };
         if layout.is_packed() {
             out.chunks_exact_mut(FORMAT.bytes()).zip(samples).for_each(&mut put);
         } else {

@@ -3,6 +3,7 @@
 use super::{Input, MOST_ROWS, convert, interleave_rows};
 use crate::sample::SamplesMut;
 use crate::{Isa, ProcessError, Sample};
+use std::ops::Range;
 
 /// A slice for each channel: sample of channel i in frame k at `[i][k]`.
 #[derive(Debug, Clone, Copy)]
@@ -42,6 +43,12 @@ impl<S: Sample> Input for Planar<'_, S> {
             [alone] => T::same(alone),
             _ => None,
         }
+    }
+
+    fn is_finite(&self, frames: Range<usize>) -> bool {
+        self.channels
+            .iter()
+            .all(|channel| channel[frames.clone()].iter().all(|sample| sample.to_f64().is_finite()))
     }
 
     fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {

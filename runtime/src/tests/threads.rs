@@ -98,8 +98,9 @@ fn threads_do_not_change_a_byte() {
         let frames: Vec<_> = rows.iter().map(|row| PcmFrames { layout, channels: 1, bytes: row }).collect();
         let mut out = [vec![0; 70_001 * m * out_format.bytes()], vec![0; 70_001 * m * out_format.bytes()]];
         let [want, got] = &mut out;
-        let mut want = PcmOutput { clipped: 5, ..PcmOutput::packed(out_format, want) };
-        let mut got = PcmOutput { clipped: 5, ..PcmOutput::packed(out_format, got) };
+        let mut want = PcmOutput::packed(out_format, want);
+        let mut got = PcmOutput::packed(out_format, got);
+        (want.clipped, got.clipped) = (5, 5);
         one.run(&frames[..], &mut want).unwrap();
         many.run_parallel(&frames[..], &mut got, &pools).unwrap();
         assert_eq!(want.clipped, got.clipped);

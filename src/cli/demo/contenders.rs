@@ -6,7 +6,7 @@ use super::spline::Samples;
 use super::{Parts, SETTLING};
 use crate::bank::Bank;
 use crate::design::{self, Problem};
-use crate::pipeline::WholeSettings;
+use crate::pipeline::{DroppedLatency, Settings};
 use crate::simulate::interleaved;
 use crate::spec::{Method, Spec};
 use crate::units::{Decibels, FastPeriods};
@@ -67,7 +67,7 @@ pub(super) fn contend(spec: &Spec, problem: &Problem, parts: &Parts) -> Result<V
     for BankOf { name, file, method, knows_the_band } in BANKS {
         let bank = designed(spec, method, knows_the_band)?;
         // The target is as late as the bank.
-        let causal = WholeSettings { keep_latency: true, ..WholeSettings::default() };
+        let causal = Settings { dropped: DroppedLatency::Added, ..Settings::default() };
         let contender = Contender::judge(name, file, parts, |channels| fused(&bank, channels, causal))?;
         contenders.push(Contender { gamma: bank.gamma.norm, ..contender });
     }

@@ -11,7 +11,7 @@ use super::page::Figure;
 use crate::bank::Bank;
 use crate::io::{MultiReader, ReadOptions};
 use crate::overview::spectra;
-use crate::pipeline::WholeSettings;
+use crate::pipeline::Settings;
 use crate::simulate::interleaved;
 use crate::units::Hertz;
 use std::path::{Path, PathBuf};
@@ -53,7 +53,7 @@ impl Spectra {
         }
         // What was lost is a zero, as `fuse` has it without --gaps.
         channels.iter_mut().flatten().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
-        let fused = fused(bank, &channels, WholeSettings::default())?;
+        let fused = fused(bank, &channels, Settings::default())?;
         let interleaved = interleaved(&bank.delays_in_fast_periods(), bank.ratio, 0, &channels);
         Ok(Self { rate, interleaved, fused, is_cut, frames })
     }

@@ -1,25 +1,19 @@
 use super::*;
 use crate::bank::SynthesisFilters;
-use crate::io::{IoError, PcmFormat, PcmFrames, SampleLayout};
-use crate::pipeline::{Block, Output, Pipeline, Settings};
+use crate::io::{PcmFormat, PcmFrames, SampleLayout};
+use crate::pipeline::{Block, DroppedLatency, GapPolicy, Pipeline};
 use crate::random::Random;
-use crate::runtime::{Algorithm, Options, PcmOutput, Planar};
+use crate::runtime::{Algorithm, Interleaved, Options, PcmOutput, Planar, Stream};
 use crate::units::Seconds;
 use std::cell::Cell;
+
+const NEVER: &dyn Fn() -> bool = &|| false;
 
 /// What the command writes: samples and marks.
 #[derive(Default)]
 struct Written {
     samples: Vec<u8>,
     mask: Vec<u8>,
-}
-
-impl Output for Written {
-    fn write(&mut self, block: Block<'_>) -> Result<(), IoError> {
-        self.samples.extend_from_slice(block.samples);
-        self.mask.extend_from_slice(block.mask.unwrap_or_default());
-        Ok(())
-    }
 }
 
 fn bank(taps: usize, ratio: usize, latency: usize) -> Bank {
@@ -40,21 +34,24 @@ fn channels(frames: usize, gap: bool) -> [Vec<f32>; 2] {
     both
 }
 
-/// As `hybank fuse` does it, from mono recordings.
+/// As `hybank fuse` does it: blocks of `block` frames of `recordings`, with as many outputs as frames.
 fn command(
     bank: &Bank,
     plan: &Plan,
-    both: &[Vec<f32>; 2],
-    settings: Settings,
-) -> (Written, super::super::Outcome) {
-    let mut pipeline = Pipeline::new(bank, plan, settings).unwrap();
-    let bytes = both.each_ref().map(|x| x.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>());
-    let layout = SampleLayout::packed(PcmFormat::F32Le);
-    let parts = bytes.each_ref().map(|bytes| PcmFrames { layout, channels: 1, bytes });
+    recordings: &[PcmFrames<'_>],
+    settings: Settings<'_>,
+    (format, is_complex): (PcmFormat, bool),
+) -> (Written, Outcome) {
+    let mut pipeline = Pipeline::new(bank, plan, settings, format, is_complex).unwrap();
     let mut written = Written::default();
-    pipeline.push(&parts, &mut written).unwrap();
-    pipeline.flush((both[0].len() * bank.ratio) as u64, &mut written).unwrap();
-    (written, pipeline.finish())
+    let mut write = |block: Block<'_>| {
+        written.samples.extend_from_slice(block.samples);
+        written.mask.extend_from_slice(block.mask.unwrap_or_default());
+        Ok(())
+    };
+    pipeline.push(recordings, &mut write).unwrap();
+    pipeline.flush((recordings.frames() * bank.ratio) as u64, &mut write).unwrap();
+    (written, pipeline.finish().unwrap())
 }
 
 #[test]
@@ -78,14 +75,18 @@ fn a_whole_signal_has_the_bits_of_the_command() {
         ] {
             let both = channels(frames, gap);
             let gaps = gap.then_some(GapPolicy::Hold);
-            let skip = if keep_latency { plan.extra_latency() } else { plan.latency() } as u64;
-            let (want, outcome) =
-                command(&bank, &plan, &both, Settings { skip, gaps, ..Settings::plain(format) });
+            let dropped = if keep_latency { DroppedLatency::Added } else { DroppedLatency::All };
+            let settings = Settings { dropped, gaps, ..Settings::default() };
+            let stored = both.each_ref().map(|x| x.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>());
+            let layout = SampleLayout::packed(PcmFormat::F32Le);
+            let recordings = stored.each_ref().map(|bytes| PcmFrames { layout, channels: 1, bytes });
+            let (want, outcome) = command(&bank, &plan, &recordings, settings, (format, false));
             let planes = both.each_ref().map(Vec::as_slice);
             let mut bytes = vec![0; frames * ratio * format.bytes()];
             let mut output = PcmOutput::packed(format, &mut bytes);
-            let settings = WholeSettings { keep_latency, gaps, workers: Some(&pool) };
-            let whole = fuse(&bank, &plan, &Planar::new(&planes).unwrap(), &mut output, settings).unwrap();
+            let settings = Settings { workers: Some(&pool), ..settings };
+            let input = [Planar::new(&planes).unwrap()];
+            let whole = fuse(&bank, &plan, &input, &mut output, settings, NEVER).unwrap();
             let case = format!("M = {ratio}, m0 = {latency}, {frames} frames, {algorithm:?}, {format}");
             assert_eq!(output.clipped, outcome.clipped, "{case}");
             assert!(bytes == want.samples, "{case}");
@@ -95,20 +96,47 @@ fn a_whole_signal_has_the_bits_of_the_command() {
     }
 }
 
+/// IQ with gaps: the arrays of Python and the blocks of the command line have the same bits, and a gap is
+/// counted once.
+#[test]
+fn complex_samples_with_gaps_have_the_bits_and_gaps_of_the_command() {
+    let (bank, frames) = (bank(24, 2, 5), 300);
+    let plan = bank.plan(Options::default()).unwrap();
+    let mut random = Random(8);
+    let mut samples: Vec<f32> = (0..4 * frames).map(|_| random.sample() as f32).collect();
+    // Of frame 40 the imaginary part of channel 1, of frames 90 and 91 a part each of channel 2.
+    [4 * 40 + 1, 4 * 90 + 2, 4 * 91 + 3].into_iter().for_each(|number| samples[number] = f32::NAN);
+    let bytes: Vec<u8> = samples.iter().flat_map(|x| x.to_le_bytes()).collect();
+    let recording = PcmFrames { layout: SampleLayout::packed(PcmFormat::F32Le), channels: 4, bytes: &bytes };
+    let settings = Settings { gaps: Some(GapPolicy::Hold), ..Settings::default() };
+    let (want, outcome) = command(&bank, &plan, &[recording], settings, (PcmFormat::F32Le, true));
+    let (real, imaginary) = ([recording.part(0)], [recording.part(1)]);
+    let parts = [&real, &imaginary].map(|part| Frames::new(&part[..], 0..frames));
+    let mut bytes = vec![0; want.samples.len()];
+    let mut output = PcmOutput::packed(PcmFormat::F32Le, &mut bytes);
+    let whole = fuse(&bank, &plan, &parts, &mut output, settings, NEVER).unwrap();
+    assert!(bytes == want.samples);
+    assert_eq!(whole.mask.as_deref(), Some(&want.mask[..]));
+    assert_eq!((whole.samples, &whole.gaps), (outcome.samples, &outcome.gaps));
+    let gaps: Vec<_> =
+        whole.gaps.unwrap().list.iter().map(|gap| (gap.channel, gap.first, gap.length)).collect();
+    assert_eq!(gaps, [(1, 40, 1), (2, 90, 2)]);
+}
+
 #[test]
 fn an_output_that_is_too_short_and_channels_that_do_not_match_are_refused() {
     let bank = bank(8, 2, 3);
     let plan = bank.plan(Options::default()).unwrap();
     let input = Interleaved::new(&[0.0f32; 8], 2).unwrap();
-    let short = fuse(&bank, &plan, &input, &mut [0.0f32; 7][..], WholeSettings::default());
+    let short = fuse(&bank, &plan, &[input], &mut [0.0f32; 7][..], Settings::default(), NEVER);
     assert!(matches!(
         short,
         Err(PipelineError::Process(ProcessError::OutputTooShort { given: 7, wanted: 8 }))
     ));
     let mono = Interleaved::new(&[0.0f32; 8], 1).unwrap();
     for gaps in [None, Some(GapPolicy::Zero)] {
-        let settings = WholeSettings { gaps, ..WholeSettings::default() };
-        let refused = fuse(&bank, &plan, &mono, &mut [0.0f32; 16][..], settings);
+        let settings = Settings { gaps, ..Settings::default() };
+        let refused = fuse(&bank, &plan, &[mono], &mut [0.0f32; 16][..], settings, NEVER);
         assert!(matches!(
             refused,
             Err(PipelineError::Process(ProcessError::Channels { given: 1, wanted: 2 }))
@@ -130,14 +158,17 @@ fn segments_change_no_bit_and_a_fusion_ends_between_them() {
         let run = |most: usize| {
             let (mut output, stop) = (vec![0.0f32; at_once.len()], || asked.replace(asked.get() + 1) == most);
             asked.set(0);
-            let settings = WholeSettings { keep_latency: true, ..WholeSettings::default() };
-            fuse_until(&bank, &plan, &input, &mut output[..], settings, &stop).map(|_| output)
+            let settings = Settings { dropped: DroppedLatency::Added, ..Settings::default() };
+            fuse(&bank, &plan, &[input], &mut output[..], settings, &stop).map(|_| output)
         };
         let segments = run(usize::MAX).unwrap();
         let delay = plan.extra_latency();
         assert!(segments[..segments.len() - delay] == at_once[delay..], "{algorithm:?}");
         let questions = asked.get();
-        assert!(questions >= both[0].len().div_ceil(segment(&bank, &plan, 1)), "{algorithm:?}");
+        assert!(
+            questions >= both[0].len().div_ceil(step(&bank, &plan, Settings::default())),
+            "{algorithm:?}"
+        );
         assert!(
             questions > 2 || plan.algorithm() == "overlap-save",
             "{algorithm:?}: asked {questions} times"

@@ -1,0 +1,279 @@
+//! The one loop of all runs: fills gaps, filters, drops the latency and keeps the marks aligned.
+
+use super::gaps::GapFiller;
+use super::{Gap, GapPolicy, Outcome, PipelineError};
+use crate::bank::Bank;
+use crate::runtime::{
+    Input, Interleaved, Isa, Options, Output, Plan, ProcessError, Sample, SplitOutput, Stream, SwapError,
+    ThreadPool,
+};
+use std::ops::Range;
+
+/// Settings of a run.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Settings<'a> {
+    /// The output samples that are dropped at the beginning.
+    pub dropped: DroppedLatency,
+    /// Replacement of missing samples. With `None` the runtime replaces NaN and infinity by 0.
+    pub gaps: Option<GapPolicy>,
+    /// The filters change while the pipeline runs, see [`Pipeline::retuned_by`](super::Pipeline::retuned_by).
+    pub is_retuned: bool,
+    /// Threads for filtering; `None` uses the calling thread.
+    pub workers: Option<&'a ThreadPool>,
+}
+
+/// The part of the latency that is dropped at the beginning of the output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum DroppedLatency {
+    /// All of it: the output lines up with the time axis of the input.
+    #[default]
+    All,
+    /// What the algorithm adds: the output is late by the latency of the bank.
+    Added,
+    /// Nothing.
+    Nothing,
+}
+
+impl DroppedLatency {
+    /// Output samples of `plan`.
+    pub fn samples(self, plan: &Plan) -> usize {
+        match self {
+            Self::All => plan.latency(),
+            Self::Added => plan.extra_latency(),
+            Self::Nothing => 0,
+        }
+    }
+}
+
+impl Settings<'_> {
+    /// `options` for a plan of such a run. Where gaps are filled or the filters change, `Auto` is the direct
+    /// algorithm: outputs that no gap affects have the bits that they have without gaps, and filters can
+    /// change at any frame.
+    pub fn options(&self, options: Options) -> Options {
+        let needs_direct = self.gaps.is_some() || self.is_retuned;
+        let asked = options.algorithm;
+        Options { algorithm: if needs_direct { asked.without_added_latency() } else { asked }, ..options }
+    }
+}
+
+/// Streams of one signal: one of real samples, two of the parts of complex ones, with their gaps.
+#[derive(Debug)]
+pub(super) struct Fusion<'a> {
+    streams: Vec<Stream>,
+    gaps: Option<GapFiller>,
+    workers: Option<&'a ThreadPool>,
+    /// Output samples still to be dropped.
+    skip: usize,
+    /// The outputs of the last step that were not dropped.
+    kept: Range<usize>,
+    /// Samples that streams replaced whose place others have taken.
+    replaced: u64,
+    offsets: Vec<f64>,
+}
+
+impl<'a> Fusion<'a> {
+    /// A new signal of so many parts through `plan`, which must be the plan of `bank`.
+    pub(super) fn new(
+        bank: &Bank,
+        plan: &Plan,
+        parts: usize,
+        settings: Settings<'a>,
+    ) -> Result<Self, PipelineError> {
+        let filler = |policy| GapFiller::new(bank, policy, parts, plan.extra_latency());
+        Ok(Self {
+            streams: vec![Stream::new(plan); parts],
+            gaps: settings.gaps.map(filler).transpose()?,
+            workers: settings.workers,
+            skip: settings.dropped.samples(plan),
+            kept: 0..0,
+            replaced: 0,
+            offsets: bank.offsets.clone(),
+        })
+    }
+
+    /// The stream of the real parts.
+    pub(super) fn stream(&self) -> &Stream {
+        &self.streams[0]
+    }
+
+    /// 1, or 2 for complex samples.
+    pub(super) fn parts(&self) -> usize {
+        self.streams.len()
+    }
+
+    /// Numbers of the output per frame.
+    pub(super) fn outputs(&self) -> usize {
+        self.stream().ratio() * self.parts()
+    }
+
+    /// Numbers of the input so far that were NaN or infinite and became 0.
+    pub(super) fn replaced(&self) -> u64 {
+        self.replaced + self.streams.iter().map(Stream::replaced).sum::<u64>()
+    }
+
+    /// The gaps that have ended.
+    pub(super) fn gaps(&self) -> &[Gap] {
+        self.gaps.as_ref().map_or(&[], |filler| &filler.summary().list)
+    }
+
+    /// The gaps that go on.
+    pub(super) fn open_gaps(&self) -> impl Iterator<Item = Gap> {
+        self.gaps.iter().flat_map(GapFiller::open)
+    }
+
+    /// Where the step that begins with the first of these frames ends: it has at most `most` frames.
+    pub(super) fn step_end(&self, frames: Range<usize>, most: usize) -> usize {
+        let position = (self.stream().position() % most as u64) as usize;
+        let count = match self.skip {
+            // Steps end at multiples of their length, where no algorithm has to wait for more frames.
+            0 => most - position,
+            // Outputs that are dropped take a detour: they have a step of their own.
+            skip => skip.div_ceil(self.stream().ratio()).min(most),
+        };
+        frames.end.min(frames.start + count)
+    }
+
+    /// Filters frames of all `parts`. Of the outputs that are not dropped, at most the first `most` go to
+    /// `output`; returns how many.
+    pub(super) fn step(
+        &mut self,
+        parts: &[impl Input + Sync],
+        most: usize,
+        output: &mut (impl SplitOutput + ?Sized),
+    ) -> Result<usize, ProcessError> {
+        let samples = parts.first().map_or(0, Input::frames) * self.stream().ratio();
+        let dropped = self.skip.min(samples);
+        self.kept = dropped..samples.min(dropped.saturating_add(most));
+        let is_filled = self.gaps.as_mut().is_some_and(|gaps| gaps.fill(parts));
+        for (p, part) in parts.iter().enumerate() {
+            if parts.len() > 1 {
+                output.select(p);
+            }
+            let (stream, workers) = (&mut self.streams[p], self.workers);
+            let kept = (self.kept != (0..samples)).then(|| self.kept.clone());
+            match &self.gaps {
+                Some(gaps) if is_filled => {
+                    let filled = Interleaved::new(gaps.filled(p), part.channels())?;
+                    run(stream, &filled, kept, output, workers)?
+                }
+                _ => run(stream, part, kept, output, workers)?,
+            };
+        }
+        self.skip -= dropped;
+        Ok(self.kept.len())
+    }
+
+    /// Frames without a signal that bring out `count` more samples.
+    pub(super) fn flush_frames(&self, count: usize) -> usize {
+        self.skip.saturating_add(count).div_ceil(self.stream().ratio())
+    }
+
+    /// As [`Fusion::step`], with frames without a signal.
+    pub(super) fn flush(
+        &mut self,
+        frames: usize,
+        most: usize,
+        output: &mut (impl SplitOutput + ?Sized),
+    ) -> Result<usize, ProcessError> {
+        let offsets = std::mem::take(&mut self.offsets);
+        let silence = vec![Silence { offsets: &offsets, frames }; self.parts()];
+        let written = self.step(&silence, most, output);
+        self.offsets = offsets;
+        written
+    }
+
+    /// The marks of the outputs of the last step, if gaps are filled.
+    pub(super) fn marks(&self) -> Option<&[u8]> {
+        self.gaps.as_ref().map(|gaps| gaps.marks(self.kept.clone()))
+    }
+
+    /// Goes on by `next`, which takes over the history and the counts.
+    pub(super) fn continue_by(&mut self, mut next: Stream) -> Result<(), SwapError> {
+        next.continue_from(&self.streams[0])?;
+        self.streams[0] = next;
+        Ok(())
+    }
+
+    /// Goes on by `next`, which has a history of its own.
+    pub(super) fn replace(&mut self, next: Stream) {
+        self.replaced += self.streams[0].replaced();
+        self.streams[0] = next;
+    }
+
+    /// Ends the open gaps; `samples` of the outputs were written, and `clipped` of them saturated.
+    pub(super) fn finish(self, samples: u64, clipped: u64) -> Outcome {
+        let stream = self.stream();
+        Outcome {
+            plan: stream.plan().summary(),
+            channels: stream.channels(),
+            ratio: stream.ratio(),
+            samples,
+            clipped,
+            replaced: self.replaced(),
+            state_resets: self.streams.iter().map(Stream::state_resets).sum(),
+            gaps: self.gaps.map(GapFiller::finish),
+            mask: None,
+        }
+    }
+}
+
+/// Filters frames; of their outputs only those in `kept` are stored, if not all are.
+fn run(
+    stream: &mut Stream,
+    input: &(impl Input + Sync),
+    kept: Option<Range<usize>>,
+    output: &mut (impl SplitOutput + ?Sized),
+    workers: Option<&ThreadPool>,
+) -> Result<usize, ProcessError> {
+    match (kept, workers) {
+        (Some(range), _) => stream.run(input, &mut Kept { output, range }),
+        (None, Some(workers)) => stream.run_parallel(input, output, workers),
+        (None, None) => stream.run(input, output),
+    }
+}
+
+/// Room for some of the outputs of a call; the others are dropped before they are encoded.
+pub(super) struct Kept<'a, O: ?Sized> {
+    pub(super) output: &'a mut O,
+    pub(super) range: Range<usize>,
+}
+
+impl<O: Output + ?Sized> Output for Kept<'_, O> {
+    fn capacity(&self) -> usize {
+        usize::MAX
+    }
+
+    fn store<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]) {
+        let (begin, end) = (self.range.start.max(first), self.range.end.min(first + samples.len()));
+        if begin < end {
+            self.output.store(isa, begin - self.range.start, &samples[begin - first..end - first]);
+        }
+    }
+}
+
+/// Frames of converters without a signal: their offsets, which are 0 once they are subtracted.
+#[derive(Clone, Copy)]
+struct Silence<'a> {
+    offsets: &'a [f64],
+    frames: usize,
+}
+
+impl Input for Silence<'_> {
+    fn channels(&self) -> usize {
+        self.offsets.len()
+    }
+
+    fn frames(&self) -> usize {
+        self.frames
+    }
+
+    fn is_finite(&self, _: Range<usize>) -> bool {
+        true
+    }
+
+    fn load<T: Sample>(&self, _: Isa, _: usize, samples: &mut [T]) {
+        for (slot, &offset) in samples.iter_mut().zip(self.offsets.iter().cycle()) {
+            *slot = T::from_f64(offset);
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! Fuses a signal that is in memory, lined up with the time axis of the input.
+
+use super::fusion::Fusion;
+use super::{Outcome, PipelineError, Settings};
+use crate::bank::{Bank, SynthesisFilters};
+use crate::runtime::{Frames, Input, Plan, ProcessError, SplitOutput, ThreadPool};
+
+/// Samples of a step in which gaps are filled.
+const GAP_STEP_SAMPLES: usize = 1 << 17;
+
+/// Multiply-adds of a step on one thread: from 2 ms with AVX-512 to 100 ms with double sums on a slow
+/// processor.
+const STEP_MULTIPLY_ADDS: usize = 1 << 27;
+
+/// Reading, converting and storing an output sample cost about as much as so many multiply-adds.
+const MULTIPLY_ADDS_PER_STORE: usize = 8;
+
+/// Fuses a whole signal: M output samples for each of its frames.
+///
+/// With [`DroppedLatency::All`](super::DroppedLatency::All) output sample n belongs to the time of fast
+/// sample n: the first samples, as many as the latency, are dropped, and as many come out at the end from
+/// frames without a signal. These are the samples of `hybank fuse`, bit for bit. `plan` must be the plan of
+/// `bank`. Samples are read where they are and written where they shall be; the memory used does not grow
+/// with the signal.
+///
+/// `parts` is one input of real samples, or the real and the imaginary parts of complex ones; then
+/// [`Output::select`](crate::runtime::Output::select) says which of them `output` stores. `stop` is called
+/// every few milliseconds of work, on the thread of the caller, and ends the fusion if it returns true.
+///
+/// # Errors
+/// [`PipelineError::Process`] if the channels do not match the bank or the output is too short, and
+/// [`PipelineError::Stopped`]; the output is incomplete then.
+pub fn fuse(
+    bank: &Bank,
+    plan: &Plan,
+    parts: &[impl Input + Sync],
+    output: &mut (impl SplitOutput + ?Sized),
+    settings: Settings<'_>,
+    stop: &dyn Fn() -> bool,
+) -> Result<Outcome, PipelineError> {
+    let frames = parts.first().map_or(0, Input::frames);
+    let wanted = frames * plan.ratio();
+    if parts.len() > 1 {
+        output.select(0);
+    }
+    check(plan, parts, output.capacity(), wanted)?;
+    let mut fusion = Fusion::new(bank, plan, parts.len(), settings)?;
+    let most = step(bank, plan, settings);
+    let mut mask = Vec::new();
+    let (mut first, mut written) = (0, 0);
+    while first < frames {
+        if stop() {
+            return Err(PipelineError::Stopped);
+        }
+        let end = fusion.step_end(first..frames, most);
+        let step: Vec<_> = parts.iter().map(|part| Frames::new(part, first..end)).collect();
+        written += output.halves(written, |_, rest| fusion.step(&step, usize::MAX, rest))?;
+        mask.extend_from_slice(fusion.marks().unwrap_or_default());
+        first = end;
+    }
+    let missing = wanted - written;
+    output.halves(written, |_, rest| fusion.flush(fusion.flush_frames(missing), missing, rest))?;
+    mask.extend_from_slice(fusion.marks().unwrap_or_default());
+    let outcome = fusion.finish(wanted as u64, 0);
+    Ok(Outcome { mask: settings.gaps.map(|_| mask), ..outcome })
+}
+
+fn check(plan: &Plan, parts: &[impl Input], capacity: usize, wanted: usize) -> Result<(), ProcessError> {
+    let wrong = parts.iter().map(Input::channels).find(|given| *given != plan.channels());
+    if let Some(given) = wrong {
+        return Err(ProcessError::Channels { given, wanted: plan.channels() });
+    }
+    if capacity < wanted {
+        return Err(ProcessError::OutputTooShort { given: capacity, wanted });
+    }
+    Ok(())
+}
+
+/// Frames of a step, a multiple of the plan's alignment unless gaps are filled.
+fn step(bank: &Bank, plan: &Plan, settings: Settings<'_>) -> usize {
+    let threads = settings.workers.map_or(1, ThreadPool::threads);
+    let each = multiply_adds_per_frame(bank, plan) + plan.ratio() * MULTIPLY_ADDS_PER_STORE;
+    let most = (threads * STEP_MULTIPLY_ADDS / each).max(1).next_multiple_of(plan.alignment());
+    match settings.gaps {
+        Some(_) => (GAP_STEP_SAMPLES / plan.channels()).clamp(1, most),
+        None => most,
+    }
+}
+
+/// Multiply-adds of a frame, at most.
+fn multiply_adds_per_frame(bank: &Bank, plan: &Plan) -> usize {
+    let (channels, ratio) = (plan.channels(), plan.ratio());
+    match (&bank.filters, plan.summary().multiply_adds) {
+        (SynthesisFilters::StateSpace(system), None) => {
+            (system.a.len() + ratio) * (system.a.len() + channels)
+        }
+        (_, each) => each.unwrap_or_default().ceil() as usize * ratio,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,205 @@
+//! A bank that runs on frames as they arrive.
+
+use super::fusion::Fusion;
+use super::retune::Retuner;
+use super::{Gap, Outcome, PipelineError, Settings};
+use crate::bank::Bank;
+use crate::io::{IoError, PcmFormat, PcmFrames};
+use crate::runtime::{Frames, Input, PcmOutput, Plan};
+
+/// Maximum size of the encoded output of one step for one thread: a share of the second-level cache.
+const STEP_BYTES: usize = 256 << 10;
+/// Steps of several threads are so many times as long, enough for the chunks of all.
+const PARALLEL_STEPS: usize = 8;
+
+/// Output samples with their mask.
+#[derive(Debug, Clone, Copy)]
+pub struct Block<'a> {
+    /// Encoded samples.
+    pub samples: &'a [u8],
+    /// One byte per sample, 1 if a missing input affects it, else 0; `None` if gaps are not filled.
+    pub mask: Option<&'a [u8]>,
+}
+
+/// Takes the outputs of a [`Pipeline`].
+type Write<'w> = &'w mut dyn FnMut(Block<'_>) -> Result<(), IoError>;
+
+/// Runs a bank on frames as they arrive: fills gaps, filters, drops the latency, encodes and counts.
+#[derive(Debug)]
+pub struct Pipeline<'a> {
+    fusion: Fusion<'a>,
+    retuner: Option<Retuner>,
+    format: PcmFormat,
+    /// Frames of a step, at most.
+    step: usize,
+    samples: u64,
+    clipped: u64,
+    buffer: Vec<u8>,
+}
+
+impl<'a> Pipeline<'a> {
+    /// A new signal through `plan`, which must be the plan of `bank`. Outputs have numbers of `format`. If
+    /// the samples are complex, real and imaginary parts take turns in the input and in the output; a bank
+    /// is real, so it runs on both.
+    ///
+    /// # Errors
+    /// [`PipelineError::Build`] for a bank without outputs or inputs whose gaps are to be filled.
+    pub fn new(
+        bank: &Bank,
+        plan: &Plan,
+        settings: Settings<'a>,
+        format: PcmFormat,
+        is_complex: bool,
+    ) -> Result<Self, PipelineError> {
+        let fusion = Fusion::new(bank, plan, 1 + usize::from(is_complex), settings)?;
+        let steps = if settings.workers.is_some() { PARALLEL_STEPS } else { 1 };
+        let step = (steps * STEP_BYTES / plan.ratio() / format.bytes()).max(1);
+        Ok(Self { fusion, retuner: None, format, step, samples: 0, clipped: 0, buffer: Vec::new() })
+    }
+
+    /// The same pipeline, whose filters change as `retuner` says. Its plan adds no latency.
+    ///
+    /// # Errors
+    /// [`PipelineError::RetunedComplex`]: delays are measured in real samples.
+    pub fn retuned_by(self, retuner: Retuner) -> Result<Self, PipelineError> {
+        match self.fusion.parts() {
+            1 => Ok(Self { retuner: Some(retuner), ..self }),
+            _ => Err(PipelineError::RetunedComplex),
+        }
+    }
+
+    /// The plan.
+    pub fn plan(&self) -> &Plan {
+        self.fusion.stream().plan()
+    }
+
+    /// Output samples so far.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Numbers of the output that saturated so far.
+    pub fn clipped(&self) -> u64 {
+        self.clipped
+    }
+
+    /// Numbers of the input so far that were NaN or infinite and became 0.
+    pub fn replaced(&self) -> u64 {
+        self.fusion.replaced()
+    }
+
+    /// The gaps that have ended, in the order of their ends, at most [`LISTED_GAPS`](super::LISTED_GAPS).
+    pub fn gaps(&self) -> &[Gap] {
+        self.fusion.gaps()
+    }
+
+    /// The gaps that go on.
+    pub fn open_gaps(&self) -> impl Iterator<Item = Gap> {
+        self.fusion.open_gaps()
+    }
+
+    /// Processes frames. The channels are those of all `recordings`, one after another.
+    ///
+    /// # Errors
+    /// [`PipelineError::Process`] if the channels do not match the bank, and the errors of `write`.
+    pub fn push(&mut self, recordings: &[PcmFrames<'_>], write: Write<'_>) -> Result<(), PipelineError> {
+        if let Some(retuner) = &mut self.retuner {
+            retuner.push(recordings)?;
+            return self.run_retuned(write);
+        }
+        if self.fusion.parts() == 1 {
+            return self.run(&[recordings], write);
+        }
+        let part = |part| recordings.iter().map(|frames| frames.part(part)).collect::<Vec<_>>();
+        let [real, imaginary] = [part(0), part(1)];
+        self.run(&[&real[..], &imaginary[..]], write)
+    }
+
+    /// Processes frames without a signal (zeros, once the offsets are subtracted) until `samples` samples
+    /// have been written since the beginning.
+    ///
+    /// # Errors
+    /// The errors of the output, and of a [`Retuner`].
+    pub fn flush(&mut self, samples: u64, write: Write<'_>) -> Result<(), PipelineError> {
+        if let Some(retuner) = &mut self.retuner {
+            retuner.end();
+            // What is no signal says nothing of the filters.
+            self.run_retuned(write)?;
+        }
+        while self.samples < samples {
+            let most = usize::try_from(samples - self.samples).unwrap_or(usize::MAX);
+            let frames = self.fusion.flush_frames(most).min(self.step);
+            let mut output = room(&mut self.buffer, self.format, frames * self.fusion.outputs());
+            let written = self.fusion.flush(frames, most, &mut output)?;
+            self.clipped += output.clipped;
+            self.written(written, write)?;
+        }
+        Ok(())
+    }
+
+    /// Ends the open gaps and returns the outcome. Of complex samples the counts are those of both parts.
+    ///
+    /// # Errors
+    /// The errors of a [`Retuner`] in the last block.
+    pub fn finish(self) -> Result<Outcome, PipelineError> {
+        self.retuner.map_or(Ok(()), Retuner::finish)?;
+        Ok(self.fusion.finish(self.samples, self.clipped))
+    }
+
+    /// All frames of all parts, step by step.
+    fn run<I: Input + Sync + ?Sized>(&mut self, parts: &[&I], write: Write<'_>) -> Result<(), PipelineError> {
+        let frames = parts.first().map_or(0, |part| part.frames());
+        let mut first = 0;
+        while first < frames {
+            let end = self.fusion.step_end(first..frames, self.step);
+            let step: Vec<_> = parts.iter().map(|part| Frames::new(*part, first..end)).collect();
+            self.step(&step, write)?;
+            first = end;
+        }
+        Ok(())
+    }
+
+    /// The frames that can be made of the samples so far, with filters that change on the way.
+    fn run_retuned(&mut self, write: Write<'_>) -> Result<(), PipelineError> {
+        let Some(mut retuner) = self.retuner.take() else { return Ok(()) };
+        loop {
+            let count = retuner.ready(self.step);
+            if count == 0 {
+                break;
+            }
+            if let Some(stream) = retuner.shifted()? {
+                self.fusion.replace(stream);
+            }
+            self.step(&[retuner.next(count)], write)?;
+            if let Some(stream) = retuner.passed(count)? {
+                self.fusion.continue_by(stream)?;
+            }
+        }
+        self.retuner = Some(retuner);
+        Ok(())
+    }
+
+    fn step(&mut self, parts: &[impl Input + Sync], write: Write<'_>) -> Result<(), PipelineError> {
+        let frames = parts.first().map_or(0, Input::frames);
+        let mut output = room(&mut self.buffer, self.format, frames * self.fusion.outputs());
+        let written = self.fusion.step(parts, usize::MAX, &mut output)?;
+        self.clipped += output.clipped;
+        self.written(written, write)
+    }
+
+    /// Hands over the samples of a step.
+    fn written(&mut self, samples: usize, write: Write<'_>) -> Result<(), PipelineError> {
+        self.samples += samples as u64;
+        let size = self.format.bytes() * self.fusion.parts();
+        Ok(write(Block { samples: &self.buffer[..samples * size], mask: self.fusion.marks() })?)
+    }
+}
+
+/// Room for so many numbers.
+fn room(buffer: &mut Vec<u8>, format: PcmFormat, numbers: usize) -> PcmOutput<'_> {
+    buffer.resize(numbers * format.bytes(), 0);
+    PcmOutput::packed(format, buffer)
+}
+
+#[cfg(test)]
+mod tests;
