@@ -16,7 +16,7 @@ pub struct Settings<'a> {
     pub dropped: DroppedLatency,
     /// Replacement of missing samples. With `None` the runtime replaces NaN and infinity by 0.
     pub gaps: Option<GapPolicy>,
-    /// The filters change while the pipeline runs, see [`Pipeline::retuned_by`](super::Pipeline::retuned_by).
+    /// The filters change on the way, see [`Pipeline::retuned_by`](super::Pipeline::retuned_by).
     pub is_retuned: bool,
     /// Threads for filtering; `None` uses the calling thread.
     pub workers: Option<&'a ThreadPool>,

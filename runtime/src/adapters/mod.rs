@@ -35,7 +35,7 @@ pub trait Input {
         None
     }
 
-    /// True if the samples of some frames are known to be neither NaN nor infinite; false where nobody looks.
+    /// True if no sample of some frames is NaN or infinite; false where nobody looks.
     fn is_finite(&self, _frames: Range<usize>) -> bool {
         false
     }

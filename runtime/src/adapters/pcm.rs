@@ -11,7 +11,7 @@ use std::ops::Range;
 /// saturate.
 #[derive(Debug)]
 pub struct PcmOutput<'a> {
-    /// How samples, or the numbers of complex samples, are to be stored; bytes between them stay as they are.
+    /// How samples, or the numbers of complex samples, are to be stored; bytes between them stay.
     pub layout: SampleLayout,
     /// M samples per frame.
     pub bytes: &'a mut [u8],
