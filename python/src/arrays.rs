@@ -5,7 +5,7 @@ use crate::formats::{Format, Number};
 use crate::samples::Samples;
 use bytemuck::NoUninit;
 use hybank::memory::available_memory;
-use hybank::runtime::{Input, Interleaved, Isa, PcmFrames, Sample, SampleLayout};
+use hybank::runtime::{Input, Interleaved, Isa, PcmFormat, PcmFrames, Sample, SampleLayout};
 use numpy::ndarray::Axis;
 use numpy::{
     Complex32, Complex64, Element, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
@@ -148,8 +148,7 @@ impl<'py> Held<'py> {
     /// The samples, or one part of complex ones.
     fn part(&self, part: usize) -> PyResult<Samples<'_>> {
         let layout = self.layout;
-        let packed = SampleLayout::packed(self.format.number.format());
-        let lies = if self.format.complex { packed.part(part) } else { packed };
+        let (format, part) = (self.format.number.format(), self.format.complex.then_some(part));
         let (is_real, is_interleaved) = (!self.format.complex, layout.order == Order::Frames);
         Ok(match &self.numbers {
             Numbers::F32(array) if is_real && is_interleaved => {
@@ -160,12 +159,12 @@ impl<'py> Held<'py> {
             }
             Numbers::F32(array) if is_real => Samples::Planar32(layout.rows(array)?),
             Numbers::F64(array) if is_real => Samples::Planar64(layout.rows(array)?),
-            Numbers::F32(array) => Samples::Pcm(layout.pcm(array, lies)?),
-            Numbers::F64(array) => Samples::Pcm(layout.pcm(array, lies)?),
-            Numbers::I8(array) => Samples::Pcm(layout.pcm(array, lies)?),
-            Numbers::U8(array) => Samples::Pcm(layout.pcm(array, lies)?),
-            Numbers::I16(array) => Samples::Pcm(layout.pcm(array, lies)?),
-            Numbers::I32(array) => Samples::Pcm(layout.pcm(array, lies)?),
+            Numbers::F32(array) => Samples::Pcm(layout.pcm(array, format, part)?),
+            Numbers::F64(array) => Samples::Pcm(layout.pcm(array, format, part)?),
+            Numbers::I8(array) => Samples::Pcm(layout.pcm(array, format, part)?),
+            Numbers::U8(array) => Samples::Pcm(layout.pcm(array, format, part)?),
+            Numbers::I16(array) => Samples::Pcm(layout.pcm(array, format, part)?),
+            Numbers::I32(array) => Samples::Pcm(layout.pcm(array, format, part)?),
         })
     }
 
@@ -259,9 +258,16 @@ impl Layout {
     fn pcm<'a, S: Element + NoUninit>(
         &self,
         array: &'a PyReadonlyArrayDyn<'_, S>,
-        layout: SampleLayout,
+        format: PcmFormat,
+        part: Option<usize>,
     ) -> PyResult<Vec<PcmFrames<'a>>> {
-        let frames = |numbers, channels| PcmFrames { layout, channels, bytes: bytemuck::cast_slice(numbers) };
+        let frames = |numbers, channels| {
+            let (layout, bytes) = (SampleLayout::packed(format), bytemuck::cast_slice(numbers));
+            match part {
+                None => PcmFrames { layout, channels, bytes },
+                Some(part) => PcmFrames { layout, channels: 2 * channels, bytes }.part(part),
+            }
+        };
         if self.order == Order::Frames {
             return Ok(vec![frames(slice(array)?, self.channels)]);
         }

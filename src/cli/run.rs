@@ -323,28 +323,6 @@ pub(super) fn interrupted(frames: u64) -> Failure {
     Failure::Input(format!("interrupted after {frames} frames; nothing was kept, run it again"))
 }
 
-/// How the bank ran.
-#[derive(Debug, serde::Serialize)]
-struct PlanReport {
-    algorithm: &'static str,
-    numbers: &'static str,
-    isa: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    transform: Option<usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    block: Option<usize>,
-    extra_latency: usize,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    multiply_adds: Option<f64>,
-}
-
-impl From<PlanSummary> for PlanReport {
-    fn from(plan: PlanSummary) -> Self {
-        let PlanSummary { algorithm, numbers, isa, transform, block, extra_latency, multiply_adds } = plan;
-        Self { algorithm, numbers, isa, transform, block, extra_latency, multiply_adds }
-    }
-}
-
 /// What every command that fuses reports.
 #[derive(Debug, serde::Serialize)]
 pub(super) struct RunReport {
