@@ -5,7 +5,7 @@ use crate::page::Row;
 use crate::{Banks, Figure, Outcome, spec};
 use hybank::bank::Bank;
 use hybank::design::{Problem, latency};
-use hybank::pipeline::{WholeSettings, fuse};
+use hybank::pipeline::{DroppedLatency, Settings, fuse};
 use hybank::runtime::{Options, Planar, Precision};
 use hybank::simulate::{Analog, Captured, Source, capture};
 use hybank::units::Seconds;
@@ -42,8 +42,8 @@ impl Signal {
         let plan = bank.plan(Options { precision: Precision::Double, ..Options::default() })?;
         let channels: Vec<&[f64]> = self.captured.channels.iter().map(Vec::as_slice).collect();
         let mut fused = vec![0.0; self.target().len()];
-        let causal = WholeSettings { keep_latency: true, ..WholeSettings::default() };
-        fuse(bank, &plan, &Planar::new(&channels)?, &mut fused[..], causal)?;
+        let causal = Settings { dropped: DroppedLatency::Added, ..Settings::default() };
+        fuse(bank, &plan, &[Planar::new(&channels)?], &mut fused[..], causal, &|| false)?;
         Ok(self.target().iter().zip(fused).map(|(wanted, y)| wanted - y).collect())
     }
 }
