@@ -22,9 +22,8 @@ pub(super) enum FileKind {
 }
 
 /// First bytes of files, from the byte at which they stand.
-const MAGIC: [(usize, &[u8], &str); 12] = [
+const MAGIC: [(usize, &[u8], &str); 11] = [
     (8, b"WAVE", "a WAV recording"),
-    (0, b"riff", "a W64 recording"),
     (0, b"fLaC", "a FLAC recording"),
     (0, b"OggS", "an Ogg recording"),
     (0, b"ID3", "an MP3 recording"),

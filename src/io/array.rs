@@ -2,11 +2,10 @@
 //! the rows do if both are equal: `(N, T)` as the Python package has it, `(T, N)` as sound files have it.
 
 use super::capture::{Blocks, Capture};
+use super::stream_header::MOST_CHANNELS;
 use super::{IoError, PcmFormat, SampleLayout, StreamHeader};
 use std::io::{self, Read, Seek, SeekFrom, Take};
 
-/// Maximum number of channels, the same as in a WAV header.
-const MOST_CHANNELS: u64 = 65_535;
 /// Bytes of all channels together that are read at a time, where each channel lies by itself.
 const PLANAR_BYTES: usize = 1 << 20;
 

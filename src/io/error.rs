@@ -19,7 +19,7 @@ pub enum IoError {
     },
     /// The first bytes are not those of a WAV file.
     #[error(
-        "{file}: not a WAV file (byte 0 holds {found}, where RIFF, RF64, BW64 or a W64 header is expected); raw samples need a format name such as f32le"
+        "{file}: not a WAV file (byte 0 holds {found}, where RIFF, RF64 or BW64 is expected); raw samples need a format name such as f32le"
     )]
     NotWav {
         /// Name of the file.

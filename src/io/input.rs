@@ -8,7 +8,7 @@ use super::open::InputSource;
 use super::stall::Wait;
 use super::timestamps::{Timestamp, lost_between};
 #[cfg(target_os = "linux")]
-use super::{Coding, stdin_reader::StdinReader};
+use super::{Coding, stdin_reader::read_stdin};
 use super::{InputFault, IoError, StreamHeader};
 use crossbeam_channel::{Receiver, Sender, bounded, select};
 use std::thread;
@@ -67,9 +67,9 @@ struct Live {
 enum Source {
     /// Its thread, to which blocks go back.
     Thread { messages: Receiver<Result<Message, IoError>>, pool: Sender<Vec<u8>> },
-    /// Standard input itself.
+    /// Standard input itself, with a block to fill.
     #[cfg(target_os = "linux")]
-    Stdin(Box<StdinReader>),
+    Stdin { frames: Box<InputFrames>, spare: Vec<u8> },
 }
 
 impl Input {
@@ -79,8 +79,8 @@ impl Input {
         if !source.is_stdin() || source.coding == Coding::Wav {
             return Self::on_thread(source);
         }
-        let stdin = StdinReader::new(&source)?;
-        Ok(Self::new(source.name(), stdin.frames.header, Source::Stdin(Box::new(stdin))))
+        let frames = Box::new(InputFrames::open(&source)?);
+        Ok(Self::new(source.name(), frames.header, Source::Stdin { frames, spare: Vec::new() }))
     }
 
     /// The only input.
@@ -142,7 +142,7 @@ impl Input {
                 }
             },
             #[cfg(target_os = "linux")]
-            Source::Stdin(stdin) => stdin.receive(stop, &mut wait)?,
+            Source::Stdin { frames, spare } => read_stdin(frames, spare, stop, &mut wait)?,
         };
         let received = message.is_some();
         if let Some(message) = message {
@@ -190,7 +190,7 @@ impl Input {
             // A thread that has ended needs no blocks.
             Source::Thread { pool, .. } => drop(pool.send(block.bytes)),
             #[cfg(target_os = "linux")]
-            Source::Stdin(stdin) => stdin.give_back(block.bytes),
+            Source::Stdin { spare, .. } => *spare = block.bytes,
         }
     }
 

@@ -50,8 +50,7 @@ pub(super) struct Dropout {
 #[derive(Debug, Clone)]
 pub struct LostSamples {
     file: String,
-    timestamps: Vec<(Option<usize>, Timestamp)>,
-    dropouts: Vec<(Option<usize>, Range<u64>)>,
+    lines: Vec<LostLine>,
 }
 
 /// A line, as written.
@@ -75,6 +74,12 @@ pub(super) enum Entry {
     Timestamp(Timestamp),
     /// These frames are in the input but invalid.
     Invalid(Range<u64>),
+}
+
+impl Entry {
+    fn timestamp(&self) -> Option<Timestamp> {
+        if let Self::Timestamp(timestamp) = self { Some(*timestamp) } else { None }
+    }
 }
 
 /// A line, checked.
@@ -137,30 +142,22 @@ impl LostSamples {
     /// # Errors
     /// [`IoError::Unfit`] for a line that is neither of the two kinds.
     pub fn parse(text: &str, file: &str) -> Result<Self, IoError> {
-        let mut lost = Self { file: file.to_owned(), timestamps: Vec::new(), dropouts: Vec::new() };
-        for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-            let line = LostLine::parse(line, number + 1);
-            match line.map_err(|problem| lost.fault(format!("line {}: {problem}", number + 1)))? {
-                LostLine { channel, entry: Entry::Timestamp(timestamp), .. } => {
-                    lost.timestamps.push((channel, timestamp));
-                }
-                LostLine { channel, entry: Entry::Invalid(frames), .. } => {
-                    lost.dropouts.push((channel, frames))
-                }
-            }
-        }
-        Ok(lost)
+        let lines = text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty());
+        let parsed = lines.map(|(line, number)| {
+            let fault = |problem| IoError::unfit(file)(format!("line {number}: {problem}"));
+            LostLine::parse(line, number).map_err(fault)
+        });
+        Ok(Self { file: file.to_owned(), lines: parsed.collect::<Result<_, _>>()? })
     }
 
     /// The lines of each input, given the channels of all inputs in their order.
     pub(super) fn of_inputs(&self, channels: &[usize]) -> Result<Vec<LostInInput>, IoError> {
         let all = channels.iter().sum::<usize>();
-        let named =
-            self.timestamps.iter().map(|(channel, _)| channel).chain(self.dropouts.iter().map(|(c, _)| c));
-        if let Some(channel) = named.flatten().find(|&&channel| channel >= all) {
+        let mut named = self.lines.iter().filter_map(|line| line.channel);
+        if let Some(channel) = named.find(|&channel| channel >= all) {
             return Err(self.fault(format!("channel {} is named, but there are {all}", channel + 1)));
         }
-        let lines = self.timestamps.len() + self.dropouts.len();
+        let lines = self.lines.len();
         if channels.len() > 1 && lines.saturating_mul(channels.len()) > MOST_LINES {
             return Err(self.fault(format!(
                 "{lines} lines for {} inputs are more than {MOST_LINES} in all; fuse the recording in parts",
@@ -178,13 +175,14 @@ impl LostSamples {
 
     /// The channels that a timestamp names.
     fn named_channels(&self) -> BTreeSet<usize> {
-        self.timestamps.iter().filter_map(|&(channel, _)| channel).collect()
+        let timestamps = self.lines.iter().filter(|line| matches!(line.entry, Entry::Timestamp(_)));
+        timestamps.filter_map(|line| line.channel).collect()
     }
 
     fn of_input(&self, channels: Range<usize>, named: &BTreeSet<usize>) -> Result<LostInInput, IoError> {
         let timestamps = |wanted: usize| -> Vec<Timestamp> {
-            let lines = self.timestamps.iter().filter(|(channel, _)| channel.is_none_or(|c| c == wanted));
-            lines.map(|&(_, timestamp)| timestamp).collect()
+            let lines = self.lines.iter().filter(|line| line.channel.is_none_or(|channel| channel == wanted));
+            lines.filter_map(|line| line.entry.timestamp()).collect()
         };
         // Channels that no line names have the same timestamps, so one of them stands for all.
         let unnamed = channels.clone().find(|channel| !named.contains(channel));
@@ -204,12 +202,13 @@ impl LostSamples {
     }
 
     fn dropouts_of(&self, channels: &Range<usize>) -> Vec<Dropout> {
-        let here = |&(channel, ref frames): &(Option<usize>, Range<u64>)| {
-            let inside = channel.is_none_or(|channel| channels.contains(&channel)) && !frames.is_empty();
-            let channel = channel.map(|channel| channel - channels.start);
+        let here = |line: &LostLine| {
+            let Entry::Invalid(frames) = &line.entry else { return None };
+            let inside = line.channel.is_none_or(|channel| channels.contains(&channel)) && !frames.is_empty();
+            let channel = line.channel.map(|channel| channel - channels.start);
             inside.then(|| Dropout { channel, frames: frames.clone() })
         };
-        let mut dropouts: Vec<_> = self.dropouts.iter().filter_map(here).collect();
+        let mut dropouts: Vec<_> = self.lines.iter().filter_map(here).collect();
         dropouts.sort_by_key(|dropout| (dropout.frames.start, dropout.channel));
         dropouts
     }

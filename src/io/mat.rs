@@ -5,7 +5,8 @@
 //! it is the only array. A number called `fs` gives the rate.
 
 use super::array::{ArrayHeader, ArrayReader};
-use super::mat_element::{COMPRESSED, MATRIX, Numbers, Order, Tag, fill, unreadable};
+use super::capture::fill;
+use super::mat_element::{COMPRESSED, MATRIX, Numbers, Order, Tag, unreadable};
 use super::{IoError, PcmFormat};
 use flate2::read::ZlibDecoder;
 use std::fmt;

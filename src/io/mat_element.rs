@@ -1,5 +1,6 @@
 //! Data elements of MATLAB files: a tag with type and size, and bytes.
 
+use super::capture::fill;
 use std::io::{self, Read};
 
 /// Most bytes of the numbers of an array, which are held in memory.
@@ -98,20 +99,6 @@ pub(super) fn unreadable(error: io::Error) -> String {
         io::ErrorKind::InvalidInput => "its compressed bytes are damaged; copy it again".into(),
         _ => format!("cannot read it: {error}"),
     }
-}
-
-/// Reads until `bytes` are full or the end; gives how many there are.
-pub(super) fn fill(reader: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
-    let mut filled = 0;
-    while filled < bytes.len() {
-        match reader.read(&mut bytes[filled..]) {
-            Ok(0) => break,
-            Ok(count) => filled += count,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(filled)
 }
 
 /// The numbers of one part of an array, as stored.

@@ -33,20 +33,19 @@ pub struct OutputHeader {
 /// The open destination.
 enum Target {
     Wav(WavFile<AtomicFile>),
-    Raw(AtomicFile),
+    /// Raw samples, and the metadata beside those of a SigMF recording.
+    Raw {
+        data: AtomicFile,
+        meta: Option<AtomicFile>,
+    },
     /// Standard output or a FIFO.
     Stream(Stdout),
-    /// Raw samples, and the metadata beside them.
-    Sigmf {
-        data: AtomicFile,
-        meta: AtomicFile,
-        header: OutputHeader,
-    },
 }
 
 /// A writer of one channel of encoded samples.
 pub struct SampleWriter {
     target: Target,
+    header: OutputHeader,
     name: String,
     notes: OutputNotes,
     warning: Option<String>,
@@ -67,7 +66,10 @@ impl SampleWriter {
         let refused = || IoError::system(&name, "write it");
         let mut warning = None;
         let target = match header.container {
-            _ if is_sigmf_meta(path) => sigmf_target(path, header, replace)?,
+            _ if is_sigmf_meta(path) => {
+                let meta = Some(AtomicFile::create(path, replace)?);
+                Target::Raw { data: AtomicFile::create(&path.with_extension("sigmf-data"), replace)?, meta }
+            }
             Container::Wav => {
                 let OutputHeader { format, is_complex, rate, .. } = header;
                 let (channels, hertz) = (if is_complex { 2 } else { 1 }, wav_rate(&name, rate)?);
@@ -81,9 +83,9 @@ impl SampleWriter {
                 }
             }
             Container::Raw if is_stream => stream_target(path, &[]).map_err(refused())?,
-            Container::Raw => Target::Raw(AtomicFile::create(path, replace)?),
+            Container::Raw => Target::Raw { data: AtomicFile::create(path, replace)?, meta: None },
         };
-        Ok(Self { target, name, notes: OutputNotes::default(), warning })
+        Ok(Self { target, header, name, notes: OutputNotes::default(), warning })
     }
 
     /// What the header cannot say exactly.
@@ -107,9 +109,8 @@ impl SampleWriter {
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), IoError> {
         let written = match &mut self.target {
             Target::Wav(file) => file.write_bytes(bytes),
-            Target::Raw(file) => file.write_all(bytes),
+            Target::Raw { data, .. } => data.write_all(bytes),
             Target::Stream(stream) => stream.write_all(bytes),
-            Target::Sigmf { data, .. } => data.write_all(bytes),
         };
         written.map_err(IoError::system(&self.name, "write it"))
     }
@@ -128,10 +129,10 @@ impl SampleWriter {
         let refused = IoError::system(&self.name, "write it");
         match self.target {
             Target::Wav(file) => Ok(vec![file.finish(&self.notes.chunks).map_err(refused)?]),
-            Target::Raw(file) => Ok(vec![file]),
             Target::Stream(mut stream) => stream.flush().map(|()| Vec::new()).map_err(refused),
-            Target::Sigmf { data, mut meta, header } => {
-                let text = sigmf_text(&self.name, header, self.notes)?;
+            Target::Raw { data, meta: None } => Ok(vec![data]),
+            Target::Raw { data, meta: Some(mut meta) } => {
+                let text = sigmf_text(&self.name, self.header, self.notes)?;
                 meta.write_all(text.as_bytes()).map_err(refused)?;
                 Ok(vec![data, meta])
             }
@@ -146,12 +147,6 @@ fn is_fifo(path: &Path) -> bool {
 
 fn is_sigmf_meta(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "sigmf-meta")
-}
-
-fn sigmf_target(path: &Path, header: OutputHeader, replace: bool) -> Result<Target, IoError> {
-    let meta = AtomicFile::create(path, replace)?;
-    let data = AtomicFile::create(&path.with_extension("sigmf-data"), replace)?;
-    Ok(Target::Sigmf { data, meta, header })
 }
 
 /// The metadata of an output called `file`.

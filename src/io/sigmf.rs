@@ -3,15 +3,13 @@
 //! Real or complex samples, one or several interleaved channels. If `core:global_index` increases by more
 //! than `core:sample_start` between captures, samples were lost.
 
+use super::stream_header::MOST_CHANNELS;
 use super::timestamps::{Timestamp, Timestamps};
 use super::{IoError, PcmFormat, SampleLayout, StreamHeader};
 use crate::files::{Bound, read_text};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::path::{Component, Path, PathBuf};
-
-/// Maximum number of interleaved channels, the same as in a WAV header.
-const MOST_CHANNELS: usize = 65_535;
 
 /// Maximum size of a metadata file.
 pub(super) const META_FILE: Bound = Bound {
@@ -137,7 +135,7 @@ impl SigmfMeta {
             )));
         }
         match (meta.global.num_channels, meta.global.sample_rate) {
-            (Some(count), _) if !(1..=MOST_CHANNELS).contains(&count) => {
+            (Some(count), _) if !(1..=MOST_CHANNELS).contains(&(count as u64)) => {
                 Err(fault(format!("core:num_channels is {count}; it may be 1 to {MOST_CHANNELS}")))
             }
             (_, Some(rate)) if !(rate.is_finite() && rate > 0.0) => {

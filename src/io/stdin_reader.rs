@@ -6,7 +6,6 @@
 
 use super::IoError;
 use super::frames::{InputFrames, Message};
-use super::open::InputSource;
 use super::stall::Wait;
 use crossbeam_channel::{Receiver, TryRecvError};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -14,51 +13,32 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 /// Most nanoseconds by which a stop is late: a twentieth of a second, which nobody notices.
 const PATIENCE: i64 = 50_000_000;
 
-/// Standard input with its block.
-pub(super) struct StdinReader {
-    pub(super) frames: InputFrames,
-    spare: Vec<u8>,
-}
-
-impl StdinReader {
-    /// Standard input as raw samples.
-    ///
-    /// # Errors
-    /// Settings that do not fit one another.
-    pub(super) fn new(source: &InputSource) -> Result<Self, IoError> {
-        Ok(Self { frames: InputFrames::open(source)?, spare: Vec::new() })
-    }
-
-    /// Waits for whole frames or the end; `None` if a stop was requested first.
-    ///
-    /// # Errors
-    /// The system's refusal to read.
-    pub(super) fn receive(
-        &mut self,
-        stop: &Receiver<()>,
-        wait: &mut Wait<'_>,
-    ) -> Result<Option<Message>, IoError> {
-        let mut bytes = std::mem::take(&mut self.spare);
-        while !self.frames.ended() {
-            if !matches!(stop.try_recv(), Err(TryRecvError::Empty)) {
-                return Ok(None);
-            }
-            if !is_readable().map_err(IoError::system("standard input", "read the samples"))? {
-                wait.go_on();
-                continue;
-            }
-            let filled = self.frames.read_some(&mut bytes)?;
-            if filled > 0 {
-                return Ok(Some(Message::Frames { bytes, filled }));
-            }
+/// Waits for whole frames, which come in the block `spare`, or for the end; `None` if a stop was requested
+/// first.
+///
+/// # Errors
+/// The system's refusal to read.
+pub(super) fn read_stdin(
+    frames: &mut InputFrames,
+    spare: &mut Vec<u8>,
+    stop: &Receiver<()>,
+    wait: &mut Wait<'_>,
+) -> Result<Option<Message>, IoError> {
+    let mut bytes = std::mem::take(spare);
+    while !frames.ended() {
+        if !matches!(stop.try_recv(), Err(TryRecvError::Empty)) {
+            return Ok(None);
         }
-        Ok(Some(Message::End { faults: self.frames.faults(), chunks: Vec::new() }))
+        if !is_readable().map_err(IoError::system("standard input", "read the samples"))? {
+            wait.go_on();
+            continue;
+        }
+        let filled = frames.read_some(&mut bytes)?;
+        if filled > 0 {
+            return Ok(Some(Message::Frames { bytes, filled }));
+        }
     }
-
-    /// Takes a used block back.
-    pub(super) fn give_back(&mut self, bytes: Vec<u8>) {
-        self.spare = bytes;
-    }
+    Ok(Some(Message::End { faults: frames.faults(), chunks: Vec::new() }))
 }
 
 /// Whether a read would not wait; false after a while without bytes.

@@ -44,6 +44,9 @@ impl FromStr for Coding {
     }
 }
 
+/// Maximum number of channels of an input, the same as in a WAV header.
+pub(super) const MOST_CHANNELS: u64 = 65_535;
+
 /// Relative difference up to which two rates are the same. Specs state periods with six or seven digits, and
 /// within the length of a filter a difference this small moves no sample.
 const SAME_RATE: f64 = 1e-6;

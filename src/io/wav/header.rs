@@ -1,6 +1,6 @@
 //! The contents of a WAV header.
 
-use super::chunks::{Chunk, Chunks, Family};
+use super::chunks::{Chunk, Chunks};
 use crate::io::{IoError, PcmFormat, SampleLayout};
 use std::io::Read;
 
@@ -51,8 +51,6 @@ pub struct WavHeader {
     pub data_offset: u64,
     /// What is said of the recording before the samples.
     pub chunks: Vec<WavChunk>,
-    /// Chunks may follow the samples.
-    pub(super) is_riff: bool,
     /// 24 significant bits in 32: writers disagree whether they lie high or low.
     pub(super) justification_open: bool,
 }
@@ -111,9 +109,9 @@ impl WavHeader {
         let channels = usize::from(fmt.channels);
         let layout = fmt.layout(chunks)?;
         let frame = (layout.container * channels) as u64;
-        let data_bytes = match (chunks.family, true_size) {
-            (Family::Rf64, Some(size)) if data.size == u64::from(u32::MAX) => known_size_64(size),
-            (Family::W64, _) => known_size_64(data.size),
+        let data_bytes = match true_size.filter(|_| chunks.is_rf64) {
+            // 0 or more than any disk holds: the writer did not know the size.
+            Some(size) if data.size == u64::from(u32::MAX) => (1..1 << 62).contains(&size).then_some(size),
             _ => known_size(data.size, frame, chunks.promised > data.offset && chunks.promised < 0x7FFF_0000),
         };
         Ok(Self {
@@ -123,7 +121,6 @@ impl WavHeader {
             data_bytes,
             data_offset: data.offset,
             chunks: Vec::new(),
-            is_riff: chunks.family != Family::W64,
             justification_open: layout.container == 4 && fmt.significant_bits() == 24,
         })
     }
@@ -139,11 +136,6 @@ fn known_size(size: u64, frame: u64, empty_possible: bool) -> Option<u64> {
         || (0xFFFF_0000..=0xFFFF_FFFF).contains(&size)
         || (size == 0 && !empty_possible);
     (!streamed).then_some(size)
-}
-
-/// In 64-bit size fields, 0 or a number larger than any disk means that the writer did not know the size.
-fn known_size_64(size: u64) -> Option<u64> {
-    (size > 0 && size < 1 << 62).then_some(size)
 }
 
 fn no_fmt<R: Read>(chunks: &Chunks<'_, R>, data: Chunk) -> IoError {

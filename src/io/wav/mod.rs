@@ -1,4 +1,4 @@
-//! WAV files and streams: RIFF, RF64/BW64 and Sony Wave64 in, RIFF and RF64 out.
+//! WAV files and streams: RIFF and RF64/BW64 in, RIFF and RF64 out.
 //!
 //! The reader does not seek. It accepts common deviations from the standards: streamed headers with unknown
 //! length, odd chunks without their pad byte, headers of 16, 18 and 40 bytes, metadata before the samples,

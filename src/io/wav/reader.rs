@@ -20,7 +20,7 @@ impl<R: Read> WavReader<R> {
     /// Reads the header; `file` is the name in error messages.
     ///
     /// # Errors
-    /// [`IoError`] for anything that is not plain PCM in RIFF, RF64, BW64 or W64.
+    /// [`IoError`] for anything that is not plain PCM in RIFF, RF64 or BW64.
     pub fn new(inner: R, file: &str) -> Result<Self, IoError> {
         let mut chunks = Chunks::open(inner, file)?;
         let mut header = WavHeader::read(&mut chunks)?;
@@ -63,7 +63,7 @@ impl<R: Read> Capture for WavReader<R> {
     /// What is damaged there is left out: the samples matter.
     fn chunks_after(&mut self) -> Vec<WavChunk> {
         let mut chunks = Vec::new();
-        let is_whole = self.data.limit() == 0 && self.header.is_riff;
+        let is_whole = self.data.limit() == 0;
         let Some(data_bytes) = self.header.data_bytes.filter(|_| is_whole) else { return chunks };
         let inner = self.data.get_mut();
         let mut pad = data_bytes % 2;
