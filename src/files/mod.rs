@@ -31,6 +31,8 @@ mod place;
 pub(crate) mod signals;
 
 pub use atomic::{AtomicFile, commit_all, remove_unfinished};
+#[cfg(feature = "runtime")]
+pub(crate) use bounded::fill;
 pub use bounded::{Bound, bytes_of, read_bytes, read_text, text_in};
 pub use error::FileError;
 pub use hidden::{Leftover, leftovers};

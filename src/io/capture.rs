@@ -53,20 +53,6 @@ pub(super) fn open_file(path: &Path) -> Result<File, IoError> {
     File::open(path).map_err(IoError::system(&path.display().to_string(), "open it"))
 }
 
-/// Reads until `bytes` are full or the end; gives how many there are.
-pub(super) fn fill(reader: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
-    let mut filled = 0;
-    while filled < bytes.len() {
-        match reader.read(&mut bytes[filled..]) {
-            Ok(0) => break,
-            Ok(count) => filled += count,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(filled)
-}
-
 /// Bytes that are made a block at a time and read in pieces.
 #[derive(Debug, Default)]
 pub(super) struct Blocks {

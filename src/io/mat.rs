@@ -5,9 +5,9 @@
 //! it is the only array. A number called `fs` gives the rate.
 
 use super::array::{ArrayHeader, ArrayReader};
-use super::capture::fill;
 use super::mat_element::{COMPRESSED, MATRIX, Numbers, Order, Tag, unreadable};
 use super::{IoError, PcmFormat};
+use crate::files::fill;
 use flate2::read::ZlibDecoder;
 use std::fmt;
 use std::io::{Cursor, Read, Seek, SeekFrom};

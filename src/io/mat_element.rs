@@ -1,6 +1,6 @@
 //! Data elements of MATLAB files: a tag with type and size, and bytes.
 
-use super::capture::fill;
+use crate::files::fill;
 use std::io::{self, Read};
 
 /// Most bytes of the numbers of an array, which are held in memory.

@@ -1,7 +1,7 @@
 //! Reads a WAV header chunk by chunk, without seeking.
 
+use crate::files::fill;
 use crate::io::IoError;
-use crate::io::capture::fill;
 use std::io::{self, Read};
 
 /// Names that may follow an odd chunk at once, where a writer forgot the pad byte.
