@@ -2,7 +2,7 @@
 
 use super::FileError;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::Read;
 use std::path::Path;
 
 /// Maximum size of a kind of file.
@@ -62,13 +62,13 @@ pub fn text_in(bytes: Vec<u8>, name: &str) -> Result<String, FileError> {
 
 /// Reads until `bytes` are full or the end; gives how many there are.
 #[cfg(feature = "runtime")]
-pub(crate) fn fill(reader: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
+pub(crate) fn fill(reader: &mut impl Read, bytes: &mut [u8]) -> std::io::Result<usize> {
     let mut filled = 0;
     while filled < bytes.len() {
         match reader.read(&mut bytes[filled..]) {
             Ok(0) => break,
             Ok(count) => filled += count,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
             Err(error) => return Err(error),
         }
     }
