@@ -9,7 +9,7 @@ than the fastest algorithm: run it for the table of each instruction set, becaus
 """
 
 import sys
-from math import log2
+from math import ceil, log2
 
 import numpy as np
 from scipy.optimize import nnls
@@ -18,12 +18,13 @@ GROUP = int(sys.argv[1])
 
 
 def blocks(n, m, k, length):
-    """Terms of overlap-save: rows x levels, vectors of products, outputs, inputs, frames."""
+    """Terms of overlap-save: rows x passes, vectors of products, batches, outputs, inputs, frames."""
     depth = min(1 << (max(n, m) - 1).bit_length(), GROUP)
     batch = 2 * (GROUP // depth) * (length - k + 1)
     inputs, outputs = -(-n // depth), -(-m // depth)
     share = length / batch
-    return [share * (inputs + outputs) * log2(length), share * 4 * n * outputs, m, n, 1]
+    passes = ceil(log2(length) / 2) * (1 + 0.15 * max(0, log2(length / 256)))
+    return [share * (inputs + outputs) * passes, share * 4 * n * outputs, 1 / batch, m, n, 1]
 
 
 def direct(n, m, k):
