@@ -87,7 +87,8 @@ const LONGEST_TRANSFORM: usize = 1 << 24;
 const DIRECT_SUM: f64 = 1.2;
 /// Each output of the direct algorithm.
 const DIRECT_OUTPUT: f64 = 0.3;
-/// A row in one pass of a transform, of radix 4 (the last one may be of radix 2): 17 operations, loads, stores.
+/// A row in one pass of a transform, of radix 4 (the last one may be of radix 2): 17 operations, loads,
+/// stores.
 const ROW_PASS: f64 = 8.0;
 /// Each doubling of F beyond this many rows, which fill half of a first-level cache of 32 KB, makes a pass
 /// longer by this part of it.
