@@ -6,9 +6,9 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
-use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::matmul_with_conj;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{Accum, MatMut, MatRef, Par};
+use faer::{Accum, Conj, MatMut, MatRef, Par};
 
 use super::{CMat, Complex};
 
@@ -84,16 +84,6 @@ impl Blocks {
             *a += b * alpha;
         }
     }
-
-    /// Sum over all blocks of `Re tr(self* other)`.
-    pub fn inner(&self, other: &Self) -> f64 {
-        (0..self.count).map(|l| inner(self.block(l).data, other.block(l).data)).sum()
-    }
-
-    /// Square root of the sum of squared moduli of all entries.
-    pub fn norm(&self) -> f64 {
-        self.inner(self).sqrt()
-    }
 }
 
 /// `Re sum conj(a) b`.
@@ -128,12 +118,12 @@ impl<'a> Block<'a> {
 
     /// The block itself as a factor.
     pub fn plain(self) -> Factor<'a> {
-        Factor { block: self, op: Op::Plain }
+        Factor { view: self.view(), conj: Conj::No }
     }
 
     /// The conjugate transpose as a factor.
     pub fn adjoint(self) -> Factor<'a> {
-        Factor { block: self, op: Op::Adjoint }
+        Factor { view: self.view().transpose(), conj: Conj::Yes }
     }
 
     fn view(self) -> MatRef<'a, C64> {
@@ -186,28 +176,15 @@ impl BlockMut<'_> {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Op {
-    Plain,
-    Adjoint,
-}
-
 /// A factor of a product: a block or its conjugate transpose.
 #[derive(Debug, Clone, Copy)]
 pub struct Factor<'a> {
-    block: Block<'a>,
-    op: Op,
+    view: MatRef<'a, C64>,
+    conj: Conj,
 }
 
 fn product(dst: MatMut<'_, C64>, acc: Accum, a: Factor<'_>, b: Factor<'_>, alpha: f64) {
-    let alpha = C64::new(alpha, 0.0);
-    let (x, y) = (a.block.view(), b.block.view());
-    match (a.op, b.op) {
-        (Op::Plain, Op::Plain) => matmul(dst, acc, x, y, alpha, Par::Seq),
-        (Op::Adjoint, Op::Plain) => matmul(dst, acc, x.adjoint(), y, alpha, Par::Seq),
-        (Op::Plain, Op::Adjoint) => matmul(dst, acc, x, y.adjoint(), alpha, Par::Seq),
-        (Op::Adjoint, Op::Adjoint) => matmul(dst, acc, x.adjoint(), y.adjoint(), alpha, Par::Seq),
-    }
+    matmul_with_conj(dst, acc, a.view, a.conj, b.view, b.conj, C64::new(alpha, 0.0), Par::Seq);
 }
 
 /// Cholesky factorisation of small Hermitian blocks in place, with its work memory.

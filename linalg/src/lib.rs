@@ -13,24 +13,23 @@
 mod assemble;
 mod balance;
 pub mod blocks;
-mod cholesky;
 mod eigen;
 pub mod fourier;
 pub mod least_squares;
-mod lq;
+mod scalar;
 mod solve;
-mod svd;
 
 pub use assemble::{block_diagonal, from_blocks, hstack, vstack};
 pub use balance::{power_of_two, state_scales};
-pub use cholesky::{PositiveFactor, cholesky, solve_positive};
 pub use eigen::{
-    candidate_eigenvalues, candidate_eigenvalues_c, eigen, eigenvalues, eigenvalues_c, hermitian_eigenvalues,
-    real_schur, spectral_radius, symmetric_eigen, symmetric_eigenvalues,
+    candidate_eigenvalues, eigen, eigenvalues, hermitian_eigenvalues, largest_singular_value, real_schur,
+    singular_values, spectral_radius, svd, symmetric_eigen,
 };
-pub use lq::{lq, lq_c, lq_factor, lq_factor_c};
-pub use solve::{inverse, solve, solve_c, solve_lower, solve_lower_transposed, transposed_product};
-pub use svd::{Svd, SvdC, largest_singular_value_c, singular_values, singular_values_c, svd, svd_c};
+pub use scalar::{Scalar, Svd};
+pub use solve::{
+    PositiveFactor, cholesky, inverse, lq, lq_factor, solve, solve_lower, solve_lower_transposed,
+    solve_positive, transposed_product,
+};
 
 use faer::MatRef;
 pub use nalgebra::Complex;
@@ -97,15 +96,8 @@ fn no_convergence<T>(routine: &'static str, m: &DMatrix<T>) -> LinalgError {
 }
 
 /// Refuses NaN and infinity before an iteration that might never end on them.
-fn check_finite(routine: &'static str, m: &Mat) -> Result<(), LinalgError> {
-    if m.iter().all(|x| x.is_finite()) {
-        return Ok(());
-    }
-    Err(LinalgError::NotFinite { routine, rows: m.nrows(), cols: m.ncols() })
-}
-
-fn check_finite_c(routine: &'static str, m: &CMat) -> Result<(), LinalgError> {
-    if m.iter().all(|x| x.re.is_finite() && x.im.is_finite()) {
+fn check_finite<T: Scalar>(routine: &'static str, m: &DMatrix<T>) -> Result<(), LinalgError> {
+    if m.iter().all(|x| nalgebra::ComplexField::is_finite(x)) {
         return Ok(());
     }
     Err(LinalgError::NotFinite { routine, rows: m.nrows(), cols: m.ncols() })

@@ -1,17 +1,26 @@
-//! Linear systems and products without copies.
+//! LQ, LU and Cholesky factorisations, and the systems that they solve.
 
-use super::{CMat, Mat, owned, view};
-use faer::linalg::solvers::{DenseSolveCore, Solve};
+use super::{LinalgError, Mat, Scalar, owned, view};
+use faer::Side;
+use faer::linalg::solvers::{DenseSolveCore, Llt, LltError, Solve};
+use nalgebra::DMatrix;
+
+/// Lower trapezoidal `L` (rows x min(rows, cols)) with `L L* = m m*`, by a QR factorisation of `m*`. It
+/// compresses a square root without squaring it.
+pub fn lq_factor<T: Scalar>(m: &DMatrix<T>) -> DMatrix<T> {
+    if m.is_empty() { DMatrix::zeros(m.nrows(), m.nrows().min(m.ncols())) } else { T::lq_factor(m) }
+}
+
+/// Thin `(L, Q)` with `m = L Q`, `Q Q* = I`.
+pub fn lq<T: Scalar>(m: &DMatrix<T>) -> (DMatrix<T>, DMatrix<T>) {
+    let k = m.nrows().min(m.ncols());
+    if m.is_empty() { (DMatrix::zeros(m.nrows(), k), DMatrix::zeros(k, m.ncols())) } else { T::lq(m) }
+}
 
 /// Solves the square system `m x = rhs` by LU with partial pivoting. A singular `m` gives infinities or
 /// NaN, for which the caller must check.
-pub fn solve(m: &Mat, rhs: &Mat) -> Mat {
-    owned(view(m).partial_piv_lu().solve(view(rhs)).as_ref())
-}
-
-/// Complex counterpart of [`solve`].
-pub fn solve_c(m: &CMat, rhs: &CMat) -> CMat {
-    owned(view(m).partial_piv_lu().solve(view(rhs)).as_ref())
+pub fn solve<T: Scalar>(m: &DMatrix<T>, rhs: &DMatrix<T>) -> DMatrix<T> {
+    T::solve(m, rhs)
 }
 
 /// Inverse by LU with partial pivoting; see [`solve`] for singular matrices.
@@ -21,15 +30,17 @@ pub fn inverse(m: &Mat) -> Mat {
 
 /// Solves `l x = rhs` with a lower triangular `l`.
 pub fn solve_lower(l: &Mat, rhs: &Mat) -> Mat {
-    let mut x = faer::Mat::from_fn(rhs.nrows(), rhs.ncols(), |i, j| rhs[(i, j)]);
-    view(l).solve_lower_triangular_in_place(x.as_mut());
-    owned(x.as_ref())
+    in_place(rhs, |x| view(l).solve_lower_triangular_in_place(x))
 }
 
 /// Solves `l' x = rhs` with a lower triangular `l`.
 pub fn solve_lower_transposed(l: &Mat, rhs: &Mat) -> Mat {
-    let mut x = faer::Mat::from_fn(rhs.nrows(), rhs.ncols(), |i, j| rhs[(i, j)]);
-    view(l).transpose().solve_upper_triangular_in_place(x.as_mut());
+    in_place(rhs, |x| view(l).transpose().solve_upper_triangular_in_place(x))
+}
+
+fn in_place(rhs: &Mat, solve: impl FnOnce(faer::MatMut<'_, f64>)) -> Mat {
+    let mut x = view(rhs).to_owned();
+    solve(x.as_mut());
     owned(x.as_ref())
 }
 
@@ -40,4 +51,47 @@ pub fn solve_lower_transposed(l: &Mat, rhs: &Mat) -> Mat {
 pub fn transposed_product(a: &Mat, columns: std::ops::Range<usize>, b: &Mat) -> Mat {
     let part = view(a).subcols(columns.start, columns.len());
     owned((part.transpose() * view(b)).as_ref())
+}
+
+/// Lower Cholesky factor of a symmetric matrix; only the lower triangle is read.
+pub fn cholesky(m: &Mat) -> Result<Mat, LinalgError> {
+    Ok(owned(PositiveFactor::new(m)?.llt.L()))
+}
+
+/// Solves `m x = rhs` for a symmetric positive definite `m` (lower triangle read).
+pub fn solve_positive(m: &Mat, rhs: &Mat) -> Result<Mat, LinalgError> {
+    Ok(PositiveFactor::new(m)?.solve(rhs))
+}
+
+/// Cholesky factorisation of a symmetric positive definite matrix, kept for many right-hand sides.
+#[derive(Debug, Clone)]
+pub struct PositiveFactor {
+    llt: Llt<f64>,
+}
+
+impl PositiveFactor {
+    /// Factors `m`; only the lower triangle is read.
+    pub fn new(m: &Mat) -> Result<Self, LinalgError> {
+        match view(m).llt(Side::Lower) {
+            Ok(llt) => Ok(Self { llt }),
+            Err(LltError::NonPositivePivot { index }) => {
+                Err(LinalgError::NotPositiveDefinite { pivot: index })
+            }
+        }
+    }
+
+    /// `m^{-1} rhs`.
+    pub fn solve(&self, rhs: &Mat) -> Mat {
+        owned(self.llt.solve(view(rhs)).as_ref())
+    }
+
+    /// `L^{-1} rhs` with the lower factor L, `m = L L'`.
+    pub fn solve_half(&self, rhs: &Mat) -> Mat {
+        in_place(rhs, |x| self.llt.L().solve_lower_triangular_in_place(x))
+    }
+
+    /// `L'^{-1} rhs`, the other half.
+    pub fn solve_half_transposed(&self, rhs: &Mat) -> Mat {
+        in_place(rhs, |x| self.llt.L().transpose().solve_upper_triangular_in_place(x))
+    }
 }

@@ -1,6 +1,6 @@
 //! From a written filter to a gain and blocks in series, in normalised time.
 
-use crate::linalg::{Complex, Mat, eigenvalues, solve_c, to_complex};
+use crate::linalg::{Complex, Mat, eigenvalues, solve, to_complex};
 use crate::spec::{Family, FilterProblem, FilterSpec, Passband};
 use crate::units::{RadiansPerFastPeriod, Seconds};
 
@@ -59,7 +59,7 @@ impl Block {
 pub(super) fn state_response(state: &Realisation, s: Complex<f64>) -> Complex<f64> {
     let n = state.a.nrows();
     let pencil = crate::linalg::CMat::identity(n, n) * s - to_complex(&state.a);
-    let x = solve_c(&pencil, &to_complex(&state.b));
+    let x = solve(&pencil, &to_complex(&state.b));
     (to_complex(&state.c) * x)[(0, 0)] + state.d
 }
 

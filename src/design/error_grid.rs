@@ -130,7 +130,7 @@ pub(super) fn error_at(point: &Point, taps: &[Mat]) -> CMat {
 
 /// The largest singular value of K at a point.
 pub(super) fn gain(point: &Point, taps: &[Mat]) -> Result<f64, DesignError> {
-    Ok(linalg::largest_singular_value_c(&error_at(point, taps))?)
+    Ok(linalg::largest_singular_value(&error_at(point, taps))?)
 }
 
 /// Vertex of the parabola through (-1, a), (0, b), (1, c): abscissa and height.

@@ -261,7 +261,7 @@ impl<E: AffineError> Exchange<E> {
         let (mut points, mut weights) = (Vec::new(), Vec::new());
         for (l, point) in self.problem.points().iter().enumerate() {
             let weight = self.objective.weights[l];
-            let gain = linalg::largest_singular_value_c(&self.problem.error_at(l, &start.taps))?;
+            let gain = linalg::largest_singular_value(&self.problem.error_at(l, &start.taps))?;
             if weight > 0.0 || gain >= least {
                 points.push(point.clone());
                 weights.push(weight);

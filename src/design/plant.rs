@@ -179,7 +179,7 @@ impl LiftedPlant {
     /// (H, W) at e^{j omega}, omega in radians per slow period. The columns are compressed to at most N + M,
     /// which keeps `[H; W] [H; W]*`.
     pub fn response(&self, omega: f64) -> (CMat, CMat) {
-        let g = linalg::lq_factor_c(&self.at_frequency(omega));
+        let g = linalg::lq_factor(&self.at_frequency(omega));
         let (n, m) = (self.channels(), self.ratio());
         (g.rows(0, n).into_owned(), g.rows(n, m).into_owned())
     }

@@ -67,7 +67,7 @@ impl Spline {
     /// F at the angle theta, M x N.
     pub(super) fn at(&self, theta: f64) -> CMat {
         let values = self.values(theta);
-        let moments = linalg::solve_c(&self.moment_matrix(theta), &(self.slope_matrix(theta) * &values));
+        let moments = linalg::solve(&self.moment_matrix(theta), &(self.slope_matrix(theta) * &values));
         let mut filters = CMat::zeros(self.outputs.len(), self.channels);
         for (p, output) in self.outputs.iter().enumerate() {
             let row = self.piece(output.time, theta, &values, &moments);

@@ -7,8 +7,7 @@
 //!
 //! y[k] = sum_{j = 0..q} h_j u[k - j] + c x[k],  x[k + 1] = a x[k] + b u[k - q].
 
-use super::balanced::balanced;
-use super::gramian::h2_norm;
+use super::gramian::{balanced, h2_norm};
 use super::parallel_form::{parallel_form, triangular_form};
 use super::{LtiError, StateSpace, StateSpaceError};
 use crate::linalg::{self, Mat};

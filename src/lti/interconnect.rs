@@ -7,6 +7,7 @@
 
 use super::{StateSpace, StateSpaceError};
 use crate::linalg::{self, Mat};
+use nalgebra::DVector;
 use std::ops::Range;
 
 impl StateSpace {
@@ -68,9 +69,10 @@ impl StateSpace {
     /// # Errors
     /// [`StateSpaceError::Connection`] unless `next` has an input for each output.
     pub fn series(&self, next: &Self) -> Result<Self, StateSpaceError> {
-        self.fits(next, "series", "an input of the second system for each output of the first", |g, n| {
-            g.outputs() == n.inputs()
-        })?;
+        if self.outputs() != next.inputs() {
+            let (first, second) = (self.d.shape(), next.d.shape());
+            return Err(StateSpaceError::Connection { first, second });
+        }
         Ok(Self {
             a: linalg::from_blocks(&[
                 &[&self.a, &Mat::zeros(self.order(), next.order())],
@@ -96,53 +98,6 @@ impl StateSpace {
             d: linalg::vstack(&[&self.d, &driven.d])?,
             ..driven
         })
-    }
-
-    /// `[G; H]`: both systems with the same inputs, the outputs of this one first.
-    ///
-    /// # Errors
-    /// [`StateSpaceError::Connection`] unless both have equally many inputs.
-    pub fn stack(&self, below: &Self) -> Result<Self, StateSpaceError> {
-        self.fits(below, "stack", "equally many inputs", |g, h| g.inputs() == h.inputs())?;
-        Ok(Self {
-            a: linalg::block_diagonal(&[&self.a, &below.a]),
-            b: linalg::vstack(&[&self.b, &below.b])?,
-            c: linalg::block_diagonal(&[&self.c, &below.c]),
-            d: linalg::vstack(&[&self.d, &below.d])?,
-        })
-    }
-
-    /// `diag(G, H)`: both systems side by side, each with its own inputs and outputs.
-    pub fn append(&self, other: &Self) -> Self {
-        Self {
-            a: linalg::block_diagonal(&[&self.a, &other.a]),
-            b: linalg::block_diagonal(&[&self.b, &other.b]),
-            c: linalg::block_diagonal(&[&self.c, &other.c]),
-            d: linalg::block_diagonal(&[&self.d, &other.d]),
-        }
-    }
-
-    /// `G + H`.
-    ///
-    /// # Errors
-    /// [`StateSpaceError::Connection`] unless both have equally many inputs and equally many outputs.
-    pub fn parallel(&self, other: &Self) -> Result<Self, StateSpaceError> {
-        self.fits(other, "parallel", "equally many inputs and outputs", |g, h| g.d.shape() == h.d.shape())?;
-        Ok(Self {
-            a: linalg::block_diagonal(&[&self.a, &other.a]),
-            b: linalg::vstack(&[&self.b, &other.b])?,
-            c: linalg::hstack(&[&self.c, &other.c])?,
-            d: &self.d + &other.d,
-        })
-    }
-
-    /// `G - H`.
-    ///
-    /// # Errors
-    /// As [`StateSpace::parallel`].
-    pub fn subtract(&self, other: &Self) -> Result<Self, StateSpaceError> {
-        let negated = Self { c: -&other.c, d: -&other.d, ..other.clone() };
-        self.parallel(&negated)
     }
 
     /// `T G`: each output a combination of the former ones.
@@ -174,12 +129,7 @@ impl StateSpace {
     /// # Errors
     /// [`StateSpaceError::Gain`] unless there is a gain for each input.
     pub fn scale_inputs(&self, gains: &[f64]) -> Result<Self, StateSpaceError> {
-        if gains.len() != self.inputs() {
-            let (count, gain) = (self.inputs(), (gains.len(), 1));
-            return Err(StateSpaceError::Gain { ports: "inputs", count, gain });
-        }
-        let scaled = |m: &Mat| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * gains[j]);
-        Ok(Self { a: self.a.clone(), b: scaled(&self.b), c: self.c.clone(), d: scaled(&self.d) })
+        self.map_inputs(&Mat::from_diagonal(&DVector::from_column_slice(gains)))
     }
 
     /// `diag(gains) G`.
@@ -187,12 +137,7 @@ impl StateSpace {
     /// # Errors
     /// [`StateSpaceError::Gain`] unless there is a gain for each output.
     pub fn scale_outputs(&self, gains: &[f64]) -> Result<Self, StateSpaceError> {
-        if gains.len() != self.outputs() {
-            let (count, gain) = (self.outputs(), (gains.len(), 1));
-            return Err(StateSpaceError::Gain { ports: "outputs", count, gain });
-        }
-        let scaled = |m: &Mat| Mat::from_fn(m.nrows(), m.ncols(), |i, j| gains[i] * m[(i, j)]);
-        Ok(Self { a: self.a.clone(), b: self.b.clone(), c: scaled(&self.c), d: scaled(&self.d) })
+        self.map_outputs(&Mat::from_diagonal(&DVector::from_column_slice(gains)))
     }
 
     /// The same system with the given outputs only, in that order; an output may be taken twice.
@@ -203,16 +148,6 @@ impl StateSpace {
         let rows = selection("outputs", self.outputs(), outputs)?;
         let (c, d) = (self.c.select_rows(&rows), self.d.select_rows(&rows));
         Ok(Self { a: self.a.clone(), b: self.b.clone(), c, d })
-    }
-
-    /// The same system with the given inputs only, in that order; the others are zero.
-    ///
-    /// # Errors
-    /// [`StateSpaceError::Selection`] if one of them is not there.
-    pub fn select_inputs(&self, inputs: impl IntoIterator<Item = usize>) -> Result<Self, StateSpaceError> {
-        let columns = selection("inputs", self.inputs(), inputs)?;
-        let (b, d) = (self.b.select_columns(&columns), self.d.select_columns(&columns));
-        Ok(Self { a: self.a.clone(), b, c: self.c.clone(), d })
     }
 
     /// The given states only, in that order, the others held at zero. With all states given this is a
@@ -228,20 +163,6 @@ impl StateSpace {
             c: self.c.select_columns(&kept),
             d: self.d.clone(),
         })
-    }
-
-    fn fits(
-        &self,
-        other: &Self,
-        operation: &'static str,
-        rule: &'static str,
-        holds: impl Fn(&Self, &Self) -> bool,
-    ) -> Result<(), StateSpaceError> {
-        if holds(self, other) {
-            return Ok(());
-        }
-        let (first, second) = (self.d.shape(), other.d.shape());
-        Err(StateSpaceError::Connection { operation, rule, first, second })
     }
 }
 

@@ -3,23 +3,21 @@
 //! This module does not depend on filter banks: a system has inputs, outputs and states. Continuous-time
 //! helpers ([`exponential`]) serve exact discretisation.
 
-pub mod balanced;
-mod bounded_real;
-mod coordinates;
 pub mod exponential;
 mod fir_with_tail;
 pub mod gramian;
 mod interconnect;
 pub mod parallel_form;
 pub mod peak;
+mod refine;
 mod response;
 pub mod riccati;
 mod state_space;
 
-pub use bounded_real::bounded_real_riccati;
-pub use coordinates::GramianCoordinates;
 pub use fir_with_tail::FirWithTail;
+pub use gramian::GramianCoordinates;
 pub use response::FrequencyResponse;
+pub use riccati::bounded_real_riccati;
 pub use state_space::{StateSpace, StateSpaceError};
 
 use crate::linalg::LinalgError;

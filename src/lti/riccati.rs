@@ -16,47 +16,29 @@ const CONVERGED: f64 = 1e-14;
 /// A relative residual above this is not a solution; below it the caller decides.
 const RESIDUAL_LIMIT: f64 = 1e-3;
 
-/// The result of a doubling. If it does not converge, a solution may still exist.
-#[derive(Debug, Clone, PartialEq)]
-pub enum RiccatiOutcome {
-    /// The stabilising solution.
-    Solved(RiccatiSolution),
-    /// No solution was found.
-    Unresolved {
-        /// Doublings done.
-        steps: usize,
-        /// Last relative change, or relative residual when the change was small enough.
-        error: f64,
-    },
-}
-
-/// A stabilising solution with its closed loop and its residual.
+/// A stabilising solution: the eigenvalues of (I + G X)^-1 F lie inside the unit circle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RiccatiSolution {
     /// X, n x n, symmetric.
     pub x: Mat,
-    /// (I + G X)^-1 F, whose eigenvalues lie inside the unit circle.
-    pub closed_loop: Mat,
-    /// Doublings done.
-    pub steps: usize,
     /// ||F' X (I + G X)^-1 F + H - X||: X solves the equation exactly for an H that differs by this much.
     pub residual: f64,
 }
 
-/// Solves X = F' X (I + G X)^-1 F + H for the stabilising X; all matrices n x n.
-pub fn solve_doubling(f: &Mat, g: &Mat, h: &Mat) -> RiccatiOutcome {
+/// Solves X = F' X (I + G X)^-1 F + H for the stabilising X; all matrices n x n. `None` if the doubling does
+/// not converge or ends at no solution; one may still exist.
+pub fn solve_doubling(f: &Mat, g: &Mat, h: &Mat) -> Option<RiccatiSolution> {
     let mut iterate = Iterate { f: f.clone(), g: g.clone(), x: h.clone() };
-    let mut change = f64::INFINITY;
-    for steps in 1..=DOUBLING_LIMIT {
-        change = iterate.double();
+    for _ in 0..DOUBLING_LIMIT {
+        let change = iterate.double();
         if !change.is_finite() {
-            return RiccatiOutcome::Unresolved { steps, error: change };
+            return None;
         }
         if change <= CONVERGED {
-            return verify(f, g, h, iterate.x, steps);
+            return verify(f, g, h, iterate.x);
         }
     }
-    RiccatiOutcome::Unresolved { steps: DOUBLING_LIMIT, error: change }
+    None
 }
 
 struct Iterate {
@@ -91,14 +73,11 @@ fn identity_plus(g: &Mat, x: &Mat) -> Mat {
     w
 }
 
-fn verify(f: &Mat, g: &Mat, h: &Mat, x: Mat, steps: usize) -> RiccatiOutcome {
+fn verify(f: &Mat, g: &Mat, h: &Mat, x: Mat) -> Option<RiccatiSolution> {
     let (x, residual) = refined(f, g, h, x);
     let closed_loop = linalg::solve(&identity_plus(g, &x), f);
     let stable = linalg::spectral_radius(&closed_loop).is_ok_and(|radius| radius < 1.0);
-    if residual <= RESIDUAL_LIMIT * x.norm() && stable {
-        return RiccatiOutcome::Solved(RiccatiSolution { x, closed_loop, steps, residual });
-    }
-    RiccatiOutcome::Unresolved { steps, error: residual }
+    (residual <= RESIDUAL_LIMIT * x.norm() && stable).then_some(RiccatiSolution { x, residual })
 }
 
 /// A few steps of the plain recursion, which contracts about its stabilising solution, as long as they help.
@@ -131,16 +110,35 @@ fn inverse_weight(g: &Mat, x: &Mat) -> Mat {
     linalg::inverse(&(linalg::inverse(x) + g))
 }
 
+/// The stabilising solution P (n x n) of the Riccati equation of the bounded real lemma (Green and Limebeer,
+/// *Linear Robust Control*, 1995, appendix B) at the level g with `weight` on all states,
+///
+/// ```text
+/// P = A'PA + C'C/g + weight I + (A'PB + C'D/g) (g I - D'D/g - B'PB)^-1 (A'PB + C'D/g)'.
+/// ```
+///
+/// For stable A, `weight` = 0 and g above the H-infinity norm of `C (zI - A)^-1 B + D` it exists, with
+/// `P >= 0` and `g I - D'D/g - B'PB > 0`; a solution without these two signs says nothing about the norm. It
+/// is solved by doubling in the form `P = F'P (I + G P)^-1 F + H` with `R = g I - D'D/g`,
+/// `F = A + B R^-1 D'C/g`, `G = -B R^-1 B'`, `H = C'C/g + C'D R^-1 D'C/g^2 + weight I`.
+///
+/// `None` if g is not above the norm of D, or if the doubling finds no stabilising solution.
+pub fn bounded_real_riccati(a: &Mat, b: &Mat, c: &Mat, d: &Mat, g: f64, weight: f64) -> Option<Mat> {
+    let m = b.ncols();
+    let r = Mat::identity(m, m) * g - d.tr_mul(d) / g;
+    let dc = d.tr_mul(c) / g;
+    let solved = linalg::solve_positive(&r, &dc).ok()?;
+    let inverse_b = linalg::solve_positive(&r, &b.transpose()).ok()?;
+    let f = a + b * &solved;
+    let neg = -linalg::symmetric_part(&(b * inverse_b));
+    let n = a.nrows();
+    let h = linalg::symmetric_part(&(c.tr_mul(c) / g + dc.tr_mul(&solved) + Mat::identity(n, n) * weight));
+    solve_doubling(&f, &neg, &h).map(|solution| linalg::symmetric_part(&solution.x))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn solved(f: &Mat, g: &Mat, h: &Mat) -> RiccatiSolution {
-        match solve_doubling(f, g, h) {
-            RiccatiOutcome::Solved(solution) => solution,
-            RiccatiOutcome::Unresolved { steps, error } => panic!("unresolved after {steps}: {error}"),
-        }
-    }
 
     #[test]
     fn scalar_equation_has_its_quadratic_root() {
@@ -149,7 +147,7 @@ mod tests {
             [(0.9_f64, 1.0, 1.0), (1.7, 2.0, 0.3), (0.5, -0.1, 1.0), (0.99, 1e-6, 1e3), (40.0, 1.0, 1e-9)]
         {
             let scalar = |x| Mat::from_element(1, 1, x);
-            let x = solved(&scalar(f), &scalar(g), &scalar(h)).x[0];
+            let x = solve_doubling(&scalar(f), &scalar(g), &scalar(h)).unwrap().x[0];
             let b = 1.0 - f * f - g * h;
             let exact = (-b + (b * b + 4.0 * g * h).sqrt()) / (2.0 * g);
             assert!((x - exact).abs() < 1e-9 * exact.abs(), "{f} {g} {h}: {x} {exact}");
@@ -163,7 +161,7 @@ mod tests {
         let c = Mat::from_fn(2, n, |i, j| ((i + 2 * j) as f64).cos());
         let b = Mat::from_fn(n, 2, |i, j| ((3 * i + j) as f64).sin());
         let (g, h) = (c.transpose() * c, &b * b.transpose());
-        let x = solved(&f, &g, &h).x;
+        let x = solve_doubling(&f, &g, &h).unwrap().x;
         let mut plain = Mat::zeros(n, n);
         for _ in 0..2000 {
             plain = f.transpose() * &plain * linalg::solve(&identity_plus(&g, &plain), &f) + &h;
@@ -177,7 +175,7 @@ mod tests {
         let f = Mat::from_fn(n, n, |i, j| f64::from(u8::from(j == i + 1)));
         let mut h = Mat::zeros(n, n);
         h[(n - 1, n - 1)] = 1.0;
-        let x = solved(&f.transpose(), &Mat::zeros(n, n), &h).x;
+        let x = solve_doubling(&f.transpose(), &Mat::zeros(n, n), &h).unwrap().x;
         assert!((x - Mat::identity(n, n)).norm() < 1e-15);
     }
 
@@ -185,6 +183,43 @@ mod tests {
     fn no_stabilising_solution_is_said() {
         // Unit-circle eigenvalues: x = x / (1 - x) + 1 has no real root.
         let one = Mat::from_element(1, 1, 1.0);
-        assert!(matches!(solve_doubling(&one, &-&one, &one), RiccatiOutcome::Unresolved { .. }));
+        assert_eq!(solve_doubling(&one, &-&one, &one), None);
+    }
+
+    fn one(value: f64) -> Mat {
+        Mat::from_element(1, 1, value)
+    }
+
+    /// 1 / (z - 0.5) has the norm 2. Just above it the equation has a solution; between 2/3 and 2 its
+    /// discriminant is negative.
+    #[test]
+    fn a_solution_exists_above_the_norm_and_not_below() {
+        let solved = |g: f64| bounded_real_riccati(&one(0.5), &one(1.0), &one(1.0), &one(0.0), g, 0.0);
+        assert!(solved(2.0 * (1.0 + 1e-6)).is_some());
+        for g in [2.0 * (1.0 - 1e-6), 1.5, 0.7] {
+            assert!(solved(g).is_none(), "{g}");
+        }
+    }
+
+    #[test]
+    fn the_solution_satisfies_the_equation() {
+        let a = Mat::from_row_slice(3, 3, &[0.8, 0.5, 0.0, -0.3, 0.6, 0.2, 0.0, 0.1, 0.4]);
+        let b = Mat::from_row_slice(3, 2, &[1.0, 0.0, 0.3, 1.0, 0.0, -0.7]);
+        let c = Mat::from_row_slice(2, 3, &[1.0, -1.0, 0.5, 0.0, 2.0, 1.0]);
+        let d = Mat::from_row_slice(2, 2, &[0.1, 0.0, -0.2, 0.3]);
+        let (g, weight) = (40.0, 1e-3);
+        let p = bounded_real_riccati(&a, &b, &c, &d, g, weight).unwrap();
+        let cross = a.transpose() * &p * &b + c.transpose() * &d / g;
+        let inner = Mat::identity(2, 2) * g - d.transpose() * &d / g - b.transpose() * &p * &b;
+        let right = a.transpose() * &p * &a
+            + c.transpose() * &c / g
+            + Mat::identity(3, 3) * weight
+            + &cross * inner.try_inverse().unwrap() * cross.transpose();
+        assert!((&p - right).norm() < 1e-12 * p.norm());
+    }
+
+    #[test]
+    fn a_level_below_the_feedthrough_has_no_solution() {
+        assert!(bounded_real_riccati(&one(0.5), &one(1.0), &one(1.0), &one(5.0), 2.0, 0.0).is_none());
     }
 }

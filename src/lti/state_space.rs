@@ -31,14 +31,11 @@ pub enum StateSpaceError {
     },
     /// Two systems that cannot be connected.
     #[error(
-        "{operation} needs {rule}: the first system is {}x{} (outputs x inputs), the second one {}x{}",
+        "a series needs an input of the second system for each output of the first: the first system is {}x{} \
+         (outputs x inputs), the second one {}x{}",
         first.0, first.1, second.0, second.1
     )]
     Connection {
-        /// The operation.
-        operation: &'static str,
-        /// The rule that it requires.
-        rule: &'static str,
         /// Outputs and inputs of the first system.
         first: (usize, usize),
         /// Outputs and inputs of the second system.
@@ -159,7 +156,7 @@ impl StateSpace {
         for i in 0..n {
             pencil[(i, i)] += z;
         }
-        let x = linalg::solve_c(&pencil, &linalg::to_complex(&self.b));
+        let x = linalg::solve(&pencil, &linalg::to_complex(&self.b));
         linalg::to_complex(&self.c) * x + linalg::to_complex(&self.d)
     }
 }

@@ -150,7 +150,7 @@ impl<F: Number> Definite<F> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linalg::symmetric_eigenvalues;
+    use crate::linalg::hermitian_eigenvalues;
 
     /// Q diag(values) Q' with a Householder reflection: eigenvalues known beforehand.
     fn with_eigenvalues(values: &[f64]) -> Matrix {
@@ -177,7 +177,7 @@ mod tests {
     fn a_margin_is_met_and_not_exceeded() {
         let m = with_eigenvalues(&[1.0, 3.0, 0.25, 2.0]);
         assert!(exceeds(&m, 0.2499999999999999) && !exceeds(&m, 0.2500000000000001));
-        let eigenvalues = symmetric_eigenvalues(&ball::nearest(&m)).unwrap();
+        let eigenvalues = hermitian_eigenvalues(&ball::nearest(&m)).unwrap();
         assert!((eigenvalues[0] - 0.25).abs() < 1e-14);
     }
 

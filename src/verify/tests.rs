@@ -5,7 +5,7 @@ use super::spectrum::{self, ComplexMatrix};
 use super::*;
 use crate::bank::{Certificate, Gamma, LowerProof, StateSpace, SynthesisFilters};
 use crate::design::{LiftedPlant, Problem, filters};
-use crate::linalg::{CMat, symmetric_eigenvalues};
+use crate::linalg::{CMat, hermitian_eigenvalues};
 use crate::lti::FrequencyResponse;
 use crate::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, Spec};
 use crate::units::{Hertz, Seconds};
@@ -156,7 +156,7 @@ fn the_state_equations_have_the_same_response() {
 fn gram_matrices_are_positive_and_tight() {
     for (name, bank) in cases() {
         let gram = EnclosedErrorSystem::new(&bank).unwrap().period.gram;
-        let eigenvalues = symmetric_eigenvalues(&ball::nearest(&gram)).unwrap();
+        let eigenvalues = hermitian_eigenvalues(&ball::nearest(&gram)).unwrap();
         let largest = eigenvalues[eigenvalues.len() - 1];
         assert!(eigenvalues[0] > -1e-14 * largest, "{name}: {eigenvalues:?}");
         assert!(ball::radius_sum(&gram) < 1e-18 * largest, "{name}");

@@ -1,4 +1,4 @@
-use hybank_linalg::{Complex, Mat, eigenvalues, eigenvalues_c, spectral_radius, to_complex};
+use hybank_linalg::{Complex, Mat, eigenvalues, spectral_radius, to_complex};
 
 /// A delay line of `n` states, driven with `gain` by a stable pair of states.
 fn driven_line(n: usize, gain: f64) -> Mat {
@@ -20,7 +20,7 @@ fn a_gain_between_parts_does_not_move_the_eigenvalues() {
             // The other way round, and complex.
             let found = spectral_radius(&m.transpose()).unwrap();
             assert!((found - radius).abs() < 1e-14, "{n} states before {gain:e}: {found}");
-            let values = eigenvalues_c(&to_complex(&m)).unwrap();
+            let values = eigenvalues(&to_complex(&m)).unwrap();
             assert_eq!(values.iter().filter(|z| z.norm() == 0.0).count(), n);
         }
     }

@@ -3,7 +3,7 @@
 use super::spectra::Band;
 use crate::calibrate::model::Model;
 use crate::calibrate::parameters::{Kind, Parameter, Point};
-use crate::linalg::{CMat, Complex, Mat, solve_c};
+use crate::linalg::{CMat, Complex, Mat, solve};
 use std::f64::consts::TAU;
 
 /// Least noise of a band relative to its power: the rounding of the transforms.
@@ -63,7 +63,7 @@ pub(super) fn noise_power(matrix: &CMat, projection: &CMat, sources: usize) -> f
 /// I - A A^+, and A^+ = (A* A)^-1 A*.
 pub(super) fn complement(a: &CMat) -> Option<(CMat, CMat)> {
     let adjoint = a.adjoint();
-    let inverse = solve_c(&(&adjoint * a), &adjoint);
+    let inverse = solve(&(&adjoint * a), &adjoint);
     let finite = inverse.iter().all(|x| x.re.is_finite() && x.im.is_finite());
     finite.then(|| (CMat::identity(a.nrows(), a.nrows()) - a * &inverse, inverse))
 }
@@ -90,7 +90,7 @@ pub(super) fn band_score(model: &Model, point: &Point, band: &Band, aliases: &[i
         return None;
     }
     // G = S power^-1; both are Hermitian, so G* = power^-1 S.
-    let share = solve_c(&power, &signal).adjoint();
+    let share = solve(&power, &signal).adjoint();
     let weight = &share * &signal;
     let innovation = &share * &inverse * &band.matrix * &projection;
     let rows = point.parameters.iter().map(|p| derivative(model, point, band.w, aliases, p, &a));

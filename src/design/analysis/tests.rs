@@ -52,7 +52,7 @@ fn the_error_is_that_of_its_frequency_response() {
     for k in 0..count {
         let k = response(k);
         square += k.norm_squared();
-        most = most.max(linalg::singular_values_c(&k).unwrap()[0]);
+        most = most.max(linalg::singular_values(&k).unwrap()[0]);
     }
     let found = analyze(&bank, &[]).unwrap();
     let rms = (square / count as f64 / 2.0).sqrt();

@@ -40,7 +40,7 @@ fn gain(point: &Point, taps: &Taps) -> f64 {
     for (j, f) in taps.iter().enumerate() {
         k -= linalg::to_complex(f) * &point.h * Complex::from_polar(1.0, -point.omega * j as f64);
     }
-    linalg::singular_values_c(&k).unwrap()[0]
+    linalg::singular_values(&k).unwrap()[0]
 }
 
 /// The exchange on five points to begin with, `lags` lags.
@@ -138,7 +138,7 @@ fn the_dual_points_prove_the_bound() {
     let mut exchange = exchange(geometric(0.6, 1.0, &[1.0]), 2, 0.0);
     exchange.optimise().unwrap();
     let error = exchange.error();
-    let nuclear: f64 = exchange.dual.iter().map(|p| linalg::singular_values_c(&p.weight).unwrap()[0]).sum();
+    let nuclear: f64 = exchange.dual.iter().map(|p| linalg::singular_values(&p.weight).unwrap()[0]).sum();
     let inner = |taps: &Taps| -> f64 {
         let at = |p: &DualPoint| {
             let point = error.at(p.omega);

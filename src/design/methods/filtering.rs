@@ -6,7 +6,7 @@ use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, Mat};
 use crate::lti::gramian::controllability_root;
-use crate::lti::riccati::{self, RiccatiOutcome, RiccatiSolution};
+use crate::lti::riccati::{RiccatiSolution, solve_doubling};
 use crate::lti::{LtiError, StateSpace};
 use std::ops::Range;
 use std::rc::Rc;
@@ -111,10 +111,7 @@ impl RiccatiSolver for Innovations {
         let Some((f, g, h)) = self.weights(gamma) else {
             return if self.conclusive { Trial::Impossible } else { Trial::Unresolved };
         };
-        match riccati::solve_doubling(&f.transpose(), &g, &h) {
-            RiccatiOutcome::Solved(solution) => self.evaluate(&solution),
-            RiccatiOutcome::Unresolved { .. } => Trial::Unresolved,
-        }
+        solve_doubling(&f.transpose(), &g, &h).map_or(Trial::Unresolved, |solution| self.evaluate(&solution))
     }
 }
 
@@ -251,10 +248,7 @@ impl Innovations {
     fn mean_square_covariance(&self) -> Option<Mat> {
         let g = self.c2.transpose() * &self.c2;
         let h = &self.b2 * self.b2.transpose() + self.shift_of_q();
-        match riccati::solve_doubling(&self.f.transpose(), &g, &h) {
-            RiccatiOutcome::Solved(solution) => Some(solution.x + &self.p0),
-            RiccatiOutcome::Unresolved { .. } => None,
-        }
+        Some(solve_doubling(&self.f.transpose(), &g, &h)?.x + &self.p0)
     }
 
     /// (F, G, H) of the Riccati equation Delta = F Delta (I + G Delta)^-1 F' + H; `None` unless
@@ -278,7 +272,7 @@ impl Innovations {
     /// errors affect the margin, so the caller computes the norm of the error system of the filter.
     fn evaluate(&self, solution: &RiccatiSolution) -> Trial {
         let p = &solution.x + &self.p0;
-        let Ok(eigenvalues) = linalg::symmetric_eigenvalues(&p) else { return Trial::Unresolved };
+        let Ok(eigenvalues) = linalg::hermitian_eigenvalues(&p) else { return Trial::Unresolved };
         let largest = eigenvalues.iter().fold(0.0_f64, |m, e| m.max(e.abs()));
         if eigenvalues.first().is_some_and(|&least| least < -CLEARLY_NEGATIVE * largest) {
             let proven = solution.residual < RESIDUAL_OF_PROOF && self.conclusive;

@@ -120,7 +120,7 @@ impl<'a> GammaIteration<'a> {
     pub(super) fn may_be_optimal(&self, filters: &Filter) -> Result<bool, DesignError> {
         let error = self.plant.error_system(filters)?;
         let response = error.response_at(Complex::from_polar(1.0, self.noncausal.frequency));
-        let gain = linalg::largest_singular_value_c(&response)?;
+        let gain = linalg::largest_singular_value(&response)?;
         Ok(gain <= self.lower * (1.0 + GAMMA_ACCURACY) || self.is_negligible(gain))
     }
 

@@ -85,7 +85,7 @@ fn dense_grid(plant: &LiftedPlant, filters: &Filters) -> f64 {
     let gain = |k: usize| {
         let z = Complex::from_polar(1.0, PI * k as f64 / 1500.0);
         let error = w.response_at(z) - filter_response(filters, plant.ratio(), z) * h.response_at(z);
-        linalg::singular_values_c(&error).unwrap()[0]
+        linalg::singular_values(&error).unwrap()[0]
     };
     (0..=1500).map(gain).fold(0.0, f64::max)
 }

@@ -40,7 +40,7 @@ fn taps(plant: &LiftedPlant) -> Vec<Vec<f64>> {
 fn dense_grid(error: &StateSpace) -> f64 {
     let gain = |k: usize| {
         let z = Complex::from_polar(1.0, PI * k as f64 / 4000.0);
-        linalg::singular_values_c(&error.response_at(z)).unwrap()[0]
+        linalg::singular_values(&error.response_at(z)).unwrap()[0]
     };
     (0..=4000).map(gain).fold(0.0, f64::max)
 }

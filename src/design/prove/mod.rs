@@ -135,7 +135,7 @@ fn noncausal_witness(bank: &Bank) -> Result<DualWitness, DesignError> {
     let plant = LiftedPlant::new(&merged.problem)?;
     let (n, m) = (plant.channels(), plant.ratio());
     let frequency = plant.noncausal_bound()?.frequency;
-    let l = linalg::lq_factor_c(&FrequencyResponse::new(plant.system()).at_frequency(frequency));
+    let l = linalg::lq_factor(&FrequencyResponse::new(plant.system()).at_frequency(frequency));
     let rest = l.ncols().saturating_sub(n);
     let part = if rest == 0 { CMat::zeros(m, 1) } else { l.view((n, n), (m, rest)).into_owned() };
     Ok(witness(frequency, &leading_direction(&part)?))
@@ -143,7 +143,7 @@ fn noncausal_witness(bank: &Bank) -> Result<DualWitness, DesignError> {
 
 /// The left singular vector of the largest singular value.
 fn leading_direction(response: &CMat) -> Result<CMat, DesignError> {
-    Ok(linalg::svd_c(response)?.u.columns(0, 1).into_owned())
+    Ok(linalg::svd(response)?.u.columns(0, 1).into_owned())
 }
 
 fn witness(frequency: f64, reference: &CMat) -> DualWitness {
@@ -208,7 +208,7 @@ fn long_witnesses(
 fn directions(dual: &[DualPoint]) -> Result<Vec<(f64, CMat)>, DesignError> {
     let mut all = Vec::new();
     for point in dual {
-        let svd = linalg::svd_c(&point.weight)?;
+        let svd = linalg::svd(&point.weight)?;
         let scaled = |k: usize| svd.u.columns(k, 1) * Complex::new(svd.s[k].sqrt(), 0.0);
         all.extend((0..svd.s.len()).map(|k| (svd.s[k], point.omega, scaled(k))));
     }
@@ -236,7 +236,7 @@ impl<'a> Service<'a> {
         let response = FrequencyResponse::new(plant.system());
         let (n, m) = (plant.channels(), plant.ratio());
         let target = |(omega, a): &(f64, CMat)| {
-            let l = linalg::lq_factor_c(&response.at_frequency(*omega));
+            let l = linalg::lq_factor(&response.at_frequency(*omega));
             let k = n.min(l.ncols());
             (l.view((0, 0), (n, k)).into_owned(), l.view((n, 0), (m, k)).ad_mul(a))
         };

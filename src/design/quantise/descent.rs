@@ -73,7 +73,7 @@ impl<'a> Descent<'a> {
     }
 
     fn measure(&mut self) -> Result<(), DesignError> {
-        self.gains = self.errors.iter().map(linalg::largest_singular_value_c).collect::<Result<_, _>>()?;
+        self.gains = self.errors.iter().map(linalg::largest_singular_value).collect::<Result<_, _>>()?;
         let gains = &self.gains;
         self.order.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]));
         self.worst = gains[self.order[0]];
@@ -140,7 +140,7 @@ impl<'a> Descent<'a> {
     }
 
     fn gain_after(&self, k: usize, moves: &[Move]) -> Result<f64, DesignError> {
-        Ok(linalg::largest_singular_value_c(&self.error_after(k, moves))?)
+        Ok(linalg::largest_singular_value(&self.error_after(k, moves))?)
     }
 
     /// `K - e_p delta e^{-i omega j} H_i` for each move.

@@ -56,7 +56,7 @@ impl<'a> Enumeration<'a> {
         let taps = most * (-f64::from(fraction_bits)).exp2();
         let zero_output = vec![0.0; self.spans.len()];
         (0..self.errors.count()).all(|k| {
-            let gain = linalg::largest_singular_value_c(&self.errors.at(k, &zero_output));
+            let gain = linalg::largest_singular_value(&self.errors.at(k, &zero_output));
             gain.is_ok_and(|gain| gain - self.errors.reach(k, taps) < bar)
         })
     }
@@ -168,7 +168,7 @@ impl<'a> Tree<'a> {
         self.left = self.left.saturating_sub(COMPARISON);
         let mut worst = 0.0f64;
         for at in 0..self.order.len() {
-            let gain = linalg::largest_singular_value_c(&self.errors.at(self.order[at], values));
+            let gain = linalg::largest_singular_value(&self.errors.at(self.order[at], values));
             let gain = gain.unwrap_or(f64::INFINITY);
             if gain >= self.bar {
                 self.order[..=at].rotate_right(1);

@@ -98,7 +98,7 @@ impl AffineErrors {
     pub(super) fn emphasise(&self, weights: &Weights, taps: &[f64], floor: f64) -> Option<Weights> {
         let errors: Vec<CMat> = (0..self.count()).map(|k| self.at(k, taps)).collect();
         let gains: Vec<f64> =
-            errors.iter().map(linalg::largest_singular_value_c).collect::<Result<_, _>>().ok()?;
+            errors.iter().map(linalg::largest_singular_value).collect::<Result<_, _>>().ok()?;
         let worst = gains.iter().copied().fold(0.0, f64::max);
         let shares: Vec<f64> =
             gains.iter().map(|gain| ((gain - floor) / (worst - floor)).max(0.0).powi(2)).collect();
@@ -109,7 +109,7 @@ impl AffineErrors {
         let mut moved: Vec<CMat> =
             weights.0.iter().map(|weight| weight * Complex::from(1.0 - PACE)).collect();
         for (k, share) in shares.iter().enumerate().filter(|(_, share)| **share > NEGLIGIBLE) {
-            let direction = linalg::svd_c(&errors[k]).ok()?.u.column(0).into_owned();
+            let direction = linalg::svd(&errors[k]).ok()?.u.column(0).into_owned();
             moved[k] += &direction * direction.adjoint() * Complex::from(PACE * share / total);
         }
         Some(Weights(moved))

@@ -2,7 +2,7 @@
 
 use crate::design::DesignError;
 use crate::linalg::{self, Mat};
-use crate::lti::balanced::balanced_when_driven;
+use crate::lti::gramian::balanced_when_driven;
 use crate::lti::{FirWithTail, StateSpace};
 use rand_core::Rng;
 use rand_pcg::Pcg64;

@@ -96,7 +96,7 @@ fn worst_case_gradient(samples: &PlantSamples<'_>, dynamics: &Dynamics) -> Resul
     let mut total = 0.0;
     for (sample, y) in samples.samples.iter().zip(&found.dual) {
         let omega = sample.omega;
-        let nuclear: f64 = linalg::singular_values_c(y)?.iter().sum();
+        let nuclear: f64 = linalg::singular_values(y)?.iter().sum();
         if nuclear == 0.0 {
             continue;
         }

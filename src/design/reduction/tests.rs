@@ -7,7 +7,7 @@ use crate::design::methods::{Filters, Settings, synthesise};
 use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, Complex, Mat};
 use crate::lti::StateSpace;
-use crate::lti::balanced::balanced;
+use crate::lti::gramian::balanced;
 use crate::lti::gramian::h2_norm;
 use crate::lti::peak::hinf_norm;
 use crate::spec::{Method, Spec};
@@ -48,7 +48,7 @@ fn error(plant: &LiftedPlant, bank: &StateSpace) -> StateSpace {
 fn dense_grid(error: &StateSpace) -> f64 {
     let gain = |k: usize| {
         let z = Complex::from_polar(1.0, std::f64::consts::PI * k as f64 / 4000.0);
-        linalg::singular_values_c(&error.response_at(z)).unwrap()[0]
+        linalg::singular_values(&error.response_at(z)).unwrap()[0]
     };
     (0..=4000).map(gain).fold(0.0, f64::max)
 }

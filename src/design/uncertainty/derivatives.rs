@@ -58,7 +58,7 @@ pub fn delay_derivatives(bank: &Bank) -> Result<DelayDerivatives, DesignError> {
     let block = filters::lifted(&bank.filters, bank.ratio)?;
     let f = block.response_at(Complex::from_polar(1.0, peak.frequency));
     let k = response.rows(2 * n, m) - &f * response.rows(0, n);
-    let svd = linalg::svd_c(&k)?;
+    let svd = linalg::svd(&k)?;
     let (u, v) = (svd.u.column(0), svd.v.column(0));
     let derivative = |i: usize| {
         let front_end = &problem.front_ends[problem.channels[i].front_end];

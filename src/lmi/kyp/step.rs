@@ -11,6 +11,6 @@ pub(super) fn max_step(m: &Mat, d: &Mat) -> Result<f64, LinalgError> {
     let l = linalg::cholesky(m)?;
     let half = linalg::solve_lower(&l, d);
     let scaled = linalg::symmetric_part(&linalg::solve_lower(&l, &half.transpose()));
-    let least = linalg::symmetric_eigenvalues(&scaled)?[0];
+    let least = linalg::hermitian_eigenvalues(&scaled)?[0];
     Ok(if least < 0.0 { -1.0 / least } else { f64::INFINITY })
 }

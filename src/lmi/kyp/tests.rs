@@ -70,11 +70,11 @@ impl Fir {
     }
 
     fn sampled(&self, grid: &[f64]) -> sampled::Problem {
-        use crate::linalg::{CMat, Complex, solve_c, to_complex};
+        use crate::linalg::{CMat, Complex, solve, to_complex};
         let n = self.a.nrows();
         let point = |&omega: &f64| {
             let z = CMat::identity(n, n) * Complex::from_polar(1.0, omega);
-            let state = solve_c(&(z - to_complex(&self.a)), &to_complex(&self.b));
+            let state = solve(&(z - to_complex(&self.a)), &to_complex(&self.b));
             sampled::Point {
                 omega,
                 w: to_complex(&self.cw) * &state + to_complex(&self.dw),
@@ -165,7 +165,7 @@ fn the_lmi_holds_and_the_norm_lies_between_the_bounds() {
     for fir in [Fir::new(4, 2, 2, 1, 3, 0.9), Fir::of_bank(&testbank::thesis(), 11)] {
         let problem = fir.kyp();
         let s = solve("bank", &problem);
-        let least = crate::linalg::symmetric_eigenvalues(&lmi(&problem, &s)).unwrap()[0];
+        let least = crate::linalg::hermitian_eigenvalues(&lmi(&problem, &s)).unwrap()[0];
         assert!(least > -1e-12 * s.gamma, "{least}");
         let norm = norm(&problem, &s.x);
         assert!(s.lower <= norm * (1.0 + 1e-9) && norm <= s.gamma * (1.0 + 1e-9), "{} {norm}", s.gamma);

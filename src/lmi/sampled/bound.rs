@@ -69,7 +69,7 @@ pub fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Result<Lowe
     let mut nuclear = 0.0;
     for (l, y) in dual.iter().enumerate() {
         check_shape(problem, l, y)?;
-        nuclear += linalg::singular_values_c(y)?.iter().sum::<f64>();
+        nuclear += linalg::singular_values(y)?.iter().sum::<f64>();
     }
     let value = pairwise(0..points.len(), &|l| re_inner(&dual[l], &points[l].w));
     let moduli: f64 = dual.iter().zip(points).map(|(y, p)| y.norm() * p.w.norm()).sum();

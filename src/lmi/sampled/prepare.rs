@@ -39,7 +39,7 @@ impl Reduced {
         let mut w_rest = Blocks::zeros(count, m, k - k1);
         let mut inputs = Vec::with_capacity(count);
         for (l, point) in problem.points().iter().enumerate() {
-            let (lower, basis) = linalg::lq_c(&stack(&point.h, &point.w));
+            let (lower, basis) = linalg::lq(&stack(&point.h, &point.w));
             channels.set(l, &lower.view((0, 0), (n, k1)).into_owned());
             w.set(l, &lower.view((n, 0), (m, k1)).into_owned());
             w_rest.set(l, &lower.view((n, k1), (m, k - k1)).into_owned());

@@ -227,7 +227,7 @@ impl Problem {
     pub fn worst(&self, taps: &Taps) -> Result<(f64, usize), SampledError> {
         let mut worst = (0.0, 0);
         for l in 0..self.points.len() {
-            let sigma = linalg::largest_singular_value_c(&self.error_at(l, taps))?;
+            let sigma = linalg::largest_singular_value(&self.error_at(l, taps))?;
             if sigma > worst.0 {
                 worst = (sigma, l);
             }

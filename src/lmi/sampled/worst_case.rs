@@ -76,7 +76,7 @@ fn fixed(problem: &Problem) -> Result<Solution, SampledError> {
     let taps = problem.zero_taps();
     let (gamma, worst_point) = problem.worst(&taps)?;
     let mut dual = bound::zero_dual(problem);
-    let svd = linalg::svd_c(&problem.points()[worst_point].w)?;
+    let svd = linalg::svd(&problem.points()[worst_point].w)?;
     dual[worst_point] = svd.u.column(0) * svd.v.column(0).adjoint();
     let lower = LowerBound { covered: Covered::All, ..bound::lower_bound(problem, &dual, 0.0)? };
     Ok(Solution { outcome: Outcome::Solved, taps, gamma, worst_point, lower, dual, steps: Vec::new() })

@@ -73,40 +73,6 @@ fn a_cascade_keeps_the_outputs_that_drive_it() {
 }
 
 #[test]
-fn parallel_is_the_sum_and_subtract_undoes_it() {
-    for (g, h) in pairs((2, 3), (2, 3)) {
-        let sum = g.parallel(&h).unwrap();
-        let scale = points().map(|z| h.response_at(z).norm() + g.response_at(z).norm()).fold(0.0, f64::max);
-        check(&sum, |z| g.response_at(z) + h.response_at(z), scale);
-        check(&sum.subtract(&h).unwrap(), |z| g.response_at(z), 10.0 * scale);
-    }
-}
-
-#[test]
-fn stacked_and_appended_systems_do_not_mix() {
-    for (g, h) in pairs((2, 3), (2, 1)) {
-        let stacked = g.stack(&h).unwrap();
-        check(&stacked.select_outputs(0..3).unwrap(), |z| g.response_at(z), 0.0);
-        check(&stacked.select_outputs([3]).unwrap(), |z| h.response_at(z), 0.0);
-        let appended = g.append(&h);
-        check(
-            &appended.select_outputs(0..3).unwrap().select_inputs(0..2).unwrap(),
-            |z| g.response_at(z),
-            0.0,
-        );
-        check(&appended.select_outputs([3]).unwrap().select_inputs(2..4).unwrap(), |z| h.response_at(z), 0.0);
-        check(
-            &appended.select_outputs([3]).unwrap().select_inputs(0..2).unwrap(),
-            |_| CMat::zeros(1, 2),
-            0.0,
-        );
-        // [I I]' in front makes one of the other.
-        let both = linalg::vstack(&[&Mat::identity(2, 2), &Mat::identity(2, 2)]).unwrap();
-        assert_eq!(appended.map_inputs(&both).unwrap(), stacked);
-    }
-}
-
-#[test]
 fn gains_multiply_from_their_side() {
     let t = Mat::from_row_slice(2, 3, &[1.0, -2.0, 0.5, 0.0, 3.0, 1e3]);
     for g in systems(2, 3) {
@@ -182,16 +148,12 @@ fn what_does_not_fit_is_told_with_both_sizes() {
         assert!(sizes.iter().all(|size| text.contains(size)), "{text}");
     };
     refused(g.series(&h).unwrap_err(), ["3x2", "4x5"]);
-    refused(g.parallel(&h).unwrap_err(), ["3x2", "4x5"]);
-    refused(g.subtract(&h).unwrap_err(), ["3x2", "4x5"]);
-    refused(g.stack(&h).unwrap_err(), ["3x2", "4x5"]);
     refused(g.cascade(0..2, &h).unwrap_err(), ["2x2", "4x5"]);
     refused(g.map_inputs(&Mat::zeros(3, 1)).unwrap_err(), ["2 inputs", "3x1"]);
     refused(g.map_outputs(&Mat::zeros(3, 1)).unwrap_err(), ["3 outputs", "3x1"]);
     refused(g.scale_inputs(&[1.0]).unwrap_err(), ["2 inputs", "1x1"]);
     refused(g.scale_outputs(&[1.0]).unwrap_err(), ["3 outputs", "1x1"]);
     refused(g.select_outputs([0, 3]).unwrap_err(), ["number 3", "3 outputs"]);
-    refused(g.select_inputs(1..9).unwrap_err(), ["number 2", "2 inputs"]);
     refused(g.select_states([0]).unwrap_err(), ["number 0", "0 states"]);
     refused(StateSpace::fir(&[Mat::zeros(1, 2), Mat::zeros(2, 2)]).unwrap_err(), ["1x2", "2x2"]);
 }

@@ -264,7 +264,7 @@ impl AtFrequency<'_> {
 /// eigenvalue is below.
 pub(super) fn upper_gain(square: &ComplexMatrix, wanted: f64) -> f64 {
     let real = square.realified();
-    let Ok(values) = linalg::symmetric_eigenvalues(&ball::nearest(&real)) else { return f64::INFINITY };
+    let Ok(values) = linalg::hermitian_eigenvalues(&ball::nearest(&real)) else { return f64::INFINITY };
     let largest = values.into_iter().fold(0.0, f64::max);
     let exceeds = |bound: f64| {
         let shifted = Matrix::from_fn(real.nrows(), real.nrows(), |i, j| {

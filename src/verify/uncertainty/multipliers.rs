@@ -242,7 +242,7 @@ impl Doubles {
         if least.is_nan() || least <= 1e-12 * most {
             return None;
         }
-        let answer = linalg::solve_c(&rest, &mixed.adjoint());
+        let answer = linalg::solve(&rest, &mixed.adjoint());
         let weighed = CMat::from_fn(m, n, |p, k| self.filters[(p, k)] * Complex::from(multipliers[k]));
         let sum = weighed * self.filters.adjoint() + centre + mixed * &answer;
         let (square, u) = largest_eigenvector(&sum)?;

@@ -41,7 +41,7 @@ fn gain(bank: &Bank, omega: f64, point: &ErrorPoint) -> f64 {
             }
         }
     }
-    linalg::largest_singular_value_c(&k).unwrap() / 2f64.sqrt()
+    linalg::largest_singular_value(&k).unwrap() / 2f64.sqrt()
 }
 
 fn square_box(half: f64) -> ErrorBox {
@@ -227,7 +227,7 @@ fn no_jitter_adds_more_than_its_bound() {
             }
             sum
         });
-        let gain = linalg::largest_singular_value_c(&change).unwrap() / (fast as f64).sqrt();
+        let gain = linalg::largest_singular_value(&change).unwrap() / (fast as f64).sqrt();
         assert!(gain <= bound, "{gain} {bound}");
         largest = largest.max(gain);
     }

@@ -96,7 +96,7 @@ impl BruteForce {
             chosen.iter().zip(phases).map(|(taps, phase)| phase.row(k, taps)).collect();
         let columns = rows[0].len();
         let matrix = CMat::from_fn(rows.len(), columns, |r, c| rows[r][c]);
-        hybank::linalg::largest_singular_value_c(&matrix).unwrap()
+        hybank::linalg::largest_singular_value(&matrix).unwrap()
     }
 
     fn filters(&self, phases: &[Phase<'_>], chosen: &[Vec<f64>]) -> Vec<Vec<f64>> {

@@ -110,7 +110,7 @@ fn error(point: &Point, filters: &CMat) -> CMat {
 }
 
 fn gain(error: &CMat) -> Result<f64, DesignError> {
-    Ok(linalg::largest_singular_value_c(error)?)
+    Ok(linalg::largest_singular_value(error)?)
 }
 
 #[cfg(test)]

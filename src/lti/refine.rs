@@ -1,7 +1,6 @@
 //! Local maxima of the gain, and their refinement between neighbouring frequencies.
 
-use super::Peak;
-use crate::lti::LtiError;
+use super::LtiError;
 use std::f64::consts::PI;
 
 /// The refinement ends at relative differences of gains below this.
@@ -10,6 +9,24 @@ const FLAT: f64 = 1e-11;
 const ROUNDING: f64 = 1e-13;
 /// Steps of a refinement are at least this part of the width that is left.
 const LEAST_STEP: f64 = 1e-3;
+
+/// A peak gain and where it is attained.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Peak {
+    /// The largest gain, with the relative accuracy [`PEAK_ACCURACY`](super::peak::PEAK_ACCURACY). It is attained at `frequency`, so it is
+    /// never too large.
+    pub gain: f64,
+    /// Radians per step, in [0, pi].
+    pub frequency: f64,
+}
+
+impl Peak {
+    /// The same peak with its frequency brought into [0, pi].
+    pub(super) fn folded(self) -> Self {
+        let w = self.frequency.rem_euclid(2.0 * PI);
+        Self { gain: self.gain, frequency: w.min(2.0 * PI - w) }
+    }
+}
 
 /// Refines the peak between the outer of three neighbouring points by parabolas through the last three
 /// points, falling back on golden sections; `at` evaluates the gain. The gain is flat at its peak: its

@@ -1,12 +1,26 @@
-//! The level-set iteration: a lower bound from evaluated gains, raised until no eigenvalue suggests a
-//! higher one.
+//! Peak gains over the unit circle: the H-infinity norm, and the peak of the part of the references that
+//! measurements cannot explain.
+//!
+//! Both are the maximum over w of sigma_max(L_z(w)). The LQ factorisation of the response [G_y; G_z] = [L_y
+//! 0; L_zy L_z] Q separates the part L_zy of the references z that the measurements y explain. Without
+//! measurements L_z is G_z, and the peak is the H-infinity norm.
+//!
+//! Method: level sets (Boyd & Balakrishnan 1990, Bruinsma & Steinbuch 1990). gamma is the gain at some
+//! frequency exactly where G G* - gamma^2 J, J = diag(0, I), is singular; after a Cayley transform these
+//! are the imaginary eigenvalues of one Hamiltonian matrix. Eigenvalues only *suggest* frequencies. Each
+//! reported value is evaluated from the response itself and refined between its neighbours.
 
-use super::hamiltonian::{about_any, about_real};
+pub use super::refine::Peak;
 use super::refine::{higher, local_maxima, refine, upper_estimate};
-use super::{PEAK_ACCURACY, Peak, unexplained_gain};
-use crate::linalg::{self, CMat};
-use crate::lti::{LtiError, StateSpace};
+use super::{FrequencyResponse, LtiError, StateSpace};
+use crate::linalg::{self, CMat, Complex, LinalgError, Scalar};
+use nalgebra::DMatrix;
 use std::f64::consts::PI;
+
+/// Relative accuracy of the returned peak.
+pub const PEAK_ACCURACY: f64 = 1e-9;
+/// Distances from the angle of a pole, relative to the distance of the pole from the unit circle.
+const WIDTHS: [f64; 5] = [-1.5, -0.5, 0.0, 0.5, 1.5];
 
 /// Limit on the rounds. The level rises at least by [`PEAK_ACCURACY`] in each; in practice two or three
 /// rounds suffice.
@@ -24,14 +38,83 @@ const ON_AXIS: f64 = 1e-5;
 /// of 1e-4 are common if the gain is small relative to terms that cancel. A false suggestion costs one
 /// evaluation; a missed one loses a peak.
 const NEAR_AXIS: f64 = 1e-2;
-
 /// A frequency whose gain is this close to the level (relative) is a bad centre of the Cayley transform.
 const NEAR_LEVEL: f64 = 1e-2;
 /// Number of frequencies tried for a better centre.
 const CENTRES: usize = 16;
 
+/// The H-infinity norm of a stable system with its peak frequency.
+pub fn hinf_norm(system: &StateSpace) -> Result<Peak, LtiError> {
+    unexplained_peak(system, 0)
+}
+
+/// max over w of sigma_max of the part of the references (rows from `measurements` on) that no
+/// combination of the measurements (the first rows) explains, causal or not:
+/// G_z (I - G_y* (G_y G_y*)^+ G_y).
+pub fn unexplained_peak(system: &StateSpace, measurements: usize) -> Result<Peak, LtiError> {
+    let poles = stable_poles(system)?;
+    let system = system.compress_inputs();
+    let response = FrequencyResponse::new(&system);
+    Search::new(&system, measurements, &|w| response.at_frequency(w), resonances(&poles)).run()
+}
+
+/// The H-infinity norm of a system that is known to be stable, with a response that is cheaper than its
+/// own: `response(w)` has the singular values of G(e^{jw}), and `initial` are frequencies where it may be
+/// large (see [`resonances`]).
+pub fn hinf_norm_with_response(
+    system: &StateSpace,
+    response: &dyn Fn(f64) -> CMat,
+    initial: Vec<f64>,
+) -> Result<Peak, LtiError> {
+    Search::new(&system.compress_inputs(), 0, response, initial).run()
+}
+
+/// The peaks of a stable system above `level`: at least one in each frequency interval in which the gain
+/// exceeds it.
+pub fn peaks_above(system: &StateSpace, level: f64) -> Result<Vec<Peak>, LtiError> {
+    let poles = stable_poles(system)?;
+    let system = system.compress_inputs();
+    let response = FrequencyResponse::new(&system);
+    Search::new(&system, 0, &|w| response.at_frequency(w), resonances(&poles)).all_above(level)
+}
+
+/// The poles of a stable system.
+///
+/// # Errors
+/// [`LtiError::Unstable`] if one of them is not inside the unit circle.
+pub fn stable_poles(system: &StateSpace) -> Result<Vec<Complex<f64>>, LtiError> {
+    let poles = linalg::eigenvalues(system.a())?;
+    let radius = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+    if radius >= 1.0 { Err(LtiError::Unstable { radius }) } else { Ok(poles) }
+}
+
+/// Angles of the poles that may cause a peak, and angles near them at multiples of the pole's distance from
+/// the unit circle, which is the width of its resonance.
+pub fn resonances(poles: &[Complex<f64>]) -> Vec<f64> {
+    let near = poles.iter().filter(|p| p.im >= 0.0 && p.norm() > 0.5);
+    let about = |p: &Complex<f64>| WIDTHS.map(|width| p.arg() + width * (1.0 - p.norm()));
+    near.flat_map(about).filter(|w| (0.0..=PI).contains(w)).collect()
+}
+
+/// The gain at one frequency: see [`unexplained_peak`].
+pub fn unexplained_gain(response: &CMat, measurements: usize) -> Result<f64, LtiError> {
+    let references = response.nrows() - measurements;
+    if references == 0 || response.ncols() == 0 {
+        return Ok(0.0);
+    }
+    if measurements == 0 {
+        return Ok(linalg::largest_singular_value(response)?);
+    }
+    let l = linalg::lq_factor(response);
+    if l.ncols() <= measurements {
+        return Ok(0.0);
+    }
+    let rest = l.view((measurements, measurements), (references, l.ncols() - measurements)).into_owned();
+    Ok(linalg::largest_singular_value(&rest)?)
+}
+
 /// The search on one system.
-pub(super) struct Search<'a> {
+struct Search<'a> {
     system: StateSpace,
     measurements: usize,
     response: &'a dyn Fn(f64) -> CMat,
@@ -43,7 +126,7 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    pub(super) fn new(
+    fn new(
         system: &StateSpace,
         measurements: usize,
         response: &'a dyn Fn(f64) -> CMat,
@@ -58,7 +141,7 @@ impl<'a> Search<'a> {
         unexplained_gain(&(self.response)(w), self.measurements)
     }
 
-    pub(super) fn run(&self) -> Result<Peak, LtiError> {
+    fn run(&self) -> Result<Peak, LtiError> {
         let mut best = self.first_peak()?;
         for _ in 0..ROUND_LIMIT {
             if best.gain <= self.floor {
@@ -99,7 +182,7 @@ impl<'a> Search<'a> {
         grid.into_iter().map(|w| self.at(w)).collect()
     }
 
-    pub(super) fn at(&self, frequency: f64) -> Result<Peak, LtiError> {
+    fn at(&self, frequency: f64) -> Result<Peak, LtiError> {
         Ok(Peak { gain: self.gain(frequency)?, frequency })
     }
 
@@ -120,7 +203,7 @@ impl<'a> Search<'a> {
         refine(|w| self.at(w), [low, best, high]).map(Some)
     }
 
-    pub(super) fn all_above(&self, level: f64) -> Result<Vec<Peak>, LtiError> {
+    fn all_above(&self, level: f64) -> Result<Vec<Peak>, LtiError> {
         let mut edges = self.crossings(level, ON_AXIS)?;
         edges.dedup();
         let mut peaks = Vec::new();
@@ -148,9 +231,13 @@ impl<'a> Search<'a> {
         let centre = self.centre(level)?;
         let real = centre == 0.0 || centre == PI;
         let eigenvalues = if real {
-            linalg::candidate_eigenvalues(&about_real(&self.system, self.measurements, level, centre)?)
+            let turn = if centre == PI { 1.0 } else { -1.0 };
+            let matrix = hamiltonian_about(turn, &self.system, self.measurements, level)?;
+            linalg::candidate_eigenvalues(&matrix)
         } else {
-            linalg::candidate_eigenvalues_c(&about_any(&self.system, self.measurements, level, centre)?)
+            let turn = -Complex::from_polar(1.0, -centre);
+            let matrix = hamiltonian_about(turn, &self.system, self.measurements, level)?;
+            linalg::candidate_eigenvalues(&matrix)
         };
         let eigenvalues = match eigenvalues {
             Err(linalg::LinalgError::NotFinite { .. }) if self.measurements > 0 => return Ok(crossings),
@@ -187,3 +274,54 @@ impl<'a> Search<'a> {
         Ok(best.1)
     }
 }
+
+type Parts<T> = (DMatrix<T>, DMatrix<T>, DMatrix<T>, DMatrix<T>);
+
+/// The Hamiltonian matrix whose eigenvalue j tan(w / 2) marks gain(w) = level, w counted from the point
+/// opposite to the centre of the Cayley transform, e^{j centre}. `turn` is -e^{-j centre}, which is real for
+/// the centres 0 and pi. The gain is that of the outputs from `measurements` on, after subtraction of the
+/// part that the outputs before explain.
+fn hamiltonian_about<T: Scalar>(
+    turn: T,
+    system: &StateSpace,
+    measurements: usize,
+    level: f64,
+) -> Result<DMatrix<T>, LinalgError> {
+    let [a, b, c, d] = [system.a(), system.b(), system.c(), system.d()].map(|m| m.map(T::from_real));
+    hamiltonian(&cayley((a * turn, b * turn, c, d)), measurements, level)
+}
+
+/// s = (z - 1) / (z + 1): the unit circle becomes the imaginary axis, z = -1 infinity.
+fn cayley<T: Scalar>((a, b, c, d): Parts<T>) -> Parts<T> {
+    let n = a.nrows();
+    let identity = DMatrix::<T>::identity(n, n);
+    let inverse = linalg::solve(&(&a + &identity), &identity);
+    let b = &inverse * b;
+    let d = d - &c * &b;
+    let root2 = T::from_real(std::f64::consts::SQRT_2);
+    (&inverse * (a - identity), b * root2, c * inverse * root2, d)
+}
+
+/// The Hamiltonian matrix of a continuous-time system whose eigenvalues on the imaginary axis mark
+/// gain = `level`. The gain is that of the outputs from `measurements` on, after subtraction of the part
+/// that the outputs before explain.
+fn hamiltonian<T: Scalar>(
+    (a, b, c, d): &Parts<T>,
+    measurements: usize,
+    level: f64,
+) -> Result<DMatrix<T>, LinalgError> {
+    let mut r = d * d.adjoint();
+    for i in measurements..r.nrows() {
+        r[(i, i)] -= T::from_real(level * level);
+    }
+    let s = b * d.adjoint();
+    let n = a.nrows();
+    let solved = linalg::solve(&r, &linalg::hstack(&[c, &s.adjoint()])?);
+    let (rc, rs) = (solved.columns(0, n), solved.columns(n, n));
+    let drift = a - &s * &rc;
+    let (b_part, c_part) = (b * b.adjoint() - s * rs, c.adjoint() * rc);
+    linalg::from_blocks(&[&[&drift, &b_part], &[&c_part, &-drift.adjoint()]])
+}
+
+#[cfg(test)]
+mod tests;
