@@ -1,7 +1,8 @@
 //! Decompositions of real and of complex matrices, written once.
 //!
 //! A generic function is compiled where it is called, so the crates above would compile faer again with
-//! every change. The methods of [`Scalar`] are not generic: they are compiled here, for both kinds of numbers.
+//! every change. The methods of [`Scalar`] are not generic: they are compiled here, for both kinds of
+//! numbers.
 
 use super::{LinalgError, no_convergence, owned, view};
 use crate::Complex;
