@@ -7,8 +7,8 @@
 
 #![allow(unsafe_op_in_unsafe_fn, reason = "each function has the one contract above")]
 
-use crate::{FAILURE, Handle, INT16, count, kept};
-use hybank::runtime::PcmOutput;
+use crate::{FAILURE, INT16, count, kept, open, process_int16, tail};
+use hybank::runtime::{PcmOutput, Stream};
 use std::ffi::{CStr, c_char, c_int};
 use std::slice;
 
@@ -24,15 +24,15 @@ unsafe fn text<'a>(pointer: *const c_char, what: &str) -> Result<&'a str, String
     text.to_str().map_err(|_| format!("the {what} is not UTF-8"))
 }
 
-/// The bank that a pointer leads to.
-unsafe fn handle<'a>(bank: *mut Handle) -> Result<&'a mut Handle, String> {
+/// The stream through the bank that a pointer leads to.
+unsafe fn stream<'a>(bank: *mut Stream) -> Result<&'a mut Stream, String> {
     // SAFETY: the caller promises NULL or an open bank that no other thread uses.
     bank.as_mut().ok_or_else(|| NO_BANK.to_owned())
 }
 
 /// A property of the bank that a pointer leads to; 0 for NULL.
-unsafe fn ask(bank: *const Handle, of: impl FnOnce(&Handle) -> usize) -> usize {
-    // SAFETY: as for `handle`.
+unsafe fn ask(bank: *const Stream, of: impl FnOnce(&Stream) -> usize) -> usize {
+    // SAFETY: as for `stream`.
     bank.as_ref().map_or(0, of)
 }
 
@@ -71,9 +71,9 @@ pub unsafe extern "C" fn hybank_open(
     path: *const c_char,
     algorithm: *const c_char,
     double_sums: c_int,
-) -> *mut Handle {
-    let open = || Handle::open(text(path, "path")?, text(algorithm, "algorithm")?, double_sums != 0);
-    kept(open()).map_or(std::ptr::null_mut(), |handle| Box::into_raw(Box::new(handle)))
+) -> *mut Stream {
+    let opened = || open(text(path, "path")?, text(algorithm, "algorithm")?, double_sums != 0);
+    kept(opened()).map_or(std::ptr::null_mut(), |stream| Box::into_raw(Box::new(stream)))
 }
 
 /// See the header.
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn hybank_open(
 /// # Safety
 /// As the header says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn hybank_close(bank: *mut Handle) {
+pub unsafe extern "C" fn hybank_close(bank: *mut Stream) {
     if !bank.is_null() {
         // SAFETY: the caller promises a bank that `hybank_open` made by `Box::into_raw` and that was not
         // closed.
@@ -94,8 +94,8 @@ pub unsafe extern "C" fn hybank_close(bank: *mut Handle) {
 /// # Safety
 /// As the header says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn hybank_channels(bank: *const Handle) -> usize {
-    ask(bank, Handle::channels)
+pub unsafe extern "C" fn hybank_channels(bank: *const Stream) -> usize {
+    ask(bank, Stream::channels)
 }
 
 /// See the header.
@@ -103,8 +103,8 @@ pub unsafe extern "C" fn hybank_channels(bank: *const Handle) -> usize {
 /// # Safety
 /// As the header says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn hybank_ratio(bank: *const Handle) -> usize {
-    ask(bank, Handle::ratio)
+pub unsafe extern "C" fn hybank_ratio(bank: *const Stream) -> usize {
+    ask(bank, Stream::ratio)
 }
 
 /// See the header.
@@ -112,8 +112,8 @@ pub unsafe extern "C" fn hybank_ratio(bank: *const Handle) -> usize {
 /// # Safety
 /// As the header says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn hybank_latency(bank: *const Handle) -> usize {
-    ask(bank, |handle| handle.stream.latency())
+pub unsafe extern "C" fn hybank_latency(bank: *const Stream) -> usize {
+    ask(bank, Stream::latency)
 }
 
 /// See the header.
@@ -121,8 +121,8 @@ pub unsafe extern "C" fn hybank_latency(bank: *const Handle) -> usize {
 /// # Safety
 /// As the header says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn hybank_flush_frames(bank: *const Handle) -> usize {
-    ask(bank, |handle| handle.stream.plan().flush_frames())
+pub unsafe extern "C" fn hybank_flush_frames(bank: *const Stream) -> usize {
+    ask(bank, |stream| stream.plan().flush_frames())
 }
 
 /// The calls for one type of samples that the runtime takes as they are.
@@ -134,17 +134,17 @@ macro_rules! calls {
         /// As the header says.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $process(
-            bank: *mut Handle,
+            bank: *mut Stream,
             from: *const $sample,
             frames: usize,
             to: *mut $sample,
         ) -> isize {
             let run = || {
-                let handle = handle(bank)?;
-                let [n, m] = [handle.channels(), handle.ratio()];
+                let stream = stream(bank)?;
+                let [n, m] = [stream.channels(), stream.ratio()];
                 let from = input(from, len(frames, n, size_of::<$sample>())?)?;
                 let to = output(to, len(frames, m, size_of::<$sample>())?)?;
-                handle.stream.process(from, to).map_err(|error| error.to_string())
+                stream.process(from, to).map_err(|error| error.to_string())
             };
             count(run())
         }
@@ -154,10 +154,10 @@ macro_rules! calls {
         /// # Safety
         /// As the header says.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $flush(bank: *mut Handle, to: *mut $sample) -> isize {
+        pub unsafe extern "C" fn $flush(bank: *mut Stream, to: *mut $sample) -> isize {
             let run = || {
-                let handle = handle(bank)?;
-                handle.flush(output(to, handle.tail())?)
+                let stream = stream(bank)?;
+                stream.flush(output(to, tail(stream))?).map_err(|error| error.to_string())
             };
             count(run())
         }
@@ -173,16 +173,16 @@ calls!(f64, hybank_process_double, hybank_flush_double);
 /// As the header says.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hybank_process_int16(
-    bank: *mut Handle,
+    bank: *mut Stream,
     from: *const i16,
     frames: usize,
     to: *mut i16,
 ) -> isize {
     let run = || {
-        let handle = handle(bank)?;
-        let [n, m] = [handle.channels(), handle.ratio()];
+        let stream = stream(bank)?;
+        let [n, m] = [stream.channels(), stream.ratio()];
         let from = input(from.cast::<u8>(), len(frames, 2 * n, 1)?)?;
-        handle.process_int16(from, output(to.cast::<u8>(), len(frames, 2 * m, 1)?)?)
+        process_int16(stream, from, output(to.cast::<u8>(), len(frames, 2 * m, 1)?)?)
     };
     count(run())
 }
@@ -192,11 +192,11 @@ pub unsafe extern "C" fn hybank_process_int16(
 /// # Safety
 /// As the header says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn hybank_flush_int16(bank: *mut Handle, to: *mut i16) -> isize {
+pub unsafe extern "C" fn hybank_flush_int16(bank: *mut Stream, to: *mut i16) -> isize {
     let run = || {
-        let handle = handle(bank)?;
-        let bytes = output(to.cast::<u8>(), 2 * handle.tail())?;
-        handle.flush(&mut PcmOutput::packed(INT16, bytes))
+        let stream = stream(bank)?;
+        let bytes = output(to.cast::<u8>(), 2 * tail(stream))?;
+        stream.flush(&mut PcmOutput::packed(INT16, bytes)).map_err(|error| error.to_string())
     };
     count(run())
 }
@@ -206,9 +206,9 @@ pub unsafe extern "C" fn hybank_flush_int16(bank: *mut Handle, to: *mut i16) -> 
 /// # Safety
 /// As the header says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn hybank_reset(bank: *mut Handle) {
-    if let Some(handle) = kept(handle(bank)) {
-        handle.stream.reset();
+pub unsafe extern "C" fn hybank_reset(bank: *mut Stream) {
+    if let Some(stream) = kept(stream(bank)) {
+        stream.reset();
     }
 }
 

@@ -5,9 +5,7 @@ mod abi;
 
 use hybank::bank::Bank;
 use hybank::files::{Bound, read_text};
-use hybank::runtime::{
-    Algorithm, Options, Output, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, Stream,
-};
+use hybank::runtime::{Algorithm, Options, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, Stream};
 use std::cell::RefCell;
 use std::ffi::CString;
 use std::path::Path;
@@ -19,50 +17,27 @@ const BANK_FILE: Bound =
 /// 16-bit samples in the byte order of this machine.
 const INT16: PcmFormat = if cfg!(target_endian = "big") { PcmFormat::S16Be } else { PcmFormat::S16Le };
 
-/// A stream through a bank, which C holds by its address.
-pub struct Handle {
-    stream: Stream,
+/// A stream through the bank of a file.
+fn open(path: &str, algorithm: &str, double_sums: bool) -> Result<Stream, String> {
+    let text = read_text(Path::new(path), BANK_FILE).map_err(|error| error.to_string())?;
+    let bank = Bank::from_json(&text, path).map_err(|error| error.to_string())?;
+    let precision = if double_sums { Precision::Double } else { Precision::Single };
+    let algorithm = algorithm.parse::<Algorithm>().map_err(|error| format!("algorithm: {error}"))?;
+    let options = Options { precision, algorithm: algorithm.without_added_latency(), ..Options::default() };
+    let plan = bank.plan(options).map_err(|error| format!("{path}: {error}"))?;
+    Ok(Stream::new(&plan))
 }
 
-impl Handle {
-    /// Reads a bank file.
-    fn open(path: &str, algorithm: &str, double_sums: bool) -> Result<Self, String> {
-        let text = read_text(Path::new(path), BANK_FILE).map_err(|error| error.to_string())?;
-        let bank = Bank::from_json(&text, path).map_err(|error| error.to_string())?;
-        let precision = if double_sums { Precision::Double } else { Precision::Single };
-        let algorithm = algorithm.parse::<Algorithm>().map_err(|error| format!("algorithm: {error}"))?;
-        let options =
-            Options { precision, algorithm: algorithm.without_added_latency(), ..Options::default() };
-        let plan = bank.plan(options).map_err(|error| format!("{path}: {error}"))?;
-        Ok(Self { stream: Stream::new(&plan) })
-    }
+/// Samples that a flush writes.
+fn tail(stream: &Stream) -> usize {
+    stream.plan().flush_frames() * stream.ratio()
+}
 
-    /// N.
-    fn channels(&self) -> usize {
-        self.stream.channels()
-    }
-
-    /// M.
-    fn ratio(&self) -> usize {
-        self.stream.ratio()
-    }
-
-    /// Samples that a flush writes.
-    fn tail(&self) -> usize {
-        self.stream.plan().flush_frames() * self.ratio()
-    }
-
-    /// Frames of 16-bit samples as bytes.
-    fn process_int16(&mut self, input: &[u8], output: &mut [u8]) -> Result<usize, String> {
-        let layout = SampleLayout::packed(INT16);
-        let input = [PcmFrames { layout, channels: self.channels(), bytes: input }];
-        let mut output = PcmOutput::packed(INT16, output);
-        self.stream.run(&input[..], &mut output).map_err(|error| error.to_string())
-    }
-
-    fn flush(&mut self, output: &mut (impl Output + ?Sized)) -> Result<usize, String> {
-        self.stream.flush(output).map_err(|error| error.to_string())
-    }
+/// Frames of 16-bit samples as bytes.
+fn process_int16(stream: &mut Stream, input: &[u8], output: &mut [u8]) -> Result<usize, String> {
+    let layout = SampleLayout::packed(INT16);
+    let input = [PcmFrames { layout, channels: stream.channels(), bytes: input }];
+    stream.run(&input[..], &mut PcmOutput::packed(INT16, output)).map_err(|error| error.to_string())
 }
 
 thread_local! {

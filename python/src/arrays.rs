@@ -157,8 +157,6 @@ impl<'py> Held<'py> {
             Numbers::F64(array) if is_real && is_interleaved => {
                 Samples::Interleaved64(layout.interleaved(array)?)
             }
-            Numbers::F32(array) if is_real => Samples::Planar32(layout.rows(array)?),
-            Numbers::F64(array) if is_real => Samples::Planar64(layout.rows(array)?),
             Numbers::F32(array) => Samples::Pcm(layout.pcm(array, format, part)?),
             Numbers::F64(array) => Samples::Pcm(layout.pcm(array, format, part)?),
             Numbers::I8(array) => Samples::Pcm(layout.pcm(array, format, part)?),

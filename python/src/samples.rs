@@ -2,17 +2,14 @@
 //!
 //! One type for all layouts and number types, so that the kernels are compiled once.
 
-use hybank::runtime::{Input, Interleaved, Isa, Output, PcmFrames, PcmOutput, Planar, Sample, SplitOutput};
+use hybank::runtime::{Input, Interleaved, Isa, Output, PcmFrames, PcmOutput, Sample, SplitOutput};
 use std::ops::Range;
 
 /// Frames of N samples.
 pub(crate) enum Samples<'a> {
     Interleaved32(Interleaved<'a, f32>),
     Interleaved64(Interleaved<'a, f64>),
-    /// A row for each channel.
-    Planar32(Vec<&'a [f32]>),
-    Planar64(Vec<&'a [f64]>),
-    /// Integers, or one part of complex samples.
+    /// A row for each channel, integers, or one part of complex samples.
     Pcm(Vec<PcmFrames<'a>>),
 }
 
@@ -21,8 +18,6 @@ impl Input for Samples<'_> {
         match self {
             Self::Interleaved32(frames) => frames.channels(),
             Self::Interleaved64(frames) => frames.channels(),
-            Self::Planar32(rows) => rows.len(),
-            Self::Planar64(rows) => rows.len(),
             Self::Pcm(parts) => parts[..].channels(),
         }
     }
@@ -31,8 +26,6 @@ impl Input for Samples<'_> {
         match self {
             Self::Interleaved32(frames) => frames.frames(),
             Self::Interleaved64(frames) => frames.frames(),
-            Self::Planar32(rows) => rows.first().map_or(0, |row| row.len()),
-            Self::Planar64(rows) => rows.first().map_or(0, |row| row.len()),
             Self::Pcm(parts) => parts[..].frames(),
         }
     }
@@ -50,7 +43,6 @@ impl Input for Samples<'_> {
             Self::Interleaved32(frames) => frames.is_finite(range),
             Self::Interleaved64(frames) => frames.is_finite(range),
             Self::Pcm(parts) => parts[..].is_finite(range),
-            Self::Planar32(_) | Self::Planar64(_) => false,
         }
     }
 
@@ -58,17 +50,8 @@ impl Input for Samples<'_> {
         match self {
             Self::Interleaved32(frames) => frames.load(isa, first, samples),
             Self::Interleaved64(frames) => frames.load(isa, first, samples),
-            Self::Planar32(rows) => load_rows(isa, rows, first, samples),
-            Self::Planar64(rows) => load_rows(isa, rows, first, samples),
             Self::Pcm(parts) => parts[..].load(isa, first, samples),
         }
-    }
-}
-
-fn load_rows<S: Sample, T: Sample>(isa: Isa, rows: &[&[S]], first: usize, samples: &mut [T]) {
-    // The rows of an array have one length.
-    if let Ok(planar) = Planar::new(rows) {
-        planar.load(isa, first, samples);
     }
 }
 

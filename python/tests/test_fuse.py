@@ -116,6 +116,18 @@ def test_gaps_are_held_and_marked(fir, random):
     np.testing.assert_array_equal(zeros, fir.fuse(np.nan_to_num(x)))
 
 
+def test_a_complex_sample_with_one_part_missing_is_missing(fir, random):
+    x = (random.standard_normal((2, 300)) + 1j * random.standard_normal((2, 300))).astype("c8")
+    held = x.copy()
+    x[0, 50] = complex(x[0, 50].real, np.nan)
+    x[1, 100], x[1, 101] = complex(np.nan, 1.0), complex(2.0, np.inf)
+    held[0, 50], held[1, 100:102] = held[0, 49], held[1, 99]
+    y, report = fir.fuse(x, gaps="hold", full_output=True)
+    np.testing.assert_array_equal(y, fir.fuse(held, algorithm="direct"))
+    # Once, not once for each part.
+    assert (report.missing, report.gaps) == (3, [(1, 50, 1), (2, 100, 2)])
+
+
 def write_wav(path, samples, rate):
     """A mono WAV file of 32-bit floats or 16-bit integers."""
     data, (tag, size) = samples.tobytes(), (3, 4) if samples.dtype == np.float32 else (1, 2)

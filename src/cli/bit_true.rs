@@ -3,13 +3,14 @@
 use super::Failure;
 use super::bank_file::name;
 use super::output::{Bits, begin_samples};
-use super::run::{Job, interrupted, print_report};
+use super::run::{Job, each_block, interrupted, print_report};
 use super::say::warn;
 use crate::bank::Bank;
 use crate::files::commit_all;
 use crate::interchange::{BitTrue, WordSizes};
-use crate::io::{Arrival, Container, MultiReader, OutputHeader, PcmFormat, PcmFrames, SampleWriter};
+use crate::io::{Container, MultiReader, OutputHeader, PcmFormat, PcmFrames, SampleWriter};
 use crate::pipeline::DroppedLatency;
+use crate::runtime::{Input, Isa};
 
 /// The options.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -58,7 +59,11 @@ impl BitTrueArgs {
         let output = begin_samples(job.output, header, job.args.force).map_err(Failure::running)?;
         let skip = if job.dropped == DroppedLatency::All { job.bank.latency } else { 0 };
         let mut run = Run::new(model, output, format, skip, job.bank);
-        let frames = run.all(reader)?;
+        let is_stopped = each_block(reader, |recordings| run.process(recordings))?;
+        let frames = reader.consumed();
+        if is_stopped {
+            return Err(interrupted(frames));
+        }
         run.flush(job.bank.channel_count())?;
         let report = Report {
             samples: run.samples,
@@ -144,21 +149,6 @@ impl Run {
         Self { model, output, format, skip, owed: skip, ratio: bank.ratio, samples: 0 }
     }
 
-    /// All frames; gives their number.
-    fn all(&mut self, reader: &mut MultiReader) -> Result<u64, Failure> {
-        loop {
-            match reader.wait().map_err(Failure::input)? {
-                Arrival::Frames(count) => {
-                    let (frames, channels) = integers(&reader.frames(), count);
-                    self.process(&frames, channels)?;
-                    reader.consume(count);
-                }
-                Arrival::End => return Ok(reader.consumed()),
-                Arrival::Stopped => return Err(interrupted(reader.consumed())),
-            }
-        }
-    }
-
     /// Frames of zeros, until M samples have come out for each frame of the captures.
     fn flush(&mut self, channels: usize) -> Result<(), Failure> {
         let frames = self.owed.div_ceil(self.ratio);
@@ -167,9 +157,19 @@ impl Run {
         self.write(&fast)
     }
 
-    fn process(&mut self, frames: &[i32], channels: usize) -> Result<(), Failure> {
-        let fast = self.filtered(frames, channels);
+    fn process(&mut self, recordings: &[PcmFrames<'_>]) -> Result<(), Failure> {
+        let channels = recordings.channels();
+        let mut numbers = vec![0.0f64; recordings.frames() * channels];
+        recordings.load(Isa::detect(), 0, &mut numbers);
+        // A power of two: the product is the integer itself.
+        let frames: Vec<i32> = numbers.iter().map(|x| (x * self.full_scale()) as i32).collect();
+        let fast = self.filtered(&frames, channels);
         self.write(&fast)
+    }
+
+    /// The integer that stands for 1.
+    fn full_scale(&self) -> f64 {
+        (8.0 * self.format.bytes() as f64 - 1.0).exp2()
     }
 
     fn filtered(&mut self, frames: &[i32], channels: usize) -> Vec<i32> {
@@ -186,7 +186,7 @@ impl Run {
         self.skip -= dropped;
         let fast = &fast[dropped..];
         let size = self.format.bytes();
-        let full_scale = (8.0 * size as f64 - 1.0).exp2();
+        let full_scale = self.full_scale();
         let mut bytes = vec![0; fast.len() * size];
         for (slot, y) in bytes.chunks_exact_mut(size).zip(fast) {
             self.format.encode(f64::from(*y) / full_scale, slot);
@@ -194,24 +194,4 @@ impl Run {
         self.samples += fast.len() as u64;
         self.output.write(&bytes).map_err(Failure::running)
     }
-}
-
-/// The first `count` frames as integers, and the samples of each.
-fn integers(parts: &[PcmFrames<'_>], count: usize) -> (Vec<i32>, usize) {
-    let channels: usize = parts.iter().map(|part| part.channels).sum();
-    let mut frames = vec![0; count * channels];
-    let mut first = 0;
-    for part in parts {
-        let (format, container) = (part.layout.format, part.layout.container);
-        // A power of two: the product is the integer itself.
-        let full_scale = (8.0 * format.bytes() as f64 - 1.0).exp2();
-        let source = part.bytes.chunks_exact(part.frame_bytes());
-        for (frame, slots) in source.zip(frames.chunks_exact_mut(channels.max(1))) {
-            for (sample, slot) in frame.chunks_exact(container).zip(&mut slots[first..]) {
-                *slot = (format.decode(sample) * full_scale) as i32;
-            }
-        }
-        first += part.channels;
-    }
-    (frames, channels)
 }

@@ -14,11 +14,11 @@ use super::track::{TrackArgs, TrackRecord};
 use super::turns::TurnArgs;
 use crate::bank::Bank;
 use crate::io::{
-    Arrival, BLOCK_BYTES, Container, MultiReader, OutputHeader, OutputNotes, PcmFormat, Placement,
+    Arrival, BLOCK_BYTES, Container, MultiReader, OutputHeader, OutputNotes, PcmFormat, PcmFrames, Placement,
     ReadOptions, is_sigmf,
 };
 use crate::pipeline::{DroppedLatency, FileOutputs, GapSummary, Outcome, Pipeline, Settings, Warning};
-use crate::runtime::{Algorithm, Options, Plan, PlanSummary, ThreadPool};
+use crate::runtime::{Algorithm, Input, Options, Plan, PlanSummary, ThreadPool};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
 
@@ -239,19 +239,15 @@ impl Job<'_> {
         observer: &mut RunObserver,
         each: &dyn Fn(u64),
     ) -> Result<bool, Failure> {
-        loop {
-            let count = match reader.wait().map_err(Failure::running)? {
-                Arrival::Frames(count) => count,
-                Arrival::End => return Ok(false),
-                Arrival::Stopped if self.is_live => return Ok(true),
-                Arrival::Stopped => return Err(interrupted(reader.consumed())),
-            };
-            let recordings = reader.frames();
-            pipeline.push(&recordings, &mut |block| outputs.write(block)).map_err(Failure::running)?;
-            observer.step(&recordings, pipeline);
-            drop(recordings);
-            reader.consume(count);
-            each(count as u64);
+        let is_stopped = each_block(reader, |recordings| {
+            pipeline.push(recordings, &mut |block| outputs.write(block)).map_err(Failure::running)?;
+            observer.step(recordings, pipeline);
+            each(recordings.frames() as u64);
+            Ok(())
+        })?;
+        match is_stopped {
+            true if !self.is_live => Err(interrupted(reader.consumed())),
+            _ => Ok(is_stopped),
         }
     }
 
@@ -315,6 +311,23 @@ impl Job<'_> {
         judged?;
         report.warnings[..report.warnings.len() - report.reported].iter().for_each(|warning| warn(warning));
         Ok(())
+    }
+}
+
+/// Hands over all frames, block by block; true if an interrupt ended them.
+pub(super) fn each_block(
+    reader: &mut MultiReader,
+    mut take: impl FnMut(&[PcmFrames<'_>]) -> Result<(), Failure>,
+) -> Result<bool, Failure> {
+    loop {
+        match reader.wait().map_err(Failure::running)? {
+            Arrival::Frames(count) => {
+                take(&reader.frames())?;
+                reader.consume(count);
+            }
+            Arrival::End => return Ok(false),
+            Arrival::Stopped => return Ok(true),
+        }
     }
 }
 

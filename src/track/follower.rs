@@ -1,12 +1,12 @@
 //! Follows the delays of a bank's channels block by block, and says how its taps are to change.
 
-use super::filter::{DelayMeasurement, DelayState, DriftModel};
+use super::filter::{DelayFilter, DelayMeasurement, DelayState, DriftModel};
 use super::frame_shift::{least_half, shift_for};
 use super::guide::Guide;
 use super::log::{Logged, TrackWarning};
 use super::readings::{HALF_WIDTH, Reading};
 use super::timeline::Timeline;
-use super::tracker::{DelayTracker, Lock};
+use super::tracker::{DelayTracker, Lock, Taken};
 use super::{Coincidence, TrackError};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::calibrate::Model;
@@ -80,13 +80,10 @@ pub struct Follower {
     guide: Guide,
     settings: FollowSettings,
     reference: usize,
-    /// The channels whose delays the taps follow, from 0; one filter each.
-    followed: Vec<usize>,
-    /// How far their delays may be off.
-    halves: Vec<Seconds>,
-    tracker: DelayTracker,
-    /// One for each followed channel that has readings enough.
-    timelines: Vec<Option<Timeline>>,
+    /// The channels whose delays the taps follow.
+    trackers: Vec<DelayTracker>,
+    /// Standard deviation at which a delay counts as known.
+    wanted: Seconds,
     /// The frame for which the filters' states hold.
     time: f64,
     /// Something was measured.
@@ -99,17 +96,6 @@ pub struct Follower {
     /// All warnings so far, and those of this block.
     warned: Vec<TrackWarning>,
     warnings: Vec<TrackWarning>,
-}
-
-/// One filter per followed channel, which begins with the delay of the spec and its interval.
-fn tracker(spec: &Spec, followed: &[usize], halves: &[Seconds], settings: &FollowSettings) -> DelayTracker {
-    let state = |(&j, half): (&usize, &Seconds)| {
-        DelayState::known(spec.channels[j].delay, half.0 / HALF_WIDTH, settings.rate_deviation)
-    };
-    let states: Vec<DelayState> = followed.iter().zip(halves).map(state).collect();
-    let smallest = halves.iter().map(|half| half.0).fold(f64::INFINITY, f64::min);
-    let wanted = Seconds((KNOWN * spec.fast_period.0).max(KNOWN_SHARE * smallest) / HALF_WIDTH);
-    DelayTracker::new(&states, settings.model, wanted)
 }
 
 impl Follower {
@@ -134,24 +120,28 @@ impl Follower {
         if let Guide::Pilot(pilot) = guide {
             check_pilot(&Model::new(&spec)?, pilot, settings.block_frames)?;
         }
-        let halves: Vec<Seconds> = followed.iter().map(|&j| of_all[j]).collect();
-        let tracker = tracker(&spec, &followed, &halves, &settings);
-        let no_shifts = vec![0; spec.channels.len()];
+        let smallest = followed.iter().map(|&j| of_all[j].0).fold(f64::INFINITY, f64::min);
+        let wanted = Seconds((KNOWN * spec.fast_period.0).max(KNOWN_SHARE * smallest) / HALF_WIDTH);
         let frame = spec.fast_period * spec.ratio as f64;
-        let timeline = |&j: &usize| match &guide {
-            Guide::Readings(readings) => Timeline::new(readings, j, frame, settings.model),
-            Guide::Pilot(_) | Guide::AnySignal => None,
+        // Each begins with the delay of the spec and its interval.
+        let tracker = |&j: &usize| {
+            let (delay, sigma) = (spec.channels[j].delay, of_all[j].0 / HALF_WIDTH);
+            let state = DelayState::known(delay, sigma, settings.rate_deviation);
+            let timeline = match &guide {
+                Guide::Readings(readings) => Timeline::new(readings, j, frame, settings.model),
+                Guide::Pilot(_) | Guide::AnySignal => None,
+            };
+            DelayTracker::new(j, of_all[j], DelayFilter::new(state, settings.model), timeline)
         };
-        let timelines = followed.iter().map(timeline).collect();
+        let trackers = followed.iter().map(tracker).collect();
+        let no_shifts = vec![0; spec.channels.len()];
         Ok(Self {
             spec,
             guide,
             settings,
             reference,
-            followed,
-            halves,
-            tracker,
-            timelines,
+            trackers,
+            wanted,
             time: 0.0,
             is_started: false,
             blocks: 0,
@@ -176,7 +166,8 @@ impl Follower {
         let centre = first as f64 + 0.5 * (frames as f64 - 1.0);
         let measured = self.measure(samples, first, centre);
         self.advance_to(centre);
-        self.look_up(centre);
+        let time = self.frame_time() * centre;
+        self.trackers.iter_mut().for_each(|tracker| tracker.look_up(time));
         let (measured, reason) = match measured {
             Ok(measured) => (measured, None),
             Err(reason) => (vec![None; self.spec.channels.len()], Some(reason)),
@@ -212,8 +203,9 @@ impl Follower {
         }
         self.advance_to(centre);
         let mut expected = self.spec.clone();
-        for (&j, state) in self.followed.iter().zip(self.tracker.states()) {
-            expected.channels[j].delay = state.delay - self.shifted(j);
+        for tracker in &self.trackers {
+            let j = tracker.channel;
+            expected.channels[j].delay = tracker.state().delay - self.shifted(j);
         }
         let mut measured = self.guide.measure(&expected, self.reference, samples)?;
         let walked = self.mean_of_block();
@@ -250,25 +242,19 @@ impl Follower {
         frame: u64,
         mut measured: Vec<Option<DelayMeasurement>>,
     ) -> Vec<Option<DelayMeasurement>> {
-        for k in 0..self.followed.len() {
-            let j = self.followed[k];
+        let mut lost = Vec::new();
+        for tracker in &mut self.trackers {
+            let j = tracker.channel;
             let Some(measurement) = measured[j] else { continue };
             self.is_started = true;
-            if let Some(timeline) = &self.timelines[k] {
-                measured[j] = Some(measurement).filter(|_| !timeline.refuses(frame));
-                continue;
-            }
-            let (_, is_taken) = self.tracker.update(k, measurement);
-            let is_lost = self.tracker.locks().nth(k) == Some(Lock::Lost);
-            if is_lost {
-                let sigma = measurement.variance.sqrt();
-                let state = DelayState::known(measurement.delay, sigma, self.settings.rate_deviation);
-                self.tracker.restart(k, state);
-                self.warn(TrackWarning::Lost { channel: j + 1, frame: self.time as u64 });
-            } else if !is_taken {
-                measured[j] = None;
+            match tracker.take(frame, measurement, self.settings.rate_deviation) {
+                Taken::Used => {}
+                Taken::Refused => measured[j] = None,
+                Taken::Restarted => lost.push(j + 1),
             }
         }
+        let frame = self.time as u64;
+        lost.into_iter().for_each(|channel| self.warn(TrackWarning::Lost { channel, frame }));
         measured
     }
 
@@ -280,49 +266,35 @@ impl Follower {
         if frame > self.time {
             // The intervals of the spec are those of the first measurement: what it finds is no drift.
             if self.is_started {
-                self.tracker.advance(self.frame_time() * (frame - self.time));
+                let elapsed = self.frame_time() * (frame - self.time);
+                self.trackers.iter_mut().for_each(|tracker| tracker.advance(elapsed));
             }
             self.time = frame;
         }
     }
 
-    /// Lets the filters of channels with a timeline know what it says.
-    fn look_up(&mut self, frame: f64) {
-        let time = self.frame_time() * frame;
-        for (k, timeline) in self.timelines.iter().enumerate() {
-            if let Some(timeline) = timeline {
-                self.tracker.restart(k, timeline.at(time));
-            }
-        }
-    }
-
     /// What is expected at a frame of the stream, for each followed channel.
-    fn expected(&self, frame: f64) -> Vec<DelayState> {
+    fn expected(&self, frame: f64) -> impl Iterator<Item = (&DelayTracker, DelayState)> {
         let (time, elapsed) = (self.frame_time() * frame, self.frame_time() * (frame - self.time));
-        let ahead = |state: DelayState| DelayState { delay: state.delay + elapsed * state.rate, ..state };
-        let of = |(timeline, state): (&Option<Timeline>, DelayState)| match timeline {
-            Some(timeline) => timeline.at(time),
-            None => ahead(state),
-        };
-        self.timelines.iter().zip(self.tracker.states()).map(of).collect()
+        self.trackers.iter().map(move |tracker| (tracker, tracker.ahead(time, elapsed)))
     }
 
     /// Bounds of the delays of all channels at a frame; `None` without timelines.
     fn bounds(&self, frame: f64) -> Option<Vec<Option<Seconds>>> {
         let mut bounds = vec![None; self.spec.channels.len()];
         let (time, change) = (self.frame_time() * frame, self.settings.rate_change);
-        for (&j, timeline) in self.followed.iter().zip(&self.timelines) {
-            bounds[j] = timeline.as_ref().and_then(|timeline| timeline.bound(time, change));
+        for tracker in &self.trackers {
+            bounds[tracker.channel] = tracker.timeline().and_then(|timeline| timeline.bound(time, change));
         }
-        self.timelines.iter().any(Option::is_some).then_some(bounds)
+        self.trackers.iter().any(|tracker| tracker.timeline().is_some()).then_some(bounds)
     }
 
     fn logged(&self, centre: f64, measured: Vec<Option<DelayMeasurement>>, reason: Option<String>) -> Logged {
         let mut log = Logged::of_reference(&self.spec, centre, self.frame_time(), reason);
         log.bound = self.bounds(centre);
-        let states = self.tracker.states().zip(self.tracker.locks());
-        for (&j, (state, lock)) in self.followed.iter().zip(states) {
-            log.put(j, state, lock, measured[j]);
+        for tracker in &self.trackers {
+            let j = tracker.channel;
+            log.put(j, tracker.state(), tracker.lock(self.wanted), measured[j]);
             log.shift[j] = self.block_shifts()[j];
         }
         log
@@ -332,22 +304,23 @@ impl Follower {
     fn change(&mut self, frame: usize, at: f64) -> Change {
         let mut errors = vec![FastPeriods(0.0); self.spec.channels.len()];
         let (h, period) = (self.spec.fast_period, self.frame_time());
-        let states = self.expected(at);
-        for ((&j, &half), state) in self.followed.iter().zip(&self.halves).zip(states) {
+        let mut shifts = self.last_shifts.clone();
+        for (tracker, state) in self.expected(at) {
+            let (j, half) = (tracker.channel, tracker.half);
             let error = state.delay - self.spec.channels[j].delay;
-            let shift = &mut self.last_shifts[j];
-            *shift = shift_for(error, half, period, *shift);
-            let rest = error - period * *shift as f64;
+            shifts[j] = shift_for(error, half, period, shifts[j]);
+            let rest = error - period * shifts[j] as f64;
             errors[j] = Seconds(rest.0.clamp(-half.0, half.0)).in_fast_periods(h);
         }
-        Change { frame, errors, shifts: self.last_shifts.clone() }
+        self.last_shifts.clone_from(&shifts);
+        Change { frame, errors, shifts }
     }
 
     /// Changes within the block that begins at frame `first`, often enough for its drift.
     fn changes(&mut self, first: u64) -> Vec<Change> {
         let frames = self.settings.block_frames;
         let middle = first as f64 + 0.5 * frames as f64;
-        let fastest = self.expected(middle).iter().map(|state| state.rate.abs()).fold(0.0, f64::max);
+        let fastest = self.expected(middle).map(|(_, state)| state.rate.abs()).fold(0.0, f64::max);
         let drift = fastest * (frames * self.spec.ratio) as f64;
         let most = (frames / LEAST_FRAMES).max(1);
         // NaN and infinity become the limits.
@@ -370,14 +343,17 @@ impl Follower {
 
     fn warn_of_delays(&mut self, centre: f64, changes: &[Change]) {
         let h = self.spec.fast_period;
-        for k in 0..self.followed.len() {
-            let (j, half) = (self.followed[k], self.halves[k]);
-            let most = half.in_fast_periods(h).0;
-            if changes.iter().any(|change| change.errors[j].0.abs() >= most) {
-                let (frame, enough) = (centre as u64, self.enough());
-                self.warn(TrackWarning::OutsideTheBox { channel: j + 1, half, frame, enough });
-            }
-        }
+        let (frame, enough) = (centre as u64, self.enough());
+        let is_outside = |tracker: &&DelayTracker| {
+            let most = tracker.half.in_fast_periods(h).0;
+            changes.iter().any(|change| change.errors[tracker.channel].0.abs() >= most)
+        };
+        let warning = |tracker: &DelayTracker| {
+            let (channel, half) = (tracker.channel + 1, tracker.half);
+            TrackWarning::OutsideTheBox { channel, half, frame, enough }
+        };
+        let outside: Vec<_> = self.trackers.iter().filter(is_outside).map(warning).collect();
+        outside.into_iter().for_each(|warning| self.warn(warning));
         if let Some(warning) = self.coincidence() {
             self.warn(warning);
         }
@@ -394,15 +370,13 @@ impl Follower {
     /// that.
     fn coincidence(&self) -> Option<TrackWarning> {
         let channels = self.spec.channels.len();
-        let is_known = self.tracker.locks().all(|lock| lock == Lock::Locked);
+        let is_known = self.trackers.iter().all(|tracker| tracker.lock(self.wanted) == Lock::Locked);
         if channels > self.spec.ratio || !is_known {
             return None;
         }
         let known = |channel: &crate::spec::ChannelSpec| DelayState::known(channel.delay, 0.0, 0.0);
         let mut states: Vec<DelayState> = self.spec.channels.iter().map(known).collect();
-        for (&j, state) in self.followed.iter().zip(self.tracker.states()) {
-            states[j] = state;
-        }
+        self.trackers.iter().for_each(|tracker| states[tracker.channel] = tracker.state());
         let horizon = self.frame_time() * (HORIZON * self.settings.block_frames as f64);
         let distance = self.spec.fast_period * TOGETHER;
         let found = Coincidence::ahead(&states, self.frame_time(), distance, horizon)?;

@@ -3,9 +3,9 @@
 //! Each channel's delay relative to the reference changes: the delay itself walks at random, and so does the
 //! rate at which it changes (two free-running clocks). A [`DelayFilter`] is the Kalman filter of one delay
 //! and its rate: measurements of block fits enter with their variance, silence lets the variance grow. A
-//! [`DelayTracker`] holds the filters of all channels, refuses measurements that contradict them, and says
-//! whether it is locked. [`Coincidence`] warns ahead of delays that come together, where no bank recovers
-//! the signal. A [`Follower`] measures the delays of a bank's channels block by block, by a pilot tone or by
+//! tracker per channel refuses measurements that contradict the filter, and says whether it is locked.
+//! [`Coincidence`] warns ahead of delays that come together, where no bank recovers the signal. A
+//! [`Follower`] measures the delays of a bank's channels block by block, by a pilot tone or by
 //! any signal, and says how taps that are affine in the delays are to change. Delays measured before
 //! are known on both sides of every instant: a smoothing spline of [`crate::sampling`] goes through them.
 //!
@@ -44,4 +44,4 @@ pub use follower::{Change, FollowSettings, Followed, Follower};
 pub use guide::Guide;
 pub use log::{Logged, TrackWarning};
 pub use readings::Reading;
-pub use tracker::{DelayTracker, Lock};
+pub use tracker::Lock;

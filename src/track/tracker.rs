@@ -1,7 +1,8 @@
-//! The filters of all channels, with a gate and a lock state.
+//! What is known of the delay of one channel: by the filter with a gate, or by readings that are known
+//! beforehand.
 
-use super::coincidence::Coincidence;
-use super::filter::{DelayFilter, DelayMeasurement, DelayState, DriftModel, Innovation};
+use super::filter::{DelayFilter, DelayMeasurement, DelayState};
+use super::timeline::Timeline;
 use crate::units::Seconds;
 
 /// Innovations beyond this many standard deviations are refused: one in 1.7 million by chance.
@@ -18,149 +19,138 @@ pub enum Lock {
     Locked,
     /// It is not: nothing has come for a while, or not yet enough.
     Held,
-    /// Measurements contradict the filter again and again.
-    Lost,
 }
 
-/// Follows the delays of N channels relative to the reference.
+/// What became of a measurement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Taken {
+    Used,
+    /// It lies too far from what is expected; the delay is as before.
+    Refused,
+    /// Measurements contradicted the filter again and again, so it begins again with this one.
+    Restarted,
+}
+
+/// The delay of one channel relative to the reference.
 #[derive(Debug, Clone)]
-pub struct DelayTracker {
-    channels: Vec<Channel>,
-    /// Standard deviation at which a delay counts as known.
-    wanted: Seconds,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Channel {
+pub(super) struct DelayTracker {
+    /// The channel, from 0.
+    pub(super) channel: usize,
+    /// How far its delay may be off.
+    pub(super) half: Seconds,
     filter: DelayFilter,
+    /// With readings enough, what they say takes the place of the filter.
+    timeline: Option<Timeline>,
     /// Measurements refused since the last one that was taken.
     refused: u32,
 }
 
 impl DelayTracker {
-    /// Filters that know `states`, one for each channel; `wanted` is the standard deviation at which a delay
-    /// counts as known.
-    pub fn new(states: &[DelayState], model: DriftModel, wanted: Seconds) -> Self {
-        let channel = |&state: &DelayState| Channel { filter: DelayFilter::new(state, model), refused: 0 };
-        Self { channels: states.iter().map(channel).collect(), wanted }
+    pub(super) fn new(
+        channel: usize,
+        half: Seconds,
+        filter: DelayFilter,
+        timeline: Option<Timeline>,
+    ) -> Self {
+        Self { channel, half, filter, timeline, refused: 0 }
     }
 
-    /// N.
-    pub fn len(&self) -> usize {
-        self.channels.len()
+    /// What is known now.
+    pub(super) fn state(&self) -> DelayState {
+        self.filter.state()
     }
 
-    /// True without channels.
-    pub fn is_empty(&self) -> bool {
-        self.channels.is_empty()
+    /// Whether the standard deviation is at most `wanted`.
+    pub(super) fn lock(&self, wanted: Seconds) -> Lock {
+        if self.state().deviation() <= wanted { Lock::Locked } else { Lock::Held }
     }
 
-    /// Lets the time `elapsed` pass for all channels. Without measurements the delays go on at their rates,
-    /// and their variances grow.
-    pub fn advance(&mut self, elapsed: Seconds) {
-        self.channels.iter_mut().for_each(|channel| channel.filter.advance(elapsed));
+    /// The readings that are known beforehand.
+    pub(super) fn timeline(&self) -> Option<&Timeline> {
+        self.timeline.as_ref()
     }
 
-    /// Takes a measurement of channel `i` and returns true, or refuses one that lies too far from what is
-    /// expected: then the delay is as before. A channel that is [`Lock::Lost`] needs a
-    /// [restart](Self::restart).
-    ///
-    /// # Panics
-    /// If there is no channel `i`.
-    pub fn update(&mut self, i: usize, measurement: DelayMeasurement) -> (Innovation, bool) {
-        let channel = &mut self.channels[i];
-        let innovation = channel.filter.innovation(measurement);
-        if innovation.sigmas() <= GATE {
-            channel.refused = 0;
-            channel.filter.update(measurement);
-            return (innovation, true);
+    /// Lets time pass: without measurements the delay goes on at its rate, and its variance grows.
+    pub(super) fn advance(&mut self, elapsed: Seconds) {
+        self.filter.advance(elapsed);
+    }
+
+    /// Takes what the timeline says of a time, if there is one.
+    pub(super) fn look_up(&mut self, time: Seconds) {
+        if let Some(timeline) = &self.timeline {
+            self.filter = self.filter.restarted(timeline.at(time));
         }
-        channel.refused += 1;
-        (innovation, false)
     }
 
-    /// Begins again with what is known of channel `i` from elsewhere, for example after [`Lock::Lost`].
-    ///
-    /// # Panics
-    /// If there is no channel `i`.
-    pub fn restart(&mut self, i: usize, state: DelayState) {
-        let channel = &mut self.channels[i];
-        *channel = Channel { filter: channel.filter.restarted(state), refused: 0 };
+    /// What is expected at a time, `elapsed` from now.
+    pub(super) fn ahead(&self, time: Seconds, elapsed: Seconds) -> DelayState {
+        let state = self.state();
+        match &self.timeline {
+            Some(timeline) => timeline.at(time),
+            None => DelayState { delay: state.delay + elapsed * state.rate, ..state },
+        }
     }
 
-    /// What is known of each channel.
-    pub fn states(&self) -> impl Iterator<Item = DelayState> {
-        self.channels.iter().map(|channel| channel.filter.state())
-    }
-
-    /// Whether each channel is locked.
-    pub fn locks(&self) -> impl Iterator<Item = Lock> {
-        self.channels.iter().map(|channel| {
-            if channel.refused >= MOST_REFUSED {
-                Lock::Lost
-            } else if channel.filter.state().deviation() <= self.wanted {
-                Lock::Locked
-            } else {
-                Lock::Held
-            }
-        })
-    }
-
-    /// As [`Coincidence::ahead`].
-    pub fn coincidence(
-        &self,
-        slow_period: Seconds,
-        distance: Seconds,
-        horizon: Seconds,
-    ) -> Option<Coincidence> {
-        let states: Vec<DelayState> = self.states().collect();
-        Coincidence::ahead(&states, slow_period, distance, horizon)
+    /// Takes the measurement of a frame. A filter that begins again knows its rate by `rate_deviation`.
+    pub(super) fn take(&mut self, frame: u64, measurement: DelayMeasurement, rate_deviation: f64) -> Taken {
+        if let Some(timeline) = &self.timeline {
+            return if timeline.refuses(frame) { Taken::Refused } else { Taken::Used };
+        }
+        if self.filter.innovation(measurement).sigmas() <= GATE {
+            self.refused = 0;
+            self.filter.update(measurement);
+            return Taken::Used;
+        }
+        self.refused += 1;
+        if self.refused < MOST_REFUSED {
+            return Taken::Refused;
+        }
+        let state = DelayState::known(measurement.delay, measurement.variance.sqrt(), rate_deviation);
+        (self.filter, self.refused) = (self.filter.restarted(state), 0);
+        Taken::Restarted
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::DriftModel;
     use super::*;
 
+    const WANTED: Seconds = Seconds(0.05);
+
     fn tracker() -> DelayTracker {
-        let states = [DelayState::known(Seconds(1.0), 0.1, 0.01), DelayState::known(Seconds(2.0), 0.1, 0.01)];
-        DelayTracker::new(&states, DriftModel { delay_walk: 1e-4, rate_walk: 0.0 }, Seconds(0.05))
+        let model = DriftModel { delay_walk: 1e-4, rate_walk: 0.0 };
+        let filter = DelayFilter::new(DelayState::known(Seconds(1.0), 0.1, 0.01), model);
+        DelayTracker::new(0, Seconds(1.0), filter, None)
     }
 
     fn measured(delay: f64) -> DelayMeasurement {
         DelayMeasurement { delay: Seconds(delay), variance: 1e-4 }
     }
 
-    fn locks(tracker: &DelayTracker) -> Vec<Lock> {
-        tracker.locks().collect()
-    }
-
     #[test]
     fn a_channel_locks_by_measurements_and_is_held_in_silence() {
         let mut tracker = tracker();
-        assert_eq!(locks(&tracker), [Lock::Held; 2]);
-        assert!(tracker.update(1, measured(2.05)).1);
-        assert_eq!(locks(&tracker), [Lock::Held, Lock::Locked]);
-        let known = tracker.channels[1].filter.state().delay;
+        assert_eq!(tracker.lock(WANTED), Lock::Held);
+        assert_eq!(tracker.take(0, measured(1.05), 0.01), Taken::Used);
+        assert_eq!(tracker.lock(WANTED), Lock::Locked);
+        let known = tracker.state().delay;
         // sqrt(1e-4 + 1e-4 t + (0.01 t)^2) reaches 0.05 before 5 s.
         tracker.advance(Seconds(5.0));
-        assert_eq!(locks(&tracker), [Lock::Held; 2]);
-        assert_eq!(tracker.channels[1].filter.state().delay, known);
+        assert_eq!((tracker.lock(WANTED), tracker.state().delay), (Lock::Held, known));
     }
 
     #[test]
     fn a_contradiction_is_refused_and_many_of_them_are_a_loss() {
         let mut tracker = tracker();
-        tracker.update(0, measured(1.0));
-        let before = tracker.channels[0].filter.state();
-        for refused in 1..=MOST_REFUSED {
-            let (innovation, taken) = tracker.update(0, measured(1.5));
-            assert!(!taken && innovation.sigmas() > GATE);
-            assert_eq!(tracker.channels[0].filter.state(), before);
-            assert_eq!(locks(&tracker)[0], if refused < MOST_REFUSED { Lock::Locked } else { Lock::Lost });
+        tracker.take(0, measured(1.0), 0.01);
+        let before = tracker.state();
+        for _ in 1..MOST_REFUSED {
+            assert_eq!(tracker.take(0, measured(1.5), 0.01), Taken::Refused);
+            assert_eq!((tracker.state(), tracker.lock(WANTED)), (before, Lock::Locked));
         }
-        tracker.restart(0, DelayState::known(Seconds(1.5), 0.01, 0.0));
-        assert!(tracker.update(0, measured(1.5)).1);
-        assert_eq!(locks(&tracker)[0], Lock::Locked);
+        assert_eq!(tracker.take(0, measured(1.5), 0.01), Taken::Restarted);
+        assert_eq!((tracker.state().delay, tracker.lock(WANTED)), (Seconds(1.5), Lock::Locked));
+        assert_eq!(tracker.take(0, measured(1.5), 0.01), Taken::Used);
     }
 }

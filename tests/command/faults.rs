@@ -1,8 +1,10 @@
 //! Systems that refuse: standard streams that cannot be written, threads that cannot be started, inputs
 //! without end.
 
+use crate::support::blocked::until_a_write_waits;
 use crate::support::{Desk, bytes, frames, fused, names, text};
 use std::io::Write;
+use std::os::fd::AsRawFd;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
@@ -101,7 +103,7 @@ fn a_signal_ends_a_run_whose_output_nobody_takes() {
         std::thread::sleep(Duration::from_millis(1));
     }
     // Until the pipe is full.
-    std::thread::sleep(Duration::from_millis(500));
+    until_a_write_waits(child.id(), None);
     let begin = Instant::now();
     assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());
     while child.try_wait().unwrap().is_none() {
@@ -134,8 +136,9 @@ fn full_pipe() -> (std::io::PipeReader, std::io::PipeWriter) {
     let (reader, writer) = std::io::pipe().unwrap();
     let mut filler = writer.try_clone().unwrap();
     // The write that finds no room waits until the reader goes, at the end of the test.
+    let descriptor = filler.as_raw_fd();
     std::thread::spawn(move || while filler.write_all(&[b'.'; 4096]).is_ok() {});
-    std::thread::sleep(Duration::from_millis(300));
+    until_a_write_waits(std::process::id(), Some(descriptor));
     (reader, writer)
 }
 
@@ -154,7 +157,7 @@ fn a_signal_ends_a_run_whose_messages_nobody_takes() {
     while !desk.path("out").exists() {
         std::thread::sleep(Duration::from_millis(1));
     }
-    std::thread::sleep(Duration::from_millis(300));
+    until_a_write_waits(child.id(), None);
     assert!(child.try_wait().unwrap().is_none(), "the message was taken");
     let begin = Instant::now();
     assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());

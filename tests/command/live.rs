@@ -1,5 +1,6 @@
 //! What a run reports while it goes on: gaps, clipping, stalls, lost samples from a FIFO. As a user runs it.
 
+use crate::support::blocked::until_a_thread_ends;
 use crate::support::{Desk, bytes, channel, floats, frames, fused, interleaved, text, wav};
 use serde_json::{Value, json};
 use std::fs::{File, OpenOptions};
@@ -117,10 +118,11 @@ fn lost_samples_from_a_fifo_hold_nothing_up() {
     // The last line comes too late.
     lost.write_all(b"{\"channel\": 2, \"first\": 30, \"length\": 3}\n\n{\"first\": 2, \"length\": 1}\n")
         .unwrap();
-    // The line is read on a thread of its own.
-    std::thread::sleep(Duration::from_millis(300));
+    // The lines are read on a thread of its own, up to the last one.
+    drop(lost);
+    until_a_thread_ends(child.id(), "lost");
     got.extend(answer(20, 60));
-    drop((stdin, lost));
+    drop(stdin);
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success(), "{output:?}");
     let mut filled = input.clone();
@@ -139,7 +141,7 @@ fn frames_left_out_may_come_from_a_fifo_and_wrong_lines_are_refused() {
     let run = |reported: &str| {
         let mut child = desk.spawn(&["stream", "bank.json", "--gaps", "zero", "--lost", "lost"]);
         writer(&desk, "lost").write_all(reported.as_bytes()).unwrap();
-        std::thread::sleep(Duration::from_millis(300));
+        until_a_thread_ends(child.id(), "lost");
         // A run that was refused closes its input.
         let _ = child.stdin.take().unwrap().write_all(&bytes(&frames(20)));
         child.wait_with_output().unwrap()

@@ -2,6 +2,7 @@
 // Each test program uses a part of it.
 #![allow(dead_code, unused_imports)]
 
+pub(crate) mod blocked;
 mod desk;
 pub(crate) mod jobs;
 pub(crate) mod random;
