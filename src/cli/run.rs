@@ -158,7 +158,8 @@ impl Job<'_> {
         let turns = args.turns.turns(self.bank, self.bank_path)?;
         let stalls = observer.map(RunObserver::stall_watch);
         let block_bytes = args.threads.bytes(BLOCK_BYTES);
-        let files = ReadOptions { block_bytes, turns: turns.as_ref(), stalls: stalls.as_ref(), ..captures };
+        let files =
+            ReadOptions { block_bytes, interleaving: turns.as_ref(), stalls: stalls.as_ref(), ..captures };
         MultiReader::start(inputs, args.gaps.read_options(&lost, files), interrupts()).map_err(unreadable)
     }
 

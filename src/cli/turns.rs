@@ -2,7 +2,7 @@
 
 use super::Failure;
 use crate::bank::Bank;
-use crate::io::Turns;
+use crate::io::TimeInterleaving;
 use crate::units::FastPeriods;
 use std::path::Path;
 
@@ -34,7 +34,7 @@ impl TurnArgs {
     }
 
     /// The channels of `bank` in the order in which they sample, if they take turns.
-    pub(super) fn turns(self, bank: &Bank, path: &Path) -> Result<Option<Turns>, Failure> {
+    pub(super) fn turns(self, bank: &Bank, path: &Path) -> Result<Option<TimeInterleaving>, Failure> {
         self.by_delay(&bank.delays_in_fast_periods(), bank.ratio, path)
     }
 
@@ -45,7 +45,7 @@ impl TurnArgs {
         delays: &[FastPeriods],
         ratio: usize,
         path: &Path,
-    ) -> Result<Option<Turns>, Failure> {
+    ) -> Result<Option<TimeInterleaving>, Failure> {
         let Some(converters) = self.interleaved else { return Ok(None) };
         let channels = delays.len();
         if channels != usize::from(converters) {
@@ -66,6 +66,6 @@ impl TurnArgs {
                 ratio
             )));
         }
-        Ok(Some(Turns::by_delay(&delays)))
+        Ok(Some(TimeInterleaving::by_delay(&delays)))
     }
 }

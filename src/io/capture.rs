@@ -37,15 +37,15 @@ pub(super) struct InputNotes {
     /// When its frames were taken.
     pub(super) timestamps: Timestamps,
     /// Samples per frame of time-interleaved converters, or 1.
-    pub(super) turn: usize,
+    pub(super) samples_per_frame: usize,
     /// Chunks of a WAV file.
     pub(super) chunks: Vec<WavChunk>,
 }
 
 impl InputNotes {
-    /// The same notes where `turn` samples of the input are a frame.
-    pub(super) fn in_turns(self, turn: usize) -> Result<Self, String> {
-        Ok(Self { timestamps: self.timestamps.in_turns(turn)?, turn, ..self })
+    /// The same notes where so many samples of the input are a frame.
+    pub(super) fn grouped(self, samples_per_frame: usize) -> Result<Self, String> {
+        Ok(Self { timestamps: self.timestamps.grouped(samples_per_frame)?, samples_per_frame, ..self })
     }
 }
 

@@ -71,7 +71,7 @@ impl InputFrames {
         let capture = source.open()?;
         let stored = capture.stream_header();
         let header = source.chosen(stored)?;
-        let frames = FrameReader::new(capture, stored.frame_bytes().max(1) * source.turn());
+        let frames = FrameReader::new(capture, stored.frame_bytes().max(1) * source.samples_per_frame());
         Ok(Self { source: source.clone(), name: source.name(), frames, stored, header })
     }
 
@@ -114,10 +114,10 @@ impl InputSource {
             }
             return Ok(StreamHeader { channels: 1, ..header });
         }
-        let converters = self.turn();
-        if self.turns.is_some() && channels != 1 {
+        let converters = self.samples_per_frame();
+        if self.interleaving.is_some() && channels != 1 {
             return unfit(format!(
-                "{channels} channels, but converters that take turns share one; read it without --interleaved, or \
+                "{channels} channels, but time-interleaved converters share one; read it without --interleaved, or \
                  extract that channel first"
             ));
         }
@@ -134,7 +134,7 @@ impl InputSource {
     /// or keeps those of the only one. Gives the bytes that remain.
     fn arrange(&self, frames: &mut [u8], header: &StreamHeader) -> usize {
         let sample = header.layout.container * header.parts();
-        self.turns.iter().for_each(|turns| turns.reorder(frames, sample));
+        self.interleaving.iter().for_each(|interleaving| interleaving.reorder(frames, sample));
         let Some(only) = self.only.filter(|_| header.channels > 1) else { return frames.len() };
         let count = frames.len() / header.frame_bytes();
         for k in 0..count {

@@ -21,7 +21,7 @@ pub(super) const BLOCKS: usize = 4;
 fn send_all(source: &InputSource, messages: &Sender<Result<Message, IoError>>, pool: &Receiver<Vec<u8>>) {
     let end = || -> Result<Message, IoError> {
         let mut frames = InputFrames::open(source)?;
-        let notes = frames.capture().notes().in_turns(source.turn());
+        let notes = frames.capture().notes().grouped(source.samples_per_frame());
         let notes = Box::new(notes.map_err(IoError::unfit(&source.name()))?);
         let _ = messages.send(Ok(Message::Header { header: frames.header, notes }));
         while let Ok(mut bytes) = pool.recv() {

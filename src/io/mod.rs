@@ -34,8 +34,8 @@ mod stdin_reader;
 mod stream_header;
 pub(crate) mod table;
 mod tar;
+mod time_interleaving;
 mod timestamps;
-mod turns;
 pub mod wav;
 
 pub use crate::runtime::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
@@ -57,5 +57,5 @@ pub use sigmf::{SigmfAnnotation, SigmfCapture, SigmfGlobal, SigmfMeta, is_sigmf,
 pub use stall::{Stall, StallWatch};
 pub use stream_header::{Coding, StreamHeader, is_same_rate};
 pub use tar::{TarFile, tar_files};
+pub use time_interleaving::TimeInterleaving;
 pub use timestamps::{MAX_LOST, MAX_LOST_AT_ONCE};
-pub use turns::Turns;

@@ -65,13 +65,13 @@ impl MultiReader {
     ) -> Result<Option<Self>, IoError> {
         refuse_shared_pipes(paths)?;
         let block = (ALL_BYTES / BLOCKS / paths.len().max(1)).min(options.block_bytes).max(4096);
-        let turns = options.turns.filter(|_| paths.len() == 1);
+        let interleaving = options.interleaving.filter(|_| paths.len() == 1);
         let source = |path: &PathBuf| InputSource {
             path: path.clone(),
             coding: options.coding,
             channels: options.channels,
             only: options.only,
-            turns: turns.cloned(),
+            interleaving: interleaving.cloned(),
             block,
         };
         let inputs = match paths {

@@ -121,7 +121,7 @@ struct Axis<'a> {
 impl Axis<'_> {
     /// The output sample of an input sample, unless it is before the file.
     fn place(&self, sample: u64) -> Option<u64> {
-        let frame = sample.checked_sub(self.offset)? / self.input.turn as u64;
+        let frame = sample.checked_sub(self.offset)? / self.input.samples_per_frame as u64;
         let time = self.input.timestamps.time_of(frame, self.origin);
         time.checked_mul(self.placement.ratio)?.checked_add(self.placement.shift)
     }

@@ -8,7 +8,7 @@ use super::pipe::{stdin_file, widen_pipe};
 use super::sigmf::is_sigmf;
 use super::sigmf_reader::SigmfReader;
 use super::wav::WavReader;
-use super::{Coding, IoError, PcmFormat, SampleLayout, StreamHeader, Turns};
+use super::{Coding, IoError, PcmFormat, SampleLayout, StreamHeader, TimeInterleaving};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -61,7 +61,7 @@ pub(super) struct InputSource {
     /// Number of channels if the input has no header and is not time-interleaved.
     pub(super) channels: usize,
     /// The converters whose samples are time-interleaved in the input, if they are.
-    pub(super) turns: Option<Turns>,
+    pub(super) interleaving: Option<TimeInterleaving>,
     /// The only channel to read, from 0.
     pub(super) only: Option<usize>,
     /// Bytes of a block.
@@ -78,9 +78,9 @@ impl InputSource {
         self.path.as_os_str() == "-"
     }
 
-    /// Samples in a row that belong to one frame.
-    pub(super) fn turn(&self) -> usize {
-        self.turns.as_ref().map_or(1, Turns::converters)
+    /// Samples in a row that are a frame: one of each time-interleaved converter.
+    pub(super) fn samples_per_frame(&self) -> usize {
+        self.interleaving.as_ref().map_or(1, TimeInterleaving::converters)
     }
 
     /// Opens the input and reads its header; raw samples have none, and are opened when they are read.
@@ -150,7 +150,7 @@ impl InputSource {
     /// The header of raw samples: as the settings say.
     pub(super) fn raw_header(&self) -> StreamHeader {
         let layout = SampleLayout::packed(self.coding.format().unwrap_or(PcmFormat::F32Le));
-        let channels = if self.turns.is_some() { 1 } else { self.channels };
+        let channels = if self.interleaving.is_some() { 1 } else { self.channels };
         StreamHeader { is_complex: self.coding.is_complex(), ..StreamHeader::real(layout, channels) }
     }
 }
@@ -183,7 +183,8 @@ mod tests {
             let path = folder.path().join("x");
             std::fs::write(&path, bytes).unwrap();
             let coding = Coding::Raw(PcmFormat::U8);
-            let source = InputSource { path, coding, channels: 1, turns: None, only: None, block: 4096 };
+            let source =
+                InputSource { path, coding, channels: 1, interleaving: None, only: None, block: 4096 };
             io::copy(&mut source.open().unwrap(), &mut io::sink())
         };
         let header = b"RIFF\x24\0\0\0WAVEfmt ";

@@ -2,7 +2,7 @@
 
 use super::live_lost::LiveLost;
 use super::timestamps::MAX_LOST;
-use super::{Coding, LostSamples, StallWatch, Turns};
+use super::{Coding, LostSamples, StallWatch, TimeInterleaving};
 
 /// Bytes of a block that suit one thread.
 pub const BLOCK_BYTES: usize = 128 << 10;
@@ -26,9 +26,9 @@ pub struct ReadOptions<'a> {
     pub channels: usize,
     /// The only channel to read of each input, from 0.
     pub only: Option<usize>,
-    /// The converters that take turns in the only input, which has one channel then. Its frames are those of
+    /// The time-interleaved converters of the only input, which has one channel then. Its frames are those of
     /// an input of M channels, at an M-th of its rate.
-    pub turns: Option<&'a Turns>,
+    pub interleaving: Option<&'a TimeInterleaving>,
     /// The lost samples, if a file lists them.
     pub lost: Option<&'a LostSamples>,
     /// Lost samples that become known during the run.
@@ -51,7 +51,7 @@ impl ReadOptions<'_> {
             coding: Coding::Wav,
             channels: 1,
             only: None,
-            turns: None,
+            interleaving: None,
             lost: None,
             live_lost: None,
             max_lost: MAX_LOST,

@@ -49,19 +49,19 @@ impl Timestamps {
         Ok(Self(timestamps))
     }
 
-    /// The same timestamps counted in turns of M = `converters` samples.
-    pub(super) fn in_turns(self, converters: usize) -> Result<Self, String> {
+    /// The same timestamps counted in frames of M = `converters` samples.
+    pub(super) fn grouped(self, converters: usize) -> Result<Self, String> {
         let m = converters as u64;
         if let Some(broken) = self.0.iter().find(|t| !t.frame.is_multiple_of(m) || !t.index.is_multiple_of(m))
         {
             return Err(format!(
-                "sample_start {} with global_index {} is not at the beginning of a turn of {m} converters, so that \
-                 other converters would follow; cut the capture to whole turns",
+                "sample_start {} with global_index {} is not at the beginning of a frame of {m} time-interleaved converters; \
+                 cut the capture to whole frames",
                 broken.frame, broken.index
             ));
         }
-        let turn = |t: Timestamp| Timestamp { frame: t.frame / m, index: t.index / m };
-        Ok(Self(self.0.into_iter().map(turn).collect()))
+        let grouped = |t: Timestamp| Timestamp { frame: t.frame / m, index: t.index / m };
+        Ok(Self(self.0.into_iter().map(grouped).collect()))
     }
 
     /// True if there are no timestamps.
@@ -154,10 +154,10 @@ mod tests {
     }
 
     #[test]
-    fn turns_begin_with_their_first_converter() {
-        assert_eq!(timestamps(&[(0, 8), (4, 16)]).unwrap().in_turns(4), timestamps(&[(0, 2), (1, 4)]));
-        let broken = timestamps(&[(0, 0), (4, 9)]).unwrap().in_turns(4).unwrap_err();
-        assert!(broken.contains("global_index 9 is not at the beginning of a turn of 4"), "{broken}");
+    fn frames_begin_with_their_first_converter() {
+        assert_eq!(timestamps(&[(0, 8), (4, 16)]).unwrap().grouped(4), timestamps(&[(0, 2), (1, 4)]));
+        let broken = timestamps(&[(0, 0), (4, 9)]).unwrap().grouped(4).unwrap_err();
+        assert!(broken.contains("global_index 9 is not at the beginning of a frame of 4"), "{broken}");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use super::super::capture_file::Whole;
 use super::super::file_kind::unreadable;
 use super::super::interrupt::interrupts;
 use crate::calibrate::Record;
-use crate::io::{MultiReader, PcmFormat, ReadOptions, Turns};
+use crate::io::{MultiReader, PcmFormat, ReadOptions, TimeInterleaving};
 use crate::spec::Spec;
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ pub(super) struct Reading<'a> {
     /// Their format.
     pub(super) captures: CaptureArgs,
     /// The converters that take turns in one file, if they do.
-    pub(super) turns: Option<&'a Turns>,
+    pub(super) turns: Option<&'a TimeInterleaving>,
     /// Samples of this size and more are clipped.
     pub(super) clip: Option<f64>,
 }
@@ -31,7 +31,7 @@ pub(super) fn read(
     reading: Reading<'_>,
 ) -> Result<(Vec<Record>, Vec<String>), Failure> {
     let captures = reading.captures.options(paths.len(), spec.channels.len());
-    let options = ReadOptions { turns: reading.turns, ..captures };
+    let options = ReadOptions { interleaving: reading.turns, ..captures };
     let reader = MultiReader::start(paths, options, interrupts()).map_err(unreadable)?;
     let mut reader = reader.ok_or_else(|| Failure::input("interrupted; nothing was written"))?;
     check_channels(spec, &reader)?;

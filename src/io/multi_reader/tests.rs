@@ -1,8 +1,8 @@
-//! Readers that die, converters in turn, and bounds of what may be lost.
+//! Readers that die, time-interleaved converters, and bounds of what may be lost.
 
 use super::super::frames::Message;
 use super::*;
-use crate::io::{Coding, InputFault, PcmFormat, Turns};
+use crate::io::{Coding, InputFault, PcmFormat, TimeInterleaving};
 use crossbeam_channel::Sender;
 
 fn raw(channels: usize) -> ReadOptions<'static> {
@@ -17,7 +17,7 @@ fn reader(
         path: "x".into(),
         coding: raw(1).coding,
         channels: 1,
-        turns: None,
+        interleaving: None,
         only: None,
         block: 4,
     }
@@ -55,13 +55,13 @@ fn an_input_that_ends_is_no_error() {
 }
 
 #[test]
-fn converters_in_turn_are_the_channels_of_one_input() {
+fn time_interleaved_converters_are_the_channels_of_one_input() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.raw");
-    // Four turns of three converters, and two samples of a fifth.
+    // Four frames of three converters, and two samples of a fifth.
     std::fs::write(&path, (0u8..14).collect::<Vec<_>>()).unwrap();
-    let turns = Turns::by_delay(&[0.0, 2.0, 1.0]);
-    let options = ReadOptions { turns: Some(&turns), ..raw(1) };
+    let interleaving = TimeInterleaving::by_delay(&[0.0, 2.0, 1.0]);
+    let options = ReadOptions { interleaving: Some(&interleaving), ..raw(1) };
     let started = MultiReader::start(&[path], options, crossbeam_channel::never()).unwrap();
     let mut reader = started.unwrap();
     assert_eq!(reader.channels(), 3);

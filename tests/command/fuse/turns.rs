@@ -111,7 +111,11 @@ fn timestamps_count_whole_turns() {
     want.splice(6..6, [0.0; 3]);
     assert_eq!(wav::samples(&desk, "y.wav"), want);
     meta(8);
-    desk.refused(1, &args, &["capture.sigmf-meta", "global_index 8", "beginning of a turn of 3 converters"]);
+    desk.refused(
+        1,
+        &args,
+        &["capture.sigmf-meta", "global_index 8", "beginning of a frame of 3 time-interleaved"],
+    );
 }
 
 #[test]

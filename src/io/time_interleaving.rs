@@ -1,16 +1,16 @@
-//! Captures in which several converters write their samples in turn into one file.
+//! Captures in which time-interleaved converters write their samples in turn into one file.
 //!
 //! Sample k of the file, counted from 0, comes from converter k mod M. M samples in a row, one of each
 //! converter, are a frame.
 
-/// M converters that take turns, and the channel that each of them is.
+/// M time-interleaved converters, and the channel that each of them is.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Turns {
+pub struct TimeInterleaving {
     /// The channel, from 0, of each converter.
     channels: Vec<usize>,
 }
 
-impl Turns {
+impl TimeInterleaving {
     /// Converter j is channel j: for captures of which nothing else is known.
     pub fn in_order(converters: usize) -> Self {
         Self { channels: (0..converters).collect() }
@@ -56,19 +56,19 @@ mod tests {
 
     #[test]
     fn the_first_converter_is_the_one_with_the_largest_delay() {
-        assert_eq!(Turns::by_delay(&[3.1, 1.9, 1.0, 0.0]), Turns::in_order(4));
-        assert_eq!(Turns::by_delay(&[0.0, 1.0, 2.5]).channels(), [2, 1, 0]);
-        assert_eq!(Turns::by_delay(&[0.5, 1.0, 0.5]).channels(), [1, 0, 2]);
+        assert_eq!(TimeInterleaving::by_delay(&[3.1, 1.9, 1.0, 0.0]), TimeInterleaving::in_order(4));
+        assert_eq!(TimeInterleaving::by_delay(&[0.0, 1.0, 2.5]).channels(), [2, 1, 0]);
+        assert_eq!(TimeInterleaving::by_delay(&[0.5, 1.0, 0.5]).channels(), [1, 0, 2]);
     }
 
     #[test]
     fn whole_frames_come_into_the_order_of_the_channels() {
-        let turns = Turns::by_delay(&[0.0, 2.0, 1.0]);
+        let turns = TimeInterleaving::by_delay(&[0.0, 2.0, 1.0]);
         // Two bytes a sample, two frames; converters are the channels 1, 2 and 0.
         let mut bytes = *b"1a2b0c1d2e0f";
         turns.reorder(&mut bytes, 2);
         assert_eq!(&bytes, b"0c1a2b0f1d2e");
-        Turns::in_order(3).reorder(&mut bytes, 2);
+        TimeInterleaving::in_order(3).reorder(&mut bytes, 2);
         assert_eq!(&bytes, b"0c1a2b0f1d2e");
     }
 }
