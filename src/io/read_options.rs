@@ -26,8 +26,8 @@ pub struct ReadOptions<'a> {
     pub channels: usize,
     /// The only channel to read of each input, from 0.
     pub only: Option<usize>,
-    /// The time-interleaved converters of the only input, which has one channel then. Its frames are those of
-    /// an input of M channels, at an M-th of its rate.
+    /// The time-interleaved converters of the only input, which has one channel then. Its frames are those
+    /// of an input of M channels, at an M-th of its rate.
     pub interleaving: Option<&'a TimeInterleaving>,
     /// The lost samples, if a file lists them.
     pub lost: Option<&'a LostSamples>,
