@@ -129,12 +129,12 @@ fn moved(
     let is_damped = |pole: &Complex<f64>| -pole.re >= MIN_DAMPING_RATIO * pole.norm();
     match passband {
         Passband::BandPass { low, high } if !filter.poles.iter().all(is_damped) => {
-            let rule =
-                "a band this narrow puts poles within 1e-9 of the imaginary axis, beyond double precision; \
-                        widen the band or lower the order"
-                    .into();
-            let width = (high - low).0;
-            Err(FilterProblem::ParameterRange { key: "band", value: width, unit: " Hz wide", rule }.into())
+            let rule = format!(
+                "band = {} Hz wide: a band this narrow puts poles within 1e-9 of the imaginary axis, beyond double \
+                 precision; widen the band or lower the order",
+                (high - low).0
+            );
+            Err(FilterProblem::of("band", rule).into())
         }
         _ => Ok(filter),
     }
@@ -158,10 +158,11 @@ fn prototype(
     if prototype.poles.iter().all(|p| -p.re >= MIN_DAMPING_RATIO * p.norm()) {
         return Ok(prototype);
     }
-    let rule = "with these ripples the transition band is narrower than 1e-9 of the cutoff, beyond double precision; \
-                lower the order or set the ripples further apart"
-        .into();
-    Err(FilterProblem::ParameterRange { key: "order", value: order as f64, unit: "", rule }.into())
+    let rule = format!(
+        "order = {order}: with these ripples the transition band is narrower than 1e-9 of the cutoff, beyond double \
+         precision; lower the order or set the ripples further apart"
+    );
+    Err(FilterProblem::of("order", rule).into())
 }
 
 /// The roots that `error` names, from rad per fast period to rad/s.

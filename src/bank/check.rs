@@ -157,7 +157,7 @@ impl Bank {
 
     fn check_method(&self) -> Checked {
         let fir = matches!(self.filters, SynthesisFilters::Fir(_));
-        let fits = if fir { self.method.reads_taps() } else { !self.method.has_taps() };
+        let fits = if fir { self.method.reads("taps") } else { !self.method.has_taps() };
         if fits {
             return Ok(());
         }

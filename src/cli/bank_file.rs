@@ -1,19 +1,17 @@
-//! Reads specs and banks, and writes text files.
+//! Reads specs, with the measurements that they name, and banks.
 
-use super::Failure;
 use super::file_kind::{FileKind, refuse_other};
-use super::interrupt::remove_unfinished;
-use super::measured::Models;
-use super::print::print_bytes;
-use super::say::{name_leftovers, say_line};
+use super::print::{Failure, InFile, say_line};
+use crate::analog::fit::{MeasuredResponse, vector_fit};
 use crate::bank::Bank;
 use crate::design::filters;
-use crate::files::{self, AtomicFile, Bound};
+use crate::files::{self, Bound};
 use crate::memory::available_memory;
+use crate::quantity::readable;
 use crate::runtime::{Options, Plan};
-use crate::spec::{DesignOverrides, Spec, SpecProblem};
-use std::io::Write;
-use std::path::Path;
+use crate::spec::{DesignOverrides, FilterModel, MeasuredFilter, Measurement, Spec, SpecProblem};
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
 
 /// Maximum size of a spec or bank file; the largest bank with its proof is smaller.
 const TEXT_FILE: Bound =
@@ -33,27 +31,27 @@ pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
     let values = text.bytes().filter(|&byte| byte == b',').count() as f64;
     check_memory(path, "to read it", VALUE_BYTES * values, "give the file that was meant")?;
     let bank = Bank::from_json(&text, &name(path)).map_err(Failure::input)?;
-    filters::check_stable(&bank).map_err(|error| Failure::Input(format!("{}: {error}", name(path))))?;
+    filters::check_stable(&bank).in_file(path)?;
     Ok(bank)
 }
 
 /// Compiles the bank of the file `path`, if the process may use as much memory as that takes.
 pub(super) fn plan(bank: &Bank, options: Options, path: &Path) -> Result<Plan, Failure> {
-    let in_file = |error| Failure::Input(format!("{}: {error}", name(path)));
-    let bytes = bank.plan_bytes(options).map_err(in_file)?;
+    let bytes = bank.plan_bytes(options).in_file(path)?;
     check_memory(path, "to filter with it", bytes, "use shorter filters, or --algorithm direct")?;
-    bank.plan(options).map_err(in_file)
+    bank.plan(options).in_file(path)
 }
 
 /// Refuses work on the file `path` for which there is no memory; the system would end the process.
 fn check_memory(path: &Path, work: &str, bytes: f64, remedy: &str) -> Result<(), Failure> {
     match available_memory() {
-        Some(memory) if bytes > memory => Err(Failure::Input(format!(
-            "{}: {work} takes about {:.1} GB of memory, and this process may use {:.1} GB; {remedy}",
-            name(path),
-            bytes / 1e9,
-            memory / 1e9
-        ))),
+        Some(memory) if bytes > memory => {
+            let (bytes, memory) = (bytes / 1e9, memory / 1e9);
+            let problem = format!(
+                "{work} takes about {bytes:.1} GB of memory, and this process may use {memory:.1} GB; {remedy}"
+            );
+            Err(Failure::of(path, problem))
+        }
         _ => Ok(()),
     }
 }
@@ -67,13 +65,13 @@ pub(super) fn load_spec(path: &Path, overrides: DesignOverrides) -> Result<Spec,
 /// The spec in the text of the file `path`, with the measurements beside it.
 pub(super) fn parse_spec(text: &str, path: &Path, overrides: DesignOverrides) -> Result<Spec, Failure> {
     let folder = path.parent().filter(|_| !is_dash(path)).unwrap_or(Path::new(""));
-    let models = Models::beside(folder);
+    let models = Models { folder: folder.to_owned(), made: RefCell::default(), echo: RefCell::default() };
     let read = Spec::from_toml_and_files(text, &name(path), overrides, &|wanted| models.model(wanted));
     let spec = read.map_err(|error| match error.overridden() {
         Some(key) => bad_flag(key, error.problem()),
         None => Failure::input(error),
     })?;
-    models.echo().iter().for_each(|line| say_line(line));
+    models.echo.into_inner().iter().for_each(|line| say_line(line));
     Ok(spec)
 }
 
@@ -91,44 +89,9 @@ pub(super) fn load_spec_or_bank(path: &Path) -> Result<Spec, Failure> {
     let bank = load(path)?;
     let latency = Some(bank.latency);
     let spec = bank.spec.ok_or_else(|| {
-        Failure::Input(format!(
-            "{}: this bank carries no spec, so its front ends are unknown; give the spec file",
-            name(path)
-        ))
+        Failure::of(path, "this bank carries no spec, so its front ends are unknown; give the spec file")
     })?;
     Ok(Spec { latency, ..spec })
-}
-
-/// Refuses an output file that is also the input, and names what a killed run left beside it.
-pub(super) fn refuse_overlap(output: &Path, input: &Path) -> Result<(), Failure> {
-    if is_dash(output) {
-        return Ok(());
-    }
-    files::refuse_overlaps(&[output], &[input]).map_err(Failure::input)?;
-    name_leftovers(&[output]);
-    Ok(())
-}
-
-/// Writes a text file that appears when it is whole; `-` is standard output.
-pub(super) fn write_text(path: &Path, text: &str, force: bool) -> Result<(), Failure> {
-    write_bytes(path, text.as_bytes(), force)
-}
-
-/// As [`write_text`], for any bytes.
-pub(super) fn write_bytes(path: &Path, bytes: &[u8], force: bool) -> Result<(), Failure> {
-    if is_dash(path) {
-        return print_bytes(bytes);
-    }
-    begin_file(path, bytes, force)?.commit().map_err(Failure::input)
-}
-
-/// A file that is whole but has no name yet.
-pub(super) fn begin_file(path: &Path, bytes: &[u8], force: bool) -> Result<AtomicFile, Failure> {
-    remove_unfinished();
-    let mut file = AtomicFile::create(path, force).map_err(Failure::input)?;
-    file.write_all(bytes)
-        .map_err(|error| Failure::Input(format!("{}: cannot write it: {error}", name(path))))?;
-    Ok(file)
 }
 
 /// The name of a file in messages.
@@ -141,13 +104,6 @@ pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
     files::text_in(read_file(path)?, &name(path)).map_err(Failure::input)
 }
 
-/// The text of a bank or a spec, whichever is wanted.
-pub(super) fn read_kind(path: &Path, wanted: FileKind) -> Result<String, Failure> {
-    let bytes = read_file(path)?;
-    refuse_other(&name(path), FileKind::of(&bytes), wanted)?;
-    files::text_in(bytes, &name(path)).map_err(Failure::input)
-}
-
 fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
     let bytes = if is_dash(path) {
         files::bytes_of(std::io::stdin().lock(), &name(path), TEXT_FILE)
@@ -155,4 +111,68 @@ fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
         files::read_bytes(path, TEXT_FILE)
     };
     bytes.map_err(Failure::input)
+}
+
+/// The text of a bank or a spec, whichever is wanted.
+pub(super) fn read_kind(path: &Path, wanted: FileKind) -> Result<String, Failure> {
+    let bytes = read_file(path)?;
+    refuse_other(&name(path), FileKind::of(&bytes), wanted)?;
+    files::text_in(bytes, &name(path)).map_err(Failure::input)
+}
+
+/// Largest file of a measurement.
+const MEASUREMENT: Bound =
+    Bound { bytes: 64 << 20, kind: "a measured response", remedy: "give the file that was meant" };
+
+/// The models of one spec, each fitted once.
+struct Models {
+    /// The folder of the spec, to which names of files are relative.
+    folder: PathBuf,
+    made: RefCell<Vec<(MeasuredFilter, FilterModel)>>,
+    /// What was understood of them, a line each.
+    echo: RefCell<Vec<String>>,
+}
+
+impl Models {
+    /// The model of a measurement.
+    fn model(&self, wanted: &MeasuredFilter) -> Result<FilterModel, String> {
+        let known =
+            self.made.borrow().iter().find(|(made, _)| made == wanted).map(|(_, model)| model.clone());
+        if let Some(model) = known {
+            return Ok(model);
+        }
+        let path = self.folder.join(&wanted.path);
+        let text = files::read_text(&path, MEASUREMENT).map_err(|error| error.to_string())?;
+        let named = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
+        let measured = response(&path, &text, wanted).map_err(|error| named(&error))?;
+        let fitted = vector_fit(&measured.without_delay(wanted.deembed), wanted.order);
+        let fitted = fitted.map_err(|error| named(&error))?;
+        let points = measured.points();
+        let at = |k: usize| points.get(k).map_or(0.0, |point| point.0.0);
+        self.echo.borrow_mut().push(format!(
+            "{}: {} poles fitted to {} frequencies, {} to {}; error at most {:.2e} dB",
+            path.display(),
+            wanted.order,
+            points.len(),
+            readable(at(0), "Hz"),
+            readable(at(points.len() - 1), "Hz"),
+            fitted.error.0
+        ));
+        let model = FilterModel { filter: fitted.filter, error: fitted.error };
+        self.made.borrow_mut().push((wanted.clone(), model.clone()));
+        Ok(model)
+    }
+}
+
+fn response(path: &Path, text: &str, wanted: &MeasuredFilter) -> Result<MeasuredResponse, String> {
+    let Measurement::Touchstone(parameter) = &wanted.measurement else {
+        return MeasuredResponse::from_csv(text).map_err(|error| error.to_string());
+    };
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    let ports = match extension.to_ascii_lowercase().as_str() {
+        "s1p" => 1,
+        "s2p" => 2,
+        _ => return Err("Touchstone files of one or two ports end in .s1p or .s2p".to_owned()),
+    };
+    MeasuredResponse::from_touchstone(text, ports, parameter.as_deref()).map_err(|error| error.to_string())
 }

@@ -1,10 +1,9 @@
 //! `fuse --bit-true`: integer taps on the integers of the captures, as hardware has them.
 
-use super::Failure;
 use super::bank_file::name;
 use super::output::{Bits, begin_samples};
+use super::print::{Failure, warn};
 use super::run::{Job, each_block, interrupted, print_report};
-use super::say::warn;
 use crate::bank::Bank;
 use crate::files::commit_all;
 use crate::interchange::{BitTrue, WordSizes};

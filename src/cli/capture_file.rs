@@ -1,11 +1,12 @@
 //! Recordings in memory, with what must be known about their format.
 
-use super::Failure;
 use super::bank_file::{is_dash, name};
 use super::file_kind::unreadable;
+use super::print::{Failure, warn};
 use crate::io::{Arrival, MultiReader, PcmFormat, PcmFrames, ReadOptions};
 use crate::memory::available_memory;
 use crate::units::Hertz;
+use crossbeam_channel::Receiver;
 use std::path::{Path, PathBuf};
 
 /// Samples that a measurement reads at most: the spectra of more take several gigabytes.
@@ -60,32 +61,30 @@ impl CaptureFile {
         reading: Reading,
         whole: fn(&mut MultiReader, usize) -> Result<Whole, Failure>,
     ) -> Result<Self, Failure> {
-        let stop = crossbeam_channel::never();
-        let reader = MultiReader::start(&[path.to_owned()], reading.options, stop).map_err(unreadable)?;
-        let mut reader = reader.ok_or_else(interrupted)?;
+        let mut reader = start(&[path.to_owned()], reading.options, crossbeam_channel::never())?;
         let channels = reader.channels();
         if channels != 1 {
+            let file = name(path);
             return Err(Failure::Input(format!(
-                "{} has {channels} channels, and one is needed; give its number, --channel 1 to {channels}",
-                name(path)
+                "{file} has {channels} channels, and one is needed; give its number, --channel 1 to {channels}"
             )));
         }
         let header = reader.headers().next().map(|(_, header)| *header);
         let stated = header.and_then(|header| header.rate).filter(|rate| *rate > 0.0).map(Hertz);
         let rate = stated.or(reading.rate).ok_or_else(|| {
             let message = "it states no sample rate; record or convert it with its rate, or give --rate where there is one";
-            Failure::Input(format!("{}: {message}", name(path)))
+            Failure::of(path, message)
         })?;
         let rails = header.and_then(|header| rails(header.layout.format));
         let Whole { channels, is_cut } = whole(&mut reader, reading.most)?;
-        reader.warnings().iter().for_each(|warning| super::warn(&warning.to_string()));
+        reader.warnings().iter().for_each(|warning| warn(&warning.to_string()));
         let mut parts = channels.into_iter();
         let (samples, imaginary) = (parts.next().unwrap_or_default(), parts.next());
         if samples.is_empty() {
-            return Err(Failure::Input(format!("{}: no samples (the length is zero)", name(path))));
+            return Err(Failure::of(path, "no samples (the length is zero)"));
         }
         if is_cut {
-            super::warn(&format!("{}: only the first {} samples are used", name(path), samples.len()));
+            warn(&format!("{}: only the first {} samples are used", name(path), samples.len()));
         }
         Ok(Self { samples, imaginary, rate, rails })
     }
@@ -93,11 +92,12 @@ impl CaptureFile {
     /// Refuses samples that are not finite.
     pub(super) fn finite(self, path: &Path) -> Result<Self, Failure> {
         match self.samples.iter().position(|x| !x.is_finite()) {
-            Some(n) => Err(Failure::Input(format!(
-                "{}: sample {n} is {}; a source must be finite, repair the recording first",
-                name(path),
-                self.samples[n]
-            ))),
+            Some(n) => {
+                let value = self.samples[n];
+                let problem =
+                    format!("sample {n} is {value}; a source must be finite, repair the recording first");
+                Err(Failure::of(path, problem))
+            }
             None => Ok(self),
         }
     }
@@ -118,6 +118,15 @@ impl CaptureFile {
         }
         Ok(self)
     }
+}
+
+/// A reader of the headers of all inputs.
+pub(super) fn start(
+    inputs: &[PathBuf],
+    options: ReadOptions<'_>,
+    stop: Receiver<()>,
+) -> Result<MultiReader, Failure> {
+    MultiReader::start(inputs, options, stop).map_err(unreadable)?.ok_or_else(interrupted)
 }
 
 /// All channels of a reader; of complex samples each part is a channel.

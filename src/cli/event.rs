@@ -1,7 +1,7 @@
 //! What happens during a run, as lines of text and as JSON lines.
 
-use super::Failure;
 use super::bank_file::is_dash;
+use super::print::Failure;
 use crate::files::FileError;
 use crate::io::{Stall, Stdout, is_pipe};
 use crate::pipeline::{Gap, LISTED_GAPS};

@@ -1,10 +1,12 @@
 //! `hybank export`: a bank for other tools.
 
-use super::Failure;
-use super::bank_file::{load, name, refuse_overlap, write_bytes};
+use super::bank_file::load;
+use super::print::{Failure, InFile};
+use super::written::{check_outputs, write_bytes};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::design::analyze;
 use crate::interchange::{Format, block_of_sections, export, sections};
+use clap::ValueEnum;
 use std::path::PathBuf;
 
 /// Writes a bank for other tools: C99, CSV, NumPy, MATLAB, FPGA memory
@@ -26,7 +28,7 @@ pub(super) struct Args {
     bank: PathBuf,
     /// The format [default: that of the output's extension: h, csv, npz, mat, coe or mem]
     #[arg(long, value_enum)]
-    to: Option<FormatArg>,
+    to: Option<Format>,
     /// The file to write; `-` is standard output
     #[arg(short, long)]
     output: PathBuf,
@@ -38,35 +40,16 @@ pub(super) struct Args {
     force: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum FormatArg {
-    /// A C99 header with a streaming function
-    C,
-    /// Comma-separated values, one coefficient per line
-    Csv,
-    /// A NumPy archive
-    Npz,
-    /// A MATLAB file (level 4)
-    Mat,
-    /// A coefficient file of Xilinx tools
-    Coe,
-    /// Hexadecimal words for $readmemh
-    Mem,
-    /// Second-order sections (CSV)
-    Sos,
-}
-
 impl Args {
-    fn format(&self) -> Result<FormatArg, Failure> {
+    fn format(&self) -> Result<Format, Failure> {
         let extension = self.output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-        let meant = match extension.to_ascii_lowercase().as_str() {
-            "h" => Some(FormatArg::C),
-            "csv" => Some(FormatArg::Csv),
-            "npz" => Some(FormatArg::Npz),
-            "mat" => Some(FormatArg::Mat),
-            "coe" => Some(FormatArg::Coe),
-            "mem" => Some(FormatArg::Mem),
-            _ => None,
+        let extension = extension.to_ascii_lowercase();
+        // A header is the only C that is written, and a table of sections has the ending of any CSV.
+        let meant = match extension.as_str() {
+            "h" => Some(Format::C99),
+            name => Format::from_str(name, false)
+                .ok()
+                .filter(|format| !matches!(format, Format::C99 | Format::Sos)),
         };
         self.to.or(meant).ok_or_else(|| {
             let message = "the name does not say which format it is to have; give --to c, csv, npz, mat, coe, mem or sos";
@@ -75,33 +58,13 @@ impl Args {
     }
 }
 
-impl From<FormatArg> for Format {
-    fn from(format: FormatArg) -> Self {
-        match format {
-            FormatArg::C => Self::C99,
-            FormatArg::Csv => Self::Csv,
-            FormatArg::Npz => Self::Npz,
-            FormatArg::Mat => Self::Mat,
-            FormatArg::Coe => Self::Coe,
-            FormatArg::Mem => Self::Mem,
-            FormatArg::Sos => Self::Sos,
-        }
-    }
-}
-
-/// Runs the command.
-///
-/// # Errors
-/// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let format = args.format()?;
-    refuse_overlap(&args.output, &args.bank)?;
+    check_outputs(&[&args.output], &[&args.bank])?;
     let bank = load(&args.bank)?;
-    let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", name(&args.bank)));
-    let mut bytes = export(&bank, format.into(), &args.name).map_err(|error| named(&error))?;
-    if format == FormatArg::Sos {
-        let comment = gamma_of_sections(&bank).map_err(|error| named(&error))?;
-        bytes.splice(0..0, comment.bytes());
+    let mut bytes = export(&bank, format, &args.name).in_file(&args.bank)?;
+    if format == Format::Sos {
+        bytes.splice(0..0, gamma_of_sections(&bank).in_file(&args.bank)?.bytes());
     }
     write_bytes(&args.output, &bytes, args.force)
 }

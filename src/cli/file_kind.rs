@@ -1,6 +1,6 @@
 //! Tells from its first bytes what a file is that was given in place of another.
 
-use super::Failure;
+use super::print::Failure;
 use crate::bank::FORMAT;
 use crate::io::IoError;
 use std::fmt;

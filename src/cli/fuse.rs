@@ -1,14 +1,14 @@
 //! `hybank fuse`: fuses slow recordings into one fast recording.
 
-use super::Failure;
 use super::bank_file::{self, is_dash};
 use super::before_after::{BeforeAfter, BeforeAfterArgs};
 use super::bit_true::BitTrueArgs;
 use super::capture_args::CaptureArgs;
 use super::observer::RunObserver;
 use super::output::Bits;
+use super::print::Failure;
+use super::print::say_understood;
 use super::run::{Finished, Job, RunArgs, RunReport, interrupted, print_report};
-use super::say::say_understood;
 use crate::bank::Bank;
 use crate::io::{Container, MultiReader};
 use crate::overview::counted;
@@ -163,7 +163,7 @@ impl Args {
         if taken.into_iter().flatten().any(is_dash) {
             return Ok(());
         }
-        super::print(&report.text(&self.output))
+        super::print::print(&report.text(&self.output))
     }
 
     fn start_reader(&self, job: &Job<'_>, observer: Option<&RunObserver>) -> Result<MultiReader, Failure> {

@@ -1,6 +1,6 @@
 //! Signals in memory, fused as `hybank fuse` fuses files.
 
-use super::Failure;
+use super::print::Failure;
 use crate::bank::Bank;
 use crate::pipeline::{Settings, fuse};
 use crate::runtime::{Options, Planar, Precision};

@@ -1,7 +1,7 @@
 //! Missing samples on the command line: their replacement, the report, the mask file.
 
-use super::Failure;
-use super::say::say_line;
+use super::print::Failure;
+use super::print::say_line;
 use crate::files::AtomicFile;
 use crate::io::{LiveLost, LostSamples, MAX_LOST, ReadOptions, Until, is_pipe};
 use crate::pipeline::{GapPolicy, GapSummary};

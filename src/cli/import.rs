@@ -1,13 +1,12 @@
 //! `hybank import`: filters of other tools, judged like our own.
 
-use super::Failure;
-use super::bank_file::{load_spec_or_bank, refuse_overlap, write_text};
-use super::design::report::{Judged, Report};
-use crate::design::{self, DesignError, GammaScale, ProofSearch};
-use crate::figures::Figures;
+use super::bank_file::load_spec_or_bank;
+use super::design_report::{Judged, Report};
+use super::print::{Failure, InFile, show, warn};
+use super::written::{check_outputs, write_text};
+use crate::design::{self, ProofSearch};
 use crate::files::{Bound, read_bytes};
 use crate::interchange::{TapsError, taps_of_csv, taps_of_npy};
-use crate::overview::doubts;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -47,34 +46,23 @@ pub(super) struct Args {
     json: bool,
 }
 
-/// Runs the command.
-///
-/// # Errors
-/// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
-    refuse_overlap(&args.output, &args.spec)?;
-    refuse_overlap(&args.output, &args.taps)?;
+    check_outputs(&[&args.output], &[&args.spec, &args.taps])?;
     let mut spec = load_spec_or_bank(&args.spec)?;
     spec.latency = args.latency.or(spec.latency);
     if spec.latency.is_none() {
-        return Err(Failure::Input(format!(
-            "{}: it gives no latency, which taps from elsewhere have; give --latency, the delay of their output in fast samples",
-            args.spec.display()
-        )));
+        let problem = "it gives no latency, which taps from elsewhere have; give --latency, the delay of their output in fast samples";
+        return Err(Failure::of(&args.spec, problem));
     }
     let taps = read(&args.taps)?;
-    let named = |error: DesignError| Failure::Input(format!("{}: {error}", args.taps.display()));
     let begin = Instant::now();
-    let found = design::judge_taps(&spec, taps, ProofSearch::Run).map_err(named)?;
-    let mean = design::analyze_mean(&found.bank).map_err(named)?;
-    let scale = GammaScale::new(&found.bank).map_err(named)?;
-    let figures = Figures::new(&found.bank).map_err(named)?;
-    doubts(&found.bank, &mean, &scale).iter().for_each(|doubt| super::warn(doubt));
+    let found = design::judge_taps(&spec, taps, ProofSearch::Run).in_file(&args.taps)?;
+    let judged = Judged::new(&found.bank).in_file(&args.taps)?;
+    judged.warnings(&found.bank).iter().for_each(|warning| warn(warning));
     write_text(&args.output, &found.bank.to_json().map_err(Failure::input)?, args.force)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
-    let judged = Judged { mean, scale, figures, hint: None };
     let report = Report::new(args.output.display().to_string(), &found, judged, seconds);
-    if args.json { super::print_json(&report) } else { super::print(&report.text(args.verbose)) }
+    show(&report, args.json, |report| report.text(args.verbose))
 }
 
 /// Reads taps from the bytes of a file.
@@ -87,12 +75,10 @@ fn read(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
         "csv" => taps_of_csv,
         "npy" => taps_of_npy,
         _ => {
-            return Err(Failure::Usage(format!(
-                "{}: taps are read from .csv and .npy files",
-                path.display()
-            )));
+            let path = path.display();
+            return Err(Failure::Usage(format!("{path}: taps are read from .csv and .npy files")));
         }
     };
     let bytes = read_bytes(path, TAPS_FILE).map_err(Failure::input)?;
-    parse(&bytes).map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
+    parse(&bytes).in_file(path)
 }

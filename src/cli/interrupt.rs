@@ -5,7 +5,7 @@ use crossbeam_channel::Receiver;
 
 #[cfg(unix)]
 mod watch {
-    use crate::cli::say::say_line;
+    use crate::cli::print::say_line;
     use crate::files::remove_unfinished;
     use crate::files::signals::{end, watch};
     use crate::io::is_output_stalled;

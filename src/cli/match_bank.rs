@@ -1,14 +1,14 @@
 //! Checks that the inputs fit the bank.
 
-use super::Failure;
+use super::bank_file::is_dash;
+use super::print::Failure;
 use crate::bank::Bank;
 use crate::io::{MultiReader, StreamHeader, is_same_rate};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// `-` may be given once.
-pub(super) fn check_stdin(bank: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
-    let all = inputs.iter().map(PathBuf::as_path).chain([bank]);
-    if all.filter(|path| path.as_os_str() == "-").count() > 1 {
+pub(super) fn check_stdin<'a>(inputs: impl Iterator<Item = &'a Path>) -> Result<(), Failure> {
+    if inputs.filter(|path| is_dash(path)).count() > 1 {
         return Err(Failure::Usage("`-` is given twice; standard input can be only one of them".into()));
     }
     Ok(())

@@ -8,49 +8,45 @@ mod bank_file;
 mod before_after;
 mod bit_true;
 mod calibrate;
+mod calibrate_report;
 mod capture_args;
 mod capture_check;
 mod capture_file;
-mod completions;
+mod contenders;
 mod demo;
 mod design;
+mod design_report;
+mod design_studies;
 mod event;
 mod export;
-mod failure;
 mod file_kind;
-mod folder;
 mod fuse;
 mod fused;
 mod gaps;
-mod help;
 mod import;
-mod init;
 mod interrupt;
-mod man;
 mod match_bank;
 mod measure;
-mod measured;
+mod measure_report;
 mod observer;
 mod output;
-mod picture_format;
 mod plot;
 mod print;
-mod recordings;
+mod progress;
 mod report;
 mod run;
-mod say;
-mod schema;
 mod simulate;
 mod stream;
-mod sweeps;
+mod texts;
 mod track;
-mod turns;
 mod verify;
+mod virtual_converters;
+mod virtual_signal;
+mod worst_case;
+mod written;
 
 use clap::{Parser, Subcommand};
-pub use failure::Failure;
-use print::{print, print_json};
-use say::{say, warn};
+pub use print::Failure;
 use std::process::ExitCode;
 
 /// Lets several slow, imperfectly timed converters do the work of one fast converter
@@ -82,7 +78,7 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Init(init::Args),
+    Init(texts::InitArgs),
     Design(design::Args),
     Analyze(analyze::Args),
     Verify(verify::Args),
@@ -96,10 +92,10 @@ enum Command {
     Measure(measure::Args),
     Stream(stream::Args),
     Demo(demo::Args),
-    Completions(completions::Args),
-    Man(man::Args),
-    Schema(schema::Args),
-    Help(help::Args),
+    Completions(texts::CompletionsArgs),
+    Man(texts::ManArgs),
+    Schema(texts::SchemaArgs),
+    Help(texts::HelpArgs),
 }
 
 /// Runs the command that was typed; the exit code is 0 (done), 1 (the input or the design failed) or
@@ -124,7 +120,7 @@ fn show(message: &clap::Error) -> ExitCode {
 
 fn dispatch(command: Command) -> Result<(), Failure> {
     match command {
-        Command::Init(args) => init::run(&args),
+        Command::Init(args) => texts::init(&args),
         Command::Design(args) => design::run(&args),
         Command::Analyze(args) => analyze::run(&args),
         Command::Verify(args) => verify::run(&args),
@@ -138,9 +134,9 @@ fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Measure(args) => measure::run(&args),
         Command::Stream(args) => stream::run(&args),
         Command::Demo(args) => demo::run(&args),
-        Command::Completions(args) => completions::run(&args),
-        Command::Man(args) => man::run(&args),
-        Command::Schema(args) => schema::run(&args),
-        Command::Help(args) => help::run(&args),
+        Command::Completions(args) => texts::completions(&args),
+        Command::Man(args) => texts::man(&args),
+        Command::Schema(args) => texts::schema(&args),
+        Command::Help(args) => texts::help(&args),
     }
 }

@@ -1,8 +1,8 @@
 //! The format of output samples, and the files that a run writes.
 
-use super::Failure;
 use super::bank_file::is_dash;
-use super::say::{name_leftovers, warn};
+use super::print::Failure;
+use super::print::{name_leftovers, warn};
 use crate::files::refuse_overlaps;
 use crate::io::{
     Container, IoError, OutputHeader, PcmFormat, SampleWriter, is_pipe, is_sigmf, mat_variable, sigmf_files,

@@ -1,7 +1,69 @@
-//! Prints results to standard output.
+//! All that the commands say: results on standard output, messages on standard error, and the one message of
+//! a failure.
 
-use super::Failure;
-use std::io::{ErrorKind, Write};
+use super::bank_file::name;
+use crate::files::leftovers;
+use crate::overview::understood;
+use crate::pipeline::PipelineError;
+use crate::spec::Spec;
+use std::fmt::Display;
+use std::io::{ErrorKind, IsTerminal, Write};
+use std::path::Path;
+use std::process::ExitCode;
+
+/// A failure with the one message that the user sees.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Failure {
+    /// The input or the design failed: exit code 1.
+    Input(String),
+    /// Wrong usage: exit code 2.
+    Usage(String),
+    /// The reader of the output closed the pipe: end without a message.
+    ClosedPipe,
+}
+
+impl Failure {
+    /// A failure of the input with `message`.
+    pub fn input(message: impl ToString) -> Self {
+        Self::Input(message.to_string())
+    }
+
+    /// A failure of the file at `path`.
+    pub(super) fn of(path: &Path, problem: impl Display) -> Self {
+        Self::Input(format!("{}: {problem}", name(path)))
+    }
+
+    /// A failure of a run. A closed output pipe is not reported as an error.
+    pub(super) fn running(error: impl Into<PipelineError>) -> Self {
+        match error.into() {
+            error if error.is_closed_pipe() => Self::ClosedPipe,
+            error => Self::input(error),
+        }
+    }
+
+    /// Prints the message and gives the exit code.
+    pub fn report(&self) -> ExitCode {
+        let (message, code) = match self {
+            Self::Input(message) => (message, 1),
+            Self::Usage(message) => (message, 2),
+            Self::ClosedPipe => return ExitCode::SUCCESS,
+        };
+        say_line(message);
+        ExitCode::from(code)
+    }
+}
+
+/// Results whose errors are about a file.
+pub(super) trait InFile<T> {
+    /// Names the file before the error.
+    fn in_file(self, path: &Path) -> Result<T, Failure>;
+}
+
+impl<T, E: Display> InFile<T> for Result<T, E> {
+    fn in_file(self, path: &Path) -> Result<T, Failure> {
+        self.map_err(|error| Failure::of(path, error))
+    }
+}
 
 /// Results on standard output; a closed pipe ends the run without a message.
 pub(super) fn print(text: &str) -> Result<(), Failure> {
@@ -19,10 +81,54 @@ pub(super) fn print_json(report: &impl serde::Serialize) -> Result<(), Failure> 
     print(&(serde_json::to_string(report).map_err(Failure::input)? + "\n"))
 }
 
+/// A report: as one JSON object, or as text.
+pub(super) fn show<R: serde::Serialize>(
+    report: &R,
+    json: bool,
+    text: impl FnOnce(&R) -> String,
+) -> Result<(), Failure> {
+    if json { print_json(report) } else { print(&text(report)) }
+}
+
 /// Why standard output could not be written.
 pub(super) fn print_failure(error: &std::io::Error) -> Failure {
     match error.kind() {
         ErrorKind::BrokenPipe => Failure::ClosedPipe,
         _ => Failure::Input(format!("standard output: cannot write it: {error}")),
     }
+}
+
+/// Prints text to standard error. Errors are ignored, so that no result is lost.
+pub(super) fn say(text: &str) {
+    let _ = crate::io::stderr().write_all(text.as_bytes());
+}
+
+/// A line on standard error with the program's name before it.
+pub(super) fn say_line(line: &str) {
+    say(&format!("hybank: {line}\n"));
+}
+
+/// A warning on standard error.
+pub(super) fn warn(warning: &str) {
+    say_line(&format!("warning: {warning}"));
+}
+
+/// With `strict` the first warning is an error.
+pub(super) fn check_strict(warnings: &[String], strict: bool) -> Result<(), Failure> {
+    match warnings.first() {
+        Some(first) if strict => Err(Failure::Input(format!("{first} (an error because of --strict)"))),
+        _ => Ok(()),
+    }
+}
+
+/// What was understood from a spec, where a person reads it.
+pub(super) fn say_understood(spec: Option<&Spec>) {
+    if std::io::stderr().is_terminal() {
+        spec.iter().for_each(|spec| say(&format!("{}\n", understood(spec))));
+    }
+}
+
+/// Names the unfinished files that killed runs left beside `outputs`.
+pub(super) fn name_leftovers(outputs: &[&Path]) {
+    leftovers(outputs).iter().for_each(|left| warn(&left.to_string()));
 }

@@ -1,17 +1,17 @@
 //! How `fuse` and `stream` run a bank: their common options, the run from its plan to its files, the report.
 
-use super::Failure;
 use super::bank_file::{self, is_dash};
+use super::capture_args::TurnArgs;
 use super::file_kind::unreadable;
 use super::gaps::{GapArgs, say_gaps};
 use super::interrupt::interrupts;
 use super::match_bank;
 use super::observer::{ObserverArgs, RunObserver};
 use super::output::{begin_samples, check_files, precision};
+use super::print::Failure;
 use super::print::print_json;
-use super::say::{say, warn};
+use super::print::{say, warn};
 use super::track::{TrackArgs, TrackRecord};
-use super::turns::TurnArgs;
 use crate::bank::Bank;
 use crate::io::{
     Arrival, BLOCK_BYTES, Container, MultiReader, OutputHeader, OutputNotes, PcmFormat, PcmFrames, Placement,
@@ -101,7 +101,7 @@ impl RunArgs {
         (output, container): (&Path, Container),
         prints: bool,
     ) -> Result<(), Failure> {
-        match_bank::check_stdin(bank, inputs)?;
+        match_bank::check_stdin(inputs.iter().map(PathBuf::as_path).chain([bank]))?;
         self.gaps.check()?;
         self.turns.check(inputs.len())?;
         self.observer.check(output, self.json || prints)?;

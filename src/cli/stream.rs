@@ -2,8 +2,8 @@
 
 use super::capture_args::coding;
 use super::observer::RunObserver;
+use super::print::{say_line, say_understood};
 use super::run::{Finished, Job, RunArgs, RunReport, print_report};
-use super::say::{say_line, say_understood};
 use super::{Failure, bank_file};
 use crate::bank::Bank;
 use crate::io::{Coding, Container, PcmFormat, ReadOptions, is_self_describing};

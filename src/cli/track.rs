@@ -1,9 +1,9 @@
 //! Taps that follow the delays while a bank runs: the options of `fuse` and `stream`, and what connects the
 //! follower of delays to the pipeline.
 
-use super::Failure;
 use super::bank_file::read_text;
 use super::event::{Event, Events};
+use super::print::Failure;
 use crate::bank::Bank;
 use crate::files::AtomicFile;
 use crate::io::IoError;

@@ -1,8 +1,8 @@
 //! `hybank verify`: proves a bank's gammas from its file alone.
 
-use super::Failure;
 use super::bank_file::{name, read_kind};
 use super::file_kind::FileKind;
+use super::print::{Failure, InFile, show};
 use crate::bank::{Bank, FixedPoint, SynthesisFilters, check_digest};
 use crate::design;
 use crate::overview::counted;
@@ -63,40 +63,30 @@ struct Report {
     tracked: Option<f64>,
 }
 
-/// Runs the command.
-///
-/// # Errors
-/// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
-    let report = report(args)?;
-    if args.json { super::print_json(&report) } else { super::print(&report.text()) }
-}
-
-fn report(args: &Args) -> Result<Report, Failure> {
     let file = name(&args.bank);
-    let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{file}: {error}"));
     let text = read_kind(&args.bank, FileKind::Bank)?;
     let bank = Bank::from_json(&text, &file).map_err(Failure::input)?;
     let digest = check_digest(&text, &file).map_err(Failure::input)?;
     let certificate_in_file = bank.proof.as_ref().is_some_and(|proof| proof.upper.is_some());
     let verified = if args.search && !certificate_in_file {
-        let verified = design::prove(&bank).map_err(|error| named(&error))?.1;
-        check_stated(&bank).map_err(|error| named(&error))?;
+        let verified = design::prove(&bank).in_file(&args.bank)?.1;
+        check_stated(&bank).in_file(&args.bank)?;
         verified
     } else {
-        verify(&bank).map_err(|error| named(&error))?
+        verify(&bank).in_file(&args.bank)?
     };
-    let (worst_case, tracked) = (bank.gamma.worst_case, bank.gamma.tracked);
-    Ok(Report {
+    let report = Report {
         taps: taps(&bank),
         words: words(&bank),
-        worst_case,
-        tracked,
+        worst_case: bank.gamma.worst_case,
+        tracked: bank.gamma.tracked,
         bank: file,
         verified,
         digest,
         certificate_in_file,
-    })
+    };
+    show(&report, args.json, Report::text)
 }
 
 /// Taps per channel; zero for recursive filters.

@@ -27,20 +27,22 @@ use crate::bank::Bank;
 
 /// A format of [`export`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Format {
-    /// A C99 header with the coefficients and a streaming function.
+    /// A C99 header with a streaming function
+    #[cfg_attr(feature = "cli", value(name = "c"))]
     C99,
-    /// Comma-separated values, one coefficient per line.
+    /// Comma-separated values, one coefficient per line
     Csv,
-    /// A NumPy archive: `taps` (N, M, lags), or the matrices `a`, `b`, `c`, `d`.
+    /// A NumPy archive
     Npz,
-    /// A MATLAB file, level 4, with the same variables; `taps` is N x M lags.
+    /// A MATLAB file (level 4)
     Mat,
-    /// A coefficient file of Xilinx tools; integer taps only.
+    /// A coefficient file of Xilinx tools
     Coe,
-    /// Hexadecimal words for `$readmemh`; integer taps only.
+    /// Hexadecimal words for $readmemh
     Mem,
-    /// A table of the second-order sections of a recursive bank; see [`sections`].
+    /// Second-order sections (CSV)
     Sos,
 }
 

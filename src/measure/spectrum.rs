@@ -6,17 +6,18 @@ use std::f64::consts::{SQRT_2, TAU};
 
 const J: Complex<f64> = Complex::new(0.0, 1.0);
 
-/// A window w(n) = sum over k of (-1)^k a_k cos(2 pi k n / N).
+/// A window w(n) = sum over k of (-1)^k a_k cos(2 pi k n / N). Sources: F. J. Harris, 1978; H.-H. Albrecht, 2001.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Window {
-    /// All ones. A tone off a bin leaks into all others.
+    /// No window
     None,
-    /// Two terms; side lobes fall by 18 dB per octave.
+    /// Two terms
     Hann,
-    /// Four-term Blackman-Harris (Harris, 1978); side lobes at -92 dB.
+    /// Four-term Blackman-Harris, side lobes at -92 dB
     Bh4,
-    /// Seven-term Blackman-Harris (Albrecht, 2001); side lobes at -180 dB.
+    /// Seven-term Blackman-Harris, side lobes at -180 dB
     #[default]
     Bh7,
 }

@@ -1,34 +1,118 @@
 //! The `[design]` table: defaults, overrides from the command line, and the keys of each method.
 
-use super::limits::{
-    check_gamma_margin, check_optimised_taps, check_order, check_reduction_loss, check_taps, check_target_snr,
-};
+use super::limits;
 use super::word_lengths::{WordLengths, check_fraction_bits};
-use super::{DesignSpec, Method, Reduction, Solver, SpecProblem, Tracking, UncertaintySpec};
-use crate::units::Seconds;
+use super::{SpecProblem, UncertaintySpec};
+use serde::{Deserialize, Serialize};
 
-/// The keys of a `[design]` table that are present, in a file or on the command line.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct DesignOverrides {
+/// How the synthesis filters are designed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Finite impulse responses of given length, least gamma.
+    Fir,
+    /// State-space filters, least gamma.
+    Iir,
+    /// State-space filters, least mean-square error.
+    H2,
+    /// Papoulis/Yen interpolation of recurrent nonuniform samples, truncated (for comparison).
+    Sinc,
+    /// First a fractional-delay filter per channel, then a bank for integer delays (for comparison).
+    Separation,
+}
+
+/// The optimisation method of FIR designs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Solver {
+    /// The exchange algorithm: frequencies are added until gamma meets its lower bound. The secondary
+    /// objective chooses among the optimal taps.
+    Sampled,
+    /// The bounded-real LMI of thesis 5.4 with a Lyapunov matrix; slower, without a secondary objective.
+    Kyp,
+}
+
+/// How the taps of an FIR bank follow delays that change while it runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Tracking {
+    /// The taps are affine functions of the delays, optimal over the box of delays of the `[uncertainty]`
+    /// table.
+    Affine,
+}
+
+/// The keys of a `[design]` table. `M` is the [`Method`], or an option of it where it may be left out.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct DesignTable<M> {
     /// The method. If it overrides the method of a file, keys of the file that it does not read are dropped.
-    pub method: Option<Method>,
-    /// Taps per channel.
+    pub method: M,
+    /// Taps per channel at the fast rate, for FIR methods; `None` lets the designer choose. The method `h2`
+    /// makes FIR filters with them and recursive ones without.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub taps: Option<usize>,
-    /// The SNR in decibels for which the taps are chosen.
+    /// The SNR in decibels for which the fewest taps are chosen, in place of `taps`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub target_snr_db: Option<f64>,
-    /// Relative excess over the optimal gamma.
+    /// Relative excess over the optimal gamma that the designer may spend on a smaller mean-square error.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub gamma_margin: Option<f64>,
-    /// The optimisation method of FIR designs.
+    /// The optimisation method of FIR designs; `None` is [`Solver::Sampled`].
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub solver: Option<Solver>,
-    /// Bits of the taps.
+    /// Bits of the taps, for integer taps.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub bits: Option<WordLengths>,
-    /// Taps are integers times 2^-fraction_bits.
+    /// Taps are integers times 2^-fraction_bits; `None` lets the designer choose.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub fraction_bits: Option<i32>,
-    /// Taps that follow the delays.
+    /// Taps that follow the delays, for the method `fir`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking: Option<Tracking>,
-    /// The order, or the loss by order reduction.
+    /// Order reduction, for recursive methods.
+    #[serde(flatten)]
     pub reduction: Option<Reduction>,
 }
+
+/// A `[design]` table with its defaults filled in.
+pub type DesignSpec = DesignTable<Method>;
+
+/// The keys of a `[design]` table that are present, in a file or on the command line.
+pub type DesignOverrides = DesignTable<Option<Method>>;
+
+/// By how much the order of a recursive bank is reduced.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub enum Reduction {
+    /// To at most this many states, with the least error.
+    #[serde(rename = "order")]
+    Order(usize),
+    /// To the fewest states whose error is within this many decibels of the full bank's.
+    #[serde(rename = "reduction_loss_db")]
+    Loss(f64),
+}
+
+/// A key that some methods read.
+struct Key {
+    name: &'static str,
+    methods: &'static [Method],
+    /// The methods that a message advises.
+    advised: &'static str,
+}
+
+/// The keys that not every method reads.
+const KEYS: [Key; 9] = {
+    use Method::{Fir, H2, Iir, Separation, Sinc};
+    [
+        Key { name: "taps", methods: &[Fir, H2, Sinc, Separation], advised: "fir or h2" },
+        Key { name: "target_snr_db", methods: &[Fir, H2], advised: "fir or h2" },
+        Key { name: "gamma_margin", methods: &[Fir, Iir], advised: "fir or iir" },
+        Key { name: "solver", methods: &[Fir], advised: "fir" },
+        Key { name: "bits", methods: &[Fir], advised: "fir" },
+        Key { name: "fraction_bits", methods: &[Fir], advised: "fir" },
+        Key { name: "tracking", methods: &[Fir], advised: "fir" },
+        Key { name: "order", methods: &[Iir, H2], advised: "iir or h2" },
+        Key { name: "reduction_loss_db", methods: &[Iir, H2], advised: "iir or h2" },
+    ]
+};
 
 impl Method {
     /// Every method, in the order of the documentation.
@@ -50,39 +134,10 @@ impl Method {
         matches!(self, Self::Fir | Self::Sinc | Self::Separation)
     }
 
-    /// Whether the method reads `taps`; `h2` makes FIR filters with it and recursive ones without.
-    pub const fn reads_taps(self) -> bool {
-        self.has_taps() || matches!(self, Self::H2)
-    }
-
-    /// Whether the number of taps may be chosen for an SNR, so that the method reads `target_snr_db`.
-    pub const fn has_target_snr(self) -> bool {
-        matches!(self, Self::Fir | Self::H2)
-    }
-
-    /// Whether the method minimises gamma and therefore reads `gamma_margin`.
-    pub const fn has_gamma_margin(self) -> bool {
-        matches!(self, Self::Fir | Self::Iir)
-    }
-
-    /// Whether the method is a convex problem with a choice of solvers and therefore reads `solver`.
-    pub const fn has_solver(self) -> bool {
-        matches!(self, Self::Fir)
-    }
-
-    /// Whether the method chooses among integer taps and therefore reads `bits` and `fraction_bits`.
-    pub const fn has_bits(self) -> bool {
-        matches!(self, Self::Fir)
-    }
-
-    /// Whether the method makes taps that follow the delays and therefore reads `tracking`.
-    pub const fn has_tracking(self) -> bool {
-        matches!(self, Self::Fir)
-    }
-
-    /// Whether the method may make recursive filters, for which it reads `order` and `reduction_loss_db`.
-    pub const fn has_states(self) -> bool {
-        matches!(self, Self::Iir | Self::H2)
+    /// Whether the method reads a key of the `[design]` table. `h2` reads `taps` and the keys of recursive
+    /// filters: it makes FIR filters with `taps` and recursive ones without.
+    pub fn reads(self, key: &str) -> bool {
+        KEYS.iter().find(|known| known.name == key).is_none_or(|known| known.methods.contains(&self))
     }
 }
 
@@ -119,35 +174,57 @@ impl Reduction {
             Self::Loss(_) => "reduction_loss_db",
         }
     }
+}
 
-    fn check(self) -> Result<(), SpecProblem> {
-        match self {
-            Self::Order(order) => check_order(order),
-            Self::Loss(db) => check_reduction_loss(db),
+impl<M> DesignTable<M> {
+    /// The same keys with another method.
+    fn with<N>(self, method: N) -> DesignTable<N> {
+        DesignTable {
+            method,
+            taps: self.taps,
+            target_snr_db: self.target_snr_db,
+            gamma_margin: self.gamma_margin,
+            solver: self.solver,
+            bits: self.bits,
+            fraction_bits: self.fraction_bits,
+            tracking: self.tracking,
+            reduction: self.reduction,
         }
+    }
+
+    /// The keys that have a value, the method apart.
+    fn given(&self) -> impl Iterator<Item = &'static str> {
+        let keys = [
+            ("taps", self.taps.is_some()),
+            ("target_snr_db", self.target_snr_db.is_some()),
+            ("gamma_margin", self.gamma_margin.is_some()),
+            ("solver", self.solver.is_some()),
+            ("bits", self.bits.is_some()),
+            ("fraction_bits", self.fraction_bits.is_some()),
+            ("tracking", self.tracking.is_some()),
+        ];
+        keys.into_iter()
+            .filter(|(_, given)| *given)
+            .map(|(key, _)| key)
+            .chain(self.reduction.map(Reduction::key))
+    }
+
+    /// Whether it has a value for `key`, which is not the method.
+    pub(super) fn gives(&self, key: &str) -> bool {
+        self.given().any(|given| given == key)
     }
 }
 
 impl DesignSpec {
     /// Whether the filters are FIR, not recursive.
-    pub const fn is_fir(&self) -> bool {
+    pub fn is_fir(&self) -> bool {
         let asks_for_taps = self.taps.is_some() || self.target_snr_db.is_some();
-        self.method.has_taps() || (self.method.reads_taps() && asks_for_taps)
+        self.method.has_taps() || (self.method.reads("taps") && asks_for_taps)
     }
 
     /// A method, with taps if it makes FIR filters, and no other keys.
-    pub const fn new(method: Method, taps: Option<usize>) -> Self {
-        Self {
-            method,
-            taps,
-            target_snr_db: None,
-            gamma_margin: None,
-            solver: None,
-            bits: None,
-            fraction_bits: None,
-            tracking: None,
-            reduction: None,
-        }
+    pub fn new(method: Method, taps: Option<usize>) -> Self {
+        DesignOverrides { taps, ..Default::default() }.with(method)
     }
 
     /// The same design by another method; keys that it does not read are dropped.
@@ -167,63 +244,76 @@ impl DesignSpec {
     }
 
     fn overridden(&self, overrides: DesignOverrides, channels: usize) -> Result<Self, SpecProblem> {
-        let Self {
-            method,
-            taps,
-            target_snr_db,
-            gamma_margin,
-            solver,
-            bits,
-            fraction_bits,
-            tracking,
-            reduction,
-        } = self.clone();
-        let written = DesignOverrides {
-            method: Some(method),
-            taps,
-            target_snr_db,
-            gamma_margin,
-            solver,
-            bits,
-            fraction_bits,
-            tracking,
-            reduction,
-        };
-        let design = overrides.over(written).resolved();
+        let design = overrides.over(self.clone().with(Some(self.method))).resolved();
         design.check(channels)?;
         Ok(design)
     }
 
     /// Checks the numbers, and that the method reads every key.
-    pub(super) fn check(&self, channels: usize) -> Result<(), SpecProblem> {
-        self.check_by_key(channels).map_err(|KeyProblem { problem, .. }| problem)
-    }
-
-    /// As [`Self::check`], with the key whose value is wrong.
-    pub(super) fn check_by_key(&self, channels: usize) -> Result<(), KeyProblem> {
+    pub(super) fn check(&self, channels: usize) -> Result<(), KeyProblem> {
         self.check_keys()?;
-        blame("taps", self.taps.map_or(Ok(()), check_taps))?;
-        blame("gamma_margin", self.gamma_margin.map_or(Ok(()), check_gamma_margin))?;
-        if let Some(reduction) = self.reduction {
-            blame(reduction.key(), reduction.check())?;
+        blame("taps", self.taps.map_or(Ok(()), limits::check_taps))?;
+        blame("gamma_margin", self.gamma_margin.map_or(Ok(()), limits::check_gamma_margin))?;
+        match self.reduction {
+            Some(Reduction::Order(order)) => blame("order", limits::check_order(order))?,
+            Some(Reduction::Loss(db)) => blame("reduction_loss_db", limits::check_reduction_loss(db))?,
+            None => {}
         }
         blame("fraction_bits", self.fraction_bits.map_or(Ok(()), check_fraction_bits))?;
         blame("bits", self.bits.as_ref().map_or(Ok(()), |bits| bits.check(self.taps)))?;
-        if let (Some(_), None) = (self.fraction_bits, &self.bits) {
+        if self.fraction_bits.is_some() && self.bits.is_none() {
             let remedy = "fraction_bits sets the binary point of integer taps, whose word length bits gives, for example bits = 16";
             return blame("fraction_bits", Err(SpecProblem::MissingKey { key: "bits", remedy }));
         }
-        blame("target_snr_db", self.target_snr_db.map_or(Ok(()), check_target_snr))?;
+        blame("target_snr_db", self.target_snr_db.map_or(Ok(()), limits::check_target_snr))?;
+        // Taps that follow the delays are functions of all delays but one.
+        let functions = if self.tracking.is_some() { channels } else { 1 };
         match (self.method, self.taps) {
-            (Method::Fir, Some(taps)) => blame("taps", self.check_unknowns(taps, channels)),
+            (Method::Fir, Some(taps)) => {
+                blame("taps", limits::check_optimised_taps(taps, channels.saturating_mul(functions)))
+            }
             _ => Ok(()),
         }
     }
 
-    /// Each tap is a function of all delays but one if the taps follow them.
-    fn check_unknowns(&self, taps: usize, channels: usize) -> Result<(), SpecProblem> {
-        let functions = if self.tracking.is_some() { channels } else { 1 };
-        check_optimised_taps(taps, channels.saturating_mul(functions))
+    fn check_keys(&self) -> Result<(), KeyProblem> {
+        if let Some((key, problem)) = self.clash() {
+            return blame(key, Err(problem));
+        }
+        match KEYS.iter().find(|key| self.gives(key.name) && !key.methods.contains(&self.method)) {
+            Some(&Key { name: key, advised: remedy, .. }) => {
+                blame(key, Err(SpecProblem::NeedlessKey { key, method: self.method.name(), remedy }))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// A key that excludes another one, whatever their values are.
+    fn clash(&self) -> Option<(&'static str, SpecProblem)> {
+        let is_kyp = self.solver == Some(Solver::Kyp);
+        let kyp = |key| {
+            let (method, remedy) = ("fir with solver = \"kyp\"", "fir with solver = \"sampled\"");
+            Some((key, SpecProblem::NeedlessKey { key, method, remedy }))
+        };
+        let conflict =
+            |first, second, remedy| Some((second, SpecProblem::Conflict { first, second, remedy }));
+        match self.reduction {
+            _ if is_kyp && self.gamma_margin.is_some() => kyp("gamma_margin"),
+            _ if is_kyp && self.tracking.is_some() => kyp("tracking"),
+            _ if self.bits.is_some() && self.tracking.is_some() => conflict(
+                "bits",
+                "tracking",
+                "taps that follow the delays are no integers; leave out one of the two",
+            ),
+            _ if self.taps.is_some() && self.target_snr_db.is_some() => {
+                conflict("taps", "target_snr_db", "the SNR decides how many taps there are, keep one of them")
+            }
+            Some(reduction) if self.method == Method::H2 && self.is_fir() => {
+                let (key, method, remedy) = (reduction.key(), "h2 with taps", "h2 without taps");
+                Some((key, SpecProblem::NeedlessKey { key, method, remedy }))
+            }
+            _ => None,
+        }
     }
 
     /// Checks what depends on the errors of the channels.
@@ -232,121 +322,28 @@ impl DesignSpec {
         uncertainty: Option<&UncertaintySpec>,
         channels: usize,
     ) -> Result<(), KeyProblem> {
-        blame("solver", self.check_robust_solver(uncertainty, channels))?;
-        self.check_averaging(uncertainty, channels)?;
-        blame("tracking", self.check_tracking(uncertainty, channels))
-    }
-
-    /// Robust banks are an exchange of frequencies.
-    fn check_robust_solver(
-        &self,
-        uncertainty: Option<&UncertaintySpec>,
-        channels: usize,
-    ) -> Result<(), SpecProblem> {
-        match self.solver {
-            Some(Solver::Kyp) if uncertainty.is_some_and(|table| table.is_a_box(channels)) => {
-                let remedy = "a bank for uncertain channels is designed by solver = \"sampled\"; leave out one of the two";
-                Err(SpecProblem::Conflict { first: "solver = \"kyp\"", second: "[uncertainty]", remedy })
-            }
-            _ => Ok(()),
+        let conflict = |first, remedy| Err(SpecProblem::Conflict { first, second: "[uncertainty]", remedy });
+        if self.solver == Some(Solver::Kyp) && uncertainty.is_some_and(|table| table.is_a_box(channels)) {
+            let remedy =
+                "a bank for uncertain channels is designed by solver = \"sampled\"; leave out one of the two";
+            return blame("solver", conflict("solver = \"kyp\"", remedy));
         }
-    }
-
-    /// Only filters of finite length average over errors exactly.
-    fn check_averaging(
-        &self,
-        uncertainty: Option<&UncertaintySpec>,
-        channels: usize,
-    ) -> Result<(), KeyProblem> {
-        let Some(reduction) = self.reduction.filter(|_| self.method == Method::H2) else { return Ok(()) };
-        let is_uncertain = |table: &UncertaintySpec| {
-            table.delays(channels).iter().any(|delay| *delay > Seconds(0.0))
-                || table.gains(channels).iter().any(|gain| *gain > 0.0)
-        };
-        if !uncertainty.is_some_and(is_uncertain) {
-            return Ok(());
-        }
-        let remedy = "h2 averages over uncertain delays and gains with FIR filters, which have no order; leave out one of the two";
-        blame(
-            reduction.key(),
-            Err(SpecProblem::Conflict { first: reduction.key(), second: "[uncertainty]", remedy }),
-        )
-    }
-
-    /// Taps can only follow delays that are uncertain.
-    fn check_tracking(
-        &self,
-        uncertainty: Option<&UncertaintySpec>,
-        channels: usize,
-    ) -> Result<(), SpecProblem> {
-        let is_uncertain = |table: &UncertaintySpec| table.delays(channels).iter().any(|d| *d > Seconds(0.0));
-        if self.tracking.is_none() || uncertainty.is_some_and(is_uncertain) {
-            return Ok(());
+        if let (Some(reduction), Method::H2) = (self.reduction, self.method)
+            && uncertainty.is_some_and(|table| table.has_delays_or_gains(channels))
+        {
+            let remedy = "h2 averages over uncertain delays and gains with FIR filters, which have no order; leave out one of the two";
+            return blame(reduction.key(), conflict(reduction.key(), remedy));
         }
         let remedy = match uncertainty {
+            _ if self.tracking.is_none() => return Ok(()),
+            Some(table) if table.has_delays(channels) => return Ok(()),
             None => "tracking needs to know how far the delays may move: give [uncertainty] delay",
             Some(_) => {
                 "no delay moves: the delay of the reference is the origin, and [uncertainty] delay is 0 for all others; \
                  give a delay above 0 for a channel that is not the reference, or leave tracking out"
             }
         };
-        Err(SpecProblem::MissingKey { key: "delay", remedy })
-    }
-
-    fn check_keys(&self) -> Result<(), KeyProblem> {
-        let keys = [
-            ("taps", self.taps.is_some(), self.method.reads_taps(), "fir or h2"),
-            ("target_snr_db", self.target_snr_db.is_some(), self.method.has_target_snr(), "fir or h2"),
-            ("gamma_margin", self.gamma_margin.is_some(), self.method.has_gamma_margin(), "fir or iir"),
-            ("solver", self.solver.is_some(), self.method.has_solver(), "fir"),
-            ("bits", self.bits.is_some(), self.method.has_bits(), "fir"),
-            ("fraction_bits", self.fraction_bits.is_some(), self.method.has_bits(), "fir"),
-            ("tracking", self.tracking.is_some(), self.method.has_tracking(), "fir"),
-            (
-                self.reduction.map_or("order", Reduction::key),
-                self.reduction.is_some(),
-                self.method.has_states(),
-                "iir or h2",
-            ),
-        ];
-        if let (Some(Solver::Kyp), Some(_)) = (self.solver, self.gamma_margin) {
-            let (method, remedy) = ("fir with solver = \"kyp\"", "fir with solver = \"sampled\"");
-            return blame(
-                "gamma_margin",
-                Err(SpecProblem::NeedlessKey { key: "gamma_margin", method, remedy }),
-            );
-        }
-        if let (Some(Solver::Kyp), Some(_)) = (self.solver, self.tracking) {
-            let (method, remedy) = ("fir with solver = \"kyp\"", "fir with solver = \"sampled\"");
-            return blame("tracking", Err(SpecProblem::NeedlessKey { key: "tracking", method, remedy }));
-        }
-        if let (Some(_), Some(_)) = (&self.bits, self.tracking) {
-            let remedy = "taps that follow the delays are no integers; leave out one of the two";
-            return blame(
-                "tracking",
-                Err(SpecProblem::Conflict { first: "bits", second: "tracking", remedy }),
-            );
-        }
-        if let (Some(_), Some(_)) = (self.taps, self.target_snr_db) {
-            let remedy = "the SNR decides how many taps there are, keep one of them";
-            return blame(
-                "target_snr_db",
-                Err(SpecProblem::Conflict { first: "taps", second: "target_snr_db", remedy }),
-            );
-        }
-        if let (Some(reduction), true, Method::H2) = (self.reduction, self.is_fir(), self.method) {
-            let (method, remedy) = ("h2 with taps", "h2 without taps");
-            return blame(
-                reduction.key(),
-                Err(SpecProblem::NeedlessKey { key: reduction.key(), method, remedy }),
-            );
-        }
-        match keys.into_iter().find(|&(_, given, read, _)| given && !read) {
-            Some((key, _, _, remedy)) => {
-                blame(key, Err(SpecProblem::NeedlessKey { key, method: self.method.name(), remedy }))
-            }
-            None => Ok(()),
-        }
+        blame("tracking", Err(SpecProblem::MissingKey { key: "delay", remedy }))
     }
 }
 
@@ -357,71 +354,43 @@ pub(super) struct KeyProblem {
     pub(super) problem: SpecProblem,
 }
 
-fn blame(key: &'static str, checked: Result<(), SpecProblem>) -> Result<(), KeyProblem> {
+impl From<KeyProblem> for SpecProblem {
+    fn from(of_key: KeyProblem) -> Self {
+        of_key.problem
+    }
+}
+
+pub(super) fn blame(key: &'static str, checked: Result<(), SpecProblem>) -> Result<(), KeyProblem> {
     checked.map_err(|problem| KeyProblem { key, problem })
 }
 
 impl DesignOverrides {
-    /// Whether it has a value for `key`.
-    pub(super) fn gives(&self, key: &str) -> bool {
-        match key {
-            "method" => self.method.is_some(),
-            "taps" => self.taps.is_some(),
-            "target_snr_db" => self.target_snr_db.is_some(),
-            "gamma_margin" => self.gamma_margin.is_some(),
-            "solver" => self.solver.is_some(),
-            "bits" => self.bits.is_some(),
-            "fraction_bits" => self.fraction_bits.is_some(),
-            "tracking" => self.tracking.is_some(),
-            _ => self.reduction.is_some_and(|reduction| reduction.key() == key),
-        }
-    }
-
     /// Values of the command line take precedence. Keys of the file that a new method does not read are
     /// dropped; taps too if the new method is recursive without them.
     pub(super) fn over(self, file: Self) -> Self {
-        let replaced = self.method.filter(|method| file.method != Some(*method));
-        let kept = |has: fn(Method) -> bool| replaced.is_none_or(has);
+        let new = self.method.filter(|method| file.method != Some(*method));
+        let keeps = |key: &str| new.is_none_or(|method| method.reads(key));
+        let keeps_taps = new.is_none_or(Method::has_taps);
         Self {
             method: self.method.or(file.method),
             // Each stands in place of the other.
-            taps: self.taps.or(file.taps.filter(|_| kept(Method::has_taps) && self.target_snr_db.is_none())),
+            taps: self.taps.or(file.taps.filter(|_| keeps_taps && self.target_snr_db.is_none())),
             target_snr_db: self
                 .target_snr_db
-                .or(file.target_snr_db.filter(|_| kept(Method::has_target_snr) && self.taps.is_none())),
-            gamma_margin: self.gamma_margin.or(file.gamma_margin.filter(|_| kept(Method::has_gamma_margin))),
-            solver: self.solver.or(file.solver.filter(|_| kept(Method::has_solver))),
-            bits: self.bits.or(file.bits.filter(|_| kept(Method::has_bits))),
-            fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| kept(Method::has_bits))),
-            tracking: self.tracking.or(file.tracking.filter(|_| kept(Method::has_tracking))),
-            reduction: self.reduction.or(file.reduction.filter(|_| kept(Method::has_states))),
+                .or(file.target_snr_db.filter(|_| keeps("target_snr_db") && self.taps.is_none())),
+            gamma_margin: self.gamma_margin.or(file.gamma_margin.filter(|_| keeps("gamma_margin"))),
+            solver: self.solver.or(file.solver.filter(|_| keeps("solver"))),
+            bits: self.bits.or(file.bits.filter(|_| keeps("bits"))),
+            fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| keeps("fraction_bits"))),
+            tracking: self.tracking.or(file.tracking.filter(|_| keeps("tracking"))),
+            reduction: self.reduction.or(file.reduction.filter(|_| keeps("order"))),
         }
     }
 
     /// The default method is FIR if taps or an SNR are given, else IIR, which needs no size.
     pub(super) fn resolved(self) -> DesignSpec {
-        let Self {
-            method,
-            taps,
-            target_snr_db,
-            gamma_margin,
-            solver,
-            bits,
-            fraction_bits,
-            tracking,
-            reduction,
-        } = self;
-        let is_sized = taps.is_some() || target_snr_db.is_some();
-        DesignSpec {
-            method: method.unwrap_or(if is_sized { Method::Fir } else { Method::Iir }),
-            taps,
-            target_snr_db,
-            gamma_margin,
-            solver,
-            bits,
-            fraction_bits,
-            tracking,
-            reduction,
-        }
+        let is_sized = self.taps.is_some() || self.target_snr_db.is_some();
+        let method = self.method.unwrap_or(if is_sized { Method::Fir } else { Method::Iir });
+        self.with(method)
     }
 }

@@ -1,14 +1,87 @@
-//! Rules for a written filter that need no linear algebra: sizes, finite numbers, family parameters,
-//! degrees. [`crate::analog`] checks the poles.
+//! Filters as they are written, and the rules for them that need no linear algebra: sizes, finite numbers,
+//! family parameters, degrees. [`crate::analog`] checks the poles.
 
 use super::filter_problem::MAX_ORDER;
-use super::{Family, FilterProblem, FilterSpec, Passband};
+use super::{FilterProblem, Passband};
+use serde::{Deserialize, Serialize};
 
 /// Least ripple or attenuation in decibels; less is numerically none.
 pub const MIN_RIPPLE_DB: f64 = 1e-6;
 
 /// Most ripple or attenuation in decibels: 300 dB is the precision of double arithmetic.
 pub const MAX_RIPPLE_DB: f64 = 300.0;
+
+/// An analog filter as written; stability is checked by [`crate::analog`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum FilterSpec {
+    /// Numerator over denominator in descending powers of s (rad/s).
+    TransferFunction {
+        /// Numerator coefficients.
+        num: Vec<f64>,
+        /// Denominator coefficients.
+        den: Vec<f64>,
+    },
+    /// gain * prod(s - z) / prod(s - p), rad/s, complex values as `[re, im]`.
+    ZeroPoleGain {
+        /// Zeros.
+        zeros: Vec<[f64; 2]>,
+        /// Poles.
+        poles: Vec<[f64; 2]>,
+        /// Leading coefficient.
+        gain: f64,
+    },
+    /// dx/dt = a x + b f, out = c x; lists of rows.
+    StateSpace {
+        /// n x n.
+        a: Vec<Vec<f64>>,
+        /// n x 1.
+        b: Vec<Vec<f64>>,
+        /// 1 x n.
+        c: Vec<Vec<f64>>,
+    },
+    /// A classical low-pass or band-pass by name.
+    Family {
+        /// Which one.
+        family: Family,
+        /// Number of poles of the low-pass; a band-pass has twice as many.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        order: Option<usize>,
+        /// The cutoff, or the edges of the band.
+        #[serde(flatten)]
+        passband: Passband,
+        /// Pass-band ripple in decibels (Chebyshev 1, elliptic).
+        #[serde(skip_serializing_if = "Option::is_none")]
+        ripple_db: Option<f64>,
+        /// Stop-band attenuation in decibels (Chebyshev 2, elliptic).
+        #[serde(skip_serializing_if = "Option::is_none")]
+        attenuation_db: Option<f64>,
+    },
+    /// Filters one after the other, for example a ladder filter and the pole of the sampling switch.
+    /// Only the whole cascade has to be strictly proper.
+    Cascade {
+        /// The stages; none of them a cascade itself.
+        cascade: Vec<FilterSpec>,
+    },
+}
+
+/// The classical families.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Family {
+    /// Maximally flat magnitude.
+    Butterworth,
+    /// Equiripple pass band.
+    Chebyshev1,
+    /// Equiripple stop band.
+    Chebyshev2,
+    /// Equiripple in both bands.
+    Elliptic,
+    /// Maximally flat group delay, normalised by phase.
+    Bessel,
+    /// One pole; with a band, the resonator of two poles.
+    Rc,
+}
 
 impl Family {
     /// Every family, in the order of the documentation.
@@ -59,7 +132,13 @@ impl FilterSpec {
     pub fn check_proper(&self) -> Result<(), FilterProblem> {
         self.check_size()?;
         let (zeros, poles) = self.degrees();
-        if zeros > poles { Err(FilterProblem::Improper { zeros, poles }) } else { Ok(()) }
+        if zeros <= poles {
+            return Ok(());
+        }
+        let rule = format!(
+            "the filter has {zeros} zeros and {poles} poles, so it grows with frequency; give it at least as many poles as zeros"
+        );
+        Err(FilterProblem::Rule { key: None, rule })
     }
 
     /// The entries, and the number of poles.
@@ -68,9 +147,9 @@ impl FilterSpec {
         self.check_stages()?;
         let (key, (_, poles)) = (self.order_key(), self.degrees());
         match poles {
-            0 => Err(FilterProblem::NoPoles { key }),
+            0 => Err(no_poles(key)),
             1..=MAX_ORDER => Ok(()),
-            order => Err(FilterProblem::OrderTooHigh { key, order }),
+            order => Err(order_too_high(key, order)),
         }
     }
 
@@ -89,7 +168,10 @@ impl FilterSpec {
             Self::ZeroPoleGain { zeros, poles, .. } => (zeros.len(), poles.len()),
             Self::StateSpace { a, .. } => (a.len().saturating_sub(1), a.len()),
             Self::Family { family, order, passband, .. } => {
-                passband.degrees(family_degrees(*family, order.unwrap_or(1)))
+                let order = order.unwrap_or(1);
+                // The even orders with stop-band ripple have a zero for every pole.
+                let zeros = if family.has_attenuation() { order - order % 2 } else { 0 };
+                passband.degrees(zeros, order)
             }
             Self::Cascade { cascade } => {
                 cascade.iter().map(Self::degrees).fold((0, 0), |sum, d| (sum.0 + d.0, sum.1 + d.1))
@@ -143,7 +225,7 @@ impl FilterSpec {
                 check_ripples(*family, *ripple_db, *attenuation_db)
             }
             Self::Cascade { cascade } if cascade.is_empty() => {
-                Err(FilterProblem::Empty { key: "cascade", remedy: "list the stages that follow each other" })
+                Err(empty("cascade", "list the stages that follow each other"))
             }
             Self::Cascade { .. } => Ok(()),
         }
@@ -178,15 +260,36 @@ fn degree(coefficients: &[f64]) -> usize {
     (coefficients.len() - leading).saturating_sub(1)
 }
 
-/// Zeros and poles of a family member; the even orders with stop-band ripple have a zero for every pole.
-fn family_degrees(family: Family, order: usize) -> (usize, usize) {
-    (if family.has_attenuation() { order - order % 2 } else { 0 }, order)
+fn no_poles(key: &'static str) -> FilterProblem {
+    FilterProblem::of(key, "the filter has no pole, so it passes every frequency; give it at least one")
+}
+
+fn order_too_high(key: &'static str, order: usize) -> FilterProblem {
+    let rule = format!(
+        "the filter has {order} poles, but at most {MAX_ORDER} are supported; leave out stages that matter least"
+    );
+    FilterProblem::of(key, rule)
+}
+
+fn empty(key: &'static str, remedy: &str) -> FilterProblem {
+    FilterProblem::of(key, format!("{key} is empty; {remedy}"))
+}
+
+/// A filter that is zero because `key` is.
+fn check_nonzero(key: &'static str, mut values: impl Iterator<Item = f64>) -> Result<(), FilterProblem> {
+    if values.any(|x| x != 0.0) {
+        return Ok(());
+    }
+    let rule =
+        format!("the filter is zero because {key} is, so its output carries no signal; make {key} nonzero");
+    Err(FilterProblem::of(key, rule))
 }
 
 /// A stage must be a valid filter by itself, but only the whole cascade has to be strictly proper.
 fn check_stage(stage: &FilterSpec) -> Result<(), FilterProblem> {
     if matches!(stage, FilterSpec::Cascade { .. }) {
-        return Err(FilterProblem::NestedCascade);
+        let rule = "a cascade cannot hold another cascade; list all its stages in one";
+        return Err(FilterProblem::of("cascade", rule));
     }
     stage.check_parts()?;
     let (zeros, poles) = stage.degrees();
@@ -199,7 +302,7 @@ fn check_stage(stage: &FilterSpec) -> Result<(), FilterProblem> {
 
 fn check_finite(key: &'static str, values: impl IntoIterator<Item = f64>) -> Result<(), FilterProblem> {
     match values.into_iter().find(|x| !x.is_finite()) {
-        Some(value) => Err(FilterProblem::NotFinite { key, value }),
+        Some(value) => Err(FilterProblem::not_finite(key, value)),
         None => Ok(()),
     }
 }
@@ -207,108 +310,98 @@ fn check_finite(key: &'static str, values: impl IntoIterator<Item = f64>) -> Res
 fn check_polynomials(num: &[f64], den: &[f64]) -> Result<(), FilterProblem> {
     for (key, list) in [("num", num), ("den", den)] {
         if list.is_empty() {
-            return Err(FilterProblem::Empty {
-                key,
-                remedy: "list its coefficients in descending powers of s",
-            });
+            return Err(empty(key, "list its coefficients in descending powers of s"));
         }
         check_finite(key, list.iter().copied())?;
     }
     if den.iter().all(|&x| x == 0.0) {
-        return Err(FilterProblem::ZeroDenominator { count: den.len() });
+        let count = den.len();
+        let rule = format!(
+            "den is zero ({count} coefficients, all 0); its highest power of s needs another coefficient"
+        );
+        return Err(FilterProblem::of("den", rule));
     }
-    if num.iter().all(|&x| x == 0.0) {
-        return Err(FilterProblem::Zero { key: "num" });
-    }
-    Ok(())
+    check_nonzero("num", num.iter().copied())
 }
 
 fn check_zpk(zeros: &[[f64; 2]], poles: &[[f64; 2]], gain: f64) -> Result<(), FilterProblem> {
     check_finite("zeros", zeros.iter().flatten().copied())?;
     check_finite("poles", poles.iter().flatten().copied())?;
     check_finite("gain", [gain])?;
-    if gain == 0.0 { Err(FilterProblem::Zero { key: "gain" }) } else { Ok(()) }
+    check_nonzero("gain", [gain].into_iter())
 }
 
 fn check_matrices(a: &[Vec<f64>], b: &[Vec<f64>], c: &[Vec<f64>]) -> Result<(), FilterProblem> {
     let n = a.len();
     if n == 0 {
-        return Err(FilterProblem::Empty { key: "a", remedy: "a filter needs at least one state" });
+        return Err(empty("a", "a filter needs at least one state"));
     }
     for (key, matrix, rows, cols) in [("a", a, n, n), ("b", b, n, 1), ("c", c, 1, n)] {
         let odd = matrix.iter().map(Vec::len).find(|&len| len != cols);
         if matrix.len() != rows || odd.is_some() {
-            let (found, expected) = (odd.unwrap_or(cols), format!("{rows} x {cols}"));
-            return Err(FilterProblem::Shape { key, rows: matrix.len(), cols: found, states: n, expected });
+            let (found_rows, found_cols) = (matrix.len(), odd.unwrap_or(cols));
+            let rule = format!(
+                "{key} is {found_rows} x {found_cols}, but a filter with one input, one output and {n} states needs {rows} x {cols}"
+            );
+            return Err(FilterProblem::of(key, rule));
         }
         check_finite(key, matrix.iter().flatten().copied())?;
     }
-    for (key, matrix) in [("b", b), ("c", c)] {
-        if matrix.iter().flatten().all(|&x| x == 0.0) {
-            return Err(FilterProblem::Zero { key });
-        }
-    }
-    Ok(())
+    check_nonzero("b", b.iter().flatten().copied())?;
+    check_nonzero("c", c.iter().flatten().copied())
 }
 
 fn check_order(family: Family, order: Option<usize>, passband: Passband) -> Result<(), FilterProblem> {
-    let name = family.name();
     let poles = |order: usize| order.saturating_mul(passband.poles_per_order());
     match (family, order) {
         (Family::Rc, None | Some(1)) => Ok(()),
         (Family::Rc, Some(order)) => {
-            let rule = "an rc filter has one pole; remove order, or choose another family".into();
-            Err(FilterProblem::ParameterRange { key: "order", value: order as f64, unit: "", rule })
+            let rule = "an rc filter has one pole; remove order, or choose another family";
+            Err(FilterProblem::of("order", format!("order = {order}: {rule}")))
         }
-        (_, None) => Err(FilterProblem::MissingParameter {
-            family: name,
-            key: "order",
-            meaning: "the number of poles",
-        }),
-        (_, Some(0)) => Err(FilterProblem::NoPoles { key: "order" }),
-        (_, Some(order)) if poles(order) > MAX_ORDER => {
-            Err(FilterProblem::OrderTooHigh { key: "order", order: poles(order) })
-        }
+        (_, None) => Err(missing(family, "order", "the number of poles")),
+        (_, Some(0)) => Err(no_poles("order")),
+        (_, Some(order)) if poles(order) > MAX_ORDER => Err(order_too_high("order", poles(order))),
         _ => Ok(()),
     }
+}
+
+fn missing(family: Family, key: &str, meaning: &str) -> FilterProblem {
+    let rule = format!("a {} filter needs {key} ({meaning})", family.name());
+    FilterProblem::Rule { key: None, rule }
 }
 
 fn check_ripples(family: Family, ripple: Option<f64>, attenuation: Option<f64>) -> Result<(), FilterProblem> {
-    let ripple_meaning = "the ripple in the pass band in decibels";
-    let attenuation_meaning = "the attenuation in the stop band in decibels";
-    check_decibels(family, "ripple_db", ripple, family.has_ripple(), ripple_meaning)?;
-    check_decibels(family, "attenuation_db", attenuation, family.has_attenuation(), attenuation_meaning)?;
+    check_decibels(family, "ripple_db", ripple)?;
+    check_decibels(family, "attenuation_db", attenuation)?;
     match (ripple, attenuation) {
         (Some(ripple), Some(attenuation)) if attenuation <= ripple => {
-            let rule = format!("the stop-band attenuation must exceed the pass-band ripple of {ripple} dB");
-            Err(FilterProblem::ParameterRange {
-                key: "attenuation_db",
-                value: attenuation,
-                unit: " dB",
-                rule,
-            })
+            let rule = format!(
+                "attenuation_db = {attenuation} dB: the stop-band attenuation must exceed the pass-band ripple of {ripple} dB"
+            );
+            Err(FilterProblem::of("attenuation_db", rule))
         }
         _ => Ok(()),
     }
 }
 
-fn check_decibels(
-    family: Family,
-    key: &'static str,
-    value: Option<f64>,
-    required: bool,
-    meaning: &'static str,
-) -> Result<(), FilterProblem> {
-    let family = family.name();
-    match value {
-        None if required => Err(FilterProblem::MissingParameter { family, key, meaning }),
-        Some(value) if !required => Err(FilterProblem::NeedlessParameter { family, key, value }),
-        Some(value) if !(MIN_RIPPLE_DB..=MAX_RIPPLE_DB).contains(&value) => {
-            let rule = format!("it must lie between {MIN_RIPPLE_DB:e} and {MAX_RIPPLE_DB} dB");
-            Err(FilterProblem::ParameterRange { key, value, unit: " dB", rule })
+/// The ripple or the attenuation of a family.
+fn check_decibels(family: Family, key: &'static str, value: Option<f64>) -> Result<(), FilterProblem> {
+    let (is_read, meaning) = match key {
+        "ripple_db" => (family.has_ripple(), "the ripple in the pass band in decibels"),
+        _ => (family.has_attenuation(), "the attenuation in the stop band in decibels"),
+    };
+    let rule = match value {
+        None if is_read => return Err(missing(family, key, meaning)),
+        Some(value) if !is_read => {
+            format!("{key} = {value} has no meaning for a {} filter; remove it", family.name())
         }
-        _ => Ok(()),
-    }
+        Some(value) if !(MIN_RIPPLE_DB..=MAX_RIPPLE_DB).contains(&value) => {
+            format!("{key} = {value} dB: it must lie between {MIN_RIPPLE_DB:e} and {MAX_RIPPLE_DB} dB")
+        }
+        _ => return Ok(()),
+    };
+    Err(FilterProblem::of(key, rule))
 }
 
 #[cfg(test)]

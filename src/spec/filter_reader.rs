@@ -1,7 +1,7 @@
 //! Reads an analog filter in whichever form it is written.
 
-use super::reader::{Fields, Value};
-use super::{Family, Fault, FilterSpec, Passband, SpecProblem};
+use super::reader::{Either, Fields, Value};
+use super::{Family, Fault, FilterProblem, FilterSpec, Passband, SpecProblem};
 
 /// The keys of each written form of a filter; the first one names the form.
 pub(super) const FILTER_FORMS: [&[&str]; 5] = [
@@ -14,17 +14,21 @@ pub(super) const FILTER_FORMS: [&[&str]; 5] = [
 
 /// Reads one filter in whichever form it is written.
 pub(super) fn filter(value: &Value<'_>) -> Result<FilterSpec, Fault> {
-    let fields = value.fields(&FILTER_FORMS.concat())?;
-    let filter = unchecked_filter(&fields)?;
-    filter.check().map_err(|problem| fields.fault_at(problem.key(), problem))?;
-    Ok(filter)
+    checked_filter(value, FilterSpec::check)
 }
 
 /// Reads a filter that may have a direct term.
 pub(super) fn proper_filter(value: &Value<'_>) -> Result<FilterSpec, Fault> {
+    checked_filter(value, FilterSpec::check_proper)
+}
+
+fn checked_filter(
+    value: &Value<'_>,
+    check: fn(&FilterSpec) -> Result<(), FilterProblem>,
+) -> Result<FilterSpec, Fault> {
     let fields = value.fields(&FILTER_FORMS.concat())?;
     let filter = unchecked_filter(&fields)?;
-    filter.check_proper().map_err(|problem| fields.fault_at(problem.key(), problem))?;
+    check(&filter).map_err(|problem| fields.fault_at(problem.key(), problem))?;
     Ok(filter)
 }
 
@@ -41,7 +45,7 @@ fn unchecked_filter(fields: &Fields<'_>) -> Result<FilterSpec, Fault> {
             den: fields.required("den", "list the denominator in descending powers of s")?.numbers()?,
         }),
         "poles" | "zeros" | "gain" => Ok(FilterSpec::ZeroPoleGain {
-            zeros: fields.optional("zeros").map(|v| roots(&v)).transpose()?.unwrap_or_default(),
+            zeros: fields.read("zeros", |v| roots(&v))?.unwrap_or_default(),
             poles: roots(&fields.required("poles", "list the poles as [re, im] pairs in rad/s")?)?,
             gain: fields
                 .required("gain", "give the factor before the product of zeros over poles")?
@@ -65,10 +69,10 @@ fn unchecked_filter(fields: &Fields<'_>) -> Result<FilterSpec, Fault> {
 
 fn family(fields: &Fields<'_>) -> Result<FilterSpec, Fault> {
     let named = fields.required("family", "name the family, for example family = \"butterworth\"")?;
-    let number = |key| fields.optional(key).map(|v: Value<'_>| v.number()).transpose();
+    let number = |key| fields.read(key, |v| v.number());
     Ok(FilterSpec::Family {
         family: named.name("filter family", &Family::ALL.map(|f| (f.name(), f)))?,
-        order: fields.optional("order").map(|v| v.count("poles")).transpose()?,
+        order: fields.read("order", |v| v.count("poles"))?,
         passband: passband(fields)?,
         ripple_db: number("ripple_db")?,
         attenuation_db: number("attenuation_db")?,
@@ -77,21 +81,20 @@ fn family(fields: &Fields<'_>) -> Result<FilterSpec, Fault> {
 
 /// The cutoff, or the edges of the band.
 fn passband(fields: &Fields<'_>) -> Result<Passband, Fault> {
-    let missing = "give the cutoff in hertz, or band = [low, high] for a band-pass";
-    match (fields.optional("cutoff"), fields.optional("band")) {
-        (Some(_), Some(band)) => {
-            let remedy = "a low-pass has a cutoff and a band-pass has a band, keep one of them";
-            Err(band.fault(SpecProblem::Conflict { first: "cutoff", second: "band", remedy }))
+    match fields.either(
+        "cutoff",
+        "band",
+        "a low-pass has a cutoff and a band-pass has a band, keep one of them",
+    )? {
+        Either::First(cutoff) => Ok(Passband::LowPass { cutoff: cutoff.frequency()? }),
+        Either::Second(band) => {
+            let [low, high] =
+                band.frequencies("a list of two frequencies, as in [\"60 MHz\", \"80 MHz\"]")?;
+            Ok(Passband::BandPass { low, high })
         }
-        (_, None) => Ok(Passband::LowPass { cutoff: fields.required("cutoff", missing)?.frequency()? }),
-        (None, Some(band)) => {
-            const EDGES: &str = "a list of two frequencies, as in [\"60 MHz\", \"80 MHz\"]";
-            let edges = band.items(EDGES)?;
-            let [low, high] = &edges[..] else {
-                let found = "a list of another length";
-                return Err(band.fault(SpecProblem::WrongType { expected: EDGES, found }));
-            };
-            Ok(Passband::BandPass { low: low.frequency()?, high: high.frequency()? })
+        Either::Neither => {
+            let remedy = "give the cutoff in hertz, or band = [low, high] for a band-pass";
+            Err(fields.whole().fault(SpecProblem::MissingKey { key: "cutoff", remedy }))
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::SpecProblem;
 use crate::units::{FastPeriods, Hertz, Seconds};
+use std::ops::RangeInclusive;
 
 /// Largest M. The designer factors dense matrices of M + N rows at every frequency; the largest
 /// interleaved converters have a few hundred.
@@ -32,6 +33,19 @@ pub const MAX_REDUCTION_LOSS_DB: f64 = 400.0;
 /// Largest share by which gamma may exceed its optimum; no bank that is worth anything is so far from it.
 const MAX_GAMMA_MARGIN: f64 = 1e6;
 
+/// Most bits of a converter; finer steps than these are lost in doubles beside full scale.
+const MAX_CONVERTER_BITS: u32 = 32;
+
+/// Largest jitter in fast periods: instants that are off by more say nothing of the signal.
+const MAX_JITTER: f64 = 1.0;
+
+/// Largest and, inverted, smallest size of a converter's gain. 120 dB from nominal a 24-bit converter has
+/// four bits left or clips nearly always, so such a number is in the wrong unit.
+const MAX_GAIN: f64 = 1e6;
+
+/// Fast periods in seconds, and rates in hertz: rates and squares still fit a double.
+const FAST_PERIODS: RangeInclusive<f64> = 1e-100..=1e100;
+
 /// Distance to a whole number of fast periods within which a delay is rounded to it, relative to its size
 /// (at least one period). A delay of 3 periods of 0.1 s is 0.30000000000000004 s; without rounding, the
 /// fraction would become a channel state of size 1e-16.
@@ -49,132 +63,96 @@ pub(super) fn range(value: f64, unit: &'static str, rule: impl Into<String>) -> 
     SpecProblem::Range { value, unit, rule: rule.into() }
 }
 
+/// A value within its range, or the rule. NaN is outside.
+pub(crate) fn within(
+    value: f64,
+    range_of: RangeInclusive<f64>,
+    unit: &'static str,
+    rule: impl Into<String>,
+) -> Result<(), SpecProblem> {
+    if range_of.contains(&value) { Ok(()) } else { Err(range(value, unit, rule)) }
+}
+
 /// h: positive, with a margin to the ends of double precision for rates and squares.
 pub(crate) fn check_fast_period(h: Seconds) -> Result<(), SpecProblem> {
-    if (1e-100..=1e100).contains(&h.0) {
-        return Ok(());
-    }
-    Err(range(h.0, "s", "the fast period must be positive, between 1e-100 and 1e100 seconds"))
+    within(h.0, FAST_PERIODS, "s", "the fast period must be positive, between 1e-100 and 1e100 seconds")
 }
 
 /// 1/h, by the same rule.
 pub(crate) fn check_fast_rate(rate: Hertz) -> Result<(), SpecProblem> {
-    if (1e-100..=1e100).contains(&rate.0) {
-        return Ok(());
-    }
-    Err(range(rate.0, "Hz", "the fast rate must be positive, between 1e-100 and 1e100 hertz"))
+    within(rate.0, FAST_PERIODS, "Hz", "the fast rate must be positive, between 1e-100 and 1e100 hertz")
 }
 
 /// M.
 pub(crate) fn check_ratio(ratio: usize) -> Result<(), SpecProblem> {
-    if (1..=MAX_RATIO).contains(&ratio) {
-        return Ok(());
-    }
     let rule = format!("ratio is the number of fast samples per slow sample and must be 1 to {MAX_RATIO}");
-    Err(range(ratio as f64, "fast samples", rule))
+    within(ratio as f64, 1.0..=MAX_RATIO as f64, "fast samples", rule)
 }
 
 /// m0.
 pub(crate) fn check_latency(latency: usize) -> Result<(), SpecProblem> {
-    if latency <= MAX_LATENCY {
-        return Ok(());
-    }
     let rule = format!(
         "latency is in fast samples and at most {MAX_LATENCY}, since every sample of latency is a state of the design problem"
     );
-    Err(range(latency as f64, "fast samples", rule))
+    within(latency as f64, 0.0..=MAX_LATENCY as f64, "fast samples", rule)
 }
 
 /// D_i in fast periods; `written` is the number in the file, in `unit`.
 pub(crate) fn check_delay(delay: FastPeriods, written: f64, unit: &'static str) -> Result<(), SpecProblem> {
-    let periods = delay.0;
-    if periods < 0.0 {
-        return Err(range(
-            written,
-            unit,
-            "a delay cannot be negative; add the same whole number of fast periods to the delays of all channels and to the latency",
-        ));
-    }
-    // Written so that NaN is refused too.
-    if periods <= MAX_LATENCY as f64 {
-        return Ok(());
-    }
-    let rule =
-        format!("the delay is {periods:e} fast periods, at most {MAX_LATENCY} are supported; check its unit");
+    let rule = match delay.0 {
+        periods if (0.0..=MAX_LATENCY as f64).contains(&periods) => return Ok(()),
+        periods if periods < 0.0 => {
+            "a delay cannot be negative; add the same whole number of fast periods to the delays of all channels and to the latency".to_owned()
+        }
+        periods => {
+            format!("the delay is {periods:e} fast periods, at most {MAX_LATENCY} are supported; check its unit")
+        }
+    };
     Err(range(written, unit, rule))
 }
 
 /// N.
 pub(crate) fn check_channel_count(count: usize) -> Result<(), SpecProblem> {
-    if (1..=MAX_CHANNELS).contains(&count) {
-        return Ok(());
-    }
-    Err(range(count as f64, "channels", format!("a bank has 1 to {MAX_CHANNELS} channels")))
+    let rule = format!("a bank has 1 to {MAX_CHANNELS} channels");
+    within(count as f64, 1.0..=MAX_CHANNELS as f64, "channels", rule)
 }
 
 /// Taps per channel.
 pub(crate) fn check_taps(taps: usize) -> Result<(), SpecProblem> {
-    if (1..=MAX_TAPS).contains(&taps) {
-        return Ok(());
-    }
-    Err(range(taps as f64, "taps", format!("a channel's filter has 1 to {MAX_TAPS} taps at the fast rate")))
+    let rule = format!("a channel's filter has 1 to {MAX_TAPS} taps at the fast rate");
+    within(taps as f64, 1.0..=MAX_TAPS as f64, "taps", rule)
 }
 
 /// Taps of all channels together, limited only for the method `fir`.
 pub(crate) fn check_optimised_taps(taps: usize, channels: usize) -> Result<(), SpecProblem> {
-    let total = taps.saturating_mul(channels);
-    if total <= MAX_OPTIMISED_TAPS {
-        return Ok(());
-    }
     let rule = format!(
         "taps times channels is at most {MAX_OPTIMISED_TAPS} for the method fir; use fewer taps, or the method iir"
     );
-    Err(range(total as f64, "taps in all", rule))
+    within(taps.saturating_mul(channels) as f64, 0.0..=MAX_OPTIMISED_TAPS as f64, "taps in all", rule)
 }
 
 /// sigma_i.
 pub(crate) fn check_noise(noise: f64) -> Result<(), SpecProblem> {
-    if (0.0..=1.0).contains(&noise) {
-        return Ok(());
-    }
-    Err(range(
-        noise,
-        "of full scale",
-        "noise is the rms of the converter's noise relative to full scale, from 0 to 1; 1e-4 is -80 dB",
-    ))
+    let rule =
+        "noise is the rms of the converter's noise relative to full scale, from 0 to 1; 1e-4 is -80 dB";
+    within(noise, 0.0..=1.0, "of full scale", rule)
 }
-
-/// Most bits of a converter; finer steps than these are lost in doubles beside full scale.
-const MAX_CONVERTER_BITS: u32 = 32;
 
 /// The resolution of a converter.
 pub(super) fn check_converter_bits(bits: u32) -> Result<(), SpecProblem> {
-    if (1..=MAX_CONVERTER_BITS).contains(&bits) {
-        return Ok(());
-    }
     let rule = format!(
         "a converter has 1 to {MAX_CONVERTER_BITS} bits, its sign among them; leave it out for no rounding"
     );
-    Err(range(f64::from(bits), "bits", rule))
+    within(bits.into(), 1.0..=MAX_CONVERTER_BITS.into(), "bits", rule)
 }
 
-/// Largest jitter in fast periods: instants that are off by more say nothing of the signal.
-const MAX_JITTER: f64 = 1.0;
-
-/// The jitter of sampling instants.
+/// The jitter of sampling instants in fast periods; `seconds` is what a message states.
 pub(super) fn check_jitter(periods: FastPeriods, seconds: f64) -> Result<(), SpecProblem> {
-    if (0.0..=MAX_JITTER).contains(&periods.0) {
-        return Ok(());
-    }
     let rule = format!(
         "jitter is the rms error of a sampling instant, 0 to {MAX_JITTER} fast periods; check its unit"
     );
-    Err(range(seconds, "s", rule))
+    if (0.0..=MAX_JITTER).contains(&periods.0) { Ok(()) } else { Err(range(seconds, "s", rule)) }
 }
-
-/// Largest and, inverted, smallest size of a converter's gain. 120 dB from nominal a 24-bit converter has
-/// four bits left or clips nearly always, so such a number is in the wrong unit.
-const MAX_GAIN: f64 = 1e6;
 
 /// g_i.
 pub(crate) fn check_gain(gain: f64) -> Result<(), SpecProblem> {
@@ -191,59 +169,44 @@ pub(crate) fn check_gain(gain: f64) -> Result<(), SpecProblem> {
 
 /// o_i: a converter whose offset exceeds full scale delivers nothing but clipped samples.
 pub(crate) fn check_offset(offset: f64) -> Result<(), SpecProblem> {
-    if (-1.0..=1.0).contains(&offset) {
-        return Ok(());
-    }
     let rule = "offset is what the converter adds to its samples relative to full scale, -1 to 1; 5 steps of a \
                 12-bit converter are 5 / 2048";
-    Err(range(offset, "of full scale", rule))
+    within(offset, -1.0..=1.0, "of full scale", rule)
 }
 
 /// States of a recursive bank.
 pub(crate) fn check_order(order: usize) -> Result<(), SpecProblem> {
-    if order <= MAX_STATES {
-        return Ok(());
-    }
     let rule = format!(
         "order is the largest number of states of the bank, 0 to {MAX_STATES}; leave it out for no limit"
     );
-    Err(range(order as f64, "states", rule))
+    within(order as f64, 0.0..=MAX_STATES as f64, "states", rule)
 }
 
 /// The SNR for which taps are chosen.
 pub(super) fn check_target_snr(db: f64) -> Result<(), SpecProblem> {
-    if (0.0..=MAX_TARGET_SNR_DB).contains(&db) {
-        return Ok(());
-    }
     let rule = format!(
         "target_snr_db is the ratio of the signal to error and noise together, 0 to {MAX_TARGET_SNR_DB} dB; 90 is that of \
          15 bits"
     );
-    Err(range(db, "dB", rule))
+    within(db, 0.0..=MAX_TARGET_SNR_DB, "dB", rule)
 }
 
 /// Decibels that order reduction may lose.
 pub(crate) fn check_reduction_loss(db: f64) -> Result<(), SpecProblem> {
-    if (0.0..=MAX_REDUCTION_LOSS_DB).contains(&db) {
-        return Ok(());
-    }
     let rule = format!(
         "reduction_loss_db is the increase of the error that order reduction may cause, 0 to {MAX_REDUCTION_LOSS_DB} dB; \
          0 removes only states without effect"
     );
-    Err(range(db, "dB", rule))
+    within(db, 0.0..=MAX_REDUCTION_LOSS_DB, "dB", rule)
 }
 
 /// Relative excess over the optimal gamma.
 pub(crate) fn check_gamma_margin(gamma_margin: f64) -> Result<(), SpecProblem> {
-    if (0.0..=MAX_GAMMA_MARGIN).contains(&gamma_margin) {
-        return Ok(());
-    }
     let rule = format!(
         "gamma_margin is the share by which gamma may exceed its optimum, zero or more and at most {MAX_GAMMA_MARGIN}; \
          0.01 is one per cent"
     );
-    Err(range(gamma_margin, "(relative)", rule))
+    within(gamma_margin, 0.0..=MAX_GAMMA_MARGIN, "(relative)", rule)
 }
 
 #[cfg(test)]

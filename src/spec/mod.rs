@@ -21,16 +21,16 @@ mod uncertainty;
 mod word_lengths;
 mod write;
 
-pub use design::DesignOverrides;
+pub use design::{DesignOverrides, DesignSpec, DesignTable, Method, Reduction, Solver, Tracking};
 pub(crate) use error::{Fault, shown_path};
 pub use error::{Location, SpecError, SpecProblem};
-pub use filter::{MAX_RIPPLE_DB, MIN_RIPPLE_DB};
+pub use filter::{Family, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use filter_problem::{FilterProblem, MAX_ORDER};
-#[cfg(feature = "cli")]
-pub(crate) use limits::check_noise;
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES, MAX_TARGET_SNR_DB};
 pub(crate) use limits::{check_gain, check_offset};
+#[cfg(feature = "cli")]
+pub(crate) use limits::{check_noise, within};
 pub use measured::{FilterModel, FilterModels, MeasuredFilter, Measurement};
 pub use passband::Passband;
 pub use signal::{Band, SignalSpec, SignalSpectrum, USUAL_RMS};
@@ -39,7 +39,6 @@ pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
 use crate::units::{FastPeriods, Seconds};
-use design::KeyProblem;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// A spec with the units resolved (seconds) and the omitted channel filters filled in.
@@ -116,157 +115,6 @@ fn is_zero(value: &f64) -> bool {
 
 fn is_one(gain: &f64) -> bool {
     *gain == 1.0
-}
-
-/// An analog filter as written; stability is checked by [`crate::analog`].
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(untagged)]
-pub enum FilterSpec {
-    /// Numerator over denominator in descending powers of s (rad/s).
-    TransferFunction {
-        /// Numerator coefficients.
-        num: Vec<f64>,
-        /// Denominator coefficients.
-        den: Vec<f64>,
-    },
-    /// gain * prod(s - z) / prod(s - p), rad/s, complex values as `[re, im]`.
-    ZeroPoleGain {
-        /// Zeros.
-        zeros: Vec<[f64; 2]>,
-        /// Poles.
-        poles: Vec<[f64; 2]>,
-        /// Leading coefficient.
-        gain: f64,
-    },
-    /// dx/dt = a x + b f, out = c x; lists of rows.
-    StateSpace {
-        /// n x n.
-        a: Vec<Vec<f64>>,
-        /// n x 1.
-        b: Vec<Vec<f64>>,
-        /// 1 x n.
-        c: Vec<Vec<f64>>,
-    },
-    /// A classical low-pass or band-pass by name.
-    Family {
-        /// Which one.
-        family: Family,
-        /// Number of poles of the low-pass; a band-pass has twice as many.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        order: Option<usize>,
-        /// The cutoff, or the edges of the band.
-        #[serde(flatten)]
-        passband: Passband,
-        /// Pass-band ripple in decibels (Chebyshev 1, elliptic).
-        #[serde(skip_serializing_if = "Option::is_none")]
-        ripple_db: Option<f64>,
-        /// Stop-band attenuation in decibels (Chebyshev 2, elliptic).
-        #[serde(skip_serializing_if = "Option::is_none")]
-        attenuation_db: Option<f64>,
-    },
-    /// Filters one after the other, for example a ladder filter and the pole of the sampling switch.
-    /// Only the whole cascade has to be strictly proper.
-    Cascade {
-        /// The stages; none of them a cascade itself.
-        cascade: Vec<FilterSpec>,
-    },
-}
-
-/// The classical families.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Family {
-    /// Maximally flat magnitude.
-    Butterworth,
-    /// Equiripple pass band.
-    Chebyshev1,
-    /// Equiripple stop band.
-    Chebyshev2,
-    /// Equiripple in both bands.
-    Elliptic,
-    /// Maximally flat group delay, normalised by phase.
-    Bessel,
-    /// One pole; with a band, the resonator of two poles.
-    Rc,
-}
-
-/// How the synthesis filters are designed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Method {
-    /// Finite impulse responses of given length, least gamma.
-    Fir,
-    /// State-space filters, least gamma.
-    Iir,
-    /// State-space filters, least mean-square error.
-    H2,
-    /// Papoulis/Yen interpolation of recurrent nonuniform samples, truncated (for comparison).
-    Sinc,
-    /// First a fractional-delay filter per channel, then a bank for integer delays (for comparison).
-    Separation,
-}
-
-/// The optimisation method of FIR designs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Solver {
-    /// The exchange algorithm: frequencies are added until gamma meets its lower bound. The secondary
-    /// objective chooses among the optimal taps.
-    Sampled,
-    /// The bounded-real LMI of thesis 5.4 with a Lyapunov matrix; slower, without a secondary objective.
-    Kyp,
-}
-
-/// How the taps of an FIR bank follow delays that change while it runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Tracking {
-    /// The taps are affine functions of the delays, optimal over the box of delays of the `[uncertainty]`
-    /// table.
-    Affine,
-}
-
-/// The `[design]` table.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DesignSpec {
-    /// The method.
-    pub method: Method,
-    /// Taps per channel at the fast rate, for FIR methods; `None` lets the designer choose. The method `h2`
-    /// makes FIR filters with them and recursive ones without.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub taps: Option<usize>,
-    /// The SNR in decibels for which the fewest taps are chosen, in place of `taps`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub target_snr_db: Option<f64>,
-    /// Relative excess over the optimal gamma that the designer may spend on a smaller mean-square error.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub gamma_margin: Option<f64>,
-    /// The optimisation method of FIR designs; `None` is [`Solver::Sampled`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub solver: Option<Solver>,
-    /// Bits of the taps, for integer taps.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bits: Option<WordLengths>,
-    /// Taps are integers times 2^-fraction_bits; `None` lets the designer choose.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub fraction_bits: Option<i32>,
-    /// Taps that follow the delays, for the method `fir`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tracking: Option<Tracking>,
-    /// Order reduction, for recursive methods.
-    #[serde(flatten)]
-    pub reduction: Option<Reduction>,
-}
-
-/// By how much the order of a recursive bank is reduced.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub enum Reduction {
-    /// To at most this many states, with the least error.
-    #[serde(rename = "order")]
-    Order(usize),
-    /// To the fewest states whose error is within this many decibels of the full bank's.
-    #[serde(rename = "reduction_loss_db")]
-    Loss(f64),
 }
 
 impl Spec {
@@ -359,21 +207,15 @@ impl Spec {
             uncertainty.check(self.channels.len(), self.fast_period)?;
         }
         self.design.check(self.channels.len())?;
-        let beside = self.design.check_beside(self.uncertainty.as_ref(), self.channels.len());
-        beside.map_err(|KeyProblem { problem, .. }| problem)
+        Ok(self.design.check_beside(self.uncertainty.as_ref(), self.channels.len())?)
     }
 
     /// Whether the filters are FIR: by the method, by its taps, or because `h2` averages over uncertain
     /// delays and gains, which no recursive filter does exactly.
     pub fn is_fir(&self) -> bool {
-        let channels = self.channels.len();
-        let is_uncertain = |table: &UncertaintySpec| {
-            let delays = table.delays(channels).into_iter().map(|delay| delay.0);
-            delays.chain(table.gains(channels)).any(|half| half > 0.0)
-        };
-        let averages =
-            self.design.method == Method::H2 && self.uncertainty.as_ref().is_some_and(is_uncertain);
-        self.design.is_fir() || averages
+        let is_uncertain = |table: &UncertaintySpec| table.has_delays_or_gains(self.channels.len());
+        let averages = || self.uncertainty.as_ref().is_some_and(is_uncertain);
+        self.design.is_fir() || self.design.method == Method::H2 && averages()
     }
 
     /// True in normalised time: times are in fast periods, and the rates of recordings are free.

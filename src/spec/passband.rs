@@ -43,9 +43,9 @@ impl Passband {
         }
     }
 
-    /// The degrees of numerator and denominator that those of a prototype become. In a band-pass each pole
-    /// of the prototype without a zero gets a zero at s = 0, so the excess of poles stays.
-    pub(super) const fn degrees(self, (zeros, poles): (usize, usize)) -> (usize, usize) {
+    /// Zeros and poles of the filter, for those of its low-pass prototype. In a band-pass each pole of the
+    /// prototype without a zero gets a zero at s = 0, so the excess of poles stays.
+    pub(super) const fn degrees(self, zeros: usize, poles: usize) -> (usize, usize) {
         match self {
             Self::LowPass { .. } => (zeros, poles),
             Self::BandPass { .. } => (zeros + poles, 2 * poles),
@@ -64,7 +64,9 @@ impl Passband {
     /// Checks the order of the edges.
     pub(super) fn check(self) -> Result<(), FilterProblem> {
         match self {
-            Self::LowPass { cutoff } if !cutoff.0.is_finite() => Err(not_finite("cutoff", cutoff)),
+            Self::LowPass { cutoff } if !cutoff.0.is_finite() => {
+                Err(FilterProblem::not_finite("cutoff", cutoff.0))
+            }
             Self::LowPass { cutoff } if cutoff.0 <= 0.0 => {
                 Err(refused("cutoff", cutoff, "the cutoff must be a positive frequency in hertz".into()))
             }
@@ -76,7 +78,7 @@ impl Passband {
 
 fn check_band(low: Hertz, high: Hertz) -> Result<(), FilterProblem> {
     if let Some(edge) = [low, high].into_iter().find(|edge| !edge.0.is_finite()) {
-        return Err(not_finite("band", edge));
+        return Err(FilterProblem::not_finite("band", edge.0));
     }
     if low.0 <= 0.0 {
         let rule = format!(
@@ -100,10 +102,6 @@ fn check_band(low: Hertz, high: Hertz) -> Result<(), FilterProblem> {
     Ok(())
 }
 
-fn not_finite(key: &'static str, value: Hertz) -> FilterProblem {
-    FilterProblem::NotFinite { key, value: value.0 }
-}
-
 fn refused(key: &'static str, value: Hertz, rule: String) -> FilterProblem {
-    FilterProblem::ParameterRange { key, value: value.0, unit: " Hz", rule }
+    FilterProblem::of(key, format!("{key} = {value} Hz: {rule}", value = value.0))
 }

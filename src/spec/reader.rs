@@ -21,6 +21,13 @@ pub(crate) struct Fields<'a> {
     whole: Value<'a>,
 }
 
+/// The value of one of two keys.
+pub(crate) enum Either<'a> {
+    First(Value<'a>),
+    Second(Value<'a>),
+    Neither,
+}
+
 impl<'a> Value<'a> {
     /// The whole document.
     pub(crate) fn root(node: &'a Node) -> Self {
@@ -140,6 +147,40 @@ impl<'a> Value<'a> {
         }
     }
 
+    /// A number that `check` accepts.
+    pub(crate) fn number_in(&self, check: fn(f64) -> Result<(), SpecProblem>) -> Result<f64, Fault> {
+        let number = self.number()?;
+        check(number).map(|()| number).map_err(|problem| self.fault(problem))
+    }
+
+    /// A count that `check` accepts.
+    pub(crate) fn count_in(
+        &self,
+        unit: &'static str,
+        check: fn(usize) -> Result<(), SpecProblem>,
+    ) -> Result<usize, Fault> {
+        let count = self.count(unit)?;
+        check(count).map(|()| count).map_err(|problem| self.fault(problem))
+    }
+
+    /// A number of bits. One that does not fit u32 is out of range in any case.
+    pub(crate) fn bits(&self) -> Result<u32, Fault> {
+        Ok(u32::try_from(self.count("bits")?).unwrap_or(u32::MAX))
+    }
+
+    /// Two frequencies; `expected` describes them.
+    pub(crate) fn frequencies(&self, expected: &'static str) -> Result<[Hertz; 2], Fault> {
+        match &self.items(expected)?[..] {
+            [low, high] => Ok([low.frequency()?, high.frequency()?]),
+            _ => Err(self.fault(SpecProblem::WrongType { expected, found: "a list of another length" })),
+        }
+    }
+
+    /// Whether it is a list.
+    pub(crate) fn is_list(&self) -> bool {
+        matches!(self.node.kind, Kind::List(_))
+    }
+
     /// A list of numbers. Paths are built only for errors, since tap lists are long.
     pub(crate) fn numbers(&self) -> Result<Vec<f64>, Fault> {
         let Kind::List(items) = &self.node.kind else { return Err(self.wrong_type("a list of numbers")) };
@@ -180,16 +221,11 @@ impl<'a> Value<'a> {
             return Err(self.wrong_type("a table of keys and values"));
         };
         match entries.iter().find(|entry| !known.contains(&entry.key.as_str())) {
-            Some(entry) => Err(Fault {
-                path: self.path.clone(),
-                span: entry.key_span.clone(),
-                problem: Box::new(SpecProblem::UnknownKey {
-                    key: entry.key.clone(),
-                    nearest: nearest(&entry.key, known),
-                    known: known.to_vec(),
-                }),
-                overridden: false,
-            }),
+            Some(Entry { key, key_span, .. }) => {
+                let (key, nearest, known) = (key.clone(), nearest(key, known), known.to_vec());
+                let problem = SpecProblem::UnknownKey { key, nearest, known };
+                Err(Fault { span: key_span.clone(), ..self.fault(problem) })
+            }
             None => Ok(Fields { entries, whole: self.clone() }),
         }
     }
@@ -212,6 +248,30 @@ impl<'a> Fields<'a> {
         let prefix = &self.whole.path;
         let path = if prefix.is_empty() { key.to_owned() } else { format!("{prefix}.{key}") };
         Some(Value { node: &entry.value, path }).filter(|value| !value.is_null())
+    }
+
+    /// What `read` makes of the value of `key`, unless it is absent or null.
+    pub(crate) fn read<T>(
+        &self,
+        key: &str,
+        read: impl FnOnce(Value<'a>) -> Result<T, Fault>,
+    ) -> Result<Option<T>, Fault> {
+        self.optional(key).map(read).transpose()
+    }
+
+    /// The value of one of two keys that exclude each other.
+    pub(crate) fn either(
+        &self,
+        first: &'static str,
+        second: &'static str,
+        remedy: &'static str,
+    ) -> Result<Either<'a>, Fault> {
+        match (self.optional(first), self.optional(second)) {
+            (Some(_), Some(value)) => Err(value.fault(SpecProblem::Conflict { first, second, remedy })),
+            (Some(value), None) => Ok(Either::First(value)),
+            (None, Some(value)) => Ok(Either::Second(value)),
+            (None, None) => Ok(Either::Neither),
+        }
     }
 
     /// The value of `key`; `remedy` is the advice if it is absent.

@@ -1,8 +1,8 @@
 //! The `[signal]` table: what the analog signal is.
 
 use super::filter_reader::proper_filter;
-use super::limits::range;
-use super::reader::{Fields, Value};
+use super::limits::{range, within};
+use super::reader::{Either, Fields, Value};
 use super::{Fault, FilterSpec, SpecProblem};
 use crate::units::Hertz;
 use serde::ser::{Serialize, SerializeMap, Serializer};
@@ -95,39 +95,30 @@ impl SignalSpec {
     }
 }
 
-/// The keys of the table.
-pub(super) const SIGNAL_KEYS: [&str; 4] = ["band", "filter", "floor_db", "rms"];
-
 /// Reads the table.
 pub(super) fn read(item: &Value<'_>) -> Result<SignalSpec, Fault> {
-    let fields = item.fields(&SIGNAL_KEYS)?;
-    let checked = |key, check: fn(f64) -> Result<(), SpecProblem>| {
-        let value: Option<Value<'_>> = fields.optional(key);
-        value
-            .map(|v| v.number().and_then(|x| check(x).map(|()| x).map_err(|problem| v.fault(problem))))
-            .transpose()
-    };
+    let fields = item.fields(&["band", "filter", "floor_db", "rms"])?;
     let spectrum = spectrum(&fields)?;
-    let floor_db = match (&spectrum, fields.optional("floor_db")) {
-        (SignalSpectrum::Filter(_), Some(floor)) => return Err(floor.fault(needless_floor())),
-        _ => checked("floor_db", check_floor)?,
-    };
-    Ok(SignalSpec { spectrum, floor_db, rms: checked("rms", check_rms)?.unwrap_or(USUAL_RMS) })
+    let floor_db = fields.read("floor_db", |v| match &spectrum {
+        SignalSpectrum::Filter(_) => Err(v.fault(needless_floor())),
+        SignalSpectrum::Band(_) => v.number_in(check_floor),
+    })?;
+    Ok(SignalSpec {
+        spectrum,
+        floor_db,
+        rms: fields.read("rms", |v| v.number_in(check_rms))?.unwrap_or(USUAL_RMS),
+    })
 }
 
 fn spectrum(fields: &Fields<'_>) -> Result<SignalSpectrum, Fault> {
-    match (fields.optional("band"), fields.optional("filter")) {
-        (Some(_), Some(filter)) => {
-            let remedy = "each is the spectrum of the signal, keep one of them";
-            Err(filter.fault(SpecProblem::Conflict { first: "band", second: "filter", remedy }))
-        }
-        (Some(band), None) => {
+    match fields.either("band", "filter", "each is the spectrum of the signal, keep one of them")? {
+        Either::First(band) => {
             let read = band_of(&band)?;
             check_band(read).map_err(|problem| band.fault(problem))?;
             Ok(SignalSpectrum::Band(read))
         }
-        (None, Some(filter)) => proper_filter(&filter).map(SignalSpectrum::Filter),
-        (None, None) => {
+        Either::Second(filter) => proper_filter(&filter).map(SignalSpectrum::Filter),
+        Either::Neither => {
             let remedy = "say which frequencies the signal occupies, as in band = \"8 kHz\" or band = [\"60 MHz\", \"80 MHz\"]";
             Err(fields.whole().fault(SpecProblem::MissingKey { key: "band", remedy }))
         }
@@ -136,15 +127,12 @@ fn spectrum(fields: &Fields<'_>) -> Result<SignalSpectrum, Fault> {
 
 /// One frequency, the end of a band that begins at 0, or two.
 fn band_of(value: &Value<'_>) -> Result<Band, Fault> {
-    let Ok(ends) = value.items("a frequency, or a list of two") else {
+    if !value.is_list() {
         return Ok(Band::up_to(value.frequency()?));
-    };
-    let [low, high] = &ends[..] else {
-        let (expected, found) = ("a frequency, or a list of two", "a list of another length");
-        return Err(value.fault(SpecProblem::WrongType { expected, found }));
-    };
+    }
+    let [low, high] = value.frequencies("a frequency, or a list of two")?;
     // A band from -0.0 begins at 0.0.
-    Ok(Band { low: Hertz(low.frequency()?.0 + 0.0), high: high.frequency()? })
+    Ok(Band { low: Hertz(low.0 + 0.0), high })
 }
 
 impl Serialize for SignalSpec {
@@ -164,7 +152,7 @@ impl Serialize for SignalSpec {
 }
 
 /// 0 <= low < high.
-pub(super) fn check_band(band: Band) -> Result<(), SpecProblem> {
+fn check_band(band: Band) -> Result<(), SpecProblem> {
     let Band { low, high } = band;
     // Written so that NaN is refused too.
     if !(high.0.is_finite() && high.0 > 0.0) {
@@ -179,29 +167,20 @@ pub(super) fn check_band(band: Band) -> Result<(), SpecProblem> {
 }
 
 /// The floor in decibels.
-pub(super) fn check_floor(floor: f64) -> Result<(), SpecProblem> {
-    if FLOORS.contains(&floor) {
-        return Ok(());
-    }
+fn check_floor(floor: f64) -> Result<(), SpecProblem> {
     let (least, most) = (FLOORS.start(), FLOORS.end());
     let rule = format!("floor_db says how far the signal is down outside its band, {least} to {most} dB");
-    Err(range(floor, "dB", rule))
+    within(floor, FLOORS, "dB", rule)
 }
 
 /// The rms, of full scale.
-pub(super) fn check_rms(rms: f64) -> Result<(), SpecProblem> {
-    if rms.is_finite() && (1e-12..=1.0).contains(&rms) {
-        return Ok(());
-    }
-    Err(range(
-        rms,
-        "of full scale",
-        "the rms of the signal at the target must lie above 1e-12, and at 1 or below",
-    ))
+fn check_rms(rms: f64) -> Result<(), SpecProblem> {
+    let rule = "the rms of the signal at the target must lie above 1e-12, and at 1 or below";
+    within(rms, 1e-12..=1.0, "of full scale", rule)
 }
 
 /// A floor beside a filter.
-pub(super) fn needless_floor() -> SpecProblem {
+fn needless_floor() -> SpecProblem {
     let remedy = "a filter is the whole spectrum with its floor; leave floor_db out, or give a band in place of the filter";
     SpecProblem::Conflict { first: "filter", second: "floor_db", remedy }
 }

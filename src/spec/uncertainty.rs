@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use super::SpecProblem;
-use super::limits::range;
+use super::design::{KeyProblem, blame};
+use super::limits::{range, within};
 use crate::units::{FastPeriods, Seconds};
 
 /// Half-width of the 95 % interval of a normal law over its standard deviation.
@@ -102,10 +103,19 @@ impl UncertaintySpec {
         (0..channels).map(|i| self.offset.as_ref().map_or(0.0, |offset| offset.of(i))).collect()
     }
 
+    /// Whether a delay is uncertain.
+    pub(super) fn has_delays(&self, channels: usize) -> bool {
+        self.delays(channels).iter().any(|delay| *delay > Seconds(0.0))
+    }
+
+    /// Whether a delay or a gain is uncertain.
+    pub(super) fn has_delays_or_gains(&self, channels: usize) -> bool {
+        self.has_delays(channels) || self.gains(channels).iter().any(|gain| *gain > 0.0)
+    }
+
     /// Whether a delay, a gain or a cut-off is uncertain.
     pub(super) fn is_a_box(&self, channels: usize) -> bool {
-        self.delays(channels).iter().any(|delay| *delay > Seconds(0.0))
-            || self.gains(channels).into_iter().chain(self.cutoffs(channels)).any(|share| share > 0.0)
+        self.has_delays_or_gains(channels) || self.cutoffs(channels).iter().any(|share| *share > 0.0)
     }
 
     /// Standard deviations of all `channels` delays: a half-width of a 95 % interval of the normal law is
@@ -126,27 +136,19 @@ impl UncertaintySpec {
     }
 
     /// Checks all numbers for a spec of `channels` channels.
-    pub(super) fn check(&self, channels: usize, fast_period: Seconds) -> Result<(), SpecProblem> {
-        self.check_by_key(channels, fast_period).map_err(|(_, problem)| problem)
-    }
-
-    /// As [`Self::check`], with the key whose value is wrong.
-    pub(super) fn check_by_key(
-        &self,
-        channels: usize,
-        h: Seconds,
-    ) -> Result<(), (&'static str, SpecProblem)> {
+    pub(super) fn check(&self, channels: usize, h: Seconds) -> Result<(), KeyProblem> {
         let time = |value: &Seconds| check_time(value.in_fast_periods(h), *value);
-        check_list(self.delay.as_ref(), channels, time).map_err(|problem| ("delay", problem))?;
+        blame("delay", check_list(self.delay.as_ref(), channels, time))?;
         let shares =
             [("gain", &self.gain, 1e6), ("offset", &self.offset, 1.0), ("cutoff", &self.cutoff, 0.5)];
         for (key, shares, most) in shares {
-            let share = |value: &f64| check_share(*value, most);
-            check_list(shares.as_ref(), channels, share).map_err(|problem| (key, problem))?;
+            let rule = format!("a half-width is zero or more and here at most {most}; 0.01 is one per cent");
+            let share = |value: &f64| within(*value, 0.0..=most, "(half-width)", rule.as_str());
+            blame(key, check_list(shares.as_ref(), channels, share))?;
         }
-        self.reference
-            .map_or(Ok(()), |reference| check_reference(reference, channels))
-            .map_err(|p| ("reference", p))
+        let rule = format!("the reference is one of the channels 1 to {channels}, or 0 for none");
+        let reference = self.reference.unwrap_or(0) as f64;
+        blame("reference", within(reference, 0.0..=channels as f64, "(channel)", rule))
     }
 }
 
@@ -172,23 +174,4 @@ fn check_time(periods: FastPeriods, written: Seconds) -> Result<(), SpecProblem>
     }
     let rule = format!("a half-width is zero or more and at most {MAX_DELAY} fast periods; check its unit");
     Err(range(written.0, "s", rule))
-}
-
-fn check_share(value: f64, most: f64) -> Result<(), SpecProblem> {
-    if (0.0..=most).contains(&value) {
-        return Ok(());
-    }
-    Err(range(
-        value,
-        "(half-width)",
-        format!("a half-width is zero or more and here at most {most}; 0.01 is one per cent"),
-    ))
-}
-
-fn check_reference(reference: usize, channels: usize) -> Result<(), SpecProblem> {
-    if reference <= channels {
-        return Ok(());
-    }
-    let rule = format!("the reference is one of the channels 1 to {channels}, or 0 for none");
-    Err(range(reference as f64, "(channel)", rule))
 }

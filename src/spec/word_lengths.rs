@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::SpecProblem;
-use super::limits::range;
+use super::limits::{range, within};
 
 /// Most bits of a tap. Such integers are exact in a double and far finer than the error of any bank.
 pub const MAX_BITS: u32 = 32;
@@ -131,13 +131,11 @@ impl std::str::FromStr for WordLengths {
 
 /// The exponent of the finest step.
 pub(crate) fn check_fraction_bits(fraction_bits: i32) -> Result<(), SpecProblem> {
-    if (-MAX_FRACTION_BITS..=MAX_FRACTION_BITS).contains(&fraction_bits) {
-        return Ok(());
-    }
     let rule = format!(
         "fraction_bits is from -{MAX_FRACTION_BITS} to {MAX_FRACTION_BITS}: taps are integers times 2^-fraction_bits"
     );
-    Err(range(f64::from(fraction_bits), "bits", rule))
+    let most = f64::from(MAX_FRACTION_BITS);
+    within(fraction_bits.into(), -most..=most, "bits", rule)
 }
 
 #[cfg(test)]

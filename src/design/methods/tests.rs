@@ -95,7 +95,7 @@ fn check(case: &Case, method: Method, synthesis: &Synthesis, plant: &LiftedPlant
     let Synthesis { filters, peak, lower, noncausal, .. } = synthesis;
     match filters {
         Filters::Fir(taps) => {
-            assert!(method.reads_taps(), "{what}");
+            assert!(method.reads("taps"), "{what}");
             assert_eq!(taps.len(), plant.channels(), "{what}");
             assert!(taps.iter().all(|filter| filter.len() == 13), "{what}");
         }

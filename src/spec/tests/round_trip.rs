@@ -85,9 +85,9 @@ prop_compose! {
         });
         let moves = uncertainty.as_ref().is_some_and(|table| table.delays(channels.len()).iter().any(|d| d.0 > 0.0));
         let solver = solver.filter(|solver| *solver != Solver::Kyp || !uncertainty.as_ref().is_some_and(|table| table.is_a_box(channels.len())));
-        let follows = method.has_tracking() && solver != Some(Solver::Kyp) && bits.is_none() && moves;
+        let follows = method.reads("tracking") && solver != Some(Solver::Kyp) && bits.is_none() && moves;
         let is_sized = method.has_taps() || (method == Method::H2 && reduction.is_none());
-        let by_snr = method.has_target_snr() && ratio % 3 == 0;
+        let by_snr = method.reads("target_snr_db") && ratio % 3 == 0;
         Spec {
             name, fast_period, ratio, latency, target,
             channels: channels.into_iter().map(|(d, filter)| ChannelSpec { noise: 1e-4 * d.fract(), bits: (d > 5.0).then_some(d as u32), jitter: fast_period * (0.1 * d.fract()), gain: 0.9 + d.floor() % 3.0 / 10.0, offset: (d % 2.0 - 1.0).min(0.0), ..ChannelSpec::new(fast_period * d, filter) }).collect(),
@@ -97,12 +97,12 @@ prop_compose! {
                 method,
                 taps: (is_sized && !by_snr).then_some(taps),
                 target_snr_db: (is_sized && by_snr).then_some(taps as f64 / 1000.0),
-                gamma_margin: gamma_margin.filter(|_| method.has_gamma_margin() && solver != Some(Solver::Kyp)),
-                solver: solver.filter(|_| method.has_solver()),
-                bits: bits.clone().filter(|_| method.has_bits()),
-                fraction_bits: fraction_bits.filter(|_| method.has_bits() && bits.is_some()),
+                gamma_margin: gamma_margin.filter(|_| method.reads("gamma_margin") && solver != Some(Solver::Kyp)),
+                solver: solver.filter(|_| method.reads("solver")),
+                bits: bits.clone().filter(|_| method.reads("bits")),
+                fraction_bits: fraction_bits.filter(|_| method.reads("bits") && bits.is_some()),
                 tracking: follows.then_some(Tracking::Affine),
-                reduction: reduction.filter(|_| method.has_states() && !(method == Method::H2 && moves)),
+                reduction: reduction.filter(|_| method.reads("order") && !(method == Method::H2 && moves)),
             },
         }
     }

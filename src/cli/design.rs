@@ -1,22 +1,15 @@
 //! `hybank design`: from a spec file to a bank file.
 
-mod band_hint;
-mod progress;
-pub(super) mod report;
-mod studies;
-
-use super::Failure;
-use super::bank_file::{bad_flag, is_dash, load_spec, refuse_overlap, write_text};
+use super::bank_file::{bad_flag, is_dash, load_spec};
+use super::design_report::{Judged, Report};
+use super::design_studies::BandHint;
 use super::interrupt::end_at_interrupt;
-use super::say::say_understood;
-use crate::design::{self, DesignError, GammaScale, Limits, Options};
-use crate::figures::Figures;
-use crate::overview::doubts;
+use super::print::{Failure, InFile, check_strict, say, say_understood, show, warn};
+use super::progress::Progress;
+use super::written::{check_outputs, write_text};
+use crate::design::{self, Limits, Options};
 use crate::spec::{DesignOverrides, Method, Reduction, Solver, Spec, Tracking, WordLengths};
-use band_hint::BandHint;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use progress::Progress;
-use report::{Judged, Report};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -44,7 +37,7 @@ pub(super) struct Args {
     #[arg(short, long)]
     output: PathBuf,
     /// Design method, in place of that of the spec
-    #[arg(long, value_parser = methods())]
+    #[arg(long, value_parser = named(Method::ALL.map(|method| (method.name(), method))))]
     method: Option<Method>,
     /// Taps per channel, in place of those of the spec
     #[arg(long)]
@@ -61,7 +54,7 @@ pub(super) struct Args {
     gamma_margin: Option<f64>,
     /// Solver of FIR designs: sampled (on a grid of frequencies, fast) or kyp (bounded-real LMI, a second
     /// opinion)
-    #[arg(long, value_parser = solvers())]
+    #[arg(long, value_parser = named(Solver::ALL.map(|solver| (solver.name(), solver))))]
     solver: Option<Solver>,
     /// Integer taps of this many bits, sign included; or a list with the bits of each tap (4,6,8,6,4)
     #[arg(long)]
@@ -71,7 +64,7 @@ pub(super) struct Args {
     fraction_bits: Option<i32>,
     /// Taps that follow the delays while the bank runs, optimal over the delays of the spec's [uncertainty]
     /// (method fir)
-    #[arg(long, value_parser = trackings())]
+    #[arg(long, value_parser = named(Tracking::ALL.map(|tracking| (tracking.name(), tracking))))]
     tracking: Option<Tracking>,
     /// Use at most this many states (methods iir and h2)
     #[arg(long)]
@@ -99,18 +92,6 @@ pub(super) struct Args {
 }
 
 /// By name, so that completions know the names.
-fn methods() -> impl TypedValueParser<Value = Method> {
-    named(Method::ALL.map(|method| (method.name(), method)))
-}
-
-fn solvers() -> impl TypedValueParser<Value = Solver> {
-    named(Solver::ALL.map(|solver| (solver.name(), solver)))
-}
-
-fn trackings() -> impl TypedValueParser<Value = Tracking> {
-    named(Tracking::ALL.map(|tracking| (tracking.name(), tracking)))
-}
-
 fn named<T: Copy + Send + Sync + 'static, const K: usize>(
     known: [(&'static str, T); K],
 ) -> impl TypedValueParser<Value = T> {
@@ -133,53 +114,36 @@ fn overrides(args: &Args) -> DesignOverrides {
     }
 }
 
-/// Runs the command.
-///
-/// # Errors
-/// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     if args.json && is_dash(&args.output) {
-        return Err(Failure::Usage(
-            "--json and `-o -` both want standard output; write the bank to a file".into(),
-        ));
+        let message = "--json and `-o -` both want standard output; write the bank to a file";
+        return Err(Failure::Usage(message.into()));
     }
-    refuse_overlap(&args.output, &args.spec)?;
+    check_outputs(&[&args.output], &[&args.spec])?;
     let mut spec = load_spec(&args.spec, overrides(args))?;
     spec.latency = args.latency.or(spec.latency);
     // Everything else was checked on reading.
     spec.check().map_err(|problem| bad_flag("latency", &problem))?;
     say_understood(Some(&spec));
     warn_or_refuse(&spec_warnings(&spec, &args.spec), args.strict)?;
-    let named = |error: DesignError| Failure::Input(format!("{}: {error}", args.spec.display()));
     let begin = Instant::now();
     end_at_interrupt();
     let progress = Progress::default();
     let limits = if args.no_limit { Limits::Off } else { Limits::Enforced };
     let options =
         Options { limits, observer: &|stage, seconds| progress.note(stage, seconds), ..Options::default() };
-    let found = progress.during(|| design::design_observed(&spec, &options)).map_err(named)?;
+    let found = progress.during(|| design::design_observed(&spec, &options)).in_file(&args.spec)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
-    let mean = design::analyze_mean(&found.bank).map_err(named)?;
-    let scale = GammaScale::new(&found.bank).map_err(named)?;
-    let figures = Figures::new(&found.bank).map_err(named)?;
-    warn_or_refuse(&doubts(&found.bank, &mean, &scale), args.strict)?;
-    let text = found.bank.to_json().map_err(Failure::input)?;
-    write_text(&args.output, &text, args.force)?;
-    let hint = BandHint::new(&found, seconds).map_err(named)?;
-    let judged = Judged { mean, scale, figures, hint };
-    show(args, &Report::new(args.output.display().to_string(), &found, judged, seconds))
-}
-
-/// Prints the report, beside the bank if that goes to standard output.
-fn show(args: &Args, report: &Report<'_>) -> Result<(), Failure> {
-    if args.json {
-        super::print_json(report)
-    } else if is_dash(&args.output) {
-        super::say(&report.text(args.verbose));
-        Ok(())
-    } else {
-        super::print(&report.text(args.verbose))
+    let mut judged = Judged::new(&found.bank).in_file(&args.spec)?;
+    warn_or_refuse(&judged.warnings(&found.bank), args.strict)?;
+    write_text(&args.output, &found.bank.to_json().map_err(Failure::input)?, args.force)?;
+    judged.hint = BandHint::new(&found, seconds).in_file(&args.spec)?;
+    let report = Report::new(args.output.display().to_string(), &found, judged, seconds);
+    if is_dash(&args.output) {
+        say(&report.text(args.verbose));
+        return Ok(());
     }
+    show(&report, args.json, |report| report.text(args.verbose))
 }
 
 /// What in the spec is probably not meant. A spec that is wrong is refused by the design.
@@ -190,11 +154,7 @@ fn spec_warnings(spec: &Spec, path: &Path) -> Vec<String> {
 
 /// Prints the warnings; with `strict` the first one is an error.
 fn warn_or_refuse(warnings: &[String], strict: bool) -> Result<(), Failure> {
-    match warnings.first() {
-        Some(first) if strict => Err(Failure::Input(format!("{first} (an error because of --strict)"))),
-        _ => {
-            warnings.iter().for_each(|warning| super::warn(warning));
-            Ok(())
-        }
-    }
+    check_strict(warnings, strict)?;
+    warnings.iter().for_each(|warning| warn(warning));
+    Ok(())
 }

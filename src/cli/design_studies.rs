@@ -1,8 +1,15 @@
-//! What a design reports of integer taps, uncertain channels, and the order.
+//! What a design reports of integer taps, uncertain channels, the order, and a band in the spec.
 
+use crate::bank::Bank;
 use crate::design::quantise::WordStudy;
-use crate::design::{Design, OrderErrorPoint, OrderReduction, RobustStudy, TrackingStudy};
-use crate::spec::Method;
+use crate::design::{
+    Design, DesignError, OrderErrorPoint, OrderReduction, ProofSearch, RobustStudy, TrackingStudy,
+    design_with,
+};
+use crate::figures::{snr, target_band};
+use crate::overview::{band, decibels_of};
+use crate::spec::{Method, SignalSpec, Spec};
+use crate::units::{Decibels, Hertz};
 
 /// The increase of the error by integer taps.
 #[derive(Debug, serde::Serialize)]
@@ -26,7 +33,7 @@ impl<'a> Words<'a> {
             "integers   times 2^{}; gamma is {:.4} dB above that of the real taps, {}\n",
             -self.fraction_bits,
             self.loss_db,
-            number(Some(self.study.real_gamma)),
+            number(self.study.real_gamma),
         );
         for word in &self.study.words {
             text += &format!(
@@ -42,31 +49,31 @@ impl<'a> Words<'a> {
     }
 }
 
-/// A robust bank pays if it lowers the worst case by this share.
-const WORTHWHILE: f64 = 0.01;
+/// Share by which a robust bank must lower the worst case to be worth its higher error without errors.
+const LEAST_ROBUST_GAIN: f64 = 0.01;
 
 /// The bank and the nominal one, without errors and at worst over the spec's uncertainty.
 pub(super) fn robust_text(study: &RobustStudy, proven: Option<f64>) -> String {
     let RobustStudy { robust, nominal, lower, .. } = study;
     let proven = at_most(proven);
-    let gain = 100.0 * study.gain();
-    let advice = if study.gain() < WORTHWHILE {
-        format!(
-            "           the robust design lowers the worst case by {gain:.2} % only: what helps is to know the channels better; \
-             measure them\n"
-        )
+    let advice = if study.gain() < LEAST_ROBUST_GAIN {
+        " only: what helps is to know the channels better; measure them"
     } else {
-        format!("           the robust design lowers the worst case by {gain:.2} %\n")
+        ""
     };
+    let advice = format!(
+        "           the robust design lowers the worst case by {:.2} %{advice}\n",
+        100.0 * study.gain()
+    );
     format!(
         "robust     {} at worst over the spec's uncertainty ({proven}), {} without errors\n\
          nominal    {} at worst, {} without errors, for the bank that takes the errors for zero\n\
          least      {} at worst for all banks of this length (lower bound, computed)\n{advice}",
-        number(Some(robust.worst)),
-        number(Some(robust.nominal)),
-        number(Some(nominal.worst)),
-        number(Some(nominal.nominal)),
-        number(Some(*lower)),
+        number(robust.worst),
+        number(robust.nominal),
+        number(nominal.worst),
+        number(nominal.nominal),
+        number(*lower),
     )
 }
 
@@ -74,7 +81,7 @@ pub(super) fn robust_text(study: &RobustStudy, proven: Option<f64>) -> String {
 pub(super) fn tracking_text(study: &TrackingStudy, proven: Option<f64>) -> String {
     let TrackingStudy { tracked, fixed, redesigned, ratio, least_ratio, .. } = study;
     let [worst, of_fixed, redesigned_worst] =
-        [tracked.worst, fixed.worst, *redesigned].map(|value| number(Some(value)));
+        [tracked.worst, fixed.worst, *redesigned].map(|value| number(value));
     let percent = |ratio: f64| 100.0 * (ratio - 1.0);
     format!(
         "tracked    {worst} at worst over the spec's uncertainty ({}), {} without errors\n\
@@ -82,7 +89,7 @@ pub(super) fn tracking_text(study: &TrackingStudy, proven: Option<f64>) -> Strin
          \x20          at all delays at most {:.3} % above what is within reach there; no affine taps: below {:.3} %\n\
          fixed      {of_fixed} at worst, for the best taps that stay as they are\n",
         at_most(proven),
-        number(Some(tracked.nominal)),
+        number(tracked.nominal),
         100.0 * study.excess(),
         percent(*ratio),
         percent(*least_ratio),
@@ -90,7 +97,7 @@ pub(super) fn tracking_text(study: &TrackingStudy, proven: Option<f64>) -> Strin
 }
 
 fn at_most(proven: Option<f64>) -> String {
-    proven.map_or("not proven".to_owned(), |proven| format!("proven: at most {}", number(Some(proven))))
+    proven.map_or("not proven".to_owned(), |proven| format!("proven: at most {}", number(proven)))
 }
 
 /// Maximum number of rows of the table of orders; the report of `--json` has all of them.
@@ -104,13 +111,13 @@ pub(super) fn order_text(reduction: &OrderReduction, method: Method) -> String {
         "order      {} of {} states: gamma {} instead of {}, {:.4} dB {lost} lost\n",
         reduced.order,
         full.order,
-        number(Some(reduced.figures.gamma)),
-        number(Some(full.figures.gamma)),
+        number(reduced.figures.gamma),
+        number(full.figures.gamma),
         rounded(reduced.loss_db)
     );
     let row = |point: &OrderErrorPoint| {
         let OrderErrorPoint { order, figures, loss_db } = point;
-        let (gamma, rms) = (number(Some(figures.gamma)), number(Some(figures.rms_error)));
+        let (gamma, rms) = (number(figures.gamma), number(figures.rms_error));
         format!("{order:>10} {gamma:>14} {rms:>14} {:>10.4} dB\n", rounded(*loss_db))
     };
     if orders.len() <= TABLE_ROWS {
@@ -126,9 +133,60 @@ fn rounded(db: f64) -> f64 {
 }
 
 /// A gamma in nine digits.
-pub(super) fn number(value: Option<f64>) -> String {
-    value.map_or_else(
-        || "unknown".to_owned(),
-        |v| if v >= 1e-4 { format!("{v:.9}") } else { format!("{v:.6e}") },
-    )
+pub(super) fn number(gamma: f64) -> String {
+    if gamma >= 1e-4 { format!("{gamma:.9}") } else { format!("{gamma:.6e}") }
+}
+
+/// The same, of a gamma that may be unknown.
+pub(super) fn known(gamma: Option<f64>) -> String {
+    gamma.map_or_else(|| "unknown".to_owned(), number)
+}
+
+/// No second design is made after one that took longer, in seconds.
+const MOST_HINT_SECONDS: f64 = 10.0;
+/// Gains below this are not worth a line.
+const LEAST_BAND_GAIN: Decibels = Decibels(1.0);
+
+/// The signal-to-noise ratio within the band of the target, of a bank that is designed without a signal and
+/// of one that is designed for that band.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub(super) struct BandHint {
+    low_hertz: Hertz,
+    high_hertz: Hertz,
+    snr_db: Decibels,
+    instead_of_db: Decibels,
+}
+
+impl BandHint {
+    /// For a design without a signal that took so many seconds; `None` where a band gains nothing.
+    ///
+    /// # Errors
+    /// [`DesignError`] of the figures; a second design that fails is no hint.
+    pub(super) fn new(found: &Design, seconds: f64) -> Result<Option<Self>, DesignError> {
+        let Some(spec) = found.bank.spec.as_ref().filter(|spec| spec.signal.is_none()) else {
+            return Ok(None);
+        };
+        let Some(band) = target_band(spec)?.filter(|_| seconds < MOST_HINT_SECONDS) else { return Ok(None) };
+        let signal = Some(SignalSpec::in_band(band));
+        let wanted = Spec { signal, latency: Some(found.bank.latency), ..spec.clone() };
+        let Ok(other) = design_with(&wanted, ProofSearch::Skip) else { return Ok(None) };
+        let instead_of_db = snr(&Bank { spec: Some(wanted), ..found.bank.clone() })?.total_db;
+        let snr_db = snr(&other.bank)?.total_db;
+        Ok((snr_db - instead_of_db >= LEAST_BAND_GAIN).then_some(Self {
+            low_hertz: band.low,
+            high_hertz: band.high,
+            snr_db,
+            instead_of_db,
+        }))
+    }
+
+    /// One line.
+    pub(super) fn text(&self, is_normalised: bool) -> String {
+        format!(
+            "signal     without [signal]; with the band {} the SNR in the band would be {} instead of {}\n",
+            band(self.low_hertz, self.high_hertz, is_normalised),
+            decibels_of(self.snr_db),
+            decibels_of(self.instead_of_db),
+        )
+    }
 }

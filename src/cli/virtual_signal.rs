@@ -1,7 +1,7 @@
-//! The analog signal that is asked for.
+//! The analog signal that `simulate` is asked for.
 
-use crate::cli::Failure;
-use crate::cli::capture_file::{CaptureFile, Reading};
+use super::capture_file::{CaptureFile, Reading};
+use super::print::Failure;
 use crate::design::Problem;
 use crate::simulate::{Analog, ComplexSource, MOST_SAMPLES, Recording, Source, frames};
 use crate::spec::Spec;

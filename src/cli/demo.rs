@@ -1,27 +1,22 @@
 //! `hybank demo`: designs, captures and fuses one example, and compares the error with other methods.
 
-mod contenders;
-mod pictures;
-mod spline;
-
-use super::Failure;
-use super::bank_file::write_text;
-use super::recordings::{Mono, write_recordings};
+use super::contenders::{Contender, contend};
+use super::print::{Failure, show};
+use super::written::{Mono, create_folder, write_recordings, write_text};
 use crate::design::{self, Problem};
+use crate::plot::{Chart, Marks, PlotError, Series};
 use crate::simulate::{Analog, Captured, Source, Tone, capture};
 use crate::spec::Spec;
-use crate::units::{Hertz, Seconds};
-use contenders::{Contender, contend};
-use pictures::Pictures;
+use crate::units::{Decibels, Hertz, Seconds};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Two 24 kHz converters in place of one at 48 kHz.
-const SPEC: &str = include_str!("../../../filters/speech-2x.toml");
+const SPEC: &str = include_str!("../../filters/speech-2x.toml");
 const DURATION: Seconds = Seconds(2.0);
 const STEP_AT: Seconds = Seconds(1.000_01);
 /// Fast samples at the beginning that the error does not include, while the history of the filters fills.
-const SETTLING: usize = 2000;
+pub(super) const SETTLING: usize = 2000;
 
 /// Compares hybank with other methods on a signal whose exact samples are known
 ///
@@ -46,10 +41,6 @@ pub(super) struct Args {
     json: bool,
 }
 
-/// Runs the command.
-///
-/// # Errors
-/// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let folder = args.folder()?;
     let spec = Spec::from_toml(SPEC, "filters/speech-2x.toml").map_err(Failure::input)?;
@@ -63,18 +54,16 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let pictures =
         Pictures { spec: &spec, captured: &parts.sum(), step: &parts.step.target, contenders: &contenders };
     args.save(&folder, &pictures)?;
-    if args.json {
-        return super::print_json(&serde_json::json!({ "folder": folder, "contenders": contenders }));
-    }
-    super::print(&report(&folder, &contenders))
+    let report = serde_json::json!({ "folder": folder, "contenders": contenders });
+    show(&report, args.json, |_| text(&folder, &contenders))
 }
 
 /// The captures of the two parts of the signal. Everything here is linear, so each part has its own error.
-struct Parts {
+pub(super) struct Parts {
     /// Within the band of the spec.
-    in_band: Captured,
+    pub(super) in_band: Captured,
     /// Most of it within the band, and a little at all frequencies.
-    step: Captured,
+    pub(super) step: Captured,
 }
 
 impl Parts {
@@ -104,19 +93,11 @@ fn step() -> Source {
 
 impl Args {
     fn folder(&self) -> Result<PathBuf, Failure> {
-        let folder = match &self.output {
-            Some(folder) => folder.clone(),
-            None => unused_folder(),
-        };
+        let folder = self.output.clone().unwrap_or_else(unused_folder);
         if folder.exists() && !self.force {
-            return Err(Failure::Input(format!(
-                "{}: exists already; use --force to replace the files in it",
-                folder.display()
-            )));
+            return Err(Failure::of(&folder, "exists already; use --force to replace the files in it"));
         }
-        std::fs::create_dir_all(&folder).map_err(|error| {
-            Failure::Input(format!("{}: cannot create the folder: {error}", folder.display()))
-        })?;
+        create_folder(&folder)?;
         Ok(folder)
     }
 
@@ -150,7 +131,7 @@ fn unused_folder() -> PathBuf {
         .unwrap_or_default()
 }
 
-fn report(folder: &Path, contenders: &[Contender]) -> String {
+fn text(folder: &Path, contenders: &[Contender]) -> String {
     let mut text = String::from(
         "Two 24 kHz converters, delays 1.2 and 0.6 fast samples, fused to 48 kHz.\n\
          Signal: chirp 50 Hz..13 kHz and three tones, all in the band of the spec (14 kHz), and a step.\n\
@@ -167,4 +148,81 @@ fn report(folder: &Path, contenders: &[Contender]) -> String {
     );
     let _ = writeln!(text, "The WAV files, step.svg and error.svg are in {}.", folder.display());
     text
+}
+
+/// Interval over which the error is averaged.
+const ERROR_INTERVAL: Seconds = Seconds(0.02);
+/// Fast samples before and after the step that are drawn.
+const BEFORE_STEP: usize = 12;
+const AFTER_STEP: usize = 36;
+
+/// What the pictures show.
+struct Pictures<'a> {
+    spec: &'a Spec,
+    captured: &'a Captured,
+    /// What an ideal fast converter gives for the step alone.
+    step: &'a [f64],
+    contenders: &'a [Contender],
+}
+
+impl Pictures<'_> {
+    /// Names of files and their SVG text.
+    fn all(&self) -> Result<[(&'static str, String); 2], PlotError> {
+        let (step, marks) = self.around_the_step();
+        Ok([("step.svg", step.to_svg_with(&marks)?), ("error.svg", self.errors().to_svg()?)])
+    }
+
+    /// The samples around the step: those of the first and the last contender as marks on the exact curve,
+    /// and the step without the other signals.
+    fn around_the_step(&self) -> (Chart, Vec<Marks>) {
+        let latency = self.spec.latency.unwrap_or(0);
+        let centre = STEP_AT.in_fast_periods(self.spec.fast_period).0 as usize + latency;
+        let time = |n: usize| (self.spec.fast_period * (n as f64 - latency as f64)).0 - STEP_AT.0;
+        let window = centre - BEFORE_STEP..centre + AFTER_STEP;
+        let curve = |label: &str, samples: &[f64]| Series {
+            label: label.into(),
+            points: window.clone().map(|n| (time(n) * 1e3, samples[n])).collect(),
+        };
+        let marks = |contender: &Contender| Marks {
+            label: contender.name.into(),
+            points: window.clone().map(|n| (time(n) * 1e3, contender.samples[n], String::new())).collect(),
+        };
+        let chart = Chart {
+            title: "Around the step: chirp, tones and step through the converters".into(),
+            x_label: "time after the step, ms".into(),
+            y_label: "amplitude, 1 = full scale".into(),
+            series: vec![
+                curve("ideal fast converter", &self.captured.target),
+                curve("its response to the step alone", self.step),
+            ],
+        };
+        let shown = self.contenders.first().into_iter().chain(self.contenders.last());
+        (chart, shown.map(marks).collect())
+    }
+
+    /// RMS error in decibels over intervals of 20 ms. The chirp sweeps with time, so time stands for
+    /// frequency.
+    fn errors(&self) -> Chart {
+        let period = self.spec.fast_period;
+        let interval = ERROR_INTERVAL.in_fast_periods(period).0 as usize;
+        let target = &self.captured.target;
+        let level = |samples: &[f64], start: usize| {
+            let power: f64 = (start..start + interval).map(|n| (samples[n] - target[n]).powi(2)).sum::<f64>()
+                / interval as f64;
+            Decibels::of_power(power.max(1e-30)).0
+        };
+        let curve = |contender: &Contender| Series {
+            label: contender.name.into(),
+            points: (SETTLING..target.len() - interval)
+                .step_by(interval)
+                .map(|start| ((period * start as f64).0, level(&contender.samples, start)))
+                .collect(),
+        };
+        Chart {
+            title: "Error while the chirp rises from 50 Hz to 13 kHz, step at 1 s".into(),
+            x_label: "time, s".into(),
+            y_label: "RMS error in 20 ms, dB of full scale".into(),
+            series: self.contenders.iter().map(curve).collect(),
+        }
+    }
 }

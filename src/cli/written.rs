@@ -1,12 +1,72 @@
-//! Writes whole recordings of one channel.
+//! Writes files that appear when they are whole: texts, pictures, recordings, and folders of them.
 
-use super::Failure;
+use super::bank_file::is_dash;
 use super::interrupt::remove_unfinished;
-use crate::files::{AtomicFile, commit_all};
+use super::print::{Failure, name_leftovers, print_bytes};
+use crate::files::{AtomicFile, commit_all, refuse_overlaps};
 use crate::io::{Container, OutputHeader, PcmFormat, SampleWriter};
+use std::io::Write;
 use std::path::Path;
 
-/// Format of the numbers.
+/// Refuses outputs that are also inputs or other outputs, and names what killed runs left beside them.
+pub(super) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), Failure> {
+    let outputs: Vec<&Path> = outputs.iter().copied().filter(|path| !is_dash(path)).collect();
+    refuse_overlaps(&outputs, inputs).map_err(Failure::input)?;
+    name_leftovers(&outputs);
+    Ok(())
+}
+
+/// Writes a text file that appears when it is whole; `-` is standard output.
+pub(super) fn write_text(path: &Path, text: &str, force: bool) -> Result<(), Failure> {
+    write_bytes(path, text.as_bytes(), force)
+}
+
+/// As [`write_text`], for any bytes.
+pub(super) fn write_bytes(path: &Path, bytes: &[u8], force: bool) -> Result<(), Failure> {
+    if is_dash(path) {
+        return print_bytes(bytes);
+    }
+    begin_file(path, bytes, force)?.commit().map_err(Failure::input)
+}
+
+/// A file that is whole but has no name yet.
+pub(super) fn begin_file(path: &Path, bytes: &[u8], force: bool) -> Result<AtomicFile, Failure> {
+    remove_unfinished();
+    let mut file = AtomicFile::create(path, force).map_err(Failure::input)?;
+    file.write_all(bytes).map_err(|error| Failure::of(path, format!("cannot write it: {error}")))?;
+    Ok(file)
+}
+
+/// Writes the files of each item to `folder` as soon as the item is known; all files appear together. A
+/// folder that was made for them is removed if they do not.
+pub(super) fn write_together<T>(
+    folder: &Path,
+    items: impl Iterator<Item = Result<T, Failure>>,
+    begin: impl Fn(T) -> Result<Vec<AtomicFile>, Failure>,
+) -> Result<(), Failure> {
+    let is_new = !folder.exists();
+    let begin = |item: Result<T, Failure>| {
+        let item = item?;
+        create_folder(folder)?;
+        begin(item)
+    };
+    let begun = items.map(begin).collect::<Result<Vec<_>, _>>();
+    let written =
+        begun.and_then(|files| commit_all(files.into_iter().flatten().collect()).map_err(Failure::input));
+    if written.is_err() && is_new {
+        // It is empty, or another program has put files there.
+        let _ = std::fs::remove_dir(folder);
+    }
+    written
+}
+
+/// Makes a folder, if it is not there.
+pub(super) fn create_folder(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Failure::of(folder, format!("cannot create the folder: {error}")))
+}
+
+/// Format of the numbers of recordings.
 const FORMAT: PcmFormat = PcmFormat::F32Le;
 
 /// A recording of one channel to be written with 32-bit floats.

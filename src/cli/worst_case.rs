@@ -1,13 +1,18 @@
-//! The worst case over a box of errors, as text and as JSON.
+//! The worst case over a box of errors, as text, as JSON, as CSV and as a picture.
 
+use super::plot::PictureFormat;
+use super::print::Failure;
+use super::written::write_bytes;
 use crate::bank::Bank;
 use crate::design::DesignError;
-use crate::design::uncertainty::{self, DelayDerivatives, Floor};
+use crate::design::uncertainty::{self, DelayDerivatives, Floor, norm_at};
+use crate::plot::{Chart, Series};
 use crate::quantity::readable;
 use crate::units::{Hertz, Seconds};
 use crate::verify::VerifyError;
-use crate::verify::uncertainty::{ErrorBox, Slopes, WorstCase, slopes};
+use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Slopes, WorstCase, slopes};
 use std::fmt::Write;
+use std::path::Path;
 
 /// Relative distance of the two ends that is asked for.
 const ACCURACY: f64 = 0.01;
@@ -74,26 +79,13 @@ impl Report {
     /// Answers `questions` for `bank`.
     pub(super) fn new(bank: &Bank, questions: Questions) -> Result<Self, DesignError> {
         let Questions { errors, jitter, sensitivity, loss } = questions;
-        let none = || ErrorBox::none(bank.channel_count());
-        let known = if sensitivity || jitter.is_some() {
-            Some(slopes(bank, errors.as_ref().unwrap_or(&none()))?)
-        } else {
-            None
-        };
-        let jitter = match (jitter, &known) {
-            (Some(jitter), Some(slopes)) => {
-                Some(Jitter { added: slopes.jitter(&jitter, bank.fast_period), jitter })
-            }
-            _ => None,
-        };
-        let sensitivity = match known {
-            Some(slopes) if sensitivity => {
-                let derivatives = uncertainty::delay_derivatives(bank)?;
-                let per_second = derivatives.per_fast_period.iter().map(|x| x / bank.fast_period.0).collect();
-                Some(Sensitivity { derivatives, per_second, slopes })
-            }
-            _ => None,
-        };
+        let of_box = || slopes(bank, errors.as_ref().unwrap_or(&ErrorBox::none(bank.channel_count())));
+        let known = (sensitivity || jitter.is_some()).then(of_box).transpose()?;
+        let jitter = jitter
+            .zip(known.as_ref())
+            .map(|(jitter, slopes)| Jitter { added: slopes.jitter(&jitter, bank.fast_period), jitter });
+        let sensitivity =
+            known.filter(|_| sensitivity).map(|slopes| Sensitivity::new(bank, slopes)).transpose()?;
         let worst_case = errors.map(|errors| Worst::new(bank, errors, loss)).transpose()?;
         Ok(Self { worst_case, sensitivity, jitter })
     }
@@ -133,13 +125,11 @@ impl Worst {
         let accuracy = if bank.channel_count() <= FEW_CHANNELS { ACCURACY } else { ACCURACY_OF_MANY };
         let case = uncertainty::worst_case(bank, &errors, accuracy)?;
         let floor = uncertainty::floor(bank, &errors, &case.point)?;
-        let affordable = match loss {
-            None => None,
-            Some(loss) => {
-                let factor = uncertainty::affordable(bank, &errors, loss)?;
-                Some(Affordable { loss, factor, errors: errors.scaled(factor) })
-            }
-        };
+        let affordable = loss.map(|loss| {
+            let factor = uncertainty::affordable(bank, &errors, loss)?;
+            Ok::<_, DesignError>(Affordable { loss, factor, errors: errors.scaled(factor) })
+        });
+        let affordable = affordable.transpose()?;
         Ok(Self { peak_hertz: case.frequency.in_hertz(bank.slow_period()), errors, case, floor, affordable })
     }
 
@@ -177,6 +167,12 @@ impl Worst {
 }
 
 impl Sensitivity {
+    fn new(bank: &Bank, slopes: Slopes) -> Result<Self, DesignError> {
+        let derivatives = uncertainty::delay_derivatives(bank)?;
+        let per_second = derivatives.per_fast_period.iter().map(|x| x / bank.fast_period.0).collect();
+        Ok(Self { derivatives, per_second, slopes })
+    }
+
     fn write(&self, text: &mut String) {
         let Self { derivatives, slopes, .. } = self;
         let note = if derivatives.simple { "" } else { "; one of several equal peaks" };
@@ -191,33 +187,37 @@ impl Sensitivity {
     }
 }
 
+/// The box, a value per channel for each kind of error.
 fn of_box(errors: &ErrorBox) -> String {
-    let mut parts = Vec::new();
-    if errors.delays.iter().any(|x| x.0 > 0.0) {
-        parts.push(format!("delays ±({})", list(&errors.delays, |x| time(x.0))));
-    }
-    for (what, shares) in [("gains", &errors.gains), ("cut-offs", &errors.cutoffs)] {
-        if shares.iter().any(|x| *x > 0.0) {
-            parts.push(format!("{what} ±({})", list(shares, |x| percent(*x))));
-        }
-    }
+    let kinds = kinds(errors, &errors.delays, &errors.gains, &errors.cutoffs);
+    let parts: Vec<String> = kinds.map(|(what, values)| format!("{what} ±({values})")).collect();
     if parts.is_empty() { "no errors".to_owned() } else { parts.join(", ") }
 }
 
+/// The worst point of a box.
 fn of_point(case: &WorstCase, errors: &ErrorBox) -> String {
-    let point = &case.point;
-    let mut parts = Vec::new();
-    if errors.delays.iter().any(|x| x.0 > 0.0) {
-        parts.push(format!("delays off by {}", list(&point.delays, |x| time(x.0))));
-    }
-    for (what, most, shares) in
-        [("gains", &errors.gains, &point.gains), ("cut-offs", &errors.cutoffs, &point.cutoffs)]
-    {
-        if most.iter().any(|x| *x > 0.0) {
-            parts.push(format!("{what} off by {}", list(shares, |x| percent(*x))));
-        }
-    }
+    let ErrorPoint { delays, gains, cutoffs, .. } = &case.point;
+    let parts: Vec<String> = kinds(errors, delays, gains, cutoffs)
+        .map(|(what, values)| format!("{what} off by {values}"))
+        .collect();
     if parts.is_empty() { "without errors".to_owned() } else { parts.join(", ") }
+}
+
+/// Values of the kinds of errors that a box has, with their names.
+fn kinds(
+    errors: &ErrorBox,
+    delays: &[Seconds],
+    gains: &[f64],
+    cutoffs: &[f64],
+) -> impl Iterator<Item = (&'static str, String)> {
+    let any = |shares: &[f64]| shares.iter().any(|x| *x > 0.0);
+    let delays_differ = errors.delays.iter().any(|x| x.0 > 0.0);
+    let all = [
+        delays_differ.then(|| ("delays", list(delays, |x| time(x.0)))),
+        any(&errors.gains).then(|| ("gains", list(gains, |x| percent(*x)))),
+        any(&errors.cutoffs).then(|| ("cut-offs", list(cutoffs, |x| percent(*x)))),
+    ];
+    all.into_iter().flatten()
 }
 
 fn list<T>(values: &[T], text: impl Fn(&T) -> String) -> String {
@@ -238,12 +238,90 @@ fn rounded(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
 }
 
-/// The place of an error of the proof in the command line.
+/// An error of the proof, with the options that it is about.
 pub(super) fn explained(error: &DesignError) -> String {
     match error {
         DesignError::Verify(VerifyError::WideBox) => {
             format!("--delay-box, --gain-box, --cutoff-box: {error}")
         }
         _ => error.to_string(),
+    }
+}
+
+/// Points per curve; an odd number has the nominal delays among them.
+const POINTS: usize = 41;
+
+/// Curves of gamma over the share of the box, from -1 to 1.
+pub(super) struct Sweep {
+    half_widths: Vec<Seconds>,
+    shares: Vec<f64>,
+    /// One per channel whose delay is uncertain, then the one through the worst point.
+    curves: Vec<Curve>,
+}
+
+struct Curve {
+    label: String,
+    gammas: Vec<f64>,
+}
+
+impl Sweep {
+    /// Moves each channel alone, and all together towards `worst`.
+    pub(super) fn new(bank: &Bank, errors: &ErrorBox, worst: &ErrorPoint) -> Result<Self, DesignError> {
+        let shares: Vec<f64> = (0..POINTS).map(|k| 2.0 * k as f64 / (POINTS - 1) as f64 - 1.0).collect();
+        let along = |label: String, delays: &[Seconds]| -> Result<Curve, DesignError> {
+            let gamma = |share: &f64| {
+                let delays = delays.iter().map(|&delay| delay * *share).collect();
+                let point = ErrorPoint { delays, ..ErrorPoint::none(bank.channel_count()) };
+                norm_at(bank, &point).map(|(gamma, _)| gamma)
+            };
+            Ok(Curve { label, gammas: shares.iter().map(gamma).collect::<Result<_, _>>()? })
+        };
+        let mut curves = Vec::new();
+        for i in (0..bank.channel_count()).filter(|&i| errors.delays[i].0 > 0.0) {
+            let mut alone = vec![Seconds(0.0); bank.channel_count()];
+            alone[i] = errors.delays[i];
+            curves.push(along(format!("channel {}", i + 1), &alone)?);
+        }
+        curves.push(along("all, towards the worst point".into(), &worst.delays)?);
+        Ok(Self { half_widths: errors.delays.clone(), shares, curves })
+    }
+
+    /// Writes the file that `path` names: SVG or PNG if its extension says so, else CSV.
+    pub(super) fn write(&self, path: &Path, force: bool) -> Result<(), Failure> {
+        let bytes = match PictureFormat::of(path) {
+            Some(format) => format.file(&self.chart(), &[]).map_err(Failure::input)?,
+            None => self.csv().into_bytes(),
+        };
+        write_bytes(path, &bytes, force)
+    }
+
+    fn csv(&self) -> String {
+        let mut text = String::from("share_of_box");
+        for curve in &self.curves {
+            let _ = write!(text, ",{}", curve.label.replace(", ", " ").replace(' ', "_"));
+        }
+        text.push('\n');
+        for (k, share) in self.shares.iter().enumerate() {
+            let _ = write!(text, "{share}");
+            for curve in &self.curves {
+                let _ = write!(text, ",{}", curve.gammas[k]);
+            }
+            text.push('\n');
+        }
+        text
+    }
+
+    fn chart(&self) -> Chart {
+        let series = |curve: &Curve| Series {
+            label: curve.label.clone(),
+            points: self.shares.iter().copied().zip(curve.gammas.iter().copied()).collect(),
+        };
+        let widths: Vec<String> = self.half_widths.iter().map(|half| format!("{:.3e}", half.0)).collect();
+        Chart {
+            title: "gamma with delays that are not those of the bank".into(),
+            x_label: format!("error, in units of the box ({} s)", widths.join(", ")),
+            y_label: "gamma".into(),
+            series: self.curves.iter().map(series).collect(),
+        }
     }
 }

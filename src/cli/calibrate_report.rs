@@ -1,6 +1,7 @@
 //! What `calibrate` prints.
 
-use super::super::{Failure, print, print_json, warn};
+use super::bank_file::is_dash;
+use super::print::{Failure, show, warn};
 use crate::calibrate::{Calibration, ChannelEstimate, Remark};
 use crate::sine_fit::Estimate;
 use crate::spec::{HALF_WIDTH, Spec};
@@ -176,14 +177,8 @@ impl Report {
 
     pub(super) fn print(&self, output: &Path, json: bool) -> Result<(), Failure> {
         self.warnings.iter().for_each(|warning| warn(warning));
-        if json {
-            return print_json(self);
-        }
-        if output.as_os_str() == "-" {
-            // Standard output carries the spec.
-            return Ok(());
-        }
-        print(&self.text(output))
+        // Standard output carries the spec.
+        if is_dash(output) { Ok(()) } else { show(self, json, |report| report.text(output)) }
     }
 
     fn text(&self, output: &Path) -> String {

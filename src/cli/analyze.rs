@@ -1,21 +1,18 @@
 //! `hybank analyze`: the error of a bank, with its own delays or with others.
 
-mod error_box;
-mod sweep;
-mod worst_case;
-
-use super::Failure;
-use super::bank_file::{is_dash, load, refuse_overlap};
-use super::design::report::{against, figure_text};
+use super::bank_file::{is_dash, load};
+use super::design_report::{against, figure_text};
+use super::print::{Failure, InFile, show};
+use super::worst_case::{self, Questions, Sweep};
+use super::written::check_outputs;
 use crate::bank::Bank;
-use crate::design::{self, Analysis, Certified, DesignError, GammaScale, MeanAnalysis};
+use crate::design::{self, Analysis, Certified, GammaScale, MeanAnalysis};
 use crate::figures::Figures;
 use crate::overview::{decibels, frequency, six_digits, understood};
-use crate::quantity;
+use crate::quantity::{self, Time};
 use crate::units::Seconds;
+use crate::verify::uncertainty::ErrorBox;
 use std::path::PathBuf;
-use sweep::Sweep;
-use worst_case::Questions;
 
 /// Computes the gamma of a bank, with the delays of its spec or with others
 ///
@@ -47,7 +44,7 @@ pub(super) struct Args {
     #[arg(long)]
     certify: bool,
     #[command(flatten)]
-    errors: error_box::Flags,
+    errors: Flags,
     /// Also find the largest part of the box that costs at most this share of gamma (1%)
     #[arg(long, value_name = "LOSS", value_parser = loss)]
     accuracy: Option<f64>,
@@ -80,39 +77,36 @@ fn finite(text: &str) -> Result<Seconds, String> {
     }
 }
 
-/// Runs the command.
-///
-/// # Errors
-/// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check()?;
     let bank = load(&args.bank)?;
-    let named = |error: DesignError| {
-        Failure::Input(format!("{}: {}", args.bank.display(), worst_case::explained(&error)))
-    };
-    let questions = args.questions(&bank)?;
-    let analysis = design::analyze(&bank, &args.delay_error).map_err(named)?;
-    let certified = if args.certify { Some(design::certify(&bank).map_err(named)?) } else { None };
-    let errors = worst_case::Report::new(&bank, questions).map_err(named)?;
+    let errors = args.errors.is_given().then_some(args.errors.error_box(&bank)?);
+    let jitter = of_channels("--jitter", &in_seconds(&args.errors.jitter, &bank), bank.channel_count())?;
+    let jitter = (!args.errors.jitter.is_empty()).then_some(jitter);
+    let questions = Questions { errors, jitter, sensitivity: args.sensitivity, loss: args.accuracy };
+    let analysis = design::analyze(&bank, &args.delay_error).in_file(&args.bank)?;
+    let certified = args.certify.then(|| design::certify(&bank)).transpose().in_file(&args.bank)?;
+    let errors = worst_case::Report::new(&bank, questions)
+        .map_err(|error| Failure::of(&args.bank, worst_case::explained(&error)))?;
     if let Some((path, (errors, case))) = args.sweep.as_ref().zip(errors.case()) {
-        Sweep::new(&bank, errors, &case.point).map_err(named)?.write(path, args.force)?;
+        Sweep::new(&bank, errors, &case.point).in_file(&args.bank)?.write(path, args.force)?;
         // The table alone, so that a program can read it.
         if is_dash(path) {
             return Ok(());
         }
     }
     let own_delays = args.delay_error.is_empty();
-    let figures = own_delays.then(|| Figures::new(&bank)).transpose().map_err(named)?;
+    let figures = own_delays.then(|| Figures::new(&bank)).transpose().in_file(&args.bank)?;
     let report = Report {
         understood: bank.spec.as_ref().map(understood).unwrap_or_default(),
         is_normalised: bank.is_normalised(),
-        scale: GammaScale::new(&bank).map_err(named)?,
+        scale: GammaScale::new(&bank).in_file(&args.bank)?,
         analysis,
         certified,
         figures,
         errors,
     };
-    if args.json { super::print_json(&report) } else { super::print(&report.text()) }
+    show(&report, args.json, Report::text)
 }
 
 impl Args {
@@ -122,7 +116,7 @@ impl Args {
         if self.certify && !self.delay_error.is_empty() {
             return usage("--certify proves the bank with its own delays; leave out --delay-error");
         }
-        let asked = self.errors.is_given() || self.errors.has_jitter() || self.sensitivity;
+        let asked = self.errors.is_given() || !self.errors.jitter.is_empty() || self.sensitivity;
         if asked && !self.delay_error.is_empty() {
             return usage("a box of errors lies around the delays of the bank; leave out --delay-error");
         }
@@ -132,20 +126,9 @@ impl Args {
             }
         }
         match &self.sweep {
-            Some(sweep) => refuse_overlap(sweep, &self.bank),
+            Some(sweep) => check_outputs(&[sweep], &[&self.bank]),
             None => Ok(()),
         }
-    }
-
-    fn questions(&self, bank: &Bank) -> Result<Questions, Failure> {
-        let errors = self.errors.error_box(bank)?;
-        let jitter = self.errors.jitter(bank)?;
-        Ok(Questions {
-            errors: self.errors.is_given().then_some(errors),
-            jitter: self.errors.has_jitter().then_some(jitter),
-            sensitivity: self.sensitivity,
-            loss: self.accuracy,
-        })
     }
 }
 
@@ -207,5 +190,129 @@ impl Report {
             },
             self.errors.text()
         )
+    }
+}
+
+// Not a doc comment: clap would show it as the text of the whole command.
+#[derive(Debug, clap::Args)]
+struct Flags {
+    /// Prove the worst case over delays that are off by up to this much (10ps, 0.01samples, or seconds): one
+    /// value for all channels but the reference, or one per channel
+    #[arg(long, value_delimiter = ',', value_parser = time)]
+    delay_box: Vec<Time>,
+    /// Also gains that are off by up to this share (1%, 500ppm, 0.01); values as for --delay-box
+    #[arg(long, value_delimiter = ',', value_parser = share)]
+    gain_box: Vec<f64>,
+    /// Also cut-offs that are off by up to this share; values as for --delay-box
+    #[arg(long, value_delimiter = ',', value_parser = share)]
+    cutoff_box: Vec<f64>,
+    /// Also bound what instants that jitter by up to this much may add: one value, or one per channel
+    #[arg(long, value_delimiter = ',', value_parser = time)]
+    jitter: Vec<Time>,
+    /// The channel to which delays, gains and cut-offs are relative, from 1, or none if every channel has an
+    /// error of its own [default: 1 where one value is given for all channels]
+    #[arg(long, value_name = "CHANNEL|none", value_parser = reference)]
+    reference: Option<Reference>,
+}
+
+/// The reference channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Reference {
+    None,
+    /// From 1.
+    Channel(usize),
+}
+
+fn reference(text: &str) -> Result<Reference, String> {
+    match text.trim() {
+        "none" => Ok(Reference::None),
+        text => match text.parse::<usize>() {
+            Ok(channel) if channel > 0 => Ok(Reference::Channel(channel)),
+            _ => Err("the reference is a channel, counted from 1, or none".to_owned()),
+        },
+    }
+}
+
+fn time(text: &str) -> Result<Time, String> {
+    let time = quantity::time(text).map_err(|error| error.to_string())?;
+    if time.in_seconds(Seconds(1.0)).0 >= 0.0 { Ok(time) } else { Err(NEGATIVE.to_owned()) }
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match quantity::relative(text).map_err(|error| error.to_string())? {
+        share if (0.0..0.5).contains(&share) => Ok(share),
+        share if share < 0.0 => Err(NEGATIVE.to_owned()),
+        _ => Err("shares of 50% and more are not supported".to_owned()),
+    }
+}
+
+const NEGATIVE: &str = "the box reaches as far in both directions; give the positive half-width";
+
+impl Flags {
+    /// Whether a box is asked for.
+    fn is_given(&self) -> bool {
+        !(self.delay_box.is_empty() && self.gain_box.is_empty() && self.cutoff_box.is_empty())
+    }
+
+    /// The box for the channels of `bank`.
+    ///
+    /// # Errors
+    /// [`Failure::Usage`] for lists of another length and for a reference that is not there.
+    fn error_box(&self, bank: &Bank) -> Result<ErrorBox, Failure> {
+        let channels = bank.channel_count();
+        if let Some(Reference::Channel(channel)) = self.reference
+            && channel > channels
+        {
+            let message = format!(
+                "--reference {channel}: the bank has {channels} channels; give 1 to {channels}, or none"
+            );
+            return Err(Failure::Usage(message));
+        }
+        Ok(ErrorBox {
+            delays: self.relative("--delay-box", &in_seconds(&self.delay_box, bank), channels)?,
+            gains: self.relative("--gain-box", &self.gain_box, channels)?,
+            cutoffs: self.relative("--cutoff-box", &self.cutoff_box, channels)?,
+        })
+    }
+
+    /// Values of all channels, 0 for the reference.
+    fn relative<T: Copy + Default>(
+        &self,
+        flag: &str,
+        given: &[T],
+        channels: usize,
+    ) -> Result<Vec<T>, Failure> {
+        let exact = match self.reference {
+            Some(Reference::None) => None,
+            Some(Reference::Channel(channel)) => Some(channel - 1),
+            // A list says itself which channel is exact, and one channel alone is not relative to another.
+            None => (given.len() == 1 && channels > 1).then_some(0),
+        };
+        let mut all = of_channels(flag, given, channels)?;
+        if let Some(exact) = exact {
+            all[exact] = T::default();
+        }
+        Ok(all)
+    }
+}
+
+fn in_seconds(times: &[Time], bank: &Bank) -> Vec<Seconds> {
+    times.iter().map(|time| time.in_seconds(bank.fast_period)).collect()
+}
+
+/// One value per channel, of one for all or of a list; zeros where none is given.
+pub(super) fn of_channels<T: Copy + Default>(
+    flag: &str,
+    given: &[T],
+    channels: usize,
+) -> Result<Vec<T>, Failure> {
+    match given {
+        [] => Ok(vec![T::default(); channels]),
+        [all] => Ok(vec![*all; channels]),
+        _ if given.len() == channels => Ok(given.to_vec()),
+        _ => Err(Failure::Usage(format!(
+            "{flag}: {} values are given for {channels} channels; give one for each, or one for all",
+            given.len()
+        ))),
     }
 }

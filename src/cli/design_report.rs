@@ -1,18 +1,19 @@
-//! The report of `hybank design` on a finished bank, as text and as JSON.
+//! The report of `hybank design` and `hybank import` on a finished bank, as text and as JSON.
 
-use super::band_hint::BandHint;
-use super::studies::{Words, number, order_text, robust_text, tracking_text};
-use crate::bank::{Gamma, SynthesisFilters};
-use crate::design::{Design, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, TrackingStudy};
+use super::design_studies::{BandHint, Words, known, number, order_text, robust_text, tracking_text};
+use crate::bank::{Bank, Gamma, SynthesisFilters};
+use crate::design::{
+    Design, DesignError, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, TrackingStudy, analyze_mean,
+};
 use crate::figures::Figures;
-use crate::overview::{Fact, counted, decibels, figure_facts, frequency, six_digits, understood};
+use crate::overview::{Fact, counted, decibels, doubts, figure_facts, frequency, six_digits, understood};
 use crate::spec::Method;
 use crate::units::Hertz;
 use crate::verify::{BoundedBanks, Verified};
 
 /// The report; serialised it is that of `--json`.
 #[derive(Debug, serde::Serialize)]
-pub(in crate::cli) struct Report<'a> {
+pub(super) struct Report<'a> {
     bank: String,
     /// The spec in units of the user.
     understood: String,
@@ -50,14 +51,27 @@ pub(in crate::cli) struct Report<'a> {
 
 /// What is computed of a finished bank for its report.
 #[derive(Debug, serde::Serialize)]
-pub(in crate::cli) struct Judged {
+pub(super) struct Judged {
     #[serde(flatten)]
-    pub(in crate::cli) mean: MeanAnalysis,
-    pub(in crate::cli) scale: GammaScale,
-    pub(in crate::cli) figures: Figures,
+    pub(super) mean: MeanAnalysis,
+    pub(super) scale: GammaScale,
+    pub(super) figures: Figures,
     /// For a spec without a signal.
     #[serde(rename = "with_band", skip_serializing_if = "Option::is_none")]
-    pub(in crate::cli) hint: Option<BandHint>,
+    pub(super) hint: Option<BandHint>,
+}
+
+impl Judged {
+    /// Of a bank with its spec.
+    pub(super) fn new(bank: &Bank) -> Result<Self, DesignError> {
+        let (mean, scale) = (analyze_mean(bank)?, GammaScale::new(bank)?);
+        Ok(Self { mean, scale, figures: Figures::new(bank)?, hint: None })
+    }
+
+    /// What a user of the bank should know.
+    pub(super) fn warnings(&self, bank: &Bank) -> Vec<String> {
+        doubts(bank, &self.mean, &self.scale)
+    }
 }
 
 /// The bounds that `hybank verify` will prove for the file.
@@ -80,17 +94,12 @@ impl ProofReport {
         }
     }
 
-    /// Whether the lower end is that of all causal banks.
-    fn causal(&self) -> bool {
-        self.proven.is_some_and(|proven| proven.lower_banks == BoundedBanks::Causal)
-    }
-
     fn text(&self) -> String {
         match (&self.proven, &self.unproven) {
-            (Some(proven), _) => format!(
+            (Some(Verified { lower, upper, .. }), _) => format!(
                 "proven     [{}, {}] in {:.1} ms (see hybank verify)\n",
-                number(Some(proven.lower)),
-                number(Some(proven.upper)),
+                number(*lower),
+                number(*upper),
                 self.seconds * 1e3
             ),
             (_, Some(reason)) => format!("proven     no: {reason}\n"),
@@ -101,7 +110,7 @@ impl ProofReport {
 
 impl<'a> Report<'a> {
     /// Of a bank written to `output`, designed in so many seconds.
-    pub(in crate::cli) fn new(output: String, design: &'a Design, judged: Judged, seconds: f64) -> Self {
+    pub(super) fn new(output: String, design: &'a Design, judged: Judged, seconds: f64) -> Self {
         let bank = &design.bank;
         let (taps, states) = match &bank.filters {
             SynthesisFilters::Fir(taps) => (taps.first().map(Vec::len), None),
@@ -133,7 +142,7 @@ impl<'a> Report<'a> {
     }
 
     /// Six lines; all that is known with `verbose`.
-    pub(in crate::cli) fn text(&self, verbose: bool) -> String {
+    pub(super) fn text(&self, verbose: bool) -> String {
         let terms = [self.heading(), figure_text(&self.judged.figures, self.is_normalised)].concat();
         if !verbose {
             return terms + &self.gamma_line() + &self.hint();
@@ -177,18 +186,15 @@ impl Report<'_> {
     /// The worst case in one line, proven or not.
     fn gamma_line(&self) -> String {
         let proof = match (&self.proof.proven, &self.proof.unproven) {
-            (Some(proven), _) => format!("proven: at most {}", number(Some(proven.upper))),
+            (Some(proven), _) => format!("proven: at most {}", number(proven.upper)),
             (_, Some(_)) => "computed, not proven; --verbose says why".to_owned(),
             _ => "computed".to_owned(),
         };
-        let any = self
-            .judged
-            .figures
-            .any_input
-            .map_or_else(String::new, |gamma| format!("; any input: {}", six_digits(gamma)));
+        let any = self.judged.figures.any_input;
+        let any = any.map_or_else(String::new, |gamma| format!("; any input: {}", six_digits(gamma)));
         format!(
             "gamma      {} (worst-case gain from the input to the error; {proof}{any})\n",
-            number(self.gamma.norm)
+            known(self.gamma.norm)
         )
     }
 
@@ -210,12 +216,12 @@ impl Report<'_> {
             "gamma      {} (computed norm of this bank; worst at {} modulo the slow rate)\n\
              {}lower      {} ({})\n\
              noncausal  {} ({})\n",
-            number(norm),
+            known(norm),
             frequency(self.peak_hertz, self.is_normalised),
             self.scale_text(),
-            number(lower),
+            known(lower),
             self.lower_meaning(),
-            number(noncausal),
+            known(noncausal),
             if noncausal.is_none() { UNRESOLVED } else { "no latency is better" },
         )
     }
@@ -225,7 +231,9 @@ impl Report<'_> {
             _ if self.gamma.lower.is_none() => UNRESOLVED,
             Method::Fir => "no bank of this length is better",
             Method::Iir => "no causal bank is better",
-            _ if self.proof.causal() => "no causal bank is better; this method does not aim at gamma",
+            _ if self.proof.proven.is_some_and(|proven| proven.lower_banks == BoundedBanks::Causal) => {
+                "no causal bank is better; this method does not aim at gamma"
+            }
             Method::H2 | Method::Sinc | Method::Separation => {
                 "no bank at all is better; this method does not aim at gamma"
             }
@@ -235,13 +243,18 @@ impl Report<'_> {
     /// What is to be expected of signals and noise that are not the worst ones.
     fn mean_text(&self) -> String {
         let MeanAnalysis { rms_error, noise_gain, output_noise, .. } = self.judged.mean;
+        let signal = match self.judged.figures.any_input {
+            Some(_) => {
+                "the whole spectrum that the bank is designed for, the floor outside the band included"
+            }
+            None => "a signal with the target's spectrum",
+        };
         format!(
             "H2 error   {} (rms, for white noise of unit density at the analog input)\n\
-             SNR        {} for {}\n\
+             SNR        {} for {signal}\n\
              noise gain {} ({})\n",
-            number(Some(rms_error)),
+            number(rms_error),
             decibels(self.judged.scale.rms_reference, rms_error),
-            whole_spectrum(&self.judged.figures),
             six_digits(noise_gain),
             if output_noise == 0.0 {
                 "the spec gives the converters no noise".to_owned()
@@ -260,16 +273,8 @@ impl Report<'_> {
     }
 }
 
-/// The signal for which `rms_error` holds.
-pub(in crate::cli) fn whole_spectrum(figures: &Figures) -> &'static str {
-    match figures.any_input {
-        Some(_) => "the whole spectrum that the bank is designed for, the floor outside the band included",
-        None => "a signal with the target's spectrum",
-    }
-}
-
 /// gamma beside that of another bank.
-pub(in crate::cli) fn against(gamma: f64, other: f64, what: &str) -> String {
+pub(super) fn against(gamma: f64, other: f64, what: &str) -> String {
     if other == 0.0 {
         return format!("{what} makes no error at all");
     }
@@ -277,7 +282,7 @@ pub(in crate::cli) fn against(gamma: f64, other: f64, what: &str) -> String {
 }
 
 /// The figures in the user's terms, one line each.
-pub(in crate::cli) fn figure_text(figures: &Figures, is_normalised: bool) -> String {
+pub(super) fn figure_text(figures: &Figures, is_normalised: bool) -> String {
     let line = |Fact { name, value, meaning }: Fact| {
         let colon = if value == "none" { ":" } else { "" };
         format!("{name:<10} {value}{colon} {meaning}\n")

@@ -1,10 +1,11 @@
 //! The errors of virtual converters on the command line.
 
-use crate::cli::Failure;
-use crate::cli::bank_file::bad_flag;
+use super::analyze::of_channels;
+use super::bank_file::bad_flag;
+use super::print::Failure;
 use crate::quantity::{self, Time, readable};
 use crate::simulate::{Analog, Converter, Quantiser};
-use crate::spec::{ChannelSpec, MAX_LATENCY, Spec, SpecProblem, check_noise, check_offset};
+use crate::spec::{ChannelSpec, MAX_LATENCY, Spec, SpecProblem, check_noise, check_offset, within};
 use crate::units::{FastPeriods, Seconds};
 
 /// Largest rms of the jitter in fast periods: more than a tenth leaves no signal, so the unit is wrong.
@@ -105,13 +106,13 @@ impl ConverterArgs {
         let jitter = self.jitter(spec.fast_period);
         signals.try_for_each(|signal| check_jitter(jitter, spec.fast_period, signal))?;
         let channels = spec.channels.len();
-        let drift = of_channels("drift", &self.drift, channels, check_drift)?;
+        let drift = checked("drift", &self.drift, channels, check_drift)?;
         let most_delay = (spec.fast_period * MAX_LATENCY as f64).0;
         let delay_error: Vec<f64> =
             self.delay_error.iter().map(|e| e.in_seconds(spec.fast_period).0).collect();
-        let delay_error = of_channels("delay-error", &delay_error, channels, |x| check_delay(x, most_delay))?;
-        let gain_error = of_channels("gain-error", &self.gain_error, channels, check_gain_error)?;
-        let offset = of_channels("offset", &self.offset, channels, check_offset)?;
+        let delay_error = checked("delay-error", &delay_error, channels, |x| check_delay(x, most_delay))?;
+        let gain_error = checked("gain-error", &self.gain_error, channels, check_gain_error)?;
+        let offset = checked("offset", &self.offset, channels, check_offset)?;
         let each = |(i, channel): (usize, &ChannelSpec)| {
             let report = ConverterReport {
                 delay: channel.delay.0 + delay_error[i],
@@ -173,81 +174,60 @@ fn check_jitter(rms: Seconds, fast_period: Seconds, signal: &Analog) -> Result<(
     )))
 }
 
-/// One number for each channel.
-fn of_channels(
+/// One number for each channel, within its range.
+fn checked(
     flag: &str,
     given: &[f64],
     channels: usize,
     check: impl Fn(f64) -> Result<(), SpecProblem>,
 ) -> Result<Vec<f64>, Failure> {
     given.iter().try_for_each(|&value| check(value)).map_err(|problem| bad_flag(flag, &problem))?;
-    match given {
-        [] => Ok(vec![0.0; channels]),
-        &[all] => Ok(vec![all; channels]),
-        _ if given.len() == channels => Ok(given.to_vec()),
-        _ => Err(Failure::Usage(format!(
-            "--{flag}: {} values are given for {channels} channels; give one for each, or one for all",
-            given.len()
-        ))),
-    }
-}
-
-fn in_range(value: f64, most: f64, unit: &'static str, rule: String) -> Result<(), SpecProblem> {
-    let inside = value.abs() <= most;
-    if inside { Ok(()) } else { Err(SpecProblem::Range { value, unit, rule }) }
+    of_channels(&format!("--{flag}"), given, channels)
 }
 
 fn check_drift(ppm: f64) -> Result<(), SpecProblem> {
-    in_range(ppm, MOST_DRIFT, "ppm", format!("a clock is at most {MOST_DRIFT} ppm too fast or too slow"))
+    within(
+        ppm,
+        -MOST_DRIFT..=MOST_DRIFT,
+        "ppm",
+        format!("a clock is at most {MOST_DRIFT} ppm too fast or too slow"),
+    )
 }
 
 fn check_delay(seconds: f64, most: f64) -> Result<(), SpecProblem> {
-    in_range(
-        seconds,
-        most,
-        "s",
-        format!("a delay error is at most {MAX_LATENCY} fast periods; check its unit"),
-    )
+    let rule = format!("a delay error is at most {MAX_LATENCY} fast periods; check its unit");
+    within(seconds, -most..=most, "s", rule)
 }
 
 fn check_gain_error(error: f64) -> Result<(), SpecProblem> {
     let rule = format!(
         "an error of the gain is relative, -{MOST_GAIN_ERROR} to {MOST_GAIN_ERROR}; 0.01 is one per cent"
     );
-    in_range(error, MOST_GAIN_ERROR, "(relative)", rule)
+    within(error, -MOST_GAIN_ERROR..=MOST_GAIN_ERROR, "(relative)", rule)
 }
 
 impl CommonReport {
-    fn is_ideal(&self) -> bool {
-        self.noise == 0.0 && self.bits.is_none() && self.jitter == 0.0
-    }
-
     /// What differs from an ideal converter, in one line.
     pub(super) fn text(&self) -> String {
-        if self.is_ideal() {
-            return String::new();
-        }
         let noise = (self.noise > 0.0).then(|| format!("noise {} of full scale rms", self.noise));
         let jitter = (self.jitter > 0.0).then(|| format!("jitter {} rms", readable(self.jitter, "s")));
         let bits = self.bits.map(|bits| format!("{bits} bits"));
         let errors: Vec<String> = [noise, jitter, bits].into_iter().flatten().collect();
+        if errors.is_empty() {
+            return String::new();
+        }
         format!("converters: {}, seed {}\n", errors.join(", "), self.seed)
     }
 }
 
 impl ConverterReport {
-    fn is_ideal(&self) -> bool {
-        let Self { delay_error, gain, offset, drift, .. } = *self;
-        (delay_error, gain, offset, drift) == (0.0, 1.0, 0.0, 0.0)
-    }
-
     /// What differs from an ideal converter, in one line.
     pub(super) fn text(&self, channel: usize) -> String {
-        if self.is_ideal() {
+        let Self { delay, delay_error, gain, offset, drift, .. } = *self;
+        if (delay_error, gain, offset, drift) == (0.0, 1.0, 0.0, 0.0) {
             return String::new();
         }
-        let Self { gain, offset, drift, .. } = self;
-        let (delay, error) = (readable(self.delay, "s"), readable(self.delay_error, "s"));
+        let (delay, error) = (readable(delay, "s"), readable(delay_error, "s"));
         format!(
             "converter {channel}: delay {delay} (error {error}), gain {gain}, offset {offset}, drift {drift} ppm\n"
         )

@@ -1,7 +1,7 @@
 //! Tells on stderr what a long design is doing: a line that changes on a terminal, else a line every half
 //! minute.
 
-use crate::cli::say::say_line;
+use super::print::say_line;
 use crate::design::Stage;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use indicatif::{ProgressBar, ProgressStyle};

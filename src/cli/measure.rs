@@ -1,20 +1,19 @@
 //! `hybank measure`: the quality of a recording.
 
-mod chart;
-mod report;
-
-use super::Failure;
-use super::bank_file::{is_dash, name, refuse_overlap, write_bytes};
+use super::bank_file::{is_dash, name};
 use super::capture_args::CaptureArgs;
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading};
-use super::picture_format::PictureFormat;
+use super::match_bank::check_stdin;
+use super::measure_report::{chart, warnings};
+use super::plot::PictureFormat;
+use super::print::{Failure, InFile, show, warn};
+use super::written::{check_outputs, write_bytes};
 use crate::io::is_same_rate;
 use crate::measure::{
     Comparison, MeasureError, Measurement, Settings, Window, compare, measure, measure_complex,
 };
 use crate::quantity;
 use crate::units::Hertz;
-pub(super) use report::{column, warnings};
 use std::path::{Path, PathBuf};
 
 /// Measures a recording of a tone: SINAD, ENOB, SNR, THD, SFDR, noise density and spurs with their causes
@@ -40,8 +39,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "M", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     interleaved: u16,
     /// Window of the spectrum (SFDR, noise density, plot); SINAD, THD and the spurs need none
-    #[arg(long, value_enum, default_value_t = WindowArg::Bh7)]
-    window: WindowArg,
+    #[arg(long, value_enum, default_value_t)]
+    window: Window,
     /// Highest order of the harmonics in THD
     #[arg(long, value_name = "H", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1024))]
     harmonics: u16,
@@ -68,30 +67,6 @@ pub(super) struct Args {
     /// Print the figures as one JSON object
     #[arg(long)]
     json: bool,
-}
-
-/// Windows on the command line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum WindowArg {
-    /// No window
-    None,
-    /// Two terms
-    Hann,
-    /// Four-term Blackman-Harris, side lobes at -92 dB
-    Bh4,
-    /// Seven-term Blackman-Harris, side lobes at -180 dB
-    Bh7,
-}
-
-impl WindowArg {
-    fn window(self) -> Window {
-        match self {
-            Self::None => Window::None,
-            Self::Hann => Window::Hann,
-            Self::Bh4 => Window::Bh4,
-            Self::Bh7 => Window::Bh7,
-        }
-    }
 }
 
 /// A tone on the command line.
@@ -138,50 +113,43 @@ pub(super) fn tones(given: &[ToneArg]) -> Result<Vec<Hertz>, Failure> {
 
 /// What the command found.
 #[derive(Debug, serde::Serialize)]
-struct Report {
-    file: String,
+pub(super) struct Report {
+    pub(super) file: String,
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
-    measurement: Option<Measurement>,
+    pub(super) measurement: Option<Measurement>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    reference: Option<ReferenceReport>,
+    pub(super) reference: Option<ReferenceReport>,
     warnings: Vec<String>,
 }
 
 /// The comparison with a reference.
 #[derive(Debug, serde::Serialize)]
-struct ReferenceReport {
-    file: String,
+pub(super) struct ReferenceReport {
+    pub(super) file: String,
     #[serde(flatten)]
-    comparison: Comparison,
+    pub(super) comparison: Comparison,
 }
 
-/// Runs the command.
-///
-/// # Errors
-/// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check()?;
     let capture = CaptureFile::read_any(&args.file, args.reading())?.trimmed(&args.file, args.skip)?;
-    args.check_parts(&capture)?;
+    if capture.imaginary.is_some() && args.reference.is_some() {
+        let problem = "complex samples, and --ref compares real ones; extract a part of both recordings";
+        return Err(Failure::of(&args.file, problem));
+    }
     let settings = args.settings(&capture)?;
-    let measurement = match args.reference.is_some() && args.tone.is_empty() {
-        true => None,
-        false => Some(measured(&capture, &settings).map_err(|e| args.named(&e))?),
-    };
-    let reference = match &args.reference {
-        None => None,
-        Some(path) => Some(args.compared(&capture, path)?),
-    };
+    let is_measured = args.reference.is_none() || !args.tone.is_empty();
+    let measurement = is_measured.then(|| measured(&capture, &settings)).transpose().in_file(&args.file)?;
+    let reference = args.reference.as_ref().map(|path| args.compared(&capture, path)).transpose()?;
     let warnings = measurement.as_ref().map(warnings).unwrap_or_default();
     let report = Report { file: name(&args.file), measurement, reference, warnings };
     if let Some(path) = &args.plot {
-        let (chart, marks) = chart::chart(&report, &settings, &capture);
+        let (chart, marks) = chart(&report, &settings, &capture);
         let format = PictureFormat::of(path).unwrap_or(PictureFormat::Svg);
-        let picture = format.file(&chart, &marks).map_err(|e| args.named(&e))?;
-        write_bytes(path, &picture, args.force)?;
+        write_bytes(path, &format.file(&chart, &marks).in_file(&args.file)?, args.force)?;
     }
-    report.warnings.iter().for_each(|warning| super::warn(&format!("{}: {warning}", report.file)));
-    if args.json { super::print_json(&report) } else { super::print(&report.text()) }
+    report.warnings.iter().for_each(|warning| warn(&format!("{}: {warning}", report.file)));
+    show(&report, args.json, Report::text)
 }
 
 fn measured(capture: &CaptureFile, settings: &Settings) -> Result<Measurement, MeasureError> {
@@ -192,32 +160,19 @@ fn measured(capture: &CaptureFile, settings: &Settings) -> Result<Measurement, M
 }
 
 impl Args {
-    /// A comparison is one of real samples.
-    fn check_parts(&self, capture: &CaptureFile) -> Result<(), Failure> {
-        match capture.imaginary.is_some() && self.reference.is_some() {
-            true => Err(self
-                .named(&"complex samples, and --ref compares real ones; extract a part of both recordings")),
-            false => Ok(()),
-        }
-    }
-
     /// Refuses impossible combinations of options, before any file is read.
     fn check(&self) -> Result<(), Failure> {
         self.reading.check(false)?;
+        let inputs: Vec<&Path> =
+            [Some(&self.file), self.reference.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
         if let Some(plot) = &self.plot {
             if is_dash(plot) {
                 let message = "the figures go to standard output; write the plot to a file";
                 return Err(Failure::Usage(format!("--plot -: {message}")));
             }
-            let inputs = [Some(&self.file), self.reference.as_ref()];
-            inputs.into_iter().flatten().try_for_each(|input| refuse_overlap(plot, input))?;
+            check_outputs(&[plot], &inputs)?;
         }
-        match &self.reference {
-            Some(reference) if is_dash(reference) && is_dash(&self.file) => {
-                Err(Failure::Usage("`-` is given twice; standard input can be only one of them".into()))
-            }
-            _ => Ok(()),
-        }
+        check_stdin(inputs.into_iter())
     }
 
     fn reading(&self) -> Reading {
@@ -235,31 +190,27 @@ impl Args {
             harmonics: self.harmonics.into(),
             full_scale: self.full_scale,
             rails: capture.rails.unwrap_or_else(|| float_rails(capture, self.full_scale)),
-            window: self.window.window(),
+            window: self.window,
         })
     }
 
     fn compared(&self, capture: &CaptureFile, path: &Path) -> Result<ReferenceReport, Failure> {
-        let reference =
-            CaptureFile::read(path, Reading::channel(None, MOST_MEASURED))?.trimmed(path, self.skip)?;
-        if !is_same_rate(reference.rate.0, capture.rate.0, 0.0) {
-            return Err(Failure::Input(format!(
-                "{}: the sample rate is {}, but {} has {}; a comparison needs one rate, resample one of them",
-                name(path),
-                reference.rate,
-                name(&self.file),
-                capture.rate
-            )));
+        let reading = Reading::channel(None, MOST_MEASURED);
+        let reference = CaptureFile::read(path, reading)?.trimmed(path, self.skip)?;
+        let file = name(&self.file);
+        let (own, other) = (capture.rate, reference.rate);
+        if !is_same_rate(other.0, own.0, 0.0) {
+            return Err(Failure::of(
+                path,
+                format!(
+                    "the sample rate is {other}, but {file} has {own}; a comparison needs one rate, resample one of them"
+                ),
+            ));
         }
-        let comparison = compare(&capture.samples, &reference.samples, capture.rate, self.window.window());
-        let comparison = comparison.map_err(|error| {
-            Failure::Input(format!("{} against {}: {error}", name(&self.file), name(path)))
-        })?;
+        let comparison = compare(&capture.samples, &reference.samples, own, self.window);
+        let comparison =
+            comparison.map_err(|error| Failure::Input(format!("{file} against {}: {error}", name(path))))?;
         Ok(ReferenceReport { file: name(path), comparison })
-    }
-
-    fn named(&self, error: &dyn std::fmt::Display) -> Failure {
-        Failure::Input(format!("{}: {error}", name(&self.file)))
     }
 }
 

@@ -1,24 +1,17 @@
 //! `hybank simulate`: the captures of virtual slow converters.
 
-mod converters;
-mod outputs;
-mod signal;
-
-use self::converters::{CommonReport, ConverterArgs, ConverterReport, Converters};
-use self::outputs::{Kind, Output, Rates, number, outputs};
-use self::signal::{Signal, SignalArgs};
-use super::Failure;
 use super::bank_file::load_spec_or_bank;
-use super::folder::write_together;
-use super::recordings::{Mono, begin_recording};
-use super::say::name_leftovers;
+use super::print::{Failure, InFile, show, warn};
+use super::virtual_converters::{CommonReport, ConverterArgs, ConverterReport, Converters};
+use super::virtual_signal::{Signal, SignalArgs};
+use super::written::{Mono, begin_recording, check_outputs, write_together};
 use crate::design::Problem;
-use crate::files::refuse_overlaps;
-use crate::io::{Container, SampleWriter};
+use crate::io::{Container, SampleWriter, is_same_rate};
 use crate::overview::{counted, understood};
 use crate::quantity::readable;
 use crate::simulate::{Converter, target};
 use crate::spec::Spec;
+use crate::units::Hertz;
 use std::path::PathBuf;
 
 /// Simulates what the slow converters capture
@@ -96,28 +89,21 @@ struct Report {
     warnings: Vec<String>,
 }
 
-/// Runs the command.
-///
-/// # Errors
-/// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     if !args.gain.is_finite() {
         return Err(Failure::Usage(format!("--gain {} is not a finite number", args.gain)));
     }
     let spec = load_spec_or_bank(&args.spec)?;
-    let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", args.spec.display()));
     // The converters do not know what the spec says of the signal. Without latency the target lies on the
     // time axis of the output of `fuse`.
-    let unweighted = Spec { signal: None, ..spec.clone() };
-    let problem = Problem::new(&unweighted, 0).map_err(|error| named(&error))?;
+    let problem = Problem::new(&Spec { signal: None, ..spec.clone() }, 0).in_file(&args.spec)?;
     let signal = Signal::read(&args.signal, &spec)?;
     let kind = args.kind(signal.is_complex())?;
-    let (rates, mut warnings) = Rates::of(&spec, kind).map_err(|message| named(&message))?;
+    let (rates, mut warnings) = Rates::of(&spec, kind).in_file(&args.spec)?;
     warnings.extend(signal.warning(&spec));
     let Converters { common, each } = args.converters.converters(&spec, signal.parts())?;
-    let jittered = args.converters.is_jittered();
-    let frames = signal.frames(&problem, args.samples, jittered)?;
-    let outputs = outputs(&args.output, kind, signal.is_complex(), &rates, spec.channels.len());
+    let frames = signal.frames(&problem, args.samples, args.converters.is_jittered())?;
+    let outputs = args.outputs(kind, signal.is_complex(), &rates, spec.channels.len());
     args.check_outputs(&outputs)?;
     let (converters, mut reports): (Vec<_>, Vec<_>) = each.into_iter().unzip();
     let run = Run { args, problem: &problem, signal: &signal, frames };
@@ -126,32 +112,31 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let recordings = outputs.iter().zip(captures.chain(std::iter::once_with(|| run.target())));
     run.write(recordings, kind.container())?;
     let files: Vec<String> = outputs.iter().map(|output| output.path.display().to_string()).collect();
-    warnings.extend(clipping(&files, &reports));
-    Report {
+    let clipped = files.iter().zip(&reports).filter(|(_, report)| report.clipped > 0);
+    warnings.extend(
+        clipped
+            .map(|(file, report)| format!("{file}: {} samples were clipped at full scale", report.clipped)),
+    );
+    let report = Report {
         understood: understood(&spec),
+        is_complex: signal.is_complex(),
         source: signal.text,
         files,
         frames,
-        is_complex: signal.imaginary.is_some(),
         slow_rate: number(rates.slow),
         fast_rate: number(rates.fast),
         latency: spec.latency,
         common,
         converters: reports,
         warnings,
-    }
-    .print(args.json)
+    };
+    report.warnings.iter().for_each(|warning| warn(warning));
+    show(&report, args.json, Report::text)
 }
 
 /// A rate with its unit.
 fn rate(hertz: &serde_json::Value) -> String {
     hertz.as_f64().map_or_else(|| hertz.to_string(), |hertz| readable(hertz, "S/s"))
-}
-
-/// Warnings of converters that clipped.
-fn clipping<'a>(files: &'a [String], reports: &'a [ConverterReport]) -> impl Iterator<Item = String> + 'a {
-    let clipped = files.iter().zip(reports).filter(|(_, report)| report.clipped > 0);
-    clipped.map(|(file, report)| format!("{file}: {} samples were clipped at full scale", report.clipped))
 }
 
 /// Real parts, and imaginary parts of complex samples.
@@ -206,10 +191,10 @@ impl Run<'_> {
         let mut all = parts.0.iter().chain(parts.1.iter().flatten());
         match all.find(|x| x.is_nan() || x.abs() > f64::from(f32::MAX)) {
             None => Ok(parts),
-            Some(x) => Err(Failure::Input(format!(
-                "{}: a captured sample is {x:e}, beyond the range of a 32-bit float; use a smaller --gain",
-                self.signal.given
-            ))),
+            Some(x) => {
+                let rule = "beyond the range of a 32-bit float; use a smaller --gain";
+                Err(Failure::Input(format!("{}: a captured sample is {x:e}, {rule}", self.signal.given)))
+            }
         }
     }
 }
@@ -227,26 +212,30 @@ impl Args {
         }
     }
 
+    /// The recordings of the channels and of the target, in this order.
+    fn outputs(&self, kind: Kind, is_complex: bool, rates: &Rates, channels: usize) -> Vec<Output> {
+        let slow = (1..=channels).map(|i| (format!("ch{i}"), rates.slow));
+        let names = slow.chain([("target".to_owned(), rates.fast)]);
+        let extension = kind.extension(is_complex);
+        names
+            .map(|(name, rate)| Output { path: self.output.join(format!("{name}.{extension}")), rate })
+            .collect()
+    }
+
     /// Refuses outputs that are inputs.
     fn check_outputs(&self, outputs: &[Output]) -> Result<(), Failure> {
         let files: Vec<_> = outputs.iter().flat_map(|output| SampleWriter::files(&output.path)).collect();
         let files: Vec<_> = files.iter().map(PathBuf::as_path).collect();
         let inputs: Vec<_> = std::iter::once(self.spec.as_path()).chain(self.signal.names()).collect();
-        refuse_overlaps(&files, &inputs).map_err(Failure::input)?;
-        name_leftovers(&files);
-        Ok(())
+        check_outputs(&files, &inputs)
     }
 }
 
 impl Report {
-    fn print(&self, json: bool) -> Result<(), Failure> {
-        self.warnings.iter().for_each(|warning| super::warn(warning));
-        if json {
-            return super::print_json(self);
-        }
+    fn text(&self) -> String {
         let each = self.converters.iter().zip(1..).map(|(converter, channel)| converter.text(channel));
         let each: String = each.collect();
-        super::print(&format!(
+        format!(
             "{}\nsource: {}\n{} at {}, target at {} in line with the output of fuse:\n  {}\n{}{each}",
             self.understood,
             self.source,
@@ -255,6 +244,84 @@ impl Report {
             rate(&self.fast_rate),
             self.files.join("\n  "),
             self.common.text()
-        ))
+        )
     }
+}
+
+/// Fast rate in the headers of captures in normalised time.
+const NORMALISED_RATE: Hertz = Hertz(48_000.0);
+
+/// The kind of the files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Kind {
+    /// ch1.wav, real samples only
+    Wav,
+    /// ch1.sigmf-meta and ch1.sigmf-data
+    Sigmf,
+    /// ch1.f32, for complex samples ch1.cf32: little-endian 32-bit floats
+    Raw,
+}
+
+impl Kind {
+    fn container(self) -> Container {
+        if self == Self::Raw { Container::Raw } else { Container::Wav }
+    }
+
+    fn extension(self, is_complex: bool) -> &'static str {
+        match self {
+            Self::Wav => "wav",
+            Self::Sigmf => "sigmf-meta",
+            Self::Raw if is_complex => "cf32",
+            Self::Raw => "f32",
+        }
+    }
+}
+
+/// A recording to be written.
+struct Output {
+    path: PathBuf,
+    /// Hertz.
+    rate: f64,
+}
+
+/// Rates of the headers, hertz.
+struct Rates {
+    slow: f64,
+    fast: f64,
+}
+
+impl Rates {
+    /// Of a spec; WAV headers hold whole hertz, and the warnings say so.
+    fn of(spec: &Spec, kind: Kind) -> Result<(Self, Vec<String>), String> {
+        let ratio = spec.ratio as f64;
+        let exact = if spec.is_normalised() {
+            (NORMALISED_RATE / ratio).0.round().max(1.0)
+        } else {
+            (spec.fast_period * ratio).rate().0
+        };
+        let exact = Self { slow: exact, fast: exact * ratio };
+        if kind == Kind::Wav { exact.whole() } else { Ok((exact, Vec::new())) }
+    }
+
+    fn whole(self) -> Result<(Self, Vec<String>), String> {
+        let Self { slow, fast } = self;
+        if fast > f64::from(u32::MAX) || slow < 0.5 {
+            return Err(format!(
+                "the rates of {slow} Hz and {fast} Hz do not fit a WAV header (1 to {} Hz); write SigMF recordings \
+                 with --to sigmf",
+                u32::MAX
+            ));
+        }
+        let uneven = [slow, fast].into_iter().filter(|rate| !is_same_rate(rate.round(), *rate, 0.0));
+        let warning =
+            |rate: f64| format!("WAV headers hold whole hertz: {rate} Hz is written as {} Hz", rate.round());
+        let warnings = uneven.map(warning).collect();
+        Ok((Self { slow: slow.round(), fast: fast.round() }, warnings))
+    }
+}
+
+/// A rate as JSON: without a decimal point if it is whole.
+fn number(rate: f64) -> serde_json::Value {
+    let is_whole = rate.fract() == 0.0 && rate < (1u64 << 53) as f64;
+    if is_whole { (rate as u64).into() } else { rate.into() }
 }

@@ -1,0 +1,301 @@
+//! `hybank calibrate`: delays, gains, offsets and cut-offs of the channels from captures.
+
+use super::bank_file::{is_dash, parse_spec, read_kind};
+use super::calibrate_report::Report;
+use super::capture_args::{CaptureArgs, TurnArgs};
+use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, Whole, start};
+use super::file_kind::FileKind;
+use super::interrupt::interrupts;
+use super::match_bank::check_stdin;
+use super::measure::{ToneArg, tone, tones};
+use super::print::{Failure, say_understood};
+use super::written::{check_outputs, write_text};
+use crate::calibrate::{Evidence, Fit, Record, Settings, applied, calibrate};
+use crate::io::{MultiReader, PcmFormat, ReadOptions};
+use crate::spec::{DesignOverrides, Spec};
+use crate::units::{FastPeriods, Hertz};
+use std::path::{Path, PathBuf};
+
+/// Most samples of all channels together: 512 MiB as doubles.
+const MOST_SAMPLES: usize = 1 << 26;
+
+/// Measures delay, gain and offset of each channel from captures, with 95 % intervals
+///
+/// Fits what the captures say of the channels, relative to a reference channel, and writes the spec with
+/// these values and an [uncertainty] table with the half-widths of their intervals. Everything else of the
+/// spec is kept.
+///
+/// The captures hold sine tones (--tone, the default), a waveform that is known (--training), or any signal
+/// that leaves fewer aliases occupied than there are channels (--blind). Complex captures hold tones.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  hybank calibrate spec.toml tone1.wav tone2.wav -o measured.toml --tone 1.2kHz
+  hybank calibrate spec.toml tones1.wav tones2.wav -o measured.toml --tone 1kHz,5kHz,9kHz \\
+      --fit delay,gain,offset,cutoff
+  hybank calibrate spec.toml adc.wav --interleaved 4 -o measured.toml --check other.wav
+  hybank calibrate spec.toml ch1.wav ch2.wav -o measured.toml --training chirp.wav
+  hybank calibrate spec.toml ch1.wav ch2.wav -o measured.toml --blind
+
+A tone may lie in any Nyquist zone of the slow rate. `auto` finds tones below half the fast rate and
+takes their zones from the delays of the spec.")]
+pub(super) struct Args {
+    /// The spec (TOML) with the nominal values; `-` is standard input
+    spec: PathBuf,
+    /// One mono recording per channel (WAV, SigMF, .csv, .npy, .mat, or raw with --format), in the order of
+    /// the spec, or one of N channels
+    #[arg(required = true)]
+    captures: Vec<PathBuf>,
+    /// The calibrated spec; `-` is standard output
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Frequencies of tones (Hz, kHz, MHz, GHz; hertz if left out) to about 100 ppm, or auto; of complex
+    /// samples also negative
+    #[arg(long, value_name = "F,..|auto", value_delimiter = ',', value_parser = tone,
+          conflicts_with_all = ["training", "blind"], allow_hyphen_values = true)]
+    tone: Vec<ToneArg>,
+    /// A mono recording of the waveform that was played
+    #[arg(long, value_name = "WAV", conflicts_with = "blind")]
+    training: Option<PathBuf>,
+    /// Use whatever signal the captures hold
+    #[arg(long)]
+    blind: bool,
+    /// The channel to which the others are relative, from 1 [default: that of the spec's uncertainty table,
+    /// or 1]
+    #[arg(long, value_name = "I")]
+    reference: Option<usize>,
+    /// What to fit; the rest keeps the values of the spec
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "delay,gain,offset")]
+    fit: Vec<Value>,
+    /// Captures of the same converters to check the calibrated spec with, of the same kind of signal
+    #[arg(long, value_name = "HOLDOUT", num_args = 1..)]
+    check: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: CaptureArgs,
+    #[command(flatten)]
+    turns: TurnArgs,
+    /// Samples of this size and more are clipped and left out [default: the ends of integer formats, 1 for
+    /// floats none of which is beyond]
+    #[arg(long, value_name = "LEVEL")]
+    clip: Option<f64>,
+    /// Replace an existing output
+    #[arg(long)]
+    force: bool,
+    /// Print a report as one JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+/// A value of a channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Value {
+    /// Delays
+    Delay,
+    /// Gains
+    Gain,
+    /// Offsets
+    Offset,
+    /// Cut-off frequencies of the front ends
+    Cutoff,
+}
+
+/// What is known of the signal that the captures hold.
+enum Signal {
+    Tones(Vec<Hertz>),
+    Waveform { samples: Vec<f64>, spacing: FastPeriods },
+    Any,
+}
+
+impl Signal {
+    fn evidence(&self) -> Evidence<'_> {
+        match self {
+            Self::Tones(list) => Evidence::Tones(list),
+            Self::Waveform { samples, spacing } => Evidence::Waveform { samples, spacing: *spacing },
+            Self::Any => Evidence::AnySignal,
+        }
+    }
+}
+
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    args.check_usage()?;
+    let text = read_kind(&args.spec, FileKind::Spec)?;
+    let spec = parse_spec(&text, &args.spec, DesignOverrides::default())?;
+    say_understood(Some(&spec));
+    let settings = args.settings(&spec)?;
+    let signal = args.signal(&spec)?;
+    let (records, mut warnings) = args.read(&args.captures, &spec)?;
+    let found = calibrate(&spec, &records, signal.evidence(), settings).map_err(Failure::input)?;
+    let (calibrated, remarks) = applied(&spec, &found);
+    let mut report = Report::new(&spec, &found);
+    report.remark(&remarks);
+    if !args.check.is_empty() {
+        let (records, tolerated) = args.read(&args.check, &spec)?;
+        warnings.extend(tolerated);
+        let held_out = match signal.evidence() {
+            // Held-out tones have other frequencies.
+            Evidence::Tones(_) => Evidence::Tones(&[]),
+            evidence => evidence,
+        };
+        let checked = calibrate(&calibrated, &records, held_out, settings)
+            .map_err(|error| Failure::Input(format!("the held-out captures: {error}")))?;
+        report.check(&calibrated, &found, &checked);
+    }
+    report.warnings.splice(0..0, warnings);
+    let written = calibrated.to_toml_like(&text).map_err(|problem| {
+        Failure::Input(format!("the values found make no spec: {problem}; nothing was written"))
+    })?;
+    write_text(&args.output, &written, args.force)?;
+    report.print(&args.output, args.json)
+}
+
+impl Args {
+    /// Refuses impossible combinations of options, before any file is read.
+    fn check_usage(&self) -> Result<(), Failure> {
+        self.turns.check(self.captures.len())?;
+        self.reading.check(self.turns.is_given())?;
+        if !self.check.is_empty() {
+            self.turns.check(self.check.len())?;
+        }
+        if self.json && is_dash(&self.output) {
+            let message = "--json and `-o -` both want standard output; write the spec to a file";
+            return Err(Failure::Usage(message.into()));
+        }
+        let inputs = self.captures.iter().chain(&self.check).chain(&self.training).chain([&self.spec]);
+        let inputs: Vec<&Path> = inputs.map(PathBuf::as_path).collect();
+        check_stdin(inputs.iter().copied())?;
+        if let Some(level) = self.clip.filter(|level| level.is_nan() || *level <= 0.0) {
+            return Err(Failure::Usage(format!("--clip {level} is not a positive level")));
+        }
+        check_outputs(&[&self.output], &inputs)
+    }
+
+    /// One record per channel of `spec`, and what was tolerated.
+    fn read(&self, paths: &[PathBuf], spec: &Spec) -> Result<(Vec<Record>, Vec<String>), Failure> {
+        let turns = self.turns.by_delay(&spec.delays_in_fast_periods(), spec.ratio, &self.spec)?;
+        let captures = self.reading.options(paths.len(), spec.channels.len());
+        let mut reader =
+            start(paths, ReadOptions { interleaving: turns.as_ref(), ..captures }, interrupts())?;
+        check_channels(spec, &reader)?;
+        check_rate(spec, &reader)?;
+        let parts = if reader.is_complex() { 2 } else { 1 };
+        let most = MOST_SAMPLES / (parts * reader.channels()).max(1);
+        let headers = reader.headers();
+        let formats = headers
+            .flat_map(|(_, header)| std::iter::repeat_n(header.layout.format, parts * header.channels));
+        let formats: Vec<PcmFormat> = formats.collect();
+        let Whole { channels, is_cut } = Whole::read_parts(&mut reader, most)?;
+        let mut warnings: Vec<String> = reader.warnings().iter().map(ToString::to_string).collect();
+        if is_cut {
+            warnings.push(format!("only the first {most} frames are used"));
+        }
+        let records = channels.into_iter().zip(formats);
+        let mut records = records.map(|(samples, format)| record(samples, format, self.clip));
+        let mut all = Vec::new();
+        while let Some(real) = records.next() {
+            let imaginary = if parts == 2 { records.next() } else { None };
+            all.push(match imaginary {
+                Some(imaginary) => Record::complex(real, imaginary),
+                None => real,
+            });
+        }
+        Ok((all, warnings))
+    }
+
+    fn settings(&self, spec: &Spec) -> Result<Settings, Failure> {
+        let fits = |value| self.fit.contains(&value);
+        let fit = Fit {
+            delay: fits(Value::Delay),
+            gain: fits(Value::Gain),
+            offset: fits(Value::Offset),
+            cutoff: fits(Value::Cutoff),
+        };
+        let known = spec.uncertainty.as_ref().and_then(|table| table.reference_channel());
+        let reference = match self.reference {
+            Some(0) => return Err(Failure::Usage("--reference 0: channels count from 1".into())),
+            Some(channel) => channel - 1,
+            None => known.unwrap_or(0),
+        };
+        Ok(Settings { fit, reference })
+    }
+
+    fn signal(&self, spec: &Spec) -> Result<Signal, Failure> {
+        if self.blind {
+            return Ok(Signal::Any);
+        }
+        if let Some(path) = &self.training {
+            let reading = Reading::channel(None, MOST_MEASURED);
+            let CaptureFile { samples, rate, .. } = CaptureFile::read(path, reading)?.finite(path)?;
+            // In normalised time the recording's own rate is the fast rate.
+            let spacing = if spec.is_normalised() {
+                FastPeriods(1.0)
+            } else {
+                rate.period().in_fast_periods(spec.fast_period)
+            };
+            return Ok(Signal::Waveform { samples, spacing });
+        }
+        tones(&self.tone).map(Signal::Tones)
+    }
+}
+
+fn check_channels(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
+    let (wanted, given) = (spec.channels.len(), reader.channels());
+    if given == wanted {
+        return Ok(());
+    }
+    let names: Vec<&str> = reader.headers().map(|(name, _)| name).collect();
+    Err(Failure::Input(format!(
+        "the spec has {wanted} channels, but the captures have {given} ({}); give one mono recording per channel, \
+         one of {wanted} channels, or one in which the converters take turns and --interleaved {wanted}",
+        names.join(", ")
+    )))
+}
+
+/// The captures have the slow rate of the spec, as far as they state it; any for a spec in normalised time.
+fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
+    let wanted = (spec.fast_period * spec.ratio as f64).rate().0;
+    let wrong = reader.headers().find_map(|(name, header)| Some((name, header.other_rate(wanted)?)));
+    match wrong {
+        Some((name, rate)) if !spec.is_normalised() => Err(Failure::Input(format!(
+            "{name}: the sample rate is {rate} Hz, but the spec says {wanted} Hz; record at that rate or correct the spec"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Integers clip at the ends of their range. Floats within +-1 clip there, or at 1 - q if that is their
+/// largest value and all are multiples of q, a power of two: the steps of a converter.
+fn record(samples: Vec<f64>, format: PcmFormat, clip: Option<f64>) -> Record {
+    if let Some(level) = clip {
+        return Record::within(samples, -level, level);
+    }
+    match format {
+        _ if !format.is_float() => {
+            let step = 2f64.powi(1 - 8 * format.bytes() as i32);
+            Record::within(samples, -1.0, 1.0 - step)
+        }
+        _ if samples.iter().all(|x| x.is_nan() || x.abs() <= 1.0) => {
+            let top = samples.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let step = 1.0 - top;
+            let is_code = |x: &f64| x.is_nan() || (x / step).fract() == 0.0;
+            let is_quantised = step > 0.0 && step.log2().fract() == 0.0 && samples.iter().all(is_code);
+            Record::within(samples, -1.0, if is_quantised { top } else { 1.0 })
+        }
+        _ => Record::new(samples),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integers_clip_at_the_ends_of_their_range_and_floats_at_one() {
+        let clipped = |samples: &[f64], format, clip| record(samples.to_vec(), format, clip).clipped;
+        assert_eq!(clipped(&[-1.0, 0.0, 32767.0 / 32768.0, 0.99], PcmFormat::S16Le, None), 2);
+        assert_eq!(clipped(&[-1.0, 0.0, 1.0, 0.99], PcmFormat::F32Le, None), 2);
+        assert_eq!(clipped(&[-1.0, 0.0, 2047.0 / 2048.0, 0.5], PcmFormat::F32Le, None), 2);
+        assert_eq!(clipped(&[-1.0, 0.0, 0.9375, 0.9], PcmFormat::F32Le, None), 1);
+        assert_eq!(clipped(&[-1.0, 0.0, 1.5, 0.99], PcmFormat::F32Le, None), 0);
+        assert_eq!(clipped(&[-1.0, 0.0, 1.5, 0.99], PcmFormat::F32Le, Some(0.99)), 3);
+    }
+}

@@ -1,0 +1,236 @@
+//! `hybank report`: all that is known of a bank, on one page.
+
+use super::bank_file::{load, name};
+use super::capture_file::{Whole, start};
+use super::fused::fused;
+use super::match_bank::{check_channels, output_rate};
+use super::print::{Failure, InFile, warn};
+use super::written::{check_outputs, write_text};
+use crate::bank::Bank;
+use crate::design::DesignError;
+use crate::io::ReadOptions;
+use crate::overview::{ChannelFact, Fact, Facts, change, pictures, spectra};
+use crate::pipeline::Settings;
+use crate::plot::{Chart, PlotError};
+use crate::simulate::interleaved;
+use crate::units::Hertz;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use std::path::{Path, PathBuf};
+
+/// Writes a page (HTML) about a bank: what it is for, its error with the proven bounds, its filters, its
+/// cost
+///
+/// The page is one file that loads nothing. With captures it also shows their spectra, plainly interleaved
+/// and fused by the bank.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  hybank report bank.json -o report.html
+  hybank report bank.json ch1.wav ch2.wav -o report.html")]
+pub(super) struct Args {
+    /// The bank (JSON)
+    bank: PathBuf,
+    /// Captures to fuse, as `hybank fuse` takes them: one mono file per channel, or one of N channels
+    inputs: Vec<PathBuf>,
+    /// The page; `-` is standard output
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Replace an existing file
+    #[arg(long)]
+    force: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    let inputs: Vec<&Path> = args.inputs.iter().chain([&args.bank]).map(PathBuf::as_path).collect();
+    check_outputs(&[&args.output], &inputs)?;
+    let bank = load(&args.bank)?;
+    let Some(spec) = &bank.spec else { return Err(Failure::of(&args.bank, DesignError::NoSpec)) };
+    let mut figures = Vec::new();
+    for picture in pictures(&bank).in_file(&args.bank)? {
+        figures.push(Figure::new(&picture.chart, picture.caption).in_file(&args.bank)?);
+    }
+    let spectra = if args.inputs.is_empty() { None } else { Some(spectra_of(&bank, args)?) };
+    let page = Page {
+        facts: Facts::new(&bank, spec).in_file(&args.bank)?,
+        figures,
+        spectra,
+        spec: spec.to_toml().in_file(&args.bank)?,
+        commands: args.commands(),
+    };
+    write_text(&args.output, &page.html(), args.force)
+}
+
+impl Args {
+    /// The command lines that lead to what the page shows.
+    fn commands(&self) -> Vec<String> {
+        let bank = self.bank.display();
+        let inputs: String = self.inputs.iter().map(|path| format!(" {}", path.display())).collect();
+        let mut commands = vec![
+            "hybank design spec.toml -o bank.json  # the spec above, saved as spec.toml".to_owned(),
+            format!("hybank verify {bank}"),
+            format!("hybank analyze {bank} --sensitivity"),
+            format!("hybank plot {bank} -o pictures"),
+        ];
+        if !self.inputs.is_empty() {
+            commands.push(format!("hybank fuse {bank}{inputs} -o fused.wav"));
+        }
+        commands.push(format!("hybank report {bank}{inputs} -o {}", self.output.display()));
+        commands
+    }
+}
+
+/// Frames that are used; more would only make the lines denser.
+const MOST_FRAMES: usize = 1 << 20;
+/// Frames that the spectra need.
+const LEAST_FRAMES: usize = 16;
+
+/// The spectra of the captures, plainly interleaved and fused by the bank.
+fn spectra_of(bank: &Bank, args: &Args) -> Result<Figure, Failure> {
+    let mut reader = start(&args.inputs, ReadOptions::files(), crossbeam_channel::never())?;
+    check_channels(bank, &args.bank, &reader)?;
+    let rate = Hertz(output_rate(bank, &reader)?);
+    let Whole { mut channels, is_cut } = Whole::read(&mut reader, MOST_FRAMES)?;
+    reader.warnings().iter().for_each(|warning| warn(&warning.to_string()));
+    let names = args.inputs.iter().map(|input| name(input)).collect::<Vec<_>>().join(", ");
+    let frames = channels.iter().map(Vec::len).min().unwrap_or(0);
+    if frames < LEAST_FRAMES {
+        return Err(Failure::Input(format!(
+            "{names}: {frames} frames, and a spectrum needs {LEAST_FRAMES}; give longer captures, or none"
+        )));
+    }
+    let mut part = "the captures".to_owned();
+    if is_cut {
+        warn(&format!("{names}: only the first {frames} frames are on the page"));
+        part = format!("the first {frames} frames of the captures");
+    }
+    // What was lost is a zero, as `fuse` has it without --gaps.
+    channels.iter_mut().flatten().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
+    let fused = fused(bank, &channels, Settings::default())?;
+    let interleaved = interleaved(&bank.delays_in_fast_periods(), bank.ratio, 0, &channels);
+    let chart = spectra(rate, &[("plain interleaving", &interleaved[..]), ("fused", &fused)]);
+    let caption = format!(
+        "The spectra of {part}, interleaved as if they were taken in turn, and fused by the bank. Lines that only \
+         the first has are images of the signal: errors of the converters' instants and filters."
+    );
+    Figure::new(&chart, &caption).map_err(Failure::input)
+}
+
+const STYLE: &str = "
+:root { color-scheme: light; }
+body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 0 auto; padding: 1rem; }
+h1 { font-size: 1.5rem; margin: 0.5rem 0 0; } h2 { font-size: 1.15rem; margin: 2rem 0 0.5rem; }
+.understood { color: #555; margin-top: 0.25rem; }
+table { border-collapse: collapse; width: 100%; }
+th, td { text-align: left; vertical-align: top; padding: 0.3rem 1rem 0.3rem 0; border-bottom: 1px solid #ddd; }
+td.value { font-variant-numeric: tabular-nums; white-space: nowrap; }
+figure { margin: 1.5rem 0; } figure div { overflow-x: auto; }
+figure svg { display: block; width: 100%; min-width: 42rem; height: auto; }
+figcaption { color: #555; }
+pre { background: #f5f5f5; padding: 0.8rem; overflow-x: auto; font-size: 0.85rem; }
+@media (max-width: 40rem) { .facts td, .facts th { display: block; border: 0; padding-right: 0; }
+  .facts tr { display: block; border-bottom: 1px solid #ddd; padding: 0.4rem 0; } td.value { white-space: normal; } }
+";
+
+/// A chart in the page.
+struct Figure {
+    svg: String,
+    caption: String,
+}
+
+impl Figure {
+    fn new(chart: &Chart, caption: &str) -> Result<Self, PlotError> {
+        Ok(Self { svg: chart.to_svg()?, caption: caption.to_owned() })
+    }
+
+    fn html(&self) -> Markup {
+        html! {
+            figure {
+                div { (PreEscaped(&self.svg)) }
+                figcaption { (self.caption) }
+            }
+        }
+    }
+}
+
+/// All that the page shows.
+struct Page {
+    facts: Facts,
+    figures: Vec<Figure>,
+    /// The captures, if there are any.
+    spectra: Option<Figure>,
+    /// TOML.
+    spec: String,
+    commands: Vec<String>,
+}
+
+impl Page {
+    /// A document that loads nothing.
+    fn html(&self) -> String {
+        let Facts { title, understood, error, cost, channels } = &self.facts;
+        let page = html! {
+            (DOCTYPE)
+            html lang="en" {
+                head {
+                    meta charset="utf-8";
+                    meta name="viewport" content="width=device-width, initial-scale=1";
+                    link rel="icon" href="data:,";
+                    title { (title) " - hybank" }
+                    style { (PreEscaped(STYLE)) }
+                }
+                body {
+                    h1 { (title) }
+                    p class="understood" { (understood) }
+                    h2 { "Error" }
+                    (facts(error))
+                    h2 { "Cost" }
+                    (facts(cost))
+                    h2 { "Channels" }
+                    (channel_table(channels))
+                    @if let Some(spectra) = &self.spectra {
+                        h2 { "Captures" }
+                        (spectra.html())
+                    }
+                    h2 { "Pictures" }
+                    @for figure in &self.figures { (figure.html()) }
+                    h2 { "Spec" }
+                    pre { (self.spec) }
+                    h2 { "Commands" }
+                    pre { (self.commands.join("\n")) }
+                    p class="understood" { "hybank " (env!("CARGO_PKG_VERSION")) }
+                }
+            }
+        };
+        page.into_string() + "\n"
+    }
+}
+
+fn facts(facts: &[Fact]) -> Markup {
+    html! {
+        table class="facts" {
+            @for fact in facts {
+                tr { th { (fact.name) } td class="value" { (fact.value) } td { (fact.meaning) } }
+            }
+        }
+    }
+}
+
+fn channel_table(channels: &[ChannelFact]) -> Markup {
+    html! {
+        table {
+            tr { th { "channel" } th { "delay" } th { "gain" } th { "gamma, if the delay is 0.001 samples longer" } }
+            @for (channel, number) in channels.iter().zip(1..) {
+                tr {
+                    td { (number) }
+                    td class="value" { (channel.delay) }
+                    td class="value" { (channel.gain) }
+                    td class="value" {
+                        @match channel.sensitivity {
+                            Some(share) => { (change(share)) }
+                            None => "no derivative",
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
