@@ -6,7 +6,7 @@ use std::f64::consts::{SQRT_2, TAU};
 
 const J: Complex<f64> = Complex::new(0.0, 1.0);
 
-/// A window w(n) = sum over k of (-1)^k a_k cos(2 pi k n / N). Sources: F. J. Harris, 1978; H.-H. Albrecht, 2001.
+/// A window w(n) = sum over k of (-1)^k a_k cos(2 pi k n / N), after Harris (1978) and Albrecht (2001).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
