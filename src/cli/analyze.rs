@@ -1,8 +1,8 @@
 //! `hybank analyze`: the error of a bank, with its own delays or with others.
 
-use super::bank_file::{is_dash, load};
+use super::bank_file::load;
 use super::design_report::{against, figure_text};
-use super::print::{Failure, InFile, show};
+use super::print::{Failure, InFile, is_dash, show};
 use super::worst_case::{self, Questions, Sweep};
 use super::written::check_outputs;
 use crate::bank::Bank;

@@ -1,7 +1,7 @@
 //! Reads specs, with the measurements that they name, and banks.
 
 use super::file_kind::{FileKind, refuse_other};
-use super::print::{Failure, InFile, say_line};
+use super::print::{Failure, InFile, is_dash, name, say_line};
 use crate::analog::fit::{MeasuredResponse, vector_fit};
 use crate::bank::Bank;
 use crate::design::filters;
@@ -19,11 +19,6 @@ const TEXT_FILE: Bound =
 
 /// Bytes of memory that a number of a bank takes while it is read.
 const VALUE_BYTES: f64 = 200.0;
-
-/// Whether a path stands for standard input or output.
-pub(super) fn is_dash(path: &Path) -> bool {
-    path.as_os_str() == "-"
-}
 
 /// Reads a bank file; `-` is standard input.
 pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
@@ -92,11 +87,6 @@ pub(super) fn load_spec_or_bank(path: &Path) -> Result<Spec, Failure> {
         Failure::of(path, "this bank carries no spec, so its front ends are unknown; give the spec file")
     })?;
     Ok(Spec { latency, ..spec })
-}
-
-/// The name of a file in messages.
-pub(super) fn name(path: &Path) -> String {
-    if is_dash(path) { "standard input".to_owned() } else { path.display().to_string() }
 }
 
 /// The text of a file; `-` is standard input.

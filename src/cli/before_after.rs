@@ -1,10 +1,9 @@
 //! `fuse --measure`: the figures of the recording before and after.
 
-use super::bank_file::is_dash;
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, Whole, check_files_on_disk};
 use super::measure::{ToneArg, tone, tones};
 use super::measure_report::column;
-use super::print::Failure;
+use super::print::{Failure, is_dash};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::io::{MultiReader, is_pipe};
 use crate::measure::{Measurement, Settings, measure};

@@ -1,8 +1,7 @@
 //! `fuse --bit-true`: integer taps on the integers of the captures, as hardware has them.
 
-use super::bank_file::name;
 use super::output::{Bits, begin_samples};
-use super::print::{Failure, warn};
+use super::print::{Failure, name, warn};
 use super::run::{Job, each_block, interrupted, print_report};
 use crate::bank::Bank;
 use crate::files::commit_all;

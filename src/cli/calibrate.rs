@@ -1,6 +1,6 @@
 //! `hybank calibrate`: delays, gains, offsets and cut-offs of the channels from captures.
 
-use super::bank_file::{is_dash, parse_spec, read_kind};
+use super::bank_file::{parse_spec, read_kind};
 use super::calibrate_report::Report;
 use super::capture_args::{CaptureArgs, TurnArgs};
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, Whole, start};
@@ -8,7 +8,7 @@ use super::file_kind::FileKind;
 use super::interrupt::interrupts;
 use super::match_bank::check_stdin;
 use super::measure::{ToneArg, tone, tones};
-use super::print::{Failure, say_understood};
+use super::print::{Failure, is_dash, say_understood};
 use super::written::{check_outputs, write_text};
 use crate::calibrate::{Evidence, Fit, Record, Settings, applied, calibrate};
 use crate::io::{MultiReader, PcmFormat, ReadOptions};

@@ -1,7 +1,6 @@
 //! What `calibrate` prints.
 
-use super::bank_file::is_dash;
-use super::print::{Failure, show, warn};
+use super::print::{Failure, is_dash, show, warn};
 use crate::calibrate::{Calibration, ChannelEstimate, Remark};
 use crate::sine_fit::Estimate;
 use crate::spec::{HALF_WIDTH, Spec};

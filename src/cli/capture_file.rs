@@ -1,8 +1,7 @@
 //! Recordings in memory, with what must be known about their format.
 
-use super::bank_file::{is_dash, name};
 use super::file_kind::unreadable;
-use super::print::{Failure, warn};
+use super::print::{Failure, is_dash, name, warn};
 use crate::io::{Arrival, MultiReader, PcmFormat, PcmFrames, ReadOptions};
 use crate::memory::available_memory;
 use crate::units::Hertz;

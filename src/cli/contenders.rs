@@ -1,15 +1,37 @@
 //! The methods that the demo compares, one of them the cubic spline through all slow samples in the order of
 //! their instants.
 
-use super::demo::{Parts, SETTLING};
 use super::fused::fused;
 use super::print::Failure;
 use crate::bank::Bank;
 use crate::design::{self, Problem};
 use crate::pipeline::{DroppedLatency, Settings};
-use crate::simulate::interleaved;
+use crate::simulate::{Captured, interleaved};
 use crate::spec::{Method, Spec};
 use crate::units::{Decibels, FastPeriods};
+
+/// Fast samples at the beginning that the error does not include, while the history of the filters fills.
+pub(super) const SETTLING: usize = 2000;
+
+/// The captures of the two parts of the signal. Everything here is linear, so each part has its own error.
+pub(super) struct Parts {
+    /// Within the band of the spec.
+    pub(super) in_band: Captured,
+    /// Most of it within the band, and a little at all frequencies.
+    pub(super) step: Captured,
+}
+
+impl Parts {
+    /// Both together.
+    pub(super) fn sum(&self) -> Captured {
+        let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + b).collect();
+        let channels = self.in_band.channels.iter().zip(&self.step.channels);
+        Captured {
+            channels: channels.map(|(a, b)| sum(a, b)).collect(),
+            target: sum(&self.in_band.target, &self.step.target),
+        }
+    }
+}
 
 /// A method of design, and whether it knows the band of the signal.
 struct BankOf {

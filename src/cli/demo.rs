@@ -1,6 +1,6 @@
 //! `hybank demo`: designs, captures and fuses one example, and compares the error with other methods.
 
-use super::contenders::{Contender, contend};
+use super::contenders::{Contender, Parts, SETTLING, contend};
 use super::print::{Failure, show};
 use super::written::{Mono, create_folder, write_recordings, write_text};
 use crate::design::{self, Problem};
@@ -15,8 +15,6 @@ use std::path::{Path, PathBuf};
 const SPEC: &str = include_str!("../../filters/speech-2x.toml");
 const DURATION: Seconds = Seconds(2.0);
 const STEP_AT: Seconds = Seconds(1.000_01);
-/// Fast samples at the beginning that the error does not include, while the history of the filters fills.
-pub(super) const SETTLING: usize = 2000;
 
 /// Compares hybank with other methods on a signal whose exact samples are known
 ///
@@ -56,26 +54,6 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.save(&folder, &pictures)?;
     let report = serde_json::json!({ "folder": folder, "contenders": contenders });
     show(&report, args.json, |_| text(&folder, &contenders))
-}
-
-/// The captures of the two parts of the signal. Everything here is linear, so each part has its own error.
-pub(super) struct Parts {
-    /// Within the band of the spec.
-    pub(super) in_band: Captured,
-    /// Most of it within the band, and a little at all frequencies.
-    pub(super) step: Captured,
-}
-
-impl Parts {
-    /// Both together.
-    fn sum(&self) -> Captured {
-        let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + b).collect();
-        let channels = self.in_band.channels.iter().zip(&self.step.channels);
-        Captured {
-            channels: channels.map(|(a, b)| sum(a, b)).collect(),
-            target: sum(&self.in_band.target, &self.step.target),
-        }
-    }
 }
 
 /// A chirp and three tones.

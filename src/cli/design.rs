@@ -1,10 +1,10 @@
 //! `hybank design`: from a spec file to a bank file.
 
-use super::bank_file::{bad_flag, is_dash, load_spec};
+use super::bank_file::{bad_flag, load_spec};
 use super::design_report::{Judged, Report};
 use super::design_studies::BandHint;
 use super::interrupt::end_at_interrupt;
-use super::print::{Failure, InFile, check_strict, say, say_understood, show, warn};
+use super::print::{Failure, InFile, check_strict, is_dash, say, say_understood, show, warn};
 use super::progress::Progress;
 use super::written::{check_outputs, write_text};
 use crate::design::{self, Limits, Options};

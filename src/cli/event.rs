@@ -1,7 +1,6 @@
 //! What happens during a run, as lines of text and as JSON lines.
 
-use super::bank_file::is_dash;
-use super::print::Failure;
+use super::print::{Failure, is_dash};
 use crate::files::FileError;
 use crate::io::{Stall, Stdout, is_pipe};
 use crate::pipeline::{Gap, LISTED_GAPS};

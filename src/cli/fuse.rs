@@ -1,13 +1,13 @@
 //! `hybank fuse`: fuses slow recordings into one fast recording.
 
-use super::bank_file::{self, is_dash};
+use super::bank_file;
 use super::before_after::{BeforeAfter, BeforeAfterArgs};
 use super::bit_true::BitTrueArgs;
 use super::capture_args::CaptureArgs;
 use super::observer::RunObserver;
 use super::output::Bits;
-use super::print::Failure;
 use super::print::say_understood;
+use super::print::{Failure, is_dash};
 use super::run::{Finished, Job, RunArgs, RunReport, interrupted, print_report};
 use crate::bank::Bank;
 use crate::io::{Container, MultiReader};

@@ -1,7 +1,6 @@
 //! Checks that the inputs fit the bank.
 
-use super::bank_file::is_dash;
-use super::print::Failure;
+use super::print::{Failure, is_dash};
 use crate::bank::Bank;
 use crate::io::{MultiReader, StreamHeader, is_same_rate};
 use std::path::Path;

@@ -1,17 +1,14 @@
 //! `hybank measure`: the quality of a recording.
 
-use super::bank_file::{is_dash, name};
 use super::capture_args::CaptureArgs;
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading};
 use super::match_bank::check_stdin;
-use super::measure_report::{chart, warnings};
+use super::measure_report::{ReferenceReport, Report, chart, warnings};
 use super::plot::PictureFormat;
-use super::print::{Failure, InFile, show, warn};
+use super::print::{Failure, InFile, is_dash, name, show, warn};
 use super::written::{check_outputs, write_bytes};
 use crate::io::is_same_rate;
-use crate::measure::{
-    Comparison, MeasureError, Measurement, Settings, Window, compare, measure, measure_complex,
-};
+use crate::measure::{MeasureError, Measurement, Settings, Window, compare, measure, measure_complex};
 use crate::quantity;
 use crate::units::Hertz;
 use std::path::{Path, PathBuf};
@@ -109,25 +106,6 @@ pub(super) fn tones(given: &[ToneArg]) -> Result<Vec<Hertz>, Failure> {
         return Err(Failure::Usage("--tone is `auto` or a list of frequencies, not both".into()));
     }
     Ok(tones)
-}
-
-/// What the command found.
-#[derive(Debug, serde::Serialize)]
-pub(super) struct Report {
-    pub(super) file: String,
-    #[serde(flatten, skip_serializing_if = "Option::is_none")]
-    pub(super) measurement: Option<Measurement>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) reference: Option<ReferenceReport>,
-    warnings: Vec<String>,
-}
-
-/// The comparison with a reference.
-#[derive(Debug, serde::Serialize)]
-pub(super) struct ReferenceReport {
-    pub(super) file: String,
-    #[serde(flatten)]
-    pub(super) comparison: Comparison,
 }
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {

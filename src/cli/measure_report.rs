@@ -1,7 +1,6 @@
 //! The figures of a measurement as text, and the spectrum of the recording with its spurs marked.
 
 use super::capture_file::CaptureFile;
-use super::measure::Report;
 use crate::measure::{Cause, Comparison, Imbalance, Measurement, Quadrature, Settings, Spectrum, Spur};
 use crate::plot::{Chart, Marks, Series};
 use crate::quantity::{readable, scale_of};
@@ -10,6 +9,25 @@ use std::fmt::Write as _;
 
 /// Spurs that the text lists.
 const MOST_SPURS: usize = 20;
+
+/// What the command found.
+#[derive(Debug, serde::Serialize)]
+pub(super) struct Report {
+    pub(super) file: String,
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub(super) measurement: Option<Measurement>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) reference: Option<ReferenceReport>,
+    pub(super) warnings: Vec<String>,
+}
+
+/// The comparison with a reference.
+#[derive(Debug, serde::Serialize)]
+pub(super) struct ReferenceReport {
+    pub(super) file: String,
+    #[serde(flatten)]
+    pub(super) comparison: Comparison,
+}
 
 /// A figure: its name, its value, its unit and what it means.
 pub(super) struct Figure {

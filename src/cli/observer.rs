@@ -2,11 +2,10 @@
 //! lines in the file of `--report`, and checks the captures. A thread of its own writes, so that the samples
 //! never wait for a reader of messages.
 
-use super::bank_file::is_dash;
 use super::capture_check::{CaptureCheck, Checked};
 use super::event::{Event, EventWriter, Events, ReportFile, Span};
-use super::print::Failure;
 use super::print::say_line;
+use super::print::{Failure, is_dash};
 use crate::bank::Bank;
 use crate::io::{PcmFrames, StallWatch};
 use crate::pipeline::{Gap, Pipeline};

@@ -1,7 +1,6 @@
 //! The format of output samples, and the files that a run writes.
 
-use super::bank_file::is_dash;
-use super::print::Failure;
+use super::print::{Failure, is_dash};
 use super::print::{name_leftovers, warn};
 use crate::files::refuse_overlaps;
 use crate::io::{

@@ -1,7 +1,6 @@
 //! All that the commands say: results on standard output, messages on standard error, and the one message of
 //! a failure.
 
-use super::bank_file::name;
 use crate::files::leftovers;
 use crate::overview::understood;
 use crate::pipeline::PipelineError;
@@ -131,4 +130,14 @@ pub(super) fn say_understood(spec: Option<&Spec>) {
 /// Names the unfinished files that killed runs left beside `outputs`.
 pub(super) fn name_leftovers(outputs: &[&Path]) {
     leftovers(outputs).iter().for_each(|left| warn(&left.to_string()));
+}
+
+/// Whether a path stands for standard input or output.
+pub(super) fn is_dash(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// The name of a file in messages.
+pub(super) fn name(path: &Path) -> String {
+    if is_dash(path) { "standard input".to_owned() } else { path.display().to_string() }
 }

@@ -1,10 +1,10 @@
 //! `hybank report`: all that is known of a bank, on one page.
 
-use super::bank_file::{load, name};
+use super::bank_file::load;
 use super::capture_file::{Whole, start};
 use super::fused::fused;
 use super::match_bank::{check_channels, output_rate};
-use super::print::{Failure, InFile, warn};
+use super::print::{Failure, InFile, name, warn};
 use super::written::{check_outputs, write_text};
 use crate::bank::Bank;
 use crate::design::DesignError;

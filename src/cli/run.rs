@@ -1,6 +1,6 @@
 //! How `fuse` and `stream` run a bank: their common options, the run from its plan to its files, the report.
 
-use super::bank_file::{self, is_dash};
+use super::bank_file;
 use super::capture_args::TurnArgs;
 use super::file_kind::unreadable;
 use super::gaps::{GapArgs, say_gaps};
@@ -8,8 +8,8 @@ use super::interrupt::interrupts;
 use super::match_bank;
 use super::observer::{ObserverArgs, RunObserver};
 use super::output::{begin_samples, check_files, precision};
-use super::print::Failure;
 use super::print::print_json;
+use super::print::{Failure, is_dash};
 use super::print::{say, warn};
 use super::track::{TrackArgs, TrackRecord};
 use crate::bank::Bank;

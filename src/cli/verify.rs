@@ -1,8 +1,8 @@
 //! `hybank verify`: proves a bank's gammas from its file alone.
 
-use super::bank_file::{name, read_kind};
+use super::bank_file::read_kind;
 use super::file_kind::FileKind;
-use super::print::{Failure, InFile, show};
+use super::print::{Failure, InFile, name, show};
 use crate::bank::{Bank, FixedPoint, SynthesisFilters, check_digest};
 use crate::design;
 use crate::overview::counted;

@@ -1,8 +1,7 @@
 //! Writes files that appear when they are whole: texts, pictures, recordings, and folders of them.
 
-use super::bank_file::is_dash;
 use super::interrupt::remove_unfinished;
-use super::print::{Failure, name_leftovers, print_bytes};
+use super::print::{Failure, is_dash, name_leftovers, print_bytes};
 use crate::files::{AtomicFile, commit_all, refuse_overlaps};
 use crate::io::{Container, OutputHeader, PcmFormat, SampleWriter};
 use std::io::Write;

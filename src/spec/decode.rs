@@ -1,6 +1,7 @@
 //! Turns a document into a [`Spec`]: resolves units, fills in omitted filters, checks all rules.
 
-use super::design::{DesignOverrides, KeyProblem, Method, Reduction, Solver, Tracking};
+use super::design::{DesignOverrides, Method, Reduction, Solver, Tracking};
+use super::error::KeyProblem;
 use super::filter_reader::{FILTER_FORMS, filter};
 use super::measured::{FilterModel, FilterModels, MeasuredFilter, Measurement, no_models};
 use super::reader::{Either, Fields, Value};

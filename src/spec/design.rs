@@ -1,5 +1,6 @@
 //! The `[design]` table: defaults, overrides from the command line, and the keys of each method.
 
+use super::error::{KeyProblem, blame};
 use super::limits;
 use super::word_lengths::{WordLengths, check_fraction_bits};
 use super::{SpecProblem, UncertaintySpec};
@@ -345,23 +346,6 @@ impl DesignSpec {
         };
         blame("tracking", Err(SpecProblem::MissingKey { key: "delay", remedy }))
     }
-}
-
-/// A problem of a table, and the key that causes it.
-#[derive(Debug)]
-pub(super) struct KeyProblem {
-    pub(super) key: &'static str,
-    pub(super) problem: SpecProblem,
-}
-
-impl From<KeyProblem> for SpecProblem {
-    fn from(of_key: KeyProblem) -> Self {
-        of_key.problem
-    }
-}
-
-pub(super) fn blame(key: &'static str, checked: Result<(), SpecProblem>) -> Result<(), KeyProblem> {
-    checked.map_err(|problem| KeyProblem { key, problem })
 }
 
 impl DesignOverrides {

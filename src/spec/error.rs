@@ -150,6 +150,23 @@ pub enum SpecProblem {
     Filter(#[from] FilterProblem),
 }
 
+/// A problem of a table, and the key that causes it.
+#[derive(Debug)]
+pub(super) struct KeyProblem {
+    pub(super) key: &'static str,
+    pub(super) problem: SpecProblem,
+}
+
+impl From<KeyProblem> for SpecProblem {
+    fn from(of_key: KeyProblem) -> Self {
+        of_key.problem
+    }
+}
+
+pub(super) fn blame(key: &'static str, checked: Result<(), SpecProblem>) -> Result<(), KeyProblem> {
+    checked.map_err(|problem| KeyProblem { key, problem })
+}
+
 fn suggestion(nearest: &Option<&'static str>) -> String {
     nearest.map(|key| format!(", did you mean \"{key}\"?")).unwrap_or_default()
 }

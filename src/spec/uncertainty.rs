@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::SpecProblem;
-use super::design::{KeyProblem, blame};
+use super::error::{KeyProblem, blame};
 use super::limits::{range, within};
 use crate::units::{FastPeriods, Seconds};
 
