@@ -34,7 +34,7 @@ fn measure(bank: &Bank, options: Options) -> f64 {
     let narrow: Vec<f32> = x.iter().map(|&x| x as f32).collect();
     let (mut y, mut narrow_y) = (vec![0.0; m * FRAMES], vec![0.0; m * FRAMES]);
     // A batch is made by the call that completes it, and may be longer than a call.
-    let calls = (BATCHES * stream.extra_latency() / m).div_ceil(FRAMES).max(1);
+    let calls = (BATCHES * stream.plan().extra_latency() / m).div_ceil(FRAMES).max(1);
     let mut best = f64::MAX;
     let begin = Instant::now();
     while begin.elapsed() < EACH {

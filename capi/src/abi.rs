@@ -113,7 +113,7 @@ pub unsafe extern "C" fn hybank_ratio(bank: *const Stream) -> usize {
 /// As the header says.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hybank_latency(bank: *const Stream) -> usize {
-    ask(bank, Stream::latency)
+    ask(bank, |stream| stream.plan().latency())
 }
 
 /// See the header.

@@ -65,26 +65,6 @@ impl Stream {
         self.plan.ratio()
     }
 
-    /// See [`Plan::latency`].
-    pub fn latency(&self) -> usize {
-        self.plan.latency()
-    }
-
-    /// See [`Plan::extra_latency`].
-    pub fn extra_latency(&self) -> usize {
-        self.plan.extra_latency()
-    }
-
-    /// See [`Plan::history`].
-    pub fn history(&self) -> Option<usize> {
-        self.plan.history()
-    }
-
-    /// See [`Plan::alignment`].
-    pub fn alignment(&self) -> usize {
-        self.plan.alignment()
-    }
-
     /// Frames since the beginning.
     pub fn position(&self) -> u64 {
         self.position
@@ -215,7 +195,7 @@ impl Stream {
     pub fn save(&self, bytes: &mut Vec<u8>) {
         let Self { position, replaced, .. } = *self;
         let header = Header { position, replaced, resets: self.state_resets(), digest: self.plan.digest() };
-        header.write(self.alignment(), bytes);
+        header.write(self.plan.alignment(), bytes);
         let mut put = |number: f64| bytes.extend_from_slice(&number.to_le_bytes());
         self.engine.save(&mut put);
     }
@@ -228,7 +208,7 @@ impl Stream {
     /// algorithm, number type and latency; the stream is as before then.
     pub fn resume(&mut self, state: &[u8]) -> Result<(), StateError> {
         let (header, numbers) = self.read(state)?;
-        let place = header.position % self.alignment() as u64;
+        let place = header.position % self.plan.alignment() as u64;
         self.engine.resume(place as usize, numbers, header.resets);
         (self.position, self.replaced) = (header.position, header.replaced);
         Ok(())
@@ -237,12 +217,12 @@ impl Stream {
     /// The parts of a state of this plan.
     fn read<'a>(&self, state: &'a [u8]) -> Result<(Header, Numbers<'a>), StateError> {
         let count = |place: usize| self.count(place as u64);
-        Header::read(state, self.plan.digest(), self.alignment(), count)
+        Header::read(state, self.plan.digest(), self.plan.alignment(), count)
     }
 
     /// Numbers of the state at a frame.
     fn count(&self, position: u64) -> Count {
-        self.engine.count((position % self.alignment() as u64) as usize)
+        self.engine.count((position % self.plan.alignment() as u64) as usize)
     }
 
     /// The samples that will be written, if everything fits.

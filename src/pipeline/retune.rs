@@ -156,7 +156,7 @@ impl Retuner {
     /// the shifted channels.
     pub(super) fn shifted(&mut self) -> Result<Option<Stream>, ProcessError> {
         let Some(mut stream) = self.shifted.take() else { return Ok(None) };
-        let count = stream.history().unwrap_or(0);
+        let count = stream.plan().history().unwrap_or(0);
         let history = self.frames(self.position - count as i64, count, true);
         stream.run(&history, &mut Kept { output: &mut [0.0; 0][..], range: 0..0 })?;
         Ok(Some(stream))

@@ -39,11 +39,13 @@ pub enum PcmFormat {
     F64Be,
 }
 
+/// The names of [`PcmFormat::ALL`].
+const NAMES: [&str; 12] =
+    ["s8", "u8", "s16le", "s16be", "s24le", "s24be", "s32le", "s32be", "f32le", "f32be", "f64le", "f64be"];
+
 /// A format name that is not one of the twelve.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "unknown sample format `{0}`; use one of s8 u8 s16le s16be s24le s24be s32le s32be f32le f32be f64le f64be"
-)]
+#[error("unknown sample format `{0}`; use one of {names}", names = NAMES.join(" "))]
 pub struct ParsePcmFormatError(pub String);
 
 impl PcmFormat {
@@ -65,20 +67,7 @@ impl PcmFormat {
 
     /// The name, as in ffmpeg.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::S8 => "s8",
-            Self::U8 => "u8",
-            Self::S16Le => "s16le",
-            Self::S16Be => "s16be",
-            Self::S24Le => "s24le",
-            Self::S24Be => "s24be",
-            Self::S32Le => "s32le",
-            Self::S32Be => "s32be",
-            Self::F32Le => "f32le",
-            Self::F32Be => "f32be",
-            Self::F64Le => "f64le",
-            Self::F64Be => "f64be",
-        }
+        NAMES[self as usize]
     }
 
     /// Bytes per sample.
@@ -103,20 +92,23 @@ impl PcmFormat {
     /// If `bytes` is shorter than one sample.
     #[inline(always)]
     pub fn decode(self, bytes: &[u8]) -> f64 {
-        let b = bytes;
         match self {
-            Self::S8 => f64::from(b[0] as i8) / 128.0,
-            Self::U8 => (f64::from(b[0]) - 128.0) / 128.0,
-            Self::S16Le => f64::from(i16::from_le_bytes([b[0], b[1]])) / 32768.0,
-            Self::S16Be => f64::from(i16::from_be_bytes([b[0], b[1]])) / 32768.0,
-            Self::S24Le => f64::from(i32::from_le_bytes([0, b[0], b[1], b[2]])) / 2147483648.0,
-            Self::S24Be => f64::from(i32::from_be_bytes([b[0], b[1], b[2], 0])) / 2147483648.0,
-            Self::S32Le => f64::from(i32::from_le_bytes([b[0], b[1], b[2], b[3]])) / 2147483648.0,
-            Self::S32Be => f64::from(i32::from_be_bytes([b[0], b[1], b[2], b[3]])) / 2147483648.0,
-            Self::F32Le => f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
-            Self::F32Be => f64::from(f32::from_be_bytes([b[0], b[1], b[2], b[3]])),
-            Self::F64Le => f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]),
-            Self::F64Be => f64::from_be_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]),
+            Self::F32Le => f64::from(f32::from_le_bytes(first(bytes))),
+            Self::F32Be => f64::from(f32::from_be_bytes(first(bytes))),
+            Self::F64Le => f64::from_le_bytes(first(bytes)),
+            Self::F64Be => f64::from_be_bytes(first(bytes)),
+            Self::U8 => (f64::from(bytes[0]) - 128.0) / 128.0,
+            // Integers fill the upper bytes of 32 bits.
+            _ => {
+                let (mut word, size) = ([0; 4], self.bytes());
+                if self.is_big_endian() {
+                    word[..size].copy_from_slice(&bytes[..size]);
+                    word.reverse();
+                } else {
+                    word[4 - size..].copy_from_slice(&bytes[..size]);
+                }
+                f64::from(i32::from_le_bytes(word)) / 2147483648.0
+            }
         }
     }
 
@@ -127,19 +119,25 @@ impl PcmFormat {
     #[inline(always)]
     pub fn encode(self, value: f64, bytes: &mut [u8]) -> bool {
         match self {
-            Self::S8 => put(bytes, quantise(value, 7), |i| (i as i8).to_le_bytes()),
-            Self::U8 => put(bytes, quantise(value, 7), |i| [(i + 128) as u8]),
-            Self::S16Le => put(bytes, quantise(value, 15), |i| (i as i16).to_le_bytes()),
-            Self::S16Be => put(bytes, quantise(value, 15), |i| (i as i16).to_be_bytes()),
-            Self::S24Le => put(bytes, quantise(value, 23), |i| low_three(i.to_le_bytes())),
-            Self::S24Be => put(bytes, quantise(value, 23), |i| high_three(i.to_be_bytes())),
-            Self::S32Le => put(bytes, quantise(value, 31), i32::to_le_bytes),
-            Self::S32Be => put(bytes, quantise(value, 31), i32::to_be_bytes),
             Self::F32Le => store(bytes, (value as f32).to_le_bytes()),
             Self::F32Be => store(bytes, (value as f32).to_be_bytes()),
             Self::F64Le => store(bytes, value.to_le_bytes()),
             Self::F64Be => store(bytes, value.to_be_bytes()),
+            _ => {
+                let size = self.bytes();
+                let (i, clipped) = quantise(value, 8 * size as u32 - 1);
+                let word = if self == Self::U8 { i + 128 } else { i }.to_le_bytes();
+                bytes[..size].copy_from_slice(&word[..size]);
+                if self.is_big_endian() {
+                    bytes[..size].reverse();
+                }
+                clipped
+            }
         }
+    }
+
+    const fn is_big_endian(self) -> bool {
+        matches!(self, Self::S16Be | Self::S24Be | Self::S32Be | Self::F32Be | Self::F64Be)
     }
 }
 
@@ -185,26 +183,17 @@ fn quantise(value: f64, bits: u32) -> (i32, bool) {
     (scaled.clamp(-full, full - 1.0) as i32, clipped)
 }
 
+/// The first bytes.
 #[inline(always)]
-fn put<const B: usize>(bytes: &mut [u8], (i, clipped): (i32, bool), pack: impl Fn(i32) -> [u8; B]) -> bool {
-    store(bytes, pack(i));
-    clipped
+fn first<const B: usize>(bytes: &[u8]) -> [u8; B] {
+    std::array::from_fn(|i| bytes[i])
 }
 
+/// Never clips.
 #[inline(always)]
 fn store<const B: usize>(bytes: &mut [u8], packed: [u8; B]) -> bool {
     bytes[..B].copy_from_slice(&packed);
     false
-}
-
-#[inline(always)]
-fn low_three([a, b, c, _]: [u8; 4]) -> [u8; 3] {
-    [a, b, c]
-}
-
-#[inline(always)]
-fn high_three([_, a, b, c]: [u8; 4]) -> [u8; 3] {
-    [a, b, c]
 }
 
 #[cfg(test)]

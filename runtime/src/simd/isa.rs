@@ -97,13 +97,6 @@ impl Isa {
         }
     }
 
-    /// True if a multiply-add rounds once. The portable kernels round the product as well on processors
-    /// without a fused multiply-add (x86-64 before 2013), so that their bits differ from those of all other
-    /// sets.
-    pub fn fuses(self) -> bool {
-        self.0 != Kind::Portable || super::vector::FUSED
-    }
-
     pub(super) fn kind(self) -> Kind {
         self.0
     }

@@ -6,44 +6,43 @@
 //!
 //! Bits: each state is one chain of fused multiply-adds, over the inputs first, in one lane.
 
-use super::dispatch::{Compiled, Element, Kernel, compiled_narrow};
+use super::dispatch::{Compiled, Kernel, compiled_narrow};
 use super::isa::Isa;
 use super::vector::{Vector, group_lanes};
 use crate::aligned::Aligned;
-use std::marker::PhantomData;
 
 /// Frames of a section that are computed together.
 const STEP: usize = 4;
 
 /// A in the form in which it runs, with B.
 #[derive(Debug)]
-pub(crate) struct Recursion<T: Copy + Default> {
+pub(crate) struct Recursion {
     /// S, states after padding to whole vectors.
     pub(crate) states: usize,
-    pub(crate) form: Form<T>,
+    pub(crate) form: Form,
 }
 
 /// How the states depend on one another.
 #[derive(Debug)]
-pub(crate) enum Form<T: Copy + Default> {
+pub(crate) enum Form {
     /// By twos: states 2 v L + l and 2 v L + L + l, L lanes per vector, belong to section v L + l.
-    Sections(Vec<SectionVector<T>>),
+    Sections(Vec<SectionVector>),
     /// In any way.
-    Dense(Vec<ColumnTile<T>>),
+    Dense(Vec<ColumnTile>),
 }
 
 /// L sections side by side: p+ = a11 p + a12 q + b1 u, q+ = a22 q + a21 p + b2 u.
 #[derive(Debug)]
-pub(crate) struct SectionVector<T: Copy + Default> {
+pub(crate) struct SectionVector {
     /// Place in the window of each input that any of them has.
     pub(crate) inputs: Vec<u32>,
     /// Vectors a11, a12, a21, a22, then b1 and b2 for each input.
-    pub(crate) coefficients: Aligned<T>,
+    pub(crate) coefficients: Aligned<f64>,
 }
 
 /// Up to [`ColumnTile::WIDEST`] vectors of states that are computed together.
 #[derive(Debug)]
-pub(crate) struct ColumnTile<T: Copy + Default> {
+pub(crate) struct ColumnTile {
     /// The first state, and how many vectors follow: 1, 2, 4 or 8.
     pub(crate) first: usize,
     pub(crate) vectors: usize,
@@ -51,36 +50,36 @@ pub(crate) struct ColumnTile<T: Copy + Default> {
     pub(crate) inputs: Vec<u32>,
     pub(crate) columns: Vec<u32>,
     /// The columns of all inputs, then of all states.
-    pub(crate) coefficients: Aligned<T>,
+    pub(crate) coefficients: Aligned<f64>,
 }
 
-impl<T: Copy + Default> ColumnTile<T> {
+impl ColumnTile {
     /// Sums that keep two multiply-adds per cycle busy.
     pub(crate) const WIDEST: usize = 8;
 }
 
 /// One call of the kernel, checked.
-pub(crate) struct Job<'a, T: Copy + Default> {
-    recursion: &'a Recursion<T>,
-    rows: *mut T,
-    window: *const T,
+pub(crate) struct Job<'a> {
+    recursion: &'a Recursion,
+    rows: *mut f64,
+    window: *const f64,
     hop: usize,
     frames: usize,
 }
 
 /// The recursion of one sample type on one instruction set.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct RecursionKernel<T: Element> {
+pub(crate) struct RecursionKernel {
     /// L, lanes of a vector.
     pub(crate) lanes: usize,
-    run: Compiled<Body<T>>,
+    run: Compiled<Body>,
 }
 
-impl<T: Element> RecursionKernel<T> {
+impl RecursionKernel {
     /// The kernel for an instruction set, in vectors of one group: the few sections of a usual bank would
     /// leave wider ones empty.
     pub(crate) fn new(isa: Isa) -> Self {
-        Self { lanes: group_lanes::<T>(), run: compiled_narrow::<Body<T>>(isa) }
+        Self { lanes: group_lanes::<f64>(), run: compiled_narrow::<Body>(isa) }
     }
 
     /// Goes on by `frames` frames: row 0 of `rows` (rows of S states) is the state before them, row t + 1
@@ -90,9 +89,9 @@ impl<T: Element> RecursionKernel<T> {
     /// If anything is too short for that.
     pub(crate) fn run(
         &self,
-        recursion: &Recursion<T>,
-        rows: &mut [T],
-        window: &[T],
+        recursion: &Recursion,
+        rows: &mut [f64],
+        window: &[f64],
         hop: usize,
         frames: usize,
     ) {
@@ -110,7 +109,7 @@ impl<T: Element> RecursionKernel<T> {
     }
 }
 
-impl<T: Copy + Default> Form<T> {
+impl Form {
     /// Coefficients, one multiply-add per frame each.
     #[cfg(test)]
     fn coefficients(&self) -> usize {
@@ -143,15 +142,15 @@ impl<T: Copy + Default> Form<T> {
 }
 
 /// The recursion of either form.
-pub(crate) struct Body<T>(PhantomData<T>);
+pub(crate) struct Body;
 
-impl<T: Element> Kernel for Body<T> {
-    type Sample = T;
-    type Job<'a> = &'a Job<'a, T>;
+impl Kernel for Body {
+    type Sample = f64;
+    type Job<'a> = &'a Job<'a>;
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<V: Vector<Sample = T>>(job: &Job<'_, T>) {
+    unsafe fn run<V: Vector<Sample = f64>>(job: &Job<'_>) {
         match &job.recursion.form {
             Form::Sections(vectors) => {
                 let whole = job.frames / STEP * STEP;
@@ -174,13 +173,11 @@ impl<T: Element> Kernel for Body<T> {
 /// T frames from frame t on. One vector of sections after the other: while one waits for its own states, the
 /// next can begin.
 #[inline(always)]
-unsafe fn sections<V: Vector, const T: usize>(
-    job: &Job<'_, V::Sample>,
-    vectors: &[SectionVector<V::Sample>],
+unsafe fn sections<V: Vector<Sample = f64>, const T: usize>(
+    job: &Job<'_>,
+    vectors: &[SectionVector],
     t: usize,
-) where
-    V::Sample: Default,
-{
+) {
     let states = job.recursion.states;
     for (v, vector) in vectors.iter().enumerate() {
         let row = job.rows.add(t * states + 2 * v * V::LANES);
@@ -190,20 +187,18 @@ unsafe fn sections<V: Vector, const T: usize>(
 
 /// T frames: the inputs of all of them first, which do not wait for the states.
 #[inline(always)]
-unsafe fn section_vector<V: Vector, const T: usize>(
-    vector: &SectionVector<V::Sample>,
-    mut row: *mut V::Sample,
+unsafe fn section_vector<V: Vector<Sample = f64>, const T: usize>(
+    vector: &SectionVector,
+    mut row: *mut f64,
     states: usize,
-    window: *const V::Sample,
+    window: *const f64,
     hop: usize,
-) where
-    V::Sample: Default,
-{
+) {
     let mut coefficients = vector.coefficients.as_ptr();
     let [a11, a12] = [V::load(coefficients), V::load(coefficients.add(V::LANES))];
     coefficients = coefficients.add(2 * V::LANES);
     let [a21, a22] = [V::load(coefficients), V::load(coefficients.add(V::LANES))];
-    let zero = V::splat(V::Sample::default());
+    let zero = V::splat(0.0);
     let mut sums = [[zero; 2]; T];
     for &place in &vector.inputs {
         let mut input = window.add(place as usize);
@@ -228,7 +223,7 @@ unsafe fn section_vector<V: Vector, const T: usize>(
 
 /// Frame t, for any A.
 #[inline(always)]
-unsafe fn dense<V: Vector>(job: &Job<'_, V::Sample>, tiles: &[ColumnTile<V::Sample>], t: usize) {
+unsafe fn dense<V: Vector<Sample = f64>>(job: &Job<'_>, tiles: &[ColumnTile], t: usize) {
     for tile in tiles {
         match tile.vectors {
             1 => column_tile::<V, 1>(job, tile, t),
@@ -240,15 +235,9 @@ unsafe fn dense<V: Vector>(job: &Job<'_, V::Sample>, tiles: &[ColumnTile<V::Samp
 }
 
 #[inline(always)]
-unsafe fn column_tile<V: Vector, const R: usize>(
-    job: &Job<'_, V::Sample>,
-    tile: &ColumnTile<V::Sample>,
-    t: usize,
-) where
-    V::Sample: Default,
-{
+unsafe fn column_tile<V: Vector<Sample = f64>, const R: usize>(job: &Job<'_>, tile: &ColumnTile, t: usize) {
     let states = job.recursion.states;
-    let mut sums = [V::splat(V::Sample::default()); R];
+    let mut sums = [V::splat(0.0); R];
     let (x, window) = (job.rows.add(t * states), job.window.add(t * job.hop));
     let mut column = tile.coefficients.as_ptr();
     for &place in &tile.inputs {
@@ -266,7 +255,11 @@ unsafe fn column_tile<V: Vector, const R: usize>(
 
 /// sums <- sums + value times R vectors of a column.
 #[inline(always)]
-unsafe fn add_column<V: Vector, const R: usize>(sums: &mut [V; R], value: V, column: *const V::Sample) {
+unsafe fn add_column<V: Vector<Sample = f64>, const R: usize>(
+    sums: &mut [V; R],
+    value: V,
+    column: *const f64,
+) {
     for (r, sum) in sums.iter_mut().enumerate() {
         *sum = value.mul_add(V::load(column.add(r * V::LANES)), *sum);
     }

@@ -33,8 +33,6 @@ pub(crate) trait Number:
     fn mul_add(self, factor: Self, sum: Self) -> Self;
     /// Neither NaN nor infinite.
     fn is_finite(self) -> bool;
-    /// The nearest number.
-    fn from_i32(value: i32) -> Self;
 }
 
 /// True where a fused multiply-add is an instruction of every processor of the target. In software it would
@@ -52,11 +50,6 @@ macro_rules! number {
             #[inline(always)]
             fn is_finite(self) -> bool {
                 <$sample>::is_finite(self)
-            }
-
-            #[inline(always)]
-            fn from_i32(value: i32) -> Self {
-                value as $sample
             }
         }
     };
@@ -289,7 +282,7 @@ pub(crate) trait Vector: Copy {
     unsafe fn load_i16(at: *const u8) -> Self {
         let scale = Self::Sample::from(1.0 / 32768.0);
         let integer = |l: usize| i16::from_le(at.cast::<i16>().add(l).read_unaligned());
-        Self::from_fn(|l| Self::Sample::from_i32(integer(l).into()) * scale)
+        Self::from_fn(|l| Self::Sample::from(f32::from(integer(l))) * scale)
     }
 
     /// Samples from little-endian 32-bit integers, rounded to the nearest, which are divided by 2^31.
@@ -297,7 +290,7 @@ pub(crate) trait Vector: Copy {
     unsafe fn load_i32(at: *const u8) -> Self {
         let scale = Self::Sample::from(1.0 / 2147483648.0);
         let integer = |l: usize| i32::from_le(at.cast::<i32>().add(l).read_unaligned());
-        Self::from_fn(|l| Self::Sample::from_i32(integer(l)) * scale)
+        Self::from_fn(|l| Self::Sample::from(integer(l) as f32) * scale)
     }
 
     /// Samples times 2^15 to the nearest little-endian 16-bit integers, ties to even; NaN becomes 0. Returns

@@ -84,7 +84,7 @@ fn a_flush_without_room_leaves_the_stream_as_it_was() {
 fn outputs_from(stream: &Stream, input: &[f64], begin: usize, from: usize) -> Vec<f64> {
     let (n, m) = (stream.channels(), stream.ratio());
     let all = flushed(&mut Stream::new(stream.plan()), &input[begin * n..], 64);
-    all[stream.extra_latency() + (from - begin) * m..].to_vec()
+    all[stream.plan().extra_latency() + (from - begin) * m..].to_vec()
 }
 
 #[test]
@@ -92,7 +92,7 @@ fn streams_that_begin_an_alignment_apart_have_the_same_bits() {
     let mut noise = Noise(48);
     for (bank, options) in banks(&mut noise) {
         let stream = start(&bank, options).unwrap();
-        let Some(history) = stream.history() else { continue };
+        let Some(history) = stream.plan().history() else { continue };
         let alignment = stream.plan().alignment();
         let frames = 3 * alignment + history + 300;
         let input: Vec<f64> = (0..bank.channel_count() * frames).map(|_| noise.next()).collect();
@@ -114,7 +114,7 @@ fn recursions_from_a_zero_state_have_the_same_bits_an_alignment_apart() {
     let mut noise = Noise(49);
     let stream = start(&rotation_bank(), Options::default()).unwrap();
     let alignment = stream.plan().alignment();
-    assert_eq!((alignment, stream.history()), (64, None));
+    assert_eq!((alignment, stream.plan().history()), (64, None));
     let input: Vec<f64> = (0..500).map(|k| if k < 2 * alignment { 0.0 } else { noise.next() }).collect();
     let from = 2 * alignment;
     assert_eq!(outputs_from(&stream, &input, 0, from), outputs_from(&stream, &input, from, from));

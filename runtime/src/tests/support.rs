@@ -1,6 +1,6 @@
 //! Banks, inputs and the definition of the sum.
 
-use crate::{Algorithm, BuildError, Options, Plan, Precision, Sample, StateSpace, Stream};
+use crate::{Algorithm, BuildError, Isa, Options, Plan, Precision, Sample, StateSpace, Stream};
 
 /// A generator whose stream never changes (Knuth's MMIX).
 pub(crate) struct Noise(pub(crate) u64);
@@ -92,7 +92,7 @@ pub(crate) fn precise(algorithm: Algorithm, precision: Precision) -> Options {
 /// All outputs of an input in one call, the first of them for its first frame.
 pub(crate) fn run<S: Sample>(bank: &Bank, options: Options, input: &[S]) -> Vec<S> {
     let mut stream = start(bank, options).unwrap();
-    let (n, m, late) = (stream.channels(), stream.ratio(), stream.extra_latency());
+    let (n, m, late) = (stream.channels(), stream.ratio(), stream.plan().extra_latency());
     let mut padded = input.to_vec();
     padded.resize(input.len() + late / m * n, S::default());
     let mut out = vec![S::default(); padded.len() / n * m];
@@ -137,6 +137,12 @@ pub(crate) fn state_space_definition(filter: &StateSpace, input: &[f64]) -> Vec<
         x = filter.a.iter().zip(&filter.b).map(|(a, b)| dot(a, &x) + dot(b, u)).collect();
     }
     out
+}
+
+/// True if a multiply-add rounds once. The portable kernels round the product too on processors that may not
+/// have a fused multiply-add (x86-64 before 2013).
+pub(crate) fn fuses(isa: Isa) -> bool {
+    isa != Isa::portable() || cfg!(any(target_arch = "aarch64", target_feature = "fma"))
 }
 
 /// The largest distance of two sequences.

@@ -1,6 +1,6 @@
 //! The direct algorithm against a scalar twin with the same bits, and against the definition of the sum.
 
-use crate::tests::support::{Noise, definition, fir_bank, random_taps, run, worst};
+use crate::tests::support::{Noise, definition, fir_bank, fuses, random_taps, run, worst};
 use crate::{Isa, Options};
 
 /// The steps of a window in the order of use. Phases beside each other take the newest first. A single phase
@@ -57,7 +57,7 @@ fn every_small_shape_has_the_bits_of_the_scalar_twin() {
             let input = noise.samples(n * (100 + 13 * m));
             for isa in Isa::available() {
                 let got = run(&fir_bank(taps.clone(), m), Options { isa, ..Options::default() }, &input);
-                assert_eq!(got, twin(&taps, m, &input, isa.fuses()), "N {n} M {m} {isa}");
+                assert_eq!(got, twin(&taps, m, &input, fuses(isa)), "N {n} M {m} {isa}");
             }
         }
     }
@@ -71,7 +71,7 @@ fn every_tap_count_and_length_has_the_bits_of_the_scalar_twin() {
         let input = noise.samples(2 * count);
         for isa in Isa::available() {
             let got = run(&fir_bank(taps.clone(), 2), Options { isa, ..Options::default() }, &input);
-            assert_eq!(got, twin(&taps, 2, &input, isa.fuses()), "{count} taps, {isa}");
+            assert_eq!(got, twin(&taps, 2, &input, fuses(isa)), "{count} taps, {isa}");
         }
     }
 }
@@ -84,7 +84,7 @@ fn many_channels_and_many_phases_work() {
         let input = noise.samples(n * 300);
         for isa in Isa::available() {
             let got = run(&fir_bank(taps.clone(), m), Options { isa, ..Options::default() }, &input);
-            assert_eq!(got, twin(&taps, m, &input, isa.fuses()), "N {n} M {m} {isa}");
+            assert_eq!(got, twin(&taps, m, &input, fuses(isa)), "N {n} M {m} {isa}");
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::tests::support::{
-    Noise, by, definition, fir_bank, norm, precise, random_taps, recursive_bank, run, start, worst,
+    Noise, by, definition, fir_bank, fuses, norm, precise, random_taps, recursive_bank, run, start, worst,
 };
 use crate::{Algorithm, Options, Precision};
 use std::f64::consts::TAU;
@@ -169,7 +169,7 @@ fn every_small_shape_has_the_bits_of_the_scalar_twin() {
         let input = noise.samples(n * (3 * len + 7));
         let wide: Vec<f64> = input.iter().map(|&x| f64::from(x)).collect();
         for isa in Isa::available() {
-            let twin = Twin { fused: isa.fuses() };
+            let twin = Twin { fused: fuses(isa) };
             let want = twin.stream(&taps, m, len, &input);
             let single = Options { isa, ..options(len, Precision::Single) };
             let got = run(&fir_bank(taps.clone(), m), single, &input);

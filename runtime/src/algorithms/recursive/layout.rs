@@ -90,7 +90,7 @@ impl Layout {
         Polyphase::new(kernel, self.state_rows, ratio, factor)
     }
 
-    pub(super) fn recursion(&self, delay_lines: &DelayLines) -> Recursion<f64> {
+    pub(super) fn recursion(&self, delay_lines: &DelayLines) -> Recursion {
         let columns = Columns { layout: self, delay_lines, occupants: self.occupants() };
         let form = if self.parallel {
             let vectors = (0..self.states).step_by(2 * self.lanes);
@@ -116,7 +116,7 @@ impl Columns<'_> {
         places.map(|state| state.map_or(0.0, &factor)).collect()
     }
 
-    fn section_vector(&self, first: usize) -> SectionVector<f64> {
+    fn section_vector(&self, first: usize) -> SectionVector {
         let lanes = self.layout.lanes;
         // What the states from `to` on take from those from `from` on, lane by lane.
         let a = |to: usize, from: usize| {
@@ -136,12 +136,12 @@ impl Columns<'_> {
         SectionVector { inputs, coefficients: Aligned::from_slice(&coefficients) }
     }
 
-    fn tiles(&self) -> Vec<ColumnTile<f64>> {
+    fn tiles(&self) -> Vec<ColumnTile> {
         let mut tiles = Vec::new();
         let mut first = 0;
         while first < self.layout.states {
             let left = (self.layout.states - first) / self.layout.lanes;
-            let vectors = (1 << left.ilog2()).min(ColumnTile::<f64>::WIDEST);
+            let vectors = (1 << left.ilog2()).min(ColumnTile::WIDEST);
             tiles.push(self.tile(first, vectors));
             first += vectors * self.layout.lanes;
         }
@@ -149,7 +149,7 @@ impl Columns<'_> {
     }
 
     /// Columns of zeros are left out, so that triangles and blocks cost less than full matrices.
-    fn tile(&self, first: usize, vectors: usize) -> ColumnTile<f64> {
+    fn tile(&self, first: usize, vectors: usize) -> ColumnTile {
         let (mut inputs, mut columns, mut coefficients) = (Vec::new(), Vec::new(), Vec::new());
         let mut keep = |list: &mut Vec<u32>, place: u32, column: Vec<f64>| {
             if column.iter().any(|&factor| factor != 0.0) {

@@ -54,8 +54,8 @@ pub(crate) struct Recursive {
     pub(crate) ratio: usize,
     /// Frames that the delay lines look back.
     history: usize,
-    recursion: Recursion<f64>,
-    advance: RecursionKernel<f64>,
+    recursion: Recursion,
+    advance: RecursionKernel,
     feedthrough: Polyphase<f64>,
     output_matrix: Polyphase<f64>,
     isa: Isa,
