@@ -3,7 +3,8 @@
 use super::choices::{completed, settings, with_taps};
 use super::effort::{self, Effort, Limits, Observer, Stage, unobserved};
 use super::merging::Repeats;
-use super::methods::robust_fir::{RobustStudy, TrackingStudy};
+use super::methods::robust_fir::RobustStudy;
+use super::methods::scheduled_fir::TrackingStudy;
 use super::methods::{self, DualPoint, Synthesis};
 use super::plant::LiftedPlant;
 use super::problem::Problem;

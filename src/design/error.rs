@@ -3,8 +3,7 @@
 use super::effort::amount::{Effort, Rounded};
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
-use crate::lmi::kyp::KypError;
-use crate::lmi::sampled::SampledError;
+use crate::lmi::LmiError;
 use crate::lti::{LtiError, StateSpaceError};
 use crate::sampling::SamplingError;
 use crate::spec::SpecProblem;
@@ -34,12 +33,9 @@ pub enum DesignError {
     /// Matrix sizes do not match.
     #[error(transparent)]
     Shapes(#[from] StateSpaceError),
-    /// A sampled worst-case problem was not well formed.
+    /// A linear matrix inequality was not well formed, or could not be set up.
     #[error(transparent)]
-    Sampled(#[from] SampledError),
-    /// The bounded-real lemma could not be set up.
-    #[error(transparent)]
-    Kyp(#[from] KypError),
+    Lmi(#[from] LmiError),
     /// Too many states for the bounded-real LMI.
     #[error(
         "solver = \"kyp\" solves the bounded-real LMI for up to {limit} states of the error system, this one has {states}: use \

@@ -44,9 +44,9 @@ const SHARE_OF_WIDTH: f64 = 0.3;
 /// Frequencies closer than this are one point, in radians.
 const LEAST_DISTANCE: f64 = 1e-7;
 
-/// How closely the problems of the rounds are solved.
+/// The tolerance schedule: how closely the problems of the rounds are solved.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pace {
+pub(super) struct Tolerances {
     /// Relative width of the interval `[lower, gamma]` at which the exchange ends.
     accuracy: f64,
     /// Largest tolerance of the optimum on the points.
@@ -59,7 +59,7 @@ pub(super) struct Pace {
     rounds: usize,
 }
 
-impl Pace {
+impl Tolerances {
     /// Every problem as closely as the last one, for few rounds: five are rarely needed.
     fn steady(accuracy: f64) -> Self {
         let loosest = POINTS_ACCURACY * accuracy;
@@ -177,17 +177,17 @@ impl<E: AffineError> Exchange<E> {
     /// # Errors
     /// [`DesignError`] if a decomposition does not converge.
     pub(super) fn optimise(&mut self) -> Result<Candidate, DesignError> {
-        self.optimise_at(Pace::steady(GAMMA_ACCURACY))
+        self.optimise_at(Tolerances::steady(GAMMA_ACCURACY))
     }
 
-    /// As [`Exchange::optimise`], with gamma within the accuracy of `pace` before the margin is spent.
+    /// As [`Exchange::optimise`], with gamma within the accuracy of `tolerances` before the margin is spent.
     ///
     /// # Errors
     /// As [`Exchange::optimise`].
-    pub(super) fn optimise_at(&mut self, pace: Pace) -> Result<Candidate, DesignError> {
-        let least = self.minimise_gamma(pace)?;
-        self.leave_out_inactive(&least, pace.active)?;
-        self.minimise_mean_square(least, pace)
+    pub(super) fn optimise_at(&mut self, tolerances: Tolerances) -> Result<Candidate, DesignError> {
+        let least = self.minimise_gamma(tolerances)?;
+        self.leave_out_inactive(&least, tolerances.active)?;
+        self.minimise_mean_square(least, tolerances)
     }
 
     /// Unknowns with gamma within `accuracy` of the optimum, without the secondary objective.
@@ -195,7 +195,7 @@ impl<E: AffineError> Exchange<E> {
     /// # Errors
     /// As [`Exchange::optimise`].
     pub(super) fn compare(&mut self, accuracy: f64) -> Result<Candidate, DesignError> {
-        self.minimise_gamma(Pace::steady(accuracy))
+        self.minimise_gamma(Tolerances::steady(accuracy))
     }
 
     /// Adds points at the given frequencies, except where there is one. Returns whether any was added.
@@ -213,22 +213,22 @@ impl<E: AffineError> Exchange<E> {
         Ok(!added.is_empty())
     }
 
-    fn minimise_gamma(&mut self, pace: Pace) -> Result<Candidate, DesignError> {
+    fn minimise_gamma(&mut self, tolerances: Tolerances) -> Result<Candidate, DesignError> {
         let mut best: Option<Candidate> = None;
         let mut width = f64::INFINITY;
-        for _ in 0..pace.rounds {
-            let tolerance = pace.tolerance(width);
-            let (candidate, above) = self.round(pace, tolerance)?;
+        for _ in 0..tolerances.rounds {
+            let tolerance = tolerances.tolerance(width);
+            let (candidate, above) = self.round(tolerances, tolerance)?;
             if best.as_ref().is_none_or(|best| candidate.peaks.estimate < best.peaks.estimate) {
                 best = Some(candidate);
             }
             let gamma = best.as_ref().map_or(0.0, |best| best.peaks.estimate);
-            if gamma <= self.lower * (1.0 + pace.accuracy) {
+            if gamma <= self.lower * (1.0 + tolerances.accuracy) {
                 break;
             }
             // Without a peak to add it is the problem on the points that is not solved closely enough.
             let added = self.add(&above)?;
-            if !added && tolerance <= pace.finest() {
+            if !added && tolerance <= tolerances.finest() {
                 break;
             }
             width = if added { gamma / self.lower - 1.0 } else { 0.0 };
@@ -238,14 +238,18 @@ impl<E: AffineError> Exchange<E> {
 
     /// Solves the problem on the points. Returns the unknowns and the frequencies of the peaks that belong
     /// among the points.
-    fn round(&mut self, pace: Pace, tolerance: f64) -> Result<(Candidate, Vec<f64>), DesignError> {
+    fn round(
+        &mut self,
+        tolerances: Tolerances,
+        tolerance: f64,
+    ) -> Result<(Candidate, Vec<f64>), DesignError> {
         let settings = Settings { tol_gap_rel: tolerance, ..Settings::SAMPLED };
         let solution = sampled::minimise(&self.problem, &settings)?;
-        self.count_round(solution.steps.len());
+        self.count_round(solution.iterations);
         self.raise_lower_bound(solution.lower.value, solution.dual);
         // The optimum lies anywhere between the two.
-        let optimum = if tolerance > pace.finest() { self.lower } else { solution.gamma };
-        let level = optimum * (1.0 + PEAK_EXCESS * pace.accuracy);
+        let optimum = if tolerance > tolerances.finest() { self.lower } else { solution.gamma };
+        let level = optimum * (1.0 + PEAK_EXCESS * tolerances.accuracy);
         let candidate = self.judge(solution.taps, solution.gamma, level)?;
         let above = candidate.peaks.above(level);
         Ok((candidate, above))
@@ -274,11 +278,15 @@ impl<E: AffineError> Exchange<E> {
 
     /// The least secondary objective with gamma at most `(1 + gamma_margin)` times that of `start`. Returns
     /// `start` if the interior-point method makes no progress from there.
-    fn minimise_mean_square(&mut self, start: Candidate, pace: Pace) -> Result<Candidate, DesignError> {
+    fn minimise_mean_square(
+        &mut self,
+        start: Candidate,
+        tolerances: Tolerances,
+    ) -> Result<Candidate, DesignError> {
         let cap = start.peaks.estimate * (1.0 + self.gamma_margin);
         let cap_at_points = start.peaks.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);
-        let settings = Settings { tol_gap_rel: pace.mean_square, ..Settings::SAMPLED };
-        for _ in 0..pace.rounds {
+        let settings = Settings { tol_gap_rel: tolerances.mean_square, ..Settings::SAMPLED };
+        for _ in 0..tolerances.rounds {
             let found = sampled::mean_square_under_cap(
                 &self.problem,
                 &self.objective,
@@ -288,7 +296,7 @@ impl<E: AffineError> Exchange<E> {
             );
             // There is nothing to gain if gamma is zero or the iteration stalls.
             let Ok(found) = found else { break };
-            self.count_round(found.steps.len());
+            self.count_round(found.iterations);
             let candidate = self.judge(found.taps, found.gamma, cap_at_points)?;
             if candidate.peaks.estimate <= cap {
                 return Ok(candidate);

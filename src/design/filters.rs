@@ -2,7 +2,8 @@
 
 use super::DesignError;
 use crate::bank::{self, Bank, SynthesisFilters};
-use crate::linalg::{CMat, Complex, Mat};
+use crate::linalg::{CMat, Mat};
+use crate::lmi::sampled;
 use crate::lti::peak::{resonances, stable_poles};
 use crate::lti::{FrequencyResponse, StateSpace};
 use std::f64::consts::PI;
@@ -23,12 +24,7 @@ pub fn impulse_responses(lags: &[Mat], length: usize) -> Vec<Vec<f64>> {
 /// F at e^{jw}: the sum of e^{-jwj} F_j, w in radians per slow period.
 pub fn response(lags: &[Mat], w: f64) -> CMat {
     let (rows, cols) = lags.first().map_or((0, 0), Mat::shape);
-    let mut filter = CMat::zeros(rows, cols);
-    for (j, lag) in lags.iter().enumerate() {
-        let rotation = Complex::from_polar(1.0, -w * j as f64);
-        filter.zip_apply(lag, |sum, tap| *sum += rotation * tap);
-    }
-    filter
+    sampled::response(lags, w, rows, cols)
 }
 
 /// F of a bank, prepared for many frequencies.

@@ -39,7 +39,9 @@ pub use designer::{Design, Options, ProofSearch, design, design_observed, design
 pub use effort::{Limits, Stage};
 pub use error::DesignError;
 pub use error_response::error_response;
-pub use methods::robust_fir::{RobustNorms, RobustStudy, TrackingStudy};
+pub use methods::robust_fir::RobustStudy;
+pub use methods::scenarios::RobustNorms;
+pub use methods::scheduled_fir::TrackingStudy;
 pub use plant::LiftedPlant;
 pub use plausibility::{Implausible, implausible};
 pub use problem::Problem;

@@ -10,11 +10,10 @@ pub(super) struct RegularisedCholesky {
     matrix: Mat,
     scale: Vec<f64>,
     factor: PositiveFactor,
-    /// The shift, relative to the unit diagonal.
-    pub(super) shift: f64,
 }
 
-/// First shift tried if the matrix is not positive definite, and the growth and limit of the next ones.
+/// First shift tried if the matrix is not positive definite, a few roundings of its unit diagonal, and the
+/// growth and limit of the next ones. With a shift above the limit two steps of refinement would not converge.
 const SHIFT_FIRST: f64 = 1e-15;
 const SHIFT_GROWTH: f64 = 10.0;
 const SHIFT_LAST: f64 = 1e-6;
@@ -35,14 +34,8 @@ impl RegularisedCholesky {
                 *value *= scale[i] * scale[j];
             }
         }
-        let mut shift = 0.0;
-        loop {
-            match PositiveFactor::new(&with_shift(&matrix, shift)) {
-                Ok(factor) => return Ok(Self { matrix, scale, factor, shift }),
-                Err(error) if shift >= SHIFT_LAST => return Err(error),
-                Err(_) => shift = (shift * SHIFT_GROWTH).max(SHIFT_FIRST),
-            }
-        }
+        let (factor, _) = shifted_factor(&matrix)?;
+        Ok(Self { matrix, scale, factor })
     }
 
     /// Solves with the unshifted matrix, up to the accuracy of the iterative refinement.
@@ -75,12 +68,17 @@ impl RegularisedCholesky {
     }
 }
 
-fn with_shift(matrix: &Mat, shift: f64) -> Mat {
-    let mut m = matrix.clone();
-    for i in 0..m.nrows() {
-        m[(i, i)] += shift;
+/// The factor of a matrix of unit diagonal with as small a shift of the diagonal as it needs, and that shift.
+fn shifted_factor(matrix: &Mat) -> Result<(PositiveFactor, f64), LinalgError> {
+    let mut shift = 0.0;
+    loop {
+        let shifted = matrix + Mat::from_diagonal_element(matrix.nrows(), matrix.ncols(), shift);
+        match PositiveFactor::new(&shifted) {
+            Ok(factor) => return Ok((factor, shift)),
+            Err(error) if shift >= SHIFT_LAST => return Err(error),
+            Err(_) => shift = (shift * SHIFT_GROWTH).max(SHIFT_FIRST),
+        }
     }
-    m
 }
 
 #[cfg(test)]
@@ -104,7 +102,7 @@ mod tests {
     fn both_halves_make_the_inverse_in_any_units() {
         let matrix = nearly_singular(1e-3);
         let factor = RegularisedCholesky::new(matrix.clone()).unwrap();
-        assert_eq!(factor.shift, 0.0);
+        assert_eq!(shifted_factor(&factor.matrix).unwrap().1, 0.0);
         let inverse = factor.solve_half_transposed(&factor.solve_half(&Mat::identity(2, 2)));
         let product = &matrix * inverse;
         let unitless = Mat::from_fn(2, 2, |i, j| product[(i, j)] * UNITS[j] / UNITS[i]);
@@ -117,7 +115,8 @@ mod tests {
     #[test]
     fn singular_matrices_are_shifted_a_little_and_indefinite_ones_refused() {
         let singular = RegularisedCholesky::new(nearly_singular(0.0)).unwrap();
-        assert!(singular.shift <= 1e-14, "{}", singular.shift);
+        let (_, shift) = shifted_factor(&singular.matrix).unwrap();
+        assert!(shift <= 1e-14, "{shift}");
         assert!(RegularisedCholesky::new(nearly_singular(-1e-2)).is_err());
     }
 }

@@ -16,7 +16,7 @@ use super::DesignError;
 use super::effort::{self, Limits};
 use super::filters;
 use super::merging::Repeats;
-use super::methods::robust_fir::RobustProblem;
+use super::methods::scenarios::RobustProblem;
 use super::methods::{self, Deviations, Filters, Settings};
 use super::plant::LiftedPlant;
 use super::problem::{Problem, common_delay};

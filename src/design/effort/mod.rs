@@ -18,7 +18,7 @@ pub use progress::{Observer, Stage, unobserved};
 use super::DesignError;
 use super::merging::Repeats;
 use super::methods::Deviations;
-use super::methods::robust_fir::RobustProblem;
+use super::methods::scenarios::RobustProblem;
 use super::problem::{Problem, common_delay};
 use crate::memory::available_memory;
 use crate::spec::{Method, Solver, Spec};

@@ -76,7 +76,7 @@ fn a_gradual_pace_ends_at_the_same_optimum() {
     for (a, accuracy) in [(0.3, 1e-4), (-0.5, 1e-4), (0.8, 1e-5)] {
         for lags in [1, 2, 5] {
             let mut exchange = exchange(geometric(a, 1.0, &[1.0]), lags, 2.0 * accuracy);
-            let gamma = exchange.optimise_at(Pace::gradual(accuracy)).unwrap().peaks.estimate;
+            let gamma = exchange.optimise_at(Tolerances::gradual(accuracy)).unwrap().peaks.estimate;
             let nehari = f64::powi(a, lags as i32).abs() / (1.0 - a * a);
             assert!(gamma < nehari * (1.0 + 3.1 * accuracy), "{a} {lags}: {gamma} {nehari}");
             assert!(exchange.lower <= nehari * (1.0 + 1e-9), "{a} {lags}");
@@ -188,5 +188,5 @@ fn an_objective_that_does_not_fit_is_refused() {
     let problem = Problem::new(vec![error.at(0.0), error.at(1.0)], vec![1]).unwrap();
     let objective = MeanSquareObjective::noiseless(vec![1.0], 1);
     let refused = Exchange::new(error, problem, objective, 0.0).err();
-    assert!(matches!(refused, Some(DesignError::Sampled(_))), "{refused:?}");
+    assert!(matches!(refused, Some(DesignError::Lmi(_))), "{refused:?}");
 }

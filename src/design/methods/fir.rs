@@ -6,7 +6,7 @@
 //! only estimated, from the peaks between the points of a fine grid; the taps that are returned have the
 //! computed one.
 
-use super::{Filters, GAMMA_ACCURACY, Settings, Synthesis};
+use super::{GAMMA_ACCURACY, Settings, Synthesis, tap_lags};
 use crate::design::DesignError;
 use crate::design::error_grid::ErrorGrid;
 use crate::design::exchange::{Exchange, LEAST_MARGIN};
@@ -19,7 +19,7 @@ use crate::lti::peak::Peak;
 /// is known.
 const NOISY_MARGIN: f64 = 1e-3;
 /// Limit on the number of times that the norm finds a peak which the estimates missed.
-const SURPRISE_LIMIT: usize = 8;
+const MISSED_PEAK_LIMIT: usize = 8;
 
 /// The `settings.taps` taps per channel of least gamma within [`GAMMA_ACCURACY`]. Optimal banks are not
 /// unique. Of all banks within the gamma margin, this function returns the one with the least power per
@@ -32,17 +32,8 @@ const SURPRISE_LIMIT: usize = 8;
 pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
     let mut exchange = exchange(plant, settings)?;
     let best = least_gamma(plant, settings.taps, &mut exchange)?;
-    let noncausal = plant.noncausal_bound()?.gain;
-    Ok(Synthesis {
-        filters: Filters::Fir(best.taps),
-        peak: best.peak,
-        lower: exchange.lower.max(noncausal).min(best.peak.gain),
-        noncausal: noncausal.min(best.peak.gain),
-        dual: exchange.dual,
-        iterations: exchange.iterations,
-        robust: None,
-        affine: None,
-    })
+    let found = Synthesis::of_least_gamma(plant, best.taps, best.peak, exchange.lower)?;
+    Ok(Synthesis { dual: exchange.dual, iterations: exchange.iterations, ..found })
 }
 
 /// Bounds of the least gamma of `taps` taps per channel, at most `accuracy` (relative) apart, on the grid of
@@ -57,10 +48,9 @@ pub(crate) fn bracket(plant: &LiftedPlant, taps: usize, accuracy: f64) -> Result
 }
 
 fn exchange<'a>(plant: &'a LiftedPlant, settings: &Settings) -> Result<Exchange<ErrorGrid<'a>>, DesignError> {
-    let ratio = plant.ratio();
-    let lags: Vec<usize> = (0..ratio).map(|p| settings.taps.saturating_sub(p).div_ceil(ratio)).collect();
+    let lags = tap_lags(plant.ratio(), settings.taps);
     let grid = ErrorGrid::new(plant, lags[0]);
-    let (points, weights) = grid.coarse();
+    let (points, weights) = grid.coarse(0);
     let noise = plant.problem().noise.clone();
     let margin = settings.gamma_margin.unwrap_or_else(|| usual_margin(&noise));
     Exchange::new(grid, Problem::new(points, lags)?, MeanSquareObjective { weights, noise }, margin)
@@ -87,7 +77,7 @@ fn least_gamma(
     exchange: &mut Exchange<ErrorGrid<'_>>,
 ) -> Result<Evaluated, DesignError> {
     let mut best = judged(plant, length, exchange)?;
-    for _ in 0..SURPRISE_LIMIT {
+    for _ in 0..MISSED_PEAK_LIMIT {
         let missed = best.peak.gain > best.estimate * (1.0 + GAMMA_ACCURACY);
         if !missed || !exchange.add(&[best.peak.frequency])? {
             break;

@@ -11,7 +11,7 @@
 //! [`kyp::minimise`] finds the taps of least norm with a Lyapunov matrix instead of frequencies. It shares
 //! no numerics with the exchange of frequencies, so it is an independent check of it.
 
-use super::{Filters, Settings, Synthesis};
+use super::{Settings, Synthesis};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::linalg::Mat;
@@ -28,7 +28,7 @@ pub(crate) const MAX_STATES: usize = 160;
 /// dual points.
 ///
 /// # Errors
-/// [`DesignError::KypTooLarge`] for more than 160 states, [`DesignError::Kyp`] if a decomposition fails.
+/// [`DesignError::KypTooLarge`] for more than 160 states, [`DesignError::Lmi`] if a decomposition fails.
 pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
     let stored = settings.taps.div_ceil(plant.ratio()).saturating_sub(1);
     let states = plant.system().order() + plant.channels() * stored;
@@ -38,17 +38,8 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
     let solution = kyp::minimise(&problem(plant, settings.taps, stored)?, &lmi::Settings::KYP)?;
     let taps: Vec<Vec<f64>> = solution.x.chunks(settings.taps).map(<[f64]>::to_vec).collect();
     let peak = plant.fir_norm(&taps)?;
-    let noncausal = plant.noncausal_bound()?.gain;
-    Ok(Synthesis {
-        filters: Filters::Fir(taps),
-        peak,
-        lower: solution.lower.max(noncausal).min(peak.gain),
-        noncausal: noncausal.min(peak.gain),
-        dual: Vec::new(),
-        iterations: solution.steps.len(),
-        robust: None,
-        affine: None,
-    })
+    let found = Synthesis::of_least_gamma(plant, taps, peak, solution.lower)?;
+    Ok(Synthesis { iterations: solution.iterations, ..found })
 }
 
 /// The error as an affine function of the taps, those of the first channel first.

@@ -20,6 +20,8 @@ pub(crate) mod iir;
 mod mean_square_fir;
 mod precise_filtering;
 pub(crate) mod robust_fir;
+pub(crate) mod scenarios;
+pub(crate) mod scheduled_fir;
 pub(crate) mod separation;
 pub(crate) mod sinc;
 
@@ -43,7 +45,7 @@ pub(crate) struct Settings {
     /// Solver of `fir`; `None` is the sampled worst-case solver.
     pub(crate) solver: Option<Solver>,
     /// The errors that `fir` has to expect; `None` if there are none.
-    pub(crate) robust: Option<robust_fir::RobustProblem>,
+    pub(crate) robust: Option<scenarios::RobustProblem>,
     /// For mean-square designs, how well each channel is known; `None` if all are exact.
     pub(crate) deviations: Option<Vec<Deviations>>,
     /// The channels of the plant in units of the slow period, for `separation`.
@@ -98,19 +100,35 @@ pub(crate) struct Synthesis {
     pub(crate) iterations: usize,
     /// For a robust design.
     pub(crate) robust: Option<robust_fir::RobustStudy>,
-    /// For taps that follow the delays; `filters` are those without errors.
-    pub(crate) affine: Option<robust_fir::AffineDesign>,
+    /// For delay-scheduled taps; `filters` are those without errors.
+    pub(crate) affine: Option<scheduled_fir::AffineDesign>,
 }
 
 impl Synthesis {
     /// FIR filters of a method that minimises nothing. The only lower bound is the one for all filters.
     pub(crate) fn of_taps(plant: &LiftedPlant, taps: Vec<Vec<f64>>) -> Result<Self, DesignError> {
         let peak = plant.fir_norm(&taps)?;
+        Self::of_least_gamma(plant, taps, peak, 0.0)
+    }
+
+    /// FIR filters of the norm `peak` with a lower bound for all filters of their length.
+    pub(crate) fn of_least_gamma(
+        plant: &LiftedPlant,
+        taps: Vec<Vec<f64>>,
+        peak: Peak,
+        lower: f64,
+    ) -> Result<Self, DesignError> {
         let noncausal = plant.noncausal_bound()?.gain.min(peak.gain);
         let filters = Filters::Fir(taps);
         let (dual, iterations) = (Vec::new(), 0);
-        Ok(Self { filters, peak, lower: noncausal, noncausal, dual, iterations, robust: None, affine: None })
+        let lower = lower.min(peak.gain).max(noncausal);
+        Ok(Self { filters, peak, lower, noncausal, dual, iterations, robust: None, affine: None })
     }
+}
+
+/// Lags of the output samples p of a slow period, for so many taps per channel at the fast rate.
+pub(crate) fn tap_lags(ratio: usize, taps: usize) -> Vec<usize> {
+    (0..ratio).map(|p| taps.saturating_sub(p).div_ceil(ratio)).collect()
 }
 
 /// The filters of `method` for the channels of `plant`.
@@ -124,7 +142,7 @@ pub(crate) fn synthesise(
 ) -> Result<Synthesis, DesignError> {
     if let (Method::Fir, Some(problem)) = (method, &settings.robust) {
         return match problem.spec.design.tracking {
-            Some(Tracking::Affine) => robust_fir::synthesise_affine(plant, settings, problem),
+            Some(Tracking::Affine) => scheduled_fir::synthesise(plant, settings, problem),
             None => robust_fir::synthesise(plant, settings, problem),
         };
     }

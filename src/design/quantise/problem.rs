@@ -6,6 +6,7 @@ use crate::design::DesignError;
 use crate::design::error_grid::ErrorGrid;
 use crate::design::filters::polyphase;
 use crate::design::plant::LiftedPlant;
+use crate::lmi::sampled::Point;
 
 /// Taps to be replaced by integers times a power of two.
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +37,8 @@ pub(super) struct TapError<'a> {
     pub(super) problem: QuantisationProblem<'a>,
     pub(super) ratio: usize,
     pub(super) grid: ErrorGrid<'a>,
+    /// The points of the grid.
+    pub(super) points: Vec<Point>,
     pub(super) forms: Forms,
     /// Estimate of gamma of the real taps.
     pub(super) real_gamma: f64,
@@ -52,10 +55,11 @@ impl<'a> TapError<'a> {
         let ratio = problem.plant.ratio();
         let lags = polyphase(problem.taps, ratio);
         let grid = ErrorGrid::new(problem.plant, lags.len());
-        let forms = Forms::new(grid.points());
-        let real_gamma = grid.peaks(&lags)?.estimate;
+        let points = grid.points();
+        let forms = Forms::new(&points);
+        let real_gamma = grid.peaks(&lags, 0.0)?.estimate;
         let real_mean_square = grid.mean_square(&lags) + output_noise(problem.noise, problem.taps);
-        Ok(Self { problem, ratio, grid, forms, real_gamma, real_mean_square })
+        Ok(Self { problem, ratio, grid, points, forms, real_gamma, real_mean_square })
     }
 
     /// The error of integer taps.
@@ -63,12 +67,12 @@ impl<'a> TapError<'a> {
         let taps = fixed_point.taps();
         let lags = polyphase(&taps, self.ratio);
         let mean_square = self.grid.mean_square(&lags) + output_noise(self.problem.noise, &taps);
-        Ok(Candidate { gamma: self.grid.peaks(&lags)?.estimate, mean_square, fixed_point })
+        Ok(Candidate { gamma: self.grid.peaks(&lags, 0.0)?.estimate, mean_square, fixed_point })
     }
 
     /// Estimate of gamma of integer taps.
     pub(super) fn gamma(&self, fixed_point: &FixedPoint) -> Result<f64, DesignError> {
-        Ok(self.grid.peaks(&polyphase(&fixed_point.taps(), self.ratio))?.estimate)
+        Ok(self.grid.peaks(&polyphase(&fixed_point.taps(), self.ratio), 0.0)?.estimate)
     }
 }
 

@@ -54,7 +54,7 @@ pub(super) struct QuadraticBound {
 impl AffineErrors {
     pub(super) fn new(error: &TapError<'_>, unknowns: Vec<Unknown>) -> Self {
         let ratio = error.ratio;
-        let points = error.grid.points().iter().map(|point| {
+        let points = error.points.iter().map(|point| {
             let row = |u: usize, c: usize| {
                 let Unknown { channel, tap } = unknowns[u];
                 Complex::from_polar(1.0, -point.omega * (tap / ratio) as f64) * point.h[(channel, c)]

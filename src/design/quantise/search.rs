@@ -61,7 +61,7 @@ impl<'a> Search<'a> {
     }
 
     fn descended(&self, start: &FixedPoint) -> Result<FixedPoint, DesignError> {
-        let points = self.error.grid.points();
+        let points = &self.error.points;
         let integers = start.integers.iter().map(|list| list.iter().map(|&x| x as f64).collect()).collect();
         let lags = polyphase(&start.taps(), self.error.ratio);
         let real = self.error.real_gamma;
@@ -86,7 +86,7 @@ impl<'a> Search<'a> {
     /// (Lawson).
     fn reweighted(&self, found: &mut Vec<Candidate>) -> Result<(), DesignError> {
         let real = self.error.real_gamma;
-        let mut weights = vec![1.0; self.error.grid.points().len()];
+        let mut weights = vec![1.0; self.error.points.len()];
         for _ in 0..ROUNDS {
             let candidate = self.error.candidate(self.fixed_point(&self.closest(&weights)?))?;
             let lags = polyphase(&candidate.fixed_point.taps(), self.error.ratio);

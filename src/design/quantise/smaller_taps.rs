@@ -3,6 +3,7 @@
 
 use super::problem::TapError;
 use crate::design::filters::{impulse_responses, polyphase};
+use crate::design::methods::tap_lags;
 use crate::lmi::Settings;
 use crate::lmi::sampled::{MeanSquareObjective, Problem, mean_square_under_cap};
 
@@ -29,14 +30,14 @@ pub(super) fn smaller_taps(error: &TapError<'_>) -> Vec<SmallerTaps> {
 
 /// An upper bound of the gamma of zero taps.
 fn zero_output(error: &TapError<'_>) -> f64 {
-    error.grid.points().iter().map(|point| point.w.norm()).fold(0.0, f64::max)
+    error.points.iter().map(|point| point.w.norm()).fold(0.0, f64::max)
 }
 
 fn under_cap(error: &TapError<'_>, cap: f64) -> Option<SmallerTaps> {
     let (length, channels) = (error.problem.taps[0].len(), error.problem.taps.len());
-    let (points, mut weights) = error.grid.coarse();
+    let (points, mut weights) = error.grid.coarse(0);
     weights.iter_mut().for_each(|weight| *weight *= ERROR_WEIGHT);
-    let lags = (0..error.ratio).map(|p| length.saturating_sub(p).div_ceil(error.ratio)).collect();
+    let lags = tap_lags(error.ratio, length);
     let problem = Problem::new(points, lags).ok()?;
     let objective = MeanSquareObjective { weights, noise: vec![1.0; channels] };
     let start = polyphase(error.problem.taps, error.ratio);

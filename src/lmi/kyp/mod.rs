@@ -29,16 +29,10 @@
 //! direction, here in its dual form).
 
 mod covariance;
-mod iterate;
-mod lyapunov;
-mod newton;
 mod problem;
-mod reduced;
 mod solver;
-mod step;
 #[cfg(test)]
 mod tests;
 
-pub use iterate::Step;
-pub use problem::{KypError, Problem};
+pub use problem::Problem;
 pub use solver::{Solution, minimise};

@@ -2,7 +2,7 @@ use super::*;
 use crate::linalg::Mat;
 use crate::lmi::sampled;
 use crate::lmi::testbank::{self, TestBank};
-use crate::lmi::{Outcome, SettingError, Settings};
+use crate::lmi::{LmiError, Outcome, Settings};
 use crate::lti::StateSpace;
 use crate::lti::peak::hinf_norm;
 
@@ -92,7 +92,7 @@ fn report(name: &str, p: &Problem, s: &Solution, seconds: f64) {
         s.gamma,
         s.lower,
         (s.gamma - s.lower) / s.gamma,
-        s.steps.len(),
+        s.iterations,
         s.coordinates.a.nrows(),
         p.a.nrows(),
         p.unknowns()
@@ -103,11 +103,6 @@ fn solve(name: &str, p: &Problem) -> Solution {
     let start = std::time::Instant::now();
     let s = minimise(p, &Settings::KYP).unwrap();
     report(name, p, &s, start.elapsed().as_secs_f64());
-    if s.outcome != Outcome::Solved {
-        for (i, step) in s.steps.iter().enumerate() {
-            println!("  {i} {step:?}");
-        }
-    }
     s
 }
 
@@ -222,15 +217,15 @@ fn what_is_no_problem_is_refused() {
     let one = |v: f64| Mat::from_element(1, 1, v);
     let zero = one(0.0);
     let try_a = |a: Mat| Problem::new(a, one(1.0), one(1.0), zero.clone(), vec![]);
-    assert!(matches!(try_a(one(1.0)), Err(KypError::Unstable { .. })));
-    assert!(matches!(try_a(one(f64::NAN)), Err(KypError::NotFinite { .. })));
-    assert!(matches!(try_a(Mat::zeros(1, 2)), Err(KypError::Size { .. })));
+    assert!(matches!(try_a(one(1.0)), Err(LmiError::Unstable { .. })));
+    assert!(matches!(try_a(one(f64::NAN)), Err(LmiError::NotFinite { .. })));
+    assert!(matches!(try_a(Mat::zeros(1, 2)), Err(LmiError::Size { .. })));
     let settings = Settings { tol_rank: 2.0, ..Settings::KYP };
     let refused = minimise(&try_a(one(0.5)).unwrap(), &settings);
-    assert!(matches!(refused, Err(KypError::Setting(SettingError { name: "tol_rank", .. }))));
+    assert!(matches!(refused, Err(LmiError::Setting { name: "tol_rank", .. })));
     let term = vec![(Mat::zeros(2, 1), zero.clone())];
     let bad = Problem::new(one(0.5), one(1.0), one(1.0), zero.clone(), term);
-    assert!(matches!(bad, Err(KypError::Size { rows: 2, want_rows: 1, .. })));
+    assert!(matches!(bad, Err(LmiError::Size { given: (2, 1), wanted: (1, 1), .. })));
 }
 
 #[test]
@@ -240,7 +235,7 @@ fn an_exhausted_iteration_limit_keeps_valid_bounds() {
     for max_iterations in 0..8 {
         let s = minimise(&problem, &Settings { max_iterations, ..Settings::KYP }).unwrap();
         assert!(s.outcome == Outcome::IterationLimit || s.outcome == Outcome::SolvedInaccurate);
-        assert!(s.lower <= full.gamma && s.gamma >= full.lower && s.steps.len() == max_iterations);
+        assert!(s.lower <= full.gamma && s.gamma >= full.lower && s.iterations == max_iterations);
         assert!(norm(&problem, &s.x) <= s.gamma * (1.0 + 1e-9));
     }
 }
@@ -252,6 +247,6 @@ fn large_problems_are_feasible() {
     for lags in [7, 17] {
         let problem = Fir::new(32, 8, 16, 8, lags, 0.9).kyp();
         let s = solve("large", &problem);
-        assert!(s.outcome.is_solved());
+        assert!(matches!(s.outcome, Outcome::Solved | Outcome::SolvedInaccurate));
     }
 }

@@ -12,10 +12,10 @@
 
 use super::basis::Basis;
 use super::prepare::Reduced;
-use super::problem::SampledError;
-use super::problem::{Problem, Taps};
+use super::problem::{Problem, Taps, check_count, check_size};
 use crate::linalg::blocks::Blocks;
 use crate::linalg::{self, CMat, Complex, Mat};
+use crate::lmi::LmiError;
 
 /// Thresholds tried between weak directions of tap space and rounding errors; the best bound counts.
 const CUTS: [f64; 3] = [1e-14, 1e-12, 1e-9];
@@ -61,14 +61,12 @@ impl LowerBound {
 /// module's text; the rounding errors of the sums are included.
 ///
 /// Fails if the number or the size of the matrices does not fit.
-pub fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Result<LowerBound, SampledError> {
+pub fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Result<LowerBound, LmiError> {
     let points = problem.points();
-    if dual.len() != points.len() {
-        return Err(SampledError::Count { name: "dual matrices", given: dual.len(), points: points.len() });
-    }
+    check_count("dual matrices", dual.len(), points.len())?;
     let mut nuclear = 0.0;
     for (l, y) in dual.iter().enumerate() {
-        check_shape(problem, l, y)?;
+        check_size("the dual matrix", l, y, (problem.rows(), problem.inputs()))?;
         nuclear += linalg::singular_values(y)?.iter().sum::<f64>();
     }
     let value = pairwise(0..points.len(), &|l| re_inner(&dual[l], &points[l].w));
@@ -92,22 +90,6 @@ fn pairwise<T: std::ops::Add<Output = T>>(range: std::ops::Range<usize>, term: &
 
 fn re_inner(a: &CMat, b: &CMat) -> f64 {
     a.iter().zip(b.iter()).map(|(x, y)| x.re * y.re + x.im * y.im).sum()
-}
-
-fn check_shape(problem: &Problem, l: usize, y: &CMat) -> Result<(), SampledError> {
-    let (rows, cols) = (problem.rows(), problem.inputs());
-    if y.shape() == (rows, cols) {
-        return Ok(());
-    }
-    let (have_rows, have_cols) = y.shape();
-    Err(SampledError::Size {
-        name: "the dual matrix",
-        point: l,
-        rows: have_rows,
-        cols: have_cols,
-        want_rows: rows,
-        want_cols: cols,
-    })
 }
 
 /// Norm of `r_{p,i,j} / s_i` plus a bound of its rounding error.
@@ -165,7 +147,7 @@ pub(super) fn cover(
     reduced: &Reduced,
     basis: &Basis,
     (taps, gamma): (&Taps, f64),
-) -> Result<(f64, Covered), SampledError> {
+) -> Result<(f64, Covered), LmiError> {
     let reference = problem.points().iter().map(|p| p.w.norm()).fold(0.0, f64::max);
     let stated = RADIUS_FACTOR * size(problem, taps).max(reference);
     let spread = (problem.rows() as f64).sqrt() * gamma;
@@ -175,7 +157,7 @@ pub(super) fn cover(
 }
 
 /// Largest growth from reduced taps to the size of taps; infinite if channels had to be dropped.
-fn mix_norm(problem: &Problem, reduced: &Reduced) -> Result<f64, SampledError> {
+fn mix_norm(problem: &Problem, reduced: &Reduced) -> Result<f64, LmiError> {
     let strength = strengths(problem);
     if reduced.mix.nrows() < strength.iter().filter(|s| **s > 0.0).count() {
         return Ok(f64::INFINITY);
@@ -193,7 +175,7 @@ pub(super) fn from_iterate(
     basis: &Basis,
     z: &Blocks,
     (radius, covered): (f64, Covered),
-) -> Result<(LowerBound, Vec<CMat>), SampledError> {
+) -> Result<(LowerBound, Vec<CMat>), LmiError> {
     let mut best = (LowerBound::zero(), zero_dual(problem));
     for cut in CUTS {
         let dual = dual_matrices(reduced, basis, z, cut);

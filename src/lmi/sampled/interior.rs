@@ -8,11 +8,11 @@ use super::blocks::{Cone, SlackStep};
 use super::newton::{self, ChannelProjection};
 use super::prepare::Reduced;
 use super::quadratic::Quadratic;
-use super::step::Step;
 use crate::linalg::Mat;
 use crate::linalg::blocks::Blocks;
 use crate::lmi::Settings;
 use crate::lmi::factor::RegularisedCholesky;
+use crate::lmi::iteration::{StepLengths, centering};
 use std::cell::OnceCell;
 
 /// The objective.
@@ -24,19 +24,9 @@ pub(super) enum Objective {
     MeanSquare(Quadratic),
 }
 
-/// Why a step could not be made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stall {
-    /// A slack lost positive definiteness to rounding.
-    Slack,
-    /// The Newton matrix could not be factored.
-    Newton,
-    /// The direction holds NaN or both step lengths vanish.
-    Step,
-}
-
-/// Steps shorter than this make no progress.
-const SHORTEST_STEP: f64 = 1e-7;
+/// Start of the mean-square iteration: its gap relative to the objective. Near enough to the end, far enough
+/// from the boundary.
+const STARTING_GAP: f64 = 0.1;
 
 /// The iterate and its work memory.
 #[derive(Debug)]
@@ -82,8 +72,7 @@ impl<'a> Engine<'a> {
         let (curvature, start) = match &objective {
             Objective::WorstCase => (None, None),
             Objective::MeanSquare(quadratic) => {
-                // A gap of a tenth of the objective: near enough to the end, far enough from the boundary.
-                let gap = 0.1 * quadratic.value(&cone.k, &x).max(f64::MIN_POSITIVE);
+                let gap = STARTING_GAP * quadratic.value(&cone.k, &x).max(f64::MIN_POSITIVE);
                 (Some(quadratic.curvature(reduced)), Some(gap / cone.order() as f64))
             }
         };
@@ -187,17 +176,14 @@ impl<'a> Engine<'a> {
         Direction { taps, slack: SlackStep { t, k } }
     }
 
-    /// One step. The iterate changes only if all goes well.
-    pub(super) fn step(&mut self, settings: &Settings) -> Result<Step, Stall> {
-        let objective = self.value();
+    /// One step; `None` if rounding errors prevent it. The iterate changes only if all goes well.
+    pub(super) fn step(&mut self, settings: &Settings) -> Option<()> {
         if !self.cone.invert() {
-            return Err(Stall::Slack);
+            return None;
         }
-        let order = self.cone.order() as f64;
         let gap = self.cone.gap();
-        let mu = gap / order;
-        let dual_residual = norm(self.dual_residual());
-        let newton = self.newton().ok_or(Stall::Newton)?;
+        let mu = gap / self.cone.order() as f64;
+        let newton = self.newton()?;
         let cost = self.equality().cost.clone();
         let mut dz = std::mem::replace(&mut self.dz, Blocks::zeros(0, 0, 0));
         let mut corrector = std::mem::replace(&mut self.corrector, Blocks::zeros(0, 0, 0));
@@ -205,68 +191,56 @@ impl<'a> Engine<'a> {
         let minus_cost: Vec<f64> = cost.iter().map(|c| -c).collect();
         let affine = self.direction(&newton, &minus_cost);
         self.cone.dual_step(&affine.slack, 0.0, None, &mut dz);
-        let longest = self.max_steps(&affine, &dz, 1.0);
-        let sigma = centering(self.gap_after(gap, &affine, &dz, longest) / gap);
+        let predicted = self.max_steps(&affine, &dz, 1.0);
+        let sigma = centering(self.gap_after(gap, &affine, &dz, predicted) / gap);
 
         self.cone.corrector(&affine.slack, &dz, &mut corrector);
         let (center, second) = (self.adjoint(&self.cone.x), self.adjoint(&corrector));
         let rhs: Vec<f64> = (0..cost.len()).map(|a| sigma * mu * center[a] - second[a] - cost[a]).collect();
         let full = self.direction(&newton, &rhs);
         self.cone.dual_step(&full.slack, sigma * mu, Some(&corrector), &mut dz);
-        let fraction = settings.step_fraction.min(0.9 + 0.09 * longest.0.min(longest.1));
-        let longest = self.max_steps(&full, &dz, 1.0 / fraction);
-        let alpha = (fraction * longest.0, fraction * longest.1);
+        let fraction = settings.fraction(predicted);
+        let StepLengths { primal, dual } = self.max_steps(&full, &dz, 1.0 / fraction);
+        let length = StepLengths { primal: fraction * primal, dual: fraction * dual };
 
-        let done = self.advance(&full, &dz, alpha);
+        let done = self.advance(&full, &dz, length);
         self.dz = dz;
         self.corrector = corrector;
-        let step = Step {
-            objective,
-            mu,
-            dual_residual,
-            alpha_primal: alpha.0,
-            alpha_dual: alpha.1,
-            shift: newton.shift,
-        };
-        if done { Ok(step) } else { Err(Stall::Step) }
+        done
     }
 
-    /// Primal and dual step lengths to the boundary. With a quadratic objective the dual residual
-    /// moves with the taps, so both take the shorter one.
-    fn max_steps(&mut self, d: &Direction, dz: &Blocks, most: f64) -> (f64, f64) {
+    /// Step lengths to the boundary. With a quadratic objective the dual residual moves with the taps, so
+    /// both take the shorter one.
+    fn max_steps(&mut self, d: &Direction, dz: &Blocks, most: f64) -> StepLengths {
         let primal = self.cone.max_primal_step(&d.slack, most);
         let dual = self.cone.max_dual_step(dz, most);
-        if self.free_t() { (primal, dual) } else { (primal.min(dual), primal.min(dual)) }
+        let both = primal.min(dual);
+        if self.free_t() { StepLengths { primal, dual } } else { StepLengths { primal: both, dual: both } }
     }
 
-    fn gap_after(&self, gap: f64, d: &Direction, dz: &Blocks, (primal, dual): (f64, f64)) -> f64 {
+    fn gap_after(&self, gap: f64, d: &Direction, dz: &Blocks, length: StepLengths) -> f64 {
         // <S, dZ> = <S, Z + dZ> - <S, Z>, and S itself is linear in (t, K) up to its constant part.
         let slack_dz = self.cone.inner_slack(dz);
-        gap + primal * self.cone.inner(&d.slack, &self.cone.z)
-            + dual * slack_dz
-            + primal * dual * self.cone.inner(&d.slack, dz)
+        gap + length.primal * self.cone.inner(&d.slack, &self.cone.z)
+            + length.dual * slack_dz
+            + length.primal * length.dual * self.cone.inner(&d.slack, dz)
     }
 
-    fn advance(&mut self, d: &Direction, dz: &Blocks, (primal, dual): (f64, f64)) -> bool {
+    fn advance(&mut self, d: &Direction, dz: &Blocks, length: StepLengths) -> Option<()> {
         let finite = d.taps.iter().all(|v| v.is_finite()) && d.slack.t.is_finite();
-        if !finite || primal.max(dual) < SHORTEST_STEP {
-            return false;
+        if !finite || !length.make_progress() {
+            return None;
         }
         for (x, dx) in self.x.iter_mut().zip(&d.taps) {
-            *x += primal * dx;
+            *x += length.primal * dx;
         }
-        self.cone.t += primal * d.slack.t;
+        self.cone.t += length.primal * d.slack.t;
         // From the unknowns, not from the step, so that rounding errors do not accumulate.
         self.cone.k = self.reduced.error(&self.x);
-        self.cone.z.add_scaled(dual, dz);
+        self.cone.z.add_scaled(length.dual, dz);
         self.equality = OnceCell::new();
-        true
+        Some(())
     }
-}
-
-/// Mehrotra's centering from the ratio of the predicted to the present gap.
-fn centering(ratio: f64) -> f64 {
-    ratio.clamp(0.0, 1.0).powi(3).clamp(1e-8, 0.9)
 }
 
 pub(super) fn norm(v: &[f64]) -> f64 {

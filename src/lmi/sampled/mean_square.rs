@@ -7,15 +7,11 @@
 use super::basis::Basis;
 use super::interior::{Engine, Objective};
 use super::prepare::Reduced;
-use super::problem::{MeanSquareObjective, Point, Problem, SampledError, Taps};
+use super::problem::{MeanSquareObjective, Point, Problem, Taps};
 use super::quadratic::Quadratic;
-use super::step::Step;
-use crate::lmi::Settings;
 use crate::lmi::factor::RegularisedCholesky;
-use crate::lmi::outcome::Outcome;
-
-/// Steps without a smaller gap after which the iteration ends.
-const PATIENCE: usize = 6;
+use crate::lmi::iteration::{self, Iterate};
+use crate::lmi::{LmiError, Outcome, Settings};
 
 /// Taps of least mean square under a cap.
 #[derive(Debug, Clone)]
@@ -30,10 +26,8 @@ pub struct MeanSquare {
     pub lower: f64,
     /// Worst `sigma_max(K_l)` of these taps over the points; not above the cap.
     pub gamma: f64,
-    /// Index of the point where it is attained.
-    pub worst_point: usize,
-    /// Iteration record; the objective is relative to the start's.
-    pub steps: Vec<Step>,
+    /// Number of steps.
+    pub iterations: usize,
 }
 
 /// Taps that minimise the secondary objective, by a QR factorisation (never by normal equations); least norm
@@ -44,7 +38,7 @@ pub fn least_squares(
     problem: &Problem,
     square: &MeanSquareObjective,
     tol_rank: f64,
-) -> Result<Taps, SampledError> {
+) -> Result<Taps, LmiError> {
     problem.check_objective(square)?;
     let reduced = Reduced::new(problem)?;
     if reduced.layout.unknowns() == 0 {
@@ -66,7 +60,7 @@ pub fn mean_square_under_cap(
     cap: f64,
     start: &Taps,
     settings: &Settings,
-) -> Result<MeanSquare, SampledError> {
+) -> Result<MeanSquare, LmiError> {
     settings.check()?;
     problem.check_taps(start)?;
     let free = least_squares(problem, square, settings.tol_rank)?;
@@ -74,24 +68,32 @@ pub fn mean_square_under_cap(
     let mut best = Best::new(problem, square, cap, start)?;
     best.offer(free)?;
     if best.mean_square == free_square {
-        return Ok(best.finish(Outcome::Solved, free_square, Vec::new()));
+        return Ok(best.finish(Outcome::Solved, free_square, 0));
     }
     if best.gamma >= cap {
-        return Err(SampledError::Cap { cap, gamma: best.gamma });
+        return Err(LmiError::Cap { cap, gamma: best.gamma });
     }
     // From the start, in units of the cap and of the start's own mean square.
     let unit = best.mean_square / (cap * cap);
     let mut reduced = Reduced::new(&residual_problem(problem, start)?)?;
     reduced.rescale(cap);
     let quadratic = Quadratic::new(&reduced, square, start, cap, unit);
-    let run = Run { reduced: &reduced, start, quadratic, cap, settings };
-    let (outcome, gap, steps) = run.iterate(&mut best)?;
-    let lower = (best.mean_square - gap * best.mean_square_unit(unit)).max(free_square);
-    Ok(best.finish(outcome, lower, steps))
+    let zero = vec![0.0; reduced.layout.unknowns()];
+    let curvature = RegularisedCholesky::new(quadratic.curvature(&reduced));
+    let engine = Engine::new(&reduced, Objective::MeanSquare(quadratic), zero, 1.0);
+    let (Some(engine), Ok(curvature)) = (engine, curvature) else {
+        return Ok(best.finish(Outcome::NumericalTrouble, free_square, 0));
+    };
+    let mut run = Run { engine, curvature };
+    let (outcome, iterations) = iteration::run(&mut run, settings)?;
+    let step = reduced.taps(&run.engine.x);
+    best.offer(start.iter().zip(step).map(|(f, d)| f + d * cap).collect())?;
+    let lower = (best.mean_square - run.duality_gap() * (unit * cap * cap)).max(free_square);
+    Ok(best.finish(outcome, lower, iterations))
 }
 
 /// The problem with the error of `start` as its reference.
-fn residual_problem(problem: &Problem, start: &Taps) -> Result<Problem, SampledError> {
+fn residual_problem(problem: &Problem, start: &Taps) -> Result<Problem, LmiError> {
     let point = |l: usize| {
         let p = &problem.points()[l];
         Point { omega: p.omega, w: problem.error_at(l, start), h: p.h.clone() }
@@ -106,7 +108,6 @@ struct Best<'a> {
     taps: Taps,
     mean_square: f64,
     gamma: f64,
-    worst_point: usize,
 }
 
 impl<'a> Best<'a> {
@@ -115,85 +116,54 @@ impl<'a> Best<'a> {
         square: &'a MeanSquareObjective,
         cap: f64,
         start: &Taps,
-    ) -> Result<Self, SampledError> {
-        let (gamma, worst_point) = problem.worst(start)?;
+    ) -> Result<Self, LmiError> {
+        let (gamma, _) = problem.worst(start)?;
         let mean_square = problem.mean_square(start, square);
-        Ok(Self { problem, square, cap, taps: start.clone(), mean_square, gamma, worst_point })
+        Ok(Self { problem, square, cap, taps: start.clone(), mean_square, gamma })
     }
 
     /// Takes the taps if they respect the cap and improve.
-    fn offer(&mut self, taps: Taps) -> Result<(), SampledError> {
+    fn offer(&mut self, taps: Taps) -> Result<(), LmiError> {
         let mean_square = self.problem.mean_square(&taps, self.square);
-        let (gamma, worst_point) = self.problem.worst(&taps)?;
+        let (gamma, _) = self.problem.worst(&taps)?;
         if gamma <= self.cap && (mean_square < self.mean_square || self.gamma > self.cap) {
-            (self.taps, self.mean_square) = (taps, mean_square);
-            (self.gamma, self.worst_point) = (gamma, worst_point);
+            (self.taps, self.mean_square, self.gamma) = (taps, mean_square, gamma);
         }
         Ok(())
     }
 
-    fn mean_square_unit(&self, unit: f64) -> f64 {
-        unit * self.cap * self.cap
-    }
-
-    fn finish(self, outcome: Outcome, lower: f64, steps: Vec<Step>) -> MeanSquare {
-        let Self { taps, mean_square, gamma, worst_point, .. } = self;
-        MeanSquare { outcome, taps, mean_square, lower: lower.min(mean_square), gamma, worst_point, steps }
+    fn finish(self, outcome: Outcome, lower: f64, iterations: usize) -> MeanSquare {
+        let Self { taps, mean_square, gamma, .. } = self;
+        MeanSquare { outcome, taps, mean_square, lower: lower.min(mean_square), gamma, iterations }
     }
 }
 
 struct Run<'a> {
-    reduced: &'a Reduced,
-    start: &'a Taps,
-    quadratic: Quadratic,
-    cap: f64,
-    settings: &'a Settings,
+    engine: Engine<'a>,
+    /// Q, the second derivative of the objective.
+    curvature: RegularisedCholesky,
 }
 
 impl Run<'_> {
-    /// Returns the outcome, the gap in scaled units and the record.
-    fn iterate(&self, best: &mut Best<'_>) -> Result<(Outcome, f64, Vec<Step>), SampledError> {
-        let mut steps = Vec::new();
-        let zero = vec![0.0; self.reduced.layout.unknowns()];
-        let objective = Objective::MeanSquare(self.quadratic.clone());
-        let Some(mut engine) = Engine::new(self.reduced, objective, zero, 1.0) else {
-            return Ok((Outcome::NumericalTrouble, f64::INFINITY, steps));
-        };
-        let Ok(curvature) = RegularisedCholesky::new(self.quadratic.curvature(self.reduced)) else {
-            return Ok((Outcome::NumericalTrouble, f64::INFINITY, steps));
-        };
-        let (mut least, mut waited) = (f64::INFINITY, 0);
-        while steps.len() < self.settings.max_iterations {
-            let gap = duality_gap(&engine, &curvature) / engine.value().max(f64::MIN_POSITIVE);
-            waited = if gap < 0.9 * least { 0 } else { waited + 1 };
-            least = least.min(gap);
-            if gap <= self.settings.tol_gap_rel || waited > PATIENCE {
-                break;
-            }
-            match engine.step(self.settings) {
-                Ok(step) => steps.push(step),
-                Err(_) => break,
-            }
-        }
-        let gap = duality_gap(&engine, &curvature);
-        let relative = gap / engine.value().max(f64::MIN_POSITIVE);
-        best.offer(self.taps(&engine.x))?;
-        let limit_reached = steps.len() >= self.settings.max_iterations;
-        let solved = [self.settings.tol_gap_rel, self.settings.tol_gap_reduced].map(|tol| relative <= tol);
-        let outcome = Outcome::at_end(solved, limit_reached);
-        Ok((outcome, gap, steps))
-    }
-
-    fn taps(&self, x: &[f64]) -> Taps {
-        let step = self.reduced.taps(x);
-        self.start.iter().zip(step).map(|(f, d)| f + d * self.cap).collect()
+    /// `<S, Z> + r' Q^{-1} r / 2` with the dual residual r: how far the Lagrangian's minimum lies below the
+    /// objective, whether or not the dual equality holds.
+    fn duality_gap(&self) -> f64 {
+        let r = self.engine.dual_residual();
+        let correction: f64 = self.curvature.solve(r).iter().zip(r).map(|(a, b)| a * b).sum();
+        self.engine.cone.gap() + 0.5 * correction.max(0.0)
     }
 }
 
-/// `<S, Z> + r' Q^{-1} r / 2` with the dual residual r: how far the Lagrangian's minimum lies below
-/// the objective, whether or not the dual equality holds.
-fn duality_gap(engine: &Engine<'_>, curvature: &RegularisedCholesky) -> f64 {
-    let r = engine.dual_residual();
-    let correction: f64 = curvature.solve(r).iter().zip(r).map(|(a, b)| a * b).sum();
-    engine.cone.gap() + 0.5 * correction.max(0.0)
+impl Iterate for Run<'_> {
+    fn gap(&mut self) -> f64 {
+        self.duality_gap() / self.engine.value().max(f64::MIN_POSITIVE)
+    }
+
+    fn judged_gap(&mut self) -> Result<f64, LmiError> {
+        Ok(self.gap())
+    }
+
+    fn step(&mut self, settings: &Settings) -> Option<()> {
+        self.engine.step(settings)
+    }
 }

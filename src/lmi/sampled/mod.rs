@@ -39,13 +39,12 @@ mod newton;
 mod prepare;
 mod problem;
 mod quadratic;
-mod step;
 #[cfg(test)]
 mod tests;
 mod worst_case;
 
 pub use bound::{Covered, LowerBound, lower_bound};
 pub use mean_square::{MeanSquare, least_squares, mean_square_under_cap};
-pub use problem::{MeanSquareObjective, Point, Problem, SampledError, Taps};
-pub use step::Step;
+pub(crate) use problem::response;
+pub use problem::{MeanSquareObjective, Point, Problem, Taps};
 pub use worst_case::{Solution, minimise};

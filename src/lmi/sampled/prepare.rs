@@ -2,9 +2,10 @@
 //! correlation.
 
 use super::fourier::{Layout, Phases};
-use super::problem::{Problem, SampledError, Taps};
+use super::problem::{Problem, Taps};
 use crate::linalg::blocks::Blocks;
 use crate::linalg::{self, CMat, Mat};
+use crate::lmi::LmiError;
 
 /// Singular values of the row-normalised channels below this are rounding errors; their directions are
 /// dropped.
@@ -30,7 +31,7 @@ pub(super) struct Reduced {
 }
 
 impl Reduced {
-    pub(super) fn new(problem: &Problem) -> Result<Self, SampledError> {
+    pub(super) fn new(problem: &Problem) -> Result<Self, LmiError> {
         let (m, n, q) = (problem.rows(), problem.channels(), problem.inputs());
         let count = problem.points().len();
         let (k1, k) = (n.min(q), (m + n).min(q));
@@ -114,7 +115,7 @@ fn stack(h: &CMat, w: &CMat) -> CMat {
 
 /// n x N real matrix after which the channels, summed over all points, have unit mean power each and
 /// no correlation. Equal channels become one, zero channels none.
-fn mixing(channels: &Blocks) -> Result<Mat, SampledError> {
+fn mixing(channels: &Blocks) -> Result<Mat, LmiError> {
     let (n, k, count) = (channels.rows(), channels.cols(), channels.count());
     let half = k * count;
     let mut all = Mat::from_fn(n, 2 * half, |i, c| {

@@ -1,123 +1,11 @@
 //! The data of a sampled problem, checked once.
 
-use crate::linalg::{self, CMat, Complex, LinalgError, Mat};
-use crate::lmi::SettingError;
+use crate::linalg::{self, CMat, Complex, Mat};
+use crate::lmi::LmiError;
 
 /// Real taps: `F_j` is M x N, one matrix for each lag j. Entries beyond a row's own number of lags
 /// are zero.
 pub type Taps = Vec<Mat>;
-
-/// Why data do not form a sampled problem.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SampledError {
-    /// There is no point.
-    #[error("a sampled problem needs at least one frequency point, none was given")]
-    NoPoints,
-    /// Sizes do not fit.
-    #[error(
-        "{name} is {rows} x {cols} at point {point} but must be {want_rows} x {want_cols}: all points share M, N and q"
-    )]
-    Size {
-        /// Which matrix.
-        name: &'static str,
-        /// Index of the point, from 0.
-        point: usize,
-        /// Rows given.
-        rows: usize,
-        /// Columns given.
-        cols: usize,
-        /// Rows expected.
-        want_rows: usize,
-        /// Columns expected.
-        want_cols: usize,
-    },
-    /// A dimension is zero.
-    #[error("a sampled problem needs M, N and q of at least 1, got M = {m}, N = {n}, q = {q}")]
-    Empty {
-        /// Rows of W.
-        m: usize,
-        /// Rows of H.
-        n: usize,
-        /// Columns of both.
-        q: usize,
-    },
-    /// A NaN or infinity.
-    #[error(
-        "{name} at point {point} holds a value that is not finite: check the response it was sampled from"
-    )]
-    NotFinite {
-        /// Which datum.
-        name: &'static str,
-        /// Index of the point, from 0.
-        point: usize,
-    },
-    /// The list of lags has the wrong length.
-    #[error("{given} numbers of lags were given for {rows} rows: give one for each row of W")]
-    Lags {
-        /// Length of the list.
-        given: usize,
-        /// Rows of W.
-        rows: usize,
-    },
-    /// Taps handed in do not fit the problem.
-    #[error("the taps do not fit the problem: {what}")]
-    TapsShape {
-        /// What is wrong with them.
-        what: String,
-    },
-    /// Dual matrices or weights handed in do not fit the problem.
-    #[error("{given} {name} were given for {points} points: give one for each point")]
-    Count {
-        /// What was counted.
-        name: &'static str,
-        /// How many were given.
-        given: usize,
-        /// How many points there are.
-        points: usize,
-    },
-    /// A weight is negative or not finite, or all are zero.
-    #[error(
-        "weight {value} at point {point} is not allowed: weights are finite, not negative and not all zero"
-    )]
-    Weight {
-        /// Index of the point, from 0.
-        point: usize,
-        /// The value.
-        value: f64,
-    },
-    /// The cap lies below the start's own worst-case norm.
-    #[error(
-        "the cap {cap} is not above the start's worst-case norm {gamma}: start from taps that satisfy it strictly or raise the cap"
-    )]
-    Cap {
-        /// The cap given.
-        cap: f64,
-        /// Worst-case norm of the taps given.
-        gamma: f64,
-    },
-    /// The list of noise powers has the wrong length.
-    #[error("{given} noise powers were given for {channels} channels: give one for each channel")]
-    NoiseCount {
-        /// How many were given.
-        given: usize,
-        /// How many channels there are.
-        channels: usize,
-    },
-    /// A noise power is negative or not finite.
-    #[error("noise power {value} of channel {channel} is not allowed: powers are finite and not negative")]
-    Noise {
-        /// Index of the channel, from 0.
-        channel: usize,
-        /// The value.
-        value: f64,
-    },
-    /// A setting is out of its range.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
-    /// A decomposition failed.
-    #[error(transparent)]
-    Linalg(#[from] LinalgError),
-}
 
 /// A frequency with the responses of the reference and the measurements.
 #[derive(Debug, Clone, PartialEq)]
@@ -160,18 +48,16 @@ pub struct Problem {
 
 impl Problem {
     /// Checks the sizes. `lags[p]` is the number of lags of row p, M of them; 0 fixes the row at zero.
-    pub fn new(points: Vec<Point>, lags: Vec<usize>) -> Result<Self, SampledError> {
-        let first = points.first().ok_or(SampledError::NoPoints)?;
-        let (m, n, q) = (first.w.nrows(), first.h.nrows(), first.w.ncols());
+    pub fn new(points: Vec<Point>, lags: Vec<usize>) -> Result<Self, LmiError> {
+        let first = points.first();
+        let (m, n, q) = first.map_or((0, 0, 0), |first| (first.w.nrows(), first.h.nrows(), first.w.ncols()));
         if m == 0 || n == 0 || q == 0 {
-            return Err(SampledError::Empty { m, n, q });
+            return Err(LmiError::Empty { points: points.len(), m, n, q });
         }
-        if lags.len() != m {
-            return Err(SampledError::Lags { given: lags.len(), rows: m });
-        }
+        check_count("numbers of lags", lags.len(), m)?;
         for (l, point) in points.iter().enumerate() {
-            check_size("W", l, &point.w, m, q)?;
-            check_size("H", l, &point.h, n, q)?;
+            check_size("W", l, &point.w, (m, q))?;
+            check_size("H", l, &point.h, (n, q))?;
             check_finite(l, point)?;
         }
         Ok(Self { points, lags })
@@ -213,7 +99,7 @@ impl Problem {
     }
 
     /// The same problem with more points.
-    pub fn with_points(&self, more: impl IntoIterator<Item = Point>) -> Result<Self, SampledError> {
+    pub fn with_points(&self, more: impl IntoIterator<Item = Point>) -> Result<Self, LmiError> {
         Self::new(self.points.iter().cloned().chain(more).collect(), self.lags.clone())
     }
 
@@ -224,7 +110,7 @@ impl Problem {
     }
 
     /// Largest `sigma_max(K_l)` over the points, and the index of the point where it is attained.
-    pub fn worst(&self, taps: &Taps) -> Result<(f64, usize), SampledError> {
+    pub fn worst(&self, taps: &Taps) -> Result<(f64, usize), LmiError> {
         let mut worst = (0.0, 0);
         for l in 0..self.points.len() {
             let sigma = linalg::largest_singular_value(&self.error_at(l, taps))?;
@@ -245,48 +131,37 @@ impl Problem {
     }
 
     /// Refuses taps of the wrong size or with entries beyond a row's number of lags.
-    pub fn check_taps(&self, taps: &Taps) -> Result<(), SampledError> {
+    pub fn check_taps(&self, taps: &Taps) -> Result<(), LmiError> {
         let (m, n) = (self.rows(), self.channels());
         if let Some(f) = taps.iter().find(|f| f.shape() != (m, n)) {
-            let what = format!("a lag is {} x {} instead of {m} x {n}", f.nrows(), f.ncols());
-            return Err(SampledError::TapsShape { what });
+            return Err(LmiError::Size { name: "a tap".into(), given: f.shape(), wanted: (m, n) });
         }
-        for (j, f) in taps.iter().enumerate() {
-            for p in (0..m).filter(|&p| j >= self.lags[p]) {
-                if f.row(p).iter().any(|x| *x != 0.0) {
-                    let what = format!("row {p} is not zero at lag {j}, beyond its {} lags", self.lags[p]);
-                    return Err(SampledError::TapsShape { what });
-                }
+        for (lag, f) in taps.iter().enumerate() {
+            let beyond = |p: &usize| lag >= self.lags[*p] && f.row(*p).iter().any(|x| *x != 0.0);
+            if let Some(row) = (0..m).find(beyond) {
+                return Err(LmiError::TapBeyondLags { row, lag, lags: self.lags[row] });
             }
         }
         Ok(())
     }
 
-    pub(crate) fn check_objective(&self, square: &MeanSquareObjective) -> Result<(), SampledError> {
-        if square.noise.len() != self.channels() {
-            let (given, channels) = (square.noise.len(), self.channels());
-            return Err(SampledError::NoiseCount { given, channels });
+    pub(crate) fn check_objective(&self, square: &MeanSquareObjective) -> Result<(), LmiError> {
+        check_count("noise powers", square.noise.len(), self.channels())?;
+        check_count("weights", square.weights.len(), self.points.len())?;
+        let bad = |value: &f64| !(value.is_finite() && *value >= 0.0);
+        if let Some(index) = square.noise.iter().position(bad) {
+            return Err(LmiError::Weight { name: "noise power", index, value: square.noise[index] });
         }
-        if let Some(channel) = square.noise.iter().position(|n| !(n.is_finite() && *n >= 0.0)) {
-            return Err(SampledError::Noise { channel, value: square.noise[channel] });
-        }
-        let weights = &square.weights;
-        if weights.len() != self.points.len() {
-            let points = self.points.len();
-            return Err(SampledError::Count { name: "weights", given: weights.len(), points });
-        }
-        if let Some(point) = weights.iter().position(|w| !(w.is_finite() && *w >= 0.0)) {
-            return Err(SampledError::Weight { point, value: weights[point] });
-        }
-        if weights.iter().all(|w| *w == 0.0) {
-            return Err(SampledError::Weight { point: 0, value: 0.0 });
+        let all_zero = square.weights.iter().all(|w| *w == 0.0).then_some(0);
+        if let Some(index) = square.weights.iter().position(bad).or(all_zero) {
+            return Err(LmiError::Weight { name: "weight", index, value: square.weights[index] });
         }
         Ok(())
     }
 }
 
 /// `F(omega) = sum_j e^{-i omega j} F_j`.
-pub(crate) fn response(taps: &Taps, omega: f64, m: usize, n: usize) -> CMat {
+pub(crate) fn response(taps: &[Mat], omega: f64, m: usize, n: usize) -> CMat {
     let mut f = CMat::zeros(m, n);
     for (j, fj) in taps.iter().enumerate() {
         let phase = Complex::from_polar(1.0, -omega * j as f64);
@@ -295,21 +170,21 @@ pub(crate) fn response(taps: &Taps, omega: f64, m: usize, n: usize) -> CMat {
     f
 }
 
-fn check_size(name: &'static str, l: usize, a: &CMat, rows: usize, cols: usize) -> Result<(), SampledError> {
-    if a.shape() == (rows, cols) {
+/// Refuses a matrix of point `l` whose shape is not `wanted`.
+pub(super) fn check_size(name: &str, l: usize, a: &CMat, wanted: (usize, usize)) -> Result<(), LmiError> {
+    let given = a.shape();
+    if given == wanted {
         return Ok(());
     }
-    Err(SampledError::Size {
-        name,
-        point: l,
-        rows: a.nrows(),
-        cols: a.ncols(),
-        want_rows: rows,
-        want_cols: cols,
-    })
+    Err(LmiError::Size { name: format!("{name} of point {l}"), given, wanted })
 }
 
-fn check_finite(l: usize, point: &Point) -> Result<(), SampledError> {
+/// Refuses lists of the wrong length.
+pub(super) fn check_count(name: &'static str, given: usize, wanted: usize) -> Result<(), LmiError> {
+    if given == wanted { Ok(()) } else { Err(LmiError::Count { name, given, wanted }) }
+}
+
+fn check_finite(l: usize, point: &Point) -> Result<(), LmiError> {
     let finite = |a: &CMat| a.iter().all(|z| z.re.is_finite() && z.im.is_finite());
     let name = match (point.omega.is_finite(), finite(&point.w), finite(&point.h)) {
         (false, _, _) => "omega",
@@ -317,5 +192,5 @@ fn check_finite(l: usize, point: &Point) -> Result<(), SampledError> {
         (_, _, false) => "H",
         _ => return Ok(()),
     };
-    Err(SampledError::NotFinite { name, point: l })
+    Err(LmiError::NotFinite { name: format!("{name} of point {l}") })
 }

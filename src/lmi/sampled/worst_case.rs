@@ -4,17 +4,14 @@ use super::basis::Basis;
 use super::bound::{self, Covered, LowerBound};
 use super::interior::{Engine, Objective, norm};
 use super::prepare::Reduced;
-use super::problem::{Problem, SampledError, Taps};
-use super::step::Step;
+use super::problem::{Problem, Taps};
 use crate::linalg::{self, CMat};
-use crate::lmi::Settings;
-use crate::lmi::outcome::Outcome;
+use crate::lmi::iteration::{self, Iterate};
+use crate::lmi::{LmiError, Outcome, Settings};
 
 /// The start lies this factor above the worst point of the least-squares taps (in t), far enough inside for
 /// the first Newton step.
 const START_MARGIN: f64 = 2.0;
-/// Steps without a smaller gap after which the iteration ends.
-const PATIENCE: usize = 6;
 
 /// Taps of least worst-case norm with the interval that the optimum lies in.
 #[derive(Debug, Clone)]
@@ -25,21 +22,12 @@ pub struct Solution {
     pub taps: Taps,
     /// Largest `sigma_max(K_l)` of these taps over the points.
     pub gamma: f64,
-    /// Index of the point where it is attained.
-    pub worst_point: usize,
     /// Lower bound on gamma for all taps of the same lags, rounding errors subtracted.
     pub lower: LowerBound,
     /// The matrices `Y_l` (M x q) that prove it through [`super::lower_bound`].
     pub dual: Vec<CMat>,
-    /// Iteration record.
-    pub steps: Vec<Step>,
-}
-
-impl Solution {
-    /// `(gamma - lower) / gamma`, 0 when gamma is 0.
-    pub fn relative_gap(&self) -> f64 {
-        if self.gamma > 0.0 { (self.gamma - self.lower.value).max(0.0) / self.gamma } else { 0.0 }
-    }
+    /// Number of steps.
+    pub iterations: usize,
 }
 
 /// Minimises the worst-case norm. See the module's text for the problem and the method.
@@ -48,9 +36,9 @@ impl Solution {
 /// points and a lower bound, whatever the outcome.
 ///
 /// # Errors
-/// [`SampledError::Setting`] for a setting out of its range, [`SampledError::Linalg`] if a decomposition
+/// [`LmiError::Setting`] for a setting out of its range, [`LmiError::Linalg`] if a decomposition
 /// does not converge.
-pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, SampledError> {
+pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, LmiError> {
     settings.check()?;
     let mut reduced = Reduced::new(problem)?;
     if reduced.layout.unknowns() == 0 {
@@ -58,123 +46,100 @@ pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, Samp
     }
     let basis = Basis::new(&reduced, vec![1.0; reduced.count()])?;
     let x = basis.least_squares(&reduced, &reduced.w, settings.tol_rank);
-    let mut best = Best::new(problem, reduced.taps(&x), settings)?;
-    if best.solved(settings.tol_gap_rel) {
-        return Ok(best.finish(Outcome::Solved, Vec::new()));
+    let best = Best::new(problem, reduced.taps(&x), settings)?;
+    if best.relative_gap() <= settings.tol_gap_rel {
+        return Ok(best.finish(Outcome::Solved, 0));
     }
     // Shift and scale to the least-squares solution: the rest is of order one.
     let scale = best.gamma;
     reduced.w = reduced.error(&x);
     reduced.rescale(scale);
-    let run = Run { problem, reduced: &reduced, basis: &basis, settings, start: x, scale };
-    let (outcome, steps) = run.iterate(&mut best)?;
-    Ok(best.finish(outcome, steps))
+    let zero = vec![0.0; x.len()];
+    let Some(engine) = Engine::new(&reduced, Objective::WorstCase, zero, START_MARGIN) else {
+        return Ok(best.finish(Outcome::NumericalTrouble, 0));
+    };
+    let mut run = Run { problem, reduced: &reduced, basis: &basis, start: x, scale, engine, best };
+    let (outcome, iterations) = iteration::run(&mut run, settings)?;
+    Ok(run.best.finish(outcome, iterations))
 }
 
 /// A problem without taps: its singular vectors attain the lower bound.
-fn fixed(problem: &Problem) -> Result<Solution, SampledError> {
+fn fixed(problem: &Problem) -> Result<Solution, LmiError> {
     let taps = problem.zero_taps();
     let (gamma, worst_point) = problem.worst(&taps)?;
     let mut dual = bound::zero_dual(problem);
     let svd = linalg::svd(&problem.points()[worst_point].w)?;
     dual[worst_point] = svd.u.column(0) * svd.v.column(0).adjoint();
     let lower = LowerBound { covered: Covered::All, ..bound::lower_bound(problem, &dual, 0.0)? };
-    Ok(Solution { outcome: Outcome::Solved, taps, gamma, worst_point, lower, dual, steps: Vec::new() })
+    Ok(Solution { outcome: Outcome::Solved, taps, gamma, lower, dual, iterations: 0 })
 }
 
-struct Best<'a> {
-    problem: &'a Problem,
+struct Best {
+    /// Gap that counts as zero.
     floor: f64,
     taps: Taps,
     gamma: f64,
-    worst_point: usize,
     lower: LowerBound,
     dual: Vec<CMat>,
 }
 
-impl<'a> Best<'a> {
-    fn new(problem: &'a Problem, taps: Taps, settings: &Settings) -> Result<Self, SampledError> {
-        let (gamma, worst_point) = problem.worst(&taps)?;
+impl Best {
+    fn new(problem: &Problem, taps: Taps, settings: &Settings) -> Result<Self, LmiError> {
+        let (gamma, _) = problem.worst(&taps)?;
         let floor = settings.tol_gap_abs * problem.worst(&problem.zero_taps())?.0;
         let (lower, dual) = (LowerBound::zero(), bound::zero_dual(problem));
-        Ok(Self { problem, floor, taps, gamma, worst_point, lower, dual })
+        Ok(Self { floor, taps, gamma, lower, dual })
     }
 
-    fn gap(&self) -> f64 {
-        (self.gamma - self.lower.value).max(0.0)
+    fn relative_gap(&self) -> f64 {
+        let gap = (self.gamma - self.lower.value).max(0.0);
+        if gap <= self.floor { 0.0 } else { gap / self.gamma }
     }
 
-    fn solved(&self, relative: f64) -> bool {
-        self.gap() <= (relative * self.gamma).max(self.floor)
-    }
-
-    fn offer_taps(&mut self, taps: Taps) -> Result<(), SampledError> {
-        let (gamma, worst_point) = self.problem.worst(&taps)?;
-        if gamma < self.gamma {
-            (self.taps, self.gamma, self.worst_point) = (taps, gamma, worst_point);
-        }
-        Ok(())
-    }
-
-    fn finish(self, outcome: Outcome, steps: Vec<Step>) -> Solution {
-        let Self { taps, gamma, worst_point, lower, dual, .. } = self;
-        Solution { outcome, taps, gamma, worst_point, lower, dual, steps }
+    fn finish(self, outcome: Outcome, iterations: usize) -> Solution {
+        let Self { taps, gamma, lower, dual, .. } = self;
+        Solution { outcome, taps, gamma, lower, dual, iterations }
     }
 }
 
-/// Everything that stays fixed while iterating.
+/// The iteration, and what it has found.
 struct Run<'a> {
     problem: &'a Problem,
     reduced: &'a Reduced,
     basis: &'a Basis,
-    settings: &'a Settings,
     start: Vec<f64>,
     scale: f64,
+    engine: Engine<'a>,
+    best: Best,
 }
 
-impl Run<'_> {
-    fn iterate(&self, best: &mut Best<'_>) -> Result<(Outcome, Vec<Step>), SampledError> {
-        let mut steps = Vec::new();
-        let zero = vec![0.0; self.start.len()];
-        let Some(mut engine) = Engine::new(self.reduced, Objective::WorstCase, zero, START_MARGIN) else {
-            return Ok((Outcome::NumericalTrouble, steps));
-        };
-        let (mut least, mut waited) = (f64::INFINITY, 0);
-        while steps.len() < self.settings.max_iterations {
-            let merit = engine.cone.gap() / engine.cone.t + norm(engine.dual_residual());
-            if merit <= 4.0 * self.settings.tol_gap_rel {
-                self.judge(&engine, best)?;
-                if best.solved(self.settings.tol_gap_rel) {
-                    return Ok((Outcome::Solved, steps));
-                }
-            }
-            waited = if merit < 0.9 * least { 0 } else { waited + 1 };
-            least = least.min(merit);
-            if waited > PATIENCE {
-                break;
-            }
-            match engine.step(self.settings) {
-                Ok(step) => steps.push(step),
-                Err(_) => break,
-            }
-        }
-        self.judge(&engine, best)?;
-        let limit_reached = steps.len() >= self.settings.max_iterations;
-        let solved = [self.settings.tol_gap_rel, self.settings.tol_gap_reduced].map(|tol| best.solved(tol));
-        let outcome = Outcome::at_end(solved, limit_reached);
-        Ok((outcome, steps))
+impl Iterate for Run<'_> {
+    /// A quarter of the complementarity gap and of the residual: from there on, the gap of the bound that the
+    /// dual matrices prove is usually within the tolerance.
+    fn gap(&mut self) -> f64 {
+        let engine = &self.engine;
+        0.25 * (engine.cone.gap() / engine.cone.t + norm(engine.dual_residual()))
     }
 
-    /// Computed norm of the taps of the iterate, and the lower bound that its dual matrices give.
-    fn judge(&self, engine: &Engine<'_>, best: &mut Best<'_>) -> Result<(), SampledError> {
-        let x: Vec<f64> = self.start.iter().zip(&engine.x).map(|(a, b)| a + self.scale * b).collect();
-        best.offer_taps(self.reduced.taps(&x))?;
+    /// From the computed norm of the taps of the iterate and the lower bound that its dual matrices give.
+    fn judged_gap(&mut self) -> Result<f64, LmiError> {
+        let best = &mut self.best;
+        let x: Vec<f64> = self.start.iter().zip(&self.engine.x).map(|(a, b)| a + self.scale * b).collect();
+        let taps = self.reduced.taps(&x);
+        let (gamma, _) = self.problem.worst(&taps)?;
+        if gamma < best.gamma {
+            (best.taps, best.gamma) = (taps, gamma);
+        }
         let cover = bound::cover(self.problem, self.reduced, self.basis, (&best.taps, best.gamma))?;
         let (lower, dual) =
-            bound::from_iterate(self.problem, self.reduced, self.basis, &engine.cone.z, cover)?;
+            bound::from_iterate(self.problem, self.reduced, self.basis, &self.engine.cone.z, cover)?;
         if lower.value > best.lower.value {
             (best.lower, best.dual) = (lower, dual);
         }
-        Ok(())
+        Ok(best.relative_gap())
+    }
+
+    fn step(&mut self, settings: &Settings) -> Option<()> {
+        self.engine.step(settings)
     }
 }

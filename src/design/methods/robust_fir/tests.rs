@@ -1,6 +1,6 @@
 //! Robust optima against a semidefinite program, and the worst case that the file states.
 
-use super::scenarios::{MAX_SCENARIOS, scenarios};
+use crate::design::methods::scenarios::{MAX_SCENARIOS, scenarios};
 use crate::design::uncertainty::norm_of;
 use crate::design::{ProofSearch, design_with};
 use crate::random::Random;

@@ -1,4 +1,4 @@
-//! Points of a box of errors, each with a plant of its own.
+//! Points of a box of errors, each with a plant of its own, and the norms of banks over them.
 
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
@@ -6,6 +6,27 @@ use crate::design::problem::Problem;
 use crate::design::uncertainty::sides::{Side, point_at, sides};
 use crate::spec::{Method, Spec};
 use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
+
+/// Relative width of the interval of the worst norm over the scenarios.
+pub(super) const ACCURACY: f64 = 1e-4;
+/// Relative margin of that norm for the least mean square without errors.
+pub(super) const MARGIN: f64 = 2e-4;
+
+/// The norms of a bank, computed (h = 1).
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct RobustNorms {
+    /// Without errors.
+    pub nominal: f64,
+    /// The largest over the scenarios.
+    pub worst: f64,
+}
+
+/// The largest of some norms.
+pub(super) fn largest(
+    mut values: impl Iterator<Item = Result<f64, DesignError>>,
+) -> Result<f64, DesignError> {
+    values.try_fold(0.0, |most, value| Ok(f64::max(most, value?)))
+}
 
 /// Most scenarios.
 pub(super) const MAX_SCENARIOS: usize = 64;
@@ -33,16 +54,21 @@ impl RobustProblem {
     pub(crate) fn scenario_count(&self) -> usize {
         scenarios(&self.errors).len()
     }
+
+    /// The scenarios with their plants; `plant` is the one without errors.
+    pub(super) fn moved_plants(&self, plant: &LiftedPlant) -> Result<Vec<MovedPlant>, DesignError> {
+        let moved = |point: ErrorPoint| {
+            let problem = Problem::with_errors(&self.spec, plant.problem().latency, &point)?;
+            Ok(MovedPlant { plant: LiftedPlant::new(&problem)?, point })
+        };
+        scenarios(&self.errors).into_iter().map(moved).collect()
+    }
 }
 
-/// The plant at a point of the box.
-pub(super) fn moved_plant(
-    problem: &RobustProblem,
-    plant: &LiftedPlant,
-    point: &ErrorPoint,
-) -> Result<LiftedPlant, DesignError> {
-    let moved = Problem::with_errors(&problem.spec, plant.problem().latency, point)?;
-    LiftedPlant::new(&moved)
+/// A point of the box with its plant.
+pub(super) struct MovedPlant {
+    pub(super) point: ErrorPoint,
+    pub(super) plant: LiftedPlant,
 }
 
 /// Points of the box: a lattice over all sides, or its ends where there are many, or its most different

@@ -1,4 +1,4 @@
-//! Taps that are affine functions of the delays.
+//! Delay-scheduled taps: affine functions of the delays.
 //!
 //! With the delays of the channels off by delta_j, the taps are
 //!
@@ -19,15 +19,13 @@
 //! errors if that is larger. Where both are far below the largest of them, a share of that one counts: ideal
 //! interleaving has no error at all at its own delays.
 
-use super::norms::{ACCURACY, MARGIN, RobustNorms, lags, largest};
-use super::scenario_grid::ScenarioGrid;
-use super::scenarios::{RobustProblem, moved_plant, scenarios};
-use super::sheets::{Sheet, Sheets};
+use super::scenarios::{ACCURACY, MARGIN, MovedPlant, RobustNorms, RobustProblem, largest};
+use super::{Filters, Settings, Synthesis, fir, tap_lags};
 use crate::bank::TapSlopes;
 use crate::design::DesignError;
-use crate::design::exchange::{Exchange, Pace};
+use crate::design::error_grid::{ErrorGrid, Scenario};
+use crate::design::exchange::{Exchange, Tolerances};
 use crate::design::filters::impulse_responses;
-use crate::design::methods::{Filters, Settings, Synthesis, fir};
 use crate::design::plant::LiftedPlant;
 use crate::linalg::Mat;
 use crate::lmi::sampled::{MeanSquareObjective, Point, Problem as SampledProblem, Taps};
@@ -37,14 +35,14 @@ use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
 /// Least of what counts as within reach at some delays, relative to the largest over the box.
 const LEAST_REACH: f64 = 0.02;
 
-/// The comparison of taps that follow the delays with taps that stay.
+/// The comparison of delay-scheduled taps with fixed taps.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct TrackingStudy {
     /// The box.
     pub errors: ErrorBox,
-    /// Of this bank, its taps following the delays.
+    /// Of this bank, its taps scheduled by the delays.
     pub tracked: RobustNorms,
-    /// Of the bank that is optimal without errors, its taps staying.
+    /// Of the bank that is optimal without errors, its taps fixed.
     pub fixed: RobustNorms,
     /// Least norm of a bank that is designed for the delays at which the tracked norm is largest.
     pub redesigned: f64,
@@ -85,26 +83,24 @@ pub(crate) fn synthesise(
 ) -> Result<Synthesis, DesignError> {
     let fixed = fir::synthesise(plant, settings)?;
     let Filters::Fir(fixed_taps) = &fixed.filters else { return Ok(fixed) };
-    let points = scenarios(&problem.errors);
-    let plants =
-        points.iter().map(|point| moved_plant(problem, plant, point)).collect::<Result<Vec<_>, _>>()?;
-    let (nominal, within_reach) = within_reach(&plants, fixed.peak.gain)?;
+    let moved = problem.moved_plants(plant)?;
+    let (nominal, within_reach) = within_reach(&moved, fixed.peak.gain)?;
     let sides = Sides::new(problem);
-    let scenarios = Scenarios { plants: &plants, points: &points, within_reach: &within_reach };
-    let mut exchange = sides.exchange((plant, nominal), scenarios, settings)?;
-    let found = exchange.optimise_at(Pace::gradual(ACCURACY))?;
+    let grid = sides.grid((plant, nominal), &moved, &within_reach, settings);
+    let mut exchange = sides.exchange(plant, grid, settings)?;
+    let found = exchange.optimise_at(Tolerances::gradual(ACCURACY))?;
     let (taps, slopes) = sides.split(&found.taps, settings.taps);
-    let norm = |(plant, point): (&LiftedPlant, &ErrorPoint)| {
-        Ok(plant.fir_norm(&slopes.moved(&taps, &sides.errors(point)))?.gain)
+    let norm = |moved: &MovedPlant| {
+        Ok(moved.plant.fir_norm(&slopes.moved(&taps, &sides.errors(&moved.point)))?.gain)
     };
-    let norms = plants.iter().zip(&points).map(norm).collect::<Result<Vec<_>, DesignError>>()?;
+    let norms = moved.iter().map(norm).collect::<Result<Vec<_>, DesignError>>()?;
     let worst = (0..norms.len()).max_by(|&a, &b| norms[a].total_cmp(&norms[b])).unwrap_or(0);
     let peak = plant.fir_norm(&taps)?;
     let tracked = RobustNorms { nominal: peak.gain, worst: norms[worst].max(peak.gain) };
-    let of_fixed = largest(plants.iter().map(|plant| Ok(plant.fir_norm(fixed_taps)?.gain)))?;
+    let of_fixed = largest(moved.iter().map(|moved| Ok(moved.plant.fir_norm(fixed_taps)?.gain)))?;
     let ratios = norms.iter().zip(&within_reach).map(|(norm, reach)| norm / reach);
     let ratio = ratios.fold(peak.gain / nominal, f64::max);
-    let (_, redesigned) = fir::bracket(&plants[worst], settings.taps, ACCURACY)?;
+    let (_, redesigned) = fir::bracket(&moved[worst].plant, settings.taps, ACCURACY)?;
     let study = TrackingStudy {
         errors: problem.errors.clone(),
         tracked,
@@ -112,7 +108,7 @@ pub(crate) fn synthesise(
         redesigned,
         ratio,
         least_ratio: exchange.lower.min(ratio),
-        scenarios: plants.len(),
+        scenarios: moved.len(),
         pairs: exchange.frequencies().count(),
     };
     Ok(Synthesis {
@@ -128,20 +124,12 @@ pub(crate) fn synthesise(
 }
 
 /// The norms that are within reach without errors, where a fixed bank has gain `nominal`, and of each plant.
-fn within_reach(plants: &[LiftedPlant], nominal: f64) -> Result<(f64, Vec<f64>), DesignError> {
-    let bounds = plants.iter().map(|plant| Ok(plant.noncausal_bound()?.gain.max(nominal)));
+fn within_reach(moved: &[MovedPlant], nominal: f64) -> Result<(f64, Vec<f64>), DesignError> {
+    let bounds = moved.iter().map(|moved| Ok(moved.plant.noncausal_bound()?.gain.max(nominal)));
     let mut within_reach = bounds.collect::<Result<Vec<_>, DesignError>>()?;
     let floor = LEAST_REACH * within_reach.iter().copied().fold(0.0, f64::max);
     within_reach.iter_mut().for_each(|reach| *reach = reach.max(floor));
     Ok((nominal.max(floor), within_reach))
-}
-
-/// Points of the box with their plants, and the norms that are within reach there.
-#[derive(Clone, Copy)]
-struct Scenarios<'a, 'b> {
-    plants: &'a [LiftedPlant],
-    points: &'b [ErrorPoint],
-    within_reach: &'b [f64],
 }
 
 /// The delays that move.
@@ -187,40 +175,46 @@ impl Sides {
         (part(0, 1.0), TapSlopes { by_delay })
     }
 
-    fn exchange<'a>(
+    /// The plant without errors, then the scenarios, each relative to what is within reach there.
+    fn grid<'a>(
         &self,
         (plant, nominal): (&'a LiftedPlant, f64),
-        scenarios: Scenarios<'a, '_>,
+        moved: &'a [MovedPlant],
+        within_reach: &[f64],
         settings: &Settings,
-    ) -> Result<Exchange<Sheets<'a>>, DesignError> {
-        let lags = lags(plant.ratio(), settings.taps);
-        let centre = ErrorPoint::none(self.count);
-        let Scenarios { plants, points, within_reach } = scenarios;
-        let moved = plants.iter().zip(points).zip(within_reach);
-        let all = std::iter::once(((plant, &centre), &nominal)).chain(moved);
-        let sheet = |((plant, point), reach): ((&'a LiftedPlant, &ErrorPoint), &f64)| Sheet {
-            grid: ScenarioGrid::new(plant, lags[0]),
-            factors: self.factors(point),
-            weight: 1.0 / reach,
+    ) -> ErrorGrid<'a> {
+        let scenario = |plant: &'a LiftedPlant, point: &ErrorPoint, reach: f64| {
+            Scenario::new(plant, self.factors(point), 1.0 / reach)
         };
-        let sheets = Sheets { sheets: all.map(sheet).collect(), inputs: plant.channels() + plant.ratio() };
-        let (points, weights) = self.first_points(&sheets);
-        let noise = self.noise(&plant.problem().noise, &sheets);
-        let margin = settings.gamma_margin.unwrap_or(MARGIN).max(MARGIN);
-        let objective = MeanSquareObjective { weights, noise };
-        Exchange::new(sheets, SampledProblem::new(points, lags)?, objective, margin)
+        let mut scenarios = vec![scenario(plant, &ErrorPoint::none(self.count), nominal)];
+        let with_errors = moved.iter().zip(within_reach);
+        scenarios.extend(with_errors.map(|(moved, reach)| scenario(&moved.plant, &moved.point, *reach)));
+        ErrorGrid::of_scenarios(scenarios, tap_lags(plant.ratio(), settings.taps)[0])
     }
 
-    /// Some points of each sheet with their weights: the sheets take turns, so that there are about as many
-    /// points as for the centre and the ends of each side alone.
-    fn first_points(&self, sheets: &Sheets<'_>) -> (Vec<Point>, Vec<f64>) {
-        let count = sheets.sheets.len();
+    fn exchange<'a>(
+        &self,
+        plant: &LiftedPlant,
+        grid: ErrorGrid<'a>,
+        settings: &Settings,
+    ) -> Result<Exchange<ErrorGrid<'a>>, DesignError> {
+        let (points, weights) = self.first_points(&grid);
+        let noise = self.noise(&plant.problem().noise, grid.scenarios());
+        let margin = settings.gamma_margin.unwrap_or(MARGIN).max(MARGIN);
+        let problem = SampledProblem::new(points, tap_lags(plant.ratio(), settings.taps))?;
+        Exchange::new(grid, problem, MeanSquareObjective { weights, noise }, margin)
+    }
+
+    /// Some points of each scenario with their weights: the scenarios take turns, so that there are about as
+    /// many points as for the centre and the ends of each side alone.
+    fn first_points(&self, grid: &ErrorGrid<'_>) -> (Vec<Point>, Vec<f64>) {
+        let count = grid.scenarios().len();
         let stride = count.div_ceil(2 * self.channels.len() + 1);
         let (mut points, mut weights) = (Vec::new(), Vec::new());
-        for (number, sheet) in sheets.sheets.iter().enumerate() {
-            let (coarse, of_coarse) = sheet.grid.coarse();
-            for k in (number % stride..coarse.len()).step_by(stride) {
-                points.push(sheets.point(number, &coarse[k]));
+        for scenario in 0..count {
+            let (coarse, of_coarse) = grid.coarse(scenario);
+            for k in (scenario % stride..coarse.len()).step_by(stride) {
+                points.push(coarse[k].clone());
                 weights.push(of_coarse[k] * stride as f64 / count as f64);
             }
         }
@@ -229,15 +223,9 @@ impl Sides {
 
     /// Power of the noise of the channels `[H; delta_1 H; ..]`: that of the output's noise, averaged over
     /// the scenarios, whose shares are uncorrelated.
-    fn noise(&self, of_channels: &[f64], sheets: &Sheets<'_>) -> Vec<f64> {
-        let count = sheets.sheets.len() as f64;
-        let square =
-            |k: usize| sheets.sheets.iter().map(|sheet| sheet.factors[k].powi(2)).sum::<f64>() / count;
-        (0..=self.channels.len())
-            .flat_map(|k| {
-                let square = square(k);
-                of_channels.iter().map(move |power| power * square)
-            })
-            .collect()
+    fn noise(&self, of_channels: &[f64], scenarios: &[Scenario<'_>]) -> Vec<f64> {
+        let square = |k: usize| scenarios.iter().map(|scenario| scenario.factors[k].powi(2)).sum::<f64>();
+        let mean = |k: usize| square(k) / scenarios.len() as f64;
+        (0..=self.channels.len()).flat_map(|k| of_channels.iter().map(move |power| power * mean(k))).collect()
     }
 }

@@ -1,14 +1,17 @@
-//! Taps that stay as they are.
+//! FIR design for delays, gains and cut-offs that are known up to a box of errors only.
+//!
+//! The taps minimise the largest norm over scenarios: points of the box, each with a plant of its own. A
+//! scenario is nothing but more frequencies, so the exchange of [`crate::design::exchange`] solves it: it
+//! adds pairs of a frequency and a scenario where the error peaks, not whole grids per scenario, and its
+//! dual stays a lower bound for all banks of that length over the box. Here the taps are fixed;
+//! `scheduled_fir` is the same problem with more unknowns, for taps that are scheduled by the delays.
 
-use super::grid_filters::GridFilters;
-use super::norms::{ACCURACY, MARGIN, RobustNorms, lags, largest};
-use super::scenario_grid::ScenarioGrid;
-use super::scenarios::{RobustProblem, moved_plant, scenarios};
-use super::sheets::{Sheet, Sheets};
+use super::scenarios::{ACCURACY, MARGIN, MovedPlant, RobustNorms, RobustProblem, largest};
+use super::{Filters, Settings, Synthesis, fir, tap_lags};
 use crate::design::DesignError;
-use crate::design::exchange::{Exchange, Pace};
+use crate::design::error_grid::{ErrorGrid, Scenario};
+use crate::design::exchange::{Exchange, Tolerances};
 use crate::design::filters::{impulse_responses, polyphase};
-use crate::design::methods::{Filters, Settings, Synthesis, fir};
 use crate::design::plant::LiftedPlant;
 use crate::lmi::sampled::{MeanSquareObjective, Problem as SampledProblem};
 use crate::lti::peak::Peak;
@@ -55,15 +58,13 @@ pub(crate) fn synthesise(
 ) -> Result<Synthesis, DesignError> {
     let nominal = fir::synthesise(plant, settings)?;
     let Filters::Fir(taps) = &nominal.filters else { return Ok(nominal) };
-    let points = scenarios(&problem.errors);
-    let plants =
-        points.iter().map(|point| moved_plant(problem, plant, point)).collect::<Result<Vec<_>, _>>()?;
-    let sheets = sheets(plant, &plants, settings);
-    let study = study_of(&nominal, taps, &sheets, &plants, problem)?;
+    let moved = problem.moved_plants(plant)?;
+    let grid = grid(plant, &moved, settings);
+    let study = study_of(&nominal, taps, &grid, problem)?;
     if study.nominal.worst <= study.lower * (1.0 + NO_GAIN) {
         return Ok(Synthesis { robust: Some(study), ..nominal });
     }
-    let found = least_worst_norm(plant, sheets, settings)?;
+    let found = least_worst_norm(plant, grid, settings)?;
     let lower = found.lower.max(study.lower).min(found.norms.worst);
     let study = RobustStudy { lower, pairs: found.pairs, ..study };
     // The nominal bank is one of the candidates.
@@ -87,18 +88,17 @@ pub(crate) fn synthesise(
 fn study_of(
     nominal: &Synthesis,
     taps: &[Vec<f64>],
-    sheets: &Sheets<'_>,
-    plants: &[LiftedPlant],
+    grid: &ErrorGrid<'_>,
     problem: &RobustProblem,
 ) -> Result<RobustStudy, DesignError> {
-    let mut scenarios = estimates(sheets, taps)?;
+    let mut scenarios = estimates(grid, taps)?;
     let norms = RobustNorms { nominal: nominal.peak.gain, worst: worst_of(&scenarios, taps)? };
     // Whatever the taps, each scenario alone has the error that no bank avoids. That is at most the norm of
     // these taps there, so the scenarios with the largest norms come first.
-    scenarios.sort_by(|a, b| b.estimate.total_cmp(&a.estimate));
+    scenarios.sort_by(|a, b| b.norm.total_cmp(&a.norm));
     let mut unavoidable = nominal.lower;
-    for Scenario { plant, estimate } in scenarios {
-        if estimate <= unavoidable {
+    for Estimate { plant, norm } in scenarios {
+        if norm <= unavoidable {
             break;
         }
         unavoidable = unavoidable.max(plant.noncausal_bound()?.gain);
@@ -108,34 +108,31 @@ fn study_of(
         robust: norms,
         nominal: norms,
         lower: unavoidable.min(norms.worst),
-        scenarios: plants.len(),
+        scenarios: grid.scenarios().len() - 1,
         pairs: 0,
     })
 }
 
 /// A plant with the estimated norm of some taps.
 #[derive(Clone, Copy)]
-struct Scenario<'a> {
+struct Estimate<'a> {
     plant: &'a LiftedPlant,
-    estimate: f64,
+    norm: f64,
 }
 
-/// The norms of the taps over the scenarios, estimated.
-fn estimates<'a>(sheets: &Sheets<'a>, taps: &[Vec<f64>]) -> Result<Vec<Scenario<'a>>, DesignError> {
-    let lags = polyphase(taps, sheets.sheets[0].grid.plant().ratio());
-    let response = sheets.response(&lags);
-    let of = |sheet: &Sheet<'a>| {
-        let filters = GridFilters { response: &response, factors: &sheet.factors };
-        Ok(Scenario { plant: sheet.grid.plant(), estimate: sheet.grid.estimate(&filters)? })
-    };
-    // The first sheet has no errors.
-    sheets.sheets[1..].iter().map(of).collect()
+/// The norms of the taps over the scenarios with errors, estimated.
+fn estimates<'a>(grid: &ErrorGrid<'a>, taps: &[Vec<f64>]) -> Result<Vec<Estimate<'a>>, DesignError> {
+    let scenarios = grid.scenarios();
+    let norms = grid.estimates(&polyphase(taps, scenarios[0].plant.ratio()))?;
+    let all = scenarios.iter().zip(norms).map(|(scenario, norm)| Estimate { plant: scenario.plant, norm });
+    // The first scenario has no errors.
+    Ok(all.skip(1).collect())
 }
 
 /// The largest norm of the taps over the scenarios.
-fn worst_of(scenarios: &[Scenario<'_>], taps: &[Vec<f64>]) -> Result<f64, DesignError> {
-    let most = scenarios.iter().map(|scenario| scenario.estimate).fold(0.0, f64::max);
-    let near = scenarios.iter().filter(|scenario| scenario.estimate >= NEAR_WORST * most);
+fn worst_of(scenarios: &[Estimate<'_>], taps: &[Vec<f64>]) -> Result<f64, DesignError> {
+    let most = scenarios.iter().map(|scenario| scenario.norm).fold(0.0, f64::max);
+    let near = scenarios.iter().filter(|scenario| scenario.norm >= NEAR_WORST * most);
     largest(near.map(|scenario| Ok(scenario.plant.fir_norm(taps)?.gain)))
 }
 
@@ -152,11 +149,11 @@ struct RobustTaps {
 
 fn least_worst_norm(
     plant: &LiftedPlant,
-    sheets: Sheets<'_>,
+    grid: ErrorGrid<'_>,
     settings: &Settings,
 ) -> Result<RobustTaps, DesignError> {
-    let mut exchange = exchange(plant, sheets, settings)?;
-    let found = exchange.optimise_at(Pace::gradual(ACCURACY))?;
+    let mut exchange = exchange(plant, grid, settings)?;
+    let found = exchange.optimise_at(Tolerances::gradual(ACCURACY))?;
     let taps = impulse_responses(&found.taps, settings.taps);
     let peak = plant.fir_norm(&taps)?;
     let worst = worst_of(&estimates(exchange.error(), &taps)?, &taps)?;
@@ -166,22 +163,23 @@ fn least_worst_norm(
 }
 
 /// The plant without errors, then the scenarios.
-fn sheets<'a>(plant: &'a LiftedPlant, plants: &'a [LiftedPlant], settings: &Settings) -> Sheets<'a> {
-    let lags = lags(plant.ratio(), settings.taps);
-    let sheet = |plant| Sheet { grid: ScenarioGrid::new(plant, lags[0]), factors: vec![1.0], weight: 1.0 };
-    let sheets = std::iter::once(plant).chain(plants).map(sheet).collect();
-    Sheets { sheets, inputs: plant.channels() + plant.ratio() }
+fn grid<'a>(plant: &'a LiftedPlant, moved: &'a [MovedPlant], settings: &Settings) -> ErrorGrid<'a> {
+    let plants = std::iter::once(plant).chain(moved.iter().map(|moved| &moved.plant));
+    let scenarios = plants.map(|plant| Scenario::new(plant, vec![1.0], 1.0)).collect();
+    ErrorGrid::of_scenarios(scenarios, tap_lags(plant.ratio(), settings.taps)[0])
 }
 
 fn exchange<'a>(
     plant: &LiftedPlant,
-    sheets: Sheets<'a>,
+    grid: ErrorGrid<'a>,
     settings: &Settings,
-) -> Result<Exchange<Sheets<'a>>, DesignError> {
-    let (points, weights) = sheets.sheets[0].grid.coarse();
+) -> Result<Exchange<ErrorGrid<'a>>, DesignError> {
+    let (points, weights) = grid.coarse(0);
     let noise = plant.problem().noise.clone();
-    let points = points.iter().map(|point| sheets.point(0, point)).collect();
     let margin = settings.gamma_margin.unwrap_or(MARGIN).max(MARGIN);
-    let problem = SampledProblem::new(points, lags(plant.ratio(), settings.taps))?;
-    Exchange::new(sheets, problem, MeanSquareObjective { weights, noise }, margin)
+    let problem = SampledProblem::new(points, tap_lags(plant.ratio(), settings.taps))?;
+    Exchange::new(grid, problem, MeanSquareObjective { weights, noise }, margin)
 }
+
+#[cfg(test)]
+mod tests;
