@@ -192,12 +192,6 @@ pub struct SmallCholesky {
     memory: MemBuffer,
 }
 
-impl std::fmt::Debug for SmallCholesky {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("SmallCholesky").finish_non_exhaustive()
-    }
-}
-
 impl SmallCholesky {
     /// Work memory for blocks of up to `n` rows.
     pub fn new(n: usize) -> Self {

@@ -21,6 +21,14 @@ pub struct Svd<T: Scalar = f64> {
     pub v: DMatrix<T>,
 }
 
+impl<T: Scalar> Svd<T> {
+    /// How many singular values exceed the share `cut` of the largest.
+    pub fn rank(&self, cut: f64) -> usize {
+        let floor = cut * self.s.first().copied().unwrap_or(0.0);
+        self.s.iter().filter(|s| **s > floor).count()
+    }
+}
+
 /// A real or complex number in double precision. The methods take finite matrices that are not empty; the
 /// functions of the crate that bear their names check that.
 #[doc(hidden)]

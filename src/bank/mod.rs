@@ -57,7 +57,7 @@ pub struct Bank {
     pub offsets: Vec<f64>,
     /// The synthesis filters F_1 .. F_N.
     pub filters: SynthesisFilters,
-    /// How the taps follow the delays, for an FIR bank that was designed for it.
+    /// How the delays schedule the taps, for an FIR bank that was designed for it.
     pub tap_slopes: Option<TapSlopes>,
     /// The integers of the taps, if the taps are fixed-point numbers.
     pub fixed_point: Option<FixedPoint>,

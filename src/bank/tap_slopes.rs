@@ -1,4 +1,4 @@
-//! Taps that follow the delays of the channels.
+//! Delay-scheduled taps: affine functions of the delays of the channels.
 
 use super::{Bank, SynthesisFilters};
 use crate::units::FastPeriods;

@@ -10,7 +10,7 @@ use crate::plot::{Chart, Series};
 use crate::quantity::readable;
 use crate::units::{Hertz, Seconds};
 use crate::verify::VerifyError;
-use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Slopes, WorstCase, slopes};
+use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Slopes, Taps, WorstCase, slopes};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -123,7 +123,7 @@ impl Report {
 impl Worst {
     fn new(bank: &Bank, errors: ErrorBox, loss: Option<f64>) -> Result<Self, DesignError> {
         let accuracy = if bank.channel_count() <= FEW_CHANNELS { ACCURACY } else { ACCURACY_OF_MANY };
-        let case = uncertainty::worst_case(bank, &errors, accuracy)?;
+        let case = uncertainty::worst_case(bank, &errors, Taps::Fixed, accuracy)?;
         let floor = uncertainty::floor(bank, &errors, &case.point)?;
         let affordable = loss.map(|loss| {
             let factor = uncertainty::affordable(bank, &errors, loss)?;
@@ -272,7 +272,7 @@ impl Sweep {
             let gamma = |share: &f64| {
                 let delays = delays.iter().map(|&delay| delay * *share).collect();
                 let point = ErrorPoint { delays, ..ErrorPoint::none(bank.channel_count()) };
-                norm_at(bank, &point).map(|(gamma, _)| gamma)
+                norm_at(bank, &point, Taps::Fixed).map(|(gamma, _)| gamma)
             };
             Ok(Curve { label, gammas: shares.iter().map(gamma).collect::<Result<_, _>>()? })
         };

@@ -39,7 +39,7 @@ pub struct Design {
     pub reduction: Option<OrderReduction>,
     /// The comparison with a nominal bank, if the spec has an `[uncertainty]`.
     pub robust: Option<RobustStudy>,
-    /// The comparison of taps that follow the delays with taps that stay, if the spec asks for `tracking`.
+    /// The comparison of delay-scheduled taps with fixed taps, if the spec asks for `tracking`.
     pub tracking: Option<TrackingStudy>,
     /// The bounds that the bank's proof proves, or the reason why the bank carries no proof.
     pub proof: Result<Verified, DesignError>,
@@ -241,7 +241,7 @@ const STATED_ABOVE: f64 = 1e-9;
 
 /// A worst case over `errors` that `verify` proves; `None` if it does not.
 fn proven_worst_case(bank: &Bank, errors: &ErrorBox, taps: Taps) -> Option<f64> {
-    let found = uncertainty::worst_case_of(bank, errors, taps, WORST_CASE_ACCURACY).ok()?;
+    let found = uncertainty::worst_case(bank, errors, taps, WORST_CASE_ACCURACY).ok()?;
     let stated = found.upper * (1.0 + STATED_ABOVE);
     keeps_within(bank, errors, taps, stated).ok()?.then_some(stated)
 }

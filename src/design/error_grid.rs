@@ -1,11 +1,11 @@
-//! The error of FIR banks on fine grids of frequencies, one grid for each scenario. It gives a cheap estimate
-//! of gamma while the taps are still being optimised.
+//! The error of FIR banks on fine grids of frequencies, one grid for each scenario. It gives a cheap
+//! estimate of gamma while the taps are still being optimised.
 //!
-//! A scenario is a plant and a rule for its filters: the taps are matrices F_0, F_1, .. side by side, and the
-//! filters of a scenario are `sum_k factors[k] F_k`. So its measurements are those of the plant times each
-//! factor, one below another. A bank for known channels has one scenario with the factor 1. For the exchange,
-//! scenarios are nothing but more frequencies: scenario s is put at 2 pi s + omega, where all responses in
-//! whole lags are the same.
+//! A scenario is a plant and a rule for its filters: the taps are matrices F_0, F_1, .. side by side, and
+//! the filters of a scenario are `sum_k factors[k] F_k`. So its measurements are those of the plant times
+//! each factor, one below another. A bank for known channels has one scenario with the factor 1. For the
+//! exchange, scenarios are nothing but more frequencies: scenario s is put at 2 pi s + omega, where all
+//! responses in whole lags are the same.
 
 use super::DesignError;
 use super::exchange::{AffineError, Peaks};
@@ -116,8 +116,8 @@ impl<'a> ErrorGrid<'a> {
         (0..=self.intervals).map(|k| self.point(0, k).clone()).collect()
     }
 
-    /// The coarser points of a scenario that suffice for a mean square, as points of the exchange, with their
-    /// trapezoidal weights.
+    /// The coarser points of a scenario that suffice for a mean square, as points of the exchange, with
+    /// their trapezoidal weights.
     pub(super) fn coarse(&self, scenario: usize) -> (Vec<Point>, Vec<f64>) {
         let points: Vec<Point> = (0..=self.intervals)
             .step_by(FINE)
@@ -153,8 +153,8 @@ impl<'a> ErrorGrid<'a> {
         (0..self.scenarios.len()).map(estimate).collect()
     }
 
-    /// The peaks of the errors with `taps` above `level`. The estimate is that of gamma if gamma is above the
-    /// level; else it is at most the level.
+    /// The peaks of the errors with `taps` above `level`. The estimate is that of gamma if gamma is above
+    /// the level; else it is at most the level.
     pub(super) fn peaks(&self, taps: &[Mat], level: f64) -> Result<Peaks, DesignError> {
         let mut all = Peaks { estimate: 0.0, peaks: Vec::new() };
         let response = self.response(taps);
@@ -240,7 +240,8 @@ impl AffineError for ErrorGrid<'_> {
     }
 
     fn peaks(&self, taps: &Taps, _gamma: f64, level: f64) -> Result<Peaks, DesignError> {
-        // The estimate of a single scenario is compared with its norm, so it has to be one below the level too.
+        // The estimate of a single scenario is compared with its norm, so it has to be one below the level
+        // too.
         self.peaks(taps, if self.scenarios.len() == 1 { 0.0 } else { level })
     }
 }

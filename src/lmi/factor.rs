@@ -13,7 +13,7 @@ pub(super) struct RegularisedCholesky {
 }
 
 /// First shift tried if the matrix is not positive definite, a few roundings of its unit diagonal, and the
-/// growth and limit of the next ones. With a shift above the limit two steps of refinement would not converge.
+/// growth and limit of the next ones. Above the limit the direction would be that of another matrix.
 const SHIFT_FIRST: f64 = 1e-15;
 const SHIFT_GROWTH: f64 = 10.0;
 const SHIFT_LAST: f64 = 1e-6;
@@ -68,7 +68,8 @@ impl RegularisedCholesky {
     }
 }
 
-/// The factor of a matrix of unit diagonal with as small a shift of the diagonal as it needs, and that shift.
+/// The factor of a matrix of unit diagonal with as small a shift of the diagonal as it needs, and that
+/// shift.
 fn shifted_factor(matrix: &Mat) -> Result<(PositiveFactor, f64), LinalgError> {
     let mut shift = 0.0;
     loop {

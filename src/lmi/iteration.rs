@@ -35,21 +35,19 @@ pub struct Settings {
     pub tol_rank: f64,
     /// Largest fraction of the way to the boundary of the cone that a step goes (0.98).
     pub step_fraction: f64,
-    /// A gap below this share of the least one so far is progress (0.9; 0.95 for `kyp`, whose steps are
-    /// shorter).
+    /// A gap below this share of the least one so far is progress (0.9; 0.95 for `kyp`).
     pub progress: f64,
-    /// Gap from which on the iteration never counts as stalled (infinity; 0.5 for `kyp`, whose first steps may
-    /// go by without a useful bound).
+    /// Gap from which on the iteration never counts as stalled (infinity; 0.5 for `kyp`, whose first steps
+    /// may go by without a useful bound).
     pub gap_without_stall: f64,
 }
 
-/// Steps without progress after which an iteration has stalled. Gaps of hard problems shrink irregularly, but
-/// six steps without a gain were never followed by one.
+/// Steps without progress after which an iteration has stalled. The gap of a hard problem does not shrink in
+/// every step.
 const PATIENCE: usize = 6;
 /// Steps shorter than this part of a Newton step make no progress.
 const SHORTEST_STEP: f64 = 1e-7;
-/// Bounds of Mehrotra's centering: below the first, rounding of the complementarity takes over; above the
-/// second, a step gains nothing.
+/// Bounds of Mehrotra's centering: a step always aims inside of the cone, and always lowers the gap.
 const CENTERING: [f64; 2] = [1e-8, 0.9];
 
 impl Settings {
@@ -116,8 +114,8 @@ pub(super) trait Iterate {
     /// The relative duality gap of the iterate, or a cheap estimate of it.
     fn gap(&mut self) -> f64;
 
-    /// The relative duality gap of the best solution, this iterate included. It is asked for when the estimate
-    /// is within the tolerance, and at the end.
+    /// The relative duality gap of the best solution, this iterate included. It is asked for when the
+    /// estimate is within the tolerance, and at the end.
     fn judged_gap(&mut self) -> Result<f64, LmiError>;
 
     /// Makes one predictor-corrector step; `None` if rounding errors prevent it.

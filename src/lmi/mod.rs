@@ -10,9 +10,10 @@
 //! same problem with a Lyapunov matrix instead of frequencies (thesis 5.4) and serves as an independent
 //! check.
 //!
-//! Both are primal-dual predictor-corrector methods with one loop and one step rule (`iteration`). A hard problem is not an error: each solver returns its
-//! best iterate, bounds on the optimum and an [`Outcome`]. Rounding errors limit the relative accuracy of
-//! the optimum to about 1e-9 in [`sampled`] and 1e-8 in [`kyp`].
+//! Both are primal-dual predictor-corrector methods with one loop and one step rule (`iteration`). A hard
+//! problem is not an error: each solver returns its best iterate, bounds on the optimum and an [`Outcome`].
+//! Rounding errors limit the relative accuracy of the optimum to about 1e-9 in [`sampled`] and 1e-8 in
+//! [`kyp`].
 
 mod error;
 mod factor;

@@ -71,8 +71,7 @@ impl GramianCoordinates {
         let deviation: Vec<f64> = (0..n).map(|i| root.row(i).norm()).collect();
         let unit = |i: usize| if deviation[i] > 0.0 { 1.0 / deviation[i] } else { 0.0 };
         let svd = linalg::svd(&Mat::from_fn(n, root.ncols(), |i, j| unit(i) * root[(i, j)]))?;
-        let floor = tol_rank * svd.s.first().copied().unwrap_or(0.0);
-        let rank = svd.s.iter().filter(|s| **s > floor).count();
+        let rank = svd.rank(tol_rank);
         let basis = Mat::from_fn(n, rank, |i, r| deviation[i] * svd.u[(i, r)] * svd.s[r]);
         let inverse = Mat::from_fn(rank, n, |r, i| svd.u[(i, r)] / svd.s[r] * unit(i));
         let (small_a, small_b) = (&inverse * a * &basis, &inverse * b);

@@ -40,7 +40,8 @@ pub(super) fn robust(sizes: &Sizes, scenarios: usize) -> Effort {
 /// Scenarios of a box of delays, about.
 const SCENARIOS: f64 = 32.0;
 
-/// A design of taps that follow the delays of all channels but one: every tap is a function of N numbers.
+/// A design of taps that are scheduled by the delays of all channels but one: every tap is a function of N
+/// numbers.
 pub(super) fn affine(sizes: &Sizes) -> Effort {
     let functions = Sizes { channels: sizes.channels * sizes.channels, ..*sizes };
     let points = 2.0 * sizes.channels * sizes.points();

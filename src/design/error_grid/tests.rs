@@ -56,8 +56,8 @@ fn a_parabola_has_its_vertex_where_it_is() {
     assert_eq!(parabola(1.0, 1.0, 1.0), (0.0, 1.0));
 }
 
-/// Pruned grids against those that compute all points: the highest peak has the same bits wherever it is above
-/// the level, and nothing above the level is missed.
+/// Pruned grids against those that compute all points: the highest peak has the same bits wherever it is
+/// above the level, and nothing above the level is missed.
 #[test]
 fn the_highest_peak_is_that_of_the_whole_grid() {
     let spec = Spec::from_toml(include_str!("../../../filters/thesis-fir.toml"), "spec.toml").unwrap();

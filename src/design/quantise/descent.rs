@@ -80,7 +80,7 @@ impl<'a> Descent<'a> {
         Ok(())
     }
 
-    /// All moves that stay within their bits.
+    /// All moves within the bits of their taps.
     fn moves(&self) -> Vec<Move> {
         let taps = |channel: usize| {
             (0..self.integers[channel].len())

@@ -5,11 +5,20 @@
 //! lower bounds of gamma, minimised over the real values of the undecided taps, reaches the best gamma known
 //! (Fincke and Pohst, Math. Comp. 44, 1985, with several forms in place of one). The work is limited; within
 //! the limit the result is the best of all integers.
+//!
+//! The bounds are quadratic in the taps. For Hermitian positive semidefinite weights Lambda_k whose traces
+//! sum to one,
+//!
+//! ```text
+//! gamma(f)^2 >= sum_k tr( Lambda_k K_k K_k* ) = least + |L' (f - c)|^2,   K_k = W_k - sum_u f_u G_u(k),
+//! ```
+//!
+//! because the largest singular value bounds every weighted mean of the error. G_u is the response of a
+//! tap of value one. All phases are coupled, in contrast to `forms`.
 
 use super::lattice::{Span, closest};
 use super::problem::TapError;
-use super::quadratic_bound::{AffineErrors, QuadraticBound, Unknown};
-use crate::linalg;
+use crate::linalg::{self, CMat, Complex, Mat};
 use crate::spec::WordLengths;
 
 /// Most taps that may differ from zero, in all channels.
@@ -23,7 +32,13 @@ const BRANCHES: f64 = 128.0;
 /// Bounds at each scale.
 const BOUNDS: usize = 8;
 /// Integers must be better by this fraction.
-const BETTER: f64 = 1e-4;
+const LEAST_GAIN: f64 = 1e-4;
+/// Added to the diagonal relative to each entry, because the form is singular for equal channels.
+const RIDGE: f64 = 1e-13;
+/// Fraction of the weights that a step replaces.
+const REPLACED_SHARE: f64 = 0.3;
+/// Points whose share of the new weights is below this get none.
+const UNWEIGHTED_SHARE: f64 = 1e-3;
 
 /// Integers, one list per channel.
 pub(super) type Integers = Vec<Vec<i64>>;
@@ -101,7 +116,7 @@ struct Tree<'a> {
 impl<'a> Tree<'a> {
     fn new(errors: &'a AffineErrors, spans: &'a [Span], step: f64, bar: f64) -> Self {
         let order = (0..errors.count()).collect();
-        let bar = bar * (1.0 - BETTER);
+        let bar = bar * (1.0 - LEAST_GAIN);
         Self { errors, spans, step, bounds: Vec::new(), bar, found: Vec::new(), left: DECISIONS, order }
     }
 
@@ -176,7 +191,7 @@ impl<'a> Tree<'a> {
             }
             worst = worst.max(gain);
         }
-        self.bar = worst * (1.0 - BETTER);
+        self.bar = worst * (1.0 - LEAST_GAIN);
         self.found.push(values.to_vec());
     }
 }
@@ -187,5 +202,128 @@ impl QuadraticBound {
         let column = self.factor.column(i);
         let pull: f64 = (i + 1..values.len()).map(|l| column[l] * (values[l] - self.centre[l])).sum();
         self.centre[i] - pull / column[i]
+    }
+}
+
+/// A tap that may differ from zero.
+#[derive(Debug, Clone, Copy)]
+struct Unknown {
+    channel: usize,
+    /// Number of the tap at the fast rate.
+    tap: usize,
+}
+
+/// The error at the points of a grid as an affine function of a few taps.
+struct AffineErrors {
+    unknowns: Vec<Unknown>,
+    points: Vec<AffinePoint>,
+    ratio: usize,
+}
+
+/// W, M x q, and below one another the rows that the taps multiply, one per unknown.
+struct AffinePoint {
+    w: CMat,
+    rows: CMat,
+}
+
+/// One weight per point, M x M.
+#[derive(Clone)]
+struct Weights(Vec<CMat>);
+
+/// `gamma^2 >= least + |L' (f - centre)|^2`.
+struct QuadraticBound {
+    factor: Mat,
+    centre: Vec<f64>,
+    least: f64,
+}
+
+impl AffineErrors {
+    fn new(error: &TapError<'_>, unknowns: Vec<Unknown>) -> Self {
+        let ratio = error.ratio;
+        let points = error.points.iter().map(|point| {
+            let row = |u: usize, c: usize| {
+                let Unknown { channel, tap } = unknowns[u];
+                Complex::from_polar(1.0, -point.omega * (tap / ratio) as f64) * point.h[(channel, c)]
+            };
+            AffinePoint { w: point.w.clone(), rows: CMat::from_fn(unknowns.len(), point.h.ncols(), row) }
+        });
+        Self { points: points.collect(), unknowns, ratio }
+    }
+
+    /// Number of points.
+    fn count(&self) -> usize {
+        self.points.len()
+    }
+
+    /// K at point `k`.
+    fn at(&self, k: usize, taps: &[f64]) -> CMat {
+        let AffinePoint { w, rows } = &self.points[k];
+        let mut error = w.clone();
+        for (u, &value) in taps.iter().enumerate().filter(|(_, value)| **value != 0.0) {
+            let phase = self.unknowns[u].tap % self.ratio;
+            for c in 0..error.ncols() {
+                error[(phase, c)] -= rows[(u, c)] * value;
+            }
+        }
+        error
+    }
+
+    /// A bound of how far taps of at most `most` each can lower the gain at point `k`.
+    fn reach(&self, k: usize, most: f64) -> f64 {
+        most * self.points[k].rows.row_iter().map(|row| row.norm()).sum::<f64>()
+    }
+
+    /// Equal weights at all points and in all directions.
+    fn uniform(&self) -> Weights {
+        let share = Complex::new(1.0 / (self.count() * self.ratio) as f64, 0.0);
+        Weights(vec![CMat::from_diagonal_element(self.ratio, self.ratio, share); self.count()])
+    }
+
+    /// Moves `weights` towards the worst points and directions of the error of `taps`, which exceeds
+    /// `floor`.
+    fn emphasise(&self, weights: &Weights, taps: &[f64], floor: f64) -> Option<Weights> {
+        let errors: Vec<CMat> = (0..self.count()).map(|k| self.at(k, taps)).collect();
+        let gains: Vec<f64> =
+            errors.iter().map(linalg::largest_singular_value).collect::<Result<_, _>>().ok()?;
+        let worst = gains.iter().copied().fold(0.0, f64::max);
+        let shares: Vec<f64> =
+            gains.iter().map(|gain| ((gain - floor) / (worst - floor)).max(0.0).powi(2)).collect();
+        let total: f64 = shares.iter().sum();
+        if !(worst > floor && total.is_finite()) {
+            return None;
+        }
+        let mut moved: Vec<CMat> =
+            weights.0.iter().map(|weight| weight * Complex::from(1.0 - REPLACED_SHARE)).collect();
+        for (k, share) in shares.iter().enumerate().filter(|(_, share)| **share > UNWEIGHTED_SHARE) {
+            let direction = linalg::svd(&errors[k]).ok()?.u.column(0).into_owned();
+            moved[k] += &direction * direction.adjoint() * Complex::from(REPLACED_SHARE * share / total);
+        }
+        Some(Weights(moved))
+    }
+
+    /// The bound that `weights` give; none if rounding errors make the form indefinite.
+    fn bound(&self, weights: &Weights) -> Option<QuadraticBound> {
+        let size = self.unknowns.len();
+        let (mut form, mut slope, mut constant) = (Mat::zeros(size, size), Mat::zeros(size, 1), 0.0);
+        for (AffinePoint { w, rows }, weight) in self.points.iter().zip(&weights.0) {
+            let weighted = weight * w;
+            constant += weighted.iter().zip(w.iter()).map(|(a, b)| a.re * b.re + a.im * b.im).sum::<f64>();
+            let products = rows * rows.adjoint();
+            let against = weighted * rows.adjoint();
+            for (u, a) in self.unknowns.iter().enumerate() {
+                let phase = a.tap % self.ratio;
+                slope[u] += against[(phase, u)].re;
+                for (v, b) in self.unknowns.iter().enumerate() {
+                    form[(u, v)] += (products[(u, v)] * weight[(b.tap % self.ratio, phase)]).re;
+                }
+            }
+        }
+        (0..size).for_each(|u| form[(u, u)] += RIDGE * form[(u, u)] + f64::MIN_POSITIVE);
+        let factor = linalg::cholesky(&form).ok()?;
+        let half = factor.solve_lower_triangular(&slope)?;
+        let centre = factor.transpose().solve_upper_triangular(&half)?;
+        let least = (constant - half.norm_squared()).max(0.0);
+        let finite = least.is_finite() && centre.iter().all(|x| x.is_finite());
+        finite.then(|| QuadraticBound { factor, centre: centre.iter().copied().collect(), least })
     }
 }

@@ -5,7 +5,7 @@ use super::lattice::Span;
 use super::problem::{Candidate, QuantisationProblem, TapError};
 use super::search::Search;
 use super::smaller_taps::{SmallerTaps, smaller_taps};
-use super::study::{WordLoss, decades};
+use super::{WordLoss, decades};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::spec::{MAX_FRACTION_BITS, WordLengths};
@@ -17,10 +17,10 @@ use std::thread::ScopedJoinHandle;
 pub(super) const INDIFFERENT: f64 = 1e-4;
 /// Relative excess over the gamma of the real taps from which more scales are searched: 0.05 dB.
 const WORTH_MORE: f64 = 5.8e-3;
-/// Shares of the gamma of zero output: removing less is nothing, and real taps that remove more do
-/// something.
-const NOTHING: f64 = 1e-6;
-const SOMETHING: f64 = 1e-3;
+/// Integers that lower the gamma of zero output by less than this share do no better than zero output.
+const NO_EFFECT: f64 = 1e-6;
+/// Real taps that lower it by more than this share have an effect, which integers should have too.
+const EFFECT: f64 = 1e-3;
 /// Scales of few taps that are searched beyond the finest one that holds the optimal taps.
 const MOST_SCALES: i32 = 40;
 
@@ -72,12 +72,12 @@ impl<'a> Quantiser<'a> {
         fraction_bits: Option<i32>,
     ) -> Result<Quantised, DesignError> {
         let finest = fraction_bits.unwrap_or_else(|| self.finest_that_fits(bits));
-        let fitting = Search::new(&self.error, bits, finest);
+        let fitting = Search::new(self.error.problem.taps, &self.error, bits, finest);
         let rounded = self.error.gamma(&fitting.rounded())?;
         let mut found = vec![self.error.candidate(fitting.zero_output())?];
         found.extend(fitting.run()?);
         if fraction_bits.is_none() && finest < MAX_FRACTION_BITS {
-            found.extend(Search::new(&self.error, bits, finest + 1).run()?);
+            found.extend(Search::new(self.error.problem.taps, &self.error, bits, finest + 1).run()?);
         }
         if least_gamma(&found) > self.error.real_gamma * (1.0 + WORTH_MORE) {
             match fraction_bits {
@@ -108,7 +108,7 @@ impl<'a> Quantiser<'a> {
             }
             if scale > last {
                 for scale in [scale, scale + 1].into_iter().filter(|&scale| scale <= MAX_FRACTION_BITS) {
-                    found.extend(Search::around(&smaller.taps, &self.error, bits, scale).run()?);
+                    found.extend(Search::new(&smaller.taps, &self.error, bits, scale).run()?);
                 }
                 last = scale;
             }
@@ -170,8 +170,8 @@ impl<'a> Quantiser<'a> {
         let fixed_point = &found.fixed_point;
         let zeros = fixed_point.integers.iter().map(|list| vec![0; list.len()]).collect();
         let zero_output = self.error.gamma(&FixedPoint { integers: zeros, ..fixed_point.clone() })?;
-        Ok(found.gamma >= zero_output * (1.0 - NOTHING)
-            && self.error.real_gamma < zero_output * (1.0 - SOMETHING))
+        Ok(found.gamma >= zero_output * (1.0 - NO_EFFECT)
+            && self.error.real_gamma < zero_output * (1.0 - EFFECT))
     }
 
     pub(super) fn loss(&self, found: &Quantised) -> WordLoss {

@@ -12,11 +12,11 @@ use crate::spec::WordLengths;
 /// Rounds of reweighting.
 const ROUNDS: usize = 12;
 /// Fraction of the weights that a round replaces.
-const PACE: f64 = 0.2;
+const REPLACED_SHARE: f64 = 0.2;
 /// Weight of the worst frequency, relative to the uniform weights of the start.
 const EMPHASIS: f64 = 3.0;
 /// Relative excess over the gamma of the real taps that counts as none: 0.0002 dB.
-const NEGLIGIBLE: f64 = 2e-5;
+const NEGLIGIBLE_LOSS: f64 = 2e-5;
 /// Integers as doubles, one list per channel.
 type Integers = Vec<Vec<f64>>;
 
@@ -31,13 +31,8 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// The search near the taps of the problem.
-    pub(super) fn new(error: &'a TapError<'a>, bits: &'a WordLengths, fraction_bits: i32) -> Self {
-        Self::around(error.problem.taps, error, bits, fraction_bits)
-    }
-
-    /// The search near other taps.
-    pub(super) fn around(
+    /// The search near `taps`.
+    pub(super) fn new(
         taps: &[Vec<f64>],
         error: &'a TapError<'a>,
         bits: &'a WordLengths,
@@ -66,7 +61,7 @@ impl<'a> Search<'a> {
         let lags = polyphase(&start.taps(), self.error.ratio);
         let real = self.error.real_gamma;
         let descent = Descent::new(points, &self.spans, start.step(), integers, &lags, real)?;
-        Ok(self.fixed_point(&descent.run(NEGLIGIBLE)?))
+        Ok(self.fixed_point(&descent.run(NEGLIGIBLE_LOSS)?))
     }
 
     /// All taps zero.
@@ -92,12 +87,12 @@ impl<'a> Search<'a> {
             let lags = polyphase(&candidate.fixed_point.taps(), self.error.ratio);
             let excess_of_worst = candidate.gamma - real;
             found.push(candidate);
-            if excess_of_worst <= NEGLIGIBLE * real {
+            if excess_of_worst <= NEGLIGIBLE_LOSS * real {
                 break;
             }
             for (weight, gain) in weights.iter_mut().zip(self.error.grid.gains(&lags)?) {
                 let excess = ((gain - real) / excess_of_worst).max(0.0);
-                *weight = (1.0 - PACE) * *weight + PACE * EMPHASIS * excess * excess;
+                *weight = (1.0 - REPLACED_SHARE) * *weight + REPLACED_SHARE * EMPHASIS * excess * excess;
             }
         }
         Ok(())

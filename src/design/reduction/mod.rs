@@ -17,16 +17,73 @@ mod order_search;
 mod output_matrices;
 mod plant_samples;
 mod pole_refinement;
-mod problem;
-mod trade_off;
-
-pub use problem::{Aim, ReductionProblem};
-pub use trade_off::{Figures, OrderErrorPoint, OrderReduction};
 
 use crate::design::DesignError;
-use crate::lti::FirWithTail;
+use crate::design::plant::LiftedPlant;
+use crate::lti::{FirWithTail, StateSpace};
 use crate::spec::Reduction;
 use order_search::OrderSearch;
+
+/// The quantity that a reduction minimises.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Aim {
+    /// gamma, the H-infinity norm of the error.
+    WorstCase,
+    /// The H2 norm of the error.
+    MeanSquare,
+}
+
+/// A bank to be reduced.
+#[derive(Debug, Clone, Copy)]
+pub struct ReductionProblem<'a> {
+    /// The plant whose error counts.
+    pub plant: &'a LiftedPlant,
+    /// The full bank.
+    pub bank: &'a StateSpace,
+    /// States of the full bank in the form that is written.
+    pub order: usize,
+    /// States per slow period of FIR head: the channels of the written bank. The plant may have fewer,
+    /// because equal channels are merged.
+    pub width: usize,
+    /// The quantity that is minimised.
+    pub aim: Aim,
+    /// Relative excess of gamma granted to the mean square.
+    pub gamma_margin: f64,
+}
+
+/// The error of a bank in normalised time (h = 1).
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Figures {
+    /// gamma = ||K||, the H-infinity norm of the error system.
+    pub gamma: f64,
+    /// Root mean square of the error per fast sample, `||K||_2 / sqrt(M)`.
+    pub rms_error: f64,
+}
+
+/// A point of the trade-off between order and error.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct OrderErrorPoint {
+    /// Number of states.
+    pub order: usize,
+    /// The error of the best bank found with at most so many states.
+    #[serde(flatten)]
+    pub figures: Figures,
+    /// Excess over the full bank in decibels of the quantity that the method minimises: gamma (`iir`) or the
+    /// mean-square error (`h2`).
+    pub loss_db: f64,
+}
+
+/// The result of an order search.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct OrderReduction {
+    /// The bank of the method, not reduced.
+    pub full: OrderErrorPoint,
+    /// The bank chosen.
+    pub reduced: OrderErrorPoint,
+    /// The order/error trade-off: all orders searched, ascending. All orders below the full one where that
+    /// is cheap.
+    pub orders: Vec<OrderErrorPoint>,
+}
 
 /// The reduced bank and the order/error trade-off. No bank is returned if the full one is chosen.
 ///

@@ -5,8 +5,7 @@ use super::dynamics::Dynamics;
 use super::output_matrices::{mean_square, state_covariance_root};
 use super::plant_samples::PlantSamples;
 use super::pole_refinement::{Refined, refined};
-use super::problem::{Aim, ReductionProblem};
-use super::trade_off::{Figures, OrderErrorPoint, OrderReduction};
+use super::{Aim, Figures, OrderErrorPoint, OrderReduction, ReductionProblem};
 use crate::design::DesignError;
 use crate::lti::FirWithTail;
 use crate::lti::gramian::h2_norm;
@@ -14,6 +13,8 @@ use rand_core::SeedableRng;
 use rand_pcg::Pcg64;
 use std::collections::BTreeMap;
 
+/// Relative accuracy of a gamma that only ranks candidates.
+const RANKING_ACCURACY: f64 = 1e-4;
 /// Lengths of the FIR head that are tried.
 const HEADS: usize = 8;
 /// Splits of the states whose gamma is computed: those of least mean-square error.
@@ -167,7 +168,7 @@ impl<'a> OrderSearch<'a> {
         let mut best: Option<(f64, Dynamics)> = None;
         for (norm, dynamics) in self.finalists(order)? {
             let rough = match self.problem.aim {
-                Aim::WorstCase => self.samples.rough_gamma(&dynamics)?,
+                Aim::WorstCase => self.samples.worst_case(&dynamics, RANKING_ACCURACY)?.gamma,
                 Aim::MeanSquare => norm,
             };
             if best.as_ref().is_none_or(|(least, _)| rough <= least * (1.0 + HEAD_PREFERENCE)) {

@@ -5,9 +5,9 @@ use super::dynamics::Dynamics;
 use crate::design::DesignError;
 use crate::design::exchange::{AffineError, Exchange, Peaks};
 use crate::design::plant::LiftedPlant;
-use crate::linalg::{CMat, Complex, Mat};
+use crate::linalg::Complex;
 use crate::lmi::Settings;
-use crate::lmi::sampled::{self, MeanSquareObjective, Point, Taps};
+use crate::lmi::sampled::{self, MeanSquareObjective, Point, Solution, Taps};
 use crate::lti::peak::{peaks_above, resonances, stable_poles};
 use crate::lti::{FirWithTail, FrequencyResponse};
 use std::f64::consts::PI;
@@ -16,8 +16,6 @@ use std::f64::consts::PI;
 const GRID: usize = 32;
 /// Further frequencies, halving from pi/GRID towards 0, for slow analog filters.
 const TOWARDS_ZERO: usize = 6;
-/// Relative accuracy of a gamma that only ranks candidates.
-const RANKING_ACCURACY: f64 = 1e-4;
 /// See [`PlantSamples::coarse`].
 const COARSE: usize = 4;
 /// Frequencies closer than this are one, in radians.
@@ -28,27 +26,7 @@ const LEAST_DISTANCE: f64 = 1e-9;
 pub(super) struct PlantSamples<'a> {
     pub(super) plant: &'a LiftedPlant,
     /// The first GRID + 1 are uniform, unless the samples are coarse.
-    pub(super) samples: Vec<PlantSample>,
-}
-
-/// The plant at one frequency, with its inputs compressed by a unitary matrix.
-#[derive(Debug, Clone)]
-pub(super) struct PlantSample {
-    /// Radians per slow period.
-    pub(super) omega: f64,
-    /// Measurements, N x q.
-    pub(super) h: CMat,
-    /// Reference, M x q.
-    w: CMat,
-}
-
-/// Output matrices of least gamma at the sampled frequencies.
-#[derive(Debug, Clone)]
-pub(super) struct WorstCase {
-    pub(super) outputs: Mat,
-    pub(super) gamma: f64,
-    /// M x q for each frequency.
-    pub(super) dual: Vec<CMat>,
+    pub(super) samples: Vec<Point>,
 }
 
 impl<'a> PlantSamples<'a> {
@@ -78,27 +56,22 @@ impl<'a> PlantSamples<'a> {
         }
     }
 
-    fn at(&self, omega: f64) -> PlantSample {
+    fn at(&self, omega: f64) -> Point {
         let (h, w) = self.plant.response(omega);
-        PlantSample { omega, h, w }
+        Point { omega, w, h }
     }
 
     fn problem(&self, dynamics: &Dynamics) -> Result<sampled::Problem, DesignError> {
         let regressors = FrequencyResponse::new(&dynamics.regressors()?);
-        let points = self.samples.iter().map(|sample| point(sample.clone(), &regressors)).collect();
+        let points = self.samples.iter().map(|sample| driving(&regressors, sample.clone())).collect();
         Ok(sampled::Problem::new(points, vec![1; self.plant.ratio()])?)
     }
 
-    /// The output matrices of least gamma at the sampled frequencies, to a relative accuracy.
-    pub(super) fn worst_case(&self, dynamics: &Dynamics, accuracy: f64) -> Result<WorstCase, DesignError> {
+    /// The problem's solution at the sampled frequencies, to a relative accuracy. Its only tap holds the
+    /// output matrices.
+    pub(super) fn worst_case(&self, dynamics: &Dynamics, accuracy: f64) -> Result<Solution, DesignError> {
         let settings = Settings { tol_gap_rel: accuracy, ..Settings::SAMPLED };
-        let mut found = sampled::minimise(&self.problem(dynamics)?, &settings)?;
-        Ok(WorstCase { outputs: found.taps.swap_remove(0), gamma: found.gamma, dual: found.dual })
-    }
-
-    /// The least gamma at the sampled frequencies, accurate enough to rank candidates.
-    pub(super) fn rough_gamma(&self, dynamics: &Dynamics) -> Result<f64, DesignError> {
-        self.worst_case(dynamics, RANKING_ACCURACY).map(|found| found.gamma)
+        Ok(sampled::minimise(&self.problem(dynamics)?, &settings)?)
     }
 
     /// The bank of least gamma with these dynamics and, within `gamma_margin`, of least mean square. The
@@ -110,7 +83,8 @@ impl<'a> PlantSamples<'a> {
     ) -> Result<FirWithTail, DesignError> {
         let problem = self.problem(dynamics)?;
         let objective = MeanSquareObjective::noiseless(self.weights(), problem.channels());
-        let error = OutputError::new(self, dynamics)?;
+        let regressors = FrequencyResponse::new(&dynamics.regressors()?);
+        let error = OutputError { samples: self, dynamics, regressors };
         let mut exchange = Exchange::new(error, problem, objective, gamma_margin)?;
         let best = exchange.optimise()?;
         let frequencies: Vec<f64> = exchange.frequencies().collect();
@@ -134,15 +108,9 @@ struct OutputError<'a> {
     regressors: FrequencyResponse,
 }
 
-impl<'a> OutputError<'a> {
-    fn new(samples: &'a PlantSamples<'a>, dynamics: &'a Dynamics) -> Result<Self, DesignError> {
-        Ok(Self { samples, dynamics, regressors: FrequencyResponse::new(&dynamics.regressors()?) })
-    }
-}
-
 impl AffineError for OutputError<'_> {
     fn at(&self, omega: f64) -> Point {
-        point(self.samples.at(omega), &self.regressors)
+        driving(&self.regressors, self.samples.at(omega))
     }
 
     fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks, DesignError> {
@@ -154,9 +122,9 @@ impl AffineError for OutputError<'_> {
     }
 }
 
-fn point(sample: PlantSample, regressors: &FrequencyResponse) -> Point {
-    let PlantSample { omega, h, w } = sample;
-    Point { omega, w, h: regressors.at_frequency(omega) * h }
+/// The point with the regressors as measurements.
+fn driving(regressors: &FrequencyResponse, point: Point) -> Point {
+    Point { h: regressors.at_frequency(point.omega) * point.h, ..point }
 }
 
 /// `e^{-i omega lags}`.

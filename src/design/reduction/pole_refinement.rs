@@ -9,11 +9,11 @@
 //! Source: Golub and Pereyra, "Separable nonlinear least squares: the variable projection method", Inverse
 //! Problems 19 (2003).
 
+use super::Aim;
 use super::descent::{Evaluated, descend};
 use super::dynamics::Dynamics;
 use super::output_matrices::{mean_square, normalised};
 use super::plant_samples::{PlantSamples, delay};
-use super::problem::Aim;
 use crate::design::DesignError;
 use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lti::gramian::controllability_root;
@@ -78,7 +78,7 @@ fn unpacked(like: &Dynamics, x: &Mat) -> Dynamics {
 fn worst_case_gradient(samples: &PlantSamples<'_>, dynamics: &Dynamics) -> Result<(f64, Mat), DesignError> {
     let found = samples.worst_case(dynamics, ACCURACY)?;
     let (r, n) = dynamics.b.shape();
-    let c = found.outputs.columns(0, r).into_owned();
+    let c = found.taps[0].columns(0, r).into_owned();
     // C (zI - a)^-1.
     let observed = FrequencyResponse::new(&StateSpace::new(
         dynamics.a.clone(),

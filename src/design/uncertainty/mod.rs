@@ -13,7 +13,7 @@ mod tests;
 
 pub use derivatives::{DelayDerivatives, delay_derivatives};
 pub use floor::{Floor, floor};
-pub use search::{norm_at, norm_of};
+pub use search::norm_at;
 
 use super::DesignError;
 use super::analysis::bank_problem;
@@ -26,20 +26,12 @@ const MAX_DOUBLINGS: usize = 24;
 /// Relative width at which the bisection ends.
 const FACTOR_ACCURACY: f64 = 0.01;
 
-/// The worst case of `bank` over `errors`, proven from both sides, at most `accuracy` (relative) apart where
-/// the work allows.
+/// The worst case of `bank` over `errors`, with fixed or with delay-scheduled taps, proven from both sides,
+/// at most `accuracy` (relative) apart where the work allows.
 ///
 /// # Errors
 /// As [`super::analyze`]; [`DesignError::Verify`] as [`crate::verify::uncertainty::worst_case`].
-pub fn worst_case(bank: &Bank, errors: &ErrorBox, accuracy: f64) -> Result<WorstCase, DesignError> {
-    worst_case_of(bank, errors, Taps::Fixed, accuracy)
-}
-
-/// As [`worst_case`], with taps that stay or follow the delays.
-///
-/// # Errors
-/// As [`worst_case`].
-pub fn worst_case_of(
+pub fn worst_case(
     bank: &Bank,
     errors: &ErrorBox,
     taps: Taps,

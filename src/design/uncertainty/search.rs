@@ -20,19 +20,12 @@ pub(super) fn moved(bank: &Bank, point: &ErrorPoint) -> Result<Problem, DesignEr
     Problem::with_errors(bank.spec.as_ref().ok_or(DesignError::NoSpec)?, bank.latency, point)
 }
 
-/// The norm of `bank` with the errors of `point`, and the frequency of its peak.
+/// The norm of `bank` with the errors of `point`, and the frequency of its peak, with fixed or with
+/// delay-scheduled taps.
 ///
 /// # Errors
 /// As [`super::super::analyze`].
-pub fn norm_at(bank: &Bank, point: &ErrorPoint) -> Result<(f64, RadiansPerSlowPeriod), DesignError> {
-    norm_of(bank, point, Taps::Fixed)
-}
-
-/// As [`norm_at`], with taps that stay or follow the delays.
-///
-/// # Errors
-/// As [`norm_at`].
-pub fn norm_of(
+pub fn norm_at(
     bank: &Bank,
     point: &ErrorPoint,
     taps: Taps,

@@ -36,21 +36,6 @@ impl Problem {
         }
         Ok(Self { a, b, c, d, terms })
     }
-
-    /// Number of unknowns x.
-    pub fn unknowns(&self) -> usize {
-        self.terms.len()
-    }
-
-    /// `(C(x), D(x))`.
-    pub fn outputs(&self, x: &[f64]) -> (Mat, Mat) {
-        let (mut c, mut d) = (self.c.clone(), self.d.clone());
-        for ((ck, dk), x) in self.terms.iter().zip(x) {
-            c += ck * *x;
-            d += dk * *x;
-        }
-        (c, d)
-    }
 }
 
 fn check(name: &str, m: &Mat, want_rows: usize, want_cols: usize) -> Result<(), LmiError> {
@@ -64,10 +49,9 @@ fn check(name: &str, m: &Mat, want_rows: usize, want_cols: usize) -> Result<(), 
     Ok(())
 }
 
-/// The problem of the iteration, in Gramian coordinates and relative to the outputs of least squares. In these
-/// coordinates the squared H2 norm is the squared norm of [C D], so that the H2-optimal unknowns are a
-/// projection: `vec [C D] = k0 + terms y`, orthonormal `terms` orthogonal to `k0`,
-/// `|k0| = 1`.
+/// The problem of the iteration, in Gramian coordinates and relative to the outputs of least squares. In
+/// these coordinates the squared H2 norm is the squared norm of [C D], so that the H2-optimal unknowns are a
+/// projection: `vec [C D] = k0 + terms y`, orthonormal `terms` orthogonal to `k0`, `|k0| = 1`.
 pub(super) struct Reduced {
     pub(super) coordinates: GramianCoordinates,
     pub(super) outputs: usize,
@@ -126,8 +110,7 @@ fn orthonormal(all: &Mat, tol_rank: f64) -> Result<(Mat, Mat), LinalgError> {
         return Ok((Mat::zeros(all.nrows(), 0), Mat::zeros(all.ncols(), 0)));
     }
     let svd = linalg::svd(all)?;
-    let floor = tol_rank * svd.s.first().copied().unwrap_or(0.0);
-    let rank = svd.s.iter().filter(|s| **s > floor).count();
+    let rank = svd.rank(tol_rank);
     let back = Mat::from_fn(all.ncols(), rank, |k, r| svd.v[(k, r)] / svd.s[r]);
     Ok((svd.u.columns(0, rank).into_owned(), back))
 }

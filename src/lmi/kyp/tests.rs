@@ -85,6 +85,16 @@ impl Fir {
     }
 }
 
+/// `(C(x), D(x))`.
+fn outputs(problem: &Problem, x: &[f64]) -> (Mat, Mat) {
+    let (mut c, mut d) = (problem.c.clone(), problem.d.clone());
+    for ((ck, dk), x) in problem.terms.iter().zip(x) {
+        c += ck * *x;
+        d += dk * *x;
+    }
+    (c, d)
+}
+
 fn report(name: &str, p: &Problem, s: &Solution, seconds: f64) {
     println!(
         "{name}: {:?} gamma {:.10} lower {:.10} gap {:.1e} steps {} states {} of {} unknowns {} in {seconds:.3} s",
@@ -95,7 +105,7 @@ fn report(name: &str, p: &Problem, s: &Solution, seconds: f64) {
         s.iterations,
         s.coordinates.a.nrows(),
         p.a.nrows(),
-        p.unknowns()
+        p.terms.len()
     );
 }
 
@@ -134,13 +144,13 @@ fn the_thesis_bank_is_solved_in_kyp_form() {
 
 /// `C(x) (zI - A)^-1 B + D(x)` of a solution, and its norm by level sets.
 fn norm(problem: &Problem, x: &[f64]) -> f64 {
-    let (c, d) = problem.outputs(x);
+    let (c, d) = outputs(problem, x);
     hinf_norm(&StateSpace::new(problem.a.clone(), problem.b.clone(), c, d).unwrap()).unwrap().gain
 }
 
 /// `[P - A'PA, -A'PB, C'; -B'PA, gamma I - B'PB, D'; C, D, gamma I]`, written out as one congruence.
 fn lmi(problem: &Problem, s: &Solution) -> Mat {
-    let (c, d) = problem.outputs(&s.x);
+    let (c, d) = outputs(problem, &s.x);
     let (a, b, c) = (&s.coordinates.a, &s.coordinates.b, c * &s.coordinates.basis);
     let (n, m, p) = (a.nrows(), b.ncols(), c.nrows());
     let next = Mat::from_fn(n, n + m, |i, j| if j < n { a[(i, j)] } else { b[(i, j - n)] });

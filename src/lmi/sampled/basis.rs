@@ -70,7 +70,7 @@ impl Basis {
         let mut x = vec![0.0; reduced.layout.unknowns()];
         for p in 0..reduced.layout.rows {
             let Some(svd) = self.triangle(reduced.layout.lags[p]) else { continue };
-            let (u, kept) = (&svd.u, kept(svd, cut));
+            let (u, kept) = (&svd.u, svd.rank(cut));
             let component =
                 self.q.columns(0, u.nrows()).tr_mul(&row_vector(w, p, &self.weights, self.zero_rows));
             let mut c = u.columns(0, kept).tr_mul(&component);
@@ -88,7 +88,7 @@ impl Basis {
     pub(super) fn project_out(&self, reduced: &Reduced, y: &mut Blocks, cut: f64) {
         for p in 0..reduced.layout.rows {
             let Some(svd) = self.triangle(reduced.layout.lags[p]) else { continue };
-            let u = svd.u.columns(0, kept(svd, cut));
+            let u = svd.u.columns(0, svd.rank(cut));
             let q = self.q.columns(0, svd.u.nrows());
             let mut row = row_vector(y, p, &self.weights, self.zero_rows);
             for _ in 0..2 {
@@ -98,11 +98,6 @@ impl Basis {
             set_row(y, p, &row);
         }
     }
-}
-
-fn kept(svd: &Svd, cut: f64) -> usize {
-    let floor = cut * svd.s.first().copied().unwrap_or(0.0);
-    svd.s.iter().filter(|s| **s > floor).count()
 }
 
 /// Rows: real parts of all (point, input), then imaginary parts, then the noise of all (lag, channel with

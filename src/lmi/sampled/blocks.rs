@@ -10,7 +10,6 @@ use crate::linalg::blocks::{Block, Blocks, SmallCholesky};
 const BISECTIONS: usize = 8;
 
 /// All LMIs of a problem.
-#[derive(Debug)]
 pub(super) struct Cone {
     /// Rows of the first block of each LMI.
     pub(super) m: usize,

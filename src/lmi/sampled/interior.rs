@@ -29,7 +29,6 @@ pub(super) enum Objective {
 const STARTING_GAP: f64 = 0.1;
 
 /// The iterate and its work memory.
-#[derive(Debug)]
 pub(super) struct Engine<'a> {
     reduced: &'a Reduced,
     objective: Objective,

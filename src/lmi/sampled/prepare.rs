@@ -126,8 +126,7 @@ fn mixing(channels: &Blocks) -> Result<Mat, LmiError> {
     let unit: Vec<f64> = strength.iter().map(|s| if *s > 0.0 { 1.0 / s } else { 0.0 }).collect();
     all.row_iter_mut().zip(&unit).for_each(|(mut row, unit)| row *= *unit);
     let svd = linalg::svd(&linalg::lq_factor(&all))?;
-    let floor = CHANNEL_RANK * svd.s.first().copied().unwrap_or(0.0);
-    let rank = svd.s.iter().filter(|s| **s > floor).count();
+    let rank = svd.rank(CHANNEL_RANK);
     let power = (count as f64).sqrt();
     Ok(Mat::from_fn(rank, n, |r, i| power / svd.s[r] * svd.u[(i, r)] * unit[i]))
 }

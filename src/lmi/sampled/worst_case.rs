@@ -114,8 +114,8 @@ struct Run<'a> {
 }
 
 impl Iterate for Run<'_> {
-    /// A quarter of the complementarity gap and of the residual: from there on, the gap of the bound that the
-    /// dual matrices prove is usually within the tolerance.
+    /// A quarter of the complementarity gap and of the residual: from there on, the gap of the bound that
+    /// the dual matrices prove is usually within the tolerance.
     fn gap(&mut self) -> f64 {
         let engine = &self.engine;
         0.25 * (engine.cone.gap() / engine.cone.t + norm(engine.dual_residual()))

@@ -1,7 +1,7 @@
 //! Robust optima against a semidefinite program, and the worst case that the file states.
 
 use crate::design::methods::scenarios::{MAX_SCENARIOS, scenarios};
-use crate::design::uncertainty::norm_of;
+use crate::design::uncertainty::norm_at;
 use crate::design::{ProofSearch, design_with};
 use crate::random::Random;
 use crate::spec::Spec;
@@ -54,7 +54,7 @@ fn flat_optima_are_reached_and_random_points_are_no_worse() {
         for _ in 0..8 {
             let delays = vec![Seconds(0.0), Seconds(half * random.sample())];
             let point = ErrorPoint { delays, ..ErrorPoint::none(2) };
-            let (norm, _) = norm_of(&designed.bank, &point, Taps::Fixed).unwrap();
+            let (norm, _) = norm_at(&designed.bank, &point, Taps::Fixed).unwrap();
             assert!(norm <= study.robust.worst * (1.0 + 1e-3), "{point:?}: {norm} {study:?}");
         }
     }
@@ -111,7 +111,7 @@ fn following(half: f64) -> Spec {
 /// The norm of the bank's taps for delays that are off, and the least norm of all banks for these delays.
 fn norm_and_redesign(bank: &crate::bank::Bank, errors: [f64; 2]) -> (f64, f64) {
     let point = ErrorPoint { delays: errors.map(Seconds).to_vec(), ..ErrorPoint::none(2) };
-    let (norm, _) = norm_of(bank, &point, Taps::Following).unwrap();
+    let (norm, _) = norm_at(bank, &point, Taps::Following).unwrap();
     let mut spec = Spec { uncertainty: None, ..bank.spec.clone().unwrap() };
     spec.design.tracking = None;
     spec.channels.iter_mut().zip(errors).for_each(|(channel, error)| channel.delay += Seconds(error));
