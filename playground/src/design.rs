@@ -3,7 +3,7 @@
 use crate::answer::{Answer, Refusal, text};
 use hybank::bank::Bank;
 use hybank::design::{Design, GammaScale, Options, Stage, analyze_mean, design_observed, implausible};
-use hybank::overview::{ChannelFact, Fact, Facts, counted, doubts};
+use hybank::overview::{self, Facts, counted};
 use hybank::spec::Spec;
 use hybank::verify::Verified;
 use serde::Serialize;
@@ -17,46 +17,15 @@ const SPEC: &str = "spec.toml";
 struct Designed {
     /// The text of the bank file.
     bank: String,
-    title: String,
-    understood: String,
+    #[serde(flatten)]
+    facts: Facts,
     /// The bounds of gamma that a proof supports.
     proven: Option<Verified>,
     unproven: Option<String>,
     warnings: Vec<String>,
-    error: Vec<Row>,
-    cost: Vec<Row>,
-    channels: Vec<ChannelRow>,
     seconds: f64,
     proof_seconds: f64,
     iterations: String,
-}
-
-/// Name, value and meaning of a figure.
-#[derive(Serialize)]
-struct Row {
-    name: &'static str,
-    value: String,
-    meaning: String,
-}
-
-impl From<Fact> for Row {
-    fn from(Fact { name, value, meaning }: Fact) -> Self {
-        Self { name, value, meaning }
-    }
-}
-
-#[derive(Serialize)]
-struct ChannelRow {
-    delay: String,
-    gain: String,
-    /// Relative change of gamma if the delay is a thousandth of a fast sample longer.
-    sensitivity: Option<f64>,
-}
-
-impl From<ChannelFact> for ChannelRow {
-    fn from(ChannelFact { delay, gain, sensitivity }: ChannelFact) -> Self {
-        Self { delay, gain, sensitivity }
-    }
 }
 
 fn spec(input: &[u8]) -> Result<Spec, Refusal> {
@@ -82,18 +51,12 @@ impl Designed {
     fn new(spec: &Spec, design: Design, seconds: f64) -> Result<Self, Refusal> {
         let Design { bank, proof, proof_time, iterations, .. } = design;
         let complete = bank.spec.as_ref().unwrap_or(spec);
-        let Facts { title, understood, error, cost, channels } =
-            Facts::new(&bank, complete).map_err(Refusal::new)?;
         Ok(Self {
             bank: bank.to_json().map_err(Refusal::new)?,
-            title,
-            understood,
+            facts: Facts::new(&bank, complete).map_err(Refusal::new)?,
             proven: proof.as_ref().ok().copied(),
             unproven: proof.err().map(|reason| reason.to_string()),
             warnings: warnings(spec, &bank)?,
-            error: error.into_iter().map(Row::from).collect(),
-            cost: cost.into_iter().map(Row::from).collect(),
-            channels: channels.into_iter().map(ChannelRow::from).collect(),
             seconds,
             proof_seconds: proof_time.as_secs_f64(),
             iterations: counted(iterations, "iteration"),
@@ -106,5 +69,5 @@ fn warnings(spec: &Spec, bank: &Bank) -> Result<Vec<String>, Refusal> {
     let mean = analyze_mean(bank).map_err(Refusal::new)?;
     let scale = GammaScale::new(bank).map_err(Refusal::new)?;
     let implausible = implausible(spec).unwrap_or_default();
-    Ok(implausible.iter().map(ToString::to_string).chain(doubts(bank, &mean, &scale)).collect())
+    Ok(implausible.iter().map(ToString::to_string).chain(overview::warnings(bank, &mean, &scale)).collect())
 }

@@ -2,7 +2,7 @@
 
 use crate::arrays::Shape;
 use crate::background;
-use crate::errors::{HybankError, file_error, refused};
+use crate::errors::{HybankError, choose, file_error, refused};
 use crate::fuse::{self, Request};
 use crate::results::{Figures, Gamma};
 use crate::sources;
@@ -15,7 +15,7 @@ use numpy::{Element, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Most states of a realisation as dense matrices: 128 MiB.
@@ -70,20 +70,15 @@ impl Bank {
     /// Writes the bank file, which appears when it is whole.
     #[pyo3(signature = (path, *, overwrite = true))]
     fn save(&self, path: PathBuf, overwrite: bool) -> PyResult<()> {
-        let text = self.to_json()?;
-        let mut file = AtomicFile::create(&path, overwrite).map_err(file_error)?;
-        file.write_all(text.as_bytes())?;
-        file.commit().map_err(file_error)
+        write_file(&path, self.to_json()?.as_bytes(), overwrite)
     }
 
     /// Writes the bank for another tool: `c99`, `csv`, `npz`, `mat`, `coe` or `mem`. `name` is the prefix of
     /// C identifiers.
     #[pyo3(signature = (path, *, format, name = "bank", overwrite = true))]
     fn export(&self, path: PathBuf, format: &str, name: &str, overwrite: bool) -> PyResult<()> {
-        let bytes = export(&self.bank, parse_format(format)?, name).map_err(refused)?;
-        let mut file = AtomicFile::create(&path, overwrite).map_err(file_error)?;
-        file.write_all(&bytes)?;
-        file.commit().map_err(file_error)
+        let bytes = export(&self.bank, choose("format", format, &FORMATS)?, name).map_err(refused)?;
+        write_file(&path, &bytes, overwrite)
     }
 
     /// N.
@@ -297,19 +292,22 @@ impl Bank {
     }
 }
 
-fn parse_format(name: &str) -> PyResult<Exported> {
-    match name {
-        "c99" => Ok(Exported::C99),
-        "csv" => Ok(Exported::Csv),
-        "npz" => Ok(Exported::Npz),
-        "mat" => Ok(Exported::Mat),
-        "coe" => Ok(Exported::Coe),
-        "mem" => Ok(Exported::Mem),
-        _ => Err(HybankError::new_err(format!(
-            "format: \"{name}\" is unknown; choose c99, csv, npz, mat, coe or mem"
-        ))),
-    }
+/// Writes a file, which appears when it is whole.
+fn write_file(path: &Path, bytes: &[u8], overwrite: bool) -> PyResult<()> {
+    let mut file = AtomicFile::create(path, overwrite).map_err(file_error)?;
+    file.write_all(bytes)?;
+    file.commit().map_err(file_error)
 }
+
+/// The formats by name.
+const FORMATS: [(&str, Exported); 6] = [
+    ("c99", Exported::C99),
+    ("csv", Exported::Csv),
+    ("npz", Exported::Npz),
+    ("mat", Exported::Mat),
+    ("coe", Exported::Coe),
+    ("mem", Exported::Mem),
+];
 
 /// Rows of `columns` numbers as a read-only array; a matrix without rows keeps its columns.
 fn matrix(py: Python<'_>, rows: Vec<Vec<f64>>, columns: usize) -> PyResult<Bound<'_, PyArray2<f64>>> {

@@ -2,7 +2,7 @@
 
 use crate::arrays::{Held, Shape};
 use crate::background;
-use crate::errors::{HybankError, refused};
+use crate::errors::{HybankError, choose, refused};
 use crate::sources;
 use hybank::calibrate::{self as calibration, ChannelEstimate, Evidence, Fit, Record, Settings, applied};
 use hybank::sine_fit::Estimate;
@@ -163,17 +163,9 @@ fn records(held: &Held<'_>, channels: usize, clip: Option<f64>) -> PyResult<Vec<
 fn fitted(names: &[String]) -> PyResult<Fit> {
     let mut fit = Fit { delay: false, gain: false, offset: false, cutoff: false };
     for name in names {
-        match name.as_str() {
-            "delay" => fit.delay = true,
-            "gain" => fit.gain = true,
-            "offset" => fit.offset = true,
-            "cutoff" => fit.cutoff = true,
-            _ => {
-                return Err(HybankError::new_err(format!(
-                    "fit: \"{name}\" is unknown; choose delay, gain, offset and cutoff"
-                )));
-            }
-        }
+        let known = [("delay", 0), ("gain", 1), ("offset", 2), ("cutoff", 3)];
+        let values = [&mut fit.delay, &mut fit.gain, &mut fit.offset, &mut fit.cutoff];
+        *values[choose("fit", name, &known)?] = true;
     }
     Ok(fit)
 }

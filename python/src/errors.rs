@@ -31,6 +31,16 @@ pub(crate) fn refused_in(name: &str, error: impl Display) -> PyErr {
     HybankError::new_err(format!("{name}: {error}"))
 }
 
+/// The value of a name among the `known` ones; `keyword` is the argument that names it.
+pub(crate) fn choose<T: Copy>(keyword: &str, name: &str, known: &[(&str, T)]) -> PyResult<T> {
+    known.iter().find(|(known, _)| *known == name).map(|&(_, value)| value).ok_or_else(|| {
+        let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
+        let (last, others) = names.split_last().unwrap_or((&"", &[]));
+        let choice = format!("{} or {last}", others.join(", "));
+        HybankError::new_err(format!("{keyword}: \"{name}\" is unknown; choose {choice}"))
+    })
+}
+
 /// A spec that was refused, with its place.
 pub(crate) fn spec_error(py: Python<'_>, error: &spec::SpecError) -> PyErr {
     let place = error.location().map(|location| (location.line, location.column));

@@ -2,7 +2,7 @@
 
 use crate::arrays::{Held, Shape};
 use crate::background;
-use crate::errors::{HybankError, refused};
+use crate::errors::{HybankError, choose, refused};
 use hybank::measure::{self as quality, Imbalance, Settings, Window};
 use hybank::units::{Decibels, Hertz};
 use numpy::PyArray1;
@@ -77,7 +77,7 @@ pub(crate) fn measure(
         harmonics,
         full_scale,
         rails: (-full_scale, full_scale),
-        window: parse_window(window)?,
+        window: choose("window", window, &WINDOWS)?,
     };
     let held = Held::new(y, Shape { axis: -1, channels: 1 })?;
     let settings = Settings { rails: held.rails().unwrap_or(settings.rails), ..settings };
@@ -90,17 +90,9 @@ pub(crate) fn measure(
     result(y.py(), found.map_err(refused)?)
 }
 
-fn parse_window(name: &str) -> PyResult<Window> {
-    match name {
-        "none" => Ok(Window::None),
-        "hann" => Ok(Window::Hann),
-        "bh4" => Ok(Window::Bh4),
-        "bh7" => Ok(Window::Bh7),
-        _ => Err(HybankError::new_err(format!(
-            "window: \"{name}\" is unknown; choose \"none\", \"hann\", \"bh4\" or \"bh7\""
-        ))),
-    }
-}
+/// The windows by name.
+const WINDOWS: [(&str, Window); 4] =
+    [("none", Window::None), ("hann", Window::Hann), ("bh4", Window::Bh4), ("bh7", Window::Bh7)];
 
 fn result(py: Python<'_>, found: quality::Measurement) -> PyResult<Measurement> {
     let decibels = |value: Decibels| value.0;

@@ -6,7 +6,7 @@ use crate::design::{
     Design, DesignError, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, TrackingStudy, analyze_mean,
 };
 use crate::figures::Figures;
-use crate::overview::{Fact, counted, decibels, doubts, figure_facts, frequency, six_digits, understood};
+use crate::overview::{Fact, counted, decibels, figure_facts, frequency, six_digits, understood, warnings};
 use crate::spec::Method;
 use crate::units::Hertz;
 use crate::verify::{BoundedBanks, Verified};
@@ -70,7 +70,7 @@ impl Judged {
 
     /// What a user of the bank should know.
     pub(super) fn warnings(&self, bank: &Bank) -> Vec<String> {
-        doubts(bank, &self.mean, &self.scale)
+        warnings(bank, &self.mean, &self.scale)
     }
 }
 

@@ -1,8 +1,9 @@
-//! The band in which figures hold.
+//! The band in which figures hold, and what the words about them need to know of a bank.
 
 use crate::analog::{StableFilter, resolved_band, signal};
+use crate::bank::{Bank, SynthesisFilters};
 use crate::design::Problem;
-use crate::spec::{Band, Spec};
+use crate::spec::{Band, Method, Spec};
 use crate::units::{CyclesPerFastPeriod, Hertz};
 use std::f64::consts::TAU;
 
@@ -52,5 +53,34 @@ impl FigureBand {
     /// The ends in cycles per fast period.
     pub(super) fn cycles(&self, spec: &Spec) -> [CyclesPerFastPeriod; 2] {
         [self.low_hertz, self.high_hertz].map(|end| end.per_fast_period(spec.fast_period))
+    }
+}
+
+/// How a bank was designed, and for what.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setup {
+    /// Of the design.
+    pub method: Method,
+    /// Whether the filters are recursive, so that taps do not limit them.
+    pub is_recursive: bool,
+    /// The ratio M of the rates.
+    pub ratio: usize,
+    /// The number of channels.
+    pub channels: usize,
+    /// Whether the spec has uncertain cut-offs, which the signal-to-noise ratio does not count.
+    pub has_uncertain_cutoffs: bool,
+}
+
+impl Setup {
+    pub(super) fn new(bank: &Bank, spec: &Spec) -> Self {
+        let channels = spec.channels.len();
+        let cutoffs = spec.uncertainty.as_ref().map(|table| table.cutoffs(channels));
+        Self {
+            method: bank.method,
+            is_recursive: matches!(bank.filters, SynthesisFilters::StateSpace(_)),
+            ratio: bank.ratio,
+            channels,
+            has_uncertain_cutoffs: cutoffs.is_some_and(|shares| shares.into_iter().any(|share| share > 0.0)),
+        }
     }
 }

@@ -25,7 +25,6 @@ mod band;
 mod integral;
 mod powers;
 mod reconstruction;
-mod setup;
 mod signal;
 mod simple;
 mod snr;
@@ -34,8 +33,7 @@ mod spline;
 mod tests;
 mod tones;
 
-pub use band::{BandSource, FigureBand};
-pub use setup::Setup;
+pub use band::{BandSource, FigureBand, Setup};
 pub use simple::{SimpleFigure, SimpleWay};
 pub use snr::Snr;
 pub use tones::Tone;
@@ -50,7 +48,7 @@ use snr::Setting;
 use tones::{ToneResponse, Worst};
 
 /// By how many decibels a bank must beat the simple ways to be worth its trouble.
-pub const WORTHWHILE: Decibels = Decibels(1.0);
+const LEAST_GAIN: Decibels = Decibels(1.0);
 
 /// Share of the resolved band that a signal may take, so that a filter can end it.
 const RESOLVED_SHARE: f64 = 0.9;
@@ -125,11 +123,6 @@ impl Figures {
         })
     }
 
-    /// The best of the simple ways.
-    pub fn best_simple(&self) -> Option<&SimpleFigure> {
-        self.simple.first()
-    }
-
     /// The ratio by which the bank is compared with the simple ways: that of `snr`, or with converters of 16
     /// bits where the spec states no noise.
     pub fn compared_snr(&self) -> Decibels {
@@ -138,12 +131,12 @@ impl Figures {
 
     /// By how much the bank beats the best of the simple ways.
     pub fn gain_over_simple(&self) -> Option<Decibels> {
-        Some(self.compared_snr() - self.best_simple()?.snr_db)
+        Some(self.compared_snr() - self.simple.first()?.snr_db)
     }
 
-    /// Whether the bank beats the simple ways by [`WORTHWHILE`].
+    /// Whether the bank beats the simple ways by a decibel.
     pub fn is_worthwhile(&self) -> bool {
-        self.gain_over_simple().is_some_and(|gain| gain >= WORTHWHILE)
+        self.gain_over_simple().is_some_and(|gain| gain >= LEAST_GAIN)
     }
 }
 

@@ -14,9 +14,6 @@ use std::f64::consts::TAU;
 
 /// Variance of the rounding to 16 bits of a full scale from -1 to 1: step^2 / 12.
 const ROUNDING_16_BITS: f64 = 1.0 / (12.0 * (1u64 << 30) as f64);
-/// Above this an error is rounding of double precision.
-const EXACT: Decibels = Decibels(270.0);
-
 /// Variance of the target over the variance of the error and of its parts, averaged over time.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct Snr {
@@ -30,13 +27,6 @@ pub struct Snr {
     /// Gaussian errors whose 95 % intervals are the stated ones, constant for each converter. `None` where
     /// all delays are exact, or where the taps follow them.
     pub delays_db: Option<Decibels>,
-}
-
-impl Snr {
-    /// Whether the error is no more than the rounding of double precision.
-    pub fn is_exact(&self) -> bool {
-        self.total_db > EXACT
-    }
 }
 
 /// The ratios of one way.

@@ -194,7 +194,7 @@ fn perfect_interleaving_is_exact() {
             .collect();
         let bank = Bank { spec: Some(spec), latency: ratio - 1, ..unity(ratio) };
         let figures = Figures::new(&bank).unwrap();
-        assert!(figures.snr.is_exact(), "{figures:?}");
+        assert!(figures.snr.total_db > Decibels(270.0), "{figures:?}");
         let below = |figure: Option<ToneFigure>| figure.unwrap().db.0 < -280.0;
         assert!(below(figures.image) && below(figures.gain_error), "{figures:?}");
         assert!(!figures.is_worthwhile(), "{figures:?}");

@@ -1,8 +1,6 @@
 //! What reports show of a bank: its figures with their meaning, pictures, and what is doubtful about it.
 //! The commands `design`, `plot` and `report` and the page of `playground/` show it.
 
-mod doubts;
-mod fact;
 mod facts;
 mod pictures;
 mod spectra;
@@ -10,11 +8,9 @@ mod terms;
 mod text;
 mod understood;
 
-pub use doubts::doubts;
-pub use fact::Fact;
-pub use facts::{ChannelFact, Facts};
+pub use facts::{ChannelFact, Facts, warnings};
 pub use pictures::{Picture, pictures};
 pub use spectra::spectra;
-pub use terms::{band, figure_facts, rounded as decibels_of};
+pub use terms::{Fact, band, figure_facts, rounded as decibels_of};
 pub use text::{change, counted, decibels, frequency, six_digits};
 pub use understood::understood;

@@ -1,10 +1,25 @@
 //! The figures of a bank in the user's terms, in words.
 
-use super::fact::{Fact, fact};
 use super::text::frequency;
 use crate::figures::{BandSource, FigureBand, Figures, Setup, SimpleFigure, SimpleWay, Snr, ToneFigure};
 use crate::spec::Method;
 use crate::units::{Decibels, Hertz};
+
+/// A figure with its name and its meaning.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Fact {
+    /// Its name in tables.
+    pub name: &'static str,
+    /// With its unit.
+    pub value: String,
+    /// In a sentence.
+    pub meaning: String,
+}
+
+/// A [`Fact`] of its three texts.
+pub(super) fn fact(name: &'static str, value: impl Into<String>, meaning: impl Into<String>) -> Fact {
+    Fact { name, value: value.into(), meaning: meaning.into() }
+}
 
 /// Ratios above this are rounding errors of double precision.
 const EXACT: Decibels = Decibels(270.0);

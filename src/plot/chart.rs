@@ -1,7 +1,6 @@
 //! Line charts, and their SVG text.
 
-use super::font::letters;
-use super::legend::{Dashes, Entry, Legend, Look, OVERSIZE};
+use super::legend::{Dashes, Entry, Legend, Look, OVERSIZE, letters};
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use std::ops::Range;

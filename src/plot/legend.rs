@@ -1,10 +1,10 @@
 //! The legend of a chart, in rows above it: there it hides nothing.
 
-use super::font::letters;
 use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{FontDesc, IntoFont};
 
 /// plotters rounds SVG points to whole pixels, so charts are drawn larger and the view box scales them down.
 pub(super) const OVERSIZE: u32 = 4;
@@ -94,4 +94,22 @@ impl<'a> Legend<'a> {
         }
         Ok(())
     }
+}
+
+/// Letters of so many enlarged pixels. With the feature `png` their face is carried along, so that a picture is
+/// the same wherever it is drawn.
+pub(super) fn letters(size: u32) -> FontDesc<'static> {
+    #[cfg(feature = "png")]
+    register();
+    ("sans-serif", size).into_font()
+}
+
+#[cfg(feature = "png")]
+fn register() {
+    use plotters::style::{FontStyle, register_font};
+    static REGISTERED: std::sync::Once = std::sync::Once::new();
+    REGISTERED.call_once(|| {
+        // A face that cannot be read fails where it is drawn, with a message.
+        let _ = register_font("sans-serif", FontStyle::Normal, dejavu::sans::regular());
+    });
 }

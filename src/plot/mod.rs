@@ -1,12 +1,7 @@
 //! Charts as SVG and, with the feature `png`, as PNG.
 
-#[cfg(feature = "png")]
-mod canvas;
 mod chart;
-mod font;
 mod legend;
-#[cfg(feature = "png")]
-mod pixels;
 #[cfg(feature = "png")]
 mod raster;
 

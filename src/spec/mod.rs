@@ -13,7 +13,6 @@ mod filter_problem;
 mod filter_reader;
 mod limits;
 mod measured;
-mod nearest;
 mod passband;
 pub(crate) mod reader;
 mod signal;

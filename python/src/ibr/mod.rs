@@ -4,7 +4,7 @@ mod uncalibrated;
 mod views;
 
 use crate::background;
-use crate::errors::{HybankError, refused};
+use crate::errors::{choose, refused};
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::Measure;
 use hybank_ibr::interpolate::Cover;
@@ -81,16 +81,8 @@ pub(crate) fn render_calibrated(
 }
 
 fn settings(method: &str) -> PyResult<RenderSettings> {
-    let method = match method {
-        "auto" => Method::Auto,
-        "rows" => Method::Rows,
-        "plane" => Method::Plane,
-        _ => {
-            return Err(HybankError::new_err(format!(
-                "method: \"{method}\" is unknown; choose \"auto\", \"rows\" or \"plane\""
-            )));
-        }
-    };
+    let known = [("auto", Method::Auto), ("rows", Method::Rows), ("plane", Method::Plane)];
+    let method = choose("method", method, &known)?;
     Ok(RenderSettings { method, ..RenderSettings::default() })
 }
 
