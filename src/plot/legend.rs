@@ -96,8 +96,8 @@ impl<'a> Legend<'a> {
     }
 }
 
-/// Letters of so many enlarged pixels. With the feature `png` their face is carried along, so that a picture is
-/// the same wherever it is drawn.
+/// Letters of so many enlarged pixels. With the feature `png` their face is carried along, so that a
+/// picture is the same wherever it is drawn.
 pub(super) fn letters(size: u32) -> FontDesc<'static> {
     #[cfg(feature = "png")]
     register();

@@ -1,4 +1,5 @@
-//! Charts as PNG files: drawn larger than they are written, so that slanted lines and letters get grey edges.
+//! Charts as PNG files. They are drawn larger than they are written, so that slanted lines and letters get
+//! grey edges.
 //!
 //! plotters' own pixels draw a wide curve as one polygon, whose mitres stick out far where a spectrum has a
 //! narrow line. Here a segment is all that is within half the width of it, so the joints are round.
