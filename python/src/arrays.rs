@@ -3,14 +3,10 @@
 use crate::errors::{HybankError, refused};
 use crate::formats::{Format, Number};
 use crate::samples::Samples;
-use bytemuck::NoUninit;
 use hybank::memory::available_memory;
-use hybank::runtime::{Input, Interleaved, Isa, PcmFormat, PcmFrames, Sample, SampleLayout};
+use hybank::runtime::{Input, Interleaved, Isa, PcmFrames, SampleLayout};
 use numpy::ndarray::Axis;
-use numpy::{
-    Complex32, Complex64, Element, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
-    PyUntypedArray, PyUntypedArrayMethods,
-};
+use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
@@ -41,26 +37,16 @@ struct Layout {
 enum Order {
     /// Frame after frame.
     Frames,
-    /// Channel after channel.
+    /// Channel after channel, each without gaps; between them there may be some, as in a slice along time.
     Channels,
-    /// Each channel without gaps, but gaps between them: a slice along time. The axis of channels.
-    Slices { axis: usize },
 }
 
 /// An array that is read while the interpreter lock is released.
 pub(crate) struct Held<'py> {
-    numbers: Numbers<'py>,
+    /// Along the axis that varies fastest.
+    bytes: PyReadonlyArrayDyn<'py, u8>,
     layout: Layout,
     pub(crate) format: Format,
-}
-
-enum Numbers<'py> {
-    F32(PyReadonlyArrayDyn<'py, f32>),
-    F64(PyReadonlyArrayDyn<'py, f64>),
-    I8(PyReadonlyArrayDyn<'py, i8>),
-    U8(PyReadonlyArrayDyn<'py, u8>),
-    I16(PyReadonlyArrayDyn<'py, i16>),
-    I32(PyReadonlyArrayDyn<'py, i32>),
 }
 
 impl<'py> Held<'py> {
@@ -72,51 +58,25 @@ impl<'py> Held<'py> {
             return Self::new(&plain(x)?, shape);
         };
         let [channels, frames] = shape.of(array)?;
+        let Ok(format) = Format::of_dtype(array.dtype().as_any()) else {
+            return Self::converted(array, shape);
+        };
         let (by_rows, by_columns) = (array.is_c_contiguous(), array.is_fortran_contiguous());
-        if !array.is_aligned() {
-            return Self::new(&x.call_method0("copy")?, shape);
-        }
-        if !(by_rows || by_columns) {
-            return Self::slice(array, shape);
-        }
-        let order = if by_rows == shape.time_first() { Order::Frames } else { Order::Channels };
-        let layout = Layout { channels, frames, order };
-        // Complex numbers as pairs of floats: a view along the axis that varies fastest.
-        let pairs = |name: &str| {
-            let rows = if by_rows { x.clone() } else { x.getattr("T")? };
-            rows.call_method1("view", (name,))
+        let time = usize::from(!shape.time_first());
+        let is_slice = array.ndim() == 2 && array.strides()[time] == format.bytes() as isize;
+        let (order, is_turned) = match (by_rows, by_columns) {
+            _ if !array.is_aligned() => return Self::new(&x.call_method0("copy")?, shape),
+            (true, _) if shape.time_first() || channels == 1 => (Order::Frames, false),
+            (true, _) => (Order::Channels, false),
+            (_, true) if shape.time_first() => (Order::Channels, true),
+            (_, true) => (Order::Frames, true),
+            _ if is_slice => (Order::Channels, shape.time_first()),
+            _ => return Self::new(&x.call_method0("copy")?, shape),
         };
-        let complex = |numbers: Numbers<'py>| {
-            let format = Format { number: numbers.number(), complex: true };
-            Self { numbers, layout, format }
-        };
-        if let Some(numbers) = Numbers::of(x)? {
-            let format = Format { number: numbers.number(), complex: false };
-            return Ok(Self { numbers, layout, format });
-        }
-        if x.cast::<PyArrayDyn<Complex32>>().is_ok() {
-            return Ok(complex(Numbers::F32(readonly(pairs("f4")?.cast()?)?)));
-        }
-        if x.cast::<PyArrayDyn<Complex64>>().is_ok() {
-            return Ok(complex(Numbers::F64(readonly(pairs("f8")?.cast()?)?)));
-        }
-        Self::converted(array, shape)
-    }
-
-    /// An array with gaps.
-    fn slice(array: &Bound<'py, PyUntypedArray>, shape: Shape) -> PyResult<Self> {
-        let [channels, frames] = shape.of(array)?;
-        let axis = usize::from(shape.time_first());
-        let is_slice = array.ndim() == 2 && array.strides()[1 - axis] == array.dtype().itemsize() as isize;
-        if let (true, Some(numbers)) = (is_slice, Numbers::of(array)?) {
-            let format = Format { number: numbers.number(), complex: false };
-            return Ok(Self {
-                numbers,
-                layout: Layout { channels, frames, order: Order::Slices { axis } },
-                format,
-            });
-        }
-        Self::new(&array.call_method0("copy")?, shape)
+        let rows = if is_turned { x.getattr("T")? } else { x.clone() };
+        let bytes = rows.call_method1("view", ("u1",))?;
+        let bytes = bytes.cast::<PyArrayDyn<u8>>()?.try_readonly().map_err(refused)?;
+        Ok(Self { bytes, layout: Layout { channels, frames, order }, format })
     }
 
     /// From another byte order, or from floats of half precision.
@@ -147,23 +107,31 @@ impl<'py> Held<'py> {
 
     /// The samples, or one part of complex ones.
     fn part(&self, part: usize) -> PyResult<Samples<'_>> {
-        let layout = self.layout;
-        let (format, part) = (self.format.number.format(), self.format.complex.then_some(part));
-        let (is_real, is_interleaved) = (!self.format.complex, layout.order == Order::Frames);
-        Ok(match &self.numbers {
-            Numbers::F32(array) if is_real && is_interleaved => {
-                Samples::Interleaved32(layout.interleaved(array)?)
+        let Self { layout: Layout { channels, order, .. }, format: Format { number, complex }, .. } = *self;
+        let all = || self.bytes.as_slice().map_err(refused);
+        if order == Order::Frames && !complex && number == Number::F32 {
+            let samples = Interleaved::new(bytemuck::cast_slice(all()?), channels);
+            return Ok(Samples::Interleaved32(samples.map_err(refused)?));
+        }
+        if order == Order::Frames && !complex && number == Number::F64 {
+            let samples = Interleaved::new(bytemuck::cast_slice(all()?), channels);
+            return Ok(Samples::Interleaved64(samples.map_err(refused)?));
+        }
+        let frames = |bytes, channels| {
+            let layout = SampleLayout::packed(number.format());
+            match complex {
+                false => PcmFrames { layout, channels, bytes },
+                true => PcmFrames { layout, channels: 2 * channels, bytes }.part(part),
             }
-            Numbers::F64(array) if is_real && is_interleaved => {
-                Samples::Interleaved64(layout.interleaved(array)?)
-            }
-            Numbers::F32(array) => Samples::Pcm(layout.pcm(array, format, part)?),
-            Numbers::F64(array) => Samples::Pcm(layout.pcm(array, format, part)?),
-            Numbers::I8(array) => Samples::Pcm(layout.pcm(array, format, part)?),
-            Numbers::U8(array) => Samples::Pcm(layout.pcm(array, format, part)?),
-            Numbers::I16(array) => Samples::Pcm(layout.pcm(array, format, part)?),
-            Numbers::I32(array) => Samples::Pcm(layout.pcm(array, format, part)?),
-        })
+        };
+        if order == Order::Frames {
+            return Ok(Samples::Pcm(vec![frames(all()?, channels)]));
+        }
+        let row = |i| {
+            let bytes = self.bytes.as_array().index_axis_move(Axis(0), i).to_slice();
+            bytes.map(|bytes| frames(bytes, 1)).ok_or_else(|| refused("a channel has gaps"))
+        };
+        Ok(Samples::Pcm((0..channels).map(row).collect::<PyResult<_>>()?))
     }
 
     /// Frame after frame as doubles: the samples, or the real (0) or imaginary (1) parts of complex ones.
@@ -232,83 +200,6 @@ impl Shape {
     }
 }
 
-impl Layout {
-    /// Each channel.
-    fn rows<'a, S: Element>(&self, array: &'a PyReadonlyArrayDyn<'_, S>) -> PyResult<Vec<&'a [S]>> {
-        let Self { channels, order, .. } = *self;
-        let Order::Slices { axis } = order else {
-            let numbers = slice(array)?;
-            // Of complex samples twice as many numbers as frames.
-            let row = numbers.len() / channels.max(1);
-            return Ok((0..channels).map(|i| &numbers[i * row..(i + 1) * row]).collect());
-        };
-        let row = |i| array.as_array().index_axis_move(Axis(axis), i).to_slice();
-        (0..channels).map(|i| row(i).ok_or_else(|| refused("a channel has gaps"))).collect()
-    }
-
-    fn interleaved<'a, S: Element + Sample>(
-        &self,
-        array: &'a PyReadonlyArrayDyn<'_, S>,
-    ) -> PyResult<Interleaved<'a, S>> {
-        Interleaved::new(slice(array)?, self.channels).map_err(refused)
-    }
-
-    fn pcm<'a, S: Element + NoUninit>(
-        &self,
-        array: &'a PyReadonlyArrayDyn<'_, S>,
-        format: PcmFormat,
-        part: Option<usize>,
-    ) -> PyResult<Vec<PcmFrames<'a>>> {
-        let frames = |numbers, channels| {
-            let (layout, bytes) = (SampleLayout::packed(format), bytemuck::cast_slice(numbers));
-            match part {
-                None => PcmFrames { layout, channels, bytes },
-                Some(part) => PcmFrames { layout, channels: 2 * channels, bytes }.part(part),
-            }
-        };
-        if self.order == Order::Frames {
-            return Ok(vec![frames(slice(array)?, self.channels)]);
-        }
-        Ok(self.rows(array)?.into_iter().map(|row| frames(row, 1)).collect())
-    }
-}
-
-impl<'py> Numbers<'py> {
-    /// Of a real array; `None` for another number type.
-    fn of(x: &Bound<'py, PyAny>) -> PyResult<Option<Self>> {
-        if let Ok(array) = x.cast::<PyArrayDyn<f32>>() {
-            return Ok(Some(Self::F32(readonly(array)?)));
-        }
-        if let Ok(array) = x.cast::<PyArrayDyn<f64>>() {
-            return Ok(Some(Self::F64(readonly(array)?)));
-        }
-        if let Ok(array) = x.cast::<PyArrayDyn<i16>>() {
-            return Ok(Some(Self::I16(readonly(array)?)));
-        }
-        if let Ok(array) = x.cast::<PyArrayDyn<i32>>() {
-            return Ok(Some(Self::I32(readonly(array)?)));
-        }
-        if let Ok(array) = x.cast::<PyArrayDyn<i8>>() {
-            return Ok(Some(Self::I8(readonly(array)?)));
-        }
-        if let Ok(array) = x.cast::<PyArrayDyn<u8>>() {
-            return Ok(Some(Self::U8(readonly(array)?)));
-        }
-        Ok(None)
-    }
-
-    fn number(&self) -> Number {
-        match self {
-            Self::F32(_) => Number::F32,
-            Self::F64(_) => Number::F64,
-            Self::I8(_) => Number::I8,
-            Self::U8(_) => Number::U8,
-            Self::I16(_) => Number::I16,
-            Self::I32(_) => Number::I32,
-        }
-    }
-}
-
 /// The array of a list, of an object of another package, or of a subclass.
 fn plain<'py>(x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let numpy = x.py().import("numpy")?;
@@ -324,12 +215,4 @@ fn plain<'py>(x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         true => array.call_method1("astype", ("f8",)),
         false => Ok(array),
     }
-}
-
-fn readonly<'py, T: Element>(array: &Bound<'py, PyArrayDyn<T>>) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
-    array.try_readonly().map_err(refused)
-}
-
-fn slice<'a, S: Element>(array: &'a PyReadonlyArrayDyn<'_, S>) -> PyResult<&'a [S]> {
-    array.as_slice().map_err(refused)
 }

@@ -89,6 +89,11 @@ impl Format {
         }
     }
 
+    /// Bytes of a sample.
+    pub(crate) fn bytes(self) -> usize {
+        self.number.format().bytes() * (1 + usize::from(self.complex))
+    }
+
     /// The name that NumPy knows.
     pub(crate) fn name(self) -> &'static str {
         match (self.number, self.complex) {

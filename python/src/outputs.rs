@@ -5,88 +5,44 @@ use crate::errors::refused;
 use crate::formats::{Format, Number};
 use crate::samples::{Room, Samples};
 use hybank::runtime::{Input, Isa, Output, PcmOutput, Sample};
-use numpy::{Element, PyArray1, PyArrayMethods, PyReadwriteArray1};
+use numpy::{PyArray1, PyArrayMethods, PyReadwriteArray1};
 use pyo3::prelude::*;
 
-/// Numbers for which there is always memory. More are asked of NumPy by name, which raises `MemoryError` and
+/// Bytes for which there is always memory. More are asked of NumPy by name, which raises `MemoryError` and
 /// takes a little longer.
-const SURE: usize = 1 << 16;
+const SURE: usize = 1 << 18;
 
 /// A new array of output samples that is being written.
 pub(crate) struct NewArray<'py> {
-    numbers: Numbers<'py>,
+    /// Of one axis, in the byte order of this machine.
+    bytes: PyReadwriteArray1<'py, u8>,
     format: Format,
-}
-
-enum Numbers<'py> {
-    F32(PyReadwriteArray1<'py, f32>),
-    F64(PyReadwriteArray1<'py, f64>),
-    I8(PyReadwriteArray1<'py, i8>),
-    U8(PyReadwriteArray1<'py, u8>),
-    I16(PyReadwriteArray1<'py, i16>),
-    I32(PyReadwriteArray1<'py, i32>),
 }
 
 impl<'py> NewArray<'py> {
     /// Zeros.
     pub(crate) fn new(py: Python<'py>, samples: usize, format: Format) -> PyResult<Self> {
-        let len = if format.complex { 2 * samples } else { samples };
-        let numbers = match format.number {
-            Number::F32 => Numbers::F32(zeros(py, len)?),
-            Number::F64 => Numbers::F64(zeros(py, len)?),
-            Number::I8 => Numbers::I8(zeros(py, len)?),
-            Number::U8 => Numbers::U8(zeros(py, len)?),
-            Number::I16 => Numbers::I16(zeros(py, len)?),
-            Number::I32 => Numbers::I32(zeros(py, len)?),
-        };
-        Ok(Self { numbers, format })
+        Ok(Self { bytes: zeros(py, samples.saturating_mul(format.bytes()))?, format })
     }
 
     /// Room for the samples; for the parts of complex ones once one of them is selected.
     pub(crate) fn room(&mut self) -> PyResult<Room<'_>> {
-        let Format { number, complex } = self.format;
-        let bytes: &mut [u8] = match &mut self.numbers {
-            Numbers::F32(array) => {
-                let room = array.as_slice_mut().map_err(refused)?;
-                if !complex {
-                    return Ok(Room::F32(room));
-                }
-                bytemuck::cast_slice_mut(room)
+        let bytes = self.bytes.as_slice_mut().map_err(refused)?;
+        let is_aligned = bytes.as_ptr().cast::<f64>().is_aligned();
+        Ok(match self.format {
+            Format { number: Number::F32, complex: false } if is_aligned => {
+                Room::F32(bytemuck::cast_slice_mut(bytes))
             }
-            Numbers::F64(array) => {
-                let room = array.as_slice_mut().map_err(refused)?;
-                if !complex {
-                    return Ok(Room::F64(room));
-                }
-                bytemuck::cast_slice_mut(room)
+            Format { number: Number::F64, complex: false } if is_aligned => {
+                Room::F64(bytemuck::cast_slice_mut(bytes))
             }
-            Numbers::I8(array) => bytemuck::cast_slice_mut(array.as_slice_mut().map_err(refused)?),
-            Numbers::U8(array) => array.as_slice_mut().map_err(refused)?,
-            Numbers::I16(array) => bytemuck::cast_slice_mut(array.as_slice_mut().map_err(refused)?),
-            Numbers::I32(array) => bytemuck::cast_slice_mut(array.as_slice_mut().map_err(refused)?),
-        };
-        Ok(Room::Pcm(PcmOutput::packed(number.format(), bytes)))
+            Format { number, .. } => Room::Pcm(PcmOutput::packed(number.format(), bytes)),
+        })
     }
 
     /// The array.
     pub(crate) fn finish(self) -> PyResult<Bound<'py, PyAny>> {
-        let name = match self.format {
-            Format { number: Number::F32, complex: true } => Some("c8"),
-            Format { number: Number::F64, complex: true } => Some("c16"),
-            _ => None,
-        };
-        let array = match self.numbers {
-            Numbers::F32(array) => array.as_any().clone(),
-            Numbers::F64(array) => array.as_any().clone(),
-            Numbers::I8(array) => array.as_any().clone(),
-            Numbers::U8(array) => array.as_any().clone(),
-            Numbers::I16(array) => array.as_any().clone(),
-            Numbers::I32(array) => array.as_any().clone(),
-        };
-        match name {
-            Some(name) => array.call_method1("view", (name,)),
-            None => Ok(array),
-        }
+        self.bytes.as_any().call_method1("view", (self.format.name(),))
     }
 }
 
@@ -117,10 +73,10 @@ fn convert<T: Sample>(samples: &Samples<'_>, frames: usize, room: &mut Room<'_>)
     room.store(Isa::detect(), 0, &numbers);
 }
 
-fn zeros<T: Element>(py: Python<'_>, len: usize) -> PyResult<PyReadwriteArray1<'_, T>> {
-    if len <= SURE {
-        return PyArray1::zeros(py, len, false).try_readwrite().map_err(refused);
+fn zeros(py: Python<'_>, bytes: usize) -> PyResult<PyReadwriteArray1<'_, u8>> {
+    if bytes <= SURE {
+        return PyArray1::zeros(py, bytes, false).try_readwrite().map_err(refused);
     }
-    let zeros = py.import("numpy")?.call_method1("zeros", (len, T::get_dtype(py)))?;
-    zeros.cast_into::<PyArray1<T>>()?.try_readwrite().map_err(refused)
+    let zeros = py.import("numpy")?.call_method1("zeros", (bytes, "u1"))?;
+    zeros.cast_into::<PyArray1<u8>>()?.try_readwrite().map_err(refused)
 }
