@@ -3,6 +3,7 @@
 use crate::errors::{HybankError, refused};
 use crate::formats::{Format, Number};
 use crate::samples::Samples;
+use bytemuck::AnyBitPattern;
 use hybank::memory::available_memory;
 use hybank::runtime::{Input, Interleaved, Isa, PcmFrames, SampleLayout};
 use numpy::ndarray::Axis;
@@ -110,11 +111,11 @@ impl<'py> Held<'py> {
         let Self { layout: Layout { channels, order, .. }, format: Format { number, complex }, .. } = *self;
         let all = || self.bytes.as_slice().map_err(refused);
         if order == Order::Frames && !complex && number == Number::F32 {
-            let samples = Interleaved::new(bytemuck::cast_slice(all()?), channels);
+            let samples = Interleaved::new(numbers(all()?)?, channels);
             return Ok(Samples::Interleaved32(samples.map_err(refused)?));
         }
         if order == Order::Frames && !complex && number == Number::F64 {
-            let samples = Interleaved::new(bytemuck::cast_slice(all()?), channels);
+            let samples = Interleaved::new(numbers(all()?)?, channels);
             return Ok(Samples::Interleaved64(samples.map_err(refused)?));
         }
         let frames = |bytes, channels| {
@@ -215,4 +216,10 @@ fn plain<'py>(x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         true => array.call_method1("astype", ("f8",)),
         false => Ok(array),
     }
+}
+
+/// Bytes as the numbers that they are.
+fn numbers<S: AnyBitPattern>(bytes: &[u8]) -> PyResult<&[S]> {
+    // An array without numbers may lie anywhere.
+    if bytes.is_empty() { Ok(&[]) } else { bytemuck::try_cast_slice(bytes).map_err(refused) }
 }
