@@ -1,9 +1,9 @@
 //! Figures 3.5 to 3.7: scenes of the plane without occlusion, ten cameras.
 
 use crate::page::Verdict;
+use crate::theory::flat::scenes::{Wave, cameras, virtual_camera};
+use crate::theory::flat::{Errors, FlatCamera, FlatRig, UNIFORM_ERROR_SHARE, trial};
 use crate::{Curve, Effort, Figure, Outcome, chart, decades, mean, slope, swept};
-use hybank_ibr::analysis::flat::scenes::{Wave, cameras, virtual_camera};
-use hybank_ibr::analysis::flat::{Errors, FlatCamera, FlatRig, UNIFORM_ERROR_SHARE, trial};
 
 fn rig(cameras: &[FlatCamera], focal: f64) -> FlatRig<'_> {
     FlatRig { scene: &Wave, cameras, view: virtual_camera(focal), window: (-1.2, 1.2) }

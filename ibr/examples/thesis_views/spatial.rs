@@ -2,10 +2,10 @@
 
 use crate::flat::above;
 use crate::page::Verdict;
+use crate::theory::flat::Errors;
+use crate::theory::spatial::scenes::{Hill, camera_at};
+use crate::theory::spatial::{SpatialRig, trial};
 use crate::{Curve, Effort, Figure, Outcome, chart, decades, mean, slope, swept};
-use hybank_ibr::analysis::flat::Errors;
-use hybank_ibr::analysis::spatial::scenes::{Hill, camera_at};
-use hybank_ibr::analysis::spatial::{SpatialRig, trial};
 use hybank_ibr::camera::Camera;
 use nalgebra::Vector2;
 

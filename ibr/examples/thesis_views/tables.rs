@@ -1,10 +1,10 @@
 //! Tables 3.1 and 4.1: moments of intervals and triangles, simulated and derived.
 
 use crate::page::{Table, Verdict};
+use crate::theory::delaunay::{PoissonDelaunay, superposed_grids};
+use crate::theory::periodic::PeriodicSets;
+use crate::theory::spatial::triangles::{Corners, Triangles};
 use crate::{Effort, Outcome};
-use hybank::sampling::PeriodicSets;
-use hybank::sampling::delaunay::{PoissonDelaunay, superposed_grids};
-use hybank_ibr::analysis::spatial::triangles::{Corners, Triangles};
 use nalgebra::Vector2;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;

@@ -1,20 +1,85 @@
-//! How large the error of a rendered view is, and why (thesis chapters 3 and 4).
+//! The error of one rendered view, pixel by pixel, without a photograph to compare it with.
 //!
-//! * [`flat`]: scenes of the plane, with Theorems 3.1 and 3.2 and occlusion (4.3);
-//! * [`spatial`]: scenes of space, with Theorem 4.3 and what edges cost;
-//! * [`view`]: the error of one rendered view of photographs, pixel by pixel, without a photograph of it;
-//! * [`plan`]: where to put cameras, and how many bits to give intensities and depths.
+//! Numbers for each pixel, in grey levels:
 //!
-//! The first two have the densities of the samples, the jitter that errors of depth cause, bounds in closed
-//! form, and virtual experiments that measure what the bounds promise. Lengths in images are pixels
-//! throughout.
+//! * **sure bound**: what the error does not exceed, for given [`Limits`] of the second derivative of the
+//!   virtual rows, of the errors of intensities and of those of disparities; for rectified rigs, rendered by
+//!   rows, and nothing where no limits are known (`sure.rs`);
+//! * **local limit**: the same with slopes, second differences and residuals of the samples nearby in the
+//!   place of such limits (below). It is not sure: photographs break it where surfaces reflect, where depth
+//!   is wrong in all views, and where something lies between the samples;
+//! * **expected**: the root of the expected square. By Jensen's inequality the expected error is not larger;
+//! * **estimate**: the expected absolute error against a photograph from the place of the virtual camera.
 //!
-//! The bounds of the theorems are expectations over random phases of the cameras' pixels. They are false
-//! for cameras that share a phase: N coincident cameras have the error of one. What holds for any samples
-//! is [`hybank::sampling::nonuniform::PiecewiseLinear::mean_error_bound`].
+//! With h_s the influence of sample s on the pixel at x (the fit is linear in the samples) the local limit
+//! of a rectified rig is
+//!
+//! ```text
+//! |f'| |sum h_s (x_s - x)| + (1/2) |f''| sum |h_s| (x_s - x)^2
+//!      + E_T sum |h_s| + E_D |f'| distance sum |h_s|
+//! ```
+//!
+//! and the whole range of values for the part of the pixel that fills a hole. For linear interpolation it is
+//! (1/8) |f''| D^2 + E_T + E_D B |f'|. That of general cameras has the same form for influences that are
+//! assumed (`lookup.rs`).
+//!
+//! The other two are sums over causes. The size of each cause is computed ([`survey()`]): the bias of the
+//! fit, by fitting the fit once more; the views that share in a pixel; the slope; the change under errors of
+//! depth as large as the maps' disagreement; depth edges nearby; doubtful depths; holes, by the variogram of
+//! the photographs. The weights of the causes are calibrated on the inputs themselves: each view is left out
+//! in turn and rendered from the others, and its photograph is the truth. A single view cannot be left out;
+//! it takes the weights of typical photographs.
 
-pub mod flat;
-pub mod plan;
+mod advice;
+mod calibrate;
+mod estimate;
+mod evidence;
+mod evidence_row;
+mod general;
+mod jitter;
+mod lookup;
 mod random;
-pub mod spatial;
-pub mod view;
+mod regressors;
+mod rows;
+mod sure;
+mod variogram;
+
+pub use advice::{Advice, AnotherView};
+pub use estimate::{Calibration, Totals, ViewError};
+pub use evidence::{Evidence, Survey, survey};
+pub use general::{CameraPredictor, calibrated, depth_noise};
+pub use jitter::{depth_jitter, disparity_noise, with_noise};
+pub use rows::{RigPredictor, rectified};
+pub use sure::Limits;
+
+/// What an error comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Cause {
+    /// Samples too far apart for the texture, and the smoothing of the fit.
+    Density,
+    /// Noise, exposure and colours that depend on the view.
+    Texture,
+    /// Depths, and places of the cameras.
+    Depth,
+    /// Outlines of surfaces.
+    Edges,
+    /// What no view sees.
+    Holes,
+}
+
+impl Cause {
+    /// All causes.
+    pub const ALL: [Self; 5] = [Self::Density, Self::Texture, Self::Depth, Self::Edges, Self::Holes];
+
+    /// What makes this part of the error smaller.
+    pub fn remedy(self) -> &'static str {
+        match self {
+            Self::Density => "more views, or views of more pixels",
+            Self::Texture => "less noise, equal exposure and white balance, views closer to the virtual one",
+            Self::Depth => "finer depth, and better calibrated cameras",
+            Self::Edges => "depth maps that are sharp at outlines, and more views",
+            Self::Holes => "views that see behind the near surfaces",
+        }
+    }
+}

@@ -8,11 +8,11 @@ pub(super) fn seeded(seed: u64) -> Pcg64 {
 }
 
 /// A uniform number in \[0, 1).
-pub(super) fn part(random: &mut Pcg64) -> f64 {
+fn part(random: &mut Pcg64) -> f64 {
     (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// A uniform number in \[-limit, limit).
-pub(super) fn within(limit: f64, random: &mut Pcg64) -> f64 {
-    limit * (2.0 * part(random) - 1.0)
+/// Nearly normal with the variance one: the sum of three uniform numbers in \[-1, 1), which has bounded tails.
+pub(super) fn bounded_normal(random: &mut Pcg64) -> f64 {
+    2.0 * (part(random) + part(random) + part(random)) - 3.0
 }

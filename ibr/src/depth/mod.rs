@@ -245,7 +245,7 @@ impl DepthMap {
 
     /// The same map with changed values, all of which stay before the camera: a tenth of their disparity or
     /// depth remains.
-    pub(crate) fn changed(&self, mut change: impl FnMut(f32) -> f32) -> Self {
+    pub fn changed(&self, mut change: impl FnMut(f32) -> f32) -> Self {
         let (mut map, offset) = (self.clone(), self.offset as f32);
         map.data.iter_mut().for_each(|v| *v = change(*v).max(0.1 * *v - 0.9 * offset));
         map

@@ -22,7 +22,7 @@ impl RenderSettings {
     /// sum_k w_k J'(x_k)^2 / (W s^2). So lambda = sigma^2 / (W s^2) in the row fit. The plane fit counts
     /// edges of pixels instead of samples, so its stiffness is sigma^2 / s^2; it is never less than that of
     /// the settings, because samples of general cameras are also displaced.
-    pub(crate) fn suited_to(&self, agreement: &Agreement, balance: &Balance) -> Self {
+    pub fn suited_to(&self, agreement: &Agreement, balance: &Balance) -> Self {
         let mut settings = Self { keep_smoothing: true, ..*self };
         if self.keep_smoothing {
             return settings;

@@ -1,8 +1,8 @@
 //! What improvements are said to gain, against what they turn out to gain.
 
 use super::*;
-use hybank_ibr::analysis::plan::Advice;
-use hybank_ibr::analysis::view::RigPredictor;
+use hybank_ibr::analysis::Advice;
+use hybank_ibr::analysis::RigPredictor;
 use hybank_ibr::pipeline::rectified;
 
 fn measured(rig: &Rig, which: &[usize], truth: &Image) -> f64 {

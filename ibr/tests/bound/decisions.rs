@@ -1,9 +1,9 @@
 //! Decisions that rest on predictions, against what they turn out to cost.
 
-use super::*;
-use hybank_ibr::analysis::plan::{
+use super::planner::{
     Candidate, Costs, Placement, RoundingCosts, Search, Wanted, price_of_depth_errors, rounded_map,
 };
+use super::*;
 use hybank_ibr::partial::{Densify, densify};
 use hybank_ibr::pipeline::rectified;
 use std::cell::RefCell;
@@ -27,7 +27,7 @@ fn the_price_of_errors_of_depth() {
 
 fn price_of_errors_in(name: &str, exact: &Rig) {
     let (views, settings) = (exact.views(&[0, 1]), RenderSettings::default());
-    let now = view::rectified(&views, 0.5, &settings).unwrap();
+    let now = analysis::rectified(&views, 0.5, &settings).unwrap();
     for deviation in [0.0, 0.5, 1.0, 2.0] {
         let mut random = Random(8);
         let mut error = || deviation * (2.0 * (random.part() + random.part() + random.part()) - 3.0) as f32;

@@ -3,6 +3,9 @@
 
 mod advice;
 mod decisions;
+#[path = "../../examples/plan/planner/mod.rs"]
+#[allow(dead_code, unreachable_pub, unused_imports)]
+mod planner;
 #[path = "../../../tests/support/random.rs"]
 mod random;
 #[path = "../ray_traced/scene.rs"]
@@ -10,7 +13,7 @@ mod random;
 mod scene;
 mod sure;
 
-use hybank_ibr::analysis::view::{self, ViewError};
+use hybank_ibr::analysis::{self, ViewError};
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, read_image, read_map};
@@ -152,7 +155,7 @@ fn residual(views: &[RectifiedView<'_>], position: f64, image: &Image) -> Vec<f6
 fn predict(name: &str, rig: &Rig, which: &[usize], position: f64, truth: &Image, offset: f64) -> Verdict {
     let views = rig.views(which);
     let settings = RenderSettings { offset, ..RenderSettings::default() };
-    let predicted = view::rectified(&views, position, &settings).unwrap();
+    let predicted = analysis::rectified(&views, position, &settings).unwrap();
     judge(name, &predicted, &views, position, truth)
 }
 
@@ -302,7 +305,7 @@ fn views_of_general_cameras() {
     let mut truth = scene::shoot(&target).0;
     truth.data_mut().iter_mut().for_each(|v| *v = (*v + 2.0 * bell() as f32).clamp(0.0, 255.0).round());
     let settings = RenderSettings::default();
-    let predicted = view::calibrated(&views, &target.camera(), scene::SIZE, &settings).unwrap();
+    let predicted = analysis::calibrated(&views, &target.camera(), scene::SIZE, &settings).unwrap();
     let image = &predicted.rendering.image;
     let measured = errors(image, &truth);
     let estimate: Vec<f64> = predicted.estimate.iter().map(|v| f64::from(*v)).collect();

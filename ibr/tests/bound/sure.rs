@@ -1,7 +1,7 @@
 //! The sure bound against the errors of random scenes whose second derivatives are known.
 
 use super::*;
-use hybank_ibr::analysis::view::{Limits, RigPredictor, survey};
+use hybank_ibr::analysis::{Limits, RigPredictor, survey};
 
 /// A board whose disparity is c + s X, with the texture level + height sin(rate X + phase). X is the column
 /// in the view at position 0.

@@ -1,6 +1,6 @@
 //! The plot of a prediction: the numbers of every image row, and below them what the estimate comes from.
 
-use crate::analysis::view::{Cause, Totals, ViewError};
+use crate::analysis::{Cause, Totals, ViewError};
 use crate::image::Image;
 use hybank::plot::{Chart, PlotError, Series};
 use image::{ImageFormat, RgbImage};

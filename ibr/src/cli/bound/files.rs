@@ -1,7 +1,7 @@
 //! The map and the plot of a prediction.
 
 use super::chart;
-use crate::analysis::view::ViewError;
+use crate::analysis::ViewError;
 use crate::cli::arguments::BoundArguments;
 use crate::cli::failure::Failure;
 use crate::cli::heat;

@@ -11,7 +11,7 @@ use super::inputs;
 use super::memory::{self, Work};
 use super::output::{self, Encoded};
 use super::progress::Progress;
-use crate::analysis::view::{Limits, ViewError};
+use crate::analysis::{Limits, ViewError};
 use crate::image::Image;
 use crate::partial::{Densify, Segmentwise};
 use crate::pipeline::RenderError;

@@ -1,7 +1,7 @@
 //! The prediction for either kind of scene.
 
-use crate::analysis::plan::Advice;
-use crate::analysis::view::{CameraPredictor, Limits, RigPredictor, ViewError};
+use crate::analysis::Advice;
+use crate::analysis::{CameraPredictor, Limits, RigPredictor, ViewError};
 use crate::camera::Camera;
 use crate::pipeline::{Agreement, RenderError, RenderSettings};
 use crate::propagate::{CalibratedView, RectifiedView};

@@ -1,7 +1,7 @@
 //! What `bound` prints.
 
-use crate::analysis::plan::{Advice, AnotherView};
-use crate::analysis::view::{Cause, Totals, ViewError};
+use crate::analysis::{Advice, AnotherView};
+use crate::analysis::{Cause, Totals, ViewError};
 use crate::cli::failure::Failure;
 use crate::cli::{inputs, output};
 use crate::image::{Image, quality};

@@ -1,7 +1,7 @@
 //! Theorems 3.1 and 3.2: the mean absolute error of a virtual view of an unoccluded scene of the plane.
 
 use super::{FlatCamera, PaintedCurve, cross};
-use hybank::sampling::PeriodicSets;
+use crate::theory::periodic::PeriodicSets;
 use hybank::sampling::nonuniform::Smoothness;
 
 /// Nodes at which suprema and means over the curve are taken.
@@ -135,7 +135,7 @@ impl FlatRig<'_> {
     /// ```
     ///
     /// An expectation over independent, uniform phases of the cameras. For cameras that share a phase it is
-    /// false; [`hybank::sampling::nonuniform::PiecewiseLinear::mean_error_bound`] holds always.
+    /// false; [`crate::theory::piecewise_linear::PiecewiseLinear::mean_error_bound`] holds always.
     pub fn image_space(&self, errors: Errors) -> ErrorBound {
         let Smoothness { slope, curvature } = self.smoothness();
         ErrorBound {

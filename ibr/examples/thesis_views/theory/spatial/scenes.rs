@@ -1,7 +1,7 @@
 //! Scene and cameras of the virtual experiments in space.
 
 use super::{PaintedSurface, SurfacePoint};
-use crate::camera::{Camera, CameraError};
+use hybank_ibr::camera::{Camera, CameraError};
 use nalgebra::{Matrix3x4, Vector2, Vector3};
 
 /// A hill: S = (u, v, 6 + 0.3 cos 1.3u cos 1.1v), T = 0.5 + 0.25 sin(4u + 1) cos 3v + 0.15 sin(2u - 5v).

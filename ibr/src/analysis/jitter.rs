@@ -1,6 +1,6 @@
 //! What errors of depth change in a view: it is rendered once more from depths with such errors.
 
-use crate::analysis::random::{part, seeded};
+use super::random::{bounded_normal, seeded};
 use crate::depth::DepthMap;
 use crate::image::Image;
 use crate::pipeline::depth_errors::Lookups;
@@ -30,8 +30,7 @@ pub fn disparity_noise(views: &[RectifiedView<'_>]) -> f64 {
 /// The views' disparity maps with independent errors of this standard deviation, from a fixed seed.
 pub fn with_noise(views: &[RectifiedView<'_>], deviation: f64, seed: u64) -> Vec<DepthMap> {
     let random = &mut seeded(seed);
-    // The sum of three uniform numbers in [-1, 1) has the variance one, and bounded tails.
-    let mut error = || (deviation * (2.0 * (part(random) + part(random) + part(random)) - 3.0)) as f32;
+    let mut error = || (deviation * bounded_normal(random)) as f32;
     views.iter().map(|v| v.disparity.changed(|d| d + error())).collect()
 }
 

@@ -17,12 +17,12 @@
 //! as independent, then gives too many bits to depth. [`RoundingCosts`] renders the view from rounded
 //! inputs.
 
-use crate::analysis::random::{seeded, within};
-use crate::analysis::view::with_noise;
-use crate::depth::DepthMap;
-use crate::image::Image;
-use crate::pipeline::{Agreement, Balance, RenderError, RenderSettings, rectified};
-use crate::propagate::RectifiedView;
+use super::random::{seeded, within};
+use hybank_ibr::analysis::with_noise;
+use hybank_ibr::depth::DepthMap;
+use hybank_ibr::image::Image;
+use hybank_ibr::pipeline::{Agreement, Balance, RenderError, RenderSettings, rectified};
+use hybank_ibr::propagate::RectifiedView;
 
 /// Errors of intensity that are tried, in grey levels.
 const GREY_LEVELS: f64 = 4.0;

@@ -1,15 +1,13 @@
 //! What the samples of a rendering say about its error, pixel by pixel: how much each sample counts in the
 //! fit that is really used, and how well the samples agree.
 
-mod row;
-
+use super::evidence_row::RowSurvey;
 use super::sure::Limits;
 use crate::interpolate::Degree;
 use crate::interpolate::rows::RowWork;
 use crate::pipeline::{Balance, RenderError, RenderSettings, Rendering, rectified};
 use crate::propagate::{Frame, RectifiedView, RigCamera};
 use rayon::prelude::*;
-use row::RowSurvey;
 
 /// One pixel of a virtual view. h_s is the influence of sample s on the pixel at x.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -87,17 +85,17 @@ pub fn survey(
 }
 
 /// What all rows share.
-struct Job<'a> {
-    views: &'a [RectifiedView<'a>],
-    camera: RigCamera,
-    balance: Balance,
-    settings: &'a RenderSettings,
-    rendering: &'a Rendering,
-    limits: Option<&'a Limits>,
+pub(super) struct Job<'a> {
+    pub(super) views: &'a [RectifiedView<'a>],
+    pub(super) camera: RigCamera,
+    pub(super) balance: Balance,
+    pub(super) settings: &'a RenderSettings,
+    pub(super) rendering: &'a Rendering,
+    pub(super) limits: Option<&'a Limits>,
 }
 
 impl Job<'_> {
-    fn distance(&self, view: u16) -> f64 {
+    pub(super) fn distance(&self, view: u16) -> f64 {
         (self.views[usize::from(view)].position - self.camera.position).abs()
     }
 }

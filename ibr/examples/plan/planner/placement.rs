@@ -15,9 +15,9 @@
 //! `searched` lost more there, 0.4 and 0.7 dB in two scenes: the criterion is no finer than that.
 
 use super::search::Search;
-use crate::depth::DepthMap;
-use crate::pipeline::Balance;
-use crate::propagate::DOUBTFUL_WEIGHT;
+use hybank_ibr::depth::DepthMap;
+use hybank_ibr::pipeline::Balance;
+use hybank_ibr::propagate::DOUBTFUL_WEIGHT;
 
 /// Disparities within this share of each other, or within a pixel, belong to one point.
 const SAME_POINT: f64 = 0.05;
@@ -152,7 +152,7 @@ fn trust(wanted: &Wanted<'_>, candidate: &Candidate<'_>) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::depth::Measure;
+    use hybank_ibr::depth::Measure;
 
     /// A wall of disparity 4 and a post of 12 before it.
     fn map(position: f64) -> DepthMap {

@@ -23,11 +23,11 @@
 //! ```
 //!
 //! Sets that share a phase, for example several cameras at one position, are not superposed sets: their
-//! samples coincide, and N of them say no more than one. [`super::nonuniform`] has the bound that holds for
+//! samples coincide, and N of them say no more than one. [`super::piecewise_linear`] has the bound that holds for
 //! them.
 
-use super::error::SamplingError;
 use super::quadrature::{gauss_legendre, integral};
+use hybank::sampling::SamplingError;
 
 /// Panels of the integral over a varying density.
 const PANELS: usize = 64;

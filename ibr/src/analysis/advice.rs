@@ -1,7 +1,7 @@
 //! What to spend on next: by how much the estimate of a view falls if one thing gets better.
 
-use crate::analysis::random::{part, seeded};
-use crate::analysis::view::{CameraPredictor, Cause, RigPredictor, ViewError};
+use super::random::{bounded_normal, seeded};
+use crate::analysis::{CameraPredictor, Cause, RigPredictor, ViewError};
 use crate::camera::Camera;
 use crate::depth::{DepthMap, fill_unknown};
 use crate::image::Image;
@@ -135,8 +135,7 @@ fn imagined(rendering: Rendering) -> (Image, DepthMap) {
     let (sum, count) = noises.fold((0.0, 0.0), |(sum, count), noise| (sum + noise, count + 1.0));
     let deviation = if count > 0.0 { sum / count } else { 0.0 };
     let random = &mut seeded(2);
-    // The sum of three uniform numbers in [-1, 1) has the variance one.
-    let mut noise = || deviation * (2.0 * (part(random) + part(random) + part(random)) - 3.0);
+    let mut noise = || deviation * bounded_normal(random);
     let (mut image, mut depth) = (rendering.image, rendering.depth);
     image.data_mut().iter_mut().for_each(|v| *v = (f64::from(*v) + noise()).clamp(0.0, 255.0) as f32);
     fill_unknown(&mut depth);

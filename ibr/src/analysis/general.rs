@@ -4,9 +4,9 @@
 use super::estimate::{Calibration, Examined, Known, ViewError, calibrate, equalised, judge};
 use super::jitter::{difference, local_mean};
 use super::lookup::local_limits;
+use super::random::{bounded_normal, seeded};
 use super::regressors::{Regressors, hole_distances, slopes};
 use super::variogram::Variogram;
-use crate::analysis::random::{part, seeded};
 use crate::camera::Camera;
 use crate::depth::DepthMap;
 use crate::image::Image;
@@ -239,8 +239,7 @@ fn jitter(
         return Ok(vec![0.0; size.0 * size.1]);
     }
     let random = &mut seeded(1);
-    // The sum of three uniform numbers in [-1, 1) has the variance one, and bounded tails.
-    let mut error = || (2.0 * (part(random) + part(random) + part(random)) - TAIL) * deviation;
+    let mut error = || bounded_normal(random) * deviation;
     let maps: Vec<DepthMap> = views.iter().map(|v| v.depth.changed(|d| d * (1.0 + error()) as f32)).collect();
     let noisy: Vec<CalibratedView<'_>> =
         views.iter().zip(&maps).map(|(v, depth)| CalibratedView { depth, ..*v }).collect();

@@ -3,11 +3,11 @@
 use super::scenes::{Hill, camera_at};
 use super::triangles::{Corners, Triangles};
 use super::{EdgeModel, SpatialRig, trial};
-use crate::analysis::flat::Errors;
-use crate::analysis::flat::tests::log_slope;
-use crate::analysis::random::{part, seeded, within};
-use crate::camera::Camera;
-use hybank::sampling::delaunay::{PoissonDelaunay, superposed_grids};
+use crate::theory::delaunay::{PoissonDelaunay, superposed_grids};
+use crate::theory::flat::Errors;
+use crate::theory::flat::tests::log_slope;
+use crate::theory::random::{part, seeded, within};
+use hybank_ibr::camera::Camera;
 use nalgebra::{Matrix3, Matrix3x4, Rotation3, Vector2, Vector3};
 
 fn sweep() -> bool {

@@ -2,9 +2,9 @@
 
 use super::triangles::PlaneSmoothness;
 use super::{PaintedSurface, parameters_at, see};
-use crate::analysis::flat::{ErrorBound, Errors};
-use crate::camera::Camera;
-use hybank::sampling::delaunay::{PoissonDelaunay, superposed_grids};
+use crate::theory::delaunay::{PoissonDelaunay, superposed_grids};
+use crate::theory::flat::{ErrorBound, Errors};
+use hybank_ibr::camera::Camera;
 use nalgebra::{Matrix2, Vector2};
 
 /// Nodes per side at which suprema and means over the window are taken.

@@ -1,7 +1,7 @@
 //! The evidence of one row: how much each sample counts in its fit.
 
-use super::{Evidence, Job};
-use crate::analysis::view::sure;
+use super::evidence::{Evidence, Job};
+use super::sure;
 use crate::interpolate::rows::RowWork;
 use crate::interpolate::{Cover, InterpolationError};
 use crate::occlusion::{self, RowScratch};

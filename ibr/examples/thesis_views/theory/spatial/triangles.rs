@@ -121,7 +121,7 @@ pub struct PlaneSmoothness {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::random::{part, seeded, within};
+    use crate::theory::random::{part, seeded, within};
 
     #[test]
     fn planes_are_reproduced_and_the_outside_has_no_value() {

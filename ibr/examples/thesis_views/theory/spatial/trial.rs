@@ -3,9 +3,9 @@
 
 use super::triangles::Triangles;
 use super::{SpatialRig, parameters_at, see};
-use crate::analysis::flat::Errors;
-use crate::analysis::random::{part, seeded, within};
-use crate::camera::Camera;
+use crate::theory::flat::Errors;
+use crate::theory::random::{part, seeded, within};
+use hybank_ibr::camera::Camera;
 use nalgebra::Vector2;
 use rand_pcg::Pcg64;
 

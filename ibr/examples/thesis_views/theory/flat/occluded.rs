@@ -13,10 +13,11 @@
 //! fewer of them.
 
 use super::{ErrorBound, Errors, FlatCamera, FlatRig, PaintedCurve, parameter_at};
-use crate::analysis::random::{part, seeded};
-use hybank::sampling::PeriodicSets;
-use hybank::sampling::jump::jump_error;
-use hybank::sampling::nonuniform::{Measured, PiecewiseLinear};
+use crate::theory::jump::jump_error;
+use crate::theory::periodic::PeriodicSets;
+use crate::theory::piecewise_linear::PiecewiseLinear;
+use crate::theory::random::{part, seeded};
+use hybank::sampling::nonuniform::Measured;
 
 /// Pixels at which means over the view are taken.
 const NODES: usize = 1500;

@@ -1,8 +1,8 @@
 //! What errors of depth cost.
 
-use crate::analysis::view::{ViewError, depth_jitter};
-use crate::pipeline::{RenderError, RenderSettings};
-use crate::propagate::RectifiedView;
+use hybank_ibr::analysis::{ViewError, depth_jitter};
+use hybank_ibr::pipeline::{RenderError, RenderSettings};
+use hybank_ibr::propagate::RectifiedView;
 
 /// Mean absolute error of a view, in grey levels, when independent errors of the standard deviation
 /// `deviation` pixels (for a baseline of one) are added to the disparities of its inputs.
@@ -11,7 +11,7 @@ use crate::propagate::RectifiedView;
 /// at each pixel the change is added as the root of the sum of the squares: the two errors are independent.
 ///
 /// # Errors
-/// Those of [`crate::pipeline::rectified::render`].
+/// Those of [`hybank_ibr::pipeline::rectified::render`].
 pub fn price_of_depth_errors(
     views: &[RectifiedView<'_>],
     position: f64,

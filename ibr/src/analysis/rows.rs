@@ -2,10 +2,10 @@
 
 use super::Evidence;
 use super::estimate::{Calibration, Examined, Known, ViewError, calibrate, equalised, judge};
+use super::evidence::survey;
 use super::jitter::{depth_jitter, difference, disparity_noise, local_mean};
 use super::regressors::regressors;
 use super::sure::Limits;
-use super::survey::survey;
 use super::variogram::Variogram;
 use crate::depth::DepthMap;
 use crate::image::Image;

@@ -1,7 +1,7 @@
 //! What the error of a pixel is proportional to, cause by cause, in grey levels.
 
 use super::Cause;
-use super::survey::Survey;
+use super::evidence::Survey;
 use super::variogram::Variogram;
 use crate::image::Image;
 use crate::interpolate::Cover;

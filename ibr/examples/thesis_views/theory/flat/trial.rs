@@ -2,8 +2,9 @@
 //! compared with the exact one.
 
 use super::{Errors, FlatCamera, FlatRig, parameter_at};
-use crate::analysis::random::{part, seeded};
-use hybank::sampling::nonuniform::{Measured, PiecewiseLinear};
+use crate::theory::piecewise_linear::PiecewiseLinear;
+use crate::theory::random::{part, seeded};
+use hybank::sampling::nonuniform::Measured;
 use rand_pcg::Pcg64;
 
 /// Positions at which a view is compared.

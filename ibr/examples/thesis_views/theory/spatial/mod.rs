@@ -12,7 +12,7 @@ pub mod triangles;
 
 pub use theorem::{EdgeModel, SpatialRig};
 
-use crate::camera::Camera;
+use hybank_ibr::camera::Camera;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 /// A point of a painted surface.
