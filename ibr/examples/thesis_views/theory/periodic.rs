@@ -23,8 +23,8 @@
 //! ```
 //!
 //! Sets that share a phase, for example several cameras at one position, are not superposed sets: their
-//! samples coincide, and N of them say no more than one. [`super::piecewise_linear`] has the bound that holds for
-//! them.
+//! samples coincide, and N of them say no more than one. [`super::piecewise_linear`] has the bound that
+//! holds for them.
 
 use super::quadrature::{gauss_legendre, integral};
 use hybank::sampling::SamplingError;
