@@ -1,12 +1,15 @@
 //! What the samples of a rendering say about its error, pixel by pixel: how much each sample counts in the
 //! fit that is really used, and how well the samples agree.
 
-use super::evidence_row::RowSurvey;
-use super::sure::Limits;
-use crate::interpolate::Degree;
+use super::sure::{self, Limits};
 use crate::interpolate::rows::RowWork;
+use crate::interpolate::{Cover, Degree, InterpolationError, Settings};
+use crate::occlusion::{self, RowScratch};
 use crate::pipeline::{Balance, RenderError, RenderSettings, Rendering, rectified};
-use crate::propagate::{Frame, RectifiedView, RigCamera};
+use crate::propagate::{self, Frame, RectifiedView, RigCamera};
+use crate::sample::Sample;
+use hybank::sampling::SamplingError;
+use hybank::sampling::fit::Response;
 use rayon::prelude::*;
 
 /// One pixel of a virtual view. h_s is the influence of sample s on the pixel at x.
@@ -85,17 +88,17 @@ pub fn survey(
 }
 
 /// What all rows share.
-pub(super) struct Job<'a> {
-    pub(super) views: &'a [RectifiedView<'a>],
-    pub(super) camera: RigCamera,
-    pub(super) balance: Balance,
-    pub(super) settings: &'a RenderSettings,
-    pub(super) rendering: &'a Rendering,
-    pub(super) limits: Option<&'a Limits>,
+struct Job<'a> {
+    views: &'a [RectifiedView<'a>],
+    camera: RigCamera,
+    balance: Balance,
+    settings: &'a RenderSettings,
+    rendering: &'a Rendering,
+    limits: Option<&'a Limits>,
 }
 
 impl Job<'_> {
-    pub(super) fn distance(&self, view: u16) -> f64 {
+    fn distance(&self, view: u16) -> f64 {
         (self.views[usize::from(view)].position - self.camera.position).abs()
     }
 }
@@ -126,6 +129,209 @@ fn collect<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Collecte
         sure.clear();
     }
     Ok((evidence, edges, sure))
+}
+
+/// Pixels to each side beyond which no sample has an influence that counts: it falls by four per pixel.
+const INFLUENCE: f64 = 8.0;
+
+/// Pixels to each side over which local suprema are taken.
+const NEAR: usize = 3;
+
+/// Work memory of one row.
+struct RowSurvey<const ORDER: usize, const C: usize> {
+    samples: Vec<Sample<C>>,
+    scratch: RowScratch<C>,
+    fit: RowWork<ORDER, C>,
+    again: RowWork<ORDER, C>,
+    response: Response,
+    of_views: Vec<ViewShare<C>>,
+    values: Vec<f32>,
+    mask: Vec<Cover>,
+}
+
+/// What one view contributes to a pixel.
+#[derive(Clone, Copy)]
+struct ViewShare<const C: usize> {
+    influence: f64,
+    value: [f64; C],
+}
+
+impl<const ORDER: usize, const C: usize> RowSurvey<ORDER, C> {
+    fn new(width: usize) -> Self {
+        Self {
+            samples: Vec::new(),
+            scratch: RowScratch::default(),
+            fit: RowWork::new(width),
+            again: RowWork::new(width),
+            response: Response::default(),
+            of_views: Vec::new(),
+            values: vec![0.0; width * C],
+            mask: vec![Cover::default(); width],
+        }
+    }
+
+    /// The evidence of one row; false if it has no samples.
+    fn row(
+        &mut self,
+        job: &Job<'_>,
+        frame: &Frame,
+        y: usize,
+        evidence: &mut [Evidence],
+    ) -> Result<bool, RenderError> {
+        let failed = |source| RenderError::from(InterpolationError::Fit { row: y, source });
+        let settings = &job.settings.interpolation;
+        self.samples.clear();
+        for (index, view) in job.views.iter().enumerate() {
+            let index = index as u16;
+            propagate::rectified_row(view, index, y, &job.camera, frame, &mut self.samples);
+        }
+        occlusion::remove_in_row(&mut self.samples, job.settings.depth_test(), &mut self.scratch);
+        job.balance.apply(&mut self.samples, |view| job.views[view].image);
+        let fitted = self.fit.interpolate(&self.samples, settings, &mut self.values, &mut self.mask);
+        if !fitted.map_err(failed)? {
+            return Ok(false);
+        }
+        let limits: Vec<Nearby> = self.samples.iter().map(|s| self.limits(job, s)).collect();
+        for (x, pixel) in evidence.iter_mut().enumerate() {
+            *pixel = self.pixel(job, x, &limits);
+        }
+        self.bias(settings, evidence).map_err(failed)?;
+        Ok(true)
+    }
+
+    /// The sure bound of every pixel that is seen.
+    fn sure(&mut self, job: &Job<'_>, y: usize, sure: &mut [f32]) {
+        let Some(limits) = job.limits else { return };
+        let test = job.settings.depth_test();
+        let parts = |a: &Sample<C>, b: &Sample<C>| {
+            test.hides(f64::from(a.depth.min(b.depth)), f64::from(a.depth.max(b.depth)))
+        };
+        let row = sure::Row::new(&self.samples, limits, |view| job.distance(view), parts);
+        let seen = &job.rendering.mask[y * sure.len()..];
+        for (column, bound) in sure.iter_mut().enumerate().filter(|(x, _)| seen[*x] == Cover::Seen) {
+            let x = column as f64;
+            self.fit.respond(x, &mut self.response);
+            let response = |x: f64| self.response.at::<ORDER>(x);
+            let influence = |k: usize| f64::from(self.samples[k].weight) * response(self.samples[k].x);
+            let near = self.fit.fillers().iter().filter(|f| (**f - x).abs() <= sure::REACH);
+            let filled = near.map(|f| response(*f)).fold((0.0, 0.0), |(s, m), h| (s + h, m + h.abs()));
+            *bound = row.bound(x, limits, influence, filled) as f32;
+        }
+    }
+
+    /// Fits the fit again, at the samples.
+    fn bias(&mut self, settings: &Settings, evidence: &mut [Evidence]) -> Result<(), SamplingError> {
+        let once = std::mem::take(&mut self.values);
+        let mut smooth = self.samples.clone();
+        smooth.iter_mut().for_each(|s| s.value = self.fit.value(s.x).map(|v| v as f32));
+        self.values = vec![0.0; once.len()];
+        self.again.interpolate(&smooth, settings, &mut self.values, &mut self.mask)?;
+        let pairs = once.chunks_exact(C).zip(self.values.chunks_exact(C));
+        for (pixel, (a, b)) in evidence.iter_mut().zip(pairs) {
+            pixel.bias = a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>() / C as f32;
+        }
+        Ok(())
+    }
+
+    fn pixel(&mut self, job: &Job<'_>, column: usize, limits: &[Nearby]) -> Evidence {
+        let x = column as f64;
+        self.fit.respond(x, &mut self.response);
+        self.of_views.clear();
+        self.of_views.resize(job.views.len(), ViewShare { influence: 0.0, value: [0.0; C] });
+        let mut e = Evidence::default();
+        let from = self.samples.partition_point(|s| s.x < x - INFLUENCE);
+        for (s, limit) in
+            self.samples[from..].iter().zip(&limits[from..]).take_while(|(s, _)| s.x <= x + INFLUENCE)
+        {
+            let h = f64::from(s.weight) * self.response.at::<ORDER>(s.x);
+            let away = s.x - x;
+            e.held += h as f32;
+            e.reach += h.abs() as f32;
+            e.shift += (h * away) as f32;
+            e.spread += (h.abs() * away * away) as f32;
+            e.doubtful += if s.doubtful { h.abs() as f32 } else { 0.0 };
+            let share = &mut self.of_views[usize::from(s.view)];
+            share.influence += h;
+            share.value.iter_mut().zip(s.value).for_each(|(sum, v)| *sum += h * f64::from(v));
+            if away.abs() <= NEAR as f64 {
+                e.steepest = e.steepest.max(limit.slope);
+                e.sharpest = e.sharpest.max(limit.curvature);
+                e.residual = e.residual.max(limit.residual);
+            }
+        }
+        for (share, view) in self.of_views.iter().zip(job.views) {
+            let (g2, distance) = (share.influence.powi(2), (view.position - job.camera.position).abs());
+            e.views += g2 as f32;
+            e.lever += (g2 * distance * distance) as f32;
+            if share.influence > 0.02 {
+                e.distance = e.distance.max(distance as f32);
+            }
+        }
+        e.disagreement = disagreement(&mut self.of_views);
+        e
+    }
+
+    /// Slope and second difference of the photograph around a sample's pixel, in virtual pixels, and the
+    /// residual of the fit there; the largest over the channels.
+    fn limits(&self, job: &Job<'_>, s: &Sample<C>) -> Nearby {
+        let image = job.views[usize::from(s.view)].image;
+        let (pixel, width) = (s.pixel as usize, image.width());
+        let (column, gain) = (pixel % width, job.balance.gain(s.view));
+        let at = |p: usize| image.pixel::<C>(p).map(|v| v * gain);
+        let here = at(pixel);
+        let left = if column > 0 { at(pixel - 1) } else { here };
+        let right = if column + 1 < width { at(pixel + 1) } else { here };
+        let fitted = self.fit.value(s.x);
+        let mut limits = Nearby::default();
+        for c in 0..C {
+            let (a, b) = ((here[c] - left[c]).abs(), (right[c] - here[c]).abs());
+            limits.slope = limits.slope.max(a).max(b);
+            limits.curvature = limits.curvature.max((left[c] - 2.0 * here[c] + right[c]).abs());
+            limits.residual = limits.residual.max((s.value[c] - fitted[c] as f32).abs());
+        }
+        limits
+    }
+
+    /// The height of every jump of depth between neighbouring samples, on the pixels within 1.5 of it.
+    fn edges(&self, job: &Job<'_>, y: usize, edges: &mut [f32]) {
+        let row = job.rendering.image.row(y).chunks_exact(C).collect::<Vec<_>>();
+        let value = |x: f64| row[(x.round().max(0.0) as usize).min(row.len() - 1)];
+        let test = job.settings.depth_test();
+        for pair in self.samples.windows(2) {
+            let (near, far) = (pair[0].depth.min(pair[1].depth), pair[0].depth.max(pair[1].depth));
+            if !test.hides(f64::from(near), f64::from(far)) {
+                continue;
+            }
+            let (left, right) = (value(pair[0].x - 1.5), value(pair[1].x + 1.5));
+            let height = left.iter().zip(right).map(|(a, b)| (a - b).abs()).sum::<f32>() / left.len() as f32;
+            let (low, high) = (pair[0].x, pair[1].x);
+            let first = (low - 1.5).ceil().max(0.0) as usize;
+            for x in (first..edges.len()).take_while(|x| *x as f64 <= high + 1.5) {
+                let away = (low - x as f64).max(x as f64 - high).max(0.0) as f32;
+                edges[x] = edges[x].max(height * (1.0 - away / 1.5));
+            }
+        }
+    }
+}
+
+/// Mean over the channels of the difference between the two views of the largest influence.
+fn disagreement<const C: usize>(views: &mut [ViewShare<C>]) -> f32 {
+    views.sort_by(|a, b| b.influence.total_cmp(&a.influence));
+    match views {
+        [a, b, ..] if b.influence > 0.1 => {
+            let difference = |c: usize| (a.value[c] / a.influence - b.value[c] / b.influence).abs();
+            ((0..C).map(difference).sum::<f64>() / C as f64) as f32
+        }
+        _ => f32::NAN,
+    }
+}
+
+/// Slopes and residual at a sample.
+#[derive(Debug, Clone, Copy, Default)]
+struct Nearby {
+    slope: f32,
+    curvature: f32,
+    residual: f32,
 }
 
 #[cfg(test)]

@@ -34,7 +34,6 @@ mod advice;
 mod calibrate;
 mod estimate;
 mod evidence;
-mod evidence_row;
 mod general;
 mod jitter;
 mod lookup;
