@@ -6,8 +6,7 @@
 
 use super::aligned_input::AlignedInput;
 use super::input::{BLOCKS, Input, too_many_lost};
-use super::live_lost::LiveLost;
-use super::lost::{Entry, LostInInput, LostLine, LostSamples};
+use super::lost::{Entry, LiveLost, LostInInput, LostLine, LostSamples};
 use super::notes::{OutputNotes, Placement};
 use super::open::InputSource;
 use super::pipe::refuse_shared_pipes;

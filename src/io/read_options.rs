@@ -1,8 +1,7 @@
 //! Settings of the reading of several inputs.
 
-use super::live_lost::LiveLost;
 use super::timestamps::MAX_LOST;
-use super::{Coding, LostSamples, StallWatch, TimeInterleaving};
+use super::{Coding, LiveLost, LostSamples, StallWatch};
 
 /// Bytes of a block that suit one thread.
 pub const BLOCK_BYTES: usize = 128 << 10;
@@ -59,5 +58,76 @@ impl ReadOptions<'_> {
             block_bytes: BLOCK_BYTES,
             stalls: None,
         }
+    }
+}
+
+/// M time-interleaved converters, which write their samples in turn into one capture, and the channel that
+/// each of them is. Sample k, counted from 0, comes from converter k mod M; M samples in a row are a frame.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TimeInterleaving {
+    /// The channel, from 0, of each converter.
+    channels: Vec<usize>,
+}
+
+impl TimeInterleaving {
+    /// Converter j is channel j: for captures of which nothing else is known.
+    pub fn in_order(converters: usize) -> Self {
+        Self { channels: (0..converters).collect() }
+    }
+
+    /// The converters in the order in which they sample. Channel i takes sample k at the time
+    /// k M - `delays[i]`, so converter 0 is the channel with the largest delay. Channels of equal delay stay
+    /// in their order.
+    pub fn by_delay(delays: &[f64]) -> Self {
+        let mut channels: Vec<usize> = (0..delays.len()).collect();
+        channels.sort_by(|&a, &b| delays[b].total_cmp(&delays[a]));
+        Self { channels }
+    }
+
+    /// M.
+    pub fn converters(&self) -> usize {
+        self.channels.len()
+    }
+
+    /// The channel, from 0, of each converter.
+    pub fn channels(&self) -> &[usize] {
+        &self.channels
+    }
+
+    /// Puts the samples of whole frames, of `container` bytes each, into the order of the channels.
+    pub(super) fn reorder(&self, bytes: &mut [u8], container: usize) {
+        if self.channels.is_sorted() {
+            return;
+        }
+        let mut frame = vec![0; container * self.converters()];
+        for samples in bytes.chunks_exact_mut(frame.len()) {
+            frame.copy_from_slice(samples);
+            for (&channel, sample) in self.channels.iter().zip(frame.chunks_exact(container)) {
+                samples[channel * container..][..container].copy_from_slice(sample);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_converter_is_the_one_with_the_largest_delay() {
+        assert_eq!(TimeInterleaving::by_delay(&[3.1, 1.9, 1.0, 0.0]), TimeInterleaving::in_order(4));
+        assert_eq!(TimeInterleaving::by_delay(&[0.0, 1.0, 2.5]).channels(), [2, 1, 0]);
+        assert_eq!(TimeInterleaving::by_delay(&[0.5, 1.0, 0.5]).channels(), [1, 0, 2]);
+    }
+
+    #[test]
+    fn whole_frames_come_into_the_order_of_the_channels() {
+        let turns = TimeInterleaving::by_delay(&[0.0, 2.0, 1.0]);
+        // Two bytes a sample, two frames; converters are the channels 1, 2 and 0.
+        let mut bytes = *b"1a2b0c1d2e0f";
+        turns.reorder(&mut bytes, 2);
+        assert_eq!(&bytes, b"0c1a2b0f1d2e");
+        TimeInterleaving::in_order(3).reorder(&mut bytes, 2);
+        assert_eq!(&bytes, b"0c1a2b0f1d2e");
     }
 }
