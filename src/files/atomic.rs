@@ -1,6 +1,6 @@
 //! A file that appears only when it is complete.
 
-use super::{FileError, hidden, place};
+use super::{FileError, hidden, rename};
 use std::collections::BTreeSet;
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
@@ -113,13 +113,13 @@ impl AtomicFile {
     /// The system's refusal.
     pub fn seal(&mut self) -> Result<(), FileError> {
         let Some(file) = self.file.take() else { return Ok(()) };
-        place::sync_and_close(file).map_err(FileError::system(&self.name, "write it to the end"))
+        rename::sync_and_close(file).map_err(FileError::system(&self.name, "write it to the end"))
     }
 
     /// Gives the file, sealed before, its name: in a way that can be undone if the system allows, unless it
     /// is the last of its set.
     fn place(&mut self, is_last: bool) -> Result<Placed, FileError> {
-        let placed = match place::rename_new(&self.beside, &self.target) {
+        let placed = match rename::rename_new(&self.beside, &self.target) {
             Err(error) if self.replace && is_last && error.kind() == io::ErrorKind::AlreadyExists => {
                 fs::rename(&self.beside, &self.target).map(|()| Placed::Replaced)
             }
@@ -131,12 +131,12 @@ impl AtomicFile {
 
     /// Gives the file the name of another file, which gets the hidden one if the system allows.
     fn exchange(&self) -> io::Result<Placed> {
-        if place::exchange(&self.beside, &self.target).is_err() {
+        if rename::exchange(&self.beside, &self.target).is_err() {
             return fs::rename(&self.beside, &self.target).map(|()| Placed::Replaced);
         }
         // The system exchanges a file with a folder too, and no output replaces a folder.
         if self.beside.symlink_metadata().is_ok_and(|found| found.is_dir()) {
-            place::exchange(&self.beside, &self.target)?;
+            rename::exchange(&self.beside, &self.target)?;
             return Err(io::ErrorKind::IsADirectory.into());
         }
         Ok(Placed::Exchanged)
@@ -147,7 +147,7 @@ impl AtomicFile {
         // The failure that led here is reported; a second one adds nothing.
         match placed {
             Placed::New => drop(fs::remove_file(&self.target)),
-            Placed::Exchanged => drop(place::exchange(&self.beside, &self.target)),
+            Placed::Exchanged => drop(rename::exchange(&self.beside, &self.target)),
             Placed::Replaced => {}
         }
         if placed != Placed::Exchanged {

@@ -26,7 +26,7 @@ mod bounded;
 mod error;
 mod hidden;
 mod identity;
-mod place;
+mod rename;
 #[cfg(all(unix, feature = "signals"))]
 pub(crate) mod signals;
 

@@ -6,6 +6,8 @@ use super::stream_header::MOST_CHANNELS;
 use super::{IoError, PcmFormat, SampleLayout, StreamHeader};
 use std::io::{self, Read, Seek, SeekFrom, Take};
 
+/// No disk holds as many bytes: a shape that needs them is damaged, and the products below cannot overflow.
+const MOST_BYTES: u64 = 1 << 62;
 /// Bytes of all channels together that are read at a time, where each channel lies by itself.
 const PLANAR_BYTES: usize = 1 << 20;
 
@@ -46,7 +48,7 @@ impl ArrayHeader {
             ));
         }
         let bytes = frames.checked_mul(channels * self.sample_bytes() as u64);
-        if bytes.is_none_or(|bytes| bytes > 1 << 62) {
+        if bytes.is_none_or(|bytes| bytes > MOST_BYTES) {
             return Err(format!("the shape {shape:?} has more numbers than any disk; the file is damaged"));
         }
         Ok((channels, frames))

@@ -78,21 +78,21 @@ impl<'a, R: Read> Chunks<'a, R> {
         Ok(())
     }
 
-    /// Exactly B bytes, or the error that the header ends in `place`.
-    pub(super) fn bytes<const B: usize>(&mut self, place: &'static str) -> Result<[u8; B], IoError> {
+    /// Exactly B bytes, or the error that the header ends in `part`.
+    pub(super) fn bytes<const B: usize>(&mut self, part: &'static str) -> Result<[u8; B], IoError> {
         let mut bytes = [0; B];
-        self.exact(&mut bytes, place)?;
+        self.exact(&mut bytes, part)?;
         Ok(bytes)
     }
 
-    /// Fills `bytes`, or returns the error that the header ends in `place`.
-    pub(super) fn exact(&mut self, bytes: &mut [u8], place: &'static str) -> Result<(), IoError> {
+    /// Fills `bytes`, or returns the error that the header ends in `part`.
+    pub(super) fn exact(&mut self, bytes: &mut [u8], part: &'static str) -> Result<(), IoError> {
         if self.read_some(bytes)? == bytes.len() {
             return Ok(());
         }
         let offset = self.offset;
         Err(self.malformed(format!(
-            "the header ends at byte {offset} inside {place}; the file is truncated, record or copy it again"
+            "the header ends at byte {offset} inside {part}; the file is truncated, record or copy it again"
         )))
     }
 

@@ -187,7 +187,7 @@ impl Fmt {
     }
 
     fn check<R: Read>(&self, chunks: &Chunks<'_, R>) -> Result<(), IoError> {
-        let at = |place: u64| self.offset + place;
+        let at = |within: u64| self.offset + within;
         if self.channels == 0 {
             return Err(chunks.bad("the channel count", at(2), 0, "a file has at least one channel"));
         }
