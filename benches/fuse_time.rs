@@ -7,10 +7,7 @@
 mod random;
 mod stopwatch;
 
-use hybank::io::PcmFormat;
-use hybank::io::wav::WavFile;
 use random::Random;
-use std::fs::File;
 use std::path::Path;
 use std::process::Command;
 
@@ -19,14 +16,12 @@ const SECONDS: usize = 600;
 
 fn write_channel(path: &Path, seed: u64) {
     let mut random = Random(seed);
-    let mut second = Vec::with_capacity(4 * RATE as usize);
-    for _ in 0..RATE {
-        let sample = 0.5 * random.sample() as f32;
-        second.extend(sample.to_le_bytes());
-    }
-    let mut wav = WavFile::new(File::create(path).unwrap(), PcmFormat::F32Le, 1, RATE).unwrap();
-    (0..SECONDS).for_each(|_| wav.write_bytes(&second).unwrap());
-    wav.finish(&[]).unwrap();
+    let second: Vec<f32> = (0..RATE).map(|_| 0.5 * random.sample() as f32).collect();
+    let sample_format = hound::SampleFormat::Float;
+    let spec = hound::WavSpec { channels: 1, sample_rate: RATE, bits_per_sample: 32, sample_format };
+    let mut wav = hound::WavWriter::create(path, spec).unwrap();
+    (0..SECONDS).flat_map(|_| &second).for_each(|&sample| wav.write_sample(sample).unwrap());
+    wav.finalize().unwrap();
 }
 
 fn main() {

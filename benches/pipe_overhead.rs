@@ -7,8 +7,6 @@
 #[path = "../tests/support/random.rs"]
 mod random;
 
-use hybank::io::PcmFormat;
-use hybank::io::wav::WavFile;
 use random::Random;
 use std::fs::File;
 use std::io::{Read, Write};
@@ -39,13 +37,15 @@ fn write_inputs(folder: &Path) {
     let mut random = Random(1);
     let block: Vec<f32> = (0..1 << 18).map(|_| 0.5 * random.sample() as f32).collect();
     let floats: Vec<u8> = block.iter().flat_map(|x| x.to_le_bytes()).collect();
-    let integers: Vec<u8> = block.iter().flat_map(|x| ((x * 32768.0) as i16).to_le_bytes()).collect();
     let mut raw = File::create(folder.join("in.f32")).unwrap();
     (0..BYTES / floats.len()).for_each(|_| raw.write_all(&floats).unwrap());
-    let wav = File::create(folder.join("in.wav")).unwrap();
-    let mut wav = WavFile::new(wav, PcmFormat::S16Le, 2, 24_000).unwrap();
-    (0..BYTES / 4 / integers.len()).for_each(|_| wav.write_bytes(&integers).unwrap());
-    wav.finish(&[]).unwrap();
+    let sample_format = hound::SampleFormat::Int;
+    let spec = hound::WavSpec { channels: 2, sample_rate: 24_000, bits_per_sample: 16, sample_format };
+    let mut wav = hound::WavWriter::create(folder.join("in.wav"), spec).unwrap();
+    for _ in 0..BYTES / 8 / block.len() {
+        block.iter().for_each(|x| wav.write_sample((x * 32768.0) as i16).unwrap());
+    }
+    wav.finalize().unwrap();
     std::fs::write(folder.join("bank.json"), bank()).unwrap();
 }
 

@@ -3,8 +3,8 @@
 use super::interrupt::remove_unfinished;
 use super::print::{Failure, is_dash, name_leftovers, print_bytes};
 use crate::files::{AtomicFile, commit_all, refuse_overlaps};
-use crate::io::{Container, OutputHeader, PcmFormat, SampleWriter};
-use std::io::Write;
+use crate::io::{Container, OutputHeader, PcmFormat, SampleWriter, is_pipe, is_sigmf};
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 /// Refuses outputs that are also inputs or other outputs, and names what killed runs left beside them.
@@ -65,9 +65,6 @@ pub(super) fn create_folder(folder: &Path) -> Result<(), Failure> {
         .map_err(|error| Failure::of(folder, format!("cannot create the folder: {error}")))
 }
 
-/// Format of the numbers of recordings.
-const FORMAT: PcmFormat = PcmFormat::F32Le;
-
 /// A recording of one channel to be written with 32-bit floats.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mono<'a> {
@@ -89,21 +86,37 @@ impl<'a> Mono<'a> {
         Self { samples, imaginary: None, rate, container: Container::Wav }
     }
 
-    /// Numbers from `from` on, at most [`CHUNK`] samples of them.
-    fn chunk(&self, from: usize, bytes: &mut Vec<u8>) {
-        let to = (from + CHUNK).min(self.samples.len());
-        bytes.resize((to - from) * self.parts() * FORMAT.bytes(), 0);
-        let mut slots = bytes.chunks_exact_mut(FORMAT.bytes());
-        for k in from..to {
-            let parts = std::iter::once(self.samples[k]).chain(self.imaginary.map(|imaginary| imaginary[k]));
-            for (x, slot) in parts.zip(&mut slots) {
-                FORMAT.encode(x, slot);
-            }
-        }
+    /// The header of an ordinary WAV file, if the recording at `path` is to be one: sizes and bytes per
+    /// second are numbers of 32 bits there.
+    fn ordinary_wav(&self, path: &Path) -> Option<hound::WavSpec> {
+        const BYTES: u64 = 4;
+        let is_small = |bytes: u64| bytes < u64::from(u32::MAX - 1024);
+        let sample_rate = self.rate.round() as u32;
+        let is_ordinary = self.container == Container::Wav
+            && self.imaginary.is_none()
+            && !is_sigmf(path)
+            && !is_pipe(path)
+            && sample_rate > 0
+            && is_small(BYTES * u64::from(sample_rate))
+            && is_small(BYTES * self.samples.len() as u64);
+        let sample_format = hound::SampleFormat::Float;
+        is_ordinary.then_some(hound::WavSpec { channels: 1, sample_rate, bits_per_sample: 32, sample_format })
     }
 
-    fn parts(&self) -> usize {
-        1 + usize::from(self.imaginary.is_some())
+    /// Any other recording.
+    fn write(&self, path: &Path, force: bool) -> Result<Vec<AtomicFile>, Failure> {
+        let Self { container, rate, imaginary, .. } = *self;
+        let header =
+            OutputHeader { container, format: PcmFormat::F32Le, is_complex: imaginary.is_some(), rate };
+        let mut writer = SampleWriter::create(path, header, force).map_err(Failure::input)?;
+        for from in (0..self.samples.len()).step_by(CHUNK) {
+            let to = (from + CHUNK).min(self.samples.len());
+            let parts = |k: usize| [Some(self.samples[k]), imaginary.map(|imaginary| imaginary[k])];
+            let numbers = (from..to).flat_map(parts).flatten();
+            let bytes: Vec<u8> = numbers.flat_map(|x| (x as f32).to_le_bytes()).collect();
+            writer.write(&bytes).map_err(Failure::input)?;
+        }
+        writer.finish().map_err(Failure::input)
     }
 }
 
@@ -117,16 +130,22 @@ pub(super) fn write_recordings(files: &[(&Path, Mono<'_>)], force: bool) -> Resu
 /// The files of a recording, which are whole but have no names yet: two of a SigMF recording.
 pub(super) fn begin_recording(path: &Path, mono: Mono<'_>, force: bool) -> Result<Vec<AtomicFile>, Failure> {
     remove_unfinished();
-    let (container, is_complex, rate) = (mono.container, mono.imaginary.is_some(), mono.rate);
-    let header = OutputHeader { container, format: FORMAT, is_complex, rate };
-    let mut writer = SampleWriter::create(path, header, force).map_err(Failure::input)?;
-    let mut bytes = Vec::new();
-    for from in (0..mono.samples.len()).step_by(CHUNK) {
-        mono.chunk(from, &mut bytes);
-        writer.write(&bytes).map_err(Failure::input)?;
-    }
-    let mut files = writer.finish().map_err(Failure::input)?;
+    let mut files = match mono.ordinary_wav(path) {
+        Some(spec) => {
+            let mut file = AtomicFile::create(path, force).map_err(Failure::input)?;
+            write_wav(&mut file, mono.samples, spec)
+                .map_err(|error| Failure::of(path, format!("cannot write it: {error}")))?;
+            vec![file]
+        }
+        None => mono.write(path, force)?,
+    };
     // One open file at a time, however many there are.
     files.iter_mut().try_for_each(AtomicFile::seal).map_err(Failure::input)?;
     Ok(files)
+}
+
+fn write_wav(file: &mut AtomicFile, samples: &[f64], spec: hound::WavSpec) -> hound::Result<()> {
+    let mut writer = hound::WavWriter::new(BufWriter::new(file), spec)?;
+    samples.iter().try_for_each(|&x| writer.write_sample(x as f32))?;
+    writer.finalize()
 }

@@ -151,7 +151,7 @@ mod tests {
             std::fs::write(file, "").unwrap();
         }
         let mine = Leftover { path: stale, process: dead, host: None };
-        assert_eq!(leftovers(&[&path("out"), &path("none/out")]), [mine.clone()]);
+        assert_eq!(leftovers(&[&path("out"), &path("none/out")]), std::slice::from_ref(&mine));
         assert!(mine.to_string().ends_with("which no longer runs; remove it"));
         // A process of another host may run: its number says nothing here.
         let theirs = path(&format!(".out.elsewhere-{dead}-0.part"));
