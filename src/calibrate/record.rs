@@ -33,8 +33,8 @@ impl Record {
         Self { samples, imaginary: None, keep, clipped }
     }
 
-    /// Complex samples from the records of both parts: what is left out of one is left out of both, and what
-    /// is beyond the shorter one too.
+    /// Complex samples from the records of both parts. A sample that is left out of one part is left out of
+    /// both, and so are samples beyond the end of the shorter part.
     pub fn complex(real: Self, imaginary: Self) -> Self {
         let both = real.keep.iter().zip(&imaginary.keep);
         let keep: Vec<bool> = both.map(|(&real, &imaginary)| real && imaginary).collect();

@@ -2,7 +2,7 @@
 
 use super::bank_file::{parse_spec, read_kind};
 use super::calibrate_report::Report;
-use super::capture_args::{CaptureArgs, TurnArgs};
+use super::capture_args::{CaptureArgs, InterleavedArgs};
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, Whole, start};
 use super::file_kind::FileKind;
 use super::interrupt::interrupts;
@@ -73,7 +73,7 @@ pub(super) struct Args {
     #[command(flatten)]
     reading: CaptureArgs,
     #[command(flatten)]
-    turns: TurnArgs,
+    turns: InterleavedArgs,
     /// Samples of this size and more are clipped and left out [default: the ends of integer formats, 1 for
     /// floats none of which is beyond]
     #[arg(long, value_name = "LEVEL")]

@@ -54,7 +54,7 @@ impl CaptureArgs {
 
 /// The option of the commands that read captures of a bank.
 #[derive(Debug, Clone, Copy, clap::Args)]
-pub(super) struct TurnArgs {
+pub(super) struct InterleavedArgs {
     /// The input is one recording of one channel in which M converters take turns: its sample k, counted
     /// from 0, comes from converter k mod M. Converters count in the order in which they sample, so
     /// converter 0 is the channel with the largest delay
@@ -62,7 +62,7 @@ pub(super) struct TurnArgs {
     interleaved: Option<u16>,
 }
 
-impl TurnArgs {
+impl InterleavedArgs {
     /// True if converters take turns.
     pub(super) fn is_given(self) -> bool {
         self.interleaved.is_some()

@@ -1,7 +1,7 @@
 //! How `fuse` and `stream` run a bank: their common options, the run from its plan to its files, the report.
 
 use super::bank_file;
-use super::capture_args::TurnArgs;
+use super::capture_args::InterleavedArgs;
 use super::file_kind::unreadable;
 use super::gaps::{GapArgs, say_gaps};
 use super::interrupt::interrupts;
@@ -30,7 +30,7 @@ pub(super) struct RunArgs {
     #[arg(long, value_parser = algorithms(), default_value_t = Algorithm::Auto)]
     algorithm: Algorithm,
     #[command(flatten)]
-    pub(super) turns: TurnArgs,
+    pub(super) turns: InterleavedArgs,
     #[command(flatten)]
     pub(super) gaps: GapArgs,
     #[command(flatten)]

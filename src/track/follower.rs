@@ -158,7 +158,7 @@ impl Follower {
     }
 
     /// Takes the samples of the next block, a list per channel of the bank; NaN where one is missing. Each
-    /// channel has the shift of the change at the first frame of the block, without one none.
+    /// channel has the shift of the change at the first frame of the block; without such a change, no shift.
     pub fn follow(&mut self, samples: &[Vec<f64>]) -> Followed {
         let frames = self.settings.block_frames as u64;
         let first = self.blocks * frames;
