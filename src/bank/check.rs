@@ -28,6 +28,25 @@ fn out_of_range(path: impl Into<String>, value: f64, unit: &'static str, rule: i
     refuse(path, BankProblem::Range { value, unit, rule: rule.into() })
 }
 
+/// A list at `path` has `expected` entries, counted in `unit`.
+fn check_length(
+    path: impl Into<String>,
+    found: usize,
+    expected: usize,
+    unit: &'static str,
+    rule: &'static str,
+) -> Checked {
+    if found == expected { Ok(()) } else { refuse(path, BankProblem::Length { found, expected, unit, rule }) }
+}
+
+/// A certified norm is zero or more, and finite.
+fn check_norm(path: &str, gamma: f64) -> Checked {
+    if gamma.is_finite() && gamma >= 0.0 {
+        return Ok(());
+    }
+    out_of_range(path, gamma, "(h = 1)", "a norm is zero or more, and finite")
+}
+
 impl Bank {
     /// Checks everything that can be checked without linear algebra: numbers finite and in range, lists and
     /// matrices of matching sizes, filters that fit the method, a spec that agrees with the bank.
@@ -59,23 +78,17 @@ impl Bank {
             let (method, expected, found) = (self.method.name(), "state_space", "tap_slopes");
             return refuse("channels", BankProblem::Filters { method, expected, found });
         };
-        let sizes = |path: String, found, expected, unit| {
+        let check = |path: &str, found, expected, unit| {
             let rule = "there is a slope for each tap of each channel, or none for the delay of a channel";
-            refuse(path, BankProblem::Length { found, expected, unit, rule })
+            check_length(path, found, expected, unit, rule)
         };
-        if slopes.by_delay.len() != taps.len() {
-            return sizes("channels".into(), slopes.by_delay.len(), taps.len(), "lists of tap slopes");
-        }
+        check("channels", slopes.by_delay.len(), taps.len(), "lists of tap slopes")?;
         for (j, by_delay) in slopes.by_delay.iter().enumerate().filter(|(_, list)| !list.is_empty()) {
             let path = format!("channels[{j}].tap_slopes");
-            if by_delay.len() != taps.len() {
-                return sizes(path, by_delay.len(), taps.len(), "lists of tap slopes");
-            }
+            check(&path, by_delay.len(), taps.len(), "lists of tap slopes")?;
             for (i, list) in by_delay.iter().enumerate() {
                 let path = format!("{path}[{i}]");
-                if list.len() != taps[i].len() {
-                    return sizes(path, list.len(), taps[i].len(), "tap slopes");
-                }
+                check(&path, list.len(), taps[i].len(), "tap slopes")?;
                 check_finite(&path, list)?;
             }
         }
@@ -91,17 +104,12 @@ impl Bank {
         let inside = |key: &str, problem| BankError::new("", format!("fixed_point.{key}"), problem);
         words.bits.check(None).map_err(|problem: SpecProblem| inside("bits", problem))?;
         check_fraction_bits(words.fraction_bits).map_err(|problem| inside("fraction_bits", problem))?;
-        let sizes = |found, expected, unit| {
-            let rule = "there is an integer for each tap";
-            refuse("fixed_point.integers", BankProblem::Length { found, expected, unit, rule })
+        let check = |found, expected, unit| {
+            check_length("fixed_point.integers", found, expected, unit, "there is an integer for each tap")
         };
-        if words.integers.len() != taps.len() {
-            return sizes(words.integers.len(), taps.len(), "lists of integers");
-        }
+        check(words.integers.len(), taps.len(), "lists of integers")?;
         for (i, (integers, taps)) in words.integers.iter().zip(taps).enumerate() {
-            if integers.len() != taps.len() {
-                return sizes(integers.len(), taps.len(), "integers");
-            }
+            check(integers.len(), taps.len(), "integers")?;
             for (n, (&integer, &tap)) in integers.iter().zip(taps).enumerate() {
                 let (least, most) = words.bits.span(n);
                 if !(least..=most).contains(&integer) {
@@ -173,11 +181,8 @@ impl Bank {
         if let Some(latency) = spec.latency {
             agree("spec.latency", self.latency as f64, latency as f64, 0.0)?;
         }
-        if spec.channels.len() != self.channel_count() {
-            let (found, expected) = (spec.channels.len(), self.channel_count());
-            let rule = "the spec must describe every channel of the bank";
-            return refuse("spec.channel", BankProblem::Length { found, expected, unit: "channels", rule });
-        }
+        let rule = "the spec must describe every channel of the bank";
+        check_length("spec.channel", spec.channels.len(), self.channel_count(), "channels", rule)?;
         for (i, (&delay, channel)) in self.delays.iter().zip(&spec.channels).enumerate() {
             let path = |key: &str| format!("spec.channel[{i}].{key}");
             agree(path("delay"), delay.0, channel.delay.0, (self.fast_period + delay).0)?;
@@ -222,10 +227,8 @@ fn check_converters(
     channels: usize,
     check: fn(f64) -> Result<(), SpecProblem>,
 ) -> Checked {
-    if values.len() != channels {
-        let (found, expected, rule) = (values.len(), channels, "every channel has a gain and an offset");
-        return refuse("channels", BankProblem::Length { found, expected, unit: "gains or offsets", rule });
-    }
+    let rule = "every channel has a gain and an offset";
+    check_length("channels", values.len(), channels, "gains or offsets", rule)?;
     for (i, &value) in values.iter().enumerate() {
         check(value).or_else(|problem| refuse(format!("channels[{i}].{key}"), problem))?;
     }
@@ -253,21 +256,15 @@ fn check_gamma(gamma: &Gamma) -> Checked {
 }
 
 fn check_taps(taps: &[Vec<f64>], channels: usize) -> Checked {
-    if taps.len() != channels {
-        let (found, expected) = (taps.len(), channels);
-        let rule = "every channel has a filter";
-        return refuse("channels", BankProblem::Length { found, expected, unit: "tap lists", rule });
-    }
+    check_length("channels", taps.len(), channels, "tap lists", "every channel has a filter")?;
     let expected = taps[0].len();
     if expected == 0 {
         return out_of_range("channels[0].taps", 0.0, "taps", "a filter has at least one tap");
     }
     for (i, list) in taps.iter().enumerate() {
         let path = format!("channels[{i}].taps");
-        if list.len() != expected {
-            let rule = "all filters are as long as the first one; append zeros to the shorter ones";
-            return refuse(path, BankProblem::Length { found: list.len(), expected, unit: "taps", rule });
-        }
+        let rule = "all filters are as long as the first one; append zeros to the shorter ones";
+        check_length(&path, list.len(), expected, "taps", rule)?;
         check_finite(&path, list)?;
     }
     Ok(())
@@ -295,53 +292,38 @@ fn check_matrix(
     columns: usize,
     rule: &'static str,
 ) -> Checked {
-    if rows.len() != expected {
-        return refuse(path, BankProblem::Length { found: rows.len(), expected, unit: "rows", rule });
-    }
+    check_length(path, rows.len(), expected, "rows", rule)?;
     for (i, row) in rows.iter().enumerate() {
         let path = format!("{path}[{i}]");
-        if row.len() != columns {
-            let (found, expected) = (row.len(), columns);
-            return refuse(path, BankProblem::Length { found, expected, unit: "columns", rule });
-        }
+        check_length(&path, row.len(), columns, "columns", rule)?;
         check_finite(&path, row)?;
     }
     Ok(())
 }
 
 fn check_certificate(certificate: &Certificate) -> Checked {
-    if !(certificate.gamma.is_finite() && certificate.gamma >= 0.0) {
-        let rule = "a norm is zero or more, and finite";
-        return out_of_range("proof.upper.gamma", certificate.gamma, "(h = 1)", rule);
-    }
+    check_norm("proof.upper.gamma", certificate.gamma)?;
     check_triangle("proof.upper.factor", &certificate.factor)?;
-    let (found, expected) = (certificate.correction.len(), certificate.factor.len());
-    if found != 0 && found != expected {
-        let rule = "the correction has as many rows as the factor";
-        let problem = BankProblem::Length { found, expected, unit: "rows", rule };
-        return refuse("proof.upper.correction".to_owned(), problem);
+    if certificate.correction.is_empty() {
+        return Ok(());
     }
+    let (rows, rule) = (certificate.factor.len(), "the correction has as many rows as the factor");
+    check_length("proof.upper.correction", certificate.correction.len(), rows, "rows", rule)?;
     check_triangle("proof.upper.correction", &certificate.correction)
 }
 
 fn check_triangle(path: &str, rows: &[Vec<f64>]) -> Checked {
     for (i, row) in rows.iter().enumerate() {
         let path = format!("{path}[{i}]");
-        if row.len() != i + 1 {
-            let (found, expected, rule) =
-                (row.len(), i + 1, "the matrix is lower triangular, each row one longer");
-            return refuse(path, BankProblem::Length { found, expected, unit: "columns", rule });
-        }
+        let rule = "the matrix is lower triangular, each row one longer";
+        check_length(&path, row.len(), i + 1, "columns", rule)?;
         check_finite(&path, row)?;
     }
     Ok(())
 }
 
 fn check_causal(witness: &CausalWitness) -> Checked {
-    if !(witness.gamma.is_finite() && witness.gamma >= 0.0) {
-        let rule = "a norm is zero or more, and finite";
-        return out_of_range("proof.lower.gamma", witness.gamma, "(h = 1)", rule);
-    }
+    check_norm("proof.lower.gamma", witness.gamma)?;
     if !(1..=CausalWitness::MAX_PERIODS).contains(&witness.periods) {
         let rule = format!("the recursion runs for 1 to {} slow periods", CausalWitness::MAX_PERIODS);
         return out_of_range("proof.lower.periods", witness.periods as f64, "slow periods", rule);
@@ -359,10 +341,8 @@ fn check_witness(path: &str, witness: &DualWitness, reference: usize, measured: 
         [("reference", &witness.reference, reference), ("measured", &witness.measured, measured)]
     {
         let path = format!("{path}.{key}");
-        if list.len() != expected {
-            let (found, rule) = (list.len(), "a witness has one weight for each sample of a slow period");
-            return refuse(path, BankProblem::Length { found, expected, unit: "weights", rule });
-        }
+        let rule = "a witness has one weight for each sample of a slow period";
+        check_length(&path, list.len(), expected, "weights", rule)?;
         for (i, pair) in list.iter().enumerate() {
             check_finite(&format!("{path}[{i}]"), pair)?;
         }

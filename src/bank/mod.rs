@@ -10,19 +10,17 @@
 mod check;
 mod digest;
 mod error;
-mod fixed_point;
 mod plan;
 mod proof;
 mod read;
-mod tap_slopes;
+mod taps;
 mod write;
 
 pub use check::MAX_BANK_LATENCY;
 pub use error::{BankError, BankProblem};
-pub use fixed_point::FixedPoint;
 pub use proof::{CausalWitness, Certificate, DualWitness, LowerProof, Proof};
 pub use read::check_digest;
-pub use tap_slopes::TapSlopes;
+pub use taps::{FixedPoint, TapSlopes};
 
 pub use crate::runtime::StateSpace;
 

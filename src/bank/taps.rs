@@ -1,7 +1,40 @@
-//! Delay-scheduled taps: affine functions of the delays of the channels.
+//! What banks say of their taps: fixed-point integers, and slopes by which delay-scheduled taps follow the
+//! delays.
 
 use super::{Bank, SynthesisFilters};
+use crate::spec::WordLengths;
 use crate::units::FastPeriods;
+use serde::Serialize;
+
+/// Taps that are integers times 2^-`fraction_bits`, `f_i[n] = integers[i][n] * 2^-fraction_bits`, in two's
+/// complement with the given word lengths.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FixedPoint {
+    /// Bits of each tap.
+    pub bits: WordLengths,
+    /// Bits after the point.
+    pub fraction_bits: i32,
+    /// One list per channel.
+    pub integers: Vec<Vec<i64>>,
+}
+
+impl FixedPoint {
+    /// 2^-`fraction_bits`.
+    pub fn step(&self) -> f64 {
+        (-f64::from(self.fraction_bits)).exp2()
+    }
+
+    /// Whether all integers are zero.
+    pub fn is_zero(&self) -> bool {
+        self.integers.iter().flatten().all(|&integer| integer == 0)
+    }
+
+    /// The taps as floating-point numbers; the conversion is exact.
+    pub fn taps(&self) -> Vec<Vec<f64>> {
+        let tap = |&integer: &i64| integer as f64 * self.step();
+        self.integers.iter().map(|list| list.iter().map(tap).collect()).collect()
+    }
+}
 
 /// How the taps change with the delays: with channel j delayed by delta_j fast periods more than the bank
 /// says, tap n of channel i is
