@@ -105,6 +105,9 @@ impl NormalEquations {
     /// [`NoMinimum`] if a parameter has no effect, or if the inverse has a diagonal above `worst`.
     pub fn inverse(&self, worst: f64) -> Result<Mat, NoMinimum> {
         let n = self.gram.nrows();
+        if n == 0 {
+            return Err(NoMinimum::Dependent);
+        }
         let scale: Vec<f64> = (0..n).map(|k| self.gram[(k, k)].sqrt().recip()).collect();
         if let Some(k) = scale.iter().position(|x| !x.is_finite()) {
             return Err(NoMinimum::WithoutEffect(k));

@@ -4,7 +4,9 @@ use crate::arrays::{Held, Shape};
 use crate::background;
 use crate::errors::{HybankError, choose, refused};
 use crate::sources;
-use hybank::calibrate::{self as calibration, ChannelEstimate, Evidence, Fit, Record, Settings, applied};
+use hybank::calibrate::{
+    self as calibration, CalibrationSignal, ChannelEstimate, Fit, Record, Settings, applied,
+};
 use hybank::sine_fit::Estimate;
 use hybank::spec::Spec;
 use hybank::units::{FastPeriods, Hertz};
@@ -80,7 +82,7 @@ pub(crate) fn calibrate(
     let settings = Settings { fit: fitted(&fit)?, reference: reference_of(&spec, reference)? };
     let nominal = spec.clone();
     let found = background::run(py, None, move |_| {
-        calibration::calibrate(&spec, &records, signal.evidence(), settings)
+        calibration::calibrate(&spec, &records, signal.borrowed(), settings)
     })?;
     result(py, &nominal, &found.map_err(refused)?)
 }
@@ -133,11 +135,11 @@ impl Signal {
         }
     }
 
-    fn evidence(&self) -> Evidence<'_> {
+    fn borrowed(&self) -> CalibrationSignal<'_> {
         match self {
-            Self::Tones(tones) => Evidence::Tones(tones),
-            Self::Waveform { samples, spacing } => Evidence::Waveform { samples, spacing: *spacing },
-            Self::Any => Evidence::AnySignal,
+            Self::Tones(tones) => CalibrationSignal::Tones(tones),
+            Self::Waveform { samples, spacing } => CalibrationSignal::Waveform { samples, spacing: *spacing },
+            Self::Any => CalibrationSignal::Any,
         }
     }
 }
@@ -212,6 +214,6 @@ fn result(py: Python<'_>, spec: &Spec, found: &calibration::Calibration) -> PyRe
         frames: found.frames,
         clipped: found.clipped.clone(),
         misfit: found.misfit,
-        remarks: found.remarks.iter().chain(&more).map(ToString::to_string).collect(),
+        remarks: found.warnings.iter().chain(&more).map(ToString::to_string).collect(),
     })
 }

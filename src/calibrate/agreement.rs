@@ -1,14 +1,20 @@
-//! Whether captures agree with a spec: silence, starts, polarities, gains, order and delays.
+//! Whether captures agree with a spec: levels, starts, polarities, gains, order and delays.
 
-use super::contradiction::{Contradiction, by_delays};
-use super::model::Model;
+use super::Settings;
+use super::blind::Blind;
+use super::contradiction::Contradiction;
+use super::estimates::ChannelEstimate;
+use super::model::{Fit, Model};
+use super::order::{from_one, order_of_delays};
 use super::record::{Record, repeated};
 use super::starts::{Starts, starts};
+use crate::sine_fit::Estimate;
 use crate::spec::Spec;
+use crate::units::FastPeriods;
 use std::fmt;
 
 /// Least frames of captures that are judged.
-pub const LEAST_FRAMES: usize = 1024;
+const LEAST_FRAMES: usize = 1024;
 /// The number that suffices for the order and the delays.
 pub const ENOUGH_FRAMES: usize = 16_384;
 /// Samples of all channels that are looked at: starts that are seconds apart need long captures, and the
@@ -16,14 +22,28 @@ pub const ENOUGH_FRAMES: usize = 16_384;
 const MOST_SAMPLES: usize = 1 << 18;
 /// Most channels: the work grows with their cube.
 const MOST_CHANNELS: usize = 32;
-/// A channel is silent below this share of the rms of the loudest one; with a filter of its own below its
-/// square.
-const SILENT: f64 = 1e-3;
+/// A channel has no signal below this share of the rms of the strongest one; with a filter of its own below
+/// the square of it.
+const LEAST_LEVEL: f64 = 1e-3;
 /// A gain this far from that of the spec, beyond what the spec allows, contradicts it. Converters that are
 /// not calibrated differ by a few per cent.
 const GAIN_ERROR: f64 = 0.05;
 /// The spec explains captures that leave this share of their power unexplained.
 const EXPLAINED: f64 = 0.1;
+/// Share of the unexplained power that other delays or another order may leave to count.
+const CLEARLY_LESS: f64 = 0.1;
+/// Another order is looked for where the given one leaves more than this share of the power unexplained;
+/// delays within a tenth of a fast period leave less.
+const ORDER_DOUBTFUL: f64 = 0.05;
+/// The next best order leaves this many times as much.
+const DISTINCT_ORDER: f64 = 3.0;
+/// A delay contradicts when it is this many standard deviations beyond its interval. The interval and its
+/// own error are then both exhausted.
+const CLEAR_SIGMAS: f64 = 6.0;
+/// The interval of a delay of which the spec says nothing, in fast periods.
+const UNSTATED_HALF_WIDTH: f64 = 0.02;
+/// Low and high frequencies that disagree by more than this (in units of their noise) do not see a delay.
+const WORST_MISFIT: f64 = 3.0;
 
 /// What captures say of a spec.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,12 +59,12 @@ pub struct Agreement {
 pub enum Verdict {
     /// One alias per band, at the delays and gains of the spec, has this share of their power.
     Explained(f64),
-    /// Aliases overlap, or the signal fits other starts as well: the captures do not tell.
-    Untold,
-    /// They have fewer than [`LEAST_FRAMES`] frames.
+    /// Aliases overlap, or the signal fits other starts as well.
+    Undecided,
+    /// They have fewer than 1024 frames.
     Short,
     /// They hold no signal.
-    Silence,
+    NoSignal,
     /// There is one channel, or there are too many.
     Channels,
 }
@@ -59,12 +79,14 @@ impl fmt::Display for Verdict {
                     "the captures agree with the spec, which explains at least {least} % of their power"
                 )
             }
-            Self::Untold => f.write_str("this signal does not tell whether the captures agree with the spec"),
+            Self::Undecided => {
+                f.write_str("this signal does not tell whether the captures agree with the spec")
+            }
             Self::Short => write!(
                 f,
                 "fewer than {LEAST_FRAMES} frames do not tell whether the captures agree with the spec"
             ),
-            Self::Silence => f.write_str("the captures are silent"),
+            Self::NoSignal => f.write_str("the captures hold no signal"),
             Self::Channels => {
                 write!(f, "captures are compared with the spec for 2 to {MOST_CHANNELS} channels")
             }
@@ -78,14 +100,10 @@ pub fn frames_for_agreement(channels: usize) -> usize {
     if is_compared { (MOST_SAMPLES / channels).max(ENOUGH_FRAMES) } else { 0 }
 }
 
-/// What clearly contradicts `spec` in the first frames of captures; nothing where they do not tell.
-pub fn contradictions(spec: &Spec, records: &[Record]) -> Vec<Contradiction> {
-    agreement(spec, records).contradictions
-}
-
-/// Compares the first frames of captures, one per channel, with what `spec` says of them.
+/// Compares the first frames of captures, one per channel, with what `spec` says of them. Only what is clear
+/// is a contradiction.
 pub fn agreement(spec: &Spec, records: &[Record]) -> Agreement {
-    let contradicted = |contradictions| Agreement { contradictions, verdict: Verdict::Untold };
+    let contradicted = |contradictions| Agreement { contradictions, verdict: Verdict::Undecided };
     let nothing = |verdict| Agreement { contradictions: Vec::new(), verdict };
     let channels = spec.channels.len();
     if records.len() != channels || !(2..=MOST_CHANNELS).contains(&channels) {
@@ -99,21 +117,22 @@ pub fn agreement(spec: &Spec, records: &[Record]) -> Agreement {
     if shortest < LEAST_FRAMES {
         return nothing(Verdict::Short);
     }
-    let levels: Vec<f64> = records.iter().map(deviation).collect();
+    let levels: Vec<f64> = records.iter().map(Record::rms).collect();
     if levels.iter().all(|level| *level == 0.0) {
-        return nothing(Verdict::Silence);
+        return nothing(Verdict::NoSignal);
     }
-    let silent = silent(spec, &levels);
-    if !silent.is_empty() {
-        return contradicted(silent);
+    let without_signal = without_signal(spec, &levels);
+    if !without_signal.is_empty() {
+        return contradicted(without_signal);
     }
+    let Ok(model) = Model::new(spec) else { return nothing(Verdict::Undecided) };
     let beginning: Vec<Record> = records.iter().map(|record| record.beginning(ENOUGH_FRAMES)).collect();
-    let by_delays = by_delays(spec, &beginning).unwrap_or_default();
+    let by_delays = by_delays(spec, &model, &beginning).unwrap_or_default();
     if by_delays.iter().any(|found| matches!(found, Contradiction::WrongOrder { .. })) {
         return contradicted(by_delays);
     }
-    match Model::new(spec).ok().and_then(|model| starts(&model, records)) {
-        None => Agreement { contradictions: by_delays, verdict: Verdict::Untold },
+    match starts(&model, records) {
+        None => contradicted(by_delays),
         Some(found) => judged(spec, &found, by_delays),
     }
 }
@@ -126,40 +145,31 @@ fn judged(spec: &Spec, found: &Starts, by_delays: Vec<Contradiction>) -> Agreeme
     }
     contradictions.extend(gains(spec, found));
     let is_explained = found.implausible <= EXPLAINED;
-    let verdict = if is_explained { Verdict::Explained(1.0 - found.implausible) } else { Verdict::Untold };
+    let verdict = if is_explained { Verdict::Explained(1.0 - found.implausible) } else { Verdict::Undecided };
     Agreement { contradictions, verdict }
 }
 
-/// Root mean square of the deviations from the mean.
-fn deviation(record: &Record) -> f64 {
-    let kept = || record.samples.iter().zip(&record.keep).filter(|(_, keep)| **keep).map(|(x, _)| *x);
-    let count = record.used().max(1) as f64;
-    let mean = kept().sum::<f64>() / count;
-    (kept().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt()
-}
-
-fn silent(spec: &Spec, levels: &[f64]) -> Vec<Contradiction> {
-    let loudest = (0..levels.len()).max_by(|a, b| levels[*a].total_cmp(&levels[*b])).unwrap_or(0);
-    let least = |i: usize| {
-        let is_alike = spec.channels[i].filter == spec.channels[loudest].filter;
-        levels[loudest] * if is_alike { SILENT } else { SILENT * SILENT }
+/// The channels whose level is far below that of the strongest one.
+fn without_signal(spec: &Spec, levels: &[f64]) -> Vec<Contradiction> {
+    let strongest = (0..levels.len()).max_by(|a, b| levels[*a].total_cmp(&levels[*b])).unwrap_or(0);
+    let contradiction = |i: usize| {
+        let is_alike = spec.channels[i].filter == spec.channels[strongest].filter;
+        let least = if is_alike { LEAST_LEVEL } else { LEAST_LEVEL * LEAST_LEVEL };
+        let level = levels[i] / levels[strongest];
+        (level < least).then_some(Contradiction::NoSignal { channel: i + 1, level })
     };
-    let silent = (0..levels.len()).filter(|&i| levels[i] < least(i));
-    silent.map(|i| Contradiction::Silent { channel: i + 1, level: levels[i] / levels[loudest] }).collect()
+    (0..levels.len()).filter_map(contradiction).collect()
 }
 
 /// Wrong starts and polarities.
 fn shifted(spec: &Spec, found: &Starts) -> Vec<Contradiction> {
-    let seconds = |frames: i64| {
-        let slow = spec.fast_period * spec.ratio as f64;
-        (!spec.is_normalised()).then(|| slow * frames.unsigned_abs() as f64)
-    };
+    let slow = spec.fast_period * spec.ratio as f64;
     let start = |(i, &early): (usize, &i64)| {
-        let whole = Contradiction::Start { channel: i + 1, early, seconds: seconds(early) };
-        (early != 0).then_some(whole)
+        let seconds = (!spec.is_normalised()).then(|| slow * early.unsigned_abs() as f64);
+        (early != 0).then_some(Contradiction::Start { channel: i + 1, early, seconds })
     };
     let starts = found.early.iter().enumerate().filter_map(start);
-    let inverted = found.inverted.iter().enumerate().filter(|(_, inverted)| **inverted);
+    let inverted = found.signs.iter().enumerate().filter(|(_, sign)| **sign < 0.0);
     starts.chain(inverted.map(|(i, _)| Contradiction::Inverted { channel: i + 1 })).collect()
 }
 
@@ -171,17 +181,84 @@ fn gains(spec: &Spec, found: &Starts) -> Vec<Contradiction> {
     let mut sorted = found.gains.clone();
     sorted.sort_by(f64::total_cmp);
     let usual = if sorted.len() == 2 { found.gains[0] } else { sorted[sorted.len() / 2] };
-    let half_widths = spec.uncertainty.as_ref().map(|table| table.gains(spec.channels.len()));
+    let stated = spec.uncertainty.as_ref().map(|table| table.gains(spec.channels.len()));
+    let stated = stated.map_or(0.0, |widths| widths.into_iter().fold(0.0, f64::max));
     // Noise of one channel only would look like its gain.
-    let allowed = GAIN_ERROR + 0.5 * found.unexplained;
+    let allowed = GAIN_ERROR + 0.5 * found.unexplained + stated;
     let contradiction = |(i, gain): (usize, &f64)| {
         let ratio = gain / usual;
-        let stated =
-            half_widths.as_ref().map_or(0.0, |widths| widths.iter().fold(widths[i], |a, b| a.max(*b)));
-        let is_wrong = !((1.0 - allowed - stated)..=(1.0 + allowed + stated)).contains(&ratio);
+        let is_wrong = !((1.0 - allowed)..=(1.0 + allowed)).contains(&ratio);
         is_wrong.then_some(Contradiction::Gain { channel: i + 1, ratio, gain: ratio * spec.channels[i].gain })
     };
     found.gains.iter().enumerate().filter_map(contradiction).collect()
+}
+
+/// Another order, or delays outside of their intervals, from the bands that hold one alias each; `None`
+/// where the captures do not tell. Something is reported only if the signal then leaves at most a tenth of
+/// the power unexplained that it leaves with the spec, whatever Nyquist zone each band may belong to.
+fn by_delays(spec: &Spec, model: &Model, records: &[Record]) -> Option<Vec<Contradiction>> {
+    let uncertainty = spec.uncertainty.clone().unwrap_or_default();
+    let reference = uncertainty.reference_channel().unwrap_or(0);
+    let blind = Blind::new(model, records, 1).ok()?;
+    if let Some(order) = other_order(&blind, records.len()) {
+        return Some(vec![Contradiction::WrongOrder { order }]);
+    }
+    let fit = Fit { delay: true, gain: true, offset: false, cutoff: false };
+    let fitted = blind.fit(Settings { fit, reference }).ok()?;
+    let (nominal, found) = blind.unexplained(&fitted.point);
+    let is_clear = found <= CLEARLY_LESS * nominal;
+    if !is_clear || fitted.misfit.is_some_and(|misfit| misfit > WORST_MISFIT) {
+        return None;
+    }
+    if let Some(order) = order_of_delays(&model.delays, &fitted.point.delays, reference) {
+        return Some(vec![Contradiction::WrongOrder { order }]);
+    }
+    let half_widths = uncertainty.delays(records.len());
+    let channel = |(i, estimate): (usize, ChannelEstimate)| {
+        let delay = estimate.delay?;
+        let deviation = Estimate { value: FastPeriods(delay.value.0 - model.delays[i]), sigma: delay.sigma };
+        let half_width = match uncertainty.delay {
+            Some(_) => half_widths[i].in_fast_periods(spec.fast_period),
+            None => FastPeriods(UNSTATED_HALF_WIDTH),
+        };
+        let is_clear = deviation.value.0.abs() > half_width.0 + CLEAR_SIGMAS * delay.sigma.0;
+        let (channel, reference) = (i + 1, reference + 1);
+        is_clear.then_some(Contradiction::Delay { channel, reference, deviation, half_width })
+    };
+    Some(fitted.channels(model).into_iter().enumerate().filter_map(channel).collect())
+}
+
+/// An order of the channels, from 1, that explains bands of one alias, in whatever zone, at least ten times
+/// as well as the given one and clearly better than any other: two channels swapped, all rotated, or
+/// reversed.
+fn other_order(blind: &Blind<'_>, channels: usize) -> Option<Vec<usize>> {
+    let bands = blind.single_bands();
+    let given: Vec<usize> = (0..channels).collect();
+    let left = blind.unexplained_in_order(&bands, &given);
+    // NaN, without bands, says nothing.
+    let is_doubtful = left > ORDER_DOUBTFUL;
+    if !is_doubtful {
+        return None;
+    }
+    let mut orders: Vec<Vec<usize>> = Vec::new();
+    for i in 0..channels {
+        let rotated: Vec<usize> = (0..channels).map(|j| (i + j) % channels).collect();
+        orders.push(rotated.iter().rev().copied().collect());
+        orders.push(rotated);
+        orders.extend((0..i).map(|j| {
+            let mut swapped = given.clone();
+            swapped.swap(i, j);
+            swapped
+        }));
+    }
+    orders.sort();
+    orders.dedup();
+    let weigh = |order: Vec<usize>| (blind.unexplained_in_order(&bands, &order), order);
+    let mut weighed: Vec<_> = orders.into_iter().filter(|order| *order != given).map(weigh).collect();
+    weighed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let second = weighed.get(1).map_or(f64::INFINITY, |(left, _)| *left);
+    let (best, order) = weighed.into_iter().next()?;
+    (best <= CLEARLY_LESS * left && DISTINCT_ORDER * best <= second).then(|| from_one(order))
 }
 
 #[cfg(test)]
@@ -237,11 +314,11 @@ mod tests {
         assert_eq!(found(&recorded(20_000, 3.0, &mut dice)).contradictions, []);
         let apart = [recorded(20_000, 0.0, &mut dice).remove(0), recorded(20_000, 0.0, &mut dice).remove(1)];
         let found = found(&apart);
-        assert_eq!((found.contradictions, found.verdict), (vec![], Verdict::Untold));
+        assert_eq!((found.contradictions, found.verdict), (vec![], Verdict::Undecided));
     }
 
     #[test]
-    fn starts_are_told_from_one_sample_to_seconds() {
+    fn starts_are_recognised_from_one_sample_to_seconds() {
         let mut dice = Random(52);
         for early in [1_usize, 7, 300, 5000, 29_520] {
             let mut records = recorded(2 * early + 40_000, 0.03, &mut dice);
@@ -256,16 +333,17 @@ mod tests {
             assert_eq!(late.contradictions.len(), 1, "{late:?}");
             let mut records = recorded(2 * early + 40_000, 0.03, &mut dice);
             records[1].drain(..early);
-            let [Contradiction::Start { channel: 2, early: told, .. }] = found(&records).contradictions[..]
+            let [Contradiction::Start { channel: 2, early: reported, .. }] =
+                found(&records).contradictions[..]
             else {
                 panic!("{early}")
             };
-            assert_eq!(told, -(early as i64));
+            assert_eq!(reported, -(early as i64));
         }
     }
 
     #[test]
-    fn polarity_gain_and_silence_are_told() {
+    fn polarity_gain_and_missing_signals_are_reported() {
         let mut dice = Random(53);
         let good = recorded(20_000, 0.01, &mut dice);
         let changed = |factor: f64| {
@@ -279,9 +357,9 @@ mod tests {
         let [Contradiction::Gain { channel: 2, ratio, .. }] = &half[..] else { panic!("{half:?}") };
         assert!((ratio - 0.5).abs() < 0.005, "{ratio}");
         assert!(matches!(&changed(-0.5)[..], [Contradiction::Inverted { .. }, Contradiction::Gain { .. }]));
-        assert_eq!(changed(0.0), [Contradiction::Silent { channel: 2, level: 0.0 }]);
-        let silent = [vec![0.0; 4096], vec![0.0; 4096]];
-        assert_eq!(found(&silent).verdict, Verdict::Silence);
+        assert_eq!(changed(0.0), [Contradiction::NoSignal { channel: 2, level: 0.0 }]);
+        let zeros = [vec![0.0; 4096], vec![0.0; 4096]];
+        assert_eq!(found(&zeros).verdict, Verdict::NoSignal);
     }
 
     /// A tone fits many starts.

@@ -1,35 +1,10 @@
-//! In what captures contradict a spec, and how another order and other delays are found.
-//!
-//! The blind estimator looks at the bands that hold one alias each. Something is reported only where the
-//! evidence is clear: with the delays found, the signal leaves at most a tenth of the power unexplained
-//! that it leaves with those of the spec, whatever Nyquist zone each band may belong to.
+//! In what captures contradict a spec.
 
-use super::blind::Blind;
-use super::model::Model;
-use super::order::order_of_delays;
-use super::parameters::Fit;
-use super::record::Record;
-use super::result::ChannelEstimate;
+use super::error::list;
 use crate::quantity::readable;
 use crate::sine_fit::Estimate;
-use crate::spec::Spec;
 use crate::units::{FastPeriods, Seconds};
 use std::fmt;
-
-/// Share of the unexplained power that other delays must take away to count: all but this.
-const LEFT: f64 = 0.1;
-/// Another order is looked for where the given one leaves more than this share of the power unexplained;
-/// delays within a tenth of a fast period leave less.
-const UNEXPLAINED: f64 = 0.05;
-/// The next best order leaves this many times as much.
-const DISTINCT: f64 = 3.0;
-/// A delay contradicts when it is this many standard deviations beyond its interval. The interval and its
-/// own error are then both exhausted.
-const CLEAR: f64 = 6.0;
-/// The interval of a delay of which the spec says nothing, in fast periods.
-const UNSTATED: f64 = 0.02;
-/// Low and high frequencies that disagree by more than this (in units of their noise) do not see a delay.
-const WORST_MISFIT: f64 = 3.0;
 
 /// In what captures contradict a spec.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,7 +22,7 @@ pub enum Contradiction {
         order: Vec<usize>,
     },
     /// A capture holds next to nothing.
-    Silent {
+    NoSignal {
         /// From 1.
         channel: usize,
         /// Its rms over that of the loudest channel.
@@ -96,23 +71,15 @@ impl fmt::Display for Contradiction {
                 f,
                 "channels {first} and {second} hold the same samples, but the spec gives them different delays; was one recording given twice?"
             ),
-            Self::WrongOrder { order } => {
-                let order: Vec<_> = order.iter().map(usize::to_string).collect();
-                write!(
-                    f,
-                    "the channels seem to be in the wrong order: their delays are those of the channels {}",
-                    order.join(", ")
-                )
-            }
-            Self::Silent { channel, level } if *level == 0.0 => write!(
+            Self::WrongOrder { order } => write!(
                 f,
-                "channel {channel} is silent: it has no signal at all; check its cable, its converter, and the order of \
-                 the captures"
+                "the channels seem to be in the wrong order: their delays are those of the channels {}",
+                list(order)
             ),
-            Self::Silent { channel, level } => write!(
+            Self::NoSignal { channel, level } => write!(
                 f,
-                "channel {channel} is silent: its level is {level:.1e} of that of the loudest channel; check its cable, its \
-                 converter, and the order of the captures"
+                "channel {channel} has no signal: its level is {level:.1e} of that of the strongest channel; check its cable, \
+                 its converter, and the order of the captures"
             ),
             Self::Inverted { channel } => write!(
                 f,
@@ -150,84 +117,18 @@ fn start(f: &mut fmt::Formatter<'_>, channel: usize, early: i64, seconds: Option
     )
 }
 
-/// `None` where the captures do not tell.
-pub(super) fn by_delays(spec: &Spec, records: &[Record]) -> Option<Vec<Contradiction>> {
-    let uncertainty = spec.uncertainty.clone().unwrap_or_default();
-    let reference = uncertainty.reference_channel().unwrap_or(0);
-    let fit = Fit { delay: true, gain: true, offset: false, cutoff: false };
-    let model = Model::new(spec).ok()?;
-    let blind = Blind::of_single_aliases(&model, records).ok()?;
-    if let Some(order) = other_order(&blind, records.len()) {
-        return Some(vec![Contradiction::WrongOrder { order: order.into_iter().map(|j| j + 1).collect() }]);
-    }
-    let maximum = blind.maximise(fit, reference).ok()?;
-    let (nominal, found) = blind.unexplained(&maximum);
-    let is_clear = found <= LEFT * nominal;
-    if !is_clear {
-        return None;
-    }
-    let fitted = blind.finish(&maximum, reference, fit).ok()?;
-    if fitted.misfit.is_some_and(|misfit| misfit > WORST_MISFIT) {
-        return None;
-    }
-    let nominal: Vec<f64> = model.delays.iter().map(|delay| delay.0).collect();
-    if let Some(order) = order_of_delays(&nominal, &fitted.point.delays, reference) {
-        return Some(vec![Contradiction::WrongOrder { order: order.into_iter().map(|j| j + 1).collect() }]);
-    }
-    let half_widths = uncertainty.delays(records.len());
-    let channel = |(i, estimate): (usize, ChannelEstimate)| {
-        let delay = estimate.delay?;
-        let value = FastPeriods(delay.value.0 - nominal[i]);
-        let allowed = match uncertainty.delay {
-            Some(_) => half_widths[i].in_fast_periods(spec.fast_period),
-            None => FastPeriods(UNSTATED),
-        };
-        let is_clear = value.0.abs() > allowed.0 + CLEAR * delay.sigma.0;
-        let (channel, reference) = (i + 1, reference + 1);
-        let deviation = Estimate { value, sigma: delay.sigma };
-        is_clear.then_some(Contradiction::Delay { channel, reference, deviation, half_width: allowed })
-    };
-    Some(fitted.channels(&model).into_iter().enumerate().filter_map(channel).collect())
-}
-
-/// An order of the channels that explains bands of one alias, in whatever zone, at least ten times as well
-/// as the given one and clearly better than any other: two channels swapped, all rotated, or reversed.
-fn other_order(blind: &Blind<'_>, channels: usize) -> Option<Vec<usize>> {
-    let bands = blind.single_bands();
-    let given: Vec<usize> = (0..channels).collect();
-    let left = blind.unexplained_in_order(&bands, &given);
-    let is_told = left > UNEXPLAINED;
-    if !is_told {
-        return None;
-    }
-    let mut orders: Vec<Vec<usize>> = Vec::new();
-    for i in 0..channels {
-        let rotated: Vec<usize> = (0..channels).map(|j| (i + j) % channels).collect();
-        orders.push(rotated.iter().rev().copied().collect());
-        orders.push(rotated);
-        orders.extend((0..i).map(|j| {
-            let mut swapped = given.clone();
-            swapped.swap(i, j);
-            swapped
-        }));
-    }
-    orders.sort();
-    orders.dedup();
-    let weigh = |order: Vec<usize>| (blind.unexplained_in_order(&bands, &order), order);
-    let mut weighed: Vec<_> = orders.into_iter().filter(|order| *order != given).map(weigh).collect();
-    weighed.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let second = weighed.get(1).map_or(f64::INFINITY, |(left, _)| *left);
-    let (best, order) = weighed.into_iter().next()?;
-    (best <= LEFT * left && DISTINCT * best <= second).then_some(order)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::contradictions;
     use crate::calibrate::testbench::{gaussian, interleaved, tones, with_errors};
+    use crate::calibrate::{Record, agreement};
     use crate::random::Random;
+    use crate::spec::Spec;
     use crate::units::Hertz;
+
+    fn contradictions(spec: &Spec, records: &[Record]) -> Vec<Contradiction> {
+        agreement(spec, records).contradictions
+    }
 
     const LIST: [f64; 5] = [11e3, 37e3, 58e3, 83e3, 104e3];
 

@@ -1,6 +1,7 @@
 //! Why a calibration is refused.
 
 use crate::analog::AnalogError;
+use crate::linalg::least_squares::NoMinimum;
 use crate::sine_fit::SineFitError;
 use crate::units::{FastPeriods, Hertz};
 
@@ -195,6 +196,16 @@ pub enum CalibrateError {
     },
 }
 
-fn list(order: &[usize]) -> String {
+/// Numbers in a sentence.
+pub(super) fn list(order: &[usize]) -> String {
     order.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
+}
+
+impl From<NoMinimum> for CalibrateError {
+    fn from(why: NoMinimum) -> Self {
+        match why {
+            NoMinimum::WithoutEffect(_) | NoMinimum::Dependent => Self::NotIdentifiable,
+            NoMinimum::NoConvergence(steps) => Self::NoConvergence { steps },
+        }
+    }
 }

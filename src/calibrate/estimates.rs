@@ -1,37 +1,86 @@
-//! Fitted values and their covariance: what all three methods end with.
+//! What a calibration found, and a spec with these values.
 
-use super::model::Model;
-use super::parameters::{Kind, Point};
-use super::remark::Remark;
-use super::result::ChannelEstimate;
-use crate::linalg::{Mat, solve_positive};
+use super::model::{Kind, Model, Point};
+use super::warning::Warning;
+use crate::linalg::Mat;
 use crate::sine_fit::Estimate;
-use crate::units::FastPeriods;
+use crate::spec::{HALF_WIDTH, PerChannel, Spec, UncertaintySpec};
+use crate::units::{FastPeriods, Hertz, Seconds};
 
 /// Largest condition of an information matrix with unit diagonal. Beyond it two parameters have the same
 /// effect to five digits, and the fit follows the noise.
-const WORST_CONDITION: f64 = 1e10;
-/// A misfit counts only if chance produces it once in a thousand runs.
+pub(super) const WORST_CONDITION: f64 = 1e10;
+/// A misfit counts only if chance produces it once in a thousand runs: standard deviations of a Gaussian.
 const CHANCE: f64 = 3.09;
 
-/// Values, covariance and remarks.
+/// What a calibration found.
+#[derive(Debug, Clone)]
+pub struct Calibration {
+    /// The reference channel, from 0.
+    pub reference: usize,
+    /// One per channel.
+    pub channels: Vec<ChannelEstimate>,
+    /// The tones, if there were any.
+    pub tones: Vec<Tone>,
+    /// Delays are known modulo this, if tones were used and leave a second value within a thousand periods
+    /// of the highest one.
+    pub modulus: Option<FastPeriods>,
+    /// Frames that took part.
+    pub frames: usize,
+    /// Clipped samples of each channel, all left out.
+    pub clipped: Vec<usize>,
+    /// Square root of chi squared per degree of freedom: 1 where the model fits to the noise. `None` if
+    /// there is nothing left to judge it by.
+    pub misfit: Option<f64>,
+    /// What a reader of the estimates must know.
+    pub warnings: Vec<Warning>,
+}
+
+/// The values of one channel; `None` where the value of the spec stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChannelEstimate {
+    /// D_i.
+    pub delay: Option<Estimate<FastPeriods>>,
+    /// g_i.
+    pub gain: Option<Estimate<f64>>,
+    /// o_i, in the unit of the samples.
+    pub offset: Option<Estimate<f64>>,
+    /// The factor of the cut-off frequency of Phi_i.
+    pub cutoff: Option<Estimate<f64>>,
+}
+
+/// A tone that was used.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tone {
+    /// Its analog frequency.
+    pub frequency: Estimate<Hertz>,
+    /// Its Nyquist zone of the slow rate, from 1: zone z lies between (z - 1)/2 and z/2 of the rate.
+    pub zone: usize,
+    /// Amplitude in the reference channel.
+    pub amplitude: Estimate<f64>,
+}
+
+/// Fitted values and their covariance: what all three methods end with.
 #[derive(Debug, Clone)]
 pub(super) struct Fitted {
     pub(super) point: Point,
     /// Of the parameters of `point`.
     pub(super) covariance: Mat,
-    /// o_i and its standard deviation.
-    pub(super) offsets: Option<Vec<(f64, f64)>>,
+    /// o_i.
+    pub(super) offsets: Option<Vec<Estimate<f64>>>,
+    pub(super) tones: Vec<Tone>,
+    pub(super) modulus: Option<FastPeriods>,
     /// Square root of chi squared per degree of freedom, if it could be judged.
     pub(super) misfit: Option<f64>,
     /// Frames that took part.
     pub(super) frames: usize,
-    pub(super) remarks: Vec<Remark>,
+    pub(super) warnings: Vec<Warning>,
 }
 
 impl Fitted {
-    pub(super) fn new(point: Point, covariance: Mat) -> Self {
-        Self { point, covariance, offsets: None, misfit: None, frames: 0, remarks: Vec::new() }
+    pub(super) fn new(point: Point, covariance: Mat, frames: usize) -> Self {
+        let (tones, warnings) = (Vec::new(), Vec::new());
+        Self { point, covariance, offsets: None, tones, modulus: None, misfit: None, frames, warnings }
     }
 
     /// Notes the misfit, and widens the intervals by it if it is more than chance; returns it then.
@@ -51,32 +100,21 @@ impl Fitted {
     /// The channels' values; nominal ones have no standard deviation.
     pub(super) fn channels(&self, model: &Model) -> Vec<ChannelEstimate> {
         let sigma = |i, kind| self.point.index(i, kind).map(|k| self.covariance[(k, k)].max(0.0).sqrt());
-        let channel = |i| {
+        let channel = |i: usize| {
             let (gain, cutoff) = (self.point.gain(i, model), self.point.ln_cutoffs[i].exp());
-            let delay =
-                |sigma| Estimate { value: FastPeriods(self.point.delays[i]), sigma: FastPeriods(sigma) };
+            let delay = FastPeriods(self.point.delays[i]);
+            let of_delay = |sigma| Estimate { value: delay, sigma: FastPeriods(sigma) };
+            // The parameters are logarithms, so their errors are relative ones.
+            let of_factor = |value: f64, sigma: f64| Estimate { value, sigma: sigma * value.abs() };
             ChannelEstimate {
-                delay: sigma(i, Kind::Delay).map(delay),
-                gain: sigma(i, Kind::Gain).map(|sigma| Estimate { value: gain, sigma: sigma * gain.abs() }),
-                cutoff: sigma(i, Kind::Cutoff).map(|sigma| Estimate { value: cutoff, sigma: sigma * cutoff }),
-                offset: self.offsets.as_ref().map(|all| Estimate { value: all[i].0, sigma: all[i].1 }),
+                delay: sigma(i, Kind::Delay).map(of_delay),
+                gain: sigma(i, Kind::Gain).map(|sigma| of_factor(gain, sigma)),
+                cutoff: sigma(i, Kind::Cutoff).map(|sigma| of_factor(cutoff, sigma)),
+                offset: self.offsets.as_ref().map(|all| all[i]),
             }
         };
         (0..model.channels()).map(channel).collect()
     }
-}
-
-/// The inverse of an information matrix; `None` if it is singular to [`WORST_CONDITION`].
-pub(super) fn covariance(information: &Mat) -> Option<Mat> {
-    let n = information.nrows();
-    let scale: Vec<f64> = (0..n).map(|k| information[(k, k)].sqrt().recip()).collect();
-    if n == 0 || !scale.iter().all(|x| x.is_finite()) {
-        return None;
-    }
-    let correlation = Mat::from_fn(n, n, |i, j| information[(i, j)] * scale[i] * scale[j]);
-    let inverse = solve_positive(&correlation, &Mat::identity(n, n)).ok()?;
-    let worst = (0..n).map(|k| inverse[(k, k)]).fold(0.0, f64::max);
-    (worst < WORST_CONDITION).then(|| Mat::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
 /// The value that chi squared exceeds as rarely as a Gaussian exceeds `z` standard deviations (Wilson and
@@ -85,6 +123,56 @@ fn chi_squared_quantile(freedom: usize, z: f64) -> f64 {
     let v = freedom as f64;
     let t = 2.0 / (9.0 * v);
     v * (1.0 - t + z * t.sqrt()).powi(3)
+}
+
+/// `spec` with the values of `calibration` and an `[uncertainty]` table with their half-widths. Values that
+/// were not fitted stay, and so do their half-widths. Delays that would be negative raise all
+/// delays and the latency by whole fast periods.
+pub fn applied(spec: &Spec, calibration: &Calibration) -> (Spec, Vec<Warning>) {
+    let (mut new, h) = (spec.clone(), spec.fast_period);
+    for (channel, found) in new.channels.iter_mut().zip(&calibration.channels) {
+        channel.delay = found.delay.map_or(channel.delay, |delay| delay.value.in_seconds(h));
+        channel.gain = found.gain.map_or(channel.gain, |gain| gain.value);
+        channel.offset = found.offset.map_or(channel.offset, |offset| offset.value);
+        if let Some(cutoff) = found.cutoff {
+            channel.filter = channel.filter.with_cutoff_scaled(cutoff.value);
+        }
+    }
+    let before = spec.uncertainty.clone().unwrap_or_default();
+    let channels = &calibration.channels;
+    new.uncertainty = Some(UncertaintySpec {
+        delay: half_widths(channels, before.delay, |c| Some(c.delay?.sigma.in_seconds(h) * HALF_WIDTH)),
+        gain: half_widths(channels, before.gain, |c| Some(c.gain?.sigma * HALF_WIDTH)),
+        offset: half_widths(channels, before.offset, |c| Some(c.offset?.sigma * HALF_WIDTH)),
+        cutoff: half_widths(channels, before.cutoff, |c| {
+            c.cutoff.map(|cutoff| cutoff.sigma / cutoff.value * HALF_WIDTH)
+        }),
+        reference: Some(calibration.reference + 1),
+    });
+    let warnings = raise(&mut new, h).map(|periods| Warning::Shifted { periods });
+    (new, warnings.into_iter().collect())
+}
+
+/// The half-widths that were found, 0 for a channel without one; those of before if none was found.
+fn half_widths<T: Default>(
+    channels: &[ChannelEstimate],
+    before: Option<PerChannel<T>>,
+    of: impl Fn(&ChannelEstimate) -> Option<T>,
+) -> Option<PerChannel<T>> {
+    let found: Vec<Option<T>> = channels.iter().map(of).collect();
+    if found.iter().all(Option::is_none) {
+        return before;
+    }
+    Some(PerChannel::Each(found.into_iter().map(Option::unwrap_or_default).collect()))
+}
+
+/// Adds the whole fast periods that make all delays positive, if there must be any.
+fn raise(spec: &mut Spec, h: Seconds) -> Option<usize> {
+    let least = spec.channels.iter().map(|channel| channel.delay / h).fold(0.0, f64::min);
+    let periods = (-least).ceil() as usize;
+    spec.channels.iter_mut().for_each(|channel| channel.delay += h * periods as f64);
+    spec.latency = spec.latency.map(|latency| latency + periods);
+    (periods > 0).then_some(periods)
 }
 
 #[cfg(test)]
@@ -98,13 +186,5 @@ mod tests {
             let ours = chi_squared_quantile(freedom, CHANCE);
             assert!((ours / table - 1.0).abs() < 0.04, "{freedom}: {ours}");
         }
-    }
-
-    #[test]
-    fn parameters_with_the_same_effect_have_no_covariance() {
-        let same = Mat::from_row_slice(2, 2, &[4.0, 2.0, 2.0, 1.0]);
-        assert!(covariance(&same).is_none());
-        let apart = covariance(&Mat::from_row_slice(2, 2, &[4.0, 0.0, 0.0, 1e-12])).unwrap();
-        assert_eq!((apart[(0, 0)], apart[(1, 1)]), (0.25, 1e12));
     }
 }

@@ -3,10 +3,10 @@
 //! Channel i delivers g_i (phi_i * f)(k M - D_i) + o_i. What the spec says of D_i, g_i, o_i and of the
 //! cut-off of Phi_i is the start; captures of a known kind of signal f correct it:
 //!
-//! - [`Evidence::Tones`]: tones in any Nyquist zone of the slow rate, one frequency fitted jointly over all
+//! - [`CalibrationSignal::Tones`]: tones in any Nyquist zone of the slow rate, one frequency fitted jointly over all
 //!   channels. A tone gives a delay and a gain per channel; three tones or more also give the cut-off.
-//! - [`Evidence::Waveform`]: a waveform whose samples are known.
-//! - [`Evidence::AnySignal`]: any signal that leaves fewer aliases occupied than there are channels.
+//! - [`CalibrationSignal::Waveform`]: a waveform whose samples are known.
+//! - [`CalibrationSignal::Any`]: any signal that leaves fewer aliases occupied than there are channels.
 //!
 //! Complex captures ([`Record::complex`]) are calibrated by tones, whose frequencies then have a sign. Both
 //! parts of a channel have its delay, gain and cut-off; what its parts lack of quadrature counts as a gain
@@ -29,45 +29,63 @@
 //! blind:     the inverse of the Fisher information of the Whittle likelihood
 //! ```
 //!
-//! What spoils an estimate and can be recognised is refused ([`CalibrateError`]) or noted ([`Remark`]);
+//! What spoils an estimate and can be recognised is refused ([`CalibrateError`]) or noted ([`Warning`]);
 //! where the data contradict the model, the intervals are widened by the misfit.
 
 mod agreement;
-mod apply;
 mod blind;
 mod contradiction;
 mod error;
 mod estimates;
-mod measured;
 mod model;
 mod order;
-mod parameters;
 mod record;
-mod remark;
-mod result;
-mod settings;
 mod starts;
 #[cfg(test)]
 mod testbench;
 mod tones;
+mod warning;
 mod waveform;
 
-pub use agreement::{
-    Agreement, ENOUGH_FRAMES, LEAST_FRAMES, Verdict, agreement, contradictions, frames_for_agreement,
-};
-pub use apply::applied;
+pub use agreement::{Agreement, ENOUGH_FRAMES, Verdict, agreement, frames_for_agreement};
 pub use contradiction::Contradiction;
 pub use error::CalibrateError;
-pub use measured::{Modulus, Tone};
-pub use model::Model;
-pub use parameters::Fit;
+pub use estimates::{Calibration, ChannelEstimate, Tone, applied};
+pub use model::Fit;
+pub(crate) use model::Model;
 pub use record::Record;
-pub use remark::Remark;
-pub use result::{Calibration, ChannelEstimate};
-pub use settings::{Evidence, Settings};
+pub use warning::Warning;
 
 use crate::spec::Spec;
+use crate::units::{FastPeriods, Hertz};
 use estimates::Fitted;
+
+/// The kind of signal that was captured.
+#[derive(Debug, Clone, Copy)]
+pub enum CalibrationSignal<'a> {
+    /// Tones near these analog frequencies; an empty list for tones below half the fast rate that are to be
+    /// found.
+    Tones(&'a [Hertz]),
+    /// The samples of a waveform, taken at 0, T, 2 T, .. It is band-limited, and where it lies in the
+    /// captures is found.
+    Waveform {
+        /// The samples.
+        samples: &'a [f64],
+        /// T.
+        spacing: FastPeriods,
+    },
+    /// Any signal.
+    Any,
+}
+
+/// What to fit, and relative to what.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Settings {
+    /// The values that are fitted.
+    pub fit: Fit,
+    /// The reference channel, from 0.
+    pub reference: usize,
+}
 
 /// Calibrates the channels of `spec` by `records`, one per channel in the order of the spec, whose samples
 /// of one index belong to one frame.
@@ -77,44 +95,41 @@ use estimates::Fitted;
 pub fn calibrate(
     spec: &Spec,
     records: &[Record],
-    evidence: Evidence<'_>,
+    signal: CalibrationSignal<'_>,
     settings: Settings,
 ) -> Result<Calibration, CalibrateError> {
     check(spec, records, settings)?;
-    check_parts(records, evidence)?;
-    let model = Model::new(spec)?;
-    let Settings { fit, reference } = settings;
-    let mut tones = None;
-    let mut fitted = match evidence {
-        Evidence::Tones(frequencies) => {
-            let (fitted, found) = tones::fit(&model, records, frequencies, settings)?;
-            tones = Some(found);
-            fitted
+    check_parts(records, signal)?;
+    let (model, reference) = (Model::new(spec)?, settings.reference);
+    let mut fitted = match signal {
+        CalibrationSignal::Tones(frequencies) => tones::fit(&model, records, frequencies, settings)?,
+        CalibrationSignal::Waveform { samples, spacing } => {
+            waveform::Training::new(&model, &spec.channels, records, samples, spacing, settings)?.fit()?
         }
-        Evidence::Waveform { samples, spacing } => {
-            waveform::fit(&model, &spec.channels, records, waveform::Training { samples, spacing }, settings)?
-        }
-        Evidence::AnySignal => blind::fit(&model, records, fit, reference)?,
+        CalibrationSignal::Any => blind::Blind::new(&model, records, usize::MAX)?.fit(settings)?,
     };
-    if tones.is_none() && fit.delay {
-        order::check_delays(&model, &fitted.point, reference)?;
+    // Tones compare phases, which they do before they take whole periods off a delay.
+    if fitted.tones.is_empty()
+        && settings.fit.delay
+        && let Some(order) = order::order_of_delays(&model.delays, &fitted.point.delays, reference)
+    {
+        return Err(CalibrateError::WrongOrder { order });
     }
     let clipped: Vec<usize> = records.iter().map(|record| record.clipped).collect();
     if clipped.iter().any(|&count| count > 0) {
-        fitted.remarks.push(Remark::Clipped { counts: clipped.clone() });
+        fitted.warnings.push(Warning::Clipped { counts: clipped.clone() });
     }
-    let (tones, modulus) = tones.map_or((Vec::new(), None), |found| (found.tones, Some(found.modulus)));
     let channels = fitted.channels(&model);
-    let Fitted { misfit, frames, remarks, .. } = fitted;
-    Ok(Calibration { reference, channels, tones, modulus, frames, clipped, misfit, remarks })
+    let Fitted { tones, modulus, misfit, frames, warnings, .. } = fitted;
+    Ok(Calibration { reference, channels, tones, modulus, frames, clipped, misfit, warnings })
 }
 
 /// All records are real, or all are complex and hold tones.
-fn check_parts(records: &[Record], evidence: Evidence<'_>) -> Result<(), CalibrateError> {
+fn check_parts(records: &[Record], signal: CalibrationSignal<'_>) -> Result<(), CalibrateError> {
     let complex = records.iter().filter(|record| record.imaginary.is_some()).count();
-    match evidence {
-        Evidence::Tones(_) if complex == records.len() => Ok(()),
-        Evidence::Tones(tones) if complex == 0 => match tones.iter().find(|tone| tone.0 < 0.0) {
+    match signal {
+        CalibrationSignal::Tones(_) if complex == records.len() => Ok(()),
+        CalibrationSignal::Tones(tones) if complex == 0 => match tones.iter().find(|tone| tone.0 < 0.0) {
             Some(&tone) => Err(CalibrateError::NegativeTone { tone }),
             None => Ok(()),
         },

@@ -1,10 +1,12 @@
-//! The channels of a spec as a calibration sees them: nominal values and responses, time in fast periods.
+//! The channels of a spec as a calibration sees them: nominal values and responses, what is fitted of them,
+//! and the present values. Time counts in fast periods.
 
 use super::error::CalibrateError;
 use crate::analog::StrictlyProper;
-use crate::linalg::Complex;
-use crate::spec::Spec;
-use crate::units::{FastPeriods, Hertz, RadiansPerFastPeriod, Seconds};
+use crate::linalg::{CMat, Complex};
+use crate::spec::{ChannelSpec, Spec};
+use crate::units::{Hertz, RadiansPerFastPeriod, Seconds};
+use std::f64::consts::TAU;
 
 /// Step of ln(cut-off) for central differences: the error of the difference, its square over six, and the
 /// rounding, eps over it, are both far below a per cent of the slope.
@@ -20,17 +22,17 @@ const CUTOFF_STEP: f64 = 1e-4;
 ///
 /// where c_i scales the cut-off frequency of its front end.
 #[derive(Debug, Clone)]
-pub struct Model {
+pub(crate) struct Model {
     /// M.
-    pub ratio: usize,
+    pub(super) ratio: usize,
     /// h.
-    pub fast_period: Seconds,
-    /// D_i.
-    pub delays: Vec<FastPeriods>,
+    pub(super) fast_period: Seconds,
+    /// D_i, fast periods.
+    pub(super) delays: Vec<f64>,
     /// g_i.
-    pub gains: Vec<f64>,
+    pub(super) gains: Vec<f64>,
     /// o_i.
-    pub offsets: Vec<f64>,
+    pub(super) offsets: Vec<f64>,
     pub(super) front_ends: Vec<StrictlyProper>,
 }
 
@@ -39,15 +41,15 @@ impl Model {
     ///
     /// # Errors
     /// [`CalibrateError::Analog`] for a filter that cannot be realised.
-    pub fn new(spec: &Spec) -> Result<Self, CalibrateError> {
-        let realise = |(i, channel): (usize, &crate::spec::ChannelSpec)| {
+    pub(crate) fn new(spec: &Spec) -> Result<Self, CalibrateError> {
+        let realise = |(i, channel): (usize, &ChannelSpec)| {
             StrictlyProper::new(&channel.filter, spec.fast_period)
                 .map_err(|source| CalibrateError::Analog { channel: i + 1, source: Box::new(source) })
         };
         Ok(Self {
             ratio: spec.ratio,
             fast_period: spec.fast_period,
-            delays: spec.delays_in_fast_periods(),
+            delays: spec.delays_in_fast_periods().iter().map(|delay| delay.0).collect(),
             gains: spec.channels.iter().map(|channel| channel.gain).collect(),
             offsets: spec.channels.iter().map(|channel| channel.offset).collect(),
             front_ends: spec.channels.iter().enumerate().map(realise).collect::<Result<_, _>>()?,
@@ -55,12 +57,17 @@ impl Model {
     }
 
     /// N.
-    pub fn channels(&self) -> usize {
+    pub(super) fn channels(&self) -> usize {
         self.delays.len()
     }
 
+    /// The channels that are not the reference.
+    pub(super) fn others(&self, reference: usize) -> impl Iterator<Item = usize> + use<> {
+        (0..self.channels()).filter(move |&i| i != reference)
+    }
+
     /// 1 / (M h).
-    pub fn slow_rate(&self) -> Hertz {
+    pub(crate) fn slow_rate(&self) -> Hertz {
         (self.fast_period * self.ratio as f64).rate()
     }
 
@@ -77,6 +84,113 @@ impl Model {
 
     /// g_i Phi_i(jw) e^{-jw D_i}, nominal.
     pub(crate) fn nominal(&self, i: usize, w: f64) -> Complex<f64> {
-        self.response(i, w, 0.0) * Complex::from_polar(1.0, -w * self.delays[i].0) * self.gains[i]
+        self.response(i, w, 0.0) * Complex::from_polar(1.0, -w * self.delays[i]) * self.gains[i]
+    }
+
+    /// nu_k = (W + 2 pi k) / M, the analog frequency of an alias of the slow frequency W.
+    pub(super) fn alias(&self, w: f64, alias: i32) -> f64 {
+        (w + TAU * f64::from(alias)) / self.ratio as f64
+    }
+
+    /// A_ik = g_i Phi_i(j nu_k / c_i) e^{-2 pi j k D_i / M}: the phase e^{-j W D_i / M} that all aliases
+    /// share is removed from the spectral matrices.
+    pub(super) fn steering(&self, point: &Point, w: f64, aliases: &[i32]) -> CMat {
+        CMat::from_fn(self.channels(), aliases.len(), |i, column| {
+            let alias = aliases[column];
+            let cycles = (f64::from(alias) * point.delays[i] / self.ratio as f64).fract();
+            self.response(i, self.alias(w, alias), point.ln_cutoffs[i])
+                * Complex::from_polar(point.gain(i, self), -TAU * cycles)
+        })
+    }
+}
+
+/// Which values of the channels are fitted; the others keep those of the spec.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Fit {
+    /// Delays.
+    pub delay: bool,
+    /// Gains.
+    pub gain: bool,
+    /// Offsets.
+    pub offset: bool,
+    /// Cut-off frequencies of the front ends.
+    pub cutoff: bool,
+}
+
+impl Default for Fit {
+    /// Delays, gains and offsets.
+    fn default() -> Self {
+        Self { delay: true, gain: true, offset: true, cutoff: false }
+    }
+}
+
+/// A parameter of a channel. Gains and cut-offs are fitted by their logarithm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Delay,
+    Gain,
+    Cutoff,
+}
+
+impl Fit {
+    /// The fitted parameters of a channel that is not the reference.
+    pub(super) fn kinds(self) -> Vec<Kind> {
+        let all = [(self.delay, Kind::Delay), (self.gain, Kind::Gain), (self.cutoff, Kind::Cutoff)];
+        all.into_iter().filter_map(|(is_fitted, kind)| is_fitted.then_some(kind)).collect()
+    }
+}
+
+/// One fitted parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Parameter {
+    /// From 0; never the reference.
+    pub(super) channel: usize,
+    pub(super) kind: Kind,
+}
+
+/// The present values of all channels.
+#[derive(Debug, Clone)]
+pub(super) struct Point {
+    pub(super) parameters: Vec<Parameter>,
+    /// Fast periods.
+    pub(super) delays: Vec<f64>,
+    /// ln(g_i / nominal).
+    pub(super) ln_gains: Vec<f64>,
+    /// ln c_i.
+    pub(super) ln_cutoffs: Vec<f64>,
+}
+
+impl Point {
+    /// The values of the spec.
+    pub(super) fn nominal(model: &Model, fit: Fit, reference: usize) -> Self {
+        let of = |channel| fit.kinds().into_iter().map(move |kind| Parameter { channel, kind });
+        Self {
+            parameters: model.others(reference).flat_map(of).collect(),
+            delays: model.delays.clone(),
+            ln_gains: vec![0.0; model.channels()],
+            ln_cutoffs: vec![0.0; model.channels()],
+        }
+    }
+
+    /// g_i.
+    pub(super) fn gain(&self, i: usize, model: &Model) -> f64 {
+        model.gains[i] * self.ln_gains[i].exp()
+    }
+
+    /// Adds a step of all parameters.
+    pub(super) fn advance(&mut self, step: &[f64]) {
+        for (parameter, step) in self.parameters.iter().zip(step) {
+            let values = match parameter.kind {
+                Kind::Delay => &mut self.delays,
+                Kind::Gain => &mut self.ln_gains,
+                Kind::Cutoff => &mut self.ln_cutoffs,
+            };
+            values[parameter.channel] += step;
+        }
+    }
+
+    /// The index of a parameter.
+    pub(super) fn index(&self, channel: usize, kind: Kind) -> Option<usize> {
+        self.parameters.iter().position(|&p| p == Parameter { channel, kind })
     }
 }

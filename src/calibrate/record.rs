@@ -46,6 +46,17 @@ impl Record {
         Self { samples, imaginary: Some(others), keep, clipped }
     }
 
+    /// The kept samples, or real parts.
+    pub(crate) fn channel(&self) -> Channel<'_> {
+        Channel { keep: Some(&self.keep), ..Channel::new(&self.samples) }
+    }
+
+    /// Root mean square of the kept samples' deviations from their mean.
+    pub(crate) fn rms(&self) -> f64 {
+        let squares: f64 = self.channel().deviations().iter().map(|x| x * x).sum();
+        (squares / self.used().max(1) as f64).sqrt()
+    }
+
     /// The kept samples of each part, for a sine fit.
     pub(super) fn channels(&self) -> impl Iterator<Item = Channel<'_>> {
         self.parts().map(|part| Channel { keep: Some(&self.keep), ..Channel::new(part) })

@@ -10,7 +10,7 @@ use super::match_bank::check_stdin;
 use super::measure::{ToneArg, tone, tones};
 use super::print::{Failure, is_dash, say_understood};
 use super::written::{check_outputs, write_text};
-use crate::calibrate::{Evidence, Fit, Record, Settings, applied, calibrate};
+use crate::calibrate::{CalibrationSignal, Fit, Record, Settings, applied, calibrate};
 use crate::io::{MultiReader, PcmFormat, ReadOptions};
 use crate::spec::{DesignOverrides, Spec};
 use crate::units::{FastPeriods, Hertz};
@@ -107,11 +107,11 @@ enum Signal {
 }
 
 impl Signal {
-    fn evidence(&self) -> Evidence<'_> {
+    fn borrowed(&self) -> CalibrationSignal<'_> {
         match self {
-            Self::Tones(list) => Evidence::Tones(list),
-            Self::Waveform { samples, spacing } => Evidence::Waveform { samples, spacing: *spacing },
-            Self::Any => Evidence::AnySignal,
+            Self::Tones(list) => CalibrationSignal::Tones(list),
+            Self::Waveform { samples, spacing } => CalibrationSignal::Waveform { samples, spacing: *spacing },
+            Self::Any => CalibrationSignal::Any,
         }
     }
 }
@@ -124,17 +124,17 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let settings = args.settings(&spec)?;
     let signal = args.signal(&spec)?;
     let (records, mut warnings) = args.read(&args.captures, &spec)?;
-    let found = calibrate(&spec, &records, signal.evidence(), settings).map_err(Failure::input)?;
-    let (calibrated, remarks) = applied(&spec, &found);
+    let found = calibrate(&spec, &records, signal.borrowed(), settings).map_err(Failure::input)?;
+    let (calibrated, more) = applied(&spec, &found);
     let mut report = Report::new(&spec, &found);
-    report.remark(&remarks);
+    report.add(&more);
     if !args.check.is_empty() {
         let (records, tolerated) = args.read(&args.check, &spec)?;
         warnings.extend(tolerated);
-        let held_out = match signal.evidence() {
+        let held_out = match signal.borrowed() {
             // Held-out tones have other frequencies.
-            Evidence::Tones(_) => Evidence::Tones(&[]),
-            evidence => evidence,
+            CalibrationSignal::Tones(_) => CalibrationSignal::Tones(&[]),
+            signal => signal,
         };
         let checked = calibrate(&calibrated, &records, held_out, settings)
             .map_err(|error| Failure::Input(format!("the held-out captures: {error}")))?;

@@ -1,7 +1,7 @@
 //! What `calibrate` prints.
 
 use super::print::{Failure, is_dash, show, warn};
-use crate::calibrate::{Calibration, ChannelEstimate, Remark};
+use crate::calibrate::{Calibration, ChannelEstimate, Warning};
 use crate::sine_fit::Estimate;
 use crate::spec::{HALF_WIDTH, Spec};
 use crate::units::FastPeriods;
@@ -125,21 +125,21 @@ impl Report {
             frames: found.frames,
             channels: found.channels.iter().zip(&found.clipped).enumerate().map(channel).collect(),
             tones: tones.collect(),
-            modulus_samples: found.modulus.and_then(|modulus| modulus.0).map(|modulus| modulus.0),
+            modulus_samples: found.modulus.map(|modulus| modulus.0),
             misfit: found.misfit,
             check: None,
             notes: Vec::new(),
             warnings: Vec::new(),
         };
-        report.remark(&found.remarks);
+        report.add(&found.warnings);
         report
     }
 
-    /// Sorts remarks into warnings and notes.
-    pub(super) fn remark(&mut self, remarks: &[Remark]) {
-        for remark in remarks {
-            let list = if remark.is_warning() { &mut self.warnings } else { &mut self.notes };
-            list.push(remark.to_string());
+    /// Sorts warnings and notes.
+    pub(super) fn add(&mut self, warnings: &[Warning]) {
+        for warning in warnings {
+            let list = if warning.is_note() { &mut self.notes } else { &mut self.warnings };
+            list.push(warning.to_string());
         }
     }
 

@@ -47,6 +47,7 @@ mod tests;
 
 pub use error::SineFitError;
 pub use gauss_newton::{fit, fit_known};
+pub(crate) use result::wrapped;
 pub use result::{ChannelFit, ComplexChannel, Component, Direction, Ratio, SineFit, ToneFit};
 pub use search::{find_tones, locate};
 
@@ -99,7 +100,7 @@ impl<'a> Channel<'a> {
 
 /// Distance of a frequency in cycles per sample to the nearest multiple of 1/2, where sine and cosine
 /// coincide.
-fn distance_to_edge(cycles: f64) -> f64 {
+pub(crate) fn distance_to_edge(cycles: f64) -> f64 {
     0.5 * (2.0 * cycles - (2.0 * cycles).round()).abs()
 }
 

@@ -1,7 +1,7 @@
 //! Delays of one block of samples, by a pilot tone or by any signal.
 
 use super::{DelayMeasurement, Reading};
-use crate::calibrate::{Evidence, Fit, Model, Record, Settings, calibrate};
+use crate::calibrate::{CalibrationSignal, Fit, Model, Record, Settings, calibrate};
 use crate::sine_fit::{self, Channel, Estimate, ToneFit};
 use crate::spec::Spec;
 use crate::units::{Decibels, Hertz, Radians, Seconds};
@@ -25,7 +25,7 @@ const WORTHLESS: f64 = 0.25;
 pub enum Guide {
     /// A tone near this analog frequency that sounds all the time.
     Pilot(Hertz),
-    /// Whatever signal there is, as [`Evidence::AnySignal`].
+    /// Whatever signal there is, as [`CalibrationSignal::Any`].
     AnySignal,
     /// Measurements that are known beforehand.
     Readings(Vec<Reading>),
@@ -126,7 +126,7 @@ fn by_any_signal(
     records: &[Record],
 ) -> Result<Vec<Option<DelayMeasurement>>, String> {
     let fit = Fit { delay: true, gain: true, offset: false, cutoff: false };
-    let found = calibrate(spec, records, Evidence::AnySignal, Settings { fit, reference });
+    let found = calibrate(spec, records, CalibrationSignal::Any, Settings { fit, reference });
     let found = found.map_err(|error| error.to_string())?;
     let h = spec.fast_period;
     let measured = |estimate: &crate::calibrate::ChannelEstimate| {

@@ -65,7 +65,7 @@ fn silence_polarity_gain_and_starts_are_told_with_their_remedy() {
     };
     type Damage<'a> = &'a dyn Fn(Vec<f32>) -> Vec<f32>;
     let cases: [(Damage<'_>, &[&str]); 5] = [
-        (&|x| vec![0.0; x.len()], &["channel 2 is silent", "check its cable"]),
+        (&|x| vec![0.0; x.len()], &["channel 2 has no signal", "check its cable"]),
         (&|x| x.iter().map(|x| -x).collect(), &["channel 2 is inverted", "swap its leads"]),
         (&|x| x.iter().map(|x| 0.5 * x).collect(), &["the gain of channel 2 is 0.5", "write `gain = 0.5"]),
         (&late(7), &["channel 2 began 7 samples (291.667 us) after the others", "cut the first 7 samples"]),
@@ -92,7 +92,7 @@ fn captures_that_cannot_tell_are_not_doubted() {
     let desk = desk("2s");
     // Silence everywhere, few frames, and a tone: one may be shifted by whole periods.
     for (source, samples, said) in [
-        ("step@10s", "20000", "the captures are silent"),
+        ("step@10s", "20000", "the captures hold no signal"),
         ("chirp:50Hz..8kHz@2s", "1600", "fewer than 1024 frames"),
         ("tones:1kHz", "20000", "the captures agree"),
         ("tones:23.3kHz", "20000", "the captures"),

@@ -21,27 +21,25 @@
 //! estimation*, IEEE Trans. ASSP 38(10), 1990, for the score with S and s eliminated.
 
 mod likelihood;
-mod occupancy;
 mod spectra;
 #[cfg(test)]
 mod tests;
 
+use super::Settings;
 use super::error::CalibrateError;
-use super::estimates::{Fitted, covariance};
-use super::model::Model;
-use super::parameters::{Fit, Kind, Point};
+use super::estimates::{Fitted, WORST_CONDITION};
+use super::model::{Fit, Kind, Model, Point};
 use super::record::{Record, longest_run};
-use super::remark::Remark;
-use crate::linalg::{CMat, Complex, Mat, solve};
-use likelihood::{Score, band_score, complement, lowest_aliases, noise_power, steering};
-use occupancy::occupied;
+use super::warning::Warning;
+use crate::linalg::least_squares::{LeastSquares, Minimum, NoMinimum, NormalEquations, StepLimits, minimise};
+use crate::linalg::{CMat, Complex, solve};
+use crate::sine_fit::Estimate;
+use likelihood::{band_score, lowest_aliases};
+use spectra::occupied;
 pub(super) use spectra::{Band, Spectra};
-use std::f64::consts::TAU;
 
 /// Least number of frames in a row.
 const LEAST_FRAMES: usize = 256;
-/// Most Fisher scoring steps.
-const MOST_STEPS: usize = 60;
 /// The iteration ends when every step is below this share of its standard deviation.
 const SMALL_STEP: f64 = 1e-3;
 /// Largest step of a delay in fast periods: a quarter of the period of the highest frequency below pi.
@@ -50,6 +48,9 @@ const LARGEST_STEP: f64 = 0.5;
 /// within a band, and once the delays are known.
 const FIRST_LEAST: f64 = 1e-3;
 const FINAL_LEAST: f64 = 1e-6;
+/// A logarithm of a gain or of a cut-off beyond this is lost.
+const FARTHEST_LOGARITHM: f64 = 3.0;
+
 /// Bands whose aliases were found.
 struct Occupied {
     band: Band,
@@ -65,226 +66,195 @@ pub(super) struct Blind<'a> {
     most_aliases: usize,
 }
 
-/// The maximum of the likelihood.
-pub(super) struct Maximum {
-    pub(super) point: Point,
-    /// Of all bands.
-    score: Score,
+/// The maximum of the likelihood, or the way to it.
+pub(super) struct Maximum<'a> {
+    blind: &'a Blind<'a>,
+    point: Point,
+    /// The bands that are used, by their frequency, and the number of their aliases. They stay the same ones
+    /// while the point moves; only their phases follow it.
+    used: Vec<(f64, usize)>,
     /// Of the lower and of the upper half of the used bands.
-    halves: [Score; 2],
+    halves: [NormalEquations; 2],
     /// Mean noise of the used bands, per sample.
     noise: f64,
 }
 
+impl LeastSquares for Maximum<'_> {
+    type Error = CalibrateError;
+    const MOST_STEPS: usize = 60;
+    const WORST_CONDITION: f64 = WORST_CONDITION;
+
+    fn equations(&mut self) -> Result<NormalEquations, CalibrateError> {
+        let none = NormalEquations::new(self.point.parameters.len());
+        (self.halves, self.noise) = ([none.clone(), none.clone()], 0.0);
+        let model = self.blind.model;
+        let bands = self.blind.spectra.bands(&self.point.delays).into_iter();
+        let used = bands.filter_map(|band| Some((self.used.iter().find(|used| used.0 == band.w)?.1, band)));
+        let (count, mut scored) = (self.used.len(), 0);
+        for (number, (aliases, band)) in used.enumerate() {
+            let aliases = lowest_aliases(model, band.w, aliases);
+            let Some(score) = band_score(model, &self.point, &band, &aliases) else { continue };
+            add(&mut self.halves[usize::from(2 * number >= count)], &score.equations);
+            self.noise += score.noise;
+            scored += 1;
+        }
+        self.noise /= scored.max(1) as f64;
+        let mut all = none;
+        self.halves.iter().for_each(|half| add(&mut all, half));
+        Ok(all)
+    }
+
+    /// A point is lost when a delay is more than a slow period and the spread of all delays from its
+    /// nominal.
+    fn advance(&mut self, step: &[f64]) -> bool {
+        self.point.advance(step);
+        let model = self.blind.model;
+        let far = model.ratio as f64 + model.delays.iter().copied().fold(0.0, f64::max);
+        let is_near = |(delay, nominal): (&f64, &f64)| (delay - nominal).abs() <= far;
+        let mut logarithms = self.point.ln_gains.iter().chain(&self.point.ln_cutoffs);
+        self.point.delays.iter().zip(&model.delays).all(is_near)
+            && logarithms.all(|x| x.abs() < FARTHEST_LOGARITHM)
+    }
+
+    fn limits(&self, k: usize, sigma: f64) -> StepLimits {
+        let is_delay = self.point.parameters[k].kind == Kind::Delay;
+        let largest = if is_delay { LARGEST_STEP } else { f64::INFINITY };
+        StepLimits { largest, negligible: SMALL_STEP * sigma }
+    }
+
+    fn error(&self, why: NoMinimum) -> CalibrateError {
+        why.into()
+    }
+}
+
+fn add(sum: &mut NormalEquations, other: &NormalEquations) {
+    sum.gram += &other.gram;
+    sum.projection += &other.projection;
+}
+
 impl<'a> Blind<'a> {
-    /// Of the longest run of frames that no record lacks.
-    pub(super) fn new(model: &'a Model, records: &[Record]) -> Result<Self, CalibrateError> {
+    /// Of the longest run of frames that no record lacks; bands with more than so many aliases are left out.
+    pub(super) fn new(
+        model: &'a Model,
+        records: &[Record],
+        most_aliases: usize,
+    ) -> Result<Self, CalibrateError> {
         let (first, frames) = longest_run(records);
         if frames < LEAST_FRAMES {
             return Err(CalibrateError::TooShort { frames, needed: LEAST_FRAMES });
         }
         let captures: Vec<&[f64]> = records.iter().map(|r| &r.samples[first..first + frames]).collect();
-        let delays: Vec<f64> = model.delays.iter().map(|delay| delay.0).collect();
-        let spectra = Spectra::new(&captures, &delays, model.ratio);
-        Ok(Self { model, spectra, frames, most_aliases: usize::MAX })
+        let spectra = Spectra::new(&captures, &model.delays, model.ratio);
+        Ok(Self { model, spectra, frames, most_aliases })
     }
 
-    /// As [`Blind::new`], of bands with one alias only.
-    pub(super) fn of_single_aliases(model: &'a Model, records: &[Record]) -> Result<Self, CalibrateError> {
-        Ok(Self { most_aliases: 1, ..Self::new(model, records)? })
+    /// The estimates at the maximum of the likelihood near the nominal values, with the warnings that their
+    /// intervals call for.
+    pub(super) fn fit(&self, settings: Settings) -> Result<Fitted, CalibrateError> {
+        let Settings { fit, reference } = settings;
+        let first = self.ascended(Point::nominal(self.model, fit, reference), FIRST_LEAST)?.0;
+        let (maximum, minimum) = self.ascended(first.point, FINAL_LEAST)?;
+        let factor = self.spectra.variance_factor;
+        let disagreement = maximum.disagreement(factor);
+        let offsets = fit.offset.then(|| maximum.offsets(reference));
+        let mut fitted = Fitted::new(maximum.point, minimum.inverse * factor, self.frames);
+        let misfit = disagreement.and_then(|(squares, freedom)| fitted.widen(squares, freedom));
+        fitted.warnings.extend(misfit.map(|misfit| Warning::BandsDisagree { misfit }));
+        fitted.offsets = offsets;
+        Ok(fitted)
     }
 
-    /// The maximum of the likelihood near the nominal values.
-    pub(super) fn maximise(&self, fit: Fit, reference: usize) -> Result<Maximum, CalibrateError> {
-        let mut point = Point::nominal(self.model, fit, reference);
-        self.ascend(&mut point, FIRST_LEAST)?;
-        self.ascend(&mut point, FINAL_LEAST)
-    }
-
-    fn bands(&self, point: &Point, least: f64) -> Vec<Occupied> {
-        let bands = self.spectra.bands(&point.delays);
+    fn bands(&self, delays: &[f64], least: f64) -> Vec<Occupied> {
+        let bands = self.spectra.bands(delays);
         let counts = occupied(&bands, least);
-        let held = |(band, count): (Band, usize)| {
-            let aliases = lowest_aliases(band.w, count);
-            Occupied { band, aliases }
+        let of = |(band, count): (Band, usize)| {
+            let aliases = lowest_aliases(self.model, band.w, count);
+            (1..=self.most_aliases).contains(&count).then_some(Occupied { band, aliases })
         };
-        let with_signal =
-            bands.into_iter().zip(counts).filter(|&(_, count)| (1..=self.most_aliases).contains(&count));
-        with_signal.map(held).collect()
+        bands.into_iter().zip(counts).filter_map(of).collect()
     }
 
-    fn ascend(&self, point: &mut Point, least: f64) -> Result<Maximum, CalibrateError> {
-        let counted = self.bands(point, least);
-        let chosen: Vec<usize> = counted.iter().map(|held| held.aliases.len()).collect();
-        if chosen.is_empty() {
+    fn ascended(&self, point: Point, least: f64) -> Result<(Maximum<'_>, Minimum), CalibrateError> {
+        let used = self.bands(&point.delays, least);
+        let used: Vec<(f64, usize)> = used.iter().map(|used| (used.band.w, used.aliases.len())).collect();
+        if used.is_empty() {
             return Err(CalibrateError::AllAliasesOccupied { channels: self.model.channels() });
         }
-        let centres: Vec<f64> = counted.iter().map(|held| held.band.w).collect();
-        for _ in 0..MOST_STEPS {
-            // The bands stay the same ones while the point moves; only their phases follow it.
-            let bands = self.spectra.bands(&point.delays).into_iter();
-            let bands = bands.filter_map(|band| {
-                let at = centres.iter().position(|&w| w == band.w)?;
-                Some(Occupied { aliases: lowest_aliases(band.w, chosen[at]), band })
-            });
-            let maximum = self.scored(point, bands.collect());
-            let (step, sigma) = self.step(&maximum.score)?;
-            let delays = point.parameters.iter().zip(step.iter()).filter(|(p, _)| p.kind == Kind::Delay);
-            let largest = delays.map(|(_, x)| x.abs()).fold(0.0, f64::max);
-            let factor = if largest > LARGEST_STEP { LARGEST_STEP / largest } else { 1.0 };
-            if step.iter().zip(&sigma).all(|(x, sigma)| x.abs() < SMALL_STEP * sigma) {
-                return Ok(maximum);
-            }
-            point.advance(step.iter().map(|x| factor * x));
-            if !self.is_near(point) {
-                break;
-            }
-        }
-        Err(CalibrateError::NoConvergence { steps: MOST_STEPS })
-    }
-
-    /// A point is lost when a delay is more than a slow period and the spread of all delays from its
-    /// nominal.
-    fn is_near(&self, point: &Point) -> bool {
-        let nominal = self.model.delays.iter().map(|delay| delay.0);
-        let spread = self.model.delays.iter().map(|delay| delay.0).fold(0.0, f64::max);
-        let far = self.model.ratio as f64 + spread;
-        point.delays.iter().zip(nominal).all(|(delay, nominal)| (delay - nominal).abs() <= far)
-            && point.ln_gains.iter().chain(&point.ln_cutoffs).all(|x| x.abs() < 3.0)
-    }
-
-    fn scored(&self, point: &Point, bands: Vec<Occupied>) -> Maximum {
-        let zero = || Score::zero(point.parameters.len());
-        let mut halves = [zero(), zero()];
-        let (mut noise, mut used) = (0.0, 0);
-        let count = bands.len();
-        for (number, held) in bands.iter().enumerate() {
-            let Some(score) = band_score(self.model, point, &held.band, &held.aliases) else { continue };
-            halves[usize::from(2 * number >= count)].add(&score);
-            let a = steering(self.model, point, held.band.w, &held.aliases);
-            noise +=
-                complement(&a).map_or(0.0, |(p, _)| noise_power(&held.band.matrix, &p, held.aliases.len()));
-            used += 1;
-        }
-        let mut score = zero();
-        halves.iter().for_each(|half| score.add(half));
-        Maximum { point: point.clone(), score, halves, noise: noise / used.max(1) as f64 }
-    }
-
-    /// The scoring step and the standard deviations.
-    fn step(&self, score: &Score) -> Result<(Mat, Vec<f64>), CalibrateError> {
-        let covariance = covariance(&score.information).ok_or(CalibrateError::NotIdentifiable)?;
-        let sigma = (0..covariance.nrows()).map(|k| covariance[(k, k)].sqrt()).collect();
-        Ok((covariance * &score.gradient, sigma))
+        let none = NormalEquations::new(0);
+        let mut maximum = Maximum { blind: self, point, used, halves: [none.clone(), none], noise: 0.0 };
+        let minimum = minimise(&mut maximum)?;
+        Ok((maximum, minimum))
     }
 
     /// The bands that hold one alias, with the phases of the nominal delays removed.
     pub(super) fn single_bands(&self) -> Vec<Band> {
-        let nominal = Point::nominal(self.model, Fit::default(), 0);
-        self.bands(&nominal, FIRST_LEAST).into_iter().map(|held| held.band).collect()
+        self.bands(&self.model.delays, FIRST_LEAST).into_iter().map(|used| used.band).collect()
     }
 
     /// The share of the power that one alias per band leaves unexplained if capture i is channel `order[i]`,
     /// with the nominal values and whichever alias fits a band best. NaN without bands.
     pub(super) fn unexplained_in_order(&self, bands: &[Band], order: &[usize]) -> f64 {
-        let m = self.model.ratio as f64;
-        let reach = self.model.ratio as i32;
-        let delay = |i: usize| self.model.delays[i].0;
+        let (nominal, delays) = (self.nominal(), &self.model.delays);
         let left = |band: &Band, alias: i32| {
-            let turn = TAU * f64::from(alias);
-            let column = CMat::from_fn(order.len(), 1, |i, _| {
-                let c = order[i];
-                let phase = turn * delay(c) + band.w * (delay(c) - delay(i));
-                let gain = Complex::from_polar(self.model.gains[c], -phase / m);
-                self.model.response(c, (band.w + turn) / m, 0.0) * gain
-            });
-            let explained = (column.adjoint() * &band.matrix * &column)[(0, 0)].re / column.norm_squared();
-            band.count as f64 * (band.matrix.trace().re - explained)
+            let column = self.model.steering(&nominal, band.w, &[alias]);
+            // The phases that were removed are those of the channels in the given order.
+            let removed = |i: usize| band.w * (delays[order[i]] - delays[i]) / self.model.ratio as f64;
+            band.unexplained(&CMat::from_fn(order.len(), 1, |i, _| {
+                column[(order[i], 0)] * Complex::from_polar(1.0, -removed(i))
+            }))
         };
-        let best = |band: &Band| (-reach..=reach).map(|k| left(band, k)).fold(f64::INFINITY, f64::min);
-        let power = |band: &Band| band.count as f64 * band.matrix.trace().re;
-        bands.iter().map(best).sum::<f64>() / bands.iter().map(power).sum::<f64>()
+        let best = |band: &Band| self.least_over_aliases(|alias| left(band, alias));
+        bands.iter().map(best).sum::<f64>() / bands.iter().map(Band::power).sum::<f64>()
     }
 
     /// The power that one alias per band leaves unexplained: with the nominal values and whichever alias
     /// fits a band best, and at the maximum.
-    pub(super) fn unexplained(&self, maximum: &Maximum) -> (f64, f64) {
-        let nominal = Point::nominal(self.model, Fit::default(), 0);
-        let reach = self.model.ratio as i32;
+    pub(super) fn unexplained(&self, found: &Point) -> (f64, f64) {
+        let nominal = self.nominal();
         let left = |point: &Point, band: &Band, alias: i32| {
-            let a = steering(self.model, point, band.w, &[alias]);
-            complement(&a).map_or(0.0, |(p, _)| band.count as f64 * (p * &band.matrix).trace().re)
+            band.unexplained(&self.model.steering(point, band.w, &[alias]))
         };
-        let held = self.bands(&maximum.point, FIRST_LEAST);
+        let used = self.bands(&found.delays, FIRST_LEAST);
         let at_nominal = self.spectra.bands(&nominal.delays).into_iter();
-        let same = at_nominal.filter(|band| held.iter().any(|held| held.band.w == band.w));
-        let best = |band: Band| {
-            (-reach..=reach).map(|alias| left(&nominal, &band, alias)).fold(f64::INFINITY, f64::min)
-        };
-        let found = held.iter().map(|held| left(&maximum.point, &held.band, held.aliases[0]));
-        (same.map(best).sum(), found.sum())
+        let same = at_nominal.filter(|band| used.iter().any(|used| used.band.w == band.w));
+        let before = same.map(|band| self.least_over_aliases(|alias| left(&nominal, &band, alias))).sum();
+        (before, used.iter().map(|used| left(found, &used.band, used.aliases[0])).sum())
     }
 
-    /// The estimates at the maximum, with the remarks that their intervals call for.
-    pub(super) fn finish(
-        &self,
-        maximum: &Maximum,
-        reference: usize,
-        fit: Fit,
-    ) -> Result<Fitted, CalibrateError> {
-        let factor = self.spectra.variance_factor;
-        let covariance =
-            covariance(&maximum.score.information).ok_or(CalibrateError::NotIdentifiable)? * factor;
-        let mut fitted = Fitted::new(maximum.point.clone(), covariance);
-        let misfit =
-            maximum.disagreement(factor).and_then(|(squares, freedom)| fitted.widen(squares, freedom));
-        fitted.remarks.extend(misfit.map(|misfit| Remark::BandsDisagree { misfit }));
-        if fit.offset {
-            fitted.offsets = Some(self.offsets(maximum, reference));
-        }
-        fitted.frames = self.frames;
-        Ok(fitted)
+    fn nominal(&self) -> Point {
+        Point::nominal(self.model, Fit::default(), 0)
     }
 
-    /// o_i and its standard deviation. The signal's own mean is not known, so the reference keeps its
-    /// offset.
-    fn offsets(&self, maximum: &Maximum, reference: usize) -> Vec<(f64, f64)> {
-        let (point, means) = (&maximum.point, &self.spectra.means);
-        let constant = |i: usize| point.gain(i, self.model) * self.model.response(i, 0.0, 0.0).re;
-        let signal = means[reference] - self.model.offsets[reference];
-        let sigma = (2.0 * maximum.noise * self.spectra.mean_variance).sqrt();
-        let offset = |i: usize| match i == reference {
-            true => (self.model.offsets[reference], 0.0),
-            false => (means[i] - signal * constant(i) / constant(reference), sigma),
-        };
-        (0..self.model.channels()).map(offset).collect()
+    fn least_over_aliases(&self, left: impl Fn(i32) -> f64) -> f64 {
+        let reach = self.model.ratio as i32;
+        (-reach..=reach).map(left).fold(f64::INFINITY, f64::min)
     }
 }
 
-impl Maximum {
+impl Maximum<'_> {
     /// By how much the estimates of the two halves of the bands differ: d' (C1 + C2)^-1 d and its degrees of
     /// freedom. `None` where a half alone does not determine the parameters.
     fn disagreement(&self, factor: f64) -> Option<(f64, usize)> {
         let [lower, upper] = &self.halves;
-        let (c1, c2) = (covariance(&lower.information)?, covariance(&upper.information)?);
-        let difference = &c1 * &lower.gradient - &c2 * &upper.gradient;
+        let [c1, c2] = [lower.inverse(WORST_CONDITION).ok()?, upper.inverse(WORST_CONDITION).ok()?];
+        let difference = &c1 * &lower.projection - &c2 * &upper.projection;
         let squares = difference.dot(&solve(&((c1 + c2) * factor), &difference));
         squares.is_finite().then_some((squares, difference.len()))
     }
-}
 
-/// Calibrates from any signal that leaves fewer aliases occupied than there are channels.
-///
-/// # Errors
-/// [`CalibrateError`]: too few frames in a row, all aliases occupied, parameters that the signal does not
-/// tell apart, no convergence.
-pub(super) fn fit(
-    model: &Model,
-    records: &[Record],
-    fit: Fit,
-    reference: usize,
-) -> Result<Fitted, CalibrateError> {
-    let blind = Blind::new(model, records)?;
-    let maximum = blind.maximise(fit, reference)?;
-    blind.finish(&maximum, reference, fit)
+    /// o_i. The signal's own mean is not known, so the reference keeps its offset.
+    fn offsets(&self, reference: usize) -> Vec<Estimate<f64>> {
+        let Blind { model, spectra, .. } = self.blind;
+        let constant = |i: usize| self.point.gain(i, model) * model.response(i, 0.0, 0.0).re;
+        let signal = spectra.means[reference] - model.offsets[reference];
+        let sigma = (2.0 * self.noise * spectra.mean_variance).sqrt();
+        let offset = |i: usize| match i == reference {
+            true => Estimate { value: model.offsets[reference], sigma: 0.0 },
+            false => {
+                let value = spectra.means[i] - signal * constant(i) / constant(reference);
+                Estimate { value, sigma }
+            }
+        };
+        (0..model.channels()).map(offset).collect()
+    }
 }

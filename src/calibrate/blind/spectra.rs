@@ -1,6 +1,6 @@
-//! Spectral matrices of the captures.
+//! Spectral matrices of the captures, band by band, and how many aliases a band holds.
 
-use crate::linalg::{CMat, Complex, fourier};
+use crate::linalg::{CMat, Complex, fourier, hermitian_eigenvalues};
 use std::f64::consts::{PI, TAU};
 
 /// Share of the record at each end over which the window rises from 0 to 1. Its variance of 1.03 and its
@@ -11,6 +11,9 @@ const FIRST_BIN: usize = 3;
 /// Bins per band, if the record is long enough, and the most bands.
 const BINS_PER_BAND: usize = 32;
 const MOST_BANDS: usize = 128;
+/// An eigenvalue counts as an alias if it exceeds the noise by this factor. Of bands of 16 bins and more the
+/// largest eigenvalue of pure noise stays below four times the smallest quarter of all.
+const ABOVE_NOISE: f64 = 10.0;
 
 /// The transforms of the windowed captures.
 ///
@@ -49,24 +52,22 @@ impl Spectra {
         let latest = delays.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let earliest = delays.iter().copied().fold(f64::INFINITY, f64::min);
         let span = (frames as f64 - 1.0) * m + (latest - earliest);
-        let window = |delay: f64| -> Vec<f64> {
-            (0..frames).map(|k| taper((k as f64 * m + latest - delay) / span)).collect()
-        };
         let power = |w: &[f64], n: i32| w.iter().map(|w| w.powi(n)).sum::<f64>();
-        let (mut bins, mut means) = (Vec::new(), Vec::new());
-        let (mut variance_factor, mut mean_variance) = (1.0, 0.0);
+        let (bins, means) = (Vec::new(), Vec::new());
+        let mut all = Self { bins, frames, ratio: m, variance_factor: 1.0, means, mean_variance: 0.0 };
         for (capture, &delay) in captures.iter().zip(delays) {
-            let window = window(delay);
+            let window = |k: usize| taper((k as f64 * m + latest - delay) / span);
+            let window: Vec<f64> = (0..frames).map(window).collect();
             let (sum, squares) = (power(&window, 1), power(&window, 2));
-            variance_factor = frames as f64 * power(&window, 4) / (squares * squares);
-            mean_variance = squares / (sum * sum);
+            all.variance_factor = frames as f64 * power(&window, 4) / (squares * squares);
+            all.mean_variance = squares / (sum * sum);
             let mean = capture.iter().zip(&window).map(|(x, w)| x * w).sum::<f64>() / sum;
             let windowed: Vec<f64> = capture.iter().zip(&window).map(|(x, w)| (x - mean) * w).collect();
             let scale = squares.sqrt().recip();
-            bins.push(fourier::real_spectrum(&windowed).into_iter().map(|x| x * scale).collect());
-            means.push(mean);
+            all.bins.push(fourier::real_spectrum(&windowed).into_iter().map(|x| x * scale).collect());
+            all.means.push(mean);
         }
-        Self { bins, frames, ratio: m, variance_factor, means, mean_variance }
+        all
     }
 
     /// The spectral matrices with the phases of `delays` removed.
@@ -98,6 +99,42 @@ impl Spectra {
         let w = 0.5 * (first + end).saturating_sub(1) as f64 * step;
         Band { w, count, matrix: matrix / Complex::from(count.max(1) as f64) }
     }
+}
+
+impl Band {
+    /// The power of all channels in all bins.
+    pub(in crate::calibrate) fn power(&self) -> f64 {
+        self.count as f64 * self.matrix.trace().re
+    }
+
+    /// The power that a source with this column leaves: that of R without its part along the column.
+    pub(in crate::calibrate) fn unexplained(&self, column: &CMat) -> f64 {
+        let along = (column.adjoint() * &self.matrix * column)[(0, 0)].re / column.norm_squared();
+        self.power() - self.count as f64 * along
+    }
+
+    /// Eigenvalues, largest first; none if they cannot be computed.
+    fn eigenvalues(&self) -> Vec<f64> {
+        let mut values = hermitian_eigenvalues(&self.matrix).unwrap_or_default();
+        values.sort_by(|a, b| b.total_cmp(a));
+        values
+    }
+}
+
+/// The number of occupied aliases of each band: eigenvalues above the noise and above `least` times the
+/// largest. A band in which all N eigenvalues count is of no use, and so is one in which none does: 0 for
+/// both.
+pub(super) fn occupied(bands: &[Band], least: f64) -> Vec<usize> {
+    let values: Vec<Vec<f64>> = bands.iter().map(Band::eigenvalues).collect();
+    let mut noise: Vec<f64> = values.iter().filter_map(|values| values.last().copied()).collect();
+    noise.sort_by(f64::total_cmp);
+    let floor = noise.get(noise.len() / 4).copied().unwrap_or(0.0).max(0.0);
+    let count = |values: &Vec<f64>| {
+        let limit = (ABOVE_NOISE * floor).max(least * values.first().copied().unwrap_or(0.0));
+        let above = values.iter().filter(|&&value| value > limit).count();
+        if above < values.len() { above } else { 0 }
+    };
+    values.iter().map(count).collect()
 }
 
 /// The window at the share `x` of its length: 1 in the middle, half a cosine at both ends.

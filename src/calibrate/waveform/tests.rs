@@ -1,12 +1,11 @@
 //! A known waveform against its bound, and what is refused.
 
-use super::channel::colour;
 use super::*;
 use crate::analog::StrictlyProper;
 use crate::calibrate::testbench::{
     assert_covers, errors, gaussian, interleaved, random_errors, trials, with_errors,
 };
-use crate::calibrate::{CalibrateError, Calibration, Evidence, Fit, calibrate};
+use crate::calibrate::{CalibrateError, Calibration, CalibrationSignal, Fit, calibrate};
 use crate::random::Random;
 use crate::simulate::Instants;
 use crate::spec::Spec;
@@ -46,7 +45,7 @@ fn by_waveform(
     cutoff: bool,
 ) -> Result<Calibration, CalibrateError> {
     let settings = Settings { fit: Fit { cutoff, ..Fit::default() }, reference: 0 };
-    calibrate(spec, records, Evidence::Waveform { samples, spacing: SPACING }, settings)
+    calibrate(spec, records, CalibrationSignal::Waveform { samples, spacing: SPACING }, settings)
 }
 
 /// The standard deviation is s / sqrt(g^2 sum v'^2), and the intervals hold the truth.
@@ -122,11 +121,15 @@ fn swapped_captures_are_recognised() {
 }
 
 #[test]
-fn coloured_noise_widens_the_intervals() {
+fn correlated_noise_widens_the_intervals() {
     let mut dice = Random(25);
     let white: Vec<f64> = (0..4000).map(|_| gaussian(&mut dice)).collect();
-    assert_eq!(colour(&white), 1.0);
-    let coloured: Vec<f64> = white.windows(8).map(|window| window.iter().sum()).collect();
+    assert_eq!(correlation_factor(&white), 1.0);
+    let correlated: Vec<f64> = white.windows(8).map(|window| window.iter().sum()).collect();
     // The standard deviation of a mean of moving averages of 8 is sqrt(8) times that of white noise.
-    assert!((colour(&coloured) - 8f64.sqrt()).abs() < 0.3, "{}", colour(&coloured));
+    assert!(
+        (correlation_factor(&correlated) - 8f64.sqrt()).abs() < 0.3,
+        "{}",
+        correlation_factor(&correlated)
+    );
 }

@@ -1,10 +1,11 @@
 //! What a reader of the estimates must know.
 
+use super::error::list;
 use crate::units::{FastPeriods, Hertz};
 
 /// A property of the captures that limits what the estimates mean.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Remark {
+pub enum Warning {
     /// Clipped samples were left out.
     #[error("clipped samples were left out, per channel: {}", list(counts))]
     Clipped {
@@ -96,7 +97,7 @@ pub enum Remark {
         modulus: FastPeriods,
     },
     /// Tones were left out of the fit of delays because they are harmonics of another one.
-    #[error("{count} further tones are harmonics and tell nothing of the delays; they were left out")]
+    #[error("{count} further tones are harmonics, which say nothing of the delays; they were left out")]
     HarmonicsLeftOut {
         /// Their number.
         count: usize,
@@ -111,19 +112,14 @@ pub enum Remark {
     },
 }
 
-impl Remark {
-    /// Whether the estimates are doubtful; other remarks only say what they mean.
-    pub fn is_warning(&self) -> bool {
-        !matches!(self, Self::CutoffAssumed { .. } | Self::HarmonicsLeftOut { .. } | Self::Shifted { .. })
+impl Warning {
+    /// Whether it only says what the estimates mean; the others say that they are doubtful.
+    pub fn is_note(&self) -> bool {
+        matches!(self, Self::CutoffAssumed { .. } | Self::HarmonicsLeftOut { .. } | Self::Shifted { .. })
     }
 }
 
 fn pairs(offsets: &[Vec<f64>]) -> String {
     let numbers = |parts: &Vec<f64>| parts.iter().map(|x| format!("{x:.3e}")).collect::<Vec<_>>().join(", ");
     offsets.iter().map(|parts| format!("({})", numbers(parts))).collect::<Vec<_>>().join(", ")
-}
-
-fn list(counts: &[usize]) -> String {
-    let counts: Vec<String> = counts.iter().map(usize::to_string).collect();
-    counts.join(", ")
 }

@@ -1,0 +1,121 @@
+//! What the phases of tones leave open: the Nyquist zone of a tone, and whole periods of a delay.
+
+use super::phasors::Measured;
+use crate::calibrate::error::CalibrateError;
+use crate::calibrate::model::Model;
+use crate::sine_fit::wrapped;
+use crate::units::FastPeriods;
+use std::f64::consts::TAU;
+
+/// A zone is clear if its phases are off by less than this share of those of the next one,
+const CLEAR_SHARE: f64 = 0.35;
+/// and by less than this (radians, rms).
+const CLEAR_PHASE: f64 = 0.6;
+/// Most periods of the highest tone that are searched.
+const MOST_PERIODS: usize = 1000;
+/// Phases that differ by less than this (radians) count as the same: more than errors of front ends change
+/// them.
+const SAME_PHASE: f64 = 0.1;
+/// A delay farther from nominal must agree with the phases by this much more (radians, rms) than a nearer
+/// one.
+const CLEARLY_BETTER: f64 = 0.05;
+
+/// Where the captures show a tone.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Alias {
+    /// Cycles per slow sample: 0 to 1/2, of complex samples -1/2 to 1/2.
+    pub(super) cycles: f64,
+    pub(super) is_complex: bool,
+}
+
+/// A frequency that a tone may have.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    /// Cycles per slow sample.
+    cycles: f64,
+    /// Whether the captures show the conjugate: real samples do in odd zones (from 0).
+    is_conjugate: bool,
+}
+
+impl Alias {
+    /// The frequencies below half the fast rate with this alias.
+    fn candidates(self, ratio: usize) -> Vec<Candidate> {
+        let alias = self.cycles;
+        if self.is_complex {
+            let most = 0.5 * ratio as f64;
+            let all = (-(ratio as i64)..=ratio as i64).map(|whole| whole as f64 + alias);
+            let inside = all.filter(|cycles| cycles.abs() < most);
+            return inside.map(|cycles| Candidate { cycles, is_conjugate: false }).collect();
+        }
+        let of_zone = |zone: usize| match zone % 2 {
+            1 => Candidate { cycles: zone.div_ceil(2) as f64 - alias, is_conjugate: true },
+            _ => Candidate { cycles: (zone / 2) as f64 + alias, is_conjugate: false },
+        };
+        (0..ratio).map(of_zone).collect()
+    }
+}
+
+impl Candidate {
+    /// How far measured phases are from the nominal ones (radians, rms).
+    fn distance(self, model: &Model, phases: &[f64], reference: usize) -> f64 {
+        let w = TAU * self.cycles / model.ratio as f64;
+        let off = |i: usize| {
+            let measured = phases[i] - phases[reference];
+            let measured = if self.is_conjugate { -measured } else { measured };
+            wrapped(measured - (model.nominal(i, w) / model.nominal(reference, w)).arg())
+        };
+        let squares: f64 = (0..model.channels()).map(|i| off(i).powi(2)).sum();
+        (squares / (model.channels() - 1) as f64).sqrt()
+    }
+}
+
+/// The frequency, in cycles per slow sample, of a tone that appears at `alias` with `phases`: the one below
+/// half the fast rate whose nominal phases agree.
+pub(super) fn zone_of(
+    model: &Model,
+    alias: Alias,
+    phases: &[f64],
+    reference: usize,
+) -> Result<f64, CalibrateError> {
+    let all = alias.candidates(model.ratio).into_iter();
+    let mut all: Vec<(f64, f64)> =
+        all.map(|candidate| (candidate.distance(model, phases, reference), candidate.cycles)).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    match all[..] {
+        [best, second, ..] if best.0 > CLEAR_SHARE * second.0 || best.0 > CLEAR_PHASE => {
+            let [alias, best, other] = [alias.cycles, best.1, second.1].map(|x| model.slow_rate() * x);
+            Err(CalibrateError::AmbiguousZone { alias, best, other })
+        }
+        [best, ..] => Ok(best.1),
+        [] => Ok(alias.cycles),
+    }
+}
+
+/// The tone of the highest frequency.
+fn highest(tones: &[Measured]) -> Option<&Measured> {
+    tones.iter().max_by(|a, b| a.w.total_cmp(&b.w))
+}
+
+/// The least change of a delay that leaves all phases as they are.
+pub(super) fn modulus(tones: &[Measured]) -> Option<FastPeriods> {
+    let period = TAU / highest(tones)?.w;
+    let agrees = |shift: &f64| tones.iter().all(|tone| wrapped(tone.w * shift).abs() < SAME_PHASE);
+    (1..=MOST_PERIODS).map(|m| m as f64 * period).find(agrees).map(FastPeriods)
+}
+
+/// The deviation of the delay of channel `i` from nominal, roughly: among those within `reach` fast periods
+/// the one nearest to 0 that agrees with the phases of all tones about as well as the best.
+pub(super) fn nearest_delay(tones: &[Measured], i: usize, reach: f64) -> f64 {
+    let Some(top) = highest(tones) else { return 0.0 };
+    let (first, period) = (-top.ratios[i].arg() / top.w, TAU / top.w);
+    let most = if tones.len() == 1 { 0 } else { ((reach / period) as i64).min(MOST_PERIODS as i64) };
+    let misfit = |delay: f64| {
+        let squares = tones.iter().map(|tone| wrapped(tone.ratios[i].arg() + tone.w * delay).powi(2));
+        (squares.sum::<f64>() / tones.len() as f64).sqrt()
+    };
+    let delays = (-most..=most).map(|m| first + m as f64 * period);
+    let candidates: Vec<(f64, f64)> = delays.map(|delay| (delay, misfit(delay))).collect();
+    let best = candidates.iter().map(|candidate| candidate.1).fold(f64::INFINITY, f64::min);
+    let good = candidates.into_iter().filter(|candidate| candidate.1 <= best + CLEARLY_BETTER);
+    good.min_by(|a, b| a.0.abs().total_cmp(&b.0.abs())).map_or(first, |candidate| candidate.0)
+}
