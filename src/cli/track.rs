@@ -10,7 +10,7 @@ use crate::io::IoError;
 use crate::pipeline::{Change, PipelineError, Retuner};
 use crate::quantity;
 use crate::runtime::{Algorithm, Options, Stream};
-use crate::track::{self, DriftModel, FollowSettings, Followed, Follower, Guide, Logged, Reading};
+use crate::track::{self, DelaySource, DriftModel, FollowSettings, Followed, Follower, Logged, Reading};
 use crate::units::Seconds;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -72,13 +72,13 @@ impl TrackArgs {
     fn kind(&self, text: &str) -> Result<Kind, Failure> {
         let usage = |reason: &dyn std::fmt::Display| Failure::Usage(format!("--track {text}: {reason}"));
         if text == "blind" {
-            return Ok(Kind::Guide(Guide::AnySignal));
+            return Ok(Kind::Source(DelaySource::AnySignal));
         }
         if let Some(pilot) = text.strip_prefix("pilot=") {
             let pilot = quantity::frequency(pilot.trim()).map_err(|error| usage(&error))?;
             let is_tone = pilot.0 > 0.0;
             return if is_tone {
-                Ok(Kind::Guide(Guide::Pilot(pilot)))
+                Ok(Kind::Source(DelaySource::Pilot(pilot)))
             } else {
                 Err(usage(&"a pilot has a positive frequency"))
             };
@@ -103,12 +103,12 @@ impl TrackArgs {
     /// What follows the delays of the channels, if that is asked for; `rate` is that of the output.
     pub(super) fn follower(&self, bank: &Bank, path: &Path, rate: f64) -> Result<Option<Follower>, Failure> {
         let Some(text) = self.track.as_deref() else { return Ok(None) };
-        let guide = match self.kind(text)? {
-            Kind::Guide(guide) => guide,
+        let source = match self.kind(text)? {
+            Kind::Source(source) => source,
             Kind::File(file) => {
                 let (text, channels) = (read_text(&file)?, bank.channel_count());
                 let name = file.display().to_string();
-                Guide::Readings(Reading::parse(&text, &name, channels).map_err(Failure::input)?)
+                DelaySource::Readings(Reading::parse(&text, &name, channels).map_err(Failure::input)?)
             }
         };
         // A bank in normalised time counts in units that the recordings say.
@@ -120,7 +120,7 @@ impl TrackArgs {
             rate_deviation: FIRST_RATE * wander,
             rate_change: wander * unit,
         };
-        let follower = Follower::new(bank, guide, settings);
+        let follower = Follower::new(bank, source, settings);
         follower.map(Some).map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
     }
 
@@ -134,7 +134,7 @@ impl TrackArgs {
 
 /// What --track says.
 enum Kind {
-    Guide(Guide),
+    Source(DelaySource),
     File(PathBuf),
 }
 

@@ -1,6 +1,7 @@
 //! The response of a front end to an analytic source, exact to rounding at any uniformly spaced instants.
 
 use super::source::{NormalisedSource, Source, Tone};
+use super::walk::sample_at;
 use crate::analog::StrictlyProper;
 use crate::linalg::{self, Complex, Mat};
 use crate::units::FastPeriods;
@@ -25,31 +26,35 @@ impl Instants {
 
 /// (phi * f)(t) at the given instants, accurate to rounding.
 ///
-/// Steps and tones have closed forms. A chirp costs one small matrix product per panel of its quadrature;
-/// [`frames`](super::frames) refuses too many. Beyond a million panels between two instants digits are lost.
+/// Steps and tones have closed forms. A chirp costs the panels of its quadrature, as in
+/// [`sample_at`]; [`frames`](super::frames) refuses too many. Beyond a million panels between two instants
+/// digits are lost.
 pub fn sample(filter: &StrictlyProper, source: &NormalisedSource, instants: Instants) -> Vec<f64> {
     match source {
         Source::Step { at, height } => step(filter, at.0, *height, instants),
         Source::Tones(list) => tones(filter, list, instants),
-        Source::Chirp { length, start, end, .. } => {
-            smooth(filter, source, (0.0, length.0), start.0.abs().max(end.0.abs()), instants)
+        Source::Chirp { .. } => {
+            let times: Vec<FastPeriods> = (0..instants.count).map(|n| instants.at(n)).collect();
+            sample_at(filter, source, &times)
         }
-        Source::Sum(terms) => {
-            let mut total = vec![0.0; instants.count];
-            for term in terms {
-                let samples = sample(filter, term, instants);
-                total.iter_mut().zip(samples).for_each(|(sum, x)| *sum += x);
-            }
-            total
-        }
+        Source::Sum(terms) => sum(instants.count, terms.iter().map(|term| sample(filter, term, instants))),
     }
+}
+
+/// The sum of the samples of several terms.
+pub(super) fn sum(count: usize, terms: impl Iterator<Item = Vec<f64>>) -> Vec<f64> {
+    let mut total = vec![0.0; count];
+    terms.for_each(|term| total.iter_mut().zip(term).for_each(|(sum, x)| *sum += x));
+    total
 }
 
 /// Bytes of the arrays in [`sample`] for `count` instants: the result, and one term of each sum at a time.
 pub(super) fn work_bytes(source: &NormalisedSource, count: usize) -> usize {
     let nested = match source {
         Source::Sum(terms) => terms.iter().map(|term| work_bytes(term, count)).max().unwrap_or(0),
-        _ => 0,
+        // The instants and their order.
+        Source::Chirp { .. } => count.saturating_mul(2 * size_of::<f64>()),
+        Source::Step { .. } | Source::Tones(_) => 0,
     };
     count.saturating_mul(size_of::<f64>()).saturating_add(nested)
 }
@@ -82,71 +87,6 @@ fn step(filter: &StrictlyProper, at: f64, height: f64, instants: Instants) -> Ve
     output
 }
 
-/// Sixteen-point Gauss-Legendre rule on [0, 1]: abscissae below one half (the others mirror them) and
-/// weights (Abramowitz & Stegun, table 25.4).
-const HALF_NODES: [(f64, f64); 8] = [
-    (0.005299532504175031, 0.013576229705877088),
-    (0.0277124884633837, 0.031126761969323728),
-    (0.06718439880608412, 0.0475792558412463),
-    (0.1222977958224985, 0.062314485627767036),
-    (0.19106187779867811, 0.07479799440828835),
-    (0.2709916111713863, 0.08457825969750132),
-    (0.35919822461037054, 0.09130170752246182),
-    (0.4524937450811813, 0.09472530522753432),
-];
-
-/// The response to a smooth source that is zero outside `support` (fast periods) and has no frequency above
-/// `band` (cycles per fast period).
-///
-/// x(t + l) = e^{A l} x(t) + int_0^l e^{A (l - s)} B f(t + s) ds. The integral is taken by a Gauss-Legendre
-/// rule on panels in which the phase of the source and the exponents of the filter change by about one
-/// radian at most; the rule is then exact to rounding.
-fn smooth(
-    filter: &StrictlyProper,
-    source: &NormalisedSource,
-    support: (f64, f64),
-    band: f64,
-    instants: Instants,
-) -> Vec<f64> {
-    let rate = panel_rate(filter, band);
-    let mut state = Mat::zeros(filter.order(), 1);
-    let mut now = support.0.min(instants.first.0);
-    let mut output = Vec::with_capacity(instants.count);
-    let mut cached: Option<Panels> = None;
-    for k in 0..instants.count {
-        let target = instants.at(k).0;
-        // The source is not smooth at the ends of its support, so panels end there.
-        for corner in [support.0, support.1, target] {
-            let length = corner - now;
-            if length <= 0.0 || corner > target {
-                continue;
-            }
-            let panels = match cached.take() {
-                Some(known) if known.fits(length) => known,
-                _ => Panels::new(filter, length, rate),
-            };
-            panels.advance(&mut state, source, now, support);
-            now = corner;
-            cached = Some(panels);
-        }
-        output.push((filter.c() * &state)[0]);
-    }
-    output
-}
-
-/// The whole rule on [0, 1]: abscissae and weights.
-pub(super) const RULE: [(f64, f64); 16] = {
-    let mut rule = [(0.0, 0.0); 16];
-    let mut k = 0;
-    while k < 8 {
-        let (abscissa, weight) = HALF_NODES[k];
-        rule[k] = (abscissa, weight);
-        rule[15 - k] = (1.0 - abscissa, weight);
-        k += 1;
-    }
-    rule
-};
-
 /// Panels of the quadrature per fast period, for a source with no frequency above `band` (cycles per fast
 /// period).
 pub(super) fn panel_rate(filter: &StrictlyProper, band: f64) -> f64 {
@@ -166,49 +106,6 @@ pub(super) fn panels(
         Source::Step { .. } if jittered => span.0 * panel_rate(filter, 0.0),
         Source::Sum(terms) => terms.iter().map(|term| panels(filter, term, span, jittered)).sum(),
         Source::Step { .. } | Source::Tones(_) => 0.0,
-    }
-}
-
-/// The quadrature over an interval of `length` fast periods in equal panels; reused for intervals of equal
-/// length.
-struct Panels {
-    length: f64,
-    count: usize,
-    transition: Mat,
-    /// (abscissa, weight e^{A(l - abscissa)} B) within a panel.
-    nodes: Vec<(f64, Mat)>,
-}
-
-impl Panels {
-    fn new(filter: &StrictlyProper, length: f64, rate: f64) -> Self {
-        // Bounded so that every call ends; callers ask `panels` beforehand.
-        let count = (length * rate).ceil().clamp(1.0, 1e6) as usize;
-        let panel = length / count as f64;
-        let mirrored = HALF_NODES.iter().map(|&(x, w)| (1.0 - x, w));
-        let node = |(x, w): (f64, f64)| {
-            (x * panel, linalg::expm(&(filter.a() * (panel * (1.0 - x)))) * filter.b() * (w * panel))
-        };
-        let nodes = HALF_NODES.iter().copied().chain(mirrored).map(node).collect();
-        Self { length, count, transition: linalg::expm(&(filter.a() * panel)), nodes }
-    }
-
-    fn fits(&self, length: f64) -> bool {
-        (length - self.length).abs() <= 1e-12 * self.length
-    }
-
-    fn advance(&self, state: &mut Mat, source: &NormalisedSource, start: f64, support: (f64, f64)) {
-        let panel = self.length / self.count as f64;
-        for k in 0..self.count {
-            let begin = start + k as f64 * panel;
-            *state = &self.transition * &*state;
-            if begin + panel <= support.0 || begin >= support.1 {
-                continue;
-            }
-            for (offset, weight) in &self.nodes {
-                let value = source.value(FastPeriods(begin + offset));
-                *state += weight * value;
-            }
-        }
     }
 }
 

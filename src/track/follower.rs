@@ -2,16 +2,16 @@
 
 use super::filter::{DelayFilter, DelayMeasurement, DelayState, DriftModel};
 use super::frame_shift::{least_half, shift_for};
-use super::guide::Guide;
 use super::log::{Logged, TrackWarning};
-use super::readings::{HALF_WIDTH, Reading};
+use super::readings::Reading;
+use super::source::{DelaySource, check_pilot};
 use super::timeline::Timeline;
 use super::tracker::{DelayTracker, Lock, Taken};
 use super::{Coincidence, TrackError};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::calibrate::Model;
-use crate::spec::Spec;
-use crate::units::{FastPeriods, Hertz, Seconds};
+use crate::spec::{ChannelSpec, HALF_WIDTH, Spec};
+use crate::units::{FastPeriods, Seconds};
 use std::collections::VecDeque;
 
 /// A delay counts as known when the half-width of its 95 % interval is below this, in fast periods, or below
@@ -26,8 +26,6 @@ const LEAST_FRAMES: usize = 16;
 /// blocks.
 const TOGETHER: f64 = 0.05;
 const HORIZON: f64 = 60.0;
-/// Least distance of a pilot from a multiple of half the slow rate, cycles per block.
-const LEAST_CYCLES: f64 = 2.0;
 
 /// How delays are followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,7 +75,7 @@ pub struct Followed {
 #[derive(Debug, Clone)]
 pub struct Follower {
     spec: Spec,
-    guide: Guide,
+    source: DelaySource,
     settings: FollowSettings,
     reference: usize,
     /// The channels whose delays the taps follow.
@@ -103,7 +101,7 @@ impl Follower {
     ///
     /// # Errors
     /// [`TrackError`] for a bank whose taps do not follow delays, or a pilot that cannot be measured.
-    pub fn new(bank: &Bank, guide: Guide, settings: FollowSettings) -> Result<Self, TrackError> {
+    pub fn new(bank: &Bank, source: DelaySource, settings: FollowSettings) -> Result<Self, TrackError> {
         if matches!(bank.filters, SynthesisFilters::StateSpace(_)) {
             return Err(TrackError::Recursive);
         }
@@ -117,8 +115,8 @@ impl Follower {
         if followed.is_empty() {
             return Err(TrackError::NoTapSlopes);
         }
-        if let Guide::Pilot(pilot) = guide {
-            check_pilot(&Model::new(&spec)?, pilot, settings.block_frames)?;
+        if let DelaySource::Pilot(pilot) = source {
+            check_pilot(Model::new(&spec)?.slow_rate(), pilot, settings.block_frames)?;
         }
         let smallest = followed.iter().map(|&j| of_all[j].0).fold(f64::INFINITY, f64::min);
         let wanted = Seconds((KNOWN * spec.fast_period.0).max(KNOWN_SHARE * smallest) / HALF_WIDTH);
@@ -127,9 +125,9 @@ impl Follower {
         let tracker = |&j: &usize| {
             let (delay, sigma) = (spec.channels[j].delay, of_all[j].0 / HALF_WIDTH);
             let state = DelayState::known(delay, sigma, settings.rate_deviation);
-            let timeline = match &guide {
-                Guide::Readings(readings) => Timeline::new(readings, j, frame, settings.model),
-                Guide::Pilot(_) | Guide::AnySignal => None,
+            let timeline = match &source {
+                DelaySource::Readings(readings) => Timeline::new(readings, j, frame, settings.model),
+                DelaySource::Pilot(_) | DelaySource::AnySignal => None,
             };
             DelayTracker::new(j, of_all[j], DelayFilter::new(state, settings.model), timeline)
         };
@@ -137,7 +135,7 @@ impl Follower {
         let no_shifts = vec![0; spec.channels.len()];
         Ok(Self {
             spec,
-            guide,
+            source,
             settings,
             reference,
             trackers,
@@ -187,7 +185,7 @@ impl Follower {
         first: u64,
         centre: f64,
     ) -> Result<Vec<Option<DelayMeasurement>>, String> {
-        if let Guide::Readings(readings) = &self.guide {
+        if let DelaySource::Readings(readings) = &self.source {
             let frames = first..first + self.settings.block_frames as u64;
             let readings = Reading::within(readings, frames).to_vec();
             let mut latest = Err("no reading".to_owned());
@@ -207,7 +205,7 @@ impl Follower {
             let j = tracker.channel;
             expected.channels[j].delay = tracker.state().delay - self.shifted(j);
         }
-        let mut measured = self.guide.measure(&expected, self.reference, samples)?;
+        let mut measured = self.source.measure(&expected, self.reference, samples)?;
         let walked = self.mean_of_block();
         for (j, measurement) in measured.iter_mut().enumerate() {
             if let Some(measurement) = measurement {
@@ -374,7 +372,7 @@ impl Follower {
         if channels > self.spec.ratio || !is_known {
             return None;
         }
-        let known = |channel: &crate::spec::ChannelSpec| DelayState::known(channel.delay, 0.0, 0.0);
+        let known = |channel: &ChannelSpec| DelayState::known(channel.delay, 0.0, 0.0);
         let mut states: Vec<DelayState> = self.spec.channels.iter().map(known).collect();
         self.trackers.iter().for_each(|tracker| states[tracker.channel] = tracker.state());
         let horizon = self.frame_time() * (HORIZON * self.settings.block_frames as f64);
@@ -383,15 +381,4 @@ impl Follower {
         let [a, b] = found.channels.map(|i| i + 1);
         Some(TrackWarning::Coincidence { channels: [a, b], after: found.after })
     }
-}
-
-/// Refuses a pilot at a multiple of half the slow rate.
-fn check_pilot(model: &Model, pilot: Hertz, frames: usize) -> Result<(), TrackError> {
-    let rate = model.slow_rate();
-    let halves = 2.0 * (pilot / rate);
-    let cycles = 0.5 * (halves - halves.round()).abs() * frames as f64;
-    if cycles >= LEAST_CYCLES {
-        return Ok(());
-    }
-    Err(TrackError::PilotPosition { pilot, cycles, frames, half: rate * 0.5 })
 }

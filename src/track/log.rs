@@ -1,9 +1,8 @@
 //! What is known of the delays at some frame, as a line of a log, and what a user should know at once.
 
 use super::filter::{DelayMeasurement, DelayState};
-use super::readings::HALF_WIDTH;
 use super::tracker::Lock;
-use crate::spec::Spec;
+use crate::spec::{HALF_WIDTH, Spec};
 use crate::units::Seconds;
 use serde::Serialize;
 use std::fmt;

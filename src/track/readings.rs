@@ -1,12 +1,10 @@
 //! Delays that were measured elsewhere, as JSON lines.
 
 use super::TrackError;
+use crate::spec::HALF_WIDTH;
 use crate::units::Seconds;
 use serde::Deserialize;
 use std::ops::Range;
-
-/// Half-widths of 95 % intervals over standard deviations.
-pub(super) const HALF_WIDTH: f64 = 1.96;
 
 /// The delays at one frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,7 +100,10 @@ mod tests {
         let readings = Reading::parse(text, "d.jsonl", 2).unwrap();
         assert_eq!(readings[0].delays[0], None);
         let (delay, sigma) = readings[1].delays[1].unwrap();
-        assert!(delay == Seconds(3e-6) && (sigma.0 / 1e-8 - 1.0).abs() < 1e-12, "{readings:?}");
+        assert!(
+            delay == Seconds(3e-6) && (sigma.0 * HALF_WIDTH / 1.96e-8 - 1.0).abs() < 1e-12,
+            "{readings:?}"
+        );
         assert_eq!(readings[1].delays[0], None);
         assert_eq!(Reading::within(&readings, 4..10), &readings[1..]);
         assert!(Reading::within(&readings, 4..9).is_empty());

@@ -73,7 +73,7 @@ fn ten_ppm_per_second_are_followed_within_the_prediction() {
     let delay = |t: f64| nominal - 4e-6 + 0.5 * 1e-5 * (t - 0.4) * (t - 0.4);
     // The rate moves by 10 ppm in a second, so by that times a block between two measurements.
     let step = 1e-5 * (4096.0 * PERIOD).sqrt();
-    let mut follower = Follower::new(&bank, Guide::Pilot(Hertz(7000.0)), settings(step)).unwrap();
+    let mut follower = Follower::new(&bank, DelaySource::Pilot(Hertz(7000.0)), settings(step)).unwrap();
     let (mut square, mut predicted, mut count) = (0.0, 0.0, 0);
     // 60 dB for a tone of amplitude 1/2, whose mean square is 1/8.
     let noise = (0.125e-6f64).sqrt();
@@ -108,7 +108,7 @@ fn a_delay_of_many_periods_is_followed_by_shifts() {
     let (bank, mut random) = (bank(1.05), Random(5));
     let nominal = bank.delays[1].0;
     let delay = |t: f64| nominal + 60e-6 * t;
-    let mut follower = Follower::new(&bank, Guide::Pilot(Hertz(7000.0)), settings(1e-6)).unwrap();
+    let mut follower = Follower::new(&bank, DelaySource::Pilot(Hertz(7000.0)), settings(1e-6)).unwrap();
     let mut shifts = vec![0; 2];
     let mut largest = 0;
     for number in 0..45 {
@@ -146,14 +146,14 @@ fn a_delay_of_many_periods_is_followed_by_shifts() {
 fn a_pilot_is_measured_at_the_bound() {
     let (bank, mut random) = (bank(0.9), Random(7));
     let (tone, noise, blocks) = (9100.0, 1e-3, 60);
-    let guide = Guide::Pilot(Hertz(tone));
+    let source = DelaySource::Pilot(Hertz(tone));
     let spec = bank.spec.clone().unwrap();
     let truth = bank.delays[1].0 + 2e-6;
     let (mut square, mut stated) = (0.0, 0.0);
     let problem = Problem::new(&spec, 10).unwrap();
     for number in 0..blocks {
         let samples = block(&bank, number, tone, noise, |_| truth, &mut random);
-        let found = guide.measure(&spec, 0, &samples).unwrap();
+        let found = source.measure(&spec, 0, &samples).unwrap();
         let measured = found[1].unwrap();
         square += (measured.delay.0 - truth).powi(2);
         stated += measured.variance;
@@ -171,7 +171,7 @@ fn a_pilot_is_measured_at_the_bound() {
 fn silence_holds_the_delays_and_a_tone_takes_them_up_again() {
     let (bank, mut random) = (bank(0.9), Random(9));
     let delay = |t: f64| bank.delays[1].0 + 1e-6 + 2e-6 * t;
-    let mut follower = Follower::new(&bank, Guide::Pilot(Hertz(5000.0)), settings(1e-6)).unwrap();
+    let mut follower = Follower::new(&bank, DelaySource::Pilot(Hertz(5000.0)), settings(1e-6)).unwrap();
     let mut logs = Vec::new();
     for number in 0..20 {
         let samples = if (8..12).contains(&number) {
@@ -202,14 +202,14 @@ fn silence_holds_the_delays_and_a_tone_takes_them_up_again() {
 fn a_log_is_read_again() {
     let (bank, mut random) = (bank(0.9), Random(10));
     let delay = |_| bank.delays[1].0 - 1.5e-6;
-    let mut first = Follower::new(&bank, Guide::Pilot(Hertz(5000.0)), settings(1e-6)).unwrap();
+    let mut first = Follower::new(&bank, DelaySource::Pilot(Hertz(5000.0)), settings(1e-6)).unwrap();
     let mut lines = String::new();
     for number in 0..5 {
         let found = first.follow(&block(&bank, number, 5000.0, 1e-4, delay, &mut random));
         lines += &(serde_json::to_string(&found.log).unwrap() + "\n");
     }
     let readings = Reading::parse(&lines, "log.jsonl", 2).unwrap();
-    let mut second = Follower::new(&bank, Guide::Readings(readings), settings(1e-6)).unwrap();
+    let mut second = Follower::new(&bank, DelaySource::Readings(readings), settings(1e-6)).unwrap();
     for number in 0..6 {
         let log = second.follow(&vec![vec![0.0; 4096]; 2]).log;
         assert_eq!(log.held.is_some(), number == 5, "{log:?}");
@@ -230,7 +230,7 @@ fn a_known_drift_is_followed_between_its_readings() {
     };
     let lines: String = (0..8).map(line).collect();
     let readings = Reading::parse(&lines, "d.jsonl", 2).unwrap();
-    let mut follower = Follower::new(&bank, Guide::Readings(readings), settings(1e-5)).unwrap();
+    let mut follower = Follower::new(&bank, DelaySource::Readings(readings), settings(1e-5)).unwrap();
     let mut worst = 0.0_f64;
     for number in 0..26 {
         let found = follower.follow(&vec![vec![0.0; 4096]; 2]);
@@ -249,7 +249,7 @@ fn a_known_drift_is_followed_between_its_readings() {
 }
 
 #[test]
-fn delays_that_leave_the_box_or_come_together_are_told_once() {
+fn delays_that_leave_the_box_or_come_together_are_reported_once() {
     let bank = bank(0.9);
     // The delay of channel 2 falls from 1 fast period to that of channel 1, beyond the box.
     let line = |block: u64| {
@@ -258,7 +258,7 @@ fn delays_that_leave_the_box_or_come_together_are_told_once() {
     };
     let lines: String = (0..8).map(line).collect();
     let readings = Reading::parse(&lines, "d.jsonl", 2).unwrap();
-    let mut follower = Follower::new(&bank, Guide::Readings(readings), settings(1e-6)).unwrap();
+    let mut follower = Follower::new(&bank, DelaySource::Readings(readings), settings(1e-6)).unwrap();
     let mut warnings = Vec::new();
     for _ in 0..8 {
         let found = follower.follow(&vec![vec![0.0; 4096]; 2]);
@@ -280,14 +280,17 @@ fn delays_that_leave_the_box_or_come_together_are_told_once() {
 #[test]
 fn what_cannot_be_followed_is_refused() {
     let bank = bank(0.5);
-    let refused = |bank: &Bank, guide| Follower::new(bank, guide, settings(1e-6)).unwrap_err();
+    let refused = |bank: &Bank, source| Follower::new(bank, source, settings(1e-6)).unwrap_err();
     assert_eq!(
-        refused(&Bank { tap_slopes: None, ..bank.clone() }, Guide::AnySignal),
+        refused(&Bank { tap_slopes: None, ..bank.clone() }, DelaySource::AnySignal),
         TrackError::NoTapSlopes
     );
-    assert_eq!(refused(&Bank { spec: None, ..bank.clone() }, Guide::AnySignal), TrackError::NoSpec);
+    assert_eq!(refused(&Bank { spec: None, ..bank.clone() }, DelaySource::AnySignal), TrackError::NoSpec);
     let iir = include_str!("../../filters/thesis-iir.json");
-    assert_eq!(refused(&Bank::from_json(iir, "b.json").unwrap(), Guide::AnySignal), TrackError::Recursive);
-    let pilot = refused(&bank, Guide::Pilot(Hertz(24_000.0)));
+    assert_eq!(
+        refused(&Bank::from_json(iir, "b.json").unwrap(), DelaySource::AnySignal),
+        TrackError::Recursive
+    );
+    let pilot = refused(&bank, DelaySource::Pilot(Hertz(24_000.0)));
     assert!(matches!(pilot, TrackError::PilotPosition { frames: 4096, .. }), "{pilot}");
 }

@@ -1,9 +1,10 @@
 //! Delays at any instant from readings that are known beforehand.
 
 use super::filter::{DelayState, DriftModel};
-use super::readings::{HALF_WIDTH, Reading};
+use super::readings::Reading;
 use crate::sampling::SmoothingSpline;
 use crate::sampling::nonuniform::{Measured, Smoothness};
+use crate::spec::HALF_WIDTH;
 use crate::units::Seconds;
 
 /// Readings beyond this many standard deviations of what the others say are refused.

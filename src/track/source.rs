@@ -1,11 +1,11 @@
 //! Delays of one block of samples, by a pilot tone or by any signal.
 
-use super::{DelayMeasurement, Reading};
+use super::{DelayMeasurement, Reading, TrackError};
 use crate::calibrate::{CalibrationSignal, Fit, Model, Record, Settings, calibrate};
-use crate::sine_fit::{self, Channel, Estimate, ToneFit};
+use crate::sine_fit::{self, Channel, Estimate, ToneFit, alias, wrapped};
 use crate::spec::Spec;
 use crate::units::{Decibels, Hertz, Radians, Seconds};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// A pilot's frequency may be off by this share of itself and by this many cycles per block.
 const CLOCK_TOLERANCE: f64 = 1e-4;
@@ -15,14 +15,18 @@ const SEARCH_CYCLES: f64 = 2.0;
 const MOST_OTHERS: usize = 8;
 const OTHERS_RANGE: Decibels = Decibels(60.0);
 const APART: f64 = 3.0;
-/// Mean square of a block below which there is silence, relative to full scale.
-const SILENCE: f64 = 1e-16;
-/// A measurement with a larger standard deviation says nothing, in fast periods.
-const WORTHLESS: f64 = 0.25;
+/// Rms of a block, relative to full scale, below which it holds nothing to measure by: less than half a step
+/// of 24 bits and of any converter.
+const LEAST_LEVEL: f64 = 1e-8;
+/// A measurement with a larger standard deviation says nothing, in fast periods: its interval is as wide as
+/// the distance of two channels.
+const LARGEST_DEVIATION: f64 = 0.25;
+/// Least distance of a pilot from a multiple of half the slow rate, cycles per block.
+const LEAST_CYCLES: f64 = 2.0;
 
 /// What the delays are measured by.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Guide {
+pub enum DelaySource {
     /// A tone near this analog frequency that sounds all the time.
     Pilot(Hertz),
     /// Whatever signal there is, as [`CalibrationSignal::Any`].
@@ -31,7 +35,7 @@ pub enum Guide {
     Readings(Vec<Reading>),
 }
 
-impl Guide {
+impl DelaySource {
     /// The delays of the channels relative to `reference`, which keeps that of `spec`; those of the others
     /// in `spec` are what is expected. `Err` says why nothing was measured.
     pub(super) fn measure(
@@ -41,7 +45,7 @@ impl Guide {
         samples: &[Vec<f64>],
     ) -> Result<Vec<Option<DelayMeasurement>>, String> {
         let records: Vec<Record> = samples.iter().map(|list| Record::new(list.clone())).collect();
-        if records.iter().any(is_silent) {
+        if records.iter().any(|record| record.rms() < LEAST_LEVEL) {
             return Err("silence".to_owned());
         }
         let measured = match self {
@@ -49,7 +53,7 @@ impl Guide {
             Self::AnySignal => by_any_signal(spec, reference, &records)?,
             Self::Readings(_) => vec![None; samples.len()],
         };
-        let most = WORTHLESS * spec.fast_period.0;
+        let most = LARGEST_DEVIATION * spec.fast_period.0;
         let useful =
             |m: &DelayMeasurement| m.variance > 0.0 && m.variance.sqrt() <= most && m.delay.0.is_finite();
         let kept: Vec<_> = measured.into_iter().map(|m| m.filter(useful)).collect();
@@ -58,14 +62,6 @@ impl Guide {
         }
         Ok(kept)
     }
-}
-
-/// Without a change there is nothing to measure by.
-fn is_silent(record: &Record) -> bool {
-    let kept = || record.samples.iter().zip(&record.keep).filter(|(_, keep)| **keep).map(|(x, _)| *x);
-    let count = record.used().max(1) as f64;
-    let mean = kept().sum::<f64>() / count;
-    kept().map(|x| (x - mean).powi(2)).sum::<f64>() / count < SILENCE
 }
 
 /// The phases of a tone at the centre of the block. Each channel is fitted with a frequency of its own: a
@@ -80,10 +76,8 @@ fn by_pilot(
     let rate = model.slow_rate();
     let frames = records.iter().map(|record| record.samples.len()).min().unwrap_or(0);
     let centre = rate.period() * (0.5 * (frames as f64 - 1.0));
-    let channels: Vec<Channel<'_>> = records
-        .iter()
-        .map(|record| Channel { samples: &record.samples, offset: -centre, keep: Some(&record.keep) })
-        .collect();
+    let channels: Vec<Channel<'_>> =
+        records.iter().map(|record| Channel { offset: -centre, ..record.channel() }).collect();
     let within = pilot * CLOCK_TOLERANCE + rate * (SEARCH_CYCLES / frames as f64);
     let start = sine_fit::locate(&channels, rate, pilot, within).map_err(|error| error.to_string())?;
     let all = with_others(&channels, rate, start, frames);
@@ -113,8 +107,7 @@ fn by_pilot(
 
 /// The pilot first, and other tones that would count as noise if they were not fitted with it.
 fn with_others(channels: &[Channel<'_>], rate: Hertz, pilot: Hertz, frames: usize) -> Vec<Hertz> {
-    let folded = |f: Hertz| (f / rate - (f / rate).round()).abs();
-    let is_other = |f: &Hertz| (folded(*f) - folded(pilot)).abs() * frames as f64 > APART;
+    let is_other = |f: &Hertz| (alias(*f / rate) - alias(pilot / rate)).abs() * frames as f64 > APART;
     let found = sine_fit::find_tones(channels, rate, MOST_OTHERS, OTHERS_RANGE).unwrap_or_default();
     std::iter::once(pilot).chain(found.into_iter().filter(is_other)).collect()
 }
@@ -139,7 +132,11 @@ fn by_any_signal(
     Ok(measured)
 }
 
-/// An angle in -pi ..= pi.
-fn wrapped(angle: f64) -> f64 {
-    (angle - TAU * (angle / TAU).round()).clamp(-PI, PI)
+/// Refuses a pilot at a multiple of half the slow rate.
+pub(super) fn check_pilot(rate: Hertz, pilot: Hertz, frames: usize) -> Result<(), TrackError> {
+    let cycles = sine_fit::distance_to_edge(pilot / rate) * frames as f64;
+    if cycles >= LEAST_CYCLES {
+        return Ok(());
+    }
+    Err(TrackError::PilotPosition { pilot, cycles, frames, half: rate * 0.5 })
 }
