@@ -3,8 +3,9 @@
 //! Channel i delivers g_i (phi_i * f)(k M - D_i) + o_i. What the spec says of D_i, g_i, o_i and of the
 //! cut-off of Phi_i is the start; captures of a known kind of signal f correct it:
 //!
-//! - [`CalibrationSignal::Tones`]: tones in any Nyquist zone of the slow rate, one frequency fitted jointly over all
-//!   channels. A tone gives a delay and a gain per channel; three tones or more also give the cut-off.
+//! - [`CalibrationSignal::Tones`]: tones in any Nyquist zone of the slow rate, one frequency fitted jointly
+//!   over all channels. A tone gives a delay and a gain per channel; three tones or more also give the
+//!   cut-off.
 //! - [`CalibrationSignal::Waveform`]: a waveform whose samples are known.
 //! - [`CalibrationSignal::Any`]: any signal that leaves fewer aliases occupied than there are channels.
 //!

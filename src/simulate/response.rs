@@ -1,7 +1,7 @@
 //! The response of a front end to an analytic source, exact to rounding at any uniformly spaced instants.
 
 use super::source::{NormalisedSource, Source, Tone};
-use super::walk::sample_at;
+use super::walk::{panel_rate, sample_at, sum};
 use crate::analog::StrictlyProper;
 use crate::linalg::{self, Complex, Mat};
 use crate::units::FastPeriods;
@@ -41,13 +41,6 @@ pub fn sample(filter: &StrictlyProper, source: &NormalisedSource, instants: Inst
     }
 }
 
-/// The sum of the samples of several terms.
-pub(super) fn sum(count: usize, terms: impl Iterator<Item = Vec<f64>>) -> Vec<f64> {
-    let mut total = vec![0.0; count];
-    terms.for_each(|term| total.iter_mut().zip(term).for_each(|(sum, x)| *sum += x));
-    total
-}
-
 /// Bytes of the arrays in [`sample`] for `count` instants: the result, and one term of each sum at a time.
 pub(super) fn work_bytes(source: &NormalisedSource, count: usize) -> usize {
     let nested = match source {
@@ -85,12 +78,6 @@ fn step(filter: &StrictlyProper, at: f64, height: f64, instants: Instants) -> Ve
         state = &advance * state;
     }
     output
-}
-
-/// Panels of the quadrature per fast period, for a source with no frequency above `band` (cycles per fast
-/// period).
-pub(super) fn panel_rate(filter: &StrictlyProper, band: f64) -> f64 {
-    (filter.a().norm() + std::f64::consts::TAU * band).max(f64::MIN_POSITIVE)
 }
 
 /// Number of quadrature panels that [`sample`] needs over `span`; 0 for sources with a closed form. At

@@ -4,7 +4,6 @@
 //! change by one at most: then series of [`TERMS`] terms give the exponentials, and a Gauss-Legendre rule
 //! gives the integral, both to rounding. No matrix depends on l, so panels of any length cost the same.
 
-use super::response::{panel_rate, sum};
 use super::source::{NormalisedSource, Source};
 use crate::analog::StrictlyProper;
 use crate::units::FastPeriods;
@@ -45,6 +44,19 @@ pub fn sample_at(filter: &StrictlyProper, source: &NormalisedSource, times: &[Fa
             walk(filter, source, (0.0, length.0), start.0.abs().max(end.0.abs()), times)
         }
     }
+}
+
+/// The sum of the samples of several terms.
+pub(super) fn sum(count: usize, terms: impl Iterator<Item = Vec<f64>>) -> Vec<f64> {
+    let mut total = vec![0.0; count];
+    terms.for_each(|term| total.iter_mut().zip(term).for_each(|(sum, x)| *sum += x));
+    total
+}
+
+/// Panels of the quadrature per fast period, for a source with no frequency above `band` (cycles per fast
+/// period).
+pub(super) fn panel_rate(filter: &StrictlyProper, band: f64) -> f64 {
+    (filter.a().norm() + std::f64::consts::TAU * band).max(f64::MIN_POSITIVE)
 }
 
 /// Follows the state from the beginning of the source's `support` through the instants in their order. The
