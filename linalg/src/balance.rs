@@ -14,7 +14,7 @@ const WORD: usize = u64::BITS as usize;
 /// Sweeps over the rows of a matrix before [`scales`] gives up improving it.
 const MAX_SWEEPS: usize = 100;
 /// A factor is used only if it reduces the sum of a row and its column below this fraction.
-const WORTHWHILE: f64 = 0.95;
+const LEAST_REDUCTION: f64 = 0.95;
 
 /// The power of two near to `x` on a logarithmic scale; 1 for zero, NaN and infinity. Halves and roots of
 /// halves are common, so the border between two powers lies away from round numbers. Otherwise rounding,
@@ -119,7 +119,7 @@ fn equalising(m: &Mat, i: usize) -> f64 {
     let row: f64 = (0..m.ncols()).filter(off_diagonal).map(|k| m[(i, k)]).sum();
     let column: f64 = (0..m.nrows()).filter(off_diagonal).map(|k| m[(k, i)]).sum();
     let factor = if column > 0.0 { power_of_two((row / column).sqrt()) } else { 1.0 };
-    if column * factor + row / factor < WORTHWHILE * (column + row) { factor } else { 1.0 }
+    if column * factor + row / factor < LEAST_REDUCTION * (column + row) { factor } else { 1.0 }
 }
 
 /// Powers of two by which to divide the states of x+ = a x + b u, y = c x, so that the gains into each

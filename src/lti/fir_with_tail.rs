@@ -14,7 +14,7 @@ use crate::linalg::{self, Mat};
 
 /// States that together change the response by less than this fraction are left out. That is a quarter of
 /// the effect of rounding the taps.
-const NEGLIGIBLE: f64 = f64::EPSILON / 4.0;
+const TRUNCATION_TOLERANCE: f64 = f64::EPSILON / 4.0;
 
 /// An FIR head with a recursive tail: `y[k] = sum h_j u[k - j] + c x[k]`, `x[k + 1] = a x[k] + b u[k - q]`.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,7 +36,7 @@ impl FirWithTail {
         let Self { head, tail } = Self::split(system, chains.longest)?;
         let tail = tail.select_states(chains.core)?;
         let energy = head.iter().map(Mat::norm_squared).sum::<f64>() + h2_norm(&tail)?.powi(2);
-        Ok(Self { head, tail: balanced(&tail, NEGLIGIBLE * energy.sqrt())? })
+        Ok(Self { head, tail: balanced(&tail, TRUNCATION_TOLERANCE * energy.sqrt())? })
     }
 
     /// The same transfer function with q = `length` and all states in the tail:

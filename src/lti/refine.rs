@@ -4,9 +4,9 @@ use super::LtiError;
 use std::f64::consts::PI;
 
 /// The refinement ends at relative differences of gains below this.
-const FLAT: f64 = 1e-11;
+const FLAT_GAIN: f64 = 1e-11;
 /// Gains with a relative difference below this count as equal.
-const ROUNDING: f64 = 1e-13;
+const EQUAL_GAINS: f64 = 1e-13;
 /// Steps of a refinement are at least this part of the width that is left.
 const LEAST_STEP: f64 = 1e-3;
 
@@ -41,11 +41,11 @@ pub(super) fn refine(
         let w = next_abscissa(low, best, high, stalls);
         let tried = at(w)?;
         let gained = tried.gain - best.gain;
-        stalls = if gained < FLAT * best.gain { stalls + 1 } else { 0 };
+        stalls = if gained < FLAT_GAIN * best.gain { stalls + 1 } else { 0 };
         // A gain far below the best one shows a poor step, not convergence.
-        flats = if gained.abs() <= FLAT * best.gain { flats + 1 } else { 0 };
+        flats = if gained.abs() <= FLAT_GAIN * best.gain { flats + 1 } else { 0 };
         // Of equal gains the first stays, so that peaks at 0 and pi are exactly there.
-        if gained > ROUNDING * best.gain {
+        if gained > EQUAL_GAINS * best.gain {
             if w < best.frequency {
                 high = best
             } else {

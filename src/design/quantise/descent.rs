@@ -7,9 +7,9 @@ use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lmi::sampled::Point;
 
 /// Moves tried in pairs: those that lower the error at the worst frequency most.
-const PAIRED: usize = 48;
+const MOVES_IN_PAIRS: usize = 48;
 /// A move must remove this fraction of the excess over gamma of the real taps.
-const WORTHWHILE: f64 = 0.02;
+const LEAST_EXCESS_REMOVED: f64 = 0.02;
 /// Rounds of single moves and pairs.
 const ROUNDS: usize = 16;
 
@@ -110,7 +110,7 @@ impl<'a> Descent<'a> {
             ranked.push((self.gain_after(worst_point, &[m])?, m));
         }
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        ranked.truncate(PAIRED);
+        ranked.truncate(MOVES_IN_PAIRS);
         for (i, &(_, a)) in ranked.iter().enumerate() {
             for &(_, b) in &ranked[..i] {
                 if (a.channel, a.tap) != (b.channel, b.tap) && self.make_if_better(&[a, b])? {
@@ -122,7 +122,7 @@ impl<'a> Descent<'a> {
     }
 
     fn make_if_better(&mut self, moves: &[Move]) -> Result<bool, DesignError> {
-        let bar = self.worst - WORTHWHILE * (self.worst - self.real).max(0.0);
+        let bar = self.worst - LEAST_EXCESS_REMOVED * (self.worst - self.real).max(0.0);
         // The worst points come first, because they reject most moves.
         for &k in &self.order {
             if self.gain_after(k, moves)? > bar {

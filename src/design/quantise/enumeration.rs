@@ -22,17 +22,17 @@ use crate::linalg::{self, CMat, Complex, Mat};
 use crate::spec::WordLengths;
 
 /// Most taps that may differ from zero, in all channels.
-const MOST_UNKNOWNS: usize = 16;
+const MAX_UNKNOWNS: usize = 16;
 /// Decisions at each scale.
-const DECISIONS: usize = 30_000;
+const MAX_DECISIONS: usize = 30_000;
 /// A comparison of all integers of a bank costs as much as so many decisions.
-const COMPARISON: usize = 8;
+const DECISIONS_PER_COMPARISON: usize = 8;
 /// Integers of one tap on each side of the middle of its interval: all of 8 bits.
-const BRANCHES: f64 = 128.0;
+const MAX_BRANCHES: f64 = 128.0;
 /// Bounds at each scale.
-const BOUNDS: usize = 8;
+const BOUND_COUNT: usize = 8;
 /// Integers must be better by this fraction.
-const LEAST_GAIN: f64 = 1e-4;
+const LEAST_IMPROVEMENT: f64 = 1e-4;
 /// Added to the diagonal relative to each entry, because the form is singular for equal channels.
 const RIDGE: f64 = 1e-13;
 /// Fraction of the weights that a step replaces.
@@ -58,7 +58,7 @@ impl<'a> Enumeration<'a> {
             .filter(|&tap| bits.span(tap) != (0, 0))
             .flat_map(|tap| (0..filters.len()).map(move |channel| Unknown { channel, tap }))
             .collect();
-        if unknowns.len() > MOST_UNKNOWNS {
+        if unknowns.len() > MAX_UNKNOWNS {
             return None;
         }
         let spans = unknowns.iter().map(|unknown| Span::of(bits, unknown.tap)).collect();
@@ -116,15 +116,15 @@ struct Tree<'a> {
 impl<'a> Tree<'a> {
     fn new(errors: &'a AffineErrors, spans: &'a [Span], step: f64, bar: f64) -> Self {
         let order = (0..errors.count()).collect();
-        let bar = bar * (1.0 - LEAST_GAIN);
-        Self { errors, spans, step, bounds: Vec::new(), bar, found: Vec::new(), left: DECISIONS, order }
+        let bar = bar * (1.0 - LEAST_IMPROVEMENT);
+        Self { errors, spans, step, bounds: Vec::new(), bar, found: Vec::new(), left: MAX_DECISIONS, order }
     }
 
     /// Bounds with weights on the frequencies where the integers closest to the last bound's centre are
     /// worst. These integers are candidates, too.
     fn find_bounds(&mut self, floor: f64) {
         let mut weights = self.errors.uniform();
-        for _ in 0..BOUNDS {
+        for _ in 0..BOUND_COUNT {
             let Some(bound) = self.errors.bound(&weights) else { break };
             let centre: Vec<f64> = bound.centre.iter().map(|value| value / self.step).collect();
             let near: Vec<f64> =
@@ -171,8 +171,8 @@ impl<'a> Tree<'a> {
             high = high.min(((best + radius) / self.step).floor());
         }
         let middle = 0.5 * (low + high);
-        let first = low.max((middle - BRANCHES).ceil());
-        let count = if high >= low { (high.min(middle + BRANCHES) - first) as usize + 1 } else { 0 };
+        let first = low.max((middle - MAX_BRANCHES).ceil());
+        let count = if high >= low { (high.min(middle + MAX_BRANCHES) - first) as usize + 1 } else { 0 };
         let mut integers: Vec<f64> = (0..count).map(|k| first + k as f64).collect();
         integers.sort_by(|a, b| (a - middle).abs().total_cmp(&(b - middle).abs()));
         integers
@@ -180,7 +180,7 @@ impl<'a> Tree<'a> {
 
     /// Keeps the values if their gamma is below the bar.
     fn compare(&mut self, values: &[f64]) {
-        self.left = self.left.saturating_sub(COMPARISON);
+        self.left = self.left.saturating_sub(DECISIONS_PER_COMPARISON);
         let mut worst = 0.0f64;
         for at in 0..self.order.len() {
             let gain = linalg::largest_singular_value(&self.errors.at(self.order[at], values));
@@ -191,7 +191,7 @@ impl<'a> Tree<'a> {
             }
             worst = worst.max(gain);
         }
-        self.bar = worst * (1.0 - LEAST_GAIN);
+        self.bar = worst * (1.0 - LEAST_IMPROVEMENT);
         self.found.push(values.to_vec());
     }
 }

@@ -10,7 +10,7 @@ use crate::linalg::Mat;
 use crate::spec::WordLengths;
 
 /// Partial decisions kept.
-const LIST: usize = 32;
+const LIST_LENGTH: usize = 32;
 
 /// Integers between two bounds, both included.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,7 +58,7 @@ pub(super) fn closest(factor: &Mat, centre: &[f64], spans: &[Span]) -> Vec<f64> 
         let mut longer: Vec<Partial> =
             list.iter().flat_map(|partial| decide(partial, i, factor, centre[i], spans[i])).collect();
         longer.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        longer.truncate(LIST);
+        longer.truncate(LIST_LENGTH);
         list = longer;
     }
     let best = &list[0].deviations;

@@ -14,15 +14,15 @@ use std::sync::OnceLock;
 use std::thread::ScopedJoinHandle;
 
 /// Relative difference of gamma below which the mean square decides: 0.001 dB.
-pub(super) const INDIFFERENT: f64 = 1e-4;
+pub(super) const GAMMA_TIE: f64 = 1e-4;
 /// Relative excess over the gamma of the real taps from which more scales are searched: 0.05 dB.
-const WORTH_MORE: f64 = 5.8e-3;
+const LOSS_FOR_MORE_SCALES: f64 = 5.8e-3;
 /// Integers that lower the gamma of zero output by less than this share do no better than zero output.
-const NO_EFFECT: f64 = 1e-6;
+const LEAST_EFFECT_OF_INTEGERS: f64 = 1e-6;
 /// Real taps that lower it by more than this share have an effect, which integers should have too.
-const EFFECT: f64 = 1e-3;
+const LEAST_EFFECT_OF_REAL_TAPS: f64 = 1e-3;
 /// Scales of few taps that are searched beyond the finest one that holds the optimal taps.
-const MOST_SCALES: i32 = 40;
+const MAX_FINER_SCALES: i32 = 40;
 
 /// The integers chosen, with their error.
 #[derive(Debug, Clone)]
@@ -40,7 +40,7 @@ pub(super) struct Quantised {
 impl Quantised {
     /// Whether gamma is smaller, or about equal with a smaller mean square.
     pub(super) fn is_better(&self, other: &Self, gamma_margin: f64) -> bool {
-        let alike = 1.0 + gamma_margin.max(INDIFFERENT);
+        let alike = 1.0 + gamma_margin.max(GAMMA_TIE);
         self.gamma * alike < other.gamma
             || self.gamma < other.gamma * alike && self.mean_square < other.mean_square
     }
@@ -79,13 +79,13 @@ impl<'a> Quantiser<'a> {
         if fraction_bits.is_none() && finest < MAX_FRACTION_BITS {
             found.extend(Search::new(self.error.problem.taps, &self.error, bits, finest + 1).run()?);
         }
-        if least_gamma(&found) > self.error.real_gamma * (1.0 + WORTH_MORE) {
+        if least_gamma(&found) > self.error.real_gamma * (1.0 + LOSS_FOR_MORE_SCALES) {
             match fraction_bits {
                 None => self.search_finer_scales(bits, finest, &mut found)?,
                 Some(scale) => self.search_few_taps(bits, scale..=scale, &mut found)?,
             }
         }
-        let cap = least_gamma(&found) * (1.0 + self.error.problem.gamma_margin.max(INDIFFERENT));
+        let cap = least_gamma(&found) * (1.0 + self.error.problem.gamma_margin.max(GAMMA_TIE));
         let good = found.into_iter().filter(|found| found.gamma <= cap);
         let least_mean_square = good.min_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
         let Candidate { fixed_point, gamma, mean_square } = least_mean_square.ok_or(DesignError::NoTaps)?;
@@ -114,7 +114,7 @@ impl<'a> Quantiser<'a> {
             }
         }
         let coarsest = (finest - 1).max(-MAX_FRACTION_BITS);
-        self.search_few_taps(bits, coarsest..=(finest + MOST_SCALES).min(MAX_FRACTION_BITS), found)
+        self.search_few_taps(bits, coarsest..=(finest + MAX_FINER_SCALES).min(MAX_FRACTION_BITS), found)
     }
 
     /// Adds the best integers of a bank of few taps.
@@ -170,8 +170,8 @@ impl<'a> Quantiser<'a> {
         let fixed_point = &found.fixed_point;
         let zeros = fixed_point.integers.iter().map(|list| vec![0; list.len()]).collect();
         let zero_output = self.error.gamma(&FixedPoint { integers: zeros, ..fixed_point.clone() })?;
-        Ok(found.gamma >= zero_output * (1.0 - NO_EFFECT)
-            && self.error.real_gamma < zero_output * (1.0 - EFFECT))
+        Ok(found.gamma >= zero_output * (1.0 - LEAST_EFFECT_OF_INTEGERS)
+            && self.error.real_gamma < zero_output * (1.0 - LEAST_EFFECT_OF_REAL_TAPS))
     }
 
     pub(super) fn loss(&self, found: &Quantised) -> WordLoss {

@@ -1,4 +1,4 @@
-use super::quantiser::INDIFFERENT;
+use super::quantiser::GAMMA_TIE;
 use super::search::Search;
 use super::*;
 use crate::bank::SynthesisFilters;
@@ -72,7 +72,7 @@ fn small_banks_reach_what_trying_all_integers_reaches() {
         let search = Search::new(quantiser.error.problem.taps, &quantiser.error, &words, scale);
         let all = brute_force(&plant, &search.rounded(), 1);
         assert!(found.gamma <= all * 1.001, "{bits} bits: {} found, {all} is there", found.gamma);
-        assert!(found.gamma <= found.rounded * (1.0 + INDIFFERENT));
+        assert!(found.gamma <= found.rounded * (1.0 + GAMMA_TIE));
     }
 }
 
@@ -165,7 +165,7 @@ fn equal_channels_share_finer_steps_than_their_own() {
         THESIS.replace("delay_samples = 0.6", "delay_samples = 0.6\n[[channel]]\ndelay_samples = 0.6");
     let (plant, taps) = optimum(&twice);
     let found = quantiser(&plant, &taps).unwrap().quantise(&WordLengths::Same(4), None).unwrap();
-    assert!(found.gamma <= found.rounded * (1.0 + INDIFFERENT));
+    assert!(found.gamma <= found.rounded * (1.0 + GAMMA_TIE));
 }
 
 #[test]

@@ -13,7 +13,7 @@ const LINE_LIMIT: usize = 24;
 /// Length of the first step relative to the norm of the start.
 const FIRST_STEP: f64 = 0.05;
 /// A descent has converged if it gains less than this (relative) in [`PATIENCE`] steps.
-const GAIN: f64 = 1e-4;
+const CONVERGED_GAIN: f64 = 1e-4;
 const PATIENCE: usize = 6;
 
 /// A point with value and gradient there.
@@ -52,7 +52,7 @@ pub(super) fn descend(
         now = next;
         history.push(now.value);
         let past = history.len().checked_sub(1 + PATIENCE).map(|k| history[k]);
-        if past.is_some_and(|past| now.value > past * (1.0 - GAIN)) {
+        if past.is_some_and(|past| now.value > past * (1.0 - CONVERGED_GAIN)) {
             break;
         }
     }

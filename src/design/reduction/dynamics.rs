@@ -8,7 +8,7 @@ use rand_core::Rng;
 use rand_pcg::Pcg64;
 
 /// States below this share of the output are rounding errors.
-const NEGLIGIBLE: f64 = 1e-12;
+const ROUNDING_SHARE: f64 = 1e-12;
 /// Slower poles than this rarely belong to a good bank of low order.
 const LARGEST_RANDOM_POLE: f64 = 0.9;
 
@@ -29,7 +29,7 @@ impl Dynamics {
     /// plant drives it.
     pub(super) fn balanced(bank: &StateSpace, lags: usize, state_root: &Mat) -> Result<Self, DesignError> {
         let tail = FirWithTail::split(bank, lags)?.tail().clone();
-        let floor = NEGLIGIBLE * (tail.c() * state_root).norm();
+        let floor = ROUNDING_SHARE * (tail.c() * state_root).norm();
         let tail = balanced_when_driven(&tail, state_root, floor)?;
         Ok(Self { lags, a: tail.a().clone(), b: tail.b().clone() })
     }

@@ -23,11 +23,11 @@ const FINALISTS: usize = 3;
 /// than a recursion.
 const HEAD_PREFERENCE: f64 = 1e-4;
 /// All orders are searched if the squares of their unknowns sum to at most this.
-const CHEAP: f64 = 1e5;
+const MAX_WORK_OF_ALL_ORDERS: f64 = 1e5;
 /// Limit on the evaluations of a pole refinement, and the effort (evaluations times squared unknowns) that
 /// lowers it.
 const EVALUATIONS: usize = 80;
-const EFFORT: f64 = 4e5;
+const MAX_REFINEMENT_WORK: f64 = 4e5;
 /// Random poles from which a refinement starts, and the evaluations that rank them. The best ones go on.
 const STARTS: usize = 10;
 const SCREENING: usize = 16;
@@ -35,11 +35,11 @@ const SCREENING: usize = 16;
 const MULTI_START: usize = STARTS * SCREENING + 2 * EVALUATIONS;
 const SEED: u64 = 2007;
 /// Poles of a reduced bank keep this distance from the unit circle.
-const MARGIN: f64 = 1e-9;
+const STABILITY_MARGIN: f64 = 1e-9;
 /// Losses below this are rounding errors, in decibels.
 const ROUNDING_DB: f64 = 5e-5;
 /// Errors below this fraction of the plant's gain count as zero.
-const ZERO: f64 = 1e-12;
+const ZERO_ERROR: f64 = 1e-12;
 
 /// The bank found for an order.
 #[derive(Debug, Clone)]
@@ -71,7 +71,7 @@ impl<'a> OrderSearch<'a> {
             splits: splits(problem)?,
             full: figures(problem, &FirWithTail::new(problem.bank)?)?,
             banks: BTreeMap::new(),
-            zero: ZERO * (system.c().norm() * system.b().norm() + system.d().norm()),
+            zero: ZERO_ERROR * (system.c().norm() * system.b().norm() + system.d().norm()),
         })
     }
 
@@ -112,7 +112,7 @@ impl<'a> OrderSearch<'a> {
 
     fn is_cheap(&self) -> bool {
         let orders = self.problem.order as f64;
-        orders * self.unknowns(self.problem.order).powi(2) <= CHEAP
+        orders * self.unknowns(self.problem.order).powi(2) <= MAX_WORK_OF_ALL_ORDERS
     }
 
     /// Entries of the output matrices of a bank with so many states.
@@ -192,7 +192,7 @@ impl<'a> OrderSearch<'a> {
                 continue;
             }
             let dynamics = split.truncated(order - head);
-            if dynamics.spectral_radius() < 1.0 - MARGIN {
+            if dynamics.spectral_radius() < 1.0 - STABILITY_MARGIN {
                 tried.push((mean_square(self.problem.plant, &dynamics)?.1, dynamics));
             }
         }
@@ -224,7 +224,7 @@ impl<'a> OrderSearch<'a> {
         if self.merit(&truncation.figures) <= self.merit(&self.full).max(self.zero) {
             return Ok(());
         }
-        let affordable = (EFFORT / self.unknowns(order).powi(2)) as usize;
+        let affordable = (MAX_REFINEMENT_WORK / self.unknowns(order).powi(2)) as usize;
         let refine = |start: &Dynamics| {
             refined(self.problem.aim, &truncation.samples, start, affordable.min(EVALUATIONS))
         };

@@ -9,7 +9,7 @@ use crate::lti::StateSpace;
 use crate::lti::gramian::controllability_root;
 
 /// Directions of the regressors below this share of the strongest are rounding errors.
-const RANK: f64 = 1e-12;
+const RANK_TOLERANCE: f64 = 1e-12;
 
 /// Square root of the covariance of the states of `bank` when the plant drives it with white noise.
 pub(super) fn state_covariance_root(plant: &LiftedPlant, bank: &StateSpace) -> Result<Mat, DesignError> {
@@ -54,7 +54,7 @@ fn projection(x: &Mat, z: &Mat) -> Result<Mat, DesignError> {
     let mut unit = x.clone();
     unit.row_iter_mut().zip(&scale).for_each(|(mut row, s)| row *= *s);
     let svd = linalg::svd(&unit)?;
-    let floor = RANK * svd.s.first().copied().unwrap_or(0.0);
+    let floor = RANK_TOLERANCE * svd.s.first().copied().unwrap_or(0.0);
     let mut components = z * &svd.v;
     components
         .column_iter_mut()

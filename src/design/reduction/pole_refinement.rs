@@ -22,7 +22,7 @@ use crate::lti::{FrequencyResponse, StateSpace};
 /// Relative accuracy of gamma during the descent.
 const ACCURACY: f64 = 1e-6;
 /// Poles keep this distance from the unit circle, unless the start is closer.
-const MARGIN: f64 = 1e-3;
+const STABILITY_MARGIN: f64 = 1e-3;
 
 /// Dynamics with the error of their best output matrices at the sampled frequencies, infinite if unknown.
 #[derive(Debug, Clone)]
@@ -42,7 +42,7 @@ pub(super) fn refined(
         return Ok(Refined { dynamics: start.clone(), error: f64::INFINITY });
     }
     let (start, sizes) = normalised(samples.plant, start)?;
-    let largest_radius = (1.0 - MARGIN).max(start.spectral_radius());
+    let largest_radius = (1.0 - STABILITY_MARGIN).max(start.spectral_radius());
     let error_and_gradient = |dynamics: &Dynamics| match aim {
         Aim::WorstCase => worst_case_gradient(samples, dynamics),
         Aim::MeanSquare => mean_square_gradient(samples, dynamics),

@@ -22,11 +22,11 @@ use crate::units::Hertz;
 use crate::units::RadiansPerSlowPeriod;
 
 /// Relative distance within which another peak makes gamma not differentiable.
-const SIMPLE: f64 = 1e-7;
+const EQUAL_PEAKS: f64 = 1e-7;
 /// Frequencies closer than this belong to one peak, in radians per slow period.
 const SAME_PEAK: f64 = 1e-2;
 /// c b relative to |c| |b| above which a front end has relative degree 1.
-const DIRECT: f64 = 1e-12;
+const DEGREE_ONE: f64 = 1e-12;
 
 /// The derivatives of gamma with respect to the delays.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -64,16 +64,16 @@ pub fn delay_derivatives(bank: &Bank) -> Result<DelayDerivatives, DesignError> {
         let front_end = &problem.front_ends[problem.channels[i].front_end];
         let feedthrough = problem.signal.as_ref().map_or(1.0, |signal| signal.d());
         let direct = (front_end.c() * front_end.b())[(0, 0)].abs();
-        if feedthrough != 0.0 && direct > DIRECT * front_end.c().norm() * front_end.b().norm() {
+        if feedthrough != 0.0 && direct > DEGREE_ONE * front_end.c().norm() * front_end.b().norm() {
             return f64::NAN;
         }
         let from_error: Complex<f64> = u.iter().zip(f.column(i).iter()).map(|(u, f)| u.conj() * f).sum();
         let slope: Complex<f64> = response.row(n + i).iter().zip(v.iter()).map(|(h, v)| h * v).sum();
         (from_error * slope).re
     };
-    let others = peaks_above(&plant.error_system(&block)?, peak.gain * (1.0 - SIMPLE))?;
+    let others = peaks_above(&plant.error_system(&block)?, peak.gain * (1.0 - EQUAL_PEAKS))?;
     let other = others.iter().any(|other| (other.frequency - peak.frequency).abs() > SAME_PEAK);
-    let single = svd.s.get(1).is_none_or(|&second| second < peak.gain * (1.0 - SIMPLE));
+    let single = svd.s.get(1).is_none_or(|&second| second < peak.gain * (1.0 - EQUAL_PEAKS));
     Ok(DelayDerivatives {
         per_fast_period: (0..n).map(derivative).collect(),
         peak_hertz: RadiansPerSlowPeriod(peak.frequency).in_hertz(bank.slow_period()),
