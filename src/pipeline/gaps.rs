@@ -161,7 +161,7 @@ impl GapFiller {
     /// True if the marks no longer change: no gap is open and none affects a later output, or all later
     /// outputs are affected.
     fn is_at_rest(&self) -> bool {
-        self.affected.as_ref().is_none_or(|affected| affected.settled <= self.frame)
+        self.affected.as_ref().is_none_or(|affected| affected.unchanged_from <= self.frame)
             && self.open().next().is_none()
     }
 
@@ -262,8 +262,8 @@ struct AffectedOutputs {
     span: usize,
     /// Intervals of gaps that affect output p of the current frame.
     counts: Vec<i32>,
-    /// All changes lie before this frame.
-    settled: u64,
+    /// No count changes at this frame or later, as far as gaps are known.
+    unchanged_from: u64,
     /// Number of additions so far; tests use it as the measure of work.
     #[cfg(test)]
     additions: u64,
@@ -279,7 +279,7 @@ impl AffectedOutputs {
             changes: vec![0; span * ratio],
             span,
             counts: vec![0; ratio],
-            settled: 0,
+            unchanged_from: 0,
             #[cfg(test)]
             additions: 0,
         }
@@ -299,7 +299,7 @@ impl AffectedOutputs {
         for (p, lags) in self.lags[i].iter().enumerate() {
             for frame in lags.iter().map(&frame) {
                 self.changes[(frame % self.span as u64) as usize * self.ratio + p] += change;
-                self.settled = self.settled.max(frame + 1);
+                self.unchanged_from = self.unchanged_from.max(frame + 1);
             }
             #[cfg(test)]
             {

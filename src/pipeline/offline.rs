@@ -15,7 +15,7 @@ const STEP_MULTIPLY_ADDS: usize = 1 << 27;
 /// Reading, converting and storing an output sample cost about as much as so many multiply-adds.
 const MULTIPLY_ADDS_PER_STORE: usize = 8;
 
-/// Fuses a whole signal: M output samples for each of its frames.
+/// Fuses a signal in memory: M output samples for each of its frames.
 ///
 /// With [`DroppedLatency::All`](super::DroppedLatency::All) output sample n belongs to the time of fast
 /// sample n: the first samples, as many as the latency, are dropped, and as many come out at the end from
