@@ -110,8 +110,8 @@ impl RunObserver {
         StallWatch { patience: PATIENCE, report: Arc::new(move |stall| events.report(stall.into())) }
     }
 
-    /// From now on the captures are compared with the spec of the bank, if they are `comparable`. In a `live`
-    /// run the warnings come as soon as they are known.
+    /// From now on the captures are compared with the spec of the bank, if they are `comparable`. In a
+    /// `live` run the warnings come as soon as they are known.
     pub(super) fn check_captures(&mut self, bank: &Bank, comparable: bool, live: bool) {
         self.check = Some(CaptureCheck::new(bank, comparable, live.then(|| self.events())));
     }
