@@ -111,9 +111,8 @@ macro_rules! instruction_sets {
             #[cfg(target_arch = $arch)]
             #[target_feature(enable = $features)]
             unsafe fn $function<K: Kernel>(job: K::Job<'_>) -> K::Output {
-                // SAFETY: this function is compiled for the set, and is returned only for an `Isa` that
-                // includes it; the rest is the caller's.
-                unsafe { K::run::<<K::Sample as Element>::$kind>(job) }
+                // This function is compiled for the set, and is returned only for an `Isa` that includes it.
+                K::run::<<K::Sample as Element>::$kind>(job)
             }
         )*
     };
@@ -126,8 +125,8 @@ instruction_sets! {
 }
 
 unsafe fn portable<K: Kernel>(job: K::Job<'_>) -> K::Output {
-    // SAFETY: every processor has these instructions; the rest is the caller's.
-    unsafe { K::run::<<K::Sample as Element>::Portable>(job) }
+    // Every processor has these instructions.
+    K::run::<<K::Sample as Element>::Portable>(job)
 }
 
 /// Keeps the compiler from computing both sides of a branch and choosing afterwards, where that costs more

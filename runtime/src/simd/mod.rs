@@ -13,6 +13,14 @@
 //! and store vectors at addresses whose bounds the safe wrapper has checked once for the whole call, and for
 //! two pieces of assembly.
 //!
+//! What an unsafe function asks for is said at the function, its trait or the head of its file, and not
+//! again in its body. There are two preconditions. *The set is there*: a function that is generic over a
+//! vector runs only inside [`dispatch`], in a function compiled for the vector's set, which only an [`Isa`]
+//! selects. *The memory is there*: the safe call of each kernel (`Polyphase::run`, `RecursionKernel::run`,
+//! those of `TransformKernel`, `interleave`) asserts the lengths of its slices once, from the numbers by
+//! which the kernel addresses them. Unsafe blocks in safe functions say which of the two holds there, and
+//! why.
+//!
 //! Bits: an output is a sum of a fixed shape, lanes of fused multiply-adds and a tree over the lanes (see
 //! `vector`), the same for every instruction set. So it does not depend on vector width, block size, address
 //! or thread count. Only on an x86 processor without FMA (before 2013) the portable body rounds the product

@@ -5,6 +5,9 @@
 //! input; any other A is a sum of its columns, one broadcast of a state serving all states.
 //!
 //! Bits: each state is one chain of fused multiply-adds, over the inputs first, in one lane.
+//!
+//! Unsafe functions here run in code compiled for the instruction set of V. They read rows, inputs and
+//! coefficients at places that `RecursionKernel::run` checks, and write the next row.
 
 use super::dispatch::{Compiled, Kernel, compiled_narrow};
 use super::isa::Isa;
@@ -104,7 +107,8 @@ impl RecursionKernel {
         #[cfg(test)]
         super::work::add(frames * recursion.form.coefficients());
         let (rows, window) = (rows.as_mut_ptr(), window.as_ptr());
-        // SAFETY: all loads and stores lie within the bounds asserted above.
+        // SAFETY: rows 0 to `frames` and the inputs of all frames are in the slices, and the places, columns
+        // and coefficients of the form fit them, as asserted.
         unsafe { (self.run)(&Job { recursion, rows, window, hop, frames }) }
     }
 }

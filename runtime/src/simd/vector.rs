@@ -76,7 +76,8 @@ const MOST_LANES: usize = 16;
 ///
 /// # Safety
 /// Functions that are unsafe may run only in code compiled for the instruction set, on a processor that has
-/// it. Those that take pointers touch memory as said for each.
+/// it. A pointer to read must be valid for as many samples as the function is said to take from there on,
+/// one to write for as many as it stores; neither needs an alignment.
 pub(crate) trait Vector: Copy {
     /// The type of a lane.
     type Sample: Number;
@@ -91,9 +92,9 @@ pub(crate) trait Vector: Copy {
 
     /// The same value in all lanes.
     unsafe fn splat(value: Self::Sample) -> Self;
-    /// All lanes, from `at` on.
+    /// All lanes: reads LANES samples from `at` on.
     unsafe fn load(at: *const Self::Sample) -> Self;
-    /// All lanes, to `at`.
+    /// All lanes: writes LANES samples from `at` on.
     unsafe fn store(self, at: *mut Self::Sample);
     /// self + other.
     fn add(self, other: Self) -> Self;
@@ -116,7 +117,7 @@ pub(crate) trait Vector: Copy {
     #[inline(always)]
     fn to_array(self) -> [Self::Sample; MOST_LANES] {
         let mut lanes = [Self::Sample::default(); MOST_LANES];
-        // SAFETY: there is room for the widest vector, and `self` exists.
+        // SAFETY: the array has room for the widest vector, and the set is there because `self` exists.
         unsafe { self.store(lanes.as_mut_ptr()) };
         lanes
     }
@@ -128,8 +129,8 @@ pub(crate) trait Vector: Copy {
         for (l, slot) in lanes.iter_mut().enumerate().take(Self::LANES) {
             *slot = lane(l);
         }
-        // SAFETY: the widest vector fits the array; the rest is the caller's.
-        unsafe { Self::load(lanes.as_ptr()) }
+        // The array holds the lanes of the widest vector.
+        Self::load(lanes.as_ptr())
     }
 
     /// Neither NaN nor infinity in any lane.

@@ -119,7 +119,7 @@ impl Recursive {
         self.feedthrough.run(&[Segment { x: history.view(), first: 0, frames }], output);
         if self.recursion.states > 0 {
             self.output_matrix.run(&[Segment { x: rows, first: 0, frames }], state_output);
-            output.iter_mut().zip(&state_output[..frames * self.ratio]).for_each(|(y, more)| *y = *y + *more);
+            output.iter_mut().zip(&state_output[..frames * self.ratio]).for_each(|(y, more)| *y += *more);
         }
     }
 }

@@ -6,6 +6,10 @@
 //! Where a frame has eight lanes the end of a tile is done in two parts, because its sums are ready all at
 //! once and a long chain of shuffles and stores after them would stop the multiply-adds: the first lanes are
 //! added in registers and go to scratch memory; from there they are brought into order after the next tile.
+//!
+//! Unsafe functions here run in code compiled for the instruction set of V. They read windows of the chunks'
+//! frames and coefficients of the job, and write outputs of these frames and to the scratch: memory whose
+//! bounds `Polyphase::run` asserts for whole vectors of frames.
 
 use super::super::dispatch::keep_branch;
 use super::super::vector::Vector;

@@ -7,6 +7,8 @@
 //!
 //! If a frame fills a group (D = group), c D must be a whole number of hops: then q = c D / N frames lie
 //! between those of neighbouring vectors, and q tiles are needed to cover all frames.
+//!
+//! Unsafe functions here ask for the same as those of `phases`.
 
 use super::super::dispatch::keep_branch;
 use super::super::vector::Vector;
