@@ -80,8 +80,7 @@ pub(super) fn robust_text(study: &RobustStudy, proven: Option<f64>) -> String {
 /// Taps that follow the delays, and taps that stay, over the spec's uncertainty.
 pub(super) fn tracking_text(study: &TrackingStudy, proven: Option<f64>) -> String {
     let TrackingStudy { tracked, fixed, redesigned, ratio, least_ratio, .. } = study;
-    let [worst, of_fixed, redesigned_worst] =
-        [tracked.worst, fixed.worst, *redesigned].map(|value| number(value));
+    let [worst, of_fixed, redesigned_worst] = [tracked.worst, fixed.worst, *redesigned].map(number);
     let percent = |ratio: f64| 100.0 * (ratio - 1.0);
     format!(
         "tracked    {worst} at worst over the spec's uncertainty ({}), {} without errors\n\
