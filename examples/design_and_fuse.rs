@@ -30,7 +30,7 @@ const BLOCK: usize = 64;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let spec = Spec::from_toml(SPEC, "spec")?;
-    let bank = design(&spec)?.bank;
+    let bank = design(&spec, &Default::default())?.bank;
     println!("gamma between {:?} and {:?}", bank.gamma.lower, bank.gamma.upper);
 
     let source: Source = "tones:440Hz,3kHz".parse()?;

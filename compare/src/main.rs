@@ -15,7 +15,7 @@
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SupportedConeT};
-use hybank::design::{DesignError, LiftedPlant, Problem, ProofSearch, design_with};
+use hybank::design::{DesignError, LiftedPlant, Options, Problem, design};
 use hybank::spec::Spec;
 use nalgebra::{Complex, DMatrix};
 use std::error::Error;
@@ -173,7 +173,7 @@ fn hybank(spec: &Spec) -> Result<(f64, f64), Box<dyn Error>> {
     let (mut gamma, mut seconds) = (f64::NAN, f64::INFINITY);
     for _ in 0..3 {
         let begin = Instant::now();
-        let found = design_with(spec, ProofSearch::Skip)?.bank.gamma.upper.ok_or("the design has no norm")?;
+        let found = design(spec, &Options::without_proof())?.bank.gamma.upper.ok_or("the design has no norm")?;
         (gamma, seconds) = (found, seconds.min(begin.elapsed().as_secs_f64()));
     }
     Ok((gamma, seconds))

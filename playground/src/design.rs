@@ -2,7 +2,7 @@
 
 use crate::answer::{Answer, Refusal, text};
 use hybank::bank::Bank;
-use hybank::design::{Design, GammaScale, Options, Stage, analyze_mean, design_observed, implausible};
+use hybank::design::{Design, GammaScale, Options, Stage, analyze_mean};
 use hybank::overview::{self, Facts, counted};
 use hybank::spec::Spec;
 use hybank::verify::Verified;
@@ -37,7 +37,7 @@ pub(crate) fn design(input: &[u8]) -> Result<Answer, Refusal> {
     let spec = spec(input)?;
     let begin = Instant::now();
     let options = Options { observer: &tell, ..Options::default() };
-    let design = design_observed(&spec, &options).map_err(Refusal::new)?;
+    let design = hybank::design::design(&spec, &options).map_err(Refusal::new)?;
     let seconds = (begin.elapsed() - design.proof_time).as_secs_f64();
     Answer::of(&Designed::new(&spec, design, seconds)?)
 }
@@ -68,6 +68,6 @@ impl Designed {
 fn warnings(spec: &Spec, bank: &Bank) -> Result<Vec<String>, Refusal> {
     let mean = analyze_mean(bank).map_err(Refusal::new)?;
     let scale = GammaScale::new(bank).map_err(Refusal::new)?;
-    let implausible = implausible(spec).unwrap_or_default();
-    Ok(implausible.iter().map(ToString::to_string).chain(overview::warnings(bank, &mean, &scale)).collect())
+    let found = hybank::design::warnings(spec).unwrap_or_default();
+    Ok(found.into_iter().chain(overview::warnings(bank, &mean, &scale)).collect())
 }

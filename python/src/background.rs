@@ -1,11 +1,8 @@
 //! Long computations that Ctrl-C interrupts.
 
 use crate::errors::HybankError;
-use hybank::design::Stage;
+use hybank::design::{Stage, Stop};
 use pyo3::prelude::*;
-use std::panic;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread;
 use std::time::Duration;
@@ -24,22 +21,24 @@ enum Message<T> {
 /// What a computation says while it runs.
 pub(crate) struct Reporter<T> {
     sender: Sender<Message<T>>,
-    abandoned: Arc<AtomicBool>,
+    stop: Stop,
 }
 
 impl<T> Reporter<T> {
-    /// Reports that a step begins. Ends the thread if its result is no longer waited for.
+    /// Reports that a step begins.
     pub(crate) fn begins(&self, stage: Stage, seconds: f64) {
-        if self.abandoned.load(Ordering::Relaxed) {
-            panic::resume_unwind(Box::new("interrupted"));
-        }
         // The receiver lives as long as somebody waits.
         let _ = self.sender.send(Message::Stage(stage, seconds));
+    }
+
+    /// Due when the result is no longer waited for.
+    pub(crate) fn stop(&self) -> Stop {
+        self.stop.clone()
     }
 }
 
 /// Runs `work` on a thread of its own, without the interpreter lock. A signal whose handler raises ends the
-/// wait at once; the thread ends with the step that it is in. `progress(step, seconds)` is called for every
+/// wait at once; a design ends with the round that it is in. `progress(step, seconds)` is called for every
 /// step.
 pub(crate) fn run<T: Send + 'static>(
     py: Python<'_>,
@@ -47,8 +46,8 @@ pub(crate) fn run<T: Send + 'static>(
     work: impl FnOnce(&Reporter<T>) -> T + Send + 'static,
 ) -> PyResult<T> {
     let (sender, mut messages) = mpsc::channel();
-    let abandoned = Arc::new(AtomicBool::new(false));
-    let reporter = Reporter { sender, abandoned: Arc::clone(&abandoned) };
+    let stop = Stop::default();
+    let reporter = Reporter { sender, stop: stop.clone() };
     let thread = thread::Builder::new().name("hybank".into()).stack_size(STACK_BYTES);
     thread.spawn(move || {
         let result = work(&reporter);
@@ -69,7 +68,9 @@ pub(crate) fn run<T: Send + 'static>(
         py.check_signals()?;
     };
     let result = wait();
-    abandoned.store(result.is_err(), Ordering::Relaxed);
+    if result.is_err() {
+        stop.now();
+    }
     result
 }
 

@@ -4,7 +4,7 @@ use crate::background;
 use crate::bank::Bank;
 use crate::errors::{refused, spec_problem};
 use crate::sources;
-use hybank::design::{Design, DesignError, Limits, Options, ProofSearch, design_observed, implausible};
+use hybank::design::{Design, DesignError, Limits, Options, ProofSearch, warnings};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use std::ffi::CString;
@@ -21,14 +21,14 @@ pub(crate) fn design(
 ) -> PyResult<Bank> {
     let py = source.py();
     let spec = sources::spec(source)?;
-    for doubt in implausible(&spec).unwrap_or_default() {
+    for doubt in warnings(&spec).unwrap_or_default() {
         warn(py, &doubt)?;
     }
     let proof = if proof { ProofSearch::Run } else { ProofSearch::Skip };
     let limits = if limits { Limits::Enforced } else { Limits::Off };
     let designed = background::run(py, progress, move |reporter| {
         let observer = |stage, seconds| reporter.begins(stage, seconds);
-        design_observed(&spec, &Options { proof, limits, observer: &observer })
+        hybank::design::design(&spec, &Options { proof, limits, observer: &observer, stop: reporter.stop() })
     })?;
     let Design { bank, proof: proven, .. } = designed.map_err(|error| match &error {
         DesignError::Spec(problem) => spec_problem(py, problem),

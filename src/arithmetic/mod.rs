@@ -1,14 +1,34 @@
 //! Real numbers of more than 53 bits, with a proven relative error for each operation.
 //!
 //! [`DoubleDouble`] has 106 bits and [`BigFloat`] has 512. Both are a [`Number`], the trait over which
-//! enclosures and [`Matrix`] are generic.
+//! enclosures and the decompositions of [`dense`] are generic.
 
 mod big_float;
+pub(crate) mod dense;
 mod double_double;
-mod matrix;
 mod number;
 
 pub(crate) use big_float::BigFloat;
 pub(crate) use double_double::DoubleDouble;
-pub(crate) use matrix::Matrix;
 pub(crate) use number::Number;
+
+use std::ops::{AddAssign, SubAssign};
+
+/// The assignments by which matrices of these numbers are added.
+macro_rules! assignments {
+    ($($number:ty),*) => {$(
+        impl AddAssign for $number {
+            fn add_assign(&mut self, other: Self) {
+                *self = *self + other;
+            }
+        }
+
+        impl SubAssign for $number {
+            fn sub_assign(&mut self, other: Self) {
+                *self = *self - other;
+            }
+        }
+    )*};
+}
+
+assignments!(DoubleDouble, BigFloat);

@@ -1,6 +1,6 @@
 //! The trait of the floating-point numbers with which enclosures are computed.
 
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// A floating-point number whose operations have a proven relative error.
 pub(crate) trait Number:
@@ -15,6 +15,8 @@ pub(crate) trait Number:
     + Neg<Output = Self>
     + Add<Output = Self>
     + Sub<Output = Self>
+    + AddAssign
+    + SubAssign
     + Mul<Output = Self>
     + Div<Output = Self>
 {

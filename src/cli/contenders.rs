@@ -109,7 +109,7 @@ fn designed(spec: &Spec, method: Method, knows_the_band: bool) -> Result<Bank, F
     let mut variant = spec.clone();
     variant.design = spec.design.with_method(method, spec.channels.len()).map_err(Failure::input)?;
     variant.signal = variant.signal.filter(|_| knows_the_band);
-    Ok(design::design_with(&variant, design::ProofSearch::Skip).map_err(Failure::input)?.bank)
+    Ok(design::design(&variant, &design::Options::without_proof()).map_err(Failure::input)?.bank)
 }
 
 impl Contender {

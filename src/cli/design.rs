@@ -132,7 +132,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let limits = if args.no_limit { Limits::Off } else { Limits::Enforced };
     let options =
         Options { limits, observer: &|stage, seconds| progress.note(stage, seconds), ..Options::default() };
-    let found = progress.during(|| design::design_observed(&spec, &options)).in_file(&args.spec)?;
+    let found = progress.during(|| design::design(&spec, &options)).in_file(&args.spec)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
     let mut judged = Judged::new(&found.bank).in_file(&args.spec)?;
     warn_or_refuse(&judged.warnings(&found.bank), args.strict)?;
@@ -148,7 +148,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 
 /// What in the spec is probably not meant. A spec that is wrong is refused by the design.
 fn spec_warnings(spec: &Spec, path: &Path) -> Vec<String> {
-    let found = design::implausible(spec).unwrap_or_default();
+    let found = design::warnings(spec).unwrap_or_default();
     found.iter().map(|problem| format!("{}: {problem}", path.display())).collect()
 }
 

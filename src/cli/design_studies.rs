@@ -3,8 +3,7 @@
 use crate::bank::Bank;
 use crate::design::quantise::WordStudy;
 use crate::design::{
-    Design, DesignError, OrderErrorPoint, OrderReduction, ProofSearch, RobustStudy, TrackingStudy,
-    design_with,
+    Design, DesignError, Options, OrderErrorPoint, OrderReduction, RobustStudy, TrackingStudy, design,
 };
 use crate::figures::{snr, target_band};
 use crate::overview::{band, decibels_of};
@@ -168,7 +167,7 @@ impl BandHint {
         let Some(band) = target_band(spec)?.filter(|_| seconds < MOST_HINT_SECONDS) else { return Ok(None) };
         let signal = Some(SignalSpec::in_band(band));
         let wanted = Spec { signal, latency: Some(found.bank.latency), ..spec.clone() };
-        let Ok(other) = design_with(&wanted, ProofSearch::Skip) else { return Ok(None) };
+        let Ok(other) = design(&wanted, &Options::without_proof()) else { return Ok(None) };
         let instead_of_db = snr(&Bank { spec: Some(wanted), ..found.bank.clone() })?.total_db;
         let snr_db = snr(&other.bank)?.total_db;
         Ok((snr_db - instead_of_db >= LEAST_BAND_GAIN).then_some(Self {

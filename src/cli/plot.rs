@@ -4,7 +4,7 @@ use super::bank_file::load;
 use super::print::{Failure, InFile, print};
 use super::written::{begin_file, check_outputs, write_together};
 use crate::bank::Bank;
-use crate::design::{DesignError, ProofSearch, design_with};
+use crate::design::{DesignError, Options, design};
 use crate::overview::{Picture, pictures};
 use crate::plot::{Chart, Marks, PlotError, Series};
 use crate::spec::{DesignSpec, Spec};
@@ -143,7 +143,7 @@ fn by_taps(taps: usize, plain: &Spec) -> Vec<(f64, f64)> {
 /// gamma of a design in decibels; none where there is no such bank, as for latencies that the taps do not
 /// reach.
 fn point(at: usize, spec: &Spec) -> Option<(f64, f64)> {
-    let gamma = design_with(spec, ProofSearch::Skip).ok()?.bank.gamma.norm?;
+    let gamma = design(spec, &Options::without_proof()).ok()?.bank.gamma.norm?;
     (gamma > 0.0).then(|| (at as f64, 20.0 * gamma.log10()))
 }
 

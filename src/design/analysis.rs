@@ -1,11 +1,12 @@
 //! Analysis of a bank: the norm of its error system, its mean-square error and its noise gain, with the
-//! delays it was designed for or with others.
+//! delays it was designed for or with others; and the scale of its gamma, what the simplest banks reach.
 
 use super::plant::LiftedPlant;
 use super::problem::Problem;
-use super::resolution::resolves_delays;
 use super::{DesignError, filters};
 use crate::bank::Bank;
+use crate::linalg::Mat;
+use crate::lti::StateSpace;
 use crate::lti::gramian::h2_norm;
 use crate::units::{FastPeriods, Hertz, RadiansPerSlowPeriod, Seconds};
 
@@ -56,7 +57,7 @@ pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, Design
     shifted.check_size()?;
     let plant = LiftedPlant::new(&shifted)?;
     let peak = plant.bank_norm(&bank.filters)?;
-    let noncausal = if resolves_delays(&shifted) { Some(plant.noncausal_bound()?.gain) } else { None };
+    let noncausal = if shifted.resolves_delays() { Some(plant.noncausal_bound()?.gain) } else { None };
     Ok(Analysis {
         gamma: peak.gain,
         peak_hertz: RadiansPerSlowPeriod(peak.frequency).in_hertz(bank.slow_period()),
@@ -91,6 +92,84 @@ fn mean_of(bank: &Bank, plant: &LiftedPlant) -> Result<MeanAnalysis, DesignError
 pub fn bank_problem(bank: &Bank) -> Result<Problem, DesignError> {
     let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
     Problem::new(spec, bank.latency)
+}
+
+/// gamma of the simplest banks, h = 1, and the size of the reference.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct GammaScale {
+    /// gamma of a bank whose output is zero: the largest gain from the analog input to the reference.
+    pub zero_output: f64,
+    /// gamma of plain interleaving: each output sample is the slow sample nearest to its instant.
+    pub interleaving: f64,
+    /// Root mean square of the reference for white noise f of unit density. With `rms_error` it gives the
+    /// signal-to-noise ratio of a signal with the target's spectrum.
+    pub rms_reference: f64,
+}
+
+impl GammaScale {
+    /// Of the front ends, delays and latency of `bank`.
+    ///
+    /// # Errors
+    /// [`DesignError::NoSpec`] for a bank without front ends, [`DesignError::TooLate`] for delays that need
+    /// too many delay-chain states.
+    pub fn new(bank: &Bank) -> Result<Self, DesignError> {
+        let problem = bank_problem(bank)?;
+        let plant = LiftedPlant::new(&problem)?;
+        let zero = StateSpace::gain(Mat::zeros(problem.ratio, problem.channels.len()));
+        let reference = plant.reference()?;
+        Ok(Self {
+            zero_output: plant.norm(&zero)?.gain,
+            interleaving: plant.fir_norm(&interleaving(&problem))?.gain,
+            rms_reference: h2_norm(&reference)? / (problem.ratio as f64).sqrt(),
+        })
+    }
+}
+
+/// The taps of plain interleaving: one tap of 1 for each of the M phases.
+fn interleaving(problem: &Problem) -> Vec<Vec<f64>> {
+    let nearest = nearest_samples(&problem.delays(), problem.ratio, problem.latency, 0);
+    let lags = 1 + nearest.iter().map(|sample| sample.lag as usize).max().unwrap_or(0);
+    let mut taps = vec![vec![0.0; lags * problem.ratio]; problem.channels.len()];
+    for (phase, sample) in nearest.into_iter().enumerate() {
+        taps[sample.channel][sample.lag as usize * problem.ratio + phase] = 1.0;
+    }
+    taps
+}
+
+/// The slow sample nearest to the instant of an output phase.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NearestSample {
+    /// Index of its channel, from 0.
+    pub channel: usize,
+    /// Age in slow periods: frame k gives the output sample the slow sample k - lag. Negative for a sample
+    /// that is taken after the frame.
+    pub lag: i64,
+}
+
+/// The nearest sample of each of the M output phases; empty without channels.
+///
+/// Phase p of frame k belongs to the instant k M + p - m0 in fast periods, and sample l of channel i to
+/// l M - D_i. Of equally near samples that of the first channel is taken. No lag is below `least_lag`: 0 for
+/// causal interleaving, `i64::MIN` where the whole recording is known.
+pub fn nearest_samples(
+    delays: &[FastPeriods],
+    ratio: usize,
+    latency: usize,
+    least_lag: i64,
+) -> Vec<NearestSample> {
+    let period = ratio as f64;
+    let nearest = |phase: usize| {
+        let instant = phase as f64 - latency as f64;
+        let of_channel = |(channel, delay): (usize, &FastPeriods)| {
+            let lag = ((-instant - delay.0) / period).round() as i64;
+            let lag = lag.max(least_lag);
+            let distance = (instant + lag as f64 * period + delay.0).abs();
+            (distance, NearestSample { channel, lag })
+        };
+        let samples = delays.iter().enumerate().map(of_channel);
+        samples.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, sample)| sample)
+    };
+    (0..ratio).filter_map(nearest).collect()
 }
 
 #[cfg(test)]

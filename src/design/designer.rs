@@ -1,17 +1,17 @@
 //! The steps from a spec to a finished bank.
 
 use super::choices::{completed, settings, with_taps};
-use super::effort::{self, Effort, Limits, Observer, Stage, unobserved};
+use super::effort;
+use super::limits::{Limits, Stage, Stop};
 use super::merging::Repeats;
 use super::methods::robust_fir::RobustStudy;
 use super::methods::scheduled_fir::TrackingStudy;
-use super::methods::{self, DualPoint, Synthesis};
+use super::methods::{self, DualPoint, Settings, Synthesis};
 use super::plant::LiftedPlant;
 use super::problem::Problem;
 use super::quantise::WordStudy;
 use super::realise::{Realised, realise};
 use super::reduction::OrderReduction;
-use super::resolution::resolves_delays;
 use super::{DesignError, filters, prove, uncertainty};
 use crate::bank::{Bank, Gamma, SynthesisFilters};
 use crate::spec::{DesignSpec, Method, Spec, SpecProblem};
@@ -47,7 +47,7 @@ pub struct Design {
     pub proof_time: Duration,
 }
 
-/// Whether [`design_with`] searches for a proof of the gammas. The search may take longer than the design.
+/// Whether [`design`] searches for a proof of the gammas. The search may take longer than the design.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProofSearch {
     /// Search. The bank carries the proof if one is found.
@@ -57,63 +57,63 @@ pub enum ProofSearch {
 }
 
 /// How a design runs.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Options<'a> {
     /// Whether a proof is searched.
     pub proof: ProofSearch,
-    /// Whether a design that takes too long or needs too much memory is refused.
+    /// Whether a design that takes too long or needs too much memory is refused, or ended when it has.
     pub limits: Limits,
-    /// Called with the step that begins.
-    pub observer: Observer<'a>,
+    /// Called with the step that begins and the estimated seconds of the whole design.
+    pub observer: &'a dyn Fn(Stage, f64),
+    /// Ends the design.
+    pub stop: Stop,
 }
 
 impl Default for Options<'_> {
     /// With the search for a proof, limited and unobserved.
     fn default() -> Self {
-        Self { proof: ProofSearch::Run, limits: Limits::Enforced, observer: &unobserved }
+        let (proof, limits, stop) = (ProofSearch::Run, Limits::Enforced, Stop::default());
+        Self { proof, limits, observer: &|_, _| (), stop }
     }
 }
 
-/// Designs the bank that `spec` asks for, with the proof of its gammas.
+impl Options<'_> {
+    /// The default without the search for a proof.
+    pub fn without_proof() -> Self {
+        Self { proof: ProofSearch::Skip, ..Self::default() }
+    }
+}
+
+/// Designs the bank that `spec` asks for, with the proof of its gammas. `options` say how.
+///
+/// A design that reaches its time limit or is ended by [`Options::stop`] gives the best bank so far, whose
+/// gamma may lie above the least; [`Design::proof`] is then [`DesignError::Stopped`].
 ///
 /// # Errors
 /// [`DesignError`] if the spec breaks a rule of [`Spec::check`], a filter of the spec is not a valid front
 /// end, a comparison method does not apply, the design would take more than ten minutes or more memory than
-/// there is, or no bank was found for numerical reasons. A bank without a proof is not an error: see
-/// [`Design::proof`].
-pub fn design(spec: &Spec) -> Result<Design, DesignError> {
-    design_with(spec, ProofSearch::Run)
-}
-
-/// As [`design`]; `search` says whether to search for a proof.
-///
-/// # Errors
-/// As [`design`].
-pub fn design_with(spec: &Spec, search: ProofSearch) -> Result<Design, DesignError> {
-    design_observed(spec, &Options { proof: search, ..Options::default() })
-}
-
-/// As [`design`]; `options` say how.
-///
-/// # Errors
-/// As [`design`].
-pub fn design_observed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
+/// there is, or no bank was found for numerical reasons or before the end. A bank without a proof is not an
+/// error: see [`Design::proof`].
+pub fn design(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
     spec.check()?;
-    let (complete, problem, watch) = normalise(spec, options)?;
-    watch.begins(Stage::Filters);
-    let settings = settings(&complete)?;
-    let repeats = Repeats::of(spec);
+    let stop = options.stop.within(options.limits);
+    let (complete, problem, seconds) = complete(spec, options, &stop)?;
+    (options.observer)(Stage::Filters, seconds);
+    let settings = Settings { stop: stop.clone(), ..settings(&complete)? };
     let merged = if settings.robust.is_some() || settings.deviations.is_some() {
-        problem.keep_channels()
+        problem.merge_channels(Repeats::Never)
     } else {
-        problem.merge_channels(repeats).of_unit_size()?
+        problem.merge_channels(Repeats::of(spec)).of_unit_size()?
     };
     let plant = LiftedPlant::new(&merged.problem)?;
     let synthesis = methods::synthesise(spec.design.method, &plant, &settings)?;
-    watch.begins(Stage::Realisation);
+    (options.observer)(Stage::Realisation, seconds);
     let realised = realise(&complete, &problem, &merged, &plant, &synthesis)?;
-    watch.begins(Stage::Proof);
     let judged = judge(spec, complete, realised, &synthesis).without_unresolved_bounds(&problem);
+    if stop.is_due() {
+        return Ok(Design { proof: Err(DesignError::Stopped), ..judged });
+    }
+    (options.observer)(Stage::Proof, seconds);
     Ok(judged.proved(&synthesis.dual, options.proof))
 }
 
@@ -146,30 +146,22 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
         .proved(&[], search))
 }
 
-/// Tells the observer what is done, with the time that the design takes.
-struct Watch<'a> {
-    observer: Observer<'a>,
-    effort: Effort,
-}
-
-impl Watch<'_> {
-    fn begins(&self, stage: Stage) {
-        (self.observer)(stage, self.effort.seconds);
-    }
-}
-
-/// The spec with all defaults filled in, and its problem in normalised time. The effort is checked before
-/// the latency is chosen, and again with that latency.
-fn normalise<'a>(spec: &Spec, options: &Options<'a>) -> Result<(Spec, Problem, Watch<'a>), DesignError> {
+/// The spec with all defaults filled in, its problem in normalised time, and the estimate of its design in
+/// seconds. The effort is checked before the latency is chosen, and again with that latency.
+fn complete(spec: &Spec, options: &Options<'_>, stop: &Stop) -> Result<(Spec, Problem, f64), DesignError> {
     let checked = |spec: &Spec| effort::check(spec, options.proof == ProofSearch::Run, options.limits);
     let open = with_taps(spec)?;
-    let mut watch = Watch { observer: options.observer, effort: checked(&open)? };
-    let complete = completed(&open, &|designs| watch.begins(Stage::Latency { designs }))?;
+    let mut effort = checked(&open)?;
+    let compared = |designs| {
+        (options.observer)(Stage::Latency { designs }, effort.seconds);
+        if stop.is_due() { Err(DesignError::Stopped) } else { Ok(()) }
+    };
+    let complete = completed(&open, &compared)?;
     if complete != open {
-        watch.effort = checked(&complete)?;
+        effort = checked(&complete)?;
     }
     let problem = Problem::new(&complete, complete.latency.unwrap_or_default())?;
-    Ok((complete, problem, watch))
+    Ok((complete, problem, effort.seconds))
 }
 
 /// The bank with its complete spec and with the norm of its final coefficients. No lower bound exceeds that
@@ -211,7 +203,7 @@ impl Design {
     /// Leaves out the bounds that rest on differences which doubles do not resolve. `verify` may still prove
     /// some.
     fn without_unresolved_bounds(mut self, problem: &Problem) -> Self {
-        if !resolves_delays(problem) {
+        if !problem.resolves_delays() {
             self.bank.gamma = Gamma { lower: None, noncausal: None, ..self.bank.gamma };
         }
         self

@@ -1,6 +1,6 @@
 //! Errors of design and analysis.
 
-use super::effort::amount::{Effort, Rounded};
+use super::limits::{Effort, memory_text};
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
 use crate::lmi::LmiError;
@@ -56,6 +56,12 @@ pub enum DesignError {
     /// The caller did not ask for a proof.
     #[error("no proof was looked for")]
     ProofSkipped,
+    /// The time limit or the caller ended the design.
+    #[error(
+        "the design was ended before it was complete: a bank that it has is the best so far, and its gamma may lie above the \
+         least"
+    )]
+    Stopped,
     /// The error system is too large for the search for a proof.
     #[error("a proof is looked for up to {limit} states of the error system, this bank's has {states}")]
     NotSearched {
@@ -156,6 +162,19 @@ pub enum DesignError {
         /// m0, fast samples.
         latency: usize,
     },
+    /// The bank of least gamma misses the SNR that was asked for, whatever its length.
+    #[error(
+        "no bank of least gamma of up to {taps} taps has the SNR of {wanted:.1} dB that was asked for, the best has {best:.1} \
+         dB: it does not minimise the mean square; use method = \"h2\", ask for less, or give taps"
+    )]
+    SnrMissed {
+        /// Decibels.
+        wanted: f64,
+        /// The best of the lengths that were designed, in decibels.
+        best: f64,
+        /// The longest of them.
+        taps: usize,
+    },
     /// The design would take longer than ten minutes.
     #[error(
         "this design would take about {effort}, and ten minutes are allowed: {remedy}; --no-limit runs it all the same"
@@ -169,7 +188,7 @@ pub enum DesignError {
     /// The design would need more memory than there is.
     #[error(
         "this design would take about {effort}, and this process may use {}: {remedy}; --no-limit tries it all the same",
-        Rounded::memory(*.memory)
+        memory_text(*.memory)
     )]
     TooLarge {
         /// The estimate.

@@ -21,6 +21,7 @@
 //! exchange methods.
 
 use super::DesignError;
+use super::limits::Stop;
 use crate::linalg::{self, CMat};
 use crate::lmi::Settings;
 use crate::lmi::sampled::{self, MeanSquareObjective, Point, Problem, Taps};
@@ -138,6 +139,8 @@ pub(super) struct Exchange<E> {
     pub(super) lower: f64,
     /// The dual matrices that prove `lower`.
     pub(super) dual: Vec<DualPoint>,
+    /// Ends the exchange between two rounds, with the best unknowns so far.
+    pub(super) stop: Stop,
     /// Problems solved.
     pub(super) rounds: usize,
     /// Interior-point iterations of all rounds.
@@ -158,8 +161,8 @@ impl<E: AffineError> Exchange<E> {
     ) -> Result<Self, DesignError> {
         problem.check_objective(&objective)?;
         let gamma_margin = gamma_margin.max(LEAST_MARGIN);
-        let (lower, dual, rounds, iterations) = (0.0, Vec::new(), 0, 0);
-        Ok(Self { error, problem, objective, gamma_margin, lower, dual, rounds, iterations })
+        let (lower, dual, stop, rounds, iterations) = (0.0, Vec::new(), Stop::default(), 0, 0);
+        Ok(Self { error, problem, objective, gamma_margin, lower, dual, stop, rounds, iterations })
     }
 
     /// The error that is minimised.
@@ -223,7 +226,7 @@ impl<E: AffineError> Exchange<E> {
                 best = Some(candidate);
             }
             let gamma = best.as_ref().map_or(0.0, |best| best.peaks.estimate);
-            if gamma <= self.lower * (1.0 + tolerances.accuracy) {
+            if gamma <= self.lower * (1.0 + tolerances.accuracy) || self.stop.is_due() {
                 break;
             }
             // Without a peak to add it is the problem on the points that is not solved closely enough.
@@ -287,6 +290,9 @@ impl<E: AffineError> Exchange<E> {
         let cap_at_points = start.peaks.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);
         let settings = Settings { tol_gap_rel: tolerances.mean_square, ..Settings::SAMPLED };
         for _ in 0..tolerances.rounds {
+            if self.stop.is_due() {
+                break;
+            }
             let found = sampled::mean_square_under_cap(
                 &self.problem,
                 &self.objective,

@@ -25,13 +25,14 @@ use std::ops::Range;
 pub(super) const SAME_INSTANT: f64 = 1e-11;
 
 /// The lifted analysis side.
+#[derive(Debug, Clone)]
 pub(super) struct Lifted {
     /// x+ = A x + B w, [y; z] = C x + D w.
     pub(super) system: StateSpace,
     /// For each measurement the states of its delay chain; the first state holds the newest sample.
     pub(super) chains: Vec<Range<usize>>,
     /// The system without the delays of its outputs by whole periods.
-    pub(super) prompt: StateSpace,
+    pub(super) undelayed: StateSpace,
     /// These delays, one for each output, in slow periods.
     pub(super) delays: Vec<usize>,
 }
@@ -55,15 +56,15 @@ struct SamplingInstant {
 pub(super) fn lift(problem: &Problem) -> Result<Lifted, DesignError> {
     let instants = schedule(problem);
     let delays: Vec<usize> = instants.iter().map(|instant| instant.delay).collect();
-    let prompt = follow_state(problem, &instants)?;
-    let ends = delays.iter().scan(prompt.order(), |end, &delay| {
+    let undelayed = follow_state(problem, &instants)?;
+    let ends = delays.iter().scan(undelayed.order(), |end, &delay| {
         *end += delay;
         Some(*end)
     });
     let chains = ends.zip(&delays).map(|(end, &delay)| if delay == 0 { 0..0 } else { end - delay..end });
     let chains = chains.take(problem.channels.len()).collect();
-    let system = prompt.series(&StateSpace::delays(&delays))?.compress_inputs();
-    Ok(Lifted { system, chains, prompt: prompt.compress_inputs(), delays })
+    let system = undelayed.series(&StateSpace::delays(&delays))?.compress_inputs();
+    Ok(Lifted { system, chains, undelayed: undelayed.compress_inputs(), delays })
 }
 
 /// The outputs [y; y'; z] without their delays by whole periods, and these delays. y' are the derivatives of

@@ -4,10 +4,15 @@
 //! recursive filters, so do two that sample whole slow periods apart: the later sample of one is the earlier
 //! sample of the other, which a filter with memory has seen. Kept apart, they would make the plant singular.
 
-use super::lifting::SAME_INSTANT;
-use super::problem::Problem;
-use crate::linalg::Mat;
+use super::DesignError;
+use super::lifting::{JointState, SAME_INSTANT};
+use super::problem::{Channel, Problem};
+use crate::linalg::{Mat, power_of_two};
+use crate::lti::gramian::controllability_root;
 use crate::spec::{Method, Spec};
+
+/// Sizes of measurements within this factor of one are not changed: they lose no digits to one another.
+const USUAL_SIZE: f64 = 16.0;
 
 /// Which channels count as one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,6 +25,8 @@ pub(super) enum Repeats {
     /// The same among channels without noise. With noise an older sample says more of its instant, and the
     /// noise keeps the plant regular.
     NoiselessAtWholePeriods,
+    /// None: channels that carry one measurement without errors do not with them.
+    Never,
 }
 
 impl Repeats {
@@ -78,13 +85,6 @@ impl Problem {
         MergedChannels { problem: merged, shares }
     }
 
-    /// Each channel for itself: channels that carry one measurement without errors do not with them.
-    pub(super) fn keep_channels(&self) -> MergedChannels {
-        let shares =
-            (0..self.channels.len()).map(|representative| Share { representative, share: 1.0 }).collect();
-        MergedChannels { problem: self.clone(), shares }
-    }
-
     /// The channels in groups that carry one measurement, in the order of their first channels.
     fn groups(&self, repeats: Repeats) -> Vec<Vec<usize>> {
         let mut groups: Vec<Vec<usize>> = Vec::new();
@@ -105,6 +105,7 @@ impl Problem {
         let at_whole_periods = (apart - period * (apart / period).round()).abs() < SAME_INSTANT;
         let noisy = self.noise[i] > 0.0 || self.noise[j] > 0.0;
         let alike = match repeats {
+            Repeats::Never => false,
             Repeats::NoiselessAtWholePeriods if noisy => apart.abs() < SAME_INSTANT,
             Repeats::NoiselessAtWholePeriods | Repeats::AtWholePeriods => at_whole_periods,
             Repeats::AtOneInstant => apart == 0.0,
@@ -120,11 +121,49 @@ impl Problem {
     }
 }
 
+/// Units in which every measurement is of about unit size. A gain g of channel i is undone by its filter,
+/// `F_i H_i = (F_i / g) (g H_i)`, so gamma does not depend on it. The decompositions of double precision do:
+/// next to a large measurement a small one is lost to rounding. The units are powers of two, so a change of
+/// units rounds nothing.
+impl Problem {
+    /// For each channel the unit u_i in which it is designed: u_i times the measurement has about unit size.
+    ///
+    /// # Errors
+    /// [`DesignError::Lti`] if a decomposition does not converge.
+    pub(super) fn measurement_units(&self) -> Result<Vec<f64>, DesignError> {
+        let is_usual = |size: f64| (1.0 / USUAL_SIZE..=USUAL_SIZE).contains(&size);
+        let unit = |size: f64| if is_usual(size) { 1.0 } else { 1.0 / power_of_two(size) };
+        Ok(self.measurement_sizes()?.into_iter().map(unit).collect())
+    }
+
+    /// The root mean square of the samples of each channel for white noise of unit density at the analog
+    /// input, without the noise of the converter.
+    ///
+    /// # Errors
+    /// As [`Problem::measurement_units`].
+    pub(super) fn measurement_sizes(&self) -> Result<Vec<f64>, DesignError> {
+        let joint = JointState::new(self)?;
+        let (transition, input) = joint.over(self.ratio as f64)?;
+        let outputs = joint.c() * controllability_root(&transition, &input)?;
+        let size = |channel: &Channel| channel.gain.abs() * outputs.row(channel.front_end).norm();
+        Ok(self.channels.iter().map(size).collect())
+    }
+}
+
 impl MergedChannels {
-    /// Whether the original channels were all distinct.
-    #[cfg(test)]
-    pub(super) fn are_all(&self) -> bool {
-        self.problem.channels.len() == self.shares.len()
+    /// The same channels with measurements of about unit size.
+    ///
+    /// # Errors
+    /// As [`Problem::measurement_units`].
+    pub(super) fn of_unit_size(mut self) -> Result<Self, DesignError> {
+        let units = self.problem.measurement_units()?;
+        for (channel, unit) in self.problem.channels.iter_mut().zip(&units) {
+            channel.gain *= unit;
+            channel.converter_gain *= unit;
+        }
+        self.problem.noise.iter_mut().zip(&units).for_each(|(power, unit)| *power *= unit * unit);
+        self.shares.iter_mut().for_each(|share| share.share *= units[share.representative]);
+        Ok(self)
     }
 
     /// Whether the channels are the original ones, in their units.
@@ -214,12 +253,12 @@ mod tests {
         assert_eq!(recursive.representatives(), [2, 1]);
         assert_eq!(recursive.problem.channels[0].delay.0, 0.3);
         // Taps reach only so far back, so an older sample adds to a newer one.
-        assert!(three.merge_channels(Repeats::AtOneInstant).are_all());
+        assert!(three.merge_channels(Repeats::AtOneInstant).are_unchanged());
     }
 
     #[test]
     fn channels_that_differ_stay_apart() {
         let apart = problem(&[(1.0, 0.3, 0.0), (1.0, 1.3, 0.0), (1.0, 0.3 + 1e-9, 0.0)]);
-        assert!(apart.merge_channels(Repeats::AtWholePeriods).are_all());
+        assert!(apart.merge_channels(Repeats::AtWholePeriods).are_unchanged());
     }
 }

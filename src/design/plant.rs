@@ -42,10 +42,13 @@ const FREQUENCIES_PER_LAG: usize = 4;
 #[derive(Debug, Clone)]
 pub struct LiftedPlant {
     problem: Problem,
-    system: StateSpace,
-    chains: Vec<Range<usize>>,
-    prompt: StateSpace,
-    delays: Vec<usize>,
+    lifted: Lifted,
+    cache: Cache,
+}
+
+/// What several judgements of one plant need.
+#[derive(Debug, Clone, Default)]
+struct Cache {
     response: OnceLock<FrequencyResponse>,
     resonances: OnceLock<Vec<f64>>,
     measurement_size: OnceLock<f64>,
@@ -57,17 +60,7 @@ impl LiftedPlant {
     /// # Errors
     /// [`DesignError::Linalg`] or [`DesignError::Shapes`] never for a [`Problem`] made by [`Problem::new`].
     pub fn new(problem: &Problem) -> Result<Self, DesignError> {
-        let Lifted { system, chains, prompt, delays } = lift(problem)?;
-        Ok(Self {
-            problem: problem.clone(),
-            system,
-            chains,
-            prompt,
-            delays,
-            response: OnceLock::new(),
-            resonances: OnceLock::new(),
-            measurement_size: OnceLock::new(),
-        })
+        Ok(Self { problem: problem.clone(), lifted: lift(problem)?, cache: Cache::default() })
     }
 
     /// The same plant with the noise of the converters: each channel that has noise gets an input of unit
@@ -93,7 +86,7 @@ impl LiftedPlant {
     pub(super) fn with_noise_scaled(&self, share: f64) -> Result<Self, DesignError> {
         let noise = &self.problem.noise;
         let noisy: Vec<usize> = (0..noise.len()).filter(|&i| noise[i] > 0.0).collect();
-        let chains = self.chains.iter().zip(noise);
+        let chains = self.lifted.chains.iter().zip(noise);
         let chains = chains.map(|(chain, power)| if *power > 0.0 { 0..0 } else { chain.clone() });
         let rms = |i: usize, k: usize| if noisy[k] == i { share * noise[i].sqrt() } else { 0.0 };
         let added = |system: &StateSpace| {
@@ -102,16 +95,13 @@ impl LiftedPlant {
             let d = linalg::hstack(&[system.d(), &d])?;
             Ok::<_, DesignError>(StateSpace::new(system.a().clone(), b, system.c().clone(), d)?)
         };
-        Ok(Self {
-            problem: self.problem.clone(),
-            system: added(&self.system)?,
+        let lifted = Lifted {
+            system: added(&self.lifted.system)?,
             chains: chains.collect(),
-            prompt: added(&self.prompt)?,
-            delays: self.delays.clone(),
-            response: OnceLock::new(),
-            resonances: OnceLock::new(),
-            measurement_size: OnceLock::new(),
-        })
+            undelayed: added(&self.lifted.undelayed)?,
+            delays: self.lifted.delays.clone(),
+        };
+        Ok(Self { problem: self.problem.clone(), lifted, cache: Cache::default() })
     }
 
     /// The problem in normalised time from which the plant was made.
@@ -121,7 +111,7 @@ impl LiftedPlant {
 
     /// `[H; W]`: the measurements y first, then the references z.
     pub fn system(&self) -> &StateSpace {
-        &self.system
+        &self.lifted.system
     }
 
     /// N, the measurements per slow period.
@@ -139,7 +129,7 @@ impl LiftedPlant {
     /// # Errors
     /// [`DesignError::Shapes`] never: the outputs are there.
     pub fn measurement(&self) -> Result<StateSpace, DesignError> {
-        Ok(self.system.select_outputs(0..self.channels())?)
+        Ok(self.lifted.system.select_outputs(0..self.channels())?)
     }
 
     /// W(z), M x n_w.
@@ -147,14 +137,14 @@ impl LiftedPlant {
     /// # Errors
     /// [`DesignError::Shapes`] never: the outputs are there.
     pub fn reference(&self) -> Result<StateSpace, DesignError> {
-        Ok(self.system.select_outputs(self.channels()..self.channels() + self.ratio())?)
+        Ok(self.lifted.system.select_outputs(self.channels()..self.channels() + self.ratio())?)
     }
 
     /// The states of the delay chain of `channel`, newest sample first. The range is empty unless the
     /// channel is delayed by whole slow periods. The measurement of a delayed channel is the last state of
     /// its chain, without feedthrough.
     pub(super) fn chain(&self, channel: usize) -> Range<usize> {
-        self.chains[channel].clone()
+        self.lifted.chains[channel].clone()
     }
 
     /// `[X y; z]`: the outputs of `filters` X, which the measurements drive, and below them the references.
@@ -163,7 +153,7 @@ impl LiftedPlant {
     /// [`DesignError::Shapes`] unless `filters` has N inputs.
     pub fn driving(&self, filters: &StateSpace) -> Result<StateSpace, DesignError> {
         let (n, m, x) = (self.channels(), self.ratio(), filters.outputs());
-        let all = self.system.cascade(0..n, filters)?;
+        let all = self.lifted.system.cascade(0..n, filters)?;
         Ok(all.select_outputs((n + m..n + m + x).chain(n..n + m))?)
     }
 
@@ -248,12 +238,12 @@ impl LiftedPlant {
 
     /// ||H||_2 of measurements of about unit size.
     fn measurement_size(&self) -> Result<f64, DesignError> {
-        match self.measurement_size.get() {
+        match self.cache.measurement_size.get() {
             Some(&size) => Ok(size),
             None => {
                 let units = self.problem.measurement_units()?;
                 let size = h2_norm(&self.measurement()?.scale_outputs(&units)?)?;
-                Ok(*self.measurement_size.get_or_init(|| size))
+                Ok(*self.cache.measurement_size.get_or_init(|| size))
             }
         }
     }
@@ -273,16 +263,16 @@ impl LiftedPlant {
         let references = self.channels()..self.channels() + self.ratio();
         // Delays by whole periods turn the rows of the response, which changes neither the span of the
         // measurements nor the singular values.
-        let prompt = self.prompt.select_outputs(distinct.iter().copied().chain(references))?;
-        Ok(unexplained_peak(&prompt.scale_outputs(&scales)?, distinct.len())?)
+        let undelayed = self.lifted.undelayed.select_outputs(distinct.iter().copied().chain(references))?;
+        Ok(unexplained_peak(&undelayed.scale_outputs(&scales)?, distinct.len())?)
     }
 
     /// `[H; W]` at e^{j omega}. A delay by whole periods is a factor of its row, so the time does not depend
     /// on the length of the delay chains.
     fn at_frequency(&self, omega: f64) -> CMat {
-        let prompt = self.response.get_or_init(|| FrequencyResponse::new(&self.prompt));
-        let mut g = prompt.at_frequency(omega);
-        for (mut row, &delay) in g.row_iter_mut().zip(&self.delays).filter(|(_, delay)| **delay > 0) {
+        let undelayed = self.cache.response.get_or_init(|| FrequencyResponse::new(&self.lifted.undelayed));
+        let mut g = undelayed.at_frequency(omega);
+        for (mut row, &delay) in g.row_iter_mut().zip(&self.lifted.delays).filter(|(_, delay)| **delay > 0) {
             row *= Complex::from_polar(1.0, -omega * delay as f64);
         }
         g
@@ -291,11 +281,11 @@ impl LiftedPlant {
     /// The frequencies near the poles of the plant. Apart from poles at zero, every FIR error system has
     /// these poles.
     fn resonances(&self) -> Result<&[f64], DesignError> {
-        if self.resonances.get().is_none() {
-            let found = resonances(&stable_poles(&self.prompt)?);
-            return Ok(self.resonances.get_or_init(|| found));
+        if self.cache.resonances.get().is_none() {
+            let found = resonances(&stable_poles(&self.lifted.undelayed)?);
+            return Ok(self.cache.resonances.get_or_init(|| found));
         }
-        Ok(self.resonances.get().map_or(&[], Vec::as_slice))
+        Ok(self.cache.resonances.get().map_or(&[], Vec::as_slice))
     }
 }
 

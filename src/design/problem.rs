@@ -13,6 +13,13 @@ pub const MAX_CHAIN_STATES: usize = 4096;
 /// Slow periods of delay up to which latencies that predict are compared, too.
 const KEPT_PERIODS: usize = 16;
 
+/// Delays of like channels closer than this (in fast periods, and up to whole slow periods) are not
+/// resolved: the difference of their samples has lost half of its digits or more, and a bank of large taps
+/// may gain by it what no computation in doubles shows.
+const DELAY_RESOLUTION: f64 = 1e-8;
+/// Relative difference of two delays that comes from rounding: they are meant to be equal.
+const DELAY_ROUNDING: f64 = 1e-14;
+
 /// Front ends, delays and rates in units of the fast period (h = 1).
 #[derive(Debug, Clone)]
 pub struct Problem {
@@ -81,17 +88,36 @@ impl Problem {
     /// [`DesignError::TooLate`] if latency and delays lie so far apart that the chains between them have
     /// more than [`MAX_CHAIN_STATES`] states.
     pub fn check_size(&self) -> Result<(), DesignError> {
-        let references = (0..self.ratio).map(|p| p as f64 - self.latency as f64);
-        let times: Vec<f64> =
-            self.channels.iter().map(|channel| -channel.delay.0).chain(references).collect();
-        let latest = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let periods = |time: f64| ((latest - time) / self.ratio as f64).floor();
-        let states: f64 = times.into_iter().map(periods).sum();
+        let states = self.chain_states();
         if states <= MAX_CHAIN_STATES as f64 {
             return Ok(());
         }
         let (latency, longest_delay) = (self.latency, self.longest_delay());
         Err(DesignError::TooLate { latency, longest_delay, states, limit: MAX_CHAIN_STATES })
+    }
+
+    /// States of all delay chains: one for each whole slow period by which a sample is older than the
+    /// newest.
+    pub(super) fn chain_states(&self) -> f64 {
+        let references = (0..self.ratio).map(|p| p as f64 - self.latency as f64);
+        let times: Vec<f64> =
+            self.channels.iter().map(|channel| -channel.delay.0).chain(references).collect();
+        let latest = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        times.into_iter().map(|time| ((latest - time) / self.ratio as f64).floor()).sum()
+    }
+
+    /// Whether the delays of all channels with the same front end are equal or far enough apart for bounds
+    /// that hold for all banks.
+    pub(super) fn resolves_delays(&self) -> bool {
+        let period = self.ratio as f64;
+        self.channels.iter().enumerate().all(|(i, a)| {
+            self.channels[..i].iter().filter(|b| b.front_end == a.front_end).all(|b| {
+                let apart = (a.delay - b.delay).0;
+                let from_whole_periods = (apart - (apart / period).round() * period).abs();
+                let rounding = DELAY_ROUNDING * a.delay.0.max(b.delay.0).max(1.0);
+                from_whole_periods <= rounding || from_whole_periods >= DELAY_RESOLUTION
+            })
+        })
     }
 
     /// The same problem with `errors[i]` added to the delays.

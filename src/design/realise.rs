@@ -28,14 +28,9 @@ pub(super) struct Realised {
     pub(super) integers: Option<(FixedPoint, WordStudy)>,
 }
 
-/// Filters with the norm of their error system.
-struct Evaluated {
-    filters: SynthesisFilters,
-    peak: Peak,
-}
-
-impl From<Evaluated> for Realised {
-    fn from(Evaluated { filters, peak }: Evaluated) -> Self {
+impl Realised {
+    /// Filters of which only the norm of the error system is known.
+    fn of(filters: SynthesisFilters, peak: Peak) -> Self {
         Self { filters, peak, rounding: 0.0, reduction: None, integers: None }
     }
 }
@@ -71,17 +66,17 @@ struct Realisation<'a> {
 }
 
 impl Realisation<'_> {
-    fn fir(&self, taps: &[Vec<f64>], peak: Peak) -> Result<Evaluated, DesignError> {
+    fn fir(&self, taps: &[Vec<f64>], peak: Peak) -> Result<Realised, DesignError> {
         if self.merged.are_unchanged() {
-            return Ok(Evaluated { filters: SynthesisFilters::Fir(taps.to_vec()), peak });
+            return Ok(Realised::of(SynthesisFilters::Fir(taps.to_vec()), peak));
         }
         evaluate(self.whole, SynthesisFilters::Fir(self.merged.share_taps(taps)))
     }
 
     /// Quantises the taps if the spec asks for integer taps.
-    fn with_integers(&self, real: Evaluated) -> Result<Realised, DesignError> {
+    fn with_integers(&self, real: Realised) -> Result<Realised, DesignError> {
         let (SynthesisFilters::Fir(taps), Some(bits)) = (&real.filters, &self.spec.design.bits) else {
-            return Ok(real.into());
+            return Ok(real);
         };
         let problem = QuantisationProblem {
             plant: self.whole,
@@ -91,7 +86,7 @@ impl Realisation<'_> {
         };
         let (integers, study) = quantise(problem, real.peak.gain, bits, self.spec.design.fraction_bits)?;
         let evaluated = evaluate(self.whole, SynthesisFilters::Fir(integers.taps()))?;
-        Ok(Realised { integers: Some((integers, study)), ..evaluated.into() })
+        Ok(Realised { integers: Some((integers, study)), ..evaluated })
     }
 
     /// A recursive bank of the order that the spec asks for; `norm` is the norm of the error of `system`
@@ -101,7 +96,7 @@ impl Realisation<'_> {
         let (Some(reduction), SynthesisFilters::StateSpace(block)) =
             (self.spec.design.reduction, &full.filters)
         else {
-            return Ok(full.into());
+            return Ok(full);
         };
         let problem = ReductionProblem {
             plant: self.merged_plant,
@@ -116,11 +111,11 @@ impl Realisation<'_> {
             None => full,
             Some(smaller) => self.reduced_realisation(&smaller, record.reduced.figures.gamma)?,
         };
-        Ok(Realised { reduction: Some(record), ..evaluated.into() })
+        Ok(Realised { reduction: Some(record), ..evaluated })
     }
 
     /// A reduced bank for all channels, in a fast realisation if one keeps the norm `promised`.
-    fn reduced_realisation(&self, reduced: &FirWithTail, promised: f64) -> Result<Evaluated, DesignError> {
+    fn reduced_realisation(&self, reduced: &FirWithTail, promised: f64) -> Result<Realised, DesignError> {
         let whole = reduced.map_inputs(&self.merged.shares())?;
         match self.fast_realisation(&whole, promised)? {
             Some(found) => Ok(found),
@@ -130,7 +125,7 @@ impl Realisation<'_> {
 
     /// The filters in the cheapest realisation that keeps the norm `promised`: an FIR head followed by
     /// parallel sections, an FIR head followed by a triangular state matrix, or the filters as they are.
-    fn fastest_realisation(&self, system: &StateSpace, promised: f64) -> Result<Evaluated, DesignError> {
+    fn fastest_realisation(&self, system: &StateSpace, promised: f64) -> Result<Realised, DesignError> {
         match self.fast_realisation(&FirWithTail::new(system)?, promised)? {
             Some(found) => Ok(found),
             None => evaluate(self.whole, block_filters(system)),
@@ -138,7 +133,7 @@ impl Realisation<'_> {
     }
 
     /// The first of the fast realisations that keeps the norm, if any does.
-    fn fast_realisation(&self, split: &FirWithTail, promised: f64) -> Result<Option<Evaluated>, DesignError> {
+    fn fast_realisation(&self, split: &FirWithTail, promised: f64) -> Result<Option<Realised>, DesignError> {
         let candidates = [split.parallel_form(), split.triangular_form().map(Some)];
         for candidate in candidates.into_iter().filter_map(|form| form.ok().flatten()) {
             match evaluate(self.whole, block_filters(&candidate.realise()?)) {
@@ -158,7 +153,7 @@ fn block_filters(system: &StateSpace) -> SynthesisFilters {
     SynthesisFilters::StateSpace(filters::to_block(system))
 }
 
-fn evaluate(plant: &LiftedPlant, filters: SynthesisFilters) -> Result<Evaluated, DesignError> {
+fn evaluate(plant: &LiftedPlant, filters: SynthesisFilters) -> Result<Realised, DesignError> {
     let peak = plant.bank_norm(&filters)?;
-    Ok(Evaluated { filters, peak })
+    Ok(Realised::of(filters, peak))
 }

@@ -5,9 +5,9 @@ use super::analysis::bank_problem;
 use super::problem::{Channel, Problem};
 use super::{DesignError, LiftedPlant, filters};
 use crate::bank::{Bank, SynthesisFilters};
-use crate::linalg::{Complex, Mat};
-use crate::units::{FastPeriods, Hertz, RadiansPerFastPeriod};
-use std::f64::consts::TAU;
+use crate::linalg::{self, Complex, Mat};
+use crate::units::{FastPeriods, Hertz, RadiansPerFastPeriod, RadiansPerSlowPeriod};
+use std::f64::consts::{PI, TAU};
 
 /// Energy of a recursive filter's response beyond which it counts as over, relative to all of it.
 const TAIL: f64 = 1e-12;
@@ -71,15 +71,19 @@ pub fn fir_response(taps: &[f64], w: RadiansPerFastPeriod) -> (Complex<f64>, f64
 /// [`DesignError::NoSpec`] for a bank without front ends.
 pub fn front_end_gains(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Vec<f64>)>, DesignError> {
     let problem = bank_problem(bank)?;
-    let at = |k: usize| {
-        let cycles = 0.5 * k as f64 / points.saturating_sub(1).max(1) as f64;
+    let gains = |cycles: f64| {
         let w = RadiansPerFastPeriod(TAU * cycles);
         let gain = |front_end: usize| problem.front_ends[front_end].response(w).norm();
         let channels = problem.channels.iter().map(|channel| channel.gain.abs() * gain(channel.front_end));
-        let gains = std::iter::once(gain(problem.target)).chain(channels).collect();
-        (Hertz(cycles / bank.fast_period.0), gains)
+        std::iter::once(gain(problem.target)).chain(channels).collect()
     };
-    Ok((0..points).map(at).collect())
+    Ok(over_frequencies(bank, points, gains))
+}
+
+/// `gains` at so many frequencies from 0 to half a cycle per fast period.
+fn over_frequencies(bank: &Bank, points: usize, gains: impl Fn(f64) -> Vec<f64>) -> Vec<(Hertz, Vec<f64>)> {
+    let cycles = |k: usize| 0.5 * k as f64 / points.saturating_sub(1).max(1) as f64;
+    (0..points).map(cycles).map(|cycles| (Hertz(cycles / bank.fast_period.0), gains(cycles))).collect()
 }
 
 /// The gains `||H_i(e^{j w})||` of the norm-equivalent analysis filters (thesis 5.16) of the target and of
@@ -97,13 +101,35 @@ pub fn analysis_gains(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Vec<f64>
     let channels: Vec<Channel> = problem.channels.iter().map(undelayed).collect();
     let noise = vec![0.0; channels.len()];
     let plant = LiftedPlant::new(&Problem { ratio: 1, latency: 0, channels, noise, ..problem })?;
-    let at = |k: usize| {
-        let cycles = 0.5 * k as f64 / points.saturating_sub(1).max(1) as f64;
+    let gains = |cycles: f64| {
         let (h, w) = plant.response(TAU * cycles);
-        let gains = w.row_iter().chain(h.row_iter()).map(|row| row.norm()).collect();
-        (Hertz(cycles / bank.fast_period.0), gains)
+        w.row_iter().chain(h.row_iter()).map(|row| row.norm()).collect()
     };
-    Ok((0..points).map(at).collect())
+    Ok(over_frequencies(bank, points, gains))
+}
+
+/// The largest singular value of the error system K = W - F H at `points` equidistant frequencies from 0 to
+/// 1/(2 M h), with these frequencies.
+///
+/// Gamma is the maximum over all frequencies. A frequency stands for all that alias to it in the slow
+/// samples. The values are in normalised time (h = 1). One point is the frequency 0.
+///
+/// # Errors
+/// [`DesignError::NoSpec`] for a bank without front ends, [`DesignError::TooLate`] for delays that need too
+/// many delay-chain states.
+pub fn error_response(bank: &Bank, points: usize) -> Result<Vec<(Hertz, f64)>, DesignError> {
+    let problem = bank_problem(bank)?;
+    problem.check_size()?;
+    let plant = LiftedPlant::new(&problem)?;
+    let filters = filters::FilterResponse::new(bank)?;
+    let step = PI / points.saturating_sub(1).max(1) as f64;
+    let at = |k: usize| {
+        let omega = step * k as f64;
+        let (h, w) = plant.response(omega);
+        let gain = linalg::largest_singular_value(&(w - filters.at(omega) * h))?;
+        Ok((RadiansPerSlowPeriod(omega).in_hertz(bank.slow_period()), gain))
+    };
+    (0..points).map(at).collect()
 }
 
 #[cfg(test)]
@@ -118,7 +144,7 @@ mod tests {
              channel = [{ delay = 0.6, gain = -2.0 }, { delay = 0.1 }]\n\
              target = { filter = { num = [1.0], den = [1.0, 2.0, 1.0] } }\ndesign = { method = \"sinc\", taps = 4 }";
         let spec = crate::spec::Spec::from_toml(text, "spec.toml").unwrap();
-        let bank = crate::design::design_with(&spec, crate::design::ProofSearch::Skip).unwrap().bank;
+        let bank = crate::design::design(&spec, &crate::design::Options::without_proof()).unwrap().bank;
         for (hertz, gains) in analysis_gains(&bank, 5).unwrap() {
             // h = 0.5: 1 / (s + 1)^2 is 0.25 / (s + 0.5)^2 in fast periods.
             let square = |w: f64| (0.25 / (w * w + 0.25)).powi(2);
@@ -175,5 +201,37 @@ mod tests {
         assert!((gains[1].0.0 - 250e6).abs() < 1.0 && gains[1].1.len() == 5);
         assert!((gains[1].1[0] - 0.5_f64.sqrt()).abs() < 1e-9, "{gains:?}");
         assert!(gains[0].1.iter().all(|gain| (gain - 1.0).abs() < 1e-9));
+    }
+
+    /// The definition: the whole error system, evaluated by a solve at each frequency.
+    #[test]
+    fn the_gains_are_those_of_the_error_system_for_fir_and_recursive_banks() {
+        for text in
+            [include_str!("../../filters/thesis-fir.json"), include_str!("../../filters/thesis-iir.json")]
+        {
+            let bank = Bank::from_json(text, "bank.json").unwrap();
+            let plant = LiftedPlant::new(&bank_problem(&bank).unwrap()).unwrap();
+            let error = plant.error_system(&filters::lifted(&bank.filters, bank.ratio).unwrap()).unwrap();
+            let points = error_response(&bank, 9).unwrap();
+            assert_eq!(points.len(), 9);
+            for (k, (hertz, gain)) in points.iter().enumerate() {
+                let omega = PI * k as f64 / 8.0;
+                let want =
+                    linalg::singular_values(&error.response_at(Complex::from_polar(1.0, omega))).unwrap()[0];
+                assert!((gain - want).abs() < 1e-9 * (1.0 + want), "{k}: {gain} {want}");
+                let nyquist = 0.5 / bank.slow_period().0;
+                assert!((hertz.0 - nyquist * k as f64 / 8.0).abs() < 1e-12 * nyquist, "{k}: {hertz:?}");
+                assert!(*gain <= bank.gamma.upper.unwrap());
+            }
+        }
+    }
+
+    #[test]
+    fn a_bank_without_front_ends_is_refused_and_one_point_is_direct_current() {
+        let bare = Bank::bare(SynthesisFilters::Fir(vec![vec![1.0]]), 1);
+        assert_eq!(error_response(&bare, 2), Err(DesignError::NoSpec));
+        let bank = Bank::from_json(include_str!("../../filters/thesis-fir.json"), "bank.json").unwrap();
+        assert_eq!(error_response(&bank, 1).unwrap()[0].0, Hertz(0.0));
+        assert_eq!(error_response(&bank, 0).unwrap(), []);
     }
 }

@@ -5,7 +5,7 @@ use super::signal::Columns;
 use super::spline::Spline;
 use crate::design::Problem;
 use crate::design::filters::FilterResponse;
-use crate::design::interleaving::{NearestSample, nearest_samples};
+use crate::design::{NearestSample, nearest_samples};
 use crate::linalg::{CMat, Complex};
 
 /// A way from the N slow samples of a period to its M fast samples, linear and periodic.

@@ -6,8 +6,8 @@ use super::source::NormalisedSource;
 use super::walk::sample_at;
 use crate::analog::StrictlyProper;
 use crate::design::Problem;
-use crate::design::interleaving::{NearestSample, nearest_samples};
 use crate::design::problem::Channel;
+use crate::design::{NearestSample, nearest_samples};
 use crate::units::FastPeriods;
 
 /// An analog signal in normalised time.

@@ -51,7 +51,7 @@ use super::slow_period::SlowPeriod;
 use crate::arithmetic::Number;
 
 /// Maximum number of states of the recursion, including delay lines.
-pub(crate) const MAX_RECURSION_STATES: usize = 128;
+const MAX_RECURSION_STATES: usize = 128;
 
 /// Relative change of P per period below which it has settled.
 const SETTLED: f64 = 1e-13;

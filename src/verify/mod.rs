@@ -54,7 +54,6 @@ mod timeline;
 pub mod uncertainty;
 mod upper;
 
-pub(crate) use self::causal::MAX_RECURSION_STATES;
 pub use self::causal::{Precision, Recursion};
 pub use self::enclosed::{EnclosedErrorSystem, Midpoint};
 pub use self::error::VerifyError;

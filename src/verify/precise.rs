@@ -5,17 +5,18 @@ use super::ball::{self, Ball};
 use super::covariance::{Covariance, TapSamples};
 use super::enclosed::EnclosedErrorSystem;
 use super::spectrum::{self, ComplexMatrix};
-use crate::arithmetic::{BigFloat, Matrix};
+use crate::arithmetic::BigFloat;
+use nalgebra::DMatrix;
 
 /// Real and imaginary part.
-pub(crate) type ComplexParts = [Matrix<BigFloat>; 2];
+pub(crate) type ComplexParts = [DMatrix<BigFloat>; 2];
 
 /// An error system xi+ = A xi + J u, e = C xi + L u with the Gram matrix S of u.
 pub(crate) struct PreciseErrorSystem {
     /// [A; C], (n + M) x n.
-    pub(crate) system: Matrix<BigFloat>,
+    pub(crate) system: DMatrix<BigFloat>,
     /// [J; L] S [J; L]'.
-    pub(crate) input_gram: Matrix<BigFloat>,
+    pub(crate) input_gram: DMatrix<BigFloat>,
 }
 
 impl EnclosedErrorSystem<'_> {
@@ -42,7 +43,7 @@ impl EnclosedErrorSystem<'_> {
         &self,
         channels: &[usize],
         lags: usize,
-    ) -> Option<[Matrix<BigFloat>; 2]> {
+    ) -> Option<[DMatrix<BigFloat>; 2]> {
         let (period, ratio) = (self.long_period(), self.bank.ratio);
         let covariance = Covariance::new(period)?;
         let samples = TapSamples { ratio, channels, lags };
@@ -51,6 +52,6 @@ impl EnclosedErrorSystem<'_> {
     }
 }
 
-fn midpoints(m: &ball::Matrix<BigFloat>) -> Matrix<BigFloat> {
-    Matrix::from_fn(m.nrows(), m.ncols(), |i, j| Ball::mid(m[(i, j)]))
+fn midpoints(m: &ball::Matrix<BigFloat>) -> DMatrix<BigFloat> {
+    m.map(Ball::mid)
 }

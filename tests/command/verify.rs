@@ -7,7 +7,7 @@
 use crate::support::random::Random;
 use crate::support::{Desk, THESIS};
 use hybank::bank::{Bank, Proof, check_digest};
-use hybank::design::{analyze, design, prove};
+use hybank::design::{Options, analyze, design, prove};
 use hybank::spec::Spec;
 use hybank::verify::{BoundedBanks, verify};
 use serde_json::Value;
@@ -25,7 +25,7 @@ fn designed(method: &str) -> Bank {
         "reduced" => hurried().replace("\"fir\"\ntaps = 12", "\"iir\"\norder = 1"),
         _ => hurried().replace("\"fir\"\ntaps = 12", &format!("\"{method}\"")),
     };
-    let design = design(&Spec::from_toml(&text, "spec.toml").unwrap()).unwrap();
+    let design = design(&Spec::from_toml(&text, "spec.toml").unwrap(), &Options::default()).unwrap();
     assert!(design.proof.is_ok(), "{:?}", design.proof);
     design.bank
 }

@@ -6,7 +6,7 @@
 
 use crate::support::specs::{alike, with_taps};
 use hybank::bank::{Bank, SynthesisFilters};
-use hybank::design::{ProofSearch, design, design_with};
+use hybank::design::{Options, design};
 use hybank::spec::{Family, FilterSpec, Passband, Spec};
 use hybank::units::Hertz;
 use hybank::verify::{EnclosedErrorSystem, Precision, Recursion, verify};
@@ -163,7 +163,7 @@ fn every_causal_optimum_is_reached() {
     for Case { name, mut spec, optimum, .. } in cases {
         spec.design.method = hybank::spec::Method::Iir;
         let begin = std::time::Instant::now();
-        let excess = match design_with(&spec, ProofSearch::Skip) {
+        let excess = match design(&spec, &Options::without_proof()) {
             Ok(design) => design.bank.gamma.norm.unwrap() / optimum - 1.0,
             Err(error) => {
                 println!("{error}");
@@ -187,7 +187,7 @@ fn hardly_any_latency_is_proven_from_both_sides() {
     let mut widths = Vec::new();
     for Case { name, mut spec, optimum, .. } in cases {
         spec.design.method = hybank::spec::Method::Iir;
-        let design = design(&spec).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let design = design(&spec, &Options::default()).unwrap_or_else(|error| panic!("{name}: {error}"));
         let width = match &design.proof {
             Ok(proven) => {
                 assert_eq!(verify(&design.bank).unwrap(), *proven, "{name}");
@@ -214,7 +214,7 @@ fn long_fir_banks_are_proven_by_the_causal_bound() {
     for taps in [48, 64] {
         let Case { spec, optimum, noncausal, .. } =
             case((Family::Butterworth, 4, 0.1), 2, 1, &[1.2, 0.6], (0.01289579, 0.002532753));
-        let design = design(&with_taps(spec, taps)).unwrap();
+        let design = design(&with_taps(spec, taps), &Options::default()).unwrap();
         let proven = design.proof.unwrap();
         println!("{taps} taps: {proven:?}");
         assert!(proven.lower <= proven.upper && proven.lower > optimum * (1.0 - 1e-4), "{taps}: {proven:?}");

@@ -2,7 +2,7 @@
 //! of search and proof. `HYBANK_TRIALS=81` goes through all, `HYBANK_TRIALS=17..18` through that one.
 
 use crate::support::specs::{alike, butterworth, low_pass, with_taps};
-use hybank::design::design;
+use hybank::design::{Options, design};
 use hybank::spec::{Family, Spec};
 use hybank::verify::{BoundedBanks, verify};
 use std::f64::consts::TAU;
@@ -32,7 +32,7 @@ fn the_taps_of_long_fir_banks_are_bound() {
     for number in trials::asked_trials().unwrap_or(9..10) {
         let (name, spec) = bank(number as usize);
         let begin = Instant::now();
-        let design = design(&spec).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let design = design(&spec, &Options::default()).unwrap_or_else(|error| panic!("{name}: {error}"));
         let designed = begin.elapsed().as_secs_f64();
         let gamma = design.bank.gamma;
         let proven = design.proof.unwrap_or_else(|error| panic!("{name}: {error}"));

@@ -3,12 +3,12 @@
 //! must not be larger; and no lower bound may exceed what any bank of the kind achieves.
 
 use crate::support::specs::{alike, low_pass};
-use hybank::design::{Design, DesignError, ProofSearch, analyze, certify, design_with};
+use hybank::design::{Design, DesignError, Options, analyze, certify};
 use hybank::spec::{DesignSpec, Family, Method, Spec};
 
 /// Designs without a search for proofs, which other tests are about.
 fn design(spec: &Spec) -> Result<Design, DesignError> {
-    design_with(spec, ProofSearch::Skip)
+    hybank::design::design(spec, &Options::without_proof())
 }
 
 struct Case {

@@ -4,7 +4,7 @@
 
 use crate::support::random::Random;
 use crate::support::specs::{butterworth, low_pass, with_taps};
-use hybank::design::{DesignError, ProofSearch, analyze_mean, design_with, latency};
+use hybank::design::{DesignError, Options, analyze_mean, design, latency};
 use hybank::spec::{ChannelSpec, DesignSpec, Family, Method, Spec};
 use hybank::units::Seconds;
 use std::f64::consts::TAU;
@@ -51,7 +51,7 @@ fn error(spec: &Spec, latency: usize) -> f64 {
     if matches!(spec.design.method, Method::Fir | Method::Iir) {
         spec.design = DesignSpec::new(Method::H2, spec.design.taps);
     }
-    match design_with(&spec, ProofSearch::Skip) {
+    match design(&spec, &Options::without_proof()) {
         Ok(found) => {
             let mean = analyze_mean(&found.bank).unwrap();
             mean.rms_error.hypot(mean.output_noise)
@@ -122,8 +122,9 @@ fn iir_takes_the_shortest_latency_that_is_almost_the_best() {
     assert!(faults.is_empty(), "{faults:#?}");
 }
 
+/// They minimise nothing: the output instant lies in the middle of the samples that their taps see.
 #[test]
-fn comparison_methods_take_the_shortest_latency_that_is_almost_the_best() {
+fn comparison_methods_take_the_middle_of_their_taps() {
     for method in [Method::Sinc, Method::Separation] {
         let mut spec = with_taps(plant(1, Method::Fir), 15);
         spec.ratio = 2;
@@ -131,7 +132,9 @@ fn comparison_methods_take_the_shortest_latency_that_is_almost_the_best() {
         spec.channels
             .push(ChannelSpec { delay: Seconds(spec.channels[0].delay.0 + 0.9), ..spec.channels[0].clone() });
         spec.design = DesignSpec::new(method, Some(15));
-        assert_eq!(fault(&errors(&spec), latency(&spec).unwrap()), None, "{}", method.name());
+        let (errors, chosen) = (errors(&spec), latency(&spec).unwrap());
+        let best = errors.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!(errors[chosen] < 1.5 * best, "{}: {chosen} of {errors:?}", method.name());
     }
 }
 
@@ -174,12 +177,12 @@ fn interleaved_converters_need_three_samples_of_latency() {
 
 fn gamma(spec: &Spec, latency: usize) -> f64 {
     let spec = Spec { latency: Some(latency), ..spec.clone() };
-    design_with(&spec, ProofSearch::Skip).unwrap().bank.gamma.norm.unwrap()
+    design(&spec, &Options::without_proof()).unwrap().bank.gamma.norm.unwrap()
 }
 
 fn refusal(spec: &Spec, latency: usize) -> DesignError {
     let spec = Spec { latency: Some(latency), ..spec.clone() };
-    design_with(&spec, ProofSearch::Skip).err().unwrap_or_else(|| panic!("latency {latency} is reached"))
+    design(&spec, &Options::without_proof()).err().unwrap_or_else(|| panic!("latency {latency} is reached"))
 }
 
 /// With 32 taps the samples of latency 1000 are too old for any tap, and so are those before a long delay.
@@ -226,7 +229,7 @@ fn a_common_delay_adds_to_the_latency() {
     };
     for method in [Method::Fir, Method::Iir, Method::H2, Method::Sinc, Method::Separation] {
         let designed =
-            |common: f64| design_with(&with_delay(method, common), ProofSearch::Skip).unwrap().bank;
+            |common: f64| design(&with_delay(method, common), &Options::without_proof()).unwrap().bank;
         let (near, far) = (designed(0.0), designed(20_001.0));
         assert_eq!(far.latency, near.latency + 20_001, "{method:?}");
         let [near, far] = [near, far].map(|bank| bank.gamma.norm.unwrap());

@@ -6,7 +6,7 @@ use crate::support::random::Random;
 use crate::support::specs::{alike, low_pass, with_taps};
 use crate::support::sweep::each;
 use hybank::bank::Gamma;
-use hybank::design::{DesignError, ProofSearch, design_with};
+use hybank::design::{DesignError, Options, design};
 use hybank::spec::{DesignSpec, Family, Method, Spec};
 
 /// Distances at which doubles resolve the difference of two samples. As the distance shrinks, gamma tends to
@@ -35,7 +35,7 @@ fn plant(number: u64, apart: f64) -> Spec {
 }
 
 fn gamma(spec: &Spec) -> Result<Gamma, DesignError> {
-    Ok(design_with(spec, ProofSearch::Skip)?.bank.gamma)
+    Ok(design(spec, &Options::without_proof())?.bank.gamma)
 }
 
 /// The least gamma of banks for plants near the limit.

@@ -5,7 +5,7 @@
 use crate::support::random::Random;
 use crate::support::sweep::each;
 use hybank::bank::SynthesisFilters;
-use hybank::design::{DesignError, analyze, design};
+use hybank::design::{DesignError, Options, analyze, design};
 use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, Reduction, Spec};
 use hybank::units::{RadiansPerSecond, Seconds};
 
@@ -85,7 +85,7 @@ enum End {
 
 fn end_of(seed: u64) -> End {
     let spec = plant(seed);
-    let found = match design(&spec) {
+    let found = match design(&spec, &Options::default()) {
         Ok(found) => found,
         Err(refusal) => return refused(seed, &refusal, End::Refused),
     };

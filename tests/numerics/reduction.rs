@@ -2,14 +2,14 @@
 
 use crate::support::specs::{alike, amplified, butterworth, thesis};
 use hybank::bank::{Bank, StateSpace, SynthesisFilters};
-use hybank::design::{Design, analyze, design};
+use hybank::design::{Design, Options, analyze, design};
 use hybank::spec::{DesignSpec, FilterSpec, Method, Reduction, Spec};
 use hybank::verify::verify;
 use std::f64::consts::TAU;
 
 fn reduced(mut spec: Spec, method: Method, reduction: Reduction) -> Design {
     spec.design = DesignSpec { reduction: Some(reduction), ..DesignSpec::new(method, None) };
-    design(&spec).unwrap()
+    design(&spec, &Options::default()).unwrap()
 }
 
 fn block(bank: &Bank) -> &StateSpace {
@@ -87,7 +87,7 @@ fn refinement_leaves_the_local_optimum_of_the_truncation() {
 #[test]
 fn with_all_its_states_it_is_the_full_bank() {
     let spec = thesis(6, &[1.2, 0.6]);
-    let full = design(&spec).unwrap();
+    let full = design(&spec, &Options::default()).unwrap();
     assert!(full.reduction.is_none());
     for order in [block(&full.bank).a.len(), 1000] {
         let same = reduced(spec.clone(), Method::Iir, Reduction::Order(order));
@@ -105,7 +105,7 @@ fn it_is_worth_its_cost_beside_taps() {
     let macs = cost(block(&found.bank));
     let mut taps = spec;
     taps.design = DesignSpec::new(Method::Fir, Some(macs.div_ceil(2)));
-    let fir = design(&taps).unwrap().bank.gamma.norm.unwrap();
+    let fir = design(&taps, &Options::default()).unwrap().bank.gamma.norm.unwrap();
     let iir = found.bank.gamma.norm.unwrap();
     println!("{macs} multiply-adds per frame: recursive {iir}, taps {fir}");
     assert!(iir < 0.1 * fir, "{iir} {fir}");

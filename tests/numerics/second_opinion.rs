@@ -4,7 +4,7 @@
 use crate::golden::{g6, g8, g9, g10, g11, g12, g12c, g12d};
 use crate::support::specs::{alike, butterworth, tf, thesis, with_taps};
 use hybank::bank::Gamma;
-use hybank::design::{DesignError, design};
+use hybank::design::{DesignError, Options, design};
 use hybank::spec::{Method, Solver, Spec};
 use std::fs;
 use std::path::Path;
@@ -18,7 +18,7 @@ const ZERO: f64 = 1e-9;
 fn gamma(spec: &Spec, solver: Solver) -> Gamma {
     let mut spec = spec.clone();
     spec.design.solver = Some(solver);
-    design(&spec).unwrap_or_else(|error| panic!("{}: {error}", spec.name)).bank.gamma
+    design(&spec, &Options::default()).unwrap_or_else(|error| panic!("{}: {error}", spec.name)).bank.gamma
 }
 
 /// The two gammas agree, and neither method's lower bound exceeds the other's gamma.
@@ -96,7 +96,7 @@ fn degenerate_plants() {
 fn too_many_states_are_refused_with_the_remedy() {
     let mut spec = with_taps(thesis(10, &[1.2, 0.6]), 400);
     spec.design.solver = Some(Solver::Kyp);
-    let refused = design(&spec).map(|_| ());
+    let refused = design(&spec, &Options::default()).map(|_| ());
     assert!(matches!(refused, Err(DesignError::KypTooLarge { limit: 160, .. })), "{refused:?}");
     assert!(refused.unwrap_err().to_string().contains("solver = \"sampled\""));
 }

@@ -2,13 +2,13 @@
 //! recognises.
 
 use hybank::bank::{Bank, StateSpace, SynthesisFilters};
-use hybank::design::{Design, DesignError, ProofSearch, analyze, design_with};
+use hybank::design::{Design, DesignError, analyze};
 use hybank::runtime::{Options, Stream};
 use hybank::spec::Spec;
 
 /// Designs without a search for proofs, which other tests are about.
 fn design(spec: &Spec) -> Result<Design, DesignError> {
-    design_with(spec, ProofSearch::Skip)
+    hybank::design::design(spec, &hybank::design::Options::without_proof())
 }
 
 fn spec(method: &str, delays: &[f64], latency: usize, target: &str) -> Spec {

@@ -4,7 +4,7 @@
 use crate::support::random::Random;
 use crate::support::specs::{alike, tf, thesis, with_taps};
 use hybank::bank::{Bank, CausalWitness, Gamma, LowerProof, SynthesisFilters};
-use hybank::design::{certify, design};
+use hybank::design::{Options, certify, design};
 use hybank::spec::{DesignSpec, Method, Spec};
 use hybank::units::Seconds;
 use hybank::verify::verify;
@@ -111,7 +111,7 @@ fn no_interval_excludes_the_true_norm_for_any_delay() {
 }
 
 fn proven(spec: &Spec) -> Bank {
-    let found = design(spec).unwrap();
+    let found = design(spec, &Options::default()).unwrap();
     found.proof.unwrap();
     found.bank
 }

@@ -3,7 +3,7 @@
 
 use crate::support::random::Random;
 use crate::support::specs::{alike, low_pass, with_taps};
-use hybank::design::{Design, ProofSearch, analyze, design, design_with};
+use hybank::design::{Design, Options, analyze, design};
 use hybank::spec::{Family, FilterSpec, Method, Spec};
 use hybank::verify::{EnclosedErrorSystem, Precision, Recursion};
 use std::f64::consts::TAU;
@@ -39,12 +39,12 @@ fn loss(design: &Design) -> f64 {
 fn a_sample_just_inside_the_period_costs_nothing() {
     let front_end = filter(Family::Butterworth, 8, 0.1);
     let spec = alike(&front_end, 2, 0, &[0.2, 0.9, 1.6]);
-    let iir = design_with(&spec, ProofSearch::Skip).unwrap();
-    let fir = design_with(&with_taps(spec.clone(), 32), ProofSearch::Skip).unwrap();
+    let iir = design(&spec, &Options::without_proof()).unwrap();
+    let fir = design(&with_taps(spec.clone(), 32), &Options::without_proof()).unwrap();
     assert!(norm(&iir) <= norm(&fir) * (1.0 + 1e-5), "{} {}", norm(&iir), norm(&fir));
     let mut mean_square = spec;
     mean_square.design.method = Method::H2;
-    let h2 = design(&mean_square).unwrap();
+    let h2 = design(&mean_square, &Options::default()).unwrap();
     let rms = analyze(&h2.bank, &[]).unwrap().mean.rms_error;
     assert!((rms / 0.000500 - 1.0).abs() < 2e-3, "{rms}");
 }
@@ -53,7 +53,7 @@ fn a_sample_just_inside_the_period_costs_nothing() {
 fn one_steep_channel_is_optimal_at_every_delay() {
     let front_end = filter(Family::Chebyshev1, 8, 0.1);
     for delay in [2.2, 2.3, 2.5, 2.7, 3.0, 3.5] {
-        let bank = design_with(&alike(&front_end, 4, 2, &[delay]), ProofSearch::Skip).unwrap();
+        let bank = design(&alike(&front_end, 4, 2, &[delay]), &Options::without_proof()).unwrap();
         assert!(loss(&bank) <= 1e-5, "delay {delay}: {:e}", loss(&bank));
     }
 }
@@ -62,7 +62,7 @@ fn one_steep_channel_is_optimal_at_every_delay() {
 fn four_steep_channels_are_optimal() {
     for (family, order) in [(Family::Butterworth, 8), (Family::Bessel, 6), (Family::Chebyshev1, 8)] {
         let spec = alike(&filter(family, order, 0.1), 4, 2, &[0.0, 1.3, 2.1, 2.95]);
-        let bank = design_with(&spec, ProofSearch::Skip).unwrap();
+        let bank = design(&spec, &Options::without_proof()).unwrap();
         assert!(loss(&bank) <= 1e-5, "{family:?} {order}: {:e}", loss(&bank));
     }
 }
@@ -84,7 +84,7 @@ fn no_causal_bank_does_better_than_iir() {
     for seed in seeds.clone() {
         let begin = std::time::Instant::now();
         let bank =
-            design_with(&plant(seed), ProofSearch::Skip).unwrap_or_else(|error| panic!("{seed}: {error}"));
+            design(&plant(seed), &Options::without_proof()).unwrap_or_else(|error| panic!("{seed}: {error}"));
         let (time, loss) = (begin.elapsed(), loss(&bank));
         println!("plant {seed}: norm {:e}, loss at most {loss:e}, {time:?}", norm(&bank));
         worst = worst.max(loss);

@@ -5,7 +5,7 @@ use crate::norm::norm;
 use crate::support::random::Random;
 use crate::support::specs::{alike, tf, thesis, with_taps};
 use hybank::bank::{Bank, check_digest};
-use hybank::design::design;
+use hybank::design::{Options, design};
 use hybank::spec::Spec;
 use hybank::verify::{Verified, verify};
 use serde_json::Value;
@@ -52,7 +52,7 @@ fn examples() -> Vec<Example> {
         (CORRECTED, alike(&steep, 2, 1, &[0.6])),
     ];
     let example = |(name, spec): (&'static str, Spec)| {
-        let bank = design(&spec).unwrap().bank;
+        let bank = design(&spec, &Options::default()).unwrap().bank;
         verify(&bank).unwrap_or_else(|error| panic!("{name}: {error}"));
         let proof = bank.proof.as_ref().unwrap().upper.as_ref().unwrap();
         assert_eq!(name == CORRECTED, !proof.correction.is_empty(), "{name}");

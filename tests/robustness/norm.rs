@@ -111,6 +111,9 @@ fn response(filter: &FilterSpec, omega: f64) -> Complex<f64> {
 fn the_oracle_agrees_with_digits_of_another_program() {
     use crate::support::specs::{thesis, with_taps};
     // The thesis example with 22 taps and latency 10: gamma 0.0399320 (thesis, table of chapter 5).
-    let bank = hybank::design::design(&with_taps(thesis(10, &[1.2, 0.6]), 22)).unwrap().bank;
+    let bank =
+        hybank::design::design(&with_taps(thesis(10, &[1.2, 0.6]), 22), &hybank::design::Options::default())
+            .unwrap()
+            .bank;
     assert!((norm(&bank) - 0.0399320).abs() < 1e-6, "{}", norm(&bank));
 }

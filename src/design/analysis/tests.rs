@@ -1,8 +1,10 @@
 use super::*;
 use crate::bank::SynthesisFilters;
+use crate::design::{Options, design};
 use crate::linalg::{self, Complex};
 use crate::spec::Spec;
 use crate::units::Seconds;
+use proptest::prelude::*;
 use std::f64::consts::PI;
 
 /// A bank of arbitrary taps on the thesis example; the second channel has noise.
@@ -80,4 +82,82 @@ fn delay_errors_move_the_samples() {
     let refused = analyze(&bank, &[Seconds(0.1)]).unwrap_err();
     assert_eq!(refused, DesignError::DelayErrorCount { given: 1, channels: 2 });
     assert_eq!(analyze(&Bank { spec: None, ..bank }, &[]).unwrap_err(), DesignError::NoSpec);
+}
+
+fn recursive_bank(channels: &str, latency: usize) -> Bank {
+    let text = format!(
+        "fast_period = 1.0\nratio = 2\nlatency = {latency}\nchannel = [{channels}]\n\
+         target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n\
+         design = {{ method = \"iir\" }}"
+    );
+    design(&Spec::from_toml(&text, "spec.toml").unwrap(), &Options::default()).unwrap().bank
+}
+
+/// Converters that sample exactly in turn have the ideal samples: plain interleaving makes no error.
+#[test]
+fn interleaving_of_perfect_converters_is_exact() {
+    for latency in [1, 2, 7] {
+        let bank = recursive_bank("{ delay = 1.0 }, { delay = 0.0 }", latency);
+        let scale = GammaScale::new(&bank).unwrap();
+        assert!(scale.interleaving < 1e-12, "{latency}: {scale:?}");
+    }
+}
+
+/// The gain to the lifted reference is largest at frequency 0, where all of its M samples agree: it is
+/// the norm of the samples of |Phi|^2 that alias there, sum_k |Phi(2 pi k)|^2.
+#[test]
+fn the_gamma_of_zero_output_is_that_of_the_aliases_of_the_reference() {
+    let scale = GammaScale::new(&recursive_bank("{ delay = 1.2 }, { delay = 0.6 }", 4)).unwrap();
+    let phi = |w: f64| 0.25 / (w * w + 0.25);
+    let sum: f64 = (-2000..=2000).map(|k| phi(std::f64::consts::TAU * f64::from(k)).powi(2)).sum();
+    assert!((scale.zero_output - sum.sqrt()).abs() < 1e-9, "{scale:?} {}", sum.sqrt());
+    // int |Phi|^2 dw / 2 pi = wc / 4 for wc^2 / (s + wc)^2.
+    assert!((scale.rms_reference - (0.5_f64 / 4.0).sqrt()).abs() < 1e-12, "{scale:?}");
+    assert!(scale.interleaving < scale.zero_output && scale.interleaving > 0.04, "{scale:?}");
+}
+
+#[test]
+fn the_taps_pick_the_nearest_samples() {
+    let bank = recursive_bank("{ delay = 1.4 }, { delay = 0.2 }", 3);
+    let taps = interleaving(&bank_problem(&bank).unwrap());
+    // Instants -3 and -2: the samples at -3.4 and -2.2.
+    assert_eq!(taps, [vec![0.0, 0.0, 1.0, 0.0], vec![0.0, 0.0, 0.0, 1.0]]);
+}
+
+fn nearest(delays: &[f64], ratio: usize, latency: usize, least_lag: i64) -> Vec<(usize, i64)> {
+    let delays: Vec<_> = delays.iter().copied().map(FastPeriods).collect();
+    let samples = nearest_samples(&delays, ratio, latency, least_lag);
+    samples.into_iter().map(|sample| (sample.channel, sample.lag)).collect()
+}
+
+#[test]
+fn each_phase_has_the_nearest_sample() {
+    // Instants -3 and -2; of the last period the samples at -3.4 and -2.2.
+    assert_eq!(nearest(&[1.4, 0.2], 2, 3, 0), [(0, 1), (1, 1)]);
+}
+
+#[test]
+fn a_causal_bank_has_no_sample_of_the_future() {
+    // Instant 1 of frame 0: the nearest sample is taken at 1.5, the next period's.
+    assert_eq!(nearest(&[0.5], 2, 0, i64::MIN), [(0, 0), (0, -1)]);
+    assert_eq!(nearest(&[0.5], 2, 0, 0), [(0, 0), (0, 0)]);
+    assert_eq!(nearest(&[], 2, 0, 0), []);
+}
+
+proptest! {
+    /// Against a search of all samples within ten periods.
+    #[test]
+    fn no_sample_is_nearer(
+        delays in prop::collection::vec(-9.0..9.0, 1..5),
+        ratio in 1usize..6,
+        latency in 0usize..9,
+    ) {
+        for (phase, (channel, lag)) in nearest(&delays, ratio, latency, i64::MIN).into_iter().enumerate() {
+            let instant = phase as f64 - latency as f64;
+            let distance = |i: usize, lag: i64| (instant + (lag * ratio as i64) as f64 + delays[i]).abs();
+            let all = (0..delays.len()).flat_map(|i| (-30..30).map(move |lag| (i, lag)));
+            let least = all.map(|(i, lag)| distance(i, lag)).fold(f64::INFINITY, f64::min);
+            prop_assert!(distance(channel, lag) <= least + 1e-12);
+        }
+    }
 }

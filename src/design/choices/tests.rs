@@ -1,5 +1,6 @@
 use super::*;
 use crate::design::history_errors::{HistoryErrors, best_taps};
+use crate::design::least_errors::shortest;
 use crate::lmi::sampled;
 use crate::spec::DesignSpec;
 
@@ -56,7 +57,7 @@ fn the_errors_are_those_of_the_least_squares_taps() {
             let mut problem = problem(filter, ratio, &delays);
             problem.noise = (0..delays.len()).map(|i| (noise * (1.0 + i as f64)).powi(2)).collect();
             problem.channels[0].gain = -1.5;
-            let reach = Reach::new(&problem, taps, &(0..=taps + 6)).unwrap();
+            let reach = LeastErrors::new(&problem, taps, 0..=taps + 6).unwrap();
             for latency in 0..=taps + 6 {
                 let expected = least_mean_square(&problem, latency, taps).sqrt();
                 let found = reach.rms(latency);
@@ -131,7 +132,7 @@ fn as_many_taps_are_chosen_as_the_snr_needs() {
     {
         let mut open = spec(design);
         open.latency = Some(9);
-        let complete = completed(&with_taps(&open).unwrap(), &|_| ()).unwrap();
+        let complete = completed(&with_taps(&open).unwrap(), &|_| Ok(())).unwrap();
         let taps = complete.design.taps.unwrap();
         assert_eq!(complete.design.target_snr_db, None);
         let found = |taps: usize| {
@@ -151,9 +152,23 @@ fn as_many_taps_are_chosen_as_the_snr_needs() {
 #[test]
 fn an_snr_that_is_out_of_reach_is_refused_with_the_best_one() {
     let open = Spec { latency: Some(9), ..spec("target_snr_db = 200, method = \"h2\", noise = 1e-3") };
-    let refused = completed(&open, &|_| ()).unwrap_err();
+    let refused = completed(&open, &|_| Ok(())).unwrap_err();
     let DesignError::SnrOutOfReach { wanted, best, latency } = refused else { panic!("{refused}") };
     assert!(wanted == 200.0 && latency == 9 && (30.0..70.0).contains(&best), "{refused}");
+}
+
+/// The best SNR of all banks is that of the mean-square optimum. The bank of least gamma was returned
+/// without it, whatever its length.
+#[test]
+fn an_snr_that_banks_of_least_gamma_miss_is_refused_in_words() {
+    let open = |snr: f64| {
+        let design = format!("method = \"fir\", target_snr_db = {snr:?}, noise = 1e-2");
+        completed(&Spec { latency: Some(9), ..spec(&design) }, &|_| Ok(())).unwrap_err()
+    };
+    let DesignError::SnrOutOfReach { best: most, .. } = open(200.0) else { panic!("200 dB are reached") };
+    let refused = open(most - 0.01);
+    let DesignError::SnrMissed { wanted, best, .. } = refused else { panic!("{refused}") };
+    assert!(best < wanted && best > most - 10.0, "{refused}");
 }
 
 #[test]
@@ -161,7 +176,7 @@ fn taps_that_are_left_open_are_almost_as_good_as_any() {
     for (design, channels) in [("method = \"fir\"", 1), ("method = \"fir\", noise = 1e-3", 2)] {
         let mut open = spec(design);
         open.channels.truncate(channels);
-        let complete = completed(&with_taps(&open).unwrap(), &|_| ()).unwrap();
+        let complete = completed(&with_taps(&open).unwrap(), &|_| Ok(())).unwrap();
         let (latency, taps) = (complete.latency.unwrap(), complete.design.taps.unwrap());
         // Over all latencies: those far from the chosen one are worse.
         let least = |taps: usize, latencies: std::ops::RangeInclusive<usize>| {

@@ -20,42 +20,42 @@ fn a_spec_made_in_memory_is_checked_first() {
     for method in [Method::Fir, Method::Sinc, Method::Separation] {
         let mut spec = spec("method = \"fir\", taps = 22", THESIS);
         (spec.design.method, spec.design.taps) = (method, Some(0));
-        assert!(matches!(design(&spec), Err(DesignError::Spec(_))), "{}", method.name());
+        assert!(matches!(design(&spec, &Options::default()), Err(DesignError::Spec(_))), "{}", method.name());
     }
     let mut ratio = spec("method = \"iir\"", THESIS);
     ratio.ratio = 0;
-    assert!(matches!(design(&ratio), Err(DesignError::Spec(_))));
+    assert!(matches!(design(&ratio, &Options::default()), Err(DesignError::Spec(_))));
     let mut delay = spec("method = \"iir\"", THESIS);
     delay.channels[0].delay = Seconds(f64::NAN);
-    assert!(matches!(design(&delay), Err(DesignError::Spec(_))));
+    assert!(matches!(design(&delay, &Options::default()), Err(DesignError::Spec(_))));
 }
 
 #[test]
 fn taps_that_the_designer_chose_are_stated() {
     for method in ["sinc", "separation"] {
         let open = spec(&format!("method = \"{method}\""), THESIS);
-        let found = design_with(&open, ProofSearch::Skip).unwrap();
+        let found = design(&open, &Options::without_proof()).unwrap();
         assert!(found.taps_chosen);
         assert_eq!(found.bank.spec.as_ref().unwrap().design.taps, Some(23));
         let SynthesisFilters::Fir(taps) = &found.bank.filters else { unreachable!() };
         assert!(taps.iter().all(|filter| filter.len() == 23));
         // The spec in the bank gives the same bank again, with nothing left to choose.
-        let again = design_with(found.bank.spec.as_ref().unwrap(), ProofSearch::Skip).unwrap();
+        let again = design(found.bank.spec.as_ref().unwrap(), &Options::without_proof()).unwrap();
         assert_eq!((again.taps_chosen, &again.bank), (false, &found.bank));
     }
-    assert!(!design_with(&spec("method = \"iir\"", THESIS), ProofSearch::Skip).unwrap().taps_chosen);
+    assert!(!design(&spec("method = \"iir\"", THESIS), &Options::without_proof()).unwrap().taps_chosen);
 }
 
 #[test]
 fn a_design_carries_its_proof_or_the_reason_why_there_is_none() {
     for method in ["method = \"fir\", taps = 22", "method = \"iir\"", "method = \"sinc\""] {
         let spec = spec(method, THESIS);
-        let found = design(&spec).unwrap();
+        let found = design(&spec, &Options::default()).unwrap();
         let proven = found.proof.unwrap();
         assert!(found.bank.proof.is_some());
         assert_eq!(found.bank.gamma.upper, Some(proven.upper));
         assert!(found.bank.gamma.norm.unwrap() < proven.upper, "{proven:?}");
-        let skipped = design_with(&spec, ProofSearch::Skip).unwrap();
+        let skipped = design(&spec, &Options::without_proof()).unwrap();
         assert_eq!(skipped.proof, Err(DesignError::ProofSkipped));
         assert!(skipped.bank.proof.is_none() && skipped.bank.filters == found.bank.filters);
     }
@@ -68,7 +68,7 @@ fn channels_that_are_alike_share_one_filter_by_their_noise() {
         "method = \"fir\", taps = 14",
         "{ delay = 1.2 }, { delay = 0.6, noise = 1e-9 }, { delay = 0.6, noise = 2e-9 }",
     );
-    let taps = |spec: &Spec| match design_with(spec, ProofSearch::Skip).unwrap().bank.filters {
+    let taps = |spec: &Spec| match design(spec, &Options::without_proof()).unwrap().bank.filters {
         SynthesisFilters::Fir(taps) => taps,
         SynthesisFilters::StateSpace(_) => unreachable!(),
     };
@@ -78,6 +78,37 @@ fn channels_that_are_alike_share_one_filter_by_their_noise() {
         // Shares in inverse proportion to the powers, 4 : 1.
         assert!((quiet - 4.0 * loud).abs() <= 1e-15 + 1e-12 * quiet.abs(), "{quiet} {loud}");
     }
-    let norm = |spec: &Spec| design_with(spec, ProofSearch::Skip).unwrap().bank.gamma.norm.unwrap();
+    let norm = |spec: &Spec| design(spec, &Options::without_proof()).unwrap().bank.gamma.norm.unwrap();
     assert!((norm(&alone) / norm(&twice) - 1.0).abs() < 2e-3);
+}
+
+/// Ended before the first round the exchange has that round's taps, and gamma-iteration its first filter: no
+/// worse than half as good again, and between honest bounds.
+#[test]
+fn a_design_that_is_ended_has_its_best_bank_so_far() {
+    for method in ["method = \"fir\", taps = 22", "method = \"iir\""] {
+        let spec = spec(method, THESIS);
+        let complete = design(&spec, &Options::without_proof()).unwrap().bank.gamma;
+        let stop = Stop::default();
+        let at_filters = |stage, _| {
+            if stage == Stage::Filters {
+                stop.now()
+            }
+        };
+        let options = Options { observer: &at_filters, stop: stop.clone(), ..Options::default() };
+        let ended = design(&spec, &options).unwrap();
+        assert_eq!(ended.proof, Err(DesignError::Stopped));
+        let (norm, least) = (ended.bank.gamma.norm.unwrap(), complete.norm.unwrap());
+        assert!(norm >= least * (1.0 - 1e-6) && norm < 1.5 * least, "{method}: {norm} {least}");
+        assert!(ended.bank.gamma.lower.unwrap() <= least, "{method}");
+    }
+}
+
+#[test]
+fn a_design_that_is_ended_before_it_has_a_bank_says_so() {
+    let mut open = spec("method = \"fir\"", THESIS);
+    open.latency = None;
+    let options = Options::default();
+    options.stop.now();
+    assert_eq!(design(&open, &options).err(), Some(DesignError::Stopped));
 }

@@ -62,20 +62,9 @@ pub(super) struct Innovations {
     least_feedthrough: f64,
     /// The result "impossible" may be accepted: the coordinates are balanced and no channel is left out.
     conclusive: bool,
-    /// The same in the plant's own coordinates; `None` if the coordinates are already those of the plant.
-    plant: Option<Box<PlantSide>>,
-}
-
-/// The matrices from which a filter is built, in the coordinates of the plant. In these the columns of the
-/// delay chains have one entry 1 and exact zeros elsewhere.
-#[derive(Debug, Clone)]
-struct PlantSide {
-    /// From these coordinates to those of the plant.
-    forward: Mat,
-    f: Mat,
-    b1: Mat,
-    c1: Mat,
-    c2: Mat,
+    /// The map to the plant's own coordinates, and the same there, where the columns of the delay chains
+    /// have one entry 1 and exact zeros elsewhere; `None` if the coordinates are already those of the plant.
+    plain: Option<(Mat, Box<Self>)>,
 }
 
 /// A channel read from the end of a delay chain.
@@ -163,7 +152,7 @@ impl Innovations {
         let c2 = linalg::vstack(&[&cf, &last_links(&delayed, n)])?;
         let p0 = chain_variances(&delayed, n);
         let channels = plant.channels();
-        let (conclusive, plant) = (false, None);
+        let (conclusive, plain) = (false, None);
         Ok(Self {
             f,
             b1,
@@ -179,7 +168,7 @@ impl Innovations {
             channels,
             least_feedthrough,
             conclusive,
-            plant,
+            plain,
         })
     }
 
@@ -214,9 +203,8 @@ impl Innovations {
         let scale = |k: usize| values[k].max(0.0) + floor;
         let forward = Mat::from_fn(n, n, |i, k| vectors[(i, k)] * scale(k).sqrt());
         let back = Mat::from_fn(n, n, |k, i| vectors[(i, k)] / scale(k).sqrt());
-        let Self { f, b1, c1, c2, .. } = self.clone();
         Some(Self {
-            plant: Some(Box::new(PlantSide { forward: forward.clone(), f, b1, c1, c2 })),
+            plain: Some((forward.clone(), Box::new(self.clone()))),
             f: &back * &self.f * &forward,
             b1: &back * &self.b1,
             b2: &back * &self.b2,
@@ -295,15 +283,16 @@ impl Innovations {
     fn filter(&self, p: &Mat) -> Option<Filter> {
         let pc = p * self.c2.transpose();
         let gain = linalg::solve_positive(&self.innovation(p), &pc.transpose()).ok()?.transpose();
-        let filter = match self.plant.as_deref() {
-            None => self.with_gain(&gain, &self.f, &self.b1, &self.c1, &self.c2),
-            Some(PlantSide { forward, f, b1, c1, c2 }) => self.with_gain(&(forward * gain), f, b1, c1, c2),
+        let filter = match &self.plain {
+            None => self.with_gain(&gain),
+            Some((forward, plain)) => plain.with_gain(&(forward * gain)),
         }?;
         (filter.spectral_radius().ok()? < 1.0).then_some(filter)
     }
 
     /// The filter that corrects its state by `gain` times the innovation.
-    fn with_gain(&self, gain: &Mat, f: &Mat, b1: &Mat, c1: &Mat, c2: &Mat) -> Option<Filter> {
+    fn with_gain(&self, gain: &Mat) -> Option<Filter> {
+        let Self { f, b1, c1, c2, .. } = self;
         let (mut k, mut df) = (f * gain, c1 * gain);
         let (a, c) = (f - &k * c2, c1 - &df * c2);
         let known = self.direct.len();

@@ -53,7 +53,10 @@ fn exchange<'a>(plant: &'a LiftedPlant, settings: &Settings) -> Result<Exchange<
     let (points, weights) = grid.coarse(0);
     let noise = plant.problem().noise.clone();
     let margin = settings.gamma_margin.unwrap_or_else(|| usual_margin(&noise));
-    Exchange::new(grid, Problem::new(points, lags)?, MeanSquareObjective { weights, noise }, margin)
+    let objective = MeanSquareObjective { weights, noise };
+    let mut exchange = Exchange::new(grid, Problem::new(points, lags)?, objective, margin)?;
+    exchange.stop = settings.stop.clone();
+    Ok(exchange)
 }
 
 /// 1e-3 if a channel has noise, else the least possible margin.
@@ -79,7 +82,7 @@ fn least_gamma(
     let mut best = judged(plant, length, exchange)?;
     for _ in 0..MISSED_PEAK_LIMIT {
         let missed = best.peak.gain > best.estimate * (1.0 + GAMMA_ACCURACY);
-        if !missed || !exchange.add(&[best.peak.frequency])? {
+        if !missed || exchange.stop.is_due() || !exchange.add(&[best.peak.frequency])? {
             break;
         }
         let other = judged(plant, length, exchange)?;

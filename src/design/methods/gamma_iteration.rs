@@ -3,6 +3,7 @@
 use super::filtering::{Filter, Innovations, RiccatiSolver, Trial};
 use super::{Filters, GAMMA_ACCURACY, Synthesis};
 use crate::design::DesignError;
+use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, Complex};
 use crate::lti::LtiError;
@@ -10,7 +11,7 @@ use crate::lti::peak::{Peak, hinf_norm};
 use std::rc::Rc;
 
 /// Gammas below this fraction of ||W|| count as zero: the references are reproduced up to rounding errors.
-const NEGLIGIBLE: f64 = 1e-12;
+const ZERO_GAMMA: f64 = 1e-12;
 /// The bracket halves (on the logarithmic scale) in each trial.
 const TRIAL_LIMIT: usize = 80;
 /// Number of smaller gammas that are tried after an unresolved one.
@@ -30,15 +31,6 @@ pub(super) struct Evaluated {
     pub(super) peak: Peak,
 }
 
-/// The lower end of the bracket at which gamma-iteration ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Floor {
-    /// A gamma that no filter achieves.
-    Impossible,
-    /// A gamma at which the trial was not resolved.
-    Unresolved,
-}
-
 /// The state of the search: [lower, best] with the filters that attain the upper end.
 pub(super) struct GammaIteration<'a> {
     plant: &'a LiftedPlant,
@@ -52,11 +44,17 @@ pub(super) struct GammaIteration<'a> {
     best: Option<Evaluated>,
     /// Riccati equations solved.
     trials: usize,
+    /// Ends the search between two trials, with the best filters so far.
+    stop: Stop,
     negligible: f64,
 }
 
 impl<'a> GammaIteration<'a> {
-    pub(super) fn new(plant: &'a LiftedPlant, innovations: &[Rc<Innovations>]) -> Result<Self, DesignError> {
+    pub(super) fn new(
+        plant: &'a LiftedPlant,
+        innovations: &[Rc<Innovations>],
+        stop: &Stop,
+    ) -> Result<Self, DesignError> {
         let noncausal = plant.noncausal_bound()?;
         let feedthrough = innovations.first().map_or(Ok(0.0), |form| form.unmeasured_feedthrough())?;
         let system = plant.system();
@@ -68,7 +66,8 @@ impl<'a> GammaIteration<'a> {
             lower: noncausal.gain.max(feedthrough),
             best: None,
             trials: 0,
-            negligible: NEGLIGIBLE * (system.c().norm() * system.b().norm() + system.d().norm()),
+            stop: stop.clone(),
+            negligible: ZERO_GAMMA * (system.c().norm() * system.b().norm() + system.d().norm()),
         })
     }
 
@@ -148,7 +147,13 @@ impl<'a> GammaIteration<'a> {
     }
 
     pub(super) fn done(&self) -> bool {
-        self.upper() <= self.lower * (1.0 + GAMMA_ACCURACY) || self.is_negligible(self.upper())
+        let is_least = self.upper() <= self.lower * (1.0 + GAMMA_ACCURACY);
+        is_least || self.is_negligible(self.upper()) || self.is_stopped()
+    }
+
+    /// Whether the search is to end, with the filters that it has.
+    pub(super) fn is_stopped(&self) -> bool {
+        self.best.is_some() && self.stop.is_due()
     }
 
     /// Tries one gamma. A filter counts as found only if its computed norm confirms gamma.
@@ -183,7 +188,7 @@ impl<'a> GammaIteration<'a> {
     /// double precision a smaller gamma may be solvable.
     pub(super) fn bisect(&mut self) -> Result<(), DesignError> {
         for _ in 0..ROUND_LIMIT {
-            if self.bisect_once()? == Floor::Impossible {
+            if self.bisect_once()? {
                 break;
             }
             let before = self.upper();
@@ -209,8 +214,10 @@ impl<'a> GammaIteration<'a> {
         Ok(())
     }
 
-    fn bisect_once(&mut self) -> Result<Floor, DesignError> {
-        let mut kind = Floor::Impossible;
+    /// Whether the lower end of the last bracket is a gamma that no filter achieves: else the trial there
+    /// was not resolved.
+    fn bisect_once(&mut self) -> Result<bool, DesignError> {
+        let mut is_impossible = true;
         let (mut floor, mut ceiling) = (self.floor(), self.ceiling());
         for _ in 0..TRIAL_LIMIT {
             if self.done() || ceiling <= floor * (1.0 + 0.5 * GAMMA_ACCURACY) {
@@ -219,11 +226,11 @@ impl<'a> GammaIteration<'a> {
             let gamma = (floor * ceiling).sqrt();
             match self.attempt_or_exclude(gamma)? {
                 Trial::Achieved(_) => ceiling = gamma.min(self.upper()),
-                Trial::Impossible => (floor, kind) = (gamma, Floor::Impossible),
-                Trial::Unresolved => (floor, kind) = (gamma, Floor::Unresolved),
+                Trial::Impossible => (floor, is_impossible) = (gamma, true),
+                Trial::Unresolved => (floor, is_impossible) = (gamma, false),
             }
         }
-        Ok(kind)
+        Ok(is_impossible)
     }
 
     /// As [`GammaIteration::attempt`]; a gamma that no filter achieves raises the lower bound.

@@ -7,6 +7,7 @@ use super::gamma_iteration::GammaIteration;
 use super::precise_filtering::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, PreciseFiltering};
 use crate::arithmetic::{BigFloat, DoubleDouble, Number};
 use crate::design::DesignError;
+use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
 use crate::lti::gramian::h2_norm;
 use std::rc::Rc;
@@ -26,7 +27,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant) -> Result<Synthesis, DesignError> 
     let noisy = plant.with_noise()?;
     let innovations = Innovations::in_all_coordinates(&noisy)?;
     // gamma is that of the signal alone, so the noise counts in the filters and not in the bounds.
-    let mut iteration = GammaIteration::new(plant, &[Rc::new(Innovations::new(plant)?)])?;
+    let mut iteration = GammaIteration::new(plant, &[Rc::new(Innovations::new(plant)?)], &Stop::default())?;
     let mut candidates: Vec<Filter> = innovations.iter().filter_map(|form| form.h2()).collect();
     // Double precision loses up to a fifth of the mean square after smooth front ends, and nothing shows it.
     let precise_filter = precise::<DoubleDouble>(&noisy, MOST_STATES_AT_106_BITS)?;

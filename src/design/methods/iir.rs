@@ -22,7 +22,7 @@ const NOISE_SHARES: [f64; 6] = [1.0, 0.5, 0.25, 0.1, 0.03, 0.01];
 /// is not stable.
 pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
     let innovations = Innovations::in_all_coordinates(plant)?;
-    let mut iteration = GammaIteration::new(plant, &innovations)?;
+    let mut iteration = GammaIteration::new(plant, &innovations, &settings.stop)?;
     let mut mean_square = innovations.iter().filter_map(|form| form.h2()).peekable();
     // The mean-square optimum is usually either the worst-case optimum too or far from it. The error at one
     // frequency distinguishes the two cases.
@@ -52,7 +52,7 @@ fn refine<F: Number>(
     iteration: &mut GammaIteration<'_>,
     limit: usize,
 ) -> Result<(), DesignError> {
-    if iteration.attains_a_bound() || plant.system().order() > limit {
+    if iteration.is_stopped() || iteration.attains_a_bound() || plant.system().order() > limit {
         return Ok(());
     }
     let solver = Rc::new(PreciseFiltering::<F>::new(plant)?);
@@ -71,7 +71,7 @@ fn relaxed(
     optimum: &Evaluated,
     margin: f64,
 ) -> Result<Option<Evaluated>, DesignError> {
-    if margin <= 0.0 || iteration.is_negligible(optimum.peak.gain) {
+    if margin <= 0.0 || iteration.is_stopped() || iteration.is_negligible(optimum.peak.gain) {
         return Ok(None);
     }
     let cap = optimum.peak.gain * (1.0 + margin);

@@ -7,10 +7,11 @@
 //! | [`h2`] | the mean-square error: `iir` at gamma = infinity | state space | noncausal bound |
 //! | [`mean_square_fir`] | the same, for given length: `h2` with taps | FIR | noncausal bound |
 //! | [`averaged_fir`] | the same on average over uncertain delays and gains | FIR | noncausal bound |
-//! | [`sinc`] | nothing: Yen's interpolation, truncated (thesis 5.6.3) | FIR | noncausal bound |
-//! | [`separation`] | delays and bank one after the other (thesis 5.6.3) | FIR | noncausal bound |
+//! | [`comparison::sinc`] | nothing: Yen's interpolation, truncated (thesis 5.6.3) | FIR | noncausal bound |
+//! | [`comparison::separation`] | delays and bank one after the other (thesis 5.6.3) | FIR | noncausal bound |
 
 mod averaged_fir;
+mod comparison;
 mod filtering;
 pub(crate) mod fir;
 pub(crate) mod fir_kyp;
@@ -22,11 +23,10 @@ mod precise_filtering;
 pub(crate) mod robust_fir;
 pub(crate) mod scenarios;
 pub(crate) mod scheduled_fir;
-pub(crate) mod separation;
-pub(crate) mod sinc;
 
 use super::DesignError;
 pub(crate) use super::exchange::{DualPoint, GAMMA_ACCURACY};
+use super::limits::Stop;
 use super::plant::LiftedPlant;
 use super::problem::Problem;
 use crate::lti::StateSpace;
@@ -48,6 +48,8 @@ pub(crate) struct Settings {
     pub(crate) robust: Option<scenarios::RobustProblem>,
     /// For mean-square designs, how well each channel is known; `None` if all are exact.
     pub(crate) deviations: Option<Vec<Deviations>>,
+    /// Ends the search with the best filters so far.
+    pub(crate) stop: Stop,
     /// The channels of the plant in units of the slow period, for `separation`.
     pub(crate) at_slow_rate: Option<Problem>,
 }
@@ -155,8 +157,8 @@ pub(crate) fn synthesise(
             None => mean_square_fir::synthesise(plant, settings),
         },
         Method::H2 => h2::synthesise(plant),
-        Method::Sinc => sinc::synthesise(plant, settings),
-        Method::Separation => separation::synthesise(plant, settings),
+        Method::Sinc => comparison::sinc(plant, settings),
+        Method::Separation => comparison::separation(plant, settings),
     }
 }
 

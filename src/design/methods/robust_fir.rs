@@ -153,6 +153,7 @@ fn least_worst_norm(
     settings: &Settings,
 ) -> Result<RobustTaps, DesignError> {
     let mut exchange = exchange(plant, grid, settings)?;
+    exchange.stop = settings.stop.clone();
     let found = exchange.optimise_at(Tolerances::gradual(ACCURACY))?;
     let taps = impulse_responses(&found.taps, settings.taps);
     let peak = plant.fir_norm(&taps)?;

@@ -88,6 +88,7 @@ pub(crate) fn synthesise(
     let sides = Sides::new(problem);
     let grid = sides.grid((plant, nominal), &moved, &within_reach, settings);
     let mut exchange = sides.exchange(plant, grid, settings)?;
+    exchange.stop = settings.stop.clone();
     let found = exchange.optimise_at(Tolerances::gradual(ACCURACY))?;
     let (taps, slopes) = sides.split(&found.taps, settings.taps);
     let norm = |moved: &MovedPlant| {

@@ -5,7 +5,7 @@ use crate::bank::SynthesisFilters;
 use crate::design::error_grid::ErrorGrid;
 use crate::design::filters::polyphase;
 use crate::design::plant::LiftedPlant;
-use crate::design::{Problem, ProofSearch, design_with};
+use crate::design::{Options, Problem, design};
 use crate::spec::{MAX_FRACTION_BITS, Spec};
 
 const THESIS: &str = include_str!("../../../filters/thesis-fir.toml");
@@ -13,7 +13,7 @@ const THESIS: &str = include_str!("../../../filters/thesis-fir.toml");
 /// A plant with the taps of its optimal FIR bank.
 fn optimum(spec: &str) -> (LiftedPlant, Vec<Vec<f64>>) {
     let spec = Spec::from_toml(spec, "spec.toml").unwrap();
-    let found = design_with(&spec, ProofSearch::Skip).unwrap();
+    let found = design(&spec, &Options::without_proof()).unwrap();
     let SynthesisFilters::Fir(taps) = found.bank.filters else { unreachable!() };
     (LiftedPlant::new(&Problem::new(&spec, found.bank.latency).unwrap()).unwrap(), taps)
 }

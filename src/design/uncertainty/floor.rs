@@ -15,7 +15,6 @@
 
 use super::super::analysis::bank_problem;
 use super::super::plant::LiftedPlant;
-use super::super::resolution::resolves_delays;
 use super::super::{DesignError, problem::Problem};
 use super::search::moved;
 use crate::bank::Bank;
@@ -57,7 +56,7 @@ pub fn floor(bank: &Bank, errors: &ErrorBox, worst: &ErrorPoint) -> Result<Floor
     let common_shift = common_shift(&problem, FastPeriods(half));
     let there = moved(bank, worst)?;
     let noncausal =
-        if resolves_delays(&there) { Some(LiftedPlant::new(&there)?.noncausal_bound()?.gain) } else { None };
+        if there.resolves_delays() { Some(LiftedPlant::new(&there)?.noncausal_bound()?.gain) } else { None };
     Ok(Floor { common_shift, noncausal })
 }
 

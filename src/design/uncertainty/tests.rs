@@ -1,5 +1,5 @@
 use super::*;
-use crate::design::{ProofSearch, design_with};
+use crate::design::{Options, design};
 use crate::spec::Spec;
 use crate::units::Seconds;
 use crate::verify::uncertainty::{ErrorPoint, Taps};
@@ -16,7 +16,7 @@ fn interleaved() -> Bank {
     let text = include_str!("../../../filters/interleaved-4x250M.toml");
     let mut spec = Spec::from_toml(text, "interleaved-4x250M.toml").unwrap();
     (spec.signal, spec.latency, spec.design.taps) = (None, Some(16), Some(32));
-    design_with(&spec, ProofSearch::Skip).unwrap().bank
+    design(&spec, &Options::without_proof()).unwrap().bank
 }
 
 /// Against differences of fourth order; the thesis bank with three settings of its delays, where

@@ -80,7 +80,7 @@ fn boxes_are_proven_behind_resonant_front_ends_and_signals() {
              channel = [{{ delay = 1.2 }}, {{ delay = 0.6 }}]\ndesign = {{ method = \"fir\", taps = 24 }}"
         );
         let spec = crate::spec::Spec::from_toml(&text, "spec.toml").unwrap();
-        let bank = crate::design::design_with(&spec, crate::design::ProofSearch::Skip).unwrap().bank;
+        let bank = crate::design::design(&spec, &crate::design::Options::without_proof()).unwrap().bank;
         let found = worst_case(&bank, &square_box(1e-9), Taps::Fixed, 0.01, &[]).unwrap();
         let norm = bank.gamma.norm.unwrap();
         assert!(found.upper <= found.lower * 1.0101, "{filters}: {found:?}");

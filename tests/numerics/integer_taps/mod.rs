@@ -8,7 +8,7 @@ use crate::support::specs::{alike, butterworth, with_taps};
 use crate::support::sweep::each;
 use brute_force::BruteForce;
 use hybank::bank::SynthesisFilters;
-use hybank::design::{DesignError, LiftedPlant, Problem, ProofSearch, design_with};
+use hybank::design::{DesignError, LiftedPlant, Options, Problem, design};
 use hybank::spec::{Spec, WordLengths};
 
 /// Bits of all taps together: the brute force tries two to this power at each scale.
@@ -55,7 +55,7 @@ fn outcome(spec: &Spec, bits: u32) -> Option<Outcome> {
     let mut spec = spec.clone();
     spec.design.bits = Some(WordLengths::Same(bits));
     let begin = std::time::Instant::now();
-    let found = match design_with(&spec, ProofSearch::Skip) {
+    let found = match design(&spec, &Options::without_proof()) {
         Ok(found) => found,
         Err(DesignError::OutOfReach { .. }) => return None,
         Err(error) => panic!("{}: {error}", spec.name),

@@ -6,7 +6,7 @@
 
 use crate::design::analysis::bank_problem;
 use crate::design::filters::lifted;
-use crate::design::{Design, LiftedPlant, ProofSearch, analyze_mean, design_with};
+use crate::design::{Design, LiftedPlant, Options, analyze_mean, design};
 use crate::linalg::Complex;
 use crate::lti::gramian::h2_norm;
 use crate::spec::{
@@ -48,7 +48,7 @@ impl Case {
 
     /// Rms of the error and of the noise together.
     fn rms(&self) -> f64 {
-        total(&design_with(&self.spec(), ProofSearch::Skip).unwrap())
+        total(&design(&self.spec(), &Options::without_proof()).unwrap())
     }
 }
 
@@ -202,7 +202,7 @@ fn no_other_taps_are_better() {
         let case = Case { ratio: 3, latency: 4, taps: Some(taps), target: filter.clone(), converters };
         let mut spec = case.spec();
         (spec.channels[1].gain, spec.channels[3].gain) = (-1.7, 1e-3);
-        let designed = design_with(&spec, ProofSearch::Skip).unwrap();
+        let designed = design(&spec, &Options::without_proof()).unwrap();
         let least = total(&designed);
         let crate::bank::SynthesisFilters::Fir(best) = &designed.bank.filters else { panic!("taps") };
         for (i, n) in (0..4).flat_map(|i| (0..taps).map(move |n| (i, n))) {
@@ -254,7 +254,7 @@ fn uncertain(noise: f64, deviations: [f64; 2]) -> Design {
         reference: Some(0),
         ..UncertaintySpec::default()
     });
-    design_with(&spec, ProofSearch::Skip).unwrap()
+    design(&spec, &Options::without_proof()).unwrap()
 }
 
 /// Origin as above, with cross-spectra times the characteristic functions.
@@ -265,7 +265,8 @@ fn uncertain_delays_are_averaged_over() {
         let found = mean_over_second_delay(&design, deviation);
         assert!((found - golden).abs() < 2e-10, "{deviation}: {found} {golden}");
         // One channel alone leaves 0.04988204, and the bank for exact delays far more.
-        let nominal = design_with(&thesis(1e-3, Some(22)).spec(), ProofSearch::Skip).unwrap();
+        let nominal =
+            crate::design::design(&thesis(1e-3, Some(22)).spec(), &Options::without_proof()).unwrap();
         let careless = mean_over_second_delay(&nominal, deviation);
         assert!(found < 0.04988204 && careless > 0.0574, "{found} {careless}");
     }
@@ -291,7 +292,7 @@ fn uncertain_delays_make_h2_fir() {
     let mut spec = thesis(1e-3, None).spec();
     spec.uncertainty =
         Some(UncertaintySpec { delay: Some(PerChannel::Same(Seconds(0.1))), ..UncertaintySpec::default() });
-    let design = design_with(&spec, ProofSearch::Skip).unwrap();
+    let design = design(&spec, &Options::without_proof()).unwrap();
     assert!(design.taps_chosen && matches!(design.bank.filters, crate::bank::SynthesisFilters::Fir(_)));
     spec.design.reduction = Some(crate::spec::Reduction::Order(3));
     assert!(spec.check().is_err());

@@ -2,7 +2,7 @@
 
 use crate::design::methods::scenarios::{MAX_SCENARIOS, scenarios};
 use crate::design::uncertainty::norm_at;
-use crate::design::{ProofSearch, design_with};
+use crate::design::{Options, design};
 use crate::random::Random;
 use crate::spec::Spec;
 use crate::units::Seconds;
@@ -23,7 +23,7 @@ fn robust_optima_are_those_of_a_semidefinite_program() {
     for (half, robust, nominal) in
         [(0.05, 0.0421756, 0.0421799), (0.1, 0.0442877, 0.0478338), (0.2, 0.0635326, 0.0682)]
     {
-        let designed = design_with(&thesis(half), ProofSearch::Skip).unwrap();
+        let designed = design(&thesis(half), &Options::without_proof()).unwrap();
         let study = designed.robust.unwrap();
         assert!((study.robust.worst / robust - 1.0).abs() < 1e-3, "{study:?}");
         assert!((study.nominal.worst / nominal - 1.0).abs() < 1e-3, "{study:?}");
@@ -44,7 +44,7 @@ fn flat_optima_are_reached_and_random_points_are_no_worse() {
     for half in [0.1, 0.2, 0.3] {
         let mut spec = thesis(half);
         spec.uncertainty.as_mut().unwrap().reference = Some(1);
-        let designed = design_with(&spec, ProofSearch::Skip).unwrap();
+        let designed = design(&spec, &Options::without_proof()).unwrap();
         let study = designed.robust.unwrap();
         assert!(
             study.lower <= study.robust.worst && study.lower > study.robust.worst * (1.0 - 1e-3),
@@ -63,7 +63,7 @@ fn flat_optima_are_reached_and_random_points_are_no_worse() {
 /// The file states a worst case that `verify` proves, and it refuses a smaller one.
 #[test]
 fn the_worst_case_is_stated_and_proven() {
-    let mut bank = design_with(&thesis(0.1), ProofSearch::Run).unwrap().bank;
+    let mut bank = design(&thesis(0.1), &Options::default()).unwrap().bank;
     let stated = bank.gamma.worst_case.unwrap();
     assert!(stated > 0.0442877 * (1.0 - 1e-3) && stated < 0.0442877 * 1.007, "{stated}");
     assert!(crate::verify::verify(&bank).is_ok());
@@ -76,8 +76,8 @@ fn the_worst_case_is_stated_and_proven() {
 fn a_table_without_errors_changes_nothing() {
     let plain = Spec { uncertainty: None, ..thesis(0.1) };
     let (with, without) = (
-        design_with(&thesis(0.0), ProofSearch::Skip).unwrap(),
-        design_with(&plain, ProofSearch::Skip).unwrap(),
+        design(&thesis(0.0), &Options::without_proof()).unwrap(),
+        design(&plain, &Options::without_proof()).unwrap(),
     );
     assert_eq!((with.bank.filters, with.robust), (without.bank.filters, None));
 }
@@ -115,7 +115,7 @@ fn norm_and_redesign(bank: &crate::bank::Bank, errors: [f64; 2]) -> (f64, f64) {
     let mut spec = Spec { uncertainty: None, ..bank.spec.clone().unwrap() };
     spec.design.tracking = None;
     spec.channels.iter_mut().zip(errors).for_each(|(channel, error)| channel.delay += Seconds(error));
-    let redesign = design_with(&spec, ProofSearch::Skip).unwrap();
+    let redesign = design(&spec, &Options::without_proof()).unwrap();
     (norm, redesign.bank.gamma.norm.unwrap())
 }
 
@@ -123,7 +123,7 @@ fn norm_and_redesign(bank: &crate::bank::Bank, errors: [f64; 2]) -> (f64, f64) {
 /// are hardly worse.
 #[test]
 fn taps_that_follow_the_delays_are_nearly_as_good_as_a_redesign() {
-    let designed = design_with(&following(0.1), ProofSearch::Skip).unwrap();
+    let designed = design(&following(0.1), &Options::without_proof()).unwrap();
     let study = designed.tracking.unwrap();
     let (mut most, mut most_redesigned) = (0.0f64, 0.0f64);
     for errors in [[0.1, 0.1], [-0.1, 0.1], [0.1, -0.1], [0.04, -0.07], [0.0, 0.0]] {
@@ -145,7 +145,7 @@ fn taps_that_follow_the_delays_are_nearly_as_good_as_a_redesign() {
 fn the_worst_case_of_taps_that_follow_is_stated_and_proven() {
     let mut spec = following(0.05);
     spec.uncertainty.as_mut().unwrap().reference = Some(1);
-    let designed = design_with(&spec, ProofSearch::Run).unwrap();
+    let designed = design(&spec, &Options::default()).unwrap();
     let (mut bank, study) = (designed.bank, designed.tracking.unwrap());
     let stated = bank.gamma.tracked.unwrap();
     assert!(
@@ -176,7 +176,7 @@ fn interleaved_converters_are_followed() {
         let text = format!("{text}tracking = \"affine\"\n[uncertainty]\ndelay = {half}\nreference = 4\n");
         // For inputs of any frequency, as the figures in docs/ say.
         let spec = Spec { signal: None, ..Spec::from_toml(&text, "spec.toml").unwrap() };
-        let designed = design_with(&spec, ProofSearch::Run).unwrap();
+        let designed = design(&spec, &Options::default()).unwrap();
         let study = designed.tracking.unwrap();
         println!(
             "{half}: {:?} {study:?} excess {} in {:?}",

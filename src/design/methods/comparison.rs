@@ -1,10 +1,33 @@
-//! A comparison method: first fractional-delay filters, then a bank for integer delays (thesis 5.6.3).
+//! The comparison methods of thesis 5.6.3: sinc interpolation of recurrent nonuniform samples, and first
+//! fractional-delay filters, then a bank for integer delays.
 
 use super::{Filters, Settings, Synthesis, fir};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::design::problem::{Channel, Problem};
+use crate::sampling::Recurrent;
 use crate::units::FastPeriods;
+
+/// Yen's interpolation of the recurrent nonuniform samples, for ideal front ends and the gains of the
+/// converters, truncated to `settings.taps` taps per channel.
+///
+/// # Errors
+/// [`DesignError::SincNeedsNyquist`] unless N = M; [`DesignError::Sampling`] for delays that coincide
+/// modulo the slow period.
+pub(crate) fn sinc(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
+    let (problem, channels, ratio) = (plant.problem(), plant.channels(), plant.ratio());
+    if channels != ratio {
+        return Err(DesignError::SincNeedsNyquist { channels, ratio });
+    }
+    let offsets: Vec<f64> = problem.channels.iter().map(|channel| -channel.delay.0).collect();
+    let sets = Recurrent::new(&offsets, ratio)?;
+    let taps = |i: usize| {
+        let mut taps = sets.taps(i, problem.latency as f64, settings.taps);
+        taps.iter_mut().for_each(|tap| *tap /= problem.channels[i].converter_gain);
+        taps
+    };
+    Synthesis::of_taps(plant, (0..channels).map(taps).collect())
+}
 
 /// Two steps: a fractional-delay filter for each channel, designed alone at the slow rate, brings its
 /// samples onto the fast grid; a bank designed for integer delays fuses them. Both steps together have
@@ -12,7 +35,7 @@ use crate::units::FastPeriods;
 ///
 /// # Errors
 /// As [`fir::synthesise`]; [`DesignError::NoTaps`] without the channels at the slow rate.
-pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
+pub(crate) fn separation(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
     let problem = plant.problem();
     let split = Split::new(problem, settings.taps);
     let grid = grid_delays(problem);

@@ -21,12 +21,13 @@
 //! whose limit doubling reaches in a few steps.
 
 use super::filtering::{RiccatiSolver, Trial, output_sizes};
-use crate::arithmetic::{Matrix, Number};
+use crate::arithmetic::Number;
+use crate::arithmetic::dense::{self, product, riccati_limit, select, solve, symmetric};
 use crate::design::DesignError;
-use crate::design::doubling::{gramian, riccati_limit};
 use crate::design::plant::LiftedPlant;
 use crate::linalg::Mat;
 use crate::lti::StateSpace;
+use nalgebra::DMatrix as Matrix;
 use std::ops::Range;
 
 /// Rounding moves no eigenvalue of a scaled semidefinite matrix this far below zero.
@@ -41,9 +42,9 @@ pub(super) const MOST_STATES_AT_106_BITS: usize = 96;
 pub(super) const MOST_STATES_AT_512_BITS: usize = 40;
 /// Relative change of the covariance in one more step of the difference equation beyond which digits were
 /// lost.
-const SETTLED: f64 = 1e-7;
+const FIXED_POINT_ACCURACY: f64 = 1e-7;
 /// Part of a state's power per period below which its covariance counts as zero there.
-const KNOWN: f64 = 1e-10;
+const ZERO_COVARIANCE: f64 = 1e-10;
 
 /// The plant in extended precision.
 pub(super) struct PreciseFiltering<F> {
@@ -78,7 +79,7 @@ impl<F: Number> PreciseFiltering<F> {
         let inputs = stacked(system.b(), system.d());
         Ok(Self {
             system: stacked(system.a(), system.c()),
-            input_gram: (&inputs * &inputs.transpose()).symmetric(),
+            input_gram: symmetric(&product(&inputs, &inputs.transpose())),
             order: system.order(),
             measured,
             sizes: output_sizes(system)?.into_iter().take(measured).collect(),
@@ -110,41 +111,41 @@ impl<F: Number> PreciseFiltering<F> {
     }
 
     fn rows(&self, rows: impl IntoIterator<Item = usize>) -> Matrix<F> {
-        self.system.select_rows(&rows.into_iter().collect::<Vec<_>>())
+        select(&self.system, &rows.into_iter().collect::<Vec<_>>(), &self.states().collect::<Vec<_>>())
     }
 
     /// Covariance of the worst-case (or mean-square) prediction error; `None` if it did not converge.
     fn covariance(&self, gamma: Option<f64>) -> Option<Matrix<F>> {
-        let mut p = Matrix::zeros(self.order, self.order);
+        let mut p = dense::zeros(self.order, self.order);
         for _ in 0..self.start {
             p = self.step(&p, gamma)?.next;
         }
         let Step { next, innovation, cross } = self.step(&p, gamma)?;
         let c = self.rows(self.outputs(gamma));
-        let weighted = innovation.solve(&c)?;
-        let f = &self.rows(self.states()) - &(&cross.transpose() * &weighted);
-        let g = (&c.transpose() * &weighted).symmetric();
-        Some(&p + &riccati_limit(&f, &g, &(&next - &p))?)
+        let weighted = solve(&innovation, &c)?;
+        let f = self.rows(self.states()) - product(&cross.transpose(), &weighted);
+        let g = symmetric(&product(&c.transpose(), &weighted));
+        Some(&p + riccati_limit(&f, &g, &(next - &p))?)
     }
 
     /// [S, T'; T, Re] for the covariance `p`, states first; Re without gamma.
     fn gram(&self, p: &Matrix<F>) -> Matrix<F> {
-        &self.system.congruence(p) + &self.input_gram
+        dense::congruence(&self.system, p) + &self.input_gram
     }
 
     /// The step from `p`. A measurement that is zero so far adds nothing.
     fn step(&self, p: &Matrix<F>, gamma: Option<f64>) -> Option<Step<F>> {
         let mut gram = self.gram(p);
         let square = F::from(gamma.unwrap_or(0.0)) * F::from(gamma.unwrap_or(0.0));
-        self.references().for_each(|i| gram[(i, i)] = gram[(i, i)] - square);
+        self.references().for_each(|i| gram[(i, i)] -= square);
         let (states, outputs): (Vec<usize>, Vec<usize>) = (self.states().collect(), self.outputs(gamma));
         let active: Vec<usize> = outputs.iter().copied().filter(|&i| gram[(i, i)] != F::ZERO).collect();
-        let seen = gram.select(&active, &states);
-        let explained = &seen.transpose() * &gram.select(&active, &active).solve(&seen)?;
+        let seen = select(&gram, &active, &states);
+        let explained = product(&seen.transpose(), &solve(&select(&gram, &active, &active), &seen)?);
         Some(Step {
-            next: (&gram.select(&states, &states) - &explained).symmetric(),
-            innovation: gram.select(&outputs, &outputs),
-            cross: gram.select(&outputs, &states),
+            next: symmetric(&(select(&gram, &states, &states) - explained)),
+            innovation: select(&gram, &outputs, &outputs),
+            cross: select(&gram, &outputs, &states),
         })
     }
 
@@ -154,9 +155,11 @@ impl<F: Number> PreciseFiltering<F> {
     fn is_right(&self, covariance: &Matrix<F>, gamma: f64) -> Option<bool> {
         let Step { next, innovation, .. } = self.step(covariance, Some(gamma))?;
         let change = |i: usize| (next[(i, i)] - covariance[(i, i)]).nearest().abs();
-        let size = |i: usize| covariance[(i, i)].nearest().abs() + KNOWN * self.input_gram[(i, i)].nearest();
-        let settled = self.states().all(|i| change(i) <= SETTLED * size(i));
-        let pivots: Vec<f64> = innovation.pivots().into_iter().map(Number::nearest).collect();
+        let size = |i: usize| {
+            covariance[(i, i)].nearest().abs() + ZERO_COVARIANCE * self.input_gram[(i, i)].nearest()
+        };
+        let settled = self.states().all(|i| change(i) <= FIXED_POINT_ACCURACY * size(i));
+        let pivots: Vec<f64> = dense::pivots(&innovation).into_iter().map(Number::nearest).collect();
         if !settled || !pivots.iter().all(|pivot| pivot.is_finite()) {
             return None;
         }
@@ -171,30 +174,27 @@ impl<F: Number> PreciseFiltering<F> {
         let gram = self.gram(covariance);
         let measurements: Vec<usize> = self.measurements().collect();
         let others: Vec<usize> = self.states().chain(self.references()).collect();
-        let cross = gram.select(&measurements, &others);
-        let gains = gram.select(&measurements, &measurements).solve(&cross)?.transpose();
-        let closed = &self.rows(others) - &(&gains * &self.rows(measurements));
-        let (states, references): (Vec<usize>, Vec<usize>) =
-            (self.states().collect(), (self.order..closed.nrows()).collect());
-        let part = |m: &Matrix<F>, rows: &[usize]| m.select_rows(rows);
-        self.realised(
-            &part(&closed, &states),
-            &part(&gains, &states),
-            &part(&closed, &references),
-            &part(&gains, &references),
-        )
+        let cross = select(&gram, &measurements, &others);
+        let gains = solve(&select(&gram, &measurements, &measurements), &cross)?.transpose();
+        let closed = self.rows(others) - product(&gains, &self.rows(measurements));
+        let (n, rest) = (self.order, closed.nrows() - self.order);
+        let parts = |m: &Matrix<F>| (m.rows(0, n).into_owned(), m.rows(n, rest).into_owned());
+        let ((a, c), (b, d)) = (parts(&closed), parts(&gains));
+        self.realised(&a, &b, &c, &d)
     }
 
     /// The filter in double precision, in coordinates in which white measurements of their own size make its
     /// states white: rounding there is relative to the size of the signals.
     fn realised(&self, a: &Matrix<F>, b: &Matrix<F>, c: &Matrix<F>, d: &Matrix<F>) -> Option<StateSpace> {
         let driven = Matrix::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] * F::from(self.sizes[j]));
-        let mut gramian = gramian(a, &driven)?;
+        let squares = symmetric(&product(&driven, &driven.transpose()));
+        let mut gramian = riccati_limit(a, &dense::zeros(a.nrows(), a.nrows()), &squares)?;
         let noise = F::from(STATE_NOISE.max(100.0 * F::ROUNDING));
         (0..gramian.nrows()).for_each(|i| gramian[(i, i)] = gramian[(i, i)] + gramian[(i, i)] * noise);
-        let root = gramian.cholesky()?;
-        let (a, b) = (root.solve_lower(&(a * &root)), root.solve_lower(b));
-        let filter = StateSpace::new(nearest(&a), nearest(&b), nearest(&(c * &root)), nearest(d)).ok()?;
+        let root = dense::cholesky(&gramian)?;
+        let (a, b) = (dense::solve_lower(&root, &product(a, &root)), dense::solve_lower(&root, b));
+        let filter =
+            StateSpace::new(nearest(&a), nearest(&b), nearest(&product(c, &root)), nearest(d)).ok()?;
         (filter.spectral_radius().ok()? < 1.0).then_some(filter)
     }
 }
@@ -229,11 +229,11 @@ fn is_semidefinite<F: Number>(m: &Matrix<F>) -> bool {
         let entry = m[(kept[i], kept[j])] * scale[i] * scale[j];
         if i == j { entry + F::from(SEMIDEFINITE) } else { entry }
     });
-    scaled.cholesky().is_some()
+    dense::cholesky(&scaled).is_some()
 }
 
 fn nearest<F: Number>(m: &Matrix<F>) -> Mat {
-    Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)].nearest())
+    m.map(Number::nearest)
 }
 
 #[cfg(test)]

@@ -4,14 +4,18 @@
 //! Double precision finds it for most banks. After steep filters, whose samples are nearly dependent, the
 //! error is a small difference of large numbers; the equation is then solved in 512 bits.
 
-use super::units::Units;
-use super::{leading_direction, long_riccati, witness};
+use super::{leading_direction, witness};
+use crate::arithmetic::dense::{cholesky, product, riccati_limit, select, solve, symmetric};
+use crate::arithmetic::{BigFloat, Number};
 use crate::bank::{Bank, Certificate, DualWitness};
 use crate::design::DesignError;
-use crate::linalg::{self, Complex, Mat};
+use crate::linalg::{self, Complex, Mat, power_of_two};
+use crate::lti::gramian::{controllability_root, observability_root};
 use crate::lti::peak::hinf_norm;
-use crate::lti::{GramianCoordinates, StateSpace, bounded_real_riccati};
+use crate::lti::{GramianCoordinates, LtiError, StateSpace, bounded_real_riccati};
+use crate::verify::precise::PreciseErrorSystem;
 use crate::verify::{EnclosedErrorSystem, Midpoint};
+use nalgebra::DMatrix as Matrix;
 
 /// Relative excesses over the computed norm at which the search tries to find a certificate, smallest
 /// first.
@@ -127,8 +131,7 @@ impl Search<'_> {
         }
         let system = self.error.in_512_bits();
         let noise = NOISE * level.excess;
-        let [factor, correction] =
-            long_riccati::root(self.units, &system, self.middle, level.middle(), noise)?;
+        let [factor, correction] = long_root(self.units, &system, self.middle, level.middle(), noise)?;
         let passes = |correction| self.passes(level, factor.clone(), correction);
         let corrected = || CORRECTION_DIGITS.iter().find_map(|&digits| passes(rounded(&correction, digits)));
         passes(Vec::new()).or_else(corrected)
@@ -172,5 +175,163 @@ impl Riccati {
         let half = linalg::cholesky(&p).ok()?;
         let root = linalg::lq_factor(&(self.inverse.tr_mul(&half) * gamma.sqrt()));
         Some((0..root.nrows()).map(|i| root.row(i).iter().take(i + 1).copied().collect()).collect())
+    }
+}
+
+/// Rows of a lower triangular R with P = R R' at the level `gamma`, in `units`, and of what rounding to
+/// doubles takes from it. `middle` is the same system in doubles. The noise on the states adds about `noise`
+/// to the norm. `None` if there is no such P.
+fn long_root(
+    units: &Units,
+    error: &PreciseErrorSystem,
+    middle: &Midpoint,
+    gamma: f64,
+    noise: f64,
+) -> Option<[Vec<Vec<f64>>; 2]> {
+    // Noise of unit density on all states has this energy in e.
+    let energy = observability_root(&middle.a, &middle.c).ok()?.norm_squared();
+    let equation = LongRiccati::new(&units.of_long(error), 2.0 * gamma * noise / energy);
+    let root = cholesky(&equation.limit(gamma)?)?;
+    let rows = |entry: &dyn Fn(BigFloat) -> f64| -> Vec<Vec<f64>> {
+        (0..root.nrows()).map(|i| (0..=i).map(|j| entry(root[(i, j)])).collect()).collect()
+    };
+    Some([rows(&|x| x.nearest()), rows(&|x| (x - BigFloat::from(x.nearest())).nearest())])
+}
+
+/// The bounded-real Riccati equation in 512 bits.
+///
+/// With xi+ = A xi + J u, e = C xi + L u and the Gram matrix S of u, the least P at the level gamma is the
+/// limit from P = 0 of
+///
+/// ```text
+/// P+ = A P A' + J S J' + N - T' Re^-1 T,   T = C P A' + L S J',   Re = C P C' + L S L' - gamma^2 I.
+/// ```
+///
+/// N is white noise on the states. It makes the inequality of the certificate strict. The limit is that of
+/// P+ = F P (I + G P)^-1 F' + H with F = A - T' Re^-1 C, G = C' Re^-1 C and H = P+, all at P = 0.
+struct LongRiccati {
+    a: Matrix<BigFloat>,
+    c: Matrix<BigFloat>,
+    /// J S J' + N.
+    input_gram: Matrix<BigFloat>,
+    /// L S J'.
+    cross: Matrix<BigFloat>,
+    /// L S L'.
+    direct: Matrix<BigFloat>,
+}
+
+impl LongRiccati {
+    /// With white noise of the variance `noise` on each state.
+    fn new(error: &PreciseErrorSystem, noise: f64) -> Self {
+        let n = error.system.ncols();
+        let (states, outputs): (Vec<usize>, Vec<usize>) =
+            ((0..n).collect(), (n..error.system.nrows()).collect());
+        let mut input_gram = select(&error.input_gram, &states, &states);
+        (0..n).for_each(|i| input_gram[(i, i)] += BigFloat::from(noise));
+        Self {
+            a: select(&error.system, &states, &states),
+            c: select(&error.system, &outputs, &states),
+            input_gram,
+            cross: select(&error.input_gram, &outputs, &states),
+            direct: select(&error.input_gram, &outputs, &outputs),
+        }
+    }
+
+    /// P at the level `gamma`; `None` if the recursion has no limit.
+    fn limit(&self, gamma: f64) -> Option<Matrix<BigFloat>> {
+        let Self { a, c, input_gram, cross, direct } = self;
+        let mut re = direct.clone();
+        (0..re.nrows()).for_each(|i| re[(i, i)] -= BigFloat::from(gamma) * BigFloat::from(gamma));
+        let (weighted_c, weighted_t) = (solve(&re, c)?, solve(&re, cross)?);
+        let f = a - product(&cross.transpose(), &weighted_c);
+        let g = symmetric(&product(&c.transpose(), &weighted_c));
+        let h = symmetric(&(input_gram - product(&cross.transpose(), &weighted_t)));
+        riccati_limit(&f, &g, &h)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// x+ = a x + u, e = x: with N = 0 the equation is P = a^2 P + 1 + a^2 P^2 / (g^2 - P), or
+    /// P^2 - (1 + g^2 (1 - a^2)) P + g^2 = 0 with the norm 1 / (1 - a).
+    fn one_pole(gamma: f64) -> Option<f64> {
+        let number = |rows: usize, columns: usize, entries: &[f64]| {
+            Matrix::from_fn(rows, columns, |i, j| BigFloat::from(entries[i * columns + j]))
+        };
+        let error = PreciseErrorSystem {
+            system: number(2, 1, &[0.5, 1.0]),
+            input_gram: number(2, 2, &[1.0, 0.0, 0.0, 0.0]),
+        };
+        Some(LongRiccati::new(&error, 0.0).limit(gamma)?[(0, 0)].nearest())
+    }
+
+    #[test]
+    fn one_pole_has_its_quadratic_root() {
+        for gamma in [2.0 * (1.0 + 1e-12), 2.1, 10.0_f64] {
+            let b = 1.0 + 0.75 * gamma * gamma;
+            let exact = 2.0 * gamma * gamma / (b + (b * b - 4.0 * gamma * gamma).sqrt());
+            let p = one_pole(gamma).unwrap();
+            assert!((p / exact - 1.0).abs() < 1e-5, "{gamma}: {p} {exact}");
+        }
+        assert!(one_pole(1.9).is_none_or(|p| !(0.0..=1.9 * 1.9).contains(&p)), "{:?}", one_pole(1.9));
+    }
+}
+
+/// Units of states and references, which make the search independent of the gains of the front ends. They
+/// are powers of two, so that a change of units rounds nothing.
+///
+/// With xi = T eta, T diagonal, and e counted in units of s, a P that proves ||K|| <= gamma for [A, J; C,
+/// L] is T Q T' where Q proves ||K|| / s <= gamma / s for [T^-1 A T, T^-1 J; C T / s, L / s].
+struct Units {
+    states: Vec<f64>,
+    /// Unit of the reference samples, and so of gamma.
+    reference: f64,
+}
+
+impl Units {
+    /// Units near the standard deviations of the states and near the size `scale` of the reference samples.
+    ///
+    /// # Errors
+    /// [`LtiError::IterationLimit`] if the system is not stable.
+    fn of(system: &Midpoint, scale: f64) -> Result<Self, LtiError> {
+        let root = controllability_root(&system.a, &system.b)?;
+        let states = root.row_iter().map(|row| power_of_two(row.norm())).collect();
+        Ok(Self { states, reference: power_of_two(scale) })
+    }
+
+    /// The system in these units.
+    fn of_one(&self, system: &Midpoint) -> Midpoint {
+        let entry = |m: &Mat, row: &dyn Fn(usize) -> f64, column: &dyn Fn(usize) -> f64| {
+            Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / row(i) * column(j))
+        };
+        let (state, reference, input) =
+            (|i: usize| self.states[i], |_: usize| self.reference, |_: usize| 1.0);
+        Midpoint {
+            a: entry(&system.a, &state, &state),
+            b: entry(&system.b, &state, &input),
+            c: entry(&system.c, &reference, &state),
+            d: entry(&system.d, &reference, &input),
+        }
+    }
+
+    /// Converts rows of R from these units to those of the file.
+    fn factor(&self, rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let scaled = |(row, unit): (Vec<f64>, &f64)| row.into_iter().map(|x| x * unit).collect();
+        rows.into_iter().zip(&self.states).map(scaled).collect()
+    }
+
+    /// The system in 512 bits in these units.
+    fn of_long(&self, error: &PreciseErrorSystem) -> PreciseErrorSystem {
+        let unit = |i: usize| BigFloat::from(*self.states.get(i).unwrap_or(&self.reference));
+        let PreciseErrorSystem { system, input_gram } = error;
+        let system =
+            Matrix::from_fn(system.nrows(), system.ncols(), |i, j| system[(i, j)] * unit(j) / unit(i));
+        let gram = |i: usize, j: usize| input_gram[(i, j)] / unit(i) / unit(j);
+        PreciseErrorSystem {
+            system,
+            input_gram: Matrix::from_fn(input_gram.nrows(), input_gram.ncols(), gram),
+        }
     }
 }

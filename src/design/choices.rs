@@ -1,0 +1,275 @@
+//! What a spec leaves open: the latency, and the number of taps.
+//!
+//! What counts is the whole error: the mean square of the error for the signal plus the noise of the
+//! converters at the output. The latency is the shortest one whose whole error is within 0.1 dB of the
+//! least over all latencies, with the length of the spec. Where the spec states no noise, the samples are
+//! rounded to 16 bits: beyond that no latency pays. The error is the least that banks of that length can
+//! reach, which a smoother finds without a design. `sinc` and `separation` minimise nothing: the output
+//! instant lies in the middle of the samples that their taps see.
+
+use super::DesignError;
+use super::effort;
+use super::filters;
+use super::least_errors::{LeastErrors, candidates, check_reach, manageable};
+use super::limits::Limits;
+use super::merging::Repeats;
+use super::methods::scenarios::RobustProblem;
+use super::methods::{self, Deviations, Filters, Settings};
+use super::plant::LiftedPlant;
+use super::problem::{Problem, common_delay};
+use crate::analog::SignalFilter;
+use crate::lti::StateSpace;
+use crate::lti::gramian::h2_norm;
+use crate::spec::{MAX_OPTIMISED_TAPS, Method, Spec};
+use crate::units::Seconds;
+
+/// Bits of a converter of which nothing is said.
+const USUAL_BITS: u32 = 16;
+/// More taps are chosen only if they lower the whole error by more than this share.
+const WORTHWHILE_TAPS: f64 = 0.01;
+/// The length suffices when its doubling lowers the mean square by no more than this share.
+const SAME_SQUARE: f64 = 1e-3;
+/// Frames of the first length that is tried, beyond the latency.
+const FIRST_FRAMES: usize = 8;
+/// Frames of the longest one; a longer bank is a case for recursive filters.
+const MOST_FRAMES: usize = 2048;
+/// Lengths that are designed at most for a wanted SNR, each a tenth longer than the one before.
+const LENGTHENINGS: usize = 16;
+
+/// Called with the number of designs that were compared; an error ends the choice.
+type Compared<'a> = &'a dyn Fn(usize) -> Result<(), DesignError>;
+
+/// What a spec that leaves something open gets; no taps for recursive filters.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Choice {
+    taps: usize,
+    latency: usize,
+}
+
+/// The spec with the number of taps that the comparison methods use, and with a latency that these taps
+/// reach or none. The taps of `fir` and `h2` may still be open.
+///
+/// # Errors
+/// [`DesignError::OutOfReach`] for a latency that the taps do not reach; [`DesignError`] if the spec has no
+/// [`Problem`].
+pub(super) fn with_taps(spec: &Spec) -> Result<Spec, DesignError> {
+    let mut complete = spec.clone();
+    if matches!(spec.design.method, Method::Sinc | Method::Separation) {
+        // 23 for M = 2, as in the thesis.
+        complete.design.taps = Some(spec.design.taps.unwrap_or(12 * spec.ratio - 1));
+    }
+    if let (Some(taps), Some(latency)) = (complete.design.taps, spec.latency) {
+        check_reach(Problem::new(spec, latency)?, taps)?;
+    }
+    Ok(complete)
+}
+
+/// The spec of [`with_taps`] with nothing left open: a latency and a number of taps as well. `compared`
+/// receives the number of designs that were compared.
+///
+/// # Errors
+/// As [`latency`]; [`DesignError::SnrOutOfReach`] or [`DesignError::SnrMissed`] if no number of taps has the
+/// SNR that the spec asks for; those of `compared`.
+pub(super) fn completed(spec: &Spec, compared: Compared<'_>) -> Result<Spec, DesignError> {
+    let mut complete = spec.clone();
+    let are_taps_open = spec.is_fir() && spec.design.taps.is_none();
+    if are_taps_open || spec.latency.is_none() {
+        let Choice { taps, latency } = choose(spec, compared)?;
+        complete.latency = Some(latency);
+        if are_taps_open {
+            (complete.design.taps, complete.design.target_snr_db) = (Some(taps), None);
+        }
+    }
+    if let Some((signal, filter)) = complete.signal.as_mut().zip(SignalFilter::of(spec)) {
+        signal.floor_db = filter.floor_db;
+    }
+    // The delays may ask for more than the longest latency.
+    complete.check()?;
+    Ok(complete)
+}
+
+/// The latency m0 of a spec in fast samples: the number in the spec, or the designer's choice.
+///
+/// # Errors
+/// If it is to be chosen: [`DesignError`] if the spec has no [`Problem`]; [`DesignError::TooLong`] or
+/// [`DesignError::TooLarge`] if the design cannot be made.
+pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
+    if let Some(latency) = spec.latency {
+        return Ok(latency);
+    }
+    let open = with_taps(spec)?;
+    effort::check(&open, false, Limits::Enforced)?;
+    Ok(choose(&open, &|_| Ok(()))?.latency)
+}
+
+/// Taps and latency where at least one of them is open.
+fn choose(spec: &Spec, compared: Compared<'_>) -> Result<Choice, DesignError> {
+    compared(0)?;
+    // Delays that all channels have only add to the latency.
+    let common = if spec.latency.is_some() { 0 } else { common_delay(spec) };
+    let wanted = spec.design.target_snr_db;
+    // A wanted SNR is that of the noise which the spec states; without one the usual rounding limits it.
+    let noisy = if wanted.is_some() { with_uncertain_instants(spec) } else { with_usual_noise(spec) };
+    let problem = Problem::new(&noisy, spec.latency.unwrap_or(common))?.earlier(common);
+    let merged = problem.merge_channels(Repeats::of(spec)).of_unit_size()?.problem;
+    let problem = if wanted.is_some() { merged.clone() } else { manageable(merged.clone()) };
+    let mut chosen = match (spec.design.method, spec.design.taps) {
+        (Method::Sinc | Method::Separation, taps) => middle(&problem, taps.unwrap_or_default()),
+        (_, Some(taps)) => {
+            let errors = LeastErrors::new(&problem, taps, candidates(&problem, taps))?;
+            Choice { taps, latency: errors.shortest() }
+        }
+        (_, None) if spec.is_fir() => fewest_taps(spec, &problem)?,
+        (_, None) => Choice { taps: 0, latency: LeastErrors::causal(&problem)?.shortest() },
+    };
+    let is_minimax = spec.design.method == Method::Fir && RobustProblem::of(spec).is_none();
+    if let Some(wanted) = wanted.filter(|_| is_minimax) {
+        chosen = lengthened(spec, &merged, chosen, wanted, compared)?;
+    }
+    Ok(Choice { latency: common + chosen.latency, ..chosen })
+}
+
+/// The latency at which the output instant lies in the middle of the samples that the taps see.
+fn middle(problem: &Problem, taps: usize) -> Choice {
+    let delays: f64 = problem.channels.iter().map(|channel| channel.delay.0).sum();
+    let mean = delays / problem.channels.len() as f64;
+    Choice { taps, latency: (0.5 * (taps - 1) as f64 + mean).round() as usize }
+}
+
+/// The fewest taps per channel whose least error reaches the SNR that `spec` asks for, or which is within
+/// [`WORTHWHILE_TAPS`] of the least of all lengths; at the latency of the spec, or over all of them and then
+/// the shortest at which that many taps are almost the best.
+fn fewest_taps(spec: &Spec, problem: &Problem) -> Result<Choice, DesignError> {
+    let (ratio, given) = (spec.ratio, spec.latency);
+    let errors = |taps: usize| {
+        let latencies = given.map_or_else(|| candidates(problem, taps), |latency| latency..=latency);
+        LeastErrors::new(problem, taps, latencies)
+    };
+    let most = match spec.design.method {
+        Method::Fir => MAX_OPTIMISED_TAPS / (spec.channels.len() * ratio),
+        _ => MOST_FRAMES,
+    };
+    let most = most.clamp(1, MOST_FRAMES) * ratio;
+    let oldest = given.map_or(0, |latency| latency + problem.longest_delay().0.ceil() as usize);
+    let mut taps = ((oldest / ratio + FIRST_FRAMES) * ratio).min(most);
+    let mut best = errors(taps)?;
+    while taps < most {
+        taps = (2 * taps).min(most);
+        let more = errors(taps)?;
+        let done = best.least().powi(2) - more.least().powi(2) <= SAME_SQUARE * best.least().powi(2);
+        best = more;
+        if done {
+            break;
+        }
+    }
+    let wanted = spec.design.target_snr_db;
+    let enough = wanted
+        .map_or(best.least() * (1.0 + WORTHWHILE_TAPS), |snr| best.zero_output * 10f64.powf(-snr / 20.0));
+    if best.least() > enough {
+        return Err(DesignError::SnrOutOfReach {
+            wanted: wanted.unwrap_or_default(),
+            best: 20.0 * (best.zero_output / best.least()).log10(),
+            latency: best.shortest() + if given.is_none() { common_delay(spec) } else { 0 },
+        });
+    }
+    let mut too_few = 0;
+    while taps - too_few > 1 {
+        let middle = too_few + (taps - too_few) / 2;
+        if errors(middle)?.least() <= enough { taps = middle } else { too_few = middle }
+    }
+    Ok(Choice { taps, latency: errors(taps)?.shortest() })
+}
+
+/// At least `chosen`, and as long as it takes until the bank of least gamma has the `wanted` SNR: it does
+/// not aim at that.
+///
+/// # Errors
+/// [`DesignError::SnrMissed`] if no length of [`LENGTHENINGS`] has it.
+fn lengthened(
+    spec: &Spec,
+    problem: &Problem,
+    chosen: Choice,
+    wanted: f64,
+    compared: Compared<'_>,
+) -> Result<Choice, DesignError> {
+    let Choice { mut taps, mut latency } = chosen;
+    let most = MAX_OPTIMISED_TAPS / spec.channels.len();
+    let mut best = f64::NEG_INFINITY;
+    for designs in 0..LENGTHENINGS {
+        compared(designs)?;
+        let settings = Settings { taps, ..settings(spec)? };
+        let plant = LiftedPlant::new(&Problem { latency, ..problem.clone() })?;
+        let error = whole_error(&plant, &methods::synthesise(Method::Fir, &plant, &settings)?.filters)?;
+        let target = h2_norm(&plant.reference()?)? / (plant.ratio() as f64).sqrt();
+        best = f64::max(best, 20.0 * (target / error).log10());
+        if error <= target * 10f64.powf(-wanted / 20.0) {
+            return Ok(Choice { taps, latency });
+        }
+        if taps == most {
+            break;
+        }
+        taps = (taps + (taps / 10).max(1)).min(most);
+        if spec.latency.is_none() {
+            latency = LeastErrors::new(problem, taps, candidates(problem, taps))?.shortest();
+        }
+    }
+    Err(DesignError::SnrMissed { wanted, best, taps })
+}
+
+/// The settings of the method, from a spec with nothing left open.
+///
+/// # Errors
+/// [`DesignError`] if the spec has no [`Problem`] at the slow rate.
+pub(super) fn settings(spec: &Spec) -> Result<Settings, DesignError> {
+    let at_slow_rate = || {
+        let signal = SignalFilter::written_out(spec);
+        let slow = Spec { fast_period: spec.fast_period * spec.ratio as f64, signal, ..spec.clone() };
+        // The method replaces the latency. With this one no delay chain is long.
+        let problem = Problem::new(&slow, common_delay(&slow))?;
+        Ok::<_, DesignError>(problem.merge_channels(Repeats::AtOneInstant).of_unit_size()?.problem)
+    };
+    let separate = spec.design.method == Method::Separation;
+    Ok(Settings {
+        taps: spec.design.taps.unwrap_or_default(),
+        robust: RobustProblem::of(spec),
+        deviations: Deviations::of(spec),
+        gamma_margin: spec.design.gamma_margin,
+        solver: spec.design.solver,
+        at_slow_rate: separate.then(at_slow_rate).transpose()?,
+        ..Settings::default()
+    })
+}
+
+/// The spec with the usual resolution, if no channel has any noise; and where the method averages over
+/// delays that are uncertain, with these as jitter: about as bad, but other at each sample, which a
+/// smoother can weigh.
+fn with_usual_noise(spec: &Spec) -> Spec {
+    let mut noisy = spec.clone();
+    if spec.channels.iter().all(|channel| channel.sample_noise() == 0.0 && channel.jitter.0 == 0.0) {
+        noisy.channels.iter_mut().for_each(|channel| channel.bits = Some(USUAL_BITS));
+    }
+    with_uncertain_instants(&noisy)
+}
+
+/// The spec with uncertain delays as jitter, for a method that averages over them.
+fn with_uncertain_instants(spec: &Spec) -> Spec {
+    let mut noisy = spec.clone();
+    for (channel, deviations) in noisy.channels.iter_mut().zip(Deviations::of(spec).unwrap_or_default()) {
+        let delay = spec.fast_period * deviations.delay.0;
+        channel.jitter = Seconds(channel.jitter.0.hypot(delay.0));
+    }
+    noisy
+}
+
+/// The root of the mean square of error and noise together, per fast sample.
+fn whole_error(plant: &LiftedPlant, filters: &Filters) -> Result<f64, DesignError> {
+    let system = match filters {
+        Filters::Fir(taps) => StateSpace::fir(&filters::polyphase(taps, plant.ratio()))?,
+        Filters::StateSpace(system) => system.clone(),
+    };
+    let error = plant.with_noise()?.error_system(&system)?;
+    Ok(h2_norm(&error)? / (plant.ratio() as f64).sqrt())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,254 @@
+//! Time and memory of a design, estimated before it starts.
+//!
+//! Every step of a design is dense linear algebra on matrices whose sizes follow from the spec. The estimate
+//! counts the operations of the steps that take longest, by one formula per method, and divides by one rate.
+//! It is right within a factor of about three where a design takes more than a few seconds
+//! (docs/figures.md). The memory is that of the largest matrices that exist at one time.
+
+use super::DesignError;
+use super::error_grid::{FINE, coarse_intervals};
+use super::limits::{Effort, Limits, TIME_LIMIT};
+use super::merging::Repeats;
+use super::methods::fir_kyp::MAX_STATES;
+use super::methods::{Deviations, scenarios::RobustProblem};
+use super::problem::{Problem, common_delay};
+use super::prove::{MAX_LONG_STATES, MAX_SEARCHED_STATES, MAX_WITNESSES};
+use crate::memory::available_memory;
+use crate::spec::{Method, Solver, Spec};
+
+/// Operations at that rate for an interior-point block, relative to the square of its order: a cube, but the
+/// rate of complex decompositions grows with the order.
+const BLOCK: f64 = 2500.0;
+/// The same relative to the cube of the states, for the norm of a system: the eigenvalues of two matrices of
+/// twice the order.
+const NORM: f64 = 100.0;
+/// For a Riccati equation with its trials.
+const RICCATI: f64 = 900.0;
+/// For a certificate in double precision, and for one in 512 bits with the bounds that need them.
+const CERTIFICATES: [f64; 2] = [900.0, 1.3e5];
+/// Interior-point iterations of an exchange.
+const ITERATIONS: f64 = 25.0;
+/// Histories through which the smoother passes for an open number of taps, whose lengths are doubled and
+/// then halved, and for an open latency.
+const HISTORIES: [f64; 2] = [24.0, 2.0];
+/// Samples of the target whose errors may still fall at one instant of such a history.
+const OPEN_TARGETS: f64 = 64.0;
+/// Frames of a history that stands for all past samples, and of a bank whose taps are still to be chosen.
+const LONG_HISTORY: f64 = 256.0;
+const USUAL_FRAMES: usize = 24;
+/// Bytes of a real and of a complex number, and of everything that does not grow with the sizes.
+const REAL: f64 = 8.0;
+const COMPLEX: f64 = 16.0;
+const BASE_BYTES: f64 = 10e6;
+
+/// The effort of the design of a spec, whose latency and taps may still be to be chosen; with the search for
+/// a proof if `proving`, and with the scale of gamma that is reported.
+///
+/// # Errors
+/// [`DesignError`] if the spec has no [`Problem`].
+pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
+    let sizes = Sizes::of(spec)?;
+    let mut effort = sizes.method(spec).then(sizes.norms());
+    if proving {
+        effort = effort.then(sizes.proof());
+    }
+    if spec.design.bits.is_some() {
+        effort = effort.then(sizes.integers());
+    }
+    if spec.design.reduction.is_some() {
+        // A norm for each order that is visited, and the refinement of its poles.
+        effort.seconds += 2.0 * sizes.states.min(40.0) * sizes.norms().seconds;
+    }
+    if spec.is_fir() && spec.design.taps.is_none() {
+        effort = effort.then(sizes.smoother(HISTORIES[0], sizes.lags(), OPEN_TARGETS));
+    } else if spec.latency.is_none() {
+        let frames = if spec.is_fir() { sizes.lags() } else { LONG_HISTORY };
+        effort = effort.then(sizes.smoother(HISTORIES[1], frames, OPEN_TARGETS));
+    }
+    Ok(Effort { bytes: effort.bytes + BASE_BYTES, ..effort })
+}
+
+/// Refuses what cannot end in ten minutes or needs more memory than is free.
+///
+/// # Errors
+/// [`DesignError::TooLong`] or [`DesignError::TooLarge`], with the figures and the way out.
+pub(super) fn check(spec: &Spec, proving: bool, limits: Limits) -> Result<Effort, DesignError> {
+    let (effort, memory) = (estimate(spec, proving)?, available_memory());
+    let remedy = remedy(spec);
+    match (limits, memory) {
+        (Limits::Off, _) => Ok(effort),
+        (_, Some(memory)) if effort.bytes > memory => Err(DesignError::TooLarge { effort, memory, remedy }),
+        _ if effort.seconds > TIME_LIMIT.as_secs_f64() => Err(DesignError::TooLong { effort, remedy }),
+        _ => Ok(effort),
+    }
+}
+
+/// The way out.
+fn remedy(spec: &Spec) -> &'static str {
+    match spec.design.method {
+        Method::Fir if spec.design.bits.is_some() => {
+            "use fewer taps, leave out bits, take a smaller ratio or fewer channels"
+        }
+        Method::Fir if spec.design.tracking.is_some() => {
+            "use fewer taps or channels, a smaller ratio, or leave out tracking"
+        }
+        Method::Fir if spec.uncertainty.is_some() => {
+            "use fewer taps, a smaller ratio or fewer channels, or leave out [uncertainty]"
+        }
+        Method::Iir | Method::H2 if spec.design.reduction.is_some() => {
+            "use a shorter latency, leave out the order reduction, or use the method fir"
+        }
+        Method::Iir | Method::H2 => {
+            "use a shorter latency, a smaller ratio, fewer channels, or the method fir"
+        }
+        Method::Fir | Method::Sinc | Method::Separation => {
+            "use fewer taps, a smaller ratio or fewer channels"
+        }
+    }
+}
+
+/// The sizes of a design problem, as numbers to compute with: those of all matrices follow from these.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Sizes {
+    /// N, distinct channels, and M.
+    channels: f64,
+    ratio: f64,
+    /// States of the lifted plant, and of its analog side alone.
+    states: f64,
+    analog_states: f64,
+    /// Taps per channel at the fast rate; 0 for recursive filters.
+    taps: f64,
+}
+
+impl Sizes {
+    /// Of a spec, with a guess where latency or taps are open.
+    fn of(spec: &Spec) -> Result<Self, DesignError> {
+        let usual = if spec.is_fir() { USUAL_FRAMES * spec.ratio } else { 0 };
+        let taps = spec.design.taps.unwrap_or(usual);
+        let common = if spec.latency.is_none() { common_delay(spec) } else { 0 };
+        let problem = Problem::new(spec, spec.latency.unwrap_or(common))?.earlier(common);
+        let mut problem = problem.merge_channels(Repeats::of(spec)).problem;
+        if spec.latency.is_none() {
+            problem.latency = problem.longest_delay().0.ceil() as usize + taps / 4;
+        }
+        let analog_states = problem.analog_states() as f64;
+        Ok(Self {
+            channels: problem.channels.len() as f64,
+            ratio: problem.ratio as f64,
+            states: analog_states + problem.chain_states(),
+            analog_states,
+            taps: taps as f64,
+        })
+    }
+
+    /// Rows of the lifted plant, N + M.
+    fn outputs(&self) -> f64 {
+        self.channels + self.ratio
+    }
+
+    /// J, lags of the longest phase.
+    fn lags(&self) -> f64 {
+        (self.taps / self.ratio).ceil()
+    }
+
+    /// Points of the frequency grid on which the optimum is computed.
+    fn points(&self) -> f64 {
+        coarse_intervals(self.lags() as usize) as f64 + self.lags()
+    }
+
+    /// States of the error system: those of the plant, and of the delay lines or of a filter as large.
+    fn error_states(&self) -> f64 {
+        let own = if self.taps > 0.0 { self.channels * (self.lags() - 1.0).max(0.0) } else { self.states };
+        self.states + own
+    }
+
+    /// The method itself.
+    fn method(&self, spec: &Spec) -> Effort {
+        match spec.design.method {
+            // The bounded-real LMI. The method itself refuses more states, at once.
+            Method::Fir if spec.design.solver == Some(Solver::Kyp) => {
+                let states = self.error_states();
+                let unknowns = if states > MAX_STATES as f64 { 0.0 } else { 0.5 * states * states };
+                Effort::of(24.0 * unknowns.powi(3), 3.0 * REAL * unknowns * unknowns)
+            }
+            Method::Fir => self.exchange(RobustProblem::of(spec), spec.design.tracking.is_some()),
+            Method::H2 if spec.is_fir() && Deviations::of(spec).is_some() => self.averaged(),
+            Method::H2 if spec.is_fir() => self.smoother(2.0, self.lags(), self.ratio),
+            Method::Iir | Method::H2 => {
+                let order = self.states + self.channels;
+                Effort::of(RICCATI * order.powi(3), 20.0 * REAL * order * order)
+            }
+            Method::Sinc => Effort::default(),
+            Method::Separation => self.exchange(None, false),
+        }
+    }
+
+    /// An exchange of frequencies, or of pairs of a frequency and a scenario: blocks of order M + N at each
+    /// point, and the Newton matrix of the taps, which are affine in the errors of the channels if
+    /// `tracking`.
+    fn exchange(&self, robust: Option<RobustProblem>, tracking: bool) -> Effort {
+        let scenarios = robust.map_or(0.0, |problem| problem.scenario_count() as f64);
+        let (n, m, p) = (self.channels, self.ratio, self.outputs());
+        let functions = if tracking { n } else { 1.0 };
+        let (columns, unknowns) = (functions * n, functions * n * self.taps);
+        let points = self.points();
+        let blocks = BLOCK * points * p * p;
+        let products = points * (m.min(self.taps) * columns).powi(2) * (64.0 + 4.0 * self.lags());
+        let iteration = blocks + products + unknowns.powi(3) / 5.0;
+        // Scenarios take more rounds, on twice the points.
+        let iterations = ITERATIONS * if scenarios > 0.0 { 4.0 + functions } else { 1.0 };
+        let fine = FINE as f64 * points * (1.0 + scenarios);
+        let grid = fine * p * (12.0 * self.analog_states.powi(2) + 0.4 * BLOCK * p);
+        let norms = scenarios * NORM * self.error_states().powi(3);
+        let kept = COMPLEX * p * p * (fine + 9.0 * points);
+        Effort::of(iterations * iteration + grid + norms, kept + 3.0 * REAL * unknowns * unknowns)
+    }
+
+    /// The bank of least mean square over uncertain delays: a covariance for each pair of channels and each
+    /// lag, and two factorisations.
+    fn averaged(&self) -> Effort {
+        let rows = self.channels * self.lags();
+        let pairs = self.channels * self.outputs() * 2.0 * self.lags();
+        let covariances = pairs * (160.0 * self.analog_states.powi(3) + 3e4);
+        Effort::of(covariances + 0.6 * rows.powi(3), 3.0 * REAL * rows * rows)
+    }
+
+    /// The fixed-point smoother so many times over so many frames, with so many samples of the target open.
+    fn smoother(&self, times: f64, frames: f64, targets: f64) -> Effort {
+        let (s, steps) = (self.analog_states, frames * self.outputs());
+        Effort::of(times * steps * 32.0 * s * s * (s + targets), COMPLEX * (s * s + steps * s))
+    }
+
+    /// The norm of the bank, of plain interleaving, and those of the search.
+    fn norms(&self) -> Effort {
+        let states = self.error_states();
+        Effort::of(3.0 * NORM * states.powi(3), 20.0 * REAL * states * states)
+    }
+
+    /// The search for a proof. It is counted as if 512 bits were needed where they are tried.
+    fn proof(&self) -> Effort {
+        let states = self.error_states();
+        if states > MAX_SEARCHED_STATES as f64 {
+            return Effort::default();
+        }
+        let long = if states > MAX_LONG_STATES as f64 { 0.0 } else { CERTIFICATES[1] };
+        let (rows, taps) = (2.0 * MAX_WITNESSES as f64 * self.channels, self.channels * self.taps);
+        let witnesses = 4.0 * rows * taps * rows.min(taps);
+        let bytes = REAL * (30.0 * states * states + 5.0 * rows * taps);
+        Effort::of((CERTIFICATES[0] + long) * states.powi(3) + witnesses, bytes)
+    }
+
+    /// Integer taps of five word lengths: lattice points close to the optimum, then single steps, each
+    /// judged on the fine grid.
+    fn integers(&self) -> Effort {
+        let (phase, p) = (self.channels * self.lags(), self.outputs());
+        let lattice = 60.0 * self.ratio * (0.2 * phase.powi(3) + 520.0 * phase * phase);
+        let fine = FINE as f64 * self.points();
+        let step = fine * (32.0 * self.channels * p + 0.4 * BLOCK * self.ratio) * self.ratio;
+        let bytes = COMPLEX * p * p * fine + 3.0 * REAL * phase * phase;
+        Effort::of(lattice + 2.5 * self.channels * self.taps * step, bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,122 @@
+//! What a caller who waits for a design sees and says: the step that it is in, its time and memory, and its
+//! end before it is complete.
+
+use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// A design whose estimate is longer is refused, and one that takes longer ends with what it has.
+pub const TIME_LIMIT: Duration = Duration::from_secs(600);
+
+/// Operations per second of factorisations and products of large real matrices on one core
+/// (docs/figures.md).
+const RATE: f64 = 1e10;
+
+/// Whether a design is refused when its estimate exceeds [`TIME_LIMIT`] or the free memory, and ended at
+/// that time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Limits {
+    /// It is.
+    #[default]
+    Enforced,
+    /// It runs all the same.
+    Off,
+}
+
+/// A step of a design that may take long.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// The latency or the number of taps is chosen; so many designs were compared.
+    Latency {
+        /// Designs so far.
+        designs: usize,
+    },
+    /// The method computes the filters.
+    Filters,
+    /// Order reduction, integer taps, and the form that runs fastest.
+    Realisation,
+    /// The search for a proof.
+    Proof,
+}
+
+impl fmt::Display for Stage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Latency { designs: 0 } => write!(f, "choosing the latency"),
+            Self::Latency { designs } => write!(f, "choosing the latency ({designs} designs compared)"),
+            Self::Filters => write!(f, "designing the filters"),
+            Self::Realisation => write!(f, "realising the filters"),
+            Self::Proof => write!(f, "searching for a proof of gamma"),
+        }
+    }
+}
+
+/// Ends a design before it is complete, with the best filters so far and without a proof. Clones end the
+/// same design, from any thread. It takes effect between two rounds of a search.
+#[derive(Debug, Clone, Default)]
+pub struct Stop {
+    deadline: Option<Instant>,
+    asked: Arc<AtomicBool>,
+}
+
+impl Stop {
+    /// Ends the design.
+    pub fn now(&self) {
+        self.asked.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether the design is to end.
+    pub fn is_due(&self) -> bool {
+        self.asked.load(Ordering::Relaxed) || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    }
+
+    /// The same, due after [`TIME_LIMIT`] as well where the limits hold.
+    pub(super) fn within(&self, limits: Limits) -> Self {
+        let deadline = (limits == Limits::Enforced).then(|| Instant::now() + TIME_LIMIT);
+        Self { deadline, asked: Arc::clone(&self.asked) }
+    }
+}
+
+/// Time and memory that a design needs.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Effort {
+    /// Seconds on one core.
+    pub seconds: f64,
+    /// Bytes at the peak.
+    pub bytes: f64,
+}
+
+impl Effort {
+    /// So many operations at the rate of dense linear algebra.
+    pub(super) fn of(operations: f64, bytes: f64) -> Self {
+        Self { seconds: operations / RATE, bytes }
+    }
+
+    /// One step after the other; the memory of the first one is free again.
+    pub(super) fn then(self, next: Self) -> Self {
+        Self { seconds: self.seconds + next.seconds, bytes: self.bytes.max(next.bytes) }
+    }
+}
+
+impl fmt::Display for Effort {
+    /// "35 minutes and 8.7 GB", to two digits.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let times =
+            [(1e-3, "ms"), (1.0, "seconds"), (60.0, "minutes"), (3600.0, "hours"), (86_400.0, "days")];
+        write!(f, "{} and {}", rounded(self.seconds, &times), memory_text(self.bytes))
+    }
+}
+
+/// So many bytes, to two digits.
+pub(super) fn memory_text(bytes: f64) -> String {
+    rounded(bytes, &[(1e6, "MB"), (1e9, "GB"), (1e12, "TB"), (1e15, "PB")])
+}
+
+/// A quantity to two digits, in the largest of the units of which there are at least one and a half.
+fn rounded(value: f64, units: &[(f64, &str)]) -> String {
+    let (size, name) = units.iter().rev().find(|(size, _)| value >= 1.5 * size).unwrap_or(&units[0]);
+    let number = value / size;
+    let decimals = usize::from(number < 9.95);
+    format!("{number:.decimals$} {name}")
+}
