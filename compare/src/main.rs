@@ -173,7 +173,8 @@ fn hybank(spec: &Spec) -> Result<(f64, f64), Box<dyn Error>> {
     let (mut gamma, mut seconds) = (f64::NAN, f64::INFINITY);
     for _ in 0..3 {
         let begin = Instant::now();
-        let found = design(spec, &Options::without_proof())?.bank.gamma.upper.ok_or("the design has no norm")?;
+        let found =
+            design(spec, &Options::without_proof())?.bank.gamma.upper.ok_or("the design has no norm")?;
         (gamma, seconds) = (found, seconds.min(begin.elapsed().as_secs_f64()));
     }
     Ok((gamma, seconds))
