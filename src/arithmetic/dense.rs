@@ -17,7 +17,7 @@ pub(crate) fn product<F: Number>(a: &Matrix<F>, b: &Matrix<F>) -> Matrix<F> {
         for (&y, factors) in column.iter().zip(a.column_iter()) {
             for (sum, &x) in product.column_mut(j).iter_mut().zip(factors.iter()) {
                 if x != F::ZERO {
-                    *sum = *sum + x * y;
+                    *sum += x * y;
                 }
             }
         }

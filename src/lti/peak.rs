@@ -318,7 +318,7 @@ fn hamiltonian<T: Scalar>(
     let n = a.nrows();
     let solved = linalg::solve(&r, &linalg::hstack(&[c, &s.adjoint()])?);
     let (rc, rs) = (solved.columns(0, n), solved.columns(n, n));
-    let drift = a - &s * &rc;
+    let drift = a - &s * rc;
     let (b_part, c_part) = (b * b.adjoint() - s * rs, c.adjoint() * rc);
     linalg::from_blocks(&[&[&drift, &b_part], &[&c_part, &-drift.adjoint()]])
 }

@@ -312,7 +312,7 @@ impl<'a> Normal<'a> {
                     let [re, im] = times(both, entry(&self.moments[t][1], m + i, m + k));
                     for (d, power) in powers.iter().enumerate() {
                         let sum = &mut sums[index(d, (p, q), (i, k))];
-                        *sum = *sum + (re * power[0] - im * power[1]);
+                        *sum += re * power[0] - im * power[1];
                     }
                 }
             }
@@ -341,7 +341,7 @@ impl<'a> Normal<'a> {
                 let target = (0..m).map(from).fold([BigFloat::ZERO; 2], |[a, b], [c, d]| [a + c, b + d]);
                 for (row, &(lag, p)) in self.times.iter().enumerate() {
                     let rotated = times(times(conjugate(self.a(t, p)), powers[lag]), target);
-                    sums[row * n + i] = sums[row * n + i] + rotated[0];
+                    sums[row * n + i] += rotated[0];
                 }
             }
         }

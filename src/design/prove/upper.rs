@@ -250,35 +250,6 @@ impl LongRiccati {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// x+ = a x + u, e = x: with N = 0 the equation is P = a^2 P + 1 + a^2 P^2 / (g^2 - P), or
-    /// P^2 - (1 + g^2 (1 - a^2)) P + g^2 = 0 with the norm 1 / (1 - a).
-    fn one_pole(gamma: f64) -> Option<f64> {
-        let number = |rows: usize, columns: usize, entries: &[f64]| {
-            Matrix::from_fn(rows, columns, |i, j| BigFloat::from(entries[i * columns + j]))
-        };
-        let error = PreciseErrorSystem {
-            system: number(2, 1, &[0.5, 1.0]),
-            input_gram: number(2, 2, &[1.0, 0.0, 0.0, 0.0]),
-        };
-        Some(LongRiccati::new(&error, 0.0).limit(gamma)?[(0, 0)].nearest())
-    }
-
-    #[test]
-    fn one_pole_has_its_quadratic_root() {
-        for gamma in [2.0 * (1.0 + 1e-12), 2.1, 10.0_f64] {
-            let b = 1.0 + 0.75 * gamma * gamma;
-            let exact = 2.0 * gamma * gamma / (b + (b * b - 4.0 * gamma * gamma).sqrt());
-            let p = one_pole(gamma).unwrap();
-            assert!((p / exact - 1.0).abs() < 1e-5, "{gamma}: {p} {exact}");
-        }
-        assert!(one_pole(1.9).is_none_or(|p| !(0.0..=1.9 * 1.9).contains(&p)), "{:?}", one_pole(1.9));
-    }
-}
-
 /// Units of states and references, which make the search independent of the gains of the front ends. They
 /// are powers of two, so that a change of units rounds nothing.
 ///
@@ -333,5 +304,34 @@ impl Units {
             system,
             input_gram: Matrix::from_fn(input_gram.nrows(), input_gram.ncols(), gram),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// x+ = a x + u, e = x: with N = 0 the equation is P = a^2 P + 1 + a^2 P^2 / (g^2 - P), or
+    /// P^2 - (1 + g^2 (1 - a^2)) P + g^2 = 0 with the norm 1 / (1 - a).
+    fn one_pole(gamma: f64) -> Option<f64> {
+        let number = |rows: usize, columns: usize, entries: &[f64]| {
+            Matrix::from_fn(rows, columns, |i, j| BigFloat::from(entries[i * columns + j]))
+        };
+        let error = PreciseErrorSystem {
+            system: number(2, 1, &[0.5, 1.0]),
+            input_gram: number(2, 2, &[1.0, 0.0, 0.0, 0.0]),
+        };
+        Some(LongRiccati::new(&error, 0.0).limit(gamma)?[(0, 0)].nearest())
+    }
+
+    #[test]
+    fn one_pole_has_its_quadratic_root() {
+        for gamma in [2.0 * (1.0 + 1e-12), 2.1, 10.0_f64] {
+            let b = 1.0 + 0.75 * gamma * gamma;
+            let exact = 2.0 * gamma * gamma / (b + (b * b - 4.0 * gamma * gamma).sqrt());
+            let p = one_pole(gamma).unwrap();
+            assert!((p / exact - 1.0).abs() < 1e-5, "{gamma}: {p} {exact}");
+        }
+        assert!(one_pole(1.9).is_none_or(|p| !(0.0..=1.9 * 1.9).contains(&p)), "{:?}", one_pole(1.9));
     }
 }
