@@ -1,6 +1,6 @@
 //! Nonlinear least squares: the iteration of Gauss and Newton, with one rule for its steps and for its end.
 
-use crate::{Mat, PositiveFactor};
+use crate::{Mat, PositiveFactor, power_of_two};
 
 /// The normal equations of a problem that is linear around the present parameters: J'J, J'r and r'r of rows
 /// with the derivatives J and the residuals r. Of a likelihood they are the Fisher information and the
@@ -98,26 +98,42 @@ impl NormalEquations {
         self.squares / self.rows.saturating_sub(self.gram.nrows()).max(1) as f64
     }
 
-    /// (J'J)^-1, the covariance of the parameters for residuals of unit variance. Rows and columns are
-    /// scaled to a unit diagonal first, since the units of the parameters differ.
+    /// (J'J)^-1 J'r, the step to the minimum.
     ///
     /// # Errors
-    /// [`NoMinimum`] if a parameter has no effect, or if the inverse has a diagonal above `worst`.
+    /// [`NoMinimum`] if a parameter has no effect, or if two have the same.
+    pub fn solve(&self) -> Result<Mat, NoMinimum> {
+        let (scale, factor) = self.scaled()?;
+        Ok(&scale * factor.solve(&(&scale * &self.projection)))
+    }
+
+    /// (J'J)^-1, the covariance of the parameters for residuals of unit variance.
+    ///
+    /// # Errors
+    /// [`NoMinimum`] if a parameter has no effect, or if the inverse for a unit diagonal has a diagonal above
+    /// `worst`.
     pub fn inverse(&self, worst: f64) -> Result<Mat, NoMinimum> {
-        let n = self.gram.nrows();
-        if n == 0 {
-            return Err(NoMinimum::Dependent);
-        }
-        let scale: Vec<f64> = (0..n).map(|k| self.gram[(k, k)].sqrt().recip()).collect();
-        if let Some(k) = scale.iter().position(|x| !x.is_finite()) {
+        let (scale, factor) = self.scaled()?;
+        let inverse = &scale * factor.solve(&scale);
+        let mut of_unit_diagonal = (0..inverse.nrows()).map(|k| inverse[(k, k)] * self.gram[(k, k)]);
+        let is_sound = of_unit_diagonal.all(|x| x < worst);
+        is_sound.then_some(inverse).ok_or(NoMinimum::Dependent)
+    }
+
+    /// Scales S of the parameters, whose units differ, that bring the diagonal of J'J near 1, and the factor
+    /// of S J'J S. They are powers of two, so they change no digit.
+    fn scaled(&self) -> Result<(Mat, PositiveFactor), NoMinimum> {
+        let diagonal = self.gram.diagonal();
+        if let Some(k) = diagonal.iter().position(|x| !(*x > 0.0 && x.is_finite())) {
             return Err(NoMinimum::WithoutEffect(k));
         }
-        let correlation = Mat::from_fn(n, n, |i, j| self.gram[(i, j)] * scale[i] * scale[j]);
-        let factor = PositiveFactor::new(&correlation).map_err(|_| NoMinimum::Dependent)?;
-        let inverse = factor.solve(&Mat::identity(n, n));
-        let is_sound = inverse.diagonal().iter().all(|x| *x < worst);
-        let unscaled = || Mat::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
-        is_sound.then(unscaled).ok_or(NoMinimum::Dependent)
+        if diagonal.is_empty() {
+            return Err(NoMinimum::Dependent);
+        }
+        let scale = Mat::from_diagonal(&diagonal.map(|x| power_of_two(x.sqrt().recip())));
+        let factor =
+            PositiveFactor::new(&(&scale * &self.gram * &scale)).map_err(|_| NoMinimum::Dependent)?;
+        Ok((scale, factor))
     }
 }
 
@@ -129,7 +145,7 @@ pub fn minimise<P: LeastSquares>(problem: &mut P) -> Result<Minimum, P::Error> {
     for steps in 1..=P::MOST_STEPS {
         let equations = problem.equations()?;
         let inverse = equations.inverse(P::WORST_CONDITION).map_err(|why| problem.error(why))?;
-        let step = &inverse * &equations.projection;
+        let step = equations.solve().map_err(|why| problem.error(why))?;
         let (mut factor, mut is_settled) = (1.0f64, true);
         for (k, x) in step.iter().enumerate() {
             let StepLimits { largest, negligible } = problem.limits(k, inverse[(k, k)].sqrt());

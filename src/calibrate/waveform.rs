@@ -256,7 +256,7 @@ impl ChannelFit<'_> {
         // Gain and offset first: the derivative by the delay contains the gain.
         let (waveform, mut linear) = (self.sampled(0.0, 0.0)?, NormalEquations::new(2));
         self.covered()?.iter().for_each(|&k| linear.add(&[waveform[k], 1.0], self.record.samples[k]));
-        let start = linear.inverse(WORST_CONDITION)? * linear.projection;
+        let start = linear.solve()?;
         (self.values[1], self.values[2]) = (start[0], start[1]);
         let found = minimise(&mut self)?;
         let share = 1.0 - found.equations.squares / self.power;

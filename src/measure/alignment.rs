@@ -132,8 +132,7 @@ impl<'a> Alignment<'a> {
     pub(super) fn settle(&mut self) -> Result<Settled, MeasureError> {
         self.start = self.whole;
         // With a wrong gain the derivative by the lag is wrong, so gain and offset come first.
-        let first = self.equations_of(2)?;
-        let change = first.inverse(f64::INFINITY).map_err(|why| self.error(why))? * first.projection;
+        let change = self.equations_of(2)?.solve().map_err(|why| self.error(why))?;
         self.gain += change[0];
         self.offset += change[1];
         let Minimum { equations, inverse, .. } = minimise(self)?;
