@@ -14,8 +14,6 @@ const EQUAL_ERRORS: f64 = 1.05;
 const LEAST_SHARED: usize = 256;
 /// An error below this share of the signal is none.
 const NO_ERROR: f64 = 1e-10;
-/// Errors below this share of the largest sample are those of the rounded gain, offset and lag.
-const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Bands of the error spectrum.
 const BANDS: usize = 16;
 
@@ -142,9 +140,7 @@ fn is_better(longer: &Alignment<'_>, shorter: &Alignment<'_>) -> bool {
 
 /// The figures at the lag that was found.
 fn compared(alignment: &Alignment<'_>, rate: Hertz, window: Window, covariance: &Mat) -> Comparison {
-    let full = alignment.samples.iter().filter(|x| x.is_finite()).fold(0.0_f64, |most, x| most.max(x.abs()));
-    let error = |error: f64| if error.abs() > ROUNDING * full { error } else { 0.0 };
-    let points: Vec<(usize, f64, f64)> = alignment.points().map(|p| (p.n, p.value, error(p.error))).collect();
+    let points: Vec<(usize, f64, f64)> = alignment.points().map(|p| (p.n, p.value, p.error)).collect();
     let count = points.len() as f64;
     let mean = points.iter().map(|p| p.1).sum::<f64>() / count;
     let signal = points.iter().map(|p| (alignment.gain * (p.1 - mean)).powi(2)).sum::<f64>();
