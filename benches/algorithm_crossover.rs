@@ -60,7 +60,7 @@ fn main() {
     for (n, m) in SHAPES {
         for k in LAGS {
             let bank = fir(n, m, k * m);
-            let options = |algorithm| Options { precision, algorithm, isa, ..Options::default() };
+            let options = |algorithm| Options { precision, algorithm, isa };
             let direct = measure(&bank, options(Algorithm::Direct));
             let shortest = (2 * k).next_power_of_two().max(16);
             let lengths = (0..4).map(|i| shortest << i);

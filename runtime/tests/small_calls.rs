@@ -65,7 +65,7 @@ fn fir_kernels_follow_the_definition() {
         for isa in Isa::available() {
             for (precision, eps) in [(Precision::Single, 3e-5), (Precision::Double, 1e-13)] {
                 for algorithm in [Algorithm::Direct, Algorithm::OverlapSave { transform: Some(16) }] {
-                    let options = Options { isa, precision, algorithm, ..Options::default() };
+                    let options = Options { isa, precision, algorithm };
                     let plan = Plan::from_taps(&taps, m, 0, options).unwrap();
                     let case = format!("N {n} M {m} {isa} {precision:?} {algorithm:?}");
                     assert_close(&run(&plan, &input), &want, eps, &case);

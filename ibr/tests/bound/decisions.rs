@@ -227,7 +227,7 @@ fn placement_gives_good_views() {
         let greedy = psnr(&search.greedy(count));
         let repeated = psnr(&search.greedy_from_several(FIRSTS, count));
         let without = known.borrow().len();
-        let exchanged = psnr(&search.from_several(STARTS, count));
+        let exchanged = psnr(&search.starting_with_several(STARTS, count));
         let rendered = known.borrow().len();
         let mut all: Vec<f64> = subsets(places, count).iter().map(|s| psnr(s)).collect();
         all.sort_by(f64::total_cmp);

@@ -114,9 +114,9 @@ impl Placement {
         self.search().greedy(count)
     }
 
-    /// As [`Search::from_each`], by the predicted error.
+    /// As [`Search::starting_with_each`], by the predicted error.
     pub fn searched(&self, count: usize) -> Vec<usize> {
-        self.search().from_each(count)
+        self.search().starting_with_each(count)
     }
 
     fn search(&self) -> Search<impl Fn(&[usize]) -> f64> {

@@ -34,12 +34,12 @@ impl<F: Fn(&[usize]) -> f64> Search<F> {
 
     /// The best of the choices that grow greedily from each candidate as the first and are then improved by
     /// exchanges. As many errors as there are candidates times those of [`Search::exchanged`].
-    pub fn from_each(&self, count: usize) -> Vec<usize> {
-        self.from_several(self.candidates, count)
+    pub fn starting_with_each(&self, count: usize) -> Vec<usize> {
+        self.starting_with_several(self.candidates, count)
     }
 
     /// The same from the `starts` candidates that are best alone.
-    pub fn from_several(&self, starts: usize, count: usize) -> Vec<usize> {
+    pub fn starting_with_several(&self, starts: usize, count: usize) -> Vec<usize> {
         let choices = self.grown_from(starts, count);
         self.best_of(choices.into_iter().map(|chosen| self.improved(chosen)).collect(), count)
     }
@@ -112,14 +112,14 @@ mod tests {
         };
         assert!((search.error)(&search.greedy(2)) > 0.0);
         assert_eq!(sorted(search.exchanged(2)), [2, 17]);
-        assert_eq!(sorted(search.from_each(2)), [2, 17]);
-        assert_eq!(sorted(search.from_several(3, 2)), [2, 17]);
-        assert!(search.from_several(0, 2).is_empty() && search.greedy_from_several(0, 2).is_empty());
+        assert_eq!(sorted(search.starting_with_each(2)), [2, 17]);
+        assert_eq!(sorted(search.starting_with_several(3, 2)), [2, 17]);
+        assert!(search.starting_with_several(0, 2).is_empty() && search.greedy_from_several(0, 2).is_empty());
         // Without exchanges 2 or 17 must be a first; by itself each is worse than the middle.
         assert_eq!(sorted(search.greedy_from_several(20, 2)), [2, 17]);
         assert_eq!(search.greedy_from_several(1, 2), search.greedy(2));
         assert_eq!(search.greedy_from_several(20, 0), Vec::<usize>::new());
         assert_eq!(search.greedy(30).len(), 20);
-        assert!(search.greedy(0).is_empty() && search.from_each(0).is_empty());
+        assert!(search.greedy(0).is_empty() && search.starting_with_each(0).is_empty());
     }
 }
