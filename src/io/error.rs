@@ -78,7 +78,7 @@ impl IoError {
     }
 }
 
-/// For readers of bytes whose errors say more; [`IoError::reading`] takes them back.
+/// For readers of bytes whose errors say more; `IoError::reading` takes them back.
 impl From<IoError> for io::Error {
     fn from(error: IoError) -> Self {
         Self::other(error)
