@@ -97,7 +97,7 @@ fn no_convergence<T>(routine: &'static str, m: &DMatrix<T>) -> LinalgError {
 
 /// Refuses NaN and infinity before an iteration that might never end on them.
 fn check_finite<T: Scalar>(routine: &'static str, m: &DMatrix<T>) -> Result<(), LinalgError> {
-    if m.iter().all(|x| nalgebra::ComplexField::is_finite(x)) {
+    if m.iter().all(nalgebra::ComplexField::is_finite) {
         return Ok(());
     }
     Err(LinalgError::NotFinite { routine, rows: m.nrows(), cols: m.ncols() })
