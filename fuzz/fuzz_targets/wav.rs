@@ -1,9 +1,10 @@
-//! Any bytes are a WAV file or a message; the frames are whole, of the header's size, and the same for every
-//! buffer.
+//! Any bytes are a WAV file or a message; the samples are at most what the header promises, and the same for
+//! every buffer.
 #![no_main]
 
 use hybank::io::wav::WavReader;
 use libfuzzer_sys::fuzz_target;
+use std::io::Read;
 
 fn frames(bytes: &[u8], buffer: usize) -> Option<Vec<u8>> {
     let mut reader = match WavReader::new(bytes, "fuzz.wav") {
@@ -17,15 +18,12 @@ fn frames(bytes: &[u8], buffer: usize) -> Option<Vec<u8>> {
     assert!(
         header.channels > 0 && header.rate > 0 && header.layout.container >= header.layout.format.bytes()
     );
-    let frame = header.frame_bytes();
     let mut all = Vec::new();
-    let mut block = vec![0; frame * buffer];
-    while let Ok(filled @ 1..) = reader.frames().fill(&mut block) {
-        assert_eq!(filled % frame, 0);
+    let mut block = vec![0; header.frame_bytes() * buffer];
+    while let Ok(filled @ 1..) = reader.read(&mut block) {
         all.extend_from_slice(&block[..filled]);
     }
     assert!(header.data_bytes.is_none_or(|promised| all.len() as u64 <= promised));
-    assert!(reader.faults().iter().all(|fault| !fault.to_string().is_empty()));
     Some(all)
 }
 
