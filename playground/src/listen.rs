@@ -6,7 +6,7 @@ use hybank::bank::Bank;
 use hybank::design::Problem;
 use hybank::io::wav::WavReader;
 use hybank::overview;
-use hybank::pipeline::{WholeSettings, fuse};
+use hybank::pipeline::{Settings, fuse};
 use hybank::quantity::readable;
 use hybank::runtime::{Options, Planar, Precision};
 use hybank::simulate::{Analog, Captured, Recording, Source, Tone, capture, frames, interleaved};
@@ -95,7 +95,7 @@ fn fused(bank: &Bank, channels: &[Vec<f64>]) -> Result<Vec<f64>, Refusal> {
     let lists: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
     let input = Planar::new(&lists).map_err(Refusal::new)?;
     let mut output = vec![0.0; bank.ratio * channels.first().map_or(0, Vec::len)];
-    fuse(bank, &plan, &input, &mut output[..], WholeSettings::default()).map_err(Refusal::new)?;
+    fuse(bank, &plan, &[input], &mut output[..], Settings::default(), &|| false).map_err(Refusal::new)?;
     Ok(output)
 }
 
