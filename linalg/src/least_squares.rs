@@ -110,8 +110,8 @@ impl NormalEquations {
     /// (J'J)^-1, the covariance of the parameters for residuals of unit variance.
     ///
     /// # Errors
-    /// [`NoMinimum`] if a parameter has no effect, or if the inverse for a unit diagonal has a diagonal above
-    /// `worst`.
+    /// [`NoMinimum`] if a parameter has no effect, or if the inverse for a unit diagonal has a diagonal
+    /// above `worst`.
     pub fn inverse(&self, worst: f64) -> Result<Mat, NoMinimum> {
         let (scale, factor) = self.scaled()?;
         let inverse = &scale * factor.solve(&scale);

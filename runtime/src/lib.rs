@@ -34,7 +34,7 @@
 //! Samples need not be interleaved: [`Stream::run`] takes any [`Input`] and gives to any [`Output`], such as
 //! a slice per channel ([`Planar`]) and recordings as they lie in files ([`PcmFrames`], [`PcmOutput`]).
 //! Complex samples (IQ) are two streams through one plan, one for the real parts and one for the imaginary
-//! ones, which [`PcmFrames::part`] and [`PcmOutput::part`] pick out by a stride.
+//! ones, which [`PcmFrames::part`] and `PcmOutput::part` pick out by a stride.
 //!
 //! | [`Algorithm`] | latency | work per output sample | [`history`](Plan::history) |
 //! |---|---|---|---|
