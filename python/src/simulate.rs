@@ -34,11 +34,11 @@ pub(crate) fn simulate(
     let problem = Problem::new(&unweighted, 0).map_err(refused)?;
     let signal = Signal::new(&spec, signal, rate)?;
     let frames = signal.frames(&problem, samples).map_err(refused)?;
-    let captured = background::run(py, None, move |_| {
+    let (real, imaginary) = background::run(py, None, move |_| {
         let part = |analog| capture(&problem, analog, frames);
         (part(&signal.real), signal.imaginary.as_ref().map(part))
     })?;
-    delivered(py, &spec, captured, gain)
+    delivered(py, &spec, real, imaginary, gain)
 }
 
 /// An analog signal in normalised time.
@@ -95,7 +95,8 @@ impl Signal {
 fn delivered(
     py: Python<'_>,
     spec: &Spec,
-    (real, imaginary): (Captured, Option<Captured>),
+    real: Captured,
+    imaginary: Option<Captured>,
     gain: f64,
 ) -> PyResult<Capture> {
     let real = amplified(real, spec, gain);

@@ -121,7 +121,7 @@ impl Args {
         self.reading.check(self.run.turns.is_given())?;
         self.before_after.check(&self.inputs, &self.output)?;
         let prints = self.before_after.is_wanted();
-        self.run.check(&self.bank, &self.inputs, (&self.output, Container::Wav), prints)
+        self.run.check(&self.bank, &self.inputs, &self.output, Container::Wav, prints)
     }
 
     fn job<'a>(&'a self, bank: &'a Bank) -> Job<'a> {

@@ -96,7 +96,8 @@ fn check_extension(output: &Path, container: Container) -> Result<(), Failure> {
 /// Checks that no output of a run is also an input or another output, and that the name of the samples says
 /// what they are in.
 pub(super) fn check_files(
-    (output, container): (&Path, Container),
+    output: &Path,
+    container: Container,
     others: &[&Path],
     inputs: &[&Path],
 ) -> Result<(), Failure> {

@@ -98,7 +98,8 @@ impl RunArgs {
         &self,
         bank: &Path,
         inputs: &[PathBuf],
-        (output, container): (&Path, Container),
+        output: &Path,
+        container: Container,
         prints: bool,
     ) -> Result<(), Failure> {
         match_bank::check_stdin(inputs.iter().map(PathBuf::as_path).chain([bank]))?;
@@ -109,7 +110,7 @@ impl RunArgs {
         let inputs = inputs.iter().map(PathBuf::as_path).chain([bank]);
         let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).chain(self.track.input()).collect();
         let others = self.gaps.mask().into_iter().chain(self.observer.report()).chain(self.track.log());
-        check_files((output, container), &others.collect::<Vec<&Path>>(), &inputs)
+        check_files(output, container, &others.collect::<Vec<&Path>>(), &inputs)
     }
 }
 

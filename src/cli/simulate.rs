@@ -155,10 +155,10 @@ impl Run<'_> {
     fn capture(&self, i: usize, converter: &Converter, clipped: &mut usize) -> Parts {
         let Self { problem, signal, frames, .. } = *self;
         let level = self.args.gain;
-        let real = converter.capture(problem, i, (&signal.real, level), frames);
+        let real = converter.capture(problem, i, &signal.real, level, frames);
         let imaginary = signal.imaginary.as_ref();
         let imaginary =
-            imaginary.map(|signal| converter.capture_imaginary(problem, i, (signal, level), frames));
+            imaginary.map(|signal| converter.capture_imaginary(problem, i, signal, level, frames));
         *clipped = real.clipped + imaginary.as_ref().map_or(0, |imaginary| imaginary.clipped);
         (real.samples, imaginary.map(|imaginary| imaginary.samples))
     }

@@ -70,7 +70,7 @@ struct Report<'a> {
 /// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let inputs = args.inputs();
-    args.run.check(&args.bank, &inputs, (&args.output, args.container()), false)?;
+    args.run.check(&args.bank, &inputs, &args.output, args.container(), false)?;
     let bank = bank_file::load(&args.bank)?;
     say_understood(bank.spec.as_ref());
     args.check_inputs(&inputs, bank.channel_count())?;

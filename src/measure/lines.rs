@@ -63,7 +63,7 @@ pub(super) fn fit_lines(
         let mut found = together.found(record, pattern, expected);
         found.extend(unexpected.found.iter().cloned());
         let parameters = parameters + 3 * unexpected.found.len() / record.parts().len();
-        Lines::new(found, unexpected.rest.filled(), (used, parameters))
+        Lines::new(found, unexpected.rest.filled(), used, parameters)
     };
     let mut lines = finish(&together, &unexpected);
     // Large unexpected lines leak into the expected ones, so these are fitted again without them.
@@ -81,7 +81,7 @@ pub(super) fn fit_lines(
 
 impl Lines {
     /// Of what a fit of so many parameters to so many samples leaves.
-    fn new(found: Vec<Found>, rest: Record<'static>, (used, parameters): (usize, usize)) -> Self {
+    fn new(found: Vec<Found>, rest: Record<'static>, used: usize, parameters: usize) -> Self {
         let noise_power = rest.energy() / used.saturating_sub(parameters).max(1) as f64;
         let log_probability = SIGNIFICANCE + (found.len().max(1) as f64).ln();
         let values = (used * rest.parts().len()) as f64;

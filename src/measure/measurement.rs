@@ -235,7 +235,7 @@ impl Figures<'_> {
         Measurement {
             samples: self.record.len(),
             left_out: own.left_out,
-            clipped: self.clipped(rails),
+            clipped: self.clipped(rails.0, rails.1),
             rate: self.tones.rate,
             converters,
             full_scale,
@@ -263,7 +263,7 @@ impl Figures<'_> {
     }
 
     /// Samples with a part at the rails.
-    fn clipped(&self, (lowest, highest): (f64, f64)) -> usize {
+    fn clipped(&self, lowest: f64, highest: f64) -> usize {
         let is_clipped = |part: &[f64], n: usize| part[n] <= lowest || part[n] >= highest;
         (0..self.record.len()).filter(|&n| self.record.parts().iter().any(|part| is_clipped(part, n))).count()
     }

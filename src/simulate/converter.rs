@@ -70,10 +70,11 @@ impl Converter {
         &self,
         problem: &Problem,
         channel: usize,
-        signal: (&Analog, f64),
+        signal: &Analog,
+        level: f64,
         periods: usize,
     ) -> Delivered {
-        self.capture_part(problem, channel, signal, periods, Purpose::Noise)
+        self.capture_part(problem, channel, signal, level, periods, Purpose::Noise)
     }
 
     /// As [`Converter::capture`], of the imaginary part of a complex signal: the converter of the other part
@@ -82,17 +83,19 @@ impl Converter {
         &self,
         problem: &Problem,
         channel: usize,
-        signal: (&Analog, f64),
+        signal: &Analog,
+        level: f64,
         periods: usize,
     ) -> Delivered {
-        self.capture_part(problem, channel, signal, periods, Purpose::ImaginaryNoise)
+        self.capture_part(problem, channel, signal, level, periods, Purpose::ImaginaryNoise)
     }
 
     fn capture_part(
         &self,
         problem: &Problem,
         channel: usize,
-        (signal, level): (&Analog, f64),
+        signal: &Analog,
+        level: f64,
         periods: usize,
         noise: Purpose,
     ) -> Delivered {
@@ -179,7 +182,7 @@ mod tests {
         let signal = tone(0.7);
         let want = capture(&problem(), &signal, 50);
         for (channel, want) in want.channels.iter().enumerate() {
-            let got = Converter::ideal().capture(&problem(), channel, (&signal, 1.0), 50);
+            let got = Converter::ideal().capture(&problem(), channel, &signal, 1.0, 50);
             assert_eq!((&got.samples, got.clipped), (want, 0));
         }
     }
@@ -193,7 +196,7 @@ mod tests {
             drift: 1e-4,
             ..Converter::ideal()
         };
-        let got = converter.capture(&problem(), 1, (&tone(0.7), 3.0), 4000);
+        let got = converter.capture(&problem(), 1, &tone(0.7), 3.0, 4000);
         for (k, x) in got.samples.iter().enumerate() {
             let t = k as f64 * 2.0 / 1.0001 - 0.63;
             let want = 3.0 * -2.0 * 1.01 * exact(0.7, t) - 0.2;
@@ -206,7 +209,7 @@ mod tests {
         let converter = Converter { noise: 0.003, seed: 5, ..Converter::ideal() };
         let count = 200_000;
         let captured: Vec<Vec<f64>> =
-            (0..2).map(|i| converter.capture(&problem(), i, (&tone(0.7), 0.0), count).samples).collect();
+            (0..2).map(|i| converter.capture(&problem(), i, &tone(0.7), 0.0, count).samples).collect();
         for noise in &captured {
             // Five standard deviations of the estimate, 1 / sqrt(2 N) = 0.16 %.
             let found = rms(noise.iter().copied());
@@ -226,7 +229,7 @@ mod tests {
             let converter = Converter { jitter: FastPeriods(sigma), seed: 9, ..Converter::ideal() };
             let count = 100_000;
             let [ideal, jittered] = [Converter::ideal(), converter]
-                .map(|c| c.capture(&problem(), 0, (&tone(omega), 1.0), count).samples);
+                .map(|c| c.capture(&problem(), 0, &tone(omega), 1.0, count).samples);
             let error = rms(differences(&ideal, &jittered));
             let snr = 20.0 * (rms(ideal.iter().copied()) / error).log10();
             let formula = -20.0 * (omega * sigma).log10();
@@ -240,14 +243,14 @@ mod tests {
         let full_scale = (1.0 - 0.5f64.powi(12)) * (omega * omega + 0.25) / 0.25;
         let capture = |quantiser| {
             let converter = Converter { quantiser, ..Converter::ideal() };
-            converter.capture(&problem(), 0, (&tone(omega), full_scale), 100_000)
+            converter.capture(&problem(), 0, &tone(omega), full_scale, 100_000)
         };
         let (ideal, rounded) = (capture(None), capture(Quantiser::new(12)));
         let error = rms(differences(&ideal.samples, &rounded.samples));
         let snr = 20.0 * (rms(ideal.samples.iter().copied()) / error).log10();
         assert!((snr - (6.0206 * 12.0 + 1.7609)).abs() < 0.05, "{snr}");
         let clipped = Converter { quantiser: Quantiser::new(12), ..Converter::ideal() };
-        let clipped = clipped.capture(&problem(), 0, (&tone(omega), 2.0 * full_scale), 30_000).clipped;
+        let clipped = clipped.capture(&problem(), 0, &tone(omega), 2.0 * full_scale, 30_000).clipped;
         // A sine of twice the full scale is beyond it for two thirds of its period.
         assert!((clipped as f64 / 30_000.0 - 2.0 / 3.0).abs() < 1e-3, "{clipped}");
     }
@@ -267,7 +270,7 @@ mod tests {
             let converter =
                 Converter { jitter: FastPeriods(0.1), drift: -3e-5, seed: 2, ..Converter::ideal() };
             let shifts = converter.shifts(0, 300).unwrap();
-            let got = converter.capture(&problem(), 0, (&signal, 1.0), 300).samples;
+            let got = converter.capture(&problem(), 0, &signal, 1.0, 300).samples;
             for (k, x) in got.iter().enumerate() {
                 let want = exact(omega, k as f64 * 2.0 / (1.0 - 3e-5) - 1.2 + shifts[k].0);
                 assert!((x - want).abs() < 1e-11, "{omega} {k}: {x} {want}");
@@ -279,7 +282,7 @@ mod tests {
     fn samples_depend_on_seed_channel_and_number_only() {
         let converter = Converter { jitter: FastPeriods(0.01), noise: 0.1, seed: 3, ..Converter::ideal() };
         let capture = |converter: Converter, channel, periods| {
-            converter.capture(&problem(), channel, (&tone(0.4), 1.0), periods).samples
+            converter.capture(&problem(), channel, &tone(0.4), 1.0, periods).samples
         };
         let long = capture(converter, 1, 500);
         assert_eq!(capture(converter, 1, 200), long[..200]);

@@ -62,7 +62,7 @@ impl Spec {
         let in_samples = entries(channels.first()?).is_some_and(|keys| find(keys, "delay_samples").is_some());
         let old = Self::from_toml(text, "").ok()?;
         for ((node, channel), old) in channels.iter().zip(&self.channels).zip(&old.channels) {
-            edits.channel(self, node, (old, channel))?;
+            edits.channel(self, node, old, channel)?;
         }
         if let Some(uncertainty) = &self.uncertainty {
             let h = in_samples.then_some(self.fast_period);
@@ -95,12 +95,7 @@ impl Edits<'_> {
         }
     }
 
-    fn channel(
-        &mut self,
-        spec: &Spec,
-        node: &Node,
-        (old, channel): (&ChannelSpec, &ChannelSpec),
-    ) -> Option<()> {
+    fn channel(&mut self, spec: &Spec, node: &Node, old: &ChannelSpec, channel: &ChannelSpec) -> Option<()> {
         let keys = entries(node)?;
         let delay = match (find(keys, "delay"), find(keys, "delay_samples")) {
             (Some(entry), _) => (entry, channel.delay.0),

@@ -25,7 +25,7 @@ pub(crate) fn intervals(effort: Effort) -> Outcome<Table> {
     for _ in 0..effort.of(20_000, 2000) {
         let phases: Vec<f64> = (0..CAMERAS).map(|_| part(random)).collect();
         // One period holds one sample of each set, and all that follows repeats it.
-        let samples = sets.samples(&phases, (0.0, 2.0 * CAMERAS as f64));
+        let samples = sets.samples(&phases, 0.0..2.0 * CAMERAS as f64);
         for pair in samples.windows(2).take(CAMERAS) {
             let interval = pair[1] - pair[0];
             sums.iter_mut().enumerate().for_each(|(k, sum)| *sum += interval.powi(k as i32 + 1));

@@ -204,9 +204,9 @@ impl<const C: usize> Work<C> {
         rows.for_each(|(((u, residual), ((direction, image), inverse)), sums)| {
             for c in 0..C {
                 let row = c * stride..(c + 1) * stride;
-                let outputs = (blocks_mut(&mut u[row.clone()]), blocks_mut(&mut residual[row.clone()]));
-                let inputs = (blocks(&direction[row.clone()]), blocks(&image[row]));
-                sums[c] = step_row(lengths[c] as f32, outputs, inputs, blocks(inverse));
+                let (u, r) = (blocks_mut(&mut u[row.clone()]), blocks_mut(&mut residual[row.clone()]));
+                let (p, q) = (blocks(&direction[row.clone()]), blocks(&image[row]));
+                sums[c] = step_row(lengths[c] as f32, u, r, p, q, blocks(inverse));
             }
         });
         total(&sums)
@@ -232,8 +232,10 @@ impl<const C: usize> Work<C> {
 #[inline]
 fn step_row(
     length: f32,
-    (u, r): (BlocksMut<'_>, BlocksMut<'_>),
-    (p, q): (Blocks<'_>, Blocks<'_>),
+    u: BlocksMut<'_>,
+    r: BlocksMut<'_>,
+    p: Blocks<'_>,
+    q: Blocks<'_>,
     inverse: Blocks<'_>,
 ) -> f64 {
     let mut sums = [0.0; LANES];

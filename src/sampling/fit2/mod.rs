@@ -141,14 +141,15 @@ impl<const ORDER: usize, const C: usize> Connected<ORDER, C> {
     /// the way that is done, 0 to 1.
     pub fn solve(self, iteration: &Iteration, watch: &(dyn Fn(f64) + Sync)) -> (Vec<f32>, Convergence) {
         let (solution, convergence) = conjugate::solve::<C>(&self.matrix, self.rhs, iteration, watch);
-        (at_pixels::<ORDER, C>(&solution, self.size), convergence)
+        (at_pixels::<ORDER, C>(&solution, self.size.0, self.size.1), convergence)
     }
 }
 
 /// J at the pixels.
 fn at_pixels<const ORDER: usize, const C: usize>(
     coefficients: &Planes,
-    (width, height): (usize, usize),
+    width: usize,
+    height: usize,
 ) -> Vec<f32> {
     let mut values = vec![0.0; width * height * C];
     let last = coefficients.grid().height.saturating_sub(1);

@@ -59,29 +59,25 @@ impl<'a, const ORDER: usize, const C: usize> Fit2Rows<'a, ORDER, C> {
     pub fn add(&mut self, sample: &Fit2Sample<C>) {
         let (column, across) = span::<ORDER>(sample.x, self.size.0);
         let (row, down) = span::<ORDER>(sample.y, self.size.1);
-        let at = (column, row - self.first);
-        let weighted = self.add_couplings(at, &product(&down.weights, &across.weights), sample.weight);
+        let row = row - self.first;
+        let weighted =
+            self.add_couplings(column, row, &product(&down.weights, &across.weights), sample.weight);
         for (i, own) in weighted.iter().enumerate() {
             for (c, value) in sample.values.iter().enumerate() {
-                let sums = self.rhs.at::<ORDER>(c, at.0, at.1 + i);
+                let sums = self.rhs.at::<ORDER>(c, column, row + i);
                 (0..ORDER).for_each(|j| sums[j] += own[j] * value);
             }
         }
         if sample.slope_weight > 0.0 {
             let weight = sample.weight * sample.slope_weight;
-            self.add_couplings(at, &product(&down.weights, &across.slopes), weight);
-            self.add_couplings(at, &product(&down.slopes, &across.weights), weight);
+            self.add_couplings(column, row, &product(&down.weights, &across.slopes), weight);
+            self.add_couplings(column, row, &product(&down.slopes, &across.weights), weight);
         }
     }
 
     /// Adds weight b b', b the values of the splines from a coefficient on; returns weight b.
     #[inline(always)]
-    fn add_couplings(
-        &mut self,
-        (column, row): (usize, usize),
-        b: &Tensor<ORDER>,
-        weight: f32,
-    ) -> Tensor<ORDER> {
+    fn add_couplings(&mut self, column: usize, row: usize, b: &Tensor<ORDER>, weight: f32) -> Tensor<ORDER> {
         let weighted = b.map(|row| row.map(|b| weight * b));
         for (i, own) in weighted.iter().enumerate() {
             let mut plane = 0;

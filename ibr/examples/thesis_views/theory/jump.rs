@@ -20,7 +20,7 @@ pub fn poisson_jump_error(left: f64, right: f64) -> f64 {
     let ratio = l / r;
     if ratio < 2.0 {
         let term = |w: f64| (w * w + (1.0 - w) * (1.0 - w)) / (l * w + r * (1.0 - w)).powi(3);
-        return l * r * integral(term, (0.0, 1.0), 4);
+        return l * r * integral(term, 0.0..1.0, 4);
     }
     // The same integral in closed form, which cancels for equal densities; q = w + (1 - w) / ratio.
     let logarithm = 2.0 * ratio.ln();

@@ -28,6 +28,7 @@
 
 use super::quadrature::{gauss_legendre, integral};
 use hybank::sampling::SamplingError;
+use std::ops::Range;
 
 /// Panels of the integral over a varying density.
 const PANELS: usize = 64;
@@ -93,11 +94,11 @@ impl PeriodicSets {
     }
 
     /// The samples in \[from, to), sorted: set i has samples at (n + phases\[i\]) p_i for all integers n.
-    pub fn samples(&self, phases: &[f64], (from, to): (f64, f64)) -> Vec<f64> {
+    pub fn samples(&self, phases: &[f64], range: Range<f64>) -> Vec<f64> {
         let of_set = |(p, phase): (&f64, &f64)| {
             let (p, phase) = (*p, *phase);
-            let first = (from / p - phase).ceil();
-            (0..).map(move |n| (first + f64::from(n) + phase) * p).take_while(move |x| *x < to)
+            let first = (range.start / p - phase).ceil();
+            (0..).map(move |n| (first + f64::from(n) + phase) * p).take_while(move |x| *x < range.end)
         };
         let mut samples: Vec<f64> = self.periods.iter().zip(phases).flat_map(of_set).collect();
         samples.sort_by(f64::total_cmp);
@@ -107,7 +108,7 @@ impl PeriodicSets {
 
 /// sum_m D_m^k over `range` for a Poisson process of density `density(y)`: k! integral lambda^{1-k} dy
 /// (thesis Prop. 3.2).
-pub fn poisson_power_sum(density: impl Fn(f64) -> f64, range: (f64, f64), k: u32) -> f64 {
+pub fn poisson_power_sum(density: impl Fn(f64) -> f64, range: Range<f64>, k: u32) -> f64 {
     factorial(k) * integral(|y| density(y).powi(1 - k as i32), range, PANELS)
 }
 
@@ -115,7 +116,7 @@ pub fn poisson_power_sum(density: impl Fn(f64) -> f64, range: (f64, f64), k: u32
 /// sets of density 0 have no samples there.
 ///
 /// Exact in the limit of densities that hardly change within one period.
-pub fn superposed_power_sum(densities: impl Fn(f64) -> Vec<f64>, range: (f64, f64), k: u32) -> f64 {
+pub fn superposed_power_sum(densities: impl Fn(f64) -> Vec<f64>, range: Range<f64>, k: u32) -> f64 {
     let sum = |y: f64| {
         let present = densities(y).into_iter().filter(|d| *d > 0.0);
         let periods: Vec<f64> = present.map(|d| 1.0 / d).collect();
@@ -168,7 +169,7 @@ mod tests {
             let phase = |i: usize| ((draw / grid.pow(i as u32)) % grid) as f64 + 0.5;
             let phases: Vec<f64> =
                 std::iter::once(0.0).chain((0..free).map(|i| phase(i) / grid as f64)).collect();
-            let mut x = sets.samples(&phases, (0.0, circle));
+            let mut x = sets.samples(&phases, 0.0..circle);
             x.push(x[0] + circle);
             sum += x.windows(2).map(|w| (w[1] - w[0]).powi(k)).sum::<f64>();
             count += x.len() as f64 - 1.0;
@@ -224,8 +225,8 @@ mod tests {
     #[test]
     fn the_distribution_has_the_moments() {
         let sets = PeriodicSets::new(vec![1.0, 1.3, 0.8, 2.2]).unwrap();
-        let range = (0.0, 0.8);
-        let mean = integral(|t| sets.longer_than(t), range, 8);
+        let range = 0.0..0.8;
+        let mean = integral(|t| sets.longer_than(t), range.clone(), 8);
         let square = integral(|t| 2.0 * t * sets.longer_than(t), range, 8);
         assert!((mean - sets.moment(1)).abs() < 1e-12 && (square - sets.moment(2)).abs() < 1e-12);
     }
@@ -245,17 +246,17 @@ mod tests {
             vec![1.0 / (0.05 * (1.0 + 0.3 * x.cos())); 10]
         };
         let (end, draws) = (5.0, 1000);
-        let range = (map(0.0), map(end));
+        let range = map(0.0)..map(end);
         for k in 2..=4 {
             let mut sum = 0.0;
             for _ in 0..draws {
                 let phases: Vec<f64> = (0..10).map(|_| random.part()).collect();
-                let samples: Vec<f64> = sets.samples(&phases, (0.0, end)).into_iter().map(map).collect();
+                let samples: Vec<f64> = sets.samples(&phases, 0.0..end).into_iter().map(map).collect();
                 sum += samples.windows(2).map(|w| (w[1] - w[0]).powi(k)).sum::<f64>();
             }
-            let (sum, want) = (sum / f64::from(draws), superposed_power_sum(local, range, k as u32));
+            let (sum, want) = (sum / f64::from(draws), superposed_power_sum(local, range.clone(), k as u32));
             assert!((sum / want - 1.0).abs() < tolerance(k), "k = {k}: {sum} {want}");
-            let poisson = poisson_power_sum(|y| local(y).iter().sum(), range, k as u32);
+            let poisson = poisson_power_sum(|y| local(y).iter().sum(), range.clone(), k as u32);
             let ratio = equal(10, 1.0).poisson_ratio(k as u32);
             assert!((want / poisson / ratio - 1.0).abs() < 1e-9, "k = {k}: {want} {poisson}");
         }
@@ -267,12 +268,12 @@ mod tests {
         let mut random = Random(23);
         let periods: Vec<f64> = (0..10).map(|i| 0.05 * (1.04 * (f64::from(i) * 2.7).sin()).exp()).collect();
         let sets = PeriodicSets::new(periods).unwrap();
-        let (range, draws) = ((0.0, 5.0), 1000);
+        let (range, draws) = (0.0..5.0, 1000);
         for k in 1..=4 {
             let (mut sum, mut count) = (0.0, 0);
             for _ in 0..draws {
                 let phases: Vec<f64> = (0..10).map(|_| random.part()).collect();
-                let samples = sets.samples(&phases, range);
+                let samples = sets.samples(&phases, range.clone());
                 sum += samples.windows(2).map(|w| (w[1] - w[0]).powi(k)).sum::<f64>();
                 count += samples.len() - 1;
             }

@@ -23,7 +23,8 @@ impl Layout {
     /// For N channels and M phases, and a recursion in vectors of `lanes`.
     pub(super) fn new(
         delay_lines: &DelayLines,
-        (channels, ratio): (usize, usize),
+        channels: usize,
+        ratio: usize,
         lanes: usize,
         kernel: FirKernel<f64>,
     ) -> Result<Self, BuildError> {

@@ -87,14 +87,16 @@ impl Recursive {
         isa: Isa,
     ) -> Result<Self, BuildError> {
         let order = filter.a.len();
-        let check = |name, rows: &[Vec<f64>], wanted| check_matrix(name, rows, wanted, channels, ratio);
-        check("a", &filter.a, (order, order))?;
-        check("b", &filter.b, (order, channels))?;
-        check("c", &filter.c, (ratio, order))?;
-        check("d", &filter.d, (ratio, channels))?;
+        let check = |name, rows: &[Vec<f64>], wanted_rows, wanted_cols| {
+            check_matrix(name, rows, wanted_rows, wanted_cols, channels, ratio)
+        };
+        check("a", &filter.a, order, order)?;
+        check("b", &filter.b, order, channels)?;
+        check("c", &filter.c, ratio, order)?;
+        check("d", &filter.d, ratio, channels)?;
         let delay_lines = DelayLines::new(filter);
         let (advance, fir) = (RecursionKernel::new(isa), FirKernel::new(isa));
-        let layout = Layout::new(&delay_lines, (channels, ratio), advance.lanes, fir)?;
+        let layout = Layout::new(&delay_lines, channels, ratio, advance.lanes, fir)?;
         Ok(Self {
             channels,
             ratio,
@@ -229,7 +231,8 @@ impl RecursiveState {
 fn check_matrix(
     name: &'static str,
     rows: &[Vec<f64>],
-    (wanted_rows, wanted_cols): (usize, usize),
+    wanted_rows: usize,
+    wanted_cols: usize,
     channels: usize,
     ratio: usize,
 ) -> Result<(), BuildError> {
