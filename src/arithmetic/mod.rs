@@ -1,14 +1,19 @@
 //! Real numbers of more than 53 bits, with a proven relative error for each operation.
 //!
 //! [`DoubleDouble`] has 106 bits and [`BigFloat`] has 512. Both are a [`Number`], the trait over which
-//! enclosures and the decompositions of [`dense`] are generic.
+//! enclosures and the decompositions of [`dense`] are generic: [`Ball`] encloses a real number,
+//! [`ComplexBall`] a complex one.
 
+mod ball;
 mod big_float;
+mod complex_ball;
 pub(crate) mod dense;
 mod double_double;
 mod number;
 
+pub(crate) use ball::{Ball, OUTWARD};
 pub(crate) use big_float::BigFloat;
+pub(crate) use complex_ball::ComplexBall;
 pub(crate) use double_double::DoubleDouble;
 pub(crate) use number::Number;
 

@@ -5,7 +5,7 @@
 use super::ball::{self, Ball, Matrix};
 use super::error_system::BlockForm;
 use super::slow_period::SlowPeriod;
-use crate::arithmetic::{DoubleDouble, Number};
+use crate::arithmetic::{ComplexBall, DoubleDouble, Number};
 use crate::bank::SynthesisFilters;
 use crate::linalg::{self, Mat};
 
@@ -226,41 +226,29 @@ pub(super) fn gram<F: Number>(period: &SlowPeriod<F>, z: &ComplexMatrix<F>) -> C
     let phases: Vec<ComplexMatrix<F>> = period.delay_periods.iter().map(|&late| delay(z, late)).collect();
     // G = [A D], A from the states and D = diag(d) of the inputs of this period.
     let rows: Vec<ComplexMatrix<F>> = (0..samples).map(|s| from_state.rows(s, 1).times(&phases[s])).collect();
-    let a = |s: usize, k: usize| [rows[s].re[(0, k)], rows[s].im[(0, k)]];
-    let d = |s: usize| [phases[s].re[(0, 0)], phases[s].im[(0, 0)]];
+    let entry = |m: &ComplexMatrix<F>, k: usize| ComplexBall::new(m.re[(0, k)], m.im[(0, k)]);
+    let a = |s: usize, k: usize| entry(&rows[s], k);
+    let d = |s: usize| entry(&phases[s], 0);
     let q = |i: usize, j: usize| period.gram[(i, j)];
     let mut gram = ComplexMatrix::zeros(samples, samples);
     for i in 0..samples {
         // Row i of [A D] times the Gram matrix of states and inputs.
         let sum = |column: usize| {
-            let own = scaled_by(d(i), q(n + i, column));
-            (0..n).fold(own, |sum, k| plus(sum, scaled_by(a(i, k), q(k, column))))
+            let own = d(i).scaled(q(n + i, column));
+            (0..n).fold(own, |sum, k| sum + a(i, k).scaled(q(k, column)))
         };
-        let of_states: Vec<[Ball<F>; 2]> = (0..n).map(sum).collect();
+        let of_states: Vec<ComplexBall<F>> = (0..n).map(sum).collect();
         // The matrix is Hermitian.
         for j in 0..=i {
-            let own = times_conjugate(sum(n + j), d(j));
-            let [re, im] = (0..n).fold(own, |sum, k| plus(sum, times_conjugate(of_states[k], a(j, k))));
-            (gram.re[(i, j)], gram.re[(j, i)]) = (re, re);
+            let own = sum(n + j) * d(j).conj();
+            let entry = (0..n).fold(own, |sum, k| sum + of_states[k] * a(j, k).conj());
+            (gram.re[(i, j)], gram.re[(j, i)]) = (entry.re, entry.re);
             if i != j {
-                (gram.im[(i, j)], gram.im[(j, i)]) = (im, -im);
+                (gram.im[(i, j)], gram.im[(j, i)]) = (entry.im, -entry.im);
             }
         }
     }
     gram
-}
-
-fn plus<F: Number>(x: [Ball<F>; 2], y: [Ball<F>; 2]) -> [Ball<F>; 2] {
-    [x[0] + y[0], x[1] + y[1]]
-}
-
-fn scaled_by<F: Number>(x: [Ball<F>; 2], by: Ball<F>) -> [Ball<F>; 2] {
-    [x[0] * by, x[1] * by]
-}
-
-/// x times the conjugate of y.
-fn times_conjugate<F: Number>(x: [Ball<F>; 2], y: [Ball<F>; 2]) -> [Ball<F>; 2] {
-    [x[0] * y[0] + x[1] * y[1], x[1] * y[0] - x[0] * y[1]]
 }
 
 /// Gamma b, without Gamma.

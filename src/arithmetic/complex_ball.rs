@@ -1,0 +1,96 @@
+//! Enclosed complex numbers: a ball for each part.
+
+use super::{Ball, BigFloat, Number};
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// All numbers whose real and imaginary parts lie in these balls.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct ComplexBall<F = BigFloat> {
+    pub(crate) re: Ball<F>,
+    pub(crate) im: Ball<F>,
+}
+
+impl<F: Number> ComplexBall<F> {
+    pub(crate) fn new(re: Ball<F>, im: Ball<F>) -> Self {
+        Self { re, im }
+    }
+
+    /// The conjugates.
+    pub(crate) fn conj(self) -> Self {
+        Self { re: self.re, im: -self.im }
+    }
+
+    /// The squares of the moduli.
+    pub(crate) fn norm_sqr(self) -> Ball<F> {
+        self.re * self.re + self.im * self.im
+    }
+
+    /// Times a real number.
+    pub(crate) fn scaled(self, by: Ball<F>) -> Self {
+        Self { re: self.re * by, im: self.im * by }
+    }
+}
+
+impl<F: Number> From<Ball<F>> for ComplexBall<F> {
+    fn from(re: Ball<F>) -> Self {
+        Self { re, im: Ball::ZERO }
+    }
+}
+
+impl<F: Number> Neg for ComplexBall<F> {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self { re: -self.re, im: -self.im }
+    }
+}
+
+impl<F: Number> Add for ComplexBall<F> {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self { re: self.re + other.re, im: self.im + other.im }
+    }
+}
+
+impl<F: Number> Sub for ComplexBall<F> {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+impl<F: Number> Mul for ComplexBall<F> {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        Self { re: self.re * other.re - self.im * other.im, im: self.re * other.im + self.im * other.re }
+    }
+}
+
+impl<F: Number> Div for ComplexBall<F> {
+    type Output = Self;
+    /// NaN if the divisor may be zero.
+    fn div(self, other: Self) -> Self {
+        let (product, size) = (self * other.conj(), other.norm_sqr());
+        Self { re: product.re / size, im: product.im / size }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ball(re: f64, im: f64) -> ComplexBall {
+        ComplexBall::new(Ball::from(re), Ball::from(im))
+    }
+
+    /// (3 + 4 i) (1 - 2 i) = 11 - 2 i, all exact in binary.
+    #[test]
+    fn products_and_quotients_are_those_of_complex_numbers() {
+        let (x, y, xy) = (ball(3.0, 4.0), ball(1.0, -2.0), ball(11.0, -2.0));
+        for rest in [x * y - xy, xy / y - x, x + y - ball(4.0, 2.0), x.scaled(Ball::from(2.0)) - x - x] {
+            assert!(rest.norm_sqr().magnitude() < 1e-280, "{rest:?}");
+            assert!(rest.re.lower() <= 0.0 && rest.re.upper() >= 0.0, "{rest:?}");
+            assert!(rest.im.lower() <= 0.0 && rest.im.upper() >= 0.0, "{rest:?}");
+        }
+        assert!((x / (y - y)).re.radius().is_nan());
+    }
+}
