@@ -1,10 +1,10 @@
 //! Numbers of 512 bits, for proofs in which 106 bits are not enough.
 //!
 //! A number is `sign * m * 2^(exponent - 512)` with an integer m of eight 64-bit words whose top bit is
-//! set, so that `2^(exponent - 1) <= |x| < 2^exponent`. Every operation works on integers and drops what
-//! does not fit; its relative error is below [`BigFloat::ROUNDING`] = 2^-506. Division and square root take
-//! Newton's iteration with the exact residual in the last step, and are tested to the same bound. The
-//! exponent has 64 bits, so that nothing overflows or underflows in practice.
+//! set, so that `2^(exponent - 1) <= |x| < 2^exponent`. Sums and products are computed in integers and drop
+//! what does not fit: their relative error is below 2^-510. Quotients and roots take Newton's iteration and
+//! a last step with the residual; theirs is below 2^-508 (docs/proof.md derives both). An exponent beyond
+//! [`MAX_EXPONENT`] makes a number unknown, so that nothing overflows or underflows unseen.
 
 use super::number::Number;
 use std::cmp::Ordering;
@@ -13,6 +13,9 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 /// 64-bit words of a mantissa.
 const WORDS: usize = 8;
 const BITS: i64 = 64 * WORDS as i64;
+/// Largest modulus of an exponent: sums of two such exponents stay within 64 bits, and squaring reaches it
+/// only after fifty steps.
+const MAX_EXPONENT: i64 = 1 << 60;
 
 /// A floating-point number with a mantissa of 512 bits; zero has no mantissa, NaN is an unknown number.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,7 +33,8 @@ impl Default for BigFloat {
     }
 }
 
-/// The words `words[..]`, most significant bit first set, as a number below `2^exponent`.
+/// The words `words[..]` as a number below `2^exponent`; what lies more than 512 bits below the first bit set
+/// is dropped.
 fn normalised(words: &[u64], exponent: i64, negative: bool) -> BigFloat {
     let Some(top) = words.iter().rposition(|&word| word != 0) else { return BigFloat::ZERO };
     let shift = words[top].leading_zeros();
@@ -41,7 +45,7 @@ fn normalised(words: &[u64], exponent: i64, negative: bool) -> BigFloat {
         *word = if shift == 0 { high } else { high << shift | low >> (64 - shift) };
     }
     let dropped = 64 * (words.len() - 1 - top) as i64 + i64::from(shift);
-    BigFloat { words: result, exponent: exponent - dropped, negative, nan: false }
+    BigFloat { words: result, exponent: exponent - dropped, negative, nan: false }.within_range()
 }
 
 impl BigFloat {
@@ -70,7 +74,12 @@ impl BigFloat {
 
     /// x 2^power.
     fn scaled(self, power: i64) -> Self {
-        if self.is_zero() { self } else { Self { exponent: self.exponent + power, ..self } }
+        if self.is_zero() { self } else { Self { exponent: self.exponent + power, ..self }.within_range() }
+    }
+
+    /// The number, unknown if its exponent is too large.
+    fn within_range(self) -> Self {
+        if self.exponent.abs() <= MAX_EXPONENT { self } else { Self::NAN }
     }
 
     /// |self| + |other| for |self| >= |other| > 0, or the difference, with the sign of `self`.
@@ -111,7 +120,7 @@ impl BigFloat {
 
 impl Number for BigFloat {
     const ZERO: Self = Self { words: [0; WORDS], exponent: 0, negative: false, nan: false };
-    /// 2^-506.
+    /// 2^-506, four times what is proven of the least accurate operation.
     const ROUNDING: f64 = f64::from_bits((1023 - 506) << 52);
     /// 0.5^k / k! is below 2^-512 from here on.
     const SERIES_TERMS: usize = 90;
@@ -246,7 +255,9 @@ impl Div for BigFloat {
 
 #[cfg(test)]
 mod tests {
+    use super::super::exact::Exact;
     use super::*;
+    use num_bigint::{BigInt, Sign};
     use proptest::prelude::*;
 
     fn error_of(found: BigFloat, exact: BigFloat) -> f64 {
@@ -305,6 +316,74 @@ mod tests {
         fn doubles_come_back(x in any::<f64>()) {
             let back = BigFloat::from(x).nearest();
             prop_assert!(back == x || (!x.is_finite() && back.is_nan()));
+        }
+    }
+
+    impl From<BigFloat> for Exact {
+        fn from(x: BigFloat) -> Self {
+            assert!(!x.nan);
+            let bytes: Vec<u8> = x.words.iter().flat_map(|word| word.to_le_bytes()).collect();
+            let sign = if x.negative { Sign::Minus } else { Sign::Plus };
+            Self { mantissa: BigInt::from_bytes_le(sign, &bytes), power: x.exponent - BITS }
+        }
+    }
+
+    /// Mantissas whose digits are random, all zero but the ends, or all one but a few.
+    fn any_number() -> impl Strategy<Value = BigFloat> {
+        let words = prop_oneof![
+            any::<[u64; WORDS]>(),
+            (0..WORDS, any::<u64>()).prop_map(|(i, word)| {
+                let mut words = [0; WORDS];
+                words[i] = word;
+                words
+            }),
+            (0..WORDS, 0..64).prop_map(|(i, bit)| {
+                let mut words = [u64::MAX; WORDS];
+                words[i] ^= 1u64 << bit;
+                words
+            }),
+        ];
+        let exponent = prop_oneof![-3i64..4, -1100i64..1100, -1i64 << 40..1 << 40];
+        (words, exponent, any::<bool>()).prop_map(|(mut words, exponent, negative)| {
+            words[WORDS - 1] |= 1 << 63;
+            BigFloat { words, exponent, negative, nan: false }
+        })
+    }
+
+    /// The bounds that docs/proof.md derives.
+    fn proven(power: i64, of: &Exact) -> Exact {
+        of.times(&Exact::power_of_two(power))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 2048, failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// Against exact integers; a sum of numbers that lie close together, too.
+        #[test]
+        fn errors_are_those_that_are_proven(x in any_number(), y in any_number(), shift in -600i64..600) {
+            let y = BigFloat { exponent: if shift % 2 == 0 { x.exponent + shift } else { y.exponent }, ..y };
+            let [a, b] = [x, y].map(Exact::from);
+            if (x.exponent - y.exponent).abs() < 3000 {
+                let sum = a.plus(&b);
+                prop_assert!(Exact::from(x + y).minus(&sum).is_within(&proven(-510, &sum)));
+            }
+            let product = a.times(&b);
+            prop_assert!(Exact::from(x * y).minus(&product).is_within(&proven(-510, &product)));
+            prop_assert!(Exact::from(x / y).times(&b).minus(&a).is_within(&proven(-508, &a)));
+            let positive = BigFloat { negative: false, ..x };
+            let root = Exact::from(positive.sqrt());
+            prop_assert!(root.times(&root).minus(&a.abs()).is_within(&proven(-507, &a)));
+        }
+    }
+
+    #[test]
+    fn an_exponent_beyond_the_range_makes_a_number_unknown() {
+        for start in [2.0, 0.5] {
+            let mut x = BigFloat::from(start);
+            for _ in 0..70 {
+                x = x * x;
+            }
+            assert!(x.nearest().is_nan());
         }
     }
 

@@ -9,6 +9,8 @@ mod big_float;
 mod complex_ball;
 pub(crate) mod dense;
 mod double_double;
+#[cfg(test)]
+mod exact;
 mod number;
 
 pub(crate) use ball::{Ball, OUTWARD};

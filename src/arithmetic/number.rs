@@ -22,12 +22,13 @@ pub(crate) trait Number:
 {
     /// Zero.
     const ZERO: Self;
-    /// Bounds the relative error of each operation, underflow apart.
+    /// Bounds the relative error of each operation whose result is not below 2^-960; below that the absolute
+    /// error is less than 2^-1070.
     const ROUNDING: f64;
     /// Terms of an exponential series after which the remainder lies below the rounding.
     const SERIES_TERMS: usize;
 
-    /// The nearest double, up to a relative error of 2^-52.
+    /// The nearest double, up to a relative error of 2^-52 and, below the normal numbers, 2^-1074.
     fn nearest(self) -> f64;
 
     /// NaN for negative numbers.
