@@ -1,13 +1,13 @@
 //! Interval arithmetic with midpoint and radius. The midpoint has 106 bits (or 512), and every operation
 //! adds a bound of its rounding error to the radius. A result encloses the exact result for all values in
-//! the operands.
+//! the operands; docs/proof.md derives this, down to numbers that no double holds.
 
 use super::{DoubleDouble, Number};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Compensates for the rounding of the radius itself: at most a dozen operations in double precision.
 pub(crate) const OUTWARD: f64 = 1.0 + 32.0 * f64::EPSILON;
-/// Covers results that underflow.
+/// Covers what underflows: the operations err by less than 2^-1070 there, and `nearest` by 2^-1074.
 const TINY: f64 = 1e-290;
 
 /// All numbers x with `|x - mid| <= radius`. With an infinite or NaN radius the number is unknown.
@@ -46,13 +46,18 @@ impl<F: Number> Ball<F> {
 
     /// A bound on the modulus.
     pub(crate) fn magnitude(self) -> f64 {
-        (self.mid.nearest().abs() + self.radius) * OUTWARD
+        (self.size() + self.radius) * OUTWARD
+    }
+
+    /// A bound on the modulus of the midpoint, up to a relative error of 2^-52.
+    fn size(self) -> f64 {
+        if self.mid == F::ZERO { 0.0 } else { self.mid.nearest().abs() + TINY }
     }
 
     /// No value of the ball is less.
     pub(crate) fn lower(self) -> f64 {
-        let value = self.mid.nearest();
-        value - (self.radius + value.abs() * f64::EPSILON) * OUTWARD
+        // 2^-52 is the error of the nearest double, the rest that of the difference.
+        self.mid.nearest() - (self.radius + self.size() * (2.0 * f64::EPSILON)) * OUTWARD
     }
 
     /// No value of the ball is larger.
@@ -69,11 +74,16 @@ impl<F: Number> Ball<F> {
         Self { mid, radius: (inherited + F::ROUNDING * mid.nearest().abs()) * OUTWARD + TINY }
     }
 
-    /// Enclosure of the root; NaN if the ball contains negative numbers.
+    fn unknown() -> Self {
+        Self { mid: F::from(f64::NAN), radius: f64::NAN }
+    }
+
+    /// Enclosure of the root; NaN if the ball contains negative numbers, or positive ones that are not clearly
+    /// above the least double.
     pub(crate) fn sqrt(self) -> Self {
         let least = self.lower();
         if least.is_nan() || least < 0.0 {
-            return Self { mid: F::from(f64::NAN), radius: f64::NAN };
+            return Self::unknown();
         }
         let root = self.mid.sqrt();
         // |sqrt(x) - sqrt(m)| = |x - m| / (sqrt(x) + sqrt(m)).
@@ -119,29 +129,30 @@ impl<F: Number> Mul for Ball<F> {
         if self.is_zero() || other.is_zero() {
             return Self::ZERO;
         }
-        let (x, y) = (self.mid.nearest().abs(), other.mid.nearest().abs());
-        let spread = x * other.radius + y * self.radius + self.radius * other.radius;
+        let spread = self.size() * other.radius + other.size() * self.radius + self.radius * other.radius;
         Self::rounded(self.mid * other.mid, spread)
     }
 }
 
 impl<F: Number> Div for Ball<F> {
     type Output = Self;
-    /// NaN if the divisor's ball contains zero.
+    /// NaN if the divisor's ball contains zero or reaches out of the normal doubles.
     fn div(self, other: Self) -> Self {
         let least = other.mid.nearest().abs() * (1.0 - f64::EPSILON) - other.radius * OUTWARD;
-        if least.is_nan() || least <= 0.0 {
-            return Self { mid: F::from(f64::NAN), radius: f64::NAN };
+        if !least.is_normal() || least < 0.0 {
+            return Self::unknown();
         }
-        let quotient = self.mid / other.mid;
-        // |x/y - m/n| <= (|x - m| + |m/n| |y - n|) / |y|.
-        let spread = (self.radius + quotient.nearest().abs() * OUTWARD * other.radius) / least;
-        Self::rounded(quotient, spread * OUTWARD)
+        let quotient = Self::exactly(self.mid / other.mid);
+        // |x/y - m/n| <= |x - m| / |y| + |m/n| |y - n| / |y|, where the last factor may underflow.
+        let relative = if other.radius == 0.0 { 0.0 } else { other.radius / least + f64::MIN_POSITIVE };
+        let spread = self.radius / least + quotient.size() * relative;
+        Self::rounded(quotient.mid, spread * OUTWARD)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::{BigFloat, exact::Exact};
     use super::*;
     use proptest::prelude::*;
 
@@ -160,6 +171,91 @@ mod tests {
             prop_assert!(holds(x.sqrt(), u.sqrt()));
             prop_assert!(x.lower() <= u.nearest() && u.nearest() <= x.upper());
         }
+    }
+
+    /// Balls with midpoints and radii from the least to the largest doubles and beyond.
+    fn any_ball<F: Number>(most: i32) -> impl Strategy<Value = Ball<F>> {
+        let power = move || prop_oneof![-10..10, -most..most, -1074..-900, 900..1020];
+        let radius = prop_oneof![Just(0.0), Just(1e-300), Just(1e300), 1.0..2.0f64];
+        (-2.0..2.0f64, power(), power(), radius, power()).prop_map(|(x, p, q, radius, r)| {
+            let mid = F::from(x) * F::from(2f64.powi(p)) * F::from(2f64.powi(q.clamp(-500, 500)));
+            Ball::exactly(mid).widened(radius * 2f64.powi(r.min(1000)))
+        })
+    }
+
+    /// Values of a ball: its ends, its middle and another.
+    fn values<F: Number + Into<Exact>>(ball: Ball<F>) -> [Exact; 4] {
+        [-1.0, 0.0, 0.75, 1.0].map(|t| ball.mid.into().plus(&Exact::from(ball.radius).times(&t.into())))
+    }
+
+    fn is_unknown<F: Number>(ball: Ball<F>) -> bool {
+        !ball.radius.is_finite()
+    }
+
+    /// Whether `ball` holds `numerator` / `denominator`.
+    fn holds<F: Number + Into<Exact>>(ball: Ball<F>, numerator: &Exact, denominator: &Exact) -> bool {
+        is_unknown(ball) || {
+            let rest = ball.mid.into().times(denominator).minus(numerator);
+            rest.is_within(&Exact::from(ball.radius).times(denominator))
+        }
+    }
+
+    fn holds_root<F: Number + Into<Exact>>(ball: Ball<F>, square: &Exact) -> bool {
+        let [least, .., most] = if is_unknown(ball) { return true } else { values(ball) };
+        let zero = Exact::from(0.0);
+        let is_low = least.times(&least).is_within(square) || least.plus(&least.abs()).is_within(&zero);
+        is_low && square.is_within(&most.times(&most))
+    }
+
+    fn all_values_are_held<F: Number + Into<Exact>>(x: Ball<F>, y: Ball<F>) -> Result<(), TestCaseError> {
+        let one = Exact::from(1.0);
+        for u in values(x) {
+            prop_assert!(!x.magnitude().is_finite() || u.is_within(&x.magnitude().into()));
+            for bound in [x.lower(), x.upper()].into_iter().filter(|bound| bound.is_finite()) {
+                let above =
+                    if bound == x.lower() { u.minus(&bound.into()) } else { Exact::from(bound).minus(&u) };
+                prop_assert!(above.minus(&above.abs()).is_within(&Exact::from(0.0)), "{:?} {bound:e}", x);
+            }
+            if !is_unknown(x.sqrt()) {
+                prop_assert!(holds_root(x.sqrt(), &u), "root of {:?}", x);
+            }
+            for v in values(y) {
+                prop_assert!(holds(x + y, &u.plus(&v), &one), "{:?} + {:?}", x, y);
+                prop_assert!(holds(x * y, &u.times(&v), &one), "{:?} times {:?}", x, y);
+                prop_assert!(holds(x / y, &u, &v), "{:?} over {:?}", x, y);
+            }
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 4096, failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// Against exact integers.
+        #[test]
+        fn no_value_is_lost_however_large_or_small(
+            x in any_ball::<BigFloat>(1020), y in any_ball::<BigFloat>(1020),
+            u in any_ball::<DoubleDouble>(400), v in any_ball::<DoubleDouble>(400),
+        ) {
+            if !is_unknown(x) && !is_unknown(y) {
+                all_values_are_held(x, y)?;
+            }
+            if [u, v].iter().all(|&ball| !is_unknown(ball) && ball.nearest().is_finite()) {
+                all_values_are_held(u, v)?;
+            }
+        }
+    }
+
+    /// Numbers that no double holds: the product of a tiny midpoint with a wide ball, and a quotient by a huge
+    /// number.
+    #[test]
+    fn midpoints_beyond_the_doubles_count() {
+        let tiny = BigFloat::from(1e-200) * BigFloat::from(1e-130);
+        let wide = Ball::<BigFloat>::ZERO.widened(1e100);
+        assert!((Ball::exactly(tiny) * wide).radius() >= 1e-230);
+        let quotient = Ball::<BigFloat>::ZERO.widened(1e308) / Ball::exactly(BigFloat::from(1.0) / tiny);
+        assert!(quotient.radius().is_nan() || quotient.radius() >= 1e-22);
+        assert!(Ball::exactly(-tiny).lower() < 0.0 && Ball::exactly(tiny).magnitude() > 0.0);
     }
 
     #[test]
