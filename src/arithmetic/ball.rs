@@ -78,8 +78,8 @@ impl<F: Number> Ball<F> {
         Self { mid: F::from(f64::NAN), radius: f64::NAN }
     }
 
-    /// Enclosure of the root; NaN if the ball contains negative numbers, or positive ones that are not clearly
-    /// above the least double.
+    /// Enclosure of the root; NaN if the ball contains negative numbers, or positive ones that are not
+    /// clearly above the least double.
     pub(crate) fn sqrt(self) -> Self {
         let least = self.lower();
         if least.is_nan() || least < 0.0 {
@@ -246,8 +246,8 @@ mod tests {
         }
     }
 
-    /// Numbers that no double holds: the product of a tiny midpoint with a wide ball, and a quotient by a huge
-    /// number.
+    /// Numbers that no double holds: the product of a tiny midpoint with a wide ball, and a quotient by
+    /// a huge number.
     #[test]
     fn midpoints_beyond_the_doubles_count() {
         let tiny = BigFloat::from(1e-200) * BigFloat::from(1e-130);

@@ -33,8 +33,8 @@ impl Default for BigFloat {
     }
 }
 
-/// The words `words[..]` as a number below `2^exponent`; what lies more than 512 bits below the first bit set
-/// is dropped.
+/// The words `words[..]` as a number below `2^exponent`; what lies more than 512 bits below the first
+/// bit set is dropped.
 fn normalised(words: &[u64], exponent: i64, negative: bool) -> BigFloat {
     let Some(top) = words.iter().rposition(|&word| word != 0) else { return BigFloat::ZERO };
     let shift = words[top].leading_zeros();
