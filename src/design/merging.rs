@@ -3,6 +3,7 @@
 //! Two channels whose filters are proportional and that sample at one instant carry one measurement. For
 //! recursive filters, so do two that sample whole slow periods apart: the later sample of one is the earlier
 //! sample of the other, which a filter with memory has seen. Kept apart, they would make the plant singular.
+//! Order reduction keeps these apart (`realise`): a filter of few states has seen less.
 
 use super::DesignError;
 use super::lifting::{JointState, SAME_INSTANT};
@@ -196,6 +197,18 @@ impl MergedChannels {
             if part.representative == merged { part.share } else { 0.0 }
         };
         Mat::from_fn(self.problem.channels.len(), self.shares.len(), entry)
+    }
+
+    /// The matrix that maps the channels of `finer`, which keeps apart some channels that are one here, to
+    /// the channels here. Both weigh the channels of one instant in the same proportions.
+    pub(super) fn shares_of(&self, finer: &Self) -> Mat {
+        let representatives = finer.representatives();
+        let entry = |merged: usize, of: usize| {
+            let channel = representatives[of];
+            let part = self.shares[channel];
+            if part.representative == merged { part.share / finer.shares[channel].share } else { 0.0 }
+        };
+        Mat::from_fn(self.problem.channels.len(), finer.problem.channels.len(), entry)
     }
 }
 

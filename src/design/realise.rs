@@ -2,7 +2,7 @@
 //! reduces the order or quantises the taps if the spec asks for it, and chooses the realisation that runs
 //! fastest.
 
-use super::merging::MergedChannels;
+use super::merging::{MergedChannels, Repeats};
 use super::methods::{Filters, Synthesis};
 use super::plant::LiftedPlant;
 use super::problem::Problem;
@@ -47,7 +47,7 @@ pub(super) fn realise(
     synthesis: &Synthesis,
 ) -> Result<Realised, DesignError> {
     let whole = if merged.are_unchanged() { merged_plant.clone() } else { LiftedPlant::new(problem)? };
-    let realisation = Realisation { spec, whole: &whole, merged, merged_plant };
+    let realisation = Realisation { spec, problem, whole: &whole, merged };
     let realised = match &synthesis.filters {
         Filters::Fir(taps) => realisation.with_integers(realisation.fir(taps, synthesis.peak)?),
         Filters::StateSpace(system) => realisation.state_space(system, synthesis.peak.gain),
@@ -59,10 +59,10 @@ pub(super) fn realise(
 struct Realisation<'a> {
     spec: &'a Spec,
     /// All channels.
+    problem: &'a Problem,
+    /// The plant of all channels.
     whole: &'a LiftedPlant,
     merged: &'a MergedChannels,
-    /// The merged channels.
-    merged_plant: &'a LiftedPlant,
 }
 
 impl Realisation<'_> {
@@ -91,6 +91,9 @@ impl Realisation<'_> {
 
     /// A recursive bank of the order that the spec asks for; `norm` is the norm of the error of `system`
     /// with the merged channels.
+    ///
+    /// A smaller bank has a channel that is whole periods older as well: it costs no state, whereas the bank
+    /// would need states to keep the newer channel's samples as long.
     fn state_space(&self, system: &StateSpace, norm: f64) -> Result<Realised, DesignError> {
         let full = self.fastest_realisation(&system.map_inputs(&self.merged.shares())?, norm)?;
         let (Some(reduction), SynthesisFilters::StateSpace(block)) =
@@ -98,9 +101,10 @@ impl Realisation<'_> {
         else {
             return Ok(full);
         };
+        let distinct = self.problem.merge_channels(Repeats::AtOneInstant).of_unit_size()?;
         let problem = ReductionProblem {
-            plant: self.merged_plant,
-            bank: system,
+            plant: &LiftedPlant::new(&distinct.problem)?,
+            bank: &system.map_inputs(&self.merged.shares_of(&distinct))?,
             order: block.a.len(),
             width: self.whole.channels(),
             aim: if self.spec.design.method == Method::H2 { Aim::MeanSquare } else { Aim::WorstCase },
@@ -109,17 +113,19 @@ impl Realisation<'_> {
         let (smaller, record) = reduce(&problem, reduction)?;
         let evaluated = match smaller {
             None => full,
-            Some(smaller) => self.reduced_realisation(&smaller, record.reduced.figures.gamma)?,
+            Some(smaller) => {
+                let whole = smaller.map_inputs(&distinct.shares())?;
+                self.reduced_realisation(&whole, record.reduced.figures.gamma)?
+            }
         };
         Ok(Realised { reduction: Some(record), ..evaluated })
     }
 
     /// A reduced bank for all channels, in a fast realisation if one keeps the norm `promised`.
     fn reduced_realisation(&self, reduced: &FirWithTail, promised: f64) -> Result<Realised, DesignError> {
-        let whole = reduced.map_inputs(&self.merged.shares())?;
-        match self.fast_realisation(&whole, promised)? {
+        match self.fast_realisation(reduced, promised)? {
             Some(found) => Ok(found),
-            None => evaluate(self.whole, block_filters(&whole.realise()?)),
+            None => evaluate(self.whole, block_filters(&reduced.realise()?)),
         }
     }
 

@@ -161,8 +161,8 @@ fn same_instants(problem: &Problem) -> Option<String> {
         format!("{:.1e} fast periods apart", apart(i, j))
     };
     Some(format!(
-        "channels {} and {} sample {distance} modulo the slow period; channels that sample at one instant lower the \
-         noise and nothing else",
+        "channels {} and {} sample {distance} modulo the slow period: in a bank with enough taps or states such channels \
+         lower the noise and nothing else",
         i.min(j) + 1,
         i.max(j) + 1
     ))
@@ -175,8 +175,8 @@ fn long_span(problem: &Problem) -> Option<String> {
     let ratio = problem.ratio;
     (span >= ratio as f64).then(|| {
         format!(
-            "the delays span {span:.6} fast periods, more than the ratio {ratio}; a channel that is a whole slow period \
-             late adds nothing but latency"
+            "the delays span {span:.6} fast periods, more than the ratio {ratio}: to a bank with enough taps or states a \
+             channel that is a whole slow period late adds nothing but latency"
         )
     })
 }

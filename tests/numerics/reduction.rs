@@ -124,6 +124,27 @@ fn the_unit_of_the_signal_does_not_matter() {
     }
 }
 
+/// Without states a bank is the taps of one frame, which other methods find. A channel that is whole periods
+/// older gives it another sample.
+#[test]
+fn without_states_channels_whole_periods_apart_are_as_good_as_taps() {
+    for (ratio, latency, delays) in [(1, 1, &[0.3, 1.3][..]), (2, 3, &[2.4, 0.4, 1.1])] {
+        let spec = alike(&butterworth(2, 0.2 * TAU), ratio, latency, delays);
+        for method in [Method::Fir, Method::H2] {
+            let mut taps = spec.clone();
+            taps.design = DesignSpec::new(method, Some(ratio));
+            let taps = design(&taps, &Options::without_proof()).unwrap().bank.gamma.norm.unwrap();
+            let recursive = if method == Method::H2 { Method::H2 } else { Method::Iir };
+            let stateless = check(&reduced(spec.clone(), recursive, Reduction::Order(0)), 0);
+            let gamma = stateless.gamma.norm.unwrap();
+            assert!((gamma / taps - 1.0).abs() < 1e-5, "{} {ratio}: {gamma} {taps}", method.name());
+        }
+        // One state more can only help.
+        let one = check(&reduced(spec, Method::Iir, Reduction::Order(1)), 1).gamma.norm.unwrap();
+        println!("{delays:?}: one state {one}");
+    }
+}
+
 #[test]
 fn nasty_front_ends_end_as_banks_of_that_order() {
     let cases = [
