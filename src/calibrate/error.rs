@@ -10,7 +10,7 @@ use crate::units::{FastPeriods, Hertz};
 pub enum CalibrateError {
     /// Complex samples beside real ones, or without tones.
     #[error(
-        "{complex} of {records} captures are complex: such captures are calibrated by tones (--tone), and all are complex or none is"
+        "{complex} of {records} captures are complex: such captures are calibrated by tones, and all are complex or none is"
     )]
     ComplexSamples {
         /// Complex records.
@@ -103,13 +103,13 @@ pub enum CalibrateError {
     /// Parameters with the same effect on the captures.
     #[error(
         "the captures do not tell the fitted values apart: delay and cut-off have the same effect on these frequencies; fit fewer \
-         of them with --fit, or use a signal of more bandwidth"
+         of them, or use a signal of more bandwidth"
     )]
     NotIdentifiable,
     /// A cut-off that the tones do not determine.
     #[error(
         "channel {channel}: the tones determine the cut-off to {sigma:.1e} of itself only, because a change of the cut-off looks like \
-         one of the delay there; add tones near and above the cut-off, or leave cutoff out of --fit"
+         one of the delay there; add tones near and above the cut-off, or do not fit the cut-off"
     )]
     CutoffLooksLikeDelay {
         /// From 1.
@@ -142,7 +142,7 @@ pub enum CalibrateError {
     /// The Nyquist zone of a tone does not follow from the nominal delays.
     #[error(
         "the tone that appears at {alias} could be at {best} or at {other}: the delays of the spec are too far from the true ones, or \
-         too symmetric, to tell; give the frequency with --tone"
+         too symmetric, to tell; give the frequency"
     )]
     AmbiguousZone {
         /// Where it appears, below half the slow rate.

@@ -34,8 +34,7 @@ pub enum Warning {
     /// The tones contradict each other by more than their noise, so all intervals were widened.
     #[error(
         "the tones contradict each other {misfit:.1} times as much as their noise explains, and the intervals were \
-         widened by that; the front ends may differ from those of the spec (--fit delay,gain,offset,cutoff fits the \
-         cut-offs)"
+         widened by that; the front ends may differ from those of the spec: fit the cut-offs as well"
     )]
     TonesDisagree {
         /// The factor.

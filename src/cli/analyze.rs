@@ -86,8 +86,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let questions = Questions { errors, jitter, sensitivity: args.sensitivity, loss: args.accuracy };
     let analysis = design::analyze(&bank, &args.delay_error).in_file(&args.bank)?;
     let certified = args.certify.then(|| design::certify(&bank)).transpose().in_file(&args.bank)?;
-    let errors = worst_case::Report::new(&bank, questions)
-        .map_err(|error| Failure::of(&args.bank, worst_case::explained(&error)))?;
+    let errors = worst_case::Report::new(&bank, questions).in_file(&args.bank)?;
     if let Some((path, (errors, case))) = args.sweep.as_ref().zip(errors.case()) {
         Sweep::new(&bank, errors, &case.point).in_file(&args.bank)?.write(path, args.force)?;
         // The table alone, so that a program can read it.

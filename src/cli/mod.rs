@@ -33,6 +33,7 @@ mod output;
 mod plot;
 mod print;
 mod progress;
+mod remedy;
 mod report;
 mod run;
 mod simulate;

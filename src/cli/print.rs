@@ -1,6 +1,7 @@
 //! All that the commands say: results on standard output, messages on standard error, and the one message of
 //! a failure.
 
+use super::remedy::explained;
 use crate::files::leftovers;
 use crate::overview::understood;
 use crate::pipeline::PipelineError;
@@ -23,13 +24,13 @@ pub enum Failure {
 
 impl Failure {
     /// A failure of the input with `message`.
-    pub fn input(message: impl ToString) -> Self {
-        Self::Input(message.to_string())
+    pub fn input(message: impl Display + 'static) -> Self {
+        Self::Input(explained(&message))
     }
 
     /// A failure of the file at `path`.
-    pub(super) fn of(path: &Path, problem: impl Display) -> Self {
-        Self::Input(format!("{}: {problem}", name(path)))
+    pub(super) fn of(path: &Path, problem: impl Display + 'static) -> Self {
+        Self::Input(format!("{}: {}", name(path), explained(&problem)))
     }
 
     /// A failure of a run. A closed output pipe is not reported as an error.
@@ -58,7 +59,7 @@ pub(super) trait InFile<T> {
     fn in_file(self, path: &Path) -> Result<T, Failure>;
 }
 
-impl<T, E: Display> InFile<T> for Result<T, E> {
+impl<T, E: Display + 'static> InFile<T> for Result<T, E> {
     fn in_file(self, path: &Path) -> Result<T, Failure> {
         self.map_err(|error| Failure::of(path, error))
     }

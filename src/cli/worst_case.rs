@@ -9,7 +9,6 @@ use crate::design::uncertainty::{self, DelayDerivatives, Floor, norm_at};
 use crate::plot::{Chart, Series};
 use crate::quantity::readable;
 use crate::units::{Hertz, Seconds};
-use crate::verify::VerifyError;
 use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Slopes, Taps, WorstCase, slopes};
 use std::fmt::Write;
 use std::path::Path;
@@ -236,16 +235,6 @@ fn time(seconds: f64) -> String {
 /// Four significant digits.
 fn rounded(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
-}
-
-/// An error of the proof, with the options that it is about.
-pub(super) fn explained(error: &DesignError) -> String {
-    match error {
-        DesignError::Verify(VerifyError::WideBox) => {
-            format!("--delay-box, --gain-box, --cutoff-box: {error}")
-        }
-        _ => error.to_string(),
-    }
 }
 
 /// Points per curve; an odd number has the nominal delays among them.

@@ -93,9 +93,12 @@ pub enum DesignError {
         /// The finest scale at which no tap is clipped.
         fitting: i32,
     },
-    /// The interior-point method found no taps.
-    #[error("no taps were found; please report the spec")]
-    NoTaps,
+    /// The settings of `separation` lack the channels in units of the slow period.
+    #[error(
+        "method = \"separation\" was called without its channels at the slow rate; this is a fault of hybank, please report \
+         the spec"
+    )]
+    NoSlowRate,
     /// The sinc comparison needs the Nyquist rate: as many channels as the ratio.
     #[error(
         "method = \"sinc\" needs as many distinct channels as the ratio (N = M), got {channels} channels and ratio {ratio}; \
@@ -176,9 +179,7 @@ pub enum DesignError {
         taps: usize,
     },
     /// The design would take longer than ten minutes.
-    #[error(
-        "this design would take about {effort}, and ten minutes are allowed: {remedy}; --no-limit runs it all the same"
-    )]
+    #[error("this design would take about {effort}, and ten minutes are allowed: {remedy}")]
     TooLong {
         /// The estimate.
         effort: Effort,
@@ -187,7 +188,7 @@ pub enum DesignError {
     },
     /// The design would need more memory than there is.
     #[error(
-        "this design would take about {effort}, and this process may use {}: {remedy}; --no-limit tries it all the same",
+        "this design would take about {effort}, and this process may use {}: {remedy}",
         memory_text(*.memory)
     )]
     TooLarge {

@@ -217,15 +217,10 @@ impl<E: AffineError> Exchange<E> {
     }
 
     fn minimise_gamma(&mut self, tolerances: Tolerances) -> Result<Candidate, DesignError> {
-        let mut best: Option<Candidate> = None;
-        let mut width = f64::INFINITY;
-        for _ in 0..tolerances.rounds {
-            let tolerance = tolerances.tolerance(width);
-            let (candidate, above) = self.round(tolerances, tolerance)?;
-            if best.as_ref().is_none_or(|best| candidate.peaks.estimate < best.peaks.estimate) {
-                best = Some(candidate);
-            }
-            let gamma = best.as_ref().map_or(0.0, |best| best.peaks.estimate);
+        let mut tolerance = tolerances.tolerance(f64::INFINITY);
+        let (mut best, mut above) = self.round(tolerances, tolerance)?;
+        for _ in 1..tolerances.rounds {
+            let gamma = best.peaks.estimate;
             if gamma <= self.lower * (1.0 + tolerances.accuracy) || self.stop.is_due() {
                 break;
             }
@@ -234,9 +229,14 @@ impl<E: AffineError> Exchange<E> {
             if !added && tolerance <= tolerances.finest() {
                 break;
             }
-            width = if added { gamma / self.lower - 1.0 } else { 0.0 };
+            tolerance = tolerances.tolerance(if added { gamma / self.lower - 1.0 } else { 0.0 });
+            let (candidate, peaks) = self.round(tolerances, tolerance)?;
+            above = peaks;
+            if candidate.peaks.estimate < best.peaks.estimate {
+                best = candidate;
+            }
         }
-        best.ok_or(DesignError::NoTaps)
+        Ok(best)
     }
 
     /// Solves the problem on the points. Returns the unknowns and the frequencies of the peaks that belong

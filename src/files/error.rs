@@ -16,7 +16,7 @@ pub enum FileError {
         source: io::Error,
     },
     /// The output exists, or appeared while it was being written, and was not to be replaced.
-    #[error("{file}: the file exists; give another name or --force to replace it")]
+    #[error("{file}: the file exists; give another name, or allow it to be replaced")]
     Exists {
         /// Name of the file.
         file: String,

@@ -5,7 +5,7 @@
 pub enum ExportError {
     /// The format holds integers.
     #[error(
-        "{format} files hold integer taps, and this bank has none; design it with --method fir and --bits"
+        "{format} files hold integer taps, and this bank has none; design it with method = \"fir\" and bits"
     )]
     NoIntegers {
         /// Name of the format.

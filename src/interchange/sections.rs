@@ -74,7 +74,7 @@ impl Structure {
         let delayed: Vec<_> = (0..block.a.len()).map(|state| delayed_input(block, state)).collect();
         let poles = pole_blocks(block, &delayed).ok_or(ExportError::NoSections(
             "some of its poles nearly coincide, so that no sections side by side have its accuracy; npz and mat \
-             hold its matrices, and design --order gives fewer poles",
+             hold its matrices, and a design with order has fewer poles",
         ))?;
         Ok(Self { delayed, poles })
     }

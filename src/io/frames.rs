@@ -110,14 +110,16 @@ impl InputSource {
         if let Some(only) = self.only {
             if only >= channels {
                 let channel = only + 1;
-                return unfit(format!("--channel {channel}: it has {channels} channels, counted from 1"));
+                return unfit(format!(
+                    "channel {channel} was asked for: it has {channels} channels, counted from 1"
+                ));
             }
             return Ok(StreamHeader { channels: 1, ..header });
         }
         let converters = self.samples_per_frame();
         if self.interleaving.is_some() && channels != 1 {
             return unfit(format!(
-                "{channels} channels, but time-interleaved converters share one; read it without --interleaved, or \
+                "{channels} channels, but time-interleaved converters share one; read it as channels that are not interleaved, or \
                  extract that channel first"
             ));
         }

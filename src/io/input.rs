@@ -261,6 +261,6 @@ impl Input {
 /// The message for more lost frames than are allowed.
 pub(super) fn too_many_lost(frames: u64, most: u64) -> String {
     format!(
-        "{frames} frames were lost in all, more than {most}; check the numbers, or allow so many with --max-lost {frames}"
+        "{frames} frames were lost in all, more than {most}; check the numbers, or allow {frames} to be lost"
     )
 }

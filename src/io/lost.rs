@@ -105,7 +105,7 @@ impl LostLine {
     /// Line `number` of a file, or what is wrong with it.
     pub(super) fn parse(line: &str, number: usize) -> Result<Self, String> {
         let line: Line = serde_json::from_str(line)
-            .map_err(|error| format!("not an object of --lost: {}", without_place(&error)))?;
+            .map_err(|error| format!("not an object that says what was lost: {}", without_place(&error)))?;
         if line.channel == Some(0) {
             return Err("channel is 0; channels count from 1".into());
         }

@@ -165,7 +165,7 @@ impl Read for RawReader {
         let opened = self.bytes.insert(self.source.stream()?);
         let count = opened.read(bytes)?;
         if matches!(bytes[..count], [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'A', b'V', b'E', ..]) {
-            let problem = "it begins with a WAV header, but raw samples are expected; give --format wav";
+            let problem = "it begins with a WAV header, but raw samples are expected; give the format wav";
             return Err(IoError::unfit(&self.source.name())(problem.into()).into());
         }
         Ok(count)

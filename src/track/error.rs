@@ -1,6 +1,7 @@
 //! Why delays cannot be followed.
 
 use crate::calibrate::CalibrateError;
+use crate::sine_fit::SineFitError;
 use crate::units::Hertz;
 
 /// Why delays cannot be followed.
@@ -8,8 +9,7 @@ use crate::units::Hertz;
 pub enum TrackError {
     /// The taps are fixed.
     #[error(
-        "the taps of this bank do not follow delays; design it with tracking = \"affine\" in [design] (or --tracking affine) \
-         and with [uncertainty] delay in its spec"
+        "the taps of this bank do not follow delays; design it with tracking = \"affine\" in [design] and with [uncertainty] delay in its spec"
     )]
     NoTapSlopes,
     /// The filters are recursive.
@@ -49,6 +49,70 @@ pub enum TrackError {
         /// The line, from 1.
         line: usize,
         /// What is wrong with it.
-        problem: String,
+        problem: ReadingProblem,
     },
+}
+
+/// What is wrong with a line of a file of delays.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ReadingProblem {
+    /// It is no JSON object with the keys of a reading.
+    #[error("{reason}")]
+    Syntax {
+        /// Why.
+        reason: String,
+    },
+    /// Not one delay per channel.
+    #[error("{given} delays for {channels} channels; give one for each, or null")]
+    DelayCount {
+        /// Delays of the line.
+        given: usize,
+        /// Channels of the bank.
+        channels: usize,
+    },
+    /// A delay without its interval.
+    #[error("channel {channel}: its delay has no half_width; give one number for all channels or a list")]
+    NoHalfWidth {
+        /// From 1.
+        channel: usize,
+    },
+    /// A delay or half-width that is none.
+    #[error(
+        "channel {channel}: delay {delay} with half_width {half_width}; both are finite numbers in seconds, and the \
+         half-width is zero or more"
+    )]
+    Numbers {
+        /// From 1.
+        channel: usize,
+        /// As given.
+        delay: f64,
+        /// As given.
+        half_width: f64,
+    },
+    /// The lines are not in the order of time.
+    #[error("frame {frame} comes after a later one; sort the lines")]
+    Order {
+        /// Its frame.
+        frame: u64,
+    },
+}
+
+/// Why the delays of a block were not measured.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(super) enum NotMeasured {
+    /// A channel has no signal.
+    #[error("silence")]
+    Silence,
+    /// No channel's delay is known well enough.
+    #[error("the signal is too faint or too noisy")]
+    TooNoisy,
+    /// The file has no line in this block.
+    #[error("no reading")]
+    NoReading,
+    /// The channels do not agree with the spec.
+    #[error(transparent)]
+    Signal(#[from] CalibrateError),
+    /// The pilot cannot be fitted.
+    #[error(transparent)]
+    Pilot(#[from] SineFitError),
 }

@@ -1,5 +1,6 @@
 //! Follows the delays of a bank's channels block by block, and says how its taps are to change.
 
+use super::error::NotMeasured;
 use super::filter::{DelayFilter, DelayMeasurement, DelayState, DriftModel};
 use super::frame_shift::{least_half, shift_for};
 use super::log::{Logged, TrackWarning};
@@ -121,17 +122,21 @@ impl Follower {
         let smallest = followed.iter().map(|&j| of_all[j].0).fold(f64::INFINITY, f64::min);
         let wanted = Seconds((KNOWN * spec.fast_period.0).max(KNOWN_SHARE * smallest) / HALF_WIDTH);
         let frame = spec.fast_period * spec.ratio as f64;
-        // Each begins with the delay of the spec and its interval.
-        let tracker = |&j: &usize| {
-            let (delay, sigma) = (spec.channels[j].delay, of_all[j].0 / HALF_WIDTH);
-            let state = DelayState::known(delay, sigma, settings.rate_deviation);
+        let (mut trackers, mut warnings) = (Vec::new(), Vec::new());
+        for &j in &followed {
             let timeline = match &source {
                 DelaySource::Readings(readings) => Timeline::new(readings, j, frame, settings.model),
-                DelaySource::Pilot(_) | DelaySource::AnySignal => None,
+                DelaySource::Pilot(_) | DelaySource::AnySignal => Ok(None),
             };
-            DelayTracker::new(j, of_all[j], DelayFilter::new(state, settings.model), timeline)
-        };
-        let trackers = followed.iter().map(tracker).collect();
+            let timeline = timeline.unwrap_or_else(|reason| {
+                warnings.push(TrackWarning::NotSmoothed { channel: j + 1, reason });
+                None
+            });
+            // Each begins with the delay of the spec and its interval.
+            let (delay, sigma) = (spec.channels[j].delay, of_all[j].0 / HALF_WIDTH);
+            let state = DelayState::known(delay, sigma, settings.rate_deviation);
+            trackers.push(DelayTracker::new(j, of_all[j], DelayFilter::new(state, settings.model), timeline));
+        }
         let no_shifts = vec![0; spec.channels.len()];
         Ok(Self {
             spec,
@@ -145,8 +150,8 @@ impl Follower {
             blocks: 0,
             shifts: VecDeque::from([no_shifts.clone(), no_shifts.clone()]),
             last_shifts: no_shifts,
-            warned: Vec::new(),
-            warnings: Vec::new(),
+            warned: warnings.clone(),
+            warnings,
         })
     }
 
@@ -168,7 +173,7 @@ impl Follower {
         self.trackers.iter_mut().for_each(|tracker| tracker.look_up(time));
         let (measured, reason) = match measured {
             Ok(measured) => (measured, None),
-            Err(reason) => (vec![None; self.spec.channels.len()], Some(reason)),
+            Err(reason) => (vec![None; self.spec.channels.len()], Some(reason.to_string())),
         };
         let log = self.logged(centre, measured, reason);
         self.shifts.pop_front();
@@ -184,11 +189,11 @@ impl Follower {
         samples: &[Vec<f64>],
         first: u64,
         centre: f64,
-    ) -> Result<Vec<Option<DelayMeasurement>>, String> {
+    ) -> Result<Vec<Option<DelayMeasurement>>, NotMeasured> {
         if let DelaySource::Readings(readings) = &self.source {
             let frames = first..first + self.settings.block_frames as u64;
             let readings = Reading::within(readings, frames).to_vec();
-            let mut latest = Err("no reading".to_owned());
+            let mut latest = Err(NotMeasured::NoReading);
             for reading in readings {
                 let of = |delay: &Option<(Seconds, Seconds)>| {
                     delay.map(|(delay, sigma)| DelayMeasurement { delay, variance: sigma.0 * sigma.0 })

@@ -2,6 +2,7 @@
 
 use super::filter::{DelayMeasurement, DelayState};
 use super::tracker::Lock;
+use crate::sampling::SamplingError;
 use crate::spec::{HALF_WIDTH, Spec};
 use crate::units::Seconds;
 use serde::Serialize;
@@ -91,6 +92,14 @@ pub enum TrackWarning {
         /// Half-width of a box that no delay leaves, if taps can be designed for one.
         enough: Option<Seconds>,
     },
+    /// No curve through the readings of a channel was found, so a filter follows them, which knows the past
+    /// only.
+    NotSmoothed {
+        /// From 1.
+        channel: usize,
+        /// Why.
+        reason: SamplingError,
+    },
     /// Two channels will sample at one instant.
     Coincidence {
         /// From 1.
@@ -133,6 +142,11 @@ impl fmt::Display for TrackWarning {
                     half.0
                 )
             }
+            Self::NotSmoothed { channel, reason } => write!(
+                f,
+                "channel {channel}: no curve goes through its readings, so each is followed with those before it only: \
+                 {reason}; check their frames, delays and half-widths"
+            ),
             Self::Coincidence { channels: [a, b], after } => write!(
                 f,
                 "the channels {a} and {b} will sample at one instant in {:.3e} s: no bank recovers the signal there",

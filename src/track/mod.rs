@@ -38,7 +38,7 @@ mod timeline;
 mod tracker;
 
 pub use coincidence::Coincidence;
-pub use error::TrackError;
+pub use error::{ReadingProblem, TrackError};
 pub use filter::{DelayFilter, DelayMeasurement, DelayState, DriftModel, Innovation};
 pub use follower::{Change, FollowSettings, Followed, Follower};
 pub use log::{Logged, TrackWarning};

@@ -1,6 +1,6 @@
 //! Delays that were measured elsewhere, as JSON lines.
 
-use super::TrackError;
+use super::{ReadingProblem, TrackError};
 use crate::spec::HALF_WIDTH;
 use crate::units::Seconds;
 use serde::Deserialize;
@@ -52,32 +52,29 @@ impl Reading {
             let fault = |problem| TrackError::Reading { file: file.to_owned(), line: number + 1, problem };
             let reading = Self::of_line(line, channels).map_err(fault)?;
             if readings.last().is_some_and(|last| last.frame > reading.frame) {
-                return Err(fault(format!(
-                    "frame {} comes after a later one; sort the lines",
-                    reading.frame
-                )));
+                return Err(fault(ReadingProblem::Order { frame: reading.frame }));
             }
             readings.push(reading);
         }
         Ok(readings)
     }
 
-    fn of_line(line: &str, channels: usize) -> Result<Self, String> {
-        let line: Line = serde_json::from_str(line).map_err(|error| error.to_string())?;
+    fn of_line(line: &str, channels: usize) -> Result<Self, ReadingProblem> {
+        let syntax = |error: serde_json::Error| ReadingProblem::Syntax { reason: error.to_string() };
+        let line: Line = serde_json::from_str(line).map_err(syntax)?;
         if line.delay.len() != channels {
-            let given = line.delay.len();
-            return Err(format!("{given} delays for {channels} channels; give one for each, or null"));
+            return Err(ReadingProblem::DelayCount { given: line.delay.len(), channels });
         }
         let of = |i: usize| {
-            let Some(delay) = line.delay[i] else { return Ok(None) };
-            let half = line.half_width.of(i).ok_or("a delay has no half_width")?;
-            // The half-width of the reference is zero: it is a definition.
-            if half < 0.0 || !half.is_finite() || !delay.is_finite() {
-                return Err(format!("half_width {half} of a delay: it is zero or more, in seconds"));
+            let (Some(delay), channel) = (line.delay[i], i + 1) else { return Ok(None) };
+            let half_width = line.half_width.of(i).ok_or(ReadingProblem::NoHalfWidth { channel })?;
+            if half_width < 0.0 || !half_width.is_finite() || !delay.is_finite() {
+                return Err(ReadingProblem::Numbers { channel, delay, half_width });
             }
-            Ok((half > 0.0).then_some((Seconds(delay), Seconds(half / HALF_WIDTH))))
+            // The half-width of the reference is zero: it is a definition.
+            Ok((half_width > 0.0).then_some((Seconds(delay), Seconds(half_width / HALF_WIDTH))))
         };
-        let delays = (0..channels).map(of).collect::<Result<_, String>>()?;
+        let delays = (0..channels).map(of).collect::<Result<_, _>>()?;
         Ok(Self { frame: line.frame, delays })
     }
 

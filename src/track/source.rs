@@ -1,5 +1,6 @@
 //! Delays of one block of samples, by a pilot tone or by any signal.
 
+use super::error::NotMeasured;
 use super::{DelayMeasurement, Reading, TrackError};
 use crate::calibrate::{CalibrationSignal, Fit, Model, Record, Settings, calibrate};
 use crate::sine_fit::{self, Channel, Estimate, ToneFit, alias, wrapped};
@@ -37,16 +38,16 @@ pub enum DelaySource {
 
 impl DelaySource {
     /// The delays of the channels relative to `reference`, which keeps that of `spec`; those of the others
-    /// in `spec` are what is expected. `Err` says why nothing was measured.
+    /// in `spec` are what is expected.
     pub(super) fn measure(
         &self,
         spec: &Spec,
         reference: usize,
         samples: &[Vec<f64>],
-    ) -> Result<Vec<Option<DelayMeasurement>>, String> {
+    ) -> Result<Vec<Option<DelayMeasurement>>, NotMeasured> {
         let records: Vec<Record> = samples.iter().map(|list| Record::new(list.clone())).collect();
         if records.iter().any(|record| record.rms() < LEAST_LEVEL) {
-            return Err("silence".to_owned());
+            return Err(NotMeasured::Silence);
         }
         let measured = match self {
             Self::Pilot(pilot) => by_pilot(spec, reference, &records, *pilot)?,
@@ -58,7 +59,7 @@ impl DelaySource {
             |m: &DelayMeasurement| m.variance > 0.0 && m.variance.sqrt() <= most && m.delay.0.is_finite();
         let kept: Vec<_> = measured.into_iter().map(|m| m.filter(useful)).collect();
         if kept.iter().all(Option::is_none) {
-            return Err("the signal is too faint or too noisy".to_owned());
+            return Err(NotMeasured::TooNoisy);
         }
         Ok(kept)
     }
@@ -71,21 +72,21 @@ fn by_pilot(
     reference: usize,
     records: &[Record],
     pilot: Hertz,
-) -> Result<Vec<Option<DelayMeasurement>>, String> {
-    let model = Model::new(spec).map_err(|error| error.to_string())?;
+) -> Result<Vec<Option<DelayMeasurement>>, NotMeasured> {
+    let model = Model::new(spec)?;
     let rate = model.slow_rate();
     let frames = records.iter().map(|record| record.samples.len()).min().unwrap_or(0);
     let centre = rate.period() * (0.5 * (frames as f64 - 1.0));
     let channels: Vec<Channel<'_>> =
         records.iter().map(|record| Channel { offset: -centre, ..record.channel() }).collect();
     let within = pilot * CLOCK_TOLERANCE + rate * (SEARCH_CYCLES / frames as f64);
-    let start = sine_fit::locate(&channels, rate, pilot, within).map_err(|error| error.to_string())?;
+    let start = sine_fit::locate(&channels, rate, pilot, within)?;
     let all = with_others(&channels, rate, start, frames);
     let mut tones: Vec<(Hertz, ToneFit)> = Vec::with_capacity(channels.len());
     for channel in &channels {
         let alone = std::slice::from_ref(channel);
-        let fitted = sine_fit::fit(alone, rate, &all).or_else(|_| sine_fit::fit(alone, rate, &[start]));
-        let fitted = fitted.map_err(|error| error.to_string())?;
+        // Without the others they count as noise, and the interval of the pilot is wider.
+        let fitted = sine_fit::fit(alone, rate, &all).or_else(|_| sine_fit::fit(alone, rate, &[start]))?;
         tones.push((fitted.frequencies[0].value, fitted.channels[0].tones[0]));
     }
     let (frequency, of_reference) = tones[reference];
@@ -108,6 +109,7 @@ fn by_pilot(
 /// The pilot first, and other tones that would count as noise if they were not fitted with it.
 fn with_others(channels: &[Channel<'_>], rate: Hertz, pilot: Hertz, frames: usize) -> Vec<Hertz> {
     let is_other = |f: &Hertz| (alias(*f / rate) - alias(pilot / rate)).abs() * frames as f64 > APART;
+    // Tones that are not found count as noise.
     let found = sine_fit::find_tones(channels, rate, MOST_OTHERS, OTHERS_RANGE).unwrap_or_default();
     std::iter::once(pilot).chain(found.into_iter().filter(is_other)).collect()
 }
@@ -117,10 +119,9 @@ fn by_any_signal(
     spec: &Spec,
     reference: usize,
     records: &[Record],
-) -> Result<Vec<Option<DelayMeasurement>>, String> {
+) -> Result<Vec<Option<DelayMeasurement>>, NotMeasured> {
     let fit = Fit { delay: true, gain: true, offset: false, cutoff: false };
-    let found = calibrate(spec, records, CalibrationSignal::Any, Settings { fit, reference });
-    let found = found.map_err(|error| error.to_string())?;
+    let found = calibrate(spec, records, CalibrationSignal::Any, Settings { fit, reference })?;
     let h = spec.fast_period;
     let measured = |estimate: &crate::calibrate::ChannelEstimate| {
         let Estimate { value, sigma } = estimate.delay?;

@@ -2,8 +2,8 @@
 
 use super::filter::{DelayState, DriftModel};
 use super::readings::Reading;
-use crate::sampling::SmoothingSpline;
 use crate::sampling::nonuniform::{Measured, Smoothness};
+use crate::sampling::{SamplingError, SmoothingSpline};
 use crate::spec::HALF_WIDTH;
 use crate::units::Seconds;
 
@@ -28,29 +28,38 @@ pub(super) struct Timeline {
 impl Timeline {
     /// Of channel `i`, with the time of a frame. `None` with readings of fewer than two frames, and for
     /// models in which the delay itself walks, which is no spline: then the filter follows them.
-    pub(super) fn new(readings: &[Reading], i: usize, frame: Seconds, model: DriftModel) -> Option<Self> {
+    ///
+    /// # Errors
+    /// [`SamplingError`] if no spline goes through the readings.
+    pub(super) fn new(
+        readings: &[Reading],
+        i: usize,
+        frame: Seconds,
+        model: DriftModel,
+    ) -> Result<Option<Self>, SamplingError> {
         let of = |reading: &Reading| {
             let (delay, sigma) = reading.delays[i]?;
             let (x, jitter) = (reading.frame as f64 * frame.0, ROUNDING * frame.0);
             Some((reading.frame, Measured { x, value: delay.0, error: sigma.0, jitter }))
         };
-        if model.delay_walk > 0.0 {
-            return None;
-        }
         let mut all: Vec<(u64, Measured)> = readings.iter().filter_map(of).collect();
+        let has_two_frames = all.iter().any(|sample| sample.0 != all[0].0);
+        if model.delay_walk > 0.0 || !has_two_frames {
+            return Ok(None);
+        }
         let mut refused = Vec::new();
         for _ in 0..ROUNDS {
             let spline = spline(&all, model)?;
             let worst = contradictory(&spline);
             // Without two instants nothing is left to be judged by.
             if worst.is_empty() || all.len() < worst.len() + 2 {
-                return Some(Self { spline, refused });
+                return Ok(Some(Self { spline, refused }));
             }
             for k in worst.into_iter().rev() {
                 refused.push(all.remove(k).0);
             }
         }
-        Some(Self { spline: spline(&all, model)?, refused })
+        Ok(Some(Self { spline: spline(&all, model)?, refused }))
     }
 
     /// What is known at a time.
@@ -83,8 +92,8 @@ impl Timeline {
     }
 }
 
-fn spline(samples: &[(u64, Measured)], model: DriftModel) -> Option<SmoothingSpline> {
-    SmoothingSpline::new(samples.iter().map(|sample| sample.1).collect(), model.rate_walk).ok()
+fn spline(samples: &[(u64, Measured)], model: DriftModel) -> Result<SmoothingSpline, SamplingError> {
+    SmoothingSpline::new(samples.iter().map(|sample| sample.1).collect(), model.rate_walk)
 }
 
 /// The samples that contradict the others, each the worst of those beside it.
@@ -125,7 +134,7 @@ mod tests {
     fn readings_on_both_sides_halve_the_error_of_the_filter() {
         let (sigma, delay) = (2e-8, |t: f64| 1e-5 + 3e-6 * t + 5e-7 * (2.0 * t).sin());
         let all = readings(400, 20, sigma, delay);
-        let timeline = Timeline::new(&all, 0, FRAME, MODEL).unwrap();
+        let timeline = Timeline::new(&all, 0, FRAME, MODEL).unwrap().unwrap();
         let mut filter = DelayFilter::new(DelayState::known(Seconds(1e-5), 1e-7, 1e-4), MODEL);
         let (mut smoothed, mut filtered, mut predicted, mut stated) = (0.0, 0.0, 0.0, 0.0);
         for reading in &all {
@@ -155,7 +164,7 @@ mod tests {
         for k in [3, 77, 78, 150] {
             all[k].delays[0].as_mut().unwrap().0 += Seconds(1e-6);
         }
-        let timeline = Timeline::new(&all, 0, FRAME, MODEL).unwrap();
+        let timeline = Timeline::new(&all, 0, FRAME, MODEL).unwrap().unwrap();
         let refused: Vec<u64> = (0..200).filter(|k| timeline.refuses(20 * k)).collect();
         assert_eq!(refused, [3, 77, 78, 150]);
         let known = timeline.at(Seconds(1.55));
@@ -168,7 +177,7 @@ mod tests {
         let delay = |t: f64| Some((Seconds(0.5e-6 * t * t), Seconds(1e-14)));
         let all: Vec<Reading> =
             [0, 4000].map(|f| Reading { frame: f, delays: vec![delay(1e-3 * f as f64)] }).into();
-        let timeline = Timeline::new(&all, 0, FRAME, MODEL).unwrap();
+        let timeline = Timeline::new(&all, 0, FRAME, MODEL).unwrap().unwrap();
         for t in [1.0, 2.0, 3.0] {
             let miss = timeline.at(Seconds(t)).delay.0 - 0.5e-6 * t * t;
             let bound = timeline.bound(Seconds(t), 1e-6).unwrap().0;
@@ -182,7 +191,16 @@ mod tests {
     #[test]
     fn one_reading_and_walks_of_the_delay_are_left_to_the_filter() {
         let all = readings(5, 20, 1e-8, |t| t);
-        assert!(Timeline::new(&all[..1], 0, FRAME, MODEL).is_none());
-        assert!(Timeline::new(&all, 0, FRAME, DriftModel { delay_walk: 1e-20, ..MODEL }).is_none());
+        assert!(Timeline::new(&all[..1], 0, FRAME, MODEL).unwrap().is_none());
+        assert!(Timeline::new(&all, 0, FRAME, DriftModel { delay_walk: 1e-20, ..MODEL }).unwrap().is_none());
+    }
+
+    /// A reading whose interval is no number leaves no spline, which is an error and not a missing timeline.
+    #[test]
+    fn readings_without_a_spline_are_an_error() {
+        let mut all = readings(5, 20, 1e-8, |t| t);
+        all[2].delays[0].as_mut().unwrap().1 = Seconds(f64::NAN);
+        let refused = Timeline::new(&all, 0, FRAME, MODEL).unwrap_err();
+        assert!(matches!(refused, SamplingError::NotFinite { .. }), "{refused}");
     }
 }

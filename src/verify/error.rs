@@ -41,7 +41,7 @@ pub enum VerifyError {
     },
     /// The file carries no certificate.
     #[error(
-        "proof.upper: the file carries no proof; `hybank design` writes one, and `hybank verify --search` searches for one"
+        "proof.upper: the file carries no proof of the upper end: design the bank with one, or search for one"
     )]
     NoCertificate,
     /// The certificate belongs to another system.

@@ -125,7 +125,7 @@ fn inputs_without_end_are_refused_with_their_bound() {
     desk.refused(1, &[&stream[..], &["/dev/zero"]].concat(), &["/dev/zero", "longer than", "lost samples"]);
     desk.write("lost", "{\"channel\":1,\"sample_start\":0,\"global_index\":0}\n{\"channel\":1,\"sample_start\":1,\"global_index\":4000000000}");
     let refused = [&stream[..], &["lost"]].concat();
-    desk.refused(1, &refused, &["in: ", "more than 67108864", "--max-lost 3999999999"]);
+    desk.refused(1, &refused, &["in: ", "more than 67108864", "allow 3999999999 to be lost"]);
     desk.write("zero.sigmf-meta", r#"{"global": {"core:datatype": "ri8", "core:dataset": "/dev/zero"}}"#);
     let args = ["stream", "bank.json", "--input", "zero.sigmf-meta", "-o", "out"];
     desk.refused(1, &args, &["zero.sigmf-meta", "core:dataset", "same folder"]);

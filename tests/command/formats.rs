@@ -83,7 +83,7 @@ fn captures_of_every_kind_give_the_same_samples() {
         desk.refused(2, &[&["fuse", "bank.json", "-o", "no.wav"], args].concat(), parts);
     }
     let third = ["fuse", "bank.json", "wide.wav", "wider.wav", "-o", "no.wav", "--channel", "3"];
-    desk.refused(1, &third, &["--channel 3", "2 channels, counted from 1"]);
+    desk.refused(1, &third, &["channel 3", "2 channels, counted from 1"]);
 }
 
 #[test]

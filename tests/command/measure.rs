@@ -161,7 +161,7 @@ fn channels_ends_and_standard_input() {
     wav::write(&desk, "both.wav", 2, 48_000, &both);
     wav::write(&desk, "x.wav", 1, 48_000, &tone);
     desk.refused(1, &["measure", "both.wav"], &["2 channels", "--channel 1 to 2"]);
-    desk.refused(1, &["measure", "both.wav", "--channel", "3"], &["--channel 3", "counted from 1"]);
+    desk.refused(1, &["measure", "both.wav", "--channel", "3"], &["channel 3", "counted from 1"]);
     desk.refused(1, &["measure", "both.wav", "--channel", "2"], &["both.wav", "no tone found"]);
     let mono = desk.json(&["measure", "x.wav", "--json"]);
     let first = desk.json(&["measure", "both.wav", "--channel", "1", "--json"]);

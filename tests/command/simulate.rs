@@ -299,7 +299,7 @@ fn one_channel_of_a_recording_is_a_source() {
     }
     for (code, more, parts) in [
         (1, &["--source", "wide.wav"][..], &["wide.wav has 3 channels", "--channel 1 to 3"][..]),
-        (1, &["--source", "wide.wav", "--channel", "4"], &["--channel 4", "has 3 channels, counted from 1"]),
+        (1, &["--source", "wide.wav", "--channel", "4"], &["channel 4", "has 3 channels, counted from 1"]),
         (2, &["--source", "wide.wav", "--channel", "0"], &["--channel"]),
         (2, &["--source", "step@1", "--channel", "1"], &["--channel 1", "no WAV recording"]),
     ] {

@@ -145,7 +145,7 @@ fn wav_goes_through_with_its_rate() {
     input.iter().for_each(|&x| writer.write_sample(x).unwrap());
     writer.finalize().unwrap();
     let raw = bench.run(&[], wav.get_ref());
-    assert!(!raw.status.success() && text(&raw.stderr).contains("give --format wav"), "{raw:?}");
+    assert!(!raw.status.success() && text(&raw.stderr).contains("give the format wav"), "{raw:?}");
     let output = bench.run(&["--format", "wav"], wav.get_ref());
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
     assert_eq!((&output.stdout[..4], &output.stdout[24..28]), (&b"RIFF"[..], &48_000u32.to_le_bytes()[..]));

@@ -1,7 +1,7 @@
 //! The comparison methods of thesis 5.6.3: sinc interpolation of recurrent nonuniform samples, and first
 //! fractional-delay filters, then a bank for integer delays.
 
-use super::{Filters, Settings, Synthesis, fir};
+use super::{Settings, Synthesis, fir};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::design::problem::{Channel, Problem};
@@ -34,13 +34,13 @@ pub(crate) fn sinc(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis
 /// `settings.taps` taps per channel.
 ///
 /// # Errors
-/// As [`fir::synthesise`]; [`DesignError::NoTaps`] without the channels at the slow rate.
+/// As [`fir::synthesise`]; [`DesignError::NoSlowRate`] without the channels at the slow rate.
 pub(crate) fn separation(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
     let problem = plant.problem();
     let split = Split::new(problem, settings.taps);
     let grid = grid_delays(problem);
     let bank = fir_taps(&on_grid(problem, &grid, &split), split.bank_taps)?;
-    let slow = settings.at_slow_rate.as_ref().ok_or(DesignError::NoTaps)?;
+    let slow = settings.at_slow_rate.as_ref().ok_or(DesignError::NoSlowRate)?;
     let mut taps = Vec::with_capacity(bank.len());
     for (i, synthesis) in bank.iter().enumerate() {
         let shift = FastPeriods(grid[i] as f64 / problem.ratio as f64);
@@ -55,10 +55,7 @@ pub(crate) fn separation(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
 fn fir_taps(problem: &Problem, taps: usize) -> Result<Vec<Vec<f64>>, DesignError> {
     let noiseless = Problem { noise: vec![0.0; problem.channels.len()], ..problem.clone() };
     let settings = Settings { taps, ..Settings::default() };
-    match fir::synthesise(&LiftedPlant::new(&noiseless)?, &settings)?.filters {
-        Filters::Fir(taps) => Ok(taps),
-        Filters::StateSpace(_) => Err(DesignError::NoTaps),
-    }
+    fir::taps_of_least_gamma(&LiftedPlant::new(&noiseless)?, &settings)
 }
 
 /// The channels as inputs of the second step: with integer delays, with the latency that the first step

@@ -27,13 +27,24 @@ const MISSED_PEAK_LIMIT: usize = 8;
 /// converters' noise at the output: `||K||_2^2 + sum_i noise_i ||f_i||^2`.
 ///
 /// # Errors
-/// [`DesignError::Lti`] for unstable plants; [`DesignError::NoTaps`] if the interior-point method found
-/// none.
+/// [`DesignError::Lti`] for unstable plants; [`DesignError::Linalg`] or [`DesignError::Lmi`] if a
+/// decomposition fails.
 pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
     let mut exchange = exchange(plant, settings)?;
     let best = least_gamma(plant, settings.taps, &mut exchange)?;
     let found = Synthesis::of_least_gamma(plant, best.taps, best.peak, exchange.lower)?;
     Ok(Synthesis { dual: exchange.dual, iterations: exchange.iterations, ..found })
+}
+
+/// The taps of [`synthesise`] alone.
+///
+/// # Errors
+/// As [`synthesise`].
+pub(super) fn taps_of_least_gamma(
+    plant: &LiftedPlant,
+    settings: &Settings,
+) -> Result<Vec<Vec<f64>>, DesignError> {
+    Ok(least_gamma(plant, settings.taps, &mut exchange(plant, settings)?)?.taps)
 }
 
 /// Bounds of the least gamma of `taps` taps per channel, at most `accuracy` (relative) apart, on the grid of

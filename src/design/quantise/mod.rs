@@ -76,7 +76,7 @@ fn decades(a: f64, b: f64) -> f64 {
 ///
 /// # Errors
 /// [`DesignError::Lti`] if the plant is not stable, [`DesignError::Linalg`] if a decomposition fails,
-/// [`DesignError::NoTaps`] if `bits` are out of their range, [`DesignError::AllZero`] if all taps are zero
+/// [`DesignError::Spec`] if `bits` are out of their range, [`DesignError::AllZero`] if all taps are zero
 /// at the given scale, and [`DesignError::TinyTaps`] if they are no better there than zero taps. Without a
 /// given scale all taps may be zero, too: see [`FixedPoint::is_zero`].
 pub fn quantise(
@@ -85,6 +85,7 @@ pub fn quantise(
     bits: &WordLengths,
     fraction_bits: Option<i32>,
 ) -> Result<(FixedPoint, WordStudy), DesignError> {
+    bits.check(None)?;
     let quantiser = Quantiser::new(problem)?;
     let all: Vec<WordLengths> = NEIGHBOURS.into_iter().filter_map(|more| bits.widened(more)).collect();
     let mut found = quantiser.quantise_all(&all, fraction_bits)?;
@@ -96,7 +97,10 @@ pub fn quantise(
         }
     }
     let words = found.iter().map(|found| quantiser.loss(found)).collect();
-    let asked = found.into_iter().find(|found| found.fixed_point.bits == *bits).ok_or(DesignError::NoTaps)?;
+    let asked = match all.iter().position(|neighbour| neighbour == bits) {
+        Some(index) => found.swap_remove(index),
+        None => quantiser.quantise(bits, fraction_bits)?,
+    };
     match fraction_bits {
         Some(fraction_bits)
             if asked.fixed_point.is_zero() && problem.taps.iter().flatten().any(|&tap| tap != 0.0) =>

@@ -74,7 +74,8 @@ impl<'a> Quantiser<'a> {
         let finest = fraction_bits.unwrap_or_else(|| self.finest_that_fits(bits));
         let fitting = Search::new(self.error.problem.taps, &self.error, bits, finest);
         let rounded = self.error.gamma(&fitting.rounded())?;
-        let mut found = vec![self.error.candidate(fitting.zero_output())?];
+        let zero_output = self.error.candidate(fitting.zero_output())?;
+        let mut found = vec![zero_output.clone()];
         found.extend(fitting.run()?);
         if fraction_bits.is_none() && finest < MAX_FRACTION_BITS {
             found.extend(Search::new(self.error.problem.taps, &self.error, bits, finest + 1).run()?);
@@ -88,7 +89,7 @@ impl<'a> Quantiser<'a> {
         let cap = least_gamma(&found) * (1.0 + self.error.problem.gamma_margin.max(GAMMA_TIE));
         let good = found.into_iter().filter(|found| found.gamma <= cap);
         let least_mean_square = good.min_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
-        let Candidate { fixed_point, gamma, mean_square } = least_mean_square.ok_or(DesignError::NoTaps)?;
+        let Candidate { fixed_point, gamma, mean_square } = least_mean_square.unwrap_or(zero_output);
         Ok(Quantised { fixed_point, gamma, mean_square, rounded })
     }
 

@@ -50,8 +50,9 @@ impl<'a> Search<'a> {
     pub(super) fn run(&self) -> Result<Vec<Candidate>, DesignError> {
         let mut found = vec![self.error.candidate(self.rounded())?];
         self.reweighted(&mut found)?;
-        let start = found.iter().min_by(|a, b| a.gamma.total_cmp(&b.gamma)).ok_or(DesignError::NoTaps)?;
-        found.push(self.error.candidate(self.descended(&start.fixed_point)?)?);
+        let least = found.iter().min_by(|a, b| a.gamma.total_cmp(&b.gamma));
+        let start = least.map_or_else(|| self.rounded(), |candidate| candidate.fixed_point.clone());
+        found.push(self.error.candidate(self.descended(&start)?)?);
         Ok(found)
     }
 

@@ -72,16 +72,20 @@ impl Search<'_> {
     }
 
     fn best_of_all(&self) -> Result<(ErrorPoint, Peak), DesignError> {
-        let mut best: Option<(ErrorPoint, Peak)> = None;
-        for signs in 0..1usize << self.sides.len() {
+        let judged = |signs: usize| {
             let up: Vec<bool> = (0..self.sides.len()).map(|bit| signs >> bit & 1 == 1).collect();
             let point = self.vertex(&up);
             let peak = self.norm(&point)?;
-            if best.as_ref().is_none_or(|(_, known)| known.gain < peak.gain) {
-                best = Some((point, peak));
+            Ok::<_, DesignError>((point, peak))
+        };
+        let mut worst = judged(0)?;
+        for signs in 1..1usize << self.sides.len() {
+            let other = judged(signs)?;
+            if other.1.gain > worst.1.gain {
+                worst = other;
             }
         }
-        best.ok_or(DesignError::NoTaps)
+        Ok(worst)
     }
 
     /// From the signs of the derivatives, one change at a time.

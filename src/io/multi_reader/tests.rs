@@ -91,5 +91,5 @@ fn more_lost_samples_than_allowed_are_refused_with_the_bound() {
     assert!(start(80).is_ok());
     let error = start(79).err().unwrap().to_string();
     assert!(error.contains("80 frames were lost in all, more than 79"), "{error}");
-    assert!(error.contains("--max-lost 80"), "{error}");
+    assert!(error.contains("allow 80"), "{error}");
 }

@@ -133,7 +133,7 @@ fn what_cannot_take_turns_is_refused() {
         &["2 inputs are given", "leave out --interleaved"],
     );
     desk.refused(2, &fuse(&["0", "capture.wav"]), &["--interleaved"]);
-    desk.refused(1, &fuse(&["3", "wide.wav"]), &["wide.wav: 3 channels", "without --interleaved"]);
+    desk.refused(1, &fuse(&["3", "wide.wav"]), &["wide.wav: 3 channels", "not interleaved"]);
     write_bank(&desk, [0.0, 3.0, 1.0]);
     desk.refused(1, &fuse(&["3", "capture.wav"]), &["3 fast periods apart", "one recording per channel"]);
 }
