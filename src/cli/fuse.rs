@@ -8,7 +8,7 @@ use super::observer::RunObserver;
 use super::output::Bits;
 use super::print::say_understood;
 use super::print::{Failure, is_dash};
-use super::run::{Finished, Job, RunArgs, RunReport, interrupted, print_report};
+use super::run::{Finished, Job, RunArgs, RunReport, print_report};
 use crate::bank::Bank;
 use crate::io::{Container, MultiReader};
 use crate::overview::counted;
@@ -168,7 +168,7 @@ impl Args {
 
     fn start_reader(&self, job: &Job<'_>, observer: Option<&RunObserver>) -> Result<MultiReader, Failure> {
         let captures = self.reading.options(self.inputs.len(), job.bank.channel_count());
-        job.start_reader(&self.inputs, captures, observer)?.ok_or_else(|| interrupted(0))
+        job.start_reader(&self.inputs, captures, observer)
     }
 
     /// Reads the inputs once more, and the output.

@@ -1,5 +1,5 @@
-//! Ctrl-C and SIGTERM. In a run the first one requests an orderly end, and the second one ends the
-//! process at once. In a computation the first one ends it at once.
+//! Interrupts: Ctrl-C, SIGTERM and the other signals that end a process. In a run the first one requests an
+//! orderly end, and the second one ends the process at once. In a computation the first one ends it at once.
 
 use crossbeam_channel::Receiver;
 
@@ -7,7 +7,7 @@ use crossbeam_channel::Receiver;
 mod watch {
     use crate::cli::print::say_line;
     use crate::files::remove_unfinished;
-    use crate::files::signals::{end, watch};
+    use crate::files::signals::{end, is_urgent, watch};
     use crate::io::is_output_stalled;
     use crossbeam_channel::{Receiver, Sender, bounded, never};
     use signal_hook::iterator::Signals;
@@ -45,7 +45,7 @@ mod watch {
         // The receiver lives as long as the run.
         let _ = stop.send(());
         loop {
-            if let Some(second) = signals.pending().next() {
+            if let Some(second) = signals.pending().find(|&signal| is_urgent(signal)) {
                 end(second);
             }
             // The run is blocked by a reader of its output and does not notice the request.

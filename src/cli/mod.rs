@@ -102,6 +102,8 @@ enum Command {
 /// Runs the command that was typed; the exit code is 0 (done), 1 (the input or the design failed) or
 /// 2 (wrong usage).
 pub fn run() -> ExitCode {
+    #[cfg(unix)]
+    crate::files::fail_at_file_size_limit();
     match Cli::try_parse() {
         Ok(cli) => match dispatch(cli.command) {
             Ok(()) => ExitCode::SUCCESS,

@@ -8,7 +8,7 @@ use crate::pipeline::PipelineError;
 use crate::spec::Spec;
 use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// A failure with the one message that the user sees.
@@ -38,6 +38,19 @@ impl Failure {
         match error.into() {
             error if error.is_closed_pipe() => Self::ClosedPipe,
             error => Self::input(error),
+        }
+    }
+
+    /// Names what a failed run has left of what cannot be recorded again.
+    pub(super) fn with_remains(self, files: &[PathBuf]) -> Self {
+        let is_something = |file: &&PathBuf| file.metadata().is_ok_and(|found| found.len() > 0);
+        let names: Vec<String> =
+            files.iter().filter(is_something).map(|file| file.display().to_string()).collect();
+        match self {
+            Self::Input(message) if !names.is_empty() => {
+                Self::Input(format!("{message}; what was recorded is in {}", names.join(" and ")))
+            }
+            other => other,
         }
     }
 

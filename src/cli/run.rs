@@ -11,7 +11,7 @@ use super::output::{begin_samples, check_files, precision};
 use super::print::print_json;
 use super::print::{Failure, is_dash};
 use super::print::{say, warn};
-use super::track::{TrackArgs, TrackRecord};
+use super::track::{TrackArgs, TrackRecord, Tracked};
 use crate::bank::Bank;
 use crate::io::{
     Arrival, BLOCK_BYTES, Container, MultiReader, OutputHeader, OutputNotes, PcmFormat, PcmFrames, Placement,
@@ -147,13 +147,16 @@ pub(super) struct Finished {
 }
 
 impl Job<'_> {
-    /// Begins to read as `captures` says; `None` if an interrupt came first.
+    /// Begins to read as `captures` says.
+    ///
+    /// # Errors
+    /// [`Failure`], also for an interrupt that came first: no output has been begun.
     pub(super) fn start_reader(
         &self,
         inputs: &[PathBuf],
         captures: ReadOptions<'_>,
         observer: Option<&RunObserver>,
-    ) -> Result<Option<MultiReader>, Failure> {
+    ) -> Result<MultiReader, Failure> {
         let args = self.args;
         let lost = args.gaps.lost_samples(self.is_live)?;
         let turns = args.turns.turns(self.bank, self.bank_path)?;
@@ -161,7 +164,8 @@ impl Job<'_> {
         let block_bytes = args.threads.bytes(BLOCK_BYTES);
         let files =
             ReadOptions { block_bytes, interleaving: turns.as_ref(), stalls: stalls.as_ref(), ..captures };
-        MultiReader::start(inputs, args.gaps.read_options(&lost, files), interrupts()).map_err(unreadable)
+        let started = MultiReader::start(inputs, args.gaps.read_options(&lost, files), interrupts());
+        started.map_err(unreadable)?.ok_or_else(|| interrupted(0))
     }
 
     fn settings(&self) -> Settings<'static> {
@@ -206,15 +210,32 @@ impl Job<'_> {
             pipeline = pipeline.retuned_by(retuner).map_err(Failure::running)?;
         }
         let mut outputs = self.outputs(rate, is_complex)?;
+        // What is recorded live cannot be recorded again.
+        let kept = if self.is_live { outputs.keep() } else { Vec::new() };
         observer.check_captures(self.bank, !is_complex && !self.args.track.is_wanted(), self.is_live);
+        let finished = self.record(pipeline, reader, outputs, tracked, observer, each);
+        finished.map_err(|failure| failure.with_remains(&kept))
+    }
+
+    /// From the first frame to the names of the outputs.
+    fn record(
+        &self,
+        mut pipeline: Pipeline<'_>,
+        reader: &mut MultiReader,
+        mut outputs: FileOutputs,
+        tracked: Tracked,
+        observer: &mut RunObserver,
+        each: &dyn Fn(u64),
+    ) -> Result<Finished, Failure> {
         let is_interrupted = self.all_frames(reader, &mut pipeline, &mut outputs, observer, each)?;
+        let latency = pipeline.plan().latency();
+        let dropped = self.dropped.samples(pipeline.plan());
         let outcome = self.drain(pipeline, reader.consumed(), &mut outputs)?;
         let TrackRecord { log, warnings, .. } = tracked.take();
         let checked = observer.checked();
         let report = RunReport::new(outcome, self.tolerated(reader), self.lossless);
         let report = report.with(checked.warnings, self.is_live, warnings);
-        let dropped = self.dropped.samples(plan);
-        let shift = (plan.latency() - dropped) as u64;
+        let shift = (latency - dropped) as u64;
         let placement = Placement { ratio: self.bank.ratio as u64, shift, samples: report.samples };
         outputs.annotate(self.notes(reader, &report, placement)?);
         let peak = outputs.peak();

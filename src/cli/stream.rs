@@ -100,7 +100,7 @@ impl Args {
         let plan = job.plan()?;
         let channels = if inputs.len() == 1 { job.bank.channel_count() } else { 1 };
         let raw = ReadOptions { coding: self.format, channels, ..ReadOptions::files() };
-        let Some(mut reader) = job.start_reader(inputs, raw, Some(observer))? else { return Ok(()) };
+        let mut reader = job.start_reader(inputs, raw, Some(observer))?;
         self.check_output(reader.is_complex())?;
         let finished = job.run(&plan, &mut reader, observer, &|_| {})?;
         let Finished { report: run, frames, is_interrupted, .. } = &finished;

@@ -50,6 +50,8 @@ pub struct AtomicFile {
     target: PathBuf,
     name: String,
     replace: bool,
+    /// What is written cannot be made again: it stays under the hidden name if it gets no other.
+    is_unique: bool,
 }
 
 /// How a file got its name; this determines how to undo it.
@@ -83,7 +85,8 @@ impl AtomicFile {
                 files.insert(created.0.clone());
                 io::Result::Ok(created)
             })?;
-            let begun = Self { file: Some(file), beside, target, name: name.clone(), replace };
+            let begun =
+                Self { file: Some(file), beside, target, name: name.clone(), replace, is_unique: false };
             if let (Some(file), Some(known)) = (&begun.file, known) {
                 file.set_permissions(known.permissions())?;
             }
@@ -95,6 +98,17 @@ impl AtomicFile {
     /// The name that was asked for.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// From now on the file stays under its hidden name if it gets no other: what is written to it, as what
+    /// is recorded live, cannot be made again.
+    pub fn keep(&mut self) {
+        self.is_unique = true;
+    }
+
+    /// The hidden name.
+    pub fn hidden_name(&self) -> &Path {
+        &self.beside
     }
 
     /// Gives the file its final name.
@@ -146,21 +160,19 @@ impl AtomicFile {
     fn undo(mut self, placed: Placed) {
         // The failure that led here is reported; a second one adds nothing.
         match placed {
-            Placed::New => drop(fs::remove_file(&self.target)),
+            Placed::New => drop(fs::rename(&self.target, &self.beside)),
             Placed::Exchanged => drop(rename::exchange(&self.beside, &self.target)),
-            Placed::Replaced => {}
-        }
-        if placed != Placed::Exchanged {
-            self.forget();
+            Placed::Replaced => self.forget(),
         }
     }
 
     /// Makes the new name final.
-    fn keep(mut self, placed: Placed) {
+    fn confirm(mut self, placed: Placed) {
         if placed != Placed::Exchanged {
             self.forget();
         }
         // Otherwise the hidden name is that of the old file, which goes with this value.
+        self.is_unique = false;
     }
 
     /// Nothing has the hidden name any more.
@@ -185,8 +197,10 @@ impl AtomicFile {
 impl Drop for AtomicFile {
     fn drop(&mut self) {
         if !self.beside.as_os_str().is_empty() {
-            // A second error is not reported: the first one is already being returned.
-            let _ = fs::remove_file(&self.beside);
+            if !self.is_unique {
+                // A second error is not reported: the first one is already being returned.
+                let _ = fs::remove_file(&self.beside);
+            }
             self.forget();
         }
     }
@@ -229,7 +243,7 @@ pub fn commit_all(mut files: Vec<AtomicFile>) -> Result<(), FileError> {
         }
     }
     named.extend(placed.iter().map(|(file, _)| file.name.clone()));
-    placed.into_iter().for_each(|(file, how)| file.keep(how));
+    placed.into_iter().for_each(|(file, how)| file.confirm(how));
     Ok(())
 }
 
@@ -240,7 +254,11 @@ fn unfinished<R>(change: impl FnOnce(&mut BTreeSet<PathBuf>) -> R) -> R {
 /// Where a file of this name has to be put, and the plain file that is there.
 fn destination(path: &Path) -> Result<(PathBuf, Option<Metadata>), FileError> {
     let refused = |what| Err(FileError::NotAFile { file: path.display().to_string(), what });
-    let Ok(found) = path.symlink_metadata() else { return Ok((path.to_owned(), None)) };
+    let found = match path.symlink_metadata() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok((path.to_owned(), None)),
+        // A name that is too long, for example, of which the hidden name knows nothing.
+        found => found.map_err(FileError::system(&path.display().to_string(), "create it"))?,
+    };
     let (target, found) = if found.is_symlink() {
         match follow(path) {
             Ok(end) => end,

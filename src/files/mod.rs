@@ -38,4 +38,4 @@ pub use error::FileError;
 pub use hidden::{Leftover, leftovers};
 pub use identity::{is_same_file, refuse_overlaps};
 #[cfg(all(unix, feature = "signals"))]
-pub use signals::remove_unfinished_on_signals;
+pub use signals::{fail_at_file_size_limit, remove_unfinished_on_signals};

@@ -1,14 +1,19 @@
 //! Signals that end a process, and what is removed before they do.
 
 use super::remove_unfinished;
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGALRM, SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGUSR2, SIGXCPU, SIGXFSZ};
 use signal_hook::iterator::Signals;
-use std::sync::Once;
+use std::io::IsTerminal;
 use std::sync::mpsc::sync_channel;
+use std::sync::{Arc, Once};
 
-/// From this call on, SIGINT and SIGTERM remove the unfinished files of this process before they end it with
-/// code 128 + signal. Where no thread can be started, signals keep their default effect: the process ends,
-/// and its unfinished files stay.
+/// What terminals, shells, timers, limits of the processor time and users send to end a process.
+const ENDING: [i32; 7] = [SIGINT, SIGTERM, SIGHUP, SIGXCPU, SIGALRM, SIGUSR1, SIGUSR2];
+
+/// From this call on, the signals that end a process (interrupt, termination, a lost terminal, the limit of
+/// processor time, alarms, user signals) remove its unfinished files before they end it with code
+/// 128 + signal. Where no thread can be started, signals keep their default effect: the process ends, and
+/// its unfinished files stay.
 pub fn remove_unfinished_on_signals() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -20,7 +25,14 @@ pub fn remove_unfinished_on_signals() {
     });
 }
 
-/// Hands the signals SIGINT and SIGTERM to `handle` on a thread of its own; false if that is impossible.
+/// From this call on, a write beyond the limit of the file size (`ulimit -f`) fails as one to a full disk
+/// does. By default the signal SIGXFSZ ends the process there, without a message.
+pub fn fail_at_file_size_limit() {
+    // The handler only has to exist. Where the system refuses it, the default effect stays.
+    let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());
+}
+
+/// Hands the signals that end a process to `handle` on a thread of its own; false if that is impossible.
 pub(crate) fn watch(handle: impl FnOnce(Signals) + Send + 'static) -> bool {
     let (sender, signals) = sync_channel::<Signals>(1);
     // The thread is started first: if that fails, signals keep their default effect.
@@ -29,7 +41,25 @@ pub(crate) fn watch(handle: impl FnOnce(Signals) + Send + 'static) -> bool {
         return false;
     }
     // The thread waits for them.
-    Signals::new([SIGINT, SIGTERM]).is_ok_and(|signals| sender.send(signals).is_ok())
+    let caught = ENDING.iter().filter(|&&signal| signal != SIGHUP || !outlives_terminal());
+    Signals::new(caught).is_ok_and(|signals| sender.send(signals).is_ok())
+}
+
+/// Whether the process was started to go on without its terminal, as by `nohup`, with SIGHUP ignored. Where
+/// that is unknown: `nohup` redirects the messages of a terminal to a file.
+fn outlives_terminal() -> bool {
+    let ignored = || {
+        let status = std::fs::read_to_string("/proc/self/status").ok()?;
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"))?;
+        u64::from_str_radix(mask.trim(), 16).ok()
+    };
+    ignored().map_or_else(|| !std::io::stderr().is_terminal(), |mask| mask >> (SIGHUP - 1) & 1 == 1)
+}
+
+/// Whether this signal, as a second one, asks for an end at once: a lost terminal may be reported by the
+/// system and by the shell.
+pub(crate) fn is_urgent(signal: i32) -> bool {
+    signal != SIGHUP
 }
 
 /// Ends the process as `signal` asks, without unfinished files.

@@ -93,6 +93,16 @@ impl SampleWriter {
         self.warning.as_deref()
     }
 
+    /// The files that have no final name yet.
+    pub fn unfinished(&mut self) -> impl Iterator<Item = &mut AtomicFile> {
+        let files = match &mut self.target {
+            Target::Wav(file) => [Some(file.inner_mut()), None],
+            Target::Raw { data, meta } => [Some(data), meta.as_mut()],
+            Target::Stream(_) => [None, None],
+        };
+        files.into_iter().flatten()
+    }
+
     /// The files that an output of this name has: none for `-`, two for a SigMF recording.
     pub fn files(path: &Path) -> Vec<PathBuf> {
         match path {

@@ -4,6 +4,7 @@ use super::{Block, PipelineError};
 use crate::files::{AtomicFile, commit_all};
 use crate::io::{IoError, OutputNotes, PcmFormat, SampleWriter};
 use std::io::Write;
+use std::path::PathBuf;
 
 /// Samples to a file or standard output, the mask to a file of its own. [`FileOutputs::finish`] makes all
 /// files appear together; before it no file is visible.
@@ -20,6 +21,17 @@ impl FileOutputs {
     /// Writes samples, encoded as `format`, to `samples`, and the mask to `mask` if given.
     pub fn new(samples: SampleWriter, mask: Option<AtomicFile>, format: PcmFormat) -> Self {
         Self { samples, mask, log: None, format, peak: 0.0 }
+    }
+
+    /// From now on what was written stays, under the hidden names that this gives, if the files get no
+    /// others.
+    pub fn keep(&mut self) -> Vec<PathBuf> {
+        let files = self.samples.unfinished().chain(&mut self.mask);
+        let keep = |file: &mut AtomicFile| {
+            file.keep();
+            file.hidden_name().to_owned()
+        };
+        files.map(keep).collect()
     }
 
     /// What is to accompany the samples.

@@ -4,7 +4,7 @@ use crate::support::{Desk, bytes, floats, frames, fused, text};
 use std::fs;
 use std::io::{Read, Write};
 use std::path::PathBuf;
-use std::process::{Child, Command, Output};
+use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 /// A folder in which `hybank stream` works with its bank.
@@ -190,7 +190,11 @@ fn cut_frames_and_unequal_channels_are_reported() {
 }
 
 #[test]
-fn an_interrupt_ends_after_whole_frames_and_reports() {
+fn a_signal_ends_after_whole_frames_and_reports() {
+    ["INT", "TERM", "HUP", "XCPU", "ALRM", "USR1", "USR2"].into_iter().for_each(ends_after_whole_frames);
+}
+
+fn ends_after_whole_frames(signal: &str) {
     let bench = Bench::new();
     let mut child = bench.spawn(&["-o", "out.raw", "--json"]);
     let mut stdin = child.stdin.take().unwrap();
@@ -202,7 +206,7 @@ fn an_interrupt_ends_after_whole_frames_and_reports() {
         std::thread::sleep(Duration::from_millis(1));
     }
     let id = child.id().to_string();
-    assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    assert!(Command::new("kill").args(["-s", signal, &id]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();
     drop(stdin);
     assert!(output.status.success(), "{output:?}");
@@ -210,6 +214,85 @@ fn an_interrupt_ends_after_whole_frames_and_reports() {
     assert_eq!((report["interrupted"].as_bool(), report["frames"].as_u64()), (Some(true), Some(100)));
     assert!(text(&output.stderr).contains("interrupted after 100 frames, 200 samples written"), "{output:?}");
     assert_eq!(floats(&fs::read(bench.path("out.raw")).unwrap()), fused(&input));
+}
+
+/// The header of the input has not come yet: nothing has been begun, so there is neither output nor success.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupt_before_the_first_sample_is_reported() {
+    let bench = Bench::new();
+    assert!(Command::new("mkfifo").arg(bench.path("in")).status().unwrap().success());
+    let child = bench.spawn(&["--format", "wav", "--input", "in", "-o", "out.wav"]);
+    until_caught(child.id(), 15);
+    assert!(Command::new("kill").arg(child.id().to_string()).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    assert!(text(&output.stderr).contains("interrupted after 0 frames"), "{output:?}");
+    assert!(!bench.path("out.wav").exists() && bench.unfinished_bytes().is_none());
+}
+
+/// Waits until the process handles this signal.
+#[cfg(target_os = "linux")]
+fn until_caught(process: u32, signal: u32) {
+    let caught = || {
+        let status = fs::read_to_string(format!("/proc/{process}/status")).unwrap();
+        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap().trim();
+        u64::from_str_radix(caught, 16).unwrap() >> (signal - 1) & 1 == 1
+    };
+    while !caught() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// As after `nohup`: the stream goes on when its terminal is gone.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_ignored_hangup_stays_ignored() {
+    let bench = Bench::new();
+    let run = format!("trap '' HUP; exec {} stream bank.json -o out.raw", env!("CARGO_BIN_EXE_hybank"));
+    let mut command = Command::new("sh");
+    command.current_dir(bench.path("")).args(["-c", &run]).stdin(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    until_caught(child.id(), 15);
+    assert!(Command::new("kill").args(["-HUP", &child.id().to_string()]).status().unwrap().success());
+    let input = frames(100);
+    child.stdin.take().unwrap().write_all(&bytes(&input)).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    assert_eq!(floats(&fs::read(bench.path("out.raw")).unwrap()), fused(&input));
+}
+
+/// Another process takes the name while samples arrive: what cannot be recorded again is not lost.
+#[test]
+fn a_recording_whose_name_is_taken_stays_under_its_hidden_name() {
+    let bench = Bench::new();
+    let mut child = bench.spawn(&["-o", "out.raw"]);
+    let mut stdin = child.stdin.take().unwrap();
+    let input = frames(100);
+    stdin.write_all(&bytes(&input)).unwrap();
+    while bench.unfinished_bytes() < Some(800) {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    fs::write(bench.path("out.raw"), "another").unwrap();
+    drop(stdin);
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let message = text(&output.stderr);
+    assert!(message.starts_with("hybank: out.raw: the file exists"), "{message}");
+    let (_, hidden) = message.trim_end().split_once("; what was recorded is in ").expect(&message);
+    assert_eq!(floats(&fs::read(bench.path(hidden)).unwrap()), fused(&input));
+    assert_eq!(fs::read(bench.path("out.raw")).unwrap(), b"another");
+}
+
+#[test]
+fn a_name_that_is_too_long_is_refused_before_the_first_sample() {
+    let bench = Bench::new();
+    let name = "x".repeat(256);
+    let output = bench.run(&["-o", &name], &bytes(&frames(3)));
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let message = text(&output.stderr);
+    assert!(message.contains("cannot create it: File name too long"), "{message}");
+    assert!(bench.unfinished_bytes().is_none());
 }
 
 #[test]

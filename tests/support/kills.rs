@@ -30,8 +30,12 @@ impl fmt::Display for Seen {
     }
 }
 
-/// Kills `job` so often, with SIGKILL and SIGTERM by turns, at times from its start to a little after its
-/// end.
+/// Signals that a process can catch, with their numbers.
+const CAUGHT: [(&str, i32); 7] =
+    [("TERM", 15), ("HUP", 1), ("XCPU", 24), ("INT", 2), ("ALRM", 14), ("USR1", 10), ("USR2", 12)];
+
+/// Kills `job` so often, with SIGKILL and the other signals by turns, at times from its start to a little
+/// after its end.
 pub(crate) fn campaign(job: &Job, kills: usize, dice: &mut Random) -> Seen {
     let begin = Instant::now();
     assert!(job.command().stdout(Stdio::null()).status().unwrap().success());
@@ -39,17 +43,18 @@ pub(crate) fn campaign(job: &Job, kills: usize, dice: &mut Random) -> Seen {
     let mut seen = Seen { kills, ..Seen::default() };
     for kill in 0..kills {
         let (hard, old) = (kill % 2 == 0, kill % 4 < 2);
+        let (name, number) = if hard { ("KILL", 9) } else { CAUGHT[kill / 2 % CAUGHT.len()] };
         let before = job.prepare(old);
-        let (status, during, said) = killed(job.command(), longest.mul_f64(dice.part()), hard);
-        let what = format!("{:?}, kill {kill}: {status}", job.args);
-        check_status(status, hard, &what);
+        let (status, during, said) = killed(job.command(), longest.mul_f64(dice.part()), name);
+        let what = format!("{:?}, {name} {kill}: {status}", job.args);
+        check_status(status, number, &what);
         seen.during += usize::from(during);
         let judged = job.judge(&before, &what);
         match judged {
             Some(whole) => seen.whole += usize::from(whole),
             None => seen.parts_of_sets += 1,
         }
-        assert!(hard || judged.is_some(), "{what}: a set in part after SIGTERM");
+        assert!(hard || judged.is_some(), "{what}: a set in part");
         if status.code() == Some(1) {
             assert_eq!(judged, Some(said.contains("was written")), "{what}: {said}");
         }
@@ -73,25 +78,23 @@ pub(crate) fn campaign(job: &Job, kills: usize, dice: &mut Random) -> Seen {
 }
 
 /// Ends a run by a signal after `delay`; true if the run had not ended before, and what it said.
-fn killed(mut command: Command, delay: Duration, hard: bool) -> (ExitStatus, bool, String) {
+fn killed(mut command: Command, delay: Duration, signal: &str) -> (ExitStatus, bool, String) {
     let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     std::thread::sleep(delay);
     let during = child.try_wait().unwrap().is_none();
-    if hard {
-        child.kill().unwrap();
-    } else if during {
-        let _ = Command::new("kill").args(["-TERM", &child.id().to_string()]).stderr(Stdio::null()).status();
+    if during {
+        let signal = format!("-{signal}");
+        let _ = Command::new("kill").args([&signal, &child.id().to_string()]).stderr(Stdio::null()).status();
     }
     let output = child.wait_with_output().unwrap();
     (output.status, during, String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
-/// Done, killed, or ended by SIGTERM: at once, in order (1), or after removing files (128 + 15).
-fn check_status(status: ExitStatus, hard: bool, what: &str) {
-    let signal = if hard { 9 } else { 15 };
+/// Done, or ended by this signal: at once, in order (1), or after removing files (128 + signal).
+fn check_status(status: ExitStatus, signal: i32, what: &str) {
     let fits = match status.code() {
         Some(0) => true,
-        Some(code) => !hard && (code == 1 || code == 143),
+        Some(code) => signal != 9 && (code == 1 || code == 128 + signal),
         None => status.signal() == Some(signal),
     };
     assert!(fits, "{what}");

@@ -25,6 +25,8 @@ const MOST_THREADS: usize = 1024;
 /// Reads the arguments, runs the command and maps its outcome to an exit code: 0 success, 1 input error, 2
 /// usage error.
 pub fn run() -> ExitCode {
+    #[cfg(unix)]
+    hybank::files::fail_at_file_size_limit();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(message) => return show(&message),

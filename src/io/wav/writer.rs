@@ -87,6 +87,11 @@ impl<W: Write + Seek> WavFile<W> {
         Ok(Self { inner, frame_bytes, header_bytes: header.len() as u64, data_bytes: 0 })
     }
 
+    /// What it is written to.
+    pub fn inner_mut(&mut self) -> &mut W {
+        &mut self.inner
+    }
+
     /// Appends encoded samples.
     ///
     /// # Errors
