@@ -51,14 +51,30 @@ fn check_memory(path: &Path, work: &str, bytes: f64, remedy: &str) -> Result<(),
     }
 }
 
+/// A spec, and the files of measurements that it names.
+pub(super) struct SpecFile {
+    spec: Spec,
+    measurements: Vec<PathBuf>,
+}
+
+impl SpecFile {
+    /// The spec, unless one of these outputs is a file that it names.
+    pub(super) fn for_outputs(self, outputs: &[&Path]) -> Result<Spec, Failure> {
+        let inputs: Vec<&Path> = self.measurements.iter().map(PathBuf::as_path).collect();
+        let outputs: Vec<&Path> = outputs.iter().copied().filter(|path| !is_dash(path)).collect();
+        files::refuse_overlaps(&outputs, &inputs).map_err(Failure::input)?;
+        Ok(self.spec)
+    }
+}
+
 /// Reads a spec file; `-` is standard input.
-pub(super) fn load_spec(path: &Path, overrides: DesignOverrides) -> Result<Spec, Failure> {
+pub(super) fn load_spec(path: &Path, overrides: DesignOverrides) -> Result<SpecFile, Failure> {
     let text = read_kind(path, FileKind::Spec)?;
     parse_spec(&text, path, overrides)
 }
 
 /// The spec in the text of the file `path`, with the measurements beside it.
-pub(super) fn parse_spec(text: &str, path: &Path, overrides: DesignOverrides) -> Result<Spec, Failure> {
+pub(super) fn parse_spec(text: &str, path: &Path, overrides: DesignOverrides) -> Result<SpecFile, Failure> {
     let folder = path.parent().filter(|_| !is_dash(path)).unwrap_or(Path::new(""));
     let models = Models { folder: folder.to_owned(), made: RefCell::default(), echo: RefCell::default() };
     let read = Spec::from_toml_and_files(text, &name(path), overrides, &|wanted| models.model(wanted));
@@ -67,7 +83,8 @@ pub(super) fn parse_spec(text: &str, path: &Path, overrides: DesignOverrides) ->
         None => Failure::input(error),
     })?;
     models.echo.into_inner().iter().for_each(|line| say_line(line));
-    Ok(spec)
+    let measurements = models.made.into_inner().iter().map(|(made, _)| folder.join(&made.path)).collect();
+    Ok(SpecFile { spec, measurements })
 }
 
 /// A value of the command line that was given in place of the spec's `key`.
@@ -77,7 +94,7 @@ pub(super) fn bad_flag(key: &str, problem: &SpecProblem) -> Failure {
 }
 
 /// The spec of a spec file, or the one that a bank file carries (with the bank's latency).
-pub(super) fn load_spec_or_bank(path: &Path) -> Result<Spec, Failure> {
+pub(super) fn load_spec_or_bank(path: &Path) -> Result<SpecFile, Failure> {
     if path.extension().is_none_or(|extension| extension != "json") {
         return load_spec(path, DesignOverrides::default());
     }
@@ -86,7 +103,7 @@ pub(super) fn load_spec_or_bank(path: &Path) -> Result<Spec, Failure> {
     let spec = bank.spec.ok_or_else(|| {
         Failure::of(path, "this bank carries no spec, so its front ends are unknown; give the spec file")
     })?;
-    Ok(Spec { latency, ..spec })
+    Ok(SpecFile { spec: Spec { latency, ..spec }, measurements: Vec::new() })
 }
 
 /// The text of a file; `-` is standard input.

@@ -119,7 +119,7 @@ impl Signal {
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check_usage()?;
     let text = read_kind(&args.spec, FileKind::Spec)?;
-    let spec = parse_spec(&text, &args.spec, DesignOverrides::default())?;
+    let spec = parse_spec(&text, &args.spec, DesignOverrides::default())?.for_outputs(&[&args.output])?;
     say_understood(Some(&spec));
     let settings = args.settings(&spec)?;
     let signal = args.signal(&spec)?;

@@ -120,7 +120,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::Usage(message.into()));
     }
     check_outputs(&[&args.output], &[&args.spec])?;
-    let mut spec = load_spec(&args.spec, overrides(args))?;
+    let mut spec = load_spec(&args.spec, overrides(args))?.for_outputs(&[&args.output])?;
     spec.latency = args.latency.or(spec.latency);
     // Everything else was checked on reading.
     spec.check().map_err(|problem| bad_flag("latency", &problem))?;

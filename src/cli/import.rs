@@ -48,7 +48,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     check_outputs(&[&args.output], &[&args.spec, &args.taps])?;
-    let mut spec = load_spec_or_bank(&args.spec)?;
+    let mut spec = load_spec_or_bank(&args.spec)?.for_outputs(&[&args.output])?;
     spec.latency = args.latency.or(spec.latency);
     if spec.latency.is_none() {
         let problem = "it gives no latency, which taps from elsewhere have; give --latency, the delay of their output in fast samples";

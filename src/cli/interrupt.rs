@@ -7,9 +7,10 @@ use crossbeam_channel::Receiver;
 mod watch {
     use crate::cli::print::say_line;
     use crate::files::remove_unfinished;
-    use crate::files::signals::{end, is_urgent, watch};
+    use crate::files::signals::{end, watch};
     use crate::io::is_output_stalled;
     use crossbeam_channel::{Receiver, Sender, bounded, never};
+    use signal_hook::consts::SIGHUP;
     use signal_hook::iterator::Signals;
     use std::time::Duration;
 
@@ -45,7 +46,8 @@ mod watch {
         // The receiver lives as long as the run.
         let _ = stop.send(());
         loop {
-            if let Some(second) = signals.pending().find(|&signal| is_urgent(signal)) {
+            // A lost terminal may be reported twice, by the system and by the shell.
+            if let Some(second) = signals.pending().find(|&signal| signal != SIGHUP) {
                 end(second);
             }
             // The run is blocked by a reader of its output and does not notice the request.

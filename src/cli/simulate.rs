@@ -93,7 +93,8 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     if !args.gain.is_finite() {
         return Err(Failure::Usage(format!("--gain {} is not a finite number", args.gain)));
     }
-    let spec = load_spec_or_bank(&args.spec)?;
+    // Its outputs are recordings, which no measurement of a spec is.
+    let spec = load_spec_or_bank(&args.spec)?.for_outputs(&[])?;
     // The converters do not know what the spec says of the signal. Without latency the target lies on the
     // time axis of the output of `fuse`.
     let problem = Problem::new(&Spec { signal: None, ..spec.clone() }, 0).in_file(&args.spec)?;

@@ -56,12 +56,6 @@ fn outlives_terminal() -> bool {
     ignored().map_or_else(|| !std::io::stderr().is_terminal(), |mask| mask >> (SIGHUP - 1) & 1 == 1)
 }
 
-/// Whether this signal, as a second one, asks for an end at once: a lost terminal may be reported by the
-/// system and by the shell.
-pub(crate) fn is_urgent(signal: i32) -> bool {
-    signal != SIGHUP
-}
-
 /// Ends the process as `signal` asks, without unfinished files.
 pub(crate) fn end(signal: i32) -> ! {
     remove_unfinished();
