@@ -1,5 +1,6 @@
 //! Scaling of states by powers of two, which causes no rounding.
 
+use crate::arithmetic::Real;
 use crate::linalg::{Mat, inverse, power_of_two};
 
 use super::section::Realisation;
@@ -10,20 +11,24 @@ const MAX_DOUBLINGS: usize = 60;
 /// Scales every state by a power of two to unit input energy: the diagonal of the controllability Gramian
 /// lies between 0.37 and 1.6 afterwards. States that the input does not drive keep their scale. The input is
 /// white, or white noise through `signal`.
-pub(super) fn with_unit_states(signal: Option<&Realisation>, system: &Realisation) -> Realisation {
+pub(super) fn with_unit_states<T: Real>(
+    signal: Option<&Realisation<f64>>,
+    system: &Realisation<T>,
+) -> Realisation<T> {
     let mut scaled = system.clone();
-    for (i, energy) in own_energy(signal, system).into_iter().enumerate() {
+    for (i, energy) in own_energy(signal, &system.rounded()).into_iter().enumerate() {
         let factor = power_of_two(energy.sqrt());
-        scaled.a.row_mut(i).scale_mut(1.0 / factor);
-        scaled.b.row_mut(i).scale_mut(1.0 / factor);
-        scaled.a.column_mut(i).scale_mut(factor);
-        scaled.c.column_mut(i).scale_mut(factor);
+        let times = |by: f64| move |x: &mut T| *x = *x * T::from(by);
+        scaled.a.row_mut(i).apply(times(1.0 / factor));
+        scaled.b.row_mut(i).apply(times(1.0 / factor));
+        scaled.a.column_mut(i).apply(times(factor));
+        scaled.c.column_mut(i).apply(times(factor));
     }
     scaled
 }
 
 /// The energy of each state of `system`.
-fn own_energy(signal: Option<&Realisation>, system: &Realisation) -> Vec<f64> {
+fn own_energy(signal: Option<&Realisation<f64>>, system: &Realisation<f64>) -> Vec<f64> {
     let (whole, first) = match signal {
         Some(signal) => (signal.then(system), signal.a.nrows()),
         None => (system.clone(), 0),
@@ -33,7 +38,7 @@ fn own_energy(signal: Option<&Realisation>, system: &Realisation) -> Vec<f64> {
 }
 
 /// ||c (s - a)^-1 b||_2^2.
-pub(super) fn output_energy(system: &Realisation) -> f64 {
+pub(super) fn output_energy(system: &Realisation<f64>) -> f64 {
     (&system.c * gramian(system) * system.c.transpose())[(0, 0)]
 }
 
@@ -42,7 +47,7 @@ pub(super) fn output_energy(system: &Realisation) -> f64 {
 /// The bilinear map e = (alpha + a)(alpha - a)^-1 turns it into P = e P e' + 2 alpha g g' with
 /// g = (alpha - a)^-1 b, whose series is summed by doubling. Every term is positive, so the
 /// diagonal is accurate enough for scaling even if P is nearly singular.
-fn gramian(system: &Realisation) -> Mat {
+fn gramian(system: &Realisation<f64>) -> Mat {
     let n = system.a.nrows();
     let alpha = typical_rate(&system.a);
     let resolvent = inverse(&(Mat::identity(n, n) * alpha - &system.a));

@@ -57,6 +57,15 @@ pub enum AnalogError {
         /// Imaginary part in rad/s.
         im: f64,
     },
+    /// Roots of a polynomial lie too close together to be told apart.
+    #[error(
+        "the roots of {what} lie so close together that 512 bits do not tell them apart; write the filter as zeros, \
+         poles and gain, or as a cascade of smaller filters"
+    )]
+    RootsNotIsolated {
+        /// "num" or "den".
+        what: &'static str,
+    },
     /// The response is zero at all frequencies although neither b nor c is zero.
     #[error(
         "the output of the filter does not depend on its input; check which states b drives and c observes"

@@ -14,10 +14,10 @@
 //! nearest to it, and the most resonant pair comes last. A companion matrix would lose its roots to
 //! rounding from order six on.
 //!
-//! Numerators and denominators are factored first. The computed roots of an m-fold pole are wrong by the
-//! m-th root of the rounding error, but their errors cancel in the product. This is checked: if the roots
-//! do not reproduce every coefficient to 1e-13, the polynomials are realised in controllable canonical form
-//! instead, with frequency measured relative to the natural frequency.
+//! Numerators and denominators are factored first, in 512 bits: multiple roots are found exactly, the others
+//! enclosed by discs that hold one root each. The design takes the nearest doubles to the real and imaginary
+//! parts of the roots. The proof takes the balls: [`enclosed`] realises a written filter with every rounding
+//! error bounded, from the same formulas.
 //!
 //! Finally every state is scaled by a power of two so that its impulse response has unit energy up to
 //! rounding to that power: no state is large only because its pole is fast.
@@ -28,13 +28,17 @@ pub mod families;
 pub mod fit;
 mod half_power;
 mod pairing;
-mod rational;
+mod polynomial;
 mod realise;
 mod roots;
 mod section;
 mod signal;
+mod square_free;
 mod strictly_proper;
 mod zpk;
+
+pub(crate) use section::Realisation;
+pub(crate) use strictly_proper::enclosed;
 
 pub use error::AnalogError;
 pub use half_power::HalfPowerBand;

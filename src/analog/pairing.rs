@@ -1,5 +1,7 @@
 //! Pairing of zeros with poles, and the order of the sections.
 
+use crate::arithmetic::Real;
+
 use super::roots::{RootSet, Roots};
 use super::section::Section;
 
@@ -9,9 +11,9 @@ use super::section::Section;
 /// In each step the pair with the least ratio of frequencies is joined. If the zeros of a section were far
 /// from its poles, its gain on one side of the spectrum would be tiny, and no later section could restore
 /// the digits lost to rounding.
-pub(super) fn pair_sections(poles: &RootSet, zeros: &RootSet) -> Vec<Section> {
+pub(super) fn pair_sections<T: Real>(poles: &RootSet<T>, zeros: &RootSet<T>) -> Vec<Section<T>> {
     let mut unpaired = UnpairedPoles { real: poles.real.clone(), upper: poles.upper.clone() };
-    let mut pairs: Vec<Roots> = zeros.upper.iter().map(|&(re, im)| Roots::Conjugate { re, im }).collect();
+    let mut pairs: Vec<Roots<T>> = zeros.upper.iter().map(|&(re, im)| Roots::Conjugate { re, im }).collect();
     let mut sections = Vec::new();
     while let Some((pair, group)) = closest_pair(&pairs, &unpaired) {
         sections.push(Section { zeros: pairs.remove(pair), poles: unpaired.take(group) });
@@ -21,7 +23,7 @@ pub(super) fn pair_sections(poles: &RootSet, zeros: &RootSet) -> Vec<Section> {
     while let Some((zero, section)) = closest_section(&real_zeros, &sections) {
         attach(&mut sections[section], real_zeros.remove(zero));
     }
-    let rank = |section: &Section| (section.poles.quality().ln() / SAME_QUALITY).round();
+    let rank = |section: &Section<T>| (section.poles.quality().ln() / SAME_QUALITY).round();
     sections.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
     sections
 }
@@ -31,9 +33,9 @@ pub(super) fn pair_sections(poles: &RootSet, zeros: &RootSet) -> Vec<Section> {
 const SAME_QUALITY: f64 = 1e-6;
 
 /// Poles not yet in a section.
-struct UnpairedPoles {
-    real: Vec<f64>,
-    upper: Vec<(f64, f64)>,
+struct UnpairedPoles<T> {
+    real: Vec<T>,
+    upper: Vec<(T, T)>,
 }
 
 /// Two poles that could take a pair of zeros.
@@ -45,20 +47,20 @@ enum Group {
     Real(usize),
 }
 
-impl UnpairedPoles {
+impl<T: Real> UnpairedPoles<T> {
     fn groups(&self) -> impl Iterator<Item = Group> {
         let upper = (0..self.upper.len()).map(Group::Upper);
         upper.chain((1..self.real.len()).map(|i| Group::Real(i - 1)))
     }
 
-    fn poles(&self, group: Group) -> Roots {
+    fn poles(&self, group: Group) -> Roots<T> {
         match group {
             Group::Upper(i) => Roots::Conjugate { re: self.upper[i].0, im: self.upper[i].1 },
             Group::Real(i) => Roots::Two(self.real[i], self.real[i + 1]),
         }
     }
 
-    fn take(&mut self, group: Group) -> Roots {
+    fn take(&mut self, group: Group) -> Roots<T> {
         let poles = self.poles(group);
         match group {
             Group::Upper(i) => drop(self.upper.remove(i)),
@@ -68,7 +70,7 @@ impl UnpairedPoles {
     }
 
     /// Sections without zeros for the remaining poles.
-    fn rest(self) -> impl Iterator<Item = Section> {
+    fn rest(self) -> impl Iterator<Item = Section<T>> {
         let conjugate = self.upper.into_iter().map(|(re, im)| Roots::Conjugate { re, im });
         let single = self.real.into_iter().map(Roots::One);
         conjugate.chain(single).map(|poles| Section { poles, zeros: Roots::None })
@@ -93,31 +95,32 @@ fn distance(zero: f64, pole: f64) -> f64 {
 }
 
 /// The larger distance of a pair of zeros to the two poles.
-fn pair_distance(zeros: Roots, poles: Roots) -> f64 {
+fn pair_distance<T: Real>(zeros: Roots<T>, poles: Roots<T>) -> f64 {
     let w = zeros.natural_frequency();
     match poles {
-        Roots::Two(p1, p2) => distance(w, p1).max(distance(w, p2)),
+        Roots::Two(p1, p2) => distance(w, p1.to_double()).max(distance(w, p2.to_double())),
         _ => distance(w, poles.natural_frequency()),
     }
 }
 
-fn closest_pair(pairs: &[Roots], unpaired: &UnpairedPoles) -> Option<(usize, Group)> {
+fn closest_pair<T: Real>(pairs: &[Roots<T>], unpaired: &UnpairedPoles<T>) -> Option<(usize, Group)> {
     let candidates = (0..pairs.len()).flat_map(|i| unpaired.groups().map(move |group| (i, group)));
     let cost = |&(i, group): &(usize, Group)| pair_distance(pairs[i], unpaired.poles(group));
     candidates.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
-fn closest_section(zeros: &[f64], sections: &[Section]) -> Option<(usize, usize)> {
+fn closest_section<T: Real>(zeros: &[T], sections: &[Section<T>]) -> Option<(usize, usize)> {
     let open = (0..sections.len()).filter(|&k| sections[k].zeros.count() < sections[k].poles.count());
     let candidates = open.flat_map(|k| (0..zeros.len()).map(move |i| (i, k)));
     let cost = |&(i, k): &(usize, usize)| {
-        let second = if zeros[i] == 0.0 && sections[k].zeros.count() > 0 { SECOND_AT_ORIGIN } else { 0.0 };
-        distance(zeros[i], sections[k].poles.natural_frequency()) + second
+        let zero = zeros[i].to_double();
+        let second = if zero == 0.0 && sections[k].zeros.count() > 0 { SECOND_AT_ORIGIN } else { 0.0 };
+        distance(zero, sections[k].poles.natural_frequency()) + second
     };
     candidates.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
-fn attach(section: &mut Section, zero: f64) {
+fn attach<T: Real>(section: &mut Section<T>, zero: T) {
     section.zeros = match section.zeros {
         Roots::One(other) => Roots::Two(other, zero),
         _ => Roots::One(zero),

@@ -1,47 +1,94 @@
 //! From a written filter to a gain and blocks in series, in normalised time.
 
-use crate::linalg::{Complex, Mat, eigenvalues, solve, to_complex};
+use nalgebra::DMatrix;
+
+use crate::arithmetic::{Ball, BigFloat, Real};
+use crate::linalg::{Complex, eigenvalues, solve, to_complex};
 use crate::spec::{Family, FilterProblem, FilterSpec, Passband};
 use crate::units::{RadiansPerFastPeriod, Seconds};
 
 use super::pairing::pair_sections;
-use super::rational::Rational;
-use super::roots::RootSet;
+use super::polynomial::enclosed_roots;
+use super::roots::{Factors, RootSet};
 use super::section::{Realisation, Section};
 use super::zpk::{Cutoffs, Zpk};
 use super::{AnalogError, MIN_DAMPING_RATIO, families};
 
 /// One block of a series, with one input and one output.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Block {
+pub(super) enum Block<T> {
     /// One or two poles with at most as many zeros.
-    Section(Section),
-    /// A polynomial fraction whose computed roots do not reproduce it.
-    Rational(Rational),
+    Section(Section<T>),
     /// State equations as the spec gives them.
-    State(Realisation),
+    State(Realisation<T>),
 }
 
 /// A gain and blocks in series.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Chain {
-    pub(super) gain: f64,
-    pub(super) blocks: Vec<Block>,
+pub(super) struct Chain<T> {
+    pub(super) gain: T,
+    pub(super) blocks: Vec<Block<T>>,
 }
 
-impl Block {
-    pub(super) fn realise(&self) -> Realisation {
+/// A number in which written filters are realised: `f64` for the design, a ball for the proof.
+pub(super) trait Written: Real {
+    /// Zeros, poles and gain of `num(s) / den(s)`.
+    fn quotient(num: &[f64], den: &[f64]) -> Result<Factors<Self>, AnalogError>;
+
+    /// Zeros, poles and gain of a member of a family, in normalised time.
+    fn family(member: &Member, passband: Passband, h: Seconds) -> Result<Factors<Self>, AnalogError>;
+}
+
+/// A family member with its cutoff at |s| = 1.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Member {
+    pub(super) family: Family,
+    pub(super) order: usize,
+    pub(super) ripple_db: f64,
+    pub(super) attenuation_db: f64,
+}
+
+impl Written for Ball<BigFloat> {
+    fn quotient(num: &[f64], den: &[f64]) -> Result<Factors<Self>, AnalogError> {
+        let [num, den] = [num, den].map(without_leading_zeros);
+        let (zeros, poles) = (enclosed_roots(num, "num")?, enclosed_roots(den, "den")?);
+        Ok(Factors { zeros, poles, gain: Self::from(num[0]) / Self::from(den[0]) })
+    }
+
+    fn family(member: &Member, passband: Passband, h: Seconds) -> Result<Factors<Self>, AnalogError> {
+        f64::family(member, passband, h).map(|factors| factors.map(Self::from))
+    }
+}
+
+impl Written for f64 {
+    fn quotient(num: &[f64], den: &[f64]) -> Result<Factors<Self>, AnalogError> {
+        Ok(Ball::quotient(num, den)?.rounded())
+    }
+
+    fn family(member: &Member, passband: Passband, h: Seconds) -> Result<Factors<Self>, AnalogError> {
+        let Zpk { zeros, poles, gain, .. } = moved(&prototype(member)?, passband, h)?;
+        Ok(Factors { zeros: RootSet::new(&zeros, "zero")?, poles: RootSet::new(&poles, "pole")?, gain })
+    }
+}
+
+fn without_leading_zeros(values: &[f64]) -> &[f64] {
+    let start = values.iter().position(|&x| x != 0.0).unwrap_or(values.len());
+    &values[start..]
+}
+
+impl<T: Written> Block<T> {
+    pub(super) fn realise(&self) -> Realisation<T> {
         match self {
             Self::Section(section) => section.realise(),
-            Self::Rational(rational) => rational.realise(),
             Self::State(state) => state.clone(),
         }
     }
+}
 
+impl Block<f64> {
     pub(super) fn response(&self, s: Complex<f64>) -> Complex<f64> {
         match self {
             Self::Section(section) => section.response(s),
-            Self::Rational(rational) => rational.response(s),
             Self::State(state) => state_response(state, s),
         }
     }
@@ -49,41 +96,50 @@ impl Block {
     pub(super) fn poles(&self) -> Result<Vec<Complex<f64>>, AnalogError> {
         match self {
             Self::Section(section) => Ok(section.poles.list()),
-            Self::Rational(rational) => rational.poles(),
             Self::State(state) => Ok(eigenvalues(&state.a)?),
         }
     }
 }
 
 /// d + c (s - a)^-1 b.
-pub(super) fn state_response(state: &Realisation, s: Complex<f64>) -> Complex<f64> {
+pub(super) fn state_response(state: &Realisation<f64>, s: Complex<f64>) -> Complex<f64> {
     let n = state.a.nrows();
     let pencil = crate::linalg::CMat::identity(n, n) * s - to_complex(&state.a);
     let x = solve(&pencil, &to_complex(&state.b));
     (to_complex(&state.c) * x)[(0, 0)] + state.d
 }
 
-impl Chain {
+impl<T: Written> Chain<T> {
     /// Normalises by the fast period `h` a filter whose written form has been checked.
     pub(super) fn new(filter: &FilterSpec, h: Seconds) -> Result<Self, AnalogError> {
+        let period = T::from(h.0);
         match filter {
-            FilterSpec::TransferFunction { num, den } => Self::from_rational(Rational::new(num, den, h)),
-            FilterSpec::ZeroPoleGain { zeros, poles, gain } => {
-                let complex = |list: &[[f64; 2]]| list.iter().map(|&[re, im]| Complex::new(re, im)).collect();
-                Self::from_zpk(&Zpk::new(complex(zeros), complex(poles), *gain).normalised(h), h)
+            FilterSpec::TransferFunction { num, den } => {
+                Ok(Self::of_sections(T::quotient(num, den)?.stretched(period)))
             }
-            FilterSpec::StateSpace { a, b, c } => Ok(Self::from_matrices(a, b, c, h)),
+            FilterSpec::ZeroPoleGain { zeros, poles, gain } => {
+                let complex = |list: &[[f64; 2]]| -> Vec<Complex<f64>> {
+                    list.iter().map(|&[re, im]| Complex::new(re, im)).collect()
+                };
+                let (zeros, poles) =
+                    (RootSet::new(&complex(zeros), "zero")?, RootSet::new(&complex(poles), "pole")?);
+                Ok(Self::of_sections(Factors { zeros, poles, gain: T::from(*gain) }.stretched(period)))
+            }
+            FilterSpec::StateSpace { a, b, c } => Ok(Self::of_matrices(a, b, c, period)),
             FilterSpec::Family { family, order, passband, ripple_db, attenuation_db } => {
-                let order = order.unwrap_or(1);
-                let prototype =
-                    prototype(*family, order, ripple_db.unwrap_or(0.0), attenuation_db.unwrap_or(0.0))?;
-                Self::from_zpk(&moved(&prototype, *passband, h)?, h)
+                let member = Member {
+                    family: *family,
+                    order: order.unwrap_or(1),
+                    ripple_db: ripple_db.unwrap_or(0.0),
+                    attenuation_db: attenuation_db.unwrap_or(0.0),
+                };
+                Ok(Self::of_sections(T::family(&member, *passband, h)?))
             }
             FilterSpec::Cascade { cascade } => {
-                let mut whole = Self { gain: 1.0, blocks: Vec::new() };
+                let mut whole = Self { gain: T::from(1.0), blocks: Vec::new() };
                 for stage in cascade {
                     let stage = Self::new(stage, h)?;
-                    whole.gain *= stage.gain;
+                    whole.gain = whole.gain * stage.gain;
                     whole.blocks.extend(stage.blocks);
                 }
                 Ok(whole)
@@ -91,31 +147,29 @@ impl Chain {
         }
     }
 
-    /// `h` only serves to give roots in rad/s in errors.
-    fn from_zpk(zpk: &Zpk<RadiansPerFastPeriod>, h: Seconds) -> Result<Self, AnalogError> {
-        let poles = RootSet::new(&zpk.poles, "pole").map_err(|e| in_written_unit(e, h))?;
-        let zeros = RootSet::new(&zpk.zeros, "zero").map_err(|e| in_written_unit(e, h))?;
-        let sections = pair_sections(&poles, &zeros);
-        let gain = sections.iter().fold(zpk.gain, |gain, section| gain / section.scale());
-        Ok(Self { gain, blocks: sections.into_iter().map(Block::Section).collect() })
+    fn of_sections(factors: Factors<T>) -> Self {
+        let sections = pair_sections(&factors.poles, &factors.zeros);
+        let gain = sections.iter().fold(factors.gain, |gain, section| section.unscaled(gain));
+        Self { gain, blocks: sections.into_iter().map(Block::Section).collect() }
     }
 
-    fn from_rational(rational: Rational) -> Result<Self, AnalogError> {
-        match rational.factored()? {
-            Some(zpk) => Self::from_zpk(&zpk, Seconds(1.0)),
-            None => Ok(Self { gain: 1.0, blocks: vec![Block::Rational(rational)] }),
-        }
-    }
-
-    fn from_matrices(a: &[Vec<f64>], b: &[Vec<f64>], c: &[Vec<f64>], h: Seconds) -> Self {
+    fn of_matrices(a: &[Vec<f64>], b: &[Vec<f64>], c: &[Vec<f64>], h: T) -> Self {
         let n = a.len();
         let state = Realisation {
-            a: Mat::from_fn(n, n, |i, j| a[i][j] * h.0),
-            b: Mat::from_fn(n, 1, |i, _| b[i][0] * h.0),
-            c: Mat::from_fn(1, n, |_, j| c[0][j]),
-            d: 0.0,
+            a: DMatrix::from_fn(n, n, |i, j| T::from(a[i][j]) * h),
+            b: DMatrix::from_fn(n, 1, |i, _| T::from(b[i][0]) * h),
+            c: DMatrix::from_fn(1, n, |_, j| T::from(c[0][j])),
+            d: T::from(0.0),
         };
-        Self { gain: 1.0, blocks: vec![Block::State(state)] }
+        Self { gain: T::from(1.0), blocks: vec![Block::State(state)] }
+    }
+
+    /// The blocks in series. The gain is applied at the output, so that states keep their size.
+    pub(super) fn realise(&self) -> Realisation<T> {
+        self.blocks
+            .iter()
+            .fold(Realisation::wire(), |whole, block| whole.then(&block.realise()))
+            .amplified(self.gain)
     }
 }
 
@@ -140,13 +194,9 @@ fn moved(
     }
 }
 
-/// The family member with its cutoff at |s| = 1.
-fn prototype(
-    family: Family,
-    order: usize,
-    ripple_db: f64,
-    attenuation_db: f64,
-) -> Result<Zpk<Cutoffs>, AnalogError> {
+/// The prototype, refused where its transition band is too narrow for its poles.
+fn prototype(member: &Member) -> Result<Zpk<Cutoffs>, AnalogError> {
+    let Member { family, order, ripple_db, attenuation_db } = *member;
     let prototype = match family {
         Family::Butterworth => families::butterworth(order),
         Family::Chebyshev1 => families::chebyshev1(order, ripple_db),
@@ -163,14 +213,4 @@ fn prototype(
          precision; lower the order or set the ripples further apart"
     );
     Err(FilterProblem::of("order", rule).into())
-}
-
-/// The roots that `error` names, from rad per fast period to rad/s.
-fn in_written_unit(error: AnalogError, h: Seconds) -> AnalogError {
-    match error {
-        AnalogError::NotConjugate { what, re, im } => {
-            AnalogError::NotConjugate { what, re: re / h.0, im: im / h.0 }
-        }
-        other => other,
-    }
 }

@@ -1,5 +1,6 @@
 //! Real polynomials of degree zero to two in terms of their roots, and the sorting of root lists into them.
 
+use crate::arithmetic::Real;
 use crate::linalg::Complex;
 
 use super::AnalogError;
@@ -8,35 +9,31 @@ use super::AnalogError;
 /// and narrow enough not to pair distinct roots.
 const CONJUGATE_TOLERANCE: f64 = 1e-11;
 
+/// Distance of two roots, relative to their mean, up to which their doubles are one double root: the square of
+/// half of it changes the polynomial on the imaginary axis by less than the rounding of its coefficients. The
+/// roots of a double root that was written with rounding are about this far apart.
+const DOUBLE_ROOT: f64 = 8e-8;
+
 /// A monic real polynomial of degree at most two, stored by its roots: near a root, the product of
 /// differences is accurate while expanded coefficients cancel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Roots {
+pub(super) enum Roots<T> {
     /// The constant 1.
     None,
     /// s - r.
-    One(f64),
+    One(T),
     /// (s - r1) (s - r2).
-    Two(f64, f64),
+    Two(T, T),
     /// (s - re)^2 + im^2 with im > 0.
     Conjugate {
         /// Real part of both roots.
-        re: f64,
+        re: T,
         /// Imaginary part of the upper root.
-        im: f64,
+        im: T,
     },
 }
 
-impl Roots {
-    /// Degree of the polynomial.
-    pub(super) fn count(self) -> usize {
-        match self {
-            Self::None => 0,
-            Self::One(_) => 1,
-            Self::Two(..) | Self::Conjugate { .. } => 2,
-        }
-    }
-
+impl Roots<f64> {
     /// Value at `s`.
     pub(super) fn eval(self, s: Complex<f64>) -> Complex<f64> {
         match self {
@@ -56,14 +53,25 @@ impl Roots {
             Self::Conjugate { re, im } => vec![Complex::new(re, im), Complex::new(re, -im)],
         }
     }
+}
 
-    /// Geometric mean of the moduli; 1 for the constant.
+impl<T: Real> Roots<T> {
+    /// Degree of the polynomial.
+    pub(super) fn count(self) -> usize {
+        match self {
+            Self::None => 0,
+            Self::One(_) => 1,
+            Self::Two(..) | Self::Conjugate { .. } => 2,
+        }
+    }
+
+    /// Geometric mean of the moduli, rounded to a double; 1 for the constant.
     pub(super) fn natural_frequency(self) -> f64 {
         match self {
             Self::None => 1.0,
-            Self::One(r) => r.abs(),
-            Self::Two(r1, r2) => r1.abs().sqrt() * r2.abs().sqrt(),
-            Self::Conjugate { re, im } => re.hypot(im),
+            Self::One(r) => r.to_double().abs(),
+            Self::Two(r1, r2) => r1.to_double().abs().sqrt() * r2.to_double().abs().sqrt(),
+            Self::Conjugate { re, im } => re.to_double().hypot(im.to_double()),
         }
     }
 
@@ -71,8 +79,8 @@ impl Roots {
     pub(super) fn quality(self) -> f64 {
         match self {
             Self::None | Self::One(_) => 0.0,
-            Self::Two(r1, r2) => self.natural_frequency() / (r1 + r2).abs(),
-            Self::Conjugate { re, .. } => self.natural_frequency() / (2.0 * re.abs()),
+            Self::Two(r1, r2) => self.natural_frequency() / (r1.to_double() + r2.to_double()).abs(),
+            Self::Conjugate { re, .. } => self.natural_frequency() / (2.0 * re.to_double().abs()),
         }
     }
 }
@@ -80,33 +88,113 @@ impl Roots {
 /// A list of roots split into the real ones and the conjugate pairs, each sorted.
 ///
 /// The result does not depend on the order of the list, so two spellings of one filter are equal.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct RootSet {
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct RootSet<T> {
     /// Real roots, ascending.
-    pub(super) real: Vec<f64>,
+    pub(super) real: Vec<T>,
     /// Upper roots (re, im > 0), by modulus and then real part.
-    pub(super) upper: Vec<(f64, f64)>,
+    pub(super) upper: Vec<(T, T)>,
 }
 
-impl RootSet {
-    /// Sorts `roots`; `what` names them in the error about a root without partner.
+impl<T> Default for RootSet<T> {
+    fn default() -> Self {
+        Self { real: Vec::new(), upper: Vec::new() }
+    }
+}
+
+impl<T: Real> RootSet<T> {
+    /// Sorts the written `roots`; `what` names them in the error about a root without partner. Conjugates
+    /// that agree up to rounding stand for their mean, and a root that is real up to rounding for its real
+    /// part.
     pub(super) fn new(roots: &[Complex<f64>], what: &'static str) -> Result<Self, AnalogError> {
         let mut real: Vec<f64> = roots.iter().filter(|r| r.im == 0.0).map(|r| r.re).collect();
         let mut lower: Vec<Complex<f64>> = roots.iter().copied().filter(|r| r.im < 0.0).collect();
         let mut upper = Vec::new();
+        let mean = |x: f64, y: f64| T::from(0.5) * (T::from(x) + T::from(y));
         for root in roots.iter().filter(|r| r.im > 0.0) {
             match take_partner(*root, &mut lower) {
-                Some(partner) => upper.push((0.5 * (root.re + partner.re), 0.5 * (root.im - partner.im))),
+                Some(partner) => upper.push((mean(root.re, partner.re), mean(root.im, -partner.im))),
                 None => real.push(nearly_real(*root).ok_or(unpaired(what, *root))?),
             }
         }
         for root in lower {
             real.push(nearly_real(root).ok_or(unpaired(what, root))?);
         }
+        Ok(Self { real: real.into_iter().map(T::from).collect(), upper }.sorted())
+    }
+
+    /// In the order that the type promises.
+    pub(super) fn sorted(mut self) -> Self {
+        let double = |z: &(T, T)| Complex::new(z.0.to_double(), z.1.to_double());
+        self.real.sort_by(|a, b| a.to_double().total_cmp(&b.to_double()));
+        self.upper.sort_by(|a, b| {
+            let (a, b) = (double(a), double(b));
+            a.norm().total_cmp(&b.norm()).then(a.re.total_cmp(&b.re))
+        });
+        self
+    }
+
+    /// Number of roots.
+    pub(super) fn count(&self) -> usize {
+        self.real.len() + 2 * self.upper.len()
+    }
+
+    /// Each root times a positive number.
+    pub(super) fn scaled(&self, by: T) -> Self {
+        let upper = self.upper.iter().map(|&(re, im)| (re * by, im * by)).collect();
+        Self { real: self.real.iter().map(|&r| r * by).collect(), upper }
+    }
+
+    /// The nearest doubles, real and imaginary part apart, so that the distance of a root from the axis keeps
+    /// its accuracy; of two roots within [`DOUBLE_ROOT`], twice their mean.
+    pub(super) fn rounded(&self) -> RootSet<f64> {
+        let mut real: Vec<f64> = self.real.iter().map(|r| r.to_double()).collect();
+        let mut upper = Vec::new();
+        for (re, im) in self.upper.iter().map(|z| (z.0.to_double(), z.1.to_double())) {
+            if im <= 0.5 * DOUBLE_ROOT * re.abs() { real.extend([re, re]) } else { upper.push((re, im)) }
+        }
         real.sort_by(f64::total_cmp);
-        let modulus = |z: &(f64, f64)| z.0.hypot(z.1);
-        upper.sort_by(|a, b| modulus(a).total_cmp(&modulus(b)).then(a.0.total_cmp(&b.0)));
-        Ok(Self { real, upper })
+        for i in 1..real.len() {
+            let mean = 0.5 * (real[i - 1] + real[i]);
+            if real[i] - real[i - 1] <= DOUBLE_ROOT * mean.abs() {
+                real[i - 1..=i].fill(mean);
+            }
+        }
+        RootSet { real, upper }.sorted()
+    }
+}
+
+/// `gain` prod(s - zeros) / prod(s - poles).
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Factors<T> {
+    pub(super) zeros: RootSet<T>,
+    pub(super) poles: RootSet<T>,
+    pub(super) gain: T,
+}
+
+impl<T: Real> Factors<T> {
+    /// H(s / scale): every zero and pole times `scale`, a positive number.
+    pub(super) fn stretched(&self, scale: T) -> Self {
+        let relative_degree = self.poles.count() as i64 - self.zeros.count() as i64;
+        Self {
+            zeros: self.zeros.scaled(scale),
+            poles: self.poles.scaled(scale),
+            gain: self.gain.times_power(scale, relative_degree),
+        }
+    }
+
+    /// In other numbers.
+    pub(super) fn map<U>(&self, to: impl Fn(T) -> U) -> Factors<U> {
+        let set = |roots: &RootSet<T>| RootSet {
+            real: roots.real.iter().map(|&r| to(r)).collect(),
+            upper: roots.upper.iter().map(|&(re, im)| (to(re), to(im))).collect(),
+        };
+        Factors { zeros: set(&self.zeros), poles: set(&self.poles), gain: to(self.gain) }
+    }
+
+    /// In doubles; see [`RootSet::rounded`].
+    pub(super) fn rounded(&self) -> Factors<f64> {
+        Factors { zeros: self.zeros.rounded(), poles: self.poles.rounded(), gain: self.gain.to_double() }
     }
 }
 

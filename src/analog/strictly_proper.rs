@@ -1,5 +1,6 @@
 //! The checked filters.
 
+use crate::arithmetic::{Ball, BigFloat};
 use crate::linalg::{Complex, Mat};
 use crate::spec::FilterSpec;
 use crate::units::{RadiansPerFastPeriod, Seconds};
@@ -17,9 +18,9 @@ use super::{AnalogError, MAX_GAIN, MAX_NORMALISED_POLE, MIN_DAMPING_RATIO, MIN_G
 /// poles, zeros and gains are (for state-space forms: their matrices), in whatever form they were written.
 #[derive(Debug, Clone)]
 pub struct StableFilter {
-    chain: Chain,
+    chain: Chain<f64>,
     poles: Vec<Complex<f64>>,
-    realisation: Realisation,
+    realisation: Realisation<f64>,
 }
 
 impl PartialEq for StableFilter {
@@ -54,7 +55,7 @@ impl StableFilter {
         if !chain.gain.is_normal() {
             return Err(AnalogError::GainOutOfRange { value: chain.gain });
         }
-        let realisation = with_unit_states(signal.map(|signal| &signal.realisation), &realise(&chain));
+        let realisation = with_unit_states(signal.map(|signal| &signal.realisation), &chain.realise());
         Self { chain, poles, realisation }.transmitting()
     }
 
@@ -168,13 +169,18 @@ impl StrictlyProper {
     }
 }
 
-/// The blocks in series. The gain is applied at the output, so that states keep their size.
-fn realise(chain: &Chain) -> Realisation {
-    let mut whole =
-        chain.blocks.iter().fold(Realisation::wire(), |whole, block| whole.then(&block.realise()));
-    whole.c *= chain.gain;
-    whole.d *= chain.gain;
-    whole
+/// The state equations of a written filter that has been realised as a [`StableFilter`], enclosed: those of
+/// the filter as it is written, with states of about unit energy for the input `signal` or white noise.
+///
+/// # Errors
+/// As [`StrictlyProper::new`].
+pub(crate) fn enclosed(
+    signal: Option<&Realisation<Ball<BigFloat>>>,
+    filter: &FilterSpec,
+    h: Seconds,
+) -> Result<Realisation<Ball<BigFloat>>, AnalogError> {
+    let realisation = Chain::new(filter, h)?.realise();
+    Ok(with_unit_states(signal.map(Realisation::rounded).as_ref(), &realisation))
 }
 
 /// The rules for a pole, given in rad per fast period; errors name it in rad/s.

@@ -2,7 +2,7 @@
 //! adds a bound of its rounding error to the radius. A result encloses the exact result for all values in
 //! the operands; docs/proof.md derives this, down to numbers that no double holds.
 
-use super::{DoubleDouble, Number};
+use super::{BigFloat, DoubleDouble, Number};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Compensates for the rounding of the radius itself: at most a dozen operations in double precision.
@@ -89,6 +89,13 @@ impl<F: Number> Ball<F> {
         // |sqrt(x) - sqrt(m)| = |x - m| / (sqrt(x) + sqrt(m)).
         let spread = if self.radius == 0.0 { 0.0 } else { self.radius / root.nearest() };
         Self::rounded(root, spread)
+    }
+}
+
+impl Ball<BigFloat> {
+    /// The enclosed numbers in the precision of `F`.
+    pub(crate) fn shortened<F: Number>(self) -> Ball<F> {
+        if self.is_zero() { Ball::ZERO } else { Ball::rounded(F::shortened(self.mid), self.radius) }
     }
 }
 

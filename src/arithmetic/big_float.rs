@@ -72,8 +72,13 @@ impl BigFloat {
         self.exponent.cmp(&other.exponent).then_with(|| self.words.iter().rev().cmp(other.words.iter().rev()))
     }
 
+    /// e with 2^(e - 1) <= |x| < 2^e; 0 for zero and NaN.
+    pub(crate) fn exponent(&self) -> i64 {
+        self.exponent
+    }
+
     /// x 2^power.
-    fn scaled(self, power: i64) -> Self {
+    pub(crate) fn scaled(self, power: i64) -> Self {
         if self.is_zero() { self } else { Self { exponent: self.exponent + power, ..self }.within_range() }
     }
 
@@ -157,6 +162,10 @@ impl Number for BigFloat {
         let root = m * y;
         let rest = m - root * root;
         (root + (rest * y).scaled(-1)).scaled(half)
+    }
+
+    fn shortened(x: Self) -> Self {
+        x
     }
 }
 

@@ -2,22 +2,24 @@
 //!
 //! [`DoubleDouble`] has 106 bits and [`BigFloat`] has 512. Both are a [`Number`], the trait over which
 //! enclosures and the decompositions of [`dense`] are generic: [`Ball`] encloses a real number,
-//! [`ComplexBall`] a complex one.
+//! [`ComplexBall`] a complex one. A formula that is generic over [`Real`] is computed in doubles and in balls.
 
 mod ball;
 mod big_float;
-mod complex_ball;
+mod cartesian;
 pub(crate) mod dense;
 mod double_double;
 #[cfg(test)]
 mod exact;
 mod number;
+mod real;
 
 pub(crate) use ball::{Ball, OUTWARD};
 pub(crate) use big_float::BigFloat;
-pub(crate) use complex_ball::ComplexBall;
+pub(crate) use cartesian::{Cartesian, ComplexBall};
 pub(crate) use double_double::DoubleDouble;
 pub(crate) use number::Number;
+pub(crate) use real::{Field, Real};
 
 use std::ops::{AddAssign, SubAssign};
 

@@ -1,32 +1,36 @@
-//! Enclosed complex numbers: a ball for each part.
+//! Complex numbers of any of the real ones.
 
+use super::real::Field;
 use super::{Ball, BigFloat, Number};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// All numbers whose real and imaginary parts lie in these balls.
+/// A complex number by its parts.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct ComplexBall<F = BigFloat> {
-    pub(crate) re: Ball<F>,
-    pub(crate) im: Ball<F>,
+pub(crate) struct Cartesian<T> {
+    pub(crate) re: T,
+    pub(crate) im: T,
 }
 
-impl<F: Number> ComplexBall<F> {
-    pub(crate) fn new(re: Ball<F>, im: Ball<F>) -> Self {
+/// All complex numbers whose parts lie in two balls.
+pub(crate) type ComplexBall<F = BigFloat> = Cartesian<Ball<F>>;
+
+impl<T: Field> Cartesian<T> {
+    pub(crate) fn new(re: T, im: T) -> Self {
         Self { re, im }
     }
 
-    /// The conjugates.
+    /// The conjugate.
     pub(crate) fn conj(self) -> Self {
         Self { re: self.re, im: -self.im }
     }
 
-    /// The squares of the moduli.
-    pub(crate) fn norm_sqr(self) -> Ball<F> {
+    /// The square of the modulus.
+    pub(crate) fn norm_sqr(self) -> T {
         self.re * self.re + self.im * self.im
     }
 
     /// Times a real number.
-    pub(crate) fn scaled(self, by: Ball<F>) -> Self {
+    pub(crate) fn scaled(self, by: T) -> Self {
         Self { re: self.re * by, im: self.im * by }
     }
 }
@@ -37,37 +41,37 @@ impl<F: Number> From<Ball<F>> for ComplexBall<F> {
     }
 }
 
-impl<F: Number> Neg for ComplexBall<F> {
+impl<T: Field> Neg for Cartesian<T> {
     type Output = Self;
     fn neg(self) -> Self {
         Self { re: -self.re, im: -self.im }
     }
 }
 
-impl<F: Number> Add for ComplexBall<F> {
+impl<T: Field> Add for Cartesian<T> {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         Self { re: self.re + other.re, im: self.im + other.im }
     }
 }
 
-impl<F: Number> Sub for ComplexBall<F> {
+impl<T: Field> Sub for Cartesian<T> {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
-        self + -other
+        Self { re: self.re - other.re, im: self.im - other.im }
     }
 }
 
-impl<F: Number> Mul for ComplexBall<F> {
+impl<T: Field> Mul for Cartesian<T> {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
         Self { re: self.re * other.re - self.im * other.im, im: self.re * other.im + self.im * other.re }
     }
 }
 
-impl<F: Number> Div for ComplexBall<F> {
+impl<T: Field> Div for Cartesian<T> {
     type Output = Self;
-    /// NaN if the divisor may be zero.
+    /// NaN if the divisor is, or may be, zero.
     fn div(self, other: Self) -> Self {
         let (product, size) = (self * other.conj(), other.norm_sqr());
         Self { re: product.re / size, im: product.im / size }

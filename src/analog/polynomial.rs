@@ -1,0 +1,180 @@
+//! Roots of polynomials, enclosed in discs of which each holds one root.
+//!
+//! Approximations in 512 bits are the centres of Smith's discs: the discs around z_i with the radii
+//! n |p(z_i)| / |a_n prod_j (z_i - z_j)| together hold all roots, and a disc that meets no other holds one
+//! (B. T. Smith, *Error bounds for zeros of a polynomial based upon Gerschgorin's theorems*, J. ACM 17, 1970).
+//! The centres lie symmetric about the real axis, so the root of a real centre is real, and two conjugate
+//! discs hold a conjugate pair.
+
+use crate::arithmetic::{Ball, BigFloat, Cartesian, ComplexBall, Number};
+use crate::linalg::{self, Complex, Mat};
+
+use super::AnalogError;
+use super::roots::RootSet;
+use super::square_free::{Factor, square_free_factors};
+
+/// Relative error of a coefficient of a square-free factor.
+const COEFFICIENT_ERROR: f64 = 2.0 * BigFloat::ROUNDING;
+/// Most steps of [`refined`]. From eigenvalues in doubles three are enough; the further ones are for clusters,
+/// to which the eigenvalues are poor approximations.
+const MAX_STEPS: usize = 100;
+/// Relative correction from which the next approximation has all its digits, because each step triples them.
+const SETTLED: f64 = 1e-70;
+/// Relative change of the first approximations by which they lose their symmetry: two real ones could not
+/// become a conjugate pair otherwise.
+const ASYMMETRY: f64 = 1e-10;
+/// Imaginary part over modulus of an approximation to a real root. The discs decide whether it is real.
+const REAL: f64 = 1e-100;
+/// Covers the rounding of the radii, which are computed with some hundred operations of 512 bits and then
+/// rounded to doubles.
+const OUTWARD: f64 = 1.0 + 1e-12;
+
+type Long = Cartesian<BigFloat>;
+
+/// The roots of the polynomial with these coefficients in descending powers, each as often as it occurs;
+/// `what` names it in errors.
+///
+/// # Errors
+/// [`AnalogError::RootsNotIsolated`] for roots that 512 bits do not tell apart.
+pub(super) fn enclosed_roots(
+    coefficients: &[f64],
+    what: &'static str,
+) -> Result<RootSet<Ball<BigFloat>>, AnalogError> {
+    let significant = coefficients.iter().rposition(|&x| x != 0.0).map_or(0, |last| last + 1);
+    let mut roots = RootSet::default();
+    roots.real.resize(coefficients.len() - significant, Ball::ZERO);
+    for Factor { coefficients, multiplicity } in square_free_factors(&coefficients[..significant]) {
+        let simple = isolated(&coefficients).ok_or(AnalogError::RootsNotIsolated { what })?;
+        for _ in 0..multiplicity {
+            roots.real.extend(&simple.real);
+            roots.upper.extend(&simple.upper);
+        }
+    }
+    Ok(roots.sorted())
+}
+
+/// The simple roots of a polynomial.
+fn isolated(p: &[BigFloat]) -> Option<RootSet<Ball<BigFloat>>> {
+    let centres = symmetric(refined(p, approximate_roots(p)?))?;
+    let radii: Vec<f64> = (0..centres.len()).map(|i| radius(p, &centres, i)).collect();
+    for (i, &z) in centres.iter().enumerate() {
+        for (j, &other) in centres.iter().enumerate().take(i) {
+            let apart = modulus(z - other).nearest() > (radii[i] + radii[j]) * OUTWARD;
+            if !apart {
+                return None;
+            }
+        }
+    }
+    let mut roots = RootSet::default();
+    for (z, &radius) in centres.iter().zip(&radii) {
+        let part = |x| Ball::exactly(x).widened(radius);
+        match (z.im == BigFloat::ZERO, z.im.nearest() > 0.0) {
+            (true, _) => roots.real.push(part(z.re)),
+            (_, true) => roots.upper.push((part(z.re), part(z.im))),
+            _ => {}
+        }
+    }
+    // A radius that is not a number has compared as not apart, except for a single root.
+    radii.iter().all(|radius| radius.is_finite()).then_some(roots)
+}
+
+/// Eigenvalues of the companion matrix in the unit of their geometric mean, without symmetry.
+fn approximate_roots(p: &[BigFloat]) -> Option<Vec<Long>> {
+    let n = p.len() - 1;
+    let unit = (p[n].exponent() - p[0].exponent()) / (n as i64).max(1);
+    let scaled = |k: usize| (p[k] / p[0]).scaled(-unit * k as i64).nearest();
+    let companion = Mat::from_fn(n, n, |i, j| match i {
+        0 => -scaled(j + 1),
+        _ if j + 1 == i => 1.0,
+        _ => 0.0,
+    });
+    let eigenvalues = linalg::eigenvalues(&companion).ok()?;
+    let turned = |(i, z): (usize, Complex<f64>)| {
+        let z = z * Complex::from_polar(1.0 + ASYMMETRY * i as f64, ASYMMETRY);
+        Long::new(BigFloat::from(z.re).scaled(unit), BigFloat::from(z.im).scaled(unit))
+    };
+    Some(eigenvalues.into_iter().enumerate().map(turned).collect())
+}
+
+/// Newton's steps for all roots at once, each deflated by the other roots (Ehrlich and Aberth).
+fn refined(p: &[BigFloat], mut roots: Vec<Long>) -> Vec<Long> {
+    for _ in 0..MAX_STEPS {
+        let mut settled = true;
+        for i in 0..roots.len() {
+            let z = roots[i];
+            let step = correction(p, &roots, i);
+            let size = modulus(step).nearest();
+            if size.is_finite() {
+                roots[i] = z - step;
+            }
+            // NaN compares as not settled.
+            settled &= size <= SETTLED * modulus(z).nearest();
+        }
+        if settled {
+            break;
+        }
+    }
+    roots
+}
+
+fn correction(p: &[BigFloat], roots: &[Long], i: usize) -> Long {
+    let z = roots[i];
+    let (mut value, mut slope) = (real(BigFloat::ZERO), real(BigFloat::ZERO));
+    for &coefficient in p {
+        slope = slope * z + value;
+        value = value * z + real(coefficient);
+    }
+    let newton = value / slope;
+    let others = roots.iter().enumerate().filter(|&(j, _)| j != i);
+    let repulsion = others.fold(real(BigFloat::ZERO), |sum, (_, &other)| sum + inverse(z - other));
+    newton / (real(BigFloat::from(1.0)) - newton * repulsion)
+}
+
+fn real(x: BigFloat) -> Long {
+    Long::new(x, BigFloat::ZERO)
+}
+
+fn inverse(z: Long) -> Long {
+    z.conj().scaled(BigFloat::from(1.0) / z.norm_sqr())
+}
+
+fn modulus(z: Long) -> BigFloat {
+    z.norm_sqr().sqrt()
+}
+
+/// The approximations with exact symmetry: real roots on the axis, the others in conjugate pairs. `None` if
+/// some have no partner.
+fn symmetric(roots: Vec<Long>) -> Option<Vec<Long>> {
+    let is_real = |z: &Long| z.im.nearest().abs() <= REAL * modulus(*z).nearest();
+    let (real_ones, others): (Vec<Long>, Vec<Long>) = roots.into_iter().partition(is_real);
+    let (upper, lower): (Vec<Long>, Vec<Long>) = others.into_iter().partition(|z| z.im.nearest() > 0.0);
+    let real_ones = real_ones.into_iter().map(|z| real(z.re));
+    let pairs = upper.iter().flat_map(|&z| [z, z.conj()]);
+    (upper.len() == lower.len()).then(|| real_ones.chain(pairs).collect())
+}
+
+/// Smith's radius of the disc around centre `i`.
+fn radius(p: &[BigFloat], centres: &[Long], i: usize) -> f64 {
+    let z = centres[i];
+    let others = centres.iter().enumerate().filter(|&(j, _)| j != i);
+    let denominator = others.fold(p[0], |product, (_, &other)| product * modulus(z - other));
+    let size = residual(p, z) * BigFloat::from(centres.len() as f64);
+    // What is no double is rounded up.
+    (size / denominator).nearest().abs() * OUTWARD + f64::MIN_POSITIVE
+}
+
+/// A bound of |p(z)|. It is computed in the unit of |z|, in which no power of z leaves the range of doubles.
+fn residual(p: &[BigFloat], z: Long) -> BigFloat {
+    let (n, unit) = (p.len() as i64 - 1, modulus(z).exponent());
+    let power = |k: usize| unit * (n - k as i64);
+    let size = (0..p.len()).filter(|&k| p[k] != BigFloat::ZERO).map(|k| p[k].exponent() + power(k)).max();
+    let size = size.unwrap_or(0);
+    let coefficient = |k: usize| {
+        let x = p[k].scaled(power(k) - size);
+        // The second number covers what is no double.
+        Ball::exactly(x).widened(COEFFICIENT_ERROR * x.nearest().abs() + f64::MIN_POSITIVE)
+    };
+    let point = ComplexBall::new(Ball::exactly(z.re.scaled(-unit)), Ball::exactly(z.im.scaled(-unit)));
+    let value = (0..p.len()).fold(ComplexBall::from(Ball::ZERO), |sum, k| sum * point + coefficient(k).into());
+    BigFloat::from(value.re.magnitude() + value.im.magnitude()).scaled(size)
+}
