@@ -29,6 +29,7 @@ pub mod fit;
 mod half_power;
 mod pairing;
 mod polynomial;
+mod proportion;
 mod realise;
 mod roots;
 mod section;
@@ -37,6 +38,7 @@ mod square_free;
 mod strictly_proper;
 mod zpk;
 
+pub(crate) use proportion::proportion;
 pub(crate) use section::Realisation;
 pub(crate) use strictly_proper::enclosed;
 

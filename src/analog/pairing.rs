@@ -2,7 +2,7 @@
 
 use crate::arithmetic::Real;
 
-use super::roots::{RootSet, Roots};
+use super::roots::{RootSet, Roots, steps};
 use super::section::Section;
 
 /// Pairs zeros with poles and orders the sections, low quality first, and those of one quality as they were
@@ -105,7 +105,7 @@ fn pair_distance<T: Real>(zeros: Roots<T>, poles: Roots<T>) -> f64 {
 
 fn closest_pair<T: Real>(pairs: &[Roots<T>], unpaired: &UnpairedPoles<T>) -> Option<(usize, Group)> {
     let candidates = (0..pairs.len()).flat_map(|i| unpaired.groups().map(move |group| (i, group)));
-    let cost = |&(i, group): &(usize, Group)| pair_distance(pairs[i], unpaired.poles(group));
+    let cost = |&(i, group): &(usize, Group)| steps(pair_distance(pairs[i], unpaired.poles(group)));
     candidates.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
@@ -115,7 +115,7 @@ fn closest_section<T: Real>(zeros: &[T], sections: &[Section<T>]) -> Option<(usi
     let cost = |&(i, k): &(usize, usize)| {
         let zero = zeros[i].to_double();
         let second = if zero == 0.0 && sections[k].zeros.count() > 0 { SECOND_AT_ORIGIN } else { 0.0 };
-        distance(zero, sections[k].poles.natural_frequency()) + second
+        steps(distance(zero, sections[k].poles.natural_frequency()) + second)
     };
     candidates.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }

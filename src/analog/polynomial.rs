@@ -175,6 +175,7 @@ fn residual(p: &[BigFloat], z: Long) -> BigFloat {
         Ball::exactly(x).widened(COEFFICIENT_ERROR * x.nearest().abs() + f64::MIN_POSITIVE)
     };
     let point = ComplexBall::new(Ball::exactly(z.re.scaled(-unit)), Ball::exactly(z.im.scaled(-unit)));
-    let value = (0..p.len()).fold(ComplexBall::from(Ball::ZERO), |sum, k| sum * point + coefficient(k).into());
+    let value =
+        (0..p.len()).fold(ComplexBall::from(Ball::ZERO), |sum, k| sum * point + coefficient(k).into());
     BigFloat::from(value.re.magnitude() + value.im.magnitude()).scaled(size)
 }

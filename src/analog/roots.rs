@@ -14,6 +14,15 @@ const CONJUGATE_TOLERANCE: f64 = 1e-11;
 /// roots of a double root that was written with rounding are about this far apart.
 const DOUBLE_ROOT: f64 = 8e-8;
 
+/// Relative difference of two frequencies that are one, so that rounding does not decide about the order of
+/// roots and sections. The poles of a Butterworth filter have one modulus.
+const SAME_FREQUENCY: f64 = 1e-9;
+
+/// Steps of [`SAME_FREQUENCY`] in the logarithm of a ratio of frequencies, by which these are compared.
+pub(super) fn steps(logarithm: f64) -> f64 {
+    (logarithm / SAME_FREQUENCY).round()
+}
+
 /// A monic real polynomial of degree at most two, stored by its roots: near a root, the product of
 /// differences is accurate while expanded coefficients cancel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -129,7 +138,8 @@ impl<T: Real> RootSet<T> {
         self.real.sort_by(|a, b| a.to_double().total_cmp(&b.to_double()));
         self.upper.sort_by(|a, b| {
             let (a, b) = (double(a), double(b));
-            a.norm().total_cmp(&b.norm()).then(a.re.total_cmp(&b.re))
+            let rank = |z: Complex<f64>| steps(z.norm().ln());
+            rank(a).total_cmp(&rank(b)).then(a.re.total_cmp(&b.re))
         });
         self
     }

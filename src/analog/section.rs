@@ -88,6 +88,11 @@ fn biproper_row<T: Real>([m1, m2, v]: [T; 3], [z1, z2, y]: [T; 3], [k, w]: [T; 2
 }
 
 impl<T: Real> Realisation<T> {
+    /// Number of states.
+    pub(crate) fn order(&self) -> usize {
+        self.a.nrows()
+    }
+
     /// No state, output = input.
     pub(super) fn wire() -> Self {
         let empty = |rows, columns| DMatrix::from_element(rows, columns, T::from(0.0));

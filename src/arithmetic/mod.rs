@@ -19,7 +19,7 @@ pub(crate) use big_float::BigFloat;
 pub(crate) use cartesian::{Cartesian, ComplexBall};
 pub(crate) use double_double::DoubleDouble;
 pub(crate) use number::Number;
-pub(crate) use real::{Field, Real};
+pub(crate) use real::Real;
 
 use std::ops::{AddAssign, SubAssign};
 

@@ -1,6 +1,6 @@
 //! Matrices of enclosed numbers.
 
-use crate::arithmetic::{DoubleDouble, Number, OUTWARD};
+use crate::arithmetic::{BigFloat, DoubleDouble, Number, OUTWARD};
 use nalgebra::DMatrix;
 
 pub(super) use crate::arithmetic::Ball;
@@ -11,6 +11,11 @@ pub(super) type Matrix<F = DoubleDouble> = DMatrix<Ball<F>>;
 /// The matrix of exactly these doubles.
 pub(super) fn exact<F: Number>(m: &DMatrix<f64>) -> Matrix<F> {
     m.map(Ball::from)
+}
+
+/// The same in the precision of `F`.
+pub(super) fn shortened<F: Number>(m: &Matrix<BigFloat>) -> Matrix<F> {
+    m.map(Ball::shortened)
 }
 
 pub(super) fn zeros<F: Number>(rows: usize, columns: usize) -> Matrix<F> {

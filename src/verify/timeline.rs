@@ -26,7 +26,7 @@ pub(super) struct SamplingInstant {
     /// Index of the filter.
     pub(super) filter: usize,
     /// The output of the sample's own filter over that filter's, not zero.
-    pub(super) gain: f64,
+    pub(super) gain: Ball<BigFloat>,
     /// The sample over the output of its own filter, not zero.
     pub(super) converter_gain: f64,
     pub(super) time: Instant,
@@ -174,7 +174,7 @@ mod tests {
     fn sample(whole: f64, delay: f64) -> SamplingInstant {
         SamplingInstant {
             filter: 0,
-            gain: 1.0,
+            gain: Ball::from(1.0),
             converter_gain: 1.0,
             time: Instant { whole, delay: Seconds(delay) },
         }

@@ -195,13 +195,13 @@ impl Bent {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analog::{StableFilter, StrictlyProper};
+    use crate::analog::enclosed;
     use crate::spec::FilterSpec;
     use crate::units::Seconds;
 
     fn transfer(num: &[f64], den: &[f64]) -> Transfer {
         let spec = FilterSpec::TransferFunction { num: num.to_vec(), den: den.to_vec() };
-        Transfer::new(&StrictlyProper::new(&spec, Seconds(1.0)).unwrap(), 1.0)
+        Transfer::new(&enclosed(None, &spec, Seconds(1.0)).unwrap(), Ball::from(1.0))
     }
 
     fn alone(transfer: &Transfer) -> FrontEnd<'_> {
@@ -213,7 +213,7 @@ mod tests {
     fn a_signal_shapes_the_sums() {
         let front_end = transfer(&[1.0], &[1.0, 0.7]);
         let filter = FilterSpec::TransferFunction { num: vec![0.1, 0.2, 1.0], den: vec![1.0, 0.9, 1.0] };
-        let signal = Transfer::new(&StableFilter::new(&filter, Seconds(1.0)).unwrap(), 1.0);
+        let signal = Transfer::new(&enclosed(None, &filter, Seconds(1.0)).unwrap(), Ball::from(1.0));
         let shaped = FrontEnd { transfer: &front_end, signal: Some(&signal) };
         for weight in [Weight::One, Weight::Chord(0.1), Weight::Shift(1e-3)] {
             let bound = Aliases::new(&shaped, Ball::from(2.0), 3, [1.0, 1.0]).unwrap().norm(weight);

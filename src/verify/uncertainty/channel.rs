@@ -92,7 +92,7 @@ pub(super) fn transfer(grid: &Grid, i: usize) -> Transfer {
 
 /// The transfer function of the signal's filter.
 pub(super) fn signal_transfer(grid: &Grid) -> Option<Transfer> {
-    grid.front_ends.signal().map(|signal| Transfer::new(signal, 1.0))
+    grid.front_ends.signal().map(|signal| Transfer::new(signal, Ball::from(1.0)))
 }
 
 impl Channel {

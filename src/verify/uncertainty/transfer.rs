@@ -2,8 +2,8 @@
 //! the imaginary axis.
 
 use super::super::ball::{self, Ball, Matrix};
-use crate::analog::StableFilter;
-use crate::arithmetic::{BigFloat, DoubleDouble, Number};
+use super::super::front_ends::Equations;
+use crate::arithmetic::BigFloat;
 
 /// N(s) / D(s), coefficients in ascending powers of s, s in rad per fast period; D is monic.
 #[derive(Debug, Clone)]
@@ -16,22 +16,22 @@ impl Transfer {
     /// `gain` (c (s I - a)^-1 b + d), by the recursion of Faddeev and Le Verrier: M_0 = I,
     /// M_k = a M_{k-1} + d_k I, d_k = -tr(a M_{k-1}) / k; then D = s^n + sum_k d_k s^(n-k) and
     /// N = sum_k c M_k b s^(n-1-k) + d D. It loses many digits, so it runs with 512 bits.
-    pub(super) fn new(filter: &StableFilter, gain: f64) -> Self {
-        let (a, b): (Matrix<BigFloat>, Matrix<BigFloat>) = (ball::exact(filter.a()), ball::exact(filter.b()));
-        let c: Matrix<BigFloat> = ball::scaled(&ball::exact(filter.c()), Ball::from(gain));
+    pub(super) fn new(filter: &Equations, gain: Ball<BigFloat>) -> Self {
+        let Equations { a, b, c, d } = filter;
+        let c = ball::scaled(c, gain);
         let n = a.nrows();
         let (mut num, mut den) = (vec![Ball::ZERO; n], vec![Ball::from(1.0); n + 1]);
         let mut power: Matrix<BigFloat> = ball::identity(n);
         for k in 1..=n {
-            num[n - k] = narrowed(ball::product(&c, &ball::product(&power, &b))[(0, 0)]);
-            let next = ball::product(&a, &power);
+            num[n - k] = ball::product(&c, &ball::product(&power, b))[(0, 0)].shortened();
+            let next = ball::product(a, &power);
             let trace = (0..n).fold(Ball::ZERO, |sum, i| sum + next[(i, i)]);
-            let d = -(trace / Ball::from(k as f64));
-            den[n - k] = narrowed(d);
-            power = ball::add(&next, &ball::scaled(&ball::identity(n), d));
+            let coefficient = -(trace / Ball::from(k as f64));
+            den[n - k] = coefficient.shortened();
+            power = ball::add(&next, &ball::scaled(&ball::identity(n), coefficient));
         }
-        if filter.d() != 0.0 {
-            let direct = Ball::from(filter.d()) * Ball::from(gain);
+        if !d.is_zero() {
+            let direct = (*d * gain).shortened();
             num = plus(&num, &den.iter().map(|&x| x * direct).collect::<Vec<_>>());
         }
         Self { num, den }
@@ -69,17 +69,6 @@ impl Transfer {
             |p: usize| self.num.get(n - p).map_or(0.0, |x| x.magnitude() / share * (1.0 + 1e-10));
         Some((0..=n).map(coefficient).collect())
     }
-}
-
-/// An enclosure of 512 bits in 106.
-fn narrowed(x: Ball<BigFloat>) -> Ball {
-    let high = x.mid().nearest();
-    let low = (x.mid() - BigFloat::from(high)).nearest();
-    let mid = DoubleDouble::from(high) + DoubleDouble::from(low);
-    if high == 0.0 && x.radius() == 0.0 {
-        return Ball::ZERO;
-    }
-    Ball::exactly(mid).widened(x.radius() + DoubleDouble::ROUNDING * high.abs())
 }
 
 /// s d/ds of a polynomial.
@@ -130,19 +119,20 @@ fn square(p: &[Ball], u: Ball) -> Ball {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analog::StrictlyProper;
+    use crate::analog::{StrictlyProper, enclosed};
     use crate::spec::FilterSpec;
     use crate::units::{RadiansPerFastPeriod, Seconds};
 
-    fn filter(num: &[f64], den: &[f64]) -> StrictlyProper {
-        let spec = FilterSpec::TransferFunction { num: num.to_vec(), den: den.to_vec() };
-        StrictlyProper::new(&spec, Seconds(1.0)).unwrap()
+    /// (s/2 + 2) / (s^4 + 1.3 s^3 + 2 s^2 + 0.7 s + 0.1) in doubles, and enclosed with a gain.
+    fn filter(gain: f64) -> (StrictlyProper, Transfer) {
+        let spec = FilterSpec::TransferFunction { num: vec![0.5, 2.0], den: vec![1.0, 1.3, 2.0, 0.7, 0.1] };
+        let equations = enclosed(None, &spec, Seconds(1.0)).unwrap();
+        (StrictlyProper::new(&spec, Seconds(1.0)).unwrap(), Transfer::new(&equations, Ball::from(gain)))
     }
 
     #[test]
     fn moduli_are_those_of_the_response() {
-        let filter = filter(&[0.5, 2.0], &[1.0, 1.3, 2.0, 0.7, 0.1]);
-        let transfer = Transfer::new(&filter, -1.5);
+        let (filter, transfer) = filter(-1.5);
         for u in [-40.0, -1.0, 0.0, 0.3, 1.4, 20.0] {
             let modulus = 1.5 * filter.response(RadiansPerFastPeriod(u)).norm();
             let square = transfer.square(Ball::from(u));
@@ -162,8 +152,8 @@ mod tests {
     /// Against second differences of Phi(j u / x) in x.
     #[test]
     fn the_curvature_is_the_second_derivative_in_the_cutoff() {
-        let filter = filter(&[0.5, 2.0], &[1.0, 1.3, 2.0, 0.7, 0.1]);
-        let curvature = Transfer::new(&filter, 1.0).curvature();
+        let (filter, transfer) = filter(1.0);
+        let curvature = transfer.curvature();
         for u in [0.2, 0.9, 1.5, 6.0] {
             let at = |x: f64| filter.response(RadiansPerFastPeriod(u / x));
             let step = 1e-4;
