@@ -2,7 +2,8 @@
 //!
 //! Approximations in 512 bits are the centres of Smith's discs: the discs around z_i with the radii
 //! n |p(z_i)| / |a_n prod_j (z_i - z_j)| together hold all roots, and a disc that meets no other holds one
-//! (B. T. Smith, *Error bounds for zeros of a polynomial based upon Gerschgorin's theorems*, J. ACM 17, 1970).
+//! (B. T. Smith, *Error bounds for zeros of a polynomial based upon Gerschgorin's theorems*, J. ACM 17,
+//! 1970).
 //! The centres lie symmetric about the real axis, so the root of a real centre is real, and two conjugate
 //! discs hold a conjugate pair.
 
@@ -15,8 +16,8 @@ use super::square_free::{Factor, square_free_factors};
 
 /// Relative error of a coefficient of a square-free factor.
 const COEFFICIENT_ERROR: f64 = 2.0 * BigFloat::ROUNDING;
-/// Most steps of [`refined`]. From eigenvalues in doubles three are enough; the further ones are for clusters,
-/// to which the eigenvalues are poor approximations.
+/// Most steps of [`refined`]. From eigenvalues in doubles three are enough; the further ones are for
+/// clusters, to which the eigenvalues are poor approximations.
 const MAX_STEPS: usize = 100;
 /// Relative correction from which the next approximation has all its digits, because each step triples them.
 const SETTLED: f64 = 1e-70;

@@ -9,9 +9,9 @@ use super::AnalogError;
 /// and narrow enough not to pair distinct roots.
 const CONJUGATE_TOLERANCE: f64 = 1e-11;
 
-/// Distance of two roots, relative to their mean, up to which their doubles are one double root: the square of
-/// half of it changes the polynomial on the imaginary axis by less than the rounding of its coefficients. The
-/// roots of a double root that was written with rounding are about this far apart.
+/// Distance of two roots, relative to their mean, up to which their doubles are one double root: the square
+/// of half of it changes the polynomial on the imaginary axis by less than the rounding of its coefficients.
+/// The roots of a double root that was written with rounding are about this far apart.
 const DOUBLE_ROOT: f64 = 8e-8;
 
 /// Relative difference of two frequencies that are one, so that rounding does not decide about the order of
@@ -155,8 +155,8 @@ impl<T: Real> RootSet<T> {
         Self { real: self.real.iter().map(|&r| r * by).collect(), upper }
     }
 
-    /// The nearest doubles, real and imaginary part apart, so that the distance of a root from the axis keeps
-    /// its accuracy; of two roots within [`DOUBLE_ROOT`], twice their mean.
+    /// The nearest doubles, real and imaginary part apart, so that the distance of a root from the axis
+    /// keeps its accuracy; of two roots within [`DOUBLE_ROOT`], twice their mean.
     pub(super) fn rounded(&self) -> RootSet<f64> {
         let mut real: Vec<f64> = self.real.iter().map(|r| r.to_double()).collect();
         let mut upper = Vec::new();

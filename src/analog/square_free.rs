@@ -11,7 +11,7 @@ use crate::arithmetic::BigFloat;
 /// 2^61 - 1, a prime. A polynomial with a multiple root has one modulo every prime that does not divide its
 /// leading coefficient, and none of 53 bits is a multiple of this one.
 const PRIME: u64 = (1 << 61) - 1;
-/// Bits of each piece in which an integer is handed to 512-bit arithmetic: all of them are exact in a double.
+/// Bits of each piece in which an integer is handed to 512-bit arithmetic: every piece is exact in a double.
 const PIECE_BITS: u64 = 48;
 /// Pieces that are handed over: the 512 bits end within the last one.
 const PIECES: u64 = 12;

@@ -2,7 +2,8 @@
 //!
 //! [`DoubleDouble`] has 106 bits and [`BigFloat`] has 512. Both are a [`Number`], the trait over which
 //! enclosures and the decompositions of [`dense`] are generic: [`Ball`] encloses a real number,
-//! [`ComplexBall`] a complex one. A formula that is generic over [`Real`] is computed in doubles and in balls.
+//! [`ComplexBall`] a complex one. A formula that is generic over [`Real`] is computed in doubles and in
+//! balls.
 
 mod ball;
 mod big_float;
