@@ -95,7 +95,18 @@ impl<F: Number> Ball<F> {
 impl Ball<BigFloat> {
     /// The enclosed numbers in the precision of `F`.
     pub(crate) fn shortened<F: Number>(self) -> Ball<F> {
-        if self.is_zero() { Ball::ZERO } else { Ball::rounded(F::shortened(self.mid), self.radius) }
+        if self.radius.is_nan() {
+            return Ball::unknown();
+        }
+        let (mut mid, mut rest, mut pieces) = (F::ZERO, self.mid, 0.0);
+        let negligible = F::ROUNDING * self.mid.nearest().abs();
+        while rest.nearest().abs() > negligible {
+            mid += F::from(rest.nearest());
+            rest = rest - BigFloat::from(rest.nearest());
+            pieces += 1.0;
+        }
+        // Each sum is rounded, and what is left is negligible.
+        if self.is_zero() { Ball::ZERO } else { Ball::rounded(mid, self.radius + pieces * negligible) }
     }
 }
 

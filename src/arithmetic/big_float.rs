@@ -163,10 +163,6 @@ impl Number for BigFloat {
         let rest = m - root * root;
         (root + (rest * y).scaled(-1)).scaled(half)
     }
-
-    fn shortened(x: Self) -> Self {
-        x
-    }
 }
 
 impl From<f64> for BigFloat {

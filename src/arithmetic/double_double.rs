@@ -6,7 +6,6 @@
 //! root with one Newton step (5 u^2), for which docs/proof.md derives the bounds. All of them are below
 //! [`ROUNDING`] = 64 u^2 relative; results that underflow are off by less than 2^-1070.
 
-use super::BigFloat;
 use super::number::Number;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -72,11 +71,6 @@ impl Number for DoubleDouble {
         let root = self.high.sqrt();
         let rest = self.low + (-root).mul_add(root, self.high);
         fast_two_sum(root, rest / (2.0 * root))
-    }
-
-    fn shortened(x: BigFloat) -> Self {
-        let high = x.nearest();
-        fast_two_sum(high, (x - BigFloat::from(high)).nearest())
     }
 }
 

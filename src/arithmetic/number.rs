@@ -1,6 +1,5 @@
 //! The trait of the floating-point numbers with which enclosures are computed.
 
-use super::BigFloat;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// A floating-point number whose operations have a proven relative error.
@@ -34,7 +33,4 @@ pub(crate) trait Number:
 
     /// NaN for negative numbers.
     fn sqrt(self) -> Self;
-
-    /// `x` with the precision of this type.
-    fn shortened(x: BigFloat) -> Self;
 }
