@@ -58,7 +58,11 @@ fn parse(text: &str, offset: u64) -> Result<ArrayHeader, String> {
     // Complex numbers of 8 bytes are two of 4.
     let parts = [("<c8", "<f4"), (">c8", ">f4"), ("<c16", "<f8"), (">c16", ">f8")];
     let part = parts.iter().find(|(complex, _)| *complex == descr).map(|(_, part)| *part);
-    let is_column_major = value(text, "fortran_order")?.starts_with("True");
+    let is_column_major = match value(text, "fortran_order")? {
+        order if order.starts_with("True") => true,
+        order if order.starts_with("False") => false,
+        _ => return Err("its 'fortran_order' is neither True nor False; save it with numpy.save".to_owned()),
+    };
     let (format, is_complex) = (format(part.unwrap_or(descr))?, part.is_some());
     Ok(ArrayHeader { format, is_complex, shape: shape(value(text, "shape")?)?, is_column_major, offset })
 }
@@ -157,6 +161,8 @@ mod tests {
             let message = open(descr, "False", shape).unwrap_err();
             assert!(message.starts_with("x.npy: not a NumPy array") && message.contains(part), "{message}");
         }
+        let garbage = open("<f4", "maybe", "(2, 9)").unwrap_err();
+        assert!(garbage.contains("neither True nor False"), "{garbage}");
         for bytes in
             [&b"RIFFxxxx"[..], b"\x93NUM", b"\x93NUMPY\x01\x00\x40\x00{'descr'", b"\x93NUMPY\x09\x00\0\0\0\0"]
         {

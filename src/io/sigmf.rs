@@ -32,7 +32,7 @@ pub struct SigmfMeta {
 }
 
 /// The `global` object.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SigmfGlobal {
     /// For example `rf32_le`.
     #[serde(rename = "core:datatype")]
@@ -50,6 +50,12 @@ pub struct SigmfGlobal {
     /// Number of the file's first frame, where a recording was split into several files.
     #[serde(rename = "core:offset", default, skip_serializing_if = "is_zero")]
     pub offset: u64,
+    /// Bytes after the last frame that are not samples.
+    #[serde(rename = "core:trailing_bytes", default, skip_serializing_if = "is_zero")]
+    pub trailing_bytes: u64,
+    /// Whether the samples were left out on purpose.
+    #[serde(rename = "core:metadata_only", default, skip_serializing_if = "std::ops::Not::not")]
+    pub metadata_only: bool,
     /// Version of SigMF.
     #[serde(rename = "core:version", default)]
     pub version: String,
@@ -102,10 +108,8 @@ impl SigmfMeta {
                 datatype,
                 sample_rate: Some(rate),
                 num_channels: Some(1),
-                dataset: None,
-                offset: 0,
                 version: "1.0.0".into(),
-                other: Map::new(),
+                ..SigmfGlobal::default()
             },
             captures: vec![SigmfCapture::default()],
             annotations: Vec::new(),
@@ -129,6 +133,16 @@ impl SigmfMeta {
         let meta: Self = serde_json::from_str(text).map_err(|error| fault(error.to_string()))?;
         meta.format(file)?;
         meta.timestamps(file)?;
+        if meta.global.metadata_only {
+            return Err(fault(
+                "core:metadata_only is true, so there are no samples; give a recording".into(),
+            ));
+        }
+        if let Some(name) = meta.required_extension() {
+            return Err(fault(format!(
+                "it needs the extension {name:?}, which is unknown here; convert the recording to one without"
+            )));
+        }
         if let Some(name) = meta.global.dataset.as_deref().filter(|name| !is_file_name(name)) {
             return Err(fault(format!(
                 "core:dataset is {name:?}; it must be the name of a file in the same folder, without any path"
@@ -143,6 +157,13 @@ impl SigmfMeta {
             }
             _ => Ok(meta),
         }
+    }
+
+    /// The first extension without which the recording cannot be read.
+    fn required_extension(&self) -> Option<&str> {
+        let extensions = self.global.other.get("core:extensions")?.as_array()?;
+        let required = |extension: &&Value| extension.get("optional") == Some(&Value::Bool(false));
+        extensions.iter().find(required)?.get("name")?.as_str()
     }
 
     /// The format of the numbers of the data type.

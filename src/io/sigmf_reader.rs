@@ -18,7 +18,7 @@ pub(super) struct SigmfReader<R> {
     samples: R,
 }
 
-impl SigmfReader<File> {
+impl SigmfReader<Take<File>> {
     /// Opens the recording that the name of either of its files means.
     pub(super) fn open(path: &Path) -> Result<Self, IoError> {
         let (meta_path, _) = file_pair(path, None);
@@ -26,11 +26,14 @@ impl SigmfReader<File> {
         let (_, data_path) = file_pair(path, Some(&meta));
         let file = open_file(&data_path)?;
         let bytes = file.metadata().ok().filter(|data| data.is_file()).map(|data| data.len());
-        Self::new(meta, &meta_path.display().to_string(), file, bytes)
+        if let (Some(name), None) = (&meta.global.dataset, bytes) {
+            let problem = format!("core:dataset leads to {name:?}, which is no file; give one with samples");
+            return Err(malformed(&meta_path.display().to_string(), problem));
+        }
+        // A file may grow while it is read.
+        Self::new(meta, &meta_path.display().to_string(), file.take(u64::MAX), bytes)
     }
-}
 
-impl SigmfReader<Take<File>> {
     /// Opens the only recording of an archive.
     pub(super) fn open_archive(path: &Path) -> Result<Self, IoError> {
         let (mut archive, file) = (open_file(path)?, path.display().to_string());
@@ -39,11 +42,25 @@ impl SigmfReader<Take<File>> {
         sought.map_err(IoError::system(&file, "read the samples"))?;
         Self::new(meta, &name, archive.take(data.size), Some(data.size))
     }
-}
 
-impl<R> SigmfReader<R> {
     /// Of `samples`, of `bytes` bytes if that is known, with their metadata, called `name`.
-    fn new(meta: SigmfMeta, name: &str, samples: R, bytes: Option<u64>) -> Result<Self, IoError> {
+    fn new(
+        meta: SigmfMeta,
+        name: &str,
+        mut samples: Take<File>,
+        mut bytes: Option<u64>,
+    ) -> Result<Self, IoError> {
+        let trailing = meta.global.trailing_bytes;
+        if trailing > 0 {
+            let problem = || match bytes {
+                None => format!("core:trailing_bytes is {trailing}, but the samples come from a pipe"),
+                Some(bytes) => format!("core:trailing_bytes is {trailing}, but there are {bytes} bytes"),
+            };
+            let kept = bytes.and_then(|bytes| bytes.checked_sub(trailing));
+            let kept = kept.ok_or_else(|| malformed(name, problem()))?;
+            samples.set_limit(kept);
+            bytes = Some(kept);
+        }
         let header = meta.stream_header(name)?;
         let promised = bytes.map(|bytes| bytes / header.frame_bytes() as u64);
         let (header, timestamps) = (StreamHeader { promised, ..header }, meta.timestamps(name)?);

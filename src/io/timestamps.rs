@@ -44,6 +44,12 @@ impl Timestamps {
             ));
         }
         for pair in timestamps.windows(2) {
+            if pair[0].frame == pair[1].frame && pair[0].index != pair[1].index {
+                return Err(format!(
+                    "sample_start {} has two numbers, global_index {} and {}; give it one",
+                    pair[0].frame, pair[0].index, pair[1].index
+                ));
+            }
             lost_between(pair[0], pair[1])?;
         }
         Ok(Self(timestamps))
@@ -140,8 +146,8 @@ mod tests {
         assert_eq!(breaks(&[(0, 100), (3, 105), (5, 3000)], 98), [(0, 2), (3, 2), (5, 2893)]);
         // What stands before the first timestamp lies directly before it.
         assert_eq!(breaks(&[(4, 14), (6, 17)], 8), [(0, 2), (4, 0), (6, 1)]);
-        // Lost at the very beginning, said twice.
-        assert_eq!(breaks(&[(0, 5), (0, 6)], 5), [(0, 1)]);
+        // Said twice.
+        assert_eq!(breaks(&[(0, 6), (0, 6)], 5), [(0, 1)]);
         assert_eq!(timestamps(&[(4, 14)]).unwrap().beginning(), Some(10));
     }
 
@@ -166,6 +172,7 @@ mod tests {
             (&[(0, 5), (4, 6)][..], "must not overlap"),
             (&[(4, 4), (2, 9)], "must not overlap"),
             (&[(4, 3)], "before 0"),
+            (&[(4, 5), (4, 6)], "sample_start 4 has two numbers"),
             (&[(0, 0), (1, MAX_LOST_AT_ONCE + 2)], "mistake"),
             (&[(0, 0), (1, u64::MAX)], "mistake"),
         ] {

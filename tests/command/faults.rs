@@ -129,6 +129,10 @@ fn inputs_without_end_are_refused_with_their_bound() {
     desk.write("zero.sigmf-meta", r#"{"global": {"core:datatype": "ri8", "core:dataset": "/dev/zero"}}"#);
     let args = ["stream", "bank.json", "--input", "zero.sigmf-meta", "-o", "out"];
     desk.refused(1, &args, &["zero.sigmf-meta", "core:dataset", "same folder"]);
+    // A link beside the metadata leads as far.
+    std::os::unix::fs::symlink("/dev/zero", desk.path("link")).unwrap();
+    desk.write("zero.sigmf-meta", r#"{"global": {"core:datatype": "ri8", "core:dataset": "link"}}"#);
+    desk.refused(1, &args, &["zero.sigmf-meta", "core:dataset leads to \"link\"", "no file"]);
 }
 
 /// A pipe that nobody reads, full to the last byte.

@@ -13,6 +13,8 @@ const NOTES: [&[u8; 4]; 3] = [b"bext", b"iXML", b"LIST"];
 /// Longest chunk that is kept, and longest in all.
 const LONGEST_NOTE: u64 = 1 << 20;
 const ALL_NOTES: usize = 4 << 20;
+/// Most chunks that are kept; recorders write a handful, and each costs a look at those before it.
+const MOST_NOTES: usize = 64;
 
 /// A chunk that says something about the recording: `bext`, `iXML`, or `LIST` of the type `INFO`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,7 +29,8 @@ impl WavChunk {
     /// Whether a chunk of this name and size, beside those that are kept, may be one.
     pub(super) fn may_be(id: &[u8; 4], size: u64, kept: &[Self]) -> bool {
         let bytes: usize = kept.iter().map(|chunk| chunk.bytes.len()).sum();
-        NOTES.contains(&id) && size <= LONGEST_NOTE && bytes <= ALL_NOTES - LONGEST_NOTE as usize
+        let has_room = kept.len() < MOST_NOTES && bytes <= ALL_NOTES - LONGEST_NOTE as usize;
+        NOTES.contains(&id) && size <= LONGEST_NOTE && has_room
     }
 
     /// The chunk, unless it is a list of something else.

@@ -178,6 +178,15 @@ fn chunks_before_and_after_the_samples_are_passed_over() {
     }
 }
 
+/// In a time that grows with their number, and in bounded memory.
+#[test]
+fn of_very_many_chunks_the_first_are_kept() {
+    let mut chunks = vec![chunk(b"LIST", b"INFO"); 400_000];
+    chunks.extend([chunk(b"fmt ", &fmt(1, 1, 2, 16)), chunk(b"data", &counting(3))]);
+    let (header, samples, faults) = read(&riff(&chunks)).unwrap();
+    assert_eq!((header.chunks.len(), samples.len(), faults.len()), (64, 3, 0));
+}
+
 #[test]
 fn format_chunks_of_all_sizes_are_read() {
     let mut eighteen = fmt(1, 1, 2, 16);
