@@ -2,9 +2,10 @@
 //! must be true.
 
 use crate::norm::norm;
+use crate::support::forgery::{forged, numbers, parts, sealed};
 use crate::support::random::Random;
 use crate::support::specs::{alike, tf, thesis, with_taps};
-use hybank::bank::{Bank, check_digest};
+use hybank::bank::Bank;
 use hybank::design::{Options, design};
 use hybank::spec::Spec;
 use hybank::verify::{Verified, verify};
@@ -62,58 +63,9 @@ fn examples() -> Vec<Example> {
     list.into_iter().map(example).collect()
 }
 
-/// Every number in a document, in its order.
-fn numbers(value: &mut Value) -> Vec<&mut Value> {
-    match value {
-        Value::Number(_) => vec![value],
-        Value::Array(items) => items.iter_mut().flat_map(numbers).collect(),
-        Value::Object(members) => members.values_mut().flat_map(numbers).collect(),
-        _ => Vec::new(),
-    }
-}
-
-/// The parts of a file that hold numbers; gamma, spec and coefficients would be rare among the numbers of
-/// the proof.
-fn parts(document: &mut Value) -> Vec<&mut Value> {
-    let mut parts = Vec::new();
-    for (key, value) in document.as_object_mut().unwrap() {
-        if key == "proof" && value.is_object() {
-            parts.extend(value.as_object_mut().unwrap().values_mut());
-        } else {
-            parts.push(value);
-        }
-    }
-    parts.retain_mut(|part| !numbers(part).is_empty());
-    parts
-}
-
-/// Another number, near or far.
-fn forged(dice: &mut Random, value: &Value) -> Value {
-    if let Some(whole) = value.as_u64() {
-        return match dice.below(3) {
-            0 => (whole + 1).into(),
-            1 => whole.saturating_sub(1).into(),
-            _ => (whole * 2).into(),
-        };
-    }
-    let x = value.as_f64().unwrap();
-    let near = 10f64.powf(-16.0 * dice.part()) * dice.of(&[-1.0, 1.0]);
-    let y = match dice.below(8) {
-        0 => 0.0,
-        1 => -x,
-        2 => 50.0 * x,
-        3 => x.next_up(),
-        _ => x * (1.0 + near),
-    };
-    y.into()
-}
-
 /// The forged document as a file whose digest is right, read as any other.
 fn read(document: &Value) -> Option<Bank> {
-    let bank = Bank::from_json(&document.to_string(), "forged").ok()?;
-    let text = bank.to_json().ok()?;
-    check_digest(&text, "forged").unwrap();
-    Bank::from_json(&text, "forged").ok()
+    Bank::from_json(&sealed(document)?, "forged").ok()
 }
 
 /// Everything that was proven or stated is true of the forged bank.

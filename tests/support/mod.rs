@@ -4,6 +4,7 @@
 
 pub(crate) mod blocked;
 mod desk;
+pub(crate) mod forgery;
 pub(crate) mod jobs;
 pub(crate) mod random;
 pub(crate) mod schema;

@@ -1,0 +1,125 @@
+//! Latencies that the program chooses, against the least mean-square error of explicit banks at every latency.
+
+use super::bounds::cholesky;
+use super::plant::{Errors, Library, Plant};
+use super::plants::family;
+use super::real::{Complex, double, real};
+use super::statements::{Outcome, Tally, designed};
+use crate::support::Desk;
+use crate::support::random::Random;
+use crate::support::sweep::each;
+use serde_json::{Value, json};
+use std::cell::RefCell;
+use std::collections::HashMap;
+
+const SEED: u64 = 0xA0D1_1000;
+/// Plants of the short form.
+const PLANTS: usize = 2;
+/// What "within 0.1 dB of the least" means for an rms value, and the accuracy of the comparison.
+const WORTHWHILE: f64 = 0.011_58;
+const COMPARED: f64 = 3e-4;
+/// Slow periods of taps that stand for a recursive bank, and latencies that are tried with it.
+const LONG: usize = 20;
+
+/// Correlations of samples of a plant of latency 0 at whole fast periods, which recur.
+struct Correlations<'a> {
+    plant: &'a Plant,
+    known: RefCell<HashMap<(usize, usize, i64), f64>>,
+}
+
+impl Correlations<'_> {
+    /// Row `a` sampled `later` fast periods later than it is, with row `b`.
+    fn of(&self, a: usize, b: usize, later: i64) -> Complex {
+        let key = (a, b, later);
+        let compute = || double(&self.plant.correlation(a, b, &real(later as f64)));
+        Complex::real(real(*self.known.borrow_mut().entry(key).or_insert_with(compute)))
+    }
+}
+
+/// The least rms error at each latency with `taps` taps per channel and white noise of rms `noise` on each.
+fn errors(plant: &Plant, taps: usize, noise: f64, latencies: usize) -> Vec<f64> {
+    let known = Correlations { plant, known: RefCell::default() };
+    let m = plant.ratio;
+    let mut squares = vec![0.0; latencies];
+    for phase in 0..m {
+        let samples: Vec<(usize, i64)> = (0..plant.channels)
+            .flat_map(|i| (phase..taps).step_by(m).enumerate().map(move |(j, _)| (m + i, j as i64)))
+            .collect();
+        let entry = |k: usize, l: usize| {
+            let ((a, j), (b, i)) = (samples[k], samples[l]);
+            let own = if k == l { noise * noise } else { 0.0 };
+            &known.of(a, b, (i - j) * m as i64) + &Complex::real(real(own))
+        };
+        let rows: Vec<Vec<Complex>> =
+            (0..samples.len()).map(|k| (0..=k).map(|l| entry(k, l)).collect()).collect();
+        let lower = cholesky(&rows).expect("noise on every channel");
+        for (latency, square) in squares.iter_mut().enumerate() {
+            let mut x: Vec<Complex> = Vec::new();
+            let mut error = double(&known.of(0, 0, 0).re);
+            for (k, (a, j)) in samples.iter().enumerate() {
+                let right = known.of(0, *a, phase as i64 - latency as i64 + j * m as i64);
+                let rest = (0..k).fold(right, |sum, l| &sum - &(&lower[k][l] * &x[l]));
+                x.push(rest.times(&(real(1.0) / &lower[k][k].re)));
+                error -= double(&x[k].square_size());
+            }
+            *square += error;
+        }
+    }
+    squares.into_iter().map(|square: f64| square.max(0.0).sqrt()).collect()
+}
+
+fn audited(seed: u64) -> Tally {
+    let mut dice = Random(SEED + seed);
+    let ratio = dice.count(1, 3);
+    let channels = dice.count(1, 3);
+    let share = 0.05 + 0.3 * dice.part();
+    let filter = family(&mut dice, share);
+    let noise = 10f64.powf(-2.0 - 2.0 * dice.part());
+    let spread = if dice.part() < 0.3 { 10.0 } else { 2.0 };
+    let list: Vec<Value> = (0..channels)
+        .map(|_| json!({ "delay": spread * ratio as f64 * dice.part(), "filter": filter, "noise": noise }))
+        .collect();
+    let design = match dice.below(3) {
+        0 => json!({ "method": "fir", "taps": ratio * dice.count(1, 8) }),
+        1 => json!({ "method": "h2", "taps": ratio * dice.count(1, 8) }),
+        _ => json!({ "method": "h2" }),
+    };
+    let spec = json!({ "fast_period": 1.0, "ratio": ratio, "target": { "filter": filter }, "channel": list, "design": design });
+    let name = format!("latency {seed}: {spec}");
+    let mut tally = Tally { cases: 1, ..Tally::default() };
+    let desk = Desk::empty();
+    let report = match designed(&desk, &spec) {
+        Outcome::Bank { report, .. } => report,
+        Outcome::Refused(reason) => {
+            tally.refused.push(format!("{name}: {reason}"));
+            return tally;
+        }
+    };
+    let chosen = report["latency"].as_u64().expect("a latency") as usize;
+    let plant = Plant::new(&spec, 0, &Errors::none(channels), &mut Library::default());
+    let oldest = (spread * ratio as f64).ceil() as usize;
+    let taps = design["taps"].as_u64().map(|taps| taps as usize);
+    let count = taps.unwrap_or(LONG * ratio + oldest);
+    let range = taps.map_or(LONG * ratio / 2 + oldest, |taps| taps + oldest).max(chosen + 1);
+    let errors = errors(&plant, count, noise, range);
+    let best = errors.iter().copied().fold(f64::INFINITY, f64::min);
+    let shorter = errors[..chosen].iter().position(|error| *error <= best * (1.0 + WORTHWHILE - COMPARED));
+    if errors[chosen] > best * (1.0 + WORTHWHILE + COMPARED) || shorter.is_some() {
+        let at = errors.iter().position(|error| *error == best);
+        tally.refuted.push(format!(
+            "{name}: chosen {chosen} with {:.6e}; best {best:.6e} at {at:?}; first within 0.1 dB before it {shorter:?}",
+            errors[chosen]
+        ));
+    }
+    tally.excesses.push(errors[chosen] / best - 1.0);
+    tally
+}
+
+#[test]
+fn chosen_latencies_are_the_shortest_within_a_tenth_of_a_decibel() {
+    let mut whole = Tally::default();
+    each(trials::trials(trials::rounds(PLANTS) as u64), audited)
+        .into_iter()
+        .for_each(|tally| whole.add(tally));
+    whole.report("chosen latencies");
+}

@@ -1,0 +1,249 @@
+//! Narrow filters in all forms, order reductions, integer taps and forged files.
+
+use super::judge::{Filters, Judge, on_circle};
+use super::optimum::optimum;
+use super::plants::{as_coefficients, as_roots, plant};
+use super::statements::{Outcome, Tally, at, designed, judged, verified};
+use crate::support::Desk;
+use crate::support::forgery::{forged, numbers, parts, sealed};
+use crate::support::random::Random;
+use crate::support::sweep::each;
+use nalgebra::{Complex, DMatrix};
+use serde_json::{Value, json};
+use std::f64::consts::PI;
+
+const SEED: u64 = 0xA0D1_5000;
+/// Cases of the short form.
+const NARROW: usize = 2;
+const REDUCTIONS: usize = 2;
+const INTEGERS: usize = 2;
+const FORGED: usize = 2;
+/// Forgeries of each bank.
+const FORGERIES: usize = 12;
+/// The printed gamma of a reduced bank against its norm.
+const PRINTED: f64 = 1e-8;
+/// Frequencies for the exhaustive search, and the candidates that are judged exactly.
+const FREQUENCIES: usize = 48;
+const CANDIDATES: usize = 4;
+
+fn campaign(usual: usize, name: &str, task: impl Fn(u64) -> Tally + Sync) {
+    let mut whole = Tally::default();
+    each(trials::trials(trials::rounds(usual) as u64), task).into_iter().for_each(|tally| whole.add(tally));
+    whole.report(name);
+}
+
+fn refused(name: &str, reason: &str) -> Tally {
+    Tally { cases: 1, refused: vec![format!("{name}: {reason}")], ..Tally::default() }
+}
+
+/// A band-pass of Q up to 10,000, its target in one form and its channel in another.
+fn narrow(seed: u64) -> Tally {
+    let mut dice = Random(SEED + seed);
+    let (centre, width) = (0.05 + 0.35 * dice.part(), 10f64.powf(-1.0 - 3.0 * dice.part()));
+    let mut family = json!({ "family": dice.of(&["butterworth", "chebyshev1"]), "order": dice.count(1, 6),
+        "band": [centre * (1.0 - 0.5 * width), centre * (1.0 + 0.5 * width)] });
+    if family["family"] == "chebyshev1" {
+        family["ripple_db"] = (0.2 + dice.part()).into();
+    }
+    let forms = [family.clone(), as_coefficients(&family), as_roots(&family)];
+    let (target, own) = (dice.of(&[0, 1, 1, 2]), dice.of(&[0, 1, 2]));
+    let ratio = dice.count(1, 2);
+    let delay = if dice.part() < 0.5 { 1.0 } else { 2.0 * dice.part() };
+    let list: Vec<Value> =
+        (0..ratio).map(|i| json!({ "delay": delay + 0.9 * i as f64, "filter": forms[own] })).collect();
+    let spec = json!({ "fast_period": 1.0, "ratio": ratio, "latency": dice.count(1, 3),
+        "target": { "filter": forms[target] }, "channel": list,
+        "design": { "method": "fir", "taps": ratio * dice.count(1, 4) } });
+    let name = format!("narrow {seed}, Q {:.0}: {spec}", 1.0 / width);
+    let desk = Desk::empty();
+    let (bank, report) = match designed(&desk, &spec) {
+        Outcome::Bank { bank, report } => (bank, report),
+        Outcome::Refused(reason) => return refused(&name, &reason),
+    };
+    let proven = verified(&desk);
+    let mut tally = judged(&name, &bank, proven.as_ref());
+    if proven.is_none() {
+        tally.unproven.push(format!("{name}: {}", report["unproven"]));
+    }
+    tally
+}
+
+/// What is printed of a reduced bank; without states against the best taps that see one frame.
+fn reduced(seed: u64) -> Tally {
+    let mut dice = Random(SEED + 0x400 + seed);
+    let mut spec = plant(&mut dice);
+    let order = dice.of(&[0, 0, 1, 2, 4, 6]);
+    spec["design"] = json!({ "method": "iir", "order": order });
+    let name = format!("reduction {seed}: {spec}");
+    let desk = Desk::empty();
+    let (bank, report) = match designed(&desk, &spec) {
+        Outcome::Bank { bank, report } => (bank, report),
+        Outcome::Refused(reason) => return refused(&name, &reason),
+    };
+    let proven = verified(&desk);
+    let mut tally = judged(&name, &bank, proven.as_ref());
+    tally.widths.clear();
+    tally.excesses.clear();
+    tally.notes.clear();
+    if proven.is_none() {
+        tally.unproven.push(format!("{name}: {}", report["unproven"]));
+    }
+    let judge = Judge::of(&bank);
+    let norm = judge.norm(&[]).gain;
+    if let Some(printed) = at(&report, "/reduction/reduced/gamma")
+        && (printed - norm).abs() > PRINTED * norm + 1e-13
+    {
+        tally.refuted.push(format!("{name}: printed {printed:e}, true {norm:e}"));
+    }
+    let states = bank["state_space"]["a"].as_array().map_or(0, Vec::len);
+    if states as u64 > order {
+        tally.refuted.push(format!("{name}: {states} states"));
+    }
+    if states == 0
+        && let Some(best) = optimum(vec![judge.plant], spec["ratio"].as_u64().unwrap_or(1) as usize)
+    {
+        tally.excesses.push(norm / best.norm - 1.0);
+        if norm > best.norm * 1.001 {
+            tally.notes.push(format!("{name}: norm {norm:e}, {:e} with the taps {:?}", best.norm, best.taps));
+        }
+    }
+    tally
+}
+
+/// Integer taps against all integer taps, ratio 1.
+fn integer(seed: u64) -> Tally {
+    let mut dice = Random(SEED + 0x800 + seed);
+    let share = 0.05 + 0.3 * dice.part();
+    let filter = super::plants::family(&mut dice, share);
+    let (channels, taps, bits) = dice.of(&[(1usize, 3usize, 4u32), (2, 2, 3), (1, 2, 6)]);
+    let list: Vec<Value> =
+        (0..channels).map(|_| json!({ "delay": 1.5 * dice.part(), "filter": filter })).collect();
+    let fraction = bits - dice.count(1, 2) as u32;
+    let spec = json!({ "fast_period": 1.0, "ratio": 1, "latency": dice.count(0, 2), "target": { "filter": filter },
+        "channel": list, "design": { "method": "fir", "taps": taps, "bits": bits, "fraction_bits": fraction } });
+    let name = format!("integers {seed}: {spec}");
+    let desk = Desk::empty();
+    let bank = match designed(&desk, &spec) {
+        Outcome::Bank { bank, .. } => bank,
+        Outcome::Refused(reason) => return refused(&name, &reason),
+    };
+    let mut tally = judged(&name, &bank, verified(&desk).as_ref());
+    tally.widths.clear();
+    tally.excesses.clear();
+    tally.notes.clear();
+    let mut judge = Judge::of(&bank);
+    let norm = judge.norm(&[]).gain;
+    let best = exhaustive(&mut judge, taps, bits, fraction);
+    tally.excesses.push(norm / best - 1.0);
+    if norm > best * 1.01 {
+        tally.notes.push(format!("{name}: norm {norm:e}, best {best:e}"));
+    }
+    tally
+}
+
+/// The least norm of all integer taps: all by a grid in doubles, the best of these by the judge.
+fn exhaustive(judge: &mut Judge, taps: usize, bits: u32, fraction: u32) -> f64 {
+    let (n, unit) = (judge.plant.channels, 0.5f64.powi(fraction as i32));
+    let grams: Vec<(Complex<f64>, DMatrix<Complex<f64>>)> = (0..=FREQUENCIES)
+        .map(|k| {
+            let z = on_circle(PI * k as f64 / FREQUENCIES as f64);
+            let gram = judge.plant.gram(&z);
+            (z.conj().rounded(), DMatrix::from_fn(n + 1, n + 1, |a, b| gram[a][b].rounded()))
+        })
+        .collect();
+    let values = 1i64 << bits;
+    let unknowns = (n * taps) as u32;
+    let of = |number: i64| -> Vec<Vec<f64>> {
+        let digit = |k: usize| (number / values.pow(k as u32) % values - values / 2) as f64 * unit;
+        (0..n).map(|i| (0..taps).map(|k| digit(i * taps + k)).collect()).collect()
+    };
+    let worst = |number: i64| {
+        let lists = of(number);
+        let square = |(back, gram): &(Complex<f64>, DMatrix<Complex<f64>>)| {
+            let filter = |list: &Vec<f64>| {
+                list.iter().rev().fold(Complex::default(), |sum: Complex<f64>, tap| sum * back + *tap)
+            };
+            let row = |a: usize| if a == 0 { Complex::from(1.0) } else { -filter(&lists[a - 1]) };
+            let rows: Vec<_> = (0..=n).map(row).collect();
+            let pairs = (0..=n).flat_map(|a| (0..=n).map(move |b| (a, b)));
+            pairs.map(|(a, b)| (rows[a] * gram[(a, b)] * rows[b].conj()).re).sum::<f64>()
+        };
+        grams.iter().map(square).fold(0.0, f64::max)
+    };
+    let mut all: Vec<(f64, i64)> = (0..values.pow(unknowns)).map(|number| (worst(number), number)).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let exact = |(_, number): &(f64, i64)| {
+        judge.filters = Filters::of_taps(&of(*number));
+        judge.norm(&[]).gain
+    };
+    all.iter().take(CANDIDATES).map(exact).fold(f64::INFINITY, f64::min)
+}
+
+/// Files whose numbers were changed and whose digest is right: refused, or all that they say is true.
+fn forgeries(seed: u64) -> Tally {
+    let mut dice = Random(SEED + 0xC00 + seed);
+    let mut spec = plant(&mut dice);
+    let taps = spec["ratio"].as_u64().unwrap_or(1) * dice.count(1, 3) as u64;
+    spec["design"] = dice
+        .of(&[0, 1])
+        .eq(&0)
+        .then(|| json!({ "method": "fir", "taps": taps }))
+        .unwrap_or(json!({ "method": "iir" }));
+    let name = format!("forged {seed}");
+    let desk = Desk::empty();
+    let Outcome::Bank { bank, .. } = designed(&desk, &spec) else {
+        return refused(&name, "no bank to forge");
+    };
+    let mut tally = Tally::default();
+    for trial in 0..FORGERIES {
+        let mut document = bank.clone();
+        let mut parts = parts(&mut document);
+        let count = parts.len();
+        let mut numbers = numbers(parts[dice.below(count)]);
+        let count = numbers.len();
+        let number = &mut *numbers[dice.below(count)];
+        *number = forged(&mut dice, number);
+        tally.cases += 1;
+        let name = format!("{name}, {trial}");
+        let Some(text) = sealed(&document) else {
+            tally.refused.push(format!("{name}: not read"));
+            continue;
+        };
+        desk.write("bank.json", &text);
+        match verified(&desk) {
+            None => tally.refused.push(format!("{name}: refused")),
+            Some(proven) => {
+                let mut found = judged(&name, &serde_json::from_str(&text).expect("a file"), Some(&proven));
+                found.cases = 0;
+                found.widths.clear();
+                found.excesses.clear();
+                found.notes.clear();
+                tally.add(found);
+            }
+        }
+    }
+    // Refusals are what is wanted here.
+    println!("{name}: {} of {} refused", tally.refused.len(), tally.cases);
+    tally.refused.clear();
+    tally
+}
+
+#[test]
+fn no_statement_about_a_narrow_filter_is_false() {
+    campaign(NARROW, "narrow band-passes", narrow);
+}
+
+#[test]
+fn no_statement_about_a_reduced_bank_is_false() {
+    campaign(REDUCTIONS, "order reductions", reduced);
+}
+
+#[test]
+fn integer_taps_are_near_the_best_of_all() {
+    campaign(INTEGERS, "integer taps", integer);
+}
+
+#[test]
+fn forged_files_are_refused_or_true() {
+    campaign(FORGED, "forged files", forgeries);
+}

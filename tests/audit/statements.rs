@@ -1,0 +1,184 @@
+//! A spec as a user gives it to the program, the bank that comes out, and whether what the program says of it
+//! is true.
+
+use super::bounds::{causal, noncausal};
+use super::judge::Judge;
+use super::optimum::optimum;
+use super::plant::{Errors, Library, Plant};
+use crate::support::Desk;
+use serde_json::Value;
+
+/// Rounding of the judge: its last step is an eigenvalue in doubles.
+const ROUNDING: f64 = 1e-12;
+/// What the bank format promises of `norm`, with ten times as much for the rounding that it leaves open.
+const NORM_ACCURACY: f64 = 1e-8;
+/// Where nothing is proven, gammas are computed in doubles from front ends of about unit size.
+const UNPROVEN: f64 = 1e-12;
+/// Taps of all channels up to which the judge looks for the best taps itself.
+const MOST_TAPS: usize = 40;
+/// Widths and excesses above this are listed.
+const NOTEWORTHY: f64 = 1e-4;
+/// Slow periods of an input that leaves all samples zero, and the gain over half of them at which its error
+/// has settled.
+const PERIODS: i64 = 24;
+const SETTLED: f64 = 1e-6;
+
+/// What became of a spec.
+pub(crate) enum Outcome {
+    /// No bank, with the program's reason.
+    Refused(String),
+    /// A bank as its file says, and the report of the design.
+    Bank { bank: Value, report: Value },
+}
+
+/// Designs `spec` and reads the file that was written.
+pub(crate) fn designed(desk: &Desk, spec: &Value) -> Outcome {
+    desk.write("spec.toml", toml::to_string(spec).expect("a spec"));
+    let output = desk.run(&["design", "spec.toml", "-o", "bank.json", "--json", "--force"], &[]);
+    if !output.status.success() {
+        return Outcome::Refused(String::from_utf8_lossy(&output.stderr).into_owned());
+    }
+    let report = serde_json::from_slice(&output.stdout).expect("a report");
+    Outcome::Bank { bank: desk.read_json("bank.json"), report }
+}
+
+/// What `verify` says of `bank.json` in the folder; `None` if it refuses the file.
+pub(crate) fn verified(desk: &Desk) -> Option<Value> {
+    let output = desk.run(&["verify", "bank.json", "--json"], &[]);
+    output.status.success().then(|| serde_json::from_slice(&output.stdout).expect("a report"))
+}
+
+/// The number at a key, if there is one.
+pub(crate) fn at(value: &Value, pointer: &str) -> Option<f64> {
+    value.pointer(pointer).and_then(Value::as_f64)
+}
+
+/// Findings of one campaign.
+#[derive(Default)]
+pub(crate) struct Tally {
+    pub(crate) cases: usize,
+    pub(crate) refused: Vec<String>,
+    pub(crate) unproven: Vec<String>,
+    pub(crate) refuted: Vec<String>,
+    /// True, and worth a look.
+    pub(crate) notes: Vec<String>,
+    /// Upper over lower end, less one, of every proven interval that is to be narrow.
+    pub(crate) widths: Vec<f64>,
+    /// By how much more than the best that the judge knows, relative.
+    pub(crate) excesses: Vec<f64>,
+}
+
+impl Tally {
+    pub(crate) fn add(&mut self, other: Self) {
+        self.cases += other.cases;
+        self.refused.extend(other.refused);
+        self.unproven.extend(other.unproven);
+        self.refuted.extend(other.refuted);
+        self.notes.extend(other.notes);
+        self.widths.extend(other.widths);
+        self.excesses.extend(other.excesses);
+    }
+
+    /// A row of the table in docs/audit.md, and the details. Fails if a statement was refuted.
+    pub(crate) fn report(&self, campaign: &str) {
+        let all = [&self.refused, &self.unproven, &self.notes, &self.refuted];
+        for (list, kind) in all.into_iter().zip(["refused", "not proven", "note", "REFUTED"]) {
+            list.iter().for_each(|line| println!("{campaign}: {kind}: {}", line.trim_end()));
+        }
+        let ends = |list: &[f64]| {
+            let mut list = list.to_vec();
+            list.sort_by(f64::total_cmp);
+            let middle = list.get(list.len() / 2).copied().unwrap_or(f64::NAN);
+            format!("{middle:.0e}, {:.1e}", list.last().copied().unwrap_or(f64::NAN))
+        };
+        println!(
+            "| {campaign} | {} | {} | {} | {} | {} | {} |",
+            self.cases,
+            self.refused.len(),
+            self.unproven.len(),
+            self.refuted.len(),
+            ends(&self.widths),
+            ends(&self.excesses),
+        );
+        assert!(self.refuted.is_empty(), "{campaign}: {} false statements", self.refuted.len());
+    }
+}
+
+/// The frequency of a witness in the proof of a bank file, radians per slow period.
+pub(crate) fn witness(bank: &Value, pointer: &str) -> Option<f64> {
+    let half = bank.pointer(pointer)?;
+    Some(2.0 * half[1].as_f64()?.atan2(half[0].as_f64()?))
+}
+
+/// Compares every gamma of a bank file and of the report of `verify` with the judge's.
+pub(crate) fn judged(name: &str, bank: &Value, proven: Option<&Value>) -> Tally {
+    let mut tally = Tally { cases: 1, ..Tally::default() };
+    let judge = Judge::of(bank);
+    let peak: Vec<f64> = witness(bank, "/proof/upper/peak/half").into_iter().collect();
+    let norm = judge.norm(&peak).gain;
+    let least: Vec<f64> = witness(bank, "/proof/noncausal/half").into_iter().collect();
+    let any = noncausal(&judge.plant, &least).gain;
+    let mut claim = |is_true: bool, what: &str, stated: f64, truth: f64| {
+        if !is_true {
+            tally.refuted.push(format!("{name}: {what} {stated:.12e}, true {truth:.12e}"));
+        }
+    };
+    let upwards = 1.0 + ROUNDING;
+    for (source, value) in [("file", &bank["gamma"]), ("verify", proven.unwrap_or(&Value::Null))] {
+        let number = |key: &str| at(value, &format!("/{key}")).map(|x| (format!("{source}: {key}"), x));
+        if let Some((what, upper)) = number("upper") {
+            let rounding = if proven.is_some() { 0.0 } else { UNPROVEN };
+            claim(norm <= upper * upwards + rounding, &what, upper, norm);
+        }
+        if let Some((what, attained)) = number("attained") {
+            claim(attained <= norm * upwards, &what, attained, norm);
+        }
+        if let Some((what, stated)) = number("norm") {
+            let accuracy = if norm < 1e-9 { 0.1 } else { NORM_ACCURACY };
+            claim((stated - norm).abs() <= accuracy * norm + 1e-13, &what, stated, norm);
+        }
+        if let Some((what, noncausal)) = number("noncausal") {
+            claim(noncausal <= any.max(1e-13) * upwards.max(1.0 + 1e-9), &what, noncausal, any);
+        }
+    }
+    let Some(proven) = proven else { return tally };
+    let (lower, upper) = (at(proven, "/lower").unwrap_or(0.0), at(proven, "/upper").unwrap_or(f64::NAN));
+    let best = reachable(bank, &judge, proven["lower_banks"].as_str(), any);
+    if let Some(best) = best {
+        claim(lower <= best * (1.0 + SETTLED), "verify: lower", lower, best);
+        tally.excesses.push(norm / best - 1.0);
+    }
+    tally.widths.push(upper / lower - 1.0);
+    let far = |list: &[f64]| list.iter().any(|x| *x > NOTEWORTHY);
+    if far(&tally.widths) || far(&tally.excesses) {
+        let Tally { widths, excesses, .. } = &tally;
+        tally
+            .notes
+            .push(format!("{name}: width {widths:?}, excess {excesses:?}, norm {norm:e}, best {best:?}"));
+    }
+    tally
+}
+
+/// The least norm of the class of banks of a lower bound, up to [`SETTLED`] or above it; `None` where the judge
+/// does not find it.
+fn reachable(bank: &Value, judge: &Judge, class: Option<&str>, any: f64) -> Option<f64> {
+    let plant = &judge.plant;
+    match class? {
+        "fir_of_this_length" => {
+            let count = bank["channels"][0]["taps"].as_array()?.len();
+            let latency = bank["latency"].as_u64()? as usize;
+            let own =
+                || Plant::new(&bank["spec"], latency, &Errors::none(plant.channels), &mut Library::default());
+            (count * plant.channels <= MOST_TAPS)
+                .then(|| optimum(vec![own()], count))
+                .flatten()
+                .map(|best| best.norm)
+        }
+        "causal" => {
+            let [half, whole] = [PERIODS / 2, PERIODS].map(|periods| causal(plant, periods).max(any));
+            // Front ends that remember for longer leave it open.
+            (whole <= half * (1.0 + SETTLED)).then_some(whole)
+        }
+        _ => Some(any),
+    }
+}
