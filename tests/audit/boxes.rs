@@ -19,10 +19,12 @@ const TRACKED: usize = 1;
 /// Frequencies that are looked at for each point of a box.
 const FREQUENCIES: usize = 16;
 /// Vertices that are looked at, and points within.
-const VERTICES: usize = 32;
-const INSIDE: usize = 8;
+const VERTICES: usize = 16;
+const INSIDE: usize = 4;
+/// Vertices for which the judge designs taps.
+const SCENARIOS: usize = 12;
 /// Rounds of halved steps from the best point.
-const ROUNDS: usize = 4;
+const ROUNDS: usize = 3;
 /// The program's own computed worst case may be below the judge's by this much: both are searches.
 const SEARCH: f64 = 1e-3;
 
@@ -31,6 +33,21 @@ pub(crate) struct Found {
     pub(crate) gain: f64,
     errors: Errors,
     omega: f64,
+}
+
+/// All vertices of the box of half-widths, or `most` random ones.
+fn vertices(half: &[f64], most: usize, dice: &mut Random) -> Vec<Vec<f64>> {
+    let open: Vec<usize> = (0..half.len()).filter(|&k| half[k] > 0.0).collect();
+    let all = 1usize << open.len();
+    let mut vertex = |k: usize| {
+        let number = if all <= most { k } else { dice.below(all) };
+        let mut point = vec![0.0; half.len()];
+        for (bit, &i) in open.iter().enumerate() {
+            point[i] = if number >> bit & 1 == 1 { half[i] } else { -half[i] };
+        }
+        point
+    };
+    (0..all.min(most)).map(&mut vertex).collect()
 }
 
 /// A search in one box for one bank.
@@ -86,15 +103,7 @@ impl Search<'_> {
             (0..=FREQUENCIES).map(|k| PI * k as f64 / FREQUENCIES as f64).collect();
         frequencies.extend(centre.peaks(&[]).iter().take(4).map(|peak| peak.omega));
         let mut points = vec![vec![0.0; half.len()]];
-        let all = 1usize << open.len().min(12);
-        for k in 0..all.min(VERTICES) {
-            let number = if all <= VERTICES { k } else { dice.below(all) };
-            let mut point = vec![0.0; half.len()];
-            open.iter()
-                .enumerate()
-                .for_each(|(bit, &i)| point[i] = if number >> bit & 1 == 1 { half[i] } else { -half[i] });
-            points.push(point);
-        }
+        points.extend(vertices(&half, VERTICES, dice));
         for _ in 0..INSIDE {
             points.push(half.iter().map(|half| half * dice.sample()).collect());
         }
@@ -206,19 +215,14 @@ fn boxed(seed: u64) -> Tally {
 }
 
 /// The taps of least worst norm over the centre and the vertices of the box.
-fn robust_taps(bank: &Value, half: &Errors, count: usize) -> Option<Value> {
+fn robust_taps(bank: &Value, half: &Errors, count: usize, dice: &mut Random) -> Option<Value> {
     let widths = half.coordinates();
-    let open: Vec<usize> = (0..widths.len()).filter(|&k| widths[k] > 0.0).collect();
     let latency = bank["latency"].as_u64()? as usize;
     let mut library = Library::default();
     let mut plant =
         |point: &[f64]| Plant::new(&bank["spec"], latency, &Errors::of_coordinates(point), &mut library);
     let mut plants = vec![plant(&vec![0.0; widths.len()])];
-    for number in 0..1usize << open.len() {
-        let mut point = vec![0.0; widths.len()];
-        open.iter()
-            .enumerate()
-            .for_each(|(bit, &k)| point[k] = if number >> bit & 1 == 1 { widths[k] } else { -widths[k] });
+    for point in vertices(&widths, SCENARIOS, dice) {
         plants.push(plant(&point));
     }
     let best = optimum(plants, count)?;
@@ -235,11 +239,24 @@ fn uncertain(seed: u64, follows: bool) -> Tally {
     let mut spec = plant(&mut dice);
     let channels = spec["channel"].as_array().map_or(1, Vec::len);
     let size = 0.005 * 30f64.powf(dice.part());
-    let mut table = json!({ "delay_samples": size, "reference": dice.below(2) });
+    // Each channel has errors of its own size, or all have the same.
+    let widths = |dice: &mut Random, size: f64| -> Value {
+        if dice.part() < 0.5 {
+            json!(size)
+        } else {
+            json!((0..channels).map(|_| size * dice.part()).collect::<Vec<_>>())
+        }
+    };
+    let mut table = json!({ "delay_samples": widths(&mut dice, size), "reference": dice.below(2) });
     if follows {
         spec["design"]["tracking"] = "affine".into();
-    } else if dice.part() < 0.4 && channels < 3 {
-        table["gain"] = (0.3 * size).into();
+    } else {
+        if dice.part() < 0.5 {
+            table["gain"] = widths(&mut dice, 0.3 * size);
+        }
+        if dice.part() < 0.3 {
+            table["cutoff"] = widths(&mut dice, 0.2 * size);
+        }
     }
     spec["uncertainty"] = table;
     let kind = if follows { "tracked" } else { "robust" };
@@ -282,7 +299,7 @@ fn uncertain(seed: u64, follows: bool) -> Tally {
             .push(format!("{name}: printed {printed:e}, found {:e} at {:?}", found.gain, found.errors));
     }
     let count = bank["channels"][0]["taps"].as_array().map_or(0, Vec::len);
-    if !follows && let Some(other) = robust_taps(&bank, &half, count) {
+    if !follows && let Some(other) = robust_taps(&bank, &half, count, &mut dice) {
         let mut search = Search { bank: &other, half: &half, follows, library: Library::default() };
         let reachable = search.run(Some((found.errors, found.omega)), &mut dice).gain;
         tally.excesses.push(found.gain / reachable - 1.0);

@@ -1,13 +1,13 @@
 //! Latencies that the program chooses, against the least mean-square error of explicit banks at every latency.
 
-use super::bounds::cholesky;
 use super::plant::{Errors, Library, Plant};
 use super::plants::family;
-use super::real::{Complex, double, real};
+use super::real::{double, real};
 use super::statements::{Outcome, Tally, designed};
 use crate::support::Desk;
 use crate::support::random::Random;
 use crate::support::sweep::each;
+use nalgebra::{DMatrix, DVector};
 use serde_json::{Value, json};
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -18,8 +18,10 @@ const PLANTS: usize = 2;
 /// What "within 0.1 dB of the least" means for an rms value, and the accuracy of the comparison.
 const WORTHWHILE: f64 = 0.011_58;
 const COMPARED: f64 = 3e-4;
-/// Slow periods of taps that stand for a recursive bank, and latencies that are tried with it.
-const LONG: usize = 20;
+/// Fast samples that a bank remembers beyond its latency where it stands for a recursive one.
+const MEMORY: usize = 80;
+/// Latencies that are tried for a recursive bank beyond twice the chosen one.
+const BEYOND: usize = 24;
 
 /// Correlations of samples of a plant of latency 0 at whole fast periods, which recur.
 struct Correlations<'a> {
@@ -29,10 +31,9 @@ struct Correlations<'a> {
 
 impl Correlations<'_> {
     /// Row `a` sampled `later` fast periods later than it is, with row `b`.
-    fn of(&self, a: usize, b: usize, later: i64) -> Complex {
-        let key = (a, b, later);
+    fn of(&self, a: usize, b: usize, later: i64) -> f64 {
         let compute = || double(&self.plant.correlation(a, b, &real(later as f64)));
-        Complex::real(real(*self.known.borrow_mut().entry(key).or_insert_with(compute)))
+        *self.known.borrow_mut().entry((a, b, later)).or_insert_with(compute)
     }
 }
 
@@ -47,22 +48,19 @@ fn errors(plant: &Plant, taps: usize, noise: f64, latencies: usize) -> Vec<f64> 
             .collect();
         let entry = |k: usize, l: usize| {
             let ((a, j), (b, i)) = (samples[k], samples[l]);
-            let own = if k == l { noise * noise } else { 0.0 };
-            &known.of(a, b, (i - j) * m as i64) + &Complex::real(real(own))
+            known.of(a, b, (i - j) * m as i64) + if k == l { noise * noise } else { 0.0 }
         };
-        let rows: Vec<Vec<Complex>> =
-            (0..samples.len()).map(|k| (0..=k).map(|l| entry(k, l)).collect()).collect();
-        let lower = cholesky(&rows).expect("noise on every channel");
+        // The noise keeps the condition number below 1e9, so doubles suffice from here on.
+        let matrix =
+            DMatrix::from_fn(samples.len(), samples.len(), |k, l| if k >= l { entry(k, l) } else { 0.0 });
+        let root = matrix.cholesky().expect("noise on every channel").unpack();
         for (latency, square) in squares.iter_mut().enumerate() {
-            let mut x: Vec<Complex> = Vec::new();
-            let mut error = double(&known.of(0, 0, 0).re);
-            for (k, (a, j)) in samples.iter().enumerate() {
-                let right = known.of(0, *a, phase as i64 - latency as i64 + j * m as i64);
-                let rest = (0..k).fold(right, |sum, l| &sum - &(&lower[k][l] * &x[l]));
-                x.push(rest.times(&(real(1.0) / &lower[k][k].re)));
-                error -= double(&x[k].square_size());
-            }
-            *square += error;
+            let later = phase as i64 - latency as i64;
+            let right = DVector::from_fn(samples.len(), |k, _| {
+                known.of(0, samples[k].0, later + samples[k].1 * m as i64)
+            });
+            *square +=
+                known.of(0, 0, 0) - root.solve_lower_triangular(&right).expect("a root").norm_squared();
         }
     }
     squares.into_iter().map(|square: f64| square.max(0.0).sqrt()).collect()
@@ -99,8 +97,8 @@ fn audited(seed: u64) -> Tally {
     let plant = Plant::new(&spec, 0, &Errors::none(channels), &mut Library::default());
     let oldest = (spread * ratio as f64).ceil() as usize;
     let taps = design["taps"].as_u64().map(|taps| taps as usize);
-    let count = taps.unwrap_or(LONG * ratio + oldest);
-    let range = taps.map_or(LONG * ratio / 2 + oldest, |taps| taps + oldest).max(chosen + 1);
+    let range = taps.map_or(2 * chosen + BEYOND, |taps| (taps + oldest).max(chosen + 1));
+    let count = taps.unwrap_or(range + MEMORY);
     let errors = errors(&plant, count, noise, range);
     let best = errors.iter().copied().fold(f64::INFINITY, f64::min);
     let shorter = errors[..chosen].iter().position(|error| *error <= best * (1.0 + WORTHWHILE - COMPARED));

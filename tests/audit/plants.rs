@@ -123,6 +123,7 @@ fn audited(seed: u64) -> Tally {
                     // It does not minimise the norm.
                     found.widths.clear();
                     found.excesses.clear();
+                    found.notes.clear();
                 }
                 tally.add(found);
             }
