@@ -1,4 +1,5 @@
-//! What any bank can reach: at any latency by one matrix per frequency, and causally by finitely many samples.
+//! What any bank can reach: at any latency by one matrix per frequency, and causally by finitely many
+//! samples.
 
 use super::judge::{Peak, largest, on_circle, peaks};
 use super::plant::{Plant, Row};
@@ -24,8 +25,8 @@ pub(crate) fn cholesky(matrix: &[Vec<Complex>]) -> Option<Vec<Vec<Complex>>> {
     Some(lower)
 }
 
-/// The least gain of any bank at one frequency: S_ww - S_wh S_hh^-1 S_hw with the channels first, so that the
-/// Cholesky factor's last block is a root of it.
+/// The least gain of any bank at one frequency: S_ww - S_wh S_hh^-1 S_hw with the channels first, so that
+/// the Cholesky factor's last block is a root of it.
 fn noncausal_gain(plant: &Plant, omega: f64) -> f64 {
     let gram = plant.gram(&on_circle(omega));
     let (m, n) = (plant.ratio, plant.channels);
@@ -55,8 +56,8 @@ pub(crate) fn noncausal(plant: &Plant, more: &[f64]) -> Peak {
     peaks(&|omega| noncausal_gain(plant, omega), &plant.resonances(), more)[0]
 }
 
-/// A sample of a row: e^{p t} for the poles of its front end, and for each front end the factors that e^{p t}
-/// of a later sample takes.
+/// A sample of a row: e^{p t} for the poles of its front end, and for each front end the factors that e^{p
+/// t} of a later sample takes.
 struct Sample<'a> {
     row: &'a Row,
     time: Real,
@@ -69,7 +70,8 @@ impl<'a> Sample<'a> {
         let time = &row.time + real(plant.ratio as f64 * period as f64);
         let own = &plant.modes[row.front];
         let growth = own.exponentials(&time);
-        // For an input from time 0 on: the stationary r e^{-p t} less residue(p) sum_q residue(q) e^{q t} / -(p + q).
+        // For an input from time 0 on: the stationary r e^{-p t} less residue(p) sum_q residue(q) e^{q t} /
+        // -(p + q).
         let factors = plant.modes.iter().map(|later| {
             let back = later.exponentials(&-&time);
             let strengths = later.strengths(own);
@@ -96,8 +98,8 @@ impl<'a> Sample<'a> {
 }
 
 /// A gamma below which no causal bank lies: the largest ||e|| of an input of unit energy from time 0 on that
-/// leaves the samples of `periods` slow periods zero. By Parrott's theorem the least norm over causal banks is
-/// the supremum of these over the number of periods.
+/// leaves the samples of `periods` slow periods zero. By Parrott's theorem the least norm over causal banks
+/// is the supremum of these over the number of periods.
 pub(crate) fn causal(plant: &Plant, periods: i64) -> f64 {
     let zero = real(0.0);
     let samples = |rows: &'_ [Row]| -> Vec<(usize, i64)> {

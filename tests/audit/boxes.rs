@@ -1,4 +1,5 @@
-//! Worst cases over boxes of errors: what is proven, what is printed as found, and what the taps could reach.
+//! Worst cases over boxes of errors: what is proven, what is printed as found, and what the taps could
+//! reach.
 
 use super::judge::Judge;
 use super::optimum::optimum;

@@ -49,7 +49,8 @@ pub(crate) fn on_circle(omega: f64) -> Complex {
 }
 
 impl Filters {
-    /// The taps or matrices of a bank file. With `moved` delays (fast periods) the taps follow by their slopes.
+    /// The taps or matrices of a bank file. With `moved` delays (fast periods) the taps follow by their
+    /// slopes.
     pub(crate) fn read(bank: &Value, moved: Option<&[f64]>) -> Self {
         if let Some(block) = bank.get("state_space").filter(|block| block.is_object()) {
             let rows =
@@ -209,7 +210,8 @@ pub(crate) fn peaks(gain: &dyn Fn(f64) -> f64, resonances: &[(f64, f64)], more: 
     let last = grid.len() - 1;
     let is_peak =
         |k: usize| (k == 0 || values[k] >= values[k - 1]) && (k == last || values[k] >= values[k + 1]);
-    // The gain is even about both ends, so the neighbour of an end is its mirror image on the other side too.
+    // The gain is even about both ends, so the neighbour of an end is its mirror image on the other side
+    // too.
     let bracket = |k: usize| {
         let (before, after) = (if k == 0 { 1 } else { k - 1 }, if k == last { last - 1 } else { k + 1 });
         let mirrored = |from: usize| 2.0 * grid[k] - grid[from];
@@ -238,8 +240,8 @@ fn vertex(top: &Bracket) -> Option<(f64, f64)> {
     (bend < 0.0 && x > a && x < c).then(|| (x, fb + (x - b) * (left + bend * (x - a))))
 }
 
-/// The local maximum in a bracket, by parabolas, and by halving the longer side where they come too near to the
-/// middle.
+/// The local maximum in a bracket, by parabolas, and by halving the longer side where they come too near to
+/// the middle.
 fn refined(gain: &dyn Fn(f64) -> f64, mut top: Bracket) -> Peak {
     for step in 0..STEPS {
         let [(a, _), (b, best), (c, _)] = top;

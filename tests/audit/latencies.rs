@@ -1,4 +1,5 @@
-//! Latencies that the program chooses, against the least mean-square error of explicit banks at every latency.
+//! Latencies that the program chooses, against the least mean-square error of explicit banks at every
+//! latency.
 
 use super::plant::{Errors, Library, Plant};
 use super::plants::family;

@@ -1,8 +1,8 @@
 //! The taps of least norm by a barrier method on finitely many frequencies, with peaks added until they fit.
 //!
-//! Minimise s subject to s I - K_l K_l* > 0 at all frequencies, K_l = [I, -F(z_l)] R_l with the Cholesky factor
-//! R_l of the Gram matrix. The barrier -log det of [[s I, K], [K*, I]] is that of a linear matrix inequality in
-//! s and the taps, so Newton's method follows its central path.
+//! Minimise s subject to s I - K_l K_l* > 0 at all frequencies, K_l = [I, -F(z_l)] R_l with the Cholesky
+//! factor R_l of the Gram matrix. The barrier -log det of [[s I, K], [K*, I]] is that of a linear matrix
+//! inequality in s and the taps, so Newton's method follows its central path.
 
 use super::bounds::cholesky;
 use super::judge::{Filters, Judge, grid, on_circle};

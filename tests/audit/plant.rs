@@ -1,10 +1,10 @@
 //! The samples of a bank's converters and of its target for white noise: their cross-correlations as exact
 //! quotients.
 //!
-//! Time in fast periods. Row a samples the output of G_a at the times k M + t_a: phase p of the target at
-//! p - m0, channel i at -D_i. For t >= 0 the correlation of G_a at time t with G_b at 0 is the sum over the
-//! poles of G_a of r e^{p t}, r = Res G_a(p) G_b(-p). Over the slow periods this is a geometric series, so with
-//! d = t_a - t_b and j0 the least j for which j M + d >= 0
+//! Time in fast periods. Row a samples the output of G_a at the times k M + t_a: phase p of the target at p
+//! - m0, channel i at -D_i. For t >= 0 the correlation of G_a at time t with G_b at 0 is the sum over the
+//! poles of G_a of r e^{p t}, r = Res G_a(p) G_b(-p). Over the slow periods this is a geometric series, so
+//! with d = t_a - t_b and j0 the least j for which j M + d >= 0
 //!
 //! S_ab(z) = sum over poles p of G_a of r_ab(p) e^{p (j0 M + d)} z^-j0 / (1 - e^{p M} z^-1)
 //!         + sum over poles p of G_b of r_ba(p) e^{p ((1 - j0) M - d)} z^(1-j0) / (1 - e^{p M} z).
@@ -184,7 +184,8 @@ impl Plant {
         poles.map(|p| ((double(&p.im) * m).abs(), -double(&p.re) * m)).collect()
     }
 
-    /// The correlation of row `a`, sampled `later` fast periods later, with row `b`, both in one slow period.
+    /// The correlation of row `a`, sampled `later` fast periods later, with row `b`, both in one slow
+    /// period.
     pub(crate) fn correlation(&self, a: usize, b: usize, later: &Real) -> Real {
         let (a, b) = (&self.rows[a], &self.rows[b]);
         let distance = &a.time - &b.time + later;

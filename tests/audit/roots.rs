@@ -3,8 +3,8 @@
 use super::real::{BITS, Complex, real};
 use std::f64::consts::TAU;
 
-/// Simple roots take about 30 steps. A double root converges by a factor of two per step, so it needs as many
-/// steps as half of the bits; a triple root by 3/2.
+/// Simple roots take about 30 steps. A double root converges by a factor of two per step, so it needs as
+/// many steps as half of the bits; a triple root by 3/2.
 const STEPS: usize = 700;
 
 /// p(s) and p'(s), coefficients in descending powers.
@@ -33,8 +33,8 @@ pub(crate) fn expand(leading: Complex, roots: &[Complex]) -> Vec<Complex> {
     })
 }
 
-/// The roots, by the iteration of Ehrlich and Aberth (O. Aberth, "Iteration methods for finding all zeros of a
-/// polynomial simultaneously", 1973).
+/// The roots, by the iteration of Ehrlich and Aberth (O. Aberth, "Iteration methods for finding all zeros of
+/// a polynomial simultaneously", 1973).
 pub(crate) fn roots(polynomial: &[Complex]) -> Vec<Complex> {
     let degree = polynomial.len() - 1;
     // Each coefficient over the leading one bounds the roots by the power that fits it.

@@ -1,5 +1,5 @@
-//! A spec as a user gives it to the program, the bank that comes out, and whether what the program says of it
-//! is true.
+//! A spec as a user gives it to the program, the bank that comes out, and whether what the program says of
+//! it is true.
 
 use super::bounds::{causal, noncausal};
 use super::judge::Judge;
@@ -159,8 +159,8 @@ pub(crate) fn judged(name: &str, bank: &Value, proven: Option<&Value>) -> Tally 
     tally
 }
 
-/// The least norm of the class of banks of a lower bound, up to [`SETTLED`] or above it; `None` where the judge
-/// does not find it.
+/// The least norm of the class of banks of a lower bound, up to [`SETTLED`] or above it; `None` where the
+/// judge does not find it.
 fn reachable(bank: &Value, judge: &Judge, class: Option<&str>, any: f64) -> Option<f64> {
     let plant = &judge.plant;
     match class? {
