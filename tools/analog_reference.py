@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Writes src/analog/families/reference.txt: low-pass prototypes and band-passes by scipy.signal and by mpmath.
+"""Writes the digits of the families' tests: low-pass prototypes and band-passes by scipy.signal and by mpmath in
+src/analog/families/reference.txt, and numbers of prototypes by mpmath to 50 digits in digits.txt beside it.
 
 Run from the repository root: python3 tools/analog_reference.py
 Made with scipy 1.17.1 and mpmath 1.4.1.
@@ -7,6 +8,9 @@ Made with scipy 1.17.1 and mpmath 1.4.1.
 One line a filter: source family order ripple_db attenuation_db gain, then `z re im` and `p re im` for
 the roots of the closed upper half plane. A band-pass has `e low high` before them, its edges in Hz. scipy designs elliptic filters iteratively; the mpmath lines are
 the closed formulas at 60 digits.
+
+One line of digits.txt: family order ripple_db attenuation_db gain, the products of 1/2 minus each zero and of 1/2
+minus each pole, and real and imaginary part of the pole with the largest imaginary part, by formulas at 110 digits.
 """
 
 import mpmath as mp
@@ -15,6 +19,8 @@ import scipy.signal as ss
 
 mp.mp.dps = 60
 OUT = "src/analog/families/reference.txt"
+DIGITS_OUT = "src/analog/families/digits.txt"
+DIGITS = 50
 
 
 def upper(roots):
@@ -51,6 +57,9 @@ def bessel(n):
 
 
 def elliptic(n, ripple, attenuation):
+    if n == 1:
+        pole = 1 / mp.sqrt(mp.mpf(10) ** (mp.mpf(ripple) / 10) - 1)
+        return [], [-pole], pole
     e1 = mp.mpf(10) ** (mp.mpf(ripple) / 10) - 1
     e2 = mp.mpf(10) ** (mp.mpf(attenuation) / 10) - 1
     m1 = e1 / e2
@@ -98,15 +107,15 @@ def ripples(family):
             ATTENUATION if family in ("chebyshev2", "elliptic") else 0.0)
 
 
-def prototype(family, n):
+def prototype(family, n, ripple=RIPPLE, attenuation=ATTENUATION):
     if family == "bessel":
         return bessel(n)
     if family == "elliptic":
-        return elliptic(n, RIPPLE, ATTENUATION)
+        return elliptic(n, ripple, attenuation)
     angles = [mp.pi * (2 * i - n + 1) / (2 * n) for i in range(n)]
     if family == "butterworth":
         return [], [-mp.exp(mp.j * a) for a in angles], mp.mpf(1)
-    db = RIPPLE if family == "chebyshev1" else ATTENUATION
+    db = ripple if family == "chebyshev1" else attenuation
     eps = mp.sqrt(mp.mpf(10) ** (mp.mpf(db) / 10) - 1)
     mu = mp.asinh(1 / eps if family == "chebyshev1" else eps) / n
     poles = [-mp.sinh(mu + mp.j * a) for a in angles]
@@ -140,6 +149,38 @@ def mpmath_lines():
             yield line("mpmath", "elliptic", n, ripple, attenuation, *elliptic(n, ripple, attenuation))
 
 
+def digits_members():
+    for n in range(1, 33):
+        yield "butterworth", n, 0.0, 0.0
+        yield "bessel", n, 0.0, 0.0
+        yield "chebyshev1", n, 0.5, 0.0
+        yield "chebyshev2", n, 0.0, 60.0
+        yield "elliptic", n, 0.5, 60.0
+    for n in (1, 2, 3, 4, 7, 32):
+        for db in (1e-6, 0.01, 3.0103, 123.456, 300.0):
+            yield "chebyshev1", n, db, 0.0
+            yield "chebyshev2", n, 0.0, db
+        for dbs in ((1e-6, 300.0), (1e-6, 0.5), (3.0, 300.0), (150.0, 300.0), (0.1, 20.0)):
+            yield "elliptic", n, *dbs
+    # Transition bands from a hundredth of the cutoff to a millionth.
+    for n, *dbs in ((2, 3.0, 3.5), (3, 1.0, 1.1), (4, 3.0, 4.0), (2, 100.0, 100.001), (5, 0.5, 3.0), (3, 1e-6, 2e-6)):
+        yield "elliptic", n, *dbs
+
+
+def digits_lines():
+    mp.mp.dps = 110
+    for family, n, ripple, attenuation in digits_members():
+        zeros, poles, gain = prototype(family, n, ripple, attenuation)
+        at_half = [mp.re(mp.fprod(mp.mpf(0.5) - r for r in roots)) for roots in (zeros, poles)]
+        upper = max(poles, key=lambda p: mp.im(p))
+        numbers = [gain, *at_half, mp.re(upper), mp.im(upper) if n > 1 else mp.mpf(0)]
+        yield " ".join([family, str(n), repr(ripple), repr(attenuation)] + [mp.nstr(mp.mpf(x), DIGITS, min_fixed=1, max_fixed=0) for x in numbers])
+
+
+with open(DIGITS_OUT, "w") as out:
+    for text in digits_lines():
+        out.write(text + "\n")
+mp.mp.dps = 60
 with open(OUT, "w") as out:
     for text in [*scipy_lines(), *mpmath_lines(), *scipy_band_lines(), *mpmath_band_lines()]:
         out.write(text + "\n")

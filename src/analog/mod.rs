@@ -6,7 +6,7 @@
 //!
 //! - [`StrictlyProper`] is the type that the designer works with: stable, strictly proper, real, normalised.
 //! - [`StableFilter`] is the same with a direct term: the filter W of a [`signal`].
-//! - [`families`] are the classical low-passes as [`Zpk`].
+//! - `families` are the classical low-passes, enclosed.
 //! - [`fit`] makes filters of measured responses.
 //!
 //! # How a filter is realised
@@ -24,7 +24,7 @@
 
 mod balance;
 mod error;
-pub mod families;
+mod families;
 pub mod fit;
 mod half_power;
 mod pairing;
@@ -36,7 +36,6 @@ mod section;
 mod signal;
 mod square_free;
 mod strictly_proper;
-mod zpk;
 
 pub(crate) use proportion::proportion;
 pub(crate) use section::Realisation;
@@ -46,7 +45,6 @@ pub use error::AnalogError;
 pub use half_power::HalfPowerBand;
 pub use signal::{SignalFilter, resolved_band, signal};
 pub use strictly_proper::{StableFilter, StrictlyProper};
-pub use zpk::{Cutoffs, Zpk};
 
 /// Least -Re(p)/|p| of a pole: a quality factor of 5e8. Eigenvalues of a realisation are not known to
 /// higher accuracy, so a pole closer to the imaginary axis might as well be unstable.

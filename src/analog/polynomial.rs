@@ -55,7 +55,7 @@ pub(super) fn enclosed_roots(
 }
 
 /// The simple roots of a polynomial.
-fn isolated(p: &[BigFloat]) -> Option<RootSet<Ball<BigFloat>>> {
+pub(super) fn isolated(p: &[BigFloat]) -> Option<RootSet<Ball<BigFloat>>> {
     let centres = symmetric(refined(p, approximate_roots(p)?))?;
     let radii: Vec<f64> = (0..centres.len()).map(|i| radius(p, &centres, i)).collect();
     for (i, &z) in centres.iter().enumerate() {

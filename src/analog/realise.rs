@@ -4,15 +4,15 @@ use nalgebra::DMatrix;
 
 use crate::arithmetic::{Ball, BigFloat, Real};
 use crate::linalg::{Complex, eigenvalues, solve, to_complex};
-use crate::spec::{Family, FilterProblem, FilterSpec, Passband};
-use crate::units::{RadiansPerFastPeriod, Seconds};
+use crate::spec::{FilterSpec, Passband};
+use crate::units::Seconds;
 
+use super::AnalogError;
+use super::families::{self, Member};
 use super::pairing::pair_sections;
 use super::polynomial::enclosed_roots;
 use super::roots::{Factors, RootSet};
 use super::section::{Realisation, Section};
-use super::zpk::{Cutoffs, Zpk};
-use super::{AnalogError, MIN_DAMPING_RATIO, families};
 
 /// One block of a series, with one input and one output.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,15 +39,6 @@ pub(super) trait Written: Real {
     fn family(member: &Member, passband: Passband, h: Seconds) -> Result<Factors<Self>, AnalogError>;
 }
 
-/// A family member with its cutoff at |s| = 1.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Member {
-    pub(super) family: Family,
-    pub(super) order: usize,
-    pub(super) ripple_db: f64,
-    pub(super) attenuation_db: f64,
-}
-
 impl Written for Ball<BigFloat> {
     fn quotient(num: &[f64], den: &[f64]) -> Result<Factors<Self>, AnalogError> {
         let [num, den] = [num, den].map(without_leading_zeros);
@@ -56,7 +47,7 @@ impl Written for Ball<BigFloat> {
     }
 
     fn family(member: &Member, passband: Passband, h: Seconds) -> Result<Factors<Self>, AnalogError> {
-        f64::family(member, passband, h).map(|factors| factors.map(Self::from))
+        families::placed(member, passband, h)
     }
 }
 
@@ -66,8 +57,7 @@ impl Written for f64 {
     }
 
     fn family(member: &Member, passband: Passband, h: Seconds) -> Result<Factors<Self>, AnalogError> {
-        let Zpk { zeros, poles, gain, .. } = moved(&prototype(member)?, passband, h)?;
-        Ok(Factors { zeros: RootSet::new(&zeros, "zero")?, poles: RootSet::new(&poles, "pole")?, gain })
+        Ok(families::placed(member, passband, h)?.rounded())
     }
 }
 
@@ -171,46 +161,4 @@ impl<T: Written> Chain<T> {
             .fold(Realisation::wire(), |whole, block| whole.then(&block.realise()))
             .amplified(self.gain)
     }
-}
-
-/// The prototype at its place, refused where the band is too narrow for its poles.
-fn moved(
-    prototype: &Zpk<Cutoffs>,
-    passband: Passband,
-    h: Seconds,
-) -> Result<Zpk<RadiansPerFastPeriod>, AnalogError> {
-    let filter = prototype.moved(passband, h);
-    let is_damped = |pole: &Complex<f64>| -pole.re >= MIN_DAMPING_RATIO * pole.norm();
-    match passband {
-        Passband::BandPass { low, high } if !filter.poles.iter().all(is_damped) => {
-            let rule = format!(
-                "band = {} Hz wide: a band this narrow puts poles within 1e-9 of the imaginary axis, beyond double \
-                 precision; widen the band or lower the order",
-                (high - low).0
-            );
-            Err(FilterProblem::of("band", rule).into())
-        }
-        _ => Ok(filter),
-    }
-}
-
-/// The prototype, refused where its transition band is too narrow for its poles.
-fn prototype(member: &Member) -> Result<Zpk<Cutoffs>, AnalogError> {
-    let Member { family, order, ripple_db, attenuation_db } = *member;
-    let prototype = match family {
-        Family::Butterworth => families::butterworth(order),
-        Family::Chebyshev1 => families::chebyshev1(order, ripple_db),
-        Family::Chebyshev2 => families::chebyshev2(order, attenuation_db),
-        Family::Elliptic => families::elliptic(order, ripple_db, attenuation_db),
-        Family::Bessel => families::bessel(order)?,
-        Family::Rc => families::rc(),
-    };
-    if prototype.poles.iter().all(|p| -p.re >= MIN_DAMPING_RATIO * p.norm()) {
-        return Ok(prototype);
-    }
-    let rule = format!(
-        "order = {order}: with these ripples the transition band is narrower than 1e-9 of the cutoff, beyond double \
-         precision; lower the order or set the ripples further apart"
-    );
-    Err(FilterProblem::of("order", rule).into())
 }

@@ -193,15 +193,6 @@ impl<T: Real> Factors<T> {
         }
     }
 
-    /// In other numbers.
-    pub(super) fn map<U>(&self, to: impl Fn(T) -> U) -> Factors<U> {
-        let set = |roots: &RootSet<T>| RootSet {
-            real: roots.real.iter().map(|&r| to(r)).collect(),
-            upper: roots.upper.iter().map(|&(re, im)| (to(re), to(im))).collect(),
-        };
-        Factors { zeros: set(&self.zeros), poles: set(&self.poles), gain: to(self.gain) }
-    }
-
     /// In doubles; see [`RootSet::rounded`].
     pub(super) fn rounded(&self) -> Factors<f64> {
         Factors { zeros: self.zeros.rounded(), poles: self.poles.rounded(), gain: self.gain.to_double() }

@@ -74,7 +74,8 @@ impl<F: Number> Ball<F> {
         Self { mid, radius: (inherited + F::ROUNDING * mid.nearest().abs()) * OUTWARD + TINY }
     }
 
-    fn unknown() -> Self {
+    /// A number of which nothing is known.
+    pub(crate) fn unknown() -> Self {
         Self { mid: F::from(f64::NAN), radius: f64::NAN }
     }
 
@@ -159,6 +160,9 @@ impl<F: Number> Div for Ball<F> {
         let least = other.mid.nearest().abs() * (1.0 - f64::EPSILON) - other.radius * OUTWARD;
         if !least.is_normal() || least < 0.0 {
             return Self::unknown();
+        }
+        if self.is_zero() {
+            return Self::ZERO;
         }
         let quotient = Self::exactly(self.mid / other.mid);
         // |x/y - m/n| <= |x - m| / |y| + |m/n| |y - n| / |y|, where the last factor may underflow.

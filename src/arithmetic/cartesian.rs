@@ -35,6 +35,19 @@ impl<T: Field> Cartesian<T> {
     }
 }
 
+impl<F: Number> ComplexBall<F> {
+    /// One of the two square roots.
+    pub(crate) fn sqrt(self) -> Self {
+        let half = Ball::from(0.5);
+        // The part that is a sum; the other one follows from 2 re im.
+        let large = ((self.norm_sqr().sqrt() + if self.re.nearest() < 0.0 { -self.re } else { self.re })
+            * half)
+            .sqrt();
+        let small = self.im * half / large;
+        if self.re.nearest() < 0.0 { Self::new(small, large) } else { Self::new(large, small) }
+    }
+}
+
 impl<F: Number> From<Ball<F>> for ComplexBall<F> {
     fn from(re: Ball<F>) -> Self {
         Self { re, im: Ball::ZERO }
@@ -94,6 +107,11 @@ mod tests {
             assert!(rest.norm_sqr().magnitude() < 1e-280, "{rest:?}");
             assert!(rest.re.lower() <= 0.0 && rest.re.upper() >= 0.0, "{rest:?}");
             assert!(rest.im.lower() <= 0.0 && rest.im.upper() >= 0.0, "{rest:?}");
+        }
+        for z in [x, -x, y, -y, x * y, x.conj(), ball(0.0, -2.0)] {
+            let rest = z.sqrt() * z.sqrt() - z;
+            assert!(rest.norm_sqr().magnitude() < 1e-280, "{z:?}");
+            assert!(rest.re.lower() <= 0.0 && rest.re.upper() >= 0.0, "{rest:?}");
         }
         assert!((x / (y - y)).re.radius().is_nan());
     }

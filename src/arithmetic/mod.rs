@@ -10,6 +10,7 @@ mod big_float;
 mod cartesian;
 pub(crate) mod dense;
 mod double_double;
+pub(crate) mod elementary;
 #[cfg(test)]
 mod exact;
 mod number;

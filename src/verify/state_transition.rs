@@ -57,8 +57,8 @@ fn taylor<F: Number>(a: &Matrix<F>, b: &Matrix<F>, t: Ball<F>, norm: f64) -> Sta
     let (size, factorial) = (norm * t.magnitude() * 1.001, factorial(terms));
     let rest = 2.0 * size.powi(terms as i32) / factorial;
     let gramian_rest = 2.0 * ball::row_sum(&inputs) * (2.0 * size).powi(terms as i32) / factorial;
-    // This form of the comparison also treats NaN as unknown.
-    let known = |rest: f64| if size <= 0.26 { 1.01 * rest } else { f64::NAN };
+    // This form of the comparison also treats NaN as unknown; the remainder may be too small for a double.
+    let known = |rest: f64| if size <= 0.26 { 1.01 * rest + f64::MIN_POSITIVE } else { f64::NAN };
     StateTransition {
         transition: transition.map(|x| x.widened(known(rest))),
         gramian: gramian.map(|x| x.widened(known(gramian_rest))),

@@ -1,38 +1,30 @@
 //! Chebyshev filters: equal ripple in the pass band (1) or in the stop band (2).
 
-use super::{excess_power, left_half, product_of_negatives};
-use crate::analog::{Cutoffs, Zpk};
-use crate::linalg::Complex;
+use super::{Long, dc_gain, excess_power, exp_asinh, on_ellipse, product_of_negatives, upper_roots};
+use crate::analog::roots::{Factors, RootSet};
+use crate::arithmetic::{Ball, ComplexBall, elementary};
 
 /// Chebyshev 1: poles on an ellipse. The gain ripples by `ripple_db` (> 0 dB) below the cutoff and falls
 /// above it.
-pub fn chebyshev1(order: usize, ripple_db: f64) -> Zpk<Cutoffs> {
+pub(super) fn first(order: usize, ripple_db: f64) -> Factors<Long> {
     let ripple = excess_power(ripple_db);
-    let poles = ellipse(order, (1.0 / ripple.sqrt()).asinh() / order as f64);
-    let dc = if order.is_multiple_of(2) { 1.0 / (1.0 + ripple).sqrt() } else { 1.0 };
-    let gain = dc * product_of_negatives(&poles);
-    Zpk::new(Vec::new(), poles, gain)
+    let stretch = elementary::root(exp_asinh(Ball::from(1.0) / ripple.sqrt()), order);
+    let poles = upper_roots(order, |angle| on_ellipse(stretch, angle));
+    let gain = dc_gain(order, ripple) * product_of_negatives(&poles);
+    Factors { zeros: RootSet::default(), poles, gain }
 }
 
 /// Chebyshev 2 (inverse Chebyshev): the attenuation is at least `attenuation_db` (> 0 dB) from the cutoff
 /// on. An even order has as many zeros as poles.
-pub fn chebyshev2(order: usize, attenuation_db: f64) -> Zpk<Cutoffs> {
-    let poles: Vec<Complex<f64>> = ellipse(order, excess_power(attenuation_db).sqrt().asinh() / order as f64)
-        .iter()
-        .map(|p| p.inv())
-        .collect();
+pub(super) fn second(order: usize, attenuation_db: f64) -> Factors<Long> {
+    let stretch = elementary::root(exp_asinh(excess_power(attenuation_db).sqrt()), order);
+    let poles = upper_roots(order, |angle| {
+        let z = on_ellipse(stretch, angle);
+        z.scaled(Ball::from(1.0) / z.norm_sqr())
+    });
     // The zeros are the inverse Chebyshev nodes; the middle one of an odd order is at infinity.
-    let zeros: Vec<Complex<f64>> = left_half(order, |angle| Complex::new(0.0, angle.sin()))
-        .into_iter()
-        .filter(|z| z.im != 0.0)
-        .map(|z| Complex::new(0.0, 1.0 / z.im))
-        .collect();
+    let mut zeros = upper_roots(order, |angle| ComplexBall::new(Ball::ZERO, Ball::from(1.0) / angle.im));
+    zeros.real.clear();
     let gain = product_of_negatives(&poles) / product_of_negatives(&zeros);
-    Zpk::new(zeros, poles, gain)
-}
-
-/// Butterworth angles on the ellipse with half axes sinh(mu), cosh(mu).
-fn ellipse(order: usize, mu: f64) -> Vec<Complex<f64>> {
-    let (real, imaginary) = (mu.sinh(), mu.cosh());
-    left_half(order, |angle| Complex::new(-real * angle.cos(), imaginary * angle.sin()))
+    Factors { zeros, poles, gain }
 }

@@ -1,76 +1,147 @@
 //! Elliptic (Cauer) filters in closed form.
 //!
-//! Source: Orfanidis, "Lecture notes on elliptic filter design" (2006), equations for zeros and poles;
-//! the degree equation by nomes as in Lutovac, Tosic and Evans, "Filter design for signal processing"
-//! (2001).
+//! With the nome q of the modulus k, the theta series T(y), the sum of (-1)^m q^(m^2) y^m over all whole m,
+//! and x = e^(i z), z = pi u / (2 K), the Jacobi function is
+//!
+//! ```text
+//! sn(u, k) = -i c x T(q x^2) / T(x^2),  c = T(-1) / T(-q),  k = q^(1/2) / c^2
+//! ```
+//!
+//! so that poles and zeros are quotients of theta series. The nome of the filter is the n-th root of that of
+//! the modulus k1 = sqrt(ripple / attenuation) as powers (the degree equation), and the poles lie at
+//! u = j K / n + i v K with sc(n v K1, k1') = 1 / sqrt(ripple). Both follow from Landen's transformation.
+//!
+//! Sources: Abramowitz and Stegun, chapters 16 and 17; Orfanidis, "Lecture notes on elliptic filter design"
+//! (2006); the degree equation by nomes as in Lutovac, Tosic and Evans, "Filter design for signal
+//! processing" (2001).
 
-use super::jacobi::Modulus;
-use super::{excess_power, product_of_negatives};
-use crate::analog::{Cutoffs, Zpk};
-use crate::linalg::Complex;
+use super::{Long, dc_gain, excess_power, exp_asinh, product_of_negatives, upper_roots};
+use crate::analog::roots::{Factors, RootSet};
+use crate::arithmetic::{Ball, ComplexBall, elementary};
+
+/// Modulus below which Landen's transformation ends, 2^-256: what is left is of the order of its square.
+const LAST_MODULUS: f64 = f64::from_bits((1023 - 256) << 52);
+/// Most of Landen's transformations. Each squares the modulus, and before that the complementary modulus
+/// grows as its root: 20 are enough from 1e-300 on.
+const MAX_TRANSFORMATIONS: usize = 32;
+/// Most terms of a theta series on each side. Nomes for which they are not enough belong to transition bands
+/// that are narrower than 1e-9 of the cutoff.
+const MAX_TERMS: usize = 200;
+/// Size of a term of a theta series, 2^-540, that lies below the rounding of the others.
+const NEGLIGIBLE: f64 = f64::from_bits((1023 - 540) << 52);
 
 /// Elliptic: ripple of `ripple_db` up to the cutoff, attenuation of at least `attenuation_db` (>
 /// `ripple_db` > 0) beyond the stop-band edge, which follows from order and ripples. An even order has as
 /// many zeros as poles.
-pub fn elliptic(order: usize, ripple_db: f64, attenuation_db: f64) -> Zpk<Cutoffs> {
-    let ripple = excess_power(ripple_db);
+pub(super) fn elliptic(order: usize, ripple_db: f64, attenuation_db: f64) -> Factors<Long> {
+    let (one, ripple) = (Ball::from(1.0), excess_power(ripple_db));
+    let slope = one / ripple.sqrt();
     if order == 1 {
-        let p = 1.0 / ripple.sqrt();
-        return Zpk::new(Vec::new(), vec![Complex::new(-p, 0.0)], p);
+        let poles = RootSet { real: vec![-slope], upper: Vec::new() };
+        return Factors { zeros: RootSet::default(), poles, gain: slope };
     }
-    let selectivity = Modulus::new((ripple / excess_power(attenuation_db)).sqrt());
-    let modulus = selectivity.with_nome_root(order);
-    let quarter = modulus.quarter_period();
-    // At j v0 the square of the elliptic rational function is -1/ripple.
-    let v0 = quarter * selectivity.swapped().first_kind(1.0 / ripple.sqrt())
-        / (order as f64 * selectivity.quarter_period());
-    let v = modulus.swapped().functions(v0);
+    let Landen { nome_root, stretch } = Landen::new(ripple, excess_power(attenuation_db));
+    let nome_root = elementary::root(nome_root, order);
+    let shrink = one / elementary::root(stretch, order);
+    let sine = Sine::new(nome_root * nome_root);
 
-    let (mut zeros, mut poles) = (Vec::new(), Vec::new());
-    for j in ((1 - order % 2)..order).step_by(2) {
-        let u = modulus.functions(quarter * j as f64 / order as f64);
-        let denominator = v.cn * v.cn + (modulus.k * u.sn * v.sn) * (modulus.k * u.sn * v.sn);
-        let pole = Complex::new(-u.cn * u.dn * v.sn * v.cn, u.sn * v.dn) / denominator;
-        if j == 0 {
-            poles.push(Complex::new(pole.re, 0.0));
-            continue;
+    let poles = upper_roots(order, |angle| sine.times_i(angle.scaled(shrink)));
+    let mut zeros = upper_roots(order, |angle| {
+        // 1 / (k sn u), from i sn u.
+        let modulus = nome_root / (sine.factor * sine.factor);
+        ComplexBall::new(Ball::ZERO, one / (modulus * sine.times_i(angle).im))
+    });
+    // An odd order has one at infinity.
+    zeros.real.clear();
+    let gain = dc_gain(order, ripple) * product_of_negatives(&poles) / product_of_negatives(&zeros);
+    Factors { zeros, poles, gain }
+}
+
+/// What Landen's descending transformation gives for the modulus k with k^2 = `ripple` / `attenuation`.
+struct Landen {
+    /// q^(1/2).
+    nome_root: Long,
+    /// e^(pi v / 2) with sc(v K, k') = `ripple`^(-1/2).
+    stretch: Long,
+}
+
+impl Landen {
+    /// Each transformation squares the nome and keeps v, while the modulus k falls and S = sc(v K, k') comes
+    /// to sinh(pi v / 2):
+    ///
+    /// ```text
+    /// k -> (k / (1 + k'))^2,  k' -> 2 sqrt(k') / (1 + k')
+    /// S -> 2 S / ((1 + new k) (1 + sqrt(1 + k^2 S^2)))
+    /// ```
+    ///
+    /// In the end v K is the integral of ((1 + y^2) (1 + k^2 y^2))^(-1/2) from 0 to S, and K lies between
+    /// pi/2 and pi/(2 k'). So pi v / 2 = (1 - d) asinh S with
+    /// 0 <= d <= 1 - k' (1 + k^2 S^2)^(-1/2) <= k^2 (1 + S^2). And k = 4 q^(1/2) times the product of
+    /// ((1 + q^2m) / (1 + q^(2m-1)))^4, which lies between 1 - 5 q and 1 for q < 0.1, so that q^(1/2) = k/4
+    /// up to a factor within k^2 of 1.
+    fn new(ripple: Long, attenuation: Long) -> Self {
+        let (one, two) = (Ball::from(1.0), Ball::from(2.0));
+        let (mut k, mut complement) =
+            ((ripple / attenuation).sqrt(), ((attenuation - ripple) / attenuation).sqrt());
+        let mut sc = one / ripple.sqrt();
+        let mut transformations = 0;
+        while k.upper() > LAST_MODULUS && transformations < MAX_TRANSFORMATIONS {
+            let ratio = k / (one + complement);
+            let next = ratio * ratio;
+            sc = two * sc / ((one + next) * (one + (one + k * k * sc * sc).sqrt()));
+            (k, complement) = (next, two * complement.sqrt() / (one + complement));
+            transformations += 1;
         }
-        let zero = Complex::new(0.0, 1.0 / (modulus.k * u.sn));
-        zeros.extend([zero, zero.conj()]);
-        poles.extend([pole, pole.conj()]);
+        let (square, size) = ((k * k).magnitude(), sc.magnitude());
+        let is_last = k.magnitude() <= LAST_MODULUS;
+        if !is_last {
+            return Self { nome_root: Ball::unknown(), stretch: Ball::unknown() };
+        }
+        let nome_root = k * Ball::from(0.25) * one.widened(square);
+        // 1 - e^(-d asinh S) <= d S.
+        let stretch = exp_asinh(sc) * one.widened(2.0 * square * (1.0 + size * size) * size);
+        Self { nome_root: (0..transformations).fold(nome_root, |q, _| q.sqrt()), stretch }
     }
-    let dc = if order.is_multiple_of(2) { 1.0 / (1.0 + ripple).sqrt() } else { 1.0 };
-    let gain = dc * product_of_negatives(&poles) / product_of_negatives(&zeros);
-    Zpk::new(zeros, poles, gain)
 }
 
-/// The shape of elliptic filters: the ripple up to the cutoff, and the stop-band edge over the cutoff.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Selectivity {
-    /// Ripple in the pass band, decibels.
-    pub ripple_db: f64,
-    /// Stop-band edge over the cutoff, above 1.
-    pub transition: f64,
+/// The function i sn of x = e^(i z) for one nome.
+struct Sine {
+    nome: Long,
+    /// c.
+    factor: Long,
 }
 
-impl Selectivity {
-    /// The least order with an attenuation of at least `attenuation_db` from the stop-band edge on: the
-    /// degree equation n = K'(k1) K(k) / (K(k1) K'(k)), k = 1 / `transition`,
-    /// k1^2 = (10^(ripple/10) - 1) / (10^(attenuation/10) - 1).
-    pub fn order_for(self, attenuation_db: f64) -> usize {
-        let selectivity = Modulus::new((excess_power(self.ripple_db) / excess_power(attenuation_db)).sqrt());
-        let degree = selectivity.ln_nome() / self.modulus().ln_nome();
-        // The attenuation of a whole order has that order, whatever the rounding.
-        (degree - 1e-9).ceil().max(1.0) as usize
+impl Sine {
+    fn new(nome: Long) -> Self {
+        let minus = ComplexBall::from(Ball::from(-1.0));
+        Self { nome, factor: theta(nome, minus).re / theta(nome, minus.scaled(nome)).re }
     }
 
-    /// The attenuation in decibels from the stop-band edge on of the filter of this `order`.
-    pub fn attenuation_of(self, order: usize) -> f64 {
-        let selectivity = self.modulus().with_nome_power(order).k;
-        10.0 * (excess_power(self.ripple_db) / (selectivity * selectivity)).ln_1p() / std::f64::consts::LN_10
+    /// i sn(u).
+    fn times_i(&self, x: ComplexBall) -> ComplexBall {
+        let square = x * x;
+        (x * theta(self.nome, square.scaled(self.nome)) / theta(self.nome, square)).scaled(self.factor)
     }
+}
 
-    fn modulus(self) -> Modulus {
-        Modulus::new(1.0 / self.transition)
+/// T(y). From some term on each is at most half of the one before it, so that all others together are at
+/// most as large as the last.
+fn theta(nome: Long, y: ComplexBall) -> ComplexBall {
+    let one = ComplexBall::from(Ball::from(1.0));
+    let (inverse, square) = (one / y, nome * nome);
+    let size = |z: ComplexBall| z.re.magnitude() + z.im.magnitude();
+    let (mut rising, mut falling, mut sum, mut step) = (one, one, one, nome);
+    for _ in 0..MAX_TERMS {
+        rising = -(rising * y).scaled(step);
+        falling = -(falling * inverse).scaled(step);
+        sum = sum + rising + falling;
+        step = step * square;
+        let last = size(rising) + size(falling);
+        if last <= NEGLIGIBLE && step.magnitude() * size(y).max(size(inverse)) <= 0.5 {
+            // The series of a real number is real.
+            let im = if y.im.is_zero() { sum.im } else { sum.im.widened(last) };
+            return ComplexBall::new(sum.re.widened(last), im);
+        }
     }
+    ComplexBall::new(Ball::unknown(), Ball::unknown())
 }

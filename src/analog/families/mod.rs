@@ -1,53 +1,157 @@
-//! Classical low-pass families as zeros, poles and gain.
+//! Classical low-pass families as enclosed zeros, poles and gain.
 //!
-//! Every function returns the prototype with its cutoff at |s| = 1. "Cutoff" means what scipy.signal means
-//! by it (`buttap`, `cheb1ap`, `cheb2ap`, `ellipap`, `besselap` with `norm="phase"`);
-//! [`Zpk::low_pass`](super::Zpk::low_pass) moves it. The DC gain also follows scipy: 1, except `-ripple_db`
-//! for Chebyshev 1 and elliptic filters of even order.
+//! Every function returns the prototype with its cutoff at |s| = 1. "Cutoff" means what scipy.signal
+//! means by it (`buttap`, `cheb1ap`, `cheb2ap`, `ellipap`, `besselap` with `norm="phase"`); [`passband`]
+//! moves it. The DC gain also follows scipy: 1, except `-ripple_db` for Chebyshev 1 and elliptic filters
+//! of even order.
 //!
-//! All are closed formulas or convergent series, evaluated to double precision.
+//! All are formulas in balls of 512 bits. Doubles are these numbers, rounded.
 
 mod bessel;
 mod chebyshev;
-mod complex;
 mod elliptic;
-mod jacobi;
+mod passband;
+mod selectivity;
 
-pub use bessel::bessel;
-pub use chebyshev::{chebyshev1, chebyshev2};
-pub use elliptic::{Selectivity, elliptic};
+pub(super) use selectivity::Selectivity;
 
-use std::f64::consts::FRAC_PI_2;
+use super::roots::{Factors, RootSet};
+use super::{AnalogError, MIN_DAMPING_RATIO};
+use crate::arithmetic::{Ball, BigFloat, ComplexBall, elementary};
+use crate::spec::{Family, FilterProblem, Passband};
+use crate::units::Seconds;
 
-use super::{Cutoffs, Zpk};
-use crate::linalg::Complex;
+type Long = Ball<BigFloat>;
 
-/// Butterworth: poles evenly on the unit circle, -3.01 dB at the cutoff.
-pub fn butterworth(order: usize) -> Zpk<Cutoffs> {
-    Zpk::new(Vec::new(), left_half(order, |angle| Complex::new(-angle.cos(), angle.sin())), 1.0)
+/// Radius over midpoint up to which a number counts as resolved: its double is right then, and the
+/// proofs need a few digits more.
+const RESOLVED: f64 = 1e-40;
+
+/// A family member with its cutoff at |s| = 1.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Member {
+    pub(super) family: Family,
+    /// From 1 to [`MAX_ORDER`](crate::spec::MAX_ORDER).
+    pub(super) order: usize,
+    /// Ripple in the pass band of Chebyshev 1 and elliptic filters, decibels.
+    pub(super) ripple_db: f64,
+    /// Attenuation in the stop band of Chebyshev 2 and elliptic filters, decibels.
+    pub(super) attenuation_db: f64,
 }
 
-/// One pole, -3.01 dB at the cutoff.
-pub fn rc() -> Zpk<Cutoffs> {
-    butterworth(1)
+/// Zeros, poles and gain of `member` moved to `passband`, in normalised time t / `h`.
+///
+/// # Errors
+/// [`AnalogError::Filter`] where the transition band or the band is too narrow for the poles;
+/// [`AnalogError::RootsNotIsolated`].
+pub(super) fn placed(member: &Member, passband: Passband, h: Seconds) -> Result<Factors<Long>, AnalogError> {
+    let prototype = prototype(member)?;
+    if !is_damped(&prototype) {
+        let rule = format!(
+            "order = {}: with these ripples the transition band is narrower than 1e-9 of the cutoff, beyond double \
+             precision; lower the order or set the ripples further apart",
+            member.order
+        );
+        return Err(FilterProblem::of("order", rule).into());
+    }
+    let filter = passband::moved(&prototype, passband, h);
+    match passband {
+        Passband::BandPass { low, high } if !is_damped(&filter) => {
+            let rule = format!(
+                "band = {} Hz wide: a band this narrow puts poles within 1e-9 of the imaginary axis, beyond double \
+                 precision; widen the band or lower the order",
+                (high - low).0
+            );
+            Err(FilterProblem::of("band", rule).into())
+        }
+        _ => Ok(filter),
+    }
 }
 
-/// `root` at the angles (2 i - n + 1)/n * 90 degrees, i = 0..n: those of the Butterworth poles, counted
-/// from the negative real axis. Conjugate angles give exactly conjugate roots, and the middle angle of an
-/// odd order is exactly zero.
-fn left_half(order: usize, root: impl Fn(f64) -> Complex<f64>) -> Vec<Complex<f64>> {
-    let angle = |i: usize| FRAC_PI_2 * (2.0 * i as f64 - order as f64 + 1.0) / order as f64;
-    (0..order).map(|i| root(angle(i))).collect()
+/// Whether all numbers are resolved and all poles have the least damping.
+fn is_damped(filter: &Factors<Long>) -> bool {
+    let is_resolved = |x: Long| x.radius() <= RESOLVED * x.nearest().abs();
+    let real = |&p: &Long| is_resolved(p) && p.nearest() < 0.0;
+    let pair = |&(re, im): &(Long, Long)| {
+        let (re, im, resolved) = (re.nearest(), im.nearest(), is_resolved(re) && is_resolved(im));
+        resolved && -re >= MIN_DAMPING_RATIO * re.hypot(im)
+    };
+    let poles = &filter.poles;
+    is_resolved(filter.gain) && poles.real.iter().all(real) && poles.upper.iter().all(pair)
+}
+
+/// Zeros, poles and gain of `member`. Numbers that 512 bits do not resolve are unknown.
+///
+/// # Errors
+/// [`AnalogError::RootsNotIsolated`] for a Bessel polynomial.
+pub(super) fn prototype(member: &Member) -> Result<Factors<Long>, AnalogError> {
+    let Member { order, ripple_db, attenuation_db, .. } = *member;
+    Ok(match member.family {
+        Family::Butterworth => butterworth(order),
+        Family::Chebyshev1 => chebyshev::first(order, ripple_db),
+        Family::Chebyshev2 => chebyshev::second(order, attenuation_db),
+        Family::Elliptic => elliptic::elliptic(order, ripple_db, attenuation_db),
+        Family::Bessel => bessel::bessel(order)?,
+        Family::Rc => butterworth(1),
+    })
+}
+
+/// Poles evenly on the unit circle, -3.01 dB at the cutoff.
+fn butterworth(order: usize) -> Factors<Long> {
+    let pole = |angle: ComplexBall| ComplexBall::new(-angle.re, angle.im);
+    Factors { zeros: RootSet::default(), poles: upper_roots(order, pole), gain: Ball::from(1.0) }
+}
+
+/// `root` for each angle of the Butterworth poles, counted from the negative real axis: j / n times 90
+/// degrees, j = n - 1, n - 3, .. down to 1 or 0. It takes cos + i sin of the angle and gives an upper
+/// root, for the angle 0 a real one.
+fn upper_roots(order: usize, root: impl Fn(ComplexBall) -> ComplexBall) -> RootSet<Long> {
+    let mut roots = RootSet::default();
+    for z in angles(order) {
+        let root = root(z);
+        if z.im.is_zero() {
+            roots.real.push(root.re);
+        } else {
+            roots.upper.push((root.re, root.im));
+        }
+    }
+    roots.sorted()
+}
+
+/// cos + i sin of the angles of [`upper_roots`], ascending; exactly 1 for the angle 0.
+fn angles(order: usize) -> impl Iterator<Item = ComplexBall> {
+    let step = elementary::phasor(elementary::pi() / Ball::from(2.0 * order as f64));
+    let first = if order.is_multiple_of(2) { step } else { ComplexBall::from(Ball::from(1.0)) };
+    std::iter::successors(Some(first), move |&z| Some(z * step * step)).take(order.div_ceil(2))
+}
+
+/// The point at this angle on the ellipse with half axes sinh(mu), cosh(mu), counted from the negative real
+/// axis, for `stretch` = e^mu.
+fn on_ellipse(stretch: Long, angle: ComplexBall) -> ComplexBall {
+    let (half, inverse) = (Ball::from(0.5), Ball::from(1.0) / stretch);
+    ComplexBall::new(angle.re * (inverse - stretch) * half, angle.im * (inverse + stretch) * half)
 }
 
 /// prod(-roots), real by conjugate symmetry.
-fn product_of_negatives(roots: &[Complex<f64>]) -> f64 {
-    roots.iter().fold(Complex::new(1.0, 0.0), |product, r| product * -r).re
+fn product_of_negatives(roots: &RootSet<Long>) -> Long {
+    let real = roots.real.iter().fold(Ball::from(1.0), |product, &r| product * -r);
+    roots.upper.iter().fold(real, |product, &(re, im)| product * (re * re + im * im))
 }
 
-/// 10^(db/10) - 1 without cancellation for small `db`.
-fn excess_power(db: f64) -> f64 {
-    (db * std::f64::consts::LN_10 / 10.0).exp_m1()
+/// The gain at 0 of a filter with this power of ripple: the ripple for an even order.
+fn dc_gain(order: usize, ripple: Long) -> Long {
+    let one = Ball::from(1.0);
+    if order.is_multiple_of(2) { one / (one + ripple).sqrt() } else { one }
+}
+
+/// 10^(db/10) - 1.
+fn excess_power(db: f64) -> Long {
+    elementary::exp_m1(Ball::from(db) * elementary::ln_10() / Ball::from(10.0))
+}
+
+/// e^asinh(x).
+fn exp_asinh(x: Long) -> Long {
+    x + (Ball::from(1.0) + x * x).sqrt()
 }
 
 #[cfg(test)]

@@ -35,7 +35,10 @@ fn band_passes_realise_narrow_and_wide() {
             for band in [[0.2, 0.25], [0.2, 0.202], [20.0, 20.2], [1e-3, 10.0], [0.775, 0.975]] {
                 let phi = realise(&band_pass(kind, order, band), 1.0).unwrap();
                 let error = realisation_error(&phi);
-                assert!(error < 1e-11, "{kind:?} {order} at {band:?}: {error:e}");
+                // The pencil j w - a is as nearly singular as the poles are near to the axis.
+                let damping = phi.poles().iter().map(|p| -p.re / p.norm()).fold(1.0, f64::min);
+                let rounding = 1e-15 * phi.order() as f64;
+                assert!(error < (rounding / damping).max(1e-11), "{kind:?} {order} at {band:?}: {error:e}");
             }
         }
     }
