@@ -61,16 +61,16 @@ pub(super) fn robust_text(study: &RobustStudy, proven: Option<f64>) -> String {
         ""
     };
     let advice = format!(
-        "           the robust design lowers the worst case by {:.2} %{advice}\n",
+        "           the robust design lowers the largest gain found by {:.2} %{advice}\n",
         100.0 * study.gain()
     );
     format!(
-        "robust     {} at worst over the spec's uncertainty ({proven}), {} without errors\n\
-         nominal    {} at worst, {} without errors, for the bank that takes the errors for zero\n\
+        "robust     {} is the largest gain found over the spec's uncertainty ({proven}), {} without errors\n\
+         nominal    {} is the largest found, {} without errors, for the bank that takes the errors for zero\n\
          least      {} at worst for all banks of this length (lower bound, computed)\n{advice}",
-        number(robust.worst),
+        number(robust.largest_found),
         number(robust.nominal),
-        number(nominal.worst),
+        number(nominal.largest_found),
         number(nominal.nominal),
         number(*lower),
     )
@@ -79,13 +79,14 @@ pub(super) fn robust_text(study: &RobustStudy, proven: Option<f64>) -> String {
 /// Taps that follow the delays, and taps that stay, over the spec's uncertainty.
 pub(super) fn tracking_text(study: &TrackingStudy, proven: Option<f64>) -> String {
     let TrackingStudy { tracked, fixed, redesigned, ratio, least_ratio, .. } = study;
-    let [worst, of_fixed, redesigned_worst] = [tracked.worst, fixed.worst, *redesigned].map(number);
+    let [worst, of_fixed, redesigned_worst] =
+        [tracked.largest_found, fixed.largest_found, *redesigned].map(number);
     let percent = |ratio: f64| 100.0 * (ratio - 1.0);
     format!(
-        "tracked    {worst} at worst over the spec's uncertainty ({}), {} without errors\n\
-         redesigned {redesigned_worst} for the delays where that is worst: {:.3} % less\n\
+        "tracked    {worst} is the largest gain found over the spec's uncertainty ({}), {} without errors\n\
+         redesigned {redesigned_worst} for the delays where that was found: {:.3} % less\n\
          \x20          at all delays at most {:.3} % above what is within reach there; no affine taps: below {:.3} %\n\
-         fixed      {of_fixed} at worst, for the best taps that stay as they are\n",
+         fixed      {of_fixed} is the largest found for the best taps that stay as they are\n",
         at_most(proven),
         number(tracked.nominal),
         100.0 * study.excess(),

@@ -3,19 +3,21 @@
 //!
 //! A scenario is a plant and a rule for its filters: the taps are matrices F_0, F_1, .. side by side, and
 //! the filters of a scenario are `sum_k factors[k] F_k`. So its measurements are those of the plant times
-//! each factor, one below another. A bank for known channels has one scenario with the factor 1. For the
-//! exchange, scenarios are nothing but more frequencies: scenario s is put at 2 pi s + omega, where all
-//! responses in whole lags are the same.
+//! each factor, one below another. A bank for known channels has one scenario with the factor 1.
+//!
+//! The grid is uniform, with further points at the resonances of the plant: beside a narrow one the error
+//! may peak between two uniform points.
 
 use super::DesignError;
-use super::exchange::{AffineError, Peaks};
+use super::exchange::{AffineError, LocatedPeak, Location, Peaks};
 use super::filters;
 use super::plant::LiftedPlant;
 use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lmi::sampled::{Point, Taps};
-use crate::lti::peak::Peak;
+use crate::lti::peak::{Peak, local_maxima, refine};
+use std::borrow::Cow;
 use std::cell::OnceCell;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 use std::sync::OnceLock;
 
 /// Grid intervals for each slow lag: enough for the mean square of a polynomial of that degree to be exact.
@@ -29,32 +31,65 @@ pub(super) const FINE: usize = 8;
 /// t = pi / (12 lags)), and the memory of the front ends adds some.
 const STRIDE: usize = FINE / 2;
 /// Prune level: around points below this share of a level there is no peak above the level.
-const PRUNE_LEVEL: f64 = 0.96;
-/// Frequencies of a scenario lie in [0, pi]; half a radian keeps clear of the rounding at the ends.
-const CLEAR_OF_ENDS: f64 = 0.5;
+pub(super) const PRUNE_LEVEL: f64 = 0.96;
+/// Relative change of a gain at which the refinement of a peak between grid points ends: below the accuracy
+/// of gamma, so that the peaks that become points are those of the error.
+const FLAT_GAIN: f64 = 1e-8;
+/// Further frequencies closer to an equidistant one than this share of their distance are left out.
+const LEAST_SHARE: f64 = 1e-6;
 
 /// Intervals of the grid for mean squares, for filters of `lags` slow lags.
 pub(super) fn coarse_intervals(lags: usize) -> usize {
     LEAST_POINTS.max(POINTS_PER_LAG * lags)
 }
 
-/// The errors of all scenarios at equidistant frequencies from 0 to pi. The plants' responses are computed
-/// when they are needed: in most scenarios the error is far below that of the worst one.
+/// The errors of all scenarios at frequencies from 0 to pi. The plants' responses are computed when they are
+/// needed: in most scenarios the error is far below that of the worst one.
 pub(super) struct ErrorGrid<'a> {
     scenarios: Vec<Scenario<'a>>,
-    intervals: usize,
-    /// Columns of all responses.
-    inputs: usize,
+    frequencies: Frequencies,
+}
+
+/// Frequencies from 0 to pi.
+pub(super) struct Frequencies {
+    /// Ascending: equidistant ones and some between them.
+    pub(super) all: Vec<f64>,
+    /// The indices of those that are looked at first: every so many of the equidistant ones, and all others.
+    pub(super) first: Vec<usize>,
+    /// The equidistant ones.
+    uniform: Vec<usize>,
+}
+
+impl Frequencies {
+    /// Those for filters of `lags` slow lags, and `further` ones.
+    pub(super) fn new(lags: usize, further: &[f64]) -> Self {
+        let intervals = FINE * coarse_intervals(lags);
+        let uniform = (0..=intervals).map(|k| PI * k as f64 / intervals as f64);
+        let is_new = |omega: &f64| {
+            let place = omega * intervals as f64 / PI;
+            (0.0..=PI).contains(omega) && (place - place.round()).abs() > LEAST_SHARE
+        };
+        let mut all: Vec<f64> = uniform.clone().chain(further.iter().copied().filter(is_new)).collect();
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        let mut rest = uniform.peekable();
+        let is_uniform: Vec<bool> = all.iter().map(|omega| rest.next_if_eq(omega).is_some()).collect();
+        let uniform: Vec<usize> = (0..all.len()).filter(|&k| is_uniform[k]).collect();
+        let mut first: Vec<usize> = uniform.iter().copied().step_by(STRIDE).collect();
+        first.extend((0..all.len()).filter(|&k| !is_uniform[k]));
+        first.sort_unstable();
+        Self { all, first, uniform }
+    }
 }
 
 /// A plant with the rule for its filters.
 pub(super) struct Scenario<'a> {
     /// The plant.
-    pub(super) plant: &'a LiftedPlant,
+    pub(super) plant: Cow<'a, LiftedPlant>,
     /// The factors of the unknowns.
     pub(super) factors: Vec<f64>,
     /// The error of this scenario counts times this.
-    weight: f64,
+    pub(super) weight: f64,
     points: Vec<OnceLock<Point>>,
 }
 
@@ -66,7 +101,7 @@ struct GridResponse<'t> {
 
 impl<'a> Scenario<'a> {
     /// A scenario of a grid.
-    pub(super) fn new(plant: &'a LiftedPlant, factors: Vec<f64>, weight: f64) -> Self {
+    pub(super) fn new(plant: Cow<'a, LiftedPlant>, factors: Vec<f64>, weight: f64) -> Self {
         Self { plant, factors, weight, points: Vec::new() }
     }
 
@@ -93,17 +128,29 @@ impl<'a> Scenario<'a> {
 
 impl<'a> ErrorGrid<'a> {
     /// One plant, for filters of `lags` slow lags.
-    pub(super) fn new(plant: &'a LiftedPlant, lags: usize) -> Self {
-        Self::of_scenarios(vec![Scenario::new(plant, vec![1.0], 1.0)], lags)
+    ///
+    /// # Errors
+    /// As [`ErrorGrid::of_scenarios`].
+    pub(super) fn new(plant: &'a LiftedPlant, lags: usize) -> Result<Self, DesignError> {
+        Self::of_scenarios(vec![Scenario::new(Cow::Borrowed(plant), vec![1.0], 1.0)], lags)
     }
 
     /// Several scenarios.
-    pub(super) fn of_scenarios(mut scenarios: Vec<Scenario<'a>>, lags: usize) -> Self {
-        let intervals = FINE * coarse_intervals(lags);
-        scenarios.iter_mut().for_each(|scenario| scenario.points = vec![OnceLock::new(); intervals + 1]);
-        let mut grid = Self { scenarios, intervals, inputs: 0 };
-        grid.inputs = (0..grid.scenarios.len()).map(|s| grid.point(s, 0).w.ncols()).max().unwrap_or(0);
-        grid
+    ///
+    /// # Errors
+    /// [`DesignError::Lti`] if a plant is not stable.
+    pub(super) fn of_scenarios(scenarios: Vec<Scenario<'a>>, lags: usize) -> Result<Self, DesignError> {
+        // Errors of delays and gains do not move the poles.
+        let frequencies = Frequencies::new(lags, scenarios[0].plant.resonances()?);
+        let mut grid = Self { scenarios: Vec::new(), frequencies };
+        scenarios.into_iter().for_each(|scenario| grid.add(scenario));
+        Ok(grid)
+    }
+
+    /// Adds a scenario.
+    pub(super) fn add(&mut self, scenario: Scenario<'a>) {
+        let points = vec![OnceLock::new(); self.frequencies.all.len()];
+        self.scenarios.push(Scenario { points, ..scenario });
     }
 
     /// The scenarios.
@@ -113,20 +160,18 @@ impl<'a> ErrorGrid<'a> {
 
     /// All points of the first scenario.
     pub(super) fn points(&self) -> Vec<Point> {
-        (0..=self.intervals).map(|k| self.point(0, k).clone()).collect()
+        (0..self.frequencies.all.len()).map(|k| self.point(0, k).clone()).collect()
     }
 
     /// The coarser points of a scenario that suffice for a mean square, as points of the exchange, with
     /// their trapezoidal weights.
     pub(super) fn coarse(&self, scenario: usize) -> (Vec<Point>, Vec<f64>) {
-        let points: Vec<Point> = (0..=self.intervals)
-            .step_by(FINE)
-            .map(|k| self.of_exchange(scenario, self.point(scenario, k)))
-            .collect();
-        let last = points.len() - 1;
-        let mut weights = vec![1.0 / last as f64; points.len()];
+        let last = self.frequencies.uniform.len() / FINE;
+        let at =
+            |k: usize| self.of_exchange(scenario, self.point(scenario, self.frequencies.uniform[k * FINE]));
+        let mut weights = vec![1.0 / last as f64; last + 1];
         (weights[0], weights[last]) = (0.5 / last as f64, 0.5 / last as f64);
-        (points, weights)
+        ((0..=last).map(at).collect(), weights)
     }
 
     /// The gain of the first scenario's error with `taps` at each point.
@@ -135,141 +180,113 @@ impl<'a> ErrorGrid<'a> {
     }
 
     /// The mean square of the first scenario's error per slow period, for white noise of unit density at the
-    /// analog input.
+    /// analog input, by the trapezoidal rule on the equidistant frequencies.
     pub(super) fn mean_square(&self, taps: &[Mat]) -> f64 {
-        let response = self.response(taps);
-        let weight = |k: usize| if k == 0 || k == self.intervals { 0.5 } else { 1.0 };
-        let square = |k: usize| weight(k) * self.error(0, k, &response).norm_squared();
-        (0..=self.intervals).map(square).sum::<f64>() / self.intervals as f64
-    }
-
-    /// For each scenario the largest gain with `taps` at every fourth point.
-    pub(super) fn estimates(&self, taps: &[Mat]) -> Result<Vec<f64>, DesignError> {
-        let response = self.response(taps);
-        let estimate = |s: usize| {
-            let mut gains = (0..=self.intervals).step_by(STRIDE).map(|k| gain(&self.error(s, k, &response)));
-            gains.try_fold(0.0, |most, gain| Ok(f64::max(most, gain?)))
-        };
-        (0..self.scenarios.len()).map(estimate).collect()
+        let (response, uniform) = (self.response(taps), &self.frequencies.uniform);
+        let last = uniform.len() - 1;
+        let weight = |k: usize| if k == 0 || k == last { 0.5 } else { 1.0 };
+        let square = |k: usize| weight(k) * self.error(0, uniform[k], &response).norm_squared();
+        (0..=last).map(square).sum::<f64>() / last as f64
     }
 
     /// The peaks of the errors with `taps` above `level`. The estimate is that of gamma if gamma is above
     /// the level; else it is at most the level.
-    pub(super) fn peaks(&self, taps: &[Mat], level: f64) -> Result<Peaks, DesignError> {
+    pub(super) fn peaks(&self, taps: &[Mat], level: f64) -> Result<Peaks<usize>, DesignError> {
         let mut all = Peaks { estimate: 0.0, peaks: Vec::new() };
         let response = self.response(taps);
         for (s, scenario) in self.scenarios.iter().enumerate() {
-            let found = self.scenario_peaks(s, &response, level / scenario.weight)?;
-            all.estimate = all.estimate.max(scenario.weight * found.estimate);
-            let of_exchange = |peak: Peak| Peak {
-                frequency: peak.frequency + TAU * s as f64,
-                gain: scenario.weight * peak.gain,
-            };
-            all.peaks.extend(found.peaks.into_iter().map(of_exchange).filter(|peak| peak.gain > level));
+            for peak in self.scenario_peaks(s, &response, level / scenario.weight)? {
+                let gain = scenario.weight * peak.gain;
+                all.estimate = all.estimate.max(gain);
+                if gain > level {
+                    let location = Location { frequency: peak.frequency, scenario: s };
+                    all.peaks.push(LocatedPeak { gain, location });
+                }
+            }
         }
         Ok(all)
     }
 
-    fn scenario_peaks(&self, s: usize, taps: &GridResponse<'_>, level: f64) -> Result<Peaks, DesignError> {
+    /// The local maxima above a share of `level`.
+    fn scenario_peaks(
+        &self,
+        s: usize,
+        taps: &GridResponse<'_>,
+        level: f64,
+    ) -> Result<Vec<Peak>, DesignError> {
         let gains = self.gains_about(s, taps, level)?;
-        let most = gains.iter().copied().fold(0.0, f64::max);
+        let grid: Vec<Peak> = gains
+            .into_iter()
+            .zip(&self.frequencies.all)
+            .map(|(gain, &frequency)| Peak { gain, frequency })
+            .collect();
         let scenario = &self.scenarios[s];
-        let between = |omega| {
-            let filters = scenario.filters(&filters::response(taps.taps, omega));
-            gain(&error(&scenario.at(omega), &filters))
+        let at = |frequency: f64| {
+            let filters = scenario.filters(&filters::response(taps.taps, frequency));
+            Ok(Peak { gain: gain(&error(&scenario.at(frequency), &filters))?, frequency })
         };
-        let found = peaks_between(&gains, self.frequency(1), PRUNE_LEVEL * level, between)?;
-        Ok(Peaks { estimate: found.estimate.max(most), ..found })
+        let maxima = local_maxima(&grid).into_iter().filter(|[_, peak, _]| peak.gain >= PRUNE_LEVEL * level);
+        maxima.map(|around| refine(at, around, FLAT_GAIN)).collect()
     }
 
     /// The gains near points with gains about `level` or more; elsewhere smaller numbers.
     fn gains_about(&self, s: usize, taps: &GridResponse<'_>, level: f64) -> Result<Vec<f64>, DesignError> {
-        let count = self.intervals + 1;
-        let mut gains = vec![0.0; count];
-        for k in (0..count).step_by(STRIDE) {
+        let mut gains = vec![0.0; self.frequencies.all.len()];
+        for &k in &self.frequencies.first {
             let error = self.error(s, k, taps);
             // The Frobenius norm is no smaller than the gain and costs less.
             let bound = error.norm();
             gains[k] = if bound < PRUNE_LEVEL * level { bound } else { gain(&error)? };
         }
-        let is_near = |k: usize| gains[k] >= PRUNE_LEVEL * level;
-        let near: Vec<usize> = (0..count).step_by(STRIDE).filter(|&k| is_near(k)).collect();
-        for &centre in &near {
-            let first = centre.saturating_sub(STRIDE - 1);
-            let around = &mut gains[first..(centre + STRIDE).min(count)];
-            for (k, known) in around.iter_mut().enumerate().filter(|(_, known)| **known == 0.0) {
-                *known = gain(&self.error(s, first + k, taps))?;
+        for pair in self.frequencies.first.windows(2) {
+            if gains[pair[0]].max(gains[pair[1]]) >= PRUNE_LEVEL * level {
+                for k in pair[0] + 1..pair[1] {
+                    gains[k] = gain(&self.error(s, k, taps))?;
+                }
             }
         }
         Ok(gains)
     }
 
     fn response<'t>(&self, taps: &'t [Mat]) -> GridResponse<'t> {
-        GridResponse { taps, values: vec![OnceCell::new(); self.intervals + 1] }
+        GridResponse { taps, values: vec![OnceCell::new(); self.frequencies.all.len()] }
     }
 
     fn error(&self, s: usize, k: usize, taps: &GridResponse<'_>) -> CMat {
-        let response = taps.values[k].get_or_init(|| filters::response(taps.taps, self.frequency(k)));
+        let response = taps.values[k].get_or_init(|| filters::response(taps.taps, self.frequencies.all[k]));
         error(self.point(s, k), &self.scenarios[s].filters(response))
     }
 
     fn point(&self, s: usize, k: usize) -> &Point {
         let scenario = &self.scenarios[s];
-        scenario.points[k].get_or_init(|| scenario.at(self.frequency(k)))
-    }
-
-    fn frequency(&self, k: usize) -> f64 {
-        PI * k as f64 / self.intervals as f64
+        scenario.points[k].get_or_init(|| scenario.at(self.frequencies.all[k]))
     }
 
     /// A point of a scenario among those of all, with columns of zeros where a scenario with coinciding
     /// instants has fewer.
     fn of_exchange(&self, s: usize, point: &Point) -> Point {
-        let pad = |m: CMat| m.resize_horizontally(self.inputs, Default::default());
         let scenario = &self.scenarios[s];
+        let inputs = scenario.plant.channels() + scenario.plant.ratio();
+        let pad = |m: CMat| m.resize_horizontally(inputs, Default::default());
         let (w, h) = (&point.w * Complex::from(scenario.weight), scenario.stacked(&point.h));
-        Point { omega: point.omega + TAU * s as f64, w: pad(w), h: pad(h) }
+        Point { omega: point.omega, w: pad(w), h: pad(h) }
     }
 }
 
 impl AffineError for ErrorGrid<'_> {
-    fn at(&self, omega: f64) -> Point {
-        let s = (((omega + CLEAR_OF_ENDS) / TAU).floor() as usize).min(self.scenarios.len() - 1);
-        let frequency = (omega - TAU * s as f64).clamp(0.0, PI);
-        Point { omega, ..self.of_exchange(s, &self.scenarios[s].at(frequency)) }
+    type Scenario = usize;
+
+    fn at(&self, location: &Location<usize>) -> Result<Point, DesignError> {
+        let s = location.scenario;
+        Ok(self.of_exchange(s, &self.scenarios[s].at(location.frequency)))
     }
 
-    fn peaks(&self, taps: &Taps, _gamma: f64, level: f64) -> Result<Peaks, DesignError> {
+    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<usize>, DesignError> {
         // The estimate of a single scenario is compared with its norm, so it has to be one below the level
         // too.
-        self.peaks(taps, if self.scenarios.len() == 1 { 0.0 } else { level })
+        let found = self.peaks(taps, if self.scenarios.len() == 1 { 0.0 } else { level })?;
+        Ok(Peaks { estimate: found.estimate.max(gamma), ..found })
     }
-}
-
-/// The local maxima above `level` of a gain that has the values `gains` at the multiples of `step` from 0 to
-/// pi. `gain_at` computes it at any frequency. A parabola through three neighbouring grid points locates a
-/// peak between them.
-fn peaks_between(
-    gains: &[f64],
-    step: f64,
-    level: f64,
-    gain_at: impl Fn(f64) -> Result<f64, DesignError>,
-) -> Result<Peaks, DesignError> {
-    // The gain is even about 0 and about pi.
-    let last = gains.len() - 1;
-    let at = |k: isize| gains[last - (last as isize - k.abs()).unsigned_abs()];
-    let mut peaks = Vec::new();
-    for k in 0..=last as isize {
-        if at(k) >= at(k - 1) && at(k) >= at(k + 1) && at(k) >= level {
-            let (shift, _) = parabola(at(k - 1), at(k), at(k + 1));
-            let frequency = ((k as f64 + shift) * step).clamp(0.0, PI);
-            let between = gain_at(frequency)?;
-            let point = Peak { gain: at(k), frequency: k as f64 * step };
-            peaks.push(if between > point.gain { Peak { gain: between, frequency } } else { point });
-        }
-    }
-    let estimate = peaks.iter().map(|peak| peak.gain).fold(0.0, f64::max);
-    Ok(Peaks { estimate, peaks })
 }
 
 /// K = W - F H for the filters' response F.
@@ -284,16 +301,6 @@ pub(super) fn error_at(point: &Point, lags: &[Mat]) -> CMat {
 
 fn gain(error: &CMat) -> Result<f64, DesignError> {
     Ok(linalg::largest_singular_value(error)?)
-}
-
-/// Vertex of the parabola through (-1, a), (0, b), (1, c): abscissa and height.
-fn parabola(a: f64, b: f64, c: f64) -> (f64, f64) {
-    let curvature = a - 2.0 * b + c;
-    if curvature >= 0.0 {
-        return (0.0, b);
-    }
-    let shift = (0.5 * (a - c) / curvature).clamp(-1.0, 1.0);
-    (shift, b - 0.25 * (a - c) * shift)
 }
 
 #[cfg(test)]

@@ -25,7 +25,6 @@ use super::limits::Stop;
 use crate::linalg::{self, CMat};
 use crate::lmi::Settings;
 use crate::lmi::sampled::{self, MeanSquareObjective, Point, Problem, Taps};
-use crate::lti::peak::Peak;
 
 /// Relative width of the interval `[lower, gamma]` at which the exchange ends.
 pub(crate) const GAMMA_ACCURACY: f64 = 5e-7;
@@ -83,39 +82,67 @@ impl Tolerances {
     }
 }
 
-/// An error `K(omega) = W(omega) - sum_j e^{-i omega j} F_j H(omega)`, affine in the unknowns `F_j`.
+/// Errors `K(omega) = W(omega) - sum_j e^{-i omega j} F_j H(omega)`, affine in the unknowns `F_j`: one for
+/// each scenario, all with the same unknowns.
 pub(super) trait AffineError {
-    /// W and H at a frequency in radians per lag.
-    fn at(&self, omega: f64) -> Point;
+    /// What tells the scenarios apart; `()` where there is one.
+    type Scenario: Clone + PartialEq + std::fmt::Debug;
+
+    /// W and H at a location.
+    ///
+    /// # Errors
+    /// [`DesignError`] if a decomposition does not converge.
+    fn at(&self, location: &Location<Self::Scenario>) -> Result<Point, DesignError>;
 
     /// The peaks of `sigma_max(K)` for the unknowns `taps`, whose largest value at the points is `gamma`.
     /// Peaks up to `level` may be left out.
-    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks, DesignError>;
+    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<Self::Scenario>, DesignError>;
+}
+
+/// A frequency in one of the scenarios.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Location<S> {
+    /// Radians per lag.
+    pub(super) frequency: f64,
+    pub(super) scenario: S,
+}
+
+impl<S: PartialEq> Location<S> {
+    fn is_near(&self, other: &Self) -> bool {
+        (self.frequency - other.frequency).abs() <= LEAST_DISTANCE && self.scenario == other.scenario
+    }
+}
+
+/// A local maximum of `sigma_max(K)` over the frequencies.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct LocatedPeak<S> {
+    pub(super) gain: f64,
+    pub(super) location: Location<S>,
 }
 
 /// Local maxima of `sigma_max(K)` over the frequencies.
 #[derive(Debug, Clone)]
-pub(super) struct Peaks {
+pub(super) struct Peaks<S> {
     /// Estimate of gamma; equal to gamma if no peak was missed.
     pub(super) estimate: f64,
     /// The peaks, in any order.
-    pub(super) peaks: Vec<Peak>,
+    pub(super) peaks: Vec<LocatedPeak<S>>,
 }
 
-impl Peaks {
-    /// The frequencies of the peaks above `level`.
-    fn above(&self, level: f64) -> Vec<f64> {
-        self.peaks.iter().filter(|peak| peak.gain > level).map(|peak| peak.frequency).collect()
+impl<S: Clone> Peaks<S> {
+    /// The locations of the peaks above `level`.
+    fn above(&self, level: f64) -> Vec<Location<S>> {
+        self.peaks.iter().filter(|peak| peak.gain > level).map(|peak| peak.location.clone()).collect()
     }
 }
 
 /// Unknowns with the peaks of their error.
 #[derive(Debug, Clone)]
-pub(super) struct Candidate {
+pub(super) struct Candidate<S> {
     /// `F_j`, M x N.
     pub(super) taps: Taps,
     /// The peaks of the error.
-    pub(super) peaks: Peaks,
+    pub(super) peaks: Peaks<S>,
 }
 
 /// A frequency with the dual matrix of the error there.
@@ -129,9 +156,11 @@ pub(crate) struct DualPoint {
 
 /// The state of the exchange: the points so far and the lower bound that they prove.
 #[derive(Debug)]
-pub(super) struct Exchange<E> {
+pub(super) struct Exchange<E: AffineError> {
     error: E,
     problem: Problem,
+    /// Of the points of the problem.
+    locations: Vec<Location<E::Scenario>>,
     /// Added points have the weight zero.
     objective: MeanSquareObjective,
     gamma_margin: f64,
@@ -148,21 +177,27 @@ pub(super) struct Exchange<E> {
 }
 
 impl<E: AffineError> Exchange<E> {
-    /// Starts from the points of `problem`. `objective` has a weight for each of them, `gamma_margin` is the
-    /// relative excess of gamma granted to it, at least [`LEAST_MARGIN`].
+    /// Starts from the points of `problem`, which belong to these scenarios. `objective` has a weight for
+    /// each of them, `gamma_margin` is the relative excess of gamma granted to it, at least
+    /// [`LEAST_MARGIN`].
     ///
     /// # Errors
     /// [`DesignError::Sampled`] if the objective does not fit the problem.
     pub(super) fn new(
         error: E,
         problem: Problem,
+        scenarios: impl IntoIterator<Item = E::Scenario>,
         objective: MeanSquareObjective,
         gamma_margin: f64,
     ) -> Result<Self, DesignError> {
         problem.check_objective(&objective)?;
+        let frequencies = problem.points().iter().map(|point| point.omega);
+        let located =
+            frequencies.zip(scenarios).map(|(frequency, scenario)| Location { frequency, scenario });
+        let locations = located.collect();
         let gamma_margin = gamma_margin.max(LEAST_MARGIN);
         let (lower, dual, stop, rounds, iterations) = (0.0, Vec::new(), Stop::default(), 0, 0);
-        Ok(Self { error, problem, objective, gamma_margin, lower, dual, stop, rounds, iterations })
+        Ok(Self { error, problem, locations, objective, gamma_margin, lower, dual, stop, rounds, iterations })
     }
 
     /// The error that is minimised.
@@ -170,16 +205,21 @@ impl<E: AffineError> Exchange<E> {
         &self.error
     }
 
-    /// The frequencies of all points, in the order in which they were added.
-    pub(super) fn frequencies(&self) -> impl Iterator<Item = f64> {
-        self.problem.points().iter().map(|point| point.omega)
+    /// The same, to refine its scenarios. The points stay, so those of known scenarios must not change.
+    pub(super) fn error_mut(&mut self) -> &mut E {
+        &mut self.error
+    }
+
+    /// The locations of all points, in the order in which they were added.
+    pub(super) fn locations(&self) -> &[Location<E::Scenario>] {
+        &self.locations
     }
 
     /// Unknowns with gamma within the margin of the optimum and the least secondary objective.
     ///
     /// # Errors
     /// [`DesignError`] if a decomposition does not converge.
-    pub(super) fn optimise(&mut self) -> Result<Candidate, DesignError> {
+    pub(super) fn optimise(&mut self) -> Result<Candidate<E::Scenario>, DesignError> {
         self.optimise_at(Tolerances::steady(GAMMA_ACCURACY))
     }
 
@@ -187,7 +227,10 @@ impl<E: AffineError> Exchange<E> {
     ///
     /// # Errors
     /// As [`Exchange::optimise`].
-    pub(super) fn optimise_at(&mut self, tolerances: Tolerances) -> Result<Candidate, DesignError> {
+    pub(super) fn optimise_at(
+        &mut self,
+        tolerances: Tolerances,
+    ) -> Result<Candidate<E::Scenario>, DesignError> {
         let least = self.minimise_gamma(tolerances)?;
         self.leave_out_inactive(&least, tolerances.active)?;
         self.minimise_mean_square(least, tolerances)
@@ -197,26 +240,27 @@ impl<E: AffineError> Exchange<E> {
     ///
     /// # Errors
     /// As [`Exchange::optimise`].
-    pub(super) fn compare(&mut self, accuracy: f64) -> Result<Candidate, DesignError> {
+    pub(super) fn compare(&mut self, accuracy: f64) -> Result<Candidate<E::Scenario>, DesignError> {
         self.minimise_gamma(Tolerances::steady(accuracy))
     }
 
-    /// Adds points at the given frequencies, except where there is one. Returns whether any was added.
-    pub(super) fn add(&mut self, frequencies: &[f64]) -> Result<bool, DesignError> {
-        let mut added: Vec<f64> = Vec::new();
-        for &omega in frequencies {
-            let mut known = self.frequencies().chain(added.iter().copied());
-            if known.all(|other| (other - omega).abs() > LEAST_DISTANCE) {
-                added.push(omega);
+    /// Adds points at the given locations, except where there is one. Returns whether any was added.
+    pub(super) fn add(&mut self, locations: &[Location<E::Scenario>]) -> Result<bool, DesignError> {
+        let known = self.locations.len();
+        for location in locations {
+            if !self.locations.iter().any(|other| other.is_near(location)) {
+                self.locations.push(location.clone());
             }
         }
+        let added = &self.locations[known..];
+        let points: Vec<Point> =
+            added.iter().map(|location| self.error.at(location)).collect::<Result<_, _>>()?;
         self.objective.weights.extend(std::iter::repeat_n(0.0, added.len()));
-        let points = added.iter().map(|&omega| self.error.at(omega));
         self.problem = self.problem.with_points(points)?;
-        Ok(!added.is_empty())
+        Ok(known < self.locations.len())
     }
 
-    fn minimise_gamma(&mut self, tolerances: Tolerances) -> Result<Candidate, DesignError> {
+    fn minimise_gamma(&mut self, tolerances: Tolerances) -> Result<Candidate<E::Scenario>, DesignError> {
         let mut tolerance = tolerances.tolerance(f64::INFINITY);
         let (mut best, mut above) = self.round(tolerances, tolerance)?;
         for _ in 1..tolerances.rounds {
@@ -239,13 +283,13 @@ impl<E: AffineError> Exchange<E> {
         Ok(best)
     }
 
-    /// Solves the problem on the points. Returns the unknowns and the frequencies of the peaks that belong
+    /// Solves the problem on the points. Returns the unknowns and the locations of the peaks that belong
     /// among the points.
     fn round(
         &mut self,
         tolerances: Tolerances,
         tolerance: f64,
-    ) -> Result<(Candidate, Vec<f64>), DesignError> {
+    ) -> Result<(Candidate<E::Scenario>, Vec<Location<E::Scenario>>), DesignError> {
         let settings = Settings { tol_gap_rel: tolerance, ..Settings::SAMPLED };
         let solution = sampled::minimise(&self.problem, &settings)?;
         self.count_round(solution.iterations);
@@ -260,21 +304,23 @@ impl<E: AffineError> Exchange<E> {
 
     /// Leaves out the added points where the gain of `start` is below a share of its gamma. If the secondary
     /// objective raises the gain there, it is a peak and becomes a point again.
-    fn leave_out_inactive(&mut self, start: &Candidate, share: f64) -> Result<(), DesignError> {
+    fn leave_out_inactive(&mut self, start: &Candidate<E::Scenario>, share: f64) -> Result<(), DesignError> {
         if share == 0.0 {
             return Ok(());
         }
         let least = share * start.peaks.estimate;
-        let (mut points, mut weights) = (Vec::new(), Vec::new());
+        let (mut points, mut weights, mut locations) = (Vec::new(), Vec::new(), Vec::new());
         for (l, point) in self.problem.points().iter().enumerate() {
             let weight = self.objective.weights[l];
             let gain = linalg::largest_singular_value(&self.problem.error_at(l, &start.taps))?;
             if weight > 0.0 || gain >= least {
                 points.push(point.clone());
                 weights.push(weight);
+                locations.push(self.locations[l].clone());
             }
         }
         self.objective.weights = weights;
+        self.locations = locations;
         self.problem = Problem::new(points, self.problem.lags().to_vec())?;
         Ok(())
     }
@@ -283,9 +329,9 @@ impl<E: AffineError> Exchange<E> {
     /// `start` if the interior-point method makes no progress from there.
     fn minimise_mean_square(
         &mut self,
-        start: Candidate,
+        start: Candidate<E::Scenario>,
         tolerances: Tolerances,
-    ) -> Result<Candidate, DesignError> {
+    ) -> Result<Candidate<E::Scenario>, DesignError> {
         let cap = start.peaks.estimate * (1.0 + self.gamma_margin);
         let cap_at_points = start.peaks.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);
         let settings = Settings { tol_gap_rel: tolerances.mean_square, ..Settings::SAMPLED };
@@ -314,7 +360,7 @@ impl<E: AffineError> Exchange<E> {
         Ok(start)
     }
 
-    fn judge(&self, taps: Taps, gamma: f64, level: f64) -> Result<Candidate, DesignError> {
+    fn judge(&self, taps: Taps, gamma: f64, level: f64) -> Result<Candidate<E::Scenario>, DesignError> {
         let peaks = self.error.peaks(&taps, gamma, level)?;
         Ok(Candidate { taps, peaks })
     }

@@ -74,13 +74,17 @@ impl FilterResponse {
         if let Self::Polynomial(lags) = self { lags.len() } else { 1 }
     }
 
+    /// Angles of the resonances of a recursion.
+    pub(crate) fn resonances(&self) -> &[f64] {
+        if let Self::Recursive { resonances, .. } = self { resonances } else { &[] }
+    }
+
     /// Angles from 0 to pi that part the response into smooth pieces.
     pub(crate) fn breaks(&self) -> Vec<f64> {
         let pieces =
             (Self::BREAKS_PER_LAG * self.lags() as f64).clamp(*Self::BREAKS.start(), *Self::BREAKS.end());
         let even = (1..pieces as usize).map(|k| PI * k as f64 / pieces.floor());
-        let narrow = if let Self::Recursive { resonances, .. } = self { resonances.as_slice() } else { &[] };
-        even.chain(narrow.iter().copied()).collect()
+        even.chain(self.resonances().iter().copied()).collect()
     }
 }
 

@@ -269,7 +269,7 @@ impl LiftedPlant {
 
     /// `[H; W]` at e^{j omega}. A delay by whole periods is a factor of its row, so the time does not depend
     /// on the length of the delay chains.
-    fn at_frequency(&self, omega: f64) -> CMat {
+    pub(super) fn at_frequency(&self, omega: f64) -> CMat {
         let undelayed = self.cache.response.get_or_init(|| FrequencyResponse::new(&self.lifted.undelayed));
         let mut g = undelayed.at_frequency(omega);
         for (mut row, &delay) in g.row_iter_mut().zip(&self.lifted.delays).filter(|(_, delay)| **delay > 0) {
@@ -280,7 +280,7 @@ impl LiftedPlant {
 
     /// The frequencies near the poles of the plant. Apart from poles at zero, every FIR error system has
     /// these poles.
-    fn resonances(&self) -> Result<&[f64], DesignError> {
+    pub(super) fn resonances(&self) -> Result<&[f64], DesignError> {
         if self.cache.resonances.get().is_none() {
             let found = resonances(&stable_poles(&self.lifted.undelayed)?);
             return Ok(self.cache.resonances.get_or_init(|| found));

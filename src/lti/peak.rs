@@ -10,8 +10,8 @@
 //! are the imaginary eigenvalues of one Hamiltonian matrix. Eigenvalues only *suggest* frequencies. Each
 //! reported value is evaluated from the response itself and refined between its neighbours.
 
-pub use super::refine::Peak;
-use super::refine::{higher, local_maxima, refine, upper_estimate};
+use super::refine::{FLAT_GAIN, higher, upper_estimate};
+pub use super::refine::{Peak, local_maxima, refine};
 use super::{FrequencyResponse, LtiError, StateSpace};
 use crate::linalg::{self, CMat, Complex, LinalgError, Scalar};
 use nalgebra::DMatrix;
@@ -166,7 +166,7 @@ impl<'a> Search<'a> {
             maxima.first().map_or(Peak { gain: 0.0, frequency: 0.0 }, |maximum| maximum[1].folded());
         for [low, middle, high] in maxima {
             if upper_estimate(low, middle, high) > best.gain {
-                best = higher(best, refine(|w| self.at(w), [low, middle, high])?);
+                best = higher(best, refine(|w| self.at(w), [low, middle, high], FLAT_GAIN)?);
             }
         }
         Ok(best)
@@ -200,7 +200,7 @@ impl<'a> Search<'a> {
         }
         let spread = 0.25 * PI / FIRST_GRID as f64;
         let (low, high) = (self.at(best.frequency - spread)?, self.at(best.frequency + spread)?);
-        refine(|w| self.at(w), [low, best, high]).map(Some)
+        refine(|w| self.at(w), [low, best, high], FLAT_GAIN).map(Some)
     }
 
     fn all_above(&self, level: f64) -> Result<Vec<Peak>, LtiError> {
@@ -211,7 +211,8 @@ impl<'a> Search<'a> {
             let start = self.at(0.5 * (range[0] + range[1]))?;
             if start.gain > level {
                 let (low, high) = (self.at(range[0])?, self.at(range[1])?);
-                peaks.push(higher(refine(|w| self.at(w), [low, start, high])?, higher(low, high)));
+                let inside = refine(|w| self.at(w), [low, start, high], FLAT_GAIN)?;
+                peaks.push(higher(inside, higher(low, high)));
             }
         }
         Ok(peaks)

@@ -1,10 +1,9 @@
 //! Local maxima of the gain, and their refinement between neighbouring frequencies.
 
-use super::LtiError;
 use std::f64::consts::PI;
 
-/// The refinement ends at relative differences of gains below this.
-const FLAT_GAIN: f64 = 1e-11;
+/// Where a refinement ends that nothing else limits: relative difference of gains.
+pub(super) const FLAT_GAIN: f64 = 1e-11;
 /// Gains with a relative difference below this count as equal.
 const EQUAL_GAINS: f64 = 1e-13;
 /// Steps of a refinement are at least this part of the width that is left.
@@ -30,20 +29,21 @@ impl Peak {
 
 /// Refines the peak between the outer of three neighbouring points by parabolas through the last three
 /// points, falling back on golden sections; `at` evaluates the gain. The gain is flat at its peak: its
-/// value converges twice as fast as the frequency.
-pub(super) fn refine(
-    at: impl Fn(f64) -> Result<Peak, LtiError>,
+/// value converges twice as fast as the frequency. Ends at relative differences of gains below `flat`.
+pub fn refine<E>(
+    at: impl Fn(f64) -> Result<Peak, E>,
     [mut low, start, mut high]: [Peak; 3],
-) -> Result<Peak, LtiError> {
+    flat: f64,
+) -> Result<Peak, E> {
     let mut best = start;
     let (mut stalls, mut flats) = (0, 0);
     while high.frequency - low.frequency > 1e-9 && flats < 2 {
         let w = next_abscissa(low, best, high, stalls);
         let tried = at(w)?;
         let gained = tried.gain - best.gain;
-        stalls = if gained < FLAT_GAIN * best.gain { stalls + 1 } else { 0 };
+        stalls = if gained < flat * best.gain { stalls + 1 } else { 0 };
         // A gain far below the best one shows a poor step, not convergence.
-        flats = if gained.abs() <= FLAT_GAIN * best.gain { flats + 1 } else { 0 };
+        flats = if gained.abs() <= flat * best.gain { flats + 1 } else { 0 };
         // Of equal gains the first stays, so that peaks at 0 and pi are exactly there.
         if gained > EQUAL_GAINS * best.gain {
             if w < best.frequency {
@@ -82,7 +82,7 @@ pub(super) fn higher(a: Peak, b: Peak) -> Peak {
 
 /// The local maxima between their neighbours. The gain is even about 0 and about pi, so the neighbours
 /// there are mirror images.
-pub(super) fn local_maxima(grid: &[Peak]) -> Vec<[Peak; 3]> {
+pub fn local_maxima(grid: &[Peak]) -> Vec<[Peak; 3]> {
     let last = grid.len() - 1;
     let neighbours = |k: usize| {
         let mirror = |about: f64, peak: Peak| Peak { frequency: 2.0 * about - peak.frequency, ..peak };

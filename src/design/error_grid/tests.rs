@@ -24,7 +24,7 @@ fn estimates_come_close_to_the_norm_from_below() {
     for (ratio, count) in [(1, 1), (2, 9), (2, 30), (3, 14)] {
         let plant = plant(ratio);
         let lags = filters::polyphase(&taps(count), ratio);
-        let estimate = ErrorGrid::new(&plant, lags.len()).peaks(&lags, 0.0).unwrap().estimate;
+        let estimate = ErrorGrid::new(&plant, lags.len()).unwrap().peaks(&lags, 0.0).unwrap().estimate;
         let norm = plant.fir_norm(&taps(count)).unwrap().gain;
         assert!(estimate <= norm * (1.0 + 1e-9) && estimate > norm * (1.0 - 1e-5), "{estimate} {norm}");
     }
@@ -35,25 +35,11 @@ fn mean_squares_are_squared_h2_norms() {
     for (ratio, count) in [(1, 1), (2, 9), (3, 14)] {
         let plant = plant(ratio);
         let lags = filters::polyphase(&taps(count), ratio);
-        let square = ErrorGrid::new(&plant, lags.len()).mean_square(&lags);
+        let square = ErrorGrid::new(&plant, lags.len()).unwrap().mean_square(&lags);
         let error = plant.error_system(&StateSpace::fir(&lags).unwrap()).unwrap();
         let want = h2_norm(&error).unwrap().powi(2);
         assert!((square / want - 1.0).abs() < 1e-9, "{square} {want}");
     }
-}
-
-#[test]
-fn a_parabola_has_its_vertex_where_it_is() {
-    let parabola_of = |vertex: f64, height: f64| {
-        let at = |x: f64| height - 0.3 * (x - vertex) * (x - vertex);
-        parabola(at(-1.0), at(0.0), at(1.0))
-    };
-    for vertex in [-0.9, -0.2, 0.0, 0.5] {
-        let (shift, height) = parabola_of(vertex, 2.0);
-        assert!((shift - vertex).abs() < 1e-13 && (height - 2.0).abs() < 1e-13);
-    }
-    // No maximum: the middle point stands.
-    assert_eq!(parabola(1.0, 1.0, 1.0), (0.0, 1.0));
 }
 
 /// Pruned grids against those that compute all points: the highest peak has the same bits wherever it is
@@ -64,11 +50,12 @@ fn the_highest_peak_is_that_of_the_whole_grid() {
     let plant = LiftedPlant::new(&Problem::new(&spec, 10).unwrap()).unwrap();
     let mut random = crate::random::Random(5);
     for lags in [1, 3, 11] {
-        let grid = ErrorGrid::new(&plant, lags);
+        let grid = ErrorGrid::new(&plant, lags).unwrap();
         for _ in 0..8 {
             let taps: Taps = (0..lags).map(|_| Mat::from_fn(2, 2, |_, _| random.sample())).collect();
-            let highest =
-                |peaks: &Peaks| peaks.peaks.iter().copied().max_by(|a, b| a.gain.total_cmp(&b.gain)).unwrap();
+            let highest = |peaks: &Peaks<usize>| {
+                peaks.peaks.iter().cloned().max_by(|a, b| a.gain.total_cmp(&b.gain)).unwrap()
+            };
             let all = grid.peaks(&taps, 0.0).unwrap();
             for level in [0.5, 0.9, 0.999].map(|share| share * all.estimate) {
                 let some = grid.peaks(&taps, level).unwrap();
@@ -76,8 +63,6 @@ fn the_highest_peak_is_that_of_the_whole_grid() {
             }
             let above = 1.01 * all.estimate;
             assert!(grid.peaks(&taps, above).unwrap().estimate <= above);
-            let estimate = grid.estimates(&taps).unwrap()[0];
-            assert!(estimate <= all.estimate && estimate > 0.97 * all.estimate, "{estimate}");
         }
     }
 }

@@ -16,22 +16,30 @@ struct Geometric {
 }
 
 impl AffineError for Geometric {
-    fn at(&self, omega: f64) -> Point {
+    type Scenario = ();
+
+    fn at(&self, location: &Location<()>) -> Result<Point, DesignError> {
+        Ok(self.point(location.frequency))
+    }
+
+    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<()>, DesignError> {
+        let gain = |k: usize| {
+            let location = Location { frequency: PI * k as f64 / self.grid as f64, scenario: () };
+            LocatedPeak { gain: gain(&self.point(location.frequency), taps), location }
+        };
+        let gains: Vec<LocatedPeak<()>> = (0..=self.grid).map(gain).collect();
+        let estimate = gains.iter().map(|peak| peak.gain).fold(gamma, f64::max);
+        let highest = gains.into_iter().filter(|p| p.gain > level).max_by(|a, b| a.gain.total_cmp(&b.gain));
+        Ok(Peaks { estimate, peaks: highest.into_iter().collect() })
+    }
+}
+
+impl Geometric {
+    fn point(&self, omega: f64) -> Point {
         let z = Complex::from_polar(1.0, -omega);
         let w = CMat::from_element(1, 1, self.gain / (1.0 - z * self.a));
         let h = CMat::from_fn(self.channels.len(), 1, |i, _| Complex::new(self.channels[i], 0.0));
         Point { omega, w, h }
-    }
-
-    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks, DesignError> {
-        let gain = |k: usize| {
-            let omega = PI * k as f64 / self.grid as f64;
-            Peak { gain: gain(&self.at(omega), taps), frequency: omega }
-        };
-        let gains: Vec<Peak> = (0..=self.grid).map(gain).collect();
-        let estimate = gains.iter().map(|peak| peak.gain).fold(gamma, f64::max);
-        let highest = gains.into_iter().filter(|p| p.gain > level).max_by(|a, b| a.gain.total_cmp(&b.gain));
-        Ok(Peaks { estimate, peaks: highest.into_iter().collect() })
     }
 }
 
@@ -45,11 +53,11 @@ fn gain(point: &Point, taps: &Taps) -> f64 {
 
 /// The exchange on five points to begin with, `lags` lags.
 fn exchange(error: Geometric, lags: usize, gamma_margin: f64) -> Exchange<Geometric> {
-    let points: Vec<Point> = (0..5).map(|k| error.at(PI * f64::from(k) / 4.0)).collect();
+    let points: Vec<Point> = (0..5).map(|k| error.point(PI * f64::from(k) / 4.0)).collect();
     let problem = Problem::new(points, vec![lags]).unwrap();
     let objective =
         MeanSquareObjective::noiseless(vec![0.125, 0.25, 0.25, 0.25, 0.125], error.channels.len());
-    Exchange::new(error, problem, objective, gamma_margin).unwrap()
+    Exchange::new(error, problem, std::iter::repeat(()), objective, gamma_margin).unwrap()
 }
 
 fn geometric(a: f64, gain: f64, channels: &[f64]) -> Geometric {
@@ -118,7 +126,7 @@ fn a_zero_measurement_leaves_the_reference_and_a_zero_reference_has_no_error() {
 fn the_exchange_ends_where_a_dense_grid_does() {
     for a in [0.4, -0.7] {
         let dense: Vec<Point> =
-            (0..=600).map(|k| geometric(a, 1.0, &[1.0, 2.0]).at(PI * f64::from(k) / 600.0)).collect();
+            (0..=600).map(|k| geometric(a, 1.0, &[1.0, 2.0]).point(PI * f64::from(k) / 600.0)).collect();
         let dense = sampled::minimise(&Problem::new(dense, vec![3]).unwrap(), &Settings::SAMPLED).unwrap();
         let mut exchange = exchange(geometric(a, 1.0, &[1.0, 2.0]), 3, 0.0);
         let best = exchange.optimise().unwrap();
@@ -128,7 +136,7 @@ fn the_exchange_ends_where_a_dense_grid_does() {
             best.peaks.estimate,
             dense.gamma
         );
-        assert!(exchange.frequencies().count() < 60, "{}", exchange.frequencies().count());
+        assert!(exchange.locations().len() < 60, "{}", exchange.locations().len());
     }
 }
 
@@ -141,7 +149,7 @@ fn the_dual_points_prove_the_bound() {
     let nuclear: f64 = exchange.dual.iter().map(|p| linalg::singular_values(&p.weight).unwrap()[0]).sum();
     let inner = |taps: &Taps| -> f64 {
         let at = |p: &DualPoint| {
-            let point = error.at(p.omega);
+            let point = error.point(p.omega);
             let f = taps.iter().enumerate().fold(CMat::zeros(1, 1), |sum, (j, f)| {
                 sum + linalg::to_complex(f) * Complex::from_polar(1.0, -p.omega * j as f64)
             });
@@ -166,7 +174,7 @@ fn a_wider_margin_lowers_the_mean_square_within_the_cap() {
         let mut exchange = exchange(geometric(0.8, 1.0, &[1.0]), 2, margin);
         let best = exchange.optimise().unwrap();
         let error = exchange.error();
-        let square = |k: i32| gain(&error.at(PI * f64::from(k) / 4.0), &best.taps).powi(2);
+        let square = |k: i32| gain(&error.point(PI * f64::from(k) / 4.0), &best.taps).powi(2);
         assert!(best.peaks.estimate <= exchange.lower * (1.0 + margin) * (1.0 + 2e-6));
         0.125 * (square(0) + square(4)) + 0.25 * (1..4).map(square).sum::<f64>()
     };
@@ -177,16 +185,17 @@ fn a_wider_margin_lowers_the_mean_square_within_the_cap() {
 #[test]
 fn known_frequencies_are_not_added_twice() {
     let mut exchange = exchange(geometric(0.5, 1.0, &[1.0]), 1, 0.0);
-    assert!(!exchange.add(&[0.0, PI + 1e-9]).unwrap());
-    assert!(exchange.add(&[1.0, 1.0]).unwrap());
-    assert_eq!(exchange.frequencies().count(), 6);
+    let at = |frequency: f64| Location { frequency, scenario: () };
+    assert!(!exchange.add(&[at(0.0), at(PI + 1e-9)]).unwrap());
+    assert!(exchange.add(&[at(1.0), at(1.0)]).unwrap());
+    assert_eq!(exchange.locations().len(), 6);
 }
 
 #[test]
 fn an_objective_that_does_not_fit_is_refused() {
     let error = geometric(0.5, 1.0, &[1.0]);
-    let problem = Problem::new(vec![error.at(0.0), error.at(1.0)], vec![1]).unwrap();
+    let problem = Problem::new(vec![error.point(0.0), error.point(1.0)], vec![1]).unwrap();
     let objective = MeanSquareObjective::noiseless(vec![1.0], 1);
-    let refused = Exchange::new(error, problem, objective, 0.0).err();
+    let refused = Exchange::new(error, problem, std::iter::repeat(()), objective, 0.0).err();
     assert!(matches!(refused, Some(DesignError::Lmi(_))), "{refused:?}");
 }

@@ -9,7 +9,7 @@
 use super::{GAMMA_ACCURACY, Settings, Synthesis, tap_lags};
 use crate::design::DesignError;
 use crate::design::error_grid::ErrorGrid;
-use crate::design::exchange::{Exchange, LEAST_MARGIN};
+use crate::design::exchange::{Exchange, LEAST_MARGIN, Location};
 use crate::design::filters::impulse_responses;
 use crate::design::plant::LiftedPlant;
 use crate::lmi::sampled::{MeanSquareObjective, Problem};
@@ -60,12 +60,13 @@ pub(crate) fn bracket(plant: &LiftedPlant, taps: usize, accuracy: f64) -> Result
 
 fn exchange<'a>(plant: &'a LiftedPlant, settings: &Settings) -> Result<Exchange<ErrorGrid<'a>>, DesignError> {
     let lags = tap_lags(plant.ratio(), settings.taps);
-    let grid = ErrorGrid::new(plant, lags[0]);
+    let grid = ErrorGrid::new(plant, lags[0])?;
     let (points, weights) = grid.coarse(0);
     let noise = plant.problem().noise.clone();
     let margin = settings.gamma_margin.unwrap_or_else(|| usual_margin(&noise));
     let objective = MeanSquareObjective { weights, noise };
-    let mut exchange = Exchange::new(grid, Problem::new(points, lags)?, objective, margin)?;
+    let problem = Problem::new(points, lags)?;
+    let mut exchange = Exchange::new(grid, problem, std::iter::repeat(0), objective, margin)?;
     exchange.stop = settings.stop.clone();
     Ok(exchange)
 }
@@ -93,7 +94,10 @@ fn least_gamma(
     let mut best = judged(plant, length, exchange)?;
     for _ in 0..MISSED_PEAK_LIMIT {
         let missed = best.peak.gain > best.estimate * (1.0 + GAMMA_ACCURACY);
-        if !missed || exchange.stop.is_due() || !exchange.add(&[best.peak.frequency])? {
+        if !missed
+            || exchange.stop.is_due()
+            || !exchange.add(&[Location { frequency: best.peak.frequency, scenario: 0 }])?
+        {
             break;
         }
         let other = judged(plant, length, exchange)?;

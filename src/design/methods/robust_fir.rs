@@ -1,27 +1,27 @@
 //! FIR design for delays, gains and cut-offs that are known up to a box of errors only.
 //!
-//! The taps minimise the largest norm over scenarios: points of the box, each with a plant of its own. A
-//! scenario is nothing but more frequencies, so the exchange of [`crate::design::exchange`] solves it: it
-//! adds pairs of a frequency and a scenario where the error peaks, not whole grids per scenario, and its
-//! dual stays a lower bound for all banks of that length over the box. Here the taps are fixed;
-//! `scheduled_fir` is the same problem with more unknowns, for taps that are scheduled by the delays.
+//! The taps minimise the largest gain over the box. Each combination of errors is a scenario with the same
+//! taps, and a scenario is nothing but more frequencies, so the exchange of [`crate::design::exchange`]
+//! solves it: it adds pairs of a frequency and a combination where the error peaks, as the search of
+//! [`crate::design::uncertainty::search`] finds them, and its dual stays a lower bound for all banks of that
+//! length over the box. Here the taps are fixed; `scheduled_fir` has taps that are scheduled by the delays.
 
-use super::scenarios::{ACCURACY, MARGIN, MovedPlant, RobustNorms, RobustProblem, largest};
+use super::scenarios::{ACCURACY, MARGIN, MISSED_ERROR_LIMIT, RobustNorms, RobustProblem};
 use super::{Filters, Settings, Synthesis, fir, tap_lags};
 use crate::design::DesignError;
-use crate::design::error_grid::{ErrorGrid, Scenario};
-use crate::design::exchange::{Exchange, Tolerances};
+use crate::design::error_grid::ErrorGrid;
+use crate::design::exchange::{AffineError, Exchange, Location, Peaks, Tolerances};
 use crate::design::filters::{impulse_responses, polyphase};
 use crate::design::plant::LiftedPlant;
-use crate::lmi::sampled::{MeanSquareObjective, Problem as SampledProblem};
+use crate::design::uncertainty::box_plant::Combination;
+use crate::design::uncertainty::search::{BoxSearch, MovingFilters};
+use crate::linalg::{self, CMat};
+use crate::lmi::sampled::{MeanSquareObjective, Point, Problem as SampledProblem, Taps};
 use crate::lti::peak::Peak;
-use crate::verify::uncertainty::ErrorBox;
+use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
 
-/// A nominal bank whose worst norm is within this of a lower bound is kept.
+/// A nominal bank whose largest gain is within this of a lower bound is kept.
 const NO_GAIN: f64 = 1e-3;
-/// The norm is computed where its estimate is at least this share of the largest estimate: estimates are off
-/// by a per cent or two.
-const NEAR_WORST: f64 = 0.97;
 
 /// The comparison of a robust design with one that takes the errors for zero.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -32,22 +32,26 @@ pub struct RobustStudy {
     pub robust: RobustNorms,
     /// Of the bank that is optimal without errors.
     pub nominal: RobustNorms,
-    /// No FIR bank of this length has a smaller worst norm over the box (computed).
+    /// No FIR bank of this length has a smaller largest norm over the box (computed).
     pub lower: f64,
-    /// Points of the box with a plant of their own.
+    /// Combinations of errors among the pairs.
     pub scenarios: usize,
-    /// Pairs of a frequency and a scenario at the end; 0 if the nominal bank was kept.
+    /// Pairs of a frequency and a combination of errors at the end; 0 if the nominal bank was kept.
     pub pairs: usize,
 }
 
 impl RobustStudy {
-    /// The share by which the robust bank lowers the worst norm.
+    /// The share by which the robust bank lowers the largest norm that was found.
     pub fn gain(&self) -> f64 {
-        if self.nominal.worst > 0.0 { 1.0 - self.robust.worst / self.nominal.worst } else { 0.0 }
+        if self.nominal.largest_found > 0.0 {
+            1.0 - self.robust.largest_found / self.nominal.largest_found
+        } else {
+            0.0
+        }
     }
 }
 
-/// The `settings.taps` taps per channel of least norm over the scenarios, within 3e-4.
+/// The `settings.taps` taps per channel of least norm over the box, within 3e-4.
 ///
 /// # Errors
 /// As [`fir::synthesise`].
@@ -58,17 +62,16 @@ pub(crate) fn synthesise(
 ) -> Result<Synthesis, DesignError> {
     let nominal = fir::synthesise(plant, settings)?;
     let Filters::Fir(taps) = &nominal.filters else { return Ok(nominal) };
-    let moved = problem.moved_plants(plant)?;
-    let grid = grid(plant, &moved, settings);
-    let study = study_of(&nominal, taps, &grid, problem)?;
-    if study.nominal.worst <= study.lower * (1.0 + NO_GAIN) {
+    let search = problem.search(plant, settings.taps)?;
+    let study = study_of(&nominal, taps, &search)?;
+    if study.nominal.largest_found <= study.lower * (1.0 + NO_GAIN) {
         return Ok(Synthesis { robust: Some(study), ..nominal });
     }
-    let found = least_worst_norm(plant, grid, settings)?;
-    let lower = found.lower.max(study.lower).min(found.norms.worst);
-    let study = RobustStudy { lower, pairs: found.pairs, ..study };
+    let found = least_worst_norm(plant, search, settings)?;
+    let lower = found.lower.max(study.lower).min(found.norms.largest_found);
+    let study = RobustStudy { lower, pairs: found.pairs, scenarios: found.scenarios, ..study };
     // The nominal bank is one of the candidates.
-    if found.norms.worst >= study.nominal.worst {
+    if found.norms.largest_found >= study.nominal.largest_found {
         return Ok(Synthesis { robust: Some(study), ..nominal });
     }
     let robust = Some(RobustStudy { robust: found.norms, ..study });
@@ -85,101 +88,129 @@ pub(crate) fn synthesise(
 }
 
 /// The study of a design that keeps the nominal bank.
-fn study_of(
-    nominal: &Synthesis,
-    taps: &[Vec<f64>],
-    grid: &ErrorGrid<'_>,
-    problem: &RobustProblem,
-) -> Result<RobustStudy, DesignError> {
-    let mut scenarios = estimates(grid, taps)?;
-    let norms = RobustNorms { nominal: nominal.peak.gain, worst: worst_of(&scenarios, taps)? };
-    // Whatever the taps, each scenario alone has the error that no bank avoids. That is at most the norm of
-    // these taps there, so the scenarios with the largest norms come first.
-    scenarios.sort_by(|a, b| b.norm.total_cmp(&a.norm));
-    let mut unavoidable = nominal.lower;
-    for Estimate { plant, norm } in scenarios {
-        if norm <= unavoidable {
-            break;
-        }
-        unavoidable = unavoidable.max(plant.noncausal_bound()?.gain);
-    }
+fn study_of(nominal: &Synthesis, taps: &[Vec<f64>], search: &BoxSearch) -> Result<RobustStudy, DesignError> {
+    let worst = worst_of(search, taps)?;
+    // Whatever the taps, each combination of errors alone has the error that no bank avoids.
+    let unavoidable = search.plant().moved(&worst.point)?.noncausal_bound()?.gain;
+    let norms =
+        RobustNorms { nominal: nominal.peak.gain, largest_found: worst.peak.gain.max(nominal.peak.gain) };
     Ok(RobustStudy {
-        errors: problem.errors.clone(),
+        errors: search.plant().errors.clone(),
         robust: norms,
         nominal: norms,
-        lower: unavoidable.min(norms.worst),
-        scenarios: grid.scenarios().len() - 1,
+        lower: nominal.lower.max(unavoidable).min(norms.largest_found),
+        scenarios: 0,
         pairs: 0,
     })
 }
 
-/// A plant with the estimated norm of some taps.
-#[derive(Clone, Copy)]
-struct Estimate<'a> {
-    plant: &'a LiftedPlant,
-    norm: f64,
+/// Errors with the norm of some taps.
+pub(super) struct WorstErrors {
+    point: ErrorPoint,
+    pub(super) peak: Peak,
 }
 
-/// The norms of the taps over the scenarios with errors, estimated.
-fn estimates<'a>(grid: &ErrorGrid<'a>, taps: &[Vec<f64>]) -> Result<Vec<Estimate<'a>>, DesignError> {
-    let scenarios = grid.scenarios();
-    let norms = grid.estimates(&polyphase(taps, scenarios[0].plant.ratio()))?;
-    let all = scenarios.iter().zip(norms).map(|(scenario, norm)| Estimate { plant: scenario.plant, norm });
-    // The first scenario has no errors.
-    Ok(all.skip(1).collect())
+/// The largest norm found of the taps over the box.
+pub(super) fn worst_of(search: &BoxSearch, taps: &[Vec<f64>]) -> Result<WorstErrors, DesignError> {
+    let points = search.worst_points(&MovingFilters::fixed(polyphase(taps, search.plant().ratio())))?;
+    let norm = |point: ErrorPoint| {
+        let peak = search.plant().moved(&point)?.fir_norm(taps)?;
+        Ok::<_, DesignError>(WorstErrors { point, peak })
+    };
+    let norms = points.into_iter().map(norm).collect::<Result<Vec<_>, _>>()?;
+    norms.into_iter().max_by(|a, b| a.peak.gain.total_cmp(&b.peak.gain)).ok_or(DesignError::NoTaps)
 }
 
-/// The largest norm of the taps over the scenarios.
-fn worst_of(scenarios: &[Estimate<'_>], taps: &[Vec<f64>]) -> Result<f64, DesignError> {
-    let most = scenarios.iter().map(|scenario| scenario.norm).fold(0.0, f64::max);
-    let near = scenarios.iter().filter(|scenario| scenario.norm >= NEAR_WORST * most);
-    largest(near.map(|scenario| Ok(scenario.plant.fir_norm(taps)?.gain)))
-}
-
-/// Taps of least norm over the scenarios.
+/// Taps of least norm over the box.
 struct RobustTaps {
     taps: Vec<Vec<f64>>,
     peak: Peak,
     norms: RobustNorms,
-    /// No taps have a smaller worst norm.
+    /// No taps have a smaller largest norm.
     lower: f64,
+    scenarios: usize,
     pairs: usize,
     iterations: usize,
 }
 
+/// The exchange. Where the taps are worse between the errors or frequencies that the search looks at, it is
+/// repeated with these.
 fn least_worst_norm(
     plant: &LiftedPlant,
-    grid: ErrorGrid<'_>,
+    search: BoxSearch,
     settings: &Settings,
 ) -> Result<RobustTaps, DesignError> {
-    let mut exchange = exchange(plant, grid, settings)?;
-    exchange.stop = settings.stop.clone();
-    let found = exchange.optimise_at(Tolerances::gradual(ACCURACY))?;
-    let taps = impulse_responses(&found.taps, settings.taps);
+    let mut exchange = exchange(plant, search, settings)?;
+    let (mut best, mut least) = (None, f64::INFINITY);
+    for _ in 0..MISSED_ERROR_LIMIT {
+        let found = exchange.optimise_at(Tolerances::gradual(ACCURACY))?;
+        let taps = impulse_responses(&found.taps, settings.taps);
+        let worst = worst_of(&exchange.error().search, &taps)?;
+        let known = found.peaks.estimate.max(exchange.lower);
+        if worst.peak.gain < least {
+            (best, least) = (Some(taps), worst.peak.gain);
+        }
+        if worst.peak.gain <= known * (1.0 + ACCURACY) || exchange.stop.is_due() {
+            break;
+        }
+        let scenario = exchange.error_mut().search.include(&worst.point)?;
+        if !exchange.add(&[Location { frequency: worst.peak.frequency, scenario }])? {
+            break;
+        }
+    }
+    let taps = best.ok_or(DesignError::NoTaps)?;
     let peak = plant.fir_norm(&taps)?;
-    let worst = worst_of(&estimates(exchange.error(), &taps)?, &taps)?;
-    let norms = RobustNorms { nominal: peak.gain, worst };
-    let pairs = exchange.frequencies().count();
-    Ok(RobustTaps { taps, peak, norms, lower: exchange.lower, pairs, iterations: exchange.iterations })
+    let norms = RobustNorms { nominal: peak.gain, largest_found: least.max(peak.gain) };
+    let (lower, iterations) = (exchange.lower, exchange.iterations);
+    let pairs = exchange.locations().len();
+    let mut scenarios: Vec<_> = exchange.locations().iter().map(|location| &location.scenario).collect();
+    scenarios.sort();
+    scenarios.dedup();
+    Ok(RobustTaps { peak, norms, lower, scenarios: scenarios.len(), pairs, iterations, taps })
 }
 
-/// The plant without errors, then the scenarios.
-fn grid<'a>(plant: &'a LiftedPlant, moved: &'a [MovedPlant], settings: &Settings) -> ErrorGrid<'a> {
-    let plants = std::iter::once(plant).chain(moved.iter().map(|moved| &moved.plant));
-    let scenarios = plants.map(|plant| Scenario::new(plant, vec![1.0], 1.0)).collect();
-    ErrorGrid::of_scenarios(scenarios, tap_lags(plant.ratio(), settings.taps)[0])
+/// The error of fixed taps over the box.
+struct BoxError {
+    search: BoxSearch,
+    /// N + M, the columns of all points.
+    inputs: usize,
 }
 
-fn exchange<'a>(
+impl AffineError for BoxError {
+    type Scenario = Combination;
+
+    fn at(&self, location: &Location<Combination>) -> Result<Point, DesignError> {
+        let (response, count) = (self.search.plant().response(location.frequency), location.scenario.len());
+        let h = self.search.plant().measurements(&response, &location.scenario);
+        let g = linalg::lq_factor(&linalg::vstack(&[&h, &response.references])?);
+        let rows = |first: usize, rows: usize| -> CMat {
+            g.rows(first, rows).into_owned().resize_horizontally(self.inputs, Default::default())
+        };
+        Ok(Point { omega: location.frequency, h: rows(0, count), w: rows(count, g.nrows() - count) })
+    }
+
+    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<Combination>, DesignError> {
+        let found = self.search.peaks(&MovingFilters::fixed(taps.clone()), level)?;
+        Ok(Peaks { estimate: found.estimate.max(gamma), ..found })
+    }
+}
+
+fn exchange(
     plant: &LiftedPlant,
-    grid: ErrorGrid<'a>,
+    search: BoxSearch,
     settings: &Settings,
-) -> Result<Exchange<ErrorGrid<'a>>, DesignError> {
-    let (points, weights) = grid.coarse(0);
+) -> Result<Exchange<BoxError>, DesignError> {
+    let lags = tap_lags(plant.ratio(), settings.taps);
+    let (points, weights) = ErrorGrid::new(plant, lags[0])?.coarse(0);
     let noise = plant.problem().noise.clone();
     let margin = settings.gamma_margin.unwrap_or(MARGIN).max(MARGIN);
-    let problem = SampledProblem::new(points, tap_lags(plant.ratio(), settings.taps))?;
-    Exchange::new(grid, problem, MeanSquareObjective { weights, noise }, margin)
+    let problem = SampledProblem::new(points, lags)?;
+    let without_errors = std::iter::repeat(vec![0; plant.channels()]);
+    let error = BoxError { search, inputs: plant.channels() + plant.ratio() };
+    let objective = MeanSquareObjective { weights, noise };
+    let mut exchange = Exchange::new(error, problem, without_errors, objective, margin)?;
+    exchange.stop = settings.stop.clone();
+    Ok(exchange)
 }
 
 #[cfg(test)]

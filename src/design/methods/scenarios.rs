@@ -1,8 +1,11 @@
 //! Points of a box of errors, each with a plant of its own, and the norms of banks over them.
 
+use super::tap_lags;
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::design::problem::Problem;
+use crate::design::uncertainty::box_plant::BoxPlant;
+use crate::design::uncertainty::search::BoxSearch;
 use crate::design::uncertainty::sides::{Side, point_at, sides};
 use crate::spec::{Method, Spec};
 use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
@@ -17,18 +20,14 @@ pub(super) const MARGIN: f64 = 2e-4;
 pub struct RobustNorms {
     /// Without errors.
     pub nominal: f64,
-    /// The largest over the scenarios.
-    pub worst: f64,
+    /// The largest that a search over the box found; see `gamma.worst_case` for a bound that is proven.
+    pub largest_found: f64,
 }
 
-/// The largest of some norms.
-pub(super) fn largest(
-    mut values: impl Iterator<Item = Result<f64, DesignError>>,
-) -> Result<f64, DesignError> {
-    values.try_fold(0.0, |most, value| Ok(f64::max(most, value?)))
-}
+/// Limit on the number of times that an exchange is repeated with errors that it did not know.
+pub(super) const MISSED_ERROR_LIMIT: usize = 8;
 
-/// Most scenarios.
+/// Most scenarios to begin with.
 pub(super) const MAX_SCENARIOS: usize = 64;
 /// Points on each side of the box that are tried, most first.
 const STEPS: [usize; 4] = [9, 5, 3, 2];
@@ -53,6 +52,15 @@ impl RobustProblem {
     /// The number of points with a plant of their own.
     pub(crate) fn scenario_count(&self) -> usize {
         scenarios(&self.errors).len()
+    }
+
+    /// The search for the worst errors of filters with so many taps; `plant` is the one without errors.
+    ///
+    /// # Errors
+    /// As [`Problem::with_errors`].
+    pub(super) fn search(&self, plant: &LiftedPlant, taps: usize) -> Result<BoxSearch, DesignError> {
+        let front_ends = BoxPlant::new(&self.spec, plant.problem().latency, &self.errors)?;
+        BoxSearch::new(front_ends, tap_lags(plant.ratio(), taps)[0], &[])
     }
 
     /// The scenarios with their plants; `plant` is the one without errors.

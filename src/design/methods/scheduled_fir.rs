@@ -19,18 +19,22 @@
 //! errors if that is larger. Where both are far below the largest of them, a share of that one counts: ideal
 //! interleaving has no error at all at its own delays.
 
-use super::scenarios::{ACCURACY, MARGIN, MovedPlant, RobustNorms, RobustProblem, largest};
+use super::robust_fir::worst_of;
+use super::scenarios::{ACCURACY, MARGIN, MISSED_ERROR_LIMIT, MovedPlant, RobustNorms, RobustProblem};
 use super::{Filters, Settings, Synthesis, fir, tap_lags};
 use crate::bank::TapSlopes;
 use crate::design::DesignError;
 use crate::design::error_grid::{ErrorGrid, Scenario};
-use crate::design::exchange::{Exchange, Tolerances};
+use crate::design::exchange::{Exchange, Location, Tolerances};
 use crate::design::filters::impulse_responses;
 use crate::design::plant::LiftedPlant;
+use crate::design::uncertainty::search::{BoxSearch, MovingFilters};
 use crate::linalg::Mat;
 use crate::lmi::sampled::{MeanSquareObjective, Point, Problem as SampledProblem, Taps};
+use crate::lti::peak::Peak;
 use crate::units::{FastPeriods, Seconds};
 use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
+use std::borrow::Cow;
 
 /// Least of what counts as within reach at some delays, relative to the largest over the box.
 const LEAST_REACH: f64 = 0.02;
@@ -44,7 +48,7 @@ pub struct TrackingStudy {
     pub tracked: RobustNorms,
     /// Of the bank that is optimal without errors, its taps fixed.
     pub fixed: RobustNorms,
-    /// Least norm of a bank that is designed for the delays at which the tracked norm is largest.
+    /// Least norm of a bank that is designed for the delays at which the largest tracked norm was found.
     pub redesigned: f64,
     /// The largest ratio over the scenarios of the tracked norm to what is within reach there: the noncausal
     /// bound, or the least norm without errors if that is larger, or 2 % of the largest such number. This is
@@ -59,9 +63,9 @@ pub struct TrackingStudy {
 }
 
 impl TrackingStudy {
-    /// By how much the worst norm exceeds that of a redesign, relative to it.
+    /// By how much the largest norm found exceeds that of a redesign, relative to it.
     pub fn excess(&self) -> f64 {
-        if self.redesigned > 0.0 { self.tracked.worst / self.redesigned - 1.0 } else { 0.0 }
+        if self.redesigned > 0.0 { self.tracked.largest_found / self.redesigned - 1.0 } else { 0.0 }
     }
 }
 
@@ -73,6 +77,7 @@ pub(crate) struct AffineDesign {
 }
 
 /// The affine taps of least norm over the scenarios, relative to what is within reach there, within 3e-4.
+/// Errors for which they are worse than for the scenarios become scenarios.
 ///
 /// # Errors
 /// As [`fir::synthesise`].
@@ -83,54 +88,78 @@ pub(crate) fn synthesise(
 ) -> Result<Synthesis, DesignError> {
     let fixed = fir::synthesise(plant, settings)?;
     let Filters::Fir(fixed_taps) = &fixed.filters else { return Ok(fixed) };
+    let search = problem.search(plant, settings.taps)?;
     let moved = problem.moved_plants(plant)?;
-    let (nominal, within_reach) = within_reach(&moved, fixed.peak.gain)?;
+    let reach = Reach::new(&moved, fixed.peak.gain)?;
     let sides = Sides::new(problem);
-    let grid = sides.grid((plant, nominal), &moved, &within_reach, settings);
+    let grid = sides.grid(plant, moved, &reach, settings)?;
     let mut exchange = sides.exchange(plant, grid, settings)?;
     exchange.stop = settings.stop.clone();
-    let found = exchange.optimise_at(Tolerances::gradual(ACCURACY))?;
-    let (taps, slopes) = sides.split(&found.taps, settings.taps);
-    let norm = |moved: &MovedPlant| {
-        Ok(moved.plant.fir_norm(&slopes.moved(&taps, &sides.errors(&moved.point)))?.gain)
-    };
-    let norms = moved.iter().map(norm).collect::<Result<Vec<_>, DesignError>>()?;
-    let worst = (0..norms.len()).max_by(|&a, &b| norms[a].total_cmp(&norms[b])).unwrap_or(0);
-    let peak = plant.fir_norm(&taps)?;
-    let tracked = RobustNorms { nominal: peak.gain, worst: norms[worst].max(peak.gain) };
-    let of_fixed = largest(moved.iter().map(|moved| Ok(moved.plant.fir_norm(fixed_taps)?.gain)))?;
-    let ratios = norms.iter().zip(&within_reach).map(|(norm, reach)| norm / reach);
-    let ratio = ratios.fold(peak.gain / nominal, f64::max);
-    let (_, redesigned) = fir::bracket(&moved[worst].plant, settings.taps, ACCURACY)?;
+    let found = sides.least_ratio(&mut exchange, &search, &reach, settings)?;
+    let of_fixed = worst_of(&search, fixed_taps)?.peak.gain;
+    let worst = &exchange.error().scenarios()[found.worst];
+    let (_, redesigned) = fir::bracket(&worst.plant, settings.taps, ACCURACY)?;
+    let peak = found.peaks[0];
     let study = TrackingStudy {
         errors: problem.errors.clone(),
-        tracked,
-        fixed: RobustNorms { nominal: fixed.peak.gain, worst: of_fixed },
+        tracked: RobustNorms { nominal: peak.gain, largest_found: found.peaks[found.worst].gain },
+        fixed: RobustNorms { nominal: fixed.peak.gain, largest_found: of_fixed },
         redesigned,
-        ratio,
-        least_ratio: exchange.lower.min(ratio),
-        scenarios: moved.len(),
-        pairs: exchange.frequencies().count(),
+        ratio: found.ratio,
+        least_ratio: exchange.lower.min(found.ratio),
+        scenarios: exchange.error().scenarios().len() - 1,
+        pairs: exchange.locations().len(),
     };
     Ok(Synthesis {
-        filters: Filters::Fir(taps),
+        filters: Filters::Fir(found.taps),
         peak,
         lower: fixed.lower.min(peak.gain),
         noncausal: fixed.noncausal.min(peak.gain),
         iterations: fixed.iterations + exchange.iterations,
         dual: fixed.dual,
         robust: None,
-        affine: Some(AffineDesign { slopes, study }),
+        affine: Some(AffineDesign { slopes: found.slopes, study }),
     })
 }
 
-/// The norms that are within reach without errors, where a fixed bank has gain `nominal`, and of each plant.
-fn within_reach(moved: &[MovedPlant], nominal: f64) -> Result<(f64, Vec<f64>), DesignError> {
-    let bounds = moved.iter().map(|moved| Ok(moved.plant.noncausal_bound()?.gain.max(nominal)));
-    let mut within_reach = bounds.collect::<Result<Vec<_>, DesignError>>()?;
-    let floor = LEAST_REACH * within_reach.iter().copied().fold(0.0, f64::max);
-    within_reach.iter_mut().for_each(|reach| *reach = reach.max(floor));
-    Ok((nominal.max(floor), within_reach))
+/// What is within reach.
+struct Reach {
+    /// Of a fixed bank without errors.
+    nominal: f64,
+    /// Least of what counts.
+    floor: f64,
+}
+
+impl Reach {
+    /// Over these plants, where a fixed bank has gain `nominal` without errors.
+    fn new(moved: &[MovedPlant], nominal: f64) -> Result<Self, DesignError> {
+        let most = moved.iter().try_fold(nominal, |most, moved| {
+            Ok::<_, DesignError>(f64::max(most, moved.plant.noncausal_bound()?.gain))
+        })?;
+        Ok(Self { nominal, floor: LEAST_REACH * most })
+    }
+
+    /// With the errors of a plant.
+    fn of(&self, plant: &LiftedPlant) -> Result<f64, DesignError> {
+        Ok(plant.noncausal_bound()?.gain.max(self.nominal).max(self.floor))
+    }
+
+    /// Without errors.
+    fn without_errors(&self) -> f64 {
+        self.nominal.max(self.floor)
+    }
+}
+
+/// Affine taps with their norms.
+struct Scheduled {
+    taps: Vec<Vec<f64>>,
+    slopes: TapSlopes,
+    /// Of each scenario.
+    peaks: Vec<Peak>,
+    /// The scenario of the largest norm.
+    worst: usize,
+    /// The largest ratio of a norm to what is within reach.
+    ratio: f64,
 }
 
 /// The delays that move.
@@ -158,8 +187,73 @@ impl Sides {
         std::iter::once(1.0).chain(self.channels.iter().zip(&self.halves).map(share)).collect()
     }
 
-    fn errors(&self, point: &ErrorPoint) -> Vec<FastPeriods> {
-        point.delays.iter().map(|delay| delay.in_fast_periods(self.fast_period)).collect()
+    /// The errors of the delays of a scenario.
+    fn errors(&self, scenario: &Scenario<'_>) -> Vec<FastPeriods> {
+        let mut errors = vec![FastPeriods(0.0); self.count];
+        for (k, (&j, half)) in self.channels.iter().zip(&self.halves).enumerate() {
+            errors[j] = half.in_fast_periods(self.fast_period) * scenario.factors[k + 1];
+        }
+        errors
+    }
+
+    /// The exchange. Where the taps are worse at errors or frequencies that it does not know, it is repeated
+    /// with these.
+    fn least_ratio(
+        &self,
+        exchange: &mut Exchange<ErrorGrid<'_>>,
+        search: &BoxSearch,
+        reach: &Reach,
+        settings: &Settings,
+    ) -> Result<Scheduled, DesignError> {
+        let mut rounds = 0;
+        loop {
+            let found = exchange.optimise_at(Tolerances::gradual(ACCURACY))?;
+            let (taps, slopes) = self.split(&found.taps, settings.taps);
+            let filters = MovingFilters::scheduled(&taps, &slopes, search.plant().ratio(), self.fast_period);
+            let enough = found.peaks.estimate.max(exchange.lower) * (1.0 + ACCURACY);
+            for point in search.worst_points(&filters)? {
+                let plant = search.plant().moved(&point)?;
+                let weight = 1.0 / reach.of(&plant)?;
+                let scenario = Scenario::new(Cow::Owned(plant), self.factors(&point), weight);
+                let moved = slopes.moved(&taps, &self.errors(&scenario));
+                if weight * scenario.plant.fir_norm(&moved)?.gain > enough {
+                    exchange.error_mut().add(scenario);
+                }
+            }
+            let scheduled = self.judged(exchange.error().scenarios(), taps, slopes)?;
+            rounds += 1;
+            if scheduled.ratio <= enough || rounds == MISSED_ERROR_LIMIT || exchange.stop.is_due() {
+                return Ok(scheduled);
+            }
+            let missed: Vec<Location<usize>> = exchange
+                .error()
+                .scenarios()
+                .iter()
+                .zip(&scheduled.peaks)
+                .enumerate()
+                .filter(|(_, (scenario, peak))| scenario.weight * peak.gain > enough)
+                .map(|(scenario, (_, peak))| Location { frequency: peak.frequency, scenario })
+                .collect();
+            if !exchange.add(&missed)? {
+                return Ok(scheduled);
+            }
+        }
+    }
+
+    /// The norms of the scenarios.
+    fn judged(
+        &self,
+        scenarios: &[Scenario<'_>],
+        taps: Vec<Vec<f64>>,
+        slopes: TapSlopes,
+    ) -> Result<Scheduled, DesignError> {
+        let peak =
+            |scenario: &Scenario<'_>| scenario.plant.fir_norm(&slopes.moved(&taps, &self.errors(scenario)));
+        let peaks = scenarios.iter().map(peak).collect::<Result<Vec<_>, _>>()?;
+        let worst = (0..peaks.len()).max_by(|&a, &b| peaks[a].gain.total_cmp(&peaks[b].gain)).unwrap_or(0);
+        let ratios = peaks.iter().zip(scenarios).map(|(peak, scenario)| peak.gain * scenario.weight);
+        let ratio = ratios.fold(0.0, f64::max);
+        Ok(Scheduled { taps, slopes, peaks, worst, ratio })
     }
 
     /// F_0 as taps per channel, and the slopes per fast period.
@@ -179,17 +273,17 @@ impl Sides {
     /// The plant without errors, then the scenarios, each relative to what is within reach there.
     fn grid<'a>(
         &self,
-        (plant, nominal): (&'a LiftedPlant, f64),
-        moved: &'a [MovedPlant],
-        within_reach: &[f64],
+        plant: &'a LiftedPlant,
+        moved: Vec<MovedPlant>,
+        reach: &Reach,
         settings: &Settings,
-    ) -> ErrorGrid<'a> {
-        let scenario = |plant: &'a LiftedPlant, point: &ErrorPoint, reach: f64| {
-            Scenario::new(plant, self.factors(point), 1.0 / reach)
-        };
-        let mut scenarios = vec![scenario(plant, &ErrorPoint::none(self.count), nominal)];
-        let with_errors = moved.iter().zip(within_reach);
-        scenarios.extend(with_errors.map(|(moved, reach)| scenario(&moved.plant, &moved.point, *reach)));
+    ) -> Result<ErrorGrid<'a>, DesignError> {
+        let none = self.factors(&ErrorPoint::none(self.count));
+        let mut scenarios = vec![Scenario::new(Cow::Borrowed(plant), none, 1.0 / reach.without_errors())];
+        for MovedPlant { plant, point } in moved {
+            let weight = 1.0 / reach.of(&plant)?;
+            scenarios.push(Scenario::new(Cow::Owned(plant), self.factors(&point), weight));
+        }
         ErrorGrid::of_scenarios(scenarios, tap_lags(plant.ratio(), settings.taps)[0])
     }
 
@@ -199,27 +293,28 @@ impl Sides {
         grid: ErrorGrid<'a>,
         settings: &Settings,
     ) -> Result<Exchange<ErrorGrid<'a>>, DesignError> {
-        let (points, weights) = self.first_points(&grid);
+        let (points, weights, scenarios) = self.first_points(&grid);
         let noise = self.noise(&plant.problem().noise, grid.scenarios());
         let margin = settings.gamma_margin.unwrap_or(MARGIN).max(MARGIN);
         let problem = SampledProblem::new(points, tap_lags(plant.ratio(), settings.taps))?;
-        Exchange::new(grid, problem, MeanSquareObjective { weights, noise }, margin)
+        Exchange::new(grid, problem, scenarios, MeanSquareObjective { weights, noise }, margin)
     }
 
-    /// Some points of each scenario with their weights: the scenarios take turns, so that there are about as
+    /// Some points of each scenario with their weights and their scenarios: the scenarios take turns, so that there are about as
     /// many points as for the centre and the ends of each side alone.
-    fn first_points(&self, grid: &ErrorGrid<'_>) -> (Vec<Point>, Vec<f64>) {
+    fn first_points(&self, grid: &ErrorGrid<'_>) -> (Vec<Point>, Vec<f64>, Vec<usize>) {
         let count = grid.scenarios().len();
         let stride = count.div_ceil(2 * self.channels.len() + 1);
-        let (mut points, mut weights) = (Vec::new(), Vec::new());
+        let (mut points, mut weights, mut scenarios) = (Vec::new(), Vec::new(), Vec::new());
         for scenario in 0..count {
             let (coarse, of_coarse) = grid.coarse(scenario);
             for k in (scenario % stride..coarse.len()).step_by(stride) {
                 points.push(coarse[k].clone());
                 weights.push(of_coarse[k] * stride as f64 / count as f64);
+                scenarios.push(scenario);
             }
         }
-        (points, weights)
+        (points, weights, scenarios)
     }
 
     /// Power of the noise of the channels `[H; delta_1 H; ..]`: that of the output's noise, averaged over

@@ -54,7 +54,7 @@ impl<'a> TapError<'a> {
     pub(super) fn new(problem: QuantisationProblem<'a>) -> Result<Self, DesignError> {
         let ratio = problem.plant.ratio();
         let lags = polyphase(problem.taps, ratio);
-        let grid = ErrorGrid::new(problem.plant, lags.len());
+        let grid = ErrorGrid::new(problem.plant, lags.len())?;
         let points = grid.points();
         let forms = Forms::new(&points);
         let real_gamma = grid.peaks(&lags, 0.0)?.estimate;

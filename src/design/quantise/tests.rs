@@ -54,7 +54,7 @@ fn brute_force(plant: &LiftedPlant, rounded: &FixedPoint, reach: i64) -> f64 {
         }
         if inside {
             let lags = polyphase(&point.taps(), plant.ratio());
-            best = best.min(ErrorGrid::new(plant, lags.len()).peaks(&lags, 0.0).unwrap().estimate);
+            best = best.min(ErrorGrid::new(plant, lags.len()).unwrap().peaks(&lags, 0.0).unwrap().estimate);
         }
     }
     best

@@ -3,12 +3,12 @@
 
 use super::dynamics::Dynamics;
 use crate::design::DesignError;
-use crate::design::exchange::{AffineError, Exchange, Peaks};
+use crate::design::exchange::{AffineError, Exchange, LocatedPeak, Location, Peaks};
 use crate::design::plant::LiftedPlant;
 use crate::linalg::Complex;
 use crate::lmi::Settings;
 use crate::lmi::sampled::{self, MeanSquareObjective, Point, Solution, Taps};
-use crate::lti::peak::{peaks_above, resonances, stable_poles};
+use crate::lti::peak::{Peak, peaks_above, resonances, stable_poles};
 use crate::lti::{FirWithTail, FrequencyResponse};
 use std::f64::consts::PI;
 
@@ -85,9 +85,9 @@ impl<'a> PlantSamples<'a> {
         let objective = MeanSquareObjective::noiseless(self.weights(), problem.channels());
         let regressors = FrequencyResponse::new(&dynamics.regressors()?);
         let error = OutputError { samples: self, dynamics, regressors };
-        let mut exchange = Exchange::new(error, problem, objective, gamma_margin)?;
+        let mut exchange = Exchange::new(error, problem, std::iter::repeat(()), objective, gamma_margin)?;
         let best = exchange.optimise()?;
-        let frequencies: Vec<f64> = exchange.frequencies().collect();
+        let frequencies: Vec<f64> = exchange.locations().iter().map(|location| location.frequency).collect();
         frequencies.into_iter().for_each(|omega| self.add(omega));
         dynamics.with_outputs(&best.taps[0])
     }
@@ -109,16 +109,22 @@ struct OutputError<'a> {
 }
 
 impl AffineError for OutputError<'_> {
-    fn at(&self, omega: f64) -> Point {
-        driving(&self.regressors, self.samples.at(omega))
+    type Scenario = ();
+
+    fn at(&self, location: &Location<()>) -> Result<Point, DesignError> {
+        Ok(driving(&self.regressors, self.samples.at(location.frequency)))
     }
 
-    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks, DesignError> {
+    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<()>, DesignError> {
         let bank = self.dynamics.with_outputs(&taps[0])?;
         let error = self.samples.plant.error_system(&bank.realise()?)?;
         let peaks = peaks_above(&error, level)?;
         let estimate = peaks.iter().map(|peak| peak.gain).fold(gamma, f64::max);
-        Ok(Peaks { estimate, peaks })
+        let located = |peak: Peak| {
+            let location = Location { frequency: peak.frequency, scenario: () };
+            LocatedPeak { gain: peak.gain, location }
+        };
+        Ok(Peaks { estimate, peaks: peaks.into_iter().map(located).collect() })
     }
 }
 

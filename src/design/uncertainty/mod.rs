@@ -4,9 +4,10 @@
 //! The two ends of the worst case are proven by [`crate::verify::uncertainty`]. Here they are searched, in
 //! double precision.
 
+pub(super) mod box_plant;
 mod derivatives;
 mod floor;
-mod search;
+pub(super) mod search;
 pub(super) mod sides;
 #[cfg(test)]
 mod tests;

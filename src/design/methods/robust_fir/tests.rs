@@ -25,10 +25,11 @@ fn robust_optima_are_those_of_a_semidefinite_program() {
     {
         let designed = design(&thesis(half), &Options::without_proof()).unwrap();
         let study = designed.robust.unwrap();
-        assert!((study.robust.worst / robust - 1.0).abs() < 1e-3, "{study:?}");
-        assert!((study.nominal.worst / nominal - 1.0).abs() < 1e-3, "{study:?}");
+        assert!((study.robust.largest_found / robust - 1.0).abs() < 1e-3, "{study:?}");
+        assert!((study.nominal.largest_found / nominal - 1.0).abs() < 1e-3, "{study:?}");
         assert!(
-            study.lower <= study.robust.worst && study.lower > study.robust.worst * (1.0 - 1e-3),
+            study.lower <= study.robust.largest_found
+                && study.lower > study.robust.largest_found * (1.0 - 1e-3),
             "{study:?}"
         );
         assert_eq!(designed.bank.gamma.norm, Some(study.robust.nominal));
@@ -47,15 +48,16 @@ fn flat_optima_are_reached_and_random_points_are_no_worse() {
         let designed = design(&spec, &Options::without_proof()).unwrap();
         let study = designed.robust.unwrap();
         assert!(
-            study.lower <= study.robust.worst && study.lower > study.robust.worst * (1.0 - 1e-3),
+            study.lower <= study.robust.largest_found
+                && study.lower > study.robust.largest_found * (1.0 - 1e-3),
             "{study:?}"
         );
-        assert!(study.robust.worst < 0.99 * study.nominal.worst, "{study:?}");
+        assert!(study.robust.largest_found < 0.99 * study.nominal.largest_found, "{study:?}");
         for _ in 0..8 {
             let delays = vec![Seconds(0.0), Seconds(half * random.sample())];
             let point = ErrorPoint { delays, ..ErrorPoint::none(2) };
             let (norm, _) = norm_at(&designed.bank, &point, Taps::Fixed).unwrap();
-            assert!(norm <= study.robust.worst * (1.0 + 1e-3), "{point:?}: {norm} {study:?}");
+            assert!(norm <= study.robust.largest_found * (1.0 + 1e-3), "{point:?}: {norm} {study:?}");
         }
     }
 }
@@ -133,9 +135,12 @@ fn taps_that_follow_the_delays_are_nearly_as_good_as_a_redesign() {
         most = most.max(norm);
         most_redesigned = most_redesigned.max(redesigned);
     }
-    assert!(most <= study.tracked.worst * (1.0 + 1e-3), "{most} {study:?}");
+    assert!(most <= study.tracked.largest_found * (1.0 + 1e-3), "{most} {study:?}");
     assert!(most < 1.01 * most_redesigned, "{most} {most_redesigned}");
-    assert!(study.excess() < 0.01 && study.tracked.worst < 0.95 * study.fixed.worst, "{study:?}");
+    assert!(
+        study.excess() < 0.01 && study.tracked.largest_found < 0.95 * study.fixed.largest_found,
+        "{study:?}"
+    );
     assert!(study.least_ratio <= study.ratio && study.least_ratio > study.ratio * (1.0 - 1e-3), "{study:?}");
 }
 
@@ -149,7 +154,7 @@ fn the_worst_case_of_taps_that_follow_is_stated_and_proven() {
     let (mut bank, study) = (designed.bank, designed.tracking.unwrap());
     let stated = bank.gamma.tracked.unwrap();
     assert!(
-        stated >= study.tracked.worst * (1.0 - 1e-9) && stated < 1.05 * study.tracked.worst,
+        stated >= study.tracked.largest_found * (1.0 - 1e-9) && stated < 1.05 * study.tracked.largest_found,
         "{stated} {study:?}"
     );
     assert_eq!(bank.gamma.worst_case, None);
@@ -159,9 +164,9 @@ fn the_worst_case_of_taps_that_follow_is_stated_and_proven() {
     let mut altered = bank.clone();
     altered.tap_slopes.as_mut().unwrap().by_delay[1][1][10] += 1.0;
     assert_eq!(crate::verify::verify(&altered).unwrap_err(), crate::verify::VerifyError::Tracked { stated });
-    bank.gamma.tracked = Some(0.98 * study.tracked.worst);
+    bank.gamma.tracked = Some(0.98 * study.tracked.largest_found);
     let refused = crate::verify::verify(&bank).unwrap_err();
-    assert_eq!(refused, crate::verify::VerifyError::Tracked { stated: 0.98 * study.tracked.worst });
+    assert_eq!(refused, crate::verify::VerifyError::Tracked { stated: 0.98 * study.tracked.largest_found });
 }
 
 /// Four interleaved converters, with HYBANK_SLOW set: within 0.2 % of a redesign for delays within 10 ps,
@@ -187,4 +192,24 @@ fn interleaved_converters_are_followed() {
         assert!(study.excess() < excess && study.ratio < 1.0 + excess, "{study:?}");
         assert!(designed.bank.gamma.tracked.is_some());
     }
+}
+
+/// Beside narrow resonances the error peaks between the points of a uniform grid. The least worst case of
+/// this bank is 0.671295 by an independent exchange; without these peaks it was 0.718357.
+#[test]
+fn peaks_beside_narrow_resonances_are_found() {
+    let text = "fast_period = 1e-9\nratio = 1\nlatency = 7\n\
+        target = { filter = { family = \"elliptic\", order = 7, cutoff = 309007208.3, ripple_db = 0.757, \
+        attenuation_db = 46.61 } }\n\
+        channel = [{ delay_samples = 1.528769827508 }, { delay_samples = 1.075876642955881 }, \
+        { delay_samples = 1.573375656170908 }]\n\
+        design = { method = \"fir\", taps = 5 }\n\
+        uncertainty = { delay_samples = [0.0, 0.12157, 0.0036], gain = [0.0, 0.00081, 0.03398] }\n";
+    let spec = Spec::from_toml(text, "spec.toml").unwrap();
+    let study = design(&spec, &Options::without_proof()).unwrap().robust.unwrap();
+    assert!((study.robust.largest_found / 0.671295 - 1.0).abs() < 1e-3, "{study:?}");
+    assert!(
+        study.lower <= study.robust.largest_found && study.lower > 0.999 * study.robust.largest_found,
+        "{study:?}"
+    );
 }

@@ -1,0 +1,245 @@
+//! One plant for all errors of a box.
+//!
+//! Row i of H depends on the errors of channel i alone. So one lifted plant whose measurements are the samples
+//! of every channel with several errors, its nodes, holds the rows of all combinations of nodes, with one
+//! input for all. Errors of gains are factors of rows. No other plant is lifted while the worst combination
+//! is searched.
+
+use crate::design::DesignError;
+use crate::design::plant::LiftedPlant;
+use crate::design::problem::Problem;
+use crate::linalg::{CMat, Complex};
+use crate::spec::Spec;
+use crate::units::Seconds;
+use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
+
+/// Errors of a channel as shares of the half-width, beside none: of the delay and of the cut-off. The
+/// remainder of a row between two nodes falls with the square of their distance.
+const OFFSETS: [f64; 4] = [-1.0, -0.5, 0.5, 1.0];
+/// The same for boxes with many channels.
+const ENDS: [f64; 2] = [-1.0, 1.0];
+/// Most nodes of all channels with [`OFFSETS`].
+const MAX_NODES: usize = 64;
+/// Errors this close, relative to the half-width, are one node.
+const SAME_ERROR: f64 = 1e-9;
+
+/// For each channel the index of one of its [`ChannelError`]s; zeros for no errors.
+pub(in crate::design) type Combination = Vec<usize>;
+
+/// All front ends of a box.
+#[derive(Debug)]
+pub(in crate::design) struct BoxPlant {
+    spec: Spec,
+    latency: usize,
+    pub(in crate::design) errors: ErrorBox,
+    /// Its measurements are the nodes.
+    plant: LiftedPlant,
+    nodes: Vec<Node>,
+    /// For each channel.
+    options: Vec<Vec<ChannelError>>,
+}
+
+/// A channel with errors of its delay and cut-off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Node {
+    channel: usize,
+    delay: Seconds,
+    cutoff: f64,
+}
+
+/// A node with an error of the gain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ChannelError {
+    /// Index of the row.
+    pub(super) node: usize,
+    /// Relative to the channel's own gain.
+    pub(super) gain: f64,
+    pub(super) delay: Seconds,
+}
+
+/// The responses of all nodes and of the references at one frequency.
+pub(in crate::design) struct BoxResponse {
+    pub(super) nodes: CMat,
+    pub(in crate::design) references: CMat,
+}
+
+impl BoxPlant {
+    /// The front ends of `spec` over `errors`: without errors, at the ends of each side, and between them.
+    ///
+    /// # Errors
+    /// As [`Problem::with_errors`].
+    pub(in crate::design) fn new(
+        spec: &Spec,
+        latency: usize,
+        errors: &ErrorBox,
+    ) -> Result<Self, DesignError> {
+        let centre = ErrorPoint::none(spec.channels.len());
+        let nodes = nodes(errors, &centre, &OFFSETS);
+        let nodes = if nodes.len() > MAX_NODES { self::nodes(errors, &centre, &ENDS) } else { nodes };
+        Self::with_nodes(spec, latency, errors, &centre, nodes)
+    }
+
+    /// The same front ends near one point: there, and `share` of the half-widths beside it.
+    ///
+    /// # Errors
+    /// As [`BoxPlant::new`].
+    pub(super) fn near(&self, point: &ErrorPoint, share: f64) -> Result<Self, DesignError> {
+        let nodes = nodes(&self.errors, point, &[-share, share]);
+        Self::with_nodes(&self.spec, self.latency, &self.errors, point, nodes)
+    }
+
+    /// The first option of each channel has the errors of `centre`.
+    fn with_nodes(
+        spec: &Spec,
+        latency: usize,
+        errors: &ErrorBox,
+        centre: &ErrorPoint,
+        nodes: Vec<Node>,
+    ) -> Result<Self, DesignError> {
+        let plant = lifted(spec, latency, &nodes)?;
+        let options = (0..spec.channels.len())
+            .map(|i| {
+                let of_channel = (0..nodes.len()).filter(|&node| nodes[node].channel == i);
+                let option = |node: usize, gain| ChannelError { node, gain, delay: nodes[node].delay };
+                let half = errors.gains[i];
+                let gains = if half > 0.0 { vec![-half, half] } else { vec![0.0] };
+                let all = of_channel.flat_map(|node| gains.iter().map(move |&gain| option(node, gain)));
+                let all: Vec<ChannelError> = all.collect();
+                let first = ChannelError { gain: centre.gains[i], ..all[0] };
+                let others = all.into_iter().filter(|other| *other != first);
+                std::iter::once(first).chain(others).collect()
+            })
+            .collect();
+        let (spec, errors) = (spec.clone(), errors.clone());
+        Ok(Self { spec, latency, errors, plant, nodes, options })
+    }
+
+    /// Makes the errors of `point` a combination. All other combinations stay what they are.
+    ///
+    /// # Errors
+    /// As [`BoxPlant::new`].
+    pub(in crate::design) fn include(&mut self, point: &ErrorPoint) -> Result<Combination, DesignError> {
+        let mut combination = Combination::new();
+        for channel in 0..self.options.len() {
+            let (delay, cutoff, gain) = (point.delays[channel], point.cutoffs[channel], point.gains[channel]);
+            let node = self.node_at(Node { channel, delay, cutoff });
+            let options = &mut self.options[channel];
+            let known = options.iter().position(|option| option.node == node && option.gain == gain);
+            if known.is_none() {
+                options.push(ChannelError { node, gain, delay: self.nodes[node].delay });
+            }
+            combination.push(known.unwrap_or(options.len() - 1));
+        }
+        if self.nodes.len() > self.plant.channels() {
+            self.plant = lifted(&self.spec, self.latency, &self.nodes)?;
+        }
+        Ok(combination)
+    }
+
+    /// The index of a node, which is added unless there is one like it.
+    fn node_at(&mut self, node: Node) -> usize {
+        let (delay, cutoff) = (self.errors.delays[node.channel].0, self.errors.cutoffs[node.channel]);
+        let is_same = |other: &Node| {
+            other.channel == node.channel
+                && (other.delay - node.delay).0.abs() <= SAME_ERROR * delay
+                && (other.cutoff - node.cutoff).abs() <= SAME_ERROR * cutoff
+        };
+        self.nodes.iter().position(is_same).unwrap_or_else(|| {
+            self.nodes.push(node);
+            self.nodes.len() - 1
+        })
+    }
+
+    /// The options of each channel.
+    pub(super) fn options(&self) -> &[Vec<ChannelError>] {
+        &self.options
+    }
+
+    /// M.
+    pub(in crate::design) fn ratio(&self) -> usize {
+        self.plant.ratio()
+    }
+
+    /// The frequencies near the poles of all front ends, in radians per slow period.
+    ///
+    /// # Errors
+    /// [`DesignError::Lti`] if a front end is not stable.
+    pub(in crate::design) fn resonances(&self) -> Result<&[f64], DesignError> {
+        self.plant.resonances()
+    }
+
+    /// The errors of a combination.
+    pub(in crate::design) fn point(&self, combination: &[usize]) -> ErrorPoint {
+        let mut point = ErrorPoint::none(self.options.len());
+        for (i, &choice) in combination.iter().enumerate() {
+            let ChannelError { node, gain, delay } = self.options[i][choice];
+            (point.delays[i], point.gains[i], point.cutoffs[i]) = (delay, gain, self.nodes[node].cutoff);
+        }
+        point
+    }
+
+    /// The plant with the errors of `point`.
+    ///
+    /// # Errors
+    /// As [`Problem::with_errors`].
+    pub(in crate::design) fn moved(&self, point: &ErrorPoint) -> Result<LiftedPlant, DesignError> {
+        LiftedPlant::new(&Problem::with_errors(&self.spec, self.latency, point)?)
+    }
+
+    /// All responses at a frequency in radians per slow period.
+    pub(in crate::design) fn response(&self, omega: f64) -> BoxResponse {
+        let all = self.plant.at_frequency(omega);
+        let count = self.nodes.len();
+        BoxResponse {
+            nodes: all.rows(0, count).into_owned(),
+            references: all.rows(count, self.ratio()).into_owned(),
+        }
+    }
+
+    /// H of a combination.
+    pub(in crate::design) fn measurements(&self, response: &BoxResponse, combination: &[usize]) -> CMat {
+        let choice = |i: usize| self.options[i][combination[i]];
+        CMat::from_fn(combination.len(), response.nodes.ncols(), |i, column| {
+            response.nodes[(choice(i).node, column)] * Complex::from(1.0 + choice(i).gain)
+        })
+    }
+}
+
+/// The plant whose measurements are the nodes.
+fn lifted(spec: &Spec, latency: usize, nodes: &[Node]) -> Result<LiftedPlant, DesignError> {
+    let channels = nodes.iter().map(|node| spec.channels[node.channel].clone()).collect();
+    let errors = ErrorPoint {
+        delays: nodes.iter().map(|node| node.delay).collect(),
+        gains: vec![0.0; nodes.len()],
+        cutoffs: nodes.iter().map(|node| node.cutoff).collect(),
+    };
+    LiftedPlant::new(&Problem::with_errors(&Spec { channels, ..spec.clone() }, latency, &errors)?)
+}
+
+/// The nodes of all channels: at `centre`, and `offsets` of the half-widths beside it. The first node of
+/// each channel is that at the centre.
+fn nodes(errors: &ErrorBox, centre: &ErrorPoint, offsets: &[f64]) -> Vec<Node> {
+    let of_channel = |channel: usize| {
+        let delays = side(centre.delays[channel].0, errors.delays[channel].0, offsets);
+        let cutoffs = side(centre.cutoffs[channel], errors.cutoffs[channel], offsets);
+        let node = |delay: f64, cutoff: f64| Node { channel, delay: Seconds(delay), cutoff };
+        let all: Vec<Node> = delays
+            .into_iter()
+            .flat_map(|delay| cutoffs.iter().map(move |&cutoff| node(delay, cutoff)))
+            .collect();
+        all
+    };
+    (0..errors.delays.len()).flat_map(of_channel).collect()
+}
+
+/// Values of one error, different and within the box.
+fn side(centre: f64, half: f64, offsets: &[f64]) -> Vec<f64> {
+    let mut values = vec![centre];
+    for offset in offsets {
+        let value = (centre + offset * half).clamp(-half, half);
+        if values.iter().all(|known| (known - value).abs() > SAME_ERROR * half) {
+            values.push(value);
+        }
+    }
+    values
+}
