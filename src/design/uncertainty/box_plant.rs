@@ -20,6 +20,8 @@ const OFFSETS: [f64; 4] = [-1.0, -0.5, 0.5, 1.0];
 const ENDS: [f64; 2] = [-1.0, 1.0];
 /// Most nodes of all channels with [`OFFSETS`].
 const MAX_NODES: usize = 64;
+/// Most corners that are looked at.
+const MAX_CORNERS: usize = 64;
 /// Errors this close, relative to the half-width, are one node.
 const SAME_ERROR: f64 = 1e-9;
 
@@ -153,6 +155,47 @@ impl BoxPlant {
     /// The options of each channel.
     pub(super) fn options(&self) -> &[Vec<ChannelError>] {
         &self.options
+    }
+
+    /// Corners of the box: all, or [`MAX_CORNERS`] that differ from each other in half of the sides.
+    pub(super) fn corners(&self) -> Vec<Combination> {
+        let ends: Vec<Vec<usize>> = (0..self.options.len()).map(|i| self.ends(i)).collect();
+        let sides: u32 = ends.iter().map(|ends| ends.len().ilog2()).sum();
+        let are_few = sides <= MAX_CORNERS.ilog2();
+        let corners = if are_few { 1 << sides } else { MAX_CORNERS };
+        let upper = |corner: usize, side: usize| {
+            if are_few {
+                corner >> side & 1 == 1
+            } else {
+                // Rows of a Hadamard matrix and their opposites.
+                ((corner / 2) & side).count_ones().is_multiple_of(2) == (corner % 2 == 0)
+            }
+        };
+        let of_corner = |corner: usize| {
+            let mut side = 0;
+            let end = |ends: &Vec<usize>| {
+                let own = 0..ends.len().ilog2() as usize;
+                let index =
+                    own.clone().map(|bit| usize::from(upper(corner, side + bit)) << bit).sum::<usize>();
+                side += own.end;
+                ends[index]
+            };
+            ends.iter().map(end).collect()
+        };
+        (0..corners).map(of_corner).collect()
+    }
+
+    /// The options of a channel at the ends of all its sides: a power of two.
+    fn ends(&self, channel: usize) -> Vec<usize> {
+        let at_end = |value: f64, half: f64| half - value.abs() <= SAME_ERROR * half;
+        let is_end = |option: &ChannelError| {
+            let node = self.nodes[option.node];
+            at_end(node.delay.0, self.errors.delays[channel].0)
+                && at_end(node.cutoff, self.errors.cutoffs[channel])
+                && at_end(option.gain, self.errors.gains[channel])
+        };
+        let options = &self.options[channel];
+        (0..options.len()).filter(|&choice| is_end(&options[choice])).collect()
     }
 
     /// M.

@@ -29,9 +29,11 @@ const LEAST_STEP: f64 = 1e-9;
 /// Combinations that are carried from one frequency to the next.
 const CARRIED: usize = 3;
 /// Relative change of a gain at which the refinement of a peak ends.
-const FLAT_GAIN: f64 = 1e-8;
-/// Peaks that are followed between the nodes.
-const FOLLOWED: usize = 4;
+const FLAT_GAIN: f64 = 1e-6;
+/// Peaks that are followed between the nodes, and the share of the largest that they have at least. Robust
+/// banks have many that are nearly equal.
+const FOLLOWED: usize = 6;
+const NEAR_WORST: f64 = 0.9;
 /// Halvings of the distance of the nodes while a peak is followed, from a quarter of the half-width: a gain is flat at its
 /// peak.
 const HALVINGS: i32 = 6;
@@ -143,6 +145,7 @@ pub(in crate::design) struct BoxSearch {
     plant: BoxPlant,
     frequencies: Frequencies,
     responses: Vec<OnceCell<BoxResponse>>,
+    corners: Vec<Combination>,
 }
 
 impl BoxSearch {
@@ -157,7 +160,7 @@ impl BoxSearch {
     ) -> Result<Self, DesignError> {
         let frequencies = Frequencies::new(lags, &[plant.resonances()?, resonances].concat());
         let responses = frequencies.all.iter().map(|_| OnceCell::new()).collect();
-        Ok(Self { plant, frequencies, responses })
+        Ok(Self { corners: plant.corners(), plant, frequencies, responses })
     }
 
     /// The front ends.
@@ -185,19 +188,29 @@ impl BoxSearch {
         level: f64,
     ) -> Result<Peaks<Combination>, DesignError> {
         let found = self.sweep(filters, PRUNE_LEVEL * level)?;
-        let highest = |k: usize| found[k].first().map_or(0.0, |found| found.gain);
-        let frequency = |k: usize| self.frequencies.all[k];
-        let grid: Vec<Peak> =
-            (0..found.len()).map(|k| Peak { gain: highest(k), frequency: frequency(k) }).collect();
+        self.peaks_among(&found, filters, level)
+    }
+
+    /// The refined local maxima of what a sweep found.
+    fn peaks_among(
+        &self,
+        found: &[Vec<Found>],
+        filters: &MovingFilters,
+        level: f64,
+    ) -> Result<Peaks<Combination>, DesignError> {
+        let grid: Vec<Peak> = found
+            .iter()
+            .zip(&self.frequencies.all)
+            .map(|(found, &frequency)| Peak { gain: highest(found), frequency })
+            .collect();
         let mut peaks: Vec<LocatedPeak<Combination>> = Vec::new();
         for around in local_maxima(&grid).into_iter().filter(|[_, peak, _]| peak.gain > PRUNE_LEVEL * level) {
             let k = self.frequencies.all.partition_point(|omega| *omega < around[1].frequency);
-            for start in self.from_all_sides(&found[k], k, filters)? {
+            for start in self.exchanged(&found[k], k, filters)? {
                 let peak = self.refined(&start.combination, around, filters)?;
                 let location = Location { frequency: peak.frequency, scenario: start.combination };
-                let peak = LocatedPeak { gain: peak.gain, location };
-                if peak.gain > level && !peaks.contains(&peak) {
-                    peaks.push(peak);
+                if peak.gain > level {
+                    peaks.push(LocatedPeak { gain: peak.gain, location });
                 }
             }
         }
@@ -209,92 +222,93 @@ impl BoxSearch {
     /// frequencies are left out.
     fn sweep(&self, filters: &MovingFilters, level: f64) -> Result<Vec<Vec<Found>>, DesignError> {
         let mut all: Vec<Vec<Found>> = vec![Vec::new(); self.frequencies.all.len()];
-        let nominal = vec![0; self.plant.options().len()];
-        let mut carried = vec![nominal.clone()];
+        let mut carried = vec![vec![0; self.plant.options().len()]];
         for &k in &self.frequencies.first {
-            all[k] = self.climbed(&carried, k, filters)?;
-            carried = all[k].iter().take(CARRIED).map(|found| found.combination.clone()).collect();
-            carried.push(nominal.clone());
+            let at = filters.at(self.frequencies.all[k]);
+            let mut starts = self.worst_corners(self.response(k), &at)?;
+            starts.append(&mut carried);
+            all[k] = self.climbed(starts, k, &at)?;
+            carried = combinations(&all[k]);
         }
         for pair in self.frequencies.first.windows(2) {
-            let [low, high] = [&all[pair[0]], &all[pair[1]]];
-            if low.iter().chain(high).any(|found| found.gain >= level) {
-                let starts = low.iter().chain(high).map(|found| found.combination.clone());
-                let starts: Vec<Combination> = starts.collect();
+            let (low, high) = (&all[pair[0]], &all[pair[1]]);
+            if highest(low).max(highest(high)) >= level {
+                let starts = [combinations(low), combinations(high)].concat();
                 for k in pair[0] + 1..pair[1] {
-                    all[k] = self.climbed(&starts, k, filters)?;
+                    all[k] = self.climbed(starts.clone(), k, &filters.at(self.frequencies.all[k]))?;
                 }
             }
         }
         Ok(all)
     }
 
+    /// Some corners of the box: those of the largest gains among [`BoxPlant::corners`].
+    fn worst_corners(
+        &self,
+        response: &BoxResponse,
+        filters: &FiltersAt,
+    ) -> Result<Vec<Combination>, DesignError> {
+        let found = |corner: &Combination| {
+            Ok(Found { gain: self.gain(response, filters, corner)?, combination: corner.clone() })
+        };
+        let mut corners = self.corners.iter().map(found).collect::<Result<Vec<_>, DesignError>>()?;
+        corners.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        Ok(combinations(&corners))
+    }
+
     /// Where the climbs from `starts` end, the worst first.
     fn climbed(
         &self,
-        starts: &[Combination],
+        starts: Vec<Combination>,
         k: usize,
-        filters: &MovingFilters,
+        filters: &FiltersAt,
     ) -> Result<Vec<Found>, DesignError> {
-        let at = filters.at(self.frequencies.all[k]);
         let mut all: Vec<Found> = Vec::new();
         for start in starts {
-            let found = self.climb(self.response(k), &at, start.clone())?;
+            let found = climb(&self.plant, self.response(k), filters, start)?;
             if all.iter().all(|known| known.combination != found.combination) {
                 all.push(found);
             }
         }
         all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        all.truncate(CARRIED);
         Ok(all)
     }
 
-    /// The same from `found`, and from each of its channels with each of its errors alone.
-    fn from_all_sides(
+    /// The same from `found`, where no other error of a single channel has a larger gain.
+    fn exchanged(
         &self,
         found: &[Found],
         k: usize,
         filters: &MovingFilters,
     ) -> Result<Vec<Found>, DesignError> {
-        let mut starts: Vec<Combination> = found.iter().map(|found| found.combination.clone()).collect();
-        for (i, options) in self.plant.options().iter().enumerate() {
-            for choice in 0..options.len() {
-                let mut alone = vec![0; self.plant.options().len()];
-                alone[i] = choice;
-                starts.push(alone);
+        let (response, at) = (self.response(k), filters.at(self.frequencies.all[k]));
+        let mut starts = Vec::new();
+        for Found { mut gain, mut combination } in found.iter().cloned() {
+            for i in 0..combination.len() {
+                let mut best = combination[i];
+                for choice in 0..self.plant.options()[i].len() {
+                    combination[i] = choice;
+                    let other = self.gain(response, &at, &combination)?;
+                    if other > gain * (1.0 + LEAST_STEP) {
+                        (gain, best) = (other, choice);
+                    }
+                }
+                combination[i] = best;
             }
+            starts.push(combination);
         }
-        let mut all = self.climbed(&starts, k, filters)?;
-        all.truncate(CARRIED);
-        Ok(all)
+        self.climbed(starts, k, &at)
     }
 
-    /// A combination of locally largest gain, from `combination` on.
-    fn climb(
+    /// The gain of one combination.
+    fn gain(
         &self,
         response: &BoxResponse,
         filters: &FiltersAt,
-        mut combination: Combination,
-    ) -> Result<Found, DesignError> {
-        let mut gain = 0.0;
-        for _ in 0..MAX_STEPS {
-            let delay = |j: usize| self.plant.options()[j][combination[j]].delay.0;
-            let measured = self.plant.measurements(response, &combination);
-            let svd = linalg::svd(&(&response.references - filters.moved(delay) * measured))?;
-            if svd.s[0] <= gain * (1.0 + LEAST_STEP) {
-                break;
-            }
-            gain = svd.s[0];
-            let (left, right) = (svd.u.columns(0, 1).into_owned(), svd.v.columns(0, 1).into_owned());
-            let direction = Direction {
-                samples: &response.nodes * right,
-                nominal: left.ad_mul(&filters.nominal),
-                slopes: filters.slopes.iter().map(|(j, slope)| (*j, left.ad_mul(slope))).collect(),
-            };
-            if !direction.improve(&self.plant, &mut combination) {
-                break;
-            }
-        }
-        Ok(Found { gain, combination })
+        combination: &[usize],
+    ) -> Result<f64, DesignError> {
+        Ok(linalg::largest_singular_value(&self.plant.error(response, filters, combination))?)
     }
 
     /// The peak of one combination over the frequencies.
@@ -304,7 +318,11 @@ impl BoxSearch {
         around: [Peak; 3],
         filters: &MovingFilters,
     ) -> Result<Peak, DesignError> {
-        let at = |frequency: f64| gain_of(&self.plant, combination, filters, frequency);
+        let at = |frequency: f64| {
+            let response = self.plant.response(frequency);
+            let gain = self.gain(&response, &filters.at(frequency), combination)?;
+            Ok::<_, DesignError>(Peak { gain, frequency })
+        };
         let [low, middle, high] = around;
         let around = [at(low.frequency)?, at(middle.frequency)?, at(high.frequency)?];
         refine(at, around, FLAT_GAIN)
@@ -322,7 +340,9 @@ impl BoxSearch {
         &self,
         filters: &MovingFilters,
     ) -> Result<Vec<ErrorPoint>, DesignError> {
-        let mut peaks = self.peaks(filters, 0.0)?.peaks;
+        let found = self.sweep(filters, 0.0)?;
+        let most = found.iter().map(|found| highest(found)).fold(0.0, f64::max);
+        let mut peaks = self.peaks_among(&found, filters, NEAR_WORST * most)?.peaks;
         peaks.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let mut points: Vec<ErrorPoint> = Vec::new();
         for peak in peaks {
@@ -344,27 +364,56 @@ impl BoxSearch {
         let at = filters.at(frequency);
         for halving in 2..2 + HALVINGS {
             let near = self.plant.near(&point, 0.5f64.powi(halving))?;
-            let local = Self { plant: near, frequencies: Frequencies::new(1, &[]), responses: Vec::new() };
-            let start = vec![0; point.delays.len()];
-            let found = local.climb(&local.plant.response(frequency), &at, start)?;
-            point = local.plant.point(&found.combination);
+            let found = climb(&near, &near.response(frequency), &at, vec![0; point.delays.len()])?;
+            point = near.point(&found.combination);
         }
         Ok(point)
     }
 }
 
-/// The gain of a combination at a frequency.
-fn gain_of(
+impl BoxPlant {
+    /// K of a combination.
+    fn error(&self, response: &BoxResponse, filters: &FiltersAt, combination: &[usize]) -> CMat {
+        let moved = filters.moved(|j| self.options()[j][combination[j]].delay.0);
+        &response.references - moved * self.measurements(response, combination)
+    }
+}
+
+/// A combination of locally largest gain, from `combination` on.
+fn climb(
     plant: &BoxPlant,
-    combination: &[usize],
-    filters: &MovingFilters,
-    frequency: f64,
-) -> Result<Peak, DesignError> {
-    let response = plant.response(frequency);
-    let delay = |j: usize| plant.options()[j][combination[j]].delay.0;
-    let moved = filters.at(frequency).moved(delay);
-    let error = &response.references - moved * plant.measurements(&response, combination);
-    Ok(Peak { gain: linalg::largest_singular_value(&error)?, frequency })
+    response: &BoxResponse,
+    filters: &FiltersAt,
+    mut combination: Combination,
+) -> Result<Found, DesignError> {
+    let mut gain = 0.0;
+    for _ in 0..MAX_STEPS {
+        let svd = linalg::svd(&plant.error(response, filters, &combination))?;
+        if svd.s[0] <= gain * (1.0 + LEAST_STEP) {
+            break;
+        }
+        gain = svd.s[0];
+        let (left, right) = (svd.u.columns(0, 1).into_owned(), svd.v.columns(0, 1).into_owned());
+        let direction = Direction {
+            samples: &response.nodes * right,
+            nominal: left.ad_mul(&filters.nominal),
+            slopes: filters.slopes.iter().map(|(j, slope)| (*j, left.ad_mul(slope))).collect(),
+        };
+        if !direction.improve(plant, &mut combination) {
+            break;
+        }
+    }
+    Ok(Found { gain, combination })
+}
+
+/// The largest gain of combinations of which the worst comes first.
+fn highest(found: &[Found]) -> f64 {
+    found.first().map_or(0.0, |found| found.gain)
+}
+
+/// The first combinations.
+fn combinations(found: &[Found]) -> Vec<Combination> {
+    found.iter().take(CARRIED).map(|found| found.combination.clone()).collect()
 }
 
 /// u* F and H v for the singular vectors (u, v) of an error.
