@@ -81,6 +81,9 @@ struct ProofReport {
     /// Why there is no proof in the file.
     #[serde(skip_serializing_if = "Option::is_none")]
     unproven: Option<String>,
+    /// Why the proof does not cover the errors of the spec's `[uncertainty]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    box_unproven: Option<String>,
     #[serde(rename = "proof_seconds")]
     seconds: f64,
 }
@@ -90,8 +93,13 @@ impl ProofReport {
         Self {
             proven: design.proof.as_ref().ok().copied(),
             unproven: design.proof.as_ref().err().map(ToString::to_string),
+            box_unproven: design.box_unproven.as_ref().map(ToString::to_string),
             seconds: design.proof_time.as_secs_f64(),
         }
+    }
+
+    fn of_box(&self) -> Option<&str> {
+        self.box_unproven.as_deref()
     }
 
     fn text(&self) -> String {
@@ -155,8 +163,12 @@ impl<'a> Report<'a> {
             self.hint(),
             self.words.as_ref().map(Words::text).unwrap_or_default(),
             self.reduction.map(|reduction| order_text(reduction, self.method)).unwrap_or_default(),
-            self.robust.map(|study| robust_text(study, self.gamma.worst_case)).unwrap_or_default(),
-            self.tracking.map(|study| tracking_text(study, self.gamma.tracked)).unwrap_or_default(),
+            self.robust
+                .map(|study| robust_text(study, self.gamma.worst_case, self.proof.of_box()))
+                .unwrap_or_default(),
+            self.tracking
+                .map(|study| tracking_text(study, self.gamma.tracked, self.proof.of_box()))
+                .unwrap_or_default(),
             format!("designed in {:.1} ms, {}\n", self.seconds * 1e3, counted(self.iterations, "iteration")),
             self.proof.text(),
         ];

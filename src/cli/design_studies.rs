@@ -52,9 +52,9 @@ impl<'a> Words<'a> {
 const LEAST_ROBUST_GAIN: f64 = 0.01;
 
 /// The bank and the nominal one, without errors and at worst over the spec's uncertainty.
-pub(super) fn robust_text(study: &RobustStudy, proven: Option<f64>) -> String {
+pub(super) fn robust_text(study: &RobustStudy, proven: Option<f64>, unproven: Option<&str>) -> String {
     let RobustStudy { robust, nominal, lower, .. } = study;
-    let proven = at_most(proven);
+    let proven = at_most(proven, unproven);
     let advice = if study.gain() < LEAST_ROBUST_GAIN {
         " only: what helps is to know the channels better; measure them"
     } else {
@@ -77,7 +77,7 @@ pub(super) fn robust_text(study: &RobustStudy, proven: Option<f64>) -> String {
 }
 
 /// Taps that follow the delays, and taps that stay, over the spec's uncertainty.
-pub(super) fn tracking_text(study: &TrackingStudy, proven: Option<f64>) -> String {
+pub(super) fn tracking_text(study: &TrackingStudy, proven: Option<f64>, unproven: Option<&str>) -> String {
     let TrackingStudy { tracked, fixed, redesigned, ratio, least_ratio, .. } = study;
     let [worst, of_fixed, redesigned_worst] =
         [tracked.largest_found, fixed.largest_found, *redesigned].map(number);
@@ -87,7 +87,7 @@ pub(super) fn tracking_text(study: &TrackingStudy, proven: Option<f64>) -> Strin
          redesigned {redesigned_worst} for the delays where that was found: {:.3} % less\n\
          \x20          at all delays at most {:.3} % above what is within reach there; no affine taps: below {:.3} %\n\
          fixed      {of_fixed} is the largest found for the best taps that stay as they are\n",
-        at_most(proven),
+        at_most(proven, unproven),
         number(tracked.nominal),
         100.0 * study.excess(),
         percent(*ratio),
@@ -95,8 +95,13 @@ pub(super) fn tracking_text(study: &TrackingStudy, proven: Option<f64>) -> Strin
     )
 }
 
-fn at_most(proven: Option<f64>) -> String {
-    proven.map_or("not proven".to_owned(), |proven| format!("proven: at most {}", number(proven)))
+/// What is proven of the box, or why nothing is.
+fn at_most(proven: Option<f64>, unproven: Option<&str>) -> String {
+    match (proven, unproven) {
+        (Some(proven), _) => format!("proven: at most {}", number(proven)),
+        (None, Some(reason)) => format!("not proven: {reason}"),
+        (None, None) => "not proven".to_owned(),
+    }
 }
 
 /// Maximum number of rows of the table of orders; the report of `--json` has all of them.

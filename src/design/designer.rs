@@ -6,7 +6,7 @@ use super::limits::{Limits, Stage, Stop};
 use super::merging::Repeats;
 use super::methods::robust_fir::RobustStudy;
 use super::methods::scheduled_fir::TrackingStudy;
-use super::methods::{self, DualPoint, Settings, Synthesis};
+use super::methods::{self, DualSolution, Settings, Synthesis};
 use super::plant::LiftedPlant;
 use super::problem::Problem;
 use super::quantise::WordStudy;
@@ -16,8 +16,8 @@ use super::{DesignError, filters, prove, uncertainty};
 use crate::bank::{Bank, Gamma, SynthesisFilters};
 use crate::spec::{DesignSpec, Method, Spec, SpecProblem};
 use crate::units::RadiansPerSlowPeriod;
-use crate::verify::Verified;
 use crate::verify::uncertainty::{ErrorBox, Taps, keeps_within};
+use crate::verify::{Verified, VerifyError};
 use std::time::{Duration, Instant};
 
 /// A bank with the record of its design.
@@ -43,6 +43,8 @@ pub struct Design {
     pub tracking: Option<TrackingStudy>,
     /// The bounds that the bank's proof proves, or the reason why the bank carries no proof.
     pub proof: Result<Verified, DesignError>,
+    /// Why the proof does not cover the box of the spec's `[uncertainty]`, if it does not.
+    pub box_unproven: Option<DesignError>,
     /// Time that the search for the proof took.
     pub proof_time: Duration,
 }
@@ -143,7 +145,7 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
     let realised = Realised { filters, peak: synthesis.peak, rounding, reduction: None, integers: None };
     Ok(judge(&complete, complete.clone(), realised, &synthesis)
         .without_unresolved_bounds(&problem)
-        .proved(&[], search))
+        .proved(&DualSolution::default(), search))
 }
 
 /// The spec with all defaults filled in, its problem in normalised time, and the estimate of its design in
@@ -194,6 +196,7 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
         robust: synthesis.robust.clone(),
         tracking: synthesis.affine.as_ref().map(|affine| affine.study.clone()),
         proof: Err(DesignError::ProofSkipped),
+        box_unproven: None,
         proof_time: Duration::ZERO,
         bank,
     }
@@ -210,16 +213,13 @@ impl Design {
     }
 
     /// Adds the proof to the bank, if `search` asks for one and it is found.
-    fn proved(mut self, dual: &[DualPoint], search: ProofSearch) -> Self {
+    fn proved(mut self, dual: &DualSolution, search: ProofSearch) -> Self {
         if search == ProofSearch::Run {
             let begin = Instant::now();
             self.proof = prove::attach_proof(&mut self.bank, dual);
-            // `verify` proves it only with the rest.
-            if let (Some(study), Ok(_)) = (&self.robust, &self.proof) {
-                self.bank.gamma.worst_case = proven_worst_case(&self.bank, &study.errors, Taps::Fixed);
-            }
-            if let (Some(study), Ok(_)) = (&self.tracking, &self.proof) {
-                self.bank.gamma.tracked = proven_worst_case(&self.bank, &study.errors, Taps::Following);
+            if self.proof.is_ok() {
+                // `verify` proves it only with the rest.
+                self.prove_worst_case();
             }
             self.proof_time = begin.elapsed();
         }
@@ -227,15 +227,43 @@ impl Design {
     }
 }
 
+impl Design {
+    /// States the worst case over the box of the spec, or says why there is none.
+    fn prove_worst_case(&mut self) {
+        let mut gamma = self.bank.gamma;
+        let proven = if let Some(study) = &self.robust {
+            let proven = proven_worst_case(&self.bank, &study.errors, Taps::Fixed);
+            gamma.worst_case = proven.as_ref().ok().copied();
+            proven
+        } else if let Some(study) = &self.tracking {
+            let proven = proven_worst_case(&self.bank, &study.errors, Taps::Following);
+            gamma.tracked = proven.as_ref().ok().copied();
+            proven
+        } else {
+            return;
+        };
+        self.bank.gamma = gamma;
+        self.box_unproven = proven.err();
+    }
+}
+
 /// Accuracy of the proven end of the worst case, and the margin for the rounding of its number.
 const WORST_CASE_ACCURACY: f64 = 0.005;
 const STATED_ABOVE: f64 = 1e-9;
 
-/// A worst case over `errors` that `verify` proves; `None` if it does not.
-fn proven_worst_case(bank: &Bank, errors: &ErrorBox, taps: Taps) -> Option<f64> {
-    let found = uncertainty::worst_case(bank, errors, taps, WORST_CASE_ACCURACY).ok()?;
+/// A worst case over `errors` that `verify` proves.
+///
+/// # Errors
+/// As [`uncertainty::worst_case`]; [`VerifyError::WorstCase`] or [`VerifyError::Tracked`] if `verify` does
+/// not prove the number that was found.
+fn proven_worst_case(bank: &Bank, errors: &ErrorBox, taps: Taps) -> Result<f64, DesignError> {
+    let found = uncertainty::worst_case(bank, errors, taps, WORST_CASE_ACCURACY)?;
     let stated = found.upper * (1.0 + STATED_ABOVE);
-    keeps_within(bank, errors, taps, stated).ok()?.then_some(stated)
+    match (keeps_within(bank, errors, taps, stated)?, taps) {
+        (true, _) => Ok(stated),
+        (false, Taps::Fixed) => Err(VerifyError::WorstCase { stated }.into()),
+        (false, Taps::Following) => Err(VerifyError::Tracked { stated }.into()),
+    }
 }
 
 #[cfg(test)]

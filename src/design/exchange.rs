@@ -23,8 +23,8 @@
 use super::DesignError;
 use super::limits::Stop;
 use crate::linalg::{self, CMat};
-use crate::lmi::Settings;
-use crate::lmi::sampled::{self, MeanSquareObjective, Point, Problem, Taps};
+use crate::lmi::sampled::{self, Covered, LowerBound, MeanSquareObjective, Point, Problem, Taps};
+use crate::lmi::{LmiError, Outcome, Settings};
 
 /// Relative width of the interval `[lower, gamma]` at which the exchange ends.
 pub(crate) const GAMMA_ACCURACY: f64 = 5e-7;
@@ -145,6 +145,22 @@ pub(super) struct Candidate<S> {
     pub(super) peaks: Peaks<S>,
 }
 
+/// The solution on the points.
+struct Round<S> {
+    candidate: Candidate<S>,
+    /// The locations of the peaks that belong among the points.
+    above: Vec<Location<S>>,
+    outcome: Outcome,
+}
+
+/// What an exchange says of all unknowns.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct DualSolution {
+    pub(crate) points: Vec<DualPoint>,
+    /// The lower bound that they give, for unknowns of any size that matters.
+    pub(crate) bound: f64,
+}
+
 /// A frequency with the dual matrix of the error there.
 #[derive(Debug, Clone)]
 pub(crate) struct DualPoint {
@@ -164,8 +180,10 @@ pub(super) struct Exchange<E: AffineError> {
     /// Added points have the weight zero.
     objective: MeanSquareObjective,
     gamma_margin: f64,
-    /// Lower bound on gamma for all unknowns.
+    /// Lower bound on gamma for all unknowns, or for those of any size that matters ([`Covered`]).
     pub(super) lower: f64,
+    /// The largest lower bound for all unknowns, however large.
+    pub(super) lower_for_all: f64,
     /// The dual matrices that prove `lower`.
     pub(super) dual: Vec<DualPoint>,
     /// Ends the exchange between two rounds, with the best unknowns so far.
@@ -196,8 +214,19 @@ impl<E: AffineError> Exchange<E> {
             frequencies.zip(scenarios).map(|(frequency, scenario)| Location { frequency, scenario });
         let locations = located.collect();
         let gamma_margin = gamma_margin.max(LEAST_MARGIN);
-        let (lower, dual, stop, rounds, iterations) = (0.0, Vec::new(), Stop::default(), 0, 0);
-        Ok(Self { error, problem, locations, objective, gamma_margin, lower, dual, stop, rounds, iterations })
+        Ok(Self {
+            error,
+            problem,
+            locations,
+            objective,
+            gamma_margin,
+            lower: 0.0,
+            lower_for_all: 0.0,
+            dual: Vec::new(),
+            stop: Stop::default(),
+            rounds: 0,
+            iterations: 0,
+        })
     }
 
     /// The error that is minimised.
@@ -262,44 +291,40 @@ impl<E: AffineError> Exchange<E> {
 
     fn minimise_gamma(&mut self, tolerances: Tolerances) -> Result<Candidate<E::Scenario>, DesignError> {
         let mut tolerance = tolerances.tolerance(f64::INFINITY);
-        let (mut best, mut above) = self.round(tolerances, tolerance)?;
+        let mut last = self.round(tolerances, tolerance)?;
+        let mut best = last.candidate.clone();
         for _ in 1..tolerances.rounds {
             let gamma = best.peaks.estimate;
             if gamma <= self.lower * (1.0 + tolerances.accuracy) || self.stop.is_due() {
                 break;
             }
-            // Without a peak to add it is the problem on the points that is not solved closely enough.
-            let added = self.add(&above)?;
-            if !added && tolerance <= tolerances.finest() {
+            // Without a peak to add it is the problem on the points that is not solved closely enough. If
+            // it cannot be, that is the end.
+            let added = self.add(&last.above)?;
+            if !added && (last.outcome != Outcome::Solved || tolerance <= tolerances.finest()) {
                 break;
             }
             tolerance = tolerances.tolerance(if added { gamma / self.lower - 1.0 } else { 0.0 });
-            let (candidate, peaks) = self.round(tolerances, tolerance)?;
-            above = peaks;
-            if candidate.peaks.estimate < best.peaks.estimate {
-                best = candidate;
+            last = self.round(tolerances, tolerance)?;
+            if last.candidate.peaks.estimate < best.peaks.estimate {
+                best = last.candidate.clone();
             }
         }
         Ok(best)
     }
 
-    /// Solves the problem on the points. Returns the unknowns and the locations of the peaks that belong
-    /// among the points.
-    fn round(
-        &mut self,
-        tolerances: Tolerances,
-        tolerance: f64,
-    ) -> Result<(Candidate<E::Scenario>, Vec<Location<E::Scenario>>), DesignError> {
+    /// Solves the problem on the points.
+    fn round(&mut self, tolerances: Tolerances, tolerance: f64) -> Result<Round<E::Scenario>, DesignError> {
         let settings = Settings { tol_gap_rel: tolerance, ..Settings::SAMPLED };
         let solution = sampled::minimise(&self.problem, &settings)?;
         self.count_round(solution.iterations);
-        self.raise_lower_bound(solution.lower.value, solution.dual);
+        self.raise_lower_bound(solution.lower, solution.dual);
         // The optimum lies anywhere between the two.
         let optimum = if tolerance > tolerances.finest() { self.lower } else { solution.gamma };
         let level = optimum * (1.0 + PEAK_EXCESS * tolerances.accuracy);
         let candidate = self.judge(solution.taps, solution.gamma, level)?;
         let above = candidate.peaks.above(level);
-        Ok((candidate, above))
+        Ok(Round { candidate, above, outcome: solution.outcome })
     }
 
     /// Leaves out the added points where the gain of `start` is below a share of its gamma. If the secondary
@@ -346,8 +371,12 @@ impl<E: AffineError> Exchange<E> {
                 &start.taps,
                 &settings,
             );
-            // There is nothing to gain if gamma is zero or the iteration stalls.
-            let Ok(found) = found else { break };
+            let found = match found {
+                Ok(found) => found,
+                // Gamma is zero up to rounding, so no cap lies above it, and no other unknowns are better.
+                Err(LmiError::Cap { .. }) => break,
+                Err(error) => return Err(error.into()),
+            };
             self.count_round(found.iterations);
             let candidate = self.judge(found.taps, found.gamma, cap_at_points)?;
             if candidate.peaks.estimate <= cap {
@@ -365,9 +394,12 @@ impl<E: AffineError> Exchange<E> {
         Ok(Candidate { taps, peaks })
     }
 
-    fn raise_lower_bound(&mut self, lower: f64, dual: Vec<CMat>) {
-        if lower > self.lower {
-            self.lower = lower;
+    fn raise_lower_bound(&mut self, lower: LowerBound, dual: Vec<CMat>) {
+        if lower.covered == Covered::All {
+            self.lower_for_all = self.lower_for_all.max(lower.value);
+        }
+        if lower.value > self.lower {
+            self.lower = lower.value;
             let weights = self.problem.points().iter().zip(dual);
             self.dual = weights.map(|(point, weight)| DualPoint { omega: point.omega, weight }).collect();
         }

@@ -9,7 +9,7 @@
 use super::{GAMMA_ACCURACY, Settings, Synthesis, tap_lags};
 use crate::design::DesignError;
 use crate::design::error_grid::ErrorGrid;
-use crate::design::exchange::{Exchange, LEAST_MARGIN, Location};
+use crate::design::exchange::{DualSolution, Exchange, LEAST_MARGIN, Location};
 use crate::design::filters::impulse_responses;
 use crate::design::plant::LiftedPlant;
 use crate::lmi::sampled::{MeanSquareObjective, Problem};
@@ -32,8 +32,9 @@ const MISSED_PEAK_LIMIT: usize = 8;
 pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
     let mut exchange = exchange(plant, settings)?;
     let best = least_gamma(plant, settings.taps, &mut exchange)?;
-    let found = Synthesis::of_least_gamma(plant, best.taps, best.peak, exchange.lower)?;
-    Ok(Synthesis { dual: exchange.dual, iterations: exchange.iterations, ..found })
+    let found = Synthesis::of_least_gamma(plant, best.taps, best.peak, exchange.lower_for_all)?;
+    let dual = DualSolution { points: exchange.dual, bound: exchange.lower };
+    Ok(Synthesis { dual, iterations: exchange.iterations, ..found })
 }
 
 /// The taps of [`synthesise`] alone.

@@ -274,7 +274,7 @@ impl<'a> GammaIteration<'a> {
             peak,
             lower: self.lower.min(peak.gain),
             noncausal: self.noncausal.gain.min(peak.gain),
-            dual: Vec::new(),
+            dual: super::DualSolution::default(),
             iterations: self.trials,
             robust: None,
             affine: None,

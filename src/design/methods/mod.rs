@@ -25,7 +25,7 @@ pub(crate) mod scenarios;
 pub(crate) mod scheduled_fir;
 
 use super::DesignError;
-pub(crate) use super::exchange::{DualPoint, GAMMA_ACCURACY};
+pub(crate) use super::exchange::{DualPoint, DualSolution, GAMMA_ACCURACY};
 use super::limits::Stop;
 use super::plant::LiftedPlant;
 use super::problem::Problem;
@@ -96,8 +96,9 @@ pub(crate) struct Synthesis {
     pub(crate) lower: f64,
     /// Lower bound of the norm over all filters of any latency. At most `peak.gain`.
     pub(crate) noncausal: f64,
-    /// For `fir` the dual solution, which gives `lower`; else empty.
-    pub(crate) dual: Vec<DualPoint>,
+    /// For `fir` the dual solution, else empty. Its bound may be above `lower`, but taps of any size are not
+    /// covered then: `verify` decides.
+    pub(crate) dual: DualSolution,
     /// Number of interior-point iterations or of Riccati equations solved.
     pub(crate) iterations: usize,
     /// For a robust design.
@@ -122,7 +123,7 @@ impl Synthesis {
     ) -> Result<Self, DesignError> {
         let noncausal = plant.noncausal_bound()?.gain.min(peak.gain);
         let filters = Filters::Fir(taps);
-        let (dual, iterations) = (Vec::new(), 0);
+        let (dual, iterations) = (DualSolution::default(), 0);
         let lower = lower.min(peak.gain).max(noncausal);
         Ok(Self { filters, peak, lower, noncausal, dual, iterations, robust: None, affine: None })
     }

@@ -92,8 +92,7 @@ fn study_of(nominal: &Synthesis, taps: &[Vec<f64>], search: &BoxSearch) -> Resul
     let worst = worst_of(search, taps)?;
     // Whatever the taps, each combination of errors alone has the error that no bank avoids.
     let unavoidable = search.plant().moved(&worst.point)?.noncausal_bound()?.gain;
-    let norms =
-        RobustNorms { nominal: nominal.peak.gain, largest_found: worst.peak.gain.max(nominal.peak.gain) };
+    let norms = RobustNorms { nominal: nominal.peak.gain, largest_found: worst.peak.gain };
     Ok(RobustStudy {
         errors: search.plant().errors.clone(),
         robust: norms,
@@ -112,13 +111,16 @@ pub(super) struct WorstErrors {
 
 /// The largest norm found of the taps over the box.
 pub(super) fn worst_of(search: &BoxSearch, taps: &[Vec<f64>]) -> Result<WorstErrors, DesignError> {
-    let points = search.worst_points(&MovingFilters::fixed(polyphase(taps, search.plant().ratio())))?;
+    let filters = MovingFilters::fixed(polyphase(taps, search.plant().ratio()));
     let norm = |point: ErrorPoint| {
         let peak = search.plant().moved(&point)?.fir_norm(taps)?;
         Ok::<_, DesignError>(WorstErrors { point, peak })
     };
-    let norms = points.into_iter().map(norm).collect::<Result<Vec<_>, _>>()?;
-    norms.into_iter().max_by(|a, b| a.peak.gain.total_cmp(&b.peak.gain)).ok_or(DesignError::NoTaps)
+    let without_errors = norm(ErrorPoint::none(taps.len()))?;
+    search.worst_points(&filters)?.into_iter().try_fold(without_errors, |worst, point| {
+        let other = norm(point)?;
+        Ok(if other.peak.gain > worst.peak.gain { other } else { worst })
+    })
 }
 
 /// Taps of least norm over the box.
@@ -141,27 +143,24 @@ fn least_worst_norm(
     settings: &Settings,
 ) -> Result<RobustTaps, DesignError> {
     let mut exchange = exchange(plant, search, settings)?;
-    let (mut best, mut least) = (None, f64::INFINITY);
-    for _ in 0..MISSED_ERROR_LIMIT {
+    let mut rounds = 0;
+    let (taps, largest_found) = loop {
         let found = exchange.optimise_at(Tolerances::gradual(ACCURACY))?;
         let taps = impulse_responses(&found.taps, settings.taps);
         let worst = worst_of(&exchange.error().search, &taps)?;
-        let known = found.peaks.estimate.max(exchange.lower);
-        if worst.peak.gain < least {
-            (best, least) = (Some(taps), worst.peak.gain);
-        }
-        if worst.peak.gain <= known * (1.0 + ACCURACY) || exchange.stop.is_due() {
-            break;
+        let enough = found.peaks.estimate.max(exchange.lower) * (1.0 + ACCURACY);
+        rounds += 1;
+        if worst.peak.gain <= enough || rounds == MISSED_ERROR_LIMIT || exchange.stop.is_due() {
+            break (taps, worst.peak.gain);
         }
         let scenario = exchange.error_mut().search.include(&worst.point)?;
         if !exchange.add(&[Location { frequency: worst.peak.frequency, scenario }])? {
-            break;
+            break (taps, worst.peak.gain);
         }
-    }
-    let taps = best.ok_or(DesignError::NoTaps)?;
+    };
     let peak = plant.fir_norm(&taps)?;
-    let norms = RobustNorms { nominal: peak.gain, largest_found: least.max(peak.gain) };
-    let (lower, iterations) = (exchange.lower, exchange.iterations);
+    let norms = RobustNorms { nominal: peak.gain, largest_found };
+    let (lower, iterations) = (exchange.lower_for_all, exchange.iterations);
     let pairs = exchange.locations().len();
     let mut scenarios: Vec<_> = exchange.locations().iter().map(|location| &location.scenario).collect();
     scenarios.sort();

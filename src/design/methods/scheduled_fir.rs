@@ -106,7 +106,8 @@ pub(crate) fn synthesise(
         fixed: RobustNorms { nominal: fixed.peak.gain, largest_found: of_fixed },
         redesigned,
         ratio: found.ratio,
-        least_ratio: exchange.lower.min(found.ratio),
+        // Without errors, affine taps are fixed ones.
+        least_ratio: exchange.lower_for_all.max(fixed.lower / reach.without_errors()).min(found.ratio),
         scenarios: exchange.error().scenarios().len() - 1,
         pairs: exchange.locations().len(),
     };

@@ -7,7 +7,7 @@
 //! strongest; double precision loses them, but they lower the sum. They raise the error between the
 //! frequencies, so in 512 bits the energy of the error for a faint white input is added to the sum.
 
-use super::{SHORTFALL, witness};
+use super::witness;
 use crate::arithmetic::{BigFloat, Number, dense};
 use crate::bank::{Bank, CausalWitness, DualWitness, LowerProof, SynthesisFilters};
 use crate::design::merging::Repeats;
@@ -51,18 +51,19 @@ const SHORT_BISECTIONS: usize = 24;
 /// Maximum number of bisections in 512-bit arithmetic.
 const LONG_BISECTIONS: usize = 6;
 
-/// A proof of a lower bound within `interval`: by the dual solution of an FIR design, or else by a finite
+/// A proof of a lower bound within `interval`, of `wanted` if that is known: by the dual solution of an FIR design, or else by a finite
 /// horizon over which every causal bank has a larger error.
 pub(super) fn lower_proof(
     error: &EnclosedErrorSystem<'_>,
     bank: &Bank,
     dual: &[DualPoint],
+    wanted: Option<f64>,
     interval: (f64, f64),
 ) -> Result<Option<LowerProof>, DesignError> {
     let bound = bank.method == Method::Fir && !dual.is_empty();
     let mut witnesses = if bound { binding_witnesses(bank, dual)? } else { Vec::new() };
     let mut reached = error.fir_bound(&witnesses).unwrap_or(0.0);
-    let suffices = |reached: f64| bank.gamma.lower.is_none_or(|stated| reached >= stated * (1.0 - SHORTFALL));
+    let suffices = |reached: f64| wanted.is_none_or(|wanted| reached >= wanted);
     for ridge in RIDGES.into_iter().filter(|_| bound) {
         if suffices(reached) {
             break;

@@ -5,7 +5,7 @@ mod lower;
 mod upper;
 
 use super::merging::Repeats;
-use super::methods::DualPoint;
+use super::methods::DualSolution;
 use super::plant::LiftedPlant;
 use super::{DesignError, analysis};
 use crate::bank::{Bank, DualWitness, Gamma, Proof};
@@ -53,14 +53,17 @@ pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {
 /// # Errors
 /// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found;
 /// [`DesignError::Verify`] if the proof refutes a gamma of the bank.
-pub(crate) fn prove(bank: &Bank, dual: &[DualPoint]) -> Result<(Proof, Verified), DesignError> {
+pub(crate) fn prove(bank: &Bank, dual: &DualSolution) -> Result<(Proof, Verified), DesignError> {
     let error = EnclosedErrorSystem::new(bank)?;
     let upper = certificate(&error, bank)?;
     let witness = noncausal_witness(bank)?;
     let noncausal = error.noncausal_bound(&witness);
     let above = noncausal.unwrap_or(0.0);
-    let explained = bank.gamma.lower.is_some_and(|stated| above >= stated * (1.0 - SHORTFALL));
-    let lower = if explained { None } else { lower_proof(&error, bank, dual, (above, upper.gamma))? };
+    // What the noncausal bound does not explain is looked for.
+    let wanted = bank.gamma.lower.map(|stated| stated.max(dual.bound) * (1.0 - SHORTFALL));
+    let explained = wanted.is_some_and(|wanted| above >= wanted);
+    let interval = (above, upper.gamma);
+    let lower = if explained { None } else { lower_proof(&error, bank, &dual.points, wanted, interval)? };
     let proof = Proof { upper: Some(upper), lower, noncausal: noncausal.map(|_| witness) };
     let verified = error.judge(&proof, Strictness::NotRefuted)?;
     Ok((proof, verified))
@@ -70,7 +73,7 @@ pub(crate) fn prove(bank: &Bank, dual: &[DualPoint]) -> Result<(Proof, Verified)
 ///
 /// # Errors
 /// As [`prove`]; `bank` is then unchanged.
-pub(crate) fn attach_proof(bank: &mut Bank, dual: &[DualPoint]) -> Result<Verified, DesignError> {
+pub(crate) fn attach_proof(bank: &mut Bank, dual: &DualSolution) -> Result<Verified, DesignError> {
     let (proof, verified) = prove(bank, dual)?;
     let stated = |proven: f64| Some(proven * (1.0 - STATED_BELOW));
     bank.gamma = Gamma {

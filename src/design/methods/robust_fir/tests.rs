@@ -213,3 +213,81 @@ fn peaks_beside_narrow_resonances_are_found() {
         "{study:?}"
     );
 }
+
+/// Three channels of which delay, gain and cut-off may be off: 512 corners. None of them, and no point that
+/// was drawn between them, is worse than what the study found, neither for the robust nor for the nominal
+/// bank.
+#[test]
+fn no_corner_is_worse_than_what_was_found() {
+    let text = "fast_period = 1.0\nratio = 2\nlatency = 1\n\
+        target = { filter = { family = \"butterworth\", order = 2, cutoff = 0.3241174 } }\n\
+        channel = [{ delay = 2.11980597 }, { delay = 2.45670999 }, { delay = 2.364508 }]\n\
+        design = { method = \"fir\", taps = 6 }\n\
+        [uncertainty]\ndelay = [0.02518, 0.047507, 0.0625434]\ngain = [0.0242652, 0.0432963, 0.0166312]\n\
+        cutoff = [0.0036178, 0.0597556, 0.0032301]\nreference = 0\n";
+    let spec = Spec::from_toml(text, "spec.toml").unwrap();
+    let robust = design(&spec, &Options::without_proof()).unwrap();
+    let nominal = design(&Spec { uncertainty: None, ..spec.clone() }, &Options::without_proof()).unwrap();
+    let study = robust.robust.unwrap();
+    let errors = study.errors.clone();
+    let mut random = Random(3);
+    for sample in 0..600 {
+        let mut share = |side: usize| match sample {
+            0..512 => f64::from((sample >> side & 1) * 2 - 1),
+            _ => random.sample(),
+        };
+        let point = ErrorPoint {
+            delays: (0..3).map(|i| errors.delays[i] * share(i)).collect(),
+            gains: (0..3).map(|i| errors.gains[i] * share(3 + i)).collect(),
+            cutoffs: (0..3).map(|i| errors.cutoffs[i] * share(6 + i)).collect(),
+        };
+        for (bank, found) in [(&robust.bank, study.robust), (&nominal.bank, study.nominal)] {
+            let (norm, _) = norm_at(bank, &point, Taps::Fixed).unwrap();
+            assert!(norm <= found.largest_found * (1.0 + 1e-4), "{point:?}: {norm} {found:?}");
+        }
+    }
+}
+
+/// What a robust design wins over the bank that takes the errors for zero, in per cent of its largest gain:
+/// the table of docs/uncertainty.md, with HYBANK_SLOW set. Without it, one row of it.
+#[test]
+fn robust_designs_pay_where_the_taps_amplify() {
+    let filters = [
+        "family = \"butterworth\", order = 4, cutoff = 0.2",
+        "family = \"chebyshev1\", order = 5, cutoff = 0.3, ripple_db = 0.5",
+        "family = \"elliptic\", order = 5, cutoff = 0.4, ripple_db = 0.5, attenuation_db = 50.0",
+    ];
+    let rows = if trials::is_slow("all rows of the table of what robust designs win") { 3 } else { 1 };
+    for filter in &filters[..rows] {
+        for (ratio, channels) in [(2, 2), (3, 3), (1, 2), (2, 3)] {
+            let wins: Vec<f64> = [(8, 0.01), (8, 0.1), (24, 0.01), (24, 0.1)]
+                .into_iter()
+                .map(|(taps, delay)| {
+                    let delays = (0..channels).map(|i| {
+                        let place = (i as f64 + 0.1 * (i * i) as f64) * ratio as f64 / channels as f64;
+                        format!("{{ delay = {place} }}")
+                    });
+                    let text = format!(
+                        "fast_period = 1.0\nratio = {ratio}\nlatency = {}\n\
+                         target = {{ filter = {{ {filter} }} }}\nchannel = [{}]\n\
+                         design = {{ method = \"fir\", taps = {taps} }}\n\
+                         uncertainty = {{ delay = {delay}, gain = {delay} }}\n",
+                        taps / 2,
+                        delays.collect::<Vec<_>>().join(", "),
+                    );
+                    let spec = Spec::from_toml(&text, "spec.toml").unwrap();
+                    let study = design(&spec, &Options::without_proof()).unwrap().robust.unwrap();
+                    assert!(study.gain() >= 0.0 && study.lower <= study.robust.largest_found, "{study:?}");
+                    100.0 * study.gain()
+                })
+                .collect();
+            println!("{filter} | ratio {ratio}, {channels} channels | {wins:.1?}");
+            // As many samples as the output has leave nothing to amplify with; a channel more does.
+            let most = wins.iter().copied().fold(0.0, f64::max);
+            assert!(
+                if channels > ratio { most > 10.0 } else { most < 10.0 },
+                "{filter} {ratio} {channels} {wins:?}"
+            );
+        }
+    }
+}
