@@ -51,8 +51,8 @@ const SHORT_BISECTIONS: usize = 24;
 /// Maximum number of bisections in 512-bit arithmetic.
 const LONG_BISECTIONS: usize = 6;
 
-/// A proof of a lower bound within `interval`, of `wanted` if that is known: by the dual solution of an FIR design, or else by a finite
-/// horizon over which every causal bank has a larger error.
+/// A proof of a lower bound within `interval`, of `wanted` if that is known: by the dual solution of an FIR
+/// design, or else by a finite horizon over which every causal bank has a larger error.
 pub(super) fn lower_proof(
     error: &EnclosedErrorSystem<'_>,
     bank: &Bank,

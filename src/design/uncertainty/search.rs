@@ -34,8 +34,8 @@ const FLAT_GAIN: f64 = 1e-6;
 /// banks have many that are nearly equal.
 const FOLLOWED: usize = 6;
 const NEAR_WORST: f64 = 0.9;
-/// Halvings of the distance of the nodes while a peak is followed, from a quarter of the half-width: a gain is flat at its
-/// peak.
+/// Halvings of the distance of the nodes while a peak is followed, from a quarter of the half-width: a gain
+/// is flat at its peak.
 const HALVINGS: i32 = 6;
 
 /// The norm of `bank` with the errors of `point`, and the frequency of its peak, with fixed or with
