@@ -301,8 +301,8 @@ impl Sides {
         Exchange::new(grid, problem, scenarios, MeanSquareObjective { weights, noise }, margin)
     }
 
-    /// Some points of each scenario with their weights and their scenarios: the scenarios take turns, so that
-    /// there are about as many points as for the centre and the ends of each side alone.
+    /// Some points of each scenario with their weights and their scenarios: the scenarios take turns, so
+    /// that there are about as many points as for the centre and the ends of each side alone.
     fn first_points(&self, grid: &ErrorGrid<'_>) -> (Vec<Point>, Vec<f64>, Vec<usize>) {
         let count = grid.scenarios().len();
         let stride = count.div_ceil(2 * self.channels.len() + 1);

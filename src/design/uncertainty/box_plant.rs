@@ -1,9 +1,9 @@
 //! One plant for all errors of a box.
 //!
 //! Row i of H depends on the errors of channel i alone. So one lifted plant whose measurements are the
-//! samples of every channel with several errors, its nodes, holds the rows of all combinations of nodes, with
-//! one input for all. Errors of gains are factors of rows. No other plant is lifted while the worst combination
-//! is searched.
+//! samples of every channel with several errors, its nodes, holds the rows of all combinations of nodes,
+//! with one input for all. Errors of gains are factors of rows. No other plant is lifted while the worst
+//! combination is searched.
 
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
