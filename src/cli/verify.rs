@@ -61,6 +61,9 @@ struct Report {
     /// No delays within the spec's uncertainty make gamma larger while the taps follow them.
     #[serde(skip_serializing_if = "Option::is_none")]
     tracked: Option<f64>,
+    /// The file has tap slopes and states nothing that could be proven of them.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    unproven_slopes: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
@@ -81,6 +84,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         words: words(&bank),
         worst_case: bank.gamma.worst_case,
         tracked: bank.gamma.tracked,
+        unproven_slopes: bank.tap_slopes.is_some() && bank.gamma.tracked.is_none(),
         bank: file,
         verified,
         digest,
@@ -117,6 +121,19 @@ impl Report {
         }
     }
 
+    fn tracked_line(&self) -> String {
+        match self.tracked {
+            Some(bound) => {
+                format!("tracked    {}   no delays within it do while the taps follow them\n", number(bound))
+            }
+            None if self.unproven_slopes => {
+                "tracked    not proven: the file states no gamma.tracked, so its tap_slopes may be anything\n"
+                    .to_owned()
+            }
+            None => String::new(),
+        }
+    }
+
     fn text(&self) -> String {
         let Verified { lower, upper, attained, noncausal, states, .. } = self.verified;
         let origin = if self.certificate_in_file { "from the file" } else { "found now, the file has none" };
@@ -144,9 +161,7 @@ impl Report {
                     number(bound)
                 )
             }),
-            self.tracked.map_or_else(String::new, |bound| {
-                format!("tracked    {}   no delays within it do while the taps follow them\n", number(bound))
-            }),
+            self.tracked_line(),
             self.words,
         )
     }

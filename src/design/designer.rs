@@ -16,7 +16,7 @@ use super::{DesignError, filters, prove, uncertainty};
 use crate::bank::{Bank, Gamma, SynthesisFilters};
 use crate::spec::{DesignSpec, Method, Spec, SpecProblem};
 use crate::units::RadiansPerSlowPeriod;
-use crate::verify::uncertainty::{ErrorBox, Taps, keeps_within};
+use crate::verify::uncertainty::{ErrorBox, Taps, certifies};
 use crate::verify::{Verified, VerifyError};
 use std::time::{Duration, Instant};
 
@@ -236,7 +236,7 @@ impl Design {
             gamma.worst_case = proven.as_ref().ok().copied();
             proven
         } else if let Some(study) = &self.tracking {
-            let proven = proven_worst_case(&self.bank, &study.errors, Taps::Following);
+            let proven = proven_worst_case(&self.bank, &study.errors, Taps::Scheduled);
             gamma.tracked = proven.as_ref().ok().copied();
             proven
         } else {
@@ -259,10 +259,10 @@ const STATED_ABOVE: f64 = 1e-9;
 fn proven_worst_case(bank: &Bank, errors: &ErrorBox, taps: Taps) -> Result<f64, DesignError> {
     let found = uncertainty::worst_case(bank, errors, taps, WORST_CASE_ACCURACY)?;
     let stated = found.upper * (1.0 + STATED_ABOVE);
-    match (keeps_within(bank, errors, taps, stated)?, taps) {
+    match (certifies(bank, errors, taps, stated)?, taps) {
         (true, _) => Ok(stated),
         (false, Taps::Fixed) => Err(VerifyError::WorstCase { stated }.into()),
-        (false, Taps::Following) => Err(VerifyError::Tracked { stated }.into()),
+        (false, Taps::Scheduled) => Err(VerifyError::Tracked { stated }.into()),
     }
 }
 

@@ -15,7 +15,7 @@
 //! fixed-point smoothing).
 
 use super::DesignError;
-use super::lifting::{JointState, SAME_INSTANT};
+use super::lifting::JointState;
 use super::problem::{Channel, Problem};
 use crate::linalg::{self, Mat};
 use crate::lti::gramian::controllability_root;
@@ -143,7 +143,7 @@ impl<'a> History<'a> {
         let ends = sources.iter().skip(1).map(|slot| slot.0).chain([ratio as f64]).collect::<Vec<_>>();
         let slot = |(&(phase, source), end): (&(f64, Source), f64)| {
             let length = end - phase;
-            let segment = (length >= SAME_INSTANT).then(|| joint.over(length)).transpose()?;
+            let segment = (length >= problem.resolution()).then(|| joint.over(length)).transpose()?;
             Ok(Slot { source, segment })
         };
         let slots = sources.iter().zip(ends).map(slot).collect::<Result<_, DesignError>>()?;

@@ -20,10 +20,6 @@ use crate::lti::StateSpace;
 use crate::lti::exponential::{StateTransition, gramian_root};
 use std::ops::Range;
 
-/// Instants closer than this (in fast periods) are treated as equal. It is far below the resolution of any
-/// converter and far above the rounding error of delay / period.
-pub(super) const SAME_INSTANT: f64 = 1e-11;
-
 /// The lifted analysis side.
 #[derive(Debug, Clone)]
 pub(super) struct Lifted {
@@ -90,16 +86,23 @@ fn schedule(problem: &Problem) -> Vec<SamplingInstant> {
     let references = (0..problem.ratio).map(|p| (target, p as f64 - problem.latency as f64));
     let times: Vec<((usize, f64), f64)> = measurements.chain(references).collect();
     let latest = times.iter().map(|&(_, time)| time).fold(f64::NEG_INFINITY, f64::max);
-    times.iter().map(|&(what, time)| before_the_end(what, latest - time, period)).collect()
+    let resolution = problem.resolution();
+    let scheduled = |&((front_end, gain), time): &((usize, f64), f64)| {
+        let (time, delay) = before_the_end(latest - time, period, resolution);
+        SamplingInstant { front_end, gain, time, delay, slope: false }
+    };
+    times.iter().map(scheduled).collect()
 }
 
-/// The instant that lies `age` fast periods before the end of the slow period.
-fn before_the_end((front_end, gain): (usize, f64), age: f64, period: f64) -> SamplingInstant {
+/// The time in the slow period, and the whole slow periods of delay, of the instant that lies `age` fast periods
+/// before the end of the period.
+fn before_the_end(age: f64, period: f64, resolution: f64) -> (f64, usize) {
     let nearest = (age / period).round();
-    let on_a_boundary = (age - nearest * period).abs() < SAME_INSTANT;
-    let delay = if on_a_boundary { nearest } else { (age / period).floor() };
-    let time = if on_a_boundary { period } else { period - (age - delay * period) };
-    SamplingInstant { front_end, gain, time, delay: delay as usize, slope: false }
+    if (age - nearest * period).abs() < resolution {
+        return (period, nearest as usize);
+    }
+    let delay = (age / period).floor();
+    (period - (age - delay * period), delay as usize)
 }
 
 /// Propagates the joint analog state through one period. The outputs of the returned system are the
@@ -109,20 +112,20 @@ fn follow_state(problem: &Problem, instants: &[SamplingInstant]) -> Result<State
     let mut order: Vec<usize> = (0..instants.len()).collect();
     order.sort_by(|&i, &j| instants[i].time.total_cmp(&instants[j].time));
     let mut rows = vec![(Mat::zeros(1, 0), Mat::zeros(1, 0)); instants.len()];
-    let mut now = 0.0;
+    let (mut now, resolution) = (0.0, problem.resolution());
     let mut state = Mat::identity(joint.order(), joint.order());
     let mut input = Mat::zeros(joint.order(), 0);
     for index in order {
         let SamplingInstant { front_end, gain, time, slope, .. } = instants[index];
-        if time - now >= SAME_INSTANT {
+        if time - now >= resolution {
             (state, input) = joint.advance(&state, &input, time - now)?;
             now = time;
         }
         let output = (if slope { &joint.slopes } else { &joint.c }).rows(front_end, 1) * gain;
         rows[index] = (&output * &state, &output * &input);
     }
-    // The latest sample ends the period by construction; a remainder below SAME_INSTANT is ignored.
-    assert!(problem.ratio as f64 - now < SAME_INSTANT);
+    // The latest sample ends the period by construction; a remainder that is not resolved is ignored.
+    assert!(problem.ratio as f64 - now < resolution);
     let width = input.ncols();
     let (c, d): (Vec<Mat>, Vec<Mat>) =
         rows.into_iter().map(|(c, d)| (c, d.resize_horizontally(width, 0.0))).unzip();

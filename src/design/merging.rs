@@ -6,11 +6,12 @@
 //! Order reduction keeps these apart (`realise`): a filter of few states has seen less.
 
 use super::DesignError;
-use super::lifting::{JointState, SAME_INSTANT};
+use super::lifting::JointState;
 use super::problem::{Channel, Problem};
 use crate::linalg::{Mat, power_of_two};
 use crate::lti::gramian::controllability_root;
 use crate::spec::{Method, Spec};
+use crate::units::FastPeriods;
 
 /// Sizes of measurements within this factor of one are not changed: they lose no digits to one another.
 const USUAL_SIZE: f64 = 16.0;
@@ -103,13 +104,15 @@ impl Problem {
         let (a, b) = (&self.channels[i], &self.channels[j]);
         let apart = a.delay.0 - b.delay.0;
         let period = self.ratio as f64;
-        let at_whole_periods = (apart - period * (apart / period).round()).abs() < SAME_INSTANT;
+        let resolution = self.resolution();
+        let at_whole_periods = (apart - period * (apart / period).round()).abs() < resolution;
         let noisy = self.noise[i] > 0.0 || self.noise[j] > 0.0;
         let alike = match repeats {
             Repeats::Never => false,
-            Repeats::NoiselessAtWholePeriods if noisy => apart.abs() < SAME_INSTANT,
+            Repeats::NoiselessAtWholePeriods if noisy => apart.abs() < resolution,
             Repeats::NoiselessAtWholePeriods | Repeats::AtWholePeriods => at_whole_periods,
-            Repeats::AtOneInstant => apart == 0.0,
+            // Taps on both cost nothing, so only those that are meant to be one are.
+            Repeats::AtOneInstant => a.delay.periods_since(b.delay, FastPeriods(period)) == Some(0.0),
         };
         a.front_end == b.front_end && alike
     }
@@ -118,7 +121,8 @@ impl Problem {
     fn newest(&self, group: &[usize]) -> Vec<usize> {
         let delay = |i: usize| self.channels[i].delay.0;
         let least = group.iter().map(|&i| delay(i)).fold(f64::INFINITY, f64::min);
-        group.iter().copied().filter(|&i| delay(i) - least < SAME_INSTANT).collect()
+        let resolution = self.resolution();
+        group.iter().copied().filter(|&i| delay(i) - least < resolution).collect()
     }
 }
 

@@ -17,8 +17,10 @@ const KEPT_PERIODS: usize = 16;
 /// resolved: the difference of their samples has lost half of its digits or more, and a bank of large taps
 /// may gain by it what no computation in doubles shows.
 const DELAY_RESOLUTION: f64 = 1e-8;
-/// Relative difference of two delays that comes from rounding: they are meant to be equal.
-const DELAY_ROUNDING: f64 = 1e-14;
+/// Instants closer than this (in fast periods) are one in the designer's arithmetic: what lies between them is
+/// lost in doubles. It is far below the resolution of any converter. Delays that are large enough for their
+/// rounding to exceed it are one within that.
+const UNRESOLVED: f64 = 1e-11;
 
 /// Front ends, delays and rates in units of the fast period (h = 1).
 #[derive(Debug, Clone)]
@@ -109,15 +111,21 @@ impl Problem {
     /// Whether the delays of all channels with the same front end are equal or far enough apart for bounds
     /// that hold for all banks.
     pub(super) fn resolves_delays(&self) -> bool {
-        let period = self.ratio as f64;
+        let period = FastPeriods(self.ratio as f64);
         self.channels.iter().enumerate().all(|(i, a)| {
             self.channels[..i].iter().filter(|b| b.front_end == a.front_end).all(|b| {
-                let apart = (a.delay - b.delay).0;
-                let from_whole_periods = (apart - (apart / period).round() * period).abs();
-                let rounding = DELAY_ROUNDING * a.delay.0.max(b.delay.0).max(1.0);
-                from_whole_periods <= rounding || from_whole_periods >= DELAY_RESOLUTION
+                let apart = a.delay - b.delay;
+                let from_whole_periods = (apart - period * (apart / period).round()).0.abs();
+                a.delay.periods_since(b.delay, period).is_some() || from_whole_periods >= DELAY_RESOLUTION
             })
         })
+    }
+
+    /// Instants closer than this, in fast periods, are one in the designer's arithmetic.
+    pub(super) fn resolution(&self) -> f64 {
+        let most =
+            FastPeriods(self.delays().iter().map(|delay| delay.0.abs()).fold(self.latency as f64, f64::max));
+        UNRESOLVED.max(most.rounding_of_difference(most).0)
     }
 
     /// The same problem with `errors[i]` added to the delays.

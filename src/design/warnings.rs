@@ -12,8 +12,6 @@ use std::f64::consts::{PI, TAU};
 const NARROW_BAND: f64 = 0.01;
 /// Samples nearer to each other than this (in fast periods) hardly differ.
 const SAME_SAMPLES: f64 = 1e-3;
-/// Samples nearer to each other than this are at one instant up to rounding.
-const INSTANT_ROUNDING: f64 = 1e-12;
 /// An edge is on a multiple of half the fast rate within this share of it: the edges are found by bisection.
 const EDGE_ROUNDING: f64 = 1e-9;
 /// A band that ends above this share of what the samples resolve has no room.
@@ -155,7 +153,7 @@ fn same_instants(problem: &Problem) -> Option<String> {
     };
     let near = pairs.filter(|&(i, j)| i != j && apart(i, j) < SAME_SAMPLES);
     let (i, j) = near.min_by_key(|&(i, j)| (i.min(j), i.max(j)))?;
-    let distance = if apart(i, j) < INSTANT_ROUNDING {
+    let distance = if apart(i, j) < problem.resolution() {
         "at one instant".to_owned()
     } else {
         format!("{:.1e} fast periods apart", apart(i, j))

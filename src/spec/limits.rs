@@ -46,17 +46,11 @@ const MAX_GAIN: f64 = 1e6;
 /// Fast periods in seconds, and rates in hertz: rates and squares still fit a double.
 const FAST_PERIODS: RangeInclusive<f64> = 1e-100..=1e100;
 
-/// Distance to a whole number of fast periods within which a delay is rounded to it, relative to its size
-/// (at least one period). A delay of 3 periods of 0.1 s is 0.30000000000000004 s; without rounding, the
-/// fraction would become a channel state of size 1e-16.
-const WHOLE_DELAY_TOLERANCE: f64 = 1e-13;
-
-/// D / h, exactly whole where it is whole up to rounding.
+/// D / h, exactly whole where it is whole up to rounding: the fraction would become a channel state of size
+/// 1e-16.
 pub fn delay_in_fast_periods(delay: Seconds, fast_period: Seconds) -> FastPeriods {
     let periods = delay.in_fast_periods(fast_period);
-    let whole = periods.0.round();
-    let is_whole = (periods.0 - whole).abs() <= WHOLE_DELAY_TOLERANCE * whole.max(1.0);
-    if is_whole { FastPeriods(whole) } else { periods }
+    periods.periods_since(FastPeriods(0.0), FastPeriods(1.0)).map_or(periods, FastPeriods)
 }
 
 pub(super) fn range(value: f64, unit: &'static str, rule: impl Into<String>) -> SpecProblem {

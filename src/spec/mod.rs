@@ -222,9 +222,20 @@ impl Spec {
         self.fast_period == Seconds(1.0)
     }
 
-    /// D_i / h of every channel; see [`delay_in_fast_periods`].
+    /// D_i / h of every channel. Delays that are whole, one, or whole slow periods apart up to rounding are
+    /// exactly so.
     pub fn delays_in_fast_periods(&self) -> Vec<FastPeriods> {
-        self.channels.iter().map(|channel| delay_in_fast_periods(channel.delay, self.fast_period)).collect()
+        let period = FastPeriods(self.ratio as f64);
+        let rounded = |channel: &ChannelSpec| delay_in_fast_periods(channel.delay, self.fast_period);
+        let mut delays: Vec<FastPeriods> = self.channels.iter().map(rounded).collect();
+        // The short ones have the most digits.
+        let mut order: Vec<usize> = (0..delays.len()).collect();
+        order.sort_by(|&i, &k| delays[i].0.abs().total_cmp(&delays[k].0.abs()));
+        for (count, &i) in order.iter().enumerate() {
+            let later = |&k: &usize| Some(delays[k] + period * delays[i].periods_since(delays[k], period)?);
+            delays[i] = order[..count].iter().find_map(later).unwrap_or(delays[i]);
+        }
+        delays
     }
 }
 

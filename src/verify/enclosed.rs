@@ -104,7 +104,7 @@ impl<'a> EnclosedErrorSystem<'a> {
         let apart = self.timeline.between(b.time, a.time);
         let periods = (apart / self.bank.ratio as f64).round();
         let rest = (apart - periods * self.bank.ratio as f64).abs();
-        (a.filter == b.filter && rest <= self.timeline.resolution(a.time, b.time)).then_some(periods)
+        (a.filter == b.filter && rest <= self.timeline.resolution(a.time, b.time).0).then_some(periods)
     }
 
     /// Whether two samples are always multiples of each other.

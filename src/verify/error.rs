@@ -28,6 +28,15 @@ pub enum VerifyError {
         /// Its states.
         states: usize,
     },
+    /// A sample is older than the newest one by more than can be counted.
+    #[error(
+        "the delays and the latency lie {periods:e} slow periods apart, more than is counted exactly; bring them closer \
+         together"
+    )]
+    TooLate {
+        /// Whole slow periods between the newest sample and the oldest one.
+        periods: f64,
+    },
     /// Too many distinct filters.
     #[error(
         "spec: the distinct filters have {states} states together and a slow period {samples} samples; at most \
@@ -107,9 +116,9 @@ pub enum VerifyError {
         /// The number in the file.
         stated: f64,
     },
-    /// The stated worst case of taps that follow the delays is not proven.
+    /// The stated worst case of delay-scheduled taps is not proven.
     #[error(
-        "gamma.tracked: it is not proven that taps that follow the delays keep gamma within {stated} over spec.uncertainty: a \
+        "gamma.tracked: it is not proven that delay-scheduled taps keep gamma within {stated} over spec.uncertainty: a \
          tap, a slope, the spec or the number was altered; design the bank again"
     )]
     Tracked {

@@ -7,7 +7,7 @@
 use super::VerifyError;
 use super::ball::Ball;
 use crate::arithmetic::{BigFloat, Number};
-use crate::units::Seconds;
+use crate::units::{FastPeriods, Seconds};
 use std::cmp::Ordering;
 
 /// Maximum number of periods by which a sample may be late; the limit keeps the count exact in doubles.
@@ -70,7 +70,7 @@ impl Instant {
         let mut periods = (age / ratio as f64).floor();
         let is_supported = periods < MAX_PERIODS_LATE;
         if !is_supported {
-            return Err(VerifyError::TooLarge { states: usize::MAX });
+            return Err(VerifyError::TooLate { periods });
         }
         let passes =
             |periods: f64| self.later_by_periods(periods, ratio).compare(latest, fast_period).is_gt();
@@ -99,7 +99,7 @@ impl Timeline {
     /// sample.
     ///
     /// # Errors
-    /// [`VerifyError::TooLarge`] if a sample is later than the maximum number of periods.
+    /// [`VerifyError::TooLate`] if a sample is later than the maximum number of periods.
     pub(super) fn new(
         samples: &[SamplingInstant],
         fast_period: Seconds,
@@ -133,11 +133,10 @@ impl Timeline {
         later.since::<BigFloat>(earlier, self.fast_period).nearest()
     }
 
-    /// A bound on what the rounding of the delays of two instants to doubles may change in the time between
-    /// them, in fast periods.
-    pub(super) fn resolution(&self, a: Instant, b: Instant) -> f64 {
-        let size = |instant: Instant| instant.delay.0.abs() / self.fast_period.0;
-        4.0 * f64::EPSILON * (1.0 + size(a) + size(b))
+    /// What the rounding of the delays of two instants to doubles may change in the time between them.
+    pub(super) fn resolution(&self, a: Instant, b: Instant) -> FastPeriods {
+        let delay = |instant: Instant| instant.delay.in_fast_periods(self.fast_period);
+        delay(a).rounding_of_difference(delay(b))
     }
 
     /// Number of different instants.
@@ -209,6 +208,7 @@ mod tests {
         assert_eq!((line.of(0), line.of(1), line.of(2), line.of(3)), (1, 2, 0, 1));
         let times: Vec<f64> = (0..3).map(|k| line.since_start::<BigFloat>(k).nearest()).collect();
         assert_eq!(times, [0.5, 1.0, 2.0]);
-        assert!(Timeline::new(&[sample(0.0, 0.0), sample(0.0, 1e300)], Seconds(1.0), 2).is_err());
+        let far = Timeline::new(&[sample(0.0, 0.0), sample(0.0, 1e300)], Seconds(1.0), 2);
+        assert_eq!(far.unwrap_err(), VerifyError::TooLate { periods: 5e299 });
     }
 }

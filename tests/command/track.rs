@@ -39,6 +39,22 @@ fn desk() -> Desk {
     desk
 }
 
+/// Slopes that nothing was proven of may be anything, and the report says so.
+#[test]
+fn verify_says_nothing_of_slopes_without_a_tracked_gamma() {
+    let desk = Desk::with_spec(SPEC);
+    desk.good(&["design", "spec.toml", "-o", "bank.json"]);
+    let proven = desk.good(&["verify", "bank.json"]);
+    assert!(proven.contains("no delays within it do while the taps follow them"), "{proven}");
+    let mut bank = desk.read_json("bank.json");
+    bank["gamma"].as_object_mut().unwrap().remove("tracked");
+    bank.as_object_mut().unwrap().remove("digest");
+    bank["channels"][1]["tap_slopes"][0][3] = 1e3.into();
+    desk.write("bank2.json", bank.to_string());
+    let proven = desk.good(&["verify", "bank2.json"]);
+    assert!(proven.contains("tracked    not proven: the file states no gamma.tracked"), "{proven}");
+}
+
 fn rms_error(desk: &Desk, fused: &str) -> f64 {
     let samples = |name: &str| -> Vec<f32> {
         let bytes = desk.read(name);

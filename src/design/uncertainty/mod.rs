@@ -20,7 +20,7 @@ use super::DesignError;
 use super::analysis::bank_problem;
 use super::plant::LiftedPlant;
 use crate::bank::Bank;
-use crate::verify::uncertainty::{ErrorBox, Taps, WorstCase, keeps_within, worst_case as proven_worst_case};
+use crate::verify::uncertainty::{ErrorBox, Taps, WorstCase, certifies, worst_case as proven_worst_case};
 
 /// Doublings of the box in the search for the largest one that is affordable.
 const MAX_DOUBLINGS: usize = 24;
@@ -52,31 +52,24 @@ pub fn affordable(bank: &Bank, errors: &ErrorBox, loss: f64) -> Result<f64, Desi
     errors.check(bank.channel_count())?;
     let plant = LiftedPlant::new(&bank_problem(bank)?)?;
     let allowed = plant.bank_norm(&bank.filters)?.gain * (1.0 + loss);
-    let keeps = |factor: f64| -> Result<bool, DesignError> {
+    let is_certified = |factor: f64| -> Result<bool, DesignError> {
         let scaled = errors.scaled(factor);
         // Gains and cut-offs of 50 % are out of the range of the proof.
-        Ok(scaled.check(bank.channel_count()).is_ok() && keeps_within(bank, &scaled, Taps::Fixed, allowed)?)
+        Ok(scaled.check(bank.channel_count()).is_ok() && certifies(bank, &scaled, Taps::Fixed, allowed)?)
     };
-    let (mut kept, mut lost) = (0.0, 1.0);
-    let grows = keeps(1.0)?;
+    let is_whole = is_certified(1.0)?;
+    let (mut within, mut beyond) = if is_whole { (1.0, f64::INFINITY) } else { (0.0, 1.0) };
     for _ in 0..MAX_DOUBLINGS {
-        let factor = if grows { lost } else { 0.5 * lost };
-        if keeps(factor)? {
-            kept = factor;
-            if !grows {
-                break;
-            }
-            lost = 2.0 * factor;
-        } else {
-            lost = factor;
-            if grows {
-                break;
-            }
+        let factor = if is_whole { 2.0 * within } else { 0.5 * beyond };
+        let certified = is_certified(factor)?;
+        *if certified { &mut within } else { &mut beyond } = factor;
+        if certified != is_whole {
+            break;
         }
     }
-    while kept > 0.0 && lost - kept > FACTOR_ACCURACY * kept {
-        let middle = 0.5 * (kept + lost);
-        if keeps(middle)? { kept = middle } else { lost = middle }
+    while within > 0.0 && beyond.is_finite() && beyond - within > FACTOR_ACCURACY * within {
+        let middle = 0.5 * (within + beyond);
+        *if is_certified(middle)? { &mut within } else { &mut beyond } = middle;
     }
-    Ok(kept)
+    Ok(within)
 }

@@ -112,7 +112,7 @@ impl MovingFilters {
     fn of(bank: &Bank, taps: Taps) -> Result<Self, DesignError> {
         let fast_period = bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period);
         match (taps, &bank.filters, &bank.tap_slopes) {
-            (Taps::Following, SynthesisFilters::Fir(list), Some(slopes)) => {
+            (Taps::Scheduled, SynthesisFilters::Fir(list), Some(slopes)) => {
                 Ok(Self::scheduled(list, slopes, bank.ratio, fast_period))
             }
             _ => Ok(Self { nominal: FilterResponse::new(bank)?, slopes: Vec::new() }),

@@ -62,6 +62,12 @@ fn whole_delays_stay_whole_at_every_rate() {
             assert_eq!(delay_in_fast_periods(whole.in_seconds(h), h), whole, "{rate} Hz");
         }
     }
+    // So do distances of whole slow periods between long delays, where an ulp is more than 1e-11.
+    let text = thesis_with("fast_period = 1.0", "fast_rate = 44_100")
+        .replace("delay = 1.2", "delay_samples = 60000.3")
+        .replace("delay = 0.6", "delay_samples = 65000.3");
+    let delays = read(&text).delays_in_fast_periods();
+    assert_eq!(delays[1].0 - delays[0].0, 5000.0);
     // A fraction that is meant is kept.
     assert_eq!(delay_in_fast_periods(Seconds(3.0 + 1e-9), Seconds(1.0)), FastPeriods(3.0 + 1e-9));
 }

@@ -1,26 +1,18 @@
 //! The largest gain of the error system at one frequency, over a box of errors.
 //!
 //! At a fixed frequency K = W - sum_i F_i h_i with the columns F_i of the filters and the rows h_i of the
-//! channels. For a delay error between two points of the grid, h_i is a convex mix of the rows at the points
-//! plus a remainder of norm at most c_i ([`super::aliases::Weight::Chord`]). The gain is convex, so over a
-//! box
-//!
-//! ```text
-//! sigma(K) <= max over the vertices of sigma(K_v) + rho,
-//! rho^2 = the largest eigenvalue of sum_i (c_i^2 / w_i) F_i F_i*,   w_i = |F_i| c_i / sum_j |F_j| c_j.
-//! ```
-//!
-//! rho bounds sum_i F_i r_i for all rows of norms c_i, by Cauchy and Schwarz for u* F_i r_i with the weights
-//! w_i. It is at most sum_i |F_i| c_i, and for columns F_i that are far from parallel much smaller.
-//!
-//! Gains enter h_i as factors, so their box adds vertices and no remainder. Where the bound is too large,
-//! the box is halved along the channel with the largest remainder ([`super::vertex_tree`]).
+//! channels. Over a part of the box each h_i is a convex mix of its rows at the ends of the part plus a
+//! remainder (`remainder`). The gain is convex, so it is at most the largest gain at a vertex plus what the
+//! remainders add. Gains enter h_i as factors, so their box adds vertices and no remainder. Where the bound
+//! is too large, the part is halved along the side that matters most (`vertex_tree`).
 
 use super::super::ball::{self, Ball, Matrix};
 use super::super::positive;
 use super::super::spectrum::ComplexMatrix;
 use super::grid::ChannelGrid;
+use super::remainder::{Halvings, Remainders};
 use crate::linalg;
+use std::collections::HashMap;
 
 /// Relative margins over a computed eigenvalue at which a proof that it is an upper bound is tried.
 const MARGINS: [f64; 4] = [1e-9, 1e-6, 1e-3, 1.0];
@@ -38,8 +30,6 @@ pub(super) struct AtFrequency<'a> {
     pub(super) channels: &'a [ChannelGrid],
     /// Largest relative error of the gain of each channel.
     pub(super) gains: &'a [f64],
-    /// Bounds of the remainder of each channel, by the number of halvings; those of gains included.
-    pub(super) remainders: Vec<Vec<f64>>,
 }
 
 /// A row h as a sum of rows of the Gram matrix.
@@ -115,77 +105,130 @@ pub(super) enum Verdict {
     Open(Attained),
 }
 
-/// A part of the delays of a channel: the points `first..=last` of its grid, after `level` halvings.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Part {
+/// The points `first..=last` of a grid, after `halvings` of the whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct Span {
     pub(super) first: usize,
     pub(super) last: usize,
-    pub(super) level: usize,
+    halvings: u32,
+}
+
+/// A part of the errors of a channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct Part {
+    pub(super) delays: Span,
+    pub(super) cutoffs: Span,
+}
+
+impl Span {
+    /// All of `count` points.
+    fn whole(count: usize) -> Self {
+        Self { first: 0, last: count - 1, halvings: 0 }
+    }
+
+    /// Both halves, if there are at least `steps` steps between the ends.
+    fn halved(self, steps: usize) -> Option<[Self; 2]> {
+        let Self { first, last, halvings } = self;
+        let (middle, halvings) = ((first + last) / 2, halvings + 1);
+        (last - first >= steps)
+            .then_some([Self { first, last: middle, halvings }, Self { first: middle, last, halvings }])
+    }
+
+    /// The points at the ends.
+    fn ends(self) -> Vec<usize> {
+        if self.first == self.last { vec![self.first] } else { vec![self.first, self.last] }
+    }
+}
+
+/// Steps between the points of the cut-off that a part needs to be halved.
+const HALVED_CUTOFF: usize = 2;
+
+impl Part {
+    fn halvings(&self) -> Halvings {
+        Halvings { delay: self.delays.halvings, cutoff: self.cutoffs.halvings }
+    }
+
+    /// The pairs of halves, of the delays and of the cut-offs; `steps` are those that the delays need.
+    fn halves(&self, steps: usize) -> impl Iterator<Item = [Self; 2]> {
+        let Self { delays, cutoffs } = *self;
+        let by_delay = delays.halved(steps).map(|halves| halves.map(|delays| Self { delays, cutoffs }));
+        let halves = cutoffs.halved(HALVED_CUTOFF);
+        let by_cutoff = halves.map(|halves| halves.map(|cutoffs| Self { delays, cutoffs }));
+        by_delay.into_iter().chain(by_cutoff)
+    }
+}
+
+/// The gains up to which the vertices of parts may go, so that no gain in the part exceeds `threshold`.
+pub(super) struct Limits<'a> {
+    remainders: &'a Remainders,
+    filters: &'a ComplexMatrix,
+    threshold: f64,
+    /// Steps between the points of a delay that a part needs to be halved.
+    steps: usize,
+    known: HashMap<Vec<Halvings>, f64>,
+}
+
+impl<'a> Limits<'a> {
+    pub(super) fn new(
+        remainders: &'a Remainders,
+        filters: &'a ComplexMatrix,
+        threshold: f64,
+        steps: usize,
+    ) -> Self {
+        Self { remainders, filters, threshold, steps, known: HashMap::new() }
+    }
+
+    pub(super) fn of(&mut self, parts: &[Part]) -> f64 {
+        let halvings: Vec<Halvings> = parts.iter().map(Part::halvings).collect();
+        let make = |halvings: &Vec<Halvings>| self.remainders.limit(self.filters, halvings, self.threshold);
+        *self.known.entry(halvings).or_insert_with_key(make)
+    }
+
+    /// Whether the grid has points within the parts.
+    pub(super) fn can_halve(&self, parts: &[Part]) -> bool {
+        parts.iter().any(|part| part.halves(self.steps).next().is_some())
+    }
+
+    /// The halves along the side that leaves most of the limit, of those with points within.
+    pub(super) fn halved(&self, parts: &[Part]) -> Option<[Vec<Part>; 2]> {
+        let sides = parts.iter().enumerate();
+        let sides = sides.flat_map(|(i, part)| part.halves(self.steps).map(move |halves| (i, halves)));
+        let limit = |i: usize, half: Part| {
+            let at = |(k, part): (usize, &Part)| if k == i { half.halvings() } else { part.halvings() };
+            let halvings: Vec<Halvings> = parts.iter().enumerate().map(at).collect();
+            self.remainders.rough_limit(&halvings, self.threshold)
+        };
+        let rated = sides.map(|(i, halves)| (limit(i, halves[0]), i, halves));
+        let (_, i, halves) = rated.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(halves.map(|half| {
+            let mut with = parts.to_vec();
+            with[i] = half;
+            with
+        }))
+    }
 }
 
 impl AtFrequency<'_> {
     /// The whole box.
     pub(super) fn whole(&self) -> Vec<Part> {
-        let part = |channel: &ChannelGrid| Part { first: 0, last: channel.errors.len() - 1, level: 0 };
+        let part = |channel: &ChannelGrid| Part {
+            delays: Span::whole(channel.errors.len()),
+            cutoffs: Span::whole(channel.speeds.len()),
+        };
         self.channels.iter().map(part).collect()
     }
 
     /// Whether the grid has points between the ends of the box.
     pub(super) fn is_divided(&self) -> bool {
-        self.channels.iter().any(|channel| channel.errors.len() > 2)
-    }
-
-    /// A bound of what channel `i` adds to the gains at the vertices.
-    fn term(&self, i: usize, part: &Part) -> f64 {
-        self.columns[i] * self.remainders[i][part.level]
-    }
-
-    /// A bound of what all channels add to them.
-    pub(super) fn remainder(&self, parts: &[Part]) -> f64 {
-        super::angle::outward(parts.iter().enumerate().map(|(i, part)| self.term(i, part)).sum())
-    }
-
-    /// A smaller bound of the same for taps that stay: rho of the module's page.
-    pub(super) fn joint_remainder(&self, parts: &[Part]) -> f64 {
-        let sum = self.remainder(parts);
-        let outputs = self.filters.re.nrows();
-        if parts.len() < 2 || sum == 0.0 || !sum.is_finite() {
-            return sum;
-        }
-        // c_i^2 / w_i = c_i sum / |F_i|; channels without taps add nothing.
-        let weight = |(i, part): (usize, &Part)| {
-            let column = self.columns[i];
-            let square = Ball::from(self.remainders[i][part.level]) * Ball::from(sum);
-            if column > 0.0 { square / Ball::from(column) } else { Ball::ZERO }
-        };
-        let weights: Vec<Ball> = parts.iter().enumerate().map(weight).collect();
-        let scaled = |m: &Matrix| Matrix::from_fn(outputs, weights.len(), |p, i| m[(p, i)] * weights[i]);
-        let scaled = ComplexMatrix { re: scaled(&self.filters.re), im: scaled(&self.filters.im) };
-        upper_gain(&scaled.product(&self.filters.adjoint()), 0.0).min(sum)
-    }
-
-    /// The halves along the channel with the largest remainder that has at least `steps` steps of the grid.
-    pub(super) fn halved(&self, parts: &[Part], steps: usize) -> Option<[Vec<Part>; 2]> {
-        let can = |i: &usize| parts[*i].last - parts[*i].first >= steps;
-        let size = |i: usize| self.term(i, &parts[i]);
-        let i = (0..parts.len()).filter(can).max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
-        let Part { first, last, level } = parts[i];
-        let middle = (first + last) / 2;
-        let with = |first, last| {
-            let mut half = parts.to_vec();
-            half[i] = Part { first, last, level: level + 1 };
-            half
-        };
-        Some([with(first, middle), with(middle, last)])
+        self.channels.iter().any(|channel| channel.errors.len() > 2 || channel.speeds.len() > 2)
     }
 
     /// The vertices of a channel.
     pub(super) fn vertices(&self, i: usize, part: &Part) -> Vec<Vertex> {
-        let ends = if part.first == part.last { vec![part.first] } else { vec![part.first, part.last] };
         let gain = self.gains[i];
         let gains = if gain == 0.0 { vec![1.0] } else { vec![1.0 - gain, 1.0 + gain] };
-        let speeds = 0..self.channels[i].speeds.len();
-        let all = ends.iter().flat_map(|&error| speeds.clone().map(move |speed| (error, speed)));
+        let (errors, speeds) = (part.delays.ends(), part.cutoffs.ends());
+        let all = errors.iter().flat_map(|&error| speeds.iter().map(move |&speed| (error, speed)));
         all.flat_map(|(error, speed)| gains.iter().map(move |&gain| Vertex { error, speed, gain })).collect()
     }
 

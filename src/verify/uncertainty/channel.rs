@@ -1,24 +1,24 @@
-//! The bounds of one channel: what its memory and the chords of its errors leave out.
+//! The bounds of one channel: what the cut of its memory leaves out, and its row with the range of its errors.
 
 use super::super::VerifyError;
 use super::super::ball::{self, Ball, Matrix};
 use super::super::covariance::Covariance;
 use super::super::front_ends::FrontEnds;
-use super::aliases::{Aliases, FrontEnd, Weight};
-use super::angle::{Frequency, outward};
+use super::ErrorBox;
+use super::aliases::{Aliases, FrontEnd};
+use super::angle::outward;
 use super::grid::Grid;
 use super::memory::{Memory, growth};
+use super::remainder::UncertainRow;
 use super::transfer::Transfer;
-use super::{ErrorBox, Taps};
 use crate::units::Seconds;
+use std::rc::Rc;
 
 /// A channel with the range of its errors.
 pub(super) struct Channel {
     transfer: Transfer,
     /// Of the signal's filter, if the spec has a signal.
     signal: Option<Transfer>,
-    /// Second derivative in the cut-off, if that is uncertain.
-    curvature: Option<Transfer>,
     memory: Memory,
     /// Largest relative errors.
     cutoff: f64,
@@ -27,17 +27,8 @@ pub(super) struct Channel {
     half: f64,
     /// D_i in fast periods, for the rounding of delays.
     delay: f64,
-    /// The first channel with errors that has the same front end and range of cut-offs; none if this one has
-    /// no errors.
-    pub(super) like: Option<usize>,
-}
-
-/// What the front end of a channel does at a frequency, for all its cut-offs.
-#[derive(Debug, Clone)]
-pub(super) struct Response {
-    aliases: Aliases,
-    /// Bounds the distance of the rows from their chord over the cut-offs.
-    bend: f64,
+    /// The first channel that has the same front end and range of cut-offs.
+    pub(super) like: usize,
 }
 
 /// The memories of all rows of a grid.
@@ -86,7 +77,12 @@ impl<'a> Memories<'a> {
 
 /// The transfer function of channel `i`, from the filter to the sample.
 pub(super) fn transfer(grid: &Grid, i: usize) -> Transfer {
-    let sample = &grid.samples[grid.channels[i].rows[0][0]];
+    sampled_transfer(grid, grid.channels[i].rows[0][0])
+}
+
+/// The transfer function to the sample with this row of the Gram matrix, for the nominal cut-off.
+pub(super) fn sampled_transfer(grid: &Grid, sample: usize) -> Transfer {
+    let sample = &grid.samples[sample];
     Transfer::new(grid.front_ends.filter(sample.filter), FrontEnds::gain(sample))
 }
 
@@ -97,85 +93,50 @@ pub(super) fn signal_transfer(grid: &Grid) -> Option<Transfer> {
 
 impl Channel {
     /// Channel `i` of `grid`, with the largest errors of its delay, gain and cut-off.
-    pub(super) fn new(
-        memories: &Memories<'_>,
-        i: usize,
-        (half, gain, cutoff): (Seconds, f64, f64),
-        fast_period: Seconds,
-    ) -> Self {
+    pub(super) fn new(memories: &Memories<'_>, i: usize, errors: &ErrorBox, fast_period: Seconds) -> Self {
         let grid = memories.grid;
         // The row of the slowest variant is the first one.
         let first = grid.channels[i].rows[0][0];
-        let transfer = transfer(grid, i);
         Self {
-            curvature: (cutoff > 0.0).then(|| transfer.curvature()),
-            transfer,
+            transfer: transfer(grid, i),
             signal: signal_transfer(grid),
             memory: memories.of_sample(first),
-            cutoff,
-            gain,
-            half: half.in_fast_periods(fast_period).0,
-            like: None,
+            cutoff: errors.cutoffs[i],
+            gain: errors.gains[i],
+            half: errors.delays[i].in_fast_periods(fast_period).0,
+            like: i,
             delay: grid.samples[first].time.delay.in_fast_periods(fast_period).0.abs(),
         }
     }
 
-    /// Bounds what the cut of the memory after `periods` and that of the filters by `filter_tail` leave out
-    /// of F_i H_i, for all errors; `filter` bounds |F_i|.
-    pub(super) fn tail(&self, periods: usize, filter: f64, filter_tail: f64) -> f64 {
-        // A kernel that is x times faster is x phi(x t): its energy beyond T is at most that of the slowest
-        // one, times the ratio of the factors.
+    /// Bounds what the cut of the memory after `periods` leaves out of F_i H_i, for all errors; `filter`
+    /// bounds |F_i|.
+    pub(super) fn tail(&self, periods: usize, filter: f64) -> f64 {
+        self.for_all_errors(filter * self.memory.tail(periods))
+    }
+
+    /// Bounds F_i H_i, for all errors; `filter` bounds |F_i|.
+    pub(super) fn whole(&self, filter: f64) -> f64 {
+        self.for_all_errors(filter * self.memory.whole())
+    }
+
+    /// A kernel that is x times faster is x phi(x t): its energy beyond T is at most that of the slowest one,
+    /// times the ratio of the factors.
+    fn for_all_errors(&self, of_slowest: f64) -> f64 {
         let speeds = outward((1.0 + self.cutoff) / (1.0 - self.cutoff));
-        let rows = filter * self.memory.tail(periods) + filter_tail * self.memory.whole();
-        outward((1.0 + self.gain) * speeds.sqrt() * rows)
+        outward((1.0 + self.gain) * speeds.sqrt() * of_slowest)
     }
 
-    /// Whether delay and cut-off are exact.
-    pub(super) fn is_certain(&self) -> bool {
-        self.half == 0.0 && self.cutoff == 0.0
+    /// The front end.
+    pub(super) fn front_end(&self) -> FrontEnd<'_> {
+        FrontEnd { transfer: &self.transfer, signal: self.signal.as_ref(), cutoff: self.cutoff }
     }
 
-    /// The moduli at a frequency.
-    ///
-    /// # Errors
-    /// [`VerifyError::LongMemory`].
-    pub(super) fn response(&self, near: &Frequency, ratio: usize) -> Result<Response, VerifyError> {
-        let range = [1.0 - self.cutoff, 1.0 + self.cutoff];
-        let sum = |transfer: &Transfer| {
-            let front_end = FrontEnd { transfer, signal: self.signal.as_ref() };
-            Aliases::new(&front_end, near.angle, ratio, range).ok_or(VerifyError::LongMemory)
-        };
-        let aliases = sum(&self.transfer)?;
-        // The chord over 2 x of a function with second derivative at most curvature / (1 - x)^2.
-        let bend = match &self.curvature {
-            Some(curvature) => {
-                0.5 * (self.cutoff / (1.0 - self.cutoff)).powi(2) * sum(curvature)?.norm(Weight::One)
-            }
-            None => 0.0,
-        };
-        Ok(Response { aliases, bend })
-    }
-
-    /// Bounds the remainder of the chords or parabolas, after 0, 1, .. `levels` halvings of the delay;
-    /// `response` is that of a channel like this one.
-    pub(super) fn remainders(&self, response: &Response, levels: u32, taps: Taps) -> Vec<f64> {
-        let Response { aliases, bend } = response;
+    /// The row at a frequency; `response` is that of a channel like this one.
+    pub(super) fn row(&self, response: Rc<Aliases>) -> UncertainRow {
         // The grid points are rounded.
-        let slack = 8.0 * f64::EPSILON * (1.0 + self.delay + self.half);
-        let rounding = if self.half > 0.0 { slack } else { 0.0 };
-        let level = |level: u32| {
-            let half = self.half / f64::from(1u32 << level) + rounding;
-            let between = match taps {
-                Taps::Fixed => aliases.norm(Weight::Chord(half)),
-                // The parabola goes through the rows of the rounded points, so its own weights (5/4 in all)
-                // times the distance of these rows from those of the points come in addition.
-                Taps::Following => {
-                    aliases.norm(Weight::Parabola(half)) + 1.25 * aliases.norm(Weight::Shift(rounding))
-                }
-            };
-            outward((between + bend) * (1.0 + self.gain))
-        };
-        (0..=levels).map(level).collect()
+        let rounding = 8.0 * f64::EPSILON * (1.0 + self.delay + self.half);
+        UncertainRow { response, gain: 1.0 + self.gain, cutoff: self.cutoff, half: self.half, rounding }
     }
 }
 

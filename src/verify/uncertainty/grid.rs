@@ -5,6 +5,7 @@ use super::super::VerifyError;
 use super::super::front_ends::FrontEnds;
 use super::super::slow_period::SlowPeriod;
 use super::super::timeline::{Instant, SamplingInstant, Timeline};
+use super::remainder::Halvings;
 use super::{ErrorBox, ErrorPoint};
 use crate::bank::Bank;
 use crate::units::Seconds;
@@ -31,19 +32,22 @@ pub(super) struct ChannelGrid {
 }
 
 impl Grid {
-    /// The box with each side of the delays cut into 2^`level` equal parts.
+    /// The box with the delay and the cut-off of each channel cut into 2^k equal parts.
     ///
     /// # Errors
     /// As [`super::super::EnclosedErrorSystem::new`].
-    pub(super) fn new(bank: &Bank, errors: &ErrorBox, level: u32) -> Result<Self, VerifyError> {
-        let parts = 1usize << level;
-        let steps = |i: usize| -> Vec<Seconds> {
-            let half = errors.delays[i].0;
-            let at = |k: usize| Seconds(half * (2.0 * k as f64 / parts as f64 - 1.0));
-            if half == 0.0 { vec![Seconds(0.0)] } else { (0..=parts).map(at).collect() }
+    pub(super) fn new(bank: &Bank, errors: &ErrorBox, halvings: &[Halvings]) -> Result<Self, VerifyError> {
+        let points = |half: f64, halvings: u32| -> Vec<f64> {
+            let parts = 1u32 << halvings;
+            let at = |k: u32| half * (2.0 * f64::from(k) / f64::from(parts) - 1.0);
+            if half == 0.0 { vec![0.0] } else { (0..=parts).map(at).collect() }
         };
-        let channels = (0..bank.channel_count()).map(|i| (steps(i), errors.speeds(i))).collect();
-        Self::of(bank, channels)
+        let channel = |(i, at): (usize, &Halvings)| {
+            let delays = points(errors.delays[i].0, at.delay).into_iter().map(Seconds);
+            let speeds = points(errors.cutoffs[i], at.cutoff).into_iter().map(|error| 1.0 + error);
+            (delays.collect(), speeds.collect())
+        };
+        Self::of(bank, halvings.iter().enumerate().map(channel).collect())
     }
 
     /// One point.

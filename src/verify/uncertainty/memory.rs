@@ -10,6 +10,7 @@ use super::super::ball::{self, Ball, Matrix};
 use super::super::error_system::BlockForm;
 use super::angle::outward;
 use crate::bank::SynthesisFilters;
+use crate::linalg;
 
 /// Maximum number of slow periods that are followed.
 const MAX_PERIODS: usize = 20_000;
@@ -87,13 +88,37 @@ impl<'a> MovingRow<'a> {
     }
 }
 
+/// The sums of all terms from each one on, and of `rest` beyond them.
+fn sums_from(terms: &[f64], rest: f64) -> Vec<f64> {
+    let mut sums = vec![rest; terms.len() + 1];
+    for (k, term) in terms.iter().enumerate().rev() {
+        sums[k] = outward(sums[k + 1] + term);
+    }
+    sums
+}
+
+/// The same filters with states that are scaled by powers of two, so that the powers of `a` grow little.
+fn balanced(form: &BlockForm) -> BlockForm {
+    let [a, b, c] = [&form.a, &form.b, &form.c].map(ball::nearest);
+    let scales = linalg::state_scales(&a, &b, &c);
+    let scaled = |m: &Matrix, factor: &dyn Fn(usize, usize) -> f64| {
+        m.map_with_location(|i, j, x| x * Ball::from(factor(i, j)))
+    };
+    BlockForm {
+        a: scaled(&form.a, &|i, j| scales[j] / scales[i]),
+        b: scaled(&form.b, &|i, _| 1.0 / scales[i]),
+        c: scaled(&form.c, &|_, j| scales[j]),
+        d: form.d.clone(),
+    }
+}
+
 /// The tails of a kernel.
 #[derive(Debug, Clone)]
 pub(super) struct Memory {
-    /// q_k.
-    energies: Vec<f64>,
-    /// Bounds the sum of all later ones.
-    rest: f64,
+    /// By the number of periods: the sum of q_k from there on.
+    tails: Vec<f64>,
+    /// q_0.
+    energy: f64,
 }
 
 impl Memory {
@@ -113,61 +138,68 @@ impl Memory {
         }
         // sqrt(v X v') <= |v|_1 sqrt(||X||), and |v E^j|_1 <= |v|_1 ||E^j||.
         let rest = outward(moving.size() * ball::row_sum(covariance).sqrt() * growth);
-        Self { energies, rest }
+        Self { tails: sums_from(&energies, rest), energy: energies[0] }
     }
 
     /// Bounds the norm of the part of the kernel from `periods` slow periods on.
     pub(super) fn tail(&self, periods: usize) -> f64 {
-        outward(self.energies.iter().skip(periods).sum::<f64>() + self.rest)
+        self.tails[periods.min(self.tails.len() - 1)]
+    }
+
+    /// The fewest slow periods, up to `most`, after which the tail is at most `wanted`; `most` if there are
+    /// none.
+    pub(super) fn periods(&self, wanted: f64, most: usize) -> usize {
+        self.tails.partition_point(|tail| *tail > wanted).min(most)
     }
 
     /// Bounds the norm of the whole sampled filter.
     pub(super) fn whole(&self) -> f64 {
         // The part of the period in which the sample is taken has at most the energy of the whole kernel.
-        outward(self.tail(0) + self.energies.first().copied().unwrap_or(0.0))
+        outward(self.tail(0) + self.energy)
     }
 }
 
-/// The synthesis filters cut off after some lags.
+/// Bounds of the synthesis filters F = sum_k F_k z^-k, whose lags may be cut off from any number on.
 #[derive(Debug, Clone)]
 pub(super) struct Lags {
-    /// The last lag that is kept, in slow periods.
-    pub(super) last: usize,
-    /// Bounds the norm of each channel's column.
-    pub(super) sizes: Vec<f64>,
-    /// Bounds the norm of what is cut off each column.
-    pub(super) tails: Vec<f64>,
+    /// For each channel, by the number of lags that are kept: bounds the norm of the column of all others.
+    beyond: Vec<Vec<f64>>,
 }
 
 impl Lags {
-    /// FIR filters are kept whole; of recursive ones, the lags up to a tail of `negligible` relative to the
+    /// FIR filters whole; of recursive ones, the lags up to a remainder of `negligible` relative to the
     /// whole. `None` if that takes too many.
     pub(super) fn new(filters: &SynthesisFilters, ratio: usize, negligible: f64) -> Option<Self> {
-        match filters {
-            SynthesisFilters::Fir(taps) => {
-                let size = |list: &Vec<f64>| outward(list.iter().map(|x| x.abs()).sum());
-                Some(Self {
-                    last: taps[0].len().div_ceil(ratio) - 1,
-                    sizes: taps.iter().map(size).collect(),
-                    tails: vec![0.0; taps.len()],
-                })
-            }
-            SynthesisFilters::StateSpace(_) => Self::recursive(&BlockForm::new(filters, ratio), negligible),
-        }
+        let SynthesisFilters::Fir(taps) = filters else {
+            return Self::recursive(&BlockForm::new(filters, ratio), negligible);
+        };
+        let lag = |list: &[f64]| outward(list.iter().map(|x| x.abs()).sum());
+        let lags = |list: &Vec<f64>| sums_from(&list.chunks(ratio).map(lag).collect::<Vec<_>>(), 0.0);
+        Some(Self { beyond: taps.iter().map(lags).collect() })
     }
 
     /// Also holds these filters plus others times factors of at most `most` in size.
     pub(super) fn widen(&mut self, others: &Self, most: f64) {
-        self.last = self.last.max(others.last);
-        let add = |own: &mut Vec<f64>, others: &[f64]| {
-            own.iter_mut().zip(others).for_each(|(own, other)| *own = outward(*own + most * other));
-        };
-        add(&mut self.sizes, &others.sizes);
-        add(&mut self.tails, &others.tails);
+        for (own, other) in self.beyond.iter_mut().zip(&others.beyond) {
+            let length = own.len().max(other.len());
+            let at = |list: &[f64], kept: usize| list[kept.min(list.len() - 1)];
+            *own = (0..length).map(|kept| outward(at(own, kept) + most * at(other, kept))).collect();
+        }
+    }
+
+    /// Number of lags that are known one by one.
+    pub(super) fn count(&self) -> usize {
+        self.beyond.iter().map(|list| list.len() - 1).max().unwrap_or(0)
+    }
+
+    /// Bounds the norm of the column of channel `i` without its first `kept` lags.
+    pub(super) fn beyond(&self, i: usize, kept: usize) -> f64 {
+        self.beyond[i][kept.min(self.beyond[i].len() - 1)]
     }
 
     /// F = d + sum_k c a^k b z^-(k+1).
     fn recursive(form: &BlockForm, negligible: f64) -> Option<Self> {
+        let form = balanced(form);
         let growth = growth(&form.a)?;
         let columns = |m: &Matrix| -> Vec<f64> {
             m.column_iter().map(|column| column.iter().fold(0.0, |sum, x| sum + x.magnitude())).collect()
@@ -177,19 +209,25 @@ impl Lags {
         // growth of the transposed powers.
         let growth_of_columns = outward(growth_of_transposed(&form.a)?);
         let mut rounding = ball::radius_sum(&form.b.transpose());
-        let (mut sizes, mut moved) = (columns(&form.d), midpoint(&form.b));
-        for last in 0..MAX_PERIODS {
+        let mut moved = midpoint(&form.b);
+        let mut lags: Vec<Vec<f64>> = columns(&form.d).into_iter().map(|lag| vec![lag]).collect();
+        let mut sizes = columns(&form.d);
+        for _ in 0..MAX_PERIODS {
             let missing = outward(rounding * growth_of_columns);
-            let tails: Vec<f64> =
+            let rests: Vec<f64> =
                 columns(&moved).iter().map(|x| outward((x + missing) * output * growth)).collect();
             let small =
-                tails.iter().zip(&sizes).all(|(tail, size)| *tail <= negligible * size.max(negligible));
-            if small {
-                let sizes = sizes.iter().zip(&tails).map(|(size, tail)| outward(size + tail)).collect();
-                return Some(Self { last, sizes, tails });
+                rests.iter().zip(&sizes).all(|(rest, size)| *rest <= negligible * size.max(negligible));
+            // Below the rounding errors the remainder stays as it is.
+            if small || columns(&moved).iter().all(|x| *x < missing) {
+                let beyond = lags.iter().zip(&rests).map(|(lags, &rest)| sums_from(lags, rest));
+                return Some(Self { beyond: beyond.collect() });
             }
-            let lag = columns(&ball::product(&form.c, &moved));
-            sizes.iter_mut().zip(lag).for_each(|(size, lag)| *size += outward(lag + output * missing));
+            for (i, lag) in columns(&ball::product(&form.c, &moved)).into_iter().enumerate() {
+                let lag = outward(lag + output * missing);
+                lags[i].push(lag);
+                sizes[i] += lag;
+            }
             let next = ball::product(&form.a, &moved);
             rounding = ball::nan_max(rounding, ball::radius_sum(&next.transpose()));
             moved = midpoint(&next);

@@ -11,9 +11,9 @@
 //! The lower end is the gain of one K_delta at one frequency. The upper end rests on two facts.
 //!
 //! *Over the errors, at a fixed frequency* (`at_frequency`): each channel's row is a convex mix of its
-//! rows at the ends of the box plus a remainder that falls with the square of the width, so the gain is at
-//! most the largest gain at a vertex plus the remainders. Where that is too much, the box is halved. Many
-//! vertices are bounded at once (`multipliers`).
+//! rows at the ends of the box plus a remainder that falls with the width (`remainder`), so the gain is at
+//! most the largest gain at a vertex plus what the remainders add. Where that is too much, the box is halved.
+//! Many vertices are bounded at once (`multipliers`).
 //!
 //! *Between frequencies, for fixed errors*: with its memory cut off after J slow periods (`memory`) K is a
 //! polynomial in z^-1, and |a* K|^2 is a nonnegative trigonometric polynomial p of some degree d for every
@@ -27,19 +27,23 @@
 //!
 //! Only the frequencies near the peak need narrow cells and small boxes, and no norm is computed.
 //!
-//! With [`Taps::Following`] the taps are those of the bank moved to the delays at hand. K_delta is then no
-//! longer affine in the rows, and its bound at a frequency is that of `following`; the rest is the same.
+//! With [`Taps::Scheduled`] the taps are those of the bank moved to the delays at hand. K_delta is then no
+//! longer affine in the rows, and its bound at a frequency is that of `scheduled`; the rest is the same.
 
 mod aliases;
 mod angle;
 mod at_frequency;
 mod channel;
 mod cover;
-mod following;
 mod grid;
+mod judge;
 mod memory;
 mod multipliers;
+#[cfg(test)]
+mod ordinary;
 mod quick;
+mod remainder;
+mod scheduled;
 mod slopes;
 #[cfg(test)]
 mod tests;
@@ -76,13 +80,13 @@ pub struct ErrorPoint {
     pub cutoffs: Vec<f64>,
 }
 
-/// Whether the taps stay as they are or follow the delays by the bank's tap slopes.
+/// Whether the taps are fixed or scheduled by the delays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Taps {
     /// The taps of the bank, whatever the delays.
     Fixed,
-    /// The taps of [`Bank::filters_at`] for the delays at hand.
-    Following,
+    /// The taps of [`Bank::filters_at`] for the delays at hand, by the bank's tap slopes.
+    Scheduled,
 }
 
 impl Taps {
@@ -92,7 +96,7 @@ impl Taps {
         let errors: Vec<_> = point.delays.iter().map(|delay| delay.in_fast_periods(h)).collect();
         match self {
             Self::Fixed => bank.filters.clone(),
-            Self::Following => bank.filters_at(&errors),
+            Self::Scheduled => bank.filters_at(&errors),
         }
     }
 }
@@ -144,12 +148,6 @@ impl ErrorBox {
             gains: times(&self.gains),
             cutoffs: times(&self.cutoffs),
         }
-    }
-
-    /// The extreme factors of the cut-off of channel `i`.
-    fn speeds(&self, i: usize) -> Vec<f64> {
-        let cutoff = self.cutoffs[i];
-        if cutoff == 0.0 { vec![1.0] } else { vec![1.0 - cutoff, 1.0 + cutoff] }
     }
 
     /// Checks the lists and their numbers.
@@ -212,18 +210,18 @@ pub fn worst_case(
     cover.prove(accuracy)
 }
 
-/// Whether it is proven that ||K_delta|| <= `gamma` for all errors in the box. A box that is not proven may
-/// still keep it, by a share of a per cent or so.
+/// Whether it is proven that ||K_delta|| <= `gamma` for all errors in the box. It may hold without a proof
+/// where the worst case is less than a per cent below `gamma`.
 ///
 /// # Errors
 /// As [`worst_case`], without [`VerifyError::WideBox`].
-pub fn keeps_within(bank: &Bank, errors: &ErrorBox, taps: Taps, gamma: f64) -> Result<bool, VerifyError> {
+pub fn certifies(bank: &Bank, errors: &ErrorBox, taps: Taps, gamma: f64) -> Result<bool, VerifyError> {
     errors.check(bank.channel_count())?;
-    cover::Cover::new(bank, errors, taps)?.proves(gamma)
+    cover::Cover::new(bank, errors, taps)?.certifies(gamma)
 }
 
-/// Proves the worst cases that the bank states for its spec's `[uncertainty]`: with taps that stay, and with
-/// taps that follow the delays.
+/// Proves the worst cases that the bank states for its spec's `[uncertainty]`: with fixed and with
+/// delay-scheduled taps.
 ///
 /// # Errors
 /// [`VerifyError::WorstCase`] or [`VerifyError::Tracked`] if one is not proven or there is no such table;
@@ -231,15 +229,15 @@ pub fn keeps_within(bank: &Bank, errors: &ErrorBox, taps: Taps, gamma: f64) -> R
 pub fn check_stated(bank: &Bank) -> Result<(), VerifyError> {
     let table = bank.spec.as_ref().and_then(|spec| spec.uncertainty.as_ref());
     let errors = table.map(|table| ErrorBox::of(table, bank.channel_count()));
-    let keeps =
-        |taps, stated| errors.as_ref().map_or(Ok(false), |errors| keeps_within(bank, errors, taps, stated));
+    let is_proven =
+        |taps, stated| errors.as_ref().map_or(Ok(false), |errors| certifies(bank, errors, taps, stated));
     if let Some(stated) = bank.gamma.worst_case
-        && !keeps(Taps::Fixed, stated)?
+        && !is_proven(Taps::Fixed, stated)?
     {
         return Err(VerifyError::WorstCase { stated });
     }
     match bank.gamma.tracked {
-        Some(stated) if bank.tap_slopes.is_none() || !keeps(Taps::Following, stated)? => {
+        Some(stated) if bank.tap_slopes.is_none() || !is_proven(Taps::Scheduled, stated)? => {
             Err(VerifyError::Tracked { stated })
         }
         _ => Ok(()),

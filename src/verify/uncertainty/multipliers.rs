@@ -322,7 +322,6 @@ mod tests {
                 columns: vec![1.0; count],
                 channels: &grid,
                 gains: &gains,
-                remainders: vec![vec![0.0]; count],
             };
             let parts = at.whole();
             let sets: Vec<Vec<Vertex>> = (0..count).map(|i| at.vertices(i, &parts[i])).collect();

@@ -9,6 +9,7 @@ use super::angle::{Frequency, cosine_below, outward};
 use super::channel::{Memories, column_norm, signal_transfer, transfer};
 use super::grid::Grid;
 use super::memory::Lags;
+use super::remainder::Halvings;
 use crate::bank::Bank;
 use crate::units::Seconds;
 use std::f64::consts::PI;
@@ -17,7 +18,7 @@ use std::f64::consts::PI;
 const CELLS_PER_DEGREE: f64 = 10.0;
 /// Relative size of the tails.
 const TAIL: f64 = 1e-6;
-/// Relative size of the tails of recursive filters.
+/// Relative size of what is not known of recursive filters.
 const FILTER_TAIL: f64 = 1e-12;
 const MAX_DEGREE: usize = 4096;
 
@@ -58,7 +59,7 @@ impl Slopes {
 pub fn slopes(bank: &Bank, errors: &ErrorBox) -> Result<Slopes, VerifyError> {
     errors.check(bank.channel_count())?;
     let certain = ErrorBox { delays: vec![Seconds(0.0); bank.channel_count()], ..errors.clone() };
-    let grid = Grid::new(bank, &certain, 0)?;
+    let grid = Grid::new(bank, &certain, &Halvings::none(bank.channel_count()))?;
     let memories = Memories::new(&grid, errors)?;
     let lags = Lags::new(&bank.filters, bank.ratio, FILTER_TAIL).ok_or(VerifyError::LongMemory)?;
     let mut found = Slopes { lipschitz: Vec::new(), columns: Vec::new(), steepness: Vec::new() };
@@ -81,20 +82,23 @@ fn of_channel(
     cutoff: f64,
 ) -> Result<[f64; 3], VerifyError> {
     let (transfer, signal) = (transfer(memories.grid(), i), signal_transfer(memories.grid()));
-    let front_end = FrontEnd { transfer: &transfer, signal: signal.as_ref() };
+    let front_end = FrontEnd { transfer: &transfer, signal: signal.as_ref(), cutoff };
+    let count = front_end.aliases(bank.ratio).ok_or(VerifyError::LongMemory)?;
     let memory = memories.of_slope(memories.grid().channels[i].rows[0][0]);
     let range = [1.0 - cutoff, 1.0 + cutoff];
     // The slope of a kernel that is x times faster is x^2 phi'(x t).
     let factor = (range[1] / range[0]).powf(1.5) * (1.0 + 1e-12);
     let whole = memory.whole();
-    let periods = (0..MAX_DEGREE).find(|&periods| memory.tail(periods) <= TAIL * whole).unwrap_or(MAX_DEGREE);
+    let periods = memory.periods(TAIL * whole, MAX_DEGREE);
     let tail = outward(factor * memory.tail(periods));
-    let cut = [outward(lags.sizes[i] * tail + lags.tails[i] * factor * whole), lags.tails[i], tail];
-    let degrees = [periods + lags.last, lags.last, periods];
+    let (filter, last) = (lags.beyond(i, 0), lags.count() - 1);
+    let filter_tail = lags.beyond(i, lags.count());
+    let cut = [outward(filter * tail + filter_tail * factor * whole), filter_tail, tail];
+    let degrees = [periods + last, last, periods];
     let values = |near: &Frequency| {
         let filters = spectrum::filter_response(&bank.filters, bank.ratio, &near.z);
         let column = column_norm(&filters, i);
-        let steep = Aliases::new(&front_end, near.angle, bank.ratio, range)?.norm(Weight::Slope);
+        let steep = Aliases::new(&front_end, near.angle, bank.ratio, count)?.norm(Weight::Slope);
         Some([column * steep, column, steep])
     };
     largest(degrees, cut, values).ok_or(VerifyError::LongMemory)

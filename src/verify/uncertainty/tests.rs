@@ -141,12 +141,12 @@ fn no_random_point_is_above_the_upper_end() {
     }
 }
 
-/// What is proven to keep a gamma keeps it, and a gamma below the worst case is not proven.
+/// A gamma is certified from the worst case on, and none below it.
 #[test]
-fn gammas_are_kept_from_the_worst_case_on() {
+fn gammas_are_certified_from_the_worst_case_on() {
     let found = worst_case(&thesis(), &square_box(0.1), Taps::Fixed, 0.01, &[]).unwrap();
-    assert!(keeps_within(&thesis(), &square_box(0.1), Taps::Fixed, found.upper).unwrap());
-    assert!(!keeps_within(&thesis(), &square_box(0.1), Taps::Fixed, found.lower * (1.0 - 1e-6)).unwrap());
+    assert!(certifies(&thesis(), &square_box(0.1), Taps::Fixed, found.upper).unwrap());
+    assert!(!certifies(&thesis(), &square_box(0.1), Taps::Fixed, found.lower * (1.0 - 1e-6)).unwrap());
 }
 
 #[test]
@@ -243,7 +243,7 @@ fn recursive_banks_have_a_worst_case() {
 }
 
 /// Slopes of any kind: the bound holds for bad banks as for good ones.
-fn following() -> Bank {
+fn scheduled() -> Bank {
     let mut bank = thesis();
     let SynthesisFilters::Fir(taps) = &bank.filters else { panic!("taps") };
     let made_up = |j: usize, i: usize| -> Vec<f64> {
@@ -256,8 +256,8 @@ fn following() -> Bank {
 }
 
 #[test]
-fn no_random_point_is_above_the_upper_end_of_taps_that_follow() {
-    let bank = following();
+fn no_random_point_is_above_the_upper_end_of_delay_scheduled_taps() {
+    let bank = scheduled();
     let boxes = [
         square_box(0.1),
         ErrorBox { delays: vec![Seconds(0.0), Seconds(0.3)], ..ErrorBox::none(2) },
@@ -265,9 +265,9 @@ fn no_random_point_is_above_the_upper_end_of_taps_that_follow() {
     ];
     let mut random = Random(8);
     for errors in boxes {
-        let found = worst_case(&bank, &errors, Taps::Following, 0.05, &[]).unwrap();
+        let found = worst_case(&bank, &errors, Taps::Scheduled, 0.05, &[]).unwrap();
         let at = |omega: f64, point: &ErrorPoint| {
-            let moved = Bank { filters: Taps::Following.filters(&bank, point), ..bank.clone() };
+            let moved = Bank { filters: Taps::Scheduled.filters(&bank, point), ..bank.clone() };
             gain(&moved, omega, point)
         };
         let mut most = at(found.frequency.0, &found.point);
@@ -287,10 +287,10 @@ fn no_random_point_is_above_the_upper_end_of_taps_that_follow() {
     }
 }
 
-/// Without slopes, taps that follow are taps that stay.
+/// Without slopes, delay-scheduled taps are fixed.
 #[test]
 fn without_slopes_both_kinds_have_one_worst_case() {
     let fixed = worst_case(&thesis(), &square_box(0.03), Taps::Fixed, 0.05, &[]).unwrap();
-    let following = worst_case(&thesis(), &square_box(0.03), Taps::Following, 0.05, &[]).unwrap();
-    assert!(following.lower <= fixed.upper && fixed.lower <= following.upper, "{fixed:?} {following:?}");
+    let scheduled = worst_case(&thesis(), &square_box(0.03), Taps::Scheduled, 0.05, &[]).unwrap();
+    assert!(scheduled.lower <= fixed.upper && fixed.lower <= scheduled.upper, "{fixed:?} {scheduled:?}");
 }

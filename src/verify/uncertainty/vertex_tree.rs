@@ -8,16 +8,17 @@
 //! the gains that are reported.
 
 use super::at_frequency::{
-    AtFrequency, Attained, MAX_BOXES, Mix, Part, Verdict, Vertex, Work, lower_gain, upper_gain,
+    AtFrequency, Attained, Limits, MAX_BOXES, Mix, Part, Verdict, Vertex, Work, lower_gain, upper_gain,
 };
 use super::multipliers::{self, Vertices};
 use super::quick::{Compared, Quick, Terms};
+use super::remainder::Remainders;
 use std::collections::HashMap;
 
 /// Steps of the grid that a part needs to be halved.
 const HALVED: usize = 2;
-/// Least vertices of a branch for which multipliers are sought.
-const MANY_VERTICES: usize = 512;
+/// Least vertices of a branch for which multipliers are sought: fewer are looked at in less time.
+const MANY_VERTICES: usize = 1024;
 /// Above this many vertices nothing else is tried.
 const MOST_VERTICES: usize = 1 << 16;
 /// Above this many they are not sought on grids that are finer than the box.
@@ -35,29 +36,29 @@ impl Work {
 
 impl AtFrequency<'_> {
     /// Compares the largest gain over the whole box with `threshold`, within the limit of `work`.
-    pub(super) fn compare(&self, threshold: f64, work: &mut Work) -> Verdict {
+    pub(super) fn compare(&self, remainders: &Remainders, threshold: f64, work: &mut Work) -> Verdict {
         let quick = Quick::new(&self.gram, &self.filters);
-        let mut remainders: HashMap<Vec<usize>, f64> = HashMap::new();
+        let mut limits = Limits::new(remainders, &self.filters, threshold, HALVED);
         let mut sets = Sets { at: self, known: HashMap::new() };
         let mut boxes = vec![self.whole()];
         for _ in 0..MAX_BOXES {
             let Some(parts) = boxes.pop() else { return Verdict::Below };
-            let halves = self.halved(&parts, HALVED);
-            let levels = parts.iter().map(|part| part.level).collect();
-            let remainder = *remainders.entry(levels).or_insert_with(|| self.joint_remainder(&parts));
-            let limits = Limits {
-                gain: threshold - remainder,
+            let gains = Gains {
+                most: limits.of(&parts),
                 // Where the box can be halved, gains below the threshold need no digits.
-                reported: if halves.is_some() { threshold } else { 0.0 },
+                reported: if limits.can_halve(&parts) { threshold } else { 0.0 },
             };
             let sets = sets.of(&parts);
-            match (Tree { at: self, quick: &quick, sets: &sets, limits, work }.search(), halves) {
-                (Found::Nothing, _) => continue,
-                (Found::UsedUp, _) => break,
-                (Found::Gain(found), _) if found.lower > threshold => return Verdict::Above(found),
-                (Found::Gain(found), None) => return Verdict::Open(found),
-                (Found::Between | Found::Gain(_), Some(halves)) => boxes.extend(halves),
-                (Found::Between, None) => break,
+            let mut tree = Tree { at: self, quick: &quick, sets: &sets, gains, work };
+            match tree.search() {
+                Found::Nothing => continue,
+                Found::UsedUp => break,
+                Found::Gain(found) if found.lower > threshold => return Verdict::Above(found),
+                found => match (limits.halved(&parts), found) {
+                    (Some(halves), _) => boxes.extend(halves),
+                    (None, Found::Gain(found)) => return Verdict::Open(found),
+                    (None, _) => break,
+                },
             }
         }
         Verdict::Open(Attained::unknown())
@@ -76,7 +77,7 @@ struct Set {
 /// The sets of all parts so far, by channel and ends.
 struct Sets<'a, 'b> {
     at: &'a AtFrequency<'b>,
-    known: HashMap<(usize, usize, usize), Set>,
+    known: HashMap<(usize, Part), Set>,
 }
 
 impl Sets<'_, '_> {
@@ -89,7 +90,7 @@ impl Sets<'_, '_> {
                 let radius = at.columns[i] * at.radius(i, &vertices, &mean);
                 Set { vertices, mean, radius }
             };
-            self.known.entry((i, part.first, part.last)).or_insert_with(make).clone()
+            self.known.entry((i, *part)).or_insert_with(make).clone()
         };
         parts.iter().enumerate().map(set).collect()
     }
@@ -97,9 +98,9 @@ impl Sets<'_, '_> {
 
 /// What the gains of one box are compared with.
 #[derive(Debug, Clone, Copy)]
-struct Limits {
+struct Gains {
     /// Gains up to this are small enough.
-    gain: f64,
+    most: f64,
     /// Gains up to this are not computed to all digits.
     reported: f64,
 }
@@ -120,7 +121,7 @@ struct Tree<'a, 'b> {
     at: &'a AtFrequency<'b>,
     quick: &'a Quick,
     sets: &'a [Set],
-    limits: Limits,
+    gains: Gains,
     work: &'a mut Work,
 }
 
@@ -179,19 +180,19 @@ impl Tree<'_, '_> {
         }
         let order = multipliers::order(self.at.filters.re.nrows(), &channels);
         self.work.count_multipliers(order, self.at.gram.re.nrows());
-        let is_proven = multipliers::proves(self.at, &channels, self.limits.gain);
+        let is_proven = multipliers::proves(self.at, &channels, self.gains.most);
         (is_proven || count > MOST_VERTICES).then_some(is_proven)
     }
 
     /// The verdict on a branch, or `None` if its parts must be looked at.
     fn judge(&mut self, spread: f64, mixes: &[Mix], chosen: &[Vertex]) -> Option<Found> {
-        let (limit, is_leaf) = (self.limits.gain - spread, chosen.len() == self.sets.len());
+        let (limit, is_leaf) = (self.gains.most - spread, chosen.len() == self.sets.len());
         self.work.count_quick();
         let terms = self.terms(mixes);
         match self.quick.compare(&terms, limit) {
             Compared::Below => return Some(Found::Nothing),
             Compared::NotBelow if !is_leaf => return None,
-            Compared::NotBelow if self.quick.compare(&terms, self.limits.reported) == Compared::Below => {
+            Compared::NotBelow if self.quick.compare(&terms, self.gains.reported) == Compared::Below => {
                 return Some(Found::Between);
             }
             _ => {}

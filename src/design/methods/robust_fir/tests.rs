@@ -113,7 +113,7 @@ fn following(half: f64) -> Spec {
 /// The norm of the bank's taps for delays that are off, and the least norm of all banks for these delays.
 fn norm_and_redesign(bank: &crate::bank::Bank, errors: [f64; 2]) -> (f64, f64) {
     let point = ErrorPoint { delays: errors.map(Seconds).to_vec(), ..ErrorPoint::none(2) };
-    let (norm, _) = norm_at(bank, &point, Taps::Following).unwrap();
+    let (norm, _) = norm_at(bank, &point, Taps::Scheduled).unwrap();
     let mut spec = Spec { uncertainty: None, ..bank.spec.clone().unwrap() };
     spec.design.tracking = None;
     spec.channels.iter_mut().zip(errors).for_each(|(channel, error)| channel.delay += Seconds(error));

@@ -1,10 +1,9 @@
-//! The largest gain of the error system at one frequency over a box of errors, with taps that follow the
-//! delays.
+//! The largest gain of the error system at one frequency over a box of errors, with delay-scheduled taps.
 //!
 //! The filters are F(delta) = F_0 + sum_j delta_j S_j, so K(delta) = W - sum_i F_i(delta) h_i(delta_i). In a
 //! part of the box with the half-widths d let t be the distances from its centre. Between -d_i and d_i the
 //! row h_i is the parabola through its values at -d_i, 0 and d_i, h_i(0) + t_i b_i + t_i^2 q_i, plus a
-//! remainder of norm at most c_i ([`super::aliases::Weight::Parabola`]). Put
+//! remainder r_i ([`super::aliases::Weight::Parabola`]). Put
 //! t_i^2 = d_i^2 - (d_i^2 - t_i^2). The first part leaves a function that is affine in each t_i, so it is a
 //! convex mix of the K at the vertices; the second part is
 //!
@@ -13,10 +12,10 @@
 //! ```
 //!
 //! S_ii being column i of S_i. That is affine in each t_j and s_j too. With t and s taken as independent, K
-//! is within sum_i |F_i| c_i of a convex mix over the vertices v and all e in {0, 1}:
+//! is K_mix - sum_i F_i(delta) r_i with a convex mix K_mix over the vertices v and all e in {0, 1} of
 //!
 //! ```text
-//! sigma(K) <= max over v and e of sigma(K_v + sum_i e_i d_i^2 (F_i(v) q_i + S_ii b_i)) + sum_i |F_i| c_i.
+//! K_v + sum_i e_i d_i^2 (F_i(v) q_i + S_ii b_i).
 //! ```
 //!
 //! A bound by the norms of the second part, sum_i d_i^2 |F_i q_i + S_ii b_i|, would be larger: what the taps
@@ -25,18 +24,19 @@
 use super::super::ball::{self, Ball};
 use super::super::spectrum::ComplexMatrix;
 use super::at_frequency::{
-    AtFrequency, Attained, MAX_BOXES, Part, Verdict, Vertex, Work, lower_gain, upper_gain,
+    AtFrequency, Attained, Limits, MAX_BOXES, Part, Verdict, Vertex, Work, lower_gain, upper_gain,
 };
 use super::channel::column_norm;
 use super::quick::{self, Columns, Compared, Quick, Terms};
+use super::remainder::Remainders;
 
 /// Points of a grid that a part needs to be halved: each half has its ends and its middle.
-pub(super) const HALVED: usize = 4;
+const HALVED: usize = 4;
 
-/// One frequency, with taps that follow the delays.
-pub(super) struct Following<'a> {
+/// One frequency, with delay-scheduled taps.
+pub(super) struct Scheduled<'a> {
     at: AtFrequency<'a>,
-    /// S_j by channel, M x N, per fast period; `None` where the taps do not follow the delay.
+    /// S_j by channel, M x N, per fast period; `None` where the taps do not depend on the delay.
     slopes: Vec<Option<ComplexMatrix>>,
     /// Half-width of the box by channel, fast periods.
     halves: &'a [Ball],
@@ -63,7 +63,7 @@ struct Choice {
 /// A column of filters times a row of the Gram matrix.
 type Term = (ComplexMatrix, usize);
 
-impl<'a> Following<'a> {
+impl<'a> Scheduled<'a> {
     pub(super) fn new(at: AtFrequency<'a>, slopes: Vec<Option<ComplexMatrix>>, halves: &'a [Ball]) -> Self {
         let points = |i: usize| (0..at.channels[i].errors.len()).map(move |point| (i, point));
         let rounded = |(i, point)| {
@@ -76,33 +76,22 @@ impl<'a> Following<'a> {
             slopes: slopes.iter().map(|slope| slope.as_ref().map(Columns::of)).collect(),
             deltas: (0..halves.len()).map(|i| points(i).map(rounded).collect()).collect(),
         };
-        let mut following = Self { at, slopes, halves, doubles };
-        let moved = |i: usize| {
-            let of = |(slope, half): (&Option<ComplexMatrix>, &Ball)| {
-                slope.as_ref().map_or(0.0, |slope| column_norm(slope, i) * half.magnitude())
-            };
-            following.slopes.iter().zip(halves).map(of).sum::<f64>()
-        };
-        let columns = following.at.columns.iter().enumerate();
-        let columns = columns.map(|(i, column)| super::angle::outward(column + moved(i))).collect();
-        following.at.columns = columns;
-        following
+        Self { at, slopes, halves, doubles }
     }
 
     /// Compares the largest gain over the whole box with `threshold`, within the limit of `work`.
-    pub(super) fn compare(&self, threshold: f64, work: &mut Work) -> Verdict {
+    pub(super) fn compare(&self, remainders: &Remainders, threshold: f64, work: &mut Work) -> Verdict {
+        let mut limits = Limits::new(remainders, &self.at.filters, threshold, HALVED);
         let mut boxes = vec![self.at.whole()];
         for _ in 0..MAX_BOXES {
             let Some(parts) = boxes.pop() else { return Verdict::Below };
-            let limit = threshold - self.at.remainder(&parts);
-            let halves = self.at.halved(&parts, HALVED);
             // Where the box can be halved, gains below the threshold need no digits.
-            let reported = if halves.is_some() { threshold } else { 0.0 };
-            let Some(found) = self.above(&parts, [limit, reported], work) else { continue };
+            let reported = if limits.can_halve(&parts) { threshold } else { 0.0 };
+            let Some(found) = self.above(&parts, [limits.of(&parts), reported], work) else { continue };
             if found.lower > threshold {
                 return Verdict::Above(found);
             }
-            match halves {
+            match limits.halved(&parts) {
                 Some(halves) if !work.is_used_up() => boxes.extend(halves),
                 _ => return Verdict::Open(found),
             }
@@ -117,7 +106,7 @@ impl<'a> Following<'a> {
             return Some(Attained::unknown());
         }
         let choices = |(i, part): (usize, &Part)| -> Vec<Choice> {
-            let bows: &[bool] = if part.first < part.last { &[false, true] } else { &[false] };
+            let bows: &[bool] = if part.delays.first < part.delays.last { &[false, true] } else { &[false] };
             let at_vertices = self.at.vertices(i, part).into_iter();
             at_vertices.flat_map(|vertex| bows.iter().map(move |&bowed| Choice { vertex, bowed })).collect()
         };
@@ -171,7 +160,7 @@ impl<'a> Following<'a> {
         let filters = moved(&self.at.filters, &self.slopes, &deltas);
         let mut terms: Vec<Term> = Vec::with_capacity(3 * chosen.len());
         for (i, (part, choice)) in parts.iter().zip(chosen).enumerate() {
-            let Choice { vertex, bowed } = *choice;
+            let (part, Choice { vertex, bowed }) = (part.delays, *choice);
             let row = |error: usize| self.at.channels[i].rows[error][vertex.speed];
             let gain = Ball::from(vertex.gain);
             let column = scaled(&column(&filters, i), gain);
@@ -200,10 +189,11 @@ impl<'a> Following<'a> {
         delta(&self.at, self.halves, i, point)
     }
 
-    /// As [`Following::square`], in doubles.
+    /// As [`Scheduled::square`], in doubles.
     fn terms(&self, parts: &[Part], chosen: &[Choice], terms: &mut Terms) {
         terms.clear();
         for (i, (part, Choice { vertex, bowed })) in parts.iter().zip(chosen).enumerate() {
+            let part = part.delays;
             let row = |error: usize| self.at.channels[i].rows[error][vertex.speed];
             let column = self.doubles.column(i, chosen);
             let gain = vertex.gain;
@@ -263,14 +253,25 @@ fn delta(at: &AtFrequency<'_>, halves: &[Ball], i: usize, point: usize) -> Ball 
     Ball::from(2.0 * point as f64 / last as f64 - 1.0) * halves[i]
 }
 
+/// Bounds of the columns of F over the whole box, from those of F_0.
+pub(super) fn columns(fixed: &[f64], slopes: &[Option<ComplexMatrix>], halves: &[Ball]) -> Vec<f64> {
+    let change = |i: usize| {
+        let of = |(slope, half): (&Option<ComplexMatrix>, &Ball)| {
+            slope.as_ref().map_or(0.0, |slope| column_norm(slope, i) * half.magnitude())
+        };
+        slopes.iter().zip(halves).map(of).sum::<f64>()
+    };
+    fixed.iter().enumerate().map(|(i, column)| super::angle::outward(column + change(i))).collect()
+}
+
 /// F_0 + sum_j delta_j S_j.
 pub(super) fn moved(
     filters: &ComplexMatrix,
     slopes: &[Option<ComplexMatrix>],
     deltas: &[Ball],
 ) -> ComplexMatrix {
-    let followed = slopes.iter().zip(deltas).filter_map(|(slope, delta)| Some((slope.as_ref()?, *delta)));
-    followed.fold(filters.clone(), |sum, (slope, delta)| sum.plus(&scaled(slope, delta)))
+    let scheduled = slopes.iter().zip(deltas).filter_map(|(slope, delta)| Some((slope.as_ref()?, *delta)));
+    scheduled.fold(filters.clone(), |sum, (slope, delta)| sum.plus(&scaled(slope, delta)))
 }
 
 fn column(filters: &ComplexMatrix, i: usize) -> ComplexMatrix {

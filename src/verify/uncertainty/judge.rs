@@ -1,0 +1,400 @@
+//! Compares the gains over a box with a threshold, frequency by frequency, on grids that become finer where
+//! that decides.
+
+use super::super::VerifyError;
+use super::super::ball::Ball;
+use super::super::spectrum::{self, ComplexMatrix};
+use super::aliases::{Aliases, FrontEnd};
+use super::angle::Frequency;
+use super::at_frequency::{AtFrequency, Attained, Mix, Verdict, Work, lower_gain};
+use super::channel::{Channel, Memories, column_norm, sampled_transfer, signal_transfer};
+use super::grid::Grid;
+use super::memory::Memory;
+use super::remainder::{Halvings, Remainders};
+use super::scheduled::{self, Scheduled, moved};
+use super::transfer::Transfer;
+use super::{ErrorBox, ErrorPoint, Taps};
+use crate::bank::{Bank, SynthesisFilters};
+use crate::units::RadiansPerSlowPeriod;
+use std::f64::consts::PI;
+use std::rc::Rc;
+
+/// Most grids, each finer than the one before.
+const MAX_GRIDS: usize = 10;
+/// Sides of the box are halved together if each loses at least this share of what the worst one loses.
+const SHARE_OF_WORST: f64 = 0.25;
+/// Most rows of a Gram matrix.
+const MAX_ROWS: usize = 250;
+/// Operations for a grid, over its samples times the cube of its states.
+const GRID_OPERATIONS: f64 = 20.0;
+/// From this many channels on, the worst point so far is tried at each frequency before all others.
+const MANY_CHANNELS: usize = 5;
+
+/// All that is needed to judge one frequency, and the largest gain seen.
+pub(super) struct Judge<'a> {
+    bank: &'a Bank,
+    errors: &'a ErrorBox,
+    taps: Taps,
+    /// S_j by channel, where the taps depend on its delay.
+    slopes: Vec<Option<SynthesisFilters>>,
+    /// Half-widths of the delays in fast periods.
+    halves: Vec<Ball>,
+    /// Made when needed, each finer than the one before.
+    grids: Vec<(Vec<Halvings>, Grid)>,
+    pub(super) channels: Vec<Channel>,
+    /// The filters of the target and of the signal.
+    target: Transfer,
+    signal: Option<Transfer>,
+    /// Aliases on each side that are summed one by one.
+    aliases: usize,
+    /// Size of the reference samples.
+    pub(super) scale: f64,
+    pub(super) best: Option<Best>,
+    /// The grid of the point of `best`, where it was needed.
+    at_best: Option<(ErrorPoint, Grid)>,
+    /// Gains computed so far.
+    pub(super) gains_computed: usize,
+    /// Operations on balls so far, and their limit.
+    pub(super) operations: f64,
+    pub(super) limit: f64,
+}
+
+/// The largest gain found.
+pub(super) struct Best {
+    pub(super) lower: f64,
+    pub(super) point: ErrorPoint,
+    pub(super) frequency: f64,
+}
+
+impl<'a> Judge<'a> {
+    /// With the memory of the reference samples.
+    ///
+    /// # Errors
+    /// See [`super::worst_case`].
+    pub(super) fn new(
+        bank: &'a Bank,
+        errors: &'a ErrorBox,
+        taps: Taps,
+    ) -> Result<(Self, Memory), VerifyError> {
+        let halvings = Halvings::none(bank.channel_count());
+        let grid = Grid::new(bank, errors, &on_grid(&halvings, taps))?;
+        let memories = Memories::new(&grid, errors)?;
+        let fast_period = fast_period(bank);
+        let mut channels: Vec<Channel> =
+            (0..bank.channel_count()).map(|i| Channel::new(&memories, i, errors, fast_period)).collect();
+        for i in 0..channels.len() {
+            let same = |&j: &usize| grid.has_equal_front_ends(i, j) && errors.cutoffs[i] == errors.cutoffs[j];
+            channels[i].like = (0..i).find(same).unwrap_or(i);
+        }
+        let reference = memories.of_sample(0);
+        let (target, signal) = (sampled_transfer(&grid, 0), signal_transfer(&grid));
+        let n = grid.period.order();
+        let scale = (n..n + bank.ratio).map(|i| grid.period.gram[(i, i)].nearest()).sum::<f64>().sqrt();
+        let mut judge = Self {
+            bank,
+            errors,
+            taps,
+            slopes: slopes(bank, taps),
+            halves: errors.delays.iter().map(|half| fast_periods(half.0, fast_period.0)).collect(),
+            grids: vec![(halvings, grid)],
+            channels,
+            target,
+            signal,
+            aliases: 0,
+            scale,
+            best: None,
+            at_best: None,
+            gains_computed: 0,
+            operations: 0.0,
+            limit: f64::INFINITY,
+        };
+        let front_ends =
+            std::iter::once(judge.reference()).chain(judge.channels.iter().map(Channel::front_end));
+        let counts = front_ends.map(|front_end| front_end.aliases(bank.ratio));
+        judge.aliases =
+            counts.collect::<Option<Vec<_>>>().ok_or(VerifyError::LongMemory)?.into_iter().max().unwrap_or(0);
+        Ok((judge, reference))
+    }
+
+    /// The filter of the reference samples.
+    fn reference(&self) -> FrontEnd<'_> {
+        FrontEnd { transfer: &self.target, signal: self.signal.as_ref(), cutoff: 0.0 }
+    }
+
+    /// The slopes of the taps, each with the half-width of its delay.
+    pub(super) fn slopes(&self) -> impl Iterator<Item = (&SynthesisFilters, Ball)> {
+        self.slopes.iter().zip(&self.halves).filter_map(|(slope, half)| Some((slope.as_ref()?, *half)))
+    }
+
+    /// For each sample, the slow periods by which it is late.
+    pub(super) fn delay_periods(&self) -> &[usize] {
+        &self.grids[0].1.period.delay_periods
+    }
+
+    pub(super) fn is_used_up(&self) -> bool {
+        self.operations > self.limit
+    }
+
+    /// Proves the gain of one point at a frequency, and keeps it if it is the largest so far.
+    ///
+    /// # Errors
+    /// As [`Grid::at`].
+    pub(super) fn try_point(
+        &mut self,
+        point: &ErrorPoint,
+        frequency: RadiansPerSlowPeriod,
+    ) -> Result<(), VerifyError> {
+        let grid = Grid::at(self.bank, point)?;
+        let near = Frequency::near(frequency.0);
+        let mut at = self.plain(&grid, &near);
+        let fast_period = fast_period(self.bank);
+        let deltas: Vec<Ball> =
+            point.delays.iter().map(|delay| fast_periods(delay.0, fast_period.0)).collect();
+        at.filters = moved(&at.filters, &self.slopes_at(&near), &deltas);
+        let lower = lower_gain(&at.square(&mixes_at(&grid, point)));
+        self.offer(Best { lower, point: point.clone(), frequency: frequency.0 });
+        Ok(())
+    }
+
+    fn offer(&mut self, found: Best) {
+        if self.best.as_ref().is_none_or(|best| best.lower < found.lower) {
+            self.best = Some(found);
+        }
+    }
+
+    /// Compares the gains at the frequency `centre` with `threshold`, on coarse grids first.
+    ///
+    /// # Errors
+    /// As [`super::worst_case`].
+    pub(super) fn compare(&mut self, centre: f64, threshold: f64) -> Result<Verdict, VerifyError> {
+        let near = Frequency::near(centre);
+        if let Some(above) = self.gain_of_best(centre, &near, threshold)? {
+            return Ok(Verdict::Above(above));
+        }
+        let remainders = self.remainders(&near)?;
+        let mut level = 0;
+        loop {
+            let grid = &self.grids[level].1;
+            let (verdict, work, best) = self.judge_on(grid, &near, &remainders, threshold);
+            self.operations += self.cost_of_gram(grid) + work.operations;
+            self.gains_computed += work.gains;
+            if let Some(best) = best {
+                self.offer(Best { frequency: centre.min(PI), ..best });
+            }
+            level += 1;
+            let is_open = matches!(verdict, Verdict::Open(_)) && !self.is_used_up();
+            if !is_open || (level == self.grids.len() && !self.refine(&remainders, threshold)) {
+                return Ok(verdict);
+            }
+        }
+    }
+
+    /// The gain of the worst point so far at another frequency, if it is above the threshold. With many
+    /// vertices a search would take long to meet one that is.
+    fn gain_of_best(
+        &mut self,
+        centre: f64,
+        near: &Frequency,
+        threshold: f64,
+    ) -> Result<Option<Attained>, VerifyError> {
+        if self.taps == Taps::Scheduled || self.channels.len() < MANY_CHANNELS {
+            return Ok(None);
+        }
+        let Some(point) = self.best.as_ref().map(|best| best.point.clone()) else { return Ok(None) };
+        let grid = match self.at_best.take() {
+            Some((known, grid)) if known == point => grid,
+            _ => Grid::at(self.bank, &point)?,
+        };
+        let lower = lower_gain(&self.plain(&grid, near).square(&mixes_at(&grid, &point)));
+        self.operations += self.cost_of_gain() + self.cost_of_gram(&grid);
+        self.gains_computed += 1;
+        self.at_best = Some((point.clone(), grid));
+        self.offer(Best { lower, point, frequency: centre.min(PI) });
+        let attained = Attained { lower, upper: f64::INFINITY, vertices: Vec::new() };
+        Ok((lower > threshold).then_some(attained))
+    }
+
+    /// What lies between the points of the grids at a frequency.
+    fn remainders(&self, near: &Frequency) -> Result<Remainders, VerifyError> {
+        let response = |front_end: FrontEnd<'_>| {
+            let aliases = Aliases::new(&front_end, near.angle, self.bank.ratio, self.aliases);
+            aliases.map(Rc::new).ok_or(VerifyError::LongMemory)
+        };
+        // Equal front ends have one response.
+        let mut responses: Vec<Rc<Aliases>> = Vec::with_capacity(self.channels.len());
+        for channel in &self.channels {
+            let known = responses.get(channel.like).cloned();
+            responses.push(known.map_or_else(|| response(channel.front_end()), Ok)?);
+        }
+        let rows = self.channels.iter().zip(responses).map(|(channel, response)| channel.row(response));
+        let filters = spectrum::filter_response(&self.bank.filters, self.bank.ratio, &near.z);
+        let fixed: Vec<f64> = (0..self.channels.len()).map(|i| column_norm(&filters, i)).collect();
+        let columns = scheduled::columns(&fixed, &self.slopes_at(near), &self.halves);
+        let reference = response(self.reference())?;
+        Ok(Remainders::new(rows.collect(), &reference, columns, self.bank.ratio, self.taps))
+    }
+
+    /// The verdict on one grid, the work that it took and the largest gain seen.
+    fn judge_on(
+        &self,
+        grid: &Grid,
+        near: &Frequency,
+        remainders: &Remainders,
+        threshold: f64,
+    ) -> (Verdict, Work, Option<Best>) {
+        let at = self.plain(grid, near);
+        let limit = (self.limit - self.operations).max(0.0);
+        let mut work = Work { gains: 0, operations: 0.0, limit, per_gain: self.cost_of_gain() };
+        let verdict = match self.taps {
+            Taps::Fixed => at.compare(remainders, threshold, &mut work),
+            Taps::Scheduled => Scheduled::new(at, self.slopes_at(near), &self.halves)
+                .compare(remainders, threshold, &mut work),
+        };
+        let best = match &verdict {
+            Verdict::Below => None,
+            Verdict::Above(attained) | Verdict::Open(attained) => best_of(grid, attained),
+        };
+        (verdict, work, best)
+    }
+
+    /// Operations for one gain, and for the Gram matrix of a grid.
+    fn cost_of_gain(&self) -> f64 {
+        let (m, n) = (self.bank.ratio as f64, self.channels.len() as f64);
+        let rows = match self.taps {
+            Taps::Fixed => 1.5 * n,
+            Taps::Scheduled => 2.5 * n,
+        };
+        4.0 * m * (m + rows) * (2.0 * m + rows)
+    }
+
+    /// Two complex sums over the states for each pair of rows, and one for each row and state.
+    fn cost_of_gram(&self, grid: &Grid) -> f64 {
+        let (states, rows) = (grid.period.order() as f64, grid.period.samples() as f64);
+        4.0 * rows * states * (2.0 * rows + states) + 8.0 * states.powi(3)
+    }
+
+    /// Adds a grid on which the sides with the largest remainders are halved once more; false if it would be
+    /// too large.
+    fn refine(&mut self, remainders: &Remainders, threshold: f64) -> bool {
+        let Some((halvings, _)) = self.grids.last() else { return false };
+        let limit = |halvings: &[Halvings]| remainders.rough_limit(halvings, threshold);
+        let so_far = limit(halvings);
+        let rated = self.sides().into_iter().map(|side| (limit(&side.halved(halvings)) - so_far, side));
+        let mut rated: Vec<(f64, Side)> = rated.collect();
+        rated.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let most = rated.first().map_or(0.0, |(gain, _)| *gain);
+        let mut finer = halvings.clone();
+        for (gain, side) in rated {
+            let next = side.halved(&finer);
+            if gain > 0.0 && gain >= SHARE_OF_WORST * most && self.rows(&next) <= MAX_ROWS {
+                finer = next;
+            }
+        }
+        if finer == *halvings || self.grids.len() >= MAX_GRIDS {
+            return false;
+        }
+        // A grid that is too large is as good as none.
+        let Ok(grid) = Grid::new(self.bank, self.errors, &on_grid(&finer, self.taps)) else { return false };
+        self.operations +=
+            GRID_OPERATIONS * grid.period.samples() as f64 * (grid.period.order() as f64).powi(3);
+        self.grids.push((finer, grid));
+        true
+    }
+
+    /// The sides of the box that can be halved.
+    fn sides(&self) -> Vec<Side> {
+        let channels = 0..self.channels.len();
+        let delays = channels.clone().filter(|&i| self.errors.delays[i].0 > 0.0).map(Side::Delay);
+        let cutoffs = channels.filter(|&i| self.errors.cutoffs[i] > 0.0).map(Side::Cutoff);
+        delays.chain(cutoffs).collect()
+    }
+
+    /// Rows of the Gram matrix of a grid.
+    fn rows(&self, halvings: &[Halvings]) -> usize {
+        let points = |half: f64, halvings: u32| if half > 0.0 { (1usize << halvings) + 1 } else { 1 };
+        let of = |(i, at): (usize, &Halvings)| {
+            points(self.errors.delays[i].0, at.delay) * points(self.errors.cutoffs[i], at.cutoff)
+        };
+        self.bank.ratio + on_grid(halvings, self.taps).iter().enumerate().map(of).sum::<usize>()
+    }
+
+    /// S_j at a frequency.
+    fn slopes_at(&self, near: &Frequency) -> Vec<Option<ComplexMatrix>> {
+        let at = |slope: &SynthesisFilters| spectrum::filter_response(slope, self.bank.ratio, &near.z);
+        self.slopes.iter().map(|slope| slope.as_ref().map(at)).collect()
+    }
+
+    /// The Gram matrix and the filters at a frequency.
+    fn plain<'b>(&'b self, grid: &'b Grid, near: &Frequency) -> AtFrequency<'b> {
+        let filters = spectrum::filter_response(&self.bank.filters, self.bank.ratio, &near.z);
+        AtFrequency {
+            gram: spectrum::gram(&grid.period, &near.z),
+            columns: (0..self.channels.len()).map(|i| column_norm(&filters, i)).collect(),
+            filters,
+            channels: &grid.channels,
+            gains: &self.errors.gains,
+        }
+    }
+}
+
+/// A side of the box that a grid divides.
+#[derive(Debug, Clone, Copy)]
+enum Side {
+    Delay(usize),
+    Cutoff(usize),
+}
+
+impl Side {
+    /// With this side halved once more.
+    fn halved(self, halvings: &[Halvings]) -> Vec<Halvings> {
+        let mut finer = halvings.to_vec();
+        match self {
+            Self::Delay(i) => finer[i].delay += 1,
+            Self::Cutoff(i) => finer[i].cutoff += 1,
+        }
+        finer
+    }
+}
+
+/// The halvings of a grid: where the taps depend on the delays, a part has its ends and its middle.
+fn on_grid(halvings: &[Halvings], taps: Taps) -> Vec<Halvings> {
+    let middle = u32::from(taps == Taps::Scheduled);
+    halvings.iter().map(|at| Halvings { delay: at.delay + middle, ..*at }).collect()
+}
+
+/// The rows of a grid of one point.
+fn mixes_at(grid: &Grid, point: &ErrorPoint) -> Vec<Mix> {
+    let mix = |(i, gain): (usize, &f64)| vec![(grid.channels[i].rows[0][0], 1.0 + gain)];
+    point.gains.iter().enumerate().map(mix).collect()
+}
+
+/// The slopes of the taps by channel; `None` where they do not depend on its delay.
+fn slopes(bank: &Bank, taps: Taps) -> Vec<Option<SynthesisFilters>> {
+    let of = |j: usize| {
+        let slopes = bank.tap_slopes.as_ref().filter(|slopes| slopes.follows(j))?;
+        (taps == Taps::Scheduled).then(|| SynthesisFilters::Fir(slopes.by_delay[j].clone()))
+    };
+    (0..bank.channel_count()).map(of).collect()
+}
+
+fn fast_period(bank: &Bank) -> crate::units::Seconds {
+    bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period)
+}
+
+fn fast_periods(seconds: f64, fast_period: f64) -> Ball {
+    Ball::from(seconds) / Ball::from(fast_period)
+}
+
+/// The errors at a vertex of `grid`; `None` without a vertex.
+fn best_of(grid: &Grid, attained: &Attained) -> Option<Best> {
+    if attained.vertices.is_empty() {
+        return None;
+    }
+    let vertices = attained.vertices.iter().zip(&grid.channels);
+    let point = ErrorPoint {
+        delays: vertices.clone().map(|(vertex, channel)| channel.errors[vertex.error]).collect(),
+        gains: vertices.clone().map(|(vertex, _)| vertex.gain - 1.0).collect(),
+        cutoffs: vertices.map(|(vertex, channel)| channel.speeds[vertex.speed] - 1.0).collect(),
+    };
+    Some(Best { lower: attained.lower, point, frequency: 0.0 })
+}
