@@ -94,8 +94,8 @@ fn schedule(problem: &Problem) -> Vec<SamplingInstant> {
     times.iter().map(scheduled).collect()
 }
 
-/// The time in the slow period, and the whole slow periods of delay, of the instant that lies `age` fast periods
-/// before the end of the period.
+/// The time in the slow period, and the whole slow periods of delay, of the instant that lies `age` fast
+/// periods before the end of the period.
 fn before_the_end(age: f64, period: f64, resolution: f64) -> (f64, usize) {
     let nearest = (age / period).round();
     if (age - nearest * period).abs() < resolution {

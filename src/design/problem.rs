@@ -17,9 +17,9 @@ const KEPT_PERIODS: usize = 16;
 /// resolved: the difference of their samples has lost half of its digits or more, and a bank of large taps
 /// may gain by it what no computation in doubles shows.
 const DELAY_RESOLUTION: f64 = 1e-8;
-/// Instants closer than this (in fast periods) are one in the designer's arithmetic: what lies between them is
-/// lost in doubles. It is far below the resolution of any converter. Delays that are large enough for their
-/// rounding to exceed it are one within that.
+/// Instants closer than this (in fast periods) are one in the designer's arithmetic: what lies between them
+/// is lost in doubles. It is far below the resolution of any converter. Delays that are large enough for
+/// their rounding to exceed it are one within that.
 const UNRESOLVED: f64 = 1e-11;
 
 /// Front ends, delays and rates in units of the fast period (h = 1).

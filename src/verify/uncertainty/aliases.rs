@@ -86,8 +86,8 @@ impl FrontEnd<'_> {
         let from = PI * (2 * count + 1) as f64 / ratio as f64 * (1.0 - 1e-12);
         let (fastest, slowest) = ((1.0 + self.cutoff) * (1.0 + 1e-12), 1.0 - self.cutoff);
         let inner = from / fastest * (1.0 - 1e-12);
-        // Phi(nu / x) and its second derivative, which is its curvature at nu / x over x^2. Zero stays zero: the
-        // sum of slow terms is infinite.
+        // Phi(nu / x) and its second derivative, which is its curvature at nu / x over x^2. Zero stays zero:
+        // the sum of slow terms is infinite.
         let scaled = |own: Vec<f64>, factor: f64| -> Vec<f64> {
             own.iter().enumerate().map(|(p, a)| a * factor * fastest.powi(p as i32) * (1.0 + 1e-11)).collect()
         };

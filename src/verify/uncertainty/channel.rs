@@ -1,4 +1,5 @@
-//! The bounds of one channel: what the cut of its memory leaves out, and its row with the range of its errors.
+//! The bounds of one channel: what the cut of its memory leaves out, and its row with the range of its
+//! errors.
 
 use super::super::VerifyError;
 use super::super::ball::{self, Ball, Matrix};
@@ -120,8 +121,8 @@ impl Channel {
         self.for_all_errors(filter * self.memory.whole())
     }
 
-    /// A kernel that is x times faster is x phi(x t): its energy beyond T is at most that of the slowest one,
-    /// times the ratio of the factors.
+    /// A kernel that is x times faster is x phi(x t): its energy beyond T is at most that of the slowest
+    /// one, times the ratio of the factors.
     fn for_all_errors(&self, of_slowest: f64) -> f64 {
         let speeds = outward((1.0 + self.cutoff) / (1.0 - self.cutoff));
         outward((1.0 + self.gain) * speeds.sqrt() * of_slowest)

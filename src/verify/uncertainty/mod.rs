@@ -12,8 +12,8 @@
 //!
 //! *Over the errors, at a fixed frequency* (`at_frequency`): each channel's row is a convex mix of its
 //! rows at the ends of the box plus a remainder that falls with the width (`remainder`), so the gain is at
-//! most the largest gain at a vertex plus what the remainders add. Where that is too much, the box is halved.
-//! Many vertices are bounded at once (`multipliers`).
+//! most the largest gain at a vertex plus what the remainders add. Where that is too much, the box is
+//! halved. Many vertices are bounded at once (`multipliers`).
 //!
 //! *Between frequencies, for fixed errors*: with its memory cut off after J slow periods (`memory`) K is a
 //! polynomial in z^-1, and |a* K|^2 is a nonnegative trigonometric polynomial p of some degree d for every

@@ -1,5 +1,5 @@
-//! Boxes around ordinary filters: none is refused, the ends are as close as asked, and no point of the box is
-//! above them by a sum over aliases, which shares nothing with the proof.
+//! Boxes around ordinary filters: none is refused, the ends are as close as asked, and no point of the box
+//! is above them by a sum over aliases, which shares nothing with the proof.
 
 use super::*;
 use crate::analog::StrictlyProper;

@@ -8,9 +8,10 @@
 //! |u* sum_i F_i r_i| <= R_k = sum_i |F_i| |r_i|   at the alias k.
 //! ```
 //!
-//! Adding norms, |u* K| <= |u* K_mix| + |R|, is too much for front ends that pass steps: there |R| falls only
-//! with the root of the width, but lies at high aliases, where K_mix is small. So the aliases are divided.
-//! With the near ones of R bounded by A, and kappa_k a bound of |u* W| + sum_i |u* F_i h_i| at the alias k,
+//! Adding norms, |u* K| <= |u* K_mix| + |R|, is too much for front ends that pass steps: there |R| falls
+//! only with the root of the width, but lies at high aliases, where K_mix is small. So the aliases are
+//! divided. With the near ones of R bounded by A, and kappa_k a bound of |u* W| + sum_i |u* F_i h_i| at the
+//! alias k,
 //!
 //! ```text
 //! |u* K|^2 <= (|u* K_mix| + A)^2 + (1/M) sum over the far k of (2 kappa_k R_k + e R_k^2).
@@ -110,8 +111,8 @@ impl UncertainRow {
         }
     }
 
-    /// The chord over 2 x of a function with the second derivative b is within x^2 b / 2 of it. The factors of
-    /// the cut-off are doubles near 1.
+    /// The chord over 2 x of a function with the second derivative b is within x^2 b / 2 of it. The factors
+    /// of the cut-off are doubles near 1.
     fn bend(&self, halvings: u32) -> f64 {
         if self.cutoff == 0.0 {
             return 0.0;
