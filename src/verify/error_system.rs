@@ -11,6 +11,7 @@ use super::ball::{self, Ball, Matrix};
 use super::slow_period::SlowPeriod;
 use crate::arithmetic::{DoubleDouble, Number};
 use crate::bank::{StateSpace, SynthesisFilters};
+use crate::linalg;
 use std::ops::Range;
 
 /// A filter bank in block form, exactly as the file has it.
@@ -27,6 +28,22 @@ impl<F: Number> BlockForm<F> {
         match filters {
             SynthesisFilters::Fir(taps) => Self::from_taps(taps, ratio),
             SynthesisFilters::StateSpace(block) => Self::from_block(block, ratio),
+        }
+    }
+
+    /// The same filters with states that are scaled by powers of two, so that the powers of `a` grow little
+    /// and responses lose few digits.
+    pub(super) fn balanced(&self) -> Self {
+        let [a, b, c] = [&self.a, &self.b, &self.c].map(ball::nearest);
+        let scales = linalg::state_scales(&a, &b, &c);
+        let scaled = |m: &Matrix<F>, factor: &dyn Fn(usize, usize) -> f64| {
+            m.map_with_location(|i, j, x| x * Ball::from(factor(i, j)))
+        };
+        Self {
+            a: scaled(&self.a, &|i, j| scales[j] / scales[i]),
+            b: scaled(&self.b, &|i, _| 1.0 / scales[i]),
+            c: scaled(&self.c, &|_, j| scales[j]),
+            d: self.d.clone(),
         }
     }
 

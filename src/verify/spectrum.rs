@@ -283,7 +283,7 @@ pub(super) fn filter_response(filters: &SynthesisFilters, ratio: usize, z: &Comp
             })
         }
         SynthesisFilters::StateSpace(_) => {
-            let BlockForm { a, b, c, d } = BlockForm::new(filters, ratio);
+            let BlockForm { a, b, c, d } = BlockForm::new(filters, ratio).balanced();
             let moving = ComplexMatrix::real(c).product(&resolved(&a, z, &ComplexMatrix::real(b)));
             ComplexMatrix::real(d).plus(&moving)
         }

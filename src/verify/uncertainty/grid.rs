@@ -5,7 +5,6 @@ use super::super::VerifyError;
 use super::super::front_ends::FrontEnds;
 use super::super::slow_period::SlowPeriod;
 use super::super::timeline::{Instant, SamplingInstant, Timeline};
-use super::remainder::Halvings;
 use super::{ErrorBox, ErrorPoint};
 use crate::bank::Bank;
 use crate::units::Seconds;
@@ -29,6 +28,20 @@ pub(super) struct ChannelGrid {
     pub(super) speeds: Vec<f64>,
     /// Row of the Gram matrix, by the index of the delay error and of the factor.
     pub(super) rows: Vec<Vec<usize>>,
+}
+
+/// Halvings of the delay and of the cut-off of a channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct Halvings {
+    pub(super) delay: u32,
+    pub(super) cutoff: u32,
+}
+
+impl Halvings {
+    /// The whole box.
+    pub(super) fn none(channels: usize) -> Vec<Self> {
+        vec![Self { delay: 0, cutoff: 0 }; channels]
+    }
 }
 
 impl Grid {

@@ -10,7 +10,6 @@ use super::super::ball::{self, Ball, Matrix};
 use super::super::error_system::BlockForm;
 use super::angle::outward;
 use crate::bank::SynthesisFilters;
-use crate::linalg;
 
 /// Maximum number of slow periods that are followed.
 const MAX_PERIODS: usize = 20_000;
@@ -97,21 +96,6 @@ fn sums_from(terms: &[f64], rest: f64) -> Vec<f64> {
     sums
 }
 
-/// The same filters with states that are scaled by powers of two, so that the powers of `a` grow little.
-fn balanced(form: &BlockForm) -> BlockForm {
-    let [a, b, c] = [&form.a, &form.b, &form.c].map(ball::nearest);
-    let scales = linalg::state_scales(&a, &b, &c);
-    let scaled = |m: &Matrix, factor: &dyn Fn(usize, usize) -> f64| {
-        m.map_with_location(|i, j, x| x * Ball::from(factor(i, j)))
-    };
-    BlockForm {
-        a: scaled(&form.a, &|i, j| scales[j] / scales[i]),
-        b: scaled(&form.b, &|i, _| 1.0 / scales[i]),
-        c: scaled(&form.c, &|_, j| scales[j]),
-        d: form.d.clone(),
-    }
-}
-
 /// The tails of a kernel.
 #[derive(Debug, Clone)]
 pub(super) struct Memory {
@@ -171,7 +155,7 @@ impl Lags {
     /// whole. `None` if that takes too many.
     pub(super) fn new(filters: &SynthesisFilters, ratio: usize, negligible: f64) -> Option<Self> {
         let SynthesisFilters::Fir(taps) = filters else {
-            return Self::recursive(&BlockForm::new(filters, ratio), negligible);
+            return Self::recursive(&BlockForm::new(filters, ratio).balanced(), negligible);
         };
         let lag = |list: &[f64]| outward(list.iter().map(|x| x.abs()).sum());
         let lags = |list: &Vec<f64>| sums_from(&list.chunks(ratio).map(lag).collect::<Vec<_>>(), 0.0);
@@ -199,7 +183,6 @@ impl Lags {
 
     /// F = d + sum_k c a^k b z^-(k+1).
     fn recursive(form: &BlockForm, negligible: f64) -> Option<Self> {
-        let form = balanced(form);
         let growth = growth(&form.a)?;
         let columns = |m: &Matrix| -> Vec<f64> {
             m.column_iter().map(|column| column.iter().fold(0.0, |sum, x| sum + x.magnitude())).collect()

@@ -32,7 +32,8 @@ use super::super::spectrum::ComplexMatrix;
 use super::Taps;
 use super::aliases::{Aliases, FarAliases, Weight};
 use super::angle::outward;
-use super::at_frequency::upper_gain;
+use super::gain::upper_gain;
+use super::grid::Halvings;
 use std::rc::Rc;
 
 /// The uncertain row of a channel at a frequency.
@@ -46,20 +47,6 @@ pub(super) struct UncertainRow {
     /// Largest error of the delay, and how far the points of its grid are rounded; fast periods.
     pub(super) half: f64,
     pub(super) rounding: f64,
-}
-
-/// Halvings of the delay and of the cut-off of a channel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) struct Halvings {
-    pub(super) delay: u32,
-    pub(super) cutoff: u32,
-}
-
-impl Halvings {
-    /// The whole box.
-    pub(super) fn none(channels: usize) -> Vec<Self> {
-        vec![Self { delay: 0, cutoff: 0 }; channels]
-    }
 }
 
 /// The rows of all channels with the columns of the filters.

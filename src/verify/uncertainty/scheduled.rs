@@ -23,10 +23,9 @@
 
 use super::super::ball::{self, Ball};
 use super::super::spectrum::ComplexMatrix;
-use super::at_frequency::{
-    AtFrequency, Attained, Limits, MAX_BOXES, Part, Verdict, Vertex, Work, lower_gain, upper_gain,
-};
+use super::at_frequency::{AtFrequency, Attained, Limits, MAX_BOXES, Part, Verdict, Vertex, Work};
 use super::channel::column_norm;
+use super::gain::{lower_gain, upper_gain};
 use super::quick::{self, Columns, Compared, Quick, Terms};
 use super::remainder::Remainders;
 

@@ -7,9 +7,8 @@
 //! Most gains are compared in double precision (`quick`). Balls decide where that does not suffice, and give
 //! the gains that are reported.
 
-use super::at_frequency::{
-    AtFrequency, Attained, Limits, MAX_BOXES, Mix, Part, Verdict, Vertex, Work, lower_gain, upper_gain,
-};
+use super::at_frequency::{AtFrequency, Attained, Limits, MAX_BOXES, Mix, Part, Verdict, Vertex, Work};
+use super::gain::{lower_gain, upper_gain};
 use super::multipliers::{self, Vertices};
 use super::quick::{Compared, Quick, Terms};
 use super::remainder::Remainders;
