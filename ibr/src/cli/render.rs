@@ -13,11 +13,9 @@ use super::output;
 use super::progress::Progress;
 use super::summary::{Figures, Summary};
 use crate::image::{Image, quality};
-use crate::pipeline::uncalibrated::{Target, UncalibratedRendering, UncalibratedSettings};
+use crate::pipeline::uncalibrated::{Target, UncalibratedSettings};
 use crate::pipeline::{RenderSettings, Rendering, Watch, calibrated, rectified, uncalibrated};
-use crate::propagate::{CalibratedView, RectifiedView};
-use crate::scene::{self, Kind, Scene};
-use crate::uncalibrated::chirality::Handedness;
+use crate::scene::{self, CalibratedSource, Kind, RectifiedSource, Scene};
 use concerns::Concerns;
 use outputs::Outputs;
 use std::path::Path;
@@ -143,18 +141,12 @@ fn render(
     let whole = |rendering| Rendered { rendering, hull: None, geometry: None };
     match &scene.kind {
         Kind::Rectified { views, positions } => {
-            let views: Vec<RectifiedView<'_>> = views
-                .iter()
-                .map(|v| RectifiedView { image: &v.image, disparity: &v.disparity, position: v.position })
-                .collect();
+            let views: Vec<_> = views.iter().map(RectifiedSource::view).collect();
             let done = rectified::render_watched(&views, positions[frame], &settings, watch);
             done.map(|rendering| whole(metric::in_millimetres(rendering, scene))).map_err(Failure::input)
         }
         Kind::Calibrated { views, cameras, size } => {
-            let views: Vec<CalibratedView<'_>> = views
-                .iter()
-                .map(|v| CalibratedView { image: &v.image, depth: &v.depth, camera: v.camera })
-                .collect();
+            let views: Vec<_> = views.iter().map(CalibratedSource::view).collect();
             let done = calibrated::render_watched(&views, &cameras[frame], *size, &settings, watch);
             done.map(whole).map_err(Failure::input)
         }
@@ -177,21 +169,9 @@ fn render_uncalibrated(
     let mut special = UncalibratedSettings::default();
     special.robust.seed = arguments.seed;
     special.plane.degree = settings.interpolation.plane.degree;
-    // The other order needs a second rendering, after the first has said which order that is.
-    let parts = if arguments.reverse_order { 2.0 } else { 1.0 };
-    let run = |special: &UncalibratedSettings, before: f64| {
-        let watch = |share| watch((before + share) / parts);
-        uncalibrated::render_watched(&images, tracks, target, *size, settings, special, &watch)
-            .map_err(Failure::input)
-    };
-    let mut done: UncalibratedRendering = run(&special, 0.0)?;
-    if arguments.reverse_order {
-        special.handedness = Some(match done.hand {
-            Handedness::Kept => Handedness::Reversed,
-            Handedness::Reversed => Handedness::Kept,
-        });
-        done = run(&special, 1.0)?;
-    }
+    special.reverse_order = arguments.reverse_order;
+    let done = uncalibrated::render_watched(&images, tracks, target, *size, settings, &special, watch)
+        .map_err(Failure::input)?;
     let geometry = Some(done.geometry);
     Ok(Rendered { rendering: done.rendering, hull: Some(done.region), geometry })
 }

@@ -13,6 +13,7 @@ use crate::depth::{DepthError, DepthMap};
 use crate::image::{Image, ImageError};
 use crate::partial::PartialError;
 use crate::pipeline::uncalibrated::Target;
+use crate::propagate::{CalibratedView, RectifiedView};
 use crate::uncalibrated::Point;
 use crate::uncalibrated::tracks::TrackError;
 use std::path::PathBuf;
@@ -95,6 +96,13 @@ pub struct RectifiedSource {
     pub position: f64,
 }
 
+impl RectifiedSource {
+    /// As the stages take it.
+    pub fn view(&self) -> RectifiedView<'_> {
+        RectifiedView { image: &self.image, disparity: &self.disparity, position: self.position }
+    }
+}
+
 /// A view of a general rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibratedSource {
@@ -104,6 +112,13 @@ pub struct CalibratedSource {
     pub depth: DepthMap,
     /// Its camera.
     pub camera: Camera,
+}
+
+impl CalibratedSource {
+    /// As the stages take it.
+    pub fn view(&self) -> CalibratedView<'_> {
+        CalibratedView { image: &self.image, depth: &self.depth, camera: self.camera }
+    }
 }
 
 /// Errors of a scene.

@@ -83,6 +83,14 @@ impl Handedness {
         }
     }
 
+    /// The other order.
+    pub fn reversed(self) -> Self {
+        match self {
+            Self::Kept => Self::Reversed,
+            Self::Reversed => Self::Kept,
+        }
+    }
+
     /// The bit for which chi of this oriented camera grows (`slope` > 0) or falls with 1 / d.
     pub fn from_slope(camera: &Matrix3x4<f64>, slope: f64) -> Self {
         if -slope * centre_sign(camera) > 0.0 { Self::Kept } else { Self::Reversed }

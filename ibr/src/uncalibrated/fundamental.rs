@@ -3,7 +3,7 @@
 //! R. Hartley, A. Zisserman, "Multiple View Geometry in Computer Vision", 2nd ed., chapter 11.
 
 use super::normalise::Normalisation;
-use super::random::{Subsets, trials_needed};
+use super::random::consensus;
 use super::{GeometryError, Match, RobustSettings, homogeneous};
 use crate::linear;
 use nalgebra::Matrix3;
@@ -86,7 +86,9 @@ pub fn robust(matches: &[Match], settings: &RobustSettings) -> Result<Fundamenta
     if let Some(index) = matches.iter().position(|m| !finite(m)) {
         return Err(GeometryError::NotFinite { index });
     }
-    let best = consensus(matches, settings);
+    let best = consensus::<8>(matches.len(), settings, |sample| {
+        Some(inliers(&eight_point(&chosen(matches, &sample)).ok()?, matches, settings.epipolar))
+    });
     let (threshold, total) = (settings.epipolar, matches.len());
     if best.len() < 8 {
         refuse_planes(matches, threshold)?;
@@ -95,27 +97,6 @@ pub fn robust(matches: &[Match], settings: &RobustSettings) -> Result<Fundamenta
     }
     refuse_planes(&chosen(matches, &best), threshold)?;
     refit(matches, best, threshold)
-}
-
-/// The largest set of matches that agrees with the F of some sample.
-fn consensus(matches: &[Match], settings: &RobustSettings) -> Vec<usize> {
-    let mut subsets = Subsets::new(settings.seed);
-    let mut best = Vec::new();
-    let mut trial = 0;
-    while trial < settings.trials {
-        let sample = chosen(matches, &subsets.draw::<8>(matches.len()));
-        if let Ok(f) = eight_point(&sample) {
-            let agreeing = inliers(&f, matches, settings.epipolar);
-            if agreeing.len() > best.len() {
-                best = agreeing;
-            }
-        }
-        trial += 1;
-        if trial as f64 >= trials_needed(best.len(), matches.len(), 8, settings.confidence) {
-            break;
-        }
-    }
-    best
 }
 
 fn refit(matches: &[Match], mut set: Vec<usize>, threshold: f64) -> Result<Fundamental, GeometryError> {

@@ -8,7 +8,7 @@ use crate::linear;
 use nalgebra::{Matrix3, Matrix3x4, Rotation3, UnitQuaternion, Vector3};
 
 /// Focal lengths that are tried, in units of the longer side of the image.
-const FOCAL_LENGTHS: [f64; 9] = [0.5, 0.62, 0.76, 0.93, 1.14, 1.39, 1.7, 2.08, 2.5];
+pub(super) const FOCAL_LENGTHS: [f64; 9] = [0.5, 0.62, 0.76, 0.93, 1.14, 1.39, 1.7, 2.08, 2.5];
 
 /// A guessed metric pair: camera 1 at the origin, camera 2 turned by R and moved by t of length one.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,9 +28,27 @@ pub struct MetricGuess {
 }
 
 /// Calibration with the principal point in the middle.
-fn calibration(focal: f64, (width, height): (usize, usize)) -> Matrix3<f64> {
+pub(super) fn calibration(focal: f64, (width, height): (usize, usize)) -> Matrix3<f64> {
     let (cx, cy) = ((width as f64 - 1.0) / 2.0, (height as f64 - 1.0) / 2.0);
     Matrix3::new(focal, 0.0, cx, 0.0, focal, cy, 0.0, 0.0, 1.0)
+}
+
+/// What E = K2^T F K1 says of the second camera, up to the sign of t and the choice of the rotation.
+pub(super) struct Essential {
+    pub(super) rotations: [Matrix3<f64>; 2],
+    pub(super) t: Vector3<f64>,
+    /// Second over first singular value.
+    pub(super) fit: f64,
+}
+
+impl Essential {
+    pub(super) fn of(f: &Matrix3<f64>, k: &[Matrix3<f64>; 2]) -> Option<Self> {
+        let (u, s, v) = linear::svd3(&(k[1].transpose() * f * k[0]))?;
+        let (u, v) = (u * u.determinant().signum(), v * v.determinant().signum());
+        let w = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+        let rotations = [u * w * v.transpose(), u * w.transpose() * v.transpose()];
+        Some(Self { rotations, t: u.column(2).into_owned(), fit: s[1] / s[0] })
+    }
 }
 
 /// The guess for one focal length: E = K2^T F K1, the decomposition with most points in front of both
@@ -42,12 +60,7 @@ pub fn guess(
     focal: f64,
 ) -> Option<MetricGuess> {
     let k = sizes.map(|size| calibration(focal, size));
-    let e = k[1].transpose() * f * k[0];
-    let (u, s, v) = linear::svd3(&e)?;
-    let (u, v) = (u * u.determinant().signum(), v * v.determinant().signum());
-    let w = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
-    let t: Vector3<f64> = u.column(2).into_owned();
-    let rotations = [u * w * v.transpose(), u * w.transpose() * v.transpose()];
+    let Essential { rotations, t, fit } = Essential::of(f, &k)?;
     let inverse = [k[0].try_inverse()?, k[1].try_inverse()?];
     let rays: Vec<[Point; 2]> = matches
         .iter()
@@ -61,7 +74,7 @@ pub fn guess(
         .map(|(r, t)| (r, t, in_front(&rays, r, &t)))
         .max_by_key(|(_, _, points)| points.iter().flatten().count())?;
     let r = Rotation3::from_matrix_unchecked(*best.0);
-    Some(MetricGuess { focal, k, r, t: best.1, fit: s[1] / s[0], points: best.2 })
+    Some(MetricGuess { focal, k, r, t: best.1, fit, points: best.2 })
 }
 
 /// The points in camera 1 coordinates, where they lie in front of both cameras.

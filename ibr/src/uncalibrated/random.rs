@@ -1,20 +1,21 @@
 //! Seeded random samples, and their number for a given confidence.
 
+use super::RobustSettings;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
 /// Draws subsets of indices; the same seed gives the same subsets on every platform.
-pub(super) struct Subsets {
+struct Subsets {
     generator: Pcg64,
 }
 
 impl Subsets {
-    pub(super) fn new(seed: u64) -> Self {
+    fn new(seed: u64) -> Self {
         Self { generator: Pcg64::seed_from_u64(seed) }
     }
 
     /// K different indices below n >= K.
-    pub(super) fn draw<const K: usize>(&mut self, n: usize) -> [usize; K] {
+    fn draw<const K: usize>(&mut self, n: usize) -> [usize; K] {
         let mut chosen = [usize::MAX; K];
         for k in 0..K {
             loop {
@@ -34,9 +35,29 @@ impl Subsets {
     }
 }
 
+/// RANSAC: the largest set of `total` things that agrees with the model of some K of them; `agreeing` returns
+/// the set of a sample, `None` if it has no model.
+pub(super) fn consensus<const K: usize>(
+    total: usize,
+    settings: &RobustSettings,
+    agreeing: impl Fn([usize; K]) -> Option<Vec<usize>>,
+) -> Vec<usize> {
+    let mut subsets = Subsets::new(settings.seed);
+    let mut best = Vec::new();
+    for trial in 1..=settings.trials {
+        if let Some(set) = agreeing(subsets.draw::<K>(total)).filter(|set| set.len() > best.len()) {
+            best = set;
+        }
+        if trial as f64 >= trials_needed(best.len(), total, K as i32, settings.confidence) {
+            break;
+        }
+    }
+    best
+}
+
 /// Samples of `size` needed to draw one without outliers with probability `confidence`:
 /// log(1 - p) / log(1 - w^size), w the share of inliers.
-pub(super) fn trials_needed(inliers: usize, total: usize, size: i32, confidence: f64) -> f64 {
+fn trials_needed(inliers: usize, total: usize, size: i32, confidence: f64) -> f64 {
     let clean = (inliers as f64 / total as f64).powi(size);
     if clean >= 1.0 { 1.0 } else { (1.0 - confidence).ln() / (-clean).ln_1p() }
 }

@@ -1,7 +1,7 @@
 //! A camera from points and their images: DLT on six, RANSAC, refinement of the reprojection error.
 
 use super::normalise::Normalisation;
-use super::random::{Subsets, trials_needed};
+use super::random::consensus;
 use super::{GeometryError, Point, RobustSettings};
 use crate::linear;
 use nalgebra::{Matrix3x4, SMatrix, SVector, Vector4};
@@ -43,7 +43,9 @@ pub fn resect(sightings: &[Sighting], settings: &RobustSettings) -> Result<Resec
         return Err(GeometryError::TooFew { what, found: sightings.len(), needed: NEEDED });
     }
     let threshold = settings.reprojection;
-    let mut set = consensus(sightings, settings);
+    let mut set = consensus::<NEEDED>(sightings.len(), settings, |sample| {
+        Some(inliers(&direct(&sample.map(|i| sightings[i])).ok()?, sightings, threshold))
+    });
     let mut camera = Matrix3x4::zeros();
     for _ in 0..5 {
         if set.len() < NEEDED {
@@ -61,26 +63,6 @@ pub fn resect(sightings: &[Sighting], settings: &RobustSettings) -> Result<Resec
     let squares: f64 = set.iter().map(|i| error(&camera, &sightings[*i])).sum();
     let rms = (squares / set.len().max(1) as f64).sqrt();
     Ok(Resection { camera: camera / camera.norm(), inliers: set, rms })
-}
-
-fn consensus(sightings: &[Sighting], settings: &RobustSettings) -> Vec<usize> {
-    let mut subsets = Subsets::new(settings.seed);
-    let mut best = Vec::new();
-    let mut trial = 0;
-    while trial < settings.trials {
-        let sample = subsets.draw::<NEEDED>(sightings.len()).map(|i| sightings[i]);
-        if let Ok(camera) = direct(&sample) {
-            let agreeing = inliers(&camera, sightings, settings.reprojection);
-            if agreeing.len() > best.len() {
-                best = agreeing;
-            }
-        }
-        trial += 1;
-        if trial as f64 >= trials_needed(best.len(), sightings.len(), 6, settings.confidence) {
-            break;
-        }
-    }
-    best
 }
 
 /// Square of the reprojection error in square pixels.

@@ -6,11 +6,8 @@ use crate::background;
 use crate::errors::refused;
 use hybank_ibr::image::Image;
 use hybank_ibr::pipeline::RenderSettings;
-use hybank_ibr::pipeline::uncalibrated::{
-    GeometryReport, OrderBy, Target, UncalibratedError, UncalibratedRendering, UncalibratedSettings, render,
-};
+use hybank_ibr::pipeline::uncalibrated::{GeometryReport, OrderBy, Target, UncalibratedSettings, render};
 use hybank_ibr::uncalibrated::Point;
-use hybank_ibr::uncalibrated::chirality::Handedness;
 use numpy::{PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -57,7 +54,11 @@ pub(crate) fn render_uncalibrated(
     let tracks = positions(&tracks);
     let target = points.map_or(Target::Between(between), |points| Target::Tracks(column(&points)));
     let size = (size.1, size.0);
-    let run = move |_: &_| rendered(&images, &tracks, &target, size, reverse_order);
+    let special = UncalibratedSettings { reverse_order, ..UncalibratedSettings::default() };
+    let run = move |_: &_| {
+        let images: Vec<&Image> = images.iter().collect();
+        render(&images, &tracks, &target, size, &RenderSettings::default(), &special)
+    };
     let done = background::run(py, None, run)?.map_err(refused)?;
     if done.geometry.order_by == OrderBy::Nothing {
         PyErr::warn(
@@ -69,28 +70,6 @@ pub(crate) fn render_uncalibrated(
         )?;
     }
     View::new(py, &done.rendering, Some(done.region), Some(Geometry::from(done.geometry)))
-}
-
-fn rendered(
-    images: &[Image],
-    tracks: &Tracks,
-    target: &Target,
-    size: (usize, usize),
-    reverse_order: bool,
-) -> Result<UncalibratedRendering, UncalibratedError> {
-    let images: Vec<&Image> = images.iter().collect();
-    let settings = RenderSettings::default();
-    let run = |special: &UncalibratedSettings| render(&images, tracks, target, size, &settings, special);
-    let mut special = UncalibratedSettings::default();
-    let found = run(&special)?;
-    if !reverse_order {
-        return Ok(found);
-    }
-    special.handedness = Some(match found.hand {
-        Handedness::Kept => Handedness::Reversed,
-        Handedness::Reversed => Handedness::Kept,
-    });
-    run(&special)
 }
 
 fn positions(tracks: &PyReadonlyArray3<'_, f64>) -> Tracks {

@@ -4,8 +4,7 @@ use crate::analysis::Advice;
 use crate::analysis::{CameraPredictor, Limits, RigPredictor, ViewError};
 use crate::camera::Camera;
 use crate::pipeline::{Agreement, RenderError, RenderSettings};
-use crate::propagate::{CalibratedView, RectifiedView};
-use crate::scene::Kind;
+use crate::scene::{CalibratedSource, Kind, RectifiedSource};
 
 /// Calibrated weights, and the virtual views to predict.
 pub(super) enum Predictor<'a> {
@@ -21,17 +20,11 @@ impl<'a> Predictor<'a> {
     ) -> Result<Self, RenderError> {
         match kind {
             Kind::Rectified { views, positions } => {
-                let views: Vec<RectifiedView<'_>> = views
-                    .iter()
-                    .map(|v| RectifiedView { image: &v.image, disparity: &v.disparity, position: v.position })
-                    .collect();
+                let views: Vec<_> = views.iter().map(RectifiedSource::view).collect();
                 Ok(Self::Rig { predictor: RigPredictor::new(&views, settings)?, positions, limits })
             }
             Kind::Calibrated { views, cameras, size } => {
-                let views: Vec<CalibratedView<'_>> = views
-                    .iter()
-                    .map(|v| CalibratedView { image: &v.image, depth: &v.depth, camera: v.camera })
-                    .collect();
+                let views: Vec<_> = views.iter().map(CalibratedSource::view).collect();
                 Ok(Self::Cameras { predictor: CameraPredictor::new(&views, settings)?, cameras, size: *size })
             }
             Kind::Uncalibrated { .. } => Err(RenderError::NoViews),

@@ -40,6 +40,8 @@ pub struct UncalibratedSettings {
     pub robust: RobustSettings,
     /// The order of depth, if it is known; otherwise the metric guess decides.
     pub handedness: Option<Handedness>,
+    /// Exchange near and far, whatever decides their order.
+    pub reverse_order: bool,
     /// Depth threshold of the occlusion test as a share of the range of chi. The meshes of two views
     /// interpolate depth edges differently; a threshold below their difference would remove visible
     /// samples.
@@ -52,7 +54,13 @@ pub struct UncalibratedSettings {
 impl Default for UncalibratedSettings {
     fn default() -> Self {
         let plane = PlaneSettings { stiffness: 0.02, bending: 0.3, ..PlaneSettings::default() };
-        Self { robust: RobustSettings::default(), handedness: None, sigma_share: 0.2, plane }
+        Self {
+            robust: RobustSettings::default(),
+            handedness: None,
+            reverse_order: false,
+            sigma_share: 0.2,
+            plane,
+        }
     }
 }
 
@@ -187,6 +195,10 @@ pub fn render_watched(
     watch(SURFACES);
     if uncalibrated.handedness.is_none() {
         decide(images, &surfaces, &mut scene)?;
+    }
+    if uncalibrated.reverse_order {
+        scene.hand = scene.hand.reversed();
+        (scene.geometry.order_by, scene.geometry.order_agreement) = (OrderBy::Given, 1.0);
     }
     watch(DECIDED);
     let rest = |share| watch(DECIDED + (1.0 - DECIDED) * share);

@@ -8,14 +8,12 @@
 //! lie in front of both cameras, and the closer its principal point lies to the middle.
 
 use super::chirality::{self, Handedness};
+use super::metric::{Essential, FOCAL_LENGTHS, calibration};
 use super::{Match, homogeneous};
 use crate::linear;
 use nalgebra::{Matrix3, Matrix3x4, Vector3, Vector4};
 
-/// Focal lengths of the first camera that are tried, in units of the longer side of its image.
-const FOCAL_LENGTHS: [f64; 9] = [0.5, 0.62, 0.76, 0.93, 1.14, 1.39, 1.7, 2.08, 2.5];
-
-/// The same of the second camera, in units of that of the first one per side.
+/// Focal lengths of the second camera that are tried, in units of that of the first one per side.
 const RATIOS: [f64; 7] = [0.5, 0.63, 0.79, 1.0, 1.26, 1.59, 2.0];
 
 /// Shifts of the principal point of the second camera against the middle of its image that are tried, in
@@ -58,29 +56,18 @@ fn votes(
         .collect()
 }
 
-/// Calibration with the principal point in the middle.
-fn calibration(focal: f64, (width, height): (usize, usize)) -> Matrix3<f64> {
-    let (cx, cy) = ((width as f64 - 1.0) / 2.0, (height as f64 - 1.0) / 2.0);
-    Matrix3::new(focal, 0.0, cx, 0.0, focal, cy, 0.0, 0.0, 1.0)
-}
-
 fn vote(f: &Matrix3<f64>, matches: &[Match], chi: &[f64], k: &[Matrix3<f64>; 2]) -> Option<Vote> {
-    let e = k[1].transpose() * f * k[0];
-    let (u, s, v) = linear::svd3(&e)?;
-    let (u, v) = (u * u.determinant().signum(), v * v.determinant().signum());
-    let w = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
-    let t: Vector3<f64> = u.column(2).into_owned();
+    let Essential { rotations: turns, t, fit } = Essential::of(f, k)?;
     let inverse = [k[0].try_inverse()?, k[1].try_inverse()?];
     let rays: Vec<[Vector3<f64>; 2]> = matches
         .iter()
         .map(|m| [inverse[0] * homogeneous(&m.first), inverse[1] * homogeneous(&m.second)])
         .collect();
-    let turns = [u * w * v.transpose(), u * w.transpose() * v.transpose()];
     let sided = turns.map(|r| Sided::new(&rays, &r, &t));
     let best = if sided[0].count >= sided[1].count { &sided[0] } else { &sided[1] };
     let slope = best.slope(&rays, chi)?;
     let share = best.count as f64 / matches.len() as f64;
-    Some(Vote { sign: slope.signum(), fit: s[1] / s[0], share, shift: 0.0 })
+    Some(Vote { sign: slope.signum(), fit, share, shift: 0.0 })
 }
 
 /// Depths of the matches in the first camera for one rotation, with the sign of t for which most points lie
