@@ -13,7 +13,7 @@ use hybank_ibr::depth::DepthMap;
 use hybank_ibr::image::Image;
 use hybank_ibr::pipeline::{Method, RenderSettings, calibrated, rectified};
 use hybank_ibr::propagate::{CalibratedView, RectifiedView};
-use hybank_ibr::segment::MeanShift;
+use hybank_ibr::segment::segment;
 use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use stopwatch::time;
 
@@ -76,5 +76,5 @@ fn main() {
         full_depth(size, &[-1.0, -0.7, -0.3, 0.0, 1.0, 1.3, 1.7, 2.0]);
     }
     let image = &views((450, 375), &[0.0])[0].image;
-    time_chosen("mean shift, 450x375", || MeanShift::default().segment(image).expect("default settings"));
+    time_chosen("mean shift, 450x375", || segment(image));
 }

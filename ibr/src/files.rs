@@ -1,65 +1,84 @@
-//! Reading whole files up to a size limit, since a device may never end.
+//! Reading input files: whole, up to a size limit since a device may never end, and what is wrong with them.
 
-use std::fs::File;
-use std::io::{Error, Read};
-use std::path::Path;
+use hybank::files::{Bound, FileError, bytes_of, read_bytes, text_in};
+use std::fmt;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
-/// Most bytes of an image or map.
-const MOST_BYTES: u64 = 1 << 30;
-/// Most bytes of a text file.
-const MOST_TEXT: u64 = 1 << 28;
+/// What to do about a path in a scene that cannot be opened.
+pub(crate) const CHECK_THE_PATH: &str = "check the path (paths in a scene are relative to the scene file)";
+
+const IMAGE: Bound = Bound { bytes: 1 << 30, kind: "an image or map", remedy: "shrink it" };
+const TEXT: Bound = Bound { bytes: 1 << 28, kind: "a text file", remedy: "is it the right file?" };
+
+/// What is wrong with an input file: a scene, tracks, cameras, images or maps.
+#[derive(Debug, thiserror::Error)]
+pub enum InputError {
+    /// It cannot be read.
+    #[error("{source}; {remedy}")]
+    Read {
+        /// The reason, with the name of the file.
+        source: FileError,
+        /// What to do about it.
+        remedy: &'static str,
+    },
+    /// Its content cannot be used.
+    #[error("{}{at}: {reason}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// Where in the file.
+        at: Location,
+        /// What is wrong, and the remedy.
+        reason: String,
+    },
+}
+
+/// Where in a file something is wrong; lines, records and frames are counted from 1.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Location {
+    /// In all of it.
+    File,
+    /// In a line.
+    Line(usize),
+    /// In a record of a binary file.
+    Record(usize),
+    /// In a frame of transforms.json, with the name of its image.
+    Frame(usize, String),
+    /// In the camera of an image.
+    Image(String),
+}
+
+impl fmt::Display for Location {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File => Ok(()),
+            Self::Line(line) => write!(f, ":{line}"),
+            Self::Record(record) => write!(f, ": record {record}"),
+            Self::Frame(frame, image) => write!(f, ": frame {frame} ({image:?})"),
+            Self::Image(image) => write!(f, ": image {image:?}"),
+        }
+    }
+}
+
+impl InputError {
+    pub(crate) fn content(path: &Path, at: Location, reason: impl ToString) -> Self {
+        Self::Content { path: path.into(), at, reason: reason.to_string() }
+    }
+}
 
 /// The bytes of a file.
-///
-/// # Errors
-/// The system's reason, or that the file is larger than 1 GiB.
-pub(crate) fn read(path: &Path) -> std::io::Result<Vec<u8>> {
-    at_most(File::open(path)?, MOST_BYTES)
+pub(crate) fn read(path: &Path, remedy: &'static str) -> Result<Vec<u8>, InputError> {
+    read_bytes(path, IMAGE).map_err(|source| InputError::Read { source, remedy })
 }
 
 /// The text of a file.
-///
-/// # Errors
-/// The system's reason, that the file is larger than 256 MiB, or that it is not UTF-8.
-pub(crate) fn read_text(path: &Path) -> std::io::Result<String> {
-    text(File::open(path)?)
+pub(crate) fn read_text(path: &Path, remedy: &'static str) -> Result<String, InputError> {
+    hybank::files::read_text(path, TEXT).map_err(|source| InputError::Read { source, remedy })
 }
 
-/// The text of a stream, as [`read_text`].
-///
-/// # Errors
-/// As [`read_text`].
-pub(crate) fn text(stream: impl Read) -> std::io::Result<String> {
-    let bytes = at_most(stream, MOST_TEXT)?;
-    String::from_utf8(bytes).map_err(|e| {
-        let offset = e.utf8_error().valid_up_to();
-        Error::other(format!("it is not a text file: byte {offset} is not UTF-8"))
-    })
-}
-
-fn at_most(stream: impl Read, most: u64) -> std::io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    stream.take(most + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > most {
-        return Err(Error::other(format!("it has more than {} MiB", most >> 20)));
-    }
-    Ok(bytes)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_never_ends_is_refused() {
-        let message = at_most(std::io::repeat(7), 1 << 20).unwrap_err().to_string();
-        assert_eq!(message, "it has more than 1 MiB");
-        assert_eq!(at_most(&b"1234"[..], 4).unwrap(), b"1234");
-    }
-
-    #[test]
-    fn what_is_no_text_says_where() {
-        assert_eq!(text(&b"abc"[..]).unwrap(), "abc");
-        assert!(text(&b"ab\xff"[..]).unwrap_err().to_string().contains("byte 2"));
-    }
+/// The text of a stream called `name`.
+#[cfg(feature = "cli")]
+pub(crate) fn text(stream: impl Read, name: &str) -> Result<String, FileError> {
+    text_in(bytes_of(stream, name, TEXT)?, name)
 }

@@ -6,7 +6,7 @@ pub mod camera;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod depth;
-mod files;
+pub mod files;
 pub mod image;
 pub mod interpolate;
 mod linear;
@@ -17,5 +17,6 @@ pub mod propagate;
 pub mod sample;
 pub mod scene;
 pub mod segment;
+pub mod setting;
 pub mod synthetic;
 pub mod uncalibrated;

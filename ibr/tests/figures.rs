@@ -187,7 +187,7 @@ fn single_views() {
 #[test]
 fn cones_with_three_percent_of_the_depths() {
     let Some(path) = data("cones") else { return };
-    let dense = |method: &Densify| {
+    let dense = |method: Densify| {
         let mut whole = pair("cones").unwrap();
         for (i, name) in ["disp2.png", "disp6.png"].iter().enumerate() {
             let (width, height, stored) = read_map(&path.join(name)).unwrap();
@@ -198,8 +198,8 @@ fn cones_with_three_percent_of_the_depths() {
         }
         psnr(&whole, &RenderSettings::default())
     };
-    let segmentwise = dense(&Densify::default());
-    let bilinear = dense(&Densify::Bilinear);
+    let segmentwise = dense(Densify::default());
+    let bilinear = dense(Densify::Bilinear);
     assert!(segmentwise >= 28.7, "{segmentwise}");
     assert!(segmentwise >= bilinear + 1.8, "{bilinear}");
 }

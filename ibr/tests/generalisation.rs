@@ -229,7 +229,7 @@ fn every_kind_of_scene_profits_from_segments_where_depth_is_coarse() {
     for (name, layers, _) in scenes() {
         let ends = [record(&layers, 0.0), record(&layers, 1.0)];
         let (truth, _) = record(&layers, 0.5);
-        let render = |method: &Densify| {
+        let render = |method: Densify| {
             let dense = |i: usize| densify(&ends[i].1.decimated(6).unwrap(), 6, &ends[i].0, method).unwrap();
             let maps = [dense(0), dense(1)];
             let view =
@@ -237,7 +237,7 @@ fn every_kind_of_scene_profits_from_segments_where_depth_is_coarse() {
             let done = rectified::render(&[view(0), view(1)], 0.5, &RenderSettings::default()).unwrap();
             psnr(&done.image, &truth, None)
         };
-        let (segments, bilinear) = (render(&Densify::default()), render(&Densify::Bilinear));
+        let (segments, bilinear) = (render(Densify::default()), render(Densify::Bilinear));
         println!("{name}, depth at one pixel in 36: segmentwise {segments:.2}, bilinear {bilinear:.2} dB");
         // On one plane both are exact; across edges the segments must win.
         assert!(segments > bilinear - 0.1, "{name}: {segments} {bilinear}");

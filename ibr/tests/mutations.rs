@@ -4,10 +4,11 @@
 #[path = "../../tests/support/random.rs"]
 mod random;
 
+use hybank_ibr::camera::CameraList;
 use hybank_ibr::camera::colmap::parse_model;
 use hybank_ibr::camera::middlebury::parse_calibration;
 use hybank_ibr::camera::transforms::parse_transforms;
-use hybank_ibr::image::{Image, encode, pfm, read_image, read_map};
+use hybank_ibr::image::{Image, Levels, encode, pfm, read_image, read_map};
 use hybank_ibr::scene::parse;
 use hybank_ibr::uncalibrated::tracks::Tracks;
 use random::Random;
@@ -68,12 +69,12 @@ fn accepted<T>(result: Result<T, impl std::fmt::Display>) -> bool {
 
 #[test]
 fn float_maps() {
-    let grey = pfm::FloatMap { width: 3, height: 2, channels: 1, data: vec![1.5; 6] };
-    let colour = pfm::FloatMap { width: 1, height: 2, channels: 3, data: vec![-0.5; 6] };
+    let grey = Image::filled(3, 2, 1, 1.5);
+    let colour = Image::filled(1, 2, 3, -0.5);
     let big = b"Pf 2 1 1.0\n\x3f\x80\x00\x00\x3f\x80\x00\x00";
     survive(&[&pfm::encode(&grey), &pfm::encode(&colour), big], |bytes| {
         accepted(pfm::decode(bytes).inspect(|map| {
-            assert_eq!(map.data.len(), map.width * map.height * map.channels);
+            assert_eq!(map.data().len(), map.width() * map.height() * map.channels());
         }))
     });
 }
@@ -95,18 +96,23 @@ fn colmap_models() {
     let cameras = "# c\n1 PINHOLE 640 480 500 510 320 240\n2 SIMPLE_RADIAL 64 48 50 32 24 0.01\n";
     let images = "1 0.9 0.1 0 0.2 1 2 3 1 a b.png\n1 2 -1\n2 1 0 0 0 0 0 0 2 c.png\n\n";
     let folder = Path::new("model");
-    let finite = |model: &hybank_ibr::camera::colmap::Model| {
-        assert!(model.values().all(|c| c.camera.matrix().iter().all(|v| v.is_finite())));
-    };
     survive(&[cameras.as_bytes()], |bytes| {
-        accepted(parse_model(&String::from_utf8_lossy(bytes), images, folder).inspect(finite))
+        accepted(parse_model(&String::from_utf8_lossy(bytes), images, folder).inspect(finite_cameras))
     });
     survive(&[images.as_bytes()], |bytes| {
-        accepted(parse_model(cameras, &String::from_utf8_lossy(bytes), folder).inspect(finite))
+        accepted(parse_model(cameras, &String::from_utf8_lossy(bytes), folder).inspect(finite_cameras))
     });
 }
 
-/// Cameras of all frames are finite, also for the size of an image that the file does not give.
+/// Cameras of a list are finite, also for the size of an image that the file does not give.
+fn finite_cameras(list: &CameraList) {
+    for frame in &list.frames {
+        accepted(list.camera(frame, (9, 7)).inspect(|found| {
+            assert!(found.camera.matrix().iter().all(|v| v.is_finite()) && found.size.0 > 0);
+        }));
+    }
+}
+
 #[test]
 fn transforms_files() {
     let seeds: [&[u8]; 2] = [
@@ -115,15 +121,7 @@ fn transforms_files() {
     ];
     survive(&seeds, |bytes| {
         let read = parse_transforms(&String::from_utf8_lossy(bytes), Path::new("t.json"));
-        accepted(read.inspect(|file| {
-            for frame in &file.frames {
-                let camera = file.camera(frame, (9, 7));
-                let finite = |found: &hybank_ibr::camera::colmap::ModelCamera| {
-                    assert!(found.camera.matrix().iter().all(|v| v.is_finite()) && found.size.0 > 0);
-                };
-                accepted(camera.inspect(finite));
-            }
-        }))
+        accepted(read.inspect(finite_cameras))
     });
 }
 
@@ -156,7 +154,7 @@ fn images() {
     let colour = Image::new(9, 7, 3, (0..189).map(|i| (i * 31 % 256) as f32).collect()).unwrap();
     for name in ["a.png", "a.jpg", "a.ppm", "a.pgm", "a.pfm"] {
         let path = dir.path().join(name);
-        let seed = encode(&colour, &path).unwrap();
+        let seed = encode(&colour, &path, Levels::Eight).unwrap();
         survive_rounds(trials::rounds(300), &[&seed], |bytes| {
             std::fs::write(&path, bytes).unwrap();
             let named = |error: hybank_ibr::image::ImageError| {

@@ -1,4 +1,4 @@
-//! Interpolation kernels: centred B-splines of any degree and the sinc, with their slopes.
+//! Interpolation kernels: centred B-splines of any degree and the sinc, with the slopes of the splines.
 //!
 //! M. Unser, "Splines: a perfect fit for signal and image processing", IEEE Signal Processing
 //! Magazine 16(6), 1999. Unit spacing throughout: x is counted in knots.
@@ -15,15 +15,6 @@ pub fn sin_pi(x: f64) -> f64 {
 /// The sinc kernel sin(pi x) / (pi x), 1 at x = 0.
 pub fn sinc(x: f64) -> f64 {
     if x == 0.0 { 1.0 } else { sin_pi(x) / (PI * x) }
-}
-
-/// The derivative of [`sinc`]: (cos(pi x) - sinc(x)) / x, 0 at x = 0.
-pub fn sinc_slope(x: f64) -> f64 {
-    // The difference cancels near 0; its series starts with -pi^2 x / 3 + pi^4 x^3 / 30.
-    if x.abs() < 1e-3 {
-        return -PI * PI * x / 3.0 * (1.0 - PI * PI * x * x / 10.0);
-    }
-    (sin_pi(x + 0.5) - sinc(x)) / x
 }
 
 /// The largest integer not above x, saturating. On baseline x86-64 `f64::floor` would be a library call.
@@ -107,15 +98,14 @@ impl<const ORDER: usize> BSpline<ORDER> {
         (first, w.map(|[w]| w), d.map(|[d]| d))
     }
 
-    /// Weights and slopes at a position t of a knot span, 0 <= t <= 1.
+    /// Weights at a position t of a knot span, 0 <= t <= 1.
     #[cfg(feature = "fit2")]
     #[inline(always)]
-    pub(super) fn in_span(t: f64) -> ([f64; ORDER], [f64; ORDER]) {
-        let lower = raise::<ORDER, 1>(&[t], Self::DEGREE);
-        (raise_once(&lower, &[t], ORDER).map(|[w]| w), differences(&lower).map(|[d]| d))
+    pub(super) fn in_span(t: f64) -> [f64; ORDER] {
+        raise::<ORDER, 1>(&[t], ORDER).map(|[w]| w)
     }
 
-    /// The same at N positions at once, with the positions innermost. They are independent of each other,
+    /// [`Self::weights_and_slopes`] at N positions at once, with the positions innermost. They are independent of each other,
     /// so the processor need not wait for each step of the recursion. The bits are those of single calls.
     // Not inlined, the arrays would pass through memory, which takes half of a fit's time.
     #[inline(always)]
@@ -296,15 +286,6 @@ mod tests {
         assert_eq!(sin_pi(0.5), 1.0);
         assert_eq!(sin_pi(1.5), -1.0);
         assert!((sinc(0.5) - 2.0 / PI).abs() < 1e-16);
-    }
-
-    #[test]
-    fn the_slope_of_the_sinc_is_its_derivative_also_near_zero() {
-        for x in [-2.7, -1.0, -0.3, -2e-3, -0.9e-3, 0.0, 1e-5, 1.1e-3, 0.4, 3.0] {
-            let h = 1e-5;
-            let numeric = (sinc(x + h) - sinc(x - h)) / (2.0 * h);
-            assert!((sinc_slope(x) - numeric).abs() < 1e-9, "{x}: {} {numeric}", sinc_slope(x));
-        }
     }
 
     proptest! {

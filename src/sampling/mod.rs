@@ -1,6 +1,6 @@
 //! The sampling core that both crates stand on.
 //!
-//! * [`kernel`]: centred B-splines of any degree and the sinc, with slopes;
+//! * [`kernel`]: centred B-splines of any degree, with slopes, and the sinc;
 //! * [`fit`]: regularised, weighted least squares in a shift-invariant spline space, solved in O(M n^2);
 //! * `fit2`: the same for images, with tensor products (feature `fit2`);
 //! * [`recurrent`]: perfect reconstruction from M interleaved sample sets (Yen's formula);
@@ -23,6 +23,6 @@ pub use error::SamplingError;
 pub use fit::{Fit, FitSample};
 #[cfg(feature = "fit2")]
 pub use fit2::Fit2;
-pub use kernel::{BSpline, sinc, sinc_slope};
+pub use kernel::{BSpline, sinc};
 pub use recurrent::Recurrent;
 pub use smoothing::SmoothingSpline;

@@ -1,8 +1,7 @@
 //! `calib.txt` of the Middlebury stereo benchmark (2014 and later): inner parameters of both cameras,
 //! baseline and the difference of the principal points.
 
-use super::CameraFileError;
-use super::file_error::CHECK_THE_PATH;
+use crate::files::{self, CHECK_THE_PATH, InputError, Location};
 use std::path::Path;
 
 /// Difference between `doffs` and the principal points that rounding explains, in pixels.
@@ -25,21 +24,16 @@ pub struct Calibration {
 /// Reads a file.
 ///
 /// # Errors
-/// [`CameraFileError`], with the line.
-pub fn read_calibration(path: &Path) -> Result<Calibration, CameraFileError> {
-    let text = crate::files::read_text(path).map_err(|source| CameraFileError::Read {
-        path: path.into(),
-        source,
-        remedy: CHECK_THE_PATH,
-    })?;
-    parse_calibration(&text, path)
+/// [`InputError`], with the line.
+pub fn read_calibration(path: &Path) -> Result<Calibration, InputError> {
+    parse_calibration(&files::read_text(path, CHECK_THE_PATH)?, path)
 }
 
 /// The same from the text of the file; `path` appears in messages.
 ///
 /// # Errors
-/// [`CameraFileError`].
-pub fn parse_calibration(text: &str, path: &Path) -> Result<Calibration, CameraFileError> {
+/// [`InputError`].
+pub fn parse_calibration(text: &str, path: &Path) -> Result<Calibration, InputError> {
     let keys = Keys::new(text, path)?;
     let [left, right] = [keys.matrix("cam0")?, keys.matrix("cam1")?];
     let focal = left[0];
@@ -50,11 +44,7 @@ pub fn parse_calibration(text: &str, path: &Path) -> Result<Calibration, CameraF
         ));
     }
     let between = right[2] - left[2];
-    let offset = match keys.number("doffs") {
-        Ok(offset) => offset,
-        Err(CameraFileError::Content { .. }) => between,
-        Err(other) => return Err(other),
-    };
+    let offset = if keys.has("doffs") { keys.number("doffs")? } else { between };
     if (offset - between).abs() > ROUNDING {
         return keys.contradiction(format!(
             "doffs = {offset}, but the principal points of cam0 and cam1 are {between} apart"
@@ -73,7 +63,7 @@ struct Keys<'a> {
     lines: Vec<(usize, &'a str, &'a str)>,
 }
 
-type Read<T> = Result<T, CameraFileError>;
+type Read<T> = Result<T, InputError>;
 
 impl<'a> Keys<'a> {
     fn new(text: &'a str, path: &'a Path) -> Read<Self> {
@@ -82,7 +72,7 @@ impl<'a> Keys<'a> {
             let Some((key, value)) = line.split_once('=') else {
                 return keys.at(i + 1, "a line is `key=value`".into());
             };
-            if keys.lines.iter().any(|(_, known, _)| *known == key.trim()) {
+            if keys.has(key.trim()) {
                 return keys.at(i + 1, format!("{} is given twice", key.trim()));
             }
             keys.lines.push((i + 1, key.trim(), value.trim()));
@@ -91,11 +81,15 @@ impl<'a> Keys<'a> {
     }
 
     fn at<T>(&self, line: usize, reason: String) -> Read<T> {
-        Err(CameraFileError::Line { path: self.path.into(), line, reason })
+        Err(InputError::content(self.path, Location::Line(line), reason))
     }
 
     fn contradiction<T>(&self, reason: String) -> Read<T> {
-        Err(CameraFileError::Content { path: self.path.into(), reason })
+        Err(InputError::content(self.path, Location::File, reason))
+    }
+
+    fn has(&self, key: &str) -> bool {
+        self.lines.iter().any(|(_, known, _)| *known == key)
     }
 
     fn value(&self, key: &str) -> Read<(usize, &'a str)> {

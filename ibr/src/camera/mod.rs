@@ -1,16 +1,16 @@
 //! Cameras: 3 x 4 matrices, d x~ = Pi X~ (thesis eq. 2.1), pixel centres at integers.
 
 pub mod colmap;
-mod file_error;
 mod lens;
+mod list;
 pub mod middlebury;
 pub mod names;
 mod path;
 pub mod resize;
 pub mod transforms;
 
-pub use file_error::CameraFileError;
 pub use lens::Lens;
+pub use list::{CameraList, Frame, ListedCamera};
 
 use nalgebra::{Matrix3, Matrix3x4, Vector2, Vector3};
 

@@ -4,57 +4,14 @@
 //! rows y and z of its inverse therefore change their sign. Pixel centres are half-integers there, so the
 //! principal point is shifted by half a pixel on reading.
 
-use super::colmap::ModelCamera;
-use super::file_error::CHECK_THE_PATH;
-use super::names::{self, Found, NameError};
-use super::{Camera, CameraFileError, Lens};
+use super::list::{CameraList, Frame, Inner};
+use crate::files::{self, CHECK_THE_PATH, InputError, Location};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// Most columns or rows of an image, and the largest focal length in pixels.
 const LARGEST: f64 = 1e6;
-
-/// The frames of a file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Transforms {
-    path: PathBuf,
-    /// The frames in their order.
-    pub frames: Vec<Frame>,
-}
-
-/// A frame: an image, its pose and the inner parameters of its camera.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
-    /// `file_path`; `.png` is appended to a name without extension.
-    pub image: PathBuf,
-    /// `depth_file_path`.
-    pub depth: Option<PathBuf>,
-    number: usize,
-    /// World to camera, with x to the right, y down and z forwards.
-    pose: Matrix3x4<f64>,
-    inner: Inner,
-}
-
-/// The parameters that a file gives once for all frames, or in each frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
-struct Inner {
-    camera_angle_x: Option<f64>,
-    camera_angle_y: Option<f64>,
-    fl_x: Option<f64>,
-    fl_y: Option<f64>,
-    cx: Option<f64>,
-    cy: Option<f64>,
-    w: Option<f64>,
-    h: Option<f64>,
-    k1: Option<f64>,
-    k2: Option<f64>,
-    k3: Option<f64>,
-    k4: Option<f64>,
-    p1: Option<f64>,
-    p2: Option<f64>,
-    is_fisheye: Option<bool>,
-}
 
 #[derive(Deserialize)]
 struct FileSpec {
@@ -76,22 +33,17 @@ struct FrameSpec {
 /// Reads a file.
 ///
 /// # Errors
-/// [`CameraFileError`], with the line or the frame.
-pub fn read_transforms(path: &Path) -> Result<Transforms, CameraFileError> {
-    let text = crate::files::read_text(path).map_err(|source| CameraFileError::Read {
-        path: path.into(),
-        source,
-        remedy: CHECK_THE_PATH,
-    })?;
-    parse_transforms(&text, path)
+/// [`InputError`], with the line or the frame.
+pub fn read_transforms(path: &Path) -> Result<CameraList, InputError> {
+    parse_transforms(&files::read_text(path, CHECK_THE_PATH)?, path)
 }
 
 /// The same from the text of the file; `path` appears in messages.
 ///
 /// # Errors
-/// [`CameraFileError`].
-pub fn parse_transforms(text: &str, path: &Path) -> Result<Transforms, CameraFileError> {
-    let json = |reason: String| CameraFileError::Content { path: path.into(), reason };
+/// [`InputError`].
+pub fn parse_transforms(text: &str, path: &Path) -> Result<CameraList, InputError> {
+    let json = |reason: String| InputError::content(path, Location::File, reason);
     let file: FileSpec = serde_json::from_str(text).map_err(|e| json(e.to_string()))?;
     let straight = ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE"];
     if let Some(model) = file.camera_model.filter(|model| !straight.contains(&model.as_str())) {
@@ -105,18 +57,14 @@ pub fn parse_transforms(text: &str, path: &Path) -> Result<Transforms, CameraFil
     }
     let one = |(index, spec): (usize, FrameSpec)| {
         let number = index + 1;
-        let fault = |reason| CameraFileError::Frame {
-            path: path.into(),
-            frame: number,
-            image: spec.file_path.clone(),
-            reason,
-        };
+        let at = Location::Frame(number, spec.file_path.clone());
+        let fault = |reason: String| InputError::content(path, at.clone(), reason);
         let inner = spec.inner.or(&file.inner).checked().map_err(fault)?;
         let pose = world_to_camera(&spec.transform_matrix).map_err(fault)?;
         Ok(Frame { image: image_path(&spec.file_path), depth: spec.depth_file_path, number, pose, inner })
     };
     let frames = file.frames.into_iter().enumerate().map(one).collect::<Result<_, _>>()?;
-    Ok(Transforms { path: path.into(), frames })
+    Ok(CameraList { path: path.into(), frames })
 }
 
 /// The path of an image; the synthetic scenes of NeRF leave the extension out.
@@ -199,63 +147,6 @@ impl Inner {
         }
         Ok(self)
     }
-
-    /// The size of the image, if the file gives it.
-    fn size(&self) -> Option<(usize, usize)> {
-        Some((self.w? as usize, self.h? as usize))
-    }
-}
-
-impl Transforms {
-    /// The frame of an image, by the rule of [`names::find`].
-    ///
-    /// # Errors
-    /// [`NameError`].
-    pub fn find(&self, image: &str) -> Result<(&Frame, Found), NameError> {
-        let images: Vec<_> = self.frames.iter().map(|frame| frame.image.to_string_lossy()).collect();
-        let images: Vec<&str> = images.iter().map(AsRef::as_ref).collect();
-        let found = names::find(&images, image)?;
-        Ok((&self.frames[found.index], found))
-    }
-
-    /// The camera of a frame. `fallback` is the size of its image if the file does not give it.
-    ///
-    /// # Errors
-    /// [`CameraFileError::Camera`].
-    pub fn camera(&self, frame: &Frame, fallback: (usize, usize)) -> Result<ModelCamera, CameraFileError> {
-        let inner = &frame.inner;
-        let size = inner.size().unwrap_or(fallback);
-        let (w, h) = (size.0 as f64, size.1 as f64);
-        let from_angle = |side: f64, angle: Option<f64>| angle.map(|a| 0.5 * side / (0.5 * a).tan());
-        let fx = inner.fl_x.or_else(|| from_angle(w, inner.camera_angle_x)).unwrap_or(w);
-        let fy = inner.fl_y.or_else(|| from_angle(h, inner.camera_angle_y)).unwrap_or(fx);
-        let (cx, cy) = (inner.cx.unwrap_or(0.5 * w) - 0.5, inner.cy.unwrap_or(0.5 * h) - 0.5);
-        let k = Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);
-        let camera = Camera::metric(k * frame.pose, false).map_err(|source| CameraFileError::Camera {
-            path: self.path.clone(),
-            image: frame.image.display().to_string(),
-            source,
-        })?;
-        let bend = |v: Option<f64>| v.unwrap_or(0.0);
-        let radial = [bend(inner.k1), bend(inner.k2)];
-        let tangential = [bend(inner.p1), bend(inner.p2)];
-        let bent = radial.iter().chain(&tangential).any(|b| *b != 0.0);
-        let lens = bent.then(|| Lens::new([fx, fy], [cx, cy], radial, tangential));
-        Ok(ModelCamera { camera: lens.map_or(camera, |lens| camera.with_lens(lens)), size })
-    }
-
-    /// A frame that has no depth.
-    ///
-    /// # Errors
-    /// [`CameraFileError::Frame`], always.
-    pub fn without_depth(&self, frame: &Frame) -> CameraFileError {
-        CameraFileError::Frame {
-            path: self.path.clone(),
-            frame: frame.number,
-            image: frame.image.display().to_string(),
-            reason: "it has no `depth_file_path`, and views are rendered from images with depth; give the scene [[view]] tables with `image` and `depth`".into(),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -273,7 +164,7 @@ mod tests {
         ]
     }"#;
 
-    fn read(text: &str) -> Result<Transforms, String> {
+    fn read(text: &str) -> Result<CameraList, String> {
         parse_transforms(text, Path::new("t.json")).map_err(|e| e.to_string())
     }
 

@@ -75,7 +75,7 @@ fn view(position: f64, size: (usize, usize)) -> Result<(Image, DepthMap), Failur
 
 fn coarse(map: &DepthMap, image: &Image) -> Result<DepthMap, Failure> {
     let sparse = map.decimated(STEP).map_err(Failure::input)?;
-    densify(&sparse, STEP, image, &Densify::default()).map_err(Failure::input)
+    densify(&sparse, STEP, image, Densify::default()).map_err(Failure::input)
 }
 
 fn render(views: [(&Image, &DepthMap); 2], exact: &Image) -> Result<(Rendering, Summary), Failure> {

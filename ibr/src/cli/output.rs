@@ -1,7 +1,7 @@
 //! Writing results: files that are not overwritten by accident, and standard output.
 
 use super::failure::{self, Failure};
-use crate::image::{Image, Levels, begin_bytes, encode_to};
+use crate::image::{self, Image, Levels};
 use hybank::files::{AtomicFile, commit_all};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -48,7 +48,7 @@ pub(super) struct Encoded<'a> {
 /// An image in the format of its path, as PNG for standard output.
 pub(super) fn encoded<'a>(image: &Image, path: &'a Path, levels: Levels) -> Result<Encoded<'a>, Failure> {
     let format = if is_standard(path) { Path::new("standard output.png") } else { path };
-    Ok(Encoded { bytes: encode_to(image, format, levels).map_err(Failure::input)?, path })
+    Ok(Encoded { bytes: image::encode(image, format, levels).map_err(Failure::input)?, path })
 }
 
 /// Writes files, which appear together, and prints what goes to standard output.
@@ -61,7 +61,7 @@ pub(super) fn begin(outputs: &[Encoded<'_>], force: bool) -> Result<Vec<AtomicFi
     let (to_output, to_files): (Vec<_>, Vec<_>) = outputs.iter().partition(|e| is_standard(e.path));
     #[cfg(unix)]
     hybank::files::remove_unfinished_on_signals();
-    let files = to_files.iter().map(|e| begin_bytes(&e.bytes, e.path, force));
+    let files = to_files.iter().map(|e| image::begin(&e.bytes, e.path, force));
     let files = files.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
     to_output.iter().try_for_each(|e| print_bytes(&e.bytes))?;
     Ok(files)

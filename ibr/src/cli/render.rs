@@ -127,7 +127,7 @@ fn read(arguments: &RenderArguments) -> Result<Scene, Failure> {
     let film = Some(arguments.output.as_path()).filter(|path| frames > 1 && path::is_film(path));
     let film = film.filter(|path| !output::is_standard(path));
     source.refuse_overlaps(&all.iter().flat_map(Outputs::files).chain(film).collect::<Vec<_>>())?;
-    arguments.scene.load(&source, arguments.densify(), !arguments.drop_unknown)
+    arguments.scene.load(&source, arguments.densify, !arguments.drop_unknown)
 }
 
 /// The virtual view `frame` of a list or path; 0 if there is one.

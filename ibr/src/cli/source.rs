@@ -77,12 +77,8 @@ impl Source {
 /// The name and the text of a scene file, `-` for standard input.
 fn text(path: &Path) -> Result<(PathBuf, String), Failure> {
     if output::is_standard(path) {
-        let text = files::text(std::io::stdin().lock())
-            .map_err(|e| Failure::Input(format!("standard input: {e}")))?;
+        let text = files::text(std::io::stdin().lock(), "standard input").map_err(Failure::input)?;
         return Ok((PathBuf::from("<stdin>"), text));
     }
-    let path = path.to_owned();
-    let text = files::read_text(&path)
-        .map_err(|source| Failure::input(scene::SceneError::Read { path: path.clone(), source }))?;
-    Ok((path, text))
+    Ok((path.to_owned(), files::read_text(path, "check the path").map_err(Failure::input)?))
 }

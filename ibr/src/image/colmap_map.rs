@@ -1,7 +1,7 @@
 //! The maps of COLMAP's dense reconstruction (`stereo/depth_maps/*.bin`): width, height and channels in
 //! decimal, each followed by `&`, then little-endian floats row by row from the top.
 
-use super::pfm::FloatMap;
+use super::Image;
 
 /// Longest header: three numbers of up to ten digits.
 const HEADER: usize = 33;
@@ -16,7 +16,7 @@ pub(super) fn is_map(bytes: &[u8]) -> bool {
 ///
 /// # Errors
 /// A message, for an invalid header or another number of values than the header states.
-pub(super) fn decode(bytes: &[u8]) -> Result<FloatMap, String> {
+pub(super) fn decode(bytes: &[u8]) -> Result<Image, String> {
     let mut rest = bytes;
     let mut number = |name: &str| -> Result<usize, String> {
         let end = rest.iter().take(HEADER).position(|b| *b == b'&');
@@ -38,7 +38,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<FloatMap, String> {
         ));
     }
     let data = values.iter().map(|b| f32::from_le_bytes(*b)).collect();
-    Ok(FloatMap { width, height, channels, data })
+    Ok(Image::from_values((width, height), channels, data))
 }
 
 #[cfg(test)]
@@ -51,7 +51,7 @@ mod tests {
         (0..6).for_each(|v| bytes.extend((v as f32).to_le_bytes()));
         assert!(is_map(&bytes) && !is_map(b"Pf 2 3") && !is_map(b"&1") && !is_map(b"123"));
         let map = decode(&bytes).unwrap();
-        assert_eq!((map.width, map.height, map.data), (2, 3, vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0]));
+        assert_eq!((map.size(), map.data()), ((2, 3), &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0][..]));
     }
 
     #[test]

@@ -25,26 +25,41 @@ impl TryFrom<&DynamicImage> for Image {
 impl Image {
     /// The image with so many levels per value, rounded half up.
     pub fn to_dynamic(&self, levels: Levels) -> DynamicImage {
-        let (width, height) = (self.width as u32, self.height as u32);
-        let shallow = || self.to_bytes();
-        let deep = || self.data.iter().map(|v| super::write::deep_level(*v)).collect::<Vec<u16>>();
-        let made = match (self.channels, levels) {
-            (3, Levels::Eight) => {
-                ImageBuffer::from_raw(width, height, shallow()).map(DynamicImage::ImageRgb8)
-            }
-            (3, Levels::Sixteen) => {
-                ImageBuffer::from_raw(width, height, deep()).map(DynamicImage::ImageRgb16)
-            }
-            (_, Levels::Eight) => {
-                ImageBuffer::from_raw(width, height, shallow()).map(DynamicImage::ImageLuma8)
-            }
-            (_, Levels::Sixteen) => {
-                ImageBuffer::from_raw(width, height, deep()).map(DynamicImage::ImageLuma16)
-            }
-        };
-        // The buffer has width * height * channels values by construction.
-        made.unwrap_or_default()
+        picture(self.data.iter().copied(), self.size(), self.channels, levels)
     }
+}
+
+/// A picture of values 0..255: grey, grey with alpha, RGB, or RGB with alpha.
+pub(super) fn picture(
+    values: impl Iterator<Item = f32>,
+    size: (usize, usize),
+    channels: usize,
+    levels: Levels,
+) -> DynamicImage {
+    let (width, height) = (size.0 as u32, size.1 as u32);
+    let made = match levels {
+        Levels::Eight => {
+            let data: Vec<u8> = values.map(super::to_byte).collect();
+            match channels {
+                1 => ImageBuffer::from_raw(width, height, data).map(DynamicImage::ImageLuma8),
+                2 => ImageBuffer::from_raw(width, height, data).map(DynamicImage::ImageLumaA8),
+                3 => ImageBuffer::from_raw(width, height, data).map(DynamicImage::ImageRgb8),
+                _ => ImageBuffer::from_raw(width, height, data).map(DynamicImage::ImageRgba8),
+            }
+        }
+        Levels::Sixteen => {
+            // 65535 / 255 = 257.
+            let data: Vec<u16> = values.map(|v| (v.clamp(0.0, 255.0) * 257.0 + 0.5) as u16).collect();
+            match channels {
+                1 => ImageBuffer::from_raw(width, height, data).map(DynamicImage::ImageLuma16),
+                2 => ImageBuffer::from_raw(width, height, data).map(DynamicImage::ImageLumaA16),
+                3 => ImageBuffer::from_raw(width, height, data).map(DynamicImage::ImageRgb16),
+                _ => ImageBuffer::from_raw(width, height, data).map(DynamicImage::ImageRgba16),
+            }
+        }
+    };
+    // The buffer has width * height * channels values by construction.
+    made.unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -15,21 +15,17 @@ pub use frame_rate::FrameRate;
 pub(crate) use read::unavailable_memory;
 pub use read::{MOST_PIXELS, read_image, read_image_within, read_map, read_map_within};
 pub use texture::Texture;
-pub use write::{Levels, begin, begin_bytes, encode, encode_levels, encode_to, encode_with_alpha, save};
+pub use write::{Levels, begin, encode, encode_levels, encode_with_alpha, save};
 
+use crate::files::InputError;
 use std::path::PathBuf;
 
 /// Errors of image files, and of images that do not fit together.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The file cannot be opened or read.
-    #[error("{}: {source}; check the path (paths in a scene are relative to the scene file)", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Read(#[from] InputError),
     /// The file is not an image of a known format, or is damaged.
     #[error("{}: {reason}; the readable formats are PNG, JPEG, PPM, PGM and PFM", path.display())]
     Decode {
@@ -238,11 +234,6 @@ impl Image {
     pub fn quantised(&self) -> Self {
         let data = self.data.iter().map(|v| f32::from(to_byte(*v))).collect();
         Self { data, ..*self }
-    }
-
-    /// Values 0..=255, rounded half up.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        self.data.iter().map(|v| to_byte(*v)).collect()
     }
 
     /// Refuses another image of a different size; the names appear in the message.

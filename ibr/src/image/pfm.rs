@@ -2,24 +2,13 @@
 //!
 //! The sign of the scale gives the byte order (negative: little endian); its magnitude is not applied.
 
-/// The values of a float map, rows from the top, channels interleaved.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FloatMap {
-    /// Width in pixels.
-    pub width: usize,
-    /// Height in pixels.
-    pub height: usize,
-    /// 1 or 3.
-    pub channels: usize,
-    /// width * height * channels values.
-    pub data: Vec<f32>,
-}
+use super::Image;
 
-/// Reads a float map.
+/// Reads a float map, values as stored.
 ///
 /// # Errors
 /// A message, for an invalid header or for fewer values than the header states.
-pub fn decode(bytes: &[u8]) -> Result<FloatMap, String> {
+pub fn decode(bytes: &[u8]) -> Result<Image, String> {
     let mut rest = bytes;
     let channels = match word(&mut rest)? {
         "PF" => 3,
@@ -52,14 +41,14 @@ pub fn decode(bytes: &[u8]) -> Result<FloatMap, String> {
                 .map(|b| if scale < 0.0 { f32::from_le_bytes(*b) } else { f32::from_be_bytes(*b) }),
         );
     }
-    Ok(FloatMap { width, height, channels, data })
+    Ok(Image::from_values((width, height), channels, data))
 }
 
-/// Writes a little-endian float map.
-pub fn encode(map: &FloatMap) -> Vec<u8> {
-    let kind = if map.channels == 3 { "PF" } else { "Pf" };
-    let mut bytes = format!("{kind}\n{} {}\n-1.0\n", map.width, map.height).into_bytes();
-    for row in map.data.chunks_exact(map.width * map.channels).rev() {
+/// Writes a little-endian float map of the values as they are.
+pub fn encode(map: &Image) -> Vec<u8> {
+    let kind = if map.channels() == 3 { "PF" } else { "Pf" };
+    let mut bytes = format!("{kind}\n{} {}\n-1.0\n", map.width(), map.height()).into_bytes();
+    for row in (0..map.height()).rev().map(|y| map.row(y)) {
         bytes.extend(row.iter().flat_map(|v| v.to_le_bytes()));
     }
     bytes
@@ -95,13 +84,13 @@ mod tests {
     #[test]
     fn rows_are_stored_from_the_bottom() {
         let map = decode(b"Pf\n1 2\n-1\n\x00\x00\x80\x3f\x00\x00\x00\x40").unwrap();
-        assert_eq!(map.data, [2.0, 1.0]);
+        assert_eq!(map.data(), [2.0, 1.0]);
     }
 
     #[test]
     fn big_endian_is_told_by_the_sign() {
         let map = decode(b"Pf 1 1 1.0\n\x3f\x80\x00\x00").unwrap();
-        assert_eq!(map.data, [1.0]);
+        assert_eq!(map.data(), [1.0]);
     }
 
     #[test]
@@ -129,7 +118,7 @@ mod tests {
             let data = (0..width * height * channels)
                 .map(|i| f32::from_bits(seed.wrapping_mul(i as u32 + 1) & 0x7f7f_ffff))
                 .collect();
-            let map = FloatMap { width, height, channels, data };
+            let map = Image::new(width, height, channels, data).unwrap();
             prop_assert_eq!(decode(&encode(&map)).unwrap(), map);
         }
 

@@ -1,7 +1,7 @@
 //! Reading images and depth maps from files.
 
 use super::{Image, ImageError, colmap_map, pfm};
-use crate::files;
+use crate::files::{self, CHECK_THE_PATH};
 use hybank::memory::available_memory;
 use image::{DynamicImage, ImageReader};
 use std::io::Cursor;
@@ -38,9 +38,9 @@ pub fn read_image(path: &Path) -> Result<Image, ImageError> {
 /// As [`read_image`].
 pub fn read_image_within(path: &Path, most: usize) -> Result<Image, ImageError> {
     match load(path, most)? {
-        Loaded::Float(map) => {
-            let data = map.data.iter().map(|v| v * 255.0).collect();
-            Image::new(map.width, map.height, map.channels, data)
+        Loaded::Float(mut image) => {
+            image.data_mut().iter_mut().for_each(|v| *v *= 255.0);
+            Ok(image)
         }
         Loaded::Whole(picture) => whole_image(&picture, 1.0),
     }
@@ -62,7 +62,7 @@ pub fn read_map(path: &Path) -> Result<(usize, usize, Vec<f32>), ImageError> {
 /// As [`read_map`].
 pub fn read_map_within(path: &Path, most: usize) -> Result<(usize, usize, Vec<f32>), ImageError> {
     let image = match load(path, most)? {
-        Loaded::Float(map) => Image::new(map.width, map.height, map.channels, map.data)?,
+        Loaded::Float(map) => map,
         Loaded::Whole(picture) => {
             // Back from 0..255 to the stored numbers: 65535 / 255 = 257 exactly.
             let stored = if is_deep(&picture) { 257.0 } else { 1.0 };
@@ -85,20 +85,20 @@ fn single_channel(path: &Path, image: Image) -> Result<(usize, usize, Vec<f32>),
 }
 
 enum Loaded {
-    Float(pfm::FloatMap),
+    Float(Image),
     Whole(DynamicImage),
 }
 
 fn load(path: &Path, most: usize) -> Result<Loaded, ImageError> {
-    let bytes = files::read(path).map_err(|source| ImageError::Read { path: path.into(), source })?;
+    let bytes = files::read(path, CHECK_THE_PATH)?;
     let decode = |reason: String| ImageError::Decode { path: path.into(), reason };
-    if bytes.starts_with(b"PF") || bytes.starts_with(b"Pf") {
-        let map = pfm::decode(&bytes).map_err(decode)?;
-        return check_size(path, (map.width, map.height), most).map(|()| Loaded::Float(map));
-    }
-    if colmap_map::is_map(&bytes) {
-        let map = colmap_map::decode(&bytes).map_err(decode)?;
-        return check_size(path, (map.width, map.height), most).map(|()| Loaded::Float(map));
+    let float = match &bytes[..] {
+        [b'P', b'F' | b'f', ..] => Some(pfm::decode(&bytes)),
+        _ => colmap_map::is_map(&bytes).then(|| colmap_map::decode(&bytes)),
+    };
+    if let Some(map) = float {
+        let map = map.map_err(decode)?;
+        return check_size(path, map.size(), most).map(|()| Loaded::Float(map));
     }
     let open = || ImageReader::new(Cursor::new(&bytes)).with_guessed_format();
     // Before the pixels are unpacked.

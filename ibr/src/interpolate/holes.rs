@@ -4,12 +4,13 @@ use crate::occlusion::LARGEST_SPACING;
 
 /// Hole filling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum HoleFill {
-    /// Across a depth jump continue the farther side, since a moving camera uncovers background; at the
-    /// border of the image continue the nearest pixel; bridge cracks within one surface.
+    /// Continue the farther side into holes between surfaces; bridge cracks within one.
+    // A moving camera uncovers background. At the border of the image the nearest pixel is continued.
     #[default]
     Background,
-    /// Let the fit interpolate between the sides of every hole.
+    /// Let the fitted spline bridge all holes.
     Bridge,
     /// Leave holes black.
     Leave,

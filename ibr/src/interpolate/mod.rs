@@ -11,31 +11,20 @@ pub(crate) use holes::join_rows;
 pub use holes::{Cover, HoleCount, HoleFill, HoleSettings};
 
 use crate::occlusion::DepthTest;
+use crate::setting::{NOT_NEGATIVE, POSITIVE, SettingError};
 
 /// Called with the share of a piece of work that is done, 0 to 1, from any thread and not necessarily in
 /// order.
 pub type Watch<'a> = &'a (dyn Fn(f64) + Sync);
 
-/// Degree of the splines of the row fit.
+/// Degree of the splines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Degree {
-    /// Hats: piecewise linear.
+    /// Linear B-splines.
     Linear,
     /// Cubic B-splines.
     Cubic,
-}
-
-/// How the smoothing weight follows the depth around a sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Variation {
-    /// V = 1 everywhere.
-    Uniform,
-    /// V_x = 1 / (1 + var(depth / mean depth) / s0^2) over the neighbourhood: 1 on flat depth, 0 across an
-    /// edge, which lets the image be steep there (thesis eq. 2.5).
-    Local {
-        /// Relative standard deviation of the depth at which the smoothing is halved.
-        s0: f64,
-    },
 }
 
 /// Settings of the fit. Intensities are 0 to 255, positions are in pixels.
@@ -48,13 +37,15 @@ pub struct FitSettings {
     /// Weight of the squared differences of neighbouring coefficients; determines coefficients without
     /// samples.
     pub tau: f64,
-    /// How lambda follows the depth.
-    pub variation: Variation,
+    /// s0, the relative standard deviation of the depth at which the smoothing is halved: the weight of the
+    /// slope at a sample is lambda V, V = 1 / (1 + var(depth / mean depth) / s0^2) over its neighbourhood. It
+    /// is 1 on flat depth and 0 across an edge, which lets the image be steep there (thesis eq. 2.5).
+    pub variation: f64,
 }
 
 impl Default for FitSettings {
     fn default() -> Self {
-        Self { degree: Degree::Cubic, lambda: 0.1, tau: 0.05, variation: Variation::Local { s0: 0.02 } }
+        Self { degree: Degree::Cubic, lambda: 0.1, tau: 0.05, variation: 0.02 }
     }
 }
 
@@ -75,15 +66,8 @@ pub struct Settings {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum InterpolationError {
     /// A weight or length outside its range.
-    #[error("{name} is {value}: it must be {rule}")]
-    Setting {
-        /// Name of the setting.
-        name: &'static str,
-        /// Value given.
-        value: f64,
-        /// The range in words.
-        rule: &'static str,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// A sample between two rows was given to the row fit.
     #[error(
         "sample {index} lies in row {row}: the row fit takes samples on whole rows only; use the plane fit"
@@ -130,32 +114,16 @@ impl Settings {
     /// Refuses settings outside their range.
     ///
     /// # Errors
-    /// [`InterpolationError::Setting`].
-    pub fn check(&self) -> Result<(), InterpolationError> {
-        let at_least_zero = |v: f64| v.is_finite() && v >= 0.0;
-        let positive = |v: f64| v.is_finite() && v > 0.0;
-        let s0 = match self.fit.variation {
-            Variation::Local { s0 } => s0,
-            Variation::Uniform => 1.0,
-        };
-        let rules: [(&'static str, f64, bool, &'static str); 7] = [
-            ("lambda", self.fit.lambda, at_least_zero(self.fit.lambda), "a number >= 0"),
-            ("tau", self.fit.tau, at_least_zero(self.fit.tau), "a number >= 0"),
-            ("s0", s0, positive(s0), "a positive number"),
-            ("gap", self.holes.gap, positive(self.holes.gap), "a positive number of pixels"),
-            ("stiffness", self.plane.stiffness, positive(self.plane.stiffness), "a positive number"),
-            (
-                "edge stiffness",
-                self.plane.edge_stiffness,
-                positive(self.plane.edge_stiffness),
-                "a positive number",
-            ),
-            ("tolerance", self.plane.tolerance, positive(self.plane.tolerance), "a positive number"),
-        ];
-        match rules.into_iter().find(|r| !r.2) {
-            Some((name, value, _, rule)) => Err(InterpolationError::Setting { name, value, rule }),
-            None => Ok(()),
-        }
+    /// [`SettingError`].
+    pub fn check(&self) -> Result<(), SettingError> {
+        NOT_NEGATIVE.check("lambda", self.fit.lambda)?;
+        NOT_NEGATIVE.check("tau", self.fit.tau)?;
+        POSITIVE.check("variation", self.fit.variation)?;
+        POSITIVE.check("gap", self.holes.gap)?;
+        POSITIVE.check("stiffness", self.plane.stiffness)?;
+        POSITIVE.check("edge stiffness", self.plane.edge_stiffness)?;
+        POSITIVE.check("tolerance", self.plane.tolerance)?;
+        self.depth_test.check()
     }
 }
 

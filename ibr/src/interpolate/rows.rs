@@ -5,7 +5,7 @@
 //! f(c) = sum_s w_s ((I_s - J(x_s))^2 + lambda V_s J'(x_s)^2) + tau sum_m (c_m - c_{m-1})^2
 //! ```
 
-use super::{Cover, HoleFill, InterpolationError, Settings, Variation};
+use super::{Cover, HoleFill, InterpolationError, Settings};
 use crate::sample::Sample;
 use hybank::sampling::fit::Response;
 use hybank::sampling::{Fit, FitSample};
@@ -101,10 +101,7 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
     /// V_s of every sample, from the variance of the depth within max(epsilon, 1 px).
     fn weigh(&mut self, samples: &[Sample<C>], settings: &Settings) {
         self.smoothing.clear();
-        let Variation::Local { s0 } = settings.fit.variation else {
-            self.smoothing.resize(samples.len(), 1.0);
-            return;
-        };
+        let s0 = settings.fit.variation;
         let mean = samples.iter().map(|s| f64::from(s.depth)).sum::<f64>() / samples.len() as f64;
         // Prefix sums of z and z^2; about the mean, so that their differences keep their digits.
         let share = 1.0 / mean;
@@ -315,6 +312,7 @@ fn interpolate_with<const ORDER: usize, const C: usize>(
 mod tests {
     use super::*;
     use crate::interpolate::HoleSettings;
+    use crate::setting::SettingError;
 
     fn sample(x: f64, depth: f32, value: f32) -> Sample<1> {
         Sample { x, depth, value: [value], ..Sample::BLANK }
@@ -385,7 +383,7 @@ mod tests {
             let (v, _) = run(&samples, 20, &settings);
             v[10] - v[9]
         };
-        let (soft, sharp) = (edge(Variation::Uniform), edge(Variation::Local { s0: 0.02 }));
+        let (soft, sharp) = (edge(1e9), edge(0.02));
         assert!(sharp > soft + 10.0, "{sharp} {soft}");
     }
 
@@ -416,7 +414,7 @@ mod tests {
         bad.fit.lambda = -1.0;
         assert!(matches!(
             interpolate(&[sample(1.0, 1.0, 1.0)], (4, 4), &bad),
-            Err(InterpolationError::Setting { name: "lambda", .. })
+            Err(InterpolationError::Setting(SettingError { name: "lambda", .. }))
         ));
     }
 

@@ -27,6 +27,7 @@ pub(crate) use points::{Extent, Points, RUN};
 pub use row::{RowScratch, remove_in_row};
 
 use crate::sample::Sample;
+use crate::setting::{NOT_NEGATIVE, POSITIVE, SettingError};
 
 /// Spacing from which on the radius grows no further, in virtual pixels: beyond it a surface is hardly
 /// sampled, and its samples would hide what shows between them.
@@ -53,42 +54,16 @@ impl Default for DepthTest {
     }
 }
 
-/// A depth test that would remove all samples or cannot be evaluated.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum DepthTestError {
-    /// The radius is not a positive number.
-    #[error("epsilon is {epsilon} px: the radius of the depth test must be a positive finite number")]
-    Epsilon {
-        /// Value given.
-        epsilon: f64,
-    },
-    /// The thresholds are negative, not finite, or both zero.
-    #[error(
-        "sigma = {relative} depth + {absolute}: neither part may be negative and one must be positive, because otherwise every sample would hide itself"
-    )]
-    Sigma {
-        /// Relative part given.
-        relative: f64,
-        /// Absolute part given.
-        absolute: f64,
-    },
-}
-
 impl DepthTest {
-    /// Refuses invalid settings.
+    /// Refuses settings outside their range: with a difference of zero every sample would hide itself.
     ///
     /// # Errors
-    /// [`DepthTestError`].
-    pub fn check(&self) -> Result<(), DepthTestError> {
-        let Self { epsilon, relative, absolute } = *self;
-        if !(epsilon.is_finite() && epsilon > 0.0) {
-            return Err(DepthTestError::Epsilon { epsilon });
-        }
-        let sound = |v: f64| v.is_finite() && v >= 0.0;
-        if !(sound(relative) && sound(absolute) && relative + absolute > 0.0) {
-            return Err(DepthTestError::Sigma { relative, absolute });
-        }
-        Ok(())
+    /// [`SettingError`].
+    pub fn check(&self) -> Result<(), SettingError> {
+        POSITIVE.check("epsilon", self.epsilon)?;
+        NOT_NEGATIVE.check("relative depth difference", self.relative)?;
+        NOT_NEGATIVE.check("absolute depth difference", self.absolute)?;
+        POSITIVE.check("sum of relative and absolute depth difference", self.relative + self.absolute)
     }
 
     /// Whether a sample of depth `near` hides one of depth `far` at the same position.
@@ -134,11 +109,12 @@ mod tests {
         assert!(test.check().is_ok());
         for epsilon in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             let broken = DepthTest { epsilon, ..test };
-            assert!(matches!(broken.check(), Err(DepthTestError::Epsilon { .. })));
+            assert!(matches!(broken.check(), Err(SettingError { name: "epsilon", .. })));
         }
         for (relative, absolute) in [(0.0, 0.0), (-0.1, 1.0), (0.1, -1.0), (f64::NAN, 1.0)] {
             let broken = DepthTest { relative, absolute, ..test };
-            assert!(matches!(broken.check(), Err(DepthTestError::Sigma { .. })), "{relative} {absolute}");
+            let name = broken.check().unwrap_err().name;
+            assert!(name.ends_with("depth difference"), "{relative} {absolute}: {name}");
         }
     }
 

@@ -5,51 +5,19 @@ mod segmentwise;
 
 use crate::depth::{DepthError, DepthMap};
 use crate::image::Image;
-use crate::segment::{MeanShift, SegmentError};
+use crate::segment::segment;
 
 /// How a coarse map is made dense.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Densify {
-    /// Bilinear everywhere; blurs depth edges.
+    /// Interpolate within segments of image and depth.
+    #[default]
+    Segmentwise,
+    /// Bilinear interpolation everywhere.
     Bilinear,
-    /// The nearest sample.
+    /// The value of the nearest sample.
     Nearest,
-    /// Bilinear within a depth segment, and across depth edges the sample of the same intensity segment.
-    Segmentwise(Segmentwise),
-}
-
-impl Default for Densify {
-    fn default() -> Self {
-        Self::Segmentwise(Segmentwise::default())
-    }
-}
-
-/// Settings of the segmentwise interpolation.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Segmentwise {
-    /// Segmentation of the image.
-    pub mean_shift: MeanShift,
-    /// Neighbouring disparity samples of one surface differ by at most this many pixels.
-    pub disparity_step: f32,
-    /// Neighbouring depth samples of one surface differ by at most this share.
-    pub depth_share: f32,
-}
-
-impl Default for Segmentwise {
-    fn default() -> Self {
-        Self { mean_shift: MeanShift::default(), disparity_step: 1.0, depth_share: 0.02 }
-    }
-}
-
-/// Errors of making a map dense.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum PartialError {
-    /// The map does not fit the image.
-    #[error(transparent)]
-    Depth(#[from] DepthError),
-    /// The segmentation failed.
-    #[error(transparent)]
-    Segment(#[from] SegmentError),
 }
 
 /// Makes a map with one value every `step` pixels (the first at pixel (0, 0)) as large as its image.
@@ -59,13 +27,13 @@ pub enum PartialError {
 /// affine.
 ///
 /// # Errors
-/// [`PartialError`]: a map that does not fit the image, settings outside their range.
+/// [`DepthError`] of a map that does not fit the image.
 pub fn densify(
     sparse: &DepthMap,
     step: usize,
     image: &Image,
-    method: &Densify,
-) -> Result<DepthMap, PartialError> {
+    method: Densify,
+) -> Result<DepthMap, DepthError> {
     sparse.fits(image.size(), step)?;
     if step == 1 {
         return Ok(sparse.clone());
@@ -74,10 +42,7 @@ pub fn densify(
     let values = match method {
         Densify::Bilinear => grid.bilinear(),
         Densify::Nearest => grid.nearest(),
-        Densify::Segmentwise(settings) => {
-            let segments = settings.mean_shift.segment(image)?;
-            segmentwise::interpolate(&grid, &segments, settings)
-        }
+        Densify::Segmentwise => segmentwise::interpolate(&grid, &segment(image)),
     };
     Ok(grid.into_map(values, sparse))
 }
@@ -87,15 +52,7 @@ mod tests {
     use super::*;
     use crate::depth::Measure;
 
-    const METHODS: [Densify; 3] = [
-        Densify::Bilinear,
-        Densify::Nearest,
-        Densify::Segmentwise(Segmentwise {
-            mean_shift: MeanShift { spatial: 7, range: 6.5, smallest: 20, steps: 20 },
-            disparity_step: 1.0,
-            depth_share: 0.02,
-        }),
-    ];
+    const METHODS: [Densify; 3] = [Densify::Bilinear, Densify::Nearest, Densify::Segmentwise];
 
     fn map(width: usize, height: usize, measure: Measure, f: impl Fn(usize, usize) -> f32) -> DepthMap {
         let data = (0..width * height).map(|i| f(i % width, i / width)).collect();
@@ -113,7 +70,7 @@ mod tests {
             let full = map(31, 25, measure, &f);
             let sparse = full.decimated(6).unwrap();
             for method in [METHODS[0], METHODS[2]] {
-                let dense = densify(&sparse, 6, &image, &method).unwrap();
+                let dense = densify(&sparse, 6, &image, method).unwrap();
                 assert_eq!(dense.measure(), measure);
                 for (i, (a, b)) in dense.data().iter().zip(full.data()).enumerate() {
                     // 30 and 24 are sampled: nothing is extrapolated.
@@ -131,12 +88,12 @@ mod tests {
         let image = Image::new(48, 40, 1, data).unwrap();
         let full = map(48, 40, Measure::Disparity, |x, y| if inside(x, y) { 30.0 } else { 10.0 });
         let sparse = full.decimated(6).unwrap();
-        let wrong = |method: &Densify| {
+        let wrong = |method: Densify| {
             let dense = densify(&sparse, 6, &image, method).unwrap();
             dense.data().iter().zip(full.data()).filter(|(a, b)| (*a - *b).abs() > 1.0).count()
         };
-        assert_eq!(wrong(&METHODS[2]), 0);
-        assert!(wrong(&METHODS[0]) > 200 && wrong(&METHODS[1]) > 50);
+        assert_eq!(wrong(METHODS[2]), 0);
+        assert!(wrong(METHODS[0]) > 200 && wrong(METHODS[1]) > 50);
     }
 
     #[test]
@@ -146,7 +103,7 @@ mod tests {
         data[0] = f32::NAN;
         let sparse = DepthMap::new((3, 2), data, 1.0, Measure::Depth).unwrap();
         for method in METHODS {
-            let dense = densify(&sparse, 6, &image, &method).unwrap();
+            let dense = densify(&sparse, 6, &image, method).unwrap();
             assert!(dense.data().iter().all(|d| (d - 5.0).abs() < 1e-5), "{method:?}");
         }
     }
@@ -155,10 +112,10 @@ mod tests {
     fn a_map_of_another_step_is_refused() {
         let image = Image::filled(13, 7, 1, 9.0);
         let sparse = map(3, 2, Measure::Depth, |_, _| 1.0);
-        assert!(densify(&sparse, 6, &image, &METHODS[0]).is_ok());
-        assert!(matches!(densify(&sparse, 4, &image, &METHODS[0]), Err(PartialError::Depth(_))));
-        assert!(matches!(densify(&sparse, 0, &image, &METHODS[0]), Err(PartialError::Depth(_))));
+        assert!(densify(&sparse, 6, &image, METHODS[0]).is_ok());
+        assert!(matches!(densify(&sparse, 4, &image, METHODS[0]), Err(DepthError::Size { .. })));
+        assert!(matches!(densify(&sparse, 0, &image, METHODS[0]), Err(DepthError::Step)));
         let whole = map(13, 7, Measure::Depth, |x, _| 1.0 + x as f32);
-        assert_eq!(densify(&whole, 1, &image, &METHODS[2]).unwrap(), whole);
+        assert_eq!(densify(&whole, 1, &image, METHODS[2]).unwrap(), whole);
     }
 }

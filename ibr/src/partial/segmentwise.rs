@@ -4,14 +4,21 @@
 //! pixel takes the depth of the closest vertex in its own intensity segment. Pixels without such a vertex
 //! are marked and filled from their neighbours.
 
-use super::Segmentwise;
 use super::grid::{Grid, Square, around};
 use crate::depth::Measure;
 use crate::segment::Segments;
 
+/// Neighbouring disparity samples of one surface differ by at most this many pixels: full maps of whole
+/// numbers change by one from pixel to pixel on slanted surfaces.
+const DISPARITY_STEP: f32 = 1.0;
+
+/// Neighbouring depth samples of one surface differ by at most this share, less than half of the difference
+/// that the depth test takes for two surfaces.
+const DEPTH_SHARE: f32 = 0.02;
+
 /// The dense values, in the grid's quantity.
-pub(super) fn interpolate(grid: &Grid, segments: &Segments, settings: &Segmentwise) -> Vec<f32> {
-    let surfaces = depth_segments(grid, settings);
+pub(super) fn interpolate(grid: &Grid, segments: &Segments) -> Vec<f32> {
+    let surfaces = depth_segments(grid);
     let mut values: Vec<f32> = (0..grid.width * grid.height)
         .map(|p| {
             let square = grid.square(p % grid.width, p / grid.width);
@@ -35,7 +42,7 @@ fn same_segment(grid: &Grid, segments: &Segments, square: &Square, pixel: usize)
 }
 
 /// Labels of the 4-connected components of samples that differ little from their neighbours.
-fn depth_segments(grid: &Grid, settings: &Segmentwise) -> Vec<u32> {
+fn depth_segments(grid: &Grid) -> Vec<u32> {
     let n = grid.values.len();
     let mut labels = vec![u32::MAX; n];
     let mut stack = Vec::new();
@@ -47,7 +54,7 @@ fn depth_segments(grid: &Grid, settings: &Segmentwise) -> Vec<u32> {
         stack.push(start);
         while let Some(from) = stack.pop() {
             for to in around(from, grid.columns, n) {
-                let together = one_surface(grid.values[from], grid.values[to], grid.measure, settings);
+                let together = one_surface(grid.values[from], grid.values[to], grid.measure);
                 if labels[to] == u32::MAX && together {
                     labels[to] = start as u32;
                     stack.push(to);
@@ -58,10 +65,10 @@ fn depth_segments(grid: &Grid, settings: &Segmentwise) -> Vec<u32> {
     labels
 }
 
-fn one_surface(a: f32, b: f32, measure: Measure, settings: &Segmentwise) -> bool {
+fn one_surface(a: f32, b: f32, measure: Measure) -> bool {
     match measure {
-        Measure::Disparity => (a - b).abs() <= settings.disparity_step,
-        Measure::Depth => (a - b).abs() <= settings.depth_share * a.min(b),
+        Measure::Disparity => (a - b).abs() <= DISPARITY_STEP,
+        Measure::Depth => (a - b).abs() <= DEPTH_SHARE * a.min(b),
     }
 }
 

@@ -16,18 +16,20 @@ use crate::image::Image;
 pub use crate::interpolate::Watch;
 use crate::interpolate::plane::Convergence;
 use crate::interpolate::{Cover, HoleCount, InterpolationError, Settings};
-use crate::occlusion::{DepthTest, DepthTestError};
+use crate::occlusion::DepthTest;
 use crate::sample::Dropped;
+use crate::setting::{FINITE, POSITIVE, SettingError};
 
 /// The method of the third stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Method {
-    /// The row fit for rectified rigs, whose samples lie on rows, else the plane fit.
+    /// rows for rectified rigs, plane for other scenes.
     #[default]
     Auto,
-    /// One spline per row; rectified rigs only.
+    /// One spline per row (rectified rigs only).
     Rows,
-    /// The whole image at once.
+    /// One spline for the whole image.
     Plane,
 }
 
@@ -59,14 +61,11 @@ impl RenderSettings {
     /// Refuses settings outside their range.
     ///
     /// # Errors
-    /// [`RenderError`].
-    pub fn check(&self) -> Result<(), RenderError> {
-        self.depth_test().check()?;
+    /// [`SettingError`].
+    pub fn check(&self) -> Result<(), SettingError> {
         self.interpolation.check()?;
-        if self.nearest == Some(0) {
-            return Err(RenderError::NoneNearest);
-        }
-        if self.offset.is_finite() { Ok(()) } else { Err(RenderError::Offset { offset: self.offset }) }
+        POSITIVE.check("number of nearest views", self.nearest.unwrap_or(1) as f64)?;
+        FINITE.check("offset", self.offset)
     }
 }
 
@@ -76,9 +75,6 @@ pub enum RenderError {
     /// No view was given.
     #[error("there is no view to render from: give at least one")]
     NoViews,
-    /// No view may be used.
-    #[error("the number of nearest views is 0: at least one view must be used")]
-    NoneNearest,
     /// More views or pixels than the indices of samples can hold.
     #[error("{views} views of up to {pixels} pixels: at most 65535 views of 2^32 - 1 pixels can be used")]
     TooLarge {
@@ -110,24 +106,22 @@ pub enum RenderError {
         "the row method needs a rectified rig: the samples of general cameras lie between rows; use the plane method"
     )]
     RowsOfGeneralCameras,
-    /// The position of a view or of the virtual camera is not finite.
-    #[error("the position {position} is not a finite number")]
-    Position {
-        /// The position.
-        position: f64,
-    },
-    /// The offset is not finite.
-    #[error("the offset {offset} px is not a finite number")]
-    Offset {
-        /// The offset.
-        offset: f64,
-    },
-    /// A camera of a projective frame cannot be used.
+    /// A setting or a position outside its range.
     #[error(transparent)]
-    Projective(#[from] crate::uncalibrated::GeometryError),
-    /// The depth test cannot be used.
+    Setting(#[from] SettingError),
+    /// Images and columns of tracks do not fit.
+    #[error(
+        "{images} images have {columns} columns of tracks; at least two views are needed, each with a column"
+    )]
+    Tracks {
+        /// Images given.
+        images: usize,
+        /// Columns of tracks given.
+        columns: usize,
+    },
+    /// The geometry of views without cameras could not be estimated.
     #[error(transparent)]
-    DepthTest(#[from] DepthTestError),
+    Geometry(#[from] crate::uncalibrated::GeometryError),
     /// The interpolation failed.
     #[error(transparent)]
     Interpolation(#[from] InterpolationError),

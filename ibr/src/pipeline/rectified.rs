@@ -11,6 +11,7 @@ use crate::interpolate::{Cover, Degree, HoleCount, HoleFill, InterpolationError,
 use crate::occlusion::{self, RowScratch};
 use crate::propagate::{self, Frame, RectifiedView, RigCamera};
 use crate::sample::{Dropped, Sample};
+use crate::setting::FINITE;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -63,10 +64,8 @@ fn check(views: &[RectifiedView<'_>], position: f64) -> Result<(), RenderError> 
             }
         }
     }
-    match views.iter().map(|v| v.position).chain([position]).find(|p| !p.is_finite()) {
-        Some(position) => Err(RenderError::Position { position }),
-        None => Ok(()),
-    }
+    let positions = views.iter().map(|v| v.position).chain([position]);
+    positions.into_iter().try_for_each(|position| Ok(FINITE.check("position", position)?))
 }
 
 /// The inputs that all rows share.
@@ -343,11 +342,15 @@ mod tests {
         let sizes = render(&[view(&image, 0.0), view(&small, 1.0)], 0.5, &settings).unwrap_err();
         assert_eq!(sizes.to_string(), "view 1: the image has 7 x 8 pixels instead of 8 x 8");
         let nowhere = render(&[view(&image, f64::NAN)], 0.5, &settings).unwrap_err();
-        assert!(matches!(nowhere, RenderError::Position { .. }));
+        assert_eq!(nowhere.to_string(), "position is NaN: it must be a finite number");
         let far = render(&[view(&image, 0.0)], 500.0, &settings).unwrap_err();
         assert!(matches!(far, RenderError::NoOverlap { pixels: 64, .. }), "{far}");
         let mut settings = settings;
         settings.interpolation.depth_test.relative = 0.0;
-        assert!(matches!(render(&[view(&image, 0.0)], 0.5, &settings), Err(RenderError::DepthTest(_))));
+        let none = render(&[view(&image, 0.0)], 0.5, &settings).unwrap_err().to_string();
+        assert_eq!(
+            none,
+            "sum of relative and absolute depth difference is 0: it must be a positive finite number"
+        );
     }
 }

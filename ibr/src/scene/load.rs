@@ -16,6 +16,7 @@ use super::spec::{SceneSpec, ViewSpec};
 use super::{Kind, Scene, SceneError};
 use crate::camera::middlebury::Calibration;
 use crate::depth::{DepthMap, Measure, fill_unknown};
+use crate::files::{InputError, Location};
 use crate::image::{Image, MOST_PIXELS, read_image_within, read_map_within};
 use crate::partial::{Densify, densify};
 use goals::Goal;
@@ -47,11 +48,11 @@ impl Default for LoadOptions {
 /// Parses the text of a scene file; `path` appears in messages.
 ///
 /// # Errors
-/// [`SceneError::Parse`] with line, column and the keys known there.
+/// [`SceneError::Input`] with line, column and the keys known there.
 pub fn parse(text: &str, path: &Path) -> Result<SceneSpec, SceneError> {
     toml::from_str(text).map_err(|e| {
         let reason = e.to_string().trim_end().to_string() + &keys::hint(e.message());
-        SceneError::Parse { path: path.into(), reason }
+        InputError::content(path, Location::File, reason).into()
     })
 }
 
@@ -74,6 +75,11 @@ struct Loader<'a> {
 }
 
 type Loaded<T> = Result<T, SceneError>;
+
+/// That the scene file contradicts itself, or what it lacks.
+fn incomplete(path: &Path, reason: String) -> SceneError {
+    InputError::content(path, Location::File, reason).into()
+}
 
 /// What was read of a scene.
 struct Inputs {
@@ -109,7 +115,7 @@ impl Loader<'_> {
     }
 
     fn incomplete(&self, reason: impl Into<String>) -> SceneError {
-        SceneError::Incomplete { path: self.path.into(), reason: reason.into() }
+        incomplete(self.path, reason.into())
     }
 
     /// Refuses two views with the same name; images without a name may be used twice.
@@ -181,8 +187,7 @@ impl Loader<'_> {
             return Ok((image, map, filled));
         }
         let coarse = if given == 1 { map.decimated(step).map_err(depth_error)? } else { map };
-        let dense = densify(&coarse, step, &image, &self.options.densify)
-            .map_err(|source| SceneError::Partial { view: view.label(), path: path.clone(), source })?;
+        let dense = densify(&coarse, step, &image, self.options.densify).map_err(depth_error)?;
         Ok((image, dense, coarse.unknown()))
     }
 }

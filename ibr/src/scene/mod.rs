@@ -6,16 +6,14 @@ mod spec;
 pub use load::{LoadOptions, MOST_FRAMES, complete, load, parse};
 pub use spec::{SceneSpec, TargetSpec, ViewSpec};
 
-use crate::camera::CameraFileError;
 use crate::camera::middlebury::Calibration;
 use crate::camera::{Camera, CameraError};
 use crate::depth::{DepthError, DepthMap};
+use crate::files::InputError;
 use crate::image::{Image, ImageError};
-use crate::partial::PartialError;
 use crate::pipeline::uncalibrated::Target;
 use crate::propagate::{CalibratedView, RectifiedView};
 use crate::uncalibrated::Point;
-use crate::uncalibrated::tracks::TrackError;
 use std::path::PathBuf;
 
 /// A scene, read and checked.
@@ -124,40 +122,6 @@ impl CalibratedSource {
 /// Errors of a scene.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
-    /// The scene file cannot be opened.
-    #[error("{}: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The system's message.
-        source: std::io::Error,
-    },
-    /// The scene file is not a scene.
-    #[error("{}: {reason}", path.display())]
-    Parse {
-        /// The file.
-        path: PathBuf,
-        /// Line, column and what was expected.
-        reason: String,
-    },
-    /// The scene is contradictory or incomplete.
-    #[error("{}: {reason}", path.display())]
-    Incomplete {
-        /// The scene file.
-        path: PathBuf,
-        /// What is missing, and where.
-        reason: String,
-    },
-    /// No view of that name.
-    #[error("{}: there is no view {name:?}; the views are {known}", path.display())]
-    NoSuchView {
-        /// The scene file.
-        path: PathBuf,
-        /// The name asked for.
-        name: String,
-        /// The existing names.
-        known: String,
-    },
     /// A camera of the scene.
     #[error("{}: {which}: {source}", path.display())]
     Camera {
@@ -178,23 +142,10 @@ pub enum SceneError {
         /// The problem.
         source: DepthError,
     },
-    /// A coarse depth map of the scene.
-    #[error("view {view:?}: {}: {source}", path.display())]
-    Partial {
-        /// The view.
-        view: String,
-        /// The map.
-        path: PathBuf,
-        /// The problem.
-        source: PartialError,
-    },
     /// An image of the scene.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// The tracks of the scene.
+    /// The scene file, its tracks, or a file of its cameras.
     #[error(transparent)]
-    Tracks(#[from] TrackError),
-    /// A COLMAP model, transforms file or calibration file of the scene.
-    #[error(transparent)]
-    Cameras(#[from] CameraFileError),
+    Input(#[from] InputError),
 }

@@ -5,42 +5,23 @@ mod regions;
 
 use crate::image::Image;
 
-/// Settings of the mean-shift segmentation; the defaults are those of the authors' own program.
+/// Settings of the segmentation; the defaults are those of the authors' own program.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MeanShift {
-    /// h_s: half side of the window in pixels, at most 7.
-    pub spatial: usize,
+struct MeanShift {
+    /// h_s: half side of the window in pixels, 1 to 7: 2 * 7 + 1 columns fill two vectors of eight.
+    spatial: usize,
     /// h_r: radius of the window in CIE Luv.
-    pub range: f32,
+    range: f32,
     /// Regions with fewer pixels are merged into the neighbour of nearest colour; 1 keeps all.
-    pub smallest: usize,
+    smallest: usize,
     /// Most steps per pixel.
-    pub steps: usize,
+    steps: usize,
 }
 
 impl Default for MeanShift {
     fn default() -> Self {
         Self { spatial: 7, range: 6.5, smallest: 20, steps: 20 }
     }
-}
-
-/// Settings of the segmentation outside their range.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum SegmentError {
-    /// The window in the image.
-    #[error("the spatial window is {spatial} px: it must be 1 to {largest}")]
-    Spatial {
-        /// Value given.
-        spatial: usize,
-        /// Largest window.
-        largest: usize,
-    },
-    /// The window in colour.
-    #[error("the colour window is {range}: it must be a positive number")]
-    Range {
-        /// Value given.
-        range: f32,
-    },
 }
 
 /// Segments of an image: one label per pixel, 0.., in the order of their first pixels.
@@ -56,28 +37,18 @@ pub struct Segments {
     pub count: usize,
 }
 
-/// Largest half side of the spatial window: 2 * 7 + 1 columns fill two vectors of eight.
-const LARGEST_WINDOW: usize = 7;
+/// Segments an image: filter, link, merge.
+///
+/// Pixels move to the mode of the density of (x/h_s, y/h_s, L/h_r, u/h_r, v/h_r) with a flat kernel;
+/// neighbours whose modes differ by less than h_r / 2 in colour (and h_s in position) belong to one
+/// segment. Parallel over rows, same result for any number of threads.
+pub fn segment(image: &Image) -> Segments {
+    MeanShift::default().segment(image)
+}
 
 impl MeanShift {
-    /// Segments an image: filter, link, merge.
-    ///
-    /// Pixels move to the mode of the density of (x/h_s, y/h_s, L/h_r, u/h_r, v/h_r) with a flat kernel;
-    /// neighbours whose modes differ by less than h_r / 2 in colour (and h_s in position) belong to one
-    /// segment. Parallel over rows, same result for any number of threads.
-    ///
-    /// # Errors
-    /// [`SegmentError`].
-    pub fn segment(&self, image: &Image) -> Result<Segments, SegmentError> {
-        let (spatial, range) = (self.spatial, self.range);
-        if spatial == 0 || spatial > LARGEST_WINDOW {
-            return Err(SegmentError::Spatial { spatial, largest: LARGEST_WINDOW });
-        }
-        if !(range.is_finite() && range > 0.0) {
-            return Err(SegmentError::Range { range });
-        }
-        let modes = filter::modes(image, self);
-        Ok(regions::connect(image.size(), &modes, self))
+    fn segment(&self, image: &Image) -> Segments {
+        regions::connect(image.size(), &filter::modes(image, self), self)
     }
 }
 
@@ -101,7 +72,7 @@ mod tests {
 
     #[test]
     fn four_noisy_blocks_are_four_segments() {
-        let segments = MeanShift::default().segment(&blocks(40, 30)).unwrap();
+        let segments = segment(&blocks(40, 30));
         assert_eq!(segments.count, 4);
         for y in 0..30 {
             for x in 0..40 {
@@ -114,12 +85,12 @@ mod tests {
     #[test]
     fn a_flat_image_is_one_segment_and_a_speck_is_merged() {
         let mut image = Image::filled(25, 9, 1, 90.0);
-        assert_eq!(MeanShift::default().segment(&image).unwrap().count, 1);
+        assert_eq!(segment(&image).count, 1);
         image.data_mut()[4 * 25 + 12] = 250.0;
         let keep = MeanShift { smallest: 1, ..MeanShift::default() };
-        assert_eq!(keep.segment(&image).unwrap().count, 2);
-        assert_eq!(MeanShift::default().segment(&image).unwrap().count, 1);
-        assert_eq!(MeanShift::default().segment(&Image::filled(1, 1, 3, 5.0)).unwrap().count, 1);
+        assert_eq!(keep.segment(&image).count, 2);
+        assert_eq!(segment(&image).count, 1);
+        assert_eq!(segment(&Image::filled(1, 1, 3, 5.0)).count, 1);
     }
 
     #[test]
@@ -127,19 +98,8 @@ mod tests {
         let image = blocks(33, 21);
         let run = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| MeanShift::default().segment(&image).unwrap())
+            pool.install(|| segment(&image))
         };
         assert_eq!(run(1), run(3));
-    }
-
-    #[test]
-    fn windows_have_limits() {
-        let image = Image::filled(3, 3, 1, 0.0);
-        for spatial in [0, 8] {
-            let odd = MeanShift { spatial, ..MeanShift::default() };
-            assert!(matches!(odd.segment(&image), Err(SegmentError::Spatial { .. })));
-        }
-        let odd = MeanShift { range: f32::NAN, ..MeanShift::default() };
-        assert!(matches!(odd.segment(&image), Err(SegmentError::Range { .. })));
     }
 }

@@ -91,15 +91,11 @@ fn in_front(rays: &[[Point; 2]], r: &Matrix3<f64>, t: &Vector3<f64>) -> Vec<Opti
     rays.iter().map(point).collect()
 }
 
-/// All guesses that could be made, one per focal length.
-pub fn guesses(f: &Matrix3<f64>, matches: &[Match], sizes: [(usize, usize); 2]) -> Vec<MetricGuess> {
+/// The guess that fits F best, of one per focal length.
+pub fn best(f: &Matrix3<f64>, matches: &[Match], sizes: [(usize, usize); 2]) -> Option<MetricGuess> {
     let side = sizes.iter().map(|s| s.0.max(s.1)).max().unwrap_or(1) as f64;
-    FOCAL_LENGTHS.iter().filter_map(|factor| guess(f, matches, sizes, factor * side)).collect()
-}
-
-/// The guess that fits F best.
-pub fn best(guesses: &[MetricGuess]) -> Option<&MetricGuess> {
-    guesses.iter().max_by(|a, b| a.fit.total_cmp(&b.fit))
+    let guesses = FOCAL_LENGTHS.iter().filter_map(|factor| guess(f, matches, sizes, factor * side));
+    guesses.max_by(|a, b| a.fit.total_cmp(&b.fit))
 }
 
 /// The image points of the matches behind `guess` in a camera between the two views. Rotation and centre
@@ -147,10 +143,8 @@ mod tests {
     fn the_ends_of_the_way_are_the_views() {
         let scene = Synthetic::new(50, false);
         let matches = scene.matches();
-        let all = guesses(&eight_point(&matches).unwrap(), &matches, SIZES);
-        let found = best(&all).unwrap();
-        let (start, end) = (images_between(found, &matches, 0.0), images_between(found, &matches, 1.0));
-        let middle = images_between(found, &matches, 0.5);
+        let found = best(&eight_point(&matches).unwrap(), &matches, SIZES).unwrap();
+        let [start, middle, end] = [0.0, 0.5, 1.0].map(|at| images_between(&found, &matches, at));
         for (j, m) in matches.iter().enumerate() {
             assert!((start[j].unwrap() - m.first).norm() < 1e-9);
             assert!((end[j].unwrap() - m.second).norm() < 1e-9);

@@ -1,51 +1,11 @@
 //! Tracks: image positions of scene points, one line per point, one pair "x y" per view, "-" where not seen.
 
 use super::Point;
-use std::path::{Path, PathBuf};
+use crate::files::{self, CHECK_THE_PATH, InputError, Location};
+use std::path::Path;
 
-/// Errors of a track file.
-#[derive(Debug, thiserror::Error)]
-pub enum TrackError {
-    /// The file cannot be opened.
-    #[error("{}: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// A word that is neither a number nor "-".
-    #[error("{}:{line}: {word:?} is neither a finite number nor \"-\"", path.display())]
-    Word {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// The word.
-        word: String,
-    },
-    /// A line with another number of columns.
-    #[error(
-        "{}:{line}: {found} columns where the file has {expected}; a track is \"x y\" for each view in order and \"-\" where the point is not seen",
-        path.display()
-    )]
-    Columns {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// Columns found.
-        found: usize,
-        /// Columns of the first track.
-        expected: usize,
-    },
-    /// No track at all.
-    #[error("{}: there is no track in the file", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-}
+/// What a line has, for messages.
+const FORMAT: &str = "a track is \"x y\" for each view in order and \"-\" where the point is not seen";
 
 /// Tracks over a number of columns (views).
 #[derive(Debug, Clone, PartialEq)]
@@ -59,23 +19,22 @@ impl Tracks {
     /// one `-`, or one for each coordinate.
     ///
     /// # Errors
-    /// [`TrackError`], with file and line.
-    pub fn read(path: &Path) -> Result<Self, TrackError> {
-        let text =
-            crate::files::read_text(path).map_err(|source| TrackError::Read { path: path.into(), source })?;
-        Self::parse(&text, path)
+    /// [`InputError`], with file and line.
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        Self::parse(&files::read_text(path, CHECK_THE_PATH)?, path)
     }
 
     /// The same from text; `path` appears in messages.
     ///
     /// # Errors
-    /// [`TrackError`].
-    pub fn parse(text: &str, path: &Path) -> Result<Self, TrackError> {
+    /// [`InputError`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self, InputError> {
+        let fault = |line: usize, reason| InputError::content(path, Location::Line(line), reason);
         let mut lines = Vec::new();
         for (i, line) in text.lines().enumerate() {
             let content = line.split('#').next().unwrap_or("");
-            let words =
-                words(content).map_err(|word| TrackError::Word { path: path.into(), line: i + 1, word })?;
+            let words = words(content)
+                .map_err(|word| fault(i + 1, format!("{word:?} is neither a finite number nor \"-\"")))?;
             if !words.is_empty() {
                 lines.push((i + 1, words));
             }
@@ -85,21 +44,13 @@ impl Tracks {
         let single = columns(&lines, one_dash);
         let rows = match columns(&lines, two_dashes) {
             Ok(rows) if single.is_err() => rows,
-            _ => single.map_err(|(line, found, expected)| TrackError::Columns {
-                path: path.into(),
-                line,
-                found,
-                expected,
+            _ => single.map_err(|(line, found, expected)| {
+                fault(line, format!("{found} columns where the file has {expected}; {FORMAT}"))
             })?,
         };
-        let columns = rows.first().map(Vec::len).ok_or(TrackError::Empty { path: path.into() })?;
+        let empty = || InputError::content(path, Location::File, "there is no track in the file");
+        let columns = rows.first().map(Vec::len).ok_or_else(empty)?;
         Ok(Self { columns, rows })
-    }
-
-    /// Tracks from points, `rows[track][view]`; `None` unless all rows have the same length >= 1.
-    pub fn new(rows: Vec<Vec<Option<Point>>>) -> Option<Self> {
-        let columns = rows.first()?.len();
-        (columns > 0 && rows.iter().all(|r| r.len() == columns)).then_some(Self { columns, rows })
     }
 
     /// Number of views that the tracks run over.
@@ -176,7 +127,7 @@ fn two_dashes(words: &[Option<f64>]) -> (usize, Option<Point>) {
 mod tests {
     use super::*;
 
-    fn parse(text: &str) -> Result<Tracks, TrackError> {
+    fn parse(text: &str) -> Result<Tracks, InputError> {
         Tracks::parse(text, Path::new("t.txt"))
     }
 

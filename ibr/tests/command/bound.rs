@@ -61,10 +61,10 @@ fn a_float_map_holds_the_numbers() {
     let dir = rig();
     let figures = json(&run(dir.path(), &["bound", "scene.toml", "--map", "map.pfm", "--json"]));
     let map = pfm::decode(&std::fs::read(dir.path().join("map.pfm")).unwrap()).unwrap();
-    assert_eq!((map.width, map.height, map.channels), (SIZE.0, SIZE.1, 3));
+    assert_eq!((map.width(), map.height(), map.channels()), (SIZE.0, SIZE.1, 3));
     let pixels = (SIZE.0 * SIZE.1) as f64;
     let mean = |channel: usize, power: i32| {
-        let values = map.data.iter().skip(channel).step_by(3);
+        let values = map.data().iter().skip(channel).step_by(3);
         values.map(|v| f64::from(*v).powi(power)).sum::<f64>() / pixels
     };
     let total = |name: &str| figures["totals"][name].as_f64().unwrap();
@@ -82,7 +82,7 @@ fn a_sure_bound_is_given_within_limits() {
     let asked = ["bound", "scene.toml", "--truth", "middle.png", "--map", "map.pfm", "--json"];
     let figures = json(&run(dir.path(), &[&asked[..], &limits].concat()));
     let map = pfm::decode(&std::fs::read(dir.path().join("map.pfm")).unwrap()).unwrap();
-    let mean = map.data.iter().step_by(3).map(|v| f64::from(*v)).sum::<f64>() / (SIZE.0 * SIZE.1) as f64;
+    let mean = map.data().iter().step_by(3).map(|v| f64::from(*v)).sum::<f64>() / (SIZE.0 * SIZE.1) as f64;
     assert!((mean / figures["totals"]["sure_bound"].as_f64().unwrap() - 1.0).abs() < 1e-4, "{figures}");
     assert_eq!(figures["measured"]["within_sure_bound"], 1.0, "{figures}");
     let refused = run(dir.path(), &["bound", "scene.toml", "--curvature", "-3"]);

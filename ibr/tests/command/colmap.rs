@@ -24,7 +24,8 @@ fn images(names: [&str; 3]) -> String {
 fn photographs(size: (usize, usize), inner: [f64; 4]) -> Vec<(Image, DepthMap)> {
     let names = ["0", "1", "2"];
     let model = parse_model(&cameras(size, inner), &images(names), Path::new("m")).unwrap();
-    names.iter().map(|name| SyntheticScene::default().view(&model[*name].camera, size)).collect()
+    let camera = |frame| model.camera(frame, size).unwrap().camera;
+    model.frames.iter().map(|frame| SyntheticScene::default().view(&camera(frame), size)).collect()
 }
 
 /// A text model in `model`, photographs in `photos` and depth maps `0.pfm` to `2.pfm`; the scene has a view
@@ -88,8 +89,8 @@ fn binary_models_and_their_depth_maps_are_rendered() {
         put(&mut poses, &[7.0, 8.0]);
         poses.extend((-1_i64).to_le_bytes());
         let map = pfm::decode(&std::fs::read(at(&format!("{k}.pfm"))).unwrap()).unwrap();
-        let mut bytes = format!("{}&{}&1&", map.width, map.height).into_bytes();
-        map.data.iter().for_each(|depth| bytes.extend(depth.to_le_bytes()));
+        let mut bytes = format!("{}&{}&1&", map.width(), map.height()).into_bytes();
+        map.data().iter().for_each(|depth| bytes.extend(depth.to_le_bytes()));
         std::fs::write(workspace.join(format!("{name}.geometric.bin")), bytes).unwrap();
         replace(dir.path(), &format!("{k}.pfm"), &format!("dense/stereo/depth_maps/{name}.geometric.bin"));
     }

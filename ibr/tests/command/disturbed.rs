@@ -105,7 +105,7 @@ fn renderings_that_no_memory_holds_are_refused() {
     let (width, height) = (2000, 2000);
     let pixels = [format!("P5 {width} {height} 255\n").into_bytes(), vec![7; width * height]].concat();
     let data = vec![4.0; width * height];
-    let map = pfm::encode(&pfm::FloatMap { width, height, channels: 1, data });
+    let map = pfm::encode(&Image::new(width, height, 1, data).unwrap());
     let view = |k: usize| {
         format!("[[view]]\nname = \"{k}\"\nimage = \"a.pgm\"\nposition = {k}.0\ndisparity = \"a.pfm\"\n")
     };

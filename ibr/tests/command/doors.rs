@@ -99,7 +99,7 @@ fn alpha_counts_and_errors_are_written() {
     let seen = counts.as_raw().iter().zip(mask.data()).filter(|(n, m)| **n > 0 && **m == 0.0).count();
     assert_eq!(seen, 0, "pixels with samples that are no part of the view");
     let errors = pfm::decode(&std::fs::read(at("e.pfm")).unwrap()).unwrap();
-    let mean = errors.data.iter().map(|e| f64::from(*e)).sum::<f64>() / errors.data.len() as f64;
+    let mean = errors.data().iter().map(|e| f64::from(*e)).sum::<f64>() / errors.data().len() as f64;
     // The figure is that of the image rounded to 8 bits.
     assert!((mean - figures["mae"].as_f64().unwrap()).abs() < 0.15, "{mean} {figures}");
     let shown = ["render", scene, "-o", "b.png", "--truth", "middle.png", "--error", "e.png"];

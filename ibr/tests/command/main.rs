@@ -2,7 +2,7 @@
 
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::DepthMap;
-use hybank_ibr::image::{pfm, save};
+use hybank_ibr::image::{Image, pfm, save};
 use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use std::path::Path;
 use std::process::{Command, Output};
@@ -56,7 +56,7 @@ fn json(output: &Output) -> serde_json::Value {
 fn write_map(map: &DepthMap, path: &Path) {
     let (width, height) = map.size();
     let data = map.data().to_vec();
-    std::fs::write(path, pfm::encode(&pfm::FloatMap { width, height, channels: 1, data })).unwrap();
+    std::fs::write(path, pfm::encode(&Image::new(width, height, 1, data).unwrap())).unwrap();
 }
 
 /// A rectified rig of the synthetic scene: left.png, right.png, middle.png and their disparities.

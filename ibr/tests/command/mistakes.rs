@@ -52,7 +52,7 @@ fn depths_have_a_unit_and_the_report_names_it() {
     write(dir.path(), "c.toml", &("calib = \"calib.txt\"\n".to_string() + &scene(dir.path())));
     let keyed = scene(dir.path()).replace("disparity =", "disparity_offset = 12.5\ndisparity =");
     write(dir.path(), "k.toml", &keyed);
-    let read = |name: &str| pfm::decode(&std::fs::read(at(name)).unwrap()).unwrap().data;
+    let read = |name: &str| pfm::decode(&std::fs::read(at(name)).unwrap()).unwrap().data().to_vec();
     for method in ["rows", "plane"] {
         let render = |scene: &str, depth: &str| {
             let arguments = ["render", scene, "-o", "o.png", "--force", "--method", method, "--depth", depth];

@@ -50,7 +50,7 @@ fn scenes() -> tempfile::TempDir {
 }
 
 fn pixels(path: &Path) -> Vec<f32> {
-    pfm::decode(&std::fs::read(path).unwrap()).unwrap().data.iter().map(|v| 255.0 * v).collect()
+    pfm::decode(&std::fs::read(path).unwrap()).unwrap().data().iter().map(|v| 255.0 * v).collect()
 }
 
 /// By how many grey levels the frames are brighter than the scene, and the root mean square difference of

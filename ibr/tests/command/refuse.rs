@@ -8,7 +8,7 @@ fn wrong_input_has_one_clear_message() {
     let dir = rig();
     let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
     save(&Image::filled(30, 20, 3, 9.0), &dir.path().join("small.png")).unwrap();
-    let nan = pfm::FloatMap { width: 120, height: 90, channels: 1, data: vec![f32::NAN; 120 * 90] };
+    let nan = Image::filled(120, 90, 1, f32::NAN);
     std::fs::write(dir.path().join("nan.pfm"), pfm::encode(&nan)).unwrap();
     for (from, to, words) in [
         ("left.png", "nowhere.png", &["nowhere.png"][..]),
@@ -41,7 +41,7 @@ fn hostile_scenes_are_refused_by_name() {
     let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
     let map = |name: &str, value: f32| {
         let data = vec![value; 120 * 90];
-        let bytes = pfm::encode(&pfm::FloatMap { width: 120, height: 90, channels: 1, data });
+        let bytes = pfm::encode(&Image::new(120, 90, 1, data).unwrap());
         std::fs::write(dir.path().join(name), bytes).unwrap();
     };
     map("tiny.pfm", 1e-42);
@@ -96,8 +96,8 @@ fn hostile_arguments_are_refused_by_name() {
         (&["-o", "o.png", "--lambda", "-1"], 1, "lambda is -1"),
         (&["-o", "o.png", "--tau", "inf"], 1, "tau is inf"),
         (&["-o", "o.png", "--epsilon", "0"], 1, "epsilon is 0"),
-        (&["-o", "o.png", "--relative-depth", "-0.1"], 1, "sigma = -0.1"),
-        (&["-o", "o.png", "--offset", "nan"], 1, "offset NaN"),
+        (&["-o", "o.png", "--relative-depth", "-0.1"], 1, "relative depth difference is -0.1"),
+        (&["-o", "o.png", "--offset", "nan"], 1, "offset is NaN"),
         (&["-o", "o.png", "--offset", "1e9"], 1, "no sample lies"),
         (&["-o", "o.png", "--threads", "100000"], 2, "1 to 1024"),
         (&["-o", "o.png", "--mask", "o.png"], 2, "both name o.png"),

@@ -51,12 +51,12 @@ fn converged_rigs_have_negative_disparities() {
     let lower = |name: &str, columns: usize| {
         let path = dir.path().join(format!("{name}.pfm"));
         let mut map = pfm::decode(&std::fs::read(&path).unwrap()).unwrap();
-        let before = map.data.clone();
-        for (i, v) in map.data.iter_mut().enumerate() {
+        let before = map.data().to_vec();
+        for (i, v) in map.data_mut().iter_mut().enumerate() {
             let from = (i % SIZE.0).saturating_sub(columns);
             *v = before[i - i % SIZE.0 + from] - SHIFT as f32;
         }
-        assert!(map.data.iter().any(|v| *v < 0.0) && map.data.iter().any(|v| *v > 0.0));
+        assert!(map.data().iter().any(|v| *v < 0.0) && map.data().iter().any(|v| *v > 0.0));
         std::fs::write(path, pfm::encode(&map)).unwrap();
     };
     let shift_image = |name: &str, columns: usize| {
@@ -112,9 +112,9 @@ fn depth_and_sixteen_bits_are_written() {
     assert!(figures["psnr"].as_f64().unwrap() > 33.0);
     let read = |name: &str| pfm::decode(&std::fs::read(dir.path().join(name)).unwrap()).unwrap();
     let (depth, exact) = (read("d.pfm"), read("middle.pfm"));
-    let near = depth.data.iter().zip(&exact.data).filter(|(a, b)| (*a - *b).abs() < 0.25).count();
-    assert!(near as f64 > 0.95 * exact.data.len() as f64, "{near} of {}", exact.data.len());
-    let unknown = depth.data.iter().filter(|d| d.is_nan()).count();
+    let near = depth.data().iter().zip(exact.data()).filter(|(a, b)| (*a - *b).abs() < 0.25).count();
+    assert!(near as f64 > 0.95 * exact.data().len() as f64, "{near} of {}", exact.data().len());
+    let unknown = depth.data().iter().filter(|d| d.is_nan()).count();
     assert_eq!(
         unknown as u64,
         figures["holes"]["crack"].as_u64().unwrap() + figures["holes"]["disocclusion"].as_u64().unwrap()
@@ -388,7 +388,8 @@ fn colmap_lenses_are_used() {
     std::fs::write(dir.path().join("s.toml"), toml).unwrap();
     let model = hybank_ibr::camera::colmap::read_model(&dir.path().join("model")).unwrap();
     for k in 0..3 {
-        let (image, depth) = scene.view(&model[&format!("{k}.png")].camera, SIZE);
+        let camera = model.camera(&model.frames[k], SIZE).unwrap().camera;
+        let (image, depth) = scene.view(&camera, SIZE);
         save(&image, &dir.path().join(format!("{k}.png"))).unwrap();
         write_map(&depth, &dir.path().join(format!("{k}.pfm")));
     }

@@ -4,8 +4,7 @@
 //! J(x, y) = sum_mn c_mn beta(x - m) beta(y - n)
 //!
 //! ```text
-//! sum_s w_s (f_s - J(x_s, y_s))^2 + sum_s w_s mu_s |grad J(x_s, y_s)|^2
-//!     + sum_pq g_pq (c_p - c_q)^2 + sum_pqr h_pqr (c_p - 2 c_q + c_r)^2
+//! sum_s w_s (f_s - J(x_s, y_s))^2 + sum_pq g_pq (c_p - c_q)^2 + sum_pqr h_pqr (c_p - 2 c_q + c_r)^2
 //! ```
 //!
 //! over neighbours pq and triples pqr in a row or column. The springs g and h differ from place to place:
@@ -69,14 +68,6 @@ pub struct Fit2<const ORDER: usize, const C: usize> {
     rhs: Planes,
 }
 
-/// The normal equations with their springs.
-#[derive(Debug, Clone)]
-pub struct Connected<const ORDER: usize, const C: usize> {
-    size: (usize, usize),
-    matrix: Stencil,
-    rhs: Planes,
-}
-
 impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
     /// Couplings of a coefficient that samples cause, its own included.
     const COUPLINGS: usize = ORDER + (ORDER - 1) * (2 * ORDER - 1);
@@ -115,16 +106,22 @@ impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
     /// grid of coefficients, and may be asked for a row more than once. Coefficients that are `alone`, with
     /// neither samples nor springs, are held at 0.
     pub fn connect(
-        self,
+        mut self,
         springs: impl Fn(Direction, usize) -> Springs + Sync,
         alone: impl Fn(usize) -> bool + Sync,
-    ) -> Connected<ORDER, C> {
-        let Self { size, mut matrix, rhs } = self;
+    ) -> Self {
         for direction in [Direction::Across, Direction::Down] {
-            springs::add(&mut matrix, &springs, direction);
+            springs::add(&mut self.matrix, &springs, direction);
         }
-        springs::hold(&mut matrix, alone);
-        Connected { size, matrix, rhs }
+        springs::hold(&mut self.matrix, alone);
+        self
+    }
+
+    /// Solves the equations: J at the pixels, C values each, row by row. `watch` is called with the share of
+    /// the way that is done, 0 to 1.
+    pub fn solve(self, iteration: &Iteration, watch: &(dyn Fn(f64) + Sync)) -> (Vec<f32>, Convergence) {
+        let (solution, convergence) = conjugate::solve::<C>(&self.matrix, self.rhs, iteration, watch);
+        (at_pixels::<ORDER, C>(&solution, self.size.0, self.size.1), convergence)
     }
 }
 
@@ -134,15 +131,6 @@ fn offsets<const ORDER: usize>() -> Vec<Offset> {
     let triples: Vec<Offset> = [(2, 0), (0, 2)].into_iter().filter(|o| !offsets.contains(o)).collect();
     offsets.extend(triples);
     offsets
-}
-
-impl<const ORDER: usize, const C: usize> Connected<ORDER, C> {
-    /// Solves the equations: J at the pixels, C values each, row by row. `watch` is called with the share of
-    /// the way that is done, 0 to 1.
-    pub fn solve(self, iteration: &Iteration, watch: &(dyn Fn(f64) + Sync)) -> (Vec<f32>, Convergence) {
-        let (solution, convergence) = conjugate::solve::<C>(&self.matrix, self.rhs, iteration, watch);
-        (at_pixels::<ORDER, C>(&solution, self.size.0, self.size.1), convergence)
-    }
 }
 
 /// J at the pixels.

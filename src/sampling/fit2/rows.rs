@@ -14,8 +14,6 @@ pub struct Fit2Sample<const C: usize> {
     pub values: [f32; C],
     /// Weight w >= 0.
     pub weight: f32,
-    /// Slope weight mu >= 0.
-    pub slope_weight: f32,
 }
 
 /// Some rows of the equations of a [`Fit2`](super::Fit2). Rows that do not overlap take samples at the same
@@ -60,18 +58,12 @@ impl<'a, const ORDER: usize, const C: usize> Fit2Rows<'a, ORDER, C> {
         let (column, across) = span::<ORDER>(sample.x, self.size.0);
         let (row, down) = span::<ORDER>(sample.y, self.size.1);
         let row = row - self.first;
-        let weighted =
-            self.add_couplings(column, row, &product(&down.weights, &across.weights), sample.weight);
+        let weighted = self.add_couplings(column, row, &product(&down, &across), sample.weight);
         for (i, own) in weighted.iter().enumerate() {
             for (c, value) in sample.values.iter().enumerate() {
                 let sums = self.rhs.at::<ORDER>(c, column, row + i);
                 (0..ORDER).for_each(|j| sums[j] += own[j] * value);
             }
-        }
-        if sample.slope_weight > 0.0 {
-            let weight = sample.weight * sample.slope_weight;
-            self.add_couplings(column, row, &product(&down.weights, &across.slopes), weight);
-            self.add_couplings(column, row, &product(&down.slopes, &across.weights), weight);
         }
     }
 
@@ -107,19 +99,14 @@ fn product<const ORDER: usize>(down: &[f32; ORDER], across: &[f32; ORDER]) -> Te
     down.map(|d| across.map(|a| d * a))
 }
 
-/// Weights and slopes of the splines around a position.
-struct Span<const ORDER: usize> {
-    weights: [f32; ORDER],
-    slopes: [f32; ORDER],
-}
-
-/// First coefficient around a position, which is moved into a row of `length` pixels.
+/// First coefficient around a position, which is moved into a row of `length` pixels, and the weights of the
+/// splines there.
 #[inline(always)]
-fn span<const ORDER: usize>(position: f64, length: usize) -> (usize, Span<ORDER>) {
+fn span<const ORDER: usize>(position: f64, length: usize) -> (usize, [f32; ORDER]) {
     let position = position.clamp(0.0, length.saturating_sub(1) as f64);
     // The cast cuts toward zero: rounding functions are library calls on baseline x86-64, and casts of 64
     // bits take several instructions.
     let first = (position as u32).min(length.saturating_sub(2) as u32);
-    let (weights, slopes) = BSpline::<ORDER>::in_span(position - f64::from(first));
-    (first as usize, Span { weights: weights.map(|w| w as f32), slopes: slopes.map(|d| d as f32) })
+    let weights = BSpline::<ORDER>::in_span(position - f64::from(first));
+    (first as usize, weights.map(|w| w as f32))
 }

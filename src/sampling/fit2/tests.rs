@@ -10,20 +10,14 @@ fn scattered(i: usize, k: usize) -> f64 {
 }
 
 /// Irregular samples of an image, some of them on its border.
-fn samples(count: usize, (width, height): (usize, usize), slope_weight: f32) -> Vec<Fit2Sample<2>> {
+fn samples(count: usize, (width, height): (usize, usize)) -> Vec<Fit2Sample<2>> {
     (0..count)
         .map(|i| {
             let (x, y) = (scattered(i, 389), scattered(i, 631));
             let (x, y) = if i % 7 == 0 { (x.round(), y) } else { (x, y) };
             let values = [100.0 + 50.0 * (5.0 * x).sin(), 80.0 * y].map(|v| v as f32);
             let weight = 0.5 + scattered(i, 97) as f32;
-            Fit2Sample {
-                x: x * (width as f64 - 1.0),
-                y: y * (height as f64 - 1.0),
-                values,
-                weight,
-                slope_weight,
-            }
+            Fit2Sample { x: x * (width as f64 - 1.0), y: y * (height as f64 - 1.0), values, weight }
         })
         .collect()
 }
@@ -61,17 +55,17 @@ fn eliminate(mut a: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     a.iter().enumerate().map(|(k, row)| row[n..].iter().map(|r| r / row[k]).collect()).collect()
 }
 
-/// All splines of a grid at a position, with their slopes, by the kernel.
-fn splines<const ORDER: usize>(position: f64, length: usize) -> (Vec<f64>, Vec<f64>) {
-    let (first, w, d) = BSpline::<ORDER>::weights_and_slopes(position);
-    let (mut weights, mut slopes) = (vec![0.0; length], vec![0.0; length]);
+/// All splines of a grid at a position, by the kernel.
+fn splines<const ORDER: usize>(position: f64, length: usize) -> Vec<f64> {
+    let (first, w) = BSpline::<ORDER>::weights(position);
+    let mut weights = vec![0.0; length];
     for j in 0..ORDER {
         let index = first + j as i64 + (ORDER / 2 - 1) as i64;
         if let Some(k) = usize::try_from(index).ok().filter(|k| *k < length) {
-            (weights[k], slopes[k]) = (w[j], d[j]);
+            weights[k] = w[j];
         }
     }
-    (weights, slopes)
+    weights
 }
 
 /// J at the pixels, by the definition.
@@ -86,13 +80,11 @@ fn dense<const ORDER: usize>(samples: &[Fit2Sample<2>], (width, height): (usize,
         let inside = |position: f64, length: usize| position.min(length as f64 - 1.0 - 1e-9).max(0.0);
         let across = splines::<ORDER>(inside(s.x, width), w);
         let down = splines::<ORDER>(inside(s.y, height), h);
-        let value = product(&down.0, &across.0);
-        let slopes = [product(&down.0, &across.1), product(&down.1, &across.0)];
-        let (weight, mu) = (f64::from(s.weight), f64::from(s.slope_weight));
+        let value = product(&down, &across);
+        let weight = f64::from(s.weight);
         for (p, row) in a.iter_mut().enumerate() {
             for q in 0..n {
-                let steep: f64 = slopes.iter().map(|d| d[p] * d[q]).sum();
-                row[q] += weight * (value[p] * value[q] + mu * steep);
+                row[q] += weight * value[p] * value[q];
             }
             (0..2).for_each(|c| row[n + c] += weight * value[p] * f64::from(s.values[c]));
         }
@@ -111,7 +103,7 @@ fn dense<const ORDER: usize>(samples: &[Fit2Sample<2>], (width, height): (usize,
     }
     let solution = eliminate(a);
     let at = |x: usize, y: usize, c: usize| {
-        let (across, down) = (splines::<ORDER>(x as f64, w).0, splines::<ORDER>(y as f64, h).0);
+        let (across, down) = (splines::<ORDER>(x as f64, w), splines::<ORDER>(y as f64, h));
         (0..n).map(|p| down[p / w] * across[p % w] * solution[p][c]).sum()
     };
     (0..width * height).map(|p| vec![at(p % width, p / width, 0), at(p % width, p / width, 1)]).collect()
@@ -136,8 +128,8 @@ fn fitted<const ORDER: usize>(samples: &[Fit2Sample<2>], size: (usize, usize)) -
     connected.solve(&Iteration { tolerance: 1e-7, steps: 400 }, &|_| ())
 }
 
-fn check_dense<const ORDER: usize>(size: (usize, usize), slope_weight: f32) {
-    let samples = samples(3 * size.0 * size.1 / 2, size, slope_weight);
+fn check_dense<const ORDER: usize>(size: (usize, usize)) {
+    let samples = samples(3 * size.0 * size.1 / 2, size);
     let (values, convergence) = fitted::<ORDER>(&samples, size);
     assert!(convergence.residual < 1e-5, "{convergence:?}");
     for (p, want) in dense::<ORDER>(&samples, size).iter().enumerate() {
@@ -151,18 +143,16 @@ fn check_dense<const ORDER: usize>(size: (usize, usize), slope_weight: f32) {
 
 #[test]
 fn equal_to_the_dense_solution() {
-    for slope_weight in [0.0, 0.3] {
-        check_dense::<2>((7, 6), slope_weight);
-        check_dense::<4>((6, 7), slope_weight);
-    }
+    check_dense::<2>((7, 6));
+    check_dense::<4>((6, 7));
 }
 
 /// Images of a pixel or a line, and wider than a block of lanes.
 #[test]
 fn narrow_and_wide_images() {
     for size in [(1, 1), (1, 5), (5, 1), (LANES + 3, 2)] {
-        check_dense::<2>(size, 0.0);
-        check_dense::<4>(size, 0.1);
+        check_dense::<2>(size);
+        check_dense::<4>(size);
     }
 }
 
@@ -170,7 +160,7 @@ fn narrow_and_wide_images() {
 #[test]
 fn without_springs_down_rows_are_fits() {
     let (size, tau) = ((11, 4), 0.07);
-    let mut samples = samples(90, size, 0.0);
+    let mut samples = samples(90, size);
     // The row fit takes no samples at its last knot.
     samples.iter_mut().for_each(|s| (s.x, s.y) = (0.999 * s.x, s.y.round()));
     let mut fit = Fit2::<2, 2>::new(size.0, size.1);
@@ -203,7 +193,7 @@ fn without_springs_down_rows_are_fits() {
 fn sums_of_rows() {
     let size = (9, 5);
     let mut fit = Fit2::<4, 2>::new(size.0, size.1);
-    samples(60, size, 0.0).iter().for_each(|s| fit.rows().add(s));
+    samples(60, size).iter().for_each(|s| fit.rows().add(s));
     let (width, height) = fit.coefficients();
     let matrix = fit.matrix.clone();
     let mut ones = Planes::zeros(matrix.grid(), 1);
@@ -225,7 +215,7 @@ fn sums_of_rows() {
 fn blocks_move_as_one() {
     fn check<const ORDER: usize>(size: (usize, usize)) {
         let mut fit = Fit2::<ORDER, 2>::new(size.0, size.1);
-        samples(60, size, 0.1).iter().for_each(|s| fit.rows().add(s));
+        samples(60, size).iter().for_each(|s| fit.rows().add(s));
         let grid = fit.coefficients();
         let fine = fit.connect(|direction, y| row_of(&uneven(direction, grid), grid.0, y), |_| false).matrix;
         let coarse = fine.coarsened();
@@ -270,7 +260,7 @@ fn large_holes_converge() {
         for (x, y) in (0..side * side).map(|p| (p % side, p / side)).filter(|(x, y)| !(hole(*x) && hole(*y)))
         {
             let (x, y, values) = (x as f64, y as f64, [tone(x, y)]);
-            fit.rows().add(&Fit2Sample { x, y, values, weight: 1.0, slope_weight: 0.0 });
+            fit.rows().add(&Fit2Sample { x, y, values, weight: 1.0 });
         }
         let (width, height) = fit.coefficients();
         let springs = |direction, y: usize| {
@@ -297,7 +287,7 @@ fn large_holes_converge() {
 #[test]
 fn what_is_alone_is_held() {
     let mut fit = Fit2::<2, 1>::new(4, 3);
-    fit.rows().add(&Fit2Sample { x: 1.0, y: 1.0, values: [50.0], weight: 2.0, slope_weight: 0.0 });
+    fit.rows().add(&Fit2Sample { x: 1.0, y: 1.0, values: [50.0], weight: 2.0 });
     let none = |_, _| Springs::none(4);
     let (values, convergence) =
         fit.connect(none, |p| p != 5).solve(&Iteration { tolerance: 1e-6, steps: 9 }, &|_| ());

@@ -6,7 +6,8 @@
 //!              count of points u64, per point: x f64, y f64, point id i64
 //! ```
 
-use super::{Inner, Pose, inner, pose};
+use super::{Pose, inner, pose};
+use crate::camera::list::Inner;
 use std::collections::BTreeMap;
 
 /// Names and numbers of parameters of the models, by their numbers.
@@ -139,7 +140,7 @@ mod tests {
         std::fs::write(dir.path().join("images.bin"), images).unwrap();
         let want = parse_model(cameras_text, images_text, dir.path()).unwrap();
         assert_eq!(read_model(dir.path()).unwrap(), want);
-        assert_eq!(want.len(), 2);
+        assert_eq!(want.frames.len(), 2);
     }
 
     #[test]

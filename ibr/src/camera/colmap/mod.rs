@@ -1,12 +1,12 @@
 //! COLMAP models as camera input: `cameras` and `images` of one folder, as text or binary.
 //!
-//! COLMAP puts pixel centres at half-integers; the principal point is shifted by half a pixel on reading.
+//! COLMAP puts pixel centres at half-integers; [`CameraList::camera`] shifts the principal point.
 
 mod binary;
 
-use super::file_error::CHECK_THE_PATH;
-use super::{Camera, CameraFileError, Lens};
-use nalgebra::{Matrix3, Matrix3x4, Quaternion, UnitQuaternion, Vector3};
+use super::list::{CameraList, Frame, Inner};
+use crate::files::{self, CHECK_THE_PATH, InputError, Location};
+use nalgebra::{Matrix3x4, Quaternion, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -16,18 +16,6 @@ const FILES: &str = "a COLMAP model has cameras.txt and images.txt, or cameras.b
 /// Where COLMAP puts models in its folders.
 const PLACES: [&str; 6] = ["sparse/0", "sparse", "0", "dense/0/sparse", "dense/sparse", "colmap/sparse/0"];
 
-/// A camera of the model with the size of its image.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ModelCamera {
-    /// The metric camera, in pixels with centres at integers.
-    pub camera: Camera,
-    /// Width and height of the image in pixels.
-    pub size: (usize, usize),
-}
-
-/// The cameras of a model by the names of their images.
-pub type Model = BTreeMap<String, ModelCamera>;
-
 /// Reads the model in `folder`: the text files if cameras.txt is there, else the binary ones if cameras.bin
 /// is.
 ///
@@ -35,17 +23,16 @@ pub type Model = BTreeMap<String, ModelCamera>;
 /// Images of other models have to be undistorted first, so these are refused.
 ///
 /// # Errors
-/// [`CameraFileError`], with file and line or record.
-pub fn read_model(folder: &Path) -> Result<Model, CameraFileError> {
+/// [`InputError`], with file and line or record.
+pub fn read_model(folder: &Path) -> Result<CameraList, InputError> {
     if !is_model(folder) {
         return Err(no_model(folder));
     }
-    let named = |name: &str, source| CameraFileError::Read { path: folder.join(name), source, remedy: FILES };
     if !folder.join("cameras.txt").exists() && folder.join("cameras.bin").exists() {
-        let load = |name: &str| crate::files::read(&folder.join(name)).map_err(|e| named(name, e));
+        let load = |name: &str| files::read(&folder.join(name), FILES);
         return parse_binary(&load("cameras.bin")?, &load("images.bin")?, folder);
     }
-    let load = |name: &str| crate::files::read_text(&folder.join(name)).map_err(|e| named(name, e));
+    let load = |name: &str| files::read_text(&folder.join(name), FILES);
     parse_model(&load("cameras.txt")?, &load("images.txt")?, folder)
 }
 
@@ -55,7 +42,7 @@ fn is_model(folder: &Path) -> bool {
 }
 
 /// That there is no model in a folder, with those that are in folders below it.
-fn no_model(folder: &Path) -> CameraFileError {
+fn no_model(folder: &Path) -> InputError {
     let below = PLACES.iter().map(|place| folder.join(place)).filter(|place| is_model(place));
     let below: Vec<String> = below.map(|place| place.display().to_string()).collect();
     let remedy = match (below.is_empty(), folder.is_file(), folder.exists()) {
@@ -64,59 +51,46 @@ fn no_model(folder: &Path) -> CameraFileError {
         (_, _, true) => FILES.into(),
         _ => format!("there is no such folder; {CHECK_THE_PATH}"),
     };
-    CameraFileError::Content {
-        path: folder.into(),
-        reason: format!("there is neither cameras.txt nor cameras.bin: {remedy}"),
-    }
+    let reason = format!("there is neither cameras.txt nor cameras.bin: {remedy}");
+    InputError::content(folder, Location::File, reason)
 }
 
-fn parse_binary(cameras: &[u8], images: &[u8], folder: &Path) -> Result<Model, CameraFileError> {
-    let fault =
-        |name: &str, (record, reason)| CameraFileError::Record { path: folder.join(name), record, reason };
+fn parse_binary(cameras: &[u8], images: &[u8], folder: &Path) -> Result<CameraList, InputError> {
+    let fault = |name: &str, (record, reason): (usize, String)| {
+        InputError::content(&folder.join(name), Location::Record(record), reason)
+    };
     let inners = binary::cameras(cameras).map_err(|e| fault("cameras.bin", e))?;
     let poses = binary::images(images).map_err(|e| fault("images.bin", e))?;
-    join(&inners, poses, &folder.join("images.bin"), |at| fault("images.bin", at))
+    join(&inners, poses, folder).map_err(|e| fault("images.bin", e))
 }
 
 /// The same from the texts of the two files; `folder` appears in messages.
 ///
 /// # Errors
-/// [`CameraFileError`].
-pub fn parse_model(cameras: &str, images: &str, folder: &Path) -> Result<Model, CameraFileError> {
-    let fault = |name: &str, (line, reason)| CameraFileError::Line { path: folder.join(name), line, reason };
+/// [`InputError`].
+pub fn parse_model(cameras: &str, images: &str, folder: &Path) -> Result<CameraList, InputError> {
+    let fault = |name: &str, (line, reason): (usize, String)| {
+        InputError::content(&folder.join(name), Location::Line(line), reason)
+    };
     let inners = parse_cameras(cameras).map_err(|e| fault("cameras.txt", e))?;
     let poses = parse_images(images).map_err(|e| fault("images.txt", e))?;
-    join(&inners, poses, &folder.join("images.txt"), |at| fault("images.txt", at))
+    join(&inners, poses, folder).map_err(|e| fault("images.txt", e))
 }
 
-/// The camera of every image; `fault` names an image, by its line or record, whose camera is not listed.
+/// The images by their names; the error is the line or record of one whose camera is not listed.
 fn join(
     inners: &BTreeMap<u64, Inner>,
     poses: Vec<Pose>,
-    path: &Path,
-    fault: impl Fn((usize, String)) -> CameraFileError,
-) -> Result<Model, CameraFileError> {
-    let mut model = Model::new();
-    for (at, id, pose, name) in poses {
-        let inner = inners.get(&id).ok_or_else(|| {
-            fault((at, format!("image {name:?} has camera {id}, which the cameras do not list")))
+    folder: &Path,
+) -> Result<CameraList, (usize, String)> {
+    let mut frames = BTreeMap::new();
+    for (number, id, pose, name) in poses {
+        let inner = *inners.get(&id).ok_or_else(|| {
+            (number, format!("image {name:?} has camera {id}, which the cameras do not list"))
         })?;
-        let camera = Camera::metric(inner.k * pose, false).map_err(|source| CameraFileError::Camera {
-            path: path.into(),
-            image: name.clone(),
-            source,
-        })?;
-        let camera = inner.lens.map_or(camera, |lens| camera.with_lens(lens));
-        model.insert(name, ModelCamera { camera, size: inner.size });
+        frames.insert(name.clone(), Frame { image: name.into(), depth: None, number, pose, inner });
     }
-    Ok(model)
-}
-
-/// A camera without its pose.
-struct Inner {
-    k: Matrix3<f64>,
-    size: (usize, usize),
-    lens: Option<Lens>,
+    Ok(CameraList { path: folder.into(), frames: frames.into_values().collect() })
 }
 
 /// Lines with content, with their numbers.
@@ -164,20 +138,26 @@ fn inner(model: &str, size: (usize, usize), parameters: &[f64]) -> Result<Inner,
         return Err("camera parameters are missing".into());
     };
     let fy = parameters[focal - 1];
-    let (cx, cy) = (cx - 0.5, cy - 0.5);
-    let k = Matrix3::new(*fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);
     let (bends, beyond) = parameters[focal + 2..].split_at(most.min(parameters.len() - focal - 2));
     if let Some(value) = beyond.iter().find(|v| **v != 0.0) {
         return Err(format!(
             "the {model} camera has an unsupported coefficient ({value}); undistort the images first"
         ));
     }
-    let bend = |i: usize| bends.get(i).copied().unwrap_or(0.0);
-    let lens = bends
-        .iter()
-        .any(|b| *b != 0.0)
-        .then(|| Lens::new([*fx, fy], [cx, cy], [bend(0), bend(1)], [bend(2), bend(3)]));
-    Ok(Inner { k, size, lens })
+    let bend = |i: usize| bends.get(i).copied();
+    Ok(Inner {
+        fl_x: Some(*fx),
+        fl_y: Some(fy),
+        cx: Some(*cx),
+        cy: Some(*cy),
+        w: Some(size.0 as f64),
+        h: Some(size.1 as f64),
+        k1: bend(0),
+        k2: bend(1),
+        p1: bend(2),
+        p2: bend(3),
+        ..Inner::default()
+    })
 }
 
 /// Line or record of an image, id of its camera, world-to-camera pose, and name.
@@ -229,6 +209,7 @@ fn pose([w, x, y, z, t @ ..]: [f64; 7]) -> Result<Matrix3x4<f64>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::Lens;
 
     fn folder(cameras: &str, images: &str) -> tempfile::TempDir {
         let dir = tempfile::tempdir().unwrap();
@@ -245,8 +226,9 @@ mod tests {
              2 0.7071067811865476 0 0.7071067811865476 0 0 0 0 2 sub/c.jpg\n\n",
         );
         let model = read_model(dir.path()).unwrap();
-        assert_eq!(model.keys().collect::<Vec<_>>(), ["a b.png", "sub/c.jpg"]);
-        let a = &model["a b.png"];
+        let names: Vec<_> = model.frames.iter().map(|frame| frame.image.display().to_string()).collect();
+        assert_eq!(names, ["a b.png", "sub/c.jpg"]);
+        let [a, c] = [0, 1].map(|k| model.camera(&model.frames[k], (0, 0)).unwrap());
         assert_eq!(a.size, (640, 480));
         let want = Matrix3x4::new(
             500.0,
@@ -264,7 +246,7 @@ mod tests {
         );
         assert!((a.camera.matrix() - want).norm() < 1e-9);
         // A quarter turn about y: the camera looks along -x.
-        let (_, _, depth) = model["sub/c.jpg"].camera.project(&Vector3::new(-2.0, 0.0, 0.0));
+        let (_, _, depth) = c.camera.project(&Vector3::new(-2.0, 0.0, 0.0));
         assert!((depth - 2.0).abs() < 1e-12);
     }
 
@@ -280,7 +262,8 @@ mod tests {
             let model = parse_model(line, images, Path::new("m")).unwrap();
             let lens = Lens::new([50.0; 2], [32.0, 24.0], radial, tangential);
             let want = lens.record(nalgebra::Vector2::new(32.0 + 10.0, 24.0 - 5.0)).unwrap();
-            let (x, y, _) = model["a.png"].camera.project(&Vector3::new(1.0, -0.5, 5.0));
+            let (x, y, _) =
+                model.camera(&model.frames[0], (0, 0)).unwrap().camera.project(&Vector3::new(1.0, -0.5, 5.0));
             assert!((x - want.x).abs() < 1e-12 && (y - want.y).abs() < 1e-12, "{line}: {x} {y} {want}");
         }
     }

@@ -4,9 +4,9 @@ use super::SceneArguments;
 use crate::image::{FrameRate, Levels};
 use crate::interpolate::plane::PlaneSettings;
 use crate::interpolate::{Degree, HoleFill};
-use crate::partial::{Densify, Segmentwise};
+use crate::partial::Densify;
 use crate::pipeline::{Method, RenderSettings};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use std::path::PathBuf;
 
 const RENDER_EXAMPLES: &str = "Examples:
@@ -77,24 +77,24 @@ pub(in crate::cli) struct RenderArguments {
     #[arg(long, value_name = "K")]
     pub(in crate::cli) nearest: Option<usize>,
     /// Bits per value of a PNG, 8 or 16.
-    #[arg(long, value_name = "N", default_value = "8", value_parser = levels)]
+    #[arg(long, value_name = "N", value_enum, default_value_t = Levels::Eight, hide_possible_values = true)]
     pub(in crate::cli) bits: Levels,
     /// How samples are interpolated.
-    #[arg(long, value_enum, default_value_t = MethodName::Auto)]
-    pub(in crate::cli) method: MethodName,
+    #[arg(long, value_enum, default_value_t = Method::Auto)]
+    pub(in crate::cli) method: Method,
     /// How holes are filled.
-    #[arg(long, value_enum, default_value_t = FillName::Background)]
-    pub(in crate::cli) fill: FillName,
+    #[arg(long, value_enum, default_value_t = HoleFill::Background)]
+    pub(in crate::cli) fill: HoleFill,
     /// How coarse depth is made dense.
-    #[arg(long, value_enum, default_value_t = DensifyName::Segmentwise)]
-    pub(in crate::cli) densify: DensifyName,
+    #[arg(long, value_enum, default_value_t = Densify::Segmentwise)]
+    pub(in crate::cli) densify: Densify,
     /// Drop pixels of unknown depth instead of filling it from the farther neighbour.
     #[arg(long)]
     pub(in crate::cli) drop_unknown: bool,
     /// Degree of the splines [default: cubic in rows, linear in the plane]. A cubic plane is sharper and
     /// takes three times as long.
     #[arg(long, value_enum)]
-    pub(in crate::cli) degree: Option<DegreeName>,
+    pub(in crate::cli) degree: Option<Degree>,
     /// Weight of the slope penalty of the row fit, px^2 [default: from the noise of the photographs].
     #[arg(long, value_name = "L", allow_negative_numbers = true)]
     pub(in crate::cli) lambda: Option<f64>,
@@ -115,72 +115,18 @@ pub(in crate::cli) struct RenderArguments {
     pub(in crate::cli) reverse_order: bool,
 }
 
-fn levels(text: &str) -> Result<Levels, String> {
-    match text {
-        "8" => Ok(Levels::Eight),
-        "16" => Ok(Levels::Sixteen),
-        _ => Err("give 8 or 16".into()),
-    }
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(in crate::cli) enum MethodName {
-    /// rows for rectified rigs, plane for other scenes.
-    Auto,
-    /// One spline per row (rectified rigs only).
-    Rows,
-    /// One spline for the whole image.
-    Plane,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(in crate::cli) enum FillName {
-    /// Continue the farther side into holes between surfaces; bridge cracks within one.
-    Background,
-    /// Let the fitted spline bridge all holes.
-    Bridge,
-    /// Leave holes black.
-    Leave,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(in crate::cli) enum DensifyName {
-    /// Interpolate within segments of image and depth.
-    Segmentwise,
-    /// Bilinear interpolation everywhere.
-    Bilinear,
-    /// The value of the nearest sample.
-    Nearest,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(in crate::cli) enum DegreeName {
-    /// Linear B-splines.
-    Linear,
-    /// Cubic B-splines.
-    Cubic,
-}
-
 impl RenderArguments {
     /// The settings that were typed over the defaults; `offset` is that of the scene.
     pub(in crate::cli) fn settings(&self, offset: f64) -> RenderSettings {
         let keep_smoothing = self.lambda.is_some();
         let nearest = self.nearest;
         let mut settings = RenderSettings { nearest, keep_smoothing, ..self.scene.settings(offset) };
-        settings.method = match self.method {
-            MethodName::Auto => Method::Auto,
-            MethodName::Rows => Method::Rows,
-            MethodName::Plane => Method::Plane,
-        };
+        settings.method = self.method;
         let stage = &mut settings.interpolation;
-        stage.holes.fill = match self.fill {
-            FillName::Background => HoleFill::Background,
-            FillName::Bridge => HoleFill::Bridge,
-            FillName::Leave => HoleFill::Leave,
-        };
+        stage.holes.fill = self.fill;
         match self.degree {
-            Some(DegreeName::Linear) => stage.fit.degree = Degree::Linear,
-            Some(DegreeName::Cubic) => stage.plane = PlaneSettings::CUBIC,
+            Some(Degree::Linear) => stage.fit.degree = Degree::Linear,
+            Some(Degree::Cubic) => stage.plane = PlaneSettings::CUBIC,
             None => {}
         }
         let mut typed = |slot: fn(&mut crate::interpolate::Settings) -> &mut f64, value: Option<f64>| {
@@ -193,14 +139,5 @@ impl RenderArguments {
         typed(|s| &mut s.depth_test.epsilon, self.epsilon);
         typed(|s| &mut s.depth_test.relative, self.relative_depth);
         settings
-    }
-
-    /// How coarse depth is made dense.
-    pub(in crate::cli) fn densify(&self) -> Densify {
-        match self.densify {
-            DensifyName::Segmentwise => Densify::Segmentwise(Segmentwise::default()),
-            DensifyName::Bilinear => Densify::Bilinear,
-            DensifyName::Nearest => Densify::Nearest,
-        }
     }
 }

@@ -72,15 +72,15 @@ impl Outputs {
 
 /// A picture of the estimate, or the three numbers of every pixel as a float map.
 fn map<'a>(predicted: &ViewError, path: &'a Path) -> Result<(Encoded<'a>, Option<f32>), Failure> {
-    let (width, height) = predicted.rendering.image.size();
+    let size = predicted.rendering.image.size();
     if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("pfm")) {
         let first =
             if predicted.sure_bound.is_empty() { &predicted.local_limit } else { &predicted.sure_bound };
         let pixels = first.iter().zip(&predicted.expected).zip(&predicted.estimate);
         let data = pixels.flat_map(|((limit, expected), estimate)| [*limit, *expected, *estimate]).collect();
-        let bytes = pfm::encode(&pfm::FloatMap { width, height, channels: 3, data });
+        let bytes = pfm::encode(&Image::from_values(size, 3, data));
         return Ok((Encoded { bytes, path }, None));
     }
-    let (map, white) = heat::map(&predicted.estimate, (width, height));
+    let (map, white) = heat::map(&predicted.estimate, size);
     Ok((output::encoded(&map, path, Levels::Eight)?, Some(white)))
 }

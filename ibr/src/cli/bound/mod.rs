@@ -13,7 +13,7 @@ use super::output::{self, Encoded};
 use super::progress::Progress;
 use crate::analysis::{Limits, ViewError};
 use crate::image::Image;
-use crate::partial::{Densify, Segmentwise};
+use crate::partial::Densify;
 use crate::pipeline::RenderError;
 use crate::scene::{self, Kind, Scene};
 use files::Outputs;
@@ -87,7 +87,7 @@ fn check(arguments: &BoundArguments) -> Result<Option<Limits>, Failure> {
 fn read(arguments: &BoundArguments) -> Result<(Scene, Option<Image>), Failure> {
     let file = &arguments.scene.file;
     let source = arguments.scene.source()?;
-    let scene = arguments.scene.load(&source, Densify::Segmentwise(Segmentwise::default()), true)?;
+    let scene = arguments.scene.load(&source, Densify::default(), true)?;
     refuse_what_has_no_prediction(&scene, arguments)?;
     let frames = scene.kind.frames();
     let numbers = (0..frames.min(scene::MOST_FRAMES)).map(|frame| (frames > 1).then_some(frame));

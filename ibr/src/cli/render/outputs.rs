@@ -196,8 +196,8 @@ fn mask_image(rendering: &Rendering) -> Image {
 }
 
 /// A float map.
-fn numbers(data: Vec<f32>, (width, height): (usize, usize), path: &Path) -> Encoded<'_> {
-    Encoded { bytes: pfm::encode(&pfm::FloatMap { width, height, channels: 1, data }), path }
+fn numbers(data: Vec<f32>, size: (usize, usize), path: &Path) -> Encoded<'_> {
+    Encoded { bytes: pfm::encode(&Image::from_values(size, 1, data)), path }
 }
 
 /// The number of samples of every pixel, as it is.

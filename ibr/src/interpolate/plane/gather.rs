@@ -43,13 +43,7 @@ impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
             let inside = s.x >= -0.5 && s.x <= right + 0.5 && s.y >= -0.5 && s.y <= bottom + 0.5;
             if inside {
                 self.register(s);
-                self.fit.add(&Fit2Sample {
-                    x: s.x,
-                    y: s.y,
-                    values: s.value,
-                    weight: s.weight,
-                    slope_weight: 0.0,
-                });
+                self.fit.add(&Fit2Sample { x: s.x, y: s.y, values: s.value, weight: s.weight });
                 added += 1;
             }
         }
@@ -147,6 +141,6 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     /// Adds a sample of weight one on a pixel.
     pub(super) fn add_on_pixel(&mut self, pixel: usize, values: [f32; C]) {
         let (x, y) = ((pixel % self.width) as f64, (pixel / self.width) as f64);
-        self.fit.rows().add(&Fit2Sample { x, y, values, weight: 1.0, slope_weight: 0.0 });
+        self.fit.rows().add(&Fit2Sample { x, y, values, weight: 1.0 });
     }
 }

@@ -11,9 +11,8 @@ use super::{RenderError, RenderSettings, Rendering, Watch};
 use crate::image::Image;
 use crate::interpolate::Degree;
 use crate::interpolate::plane::PlaneSettings;
-use crate::uncalibrated::chirality::Handedness;
 use crate::uncalibrated::order::Order;
-use crate::uncalibrated::{GeometryError, Point, RobustSettings};
+use crate::uncalibrated::{Point, RobustSettings};
 use colours::Advantage;
 use consistency::Surface;
 use reconstruction::Reconstruction;
@@ -38,14 +37,8 @@ pub enum Target {
 pub struct UncalibratedSettings {
     /// The robust estimators.
     pub robust: RobustSettings,
-    /// The order of depth, if it is known; otherwise the metric guess decides.
-    pub handedness: Option<Handedness>,
     /// Exchange near and far, whatever decides their order.
     pub reverse_order: bool,
-    /// Depth threshold of the occlusion test as a share of the range of chi. The meshes of two views
-    /// interpolate depth edges differently; a threshold below their difference would remove visible
-    /// samples.
-    pub sigma_share: f64,
     /// The plane fit. Positions from a mesh are wrong by fractions of a pixel, differently in each view,
     /// which acts like noise on the values; so bending has more weight than for measured depth.
     pub plane: PlaneSettings,
@@ -54,41 +47,8 @@ pub struct UncalibratedSettings {
 impl Default for UncalibratedSettings {
     fn default() -> Self {
         let plane = PlaneSettings { stiffness: 0.02, bending: 0.3, ..PlaneSettings::default() };
-        Self {
-            robust: RobustSettings::default(),
-            handedness: None,
-            reverse_order: false,
-            sigma_share: 0.2,
-            plane,
-        }
+        Self { robust: RobustSettings::default(), reverse_order: false, plane }
     }
-}
-
-/// Errors of a rendering from tracks.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum UncalibratedError {
-    /// The geometry could not be estimated.
-    #[error(transparent)]
-    Geometry(#[from] GeometryError),
-    /// The rendering failed.
-    #[error(transparent)]
-    Render(#[from] RenderError),
-    /// Images and track columns do not fit.
-    #[error(
-        "{images} images have {columns} columns of tracks; at least two views are needed, each with a column"
-    )]
-    Views {
-        /// Images given.
-        images: usize,
-        /// Columns of tracks given.
-        columns: usize,
-    },
-    /// A position between the views outside 0 to 1.
-    #[error("between = {between}: the position between the views is a number from 0 to 1")]
-    Between {
-        /// Value given.
-        between: f64,
-    },
 }
 
 /// Figures of merit of the estimated geometry.
@@ -138,8 +98,6 @@ pub struct UncalibratedRendering {
     pub region: Vec<bool>,
     /// The estimated geometry.
     pub geometry: GeometryReport,
-    /// The order of depth used.
-    pub hand: Handedness,
 }
 
 /// Renders a view of `size` from images and `tracks[track][image]`.
@@ -149,7 +107,7 @@ pub struct UncalibratedRendering {
 /// then all cameras and points are adjusted together.
 ///
 /// # Errors
-/// [`UncalibratedError`].
+/// [`RenderError`].
 pub fn render(
     images: &[&Image],
     tracks: &[Vec<Option<Point>>],
@@ -157,7 +115,7 @@ pub fn render(
     size: (usize, usize),
     settings: &RenderSettings,
     uncalibrated: &UncalibratedSettings,
-) -> Result<UncalibratedRendering, UncalibratedError> {
+) -> Result<UncalibratedRendering, RenderError> {
     render_watched(images, tracks, target, size, settings, uncalibrated, &|_| ())
 }
 
@@ -173,10 +131,10 @@ pub fn render_watched(
     settings: &RenderSettings,
     uncalibrated: &UncalibratedSettings,
     watch: Watch<'_>,
-) -> Result<UncalibratedRendering, UncalibratedError> {
+) -> Result<UncalibratedRendering, RenderError> {
     let columns = tracks.first().map_or(images.len(), Vec::len);
     if images.len() < 2 || columns != images.len() {
-        return Err(UncalibratedError::Views { images: images.len(), columns });
+        return Err(RenderError::Tracks { images: images.len(), columns });
     }
     settings.check()?;
     let numbers = match target {
@@ -193,9 +151,7 @@ pub fn render_watched(
     let balance = synthesis::balance(&scene, images.len());
     let surfaces = consistency::surfaces(images, &scene, balance.first_two())?;
     watch(SURFACES);
-    if uncalibrated.handedness.is_none() {
-        decide(images, &surfaces, &mut scene)?;
-    }
+    decide(images, &surfaces, &mut scene)?;
     if uncalibrated.reverse_order {
         scene.hand = scene.hand.reversed();
         (scene.geometry.order_by, scene.geometry.order_agreement) = (OrderBy::Given, 1.0);
@@ -209,7 +165,7 @@ pub fn render_watched(
         (Degree::Cubic, false) => synthesis::render::<4, 1>,
         (Degree::Cubic, true) => synthesis::render::<4, 3>,
     };
-    Ok(render(images, &surfaces, &scene, &balance, size, (settings, uncalibrated, &rest))?)
+    render(images, &surfaces, &scene, &balance, size, (settings, uncalibrated, &rest))
 }
 
 /// Decides the order of depth from the photographs, which show what is in front, and the guessed
@@ -222,4 +178,4 @@ fn decide(images: &[&Image], surfaces: &[Surface], scene: &mut Reconstruction) -
 }
 
 #[cfg(test)]
-mod trials;
+mod tests;

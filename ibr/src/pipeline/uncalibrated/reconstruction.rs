@@ -1,15 +1,16 @@
 //! Cameras and points of a scene from tracks, in a projective frame.
 
 use super::all_views;
-use super::{GeometryReport, OrderBy, Target, UncalibratedError, UncalibratedSettings};
+use super::{GeometryReport, OrderBy, Target, UncalibratedSettings};
 use crate::camera::Camera;
 use crate::image::Image;
 use crate::pipeline::RenderError;
+use crate::setting::SHARE;
 use crate::uncalibrated::canonical::{CanonicalPair, canonical_pair};
 use crate::uncalibrated::chirality::{self, Handedness};
 use crate::uncalibrated::fundamental::{self, Fundamental};
 use crate::uncalibrated::mesh::Feature;
-use crate::uncalibrated::metric::{self, MetricGuess};
+use crate::uncalibrated::metric;
 use crate::uncalibrated::order::Order;
 use crate::uncalibrated::resection::{Resection, Sighting, resect};
 use crate::uncalibrated::triangulate::triangulate;
@@ -34,9 +35,8 @@ pub(super) struct Reconstruction {
 impl Reconstruction {
     /// The camera of a view; the virtual one comes after all views.
     pub(super) fn camera(&self, view: usize) -> Result<Camera, RenderError> {
-        Camera::projective(self.cameras[view]).map_err(|source| {
-            RenderError::Projective(GeometryError::Camera { which: self.name(view), source })
-        })
+        Camera::projective(self.cameras[view])
+            .map_err(|source| RenderError::Geometry(GeometryError::Camera { which: self.name(view), source }))
     }
 
     /// A view by its name for messages.
@@ -71,7 +71,7 @@ pub(super) fn reconstruct(
     tracks: &[Vec<Option<Point>>],
     target: &Target,
     settings: &UncalibratedSettings,
-) -> Result<Reconstruction, UncalibratedError> {
+) -> Result<Reconstruction, RenderError> {
     let base = Base::new(images, tracks, settings)?;
     let in_target = base.points_in(target)?;
     let mut seen = with_target(base.tracks.iter().map(|j| &tracks[*j]), &in_target);
@@ -83,7 +83,7 @@ pub(super) fn reconstruct(
     let found = resections.last().ok_or(GeometryError::Numerical { what: "virtual camera" })?;
     let mut points = base.points.clone();
     chirality::orient(&mut cameras, &mut points, |i, j| seen[j][i].is_some());
-    let order = base.order(&points, &cameras[0], settings)?;
+    let order = base.order(&points, &cameras[0])?;
     if let (Target::Tracks(positions), 3..) = (target, images.len()) {
         let all = with_target(tracks.iter(), positions);
         let cloud = all_views::adjust(&mut cameras, &all, settings.robust.reprojection);
@@ -99,7 +99,7 @@ pub(super) fn reconstruct(
         resection_rms: found.rms,
         order_agreement: order.agreement,
         // Until the photographs have been asked.
-        order_by: settings.handedness.map_or(OrderBy::Nothing, |_| OrderBy::Given),
+        order_by: OrderBy::Nothing,
     };
     Ok(Reconstruction { cameras, points, seen, hand: order.hand, geometry, numbers: Vec::new() })
 }
@@ -123,7 +123,6 @@ struct Base {
     tracks: Vec<usize>,
     matches: Vec<Match>,
     points: Vec<Vector4<f64>>,
-    guesses: Vec<MetricGuess>,
 }
 
 impl Base {
@@ -144,36 +143,27 @@ impl Base {
         let (tracks, matches, points) = triangulated(&pair, &numbered, &f);
         let cameras = [pair.first.inverse() * pair.cameras[0], pair.second.inverse() * pair.cameras[1]];
         let sizes = [images[0].size(), images[1].size()];
-        let guesses = metric::guesses(&f.matrix, &some(&matches), sizes);
-        Ok(Self { given: all.len(), f, sizes, cameras, tracks, matches, points, guesses })
+        Ok(Self { given: all.len(), f, sizes, cameras, tracks, matches, points })
     }
 
     /// Positions of the points in the virtual view.
-    fn points_in(&self, target: &Target) -> Result<Vec<Option<Point>>, UncalibratedError> {
+    fn points_in(&self, target: &Target) -> Result<Vec<Option<Point>>, RenderError> {
         match target {
             Target::Tracks(positions) => {
                 Ok(self.tracks.iter().map(|j| positions.get(*j).copied().flatten()).collect())
             }
-            Target::Between(between) if (0.0..=1.0).contains(between) => {
-                let guess = metric::best(&self.guesses)
+            Target::Between(between) => {
+                SHARE.check("between", *between)?;
+                let guess = metric::best(&self.f.matrix, &some(&self.matches), self.sizes)
                     .and_then(|g| metric::guess(&self.f.matrix, &self.matches, self.sizes, g.focal))
                     .ok_or(GeometryError::Numerical { what: "metric guess" })?;
                 Ok(metric::images_between(&guess, &self.matches, *between))
             }
-            Target::Between(between) => Err(UncalibratedError::Between { between: *between }),
         }
     }
 
-    /// The order of depth, given or by the guesses, and the share of the guesses that agree.
-    fn order(
-        &self,
-        points: &[Vector4<f64>],
-        camera: &Matrix3x4<f64>,
-        settings: &UncalibratedSettings,
-    ) -> Result<Order, GeometryError> {
-        if let Some(hand) = settings.handedness {
-            return Ok(Order { hand, agreement: 1.0 });
-        }
+    /// The order of depth by the guesses, and the share of the guesses that agree.
+    fn order(&self, points: &[Vector4<f64>], camera: &Matrix3x4<f64>) -> Result<Order, GeometryError> {
         Order::of(&self.f.matrix, &some(&self.matches), &some(points), camera, self.sizes)
             .ok_or(GeometryError::Numerical { what: "order of depth" })
     }

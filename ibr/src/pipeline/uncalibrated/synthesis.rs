@@ -17,6 +17,10 @@ use crate::uncalibrated::chirality;
 use crate::uncalibrated::mesh::{self, Feature};
 use nalgebra::Vector4;
 
+/// Depth threshold of the occlusion test as a share of the range of chi. The meshes of two views interpolate
+/// depth edges differently; a threshold below their difference would remove visible samples.
+const SIGMA_SHARE: f64 = 0.2;
+
 /// Share of the rendering, about, that is done when the visible samples are known.
 const GATHERED: f64 = 0.4;
 
@@ -34,7 +38,7 @@ pub(super) fn render<const ORDER: usize, const C: usize>(
     balance.apply(&mut samples, |view| images[view]);
     let mut report = Report { dropped, propagated: samples.len(), ..Report::default() };
     let hull = hull_features(scene, images.len());
-    let absolute = special.sigma_share * chi_range(&hull);
+    let absolute = SIGMA_SHARE * chi_range(&hull);
     let test = DepthTest { relative: 0.0, absolute, ..*settings.depth_test() };
     test.check()?;
     report.occluded = remove_occluded(&mut samples, &test);
@@ -54,7 +58,7 @@ pub(super) fn render<const ORDER: usize, const C: usize>(
     let (mask, depth, counts) = (fit.mask, fit.depth, fit.counts);
     let views = (0..images.len()).collect();
     let rendering = Rendering { image, mask, depth, counts, views, report, agreement };
-    Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone(), hand: scene.hand })
+    Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone() })
 }
 
 /// The samples of all views in the virtual one, and what was dropped.

@@ -4,7 +4,7 @@ use super::left_out::LeftOut;
 use super::models::Source;
 use super::{Goal, Inputs, Loaded, Loader, in_order};
 use crate::camera::Camera;
-use crate::camera::colmap::ModelCamera;
+use crate::camera::ListedCamera;
 use crate::camera::resize::{Size, factors};
 use crate::depth::Measure;
 use crate::scene::{CalibratedSource, Kind, SceneError, ViewSpec};
@@ -160,7 +160,7 @@ impl Loader<'_> {
     /// A camera from a file for an image of another size than the file says: resized with it, or refused.
     fn fitted(
         &self,
-        found: ModelCamera,
+        found: ListedCamera,
         size: Size,
         source: &Source,
         which: &str,
@@ -172,19 +172,18 @@ impl Loader<'_> {
             let resized = Resized { from: found.size, to: size };
             return Ok((self.scaled(found, size, which)?, Some(resized)));
         }
-        let (Source::Colmap(file) | Source::Transforms(file)) = source;
         Err(self.incomplete(format!(
             "{which}: the image has {} x {} pixels, but {} lists its camera for {} x {}; use the image that was calibrated, or one that was resized by the same factor in both directions",
             size.0,
             size.1,
-            file.display(),
+            source.path.display(),
             found.size.0,
             found.size.1
         )))
     }
 
     /// A camera from a file, scaled with its image; as it is, for a window of another shape.
-    fn scaled(&self, found: ModelCamera, size: Size, which: &str) -> Loaded<Camera> {
+    fn scaled(&self, found: ListedCamera, size: Size, which: &str) -> Loaded<Camera> {
         match factors(found.size, size) {
             Some(factors) if found.size != size => {
                 found.camera.resized(factors).map_err(|source| self.bad_camera(which, source))
@@ -225,7 +224,7 @@ impl Loader<'_> {
 /// A virtual camera that a table asks for.
 enum Wanted {
     Given(Camera),
-    Listed(ModelCamera),
+    Listed(ListedCamera),
 }
 
 /// What to say of cameras that were resized, each change once.

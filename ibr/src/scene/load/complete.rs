@@ -1,9 +1,10 @@
 //! Scenes whose views are listed in files of other programs.
 
-use super::Loaded;
+use super::{Loaded, incomplete};
+use crate::camera::Frame;
 use crate::camera::middlebury::read_calibration;
 use crate::camera::transforms::read_transforms;
-use crate::scene::{SceneError, SceneSpec, ViewSpec};
+use crate::scene::{SceneSpec, ViewSpec};
 use std::path::Path;
 
 /// Stored numbers per unit of depth of a depth map with whole numbers, unless the scene says another one:
@@ -29,15 +30,13 @@ pub fn complete(spec: &SceneSpec, path: &Path) -> Loaded<SceneSpec> {
         for view in &mut whole.view {
             let offset = *view.disparity_offset.get_or_insert(calibration.offset);
             if offset != calibration.offset {
-                return Err(SceneError::Incomplete {
-                    path: path.into(),
-                    reason: format!(
-                        "view {:?} has disparity_offset = {offset}, but {} says {}; remove one of them",
-                        view.label(),
-                        file.display(),
-                        calibration.offset
-                    ),
-                });
+                let reason = format!(
+                    "view {:?} has disparity_offset = {offset}, but {} says {}; remove one of them",
+                    view.label(),
+                    file.display(),
+                    calibration.offset
+                );
+                return Err(incomplete(path, reason));
             }
         }
     }
@@ -52,7 +51,7 @@ pub fn complete(spec: &SceneSpec, path: &Path) -> Loaded<SceneSpec> {
 fn transforms_views(file: &Path, folder: &Path, scale: Option<f64>) -> Loaded<Vec<ViewSpec>> {
     let all = read_transforms(&folder.join(file))?;
     let beside = file.parent().unwrap_or(Path::new(""));
-    let view = |frame: &crate::camera::transforms::Frame| {
+    let view = |frame: &Frame| {
         let depth = frame.depth.as_ref()?;
         let whole_numbers = depth.extension().is_some_and(|ending| ending == "png");
         Some(ViewSpec {

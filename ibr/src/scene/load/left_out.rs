@@ -39,11 +39,8 @@ impl Loader<'_> {
     }
 
     pub(super) fn no_such_view(&self, name: &str) -> SceneError {
-        SceneError::NoSuchView {
-            path: self.path.into(),
-            name: name.into(),
-            known: self.spec.view.iter().map(ViewSpec::label).collect::<Vec<_>>().join(", "),
-        }
+        let known = self.spec.view.iter().map(ViewSpec::label).collect::<Vec<_>>().join(", ");
+        self.incomplete(format!("there is no view {name:?}; the views are {known}"))
     }
 }
 

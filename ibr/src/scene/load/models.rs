@@ -1,62 +1,53 @@
 //! Cameras from files of other programs, each file read once.
 
 use super::{Loaded, Loader};
-use crate::camera::colmap::{Model, ModelCamera, read_model};
+use crate::camera::colmap::read_model;
 use crate::camera::names::{self, NameError};
 use crate::camera::resize::Size;
-use crate::camera::transforms::{Transforms, read_transforms};
+use crate::camera::transforms::read_transforms;
+use crate::camera::{CameraList, ListedCamera};
+use crate::files::InputError;
 use crate::scene::ViewSpec;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Where the camera of a view is written.
-pub(super) enum Source {
-    /// The folder of a COLMAP model.
-    Colmap(PathBuf),
-    /// A transforms file.
-    Transforms(PathBuf),
-}
-
-#[derive(Clone)]
-enum Read {
-    Colmap(Arc<Model>),
-    Transforms(Arc<Transforms>),
+/// Where the camera of a view is written: the folder of a COLMAP model or a transforms file.
+pub(super) struct Source {
+    pub(super) path: PathBuf,
+    read: fn(&Path) -> Result<CameraList, InputError>,
 }
 
 /// The files that have been read.
 #[derive(Default)]
 pub(super) struct Models {
-    read: Mutex<BTreeMap<PathBuf, Read>>,
+    read: Mutex<BTreeMap<PathBuf, Arc<CameraList>>>,
 }
 
 impl Models {
-    fn get(&self, source: &Source) -> Loaded<Read> {
-        let (Source::Colmap(path) | Source::Transforms(path)) = source;
+    fn get(&self, source: &Source) -> Loaded<Arc<CameraList>> {
         let mut read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(found) = read.get(path) {
+        if let Some(found) = read.get(&source.path) {
             return Ok(found.clone());
         }
-        let loaded = match source {
-            Source::Colmap(folder) => Read::Colmap(Arc::new(read_model(folder)?)),
-            Source::Transforms(file) => Read::Transforms(Arc::new(read_transforms(file)?)),
-        };
-        read.insert(path.clone(), loaded.clone());
-        Ok(loaded)
+        let list = Arc::new((source.read)(&source.path)?);
+        read.insert(source.path.clone(), list.clone());
+        Ok(list)
     }
 }
 
 impl Loader<'_> {
     /// Where the camera of a view without a matrix is written.
     pub(super) fn source_of(&self, view: &ViewSpec) -> Option<Source> {
-        let own = view.colmap.as_ref().map(|folder| Source::Colmap(self.file(folder)));
+        let own = view.colmap.as_ref().map(|folder| Source { path: self.file(folder), read: read_model });
         own.or_else(|| self.common_source())
     }
 
     /// The file of cameras that the scene names at the top.
     pub(super) fn common_source(&self) -> Option<Source> {
-        let colmap = self.spec.colmap.as_ref().map(|folder| Source::Colmap(self.file(folder)));
-        colmap.or_else(|| self.spec.transforms.as_ref().map(|file| Source::Transforms(self.file(file))))
+        let source = |path: &PathBuf, read| Source { path: self.file(path), read };
+        let colmap = self.spec.colmap.as_ref().map(|folder| source(folder, read_model));
+        colmap.or_else(|| self.spec.transforms.as_ref().map(|file| source(file, read_transforms)))
     }
 
     /// The camera of an image, as the file lists it. `fallback` is the size of the image if the file does
@@ -67,47 +58,26 @@ impl Loader<'_> {
         image: &str,
         fallback: Size,
         which: &str,
-    ) -> Loaded<ModelCamera> {
-        let (Source::Colmap(file) | Source::Transforms(file)) = source;
-        let refused = |e: NameError| self.incomplete(format!("{which}: {}: {e}", file.display()));
-        match self.models.get(source)? {
-            Read::Colmap(model) => {
-                let names = names_of(&model);
-                let found = names::find(&names, image).map_err(refused)?;
-                Ok(model[names[found.index]])
-            }
-            Read::Transforms(all) => {
-                let (frame, _) = all.find(image).map_err(refused)?;
-                Ok(all.camera(frame, fallback)?)
-            }
-        }
+    ) -> Loaded<ListedCamera> {
+        let refused = |e: NameError| self.incomplete(format!("{which}: {}: {e}", source.path.display()));
+        let list = self.models.get(source)?;
+        let (frame, _) = list.find(image).map_err(refused)?;
+        Ok(list.camera(frame, fallback)?)
     }
 
     /// The name of an image in a file of cameras, and whether its folders agree with it.
     fn listed_name(&self, source: &Source, image: &str) -> Loaded<Option<(String, bool)>> {
-        Ok(match self.models.get(source)? {
-            Read::Colmap(model) => {
-                let names = names_of(&model);
-                names::find(&names, image).ok().map(|found| (names[found.index].to_string(), found.whole))
-            }
-            Read::Transforms(all) => {
-                let frame = all.find(image).ok();
-                frame.map(|(frame, found)| (frame.image.display().to_string(), found.whole))
-            }
-        })
+        let list = self.models.get(source)?;
+        let found = list.find(image).ok();
+        Ok(found.map(|(frame, found)| (frame.image.display().to_string(), found.whole)))
     }
 
     /// Some of the images that a file lists, for messages.
     pub(super) fn some_names(&self, source: &Source) -> Loaded<String> {
-        let (Source::Colmap(file) | Source::Transforms(file)) = source;
-        let listed = match self.models.get(source)? {
-            Read::Colmap(model) => names::list(&names_of(&model), ", "),
-            Read::Transforms(all) => {
-                let images: Vec<_> = all.frames.iter().map(|frame| frame.image.to_string_lossy()).collect();
-                names::list(&images.iter().map(AsRef::as_ref).collect::<Vec<_>>(), ", ")
-            }
-        };
-        Ok(format!("{} lists {listed}", file.display()))
+        let list = self.models.get(source)?;
+        let images: Vec<_> = list.frames.iter().map(|frame| frame.image.to_string_lossy()).collect();
+        let listed = names::list(&images.iter().map(AsRef::as_ref).collect::<Vec<_>>(), ", ");
+        Ok(format!("{} lists {listed}", source.path.display()))
     }
 
     /// Whether the scene's file of cameras lists an image.
@@ -125,7 +95,7 @@ impl Loader<'_> {
             let Some((name, whole)) = self.listed_name(&source, &view.image.to_string_lossy())? else {
                 continue;
             };
-            let (Source::Colmap(file) | Source::Transforms(file)) = source;
+            let file = source.path;
             if let Some((other, sure)) = seen.insert((file.clone(), name.clone()), (view, whole))
                 && other.image != view.image
                 && !(sure && whole)
@@ -140,8 +110,4 @@ impl Loader<'_> {
         }
         Ok(())
     }
-}
-
-fn names_of(model: &Model) -> Vec<&str> {
-    model.keys().map(String::as_str).collect()
 }

@@ -170,4 +170,4 @@ fn mean_sign(votes: &[Vote]) -> Option<(f64, f64)> {
 }
 
 #[cfg(test)]
-mod trials;
+mod tests;

@@ -5,7 +5,7 @@ use super::*;
 use crate::camera::Camera;
 use crate::linear;
 use crate::synthetic::SyntheticScene;
-use crate::uncalibrated::chirality;
+use crate::uncalibrated::chirality::{self, Handedness};
 use crate::uncalibrated::random::Dice;
 use nalgebra::{Matrix3, Matrix3x4, Rotation3, Vector3};
 

@@ -1,0 +1,112 @@
+//! Images with their cameras, as files of other programs list them.
+
+use super::names::{self, Found, NameError};
+use super::{Camera, Lens};
+use crate::files::{InputError, Location};
+use nalgebra::{Matrix3, Matrix3x4};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// The images of a COLMAP model or of a transforms file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraList {
+    pub(super) path: PathBuf,
+    /// The images in their order.
+    pub frames: Vec<Frame>,
+}
+
+/// An image, its pose and the inner parameters of its camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// Its path.
+    pub image: PathBuf,
+    /// Its depth map, if the list has one.
+    pub depth: Option<PathBuf>,
+    /// Its number in the list, from 1.
+    pub(super) number: usize,
+    /// World to camera, with x to the right, y down and z forwards.
+    pub(super) pose: Matrix3x4<f64>,
+    pub(super) inner: Inner,
+}
+
+/// The inner parameters of a camera in pixels, with pixel centres at half-integers. A transforms file gives
+/// them once for all frames, or in each frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+pub(super) struct Inner {
+    pub(super) camera_angle_x: Option<f64>,
+    pub(super) camera_angle_y: Option<f64>,
+    pub(super) fl_x: Option<f64>,
+    pub(super) fl_y: Option<f64>,
+    pub(super) cx: Option<f64>,
+    pub(super) cy: Option<f64>,
+    pub(super) w: Option<f64>,
+    pub(super) h: Option<f64>,
+    pub(super) k1: Option<f64>,
+    pub(super) k2: Option<f64>,
+    pub(super) k3: Option<f64>,
+    pub(super) k4: Option<f64>,
+    pub(super) p1: Option<f64>,
+    pub(super) p2: Option<f64>,
+    pub(super) is_fisheye: Option<bool>,
+}
+
+/// A camera of a list with the size of its image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ListedCamera {
+    /// The metric camera, in pixels with centres at integers.
+    pub camera: Camera,
+    /// Width and height of the image in pixels.
+    pub size: (usize, usize),
+}
+
+impl CameraList {
+    /// The file, or the folder of a model.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The frame of an image, by the rule of [`names::find`].
+    ///
+    /// # Errors
+    /// [`NameError`].
+    pub fn find(&self, image: &str) -> Result<(&Frame, Found), NameError> {
+        let images: Vec<_> = self.frames.iter().map(|frame| frame.image.to_string_lossy()).collect();
+        let images: Vec<&str> = images.iter().map(AsRef::as_ref).collect();
+        let found = names::find(&images, image)?;
+        Ok((&self.frames[found.index], found))
+    }
+
+    /// The camera of a frame. `fallback` is the size of its image if the list does not give it.
+    ///
+    /// # Errors
+    /// [`InputError`], with the image.
+    pub fn camera(&self, frame: &Frame, fallback: (usize, usize)) -> Result<ListedCamera, InputError> {
+        let inner = &frame.inner;
+        let given = inner.w.zip(inner.h).map(|(w, h)| (w as usize, h as usize));
+        let size = given.unwrap_or(fallback);
+        let (w, h) = (size.0 as f64, size.1 as f64);
+        let from_angle = |side: f64, angle: Option<f64>| angle.map(|a| 0.5 * side / (0.5 * a).tan());
+        let fx = inner.fl_x.or_else(|| from_angle(w, inner.camera_angle_x)).unwrap_or(w);
+        let fy = inner.fl_y.or_else(|| from_angle(h, inner.camera_angle_y)).unwrap_or(fx);
+        let (cx, cy) = (inner.cx.unwrap_or(0.5 * w) - 0.5, inner.cy.unwrap_or(0.5 * h) - 0.5);
+        let k = Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);
+        let camera = Camera::metric(k * frame.pose, false).map_err(|source| {
+            let image = frame.image.display().to_string();
+            InputError::content(&self.path, Location::Image(image), source)
+        })?;
+        let bend = |v: Option<f64>| v.unwrap_or(0.0);
+        let radial = [bend(inner.k1), bend(inner.k2)];
+        let tangential = [bend(inner.p1), bend(inner.p2)];
+        let bent = radial.iter().chain(&tangential).any(|b| *b != 0.0);
+        let lens = bent.then(|| Lens::new([fx, fy], [cx, cy], radial, tangential));
+        Ok(ListedCamera { camera: lens.map_or(camera, |lens| camera.with_lens(lens)), size })
+    }
+
+    /// A frame that has no depth.
+    pub fn without_depth(&self, frame: &Frame) -> InputError {
+        let at = Location::Frame(frame.number, frame.image.display().to_string());
+        let reason = "it has no `depth_file_path`, and views are rendered from images with depth; give the scene \
+                      [[view]] tables with `image` and `depth`";
+        InputError::content(&self.path, at, reason)
+    }
+}

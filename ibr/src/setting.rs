@@ -1,0 +1,33 @@
+//! Settings outside their range.
+
+/// A number outside its range.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("{name} is {value}: it must be {rule}")]
+pub struct SettingError {
+    /// Name of the setting.
+    pub name: &'static str,
+    /// Value given.
+    pub value: f64,
+    /// The range in words.
+    pub rule: &'static str,
+}
+
+/// A test of a number, and its range in words.
+pub(crate) struct Rule {
+    holds: fn(f64) -> bool,
+    words: &'static str,
+}
+
+pub(crate) const FINITE: Rule = Rule { holds: f64::is_finite, words: "a finite number" };
+pub(crate) const NOT_NEGATIVE: Rule =
+    Rule { holds: |v| v.is_finite() && v >= 0.0, words: "a finite number >= 0" };
+pub(crate) const POSITIVE: Rule =
+    Rule { holds: |v| v.is_finite() && v > 0.0, words: "a positive finite number" };
+pub(crate) const SHARE: Rule = Rule { holds: |v| (0.0..=1.0).contains(&v), words: "a number from 0 to 1" };
+
+impl Rule {
+    /// Refuses a number outside the range.
+    pub(crate) fn check(&self, name: &'static str, value: f64) -> Result<(), SettingError> {
+        if (self.holds)(value) { Ok(()) } else { Err(SettingError { name, value, rule: self.words }) }
+    }
+}
