@@ -57,12 +57,12 @@ fn full_depth(size: (usize, usize), positions: &[f64]) {
     let views = views(size, positions);
     let rows: Vec<RectifiedView<'_>> = views
         .iter()
-        .map(|v| RectifiedView { image: &v.image, disparity: &v.disparity, position: v.position })
+        .map(|v| RectifiedView { image: &v.image, map: &v.disparity, camera: v.position })
         .collect();
     let settings = RenderSettings { method: Method::Rows, ..RenderSettings::default() };
     time_chosen(&name("rows"), || rectified::render(&rows, 0.5, &settings).expect("the views overlap"));
     let free: Vec<CalibratedView<'_>> =
-        views.iter().map(|v| CalibratedView { image: &v.image, depth: &v.depth, camera: v.camera }).collect();
+        views.iter().map(|v| CalibratedView { image: &v.image, map: &v.depth, camera: v.camera }).collect();
     let target = Camera::metric(rig_camera(0.5, size), false).expect("a rig camera is regular");
     let settings = RenderSettings::default();
     time_chosen(&name("plane"), || {

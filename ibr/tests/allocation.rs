@@ -20,8 +20,8 @@ fn rows_allocate_nothing() {
     let sources = [0.0, 1.0].map(record);
     let views = sources.each_ref().map(|(image, disparity, position)| RectifiedView {
         image,
-        disparity,
-        position: *position,
+        map: disparity,
+        camera: *position,
     });
     let (settings, camera) = (Settings::default(), RigCamera::new(&views, 0.5));
     let frame = Frame::whole(SIZE.0, SIZE.1, RowWork::<4, 3>::MARGIN, 0.0);

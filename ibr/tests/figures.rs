@@ -45,7 +45,7 @@ fn pair(folder: &str) -> Option<Pair> {
 }
 
 fn views(pair: &Pair) -> [RectifiedView<'_>; 2] {
-    [0, 1].map(|i| RectifiedView { image: &pair.images[i], disparity: &pair.maps[i], position: i as f64 })
+    [0, 1].map(|i| RectifiedView { image: &pair.images[i], map: &pair.maps[i], camera: i as f64 })
 }
 
 fn psnr(pair: &Pair, settings: &RenderSettings) -> f64 {
@@ -123,7 +123,7 @@ fn samples_with_errors_of_depth_count_less() {
         for (seed, (map, error)) in (11..).zip(pair.maps.iter_mut().zip(errors)) {
             *map = erroneous(map, error, seed);
         }
-        let found = Agreement::rectified(&views(&pair)).depth_errors;
+        let found = Agreement::of(&views(&pair)).depth_errors;
         println!("errors {errors:?}, found {found:.2?}");
         assert!(found.iter().zip(errors).all(|(found, error)| (found - error).abs() <= 0.15), "{found:?}");
         assert!(psnr(&pair, &RenderSettings::default()) >= least);
@@ -154,12 +154,9 @@ fn wrong_inputs_show() {
         };
         let share = |positions: [f64; 2], factor: f32| {
             let maps = maps(factor);
-            let view = |i: usize| RectifiedView {
-                image: &pair.images[i],
-                disparity: &maps[i],
-                position: positions[i],
-            };
-            Agreement::rectified(&[view(0), view(1)]).worst().unwrap().share
+            let view =
+                |i: usize| RectifiedView { image: &pair.images[i], map: &maps[i], camera: positions[i] };
+            Agreement::of(&[view(0), view(1)]).worst().unwrap().share
         };
         let shares = [share([0.0, 1.0], 1.0), share([1.0, 0.0], 1.0), share([0.0, 1.0], 4.0)];
         println!("{folder}: right, swapped, unscaled {shares:.2?}");

@@ -129,10 +129,9 @@ fn rounded(views: &[RectifiedView<'_>], position: f64) -> Image {
         let mut best: Vec<Option<(f64, Vec<f32>)>> = vec![None; width];
         for view in views {
             let mut own: Vec<Option<(f64, Vec<f32>)>> = vec![None; width];
-            for (x, d) in
-                view.disparity.row(y).iter().map(|d| f64::from(*d)).enumerate().filter(|p| !p.1.is_nan())
+            for (x, d) in view.map.row(y).iter().map(|d| f64::from(*d)).enumerate().filter(|p| !p.1.is_nan())
             {
-                let column = (x as f64 + (view.position - position) * d + 0.5).floor();
+                let column = (x as f64 + (view.camera - position) * d + 0.5).floor();
                 let inside = column >= 0.0 && column < width as f64;
                 if inside && own[column as usize].as_ref().is_none_or(|o| d > o.0) {
                     own[column as usize] =
@@ -177,7 +176,7 @@ fn every_kind_of_scene_is_held_against_rounding() {
     let mut behind = Vec::new();
     for (name, layers, margins) in scenes() {
         let ends = [record(&layers, 0.0), record(&layers, 1.0)];
-        let view = |i: usize| RectifiedView { image: &ends[i].0, disparity: &ends[i].1, position: i as f64 };
+        let view = |i: usize| RectifiedView { image: &ends[i].0, map: &ends[i].1, camera: i as f64 };
         let views = [view(0), view(1)];
         for (position, margin) in [0.5, 0.3].into_iter().zip(margins) {
             let (truth, _) = record(&layers, position);
@@ -216,7 +215,7 @@ fn gain_of_smoothing(layers: &[Layer], noise: [f64; 2]) -> f64 {
     let ends = [record(layers, 0.0), record(layers, 1.0)];
     let (truth, _) = record(layers, 0.5);
     let images = [noisy(&ends[0].0, noise[0], 1), noisy(&ends[1].0, noise[1], 2)];
-    let view = |i: usize| RectifiedView { image: &images[i], disparity: &ends[i].1, position: i as f64 };
+    let view = |i: usize| RectifiedView { image: &images[i], map: &ends[i].1, camera: i as f64 };
     let quality = |settings: &RenderSettings| {
         psnr(&rectified::render(&[view(0), view(1)], 0.5, settings).unwrap().image, &truth, None)
     };
@@ -232,8 +231,7 @@ fn every_kind_of_scene_profits_from_segments_where_depth_is_coarse() {
         let render = |method: Densify| {
             let dense = |i: usize| densify(&ends[i].1.decimated(6).unwrap(), 6, &ends[i].0, method).unwrap();
             let maps = [dense(0), dense(1)];
-            let view =
-                |i: usize| RectifiedView { image: &ends[i].0, disparity: &maps[i], position: i as f64 };
+            let view = |i: usize| RectifiedView { image: &ends[i].0, map: &maps[i], camera: i as f64 };
             let done = rectified::render(&[view(0), view(1)], 0.5, &RenderSettings::default()).unwrap();
             psnr(&done.image, &truth, None)
         };
@@ -257,7 +255,7 @@ fn teddy_from_one_view() {
     };
     let ends = [load("im2.png", "disp2.png"), load("im6.png", "disp6.png")];
     for (from, to) in [(0, 1), (1, 0)] {
-        let view = RectifiedView { image: &ends[from].0, disparity: &ends[from].1, position: from as f64 };
+        let view = RectifiedView { image: &ends[from].0, map: &ends[from].1, camera: from as f64 };
         let truth = &ends[to].0;
         let done = rectified::render(&[view], to as f64, &RenderSettings::default()).unwrap();
         let seen: Vec<bool> = done.mask.iter().map(|c| *c == Cover::Seen).collect();

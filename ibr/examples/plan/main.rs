@@ -9,7 +9,7 @@
 #[allow(dead_code, unreachable_pub, unused_imports)]
 mod planner;
 
-use hybank_ibr::analysis;
+use hybank_ibr::analysis::Predictor;
 use hybank_ibr::camera::{Camera, CameraError};
 use hybank_ibr::depth::DepthMap;
 use hybank_ibr::image::Image;
@@ -27,16 +27,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let view = |k: usize| {
         let (position, (image, disparity)) = &shots[k];
-        RectifiedView { image, disparity, position: *position }
+        RectifiedView { image, map: disparity, camera: *position }
     };
     let (views, settings) = ([view(0), view(4)], RenderSettings::default());
-    let now = analysis::rectified(&views, 0.5, &settings)?;
+    let now = Predictor::new(&views, &settings)?.at(&0.5, (), None)?;
     println!("estimate with exact depth: {:.2} grey levels", now.totals().estimate);
     for deviation in [0.5, 1.0, 2.0] {
         let price = price_of_depth_errors(&views, 0.5, &settings, &now, deviation)?;
         println!("with errors of {deviation} px: {price:.2}");
     }
-    let widest = views[0].disparity.data().iter().copied().fold(0.0, f32::max);
+    let widest = views[0].map.data().iter().copied().fold(0.0, f32::max);
     let costs = RoundingCosts::new(&views, 0.5, &settings, (255.0, f64::from(widest)), 8)?;
     let best = costs.best(10.0, 1);
     println!("of 10 bits per pixel {:.1} to the intensity, {:.1} to the depth", best.texture, best.depth);

@@ -2,7 +2,7 @@
 
 use crate::page::Verdict;
 use crate::{Effort, Figure, Outcome, chart};
-use hybank_ibr::analysis;
+use hybank_ibr::analysis::Predictor;
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, read_image, read_map};
@@ -25,9 +25,8 @@ pub(crate) fn rows(effort: Effort) -> Outcome<Figure> {
         Some(folder) => photographs(folder)?,
         None => synthetic()?,
     };
-    let view =
-        |i: usize| RectifiedView { image: &pair.images[i], disparity: &pair.maps[i], position: i as f64 };
-    let predicted = analysis::rectified(&[view(0), view(1)], 0.5, &RenderSettings::default())?;
+    let view = |i: usize| RectifiedView { image: &pair.images[i], map: &pair.maps[i], camera: i as f64 };
+    let predicted = Predictor::new(&[view(0), view(1)], &RenderSettings::default())?.at(&0.5, (), None)?;
     let rendered = predicted.rendering.image.quantised();
     let stride = rendered.width() * rendered.channels();
     let pairs = rendered.data().chunks(stride).zip(pair.truth.data().chunks(stride));

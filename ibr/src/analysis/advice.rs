@@ -1,13 +1,12 @@
 //! What to spend on next: by how much the estimate of a view falls if one thing gets better.
 
+use super::predictor::{Predicted, Predictor};
 use super::random::{bounded_normal, seeded};
-use crate::analysis::{CameraPredictor, Cause, RigPredictor, ViewError};
-use crate::camera::Camera;
+use crate::analysis::{Cause, ViewError};
 use crate::depth::{DepthMap, fill_unknown};
 use crate::image::Image;
 use crate::pipeline::{RenderError, Rendering};
-use crate::propagate::{CalibratedView, RectifiedView};
-use nalgebra::{Matrix3x4, Vector3};
+use crate::propagate::View;
 
 /// Values beyond this number are not taken for rounded ones.
 const MOST_LEVELS: usize = 4096;
@@ -40,57 +39,32 @@ impl Advice {
         Self { cause, halved: now.causes[cause as usize] / 2.0, depth_bit: None, view: None }
     }
 
-    /// For the view from `position` of a rectified rig, whose prediction is `now`.
+    /// For the view of `camera`, whose prediction is `now`.
     ///
     /// The further view stands half-way between the virtual camera and its neighbour, or on the side without
-    /// one as far away as the nearest view. Its photograph and depth are rendered from the others, with the
-    /// noise of the photographs. Where no view sees, its depth is that of the background. The weights of
-    /// the causes stay as they are.
+    /// one as far away as the nearest view, and looks like the virtual camera. Its photograph and depth are
+    /// rendered from the others, with the noise of the photographs. Where no view sees, its depth is that of
+    /// the background. The weights of the causes stay as they are.
     ///
     /// # Errors
-    /// Those of [`crate::pipeline::rectified::render`].
-    pub fn on_rig(predictor: &RigPredictor<'_>, position: f64, now: &ViewError) -> Result<Self, RenderError> {
-        let (views, before) = (predictor.views(), now.totals().estimate);
-        let mut advice = Self::new(now);
-        let step = views.iter().map(|v| rounding_step(v.disparity)).fold(0.0, f64::max);
-        if step > 0.0 {
-            let change = predictor.change(position, &now.rendering.image, with_a_bit_less)?;
-            advice.depth_bit = Some(gain_of_a_bit(&now.estimate, &change));
-        }
-        let positions: Vec<f64> = views.iter().map(|v| v.position).collect();
-        for place in places_on_line(&positions, position, predictor.spacing(position)) {
-            let (image, disparity) = imagined(predictor.render(place)?);
-            let another = RectifiedView { image: &image, disparity: &disparity, position: place };
-            advice.consider(vec![place], before - predictor.with_view(position, &another)?);
-        }
-        Ok(advice)
-    }
-
-    /// The same for the view of a general camera of `size` pixels. The further view stands half-way between
-    /// the virtual camera and its nearest view, or as far away on the other side, and looks like the virtual
-    /// camera.
-    ///
-    /// # Errors
-    /// Those of [`crate::pipeline::calibrated::render`].
-    pub fn on_cameras(
-        predictor: &CameraPredictor<'_>,
-        camera: &Camera,
-        size: (usize, usize),
+    /// Those of [`crate::pipeline`].
+    pub fn on<P: Predicted>(
+        predictor: &Predictor<'_, P>,
+        camera: &P,
+        size: P::Size,
         now: &ViewError,
     ) -> Result<Self, RenderError> {
         let (views, before) = (predictor.views(), now.totals().estimate);
         let mut advice = Self::new(now);
-        let step = views.iter().map(|v| rounding_step(v.depth)).fold(0.0, f64::max);
+        let step = views.iter().map(|v| rounding_step(v.map)).fold(0.0, f64::max);
         if step > 0.0 {
             let change = predictor.change(camera, &now.rendering.image, with_a_bit_less)?;
             advice.depth_bit = Some(gain_of_a_bit(&now.estimate, &change));
         }
-        for place in places_around(&views, camera) {
-            let Some(moved) = at(camera, place) else { continue };
-            let (image, depth) = imagined(predictor.render(&moved, size)?);
-            let another = CalibratedView { image: &image, depth: &depth, camera: moved };
-            let falls = before - predictor.with_view(camera, size, &another)?;
-            advice.consider(place.as_slice().to_vec(), falls);
+        for (coordinates, further) in camera.further(&views) {
+            let (image, map) = imagined(predictor.render(&further, size)?);
+            let another = View { image: &image, map: &map, camera: further };
+            advice.consider(coordinates, before - predictor.with_view(camera, size, &another)?);
         }
         Ok(advice)
     }
@@ -100,33 +74,6 @@ impl Advice {
             self.view = Some(AnotherView { place, falls });
         }
     }
-}
-
-/// The places on each side of `position` at which a further view is tried.
-fn places_on_line(positions: &[f64], position: f64, spacing: f64) -> Vec<f64> {
-    let nearest = |side: f64| {
-        let away = positions.iter().map(|p| side * (p - position)).filter(|away| *away > 0.0);
-        Some(away.fold(f64::INFINITY, f64::min)).filter(|away| away.is_finite())
-    };
-    let (below, above) = (nearest(-1.0), nearest(1.0));
-    let place = |own: Option<f64>, other: Option<f64>| own.map(|d| d / 2.0).or(other).unwrap_or(spacing);
-    vec![position - place(below, above), position + place(above, below)]
-}
-
-fn places_around(views: &[CalibratedView<'_>], camera: &Camera) -> Vec<Vector3<f64>> {
-    let centre = camera.centre();
-    let away = views.iter().map(|v| v.camera.centre() - centre).filter(|d| d.norm() > 0.0);
-    let nearest = away.min_by(|a, b| a.norm().total_cmp(&b.norm()));
-    nearest.map_or(Vec::new(), |d| vec![centre + d / 2.0, centre - d])
-}
-
-/// The camera at another place, without its lens.
-fn at(camera: &Camera, centre: Vector3<f64>) -> Option<Camera> {
-    let m = camera.m();
-    let mut matrix = Matrix3x4::zeros();
-    matrix.fixed_columns_mut::<3>(0).copy_from(&m);
-    matrix.set_column(3, &(-m * centre));
-    Camera::metric(matrix, camera.determinant() < 0.0).ok()
 }
 
 /// Photograph and depth of a place where no camera stands, from a rendering.
@@ -191,13 +138,6 @@ fn gain_of_a_bit(estimate: &[f32], change: &[f32]) -> f64 {
 mod tests {
     use super::*;
     use crate::depth::Measure;
-
-    #[test]
-    fn places_lie_between_neighbours_or_opposite_of_them() {
-        assert_eq!(places_on_line(&[0.0, 1.0, 4.0], 0.5, 2.0), [0.25, 0.75]);
-        assert_eq!(places_on_line(&[0.0, 1.0], 3.0, 1.0), [2.0, 5.0]);
-        assert_eq!(places_on_line(&[2.0], 2.0, 1.0), [1.0, 3.0]);
-    }
 
     #[test]
     fn steps_of_rounded_maps_are_found() {

@@ -176,7 +176,7 @@ pub(super) fn calibrate<View: Copy>(
 }
 
 /// What is found of a rendering before its causes are weighed.
-pub(super) struct Examined {
+pub struct Examined {
     pub(super) rendering: Rendering,
     pub(super) regressors: Vec<Regressors>,
     pub(super) sure_bound: Vec<f32>,

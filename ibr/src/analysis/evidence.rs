@@ -26,7 +26,7 @@ pub struct Evidence {
     /// sum over the views of (sum of the h_s of the view)^2: 1 for one view, 1/2 for two equal ones.
     pub views: f32,
     /// sum over the views of (sum of the h_s of the view)^2 (distance to the view)^2.
-    pub lever: f32,
+    pub disparity_gain: f32,
     /// Change of the pixel when the fit is fitted once more: its bias.
     pub bias: f32,
     /// Difference between what the two most influential views say, NaN where only one says anything.
@@ -67,7 +67,7 @@ pub fn survey(
     limits: Option<&Limits>,
 ) -> Result<Survey, RenderError> {
     let rendering = rectified::render(views, position, settings)?;
-    let balance = Balance::rectified(views, position).with_noise(&rendering.agreement);
+    let balance = Balance::of(views, &position).with_noise(&rendering.agreement);
     let settings = &settings.suited_to(&rendering.agreement, &balance);
     let colour = rendering.image.channels() == 3;
     let job = Job {
@@ -99,7 +99,7 @@ struct Job<'a> {
 
 impl Job<'_> {
     fn distance(&self, view: u16) -> f64 {
-        (self.views[usize::from(view)].position - self.camera.position).abs()
+        (self.views[usize::from(view)].camera - self.camera.position).abs()
     }
 }
 
@@ -260,9 +260,9 @@ impl<const ORDER: usize, const C: usize> RowSurvey<ORDER, C> {
             }
         }
         for (share, view) in self.of_views.iter().zip(job.views) {
-            let (g2, distance) = (share.influence.powi(2), (view.position - job.camera.position).abs());
+            let (g2, distance) = (share.influence.powi(2), (view.camera - job.camera.position).abs());
             e.views += g2 as f32;
-            e.lever += (g2 * distance * distance) as f32;
+            e.disparity_gain += (g2 * distance * distance) as f32;
             if share.influence > 0.02 {
                 e.distance = e.distance.max(distance as f32);
             }
@@ -343,8 +343,7 @@ mod tests {
     fn surveyed(positions: &[f64], at: f64, paint: impl Fn(usize) -> f32) -> Survey {
         let image = Image::new(60, 8, 1, (0..480).map(|i| paint(i % 60)).collect()).unwrap();
         let disparity = DepthMap::new((60, 8), vec![4.0; 480], 1.0, Measure::Disparity).unwrap();
-        let view =
-            |position: &f64| RectifiedView { image: &image, disparity: &disparity, position: *position };
+        let view = |position: &f64| RectifiedView { image: &image, map: &disparity, camera: *position };
         let views: Vec<RectifiedView<'_>> = positions.iter().map(view).collect();
         survey(&views, at, &RenderSettings::default(), None).unwrap()
     }
@@ -358,9 +357,12 @@ mod tests {
     fn influences_are_shares() {
         let two = surveyed(&[0.0, 1.0], 0.5, |_| 90.0);
         let one = surveyed(&[0.0], 0.5, |_| 90.0);
-        for (s, views, lever) in [(&two, 0.5, 0.125), (&one, 1.0, 0.25)] {
+        for (s, views, disparity_gain) in [(&two, 0.5, 0.125), (&one, 1.0, 0.25)] {
             let e = s.evidence[4 * 60 + 30];
-            assert!(near(e.held, 1.0) && near(e.views, views) && near(e.lever, lever), "{e:?}");
+            assert!(
+                near(e.held, 1.0) && near(e.views, views) && near(e.disparity_gain, disparity_gain),
+                "{e:?}"
+            );
             assert!(near(e.bias, 0.0) && near(e.residual, 0.0) && near(e.shift, 0.0), "{e:?}");
             assert!(e.reach >= e.held && e.spread > 0.1 && near(e.distance, 0.5), "{e:?}");
         }

@@ -1,219 +1,99 @@
 //! The error of a view of general cameras, from its rendering by the plane fit: the same causes as for
 //! rectified rigs, their sizes taken from the rendered view, its depths and its sample counts.
 
-use super::estimate::{Calibration, Examined, Known, ViewError, calibrate, equalised, judge};
-use super::jitter::{difference, local_mean};
+use super::estimate::Examined;
+use super::jitter::depth_jitter;
 use super::lookup::local_limits;
-use super::random::{bounded_normal, seeded};
-use super::regressors::{Regressors, hole_distances, slopes};
-use super::variogram::Variogram;
+use super::predictor::{Predicted, Study};
+use super::regressors::{hole_distances, slopes};
 use crate::camera::Camera;
 use crate::depth::DepthMap;
 use crate::image::Image;
-use crate::pipeline::depth_errors::Lookups;
-use crate::pipeline::{Agreement, Balance, RenderError, RenderSettings, Rendering, calibrated as pipeline};
-use crate::propagate::CalibratedView;
-
-/// Errors of depth below this share change nothing that can be seen.
-const LEAST: f64 = 1e-4;
+use crate::pipeline::{Balance, RenderError, RenderSettings, Rendering, calibrated as pipeline};
+use crate::propagate::{CalibratedView, Viewpoint};
+use nalgebra::{Matrix3x4, Vector3};
 
 /// Largest share of its depth by which a noisy depth is wrong, in standard deviations.
 const TAIL: f64 = 3.0;
 
-/// The error of the view of `camera` with `size` pixels. [`CameraPredictor`] predicts several views.
-///
-/// # Errors
-/// Those of [`crate::pipeline::calibrated::render`].
-pub fn calibrated(
-    views: &[CalibratedView<'_>],
-    camera: &Camera,
-    size: (usize, usize),
-    settings: &RenderSettings,
-) -> Result<ViewError, RenderError> {
-    CameraPredictor::new(views, settings)?.at(camera, size)
-}
+impl Predicted for Camera {
+    type Size = (usize, usize);
 
-/// Views of general cameras with the weights that are calibrated on them, for any number of predictions.
-pub struct CameraPredictor<'a> {
-    /// Photographs with one exposure.
-    images: Vec<Image>,
-    maps: Vec<(&'a DepthMap, Camera)>,
-    settings: RenderSettings,
-    known: Known,
-    calibration: Calibration,
-    agreement: Agreement,
-}
-
-impl<'a> CameraPredictor<'a> {
-    /// Leaves each view out in turn and calibrates.
-    ///
-    /// # Errors
-    /// Those of [`crate::pipeline::calibrated::render`].
-    pub fn new(views: &[CalibratedView<'a>], settings: &RenderSettings) -> Result<Self, RenderError> {
-        let agreement = Agreement::calibrated(views);
-        let gains = if settings.keep_exposure { &[][..] } else { &agreement.gains };
-        let images = equalised(views.iter().map(|v| v.image), gains);
-        let maps: Vec<_> = views.iter().map(|v| (v.depth, v.camera)).collect();
-        let views = joined(&images, &maps);
-        let settings = RenderSettings { keep_exposure: true, ..*settings };
-        let known = Known { variogram: Variogram::of(images.iter()), noise: depth_noise(&views) };
-        let calibration: Calibration = calibrate(&views, &known, |others, truth| {
-            // A registration offset belongs to the virtual view only.
-            let settings = RenderSettings { offset: 0.0, ..settings };
-            let goal = Goal { camera: &truth.camera, size: truth.image.size() };
-            let (rendering, x) = examine(others, &goal, &settings, &known, spacing(&views, &truth.camera))?;
-            Ok((x, difference(&rendering.image.quantised(), truth.image)))
-        })?;
-        Ok(Self { images, maps, settings, known, calibration, agreement })
+    fn size_of(image: &Image) -> (usize, usize) {
+        image.size()
     }
 
-    /// How well the views agree, as they were given.
-    pub fn agreement(&self) -> &Agreement {
-        &self.agreement
-    }
-
-    /// The views, with one exposure.
-    pub fn views(&self) -> Vec<CalibratedView<'_>> {
-        joined(&self.images, &self.maps)
-    }
-
-    /// The error of the view of `camera`.
-    ///
-    /// # Errors
-    /// Those of [`crate::pipeline::calibrated::render`].
-    pub fn at(&self, camera: &Camera, size: (usize, usize)) -> Result<ViewError, RenderError> {
-        let (views, goal) = (self.views(), Goal { camera, size });
-        let spacing = spacing(&views, camera);
-        let (rendering, regressors) = examine(&views, &goal, &self.settings, &self.known, spacing)?;
-        let local_limit = local_limits(&views, camera, &rendering, TAIL * self.known.noise);
-        Ok(judge(Examined { rendering, regressors, sure_bound: Vec::new(), local_limit }, self.calibration))
-    }
-
-    /// The view of `camera`, as it is rendered from the views.
-    ///
-    /// # Errors
-    /// Those of [`crate::pipeline::calibrated::render`].
-    pub fn render(&self, camera: &Camera, size: (usize, usize)) -> Result<Rendering, RenderError> {
-        pipeline::render(&self.views(), camera, size, &RenderSettings { offset: 0.0, ..self.settings })
-    }
-
-    /// The local mean of the change of a rendered view if its depths were `changed`, in grey levels.
-    ///
-    /// # Errors
-    /// Those of [`crate::pipeline::calibrated::render`].
-    pub fn change(
+    fn render(
         &self,
-        camera: &Camera,
-        rendered: &Image,
-        changed: impl Fn(&DepthMap) -> DepthMap,
-    ) -> Result<Vec<f32>, RenderError> {
-        let maps: Vec<DepthMap> = self.maps.iter().map(|(map, _)| changed(map)).collect();
-        let with = |(v, depth)| CalibratedView { depth, ..v };
-        let views: Vec<CalibratedView<'_>> = self.views().into_iter().zip(&maps).map(with).collect();
-        let image = pipeline::render(&views, camera, rendered.size(), &self.settings)?.image;
-        Ok(local_mean(&difference(&image, rendered), image.size()))
-    }
-
-    /// The mean estimate of the view of `camera` if `another` view were there too, with the weights as they
-    /// are.
-    ///
-    /// # Errors
-    /// Those of [`crate::pipeline::calibrated::render`].
-    pub fn with_view(
-        &self,
-        camera: &Camera,
+        views: &[CalibratedView<'_>],
         size: (usize, usize),
-        another: &CalibratedView<'_>,
-    ) -> Result<f64, RenderError> {
-        let views = [self.views(), vec![*another]].concat();
-        let (goal, spacing) = (Goal { camera, size }, spacing(&self.views(), camera));
-        let (_, regressors) = examine(&views, &goal, &self.settings, &self.known, spacing)?;
-        Ok(self.calibration.mean(&regressors))
+        settings: &RenderSettings,
+    ) -> Result<Rendering, RenderError> {
+        pipeline::render(views, self, size, settings)
+    }
+
+    fn examine(
+        &self,
+        views: &[CalibratedView<'_>],
+        size: (usize, usize),
+        study: &Study<'_>,
+    ) -> Result<Examined, RenderError> {
+        let Study { settings, known, spacing, bounds, .. } = *study;
+        let rendering = self.render(views, size, settings)?;
+        let jitter = depth_jitter(views, self, settings, &rendering.image, known.noise)?;
+        let balance = Balance::of(views, self).with_noise(&rendering.agreement);
+        let (shares, gain) = shares(views, self, &balance);
+        let gain = gain / (spacing * spacing);
+        let image = &rendering.image;
+        let (slopes, bends) = (slopes(image), bends(image));
+        let edges = edges(image, &rendering.depth, settings);
+        let distances = hole_distances(&rendering.mask, size.0);
+        let of_pixel = |p: usize| {
+            if distances[p] > 0 {
+                return [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, known.variogram.at(distances[p])];
+            }
+            // At most as many views share in a pixel as samples lie on it.
+            let shares = f64::max(shares, 1.0 / f64::from(rendering.counts[p].max(1)));
+            let displacement = ((shares + gain) / 2.0).sqrt();
+            let slope = f64::from(slopes[p]) * displacement;
+            let (bend, noise) = (f64::from(bends[p]), (1.0 + shares).sqrt());
+            [bend, noise, slope, f64::from(jitter[p]), f64::from(edges[p]), 0.0, 0.0]
+        };
+        let regressors = (0..size.0 * size.1).map(of_pixel).collect();
+        let limits = || local_limits(views, self, &rendering, TAIL * known.noise);
+        let local_limit = if bounds { limits() } else { Vec::new() };
+        Ok(Examined { rendering, regressors, sure_bound: Vec::new(), local_limit })
+    }
+
+    /// Mean distance between a view and the one nearest to it.
+    fn spacing(&self, views: &[CalibratedView<'_>]) -> f64 {
+        let nearest = |i: usize| {
+            let others = views.iter().enumerate().filter(|(j, _)| *j != i);
+            others.map(|(_, v)| v.camera.distance(&views[i].camera)).fold(f64::INFINITY, f64::min)
+        };
+        let mean = (0..views.len()).map(nearest).sum::<f64>() / views.len() as f64;
+        let away = views.iter().map(|v| v.camera.distance(self)).fold(f64::INFINITY, f64::min);
+        [mean, away].into_iter().find(|s| *s > 0.0 && s.is_finite()).unwrap_or(1.0)
+    }
+
+    /// Half-way to the nearest view, or as far away on the other side; without a lens.
+    fn further(&self, views: &[CalibratedView<'_>]) -> Vec<(Vec<f64>, Camera)> {
+        let centre = self.centre();
+        let away = views.iter().map(|v| v.camera.centre() - centre).filter(|d| d.norm() > 0.0);
+        let nearest = away.min_by(|a, b| a.norm().total_cmp(&b.norm()));
+        let centres = nearest.map_or(Vec::new(), |d| vec![centre + d / 2.0, centre - d]);
+        let camera = |centre: Vector3<f64>| Some((centre.as_slice().to_vec(), moved(self, centre)?));
+        centres.into_iter().filter_map(camera).collect()
     }
 }
 
-fn joined<'a>(images: &'a [Image], maps: &[(&'a DepthMap, Camera)]) -> Vec<CalibratedView<'a>> {
-    let view = |(image, (depth, camera)): (&'a Image, &(&'a DepthMap, Camera))| CalibratedView {
-        image,
-        depth,
-        camera: *camera,
-    };
-    images.iter().zip(maps).map(view).collect()
-}
-
-/// A virtual camera and its size in pixels.
-struct Goal<'a> {
-    camera: &'a Camera,
-    size: (usize, usize),
-}
-
-/// Mean distance between a view and the one nearest to it; for views at one place that of the virtual
-/// camera, or one.
-fn spacing(views: &[CalibratedView<'_>], camera: &Camera) -> f64 {
-    let between = |a: &Camera, b: &Camera| (a.centre() - b.centre()).norm();
-    let nearest = |i: usize| {
-        let others = views.iter().enumerate().filter(|(j, _)| *j != i);
-        others.map(|(_, v)| between(&v.camera, &views[i].camera)).fold(f64::INFINITY, f64::min)
-    };
-    let mean = (0..views.len()).map(nearest).sum::<f64>() / views.len() as f64;
-    let away = views.iter().map(|v| between(&v.camera, camera)).fold(f64::INFINITY, f64::min);
-    [mean, away].into_iter().find(|s| *s > 0.0 && s.is_finite()).unwrap_or(1.0)
-}
-
-/// Standard deviation of independent errors of the depths as a share of the depth, from the maps alone:
-/// points of one map are looked up in that of the nearest other view. 0 for a single view.
-///
-/// The second depth is interpolated between four, which leaves 4/9 of its variance, so the difference has
-/// s^2 (1 + 4/9). The median makes hidden points harmless.
-pub fn depth_noise(views: &[CalibratedView<'_>]) -> f64 {
-    let distance = |i: usize, j: usize| (views[i].camera.centre() - views[j].camera.centre()).norm();
-    let nearest = |j| (0..j).min_by(|a: &usize, b: &usize| distance(*a, j).total_cmp(&distance(*b, j)));
-    let lookups = |j: usize| {
-        let (a, b) = (&views[nearest(j)?], &views[j]);
-        let map = a.camera.relative_to(&b.camera);
-        Some(Lookups::of(a.depth, b.depth, |x, y, d| map.map(x, y, d)))
-    };
-    (1..views.len()).filter_map(lookups).fold(Lookups::default(), Lookups::and).common()
-}
-
-/// A rendering and the regressors of its pixels.
-fn examine(
-    views: &[CalibratedView<'_>],
-    goal: &Goal<'_>,
-    settings: &RenderSettings,
-    known: &Known,
-    spacing: f64,
-) -> Result<(Rendering, Vec<Regressors>), RenderError> {
-    let Goal { camera, size } = *goal;
-    let rendering = pipeline::render(views, camera, size, settings)?;
-    let jitter = jitter(views, camera, settings, &rendering.image, known.noise)?;
-    let balance = Balance::calibrated(views, camera).with_noise(&rendering.agreement);
-    let (shares, lever) = shares(views, camera, &balance);
-    let lever = lever / (spacing * spacing);
-    let image = &rendering.image;
-    let (slopes, bends) = (slopes(image), bends(image));
-    let edges = edges(image, &rendering.depth, settings);
-    let distances = hole_distances(&rendering.mask, size.0);
-    let of_pixel = |p: usize| {
-        if distances[p] > 0 {
-            return [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, known.variogram.at(distances[p])];
-        }
-        // At most as many views share in a pixel as samples lie on it.
-        let shares = f64::max(shares, 1.0 / f64::from(rendering.counts[p].max(1)));
-        let displacement = ((shares + lever) / 2.0).sqrt();
-        let slope = f64::from(slopes[p]) * displacement;
-        [
-            f64::from(bends[p]),
-            (1.0 + shares).sqrt(),
-            slope,
-            f64::from(jitter[p]),
-            f64::from(edges[p]),
-            0.0,
-            0.0,
-        ]
-    };
-    let regressors = (0..size.0 * size.1).map(of_pixel).collect();
-    Ok((rendering, regressors))
+/// The camera with another centre, without its lens.
+fn moved(camera: &Camera, centre: Vector3<f64>) -> Option<Camera> {
+    let m = camera.m();
+    let mut matrix = Matrix3x4::zeros();
+    matrix.fixed_columns_mut::<3>(0).copy_from(&m);
+    matrix.set_column(3, &(-m * centre));
+    Camera::metric(matrix, camera.determinant() < 0.0).ok()
 }
 
 /// Sum of the squared shares of the views in a pixel that all of them see, and the same times their squared
@@ -224,27 +104,6 @@ fn shares(views: &[CalibratedView<'_>], camera: &Camera, balance: &Balance) -> (
     let square = |i: usize| (weight(i) / total).powi(2);
     let away = |i: usize| (views[i].camera.centre() - camera.centre()).norm_squared();
     ((0..views.len()).map(square).sum(), (0..views.len()).map(|i| square(i) * away(i)).sum())
-}
-
-/// Local mean of the change of a view under errors of the depths of this relative standard deviation.
-fn jitter(
-    views: &[CalibratedView<'_>],
-    camera: &Camera,
-    settings: &RenderSettings,
-    view: &Image,
-    deviation: f64,
-) -> Result<Vec<f32>, RenderError> {
-    let size = view.size();
-    if deviation < LEAST {
-        return Ok(vec![0.0; size.0 * size.1]);
-    }
-    let random = &mut seeded(1);
-    let mut error = || bounded_normal(random) * deviation;
-    let maps: Vec<DepthMap> = views.iter().map(|v| v.depth.changed(|d| d * (1.0 + error()) as f32)).collect();
-    let noisy: Vec<CalibratedView<'_>> =
-        views.iter().zip(&maps).map(|(v, depth)| CalibratedView { depth, ..*v }).collect();
-    let changed = pipeline::render(&noisy, camera, size, settings)?.image;
-    Ok(local_mean(&difference(&changed, view), size))
 }
 
 /// (|f_xx| + |f_yy|) / 8, mean over the channels: the error of linear interpolation between samples a pixel

@@ -1,60 +1,70 @@
 //! What errors of depth change in a view: it is rendered once more from depths with such errors.
 
+use super::predictor::Predicted;
 use super::random::{bounded_normal, seeded};
-use crate::depth::DepthMap;
+use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::pipeline::depth_errors::Lookups;
-use crate::pipeline::{RenderError, RenderSettings, rectified};
-use crate::propagate::RectifiedView;
+use crate::pipeline::{RenderError, RenderSettings};
+use crate::propagate::{View, Viewpoint};
 
 /// Errors of disparity below this many pixels change nothing that can be seen.
-const LEAST: f64 = 0.02;
+const LEAST_DISPARITY: f64 = 0.02;
+
+/// Errors of depth below this share change nothing that can be seen.
+const LEAST_SHARE: f64 = 1e-4;
 
 /// Half the side of the window over which the change is averaged, in pixels.
 const WINDOW: usize = 2;
 
-/// Standard deviation of independent errors of the disparities, in pixels for a baseline of one, from the
-/// maps alone: points that one map gives are looked up in the other. 0 for a single view.
+/// Standard deviation of independent errors of the maps, from the maps alone: pixels of disparity for a
+/// baseline of one, or shares of the depth. Points of one map are looked up in that of the nearest view
+/// before it. 0 for a single view.
 ///
-/// With two maps of the standard deviation s the difference has s^2 (1 + 2/3): the second value is
-/// interpolated between two neighbours. The median makes hidden points harmless. Errors that both maps
-/// share, and offsets between the cameras, do not show.
-pub fn disparity_noise(views: &[RectifiedView<'_>]) -> f64 {
-    let lookups = |pair: &[RectifiedView<'_>]| {
-        let shift = pair[0].position - pair[1].position;
-        Lookups::of(pair[0].disparity, pair[1].disparity, |x, y, d| (x + shift * d, y, d))
+/// With two maps of the standard deviation s the difference has s^2 (1 + k): the second value is
+/// interpolated, which leaves the share k of its variance, 2/3 between two neighbours and 4/9 between four.
+/// The median makes hidden points harmless. Errors that both maps share, and offsets between the cameras, do
+/// not show.
+pub fn map_noise<P: Viewpoint>(views: &[View<'_, P>]) -> f64 {
+    let lookups = |j: usize| {
+        let (a, b) = (&views[View::nearest_before(views, j)?], &views[j]);
+        Some(Lookups::of(a.map, b.map, a.camera.map_to(&b.camera)))
     };
-    views.windows(2).map(lookups).fold(Lookups::default(), Lookups::and).common()
+    (1..views.len()).filter_map(lookups).fold(Lookups::default(), Lookups::and).common()
 }
 
-/// The views' disparity maps with independent errors of this standard deviation, from a fixed seed.
-pub fn with_noise(views: &[RectifiedView<'_>], deviation: f64, seed: u64) -> Vec<DepthMap> {
+/// The views' maps with independent errors of this standard deviation, from a fixed seed: pixels of
+/// disparity for a baseline of one, or shares of the depth.
+pub fn with_noise<P>(views: &[View<'_, P>], deviation: f64, seed: u64) -> Vec<DepthMap> {
     let random = &mut seeded(seed);
-    let mut error = || (deviation * bounded_normal(random)) as f32;
-    views.iter().map(|v| v.disparity.changed(|d| d + error())).collect()
+    let mut error = || deviation * bounded_normal(random);
+    let mut noisy = |map: &DepthMap| match map.measure() {
+        Measure::Disparity => map.changed(|d| d + error() as f32),
+        Measure::Depth => map.changed(|d| d * (1.0 + error()) as f32),
+    };
+    views.iter().map(|v| noisy(v.map)).collect()
 }
 
-/// Local mean of the change of a view under errors of the disparities with a standard deviation of
-/// `deviation` pixels for a baseline of one, in grey levels; 0 for deviations below 0.02.
+/// Local mean of the change of a view under errors of the maps with this standard deviation, in grey levels;
+/// 0 for errors that change nothing that can be seen.
 ///
 /// # Errors
-/// Those of [`rectified::render`].
-pub fn depth_jitter(
-    views: &[RectifiedView<'_>],
-    position: f64,
+/// Those of [`crate::pipeline`].
+pub fn depth_jitter<P: Predicted>(
+    views: &[View<'_, P>],
+    camera: &P,
     settings: &RenderSettings,
     view: &Image,
     deviation: f64,
 ) -> Result<Vec<f32>, RenderError> {
-    let (width, height) = view.size();
-    if deviation < LEAST {
-        return Ok(vec![0.0; width * height]);
+    let is_disparity = views.first().is_some_and(|v| v.map.measure() == Measure::Disparity);
+    if deviation < if is_disparity { LEAST_DISPARITY } else { LEAST_SHARE } {
+        return Ok(vec![0.0; view.width() * view.height()]);
     }
     let maps = with_noise(views, deviation, 1);
-    let noisy: Vec<RectifiedView<'_>> =
-        views.iter().zip(&maps).map(|(v, disparity)| RectifiedView { disparity, ..*v }).collect();
-    let changed = rectified::render(&noisy, position, settings)?.image;
-    Ok(local_mean(&difference(&changed, view), (width, height)))
+    let noisy: Vec<_> = views.iter().zip(&maps).map(|(v, map)| View { map, ..*v }).collect();
+    let changed = camera.render(&noisy, P::size_of(view), settings)?.image;
+    Ok(local_mean(&difference(&changed, view), view.size()))
 }
 
 /// |a - b| of each pixel, mean over the channels; of the brightness, if only one image has colours.

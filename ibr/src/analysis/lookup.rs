@@ -131,11 +131,11 @@ impl Lookup<'_> {
 
     /// Whether the map has this depth around a place.
     fn shows(&self, u: f64, v: f64, d: f64) -> Option<()> {
-        let (width, height) = self.view.depth.size();
+        let (width, height) = self.view.map.size();
         let inside = u >= 0.0 && v >= 0.0 && u <= width as f64 - 1.0 && v <= height as f64 - 1.0;
         // Also false for unknown depths.
         let same = |seen: f32| (f64::from(seen) / d - 1.0).abs() <= SAME_POINT;
-        (inside && d > 0.0 && same(self.view.depth.row(v.round() as usize)[u.round() as usize])).then_some(())
+        (inside && d > 0.0 && same(self.view.map.row(v.round() as usize)[u.round() as usize])).then_some(())
     }
 }
 

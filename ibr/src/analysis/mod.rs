@@ -37,6 +37,7 @@ mod evidence;
 mod general;
 mod jitter;
 mod lookup;
+mod predictor;
 mod random;
 mod regressors;
 mod rows;
@@ -46,9 +47,8 @@ mod variogram;
 pub use advice::{Advice, AnotherView};
 pub use estimate::{Calibration, Totals, ViewError};
 pub use evidence::{Evidence, Survey, survey};
-pub use general::{CameraPredictor, calibrated, depth_noise};
-pub use jitter::{depth_jitter, disparity_noise, with_noise};
-pub use rows::{RigPredictor, rectified};
+pub use jitter::{depth_jitter, map_noise, with_noise};
+pub use predictor::{Predicted, Predictor};
 pub use sure::Limits;
 
 /// What an error comes from.

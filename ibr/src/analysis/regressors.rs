@@ -40,8 +40,8 @@ pub(super) fn regressors(
         // The noise of the photograph that a view is compared with adds to that of the views.
         let noise = (1.0 + f64::from(e.views)).sqrt();
         // Displacements of the samples: one part grows with the distance to the views, and one does not.
-        let lever = f64::from(e.lever) / (spacing * spacing);
-        let displacement = ((f64::from(e.views) + lever) / 2.0).sqrt();
+        let disparity_gain = f64::from(e.disparity_gain) / (spacing * spacing);
+        let displacement = ((f64::from(e.views) + disparity_gain) / 2.0).sqrt();
         [
             f64::from(e.bias),
             noise,

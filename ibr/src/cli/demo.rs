@@ -2,7 +2,7 @@
 
 use super::arguments::DemoArguments;
 use super::contact;
-use super::failure::{self, Failure};
+use super::failure::Failure;
 use super::output;
 use super::progress::Progress;
 use super::summary::Summary;
@@ -42,12 +42,13 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
     let (right, right_map) = view(1.0, arguments.size)?;
     let (exact, _) = view(0.5, arguments.size)?;
     progress.step("full depth");
-    let (full, full_summary) = render([(&left, &left_map), (&right, &right_map)], &exact)?;
+    let (full, full_summary) = render(&[rig(&left, &left_map, 0.0), rig(&right, &right_map, 1.0)], &exact)?;
     progress.step("partial depth");
     let start = Instant::now();
-    let maps = (coarse(&left_map, &left)?, coarse(&right_map, &right)?);
+    let [left_coarse, right_coarse] = [coarse(&left_map, &left)?, coarse(&right_map, &right)?];
     let preparation = start.elapsed().as_secs_f64();
-    let (partial, mut partial_summary) = render([(&left, &maps.0), (&right, &maps.1)], &exact)?;
+    let (partial, mut partial_summary) =
+        render(&[rig(&left, &left_coarse, 0.0), rig(&right, &right_coarse, 1.0)], &exact)?;
     partial_summary.preparation_seconds = preparation;
     progress.step("writing");
     let gain = 4.0;
@@ -78,15 +79,13 @@ fn coarse(map: &DepthMap, image: &Image) -> Result<DepthMap, Failure> {
     densify(&sparse, STEP, image, Densify::default()).map_err(Failure::input)
 }
 
-fn render(views: [(&Image, &DepthMap); 2], exact: &Image) -> Result<(Rendering, Summary), Failure> {
-    let position = [0.0, 1.0];
-    let views: Vec<RectifiedView<'_>> = views
-        .iter()
-        .zip(position)
-        .map(|((image, disparity), position)| RectifiedView { image, disparity, position })
-        .collect();
+fn rig<'a>(image: &'a Image, map: &'a DepthMap, camera: f64) -> RectifiedView<'a> {
+    RectifiedView { image, map, camera }
+}
+
+fn render(views: &[RectifiedView<'_>], exact: &Image) -> Result<(Rendering, Summary), Failure> {
     let start = Instant::now();
-    let rendering = rectified::render(&views, 0.5, &RenderSettings::default()).map_err(Failure::input)?;
+    let rendering = rectified::render(views, 0.5, &RenderSettings::default()).map_err(Failure::input)?;
     let mut summary = Summary::new(&rendering, start.elapsed().as_secs_f64(), 0);
     let quality = quality::compare(&rendering.image, exact, None).map_err(Failure::input)?;
     quality.iter().for_each(|q| summary.compare(q));
@@ -94,19 +93,12 @@ fn render(views: [(&Image, &DepthMap); 2], exact: &Image) -> Result<(Rendering, 
 }
 
 fn report(summary: &DemoSummary, arguments: &DemoArguments) -> Result<(), Failure> {
-    if arguments.json {
-        let json = serde_json::to_string(summary).map_err(Failure::input)?;
-        return output::print(&(json + "\n"));
-    }
-    let text = format!(
-        "exact depth at every pixel\n{}\nexact depth at one pixel in {STEP} x {STEP}\n{}\n{}: left, exact, right; rendered, its error and that of partial depth (times 4)\n",
-        summary.full_depth.text(),
-        summary.partial_depth.text(),
-        arguments.output.display()
-    );
-    if output::is_standard(&arguments.output) {
-        failure::say(&text);
-        return Ok(());
-    }
-    output::print(&text)
+    let text = || {
+        let (full, partial) = (summary.full_depth.text(), summary.partial_depth.text());
+        format!(
+            "exact depth at every pixel\n{full}\nexact depth at one pixel in {STEP} x {STEP}\n{partial}\n{}: left, exact, right; rendered, its error and that of partial depth (times 4)\n",
+            arguments.output.display()
+        )
+    };
+    output::report(arguments.json, summary, text, Some(&arguments.output))
 }

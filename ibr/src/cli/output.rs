@@ -3,6 +3,7 @@
 use super::failure::{self, Failure};
 use crate::image::{self, Image, Levels};
 use hybank::files::{AtomicFile, commit_all};
+use serde::Serialize;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -56,13 +57,15 @@ pub(super) fn write(outputs: &[Encoded<'_>], force: bool) -> Result<(), Failure>
     commit(begin(outputs, force)?)
 }
 
-/// Writes files without giving them their names yet, and prints what goes to standard output.
+/// Writes files without giving them their names yet, and prints what goes to standard output. The files are
+/// closed: a long path has more than a process may have open.
 pub(super) fn begin(outputs: &[Encoded<'_>], force: bool) -> Result<Vec<AtomicFile>, Failure> {
     let (to_output, to_files): (Vec<_>, Vec<_>) = outputs.iter().partition(|e| is_standard(e.path));
     #[cfg(unix)]
     hybank::files::remove_unfinished_on_signals();
     let files = to_files.iter().map(|e| image::begin(&e.bytes, e.path, force));
-    let files = files.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
+    let mut files = files.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
+    files.iter_mut().try_for_each(AtomicFile::seal).map_err(Failure::input)?;
     to_output.iter().try_for_each(|e| print_bytes(&e.bytes))?;
     Ok(files)
 }
@@ -87,8 +90,40 @@ pub(super) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
     out.write_all(bytes).and_then(|()| out.flush()).map_err(|e| Failure::printing(&e))
 }
 
-/// Prints text to standard output.
-pub(super) fn print(text: &str) -> Result<(), Failure> {
-    let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|e| Failure::printing(&e))
+/// Prints a report to standard output, as one JSON object or as text. Text goes to standard error where
+/// standard output has the image.
+pub(super) fn report(
+    json: bool,
+    value: &impl Serialize,
+    text: impl FnOnce() -> String,
+    image: Option<&Path>,
+) -> Result<(), Failure> {
+    if json {
+        let json = serde_json::to_string(value).map_err(Failure::input)?;
+        return print_bytes((json + "\n").as_bytes());
+    }
+    if image.is_some_and(is_standard) {
+        failure::say(&text());
+        return Ok(());
+    }
+    print_bytes(text().as_bytes())
+}
+
+/// Refuses files beside the first that go to standard output or have its name, by their options.
+pub(super) fn check_names(files: &[(&str, &Path)]) -> Result<(), Failure> {
+    for (k, (option, path)) in files.iter().enumerate() {
+        let (name, shown) = (option.trim_start_matches('-'), path.display());
+        if name != "o" && is_standard(path) {
+            return Err(Failure::Usage(format!(
+                "{option} -: the {name} cannot go to standard output; give it a file"
+            )));
+        }
+        if k > 0 && *path == files[0].1 {
+            let first = files[0].0;
+            return Err(Failure::Usage(format!(
+                "{first} and {option} both name {shown}; give the {name} a file of its own"
+            )));
+        }
+    }
+    Ok(())
 }

@@ -6,18 +6,19 @@ mod outputs;
 mod path;
 
 use super::arguments::RenderArguments;
-use super::failure::{self, Failure};
+use super::failure::Failure;
 use super::inputs;
 use super::memory::{self, Work};
 use super::output;
 use super::progress::Progress;
-use super::summary::{Figures, Summary};
+use super::summary::Summary;
 use crate::image::{Image, quality};
 use crate::pipeline::uncalibrated::{Target, UncalibratedSettings};
 use crate::pipeline::{RenderSettings, Rendering, Watch, calibrated, rectified, uncalibrated};
-use crate::scene::{self, CalibratedSource, Kind, RectifiedSource, Scene};
+use crate::scene::{self, Kind, Scene, SourceView};
 use concerns::Concerns;
 use outputs::Outputs;
+use path::Film;
 use std::path::Path;
 use std::time::Instant;
 
@@ -30,7 +31,7 @@ struct Rendered {
 
 pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     check(arguments)?;
-    let progress = Progress::new(4);
+    let progress = Progress::new(1);
     progress.step("reading");
     let start = Instant::now();
     let scene = read(arguments)?;
@@ -38,27 +39,37 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     check_nearest(&scene.kind, arguments)?;
     let method = arguments.settings(scene.offset).method;
     memory::check(&scene, Work::Render(method)).map_err(|e| e.in_file(&arguments.scene.file))?;
-    if scene.kind.frames() > 1 {
-        drop(progress);
-        return path::run(&scene, preparation, arguments);
+    let frames = scene.kind.frames();
+    path::check(arguments, frames)?;
+    let files = path::outputs(arguments, frames);
+    for file in files.iter().flat_map(Outputs::files) {
+        output::refuse_existing(file, arguments.scene.force)?;
     }
     let truth = arguments.scene.truth()?;
-    progress.step("rendering");
-    let (done, mut summary) = timed(&scene, 0, preparation, arguments, &|share| progress.within(share))?;
-    progress.step("comparing");
-    if let (Some(truth), Some(path)) = (&truth, &arguments.scene.truth) {
-        compare(&mut summary, &done, truth, path)?;
+    drop(progress);
+    let progress = Progress::new(frames as u64 + 1);
+    let mut film = path::is_film(&arguments.output, frames).then(|| Film::new(arguments)).transpose()?;
+    let (mut summaries, mut written, mut concerns) = (Vec::new(), Vec::new(), Concerns::default());
+    for (frame, files) in files.iter().enumerate() {
+        progress.step("rendering");
+        let watch = |share| progress.within(share);
+        let (done, mut summary) = timed(&scene, frame, preparation, arguments, &watch)?;
+        if let (Some(truth), Some(path)) = (&truth, &arguments.scene.truth) {
+            compare(&mut summary, &done, truth, path)?;
+        }
+        concerns.add(&done);
+        film.as_mut().map_or(Ok(()), |film| film.append(&done.rendering.image))?;
+        let (encoded, white) = files.encoded(&done.rendering, truth.as_ref())?;
+        summary.error_white = white;
+        written.extend(output::begin(&encoded, arguments.scene.force)?);
+        summaries.push(summary);
     }
     progress.step("writing");
-    let files = Outputs::of(arguments);
-    let (encoded, white) = files.encoded(&done.rendering, truth.as_ref(), arguments.fps)?;
-    summary.error_white = white;
-    output::write(&encoded, arguments.scene.force)?;
+    written.extend(film.and_then(|film| film.file));
+    output::commit(written)?;
     drop(progress);
-    let mut concerns = Concerns::default();
-    concerns.add(&done);
     concerns.warn(&scene.kind);
-    report(&summary, arguments)
+    path::report(&summaries, &files, arguments)
 }
 
 /// One virtual view of a scene, and its summary.
@@ -120,11 +131,9 @@ fn read(arguments: &RenderArguments) -> Result<Scene, Failure> {
         Some(_) => 1,
         None => source.spec.targets.iter().map(|t| t.frames.unwrap_or(1).min(scene::MOST_FRAMES)).sum(),
     };
-    let all = match frames {
-        0 | 1 => vec![Outputs::of(arguments)],
-        _ => path::outputs(arguments, frames.min(scene::MOST_FRAMES)),
-    };
-    let film = Some(arguments.output.as_path()).filter(|path| frames > 1 && path::is_film(path));
+    let frames = frames.clamp(1, scene::MOST_FRAMES);
+    let all = path::outputs(arguments, frames);
+    let film = Some(arguments.output.as_path()).filter(|path| path::is_film(path, frames));
     let film = film.filter(|path| !output::is_standard(path));
     source.refuse_overlaps(&all.iter().flat_map(Outputs::files).chain(film).collect::<Vec<_>>())?;
     arguments.scene.load(&source, arguments.densify, !arguments.drop_unknown)
@@ -141,17 +150,17 @@ fn render(
     let whole = |rendering| Rendered { rendering, hull: None, geometry: None };
     match &scene.kind {
         Kind::Rectified { views, positions } => {
-            let views: Vec<_> = views.iter().map(RectifiedSource::view).collect();
+            let views: Vec<_> = views.iter().map(SourceView::view).collect();
             let done = rectified::render_watched(&views, positions[frame], &settings, watch);
             done.map(|rendering| whole(metric::in_millimetres(rendering, scene))).map_err(Failure::input)
         }
         Kind::Calibrated { views, cameras, size } => {
-            let views: Vec<_> = views.iter().map(CalibratedSource::view).collect();
+            let views: Vec<_> = views.iter().map(SourceView::view).collect();
             let done = calibrated::render_watched(&views, &cameras[frame], *size, &settings, watch);
             done.map(whole).map_err(Failure::input)
         }
         Kind::Uncalibrated { targets, .. } => {
-            render_uncalibrated(&scene.kind, &targets[frame], &settings, (arguments, watch))
+            render_uncalibrated(&scene.kind, &targets[frame], &settings, arguments, watch)
         }
     }
 }
@@ -160,7 +169,8 @@ fn render_uncalibrated(
     kind: &Kind,
     target: &Target,
     settings: &RenderSettings,
-    (arguments, watch): (&RenderArguments, Watch<'_>),
+    arguments: &RenderArguments,
+    watch: Watch<'_>,
 ) -> Result<Rendered, Failure> {
     let Kind::Uncalibrated { images, tracks, size, .. } = kind else {
         return Err(Failure::input("the scene has calibrated views"));
@@ -188,18 +198,6 @@ fn compare(summary: &mut Summary, done: &Rendered, truth: &Image, path: &Path) -
     summary.compared_on = "hull";
     let within = quality::compare(image, truth, Some(hull)).map_err(|e| named(&e))?;
     within.iter().for_each(|q| summary.compare(q));
-    summary.whole_image = whole.map(|q| Figures { psnr: q.psnr, ssim: q.ssim, mae: q.mae });
+    summary.whole_image = whole;
     Ok(())
-}
-
-fn report(summary: &Summary, arguments: &RenderArguments) -> Result<(), Failure> {
-    if arguments.scene.json {
-        let json = serde_json::to_string(summary).map_err(Failure::input)?;
-        return output::print(&(json + "\n"));
-    }
-    if output::is_standard(&arguments.output) {
-        failure::say(&summary.text());
-        return Ok(());
-    }
-    output::print(&summary.text())
 }

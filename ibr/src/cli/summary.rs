@@ -36,7 +36,7 @@ pub(super) struct Summary {
     /// Share of the pixels that were compared.
     pub(super) compared_share: Option<f64>,
     /// The same figures over the whole image, if that is another region.
-    pub(super) whole_image: Option<Figures>,
+    pub(super) whole_image: Option<Quality>,
     pub(super) convergence: Option<Convergence>,
     /// How well the views agree in depth and colour, from the inputs alone.
     pub(super) agreement: Agreement,
@@ -51,13 +51,6 @@ pub(super) struct SampleCount {
     pub(super) occluded: usize,
     pub(super) used: usize,
     pub(super) dropped: Dropped,
-}
-
-#[derive(Debug, Serialize)]
-pub(super) struct Figures {
-    pub(super) psnr: f64,
-    pub(super) ssim: f64,
-    pub(super) mae: f64,
 }
 
 impl Summary {

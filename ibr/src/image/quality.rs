@@ -3,7 +3,7 @@
 use super::{Image, ImageError};
 
 /// Figures of merit on the scale 0..255.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Quality {
     /// 10 log10(255^2 / MSE) in dB over all samples; infinite for equal images.
     pub psnr: f64,
@@ -12,6 +12,7 @@ pub struct Quality {
     /// Mean absolute error over all samples, in grey levels.
     pub mae: f64,
     /// Pixels that were compared.
+    #[serde(skip)]
     pub pixels: usize,
 }
 

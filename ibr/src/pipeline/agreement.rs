@@ -4,7 +4,7 @@
 use super::depth_errors::{self, Lookups};
 use crate::depth::{DepthMap, Measure};
 use crate::image::{Image, Texture};
-use crate::propagate::{CalibratedView, RectifiedView};
+use crate::propagate::{View, Viewpoint};
 use rayon::prelude::*;
 
 /// Pixels of each view that are compared, about.
@@ -65,45 +65,23 @@ pub struct Agreement {
 }
 
 impl Agreement {
-    /// Of views of a rectified rig.
-    pub fn rectified(views: &[RectifiedView<'_>]) -> Self {
-        let inputs: Vec<_> = views.iter().map(|v| (v.image, v.disparity)).collect();
-        let distance = |i: usize, j: usize| (views[i].position - views[j].position).abs();
-        Self::of(&inputs, distance, |i, j| {
-            let shift = views[i].position - views[j].position;
-            move |x, y, disparity| (x + shift * disparity, y, disparity)
-        })
-    }
-
-    /// Of calibrated views.
-    pub fn calibrated(views: &[CalibratedView<'_>]) -> Self {
-        let inputs: Vec<_> = views.iter().map(|v| (v.image, v.depth)).collect();
-        let distance = |i: usize, j: usize| (views[i].camera.centre() - views[j].camera.centre()).norm();
-        Self::of(&inputs, distance, |i, j| {
-            let map = views[i].camera.relative_to(&views[j].camera);
-            move |x, y, depth| map.map(x, y, depth)
-        })
-    }
-
-    /// `map(i, j)` takes a pixel of view i and its depth to view j.
-    fn of<M: Fn(f64, f64, f64) -> (f64, f64, f64) + Sync>(
-        inputs: &[(&Image, &DepthMap)],
-        distance: impl Fn(usize, usize) -> f64,
-        map: impl Fn(usize, usize) -> M,
-    ) -> Self {
-        let textures = inputs.par_iter().map(|(image, _)| Texture::of(image)).collect();
-        let mut agreement = Self { gains: vec![1.0; inputs.len()], textures, ..Self::default() };
-        let mut errors = vec![Vec::new(); inputs.len()];
-        for j in 1..inputs.len() {
-            let Some(i) = (0..j).min_by(|a, b| distance(*a, j).total_cmp(&distance(*b, j))) else { continue };
-            let found = Comparison::new(inputs[i], inputs[j], map(i, j)).verdict([i, j]);
+    /// Of views of one kind.
+    pub fn of<P: Viewpoint>(views: &[View<'_, P>]) -> Self {
+        let textures = views.par_iter().map(|view| Texture::of(view.image)).collect();
+        let mut agreement = Self { gains: vec![1.0; views.len()], textures, ..Self::default() };
+        let mut errors = vec![Vec::new(); views.len()];
+        for j in 1..views.len() {
+            let Some(i) = View::nearest_before(views, j) else { continue };
+            let found = Comparison::new(&views[i], &views[j]).verdict([i, j]);
             let Some(pair) = found else { continue };
             // Brightness at points that do not correspond says nothing.
             let gain = if pair.is_poor() { 1.0 } else { pair.gain };
             agreement.gains[j] = agreement.gains[i] / gain;
             agreement.pairs.push(pair);
-            let look = |a: usize, b: usize| Lookups::of(inputs[a].1, inputs[b].1, map(a, b));
-            if let Some(found) = depth_errors::of_each(look(i, j), look(j, i)) {
+            let look =
+                |a: &View<'_, P>, b: &View<'_, P>| Lookups::of(a.map, b.map, a.camera.map_to(&b.camera));
+            let lookups = [look(&views[i], &views[j]), look(&views[j], &views[i])];
+            if let Some(found) = depth_errors::of_each(lookups) {
                 [i, j].iter().zip(found).for_each(|(view, variance)| errors[*view].push(variance));
             }
         }
@@ -155,30 +133,28 @@ struct Comparison {
 }
 
 impl Comparison {
-    fn new(
-        (image, depth): (&Image, &DepthMap),
-        (other, other_depth): (&Image, &DepthMap),
-        map: impl Fn(f64, f64, f64) -> (f64, f64, f64) + Sync,
-    ) -> Self {
+    fn new<P: Viewpoint>(first: &View<'_, P>, second: &View<'_, P>) -> Self {
+        let (image, other, other_map) = (first.image, second.image, second.map);
+        let to_second = first.camera.map_to(&second.camera);
         let (width, height) = image.size();
         let step = ((width * height / PIXELS) as f64).sqrt().ceil().max(1.0) as usize;
         let rows: Vec<usize> = (0..height).step_by(step).collect();
         let of_row = |y: &usize| {
             let mut all = Self { points: 0, matched: Vec::new() };
             for x in (0..width).step_by(step) {
-                let (u, v, d) = map(x as f64, *y as f64, f64::from(depth.row(*y)[x]));
+                let (u, v, d) = to_second(x as f64, *y as f64, f64::from(first.map.row(*y)[x]));
                 let inside = |v: f64, side: usize| v > -0.5 && v < side as f64 - 0.5;
                 // False for NaN, hence for pixels without depth.
                 if !(inside(u, other.width()) && inside(v, other.height())) {
                     continue;
                 }
                 let (column, row) = ((u + 0.5) as usize, (v + 0.5) as usize);
-                let there = other_depth.row(row)[column];
+                let there = other_map.row(row)[column];
                 if there.is_nan() {
                     continue;
                 }
                 all.points += 1;
-                if same_depth(d as f32, there, other_depth) {
+                if same_depth(d as f32, there, other_map) {
                     let q = row * other.width() + column;
                     all.matched.push([brightness(image, y * width + x), brightness(other, q)]);
                 }
@@ -234,6 +210,7 @@ fn brightness(image: &Image, pixel: usize) -> f32 {
 mod tests {
     use super::*;
     use crate::camera::Camera;
+    use crate::propagate::{CalibratedView, RectifiedView};
     use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 
     const SIZE: (usize, usize) = (160, 120);
@@ -254,9 +231,8 @@ mod tests {
         let disparities = shots.each_ref().map(|s| rig_disparity(&s.1, SIZE.0));
         let share = |positions: [f64; 2], factor: f32| {
             let maps = disparities.each_ref().map(|d| scaled(d, factor));
-            let view =
-                |i: usize| RectifiedView { image: &shots[i].0, disparity: &maps[i], position: positions[i] };
-            *Agreement::rectified(&[view(0), view(1)]).worst().unwrap()
+            let view = |i: usize| RectifiedView { image: &shots[i].0, map: &maps[i], camera: positions[i] };
+            *Agreement::of(&[view(0), view(1)]).worst().unwrap()
         };
         let (right, swapped, wrong) =
             (share([0.0, 1.0], 1.0), share([1.0, 0.0], 1.0), share([0.0, 1.0], 4.0));
@@ -269,11 +245,10 @@ mod tests {
         let cameras = [0.0, 1.0].map(|p| Camera::metric(rig_camera(p, SIZE), false).unwrap());
         let shots = [0.0, 1.0].map(record);
         let disparities = shots.each_ref().map(|s| rig_disparity(&s.1, SIZE.0));
-        let free = |i: usize| CalibratedView { image: &shots[i].0, depth: &shots[i].1, camera: cameras[i] };
-        let row =
-            |i: usize| RectifiedView { image: &shots[i].0, disparity: &disparities[i], position: i as f64 };
-        let a = Agreement::calibrated(&[free(0), free(1)]);
-        let b = Agreement::rectified(&[row(0), row(1)]);
+        let free = |i: usize| CalibratedView { image: &shots[i].0, map: &shots[i].1, camera: cameras[i] };
+        let row = |i: usize| RectifiedView { image: &shots[i].0, map: &disparities[i], camera: i as f64 };
+        let a = Agreement::of(&[free(0), free(1)]);
+        let b = Agreement::of(&[row(0), row(1)]);
         assert!((a.pairs[0].share - b.pairs[0].share).abs() < 0.03, "{a:?} {b:?}");
     }
 
@@ -284,9 +259,9 @@ mod tests {
         let gains = |factor: f32| {
             let mut brighter = shots[1].0.clone();
             brighter.data_mut().iter_mut().for_each(|v| *v *= factor);
-            let first = RectifiedView { image: &shots[0].0, disparity: &disparities[0], position: 0.0 };
-            let second = RectifiedView { image: &brighter, disparity: &disparities[1], position: 1.0 };
-            Agreement::rectified(&[first, second]).gains
+            let first = RectifiedView { image: &shots[0].0, map: &disparities[0], camera: 0.0 };
+            let second = RectifiedView { image: &brighter, map: &disparities[1], camera: 1.0 };
+            Agreement::of(&[first, second]).gains
         };
         let found = gains(0.8);
         assert!(found[0] == 1.0 && (found[1] - 1.25).abs() < 0.03, "{found:?}");
@@ -297,9 +272,9 @@ mod tests {
     fn one_view_and_views_apart_have_no_verdict() {
         let (image, depth) = record(0.0);
         let disparity = rig_disparity(&depth, SIZE.0);
-        let view = |position| RectifiedView { image: &image, disparity: &disparity, position };
-        assert_eq!(Agreement::rectified(&[view(0.0)]).worst(), None);
-        let apart = Agreement::rectified(&[view(0.0), view(100.0)]);
+        let view = |position| RectifiedView { image: &image, map: &disparity, camera: position };
+        assert_eq!(Agreement::of(&[view(0.0)]).worst(), None);
+        let apart = Agreement::of(&[view(0.0), view(100.0)]);
         assert!(apart.pairs.is_empty() && apart.gains == [1.0, 1.0]);
     }
 }

@@ -1,10 +1,11 @@
 //! The share of each view in the virtual one, and its exposure.
 
 use super::Agreement;
-use super::depth_errors::Lever;
+use super::depth_errors::DisparityGain;
 use crate::camera::Camera;
+use crate::depth::Measure;
 use crate::image::Image;
-use crate::propagate::{CalibratedView, RectifiedView};
+use crate::propagate::{CalibratedView, View, Viewpoint};
 use crate::sample::Sample;
 use hybank::sampling::nonuniform::Measured;
 
@@ -45,7 +46,7 @@ pub struct Balance {
     weights: Vec<f32>,
     distances: Vec<f64>,
     /// By how much errors of depth displace the samples of each view; empty if this is not known.
-    levers: Vec<Lever>,
+    disparity_gains: Vec<DisparityGain>,
     /// Errors of the samples of each view; empty if they are not known.
     errors: Vec<SampleErrors>,
     /// Factors that give the views one exposure; empty if they have it.
@@ -69,7 +70,7 @@ impl Balance {
         Self {
             weights,
             distances: distances.to_vec(),
-            levers: Vec::new(),
+            disparity_gains: Vec::new(),
             errors: Vec::new(),
             gains: Vec::new(),
         }
@@ -125,34 +126,26 @@ impl Balance {
         (0..self.weights.len()).filter(|view| self.uses(*view)).collect()
     }
 
-    /// For a virtual camera on the line of a rectified rig.
-    pub fn rectified(views: &[RectifiedView<'_>], position: f64) -> Self {
-        let distances: Vec<f64> = views.iter().map(|v| (v.position - position).abs()).collect();
-        let levers = distances.iter().map(|distance| Lever::along_rows(*distance)).collect();
-        Self { levers, ..Self::by_distance(&distances) }
-    }
-
-    /// For a virtual camera among general ones.
-    pub fn calibrated(views: &[CalibratedView<'_>], camera: &Camera) -> Self {
-        let centre = camera.centre();
-        let distance = |v: &CalibratedView<'_>| (v.camera.centre() - centre).norm();
-        Self::by_distance(&views.iter().map(distance).collect::<Vec<_>>()).with_levers(views, camera)
+    /// For a virtual camera among the views.
+    pub fn of<P: Viewpoint>(views: &[View<'_, P>], camera: &P) -> Self {
+        let distances: Vec<f64> = views.iter().map(|v| v.camera.distance(camera)).collect();
+        Self::by_distance(&distances).with_disparity_gains(views, camera)
     }
 
     /// The same with the displacements that errors of depth cause.
-    fn with_levers(self, views: &[CalibratedView<'_>], camera: &Camera) -> Self {
-        let lever = |view: &CalibratedView<'_>| {
-            let map = view.camera.relative_to(camera);
-            Lever::of(view.depth, |x, y, d| map.map(x, y, d))
+    fn with_disparity_gains<P: Viewpoint>(self, views: &[View<'_, P>], camera: &P) -> Self {
+        let gain = |view: &View<'_, P>| match view.map.measure() {
+            Measure::Disparity => DisparityGain::along_rows(view.camera.distance(camera)),
+            Measure::Depth => DisparityGain::of(view.map, view.camera.map_to(camera)),
         };
-        Self { levers: views.iter().map(lever).collect(), ..self }
+        Self { disparity_gains: views.iter().map(gain).collect(), ..self }
     }
 
-    /// As [`Balance::calibrated`], with the distances in position and direction.
+    /// As [`Balance::of`], with the distances in position and direction.
     pub fn by_angle(views: &[CalibratedView<'_>], camera: &Camera) -> Self {
         let centre = camera.centre();
-        let Some(reach) = median(views.iter().filter_map(|v| v.depth.middle()).map(f64::from)) else {
-            return Self::calibrated(views, camera);
+        let Some(reach) = median(views.iter().filter_map(|v| v.map.middle()).map(f64::from)) else {
+            return Self::of(views, camera);
         };
         let pivot = centre + camera.axis() * reach;
         let distance = |view: &CalibratedView<'_>| {
@@ -162,7 +155,7 @@ impl Balance {
             let turn = view.camera.axis().angle(&(pivot - from));
             (from - centre).norm() / reach + angle + turn
         };
-        Self::by_distance(&views.iter().map(distance).collect::<Vec<_>>()).with_levers(views, camera)
+        Self::by_distance(&views.iter().map(distance).collect::<Vec<_>>()).with_disparity_gains(views, camera)
     }
 
     /// The same for photographs of unequal noise, and depths with errors.
@@ -170,7 +163,7 @@ impl Balance {
     /// Weights of least variance are inverse variances ([`Measured::variance`]): that of the difference
     /// between the view and the virtual one, v / w_i with v the variance of the differences between views.
     /// Noise of the photograph adds to it, and so do errors of the depths. They displace a sample by its
-    /// lever b times the error delta_i, which is a value error of the slope f' of the photograph there times
+    /// disparity_gain b times the error delta_i, which is a value error of the slope f' of the photograph there times
     /// the displacement:
     ///
     /// ```text
@@ -179,7 +172,7 @@ impl Balance {
     ///
     /// with the variance 1 / 12 of a position within a pixel. Noise that all views have is left out: it is
     /// also in the photographs that a view is compared with. The last term belongs to single samples, and of
-    /// it only the ratio between views counts, so that slopes are not smoothed more. Levers are those of a
+    /// it only the ratio between views counts, so that slopes are not smoothed more. DisparityGains are those of a
     /// typical pixel of the view.
     pub fn with_noise(mut self, agreement: &Agreement) -> Self {
         let Some(variance) = agreement.variance() else { return self };
@@ -191,12 +184,16 @@ impl Balance {
             let error = (variance / f64::from(*weight) + excess).sqrt();
             let mut typical = Measured { x: 0.0, value: 0.0, error, jitter: agreement.depth_error(view) };
             *weight = (variance * typical.weight(0.0, 0.0)) as f32;
-            if let Some(lever) = self.levers.get(view) {
-                let displacement = lever.product([1.0, 0.0, 1.0]) * typical.jitter.powi(2);
+            if let Some(disparity_gain) = self.disparity_gains.get(view) {
+                let displacement = disparity_gain.product([1.0, 0.0, 1.0]) * typical.jitter.powi(2);
                 if displacement < NEGLIGIBLE * APERTURE {
                     typical.jitter = 0.0;
                 }
-                self.errors.push(SampleErrors { typical, lever: *lever, noise: noise(view) });
+                self.errors.push(SampleErrors {
+                    typical,
+                    disparity_gain: *disparity_gain,
+                    noise: noise(view),
+                });
             }
         }
         self
@@ -275,7 +272,7 @@ const PART: usize = 64;
 struct SampleErrors {
     /// A sample where the photograph has no slope; its jitter is the error of depth.
     typical: Measured,
-    lever: Lever,
+    disparity_gain: DisparityGain,
     /// Variance of the noise of the photograph.
     noise: f64,
 }
@@ -288,7 +285,7 @@ impl SampleErrors {
         }
         let floor = APERTURE * (gradient.0[0] + gradient.0[2]).max(0.0);
         let variance = |square_slope| self.typical.variance(square_slope) + floor;
-        variance(0.0) / variance(self.lever.product(gradient.0).max(0.0))
+        variance(0.0) / variance(self.disparity_gain.product(gradient.0).max(0.0))
     }
 }
 
@@ -365,8 +362,8 @@ mod tests {
         let pair = PairAgreement { views: [0, 1], points: 1000, share: 0.9, gain: 1.0, difference: 10.0 };
         let depth_errors = vec![0.0, 2.0];
         let agreement = Agreement { pairs: vec![pair], depth_errors, ..Agreement::default() };
-        let levers = vec![Lever::along_rows(0.5); 2];
-        let balance = Balance { levers, ..Balance::by_distance(&[0.5, 0.5]) }.with_noise(&agreement);
+        let disparity_gains = vec![DisparityGain::along_rows(0.5); 2];
+        let balance = Balance { disparity_gains, ..Balance::by_distance(&[0.5, 0.5]) }.with_noise(&agreement);
         let weights = |slope: f32| {
             let image = Image::new(5, 5, 1, (0..25).map(|p| slope * (p % 5) as f32).collect()).unwrap();
             let mut samples = [0, 1].map(|view| Sample::<1> { view, pixel: 12, ..Sample::BLANK });
@@ -436,7 +433,7 @@ mod tests {
             let mut matrix = nalgebra::Matrix3x4::zeros();
             matrix.fixed_columns_mut::<3>(0).copy_from(r.matrix());
             matrix.set_column(3, &-(r * nalgebra::Vector3::from(centre)));
-            CalibratedView { image: &image, depth: &depth, camera: Camera::metric(matrix, false).unwrap() }
+            CalibratedView { image: &image, map: &depth, camera: Camera::metric(matrix, false).unwrap() }
         };
         let beside = view([1.0, 0.0, 0.0], 0.2);
         let before = view([0.0, 0.0, 1.0], 0.0);

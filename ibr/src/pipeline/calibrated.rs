@@ -65,7 +65,7 @@ fn check(views: &[CalibratedView<'_>], settings: &RenderSettings) -> Result<(), 
     }
     for (view, v) in views.iter().enumerate() {
         let (expected_width, expected_height) = v.image.size();
-        let (width, height) = v.depth.size();
+        let (width, height) = v.map.size();
         if (width, height) != (expected_width, expected_height) {
             let what = "the depth map";
             return Err(RenderError::Size { view, what, width, height, expected_width, expected_height });
@@ -83,9 +83,9 @@ fn render_with<const ORDER: usize, const C: usize>(
 ) -> Result<Rendering, RenderError> {
     let balance = match settings.nearest {
         Some(_) => Balance::by_angle(views, camera).nearest(settings.nearest),
-        None => Balance::calibrated(views, camera),
+        None => Balance::of(views, camera),
     };
-    let agreement = Agreement::calibrated(views);
+    let agreement = Agreement::of(views);
     let balance = balance.with_noise(&agreement);
     let settings = &settings.suited_to(&agreement, &balance);
     let chosen = balance.views();
@@ -181,7 +181,7 @@ mod tests {
     #[test]
     fn equal_to_the_three_stages_also_in_bands() {
         let (image, depth) = scene();
-        let view = |c| CalibratedView { image: &image, depth: &depth, camera: c };
+        let view = |c| CalibratedView { image: &image, map: &depth, camera: c };
         let views = [view(camera(-0.3, 0.03)), view(camera(0.4, -0.04))];
         let target = camera(0.05, 0.0);
         let settings = RenderSettings::default();
@@ -191,7 +191,7 @@ mod tests {
         assert_eq!((got.report.propagated, got.report.dropped), (samples.len(), dropped));
         assert_eq!(got.report.occluded, occlusion::remove(&mut samples, settings.depth_test()));
         assert!(got.report.occluded > 0);
-        Balance::calibrated(&views, &target).apply(&mut samples, |view| views[view].image);
+        Balance::of(&views, &target).apply(&mut samples, |view| views[view].image);
         let fit = plane::interpolate(&samples, (40, 30), &settings.interpolation).unwrap();
         assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
         // In bands only the order of summation differs.
@@ -200,7 +200,7 @@ mod tests {
         let mut work = Work::default();
         for rows in [0..7, 7..8, 8..30] {
             let (mut band, _) = visible_in(rows, 30, &survey, &views, settings.depth_test(), &mut work);
-            Balance::calibrated(&views, &target).apply(&mut band, |view| views[view].image);
+            Balance::of(&views, &target).apply(&mut band, |view| views[view].image);
             problem.add(&band).unwrap();
         }
         assert_eq!(problem.samples(), samples.len());
@@ -213,12 +213,12 @@ mod tests {
     #[test]
     fn views_that_see_nothing_are_an_error() {
         let (image, depth) = scene();
-        let view = CalibratedView { image: &image, depth: &depth, camera: camera(0.0, 0.0) };
+        let view = CalibratedView { image: &image, map: &depth, camera: camera(0.0, 0.0) };
         let away = camera(0.0, std::f64::consts::PI);
         let error = render(&[view], &away, (40, 30), &RenderSettings::default()).unwrap_err();
         assert!(matches!(error, RenderError::NoOverlap { dropped, .. } if dropped.behind == 1200), "{error}");
         let other = DepthMap::new((4, 3), vec![1.0; 12], 1.0, Measure::Depth).unwrap();
-        let view = CalibratedView { depth: &other, ..view };
+        let view = CalibratedView { map: &other, ..view };
         let error = render(&[view], &away, (40, 30), &RenderSettings::default()).unwrap_err();
         assert!(error.to_string().contains("the depth map has 4 x 3"), "{error}");
     }

@@ -113,7 +113,7 @@ fn median(values: &mut [f64]) -> Option<f64> {
 /// and those of the second D2 = s2^2 + k2 s1^2. So s1^2 = (D1 - k1 D2) / (1 - k1 k2). Errors that do not
 /// change from pixel to pixel are not averaged by interpolation; they have D1 = D2 and are shared equally.
 /// `None` too where most points fall on pixels, and nothing is averaged.
-pub(super) fn of_each(mut first: Lookups, mut second: Lookups) -> Option<[f64; 2]> {
+pub(super) fn of_each([mut first, mut second]: [Lookups; 2]) -> Option<[f64; 2]> {
     if first.differences.len().min(second.differences.len()) < FEWEST {
         return None;
     }
@@ -126,13 +126,13 @@ pub(super) fn of_each(mut first: Lookups, mut second: Lookups) -> Option<[f64; 2
 /// By how much errors of depth displace the samples of a view, as positions in the view itself: the mean of
 /// d d' over the pixels, d the displacement in pixels per pixel of disparity or per share of the depth.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Lever {
+pub(crate) struct DisparityGain {
     xx: f64,
     xy: f64,
     yy: f64,
 }
 
-impl Lever {
+impl DisparityGain {
     /// Of errors of disparity, at this distance along the rows.
     pub(super) fn along_rows(distance: f64) -> Self {
         Self { xx: distance * distance, ..Self::default() }
@@ -219,7 +219,7 @@ mod tests {
                 let shift = a as f64 - b as f64;
                 Lookups::of(&noisy[a], &noisy[b], move |x, y, d| (x + shift * d, y, d))
             };
-            let found = of_each(look(0, 1), look(1, 0)).unwrap();
+            let found = of_each([look(0, 1), look(1, 0)]).unwrap();
             let largest = deviations[0].max(deviations[1]).powi(2);
             for (found, deviation) in found.iter().zip(deviations) {
                 assert!((found - deviation * deviation).abs() < 0.2 * largest, "{deviations:?}: {found:?}");
@@ -235,7 +235,7 @@ mod tests {
             let map = shots[a].0.relative_to(&shots[b].0);
             Lookups::of(&noisy[a], &noisy[b], move |x, y, d| map.map(x, y, d))
         };
-        let [first, second] = of_each(look(0, 1), look(1, 0)).unwrap().map(f64::sqrt);
+        let [first, second] = of_each([look(0, 1), look(1, 0)]).unwrap().map(f64::sqrt);
         assert!((0.0..0.004).contains(&first) && (0.007..0.009).contains(&second), "{first} {second}");
     }
 
@@ -243,21 +243,21 @@ mod tests {
     /// error of a depth by its disparity, in the pixels of a view of half the size and turned by a right
     /// angle too.
     #[test]
-    fn levers_are_displacements() {
+    fn disparity_gains_are_displacements() {
         let shots = shots();
         let disparity = rig_disparity(&shots[0].1, SIZE.0);
-        let found = Lever::of(&disparity, |x, y, d| (x - 0.4 * d, y, d));
+        let found = DisparityGain::of(&disparity, |x, y, d| (x - 0.4 * d, y, d));
         assert!((found.xx - 0.16).abs() < 1e-9 && found.yy < 1e-9 && found.xy.abs() < 1e-9, "{found:?}");
-        assert!((found.xx - Lever::along_rows(0.4).xx).abs() < 1e-9);
+        assert!((found.xx - DisparityGain::along_rows(0.4).xx).abs() < 1e-9);
         let map = shots[0].0.relative_to(&shots[1].0);
         let middle = f64::from(disparity.middle().unwrap()).powi(2);
-        let found = Lever::of(&shots[0].1, |x, y, d| map.map(x, y, d));
+        let found = DisparityGain::of(&shots[0].1, |x, y, d| map.map(x, y, d));
         assert!((0.8..1.6).contains(&(found.xx / middle)) && found.yy < 1e-6 * middle, "{found:?} {middle}");
         let turned = |x: f64, y: f64, d: f64| {
             let (u, v, d) = map.map(x, y, d);
             (-0.5 * v, 0.5 * u, d)
         };
-        let again = Lever::of(&shots[0].1, turned);
+        let again = DisparityGain::of(&shots[0].1, turned);
         assert!((again.xx / found.xx - 1.0).abs() < 1e-6 && again.yy < 1e-6 * middle, "{again:?}");
         assert!((found.product([9.0, 3.0, 1.0]) / found.xx / 9.0 - 1.0).abs() < 1e-3);
     }
@@ -265,8 +265,8 @@ mod tests {
     #[test]
     fn few_points_have_no_verdict() {
         let few = |count| Lookups { differences: vec![1.0; count], kept: 0.6 * count as f64 };
-        assert_eq!(of_each(few(99), few(500)), None);
-        assert!(of_each(few(100), few(500)).is_some());
+        assert_eq!(of_each([few(99), few(500)]), None);
+        assert!(of_each([few(100), few(500)]).is_some());
         assert_eq!(Lookups::default().common(), 0.0);
     }
 }

@@ -56,15 +56,13 @@ fn check(views: &[RectifiedView<'_>], position: f64) -> Result<(), RenderError> 
     let (expected_width, expected_height) = first.image.size();
     check_counts(views.len(), expected_width * expected_height)?;
     for (view, v) in views.iter().enumerate() {
-        for (what, (width, height)) in
-            [("the image", v.image.size()), ("the disparity map", v.disparity.size())]
-        {
+        for (what, (width, height)) in [("the image", v.image.size()), ("the disparity map", v.map.size())] {
             if (width, height) != (expected_width, expected_height) {
                 return Err(RenderError::Size { view, what, width, height, expected_width, expected_height });
             }
         }
     }
-    let positions = views.iter().map(|v| v.position).chain([position]);
+    let positions = views.iter().map(|v| v.camera).chain([position]);
     positions.into_iter().try_for_each(|position| Ok(FINITE.check("position", position)?))
 }
 
@@ -85,8 +83,8 @@ fn render_with<const ORDER: usize, const C: usize>(
     watch: Watch<'_>,
 ) -> Result<Rendering, RenderError> {
     let (width, height) = views[0].image.size();
-    let agreement = Agreement::rectified(views);
-    let mut balance = Balance::rectified(views, position).nearest(settings.nearest).with_noise(&agreement);
+    let agreement = Agreement::of(views);
+    let mut balance = Balance::of(views, &position).nearest(settings.nearest).with_noise(&agreement);
     let chosen = balance.views();
     let settings = &settings.suited_to(&agreement, &balance);
     if !settings.keep_exposure {
@@ -261,8 +259,8 @@ mod tests {
     fn views<'a>(parts: &'a [(Image, DepthMap)]) -> Vec<RectifiedView<'a>> {
         let view = |(i, (image, disparity)): (usize, &'a (Image, DepthMap))| RectifiedView {
             image,
-            disparity,
-            position: i as f64,
+            map: disparity,
+            camera: i as f64,
         };
         parts.iter().enumerate().map(view).collect()
     }
@@ -277,7 +275,7 @@ mod tests {
         let (mut samples, dropped) = propagate::rectified::<3>(&views(&parts), 0.4, &frame);
         let propagated = samples.len();
         let occluded = occlusion::remove(&mut samples, settings.depth_test());
-        Balance::rectified(&views(&parts), 0.4).apply(&mut samples, |view| &parts[view].0);
+        Balance::of(&views(&parts), &0.4).apply(&mut samples, |view| &parts[view].0);
         let (values, mask) = rows::interpolate(&samples, (40, 9), &settings.interpolation).unwrap();
         assert_eq!(got.image.data(), values);
         assert_eq!(got.mask, mask);
@@ -336,7 +334,7 @@ mod tests {
     fn wrong_input_is_named() {
         let (image, disparity) = scene(8, 8, 1);
         let small = Image::filled(7, 8, 1, 0.0);
-        let view = |image, position| RectifiedView { image, disparity: &disparity, position };
+        let view = |image, position| RectifiedView { image, map: &disparity, camera: position };
         let settings = RenderSettings::default();
         assert_eq!(render(&[], 0.0, &settings), Err(RenderError::NoViews));
         let sizes = render(&[view(&image, 0.0), view(&small, 1.0)], 0.5, &settings).unwrap_err();

@@ -173,7 +173,7 @@ struct RowSurvey {
 impl RowSurvey {
     fn new(view: &CalibratedView<'_>, index: u16, map: &Relative, y: usize, frame: &Frame) -> Self {
         let (mut survey, row) = (Self::default(), RowMap::new(map, y));
-        for (k, depths) in view.depth.row(y).chunks(TILE).enumerate() {
+        for (k, depths) in view.map.row(y).chunks(TILE).enumerate() {
             let column = k * TILE;
             let unknown = depths.iter().filter(|d| d.is_nan()).count();
             survey.unknown += unknown;
@@ -188,7 +188,7 @@ impl RowSurvey {
             if reach.meets(frame) {
                 let (row, column) = (y as u32, column as u32);
                 // Slopes are known as shares of depths, not of disparities with an offset.
-                let known = view.depth.offset() == 0.0;
+                let known = view.map.offset() == 0.0;
                 let spacing = if known { reach.spacing.min(LARGEST_SPACING) } else { LARGEST_SPACING };
                 survey.tiles.push(Tile { view: index, row, column, rows: reach.rows, spacing });
             }

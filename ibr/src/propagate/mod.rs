@@ -1,37 +1,15 @@
 //! Stage one, propagation: every pixel with depth becomes a sample in the virtual image (thesis 2.3.1).
 
 mod calibrated;
+mod view;
 
 pub(crate) use calibrated::Landed;
 pub use calibrated::{Survey, calibrated};
+pub use view::{CalibratedView, RectifiedView, View, Viewpoint};
 
-use crate::camera::Camera;
-use crate::depth::{DepthMap, Reliefs, TILE};
-use crate::image::Image;
+use crate::depth::{Reliefs, TILE};
 use crate::occlusion::{Extent, LARGEST_SPACING};
 use crate::sample::{Dropped, Sample};
-
-/// One view of a rectified rig: the camera centres lie on a line parallel to the image rows.
-#[derive(Debug, Clone, Copy)]
-pub struct RectifiedView<'a> {
-    /// Intensities.
-    pub image: &'a Image,
-    /// Disparities in pixels for a baseline of one, of the size of the image.
-    pub disparity: &'a DepthMap,
-    /// Position along the baseline, in units of the baseline.
-    pub position: f64,
-}
-
-/// One view of a general rig.
-#[derive(Debug, Clone, Copy)]
-pub struct CalibratedView<'a> {
-    /// Intensities.
-    pub image: &'a Image,
-    /// Depths in the scale of the camera, of the size of the image.
-    pub depth: &'a DepthMap,
-    /// The camera.
-    pub camera: Camera,
-}
 
 /// The part of the virtual image plane in which samples are kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,7 +74,7 @@ impl RigCamera {
     /// The camera at `position`, with the largest offset of the views' maps, under which the disparities of
     /// all views have one order of depth.
     pub fn new(views: &[RectifiedView<'_>], position: f64) -> Self {
-        let offsets = views.iter().map(|v| v.disparity.offset());
+        let offsets = views.iter().map(|v| v.map.offset());
         Self { position, disparity_offset: offsets.reduce(f64::max).unwrap_or(0.0) }
     }
 }
@@ -164,10 +142,10 @@ struct ShiftedTile {
 impl ShiftedTile {
     /// Computes the tile in loops over arrays; what belongs to unknown pixels is not used.
     fn new(view: &RectifiedView<'_>, start: (usize, usize), camera: &RigCamera, frame: &Frame) -> Self {
-        let shift = view.position - camera.position;
-        let reliefs = view.disparity.reliefs(start.0, start.1);
+        let shift = view.camera - camera.position;
+        let reliefs = view.map.reliefs(start.0, start.1);
         let (mut columns, mut depths) = ([0.0; TILE], [0.0; TILE]);
-        let known = &view.disparity.row(start.1)[start.0..];
+        let known = &view.map.row(start.1)[start.0..];
         let placed = columns.iter_mut().zip(&mut depths).zip(known);
         for (i, ((column, depth), disparity)) in placed.enumerate() {
             let disparity = f64::from(*disparity);
@@ -194,7 +172,7 @@ impl ShiftedTile {
         let (mut dropped, (start, y)) = (Dropped::default(), self.start);
         let first = y * view.image.width() + start;
         samples.reserve(TILE);
-        for (i, disparity) in view.disparity.row(y)[start..].iter().take(TILE).enumerate() {
+        for (i, disparity) in view.map.row(y)[start..].iter().take(TILE).enumerate() {
             let (x, pixel) = (self.columns[i], first + i);
             if disparity.is_nan() {
                 dropped.unknown += 1;
@@ -204,7 +182,7 @@ impl ShiftedTile {
                 dropped.outside += 1;
                 continue;
             }
-            let doubtful = self.reliefs.behind_edge[i] || view.disparity.is_guessed(pixel);
+            let doubtful = self.reliefs.behind_edge[i] || view.map.is_guessed(pixel);
             samples.push(Sample {
                 x,
                 y: y as f64,
@@ -241,7 +219,9 @@ pub fn rectified<const C: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::depth::Measure;
+    use crate::camera::Camera;
+    use crate::depth::{DepthMap, Measure};
+    use crate::image::Image;
     use nalgebra::Matrix3x4;
 
     fn ramp(width: usize, height: usize) -> Image {
@@ -254,7 +234,7 @@ mod tests {
         let data = vec![1.0, 1.0, 1.0, 1.0, 2.0, f32::NAN, 8.0, 4.0];
         let disparity = DepthMap::new((4, 2), data, 1.0, Measure::Disparity).unwrap();
         let frame = Frame::whole(4, 2, 1.0, 0.25);
-        let view = RectifiedView { image: &image, disparity: &disparity, position: 0.0 };
+        let view = RectifiedView { image: &image, map: &disparity, camera: 0.0 };
         let mut samples: Vec<Sample<1>> = Vec::new();
         let camera = RigCamera::new(&[view], 0.5);
         let dropped = rectified_row(&view, 3, 1, &camera, &frame, &mut samples);
@@ -281,8 +261,8 @@ mod tests {
             Camera::metric(m, false).unwrap()
         };
         let frame = Frame::whole(width, height, 0.5, 0.0);
-        let rig = RectifiedView { image: &image, disparity: &disparity, position: 1.0 };
-        let free = CalibratedView { image: &image, depth: &depth, camera: camera(1.0) };
+        let rig = RectifiedView { image: &image, map: &disparity, camera: 1.0 };
+        let free = CalibratedView { image: &image, map: &depth, camera: camera(1.0) };
         let (a, dropped_a) = rectified::<1>(&[rig], 0.4, &frame);
         let (b, dropped_b) = calibrated::<1>(&[free], &camera(0.4), &frame);
         assert_eq!(dropped_a, dropped_b);
@@ -301,7 +281,7 @@ mod tests {
             let m = Matrix3x4::new(1.0, 0.0, 1.0, -z, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, -z);
             Camera::metric(m, false).unwrap()
         };
-        let view = CalibratedView { image: &image, depth: &depth, camera: camera(0.0) };
+        let view = CalibratedView { image: &image, map: &depth, camera: camera(0.0) };
         let frame = Frame::whole(3, 1, 2.0, 0.0);
         let (samples, dropped) = calibrated::<1>(&[view], &camera(2.0), &frame);
         assert_eq!((samples.len(), dropped.behind, dropped.unknown), (1, 1, 1));

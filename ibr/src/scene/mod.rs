@@ -12,7 +12,7 @@ use crate::depth::{DepthError, DepthMap};
 use crate::files::InputError;
 use crate::image::{Image, ImageError};
 use crate::pipeline::uncalibrated::Target;
-use crate::propagate::{CalibratedView, RectifiedView};
+use crate::propagate::View;
 use crate::uncalibrated::Point;
 use std::path::PathBuf;
 
@@ -37,14 +37,14 @@ pub enum Kind {
     /// Cameras on a line parallel to the image rows.
     Rectified {
         /// The views.
-        views: Vec<RectifiedSource>,
+        views: Vec<SourceView<f64>>,
         /// Positions of the virtual views: one, or those of a path.
         positions: Vec<f64>,
     },
     /// Any calibrated cameras.
     Calibrated {
         /// The views.
-        views: Vec<CalibratedSource>,
+        views: Vec<SourceView<Camera>>,
         /// The virtual cameras: one, or those of a path.
         cameras: Vec<Camera>,
         /// Width and height of the virtual view.
@@ -83,39 +83,21 @@ impl Kind {
     }
 }
 
-/// A view of a rectified rig.
+/// A view, read: the camera is the position on the line of a rectified rig, or a matrix.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RectifiedSource {
+pub struct SourceView<P> {
     /// The image.
     pub image: Image,
-    /// Its disparity, dense.
-    pub disparity: DepthMap,
-    /// Position along the baseline.
-    pub position: f64,
-}
-
-impl RectifiedSource {
-    /// As the stages take it.
-    pub fn view(&self) -> RectifiedView<'_> {
-        RectifiedView { image: &self.image, disparity: &self.disparity, position: self.position }
-    }
-}
-
-/// A view of a general rig.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CalibratedSource {
-    /// The image.
-    pub image: Image,
-    /// Its depth, dense.
-    pub depth: DepthMap,
+    /// Its disparities or depths, dense.
+    pub map: DepthMap,
     /// Its camera.
-    pub camera: Camera,
+    pub camera: P,
 }
 
-impl CalibratedSource {
+impl<P: Copy> SourceView<P> {
     /// As the stages take it.
-    pub fn view(&self) -> CalibratedView<'_> {
-        CalibratedView { image: &self.image, depth: &self.depth, camera: self.camera }
+    pub fn view(&self) -> View<'_, P> {
+        View { image: &self.image, map: &self.map, camera: self.camera }
     }
 }
 

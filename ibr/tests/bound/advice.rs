@@ -2,7 +2,7 @@
 
 use super::*;
 use hybank_ibr::analysis::Advice;
-use hybank_ibr::analysis::RigPredictor;
+use hybank_ibr::analysis::Predictor;
 use hybank_ibr::pipeline::rectified;
 
 fn measured(rig: &Rig, which: &[usize], truth: &Image) -> f64 {
@@ -18,9 +18,9 @@ fn gains_are_found_again() {
     for (noise, step) in [(3.0, 0.25), (1.5, 1.0)] {
         let rig = degraded(&exact, noise, step);
         let views = rig.views(&[0, 1]);
-        let predictor = RigPredictor::new(&views, &RenderSettings::default()).unwrap();
-        let now = predictor.at(0.5, None).unwrap();
-        let advice = Advice::on_rig(&predictor, 0.5, &now).unwrap();
+        let predictor = Predictor::new(&views, &RenderSettings::default()).unwrap();
+        let now = predictor.at(&0.5, (), None).unwrap();
+        let advice = Advice::on(&predictor, &0.5, (), &now).unwrap();
         let (truth, before) = (&rig.images[2], now.totals().estimate);
         let view = advice.view.clone().unwrap();
         let third = rig.positions.iter().position(|p| *p == view.place[0]).unwrap();

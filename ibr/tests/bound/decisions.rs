@@ -27,7 +27,7 @@ fn the_price_of_errors_of_depth() {
 
 fn price_of_errors_in(name: &str, exact: &Rig) {
     let (views, settings) = (exact.views(&[0, 1]), RenderSettings::default());
-    let now = analysis::rectified(&views, 0.5, &settings).unwrap();
+    let now = Predictor::new(&views, &settings).unwrap().at(&0.5, (), None).unwrap();
     for deviation in [0.0, 0.5, 1.0, 2.0] {
         let mut random = Random(8);
         let mut error = || deviation * (2.0 * (random.part() + random.part() + random.part()) - 3.0) as f32;
@@ -100,7 +100,7 @@ fn the_split_of_bits_with_partial_depth() {
     let reference = {
         let maps = dense(None);
         let views: Vec<_> =
-            views.iter().zip(&maps).map(|(v, disparity)| RectifiedView { disparity, ..*v }).collect();
+            views.iter().zip(&maps).map(|(v, disparity)| RectifiedView { map: disparity, ..*v }).collect();
         rectified::render(&views, 0.5, &settings).unwrap().image
     };
     let cost = |depth: f64| {
@@ -110,8 +110,7 @@ fn the_split_of_bits_with_partial_depth() {
         images
             .iter_mut()
             .for_each(|i| i.data_mut().iter_mut().for_each(|v| *v = ((*v / grey).floor() + 0.5) * grey));
-        let view =
-            |k: usize| RectifiedView { image: &images[k], disparity: &maps[k], position: rig.positions[k] };
+        let view = |k: usize| RectifiedView { image: &images[k], map: &maps[k], camera: rig.positions[k] };
         mean_square(&rectified::render(&[view(0), view(1)], 0.5, &settings).unwrap().image, &reference)
     };
     let tried: Vec<(f64, f64)> = (4..=24).map(|i| f64::from(i) / 2.0).map(|r| (r, cost(r).ln())).collect();

@@ -13,7 +13,7 @@ mod random;
 mod scene;
 mod sure;
 
-use hybank_ibr::analysis::{self, ViewError};
+use hybank_ibr::analysis::{Predictor, ViewError};
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, read_image, read_map};
@@ -36,8 +36,8 @@ impl Rig {
     fn views(&self, which: &[usize]) -> Vec<RectifiedView<'_>> {
         let view = |i: &usize| RectifiedView {
             image: &self.images[*i],
-            disparity: &self.maps[*i],
-            position: self.positions[*i],
+            map: &self.maps[*i],
+            camera: self.positions[*i],
         };
         which.iter().map(view).collect()
     }
@@ -155,7 +155,7 @@ fn residual(views: &[RectifiedView<'_>], position: f64, image: &Image) -> Vec<f6
 fn predict(name: &str, rig: &Rig, which: &[usize], position: f64, truth: &Image, offset: f64) -> Verdict {
     let views = rig.views(which);
     let settings = RenderSettings { offset, ..RenderSettings::default() };
-    let predicted = analysis::rectified(&views, position, &settings).unwrap();
+    let predicted = Predictor::new(&views, &settings).unwrap().at(&position, (), None).unwrap();
     judge(name, &predicted, &views, position, truth)
 }
 
@@ -300,12 +300,13 @@ fn views_of_general_cameras() {
     let views: Vec<CalibratedView<'_>> = worn
         .iter()
         .zip(&eyes)
-        .map(|((image, depth), eye)| CalibratedView { image, depth, camera: eye.camera() })
+        .map(|((image, depth), eye)| CalibratedView { image, map: depth, camera: eye.camera() })
         .collect();
     let mut truth = scene::shoot(&target).0;
     truth.data_mut().iter_mut().for_each(|v| *v = (*v + 2.0 * bell() as f32).clamp(0.0, 255.0).round());
     let settings = RenderSettings::default();
-    let predicted = analysis::calibrated(&views, &target.camera(), scene::SIZE, &settings).unwrap();
+    let predicted =
+        Predictor::new(&views, &settings).unwrap().at(&target.camera(), scene::SIZE, None).unwrap();
     let image = &predicted.rendering.image;
     let measured = errors(image, &truth);
     let estimate: Vec<f64> = predicted.estimate.iter().map(|v| f64::from(*v)).collect();

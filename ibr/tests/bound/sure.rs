@@ -1,7 +1,7 @@
 //! The sure bound against the errors of random scenes whose second derivatives are known.
 
 use super::*;
-use hybank_ibr::analysis::{Limits, RigPredictor, survey};
+use hybank_ibr::analysis::{Limits, Predictor, survey};
 
 /// A board whose disparity is c + s X, with the texture level + height sin(rate X + phase). X is the column
 /// in the view at position 0.
@@ -79,7 +79,7 @@ fn trial(seed: u64, understated: f64) -> Vec<(f64, f64)> {
         disparity: if seed.is_multiple_of(2) { 0.0 } else { 0.3 * random.part() },
     };
     let shots = [0.0, 1.0].map(|position| shoot(&layers, position, &limits, random));
-    let view = |k: usize| RectifiedView { image: &shots[k].0, disparity: &shots[k].1, position: k as f64 };
+    let view = |k: usize| RectifiedView { image: &shots[k].0, map: &shots[k].1, camera: k as f64 };
     let settings = RenderSettings { keep_exposure: true, ..RenderSettings::default() };
     limits = Limits {
         curvature: limits.curvature * understated,
@@ -125,12 +125,12 @@ fn no_pixel_exceeds_its_sure_bound() {
 #[test]
 fn a_sure_bound_needs_limits() {
     let rig = degraded(&synthetic(&[0.0, 1.0, 0.5]), 0.0, 1e-3);
-    let predictor = RigPredictor::new(&rig.views(&[0, 1]), &RenderSettings::default()).unwrap();
-    let without = predictor.at(0.5, None).unwrap();
+    let predictor = Predictor::new(&rig.views(&[0, 1]), &RenderSettings::default()).unwrap();
+    let without = predictor.at(&0.5, (), None).unwrap();
     assert!(without.sure_bound.is_empty() && without.totals().sure_bound.is_none());
     assert!(without.within_sure_bound(&rig.images[2]).is_none());
     let limits = Limits { curvature: 60.0, intensity: 1.0, disparity: 0.01 };
-    let with = predictor.at(0.5, Some(&limits)).unwrap();
+    let with = predictor.at(&0.5, (), Some(&limits)).unwrap();
     assert_eq!(with.estimate, without.estimate);
     assert_eq!(with.within_sure_bound(&rig.images[2]), Some(1.0));
     assert!(with.rows().iter().all(|row| row.sure_bound.is_some()));

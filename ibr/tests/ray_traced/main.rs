@@ -28,7 +28,7 @@ fn shots(eyes: &[Eye]) -> Vec<Shot> {
 fn render(shots: &[Shot], target: &Eye, settings: &RenderSettings) -> Rendering {
     let views: Vec<CalibratedView<'_>> = shots
         .iter()
-        .map(|s| CalibratedView { image: &s.image, depth: &s.depth, camera: s.eye.camera() })
+        .map(|s| CalibratedView { image: &s.image, map: &s.depth, camera: s.eye.camera() })
         .collect();
     calibrated::render(&views, &target.camera(), SIZE, settings).unwrap()
 }
@@ -142,7 +142,7 @@ fn a_stretched_surface_is_bridged() {
     let disparities = (0..width * height).map(|i| 40.0 + (i % width) as f32).collect();
     let disparity = DepthMap::new((width, height), disparities, 1.0, Measure::Disparity).unwrap();
     let image = picture(1.0);
-    let view = RectifiedView { image: &image, disparity: &disparity, position: 1.0 };
+    let view = RectifiedView { image: &image, map: &disparity, camera: 1.0 };
     let linear = RenderSettings::default();
     for (method, settings, least) in
         [(Method::Rows, linear, 60.0), (Method::Plane, linear, 55.0), (Method::Plane, bicubic(), 56.2)]

@@ -48,7 +48,11 @@ pub(crate) fn render_rectified(
 ) -> PyResult<View> {
     let (views, settings) = (Views::new(&images, &maps, Measure::Disparity, fill)?, settings(method)?);
     let rendering = background::run(py, None, move |_| {
-        let view = |((image, disparity), &position): (_, &f64)| RectifiedView { image, disparity, position };
+        let view = |((image, disparity), &position): (_, &f64)| RectifiedView {
+            image,
+            map: disparity,
+            camera: position,
+        };
         let views: Vec<_> = views.both().zip(&positions).map(view).collect();
         rectified::render(&views, at, &settings)
     })?;
@@ -73,7 +77,7 @@ pub(crate) fn render_calibrated(
     let cameras = cameras.iter().map(metric).collect::<PyResult<Vec<_>>>()?;
     let camera = metric(&camera)?;
     let rendering = background::run(py, None, move |_| {
-        let view = |((image, depth), &camera): (_, &Camera)| CalibratedView { image, depth, camera };
+        let view = |((image, depth), &camera): (_, &Camera)| CalibratedView { image, map: depth, camera };
         let views: Vec<_> = views.both().zip(&cameras).map(view).collect();
         calibrated::render(&views, &camera, (size.1, size.0), &settings)
     })?;

@@ -42,8 +42,8 @@ pub struct Sensitivity {
 /// The settings with exposures as they are and with the smoothing that suits the views, so that renderings
 /// from changed views are comparable.
 fn settled(views: &[RectifiedView<'_>], position: f64, settings: &RenderSettings) -> RenderSettings {
-    let agreement = Agreement::rectified(views);
-    let balance = Balance::rectified(views, position).with_noise(&agreement);
+    let agreement = Agreement::of(views);
+    let balance = Balance::of(views, &position).with_noise(&agreement);
     RenderSettings { keep_exposure: true, ..settings.suited_to(&agreement, &balance) }
 }
 
@@ -65,7 +65,7 @@ pub fn sensitivity(
     };
     let maps = with_noise(views, DISPARITY, 3);
     let moved: Vec<_> =
-        views.iter().zip(&maps).map(|(v, disparity)| RectifiedView { disparity, ..*v }).collect();
+        views.iter().zip(&maps).map(|(v, disparity)| RectifiedView { map: disparity, ..*v }).collect();
     let random = &mut seeded(4);
     // A uniform error of this limit has the standard deviation GREY_LEVELS.
     let limit = GREY_LEVELS * 3.0_f64.sqrt();
@@ -120,8 +120,8 @@ impl RoundingCosts {
     ) -> Result<Self, RenderError> {
         let depths = |step: Option<f64>| {
             let of_view = |v: &RectifiedView<'_>| match step {
-                Some(step) => rounded_map(v.disparity, step),
-                None => v.disparity.clone(),
+                Some(step) => rounded_map(v.map, step),
+                None => v.map.clone(),
             };
             views.iter().map(of_view).collect()
         };
@@ -173,7 +173,7 @@ impl RoundingCosts {
 }
 
 fn with_maps<'a>(views: &[RectifiedView<'a>], maps: &'a [DepthMap]) -> Vec<RectifiedView<'a>> {
-    views.iter().zip(maps).map(|(v, disparity)| RectifiedView { disparity, ..*v }).collect()
+    views.iter().zip(maps).map(|(v, disparity)| RectifiedView { map: disparity, ..*v }).collect()
 }
 
 /// The mean square for any number of bits; its logarithm is linear between whole numbers and beyond them.

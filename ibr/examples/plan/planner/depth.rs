@@ -19,7 +19,7 @@ pub fn price_of_depth_errors(
     now: &ViewError,
     deviation: f64,
 ) -> Result<f64, RenderError> {
-    let jitter = depth_jitter(views, position, settings, &now.rendering.image, deviation)?;
+    let jitter = depth_jitter(views, &position, settings, &now.rendering.image, deviation)?;
     let pixels = now.estimate.iter().zip(&jitter);
     Ok(pixels.map(|(e, j)| f64::from(e.hypot(*j))).sum::<f64>() / jitter.len() as f64)
 }

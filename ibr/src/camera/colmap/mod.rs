@@ -84,11 +84,11 @@ fn join(
     folder: &Path,
 ) -> Result<CameraList, (usize, String)> {
     let mut frames = BTreeMap::new();
-    for (number, id, pose, name) in poses {
-        let inner = *inners.get(&id).ok_or_else(|| {
-            (number, format!("image {name:?} has camera {id}, which the cameras do not list"))
-        })?;
-        frames.insert(name.clone(), Frame { image: name.into(), depth: None, number, pose, inner });
+    for (k, (at, id, pose, name)) in poses.into_iter().enumerate() {
+        let inner = *inners
+            .get(&id)
+            .ok_or_else(|| (at, format!("image {name:?} has camera {id}, which the cameras do not list")))?;
+        frames.insert(name.clone(), Frame { image: name.into(), depth: None, number: k + 1, pose, inner });
     }
     Ok(CameraList { path: folder.into(), frames: frames.into_values().collect() })
 }

@@ -28,20 +28,12 @@ impl Outputs {
 
     /// Checks that need no file.
     pub(super) fn check(&self) -> Result<(), Failure> {
-        for (name, path) in [("map", &self.map), ("plot", &self.plot)] {
-            if path.as_ref().is_some_and(|path| output::is_standard(path)) {
-                return Err(Failure::Usage(format!(
-                    "--{name} -: the {name} cannot go to standard output; give it a file"
-                )));
-            }
-        }
+        let named = [("--map", &self.map), ("--plot", &self.plot)];
+        let named = named.iter().filter_map(|(option, path)| Some((*option, path.as_deref()?)));
+        output::check_names(&named.collect::<Vec<_>>())?;
         if let Some(plot) = self.plot.as_ref().filter(|plot| chart::Format::of(plot).is_none()) {
             let message = "a plot is written as .svg or .png";
             return Err(Failure::Usage(format!("--plot {}: {message}", plot.display())));
-        }
-        if let (Some(map), true) = (&self.map, self.map == self.plot) {
-            let message = "--map and --plot both name it; give the plot a file of its own";
-            return Err(Failure::Usage(format!("{}: {message}", map.display())));
         }
         self.map.as_ref().map_or(Ok(()), |map| output::refuse_format(map, Levels::Eight))
     }

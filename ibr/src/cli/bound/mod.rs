@@ -9,7 +9,7 @@ use super::arguments::BoundArguments;
 use super::failure::Failure;
 use super::inputs;
 use super::memory::{self, Work};
-use super::output::{self, Encoded};
+use super::output;
 use super::progress::Progress;
 use crate::analysis::{Limits, ViewError};
 use crate::image::Image;
@@ -17,7 +17,6 @@ use crate::partial::Densify;
 use crate::pipeline::RenderError;
 use crate::scene::{self, Kind, Scene};
 use files::Outputs;
-use hybank::files::AtomicFile;
 use predictor::Predictor;
 use report::{Frames, Summary};
 use std::path::Path;
@@ -41,7 +40,7 @@ pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
         let outputs = Outputs::of(arguments, (frames > 1).then_some(frame));
         let (encoded, white) = outputs.encoded(&predicted, truth.as_ref())?;
         summary.white = white;
-        written.extend(begun(&encoded, arguments.scene.force)?);
+        written.extend(output::begin(&encoded, arguments.scene.force)?);
         summaries.push(summary);
         let estimate = predicted.totals().estimate;
         if worst.as_ref().is_none_or(|(_, largest, _)| estimate > *largest) {
@@ -55,13 +54,6 @@ pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
     drop(progress);
     inputs::warn_of_contradictions(predictor.agreement(), &scene.kind);
     Frames { summaries, worst }.print(predictor.agreement(), arguments.scene.json)
-}
-
-/// Files that are written but not named yet, and closed: a long path has more than a process may have open.
-fn begun(encoded: &[Encoded<'_>], force: bool) -> Result<Vec<AtomicFile>, Failure> {
-    let mut files = output::begin(encoded, force)?;
-    files.iter_mut().try_for_each(AtomicFile::seal).map_err(Failure::input)?;
-    Ok(files)
 }
 
 /// Checks that need no file, and the limits for a sure bound.

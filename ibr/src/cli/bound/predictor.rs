@@ -1,15 +1,14 @@
 //! The prediction for either kind of scene.
 
-use crate::analysis::Advice;
-use crate::analysis::{CameraPredictor, Limits, RigPredictor, ViewError};
+use crate::analysis::{self, Advice, Limits, ViewError};
 use crate::camera::Camera;
 use crate::pipeline::{Agreement, RenderError, RenderSettings};
-use crate::scene::{CalibratedSource, Kind, RectifiedSource};
+use crate::scene::{Kind, SourceView};
 
 /// Calibrated weights, and the virtual views to predict.
 pub(super) enum Predictor<'a> {
-    Rig { predictor: RigPredictor<'a>, positions: &'a [f64], limits: Option<Limits> },
-    Cameras { predictor: CameraPredictor<'a>, cameras: &'a [Camera], size: (usize, usize) },
+    Rig { predictor: analysis::Predictor<'a, f64>, positions: &'a [f64], limits: Option<Limits> },
+    Cameras { predictor: analysis::Predictor<'a, Camera>, cameras: &'a [Camera], size: (usize, usize) },
 }
 
 impl<'a> Predictor<'a> {
@@ -20,12 +19,16 @@ impl<'a> Predictor<'a> {
     ) -> Result<Self, RenderError> {
         match kind {
             Kind::Rectified { views, positions } => {
-                let views: Vec<_> = views.iter().map(RectifiedSource::view).collect();
-                Ok(Self::Rig { predictor: RigPredictor::new(&views, settings)?, positions, limits })
+                let views: Vec<_> = views.iter().map(SourceView::view).collect();
+                Ok(Self::Rig { predictor: analysis::Predictor::new(&views, settings)?, positions, limits })
             }
             Kind::Calibrated { views, cameras, size } => {
-                let views: Vec<_> = views.iter().map(CalibratedSource::view).collect();
-                Ok(Self::Cameras { predictor: CameraPredictor::new(&views, settings)?, cameras, size: *size })
+                let views: Vec<_> = views.iter().map(SourceView::view).collect();
+                Ok(Self::Cameras {
+                    predictor: analysis::Predictor::new(&views, settings)?,
+                    cameras,
+                    size: *size,
+                })
             }
             Kind::Uncalibrated { .. } => Err(RenderError::NoViews),
         }
@@ -42,18 +45,18 @@ impl<'a> Predictor<'a> {
     /// The error of a virtual view.
     pub(super) fn at(&self, frame: usize) -> Result<ViewError, RenderError> {
         match self {
-            Self::Rig { predictor, positions, limits } => predictor.at(positions[frame], limits.as_ref()),
-            Self::Cameras { predictor, cameras, size } => predictor.at(&cameras[frame], *size),
+            Self::Rig { predictor, positions, limits } => {
+                predictor.at(&positions[frame], (), limits.as_ref())
+            }
+            Self::Cameras { predictor, cameras, size } => predictor.at(&cameras[frame], *size, None),
         }
     }
 
     /// What would make the error of a virtual view smaller.
     pub(super) fn advice(&self, frame: usize, now: &ViewError) -> Result<Advice, RenderError> {
         match self {
-            Self::Rig { predictor, positions, .. } => Advice::on_rig(predictor, positions[frame], now),
-            Self::Cameras { predictor, cameras, size } => {
-                Advice::on_cameras(predictor, &cameras[frame], *size, now)
-            }
+            Self::Rig { predictor, positions, .. } => Advice::on(predictor, &positions[frame], (), now),
+            Self::Cameras { predictor, cameras, size } => Advice::on(predictor, &cameras[frame], *size, now),
         }
     }
 }

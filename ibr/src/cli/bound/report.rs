@@ -160,20 +160,17 @@ pub(super) struct Frames {
 impl Frames {
     /// Prints one view, or a line for each of several and the worst of them.
     pub(super) fn print(&self, agreement: &Agreement, json: bool) -> Result<(), Failure> {
-        if json {
-            let text = match self.summaries.as_slice() {
-                [one] => serde_json::to_string(one),
-                _ => serde_json::to_string(self),
-            };
-            return output::print(&(text.map_err(Failure::input)? + "\n"));
+        match self.summaries.as_slice() {
+            [one] => output::report(json, one, || one.text(agreement), None),
+            _ => output::report(json, self, || self.text(agreement), None),
         }
-        let mut text = String::new();
-        if self.summaries.len() > 1 {
-            let line =
-                |(k, s): (usize, &Summary)| format!("view {:4}  estimate {:.2}\n", k + 1, s.totals.estimate);
-            text.extend(self.summaries.iter().enumerate().map(line));
-            text += &format!("The largest, view {}:\n", self.worst + 1);
-        }
-        output::print(&(text + &self.summaries[self.worst].text(agreement)))
+    }
+
+    fn text(&self, agreement: &Agreement) -> String {
+        let line =
+            |(k, s): (usize, &Summary)| format!("view {:4}  estimate {:.2}\n", k + 1, s.totals.estimate);
+        let mut text: String = self.summaries.iter().enumerate().map(line).collect();
+        text += &format!("The largest, view {}:\n", self.worst + 1);
+        text + &self.summaries[self.worst].text(agreement)
     }
 }

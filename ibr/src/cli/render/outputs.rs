@@ -4,7 +4,7 @@ use crate::cli::arguments::RenderArguments;
 use crate::cli::failure::Failure;
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded};
-use crate::image::{FrameRate, Image, Levels, encode_levels, encode_with_alpha, pfm, y4m};
+use crate::image::{Image, Levels, encode_levels, encode_with_alpha, pfm};
 use crate::interpolate::Cover;
 use crate::pipeline::Rendering;
 use std::path::{Path, PathBuf};
@@ -20,14 +20,13 @@ enum Part {
 }
 
 impl Part {
-    /// Its option.
-    fn name(self) -> &'static str {
+    fn option(self) -> &'static str {
         match self {
-            Self::View => "output",
-            Self::Mask => "mask",
-            Self::Depth => "depth",
-            Self::Count => "count",
-            Self::Error => "error",
+            Self::View => "-o",
+            Self::Mask => "--mask",
+            Self::Depth => "--depth",
+            Self::Count => "--count",
+            Self::Error => "--error",
         }
     }
 
@@ -44,9 +43,10 @@ impl Part {
         if allowed.iter().any(|ending| path.extension().is_some_and(|e| e == *ending)) {
             return Ok(());
         }
-        let (name, path) = (self.name(), path.display());
+        let (option, path) = (self.option(), path.display());
+        let name = option.trim_start_matches('-');
         let endings: Vec<String> = allowed.iter().map(|ending| format!(".{ending}")).collect();
-        Err(Failure::Usage(format!("--{name} {path}: {name} is written as {}", endings.join(" or "))))
+        Err(Failure::Usage(format!("{option} {path}: {name} is written as {}", endings.join(" or "))))
     }
 }
 
@@ -111,20 +111,10 @@ impl Outputs {
 
     /// Checks that need no file.
     pub(super) fn check(&self) -> Result<(), Failure> {
+        let named: Vec<(&str, &Path)> =
+            self.parts.iter().map(|(part, path)| (part.option(), path.as_path())).collect();
+        output::check_names(&named)?;
         let view = &self.parts[0].1;
-        for (part, path) in self.parts.iter().skip(1) {
-            let (name, shown) = (part.name(), path.display());
-            if output::is_standard(path) {
-                return Err(Failure::Usage(format!(
-                    "--{name} -: the {name} cannot go to standard output; give it a file"
-                )));
-            }
-            if path == view {
-                return Err(Failure::Usage(format!(
-                    "-o and --{name} both name {shown}; give the {name} a file of its own"
-                )));
-            }
-        }
         let png = output::is_standard(view) || view.extension().is_some_and(|ending| ending == "png");
         if self.alpha && !png {
             let view = view.display();
@@ -141,12 +131,11 @@ impl Outputs {
         &self,
         rendering: &Rendering,
         truth: Option<&Image>,
-        fps: FrameRate,
     ) -> Result<(Vec<Encoded<'_>>, Option<f32>), Failure> {
         let (mut all, mut white) = (Vec::new(), None);
         for (part, path) in &self.parts {
             all.push(match part {
-                Part::View => self.view(rendering, path, fps)?,
+                Part::View => self.view(rendering, path)?,
                 Part::Mask => output::encoded(&mask_image(rendering), path, Levels::Eight)?,
                 Part::Depth => numbers(rendering.depth.data().to_vec(), rendering.depth.size(), path),
                 Part::Count => counts(rendering, path)?,
@@ -161,18 +150,8 @@ impl Outputs {
         Ok((all, white))
     }
 
-    fn view<'a>(
-        &self,
-        rendering: &Rendering,
-        path: &'a Path,
-        fps: FrameRate,
-    ) -> Result<Encoded<'a>, Failure> {
+    fn view<'a>(&self, rendering: &Rendering, path: &'a Path) -> Result<Encoded<'a>, Failure> {
         let image = &rendering.image;
-        if is_film(path) {
-            let mut bytes = y4m::header(image.size(), image.channels(), fps);
-            y4m::append_frame(image, &mut bytes);
-            return Ok(Encoded { bytes, path });
-        }
         if self.alpha {
             let bytes = encode_with_alpha(image, &rendering.alpha(), path, self.levels);
             return Ok(Encoded { bytes: bytes.map_err(Failure::input)?, path });

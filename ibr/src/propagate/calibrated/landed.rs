@@ -47,17 +47,17 @@ impl Landed {
     ) {
         let (row, column) = (tile.row as usize, tile.column as usize);
         let first_pixel = row * view.image.width() + column;
-        let known = &view.depth.row(row)[column..];
+        let known = &view.map.row(row)[column..];
         let known = &known[..known.len().min(TILE)];
         let mut depths = [f32::NAN; TILE];
         depths[..known.len()].copy_from_slice(known);
         let count = known.len().next_multiple_of(RUN);
-        let reliefs = view.depth.reliefs(column, row);
+        let reliefs = view.map.reliefs(column, row);
         let mut places = Places::new(&RowMap::new(map, row), column, &depths, &reliefs, count);
         places.keep(frame, own, count);
         self.append(&places, count);
         let mut doubtful = reliefs.behind_edge;
-        for (doubtful, guessed) in doubtful.iter_mut().zip(view.depth.guessed_from(first_pixel)) {
+        for (doubtful, guessed) in doubtful.iter_mut().zip(view.map.guessed_from(first_pixel)) {
             *doubtful |= *guessed;
         }
         self.append_trust(&places, &reliefs, &doubtful, count);

@@ -33,7 +33,7 @@ fn scene() -> (Image, DepthMap) {
 fn bands_together_are_the_whole() {
     let (image, depth) = scene();
     let views = [camera([0.2, 0.0, 0.0], 0.05), camera([-0.3, 0.1, -0.2], -0.3)]
-        .map(|camera| CalibratedView { image: &image, depth: &depth, camera });
+        .map(|camera| CalibratedView { image: &image, map: &depth, camera });
     let target = camera([0.0, 0.0, 0.4], 0.0);
     let frame = Frame::whole(SIZE.0, SIZE.1, 0.5, 0.0);
     let (all, dropped) = calibrated::<1>(&views, &target, &frame);
@@ -55,7 +55,7 @@ fn the_spacing_of_a_tile_is_bounded() {
     let (image, depth) = scene();
     let target = camera([0.0, 0.1, 0.9], 0.2);
     let views = [camera([0.2, 0.0, 0.0], 0.05), camera([-0.3, 0.1, -0.2], -0.3), target]
-        .map(|camera| CalibratedView { image: &image, depth: &depth, camera });
+        .map(|camera| CalibratedView { image: &image, map: &depth, camera });
     let frame = Frame::whole(SIZE.0, SIZE.1, 20.0, 0.0);
     let survey = Survey::new(&views, &target, &frame);
     let (mut found, mut near) = (0, 0);
@@ -76,7 +76,7 @@ fn the_spacing_of_a_tile_is_bounded() {
 fn bands_hide_what_the_whole_hides() {
     let (image, depth) = scene();
     let views = [camera([0.2, 0.0, 0.0], 0.05), camera([-0.3, 0.1, -0.2], -0.3)]
-        .map(|camera| CalibratedView { image: &image, depth: &depth, camera });
+        .map(|camera| CalibratedView { image: &image, map: &depth, camera });
     for (forward, epsilon) in [(0.0, 0.7), (1.6, 0.7), (0.5, 3.0)] {
         let target = camera([0.0, 0.0, forward], 0.0);
         let frame = Frame::whole(SIZE.0, SIZE.1, 0.5, 0.0);
@@ -104,7 +104,7 @@ fn every_pixel_is_looked_at_about_once() {
     let (image, depth) = scene();
     let views = [camera([0.2, 0.0, 0.0], 0.0), camera([-0.2, 0.0, 0.0], 0.0)].map(|camera| CalibratedView {
         image: &image,
-        depth: &depth,
+        map: &depth,
         camera,
     });
     let frame = Frame::whole(SIZE.0, SIZE.1, 0.5, 0.0);
@@ -123,7 +123,7 @@ fn spacing_and_weight_follow_the_neighbours() {
     let data = (0..SIZE.0 * SIZE.1).map(plane).collect();
     let depth = DepthMap::new(SIZE, data, 1.0, Measure::Depth).unwrap();
     let (image, _) = scene();
-    let view = CalibratedView { image: &image, depth: &depth, camera: camera([0.1, 0.0, 0.0], 0.1) };
+    let view = CalibratedView { image: &image, map: &depth, camera: camera([0.1, 0.0, 0.0], 0.1) };
     let frame = Frame::whole(1000, 1000, 1000.0, 0.0);
     let (samples, _) = calibrated::<1>(&[view], &camera([0.0, 0.0, 1.9], 0.0), &frame);
     assert_eq!(samples.len(), SIZE.0 * SIZE.1);

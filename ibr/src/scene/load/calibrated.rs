@@ -7,7 +7,7 @@ use crate::camera::Camera;
 use crate::camera::ListedCamera;
 use crate::camera::resize::{Size, factors};
 use crate::depth::Measure;
-use crate::scene::{CalibratedSource, Kind, SceneError, ViewSpec};
+use crate::scene::{Kind, SceneError, SourceView, ViewSpec};
 use nalgebra::Matrix3x4;
 use rayon::prelude::*;
 
@@ -58,7 +58,7 @@ impl Loader<'_> {
     }
 
     /// A view, the number of its depths that were filled, and how its camera was resized.
-    fn source(&self, view: &ViewSpec) -> Loaded<(CalibratedSource, usize, Option<Resized>)> {
+    fn source(&self, view: &ViewSpec) -> Loaded<(SourceView<Camera>, usize, Option<Resized>)> {
         let others = [
             ("disparity", view.disparity.is_some()),
             ("disparity_scale", view.disparity_scale.is_some()),
@@ -69,7 +69,7 @@ impl Loader<'_> {
         let (image, depth, filled) =
             self.image_with_map(view, map, view.depth_scale.unwrap_or(1.0), Measure::Depth)?;
         let (camera, resized) = self.camera_of(view, image.size())?;
-        Ok((CalibratedSource { image, depth, camera }, filled, resized))
+        Ok((SourceView { image, map: depth, camera }, filled, resized))
     }
 
     /// The camera of the view that is left out, or of an image that the file of cameras lists, and the size

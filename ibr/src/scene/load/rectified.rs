@@ -3,7 +3,7 @@
 use super::{Goal, Inputs, Loaded, Loader, in_order};
 use crate::camera::middlebury::{Calibration, read_calibration};
 use crate::depth::Measure;
-use crate::scene::{Kind, RectifiedSource, ViewSpec};
+use crate::scene::{Kind, SourceView, ViewSpec};
 use rayon::prelude::*;
 
 impl Loader<'_> {
@@ -30,7 +30,7 @@ impl Loader<'_> {
             let map = self.need(view.disparity.as_deref(), view, "disparity", "rectified")?;
             let (image, disparity, filled) =
                 self.image_with_map(view, map, view.disparity_scale.unwrap_or(1.0), Measure::Disparity)?;
-            Ok((RectifiedSource { image, disparity, position }, filled))
+            Ok((SourceView { image, map: disparity, camera: position }, filled))
         };
         let sources = in_order(views.par_iter().map(one).collect())?;
         let first = sources[0].0.image.size();

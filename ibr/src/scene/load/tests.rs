@@ -45,11 +45,11 @@ fn a_rectified_rig_is_read() {
     let read_rig = read(RIG, &LoadOptions::default()).unwrap();
     let Kind::Rectified { views, positions } = read_rig.kind else { panic!("{read_rig:?}") };
     assert_eq!((views.len(), &positions[..], read_rig.filled), (2, &[0.5][..], 2));
-    assert_eq!((views[0].disparity.data()[3], views[1].disparity.data()[3]), (1.0, 4.0));
+    assert_eq!((views[0].map.data()[3], views[1].map.data()[3]), (1.0, 4.0));
     let without = LoadOptions { view: Some("right".into()), fill: false, ..LoadOptions::default() };
     let Kind::Rectified { views, positions } = read(RIG, &without).unwrap().kind else { panic!() };
     assert_eq!((views.len(), &positions[..]), (1, &[1.0][..]));
-    assert!(views[0].disparity.data()[3].is_nan());
+    assert!(views[0].map.data()[3].is_nan());
 }
 
 #[test]
@@ -87,10 +87,10 @@ fn paths_have_both_ends() {
 fn coarse_maps_are_made_dense() {
     let coarse = LoadOptions { depth_step: 2, ..LoadOptions::default() };
     let Kind::Rectified { views, .. } = read(RIG, &coarse).unwrap().kind else { panic!() };
-    assert_eq!(views[0].disparity.size(), (4, 2));
+    assert_eq!(views[0].map.size(), (4, 2));
     let text = RIG.replace("disparity = \"d.pgm\"", "disparity = \"small.pgm\"\nstep = 2");
     let Kind::Rectified { views, .. } = read(&text, &LoadOptions::default()).unwrap().kind else { panic!() };
-    assert_eq!(views[1].disparity.data()[0], 1.0);
+    assert_eq!(views[1].map.data()[0], 1.0);
 }
 
 #[test]
@@ -137,7 +137,7 @@ fn cameras_and_sizes() {
     let Kind::Calibrated { views, size, .. } = read(&text, &LoadOptions::default()).unwrap().kind else {
         panic!()
     };
-    assert_eq!((views[0].depth.data()[0], size), (4.0, (6, 3)));
+    assert_eq!((views[0].map.data()[0], size), (4.0, (6, 3)));
     let singular = text.replace("[0.0, 0.0, 1.0, 0.0]", "[0.0, 0.0, 0.0, 1.0]");
     let message = read(&singular, &LoadOptions::default()).unwrap_err();
     assert!(message.contains("view \"a.pgm\"") && message.contains("singular"), "{message}");

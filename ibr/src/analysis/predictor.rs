@@ -1,0 +1,149 @@
+//! The error of any number of views, with weights that are calibrated once.
+
+use super::estimate::{Calibration, Examined, Known, ViewError, calibrate, equalised, judge};
+use super::jitter::{difference, local_mean, map_noise};
+use super::sure::Limits;
+use super::variogram::Variogram;
+use crate::depth::DepthMap;
+use crate::image::Image;
+use crate::pipeline::{Agreement, RenderError, RenderSettings, Rendering};
+use crate::propagate::{View, Viewpoint};
+
+/// What differs between the predictions for rectified rigs and for general cameras.
+pub trait Predicted: Viewpoint {
+    /// The size of a virtual view, where it is not that of the photographs.
+    type Size: Copy;
+
+    /// The size of a virtual view like this image.
+    fn size_of(image: &Image) -> Self::Size;
+
+    /// The view of this camera.
+    fn render(
+        &self,
+        views: &[View<'_, Self>],
+        size: Self::Size,
+        settings: &RenderSettings,
+    ) -> Result<Rendering, RenderError>;
+
+    /// The view of this camera with the regressors of its pixels.
+    fn examine(
+        &self,
+        views: &[View<'_, Self>],
+        size: Self::Size,
+        study: &Study<'_>,
+    ) -> Result<Examined, RenderError>;
+
+    /// Mean distance between neighbouring views; of views at one point that from this camera, or one.
+    fn spacing(&self, views: &[View<'_, Self>]) -> f64;
+
+    /// Cameras that might help this one, with their coordinates.
+    fn further(&self, views: &[View<'_, Self>]) -> Vec<(Vec<f64>, Self)>;
+}
+
+/// What a rendering is examined with.
+pub struct Study<'a> {
+    pub(super) settings: &'a RenderSettings,
+    pub(super) known: &'a Known,
+    /// Distance between neighbouring views.
+    pub(super) spacing: f64,
+    /// Whether the local limit is wanted too.
+    pub(super) bounds: bool,
+    /// For the sure bound.
+    pub(super) limits: Option<&'a Limits>,
+}
+
+/// Views with the weights that are calibrated on them, for any number of predictions.
+pub struct Predictor<'a, P> {
+    /// Photographs with one exposure.
+    images: Vec<Image>,
+    maps: Vec<(&'a DepthMap, P)>,
+    settings: RenderSettings,
+    known: Known,
+    calibration: Calibration,
+    agreement: Agreement,
+}
+
+impl<'a, P: Predicted> Predictor<'a, P> {
+    /// Leaves each view out in turn and calibrates.
+    ///
+    /// # Errors
+    /// Those of [`crate::pipeline`].
+    pub fn new(views: &[View<'a, P>], settings: &RenderSettings) -> Result<Self, RenderError> {
+        let agreement = Agreement::of(views);
+        let gains = if settings.keep_exposure { &[][..] } else { &agreement.gains };
+        let images = equalised(views.iter().map(|v| v.image), gains);
+        let maps: Vec<_> = views.iter().map(|v| (v.map, v.camera)).collect();
+        let views = joined(&images, &maps);
+        let settings = RenderSettings { keep_exposure: true, ..*settings };
+        let known = Known { variogram: Variogram::of(images.iter()), noise: map_noise(&views) };
+        // A registration offset belongs to the virtual view only.
+        let unmoved = RenderSettings { offset: 0.0, ..settings };
+        let calibration = calibrate(&views, &known, |others, truth| {
+            let spacing = truth.camera.spacing(&views);
+            let study = Study { settings: &unmoved, known: &known, spacing, bounds: false, limits: None };
+            let examined = truth.camera.examine(others, P::size_of(truth.image), &study)?;
+            let errors = difference(&examined.rendering.image.quantised(), truth.image);
+            Ok((examined.regressors, errors))
+        })?;
+        Ok(Self { images, maps, settings, known, calibration, agreement })
+    }
+
+    /// How well the views agree, as they were given.
+    pub fn agreement(&self) -> &Agreement {
+        &self.agreement
+    }
+
+    /// The views, with one exposure.
+    pub fn views(&self) -> Vec<View<'_, P>> {
+        joined(&self.images, &self.maps)
+    }
+
+    fn study(&self, camera: &P) -> Study<'_> {
+        let spacing = camera.spacing(&self.views());
+        Study { settings: &self.settings, known: &self.known, spacing, bounds: false, limits: None }
+    }
+
+    /// The error of the view of `camera`; with limits also its sure bound, of rectified rigs.
+    ///
+    /// # Errors
+    /// Those of [`crate::pipeline`].
+    pub fn at(&self, camera: &P, size: P::Size, limits: Option<&Limits>) -> Result<ViewError, RenderError> {
+        let study = Study { bounds: true, limits, ..self.study(camera) };
+        Ok(judge(camera.examine(&self.views(), size, &study)?, self.calibration))
+    }
+
+    /// The view of `camera`, as it is rendered from the views.
+    pub(super) fn render(&self, camera: &P, size: P::Size) -> Result<Rendering, RenderError> {
+        camera.render(&self.views(), size, &RenderSettings { offset: 0.0, ..self.settings })
+    }
+
+    /// The local mean of the change of a rendered view if its maps were `changed`, in grey levels.
+    pub(super) fn change(
+        &self,
+        camera: &P,
+        rendered: &Image,
+        changed: impl Fn(&DepthMap) -> DepthMap,
+    ) -> Result<Vec<f32>, RenderError> {
+        let maps: Vec<DepthMap> = self.maps.iter().map(|(map, _)| changed(map)).collect();
+        let views: Vec<_> = self.views().into_iter().zip(&maps).map(|(v, map)| View { map, ..v }).collect();
+        let image = camera.render(&views, P::size_of(rendered), &self.settings)?.image;
+        Ok(local_mean(&difference(&image, rendered), image.size()))
+    }
+
+    /// The mean estimate of the view of `camera` if `another` view were there too, with the weights as they
+    /// are.
+    pub(super) fn with_view(
+        &self,
+        camera: &P,
+        size: P::Size,
+        another: &View<'_, P>,
+    ) -> Result<f64, RenderError> {
+        let views = [self.views(), vec![*another]].concat();
+        let examined = camera.examine(&views, size, &self.study(camera))?;
+        Ok(self.calibration.mean(&examined.regressors))
+    }
+}
+
+fn joined<'a, P: Copy>(images: &'a [Image], maps: &[(&'a DepthMap, P)]) -> Vec<View<'a, P>> {
+    images.iter().zip(maps).map(|(image, &(map, camera))| View { image, map, camera }).collect()
+}
