@@ -124,7 +124,7 @@ fn depth_and_sixteen_bits_are_written() {
     for (name, value, words) in [
         ("--depth", "d.png", "depth is written as .pfm"),
         ("--depth", "-", "cannot go to standard output"),
-        ("--bits", "12", "give 8 or 16"),
+        ("--bits", "12", "possible values: 8, 16"),
     ] {
         let refused = run(dir.path(), &["render", "scene.toml", "-o", "x.png", name, value]);
         assert_eq!(code(&refused), 2);
