@@ -105,8 +105,9 @@ impl<const ORDER: usize> BSpline<ORDER> {
         raise::<ORDER, 1>(&[t], ORDER).map(|[w]| w)
     }
 
-    /// [`Self::weights_and_slopes`] at N positions at once, with the positions innermost. They are independent of each other,
-    /// so the processor need not wait for each step of the recursion. The bits are those of single calls.
+    /// [`Self::weights_and_slopes`] at N positions at once, with the positions innermost. They are
+    /// independent of each other, so the processor need not wait for each step of the recursion. The bits
+    /// are those of single calls.
     // Not inlined, the arrays would pass through memory, which takes half of a fit's time.
     #[inline(always)]
     pub fn weights_and_slopes_of<const N: usize>(

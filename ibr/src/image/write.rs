@@ -25,8 +25,8 @@ pub enum Levels {
 /// Values are rounded half up, to more than 256 levels in PNG only; .pfm keeps floats with white = 1.
 ///
 /// # Errors
-/// [`ImageError::UnknownFormat`] for another extension, [`ImageError::Levels`] for 16 bits in another format,
-/// [`ImageError::Write`] if the encoder fails.
+/// [`ImageError::UnknownFormat`] for another extension, [`ImageError::Levels`] for 16 bits in another
+/// format, [`ImageError::Write`] if the encoder fails.
 pub fn encode(image: &Image, path: &Path, levels: Levels) -> Result<Vec<u8>, ImageError> {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let format = match ending.as_str() {

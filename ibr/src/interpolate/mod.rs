@@ -38,8 +38,8 @@ pub struct FitSettings {
     /// samples.
     pub tau: f64,
     /// s0, the relative standard deviation of the depth at which the smoothing is halved: the weight of the
-    /// slope at a sample is lambda V, V = 1 / (1 + var(depth / mean depth) / s0^2) over its neighbourhood. It
-    /// is 1 on flat depth and 0 across an edge, which lets the image be steep there (thesis eq. 2.5).
+    /// slope at a sample is lambda V, V = 1 / (1 + var(depth / mean depth) / s0^2) over its neighbourhood.
+    /// V is 1 on flat depth and 0 across an edge, which lets the image be steep there (thesis eq. 2.5).
     pub variation: f64,
 }
 

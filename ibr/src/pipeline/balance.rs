@@ -163,8 +163,8 @@ impl Balance {
     /// Weights of least variance are inverse variances ([`Measured::variance`]): that of the difference
     /// between the view and the virtual one, v / w_i with v the variance of the differences between views.
     /// Noise of the photograph adds to it, and so do errors of the depths. They displace a sample by its
-    /// disparity_gain b times the error delta_i, which is a value error of the slope f' of the photograph there times
-    /// the displacement:
+    /// disparity gain b times the error delta_i, which is a value error of the slope f' of the photograph
+    /// there times the displacement:
     ///
     /// ```text
     /// v / w_i + (sigma_i^2 - sigma_min^2) + f'^2 (1 / 12 + b^2 delta_i^2)
@@ -172,8 +172,8 @@ impl Balance {
     ///
     /// with the variance 1 / 12 of a position within a pixel. Noise that all views have is left out: it is
     /// also in the photographs that a view is compared with. The last term belongs to single samples, and of
-    /// it only the ratio between views counts, so that slopes are not smoothed more. DisparityGains are those of a
-    /// typical pixel of the view.
+    /// it only the ratio between views counts, so that slopes are not smoothed more. Disparity gains are those
+    /// of a typical pixel of the view.
     pub fn with_noise(mut self, agreement: &Agreement) -> Self {
         let Some(variance) = agreement.variance() else { return self };
         let variance = variance.max(LEAST_VARIANCE);

@@ -35,8 +35,8 @@ impl Subsets {
     }
 }
 
-/// RANSAC: the largest set of `total` things that agrees with the model of some K of them; `agreeing` returns
-/// the set of a sample, `None` if it has no model.
+/// RANSAC: the largest set of `total` things that agrees with the model of some K of them; `agreeing`
+/// returns the set of a sample, `None` if it has no model.
 pub(super) fn consensus<const K: usize>(
     total: usize,
     settings: &RobustSettings,
