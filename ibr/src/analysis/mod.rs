@@ -24,11 +24,11 @@
 //! assumed (`lookup.rs`).
 //!
 //! The other two are sums over causes. The size of each cause is computed ([`survey()`]): the bias of the
-//! fit, by fitting the fit once more; the views that share in a pixel; the slope; the change under errors of
-//! depth as large as the maps' disagreement; depth edges nearby; doubtful depths; holes, by the variogram of
-//! the photographs. The weights of the causes are calibrated on the inputs themselves: each view is left out
-//! in turn and rendered from the others, and its photograph is the truth. A single view cannot be left out;
-//! it takes the weights of typical photographs.
+//! fit, by fitting the fit once more; the views that share in a pixel; the slope; the change under errors
+//! of depth as large as the maps' disagreement; depth edges nearby; doubtful depths; holes, by the
+//! variogram of the photographs. The weights of the causes are calibrated on the inputs themselves: each
+//! view is left out in turn and rendered from the others, and its photograph is the truth. A single view
+//! cannot be left out; it takes the weights of typical photographs.
 
 mod advice;
 mod calibrate;

@@ -172,8 +172,8 @@ impl Balance {
     ///
     /// with the variance 1 / 12 of a position within a pixel. Noise that all views have is left out: it is
     /// also in the photographs that a view is compared with. The last term belongs to single samples, and of
-    /// it only the ratio between views counts, so that slopes are not smoothed more. Disparity gains are those
-    /// of a typical pixel of the view.
+    /// it only the ratio between views counts, so that slopes are not smoothed more. Disparity gains are
+    /// those of a typical pixel of the view.
     pub fn with_noise(mut self, agreement: &Agreement) -> Self {
         let Some(variance) = agreement.variance() else { return self };
         let variance = variance.max(LEAST_VARIANCE);
