@@ -1,6 +1,7 @@
 //! What to spend on next: by how much the estimate of a view falls if one thing gets better.
 
-use super::predictor::{Predicted, Predictor};
+use super::estimate::Predicted;
+use super::predictor::Predictor;
 use super::random::{bounded_normal, seeded};
 use crate::analysis::{Cause, ViewError};
 use crate::depth::{DepthMap, fill_unknown};

@@ -2,11 +2,12 @@
 
 use super::Cause;
 use super::calibrate::LeastSquares;
-use super::jitter::difference;
-use super::regressors::{CAUSE_OF, REGRESSORS, Regressors};
+use super::regressors::{CAUSE_OF, REGRESSORS, Regressors, difference};
+use super::sure::Limits;
 use super::variogram::Variogram;
 use crate::image::Image;
-use crate::pipeline::{RenderError, Rendering};
+use crate::pipeline::{RenderError, RenderSettings, Rendering};
+use crate::propagate::{View, Viewpoint};
 use std::ops::Range;
 
 /// Weights of the mean absolute error for photographs, from "Cones": bias, noise, slope, jitter, edge,
@@ -137,6 +138,49 @@ pub(super) struct Known {
     pub(super) variogram: Variogram,
     /// Standard deviation of the errors of disparity, or of the relative errors of depth.
     pub(super) noise: f64,
+}
+
+/// What differs between the predictions for rectified rigs and for general cameras.
+pub trait Predicted: Viewpoint {
+    /// The size of a virtual view, where it is not that of the photographs.
+    type Size: Copy;
+
+    /// The size of a virtual view like this image.
+    fn size_of(image: &Image) -> Self::Size;
+
+    /// The view of this camera.
+    fn render(
+        &self,
+        views: &[View<'_, Self>],
+        size: Self::Size,
+        settings: &RenderSettings,
+    ) -> Result<Rendering, RenderError>;
+
+    /// The view of this camera with the regressors of its pixels.
+    fn examine(
+        &self,
+        views: &[View<'_, Self>],
+        size: Self::Size,
+        study: &Study<'_>,
+    ) -> Result<Examined, RenderError>;
+
+    /// Mean distance between neighbouring views; of views at one point that from this camera, or one.
+    fn spacing(&self, views: &[View<'_, Self>]) -> f64;
+
+    /// Cameras that might help this one, with their coordinates.
+    fn further(&self, views: &[View<'_, Self>]) -> Vec<(Vec<f64>, Self)>;
+}
+
+/// What a rendering is examined with.
+pub struct Study<'a> {
+    pub(super) settings: &'a RenderSettings,
+    pub(super) known: &'a Known,
+    /// Distance between neighbouring views.
+    pub(super) spacing: f64,
+    /// Whether the local limit is wanted too.
+    pub(super) bounds: bool,
+    /// For the sure bound.
+    pub(super) limits: Option<&'a Limits>,
 }
 
 /// Photographs with one exposure.

@@ -1,10 +1,9 @@
 //! The error of a view of general cameras, from its rendering by the plane fit: the same causes as for
 //! rectified rigs, their sizes taken from the rendered view, its depths and its sample counts.
 
-use super::estimate::Examined;
+use super::estimate::{Examined, Predicted, Study};
 use super::jitter::depth_jitter;
 use super::lookup::local_limits;
-use super::predictor::{Predicted, Study};
 use super::regressors::{hole_distances, slopes};
 use crate::camera::Camera;
 use crate::depth::DepthMap;

@@ -1,7 +1,8 @@
 //! What errors of depth change in a view: it is rendered once more from depths with such errors.
 
-use super::predictor::Predicted;
+use super::estimate::Predicted;
 use super::random::{bounded_normal, seeded};
+use super::regressors::{difference, local_mean};
 use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::pipeline::depth_errors::Lookups;
@@ -13,9 +14,6 @@ const LEAST_DISPARITY: f64 = 0.02;
 
 /// Errors of depth below this share change nothing that can be seen.
 const LEAST_SHARE: f64 = 1e-4;
-
-/// Half the side of the window over which the change is averaged, in pixels.
-const WINDOW: usize = 2;
 
 /// Standard deviation of independent errors of the maps, from the maps alone: pixels of disparity for a
 /// baseline of one, or shares of the depth. Points of one map are looked up in that of the nearest view
@@ -65,27 +63,4 @@ pub fn depth_jitter<P: Predicted>(
     let noisy: Vec<_> = views.iter().zip(&maps).map(|(v, map)| View { map, ..*v }).collect();
     let changed = camera.render(&noisy, P::size_of(view), settings)?.image;
     Ok(local_mean(&difference(&changed, view), view.size()))
-}
-
-/// |a - b| of each pixel, mean over the channels; of the brightness, if only one image has colours.
-pub(super) fn difference(a: &Image, b: &Image) -> Vec<f32> {
-    if a.channels() != b.channels() {
-        return difference(&a.to_grey(), &b.to_grey());
-    }
-    let channels = a.channels();
-    let pairs = a.data().chunks_exact(channels).zip(b.data().chunks_exact(channels));
-    pairs.map(|(p, q)| p.iter().zip(q).map(|(p, q)| (p - q).abs()).sum::<f32>() / channels as f32).collect()
-}
-
-/// Means over windows of 5 x 5 pixels, smaller at the border.
-pub(super) fn local_mean(values: &[f32], (width, height): (usize, usize)) -> Vec<f32> {
-    let range = |at: usize, side: usize| at.saturating_sub(WINDOW)..(at + WINDOW + 1).min(side);
-    let mean = |p: usize| {
-        let (columns, rows) = (range(p % width, width), range(p / width, height));
-        let count = (columns.len() * rows.len()) as f32;
-        rows.map(|y| values[y * width + columns.start..y * width + columns.end].iter().sum::<f32>())
-            .sum::<f32>()
-            / count
-    };
-    (0..width * height).map(mean).collect()
 }

@@ -45,10 +45,10 @@ mod sure;
 mod variogram;
 
 pub use advice::{Advice, AnotherView};
-pub use estimate::{Calibration, Totals, ViewError};
+pub use estimate::{Calibration, Predicted, Totals, ViewError};
 pub use evidence::{Evidence, Survey, survey};
 pub use jitter::{depth_jitter, map_noise, with_noise};
-pub use predictor::{Predicted, Predictor};
+pub use predictor::Predictor;
 pub use sure::Limits;
 
 /// What an error comes from.

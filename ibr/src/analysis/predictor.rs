@@ -1,56 +1,14 @@
 //! The error of any number of views, with weights that are calibrated once.
 
-use super::estimate::{Calibration, Examined, Known, ViewError, calibrate, equalised, judge};
-use super::jitter::{difference, local_mean, map_noise};
+use super::estimate::{Calibration, Known, Predicted, Study, ViewError, calibrate, equalised, judge};
+use super::jitter::map_noise;
+use super::regressors::{difference, local_mean};
 use super::sure::Limits;
 use super::variogram::Variogram;
 use crate::depth::DepthMap;
 use crate::image::Image;
 use crate::pipeline::{Agreement, RenderError, RenderSettings, Rendering};
-use crate::propagate::{View, Viewpoint};
-
-/// What differs between the predictions for rectified rigs and for general cameras.
-pub trait Predicted: Viewpoint {
-    /// The size of a virtual view, where it is not that of the photographs.
-    type Size: Copy;
-
-    /// The size of a virtual view like this image.
-    fn size_of(image: &Image) -> Self::Size;
-
-    /// The view of this camera.
-    fn render(
-        &self,
-        views: &[View<'_, Self>],
-        size: Self::Size,
-        settings: &RenderSettings,
-    ) -> Result<Rendering, RenderError>;
-
-    /// The view of this camera with the regressors of its pixels.
-    fn examine(
-        &self,
-        views: &[View<'_, Self>],
-        size: Self::Size,
-        study: &Study<'_>,
-    ) -> Result<Examined, RenderError>;
-
-    /// Mean distance between neighbouring views; of views at one point that from this camera, or one.
-    fn spacing(&self, views: &[View<'_, Self>]) -> f64;
-
-    /// Cameras that might help this one, with their coordinates.
-    fn further(&self, views: &[View<'_, Self>]) -> Vec<(Vec<f64>, Self)>;
-}
-
-/// What a rendering is examined with.
-pub struct Study<'a> {
-    pub(super) settings: &'a RenderSettings,
-    pub(super) known: &'a Known,
-    /// Distance between neighbouring views.
-    pub(super) spacing: f64,
-    /// Whether the local limit is wanted too.
-    pub(super) bounds: bool,
-    /// For the sure bound.
-    pub(super) limits: Option<&'a Limits>,
-}
+use crate::propagate::View;
 
 /// Views with the weights that are calibrated on them, for any number of predictions.
 pub struct Predictor<'a, P> {

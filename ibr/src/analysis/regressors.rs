@@ -91,3 +91,29 @@ pub(super) fn hole_distances(mask: &[Cover], width: usize) -> Vec<usize> {
     }
     distances
 }
+
+/// Half the side of the window over which the change is averaged, in pixels.
+const WINDOW: usize = 2;
+
+/// |a - b| of each pixel, mean over the channels; of the brightness, if only one image has colours.
+pub(super) fn difference(a: &Image, b: &Image) -> Vec<f32> {
+    if a.channels() != b.channels() {
+        return difference(&a.to_grey(), &b.to_grey());
+    }
+    let channels = a.channels();
+    let pairs = a.data().chunks_exact(channels).zip(b.data().chunks_exact(channels));
+    pairs.map(|(p, q)| p.iter().zip(q).map(|(p, q)| (p - q).abs()).sum::<f32>() / channels as f32).collect()
+}
+
+/// Means over windows of 5 x 5 pixels, smaller at the border.
+pub(super) fn local_mean(values: &[f32], (width, height): (usize, usize)) -> Vec<f32> {
+    let range = |at: usize, side: usize| at.saturating_sub(WINDOW)..(at + WINDOW + 1).min(side);
+    let mean = |p: usize| {
+        let (columns, rows) = (range(p % width, width), range(p / width, height));
+        let count = (columns.len() * rows.len()) as f32;
+        rows.map(|y| values[y * width + columns.start..y * width + columns.end].iter().sum::<f32>())
+            .sum::<f32>()
+            / count
+    };
+    (0..width * height).map(mean).collect()
+}

@@ -1,9 +1,8 @@
 //! The error of a view of a rectified rig, rendered by rows.
 
-use super::estimate::Examined;
+use super::estimate::{Examined, Predicted, Study};
 use super::evidence::{Evidence, survey};
 use super::jitter::depth_jitter;
-use super::predictor::{Predicted, Study};
 use super::regressors::regressors;
 use crate::image::Image;
 use crate::pipeline::{RenderError, RenderSettings, Rendering, rectified as pipeline};

@@ -1,7 +1,20 @@
 //! Conversion from and to the types of the `image` crate.
 
-use super::{Image, ImageError, Levels};
+use super::{Image, ImageError};
 use ::image::{DynamicImage, ImageBuffer};
+
+/// Bits per value of a PNG file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+pub enum Levels {
+    /// 256 levels.
+    #[default]
+    #[cfg_attr(feature = "cli", value(name = "8"))]
+    Eight,
+    /// 65536 levels: white is 65535.
+    #[cfg_attr(feature = "cli", value(name = "16"))]
+    Sixteen,
+}
 
 /// An image with 8 bits per value: RGB, or grey.
 impl From<&Image> for DynamicImage {

@@ -11,11 +11,12 @@ mod texture;
 mod write;
 pub mod y4m;
 
+pub use dynamic::Levels;
 pub use frame_rate::FrameRate;
 pub(crate) use read::unavailable_memory;
 pub use read::{MOST_PIXELS, read_image, read_image_within, read_map, read_map_within};
 pub use texture::Texture;
-pub use write::{Levels, begin, encode, encode_levels, encode_with_alpha, save};
+pub use write::{begin, encode, encode_levels, encode_with_alpha, save};
 
 use crate::files::InputError;
 use std::path::PathBuf;

@@ -1,24 +1,11 @@
 //! Encoding images in the format of the file extension.
 
-use super::dynamic::picture;
+use super::dynamic::{Levels, picture};
 use super::{Image, ImageError, pfm};
 use hybank::files::AtomicFile;
 use image::{DynamicImage, ImageBuffer, ImageFormat};
 use std::io::{Cursor, Write};
 use std::path::Path;
-
-/// Bits per value of a PNG file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-pub enum Levels {
-    /// 256 levels.
-    #[default]
-    #[cfg_attr(feature = "cli", value(name = "8"))]
-    Eight,
-    /// 65536 levels: white is 65535.
-    #[cfg_attr(feature = "cli", value(name = "16"))]
-    Sixteen,
-}
 
 /// The bytes of a file in the format of the extension of `path`.
 ///
