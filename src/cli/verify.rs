@@ -18,8 +18,7 @@ use std::path::PathBuf;
 /// altered coefficient, gamma or matrix is refused: its digest does not match, or the proof fails. A bank
 /// without a proof is refused at once; --search looks for one.
 ///
-/// The state equations of the front ends, as realised in double precision from the spec, are assumed to be
-/// correct.
+/// The front ends are the filters as the spec writes them: their roots and state equations are enclosed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:

@@ -53,5 +53,5 @@ use crate::verify::Verified;
 /// # Errors
 /// As [`analyze`]; [`DesignError::NotCertified`] if no certificate was found.
 pub fn prove(bank: &Bank) -> Result<(Proof, Verified), DesignError> {
-    prove::prove(bank, &methods::DualSolution::default())
+    prove::prove(bank, &bank.gamma, &methods::DualSolution::default())
 }

@@ -12,7 +12,9 @@ use super::{
     statements, upper,
 };
 use crate::arithmetic::{BigFloat, DoubleDouble};
-use crate::bank::{Bank, CausalWitness, Certificate, DualWitness, LowerProof, Proof, SynthesisFilters};
+use crate::bank::{
+    Bank, CausalWitness, Certificate, DualWitness, Gamma, LowerProof, Proof, SynthesisFilters,
+};
 use crate::linalg::Mat;
 use std::sync::OnceLock;
 
@@ -236,14 +238,18 @@ impl<'a> EnclosedErrorSystem<'a> {
         gram.re.zip_map(&gram.im, |re, im| crate::linalg::Complex::new(re.nearest(), im.nearest()))
     }
 
-    /// Computes the bounds that the witnesses of `proof` prove, and compares the gammas in the file with
-    /// them.
+    /// Computes the bounds that the witnesses of `proof` prove, and compares the stated `gamma` with them.
     ///
     /// # Errors
     /// [`VerifyError`] naming the first mismatch.
-    pub fn judge(&self, proof: &Proof, strictness: Strictness) -> Result<Verified, VerifyError> {
+    pub fn judge(
+        &self,
+        gamma: &Gamma,
+        proof: &Proof,
+        strictness: Strictness,
+    ) -> Result<Verified, VerifyError> {
         let proven = self.proven(proof)?;
-        statements::compare(&self.bank.gamma, &proven, self.scale(), strictness)?;
+        statements::compare(gamma, &proven, self.scale(), strictness)?;
         Ok(proven)
     }
 

@@ -109,7 +109,7 @@ pub fn verify(bank: &Bank) -> Result<Verified, VerifyError> {
     if proof.upper.is_none() {
         return Err(if bank.spec.is_none() { VerifyError::NoSpec } else { VerifyError::NoCertificate });
     }
-    let verified = EnclosedErrorSystem::new(bank)?.judge(proof, Strictness::Proven)?;
+    let verified = EnclosedErrorSystem::new(bank)?.judge(&bank.gamma, proof, Strictness::Proven)?;
     uncertainty::check_stated(bank)?;
     Ok(verified)
 }

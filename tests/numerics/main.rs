@@ -23,3 +23,4 @@ mod sections;
 mod soundness;
 mod steep_front_ends;
 mod tiny_gammas;
+mod written_filters;

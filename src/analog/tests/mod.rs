@@ -6,6 +6,7 @@ use crate::linalg::Complex;
 use crate::spec::{Family, FilterSpec, Passband};
 use crate::units::{Hertz, RadiansPerFastPeriod, Seconds};
 
+mod enclosed;
 mod realisation;
 mod refusal;
 mod written_forms;

@@ -42,18 +42,24 @@ pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {
     let error = EnclosedErrorSystem::new(bank)?;
     let upper = certificate(&error, bank)?;
     let proof = Proof { upper: Some(upper), ..Proof::default() };
-    let Verified { upper, attained, states, .. } = error.judge(&proof, Strictness::NotRefuted)?;
+    let Verified { upper, attained, states, .. } =
+        error.judge(&bank.gamma, &proof, Strictness::NotRefuted)?;
     Ok(Certified { gamma: upper, attained, states })
 }
 
-/// Searches for witnesses of the bank's gammas. Returns the proof and the bounds that it proves.
+/// Searches for witnesses of the bank's gammas. Returns the proof and the bounds that it proves, which
+/// do not refute the `stated` gamma.
 ///
 /// `dual` is the dual solution of an FIR design. It proves the lower end if the noncausal bound does not.
 ///
 /// # Errors
 /// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found;
-/// [`DesignError::Verify`] if the proof refutes a gamma of the bank.
-pub(crate) fn prove(bank: &Bank, dual: &DualSolution) -> Result<(Proof, Verified), DesignError> {
+/// [`DesignError::Verify`] if the proof refutes the stated gamma.
+pub(crate) fn prove(
+    bank: &Bank,
+    stated: &Gamma,
+    dual: &DualSolution,
+) -> Result<(Proof, Verified), DesignError> {
     let error = EnclosedErrorSystem::new(bank)?;
     let upper = certificate(&error, bank)?;
     let witness = noncausal_witness(bank)?;
@@ -65,18 +71,20 @@ pub(crate) fn prove(bank: &Bank, dual: &DualSolution) -> Result<(Proof, Verified
     let interval = (above, upper.gamma);
     let lower = if explained { None } else { lower_proof(&error, bank, &dual.points, wanted, interval)? };
     let proof = Proof { upper: Some(upper), lower, noncausal: noncausal.map(|_| witness) };
-    let verified = error.judge(&proof, Strictness::NotRefuted)?;
+    let verified = error.judge(stated, &proof, Strictness::NotRefuted)?;
     Ok((proof, verified))
 }
 
-/// Adds a proof to `bank` and sets the gammas to the proven bounds. The computed norm does not change.
+/// Adds a proof to `bank` and sets the gammas to the proven bounds. A computed norm outside of the proven
+/// interval, which rounding displaces where the error is a tiny difference, becomes the nearer end of it.
 ///
 /// # Errors
 /// As [`prove`]; `bank` is then unchanged.
 pub(crate) fn attach_proof(bank: &mut Bank, dual: &DualSolution) -> Result<Verified, DesignError> {
-    let (proof, verified) = prove(bank, dual)?;
+    let (proof, verified) = prove(bank, &Gamma::default(), dual)?;
     let stated = |proven: f64| Some(proven * (1.0 - STATED_BELOW));
     bank.gamma = Gamma {
+        norm: bank.gamma.norm.map(|norm| norm.max(verified.attained).min(verified.upper)),
         upper: Some(verified.upper),
         lower: stated(verified.lower),
         noncausal: stated(verified.noncausal),
