@@ -6,8 +6,8 @@ use hybank::bank::{Bank, SynthesisFilters};
 use hybank::design::{Options, certify, design};
 use hybank::spec::{FilterSpec, Method, Spec};
 
-/// A Butterworth band-pass of twelve poles around 1 rad per fast period, as scipy.signal.butter(6, [1 - width
-/// / 2, 1 + width / 2], "bandpass", analog=True) gives it in both forms.
+/// A Butterworth band-pass of twelve poles around 1 rad per fast period in both forms, by
+/// scipy.signal.butter(6, [1 - width / 2, 1 + width / 2], "bandpass", analog=True).
 struct BandPass {
     /// Leading coefficient of the numerator, g s^6.
     gain: f64,
@@ -114,8 +114,8 @@ fn rounded_coefficients_are_another_filter_than_rounded_poles() {
     }
 }
 
-/// (s / Q)^n / (s^2 + s / Q + 1)^n with its denominator multiplied out in doubles, which moves the poles. The
-/// norms, by mpmath as above, for a bank whose output is zero.
+/// (s / Q)^n / (s^2 + s / Q + 1)^n with its denominator multiplied out in doubles, which moves the poles.
+/// The norms, by mpmath as above, for a bank whose output is zero.
 #[test]
 fn resonators_multiplied_out_have_the_norm_of_their_coefficients() {
     for (pairs, q, norm) in [(6, 177.0, 0.9896052887754), (8, 21.0, 1.000393532312)] {
