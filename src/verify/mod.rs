@@ -21,9 +21,9 @@
 //! # Assumptions
 //! The proof starts from the doubles in the file: the filters as the spec writes them, the delays and the
 //! fast period in seconds, the gains of the converters, the latency, and the coefficients. Everything
-//! computed from them is enclosed. [`crate::analog`] encloses roots and state equations in 512 bits. Delays in fast
-//! periods are quotients that are compared exactly. Exponentials and Gramians are Taylor series with a bound
-//! of the remainder. Frequency responses are bounded by a residual. A Cholesky factorisation in
+//! computed from them is enclosed. [`crate::analog`] encloses roots and state equations in 512 bits. Delays
+//! in fast periods are quotients that are compared exactly. Exponentials and Gramians are Taylor series with
+//! a bound of the remainder. Frequency responses are bounded by a residual. A Cholesky factorisation in
 //! double-double arithmetic shows positive definiteness (Rump, 2006). Everything else is computed in
 //! intervals of 106 or 512 bits.
 //!
