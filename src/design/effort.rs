@@ -12,7 +12,7 @@ use super::merging::Repeats;
 use super::methods::fir_kyp::MAX_STATES;
 use super::methods::{Deviations, scenarios::RobustProblem};
 use super::problem::{Problem, common_delay};
-use super::prove::{MAX_LONG_STATES, MAX_SEARCHED_STATES, MAX_WITNESSES};
+use super::prove::{MAX_LONG_STATES, MAX_SEARCHED_STATES, max_witnesses};
 use crate::memory::available_memory;
 use crate::spec::{Method, Solver, Spec};
 
@@ -232,7 +232,8 @@ impl Sizes {
             return Effort::default();
         }
         let long = if states > MAX_LONG_STATES as f64 { 0.0 } else { CERTIFICATES[1] };
-        let (rows, taps) = (2.0 * MAX_WITNESSES as f64 * self.channels, self.channels * self.taps);
+        let taps = self.channels * self.taps;
+        let rows = 2.0 * max_witnesses(taps as usize) as f64 * self.channels;
         let witnesses = 4.0 * rows * taps * rows.min(taps);
         let bytes = REAL * (30.0 * states * states + 5.0 * rows * taps);
         Effort::of((CERTIFICATES[0] + long) * states.powi(3) + witnesses, bytes)

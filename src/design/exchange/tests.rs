@@ -111,6 +111,18 @@ fn gains_and_copies_of_channels_do_not_matter() {
     }
 }
 
+/// Copies of a channel leave their taps unconfined, so the bound holds within a radius only. It is not
+/// stated for all taps; that of a single channel is.
+#[test]
+fn a_bound_within_a_radius_is_not_one_for_all_unknowns() {
+    let mut copies = exchange(geometric(0.5, 1.0, &[1.0, 1.0]), 3, 0.0);
+    copies.optimise().unwrap();
+    assert!(copies.lower > 0.1 && copies.lower_for_all == 0.0, "{} {}", copies.lower, copies.lower_for_all);
+    let mut single = exchange(geometric(0.5, 1.0, &[1.0]), 3, 0.0);
+    single.optimise().unwrap();
+    assert!(single.lower > 0.1 && single.lower_for_all == single.lower, "{}", single.lower_for_all);
+}
+
 #[test]
 fn a_zero_measurement_leaves_the_reference_and_a_zero_reference_has_no_error() {
     let mut zero_measurement = exchange(geometric(0.5, 1.0, &[0.0]), 2, 0.0);

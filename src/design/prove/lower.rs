@@ -24,8 +24,11 @@ use nalgebra::DMatrix as Matrix;
 /// Directions with less than this share of the dual's weight are ignored: they move the bound by less than
 /// the accuracy of gamma.
 const NEGLIGIBLE_WEIGHT: f64 = 1e-9;
-/// Maximum number of witnesses.
-pub(in crate::design) const MAX_WITNESSES: usize = 64;
+/// Maximum number of witnesses, with up to [`MOST_LONG_TAPS`] taps: an optimum of n taps may bind n + 1
+/// directions, and an interior point has more that carry weight.
+const MAX_WITNESSES: usize = 256;
+/// With more taps, where their number is the time of the search.
+const MAX_WITNESSES_OF_MANY: usize = 64;
 /// Directions of tap space with less effect than this, relative to the strongest, are lost to rounding.
 const RANK: f64 = 1e-13;
 /// Relative distance from the upper end within which a bound for FIR banks is not searched further for error
@@ -92,7 +95,7 @@ fn binding_witnesses(bank: &Bank, dual: &[DualPoint]) -> Result<Vec<DualWitness>
     let merged = merged.of_unit_size()?;
     let plant = LiftedPlant::new(&merged.problem)?;
     let parts = &merged.shares;
-    let directions = directions(dual)?;
+    let directions = directions(dual, max_witnesses(taps.len() * taps[0].len()))?;
     let mut least = TapLeastSquares::new(&plant, &directions, taps[0].len());
     least.solve()?;
     // The first channel of each group carries the group's weight.
@@ -118,7 +121,8 @@ fn long_witnesses(
     ridge: f64,
 ) -> Result<Option<Vec<DualWitness>>, DesignError> {
     let SynthesisFilters::Fir(taps) = &bank.filters else { return Ok(None) };
-    let mut found: Vec<DualWitness> = directions(dual)?.iter().map(|(omega, a)| witness(*omega, a)).collect();
+    let directions = directions(dual, max_witnesses(taps.len() * taps[0].len()))?;
+    let mut found: Vec<DualWitness> = directions.iter().map(|(omega, a)| witness(*omega, a)).collect();
     let channels = error.distinct_channels();
     let Some(estimates) = Normal::estimates(error, bank, &found, &channels, ridge) else { return Ok(None) };
     for (witness, estimate) in found.iter_mut().zip(estimates) {
@@ -130,8 +134,14 @@ fn long_witnesses(
     Ok(Some(found))
 }
 
-/// The heaviest directions of a dual with their frequencies; the square of their length is their weight.
-fn directions(dual: &[DualPoint]) -> Result<Vec<(f64, CMat)>, DesignError> {
+/// Maximum number of witnesses for so many taps of all channels.
+pub(in crate::design) fn max_witnesses(taps: usize) -> usize {
+    if taps <= MOST_LONG_TAPS { MAX_WITNESSES } else { MAX_WITNESSES_OF_MANY }
+}
+
+/// The heaviest directions of a dual with their frequencies, at most `most`; the square of their length is
+/// their weight.
+fn directions(dual: &[DualPoint], most: usize) -> Result<Vec<(f64, CMat)>, DesignError> {
     let mut all = Vec::new();
     for point in dual {
         let svd = linalg::svd(&point.weight)?;
@@ -140,8 +150,7 @@ fn directions(dual: &[DualPoint]) -> Result<Vec<(f64, CMat)>, DesignError> {
     }
     all.sort_by(|x, y| y.0.total_cmp(&x.0));
     let total: f64 = all.iter().map(|(weight, ..)| weight).sum();
-    let heavy =
-        all.into_iter().take(MAX_WITNESSES).take_while(|(weight, ..)| *weight > NEGLIGIBLE_WEIGHT * total);
+    let heavy = all.into_iter().take(most).take_while(|(weight, ..)| *weight > NEGLIGIBLE_WEIGHT * total);
     Ok(heavy.map(|(_, omega, a)| (omega, a)).collect())
 }
 

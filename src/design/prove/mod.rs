@@ -12,8 +12,8 @@ use crate::bank::{Bank, DualWitness, Gamma, Proof};
 use crate::linalg::{self, CMat};
 use crate::lti::FrequencyResponse;
 use crate::verify::{EnclosedErrorSystem, Strictness, Verified};
-pub(super) use lower::MAX_WITNESSES;
 use lower::lower_proof;
+pub(super) use lower::max_witnesses;
 use upper::certificate;
 pub(super) use upper::{MAX_LONG_STATES, MAX_SEARCHED_STATES};
 

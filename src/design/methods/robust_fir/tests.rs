@@ -264,7 +264,7 @@ fn robust_designs_reach_their_bound_and_win_what_the_table_says() {
                 .into_iter()
                 .map(|(taps, delay)| {
                     let delays = (0..channels).map(|i| {
-                        let place = (i as f64 + 0.1 * (i * i) as f64) * ratio as f64 / channels as f64;
+                        let place = 0.35 + (i as f64 + 0.1 * (i * i) as f64) * ratio as f64 / channels as f64;
                         format!("{{ delay = {place} }}")
                     });
                     let text = format!(
