@@ -10,9 +10,9 @@ use crate::support::sweep::each;
 use serde_json::{Value, json};
 
 /// Seeds of the campaigns begin here, so that no other test draws the same cases.
-const SEED: u64 = 0xA0D1_7000;
+const SEED: u64 = 0xA0D1_7001;
 /// Plants of the short form.
-const PLANTS: u64 = 4;
+const PLANTS: u64 = 3;
 
 /// A family as the spec names it, edge at `cutoff` hertz.
 pub(crate) fn family(dice: &mut Random, cutoff: f64) -> Value {

@@ -15,9 +15,9 @@ use std::f64::consts::PI;
 const SEED: u64 = 0xA0D1_5000;
 /// Cases of the short form.
 const NARROW: usize = 2;
-const REDUCTIONS: usize = 2;
+const REDUCTIONS: usize = 1;
 const INTEGERS: usize = 2;
-const FORGED: usize = 2;
+const FORGED: usize = 1;
 /// Forgeries of each bank.
 const FORGERIES: usize = 12;
 /// The printed gamma of a reduced bank against its norm.
