@@ -331,3 +331,25 @@ fn no_worst_case_of_a_robust_bank_is_exceeded() {
 fn no_worst_case_of_a_tracked_bank_is_exceeded() {
     campaign(TRACKED, "tracked banks", |seed| uncertain(seed, true));
 }
+
+/// The worst cases of the example of the thesis with both delays off, in docs/uncertainty.md and
+/// docs/figures.md: of the nominal bank by the search, of the best bank by the judge's own taps.
+#[test]
+fn the_worst_cases_in_the_docs_are_true() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/filters/thesis-fir.json");
+    let bank: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+    for (size, nominal, robust) in [(0.1, 0.047_833_8, 0.044_295_9), (0.2, 0.068_209_0, 0.063_542_5)] {
+        let half = Errors { delays: vec![size; 2], ..Errors::none(2) };
+        let mut dice = Random(SEED);
+        let mut worst = |bank: &Value| {
+            Search { bank, half: &half, follows: false, library: Library::default() }
+                .run(None, &mut dice)
+                .gain
+        };
+        let found = worst(&bank);
+        assert!((found / nominal - 1.0).abs() < 1e-5, "{size}: {found}");
+        let best = worst(&robust_taps(&bank, &half, 22, &mut Random(SEED)).unwrap());
+        // The docs' bank is within 2e-4 of its own lower bound.
+        assert!((best / robust - 1.0).abs() < 5e-4, "{size}: {best}");
+    }
+}

@@ -1,17 +1,14 @@
 //! Latencies that the program chooses, against the least mean-square error of explicit banks at every
 //! latency.
 
-use super::plant::{Errors, Library, Plant};
+use super::plant::{Correlation, Errors, Library, Plant};
 use super::plants::family;
-use super::real::{double, real};
 use super::statements::{Outcome, Tally, designed};
 use crate::support::Desk;
 use crate::support::random::Random;
 use crate::support::sweep::each;
 use nalgebra::{DMatrix, DVector};
 use serde_json::{Value, json};
-use std::cell::RefCell;
-use std::collections::HashMap;
 
 const SEED: u64 = 0xA0D1_1000;
 /// Plants of the short form.
@@ -20,27 +17,29 @@ const PLANTS: usize = 2;
 const WORTHWHILE: f64 = 0.011_58;
 const COMPARED: f64 = 3e-4;
 /// Fast samples that a bank remembers beyond its latency where it stands for a recursive one.
-const MEMORY: usize = 80;
+const MEMORY: usize = 240;
 /// Latencies that are tried for a recursive bank beyond twice the chosen one.
 const BEYOND: usize = 24;
 
-/// Correlations of samples of a plant of latency 0 at whole fast periods, which recur.
-struct Correlations<'a> {
-    plant: &'a Plant,
-    known: RefCell<HashMap<(usize, usize, i64), f64>>,
-}
+/// The correlations of all rows of a plant of latency 0.
+struct Correlations(Vec<Vec<Correlation>>);
 
-impl Correlations<'_> {
+impl Correlations {
+    fn new(plant: &Plant) -> Self {
+        let rows = 0..plant.order();
+        Self(rows.clone().map(|a| rows.clone().map(|b| plant.correlation(a, b)).collect()).collect())
+    }
+
     /// Row `a` sampled `later` fast periods later than it is, with row `b`.
     fn of(&self, a: usize, b: usize, later: i64) -> f64 {
-        let compute = || double(&self.plant.correlation(a, b, &real(later as f64)));
-        *self.known.borrow_mut().entry((a, b, later)).or_insert_with(compute)
+        let time = self.0[a][b].distance + later as f64;
+        if time >= 0.0 { self.0[a][b].at(time) } else { self.0[b][a].at(-time) }
     }
 }
 
 /// The least rms error at each latency with `taps` taps per channel and white noise of rms `noise` on each.
 fn errors(plant: &Plant, taps: usize, noise: f64, latencies: usize) -> Vec<f64> {
-    let known = Correlations { plant, known: RefCell::default() };
+    let known = Correlations::new(plant);
     let m = plant.ratio;
     let mut squares = vec![0.0; latencies];
     for phase in 0..m {

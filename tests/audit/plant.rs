@@ -184,15 +184,15 @@ impl Plant {
         poles.map(|p| ((double(&p.im) * m).abs(), -double(&p.re) * m)).collect()
     }
 
-    /// The correlation of row `a`, sampled `later` fast periods later, with row `b`, both in one slow
-    /// period.
-    pub(crate) fn correlation(&self, a: usize, b: usize, later: &Real) -> Real {
+    /// The correlation of row `a` with row `b` as a sum of r e^{p t}, (r, p), for t from `distance` on;
+    /// rounded.
+    pub(crate) fn correlation(&self, a: usize, b: usize) -> Correlation {
         let (a, b) = (&self.rows[a], &self.rows[b]);
-        let distance = &a.time - &b.time + later;
-        let (a, b, distance) = if distance < real(0.0) { (b, a, -distance) } else { (a, b, distance) };
         let mode = &self.modes[a.front];
-        let terms = mode.strengths(&self.modes[b.front]).into_iter().zip(mode.exponentials(&distance));
-        terms.fold(real(0.0), |sum, (r, e)| sum + (&r * &e).re) * &a.gain * &b.gain
+        let gain = &a.gain * &b.gain;
+        let strengths = mode.strengths(&self.modes[b.front]).into_iter().map(|r| r.times(&gain).rounded());
+        let terms = strengths.zip(mode.front.poles.iter().map(Complex::rounded)).collect();
+        Correlation { distance: double(&(&a.time - &b.time)), terms }
     }
 
     /// The response of row `a` to e^{j nu t}, for brute force.
@@ -200,6 +200,20 @@ impl Plant {
         let row = &self.rows[a];
         let phase = Complex::imaginary(nu * &row.time).exp();
         (&self.modes[row.front].front.at(&Complex::imaginary(nu.clone())) * &phase).times(&row.gain)
+    }
+}
+
+/// A correlation in doubles, for what needs no digits that cancel.
+pub(crate) struct Correlation {
+    /// By how much the first row is later, in fast periods.
+    pub(crate) distance: f64,
+    terms: Vec<(nalgebra::Complex<f64>, nalgebra::Complex<f64>)>,
+}
+
+impl Correlation {
+    /// With the first row later by `time`, zero or more, in all.
+    pub(crate) fn at(&self, time: f64) -> f64 {
+        self.terms.iter().map(|(r, p)| (r * (p * time).exp()).re).sum()
     }
 }
 
