@@ -5,10 +5,9 @@ use super::judge::Judge;
 use super::optimum::optimum;
 use super::plant::{Errors, Library, Plant};
 use super::plants::family;
-use super::statements::{Outcome, Tally, at, designed, judged, verified};
+use super::statements::{Outcome, Tally, at, campaign, designed, judged, verified};
 use crate::support::Desk;
 use crate::support::random::Random;
-use crate::support::sweep::each;
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 
@@ -309,12 +308,6 @@ fn uncertain(seed: u64, follows: bool) -> Tally {
         }
     }
     tally
-}
-
-fn campaign(usual: usize, name: &str, task: impl Fn(u64) -> Tally + Sync) {
-    let mut whole = Tally::default();
-    each(trials::trials(trials::rounds(usual) as u64), task).into_iter().for_each(|tally| whole.add(tally));
-    whole.report(name);
 }
 
 #[test]

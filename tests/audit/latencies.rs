@@ -3,10 +3,9 @@
 
 use super::plant::{Correlation, Errors, Library, Plant};
 use super::plants::family;
-use super::statements::{Outcome, Tally, designed};
+use super::statements::{Outcome, Tally, campaign, designed};
 use crate::support::Desk;
 use crate::support::random::Random;
-use crate::support::sweep::each;
 use nalgebra::{DMatrix, DVector};
 use serde_json::{Value, json};
 
@@ -115,9 +114,5 @@ fn audited(seed: u64) -> Tally {
 
 #[test]
 fn chosen_latencies_are_the_shortest_within_a_tenth_of_a_decibel() {
-    let mut whole = Tally::default();
-    each(trials::trials(trials::rounds(PLANTS) as u64), audited)
-        .into_iter()
-        .for_each(|tally| whole.add(tally));
-    whole.report("chosen latencies");
+    campaign(PLANTS, "chosen latencies", audited);
 }

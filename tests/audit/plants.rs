@@ -3,16 +3,15 @@
 use super::fronts::Front;
 use super::real::{Complex, double, real};
 use super::roots::expand;
-use super::statements::{Outcome, Tally, designed, judged, verified};
+use super::statements::{Outcome, Tally, campaign, designed, judged, verified};
 use crate::support::Desk;
 use crate::support::random::Random;
-use crate::support::sweep::each;
 use serde_json::{Value, json};
 
 /// Seeds of the campaigns begin here, so that no other test draws the same cases.
 const SEED: u64 = 0xA0D1_7001;
 /// Plants of the short form.
-const PLANTS: u64 = 3;
+const PLANTS: usize = 3;
 
 /// A family as the spec names it, edge at `cutoff` hertz.
 pub(crate) fn family(dice: &mut Random, cutoff: f64) -> Value {
@@ -134,8 +133,5 @@ fn audited(seed: u64) -> Tally {
 
 #[test]
 fn no_statement_about_a_random_plant_is_false() {
-    let usual = trials::rounds(PLANTS as usize) as u64;
-    let mut whole = Tally::default();
-    each(trials::trials(usual), audited).into_iter().for_each(|tally| whole.add(tally));
-    whole.report("random plants, three banks each");
+    campaign(PLANTS, "random plants, three banks each", audited);
 }

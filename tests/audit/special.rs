@@ -3,11 +3,10 @@
 use super::judge::{Filters, Judge, on_circle};
 use super::optimum::optimum;
 use super::plants::{as_coefficients, as_roots, plant};
-use super::statements::{Outcome, Tally, at, designed, judged, verified};
+use super::statements::{Outcome, Tally, at, campaign, designed, judged, verified};
 use crate::support::Desk;
 use crate::support::forgery::{forged, numbers, parts, sealed};
 use crate::support::random::Random;
-use crate::support::sweep::each;
 use nalgebra::{Complex, DMatrix};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
@@ -25,12 +24,6 @@ const PRINTED: f64 = 1e-8;
 /// Frequencies for the exhaustive search, and the candidates that are judged exactly.
 const FREQUENCIES: usize = 48;
 const CANDIDATES: usize = 4;
-
-fn campaign(usual: usize, name: &str, task: impl Fn(u64) -> Tally + Sync) {
-    let mut whole = Tally::default();
-    each(trials::trials(trials::rounds(usual) as u64), task).into_iter().for_each(|tally| whole.add(tally));
-    whole.report(name);
-}
 
 fn refused(name: &str, reason: &str) -> Tally {
     Tally { cases: 1, refused: vec![format!("{name}: {reason}")], ..Tally::default() }

@@ -6,6 +6,7 @@ use super::judge::Judge;
 use super::optimum::optimum;
 use super::plant::{Errors, Library, Plant};
 use crate::support::Desk;
+use crate::support::sweep::each;
 use serde_json::Value;
 
 /// Rounding of the judge: its last step is an eigenvalue in doubles.
@@ -102,6 +103,13 @@ impl Tally {
         );
         assert!(self.refuted.is_empty(), "{campaign}: {} false statements", self.refuted.len());
     }
+}
+
+/// All cases of a campaign, `usual` ones unless the environment asks for others.
+pub(crate) fn campaign(usual: usize, name: &str, task: impl Fn(u64) -> Tally + Sync) {
+    let mut whole = Tally::default();
+    each(trials::trials(trials::rounds(usual) as u64), task).into_iter().for_each(|tally| whole.add(tally));
+    whole.report(name);
 }
 
 /// The frequency of a witness in the proof of a bank file, radians per slow period.
