@@ -9,6 +9,7 @@ pub mod depth;
 pub mod files;
 pub mod image;
 pub mod interpolate;
+mod lanes;
 mod linear;
 pub mod occlusion;
 pub mod partial;

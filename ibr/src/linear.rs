@@ -3,19 +3,20 @@
 //! Matrices and vectors of fixed size are nalgebra's; the decompositions are faer's.
 
 use faer::Mat;
+use faer::linalg::solvers::{Solve, Svd};
 use nalgebra::{Matrix3, SMatrix, SVector};
+
+/// The thin decomposition; `None` when an entry is not finite or the iteration does not converge.
+fn svd(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> f64) -> Option<Svd<f64>> {
+    let is_finite = (0..rows).all(|i| (0..columns).all(|j| entry(i, j).is_finite()));
+    is_finite.then(|| Mat::from_fn(rows, columns, entry).as_ref().thin_svd().ok())?
+}
 
 /// The right singular vector of the least singular value, and all singular values from the largest.
 ///
 /// `rows` is any number of rows of N entries; fewer than N rows are padded with zero rows.
-/// `None` when an entry is not finite or the iteration does not converge.
 pub(crate) fn least_vector<const N: usize>(rows: &[[f64; N]]) -> Option<(SVector<f64, N>, [f64; N])> {
-    if rows.iter().flatten().any(|v| !v.is_finite()) {
-        return None;
-    }
-    let tall = rows.len().max(N);
-    let matrix = Mat::from_fn(tall, N, |i, j| rows.get(i).map_or(0.0, |r| r[j]));
-    let svd = matrix.as_ref().thin_svd().ok()?;
+    let svd = svd(rows.len().max(N), N, |i, j| rows.get(i).map_or(0.0, |r| r[j]))?;
     let values = svd.S().column_vector();
     let vector = SVector::from_fn(|j, _| svd.V()[(j, N - 1)]);
     Some((vector, std::array::from_fn(|k| values[k])))
@@ -23,11 +24,7 @@ pub(crate) fn least_vector<const N: usize>(rows: &[[f64; N]]) -> Option<(SVector
 
 /// U, the singular values from the largest, and V of a 3 x 3 matrix: m = U diag(s) V^T.
 pub(crate) fn svd3(m: &Matrix3<f64>) -> Option<(Matrix3<f64>, [f64; 3], Matrix3<f64>)> {
-    if m.iter().any(|v| !v.is_finite()) {
-        return None;
-    }
-    let matrix = Mat::from_fn(3, 3, |i, j| m[(i, j)]);
-    let svd = matrix.as_ref().svd().ok()?;
+    let svd = svd(3, 3, |i, j| m[(i, j)])?;
     let s = svd.S().column_vector();
     let copy = |a: faer::MatRef<'_, f64>| Matrix3::from_fn(|i, j| a[(i, j)]);
     Some((copy(svd.U()), [s[0], s[1], s[2]], copy(svd.V())))
@@ -35,11 +32,10 @@ pub(crate) fn svd3(m: &Matrix3<f64>) -> Option<(Matrix3<f64>, [f64; 3], Matrix3<
 
 /// The least-squares solution of `rows` x = `rhs`, `None` when the columns are dependent (to 1e-12).
 pub(crate) fn least_squares<const N: usize>(rows: &[[f64; N]], rhs: &[f64]) -> Option<SVector<f64, N>> {
-    if rows.len() < N || rows.iter().flatten().chain(rhs).any(|v| !v.is_finite()) {
+    if rows.len() < N || rhs.iter().any(|v| !v.is_finite()) {
         return None;
     }
-    let matrix = Mat::from_fn(rows.len(), N, |i, j| rows[i][j]);
-    let svd = matrix.as_ref().thin_svd().ok()?;
+    let svd = svd(rows.len(), N, |i, j| rows[i][j])?;
     let s = svd.S().column_vector();
     if s[N - 1] <= 1e-12 * s[0] {
         return None;
@@ -52,20 +48,12 @@ pub(crate) fn least_squares<const N: usize>(rows: &[[f64; N]], rhs: &[f64]) -> O
     Some(solution)
 }
 
-/// One step of Gauss-Newton: solves J^T J dx = J^T r by Cholesky (N is at most 11).
+/// One step of Gauss-Newton: solves J^T J dx = J^T r by Cholesky (N is at most 12).
 pub(crate) fn normal_step<const N: usize>(
     jtj: &SMatrix<f64, N, N>,
     jtr: &SVector<f64, N>,
 ) -> Option<SVector<f64, N>> {
-    let matrix = Mat::from_fn(N, N, |i, j| jtj[(i, j)]);
-    if jtj.iter().chain(jtr.iter()).any(|v| !v.is_finite()) {
-        return None;
-    }
-    let factor = matrix.as_ref().llt(faer::Side::Lower).ok()?;
-    let rhs = Mat::from_fn(N, 1, |i, _| jtr[i]);
-    let x = faer::linalg::solvers::Solve::solve(&factor, &rhs);
-    let step = SVector::<f64, N>::from_fn(|i, _| x[(i, 0)]);
-    step.iter().all(|v| v.is_finite()).then_some(step)
+    positive_solution(jtj.as_slice(), jtr.as_slice()).map(|step| SVector::from_column_slice(&step))
 }
 
 /// The solution of a positive definite system, its matrix row by row; `None` if it is not positive definite
@@ -77,7 +65,7 @@ pub(crate) fn positive_solution(matrix: &[f64], rhs: &[f64]) -> Option<Vec<f64>>
     }
     let factor =
         Mat::from_fn(side, side, |i, j| matrix[i * side + j]).as_ref().llt(faer::Side::Lower).ok()?;
-    let x = faer::linalg::solvers::Solve::solve(&factor, &Mat::from_fn(side, 1, |i, _| rhs[i]));
+    let x = factor.solve(Mat::from_fn(side, 1, |i, _| rhs[i]));
     let found: Vec<f64> = (0..side).map(|i| x[(i, 0)]).collect();
     found.iter().all(|v| v.is_finite()).then_some(found)
 }

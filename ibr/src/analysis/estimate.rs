@@ -1,4 +1,4 @@
-//! The three numbers of every pixel, from the survey and the calibrated weights.
+//! The three numbers of every pixel, from the evidence and the calibrated weights.
 
 use super::Cause;
 use super::calibrate::LeastSquares;

@@ -4,9 +4,9 @@
 use super::sure::{self, Limits};
 use crate::interpolate::rows::RowWork;
 use crate::interpolate::{Cover, Degree, InterpolationError, Settings};
-use crate::occlusion::{self, RowScratch};
-use crate::pipeline::{Balance, RenderError, RenderSettings, Rendering, rectified};
-use crate::propagate::{self, Frame, RectifiedView, RigCamera};
+use crate::pipeline::rectified::{self, Strip};
+use crate::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights};
+use crate::propagate::{Frame, RectifiedView, RigCamera};
 use crate::sample::Sample;
 use hybank::sampling::SamplingError;
 use hybank::sampling::fit::Response;
@@ -44,7 +44,7 @@ pub struct Evidence {
 }
 
 /// A rendering with the evidence for each of its pixels.
-pub struct Survey {
+pub struct PixelEvidence {
     /// The rendering.
     pub rendering: Rendering,
     /// Row by row.
@@ -60,46 +60,42 @@ pub struct Survey {
 ///
 /// # Errors
 /// Those of [`rectified::render`].
-pub fn survey(
+pub fn collect_evidence(
     views: &[RectifiedView<'_>],
     position: f64,
     settings: &RenderSettings,
     limits: Option<&Limits>,
-) -> Result<Survey, RenderError> {
+) -> Result<PixelEvidence, RenderError> {
     let rendering = rectified::render(views, position, settings)?;
-    let balance = Balance::of(views, &position).with_noise(&rendering.agreement);
-    let settings = &settings.suited_to(&rendering.agreement, &balance);
+    let view_weights = ViewWeights::of(views, &position).with_noise(&rendering.agreement);
+    let settings = &settings.suited_to(&rendering.agreement, &view_weights);
+    let view_weights = view_weights.with_gains(&rendering.agreement.gains);
+    let (camera, (width, height)) = (RigCamera::new(views, position), rendering.image.size());
     let colour = rendering.image.channels() == 3;
-    let job = Job {
-        views,
-        camera: RigCamera::new(views, position),
-        balance: balance.with_gains(&rendering.agreement.gains),
-        settings,
-        rendering: &rendering,
-        limits,
+    let job = |margin| {
+        let frame = Frame::whole(width, height, margin, settings.offset);
+        let rows = rectified::Job { views, camera, view_weights, frame, settings, watch: &|_| () };
+        Job { rows, rendering: &rendering, limits }
     };
     let (evidence, edges, sure) = match (settings.interpolation.fit.degree, colour) {
-        (Degree::Linear, false) => collect::<2, 1>(&job)?,
-        (Degree::Linear, true) => collect::<2, 3>(&job)?,
-        (Degree::Cubic, false) => collect::<4, 1>(&job)?,
-        (Degree::Cubic, true) => collect::<4, 3>(&job)?,
+        (Degree::Linear, false) => collect::<2, 1>(&job(RowWork::<2, 1>::MARGIN))?,
+        (Degree::Linear, true) => collect::<2, 3>(&job(RowWork::<2, 3>::MARGIN))?,
+        (Degree::Cubic, false) => collect::<4, 1>(&job(RowWork::<4, 1>::MARGIN))?,
+        (Degree::Cubic, true) => collect::<4, 3>(&job(RowWork::<4, 3>::MARGIN))?,
     };
-    Ok(Survey { rendering, evidence, edges, sure })
+    Ok(PixelEvidence { rendering, evidence, edges, sure })
 }
 
 /// What all rows share.
 struct Job<'a> {
-    views: &'a [RectifiedView<'a>],
-    camera: RigCamera,
-    balance: Balance,
-    settings: &'a RenderSettings,
+    rows: rectified::Job<'a>,
     rendering: &'a Rendering,
     limits: Option<&'a Limits>,
 }
 
 impl Job<'_> {
     fn distance(&self, view: u16) -> f64 {
-        (self.views[usize::from(view)].camera - self.camera.position).abs()
+        (self.rows.views[usize::from(view)].camera - self.rows.camera.position).abs()
     }
 }
 
@@ -110,15 +106,14 @@ type Collected = (Vec<Evidence>, Vec<f32>, Vec<f32>);
 
 fn collect<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Collected, RenderError> {
     let (width, height) = job.rendering.image.size();
-    let frame = Frame::whole(width, height, RowWork::<ORDER, C>::MARGIN, job.settings.offset);
     let mut evidence = vec![Evidence::default(); width * height];
     let mut edges = vec![0.0; width * height];
     let mut sure = vec![UNSEEN; width * height];
     let numbers = edges.par_chunks_mut(width).zip(sure.par_chunks_mut(width));
     evidence.par_chunks_mut(width).zip(numbers).enumerate().try_for_each_init(
-        || RowSurvey::<ORDER, C>::new(width),
+        || RowEvidence::<ORDER, C>::new(job),
         |work, (y, (evidence, (edges, sure)))| {
-            if work.row(job, &frame, y, evidence)? {
+            if work.row(job, y, evidence)? {
                 work.edges(job, y, edges);
                 work.sure(job, y, sure);
             }
@@ -138,9 +133,8 @@ const INFLUENCE: f64 = 8.0;
 const NEAR: usize = 3;
 
 /// Work memory of one row.
-struct RowSurvey<const ORDER: usize, const C: usize> {
-    samples: Vec<Sample<C>>,
-    scratch: RowScratch<C>,
+struct RowEvidence<const ORDER: usize, const C: usize> {
+    strip: Strip<C>,
     fit: RowWork<ORDER, C>,
     again: RowWork<ORDER, C>,
     response: Response,
@@ -156,11 +150,11 @@ struct ViewShare<const C: usize> {
     value: [f64; C],
 }
 
-impl<const ORDER: usize, const C: usize> RowSurvey<ORDER, C> {
-    fn new(width: usize) -> Self {
+impl<const ORDER: usize, const C: usize> RowEvidence<ORDER, C> {
+    fn new(job: &Job<'_>) -> Self {
+        let width = job.rows.frame.width;
         Self {
-            samples: Vec::new(),
-            scratch: RowScratch::default(),
+            strip: Strip::new(&job.rows),
             fit: RowWork::new(width),
             again: RowWork::new(width),
             response: Response::default(),
@@ -171,27 +165,15 @@ impl<const ORDER: usize, const C: usize> RowSurvey<ORDER, C> {
     }
 
     /// The evidence of one row; false if it has no samples.
-    fn row(
-        &mut self,
-        job: &Job<'_>,
-        frame: &Frame,
-        y: usize,
-        evidence: &mut [Evidence],
-    ) -> Result<bool, RenderError> {
+    fn row(&mut self, job: &Job<'_>, y: usize, evidence: &mut [Evidence]) -> Result<bool, RenderError> {
         let failed = |source| RenderError::from(InterpolationError::Fit { row: y, source });
-        let settings = &job.settings.interpolation;
-        self.samples.clear();
-        for (index, view) in job.views.iter().enumerate() {
-            let index = index as u16;
-            propagate::rectified_row(view, index, y, &job.camera, frame, &mut self.samples);
-        }
-        occlusion::remove_in_row(&mut self.samples, job.settings.depth_test(), &mut self.scratch);
-        job.balance.apply(&mut self.samples, |view| job.views[view].image);
-        let fitted = self.fit.interpolate(&self.samples, settings, &mut self.values, &mut self.mask);
+        let settings = &job.rows.settings.interpolation;
+        self.strip.survivors_of_row(&job.rows, y);
+        let fitted = self.fit.interpolate(&self.strip.samples, settings, &mut self.values, &mut self.mask);
         if !fitted.map_err(failed)? {
             return Ok(false);
         }
-        let limits: Vec<Nearby> = self.samples.iter().map(|s| self.limits(job, s)).collect();
+        let limits: Vec<Nearby> = self.strip.samples.iter().map(|s| self.limits(job, s)).collect();
         for (x, pixel) in evidence.iter_mut().enumerate() {
             *pixel = self.pixel(job, x, &limits);
         }
@@ -202,17 +184,18 @@ impl<const ORDER: usize, const C: usize> RowSurvey<ORDER, C> {
     /// The sure bound of every pixel that is seen.
     fn sure(&mut self, job: &Job<'_>, y: usize, sure: &mut [f32]) {
         let Some(limits) = job.limits else { return };
-        let test = job.settings.depth_test();
+        let test = job.rows.settings.depth_test();
         let parts = |a: &Sample<C>, b: &Sample<C>| {
             test.hides(f64::from(a.depth.min(b.depth)), f64::from(a.depth.max(b.depth)))
         };
-        let row = sure::Row::new(&self.samples, limits, |view| job.distance(view), parts);
+        let row = sure::Row::new(&self.strip.samples, limits, |view| job.distance(view), parts);
         let seen = &job.rendering.mask[y * sure.len()..];
         for (column, bound) in sure.iter_mut().enumerate().filter(|(x, _)| seen[*x] == Cover::Seen) {
             let x = column as f64;
             self.fit.respond(x, &mut self.response);
             let response = |x: f64| self.response.at::<ORDER>(x);
-            let influence = |k: usize| f64::from(self.samples[k].weight) * response(self.samples[k].x);
+            let influence =
+                |k: usize| f64::from(self.strip.samples[k].weight) * response(self.strip.samples[k].x);
             let near = self.fit.fillers().iter().filter(|f| (**f - x).abs() <= sure::REACH);
             let filled = near.map(|f| response(*f)).fold((0.0, 0.0), |(s, m), h| (s + h, m + h.abs()));
             *bound = row.bound(x, limits, influence, filled) as f32;
@@ -222,7 +205,7 @@ impl<const ORDER: usize, const C: usize> RowSurvey<ORDER, C> {
     /// Fits the fit again, at the samples.
     fn bias(&mut self, settings: &Settings, evidence: &mut [Evidence]) -> Result<(), SamplingError> {
         let once = std::mem::take(&mut self.values);
-        let mut smooth = self.samples.clone();
+        let mut smooth = self.strip.samples.clone();
         smooth.iter_mut().for_each(|s| s.value = self.fit.value(s.x).map(|v| v as f32));
         self.values = vec![0.0; once.len()];
         self.again.interpolate(&smooth, settings, &mut self.values, &mut self.mask)?;
@@ -237,11 +220,11 @@ impl<const ORDER: usize, const C: usize> RowSurvey<ORDER, C> {
         let x = column as f64;
         self.fit.respond(x, &mut self.response);
         self.of_views.clear();
-        self.of_views.resize(job.views.len(), ViewShare { influence: 0.0, value: [0.0; C] });
+        self.of_views.resize(job.rows.views.len(), ViewShare { influence: 0.0, value: [0.0; C] });
         let mut e = Evidence::default();
-        let from = self.samples.partition_point(|s| s.x < x - INFLUENCE);
+        let from = self.strip.samples.partition_point(|s| s.x < x - INFLUENCE);
         for (s, limit) in
-            self.samples[from..].iter().zip(&limits[from..]).take_while(|(s, _)| s.x <= x + INFLUENCE)
+            self.strip.samples[from..].iter().zip(&limits[from..]).take_while(|(s, _)| s.x <= x + INFLUENCE)
         {
             let h = f64::from(s.weight) * self.response.at::<ORDER>(s.x);
             let away = s.x - x;
@@ -259,8 +242,8 @@ impl<const ORDER: usize, const C: usize> RowSurvey<ORDER, C> {
                 e.residual = e.residual.max(limit.residual);
             }
         }
-        for (share, view) in self.of_views.iter().zip(job.views) {
-            let (g2, distance) = (share.influence.powi(2), (view.camera - job.camera.position).abs());
+        for (share, view) in self.of_views.iter().zip(job.rows.views) {
+            let (g2, distance) = (share.influence.powi(2), (view.camera - job.rows.camera.position).abs());
             e.views += g2 as f32;
             e.disparity_gain += (g2 * distance * distance) as f32;
             if share.influence > 0.02 {
@@ -274,9 +257,9 @@ impl<const ORDER: usize, const C: usize> RowSurvey<ORDER, C> {
     /// Slope and second difference of the photograph around a sample's pixel, in virtual pixels, and the
     /// residual of the fit there; the largest over the channels.
     fn limits(&self, job: &Job<'_>, s: &Sample<C>) -> Nearby {
-        let image = job.views[usize::from(s.view)].image;
+        let image = job.rows.views[usize::from(s.view)].image;
         let (pixel, width) = (s.pixel as usize, image.width());
-        let (column, gain) = (pixel % width, job.balance.gain(s.view));
+        let (column, gain) = (pixel % width, job.rows.view_weights.gain(s.view));
         let at = |p: usize| image.pixel::<C>(p).map(|v| v * gain);
         let here = at(pixel);
         let left = if column > 0 { at(pixel - 1) } else { here };
@@ -296,8 +279,8 @@ impl<const ORDER: usize, const C: usize> RowSurvey<ORDER, C> {
     fn edges(&self, job: &Job<'_>, y: usize, edges: &mut [f32]) {
         let row = job.rendering.image.row(y).chunks_exact(C).collect::<Vec<_>>();
         let value = |x: f64| row[(x.round().max(0.0) as usize).min(row.len() - 1)];
-        let test = job.settings.depth_test();
-        for pair in self.samples.windows(2) {
+        let test = job.rows.settings.depth_test();
+        for pair in self.strip.samples.windows(2) {
             let (near, far) = (pair[0].depth.min(pair[1].depth), pair[0].depth.max(pair[1].depth));
             if !test.hides(f64::from(near), f64::from(far)) {
                 continue;
@@ -340,12 +323,12 @@ mod tests {
     use crate::depth::{DepthMap, Measure};
     use crate::image::Image;
 
-    fn surveyed(positions: &[f64], at: f64, paint: impl Fn(usize) -> f32) -> Survey {
+    fn examined(positions: &[f64], at: f64, paint: impl Fn(usize) -> f32) -> PixelEvidence {
         let image = Image::new(60, 8, 1, (0..480).map(|i| paint(i % 60)).collect()).unwrap();
         let disparity = DepthMap::new((60, 8), vec![4.0; 480], 1.0, Measure::Disparity).unwrap();
         let view = |position: &f64| RectifiedView { image: &image, map: &disparity, camera: *position };
         let views: Vec<RectifiedView<'_>> = positions.iter().map(view).collect();
-        survey(&views, at, &RenderSettings::default(), None).unwrap()
+        collect_evidence(&views, at, &RenderSettings::default(), None).unwrap()
     }
 
     fn near(value: f32, want: f32) -> bool {
@@ -355,8 +338,8 @@ mod tests {
     /// Inside a flat scene the influences add up to one, evenly over the views half-way between them.
     #[test]
     fn influences_are_shares() {
-        let two = surveyed(&[0.0, 1.0], 0.5, |_| 90.0);
-        let one = surveyed(&[0.0], 0.5, |_| 90.0);
+        let two = examined(&[0.0, 1.0], 0.5, |_| 90.0);
+        let one = examined(&[0.0], 0.5, |_| 90.0);
         for (s, views, disparity_gain) in [(&two, 0.5, 0.125), (&one, 1.0, 0.25)] {
             let e = s.evidence[4 * 60 + 30];
             assert!(
@@ -374,8 +357,8 @@ mod tests {
     #[test]
     fn fine_texture_has_a_bias() {
         let wave = |rate: f32| move |x: usize| 120.0 + 50.0 * (rate * x as f32).sin();
-        let mean = |s: &Survey| s.evidence[250..290].iter().map(|e| e.bias).sum::<f32>() / 40.0;
-        let (fine, coarse) = (surveyed(&[0.0, 1.0], 0.5, wave(1.8)), surveyed(&[0.0, 1.0], 0.5, wave(0.3)));
+        let mean = |s: &PixelEvidence| s.evidence[250..290].iter().map(|e| e.bias).sum::<f32>() / 40.0;
+        let (fine, coarse) = (examined(&[0.0, 1.0], 0.5, wave(1.8)), examined(&[0.0, 1.0], 0.5, wave(0.3)));
         assert!(mean(&fine) > 10.0 * mean(&coarse), "{} {}", mean(&fine), mean(&coarse));
         let steepest = coarse.evidence[270].steepest;
         assert!((10.0..15.1).contains(&steepest), "{steepest}");

@@ -8,7 +8,7 @@ use super::regressors::{hole_distances, slopes};
 use crate::camera::Camera;
 use crate::depth::DepthMap;
 use crate::image::Image;
-use crate::pipeline::{Balance, RenderError, RenderSettings, Rendering, calibrated as pipeline};
+use crate::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights, calibrated as pipeline};
 use crate::propagate::{CalibratedView, Viewpoint};
 use nalgebra::{Matrix3x4, Vector3};
 
@@ -40,8 +40,8 @@ impl Predicted for Camera {
         let Study { settings, known, spacing, bounds, .. } = *study;
         let rendering = self.render(views, size, settings)?;
         let jitter = depth_jitter(views, self, settings, &rendering.image, known.noise)?;
-        let balance = Balance::of(views, self).with_noise(&rendering.agreement);
-        let (shares, gain) = shares(views, self, &balance);
+        let view_weights = ViewWeights::of(views, self).with_noise(&rendering.agreement);
+        let (shares, gain) = shares(views, self, &view_weights);
         let gain = gain / (spacing * spacing);
         let image = &rendering.image;
         let (slopes, bends) = (slopes(image), bends(image));
@@ -97,8 +97,8 @@ fn moved(camera: &Camera, centre: Vector3<f64>) -> Option<Camera> {
 
 /// Sum of the squared shares of the views in a pixel that all of them see, and the same times their squared
 /// distances.
-fn shares(views: &[CalibratedView<'_>], camera: &Camera, balance: &Balance) -> (f64, f64) {
-    let weight = |i: usize| f64::from(balance.weight(i as u16));
+fn shares(views: &[CalibratedView<'_>], camera: &Camera, view_weights: &ViewWeights) -> (f64, f64) {
+    let weight = |i: usize| f64::from(view_weights.weight(i as u16));
     let total: f64 = (0..views.len()).map(weight).sum();
     let square = |i: usize| (weight(i) / total).powi(2);
     let away = |i: usize| (views[i].camera.centre() - camera.centre()).norm_squared();

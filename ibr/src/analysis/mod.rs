@@ -23,12 +23,12 @@
 //! (1/8) |f''| D^2 + E_T + E_D B |f'|. That of general cameras has the same form for influences that are
 //! assumed (`lookup.rs`).
 //!
-//! The other two are sums over causes. The size of each cause is computed ([`survey()`]): the bias of the
-//! fit, by fitting the fit once more; the views that share in a pixel; the slope; the change under errors
-//! of depth as large as the maps' disagreement; depth edges nearby; doubtful depths; holes, by the
-//! variogram of the photographs. The weights of the causes are calibrated on the inputs themselves: each
-//! view is left out in turn and rendered from the others, and its photograph is the truth. A single view
-//! cannot be left out; it takes the weights of typical photographs.
+//! The other two are sums over causes. The size of each cause is computed ([`collect_evidence()`]): the
+//! bias of the fit, by fitting the fit once more; the views that share in a pixel; the slope; the change
+//! under errors of depth as large as the maps' disagreement; depth edges nearby; doubtful depths; holes,
+//! by the variogram of the photographs. The weights of the causes are calibrated on the inputs themselves:
+//! each view is left out in turn and rendered from the others, and its photograph is the truth. A single
+//! view cannot be left out; it takes the weights of typical photographs.
 
 mod advice;
 mod calibrate;
@@ -46,7 +46,7 @@ mod variogram;
 
 pub use advice::{Advice, AnotherView};
 pub use estimate::{Calibration, Predicted, Totals, ViewError};
-pub use evidence::{Evidence, Survey, survey};
+pub use evidence::{Evidence, PixelEvidence, collect_evidence};
 pub use jitter::{depth_jitter, map_noise, with_noise};
 pub use predictor::Predictor;
 pub use sure::Limits;
@@ -75,7 +75,9 @@ impl Cause {
     pub fn remedy(self) -> &'static str {
         match self {
             Self::Density => "more views, or views of more pixels",
-            Self::Texture => "less noise, equal exposure and white balance, views closer to the virtual one",
+            Self::Texture => {
+                "less noise, equal exposure and white view_weights, views closer to the virtual one"
+            }
             Self::Depth => "finer depth, and better calibrated cameras",
             Self::Edges => "depth maps that are sharp at outlines, and more views",
             Self::Holes => "views that see behind the near surfaces",

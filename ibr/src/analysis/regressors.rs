@@ -1,7 +1,7 @@
 //! What the error of a pixel is proportional to, cause by cause, in grey levels.
 
 use super::Cause;
-use super::evidence::Survey;
+use super::evidence::PixelEvidence;
 use super::variogram::Variogram;
 use crate::image::Image;
 use crate::interpolate::Cover;
@@ -19,24 +19,24 @@ pub(super) const CAUSE_OF: [Cause; REGRESSORS] =
 /// Distance in pixels over which a colour of doubtful depth is wrong, for the variogram.
 const DOUBT: usize = 4;
 
-/// The regressors of every pixel of a survey; `jitter` is the local change of the view under errors of
+/// The regressors of every pixel; `jitter` is the local change of the view under errors of
 /// depth.
 ///
 /// `spacing` is the distance between neighbouring views.
 pub(super) fn regressors(
-    survey: &Survey,
+    found: &PixelEvidence,
     jitter: &[f32],
     variogram: &Variogram,
     spacing: f64,
 ) -> Vec<Regressors> {
-    let image = &survey.rendering.image;
-    let distances = hole_distances(&survey.rendering.mask, image.width());
+    let image = &found.rendering.image;
+    let distances = hole_distances(&found.rendering.mask, image.width());
     let slopes = slopes(image);
     let of_pixel = |p: usize| {
         if distances[p] > 0 {
             return [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, variogram.at(distances[p])];
         }
-        let e = &survey.evidence[p];
+        let e = &found.evidence[p];
         // The noise of the photograph that a view is compared with adds to that of the views.
         let noise = (1.0 + f64::from(e.views)).sqrt();
         // Displacements of the samples: one part grows with the distance to the views, and one does not.
@@ -47,12 +47,12 @@ pub(super) fn regressors(
             noise,
             f64::from(slopes[p]) * displacement,
             f64::from(jitter[p]),
-            f64::from(survey.edges[p]),
+            f64::from(found.edges[p]),
             f64::from(e.doubtful) * variogram.at(DOUBT),
             0.0,
         ]
     };
-    (0..survey.evidence.len()).map(of_pixel).collect()
+    (0..found.evidence.len()).map(of_pixel).collect()
 }
 
 /// Slope of the image along the rows and columns in grey levels per pixel, mean over the channels.

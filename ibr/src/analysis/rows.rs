@@ -1,7 +1,7 @@
 //! The error of a view of a rectified rig, rendered by rows.
 
 use super::estimate::{Examined, Predicted, Study};
-use super::evidence::{Evidence, survey};
+use super::evidence::{Evidence, collect_evidence};
 use super::jitter::depth_jitter;
 use super::regressors::regressors;
 use crate::image::Image;
@@ -32,12 +32,12 @@ impl Predicted for f64 {
         study: &Study<'_>,
     ) -> Result<Examined, RenderError> {
         let Study { settings, known, spacing, limits, .. } = *study;
-        let survey = survey(views, *self, settings, limits)?;
-        let jitter = depth_jitter(views, self, settings, &survey.rendering.image, known.noise)?;
-        let regressors = regressors(&survey, &jitter, &known.variogram, spacing);
+        let found = collect_evidence(views, *self, settings, limits)?;
+        let jitter = depth_jitter(views, self, settings, &found.rendering.image, known.noise)?;
+        let regressors = regressors(&found, &jitter, &known.variogram, spacing);
         let reach = (REACH * known.noise) as f32;
-        let local_limit = survey.evidence.iter().map(|e| local_limit(e, reach)).collect();
-        Ok(Examined { rendering: survey.rendering, regressors, sure_bound: survey.sure, local_limit })
+        let local_limit = found.evidence.iter().map(|e| local_limit(e, reach)).collect();
+        Ok(Examined { rendering: found.rendering, regressors, sure_bound: found.sure, local_limit })
     }
 
     fn spacing(&self, views: &[RectifiedView<'_>]) -> f64 {

@@ -17,7 +17,8 @@ pub fn fill_unknown(map: &mut DepthMap) -> usize {
     map.guessed = map.data.iter().map(|v| v.is_nan()).collect();
     let (width, measure) = (map.width, map.measure);
     map.data.chunks_exact_mut(width).for_each(|row| fill_row(row, measure));
-    fill_empty_rows(map);
+    let filled: Vec<bool> = map.data.chunks_exact(width).map(|row| !row[0].is_nan()).collect();
+    fill_empty_rows(&filled, &mut map.data);
     unknown
 }
 
@@ -40,12 +41,13 @@ fn fill_row(row: &mut [f32], measure: Measure) {
     }
 }
 
-fn fill_empty_rows(map: &mut DepthMap) {
-    let (width, height) = map.size();
-    let full: Vec<usize> = (0..height).filter(|y| !map.row(*y)[0].is_nan()).collect();
-    for y in (0..height).filter(|y| full.binary_search(y).is_err()) {
+/// Copies rows of nothing from the nearest row of something (the upper of two); `filled` marks those.
+pub(crate) fn fill_empty_rows(filled: &[bool], values: &mut [f32]) {
+    let full: Vec<usize> = (0..filled.len()).filter(|y| filled[*y]).collect();
+    let stride = values.len() / filled.len().max(1);
+    for y in (0..filled.len()).filter(|y| !filled[*y]) {
         if let Some(&nearest) = full.iter().min_by_key(|other| other.abs_diff(y)) {
-            map.data.copy_within(nearest * width..(nearest + 1) * width, y * width);
+            values.copy_within(nearest * stride..(nearest + 1) * stride, y * stride);
         }
     }
 }

@@ -3,6 +3,8 @@
 mod fill;
 mod relief;
 
+use crate::lanes::bounds;
+pub(crate) use fill::fill_empty_rows;
 pub use fill::fill_unknown;
 pub use relief::Relief;
 pub(crate) use relief::{JUMP, Reliefs, TILE};
@@ -37,23 +39,18 @@ pub enum DepthError {
     },
     /// A map does not fit its image.
     #[error(
-        "the map has {map_width} x {map_height} values, the image {width} x {height} pixels; with step {step} the map must have {expected_width} x {expected_height}"
+        "the map has {} x {} values, the image {} x {} pixels; with step {step} the map must have {} x {}",
+        map.0, map.1, image.0, image.1, expected.0, expected.1
     )]
     Size {
-        /// Width of the map.
-        map_width: usize,
-        /// Height of the map.
-        map_height: usize,
-        /// Width of the image.
-        width: usize,
-        /// Height of the image.
-        height: usize,
+        /// Width and height of the map.
+        map: (usize, usize),
+        /// Width and height of the image.
+        image: (usize, usize),
         /// Pixels from one value of the map to the next.
         step: usize,
-        /// Width that would fit.
-        expected_width: usize,
-        /// Height that would fit.
-        expected_height: usize,
+        /// Width and height that would fit.
+        expected: (usize, usize),
     },
     /// The offset of the disparities is not finite.
     #[error("the disparity offset is {offset}: it must be a finite number of pixels")]
@@ -103,18 +100,8 @@ impl DepthMap {
             return Err(DepthError::Scale { scale });
         }
         if stored.len() != width.saturating_mul(height) {
-            let (map_width, map_height) = (stored.len(), 1);
-            let (expected_width, expected_height) = (width, height);
-            let step = 1;
-            return Err(DepthError::Size {
-                map_width,
-                map_height,
-                width,
-                height,
-                step,
-                expected_width,
-                expected_height,
-            });
+            let (map, image) = ((stored.len(), 1), (width, height));
+            return Err(DepthError::Size { map, image, step: 1, expected: image });
         }
         let negatives = measure == Measure::Disparity && has_negatives(&stored);
         let data: Vec<f32> = stored.into_iter().map(|v| known(v, scale, negatives)).collect();
@@ -218,23 +205,22 @@ impl DepthMap {
             return Err(DepthError::AllUnknown { values: data.len() });
         }
         let size = (self.width.div_ceil(step), self.height.div_ceil(step));
-        Ok(Self { offset: self.offset, ..Self::from_known(size, data, self.measure) })
+        Ok(self.with_values(size, data))
     }
 
     /// Refuses a map whose size does not fit an image of `size` with one value every `step` pixels.
     ///
     /// # Errors
     /// [`DepthError::Step`] and [`DepthError::Size`].
-    pub fn fits(&self, (width, height): (usize, usize), step: usize) -> Result<(), DepthError> {
+    pub fn fits(&self, image: (usize, usize), step: usize) -> Result<(), DepthError> {
         if step == 0 {
             return Err(DepthError::Step);
         }
-        let (expected_width, expected_height) = (width.div_ceil(step), height.div_ceil(step));
-        if self.size() == (expected_width, expected_height) {
+        let expected = (image.0.div_ceil(step), image.1.div_ceil(step));
+        if self.size() == expected {
             return Ok(());
         }
-        let (map_width, map_height) = self.size();
-        Err(DepthError::Size { map_width, map_height, width, height, step, expected_width, expected_height })
+        Err(DepthError::Size { map: self.size(), image, step, expected })
     }
 
     pub(crate) fn from_known((width, height): (usize, usize), data: Vec<f32>, measure: Measure) -> Self {
@@ -252,9 +238,8 @@ impl DepthMap {
     }
 
     /// A map of the same measure and offset with other values, NaN where unknown.
-    pub(crate) fn with_values(&self, (width, height): (usize, usize), data: Vec<f32>) -> Self {
-        assert_eq!(data.len(), width * height);
-        Self { width, height, measure: self.measure, data, offset: self.offset, guessed: Vec::new() }
+    pub(crate) fn with_values(&self, size: (usize, usize), data: Vec<f32>) -> Self {
+        Self { offset: self.offset, ..Self::from_known(size, data, self.measure) }
     }
 }
 
@@ -284,25 +269,8 @@ fn has_negatives(stored: &[f32]) -> bool {
 /// 0 if all disparities are positive; else what lifts the least to a quarter of their range, and to one
 /// pixel at least: depths in the order of the disparities, in a ratio that real scenes have.
 fn guessed_offset(data: &[f32]) -> f64 {
-    let (low, high) = range(data);
+    let (low, high) = bounds::<_, 8>(data, (f32::MAX, f32::MIN));
     if low > 0.0 { 0.0 } else { f64::from((high - low) / 4.0).max(1.0) - f64::from(low) }
-}
-
-/// The least and the largest known value. In lanes, and with comparisons that are false for unknown ones, so
-/// that the compiler compares several at a time.
-fn range(data: &[f32]) -> (f32, f32) {
-    const LANES: usize = 8;
-    let (mut low, mut high) = ([f32::MAX; LANES], [f32::MIN; LANES]);
-    let mut compare = |lane: usize, v: f32| {
-        low[lane] = if v < low[lane] { v } else { low[lane] };
-        high[lane] = if v > high[lane] { v } else { high[lane] };
-    };
-    let (whole, rest) = data.as_chunks::<LANES>();
-    for values in whole {
-        (0..LANES).for_each(|lane| compare(lane, values[lane]));
-    }
-    rest.iter().for_each(|v| compare(0, *v));
-    (low.into_iter().fold(f32::MAX, f32::min), high.into_iter().fold(f32::MIN, f32::max))
 }
 
 #[cfg(test)]
@@ -341,7 +309,7 @@ mod tests {
     fn useless_maps_are_refused() {
         let new = |data: Vec<f32>, scale| DepthMap::new((2, 1), data, scale, Measure::Depth);
         assert_eq!(new(vec![0.0, f32::NAN], 1.0), Err(DepthError::AllUnknown { values: 2 }));
-        assert!(matches!(new(vec![1.0; 3], 1.0), Err(DepthError::Size { map_width: 3, .. })));
+        assert!(matches!(new(vec![1.0; 3], 1.0), Err(DepthError::Size { map: (3, 1), .. })));
         for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(matches!(new(vec![1.0; 2], scale), Err(DepthError::Scale { .. })));
         }
@@ -354,7 +322,7 @@ mod tests {
         let coarse = map.decimated(3).unwrap();
         assert_eq!((coarse.size(), coarse.data()), ((3, 2), &[1.0, 4.0, 7.0, 22.0, 25.0, 28.0][..]));
         assert!(coarse.fits((7, 5), 3).is_ok() && coarse.fits((9, 6), 3).is_ok());
-        assert!(matches!(coarse.fits((10, 6), 3), Err(DepthError::Size { expected_width: 4, .. })));
+        assert!(matches!(coarse.fits((10, 6), 3), Err(DepthError::Size { expected: (4, 2), .. })));
         assert_eq!(map.decimated(0), Err(DepthError::Step));
     }
 }

@@ -42,7 +42,6 @@ pub(crate) struct Reliefs {
 
 impl Reliefs {
     /// The surroundings of the pixel with this number in the tile.
-    #[cfg(test)]
     fn at(&self, i: usize) -> Relief {
         Relief {
             across: f64::from(self.across[i]),
@@ -66,16 +65,7 @@ impl DepthMap {
     /// The surroundings of a pixel. Slopes are means over the neighbours on the same surface, and 0 without
     /// any.
     pub fn relief(&self, x: usize, y: usize) -> Relief {
-        let at = |x: Option<usize>, y: Option<usize>| {
-            let place = x.zip(y).filter(|(x, y)| *x < self.width && *y < self.height);
-            place.map_or(f32::NAN, |(x, y)| self.data[y * self.width + x])
-        };
-        let (left, right) = (at(x.checked_sub(1), Some(y)), at(Some(x + 1), Some(y)));
-        let (above, below) = (at(Some(x), y.checked_sub(1)), at(Some(x), Some(y + 1)));
-        let (slopes, [behind_edge, outline]) =
-            Scale::of(self).relief(at(Some(x), Some(y)), [left, right, above, below]);
-        let [across, down] = slopes.map(f64::from);
-        Relief { across, down, behind_edge, outline }
+        self.reliefs(x, y).at(0)
     }
 
     /// The surroundings of the pixels of a row from this column on, up to the end of the row or a tile.

@@ -96,22 +96,14 @@ pub enum ImageError {
         y: usize,
     },
     /// Two images that belong together differ in size.
-    #[error(
-        "{left} has {left_width} x {left_height} pixels and {right} has {right_width} x {right_height}: they must agree"
-    )]
+    #[error("{left} has {} x {} pixels and {right} has {} x {}: they must agree", sizes[0].0, sizes[0].1, sizes[1].0, sizes[1].1)]
     Sizes {
         /// Name of the first image.
         left: String,
         /// Name of the second image.
         right: String,
-        /// Width of the one.
-        left_width: usize,
-        /// Height of the one.
-        left_height: usize,
-        /// Width of the other.
-        right_width: usize,
-        /// Height of the other.
-        right_height: usize,
+        /// Width and height of both.
+        sizes: [(usize, usize); 2],
     },
     /// A buffer that does not hold width * height * channels values.
     #[error("{width} x {height} pixels of {channels} channels need {expected} values, {given} were given")]
@@ -245,14 +237,7 @@ impl Image {
         if self.size() == other {
             return Ok(());
         }
-        Err(ImageError::Sizes {
-            left: name.into(),
-            right: other_name.into(),
-            left_width: self.width,
-            left_height: self.height,
-            right_width: other.0,
-            right_height: other.1,
-        })
+        Err(ImageError::Sizes { left: name.into(), right: other_name.into(), sizes: [self.size(), other] })
     }
 }
 

@@ -63,7 +63,10 @@ fn structural(a: &Image, b: &Image, channel: usize, inside: &dyn Fn(usize) -> bo
     let (mut sum, mut count) = (0.0, 0.0);
     let mut columns = vec![Moments::default(); width];
     for top in 0..=height - down.len() {
-        columns.iter_mut().enumerate().for_each(|(x, m)| *m = column_moments(a, b, channel, (x, top), &down));
+        columns
+            .iter_mut()
+            .enumerate()
+            .for_each(|(x, m)| *m = column_moments(a, b, top * width + x, channel, &down));
         for left in 0..=width - across.len() {
             if inside((top + down.len() / 2) * width + left + across.len() / 2) {
                 let weighted = across.iter().zip(&columns[left..]);
@@ -84,9 +87,10 @@ fn window(side: usize) -> Vec<f64> {
     (-reach..=reach).map(|k| bell(k) / sum).collect()
 }
 
-fn column_moments(a: &Image, b: &Image, channel: usize, (x, top): (usize, usize), window: &[f64]) -> Moments {
+/// The moments of a column of pixels, the first of which has this number.
+fn column_moments(a: &Image, b: &Image, first: usize, channel: usize, window: &[f64]) -> Moments {
     window.iter().enumerate().fold(Moments::default(), |total, (k, w)| {
-        let at = |image: &Image| f64::from(image.row(top + k)[x * image.channels + channel]);
+        let at = |image: &Image| f64::from(image.data[(first + k * image.width) * image.channels + channel]);
         let (p, q) = (at(a), at(b));
         total.plus(&Moments { a: p, b: q, aa: p * p, bb: q * q, ab: p * q }, *w)
     })

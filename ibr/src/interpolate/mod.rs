@@ -7,7 +7,7 @@ mod holes;
 pub mod plane;
 pub mod rows;
 
-pub(crate) use holes::join_rows;
+use holes::join_rows;
 pub use holes::{Cover, HoleCount, HoleFill, HoleSettings};
 
 use crate::occlusion::DepthTest;

@@ -6,6 +6,7 @@
 //! ```
 
 use super::{Cover, HoleFill, InterpolationError, Settings};
+use crate::depth::fill_empty_rows;
 use crate::sample::Sample;
 use hybank::sampling::fit::Response;
 use hybank::sampling::{Fit, FitSample};
@@ -245,17 +246,6 @@ pub(super) fn blacken(mask: &[Cover], values: &mut [f32], channels: usize) {
     }
 }
 
-/// Copies rows without samples from the nearest row that has some; `filled` marks those.
-pub fn fill_empty_rows(filled: &[bool], values: &mut [f32]) {
-    let full: Vec<usize> = (0..filled.len()).filter(|y| filled[*y]).collect();
-    let stride = values.len() / filled.len().max(1);
-    for y in (0..filled.len()).filter(|y| !filled[*y]) {
-        if let Some(&nearest) = full.iter().min_by_key(|other| other.abs_diff(y)) {
-            values.copy_within(nearest * stride..(nearest + 1) * stride, y * stride);
-        }
-    }
-}
-
 /// The whole third stage for samples on whole rows, in any order: a value for every pixel and the mask.
 ///
 /// # Errors
@@ -299,13 +289,19 @@ fn interpolate_with<const ORDER: usize, const C: usize>(
     if !filled.contains(&true) {
         return Err(InterpolationError::NoSamples { width, height });
     }
-    if settings.holes.fill != HoleFill::Leave {
-        fill_empty_rows(&filled, &mut values);
-    }
-    if settings.holes.fill == HoleFill::Background {
-        super::join_rows::<C>(&mask, width, &mut values);
-    }
+    finish::<C>(&filled, &mask, settings.holes.fill, &mut values);
     Ok((values, mask))
+}
+
+/// What rows do together when each is fitted: rows without samples are copied from the nearest one that is
+/// `filled`, and the holes of neighbouring rows are joined.
+pub(crate) fn finish<const C: usize>(filled: &[bool], mask: &[Cover], fill: HoleFill, values: &mut [f32]) {
+    if fill != HoleFill::Leave {
+        fill_empty_rows(filled, values);
+    }
+    if fill == HoleFill::Background {
+        super::join_rows::<C>(mask, mask.len() / filled.len().max(1), values);
+    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@
 //! is left for the search.
 
 use super::DepthTest;
-use super::points::{Extent, Points, RUN, bounds, largest, least};
+use super::points::{Extent, Points, RUN, Raster};
+use crate::lanes::{bounds, largest, least};
 use std::ops::Range;
 
 /// Edge of a cell in pixels. With 2.5, 4 and 6 the samples of the synthetic scene took 10.6, 10.5 and
@@ -38,12 +39,7 @@ impl Run {
 /// Runs of samples, and the depths in the cells that they reach; work memory that is used again.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Cells {
-    left: f64,
-    top: f64,
-    /// Cells per pixel.
-    scale: f64,
-    columns: usize,
-    rows: usize,
+    raster: Raster,
     runs: Vec<Run>,
     /// Least depth of all samples whose radius reaches into a cell.
     near: Vec<f32>,
@@ -55,9 +51,8 @@ impl Cells {
     /// Removes all runs and places the grid over the rectangle of at most `count` samples to come.
     pub(super) fn clear(&mut self, extent: &Extent, count: usize) {
         self.runs.clear();
-        (self.left, self.top, self.scale) = (extent.left, extent.top, extent.scale(EDGE, count + 16));
-        (self.columns, self.rows) = extent.cells(self.scale);
-        let cells = self.columns * self.rows;
+        self.raster = Raster::over(extent, EDGE, count + 16);
+        let cells = self.raster.columns * self.raster.rows;
         self.near.clear();
         self.near.resize(cells, f32::INFINITY);
         self.far.clear();
@@ -96,10 +91,13 @@ impl Cells {
         let reach = ROUNDING * test.radius(spacing);
         let last = |count: usize| count as u32 - 1;
         let cells = |(low, high): (f64, f64), origin: f64, count: usize| {
-            let cell = |v: f64| (((v - origin) * self.scale) as u32).min(last(count));
+            let cell = |v: f64| (((v - origin) * self.raster.scale) as u32).min(last(count));
             [cell(low - reach), cell(high + reach)]
         };
-        let (columns, rows) = (cells(across, self.left, self.columns), cells(down, self.top, self.rows));
+        let (columns, rows) = (
+            cells(across, self.raster.left, self.raster.columns),
+            cells(down, self.raster.top, self.raster.rows),
+        );
         Run { columns, rows, near, far }
     }
 
@@ -109,12 +107,12 @@ impl Cells {
         let ([left, right], [top, bottom]) = (run.columns.map(|c| c as usize), run.rows.map(|r| r as usize));
         if right < left + USUAL_COLUMNS && bottom < top + 2 {
             // Always as many cells: the processor cannot foresee how often a loop would run.
-            for row in [top * self.columns, bottom * self.columns] {
+            for row in [top * self.raster.columns, bottom * self.raster.columns] {
                 (0..USUAL_COLUMNS).for_each(|k| with(row + (left + k).min(right)));
             }
         } else {
             for row in top..=bottom {
-                (left..=right).for_each(|column| with(row * self.columns + column));
+                (left..=right).for_each(|column| with(row * self.raster.columns + column));
             }
         }
     }
@@ -130,8 +128,8 @@ impl Cells {
                 continue;
             }
             for i in (k * RUN..(k + 1) * RUN).filter(|i| points.own[*i]) {
-                let (x, y) = (points.x[i] - self.left, points.y[i] - self.top);
-                let cell = (y * self.scale) as usize * self.columns + (x * self.scale) as usize;
+                let (column, row) = self.raster.cell(points.x[i], points.y[i]);
+                let cell = row * self.raster.columns + column;
                 if hides(self.near[cell], points.depth[i]) {
                     self.far[cell] = largest(self.far[cell], points.depth[i]);
                     suspects.push(i as u32);

@@ -3,7 +3,7 @@
 //! or more lie in different grids.
 
 use super::cells::Cells;
-use super::points::{Extent, Points};
+use super::points::{Extent, Points, Raster};
 use super::{DepthTest, LARGEST_SPACING};
 use crate::sample::Sample;
 use rayon::prelude::*;
@@ -69,7 +69,7 @@ impl PlaneSearch {
             let is_hidden = |i: &u32| {
                 let (i, members) = (*i as usize, &members[..]);
                 let [x, y] = [points.x[i], points.y[i]];
-                grids.iter().any(|grid| grid.hides((x, y, points.depth[i]), members, test))
+                grids.iter().any(|grid| grid.hides(x, y, points.depth[i], members, test))
             };
             hidden.par_extend(suspects.par_iter().with_min_len(4096).copied().filter(is_hidden));
         }
@@ -112,12 +112,7 @@ fn level(spacing: f32) -> usize {
 /// view come one after the other, so building it touches one cell after the other.
 #[derive(Debug, Clone, Default)]
 struct Grid {
-    left: f64,
-    top: f64,
-    /// Cells per pixel.
-    scale: f64,
-    columns: usize,
-    rows: usize,
+    raster: Raster,
     /// The last member of each cell; empty without members.
     heads: Vec<u32>,
 }
@@ -137,38 +132,30 @@ impl Grid {
     /// Places an empty grid over the extent of all samples, with cells no smaller than `radius`.
     fn place(&mut self, extent: &Extent, radius: f64, most: usize) {
         // Members within the radius lie in neighbouring cells, even if the positions in the grid round.
-        let scale = extent.scale(1.0001 * radius, most);
-        let ((columns, rows), mut heads) = (extent.cells(scale), std::mem::take(&mut self.heads));
-        heads.resize(columns * rows, NONE);
-        *self = Self { left: extent.left, top: extent.top, scale, columns, rows, heads };
+        self.raster = Raster::over(extent, 1.0001 * radius, most);
+        self.heads.resize(self.raster.columns * self.raster.rows, NONE);
     }
 
     /// Adds a member; returns the one before it in its cell.
     #[inline]
     fn insert(&mut self, index: u32, x: f64, y: f64) -> u32 {
-        let (column, row) = self.cell(x, y);
-        std::mem::replace(&mut self.heads[row * self.columns + column], index)
-    }
-
-    /// Column and row of the cell of a position.
-    #[inline]
-    fn cell(&self, x: f64, y: f64) -> (usize, usize) {
-        (((x - self.left) * self.scale) as usize, ((y - self.top) * self.scale) as usize)
+        let (column, row) = self.raster.cell(x, y);
+        std::mem::replace(&mut self.heads[row * self.raster.columns + column], index)
     }
 
     /// Whether any member hides a sample with this position and depth: comparison with those in the nine
     /// cells around.
-    fn hides(&self, (x, y, depth): (f64, f64, f32), members: &[Member], test: &DepthTest) -> bool {
+    fn hides(&self, x: f64, y: f64, depth: f32, members: &[Member], test: &DepthTest) -> bool {
         if self.heads.is_empty() {
             return false;
         }
-        let (column, row) = self.cell(x, y);
-        let columns = column.saturating_sub(1)..(column + 2).min(self.columns);
+        let (column, row) = self.raster.cell(x, y);
+        let columns = column.saturating_sub(1)..(column + 2).min(self.raster.columns);
         let hides = |m: &Member| {
             test.hides(f64::from(m.depth), f64::from(depth)) && DepthTest::close(x - m.x, y - m.y, m.radius)
         };
-        (row.saturating_sub(1)..(row + 2).min(self.rows)).any(|r| {
-            let cells = &self.heads[r * self.columns..][columns.clone()];
+        (row.saturating_sub(1)..(row + 2).min(self.raster.rows)).any(|r| {
+            let cells = &self.heads[r * self.raster.columns..][columns.clone()];
             cells.iter().any(|head| list(members, *head).any(hides))
         })
     }

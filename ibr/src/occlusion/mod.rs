@@ -26,7 +26,6 @@ pub(crate) use grid::{PlaneSearch, hidden};
 pub(crate) use points::{Extent, Points, RUN};
 pub use row::{RowScratch, remove_in_row};
 
-use crate::sample::Sample;
 use crate::setting::{NOT_NEGATIVE, POSITIVE, SettingError};
 
 /// Spacing from which on the radius grows no further, in virtual pixels: beyond it a surface is hardly
@@ -86,22 +85,25 @@ impl DepthTest {
     pub fn close(dx: f64, dy: f64, radius: f64) -> bool {
         dx * dx + dy * dy <= radius * radius
     }
-
-    /// The definition, sample against sample, O(n^2): the oracle of the fast routines.
-    pub fn hidden_by_definition<const C: usize>(&self, samples: &[Sample<C>]) -> Vec<bool> {
-        let hidden = |x: &Sample<C>| {
-            samples.iter().any(|y| {
-                Self::close(x.x - y.x, x.y - y.y, self.radius(y.spacing))
-                    && self.hides(f64::from(y.depth), f64::from(x.depth))
-            })
-        };
-        samples.iter().map(hidden).collect()
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sample::Sample;
+
+    impl DepthTest {
+        /// The definition, sample against sample, O(n^2): the oracle of the fast routines.
+        pub(crate) fn hidden_by_definition<const C: usize>(&self, samples: &[Sample<C>]) -> Vec<bool> {
+            let hidden = |x: &Sample<C>| {
+                samples.iter().any(|y| {
+                    Self::close(x.x - y.x, x.y - y.y, self.radius(y.spacing))
+                        && self.hides(f64::from(y.depth), f64::from(x.depth))
+                })
+            };
+            samples.iter().map(hidden).collect()
+        }
+    }
 
     #[test]
     fn senseless_tests_are_refused() {

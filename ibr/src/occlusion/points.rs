@@ -1,5 +1,6 @@
 //! What the depth test needs of samples, as arrays.
 
+use crate::lanes::bounds;
 use crate::sample::Sample;
 
 /// Points whose bounds are found together.
@@ -61,51 +62,35 @@ pub(crate) struct Extent {
     pub(crate) bottom: f64,
 }
 
-impl Extent {
-    /// Cells per pixel, of square cells no smaller than `edge`: the edge is doubled until there are at most
-    /// `most` cells.
-    pub(super) fn scale(&self, edge: f64, most: usize) -> f64 {
-        let cells =
-            |edge: f64| ((self.right - self.left) / edge + 1.0) * ((self.bottom - self.top) / edge + 1.0);
+/// Square cells over a rectangle.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Raster {
+    pub(super) left: f64,
+    pub(super) top: f64,
+    /// Cells per pixel.
+    pub(super) scale: f64,
+    pub(super) columns: usize,
+    pub(super) rows: usize,
+}
+
+impl Raster {
+    /// Cells no smaller than `edge`: the edge is doubled until there are at most `most` cells.
+    pub(super) fn over(extent: &Extent, edge: f64, most: usize) -> Self {
+        let Extent { left, right, top, bottom } = *extent;
+        let cells = |edge: f64| ((right - left) / edge + 1.0) * ((bottom - top) / edge + 1.0);
         let mut edge = edge;
         // The doubling ends at the latest when one cell holds all samples.
         while cells(edge) > most as f64 {
             edge *= 2.0;
         }
-        1.0 / edge
-    }
-
-    /// Columns and rows of cells.
-    pub(super) fn cells(&self, scale: f64) -> (usize, usize) {
+        let scale = 1.0 / edge;
         let count = |low: f64, high: f64| ((high - low) * scale) as usize + 1;
-        (count(self.left, self.right), count(self.top, self.bottom))
+        Self { left, top, scale, columns: count(left, right), rows: count(top, bottom) }
     }
-}
 
-/// The least and the largest number; those that are not numbers do not count. In lanes, so that the compiler
-/// compares several at a time.
-#[inline]
-pub(super) fn bounds<T: Copy + PartialOrd, const LANES: usize>(numbers: &[T], none: (T, T)) -> (T, T) {
-    let (mut low, mut high) = ([none.0; LANES], [none.1; LANES]);
-    let (whole, rest) = numbers.as_chunks::<LANES>();
-    for values in whole {
-        for lane in 0..LANES {
-            low[lane] = least(low[lane], values[lane]);
-            high[lane] = largest(high[lane], values[lane]);
-        }
+    /// Column and row of the cell of a position.
+    #[inline]
+    pub(super) fn cell(&self, x: f64, y: f64) -> (usize, usize) {
+        (((x - self.left) * self.scale) as usize, ((y - self.top) * self.scale) as usize)
     }
-    let low = low.iter().chain(rest).fold(none.0, |low, v| least(low, *v));
-    (low, high.iter().chain(rest).fold(none.1, |high, v| largest(high, *v)))
-}
-
-/// The lesser of two numbers, the first if the second is not a number.
-#[inline]
-pub(super) fn least<T: PartialOrd>(a: T, b: T) -> T {
-    if b < a { b } else { a }
-}
-
-/// The larger of two numbers, the first if the second is not a number.
-#[inline]
-pub(super) fn largest<T: PartialOrd>(a: T, b: T) -> T {
-    if b > a { b } else { a }
 }

@@ -1,6 +1,7 @@
 //! Occlusion removal within one row: sort by column, then a sliding minimum of the depth.
 
 use super::DepthTest;
+use crate::lanes::{largest, least};
 use crate::sample::Sample;
 use std::ops::Range;
 
@@ -29,12 +30,10 @@ struct Depths {
 impl Depths {
     const NONE: Self = Self { near: f32::INFINITY, far: f32::NEG_INFINITY };
 
-    /// Comparisons instead of `min` and `max`: a depth that is not a number hides nothing and is not hidden.
+    /// A depth that is not a number hides nothing and is not hidden.
     #[inline]
     fn and(self, other: Self) -> Self {
-        let near = if other.near < self.near { other.near } else { self.near };
-        let far = if other.far > self.far { other.far } else { self.far };
-        Self { near, far }
+        Self { near: least(self.near, other.near), far: largest(self.far, other.far) }
     }
 
     fn of(keys: &[Key]) -> Self {
@@ -73,9 +72,8 @@ impl<const C: usize> RowScratch<C> {
         if n < 2 {
             return;
         }
-        let (low, high) = self.keys.iter().fold((f64::MAX, f64::MIN), |(low, high), k| {
-            (if k.x < low { k.x } else { low }, if k.x > high { k.x } else { high })
-        });
+        let none = (f64::MAX, f64::MIN);
+        let (low, high) = self.keys.iter().fold(none, |(low, high), k| (least(low, k.x), largest(high, k.x)));
         let scale = (n - 1) as f64 / (high - low + 1.0);
         if !(scale.is_finite() && scale > 0.0) {
             self.keys.sort_by(|a, b| a.x.total_cmp(&b.x));
@@ -116,9 +114,7 @@ impl<const C: usize> RowScratch<C> {
     /// are searched.
     fn collect(&mut self, samples: &[Sample<C>], test: &DepthTest) {
         let n = self.keys.len();
-        let largest =
-            samples.iter().fold(0.0, |most: f32, s| if s.spacing > most { s.spacing } else { most });
-        let radius = test.radius(largest);
+        let radius = test.radius(samples.iter().fold(0.0, |most, s| largest(most, s.spacing)));
         self.chunks.clear();
         self.chunks.extend(self.keys.chunks(CHUNK).map(Depths::of));
         self.hidden.clear();

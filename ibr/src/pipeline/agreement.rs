@@ -1,17 +1,14 @@
 //! Whether the inputs fit each other, from the inputs alone: points that one view gives by its depth must
 //! lie at the same depth and have the same colour in another view.
 
-use super::depth_errors::{self, Lookups};
+use super::depth_errors::{self, FEWEST_POINTS, Lookups};
 use crate::depth::{DepthMap, Measure};
 use crate::image::{Image, Texture};
 use crate::propagate::{View, Viewpoint};
 use rayon::prelude::*;
 
 /// Pixels of each view that are compared, about.
-const PIXELS: usize = 20_000;
-
-/// Fewest points for a verdict.
-const FEWEST: usize = 100;
+const COMPARED_PIXELS: usize = 20_000;
 
 /// Depths agree up to this share of the nearer one, disparities also up to one pixel.
 const DEPTH_SHARE: f32 = 0.05;
@@ -137,7 +134,7 @@ impl Comparison {
         let (image, other, other_map) = (first.image, second.image, second.map);
         let to_second = first.camera.map_to(&second.camera);
         let (width, height) = image.size();
-        let step = ((width * height / PIXELS) as f64).sqrt().ceil().max(1.0) as usize;
+        let step = ((width * height / COMPARED_PIXELS) as f64).sqrt().ceil().max(1.0) as usize;
         let rows: Vec<usize> = (0..height).step_by(step).collect();
         let of_row = |y: &usize| {
             let mut all = Self { points: 0, matched: Vec::new() };
@@ -167,7 +164,7 @@ impl Comparison {
     }
 
     fn verdict(&self, views: [usize; 2]) -> Option<PairAgreement> {
-        if self.points < FEWEST {
+        if self.points < FEWEST_POINTS {
             return None;
         }
         let gain = self.gain();
@@ -186,11 +183,7 @@ impl Comparison {
         let usable = |v: f32| (16.0..250.0).contains(&v);
         let both = self.matched.iter().filter(|[a, b]| usable(*a) && usable(*b));
         let mut ratios: Vec<f64> = both.map(|[a, b]| f64::from(*b) / f64::from(*a)).collect();
-        if ratios.len() < FEWEST {
-            return 1.0;
-        }
-        let middle = ratios.len() / 2;
-        *ratios.select_nth_unstable_by(middle, f64::total_cmp).1
+        if ratios.len() < FEWEST_POINTS { 1.0 } else { depth_errors::median(&mut ratios).unwrap_or(1.0) }
     }
 }
 

@@ -1,14 +1,14 @@
 //! A view from any number of calibrated cameras with depth.
 
 use super::{
-    Agreement, Balance, Method, RenderError, RenderSettings, Rendering, Report, Watch, check_counts,
+    Agreement, Method, RenderError, RenderSettings, Rendering, Report, ViewWeights, Watch, check_counts,
+    check_size,
 };
 use crate::camera::Camera;
-use crate::image::Image;
+use crate::interpolate::Degree;
 use crate::interpolate::plane::PlaneProblem;
-use crate::interpolate::{Degree, HoleCount};
 use crate::occlusion::{DepthTest, PlaneSearch};
-use crate::propagate::{CalibratedView, Frame, Landed, Survey};
+use crate::propagate::{CalibratedView, Footprint, Frame, Projected};
 use crate::sample::Sample;
 use std::ops::Range;
 use std::sync::Mutex;
@@ -63,15 +63,8 @@ fn check(views: &[CalibratedView<'_>], settings: &RenderSettings) -> Result<(), 
     if settings.method == Method::Rows {
         return Err(RenderError::RowsOfGeneralCameras);
     }
-    for (view, v) in views.iter().enumerate() {
-        let (expected_width, expected_height) = v.image.size();
-        let (width, height) = v.map.size();
-        if (width, height) != (expected_width, expected_height) {
-            let what = "the depth map";
-            return Err(RenderError::Size { view, what, width, height, expected_width, expected_height });
-        }
-    }
-    Ok(())
+    let mut all = views.iter().enumerate();
+    all.try_for_each(|(view, v)| check_size(view, "the depth map", v.map.size(), v.image.size()))
 }
 
 fn render_with<const ORDER: usize, const C: usize>(
@@ -81,20 +74,21 @@ fn render_with<const ORDER: usize, const C: usize>(
     settings: &RenderSettings,
     watch: Watch<'_>,
 ) -> Result<Rendering, RenderError> {
-    let balance = match settings.nearest {
-        Some(_) => Balance::by_angle(views, camera).nearest(settings.nearest),
-        None => Balance::of(views, camera),
+    let view_weights = match settings.nearest {
+        Some(_) => ViewWeights::by_angle(views, camera).nearest(settings.nearest),
+        None => ViewWeights::of(views, camera),
     };
     let agreement = Agreement::of(views);
-    let balance = balance.with_noise(&agreement);
-    let settings = &settings.suited_to(&agreement, &balance);
-    let chosen = balance.views();
+    let view_weights = view_weights.with_noise(&agreement);
+    let settings = &settings.suited_to(&agreement, &view_weights);
+    let chosen = view_weights.views();
     let pixels: usize = chosen.iter().map(|v| views[*v].image.width() * views[*v].image.height()).sum();
     let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &settings.interpolation)?;
     let whole = Frame::whole(width, height, 0.5, settings.offset);
-    let survey = Survey::of(views, &chosen, camera, &whole);
-    let balance = if settings.keep_exposure { balance } else { balance.with_gains(&agreement.gains) };
-    let count = survey.most_samples().div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS)).max(1);
+    let footprint = Footprint::of(views, &chosen, camera, &whole);
+    let view_weights =
+        if settings.keep_exposure { view_weights } else { view_weights.with_gains(&agreement.gains) };
+    let count = footprint.most_samples().div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS)).max(1);
     let bands: Vec<Range<usize>> =
         (0..count).map(|band| band * height / count..(band + 1) * height / count).collect();
     let (ready, propagated) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -102,33 +96,29 @@ fn render_with<const ORDER: usize, const C: usize>(
     problem.add_bands(&bands, |rows| {
         let mut work = pool.lock().ok().and_then(|mut pool| pool.pop()).unwrap_or_default();
         let test = settings.depth_test();
-        let (mut samples, all) = visible_in(rows.clone(), height, &survey, views, test, &mut work);
+        let (mut samples, all) = visible_in(rows.clone(), height, &footprint, views, test, &mut work);
         if let Ok(mut pool) = pool.lock() {
             pool.push(work);
         }
-        balance.apply(&mut samples, |view| views[view].image);
+        view_weights.apply(&mut samples, |view| views[view].image);
         propagated.fetch_add(all, Ordering::Relaxed);
         watch(GATHERING * (ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count as f64);
         samples
     })?;
     let propagated = propagated.into_inner();
-    let (used, dropped) = (problem.samples(), survey.dropped(propagated));
+    let (used, dropped) = (problem.samples(), footprint.dropped(propagated));
     if propagated == 0 {
         return Err(RenderError::NoOverlap { pixels, dropped });
     }
-    let mut report = Report { propagated, occluded: propagated - used, used, dropped, ..Report::default() };
+    let report = Report { propagated, occluded: propagated - used, used, dropped, ..Report::default() };
     let fit = problem.solve_watched(None, &|share| watch(GATHERING + (1.0 - GATHERING) * share))?;
-    report.holes = HoleCount::of(&fit.mask);
-    report.convergence = Some(fit.convergence);
-    let image = Image::from_values((width, height), C, fit.values);
-    let (mask, depth, counts) = (fit.mask, fit.depth, fit.counts);
-    Ok(Rendering { image, mask, depth, counts, views: chosen, report, agreement })
+    Ok(Rendering::of_plane::<C>(fit, report, chosen, agreement))
 }
 
 /// Work memory of the first two stages.
 #[derive(Default)]
 struct Work {
-    landed: Landed,
+    projected: Projected,
     search: PlaneSearch,
 }
 
@@ -138,7 +128,7 @@ struct Work {
 fn visible_in<const C: usize>(
     rows: Range<usize>,
     height: usize,
-    survey: &Survey,
+    footprint: &Footprint,
     views: &[CalibratedView<'_>],
     test: &DepthTest,
     work: &mut Work,
@@ -146,18 +136,19 @@ fn visible_in<const C: usize>(
     let last = rows.end == height;
     let top = if rows.start == 0 { f64::MIN } else { rows.start as f64 };
     let bottom = if last { f64::MAX } else { rows.end as f64 };
-    let (own, Work { landed, search }) = ((top, bottom), work);
-    search.clear(&survey.band_around(own, test).extent(), survey.most_between(own, test));
-    survey.land_between(views, own, test, landed, |points| search.enter(points, test));
-    let all = landed.count();
-    landed.remove(search.hidden(landed.points(), test));
-    (landed.samples(views), all)
+    let (own, Work { projected, search }) = ((top, bottom), work);
+    search.clear(&footprint.band_around(own, test).extent(), footprint.most_between(own, test));
+    footprint.project_between(views, own, test, projected, |points| search.enter(points, test));
+    let all = projected.count();
+    projected.remove(search.hidden(projected.points(), test));
+    (projected.samples(views), all)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::depth::{DepthMap, Measure};
+    use crate::image::Image;
     use crate::interpolate::plane;
     use crate::occlusion;
     use crate::propagate;
@@ -191,16 +182,16 @@ mod tests {
         assert_eq!((got.report.propagated, got.report.dropped), (samples.len(), dropped));
         assert_eq!(got.report.occluded, occlusion::remove(&mut samples, settings.depth_test()));
         assert!(got.report.occluded > 0);
-        Balance::of(&views, &target).apply(&mut samples, |view| views[view].image);
+        ViewWeights::of(&views, &target).apply(&mut samples, |view| views[view].image);
         let fit = plane::interpolate(&samples, (40, 30), &settings.interpolation).unwrap();
         assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
         // In bands only the order of summation differs.
-        let survey = Survey::new(&views, &target, &frame);
+        let footprint = Footprint::new(&views, &target, &frame);
         let mut problem = PlaneProblem::<2, 1>::new((40, 30), &settings.interpolation).unwrap();
         let mut work = Work::default();
         for rows in [0..7, 7..8, 8..30] {
-            let (mut band, _) = visible_in(rows, 30, &survey, &views, settings.depth_test(), &mut work);
-            Balance::of(&views, &target).apply(&mut band, |view| views[view].image);
+            let (mut band, _) = visible_in(rows, 30, &footprint, &views, settings.depth_test(), &mut work);
+            ViewWeights::of(&views, &target).apply(&mut band, |view| views[view].image);
             problem.add(&band).unwrap();
         }
         assert_eq!(problem.samples(), samples.len());

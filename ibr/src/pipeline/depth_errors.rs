@@ -4,19 +4,19 @@
 use crate::depth::{DepthMap, Measure};
 
 /// Every so many pixels of a map are looked up.
-const STEP: usize = 7;
+const LOOKUP_STEP: usize = 7;
 
 /// Fewest points for a verdict.
-const FEWEST: usize = 100;
+pub(super) const FEWEST_POINTS: usize = 100;
 
 /// Largest relative difference of two depths of one surface.
 const SAME_SURFACE: f64 = 0.05;
 
 /// The median of |x| of a normal variable of deviation one, to its inverse.
-const MEDIAN: f64 = 1.4826;
+const DEVIATION_PER_MEDIAN: f64 = 1.4826;
 
 /// Differences beyond this many deviations belong to points that another surface hides.
-const HIDDEN: f64 = 3.0;
+const HIDDEN_BEYOND: f64 = 3.0;
 
 /// Least value of 1 - k1 k2, see [`of_each`]; 5/9 at random places in a row.
 const LEAST_AVERAGED: f64 = 0.3;
@@ -39,7 +39,7 @@ impl Lookups {
     pub(crate) fn of(from: &DepthMap, to: &DepthMap, map: impl Fn(f64, f64, f64) -> (f64, f64, f64)) -> Self {
         let (width, height) = from.size();
         let mut all = Self::default();
-        for p in (0..width * height).step_by(STEP).filter(|p| !from.is_guessed(*p)) {
+        for p in (0..width * height).step_by(LOOKUP_STEP).filter(|p| !from.is_guessed(*p)) {
             let depth = f64::from(from.data()[p]);
             let (u, v, d) = map((p % width) as f64, (p / width) as f64, depth);
             let Some((there, kept)) = interpolated(to, u, v) else { continue };
@@ -73,16 +73,17 @@ impl Lookups {
     /// without points.
     pub(crate) fn common(mut self) -> f64 {
         let share = self.share();
-        median(&mut self.differences).map_or(0.0, |median| MEDIAN * median / (1.0 + share).sqrt())
+        median(&mut self.differences)
+            .map_or(0.0, |median| DEVIATION_PER_MEDIAN * median / (1.0 + share).sqrt())
     }
 
     /// Variance of the differences without hidden points: the median, again without what lies far beyond it.
     fn variance(&mut self) -> Option<f64> {
         for _ in 0..ROUNDS {
-            let limit = HIDDEN * MEDIAN * median(&mut self.differences)?;
+            let limit = HIDDEN_BEYOND * DEVIATION_PER_MEDIAN * median(&mut self.differences)?;
             self.differences.retain(|difference| *difference <= limit);
         }
-        Some((MEDIAN * median(&mut self.differences)?).powi(2))
+        Some((DEVIATION_PER_MEDIAN * median(&mut self.differences)?).powi(2))
     }
 }
 
@@ -101,7 +102,8 @@ fn interpolated(map: &DepthMap, u: f64, v: f64) -> Option<(f64, f64)> {
     Some((value, kept(s) * kept(t)))
 }
 
-fn median(values: &mut [f64]) -> Option<f64> {
+/// The middle one of some numbers.
+pub(super) fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
@@ -114,7 +116,7 @@ fn median(values: &mut [f64]) -> Option<f64> {
 /// change from pixel to pixel are not averaged by interpolation; they have D1 = D2 and are shared equally.
 /// `None` too where most points fall on pixels, and nothing is averaged.
 pub(super) fn of_each([mut first, mut second]: [Lookups; 2]) -> Option<[f64; 2]> {
-    if first.differences.len().min(second.differences.len()) < FEWEST {
+    if first.differences.len().min(second.differences.len()) < FEWEST_POINTS {
         return None;
     }
     let (k1, k2) = (first.share(), second.share());

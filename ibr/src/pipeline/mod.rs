@@ -1,20 +1,20 @@
 //! Complete renderings: the three stages for each kind of input.
 
 mod agreement;
-mod balance;
 pub mod calibrated;
 pub(crate) mod depth_errors;
 pub mod rectified;
 mod smoothing;
 pub mod uncalibrated;
+mod view_weights;
 
 pub use agreement::{Agreement, PairAgreement};
-pub use balance::Balance;
+pub use view_weights::ViewWeights;
 
 use crate::depth::DepthMap;
 use crate::image::Image;
 pub use crate::interpolate::Watch;
-use crate::interpolate::plane::Convergence;
+use crate::interpolate::plane::{Convergence, PlaneFit};
 use crate::interpolate::{Cover, HoleCount, InterpolationError, Settings};
 use crate::occlusion::DepthTest;
 use crate::sample::Dropped;
@@ -48,7 +48,8 @@ pub struct RenderSettings {
     /// Use lambda and stiffness as they are. Otherwise they follow from the noise and the slopes of the
     /// photographs, where cameras are known.
     pub keep_smoothing: bool,
-    /// Use only so many views, those that [`Balance`] finds nearest to the virtual camera; all without it.
+    /// Use only so many views, those that [`ViewWeights`] finds nearest to the virtual camera; all without
+    /// it.
     pub nearest: Option<usize>,
 }
 
@@ -84,22 +85,16 @@ pub enum RenderError {
         pixels: usize,
     },
     /// Views of different sizes in a rectified rig, or a map of another size than its image.
-    #[error(
-        "view {view}: {what} has {width} x {height} pixels instead of {expected_width} x {expected_height}"
-    )]
+    #[error("view {view}: {what} has {} x {} pixels instead of {} x {}", size.0, size.1, expected.0, expected.1)]
     Size {
         /// Index of the view.
         view: usize,
         /// The image or the map.
         what: &'static str,
-        /// Its width.
-        width: usize,
-        /// Its height.
-        height: usize,
-        /// Width expected.
-        expected_width: usize,
-        /// Height expected.
-        expected_height: usize,
+        /// Its width and height.
+        size: (usize, usize),
+        /// Width and height expected.
+        expected: (usize, usize),
     },
     /// The row fit was asked for where samples lie between rows.
     #[error(
@@ -176,18 +171,46 @@ pub struct Rendering {
 }
 
 impl Rendering {
+    /// Of a plane fit of C channels; the report is that of the stages before it.
+    fn of_plane<const C: usize>(
+        fit: PlaneFit,
+        mut report: Report,
+        views: Vec<usize>,
+        agreement: Agreement,
+    ) -> Self {
+        let PlaneFit { values, mask, depth, counts, convergence } = fit;
+        (report.holes, report.convergence) = (HoleCount::of(&mask), Some(convergence));
+        Self {
+            image: Image::from_values(depth.size(), C, values),
+            mask,
+            depth,
+            counts,
+            views,
+            report,
+            agreement,
+        }
+    }
+
     /// Share of the pixels that samples cover.
     pub fn coverage(&self) -> f64 {
         1.0 - HoleCount::of(&self.mask).total() as f64 / self.mask.len() as f64
     }
-}
 
-impl Rendering {
     /// Opacity of each pixel: 1 where a surface was seen or bridged, 0 where the value was made up because
     /// no view shows what is there.
     pub fn alpha(&self) -> Vec<f32> {
         self.mask.iter().map(|c| if *c == Cover::Disocclusion { 0.0 } else { 1.0 }).collect()
     }
+}
+
+/// Refuses an image or map of another size than expected.
+fn check_size(
+    view: usize,
+    what: &'static str,
+    size: (usize, usize),
+    expected: (usize, usize),
+) -> Result<(), RenderError> {
+    if size == expected { Ok(()) } else { Err(RenderError::Size { view, what, size, expected }) }
 }
 
 /// Refuses more views or pixels than the indices of samples can hold.

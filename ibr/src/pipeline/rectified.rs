@@ -1,13 +1,14 @@
 //! A view from a rectified rig: the three stages run row by row, rows in parallel.
 
 use super::{
-    Agreement, Balance, Method, RenderError, RenderSettings, Rendering, Report, Watch, check_counts,
+    Agreement, Method, RenderError, RenderSettings, Rendering, Report, ViewWeights, Watch, check_counts,
+    check_size,
 };
 use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::interpolate::plane::PlaneProblem;
-use crate::interpolate::rows::{self, RowWork, fill_empty_rows, nearest_depths};
-use crate::interpolate::{Cover, Degree, HoleCount, HoleFill, InterpolationError, join_rows};
+use crate::interpolate::rows::{self, RowWork, nearest_depths};
+use crate::interpolate::{Cover, Degree, HoleCount, InterpolationError};
 use crate::occlusion::{self, RowScratch};
 use crate::propagate::{self, Frame, RectifiedView, RigCamera};
 use crate::sample::{Dropped, Sample};
@@ -53,27 +54,24 @@ pub fn render_watched(
 
 fn check(views: &[RectifiedView<'_>], position: f64) -> Result<(), RenderError> {
     let first = views.first().ok_or(RenderError::NoViews)?;
-    let (expected_width, expected_height) = first.image.size();
-    check_counts(views.len(), expected_width * expected_height)?;
+    let (width, height) = first.image.size();
+    check_counts(views.len(), width * height)?;
     for (view, v) in views.iter().enumerate() {
-        for (what, (width, height)) in [("the image", v.image.size()), ("the disparity map", v.map.size())] {
-            if (width, height) != (expected_width, expected_height) {
-                return Err(RenderError::Size { view, what, width, height, expected_width, expected_height });
-            }
-        }
+        check_size(view, "the image", v.image.size(), first.image.size())?;
+        check_size(view, "the disparity map", v.map.size(), first.image.size())?;
     }
     let positions = views.iter().map(|v| v.camera).chain([position]);
     positions.into_iter().try_for_each(|position| Ok(FINITE.check("position", position)?))
 }
 
 /// The inputs that all rows share.
-struct Job<'a> {
-    views: &'a [RectifiedView<'a>],
-    camera: RigCamera,
-    balance: Balance,
-    frame: Frame,
-    settings: &'a RenderSettings,
-    watch: Watch<'a>,
+pub(crate) struct Job<'a> {
+    pub(crate) views: &'a [RectifiedView<'a>],
+    pub(crate) camera: RigCamera,
+    pub(crate) view_weights: ViewWeights,
+    pub(crate) frame: Frame,
+    pub(crate) settings: &'a RenderSettings,
+    pub(crate) watch: Watch<'a>,
 }
 
 fn render_with<const ORDER: usize, const C: usize>(
@@ -84,16 +82,16 @@ fn render_with<const ORDER: usize, const C: usize>(
 ) -> Result<Rendering, RenderError> {
     let (width, height) = views[0].image.size();
     let agreement = Agreement::of(views);
-    let mut balance = Balance::of(views, &position).nearest(settings.nearest).with_noise(&agreement);
-    let chosen = balance.views();
-    let settings = &settings.suited_to(&agreement, &balance);
+    let mut view_weights = ViewWeights::of(views, &position).nearest(settings.nearest).with_noise(&agreement);
+    let chosen = view_weights.views();
+    let settings = &settings.suited_to(&agreement, &view_weights);
     if !settings.keep_exposure {
-        balance = balance.with_gains(&agreement.gains);
+        view_weights = view_weights.with_gains(&agreement.gains);
     }
     let whole = |margin| {
         let frame = Frame::whole(width, height, margin, settings.offset);
         let camera = RigCamera::new(views, position);
-        Job { views, camera, balance, frame, settings, watch }
+        Job { views, camera, view_weights, frame, settings, watch }
     };
     let rendering = match settings.method {
         Method::Plane => match settings.interpolation.plane.degree {
@@ -138,13 +136,8 @@ fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rend
     })?;
     let report = total(counts.iter(), HoleCount::of(&mask));
     enough(job, &report)?;
-    if job.settings.interpolation.holes.fill != HoleFill::Leave {
-        let filled: Vec<bool> = counts.iter().map(|c| c.used > 0).collect();
-        fill_empty_rows(&filled, &mut values);
-    }
-    if job.settings.interpolation.holes.fill == HoleFill::Background {
-        join_rows::<C>(&mask, width, &mut values);
-    }
+    let filled: Vec<bool> = counts.iter().map(|c| c.used > 0).collect();
+    rows::finish::<C>(&filled, &mask, job.settings.interpolation.holes.fill, &mut values);
     let image = Image::from_values((width, height), C, values);
     let depth = DepthMap::from_known((width, height), keys, Measure::Disparity);
     let (views, agreement) = (Vec::new(), Agreement::default());
@@ -161,17 +154,13 @@ fn render_plane<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Ren
         counts.push(strip.survivors_of_row(job, row));
         problem.add(&strip.samples)?;
     }
-    let mut report = total(counts.iter(), HoleCount::default());
+    let report = total(counts.iter(), HoleCount::default());
     enough(job, &report)?;
     let fit = problem.solve_watched(None, job.watch)?;
-    report.holes = HoleCount::of(&fit.mask);
-    report.convergence = Some(fit.convergence);
-    let image = Image::from_values((width, height), C, fit.values);
     let mut keys = fit.depth.data().to_vec();
     job.disparities(&mut keys);
     let depth = DepthMap::from_known((width, height), keys, Measure::Disparity);
-    let (mask, counts, views) = (fit.mask, fit.counts, Vec::new());
-    Ok(Rendering { image, mask, depth, counts, views, report, agreement: Agreement::default() })
+    Ok(Rendering { depth, ..Rendering::of_plane::<C>(fit, report, Vec::new(), Agreement::default()) })
 }
 
 impl Job<'_> {
@@ -184,7 +173,7 @@ impl Job<'_> {
 
 /// Counts of the samples of one row.
 #[derive(Debug, Clone, Copy, Default)]
-struct RowCount {
+pub(crate) struct RowCount {
     propagated: usize,
     used: usize,
     dropped: Dropped,
@@ -211,22 +200,22 @@ fn enough(job: &Job<'_>, report: &Report) -> Result<(), RenderError> {
 }
 
 /// The samples of one row and their work memory.
-struct Strip<const C: usize> {
-    samples: Vec<Sample<C>>,
+pub(crate) struct Strip<const C: usize> {
+    pub(crate) samples: Vec<Sample<C>>,
     scratch: RowScratch<C>,
 }
 
 impl<const C: usize> Strip<C> {
-    fn new(job: &Job<'_>) -> Self {
+    pub(crate) fn new(job: &Job<'_>) -> Self {
         let samples = Vec::with_capacity(job.frame.width * job.views.len());
         Self { samples, scratch: RowScratch::default() }
     }
 
     /// The first two stages for one row: propagates samples and removes hidden ones.
-    fn survivors_of_row(&mut self, job: &Job<'_>, y: usize) -> RowCount {
+    pub(crate) fn survivors_of_row(&mut self, job: &Job<'_>, y: usize) -> RowCount {
         let mut count = RowCount::default();
         self.samples.clear();
-        for (index, view) in job.views.iter().enumerate().filter(|(i, _)| job.balance.uses(*i)) {
+        for (index, view) in job.views.iter().enumerate().filter(|(i, _)| job.view_weights.uses(*i)) {
             let index = index as u16;
             count.dropped +=
                 propagate::rectified_row(view, index, y, &job.camera, &job.frame, &mut self.samples);
@@ -234,7 +223,7 @@ impl<const C: usize> Strip<C> {
         count.propagated = self.samples.len();
         occlusion::remove_in_row(&mut self.samples, job.settings.depth_test(), &mut self.scratch);
         count.used = self.samples.len();
-        job.balance.apply(&mut self.samples, |view| job.views[view].image);
+        job.view_weights.apply(&mut self.samples, |view| job.views[view].image);
         count
     }
 }
@@ -275,7 +264,7 @@ mod tests {
         let (mut samples, dropped) = propagate::rectified::<3>(&views(&parts), 0.4, &frame);
         let propagated = samples.len();
         let occluded = occlusion::remove(&mut samples, settings.depth_test());
-        Balance::of(&views(&parts), &0.4).apply(&mut samples, |view| &parts[view].0);
+        ViewWeights::of(&views(&parts), &0.4).apply(&mut samples, |view| &parts[view].0);
         let (values, mask) = rows::interpolate(&samples, (40, 9), &settings.interpolation).unwrap();
         assert_eq!(got.image.data(), values);
         assert_eq!(got.mask, mask);

@@ -1,11 +1,11 @@
 //! Smoothing that suits the noise of the photographs.
 
-use super::{Agreement, Balance, RenderSettings};
+use super::{Agreement, RenderSettings, ViewWeights};
 
 /// Range of the smoothing: with less the fit is undetermined between samples, and with more the noise is
 /// not that of a photograph.
-const LEAST: f64 = 0.01;
-const MOST: f64 = 4.0;
+const LEAST_SMOOTHING: f64 = 0.01;
+const MOST_SMOOTHING: f64 = 4.0;
 
 impl RenderSettings {
     /// The settings with the lambda and the stiffness that suit the photographs; as they are with
@@ -22,7 +22,7 @@ impl RenderSettings {
     /// sum_k w_k J'(x_k)^2 / (W s^2). So lambda = sigma^2 / (W s^2) in the row fit. The plane fit counts
     /// edges of pixels instead of samples, so its stiffness is sigma^2 / s^2; it is never less than that of
     /// the settings, because samples of general cameras are also displaced.
-    pub fn suited_to(&self, agreement: &Agreement, balance: &Balance) -> Self {
+    pub fn suited_to(&self, agreement: &Agreement, view_weights: &ViewWeights) -> Self {
         let mut settings = Self { keep_smoothing: true, ..*self };
         if self.keep_smoothing {
             return settings;
@@ -30,14 +30,14 @@ impl RenderSettings {
         let (mut noise, mut slope) = (0.0, 0.0);
         for (view, texture) in agreement.textures.iter().enumerate() {
             let Some(texture) = texture else { continue };
-            let weight = f64::from(balance.weight(view as u16));
+            let weight = f64::from(view_weights.weight(view as u16));
             noise += weight * texture.noise * texture.noise;
             slope += weight * texture.slope * texture.slope;
         }
         if slope > 0.0 {
             let (fit, plane) = (&mut settings.interpolation.fit, &mut settings.interpolation.plane);
-            fit.lambda = (noise / slope / balance.total()).clamp(LEAST, MOST);
-            plane.stiffness = (noise / slope).min(MOST).max(plane.stiffness);
+            fit.lambda = (noise / slope / view_weights.total()).clamp(LEAST_SMOOTHING, MOST_SMOOTHING);
+            plane.stiffness = (noise / slope).min(MOST_SMOOTHING).max(plane.stiffness);
         }
         settings
     }
@@ -50,7 +50,7 @@ mod tests {
 
     fn suited(textures: &[Option<Texture>], settings: &RenderSettings) -> RenderSettings {
         let agreement = Agreement { textures: textures.to_vec(), ..Agreement::default() };
-        settings.suited_to(&agreement, &Balance::by_distance(&vec![1.0; textures.len()]))
+        settings.suited_to(&agreement, &ViewWeights::by_distance(&vec![1.0; textures.len()]))
     }
 
     #[test]
@@ -61,8 +61,8 @@ mod tests {
         };
         assert!((lambda(&[of(5.0)]) - 0.25).abs() < 1e-12);
         assert!((lambda(&[of(5.0), of(5.0)]) - 0.125).abs() < 1e-7);
-        assert_eq!(lambda(&[of(0.1)]), LEAST);
-        assert_eq!(lambda(&[of(100.0)]), MOST);
+        assert_eq!(lambda(&[of(0.1)]), LEAST_SMOOTHING);
+        assert_eq!(lambda(&[of(100.0)]), MOST_SMOOTHING);
     }
 
     #[test]

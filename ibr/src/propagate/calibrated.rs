@@ -1,9 +1,9 @@
 //! Propagation from general cameras.
 
-mod landed;
+mod projected;
 mod row_map;
 
-pub(crate) use landed::Landed;
+pub(crate) use projected::Projected;
 
 use super::{CalibratedView, Frame};
 use crate::camera::{Camera, Relative};
@@ -23,7 +23,7 @@ const REACH: f64 = 1.01;
 /// virtual camera v is monotone in x and in d, so its extremes over a tile lie at the four corners of the
 /// ranges of x and d: four projections for 64 pixels.
 #[derive(Debug, Clone)]
-pub struct Survey {
+pub struct Footprint {
     maps: Vec<Relative>,
     frame: Frame,
     tiles: Vec<Tile>,
@@ -44,28 +44,30 @@ struct Tile {
     spacing: f32,
 }
 
-impl Survey {
+impl Footprint {
     /// Looks at the tiles of all views, in parallel over the rows.
     pub fn new(views: &[CalibratedView<'_>], camera: &Camera, frame: &Frame) -> Self {
         let all: Vec<usize> = (0..views.len()).collect();
         Self::of(views, &all, camera, frame)
     }
 
-    /// As [`Survey::new`], for some of the views, by number.
+    /// As [`Footprint::new`], for some of the views, by number.
     pub fn of(views: &[CalibratedView<'_>], chosen: &[usize], camera: &Camera, frame: &Frame) -> Self {
         let maps: Vec<Relative> = views.iter().map(|v| v.camera.relative_to(camera)).collect();
         let rows: Vec<(usize, usize)> =
             chosen.iter().flat_map(|&i| (0..views[i].image.height()).map(move |y| (i, y))).collect();
-        let surveyed: Vec<RowSurvey> =
-            rows.par_iter().map(|&(i, y)| RowSurvey::new(&views[i], i as u16, &maps[i], y, frame)).collect();
+        let rows_of_tiles: Vec<RowFootprint> = rows
+            .par_iter()
+            .map(|&(i, y)| RowFootprint::new(&views[i], i as u16, &maps[i], y, frame))
+            .collect();
         let pixels = rows.iter().map(|&(i, _)| views[i].image.width()).sum();
-        let mut survey = Self { maps, frame: *frame, tiles: Vec::new(), pixels, unknown: 0, behind: 0 };
-        for row in surveyed {
-            survey.tiles.extend(row.tiles);
-            survey.unknown += row.unknown;
-            survey.behind += row.behind;
+        let mut footprint = Self { maps, frame: *frame, tiles: Vec::new(), pixels, unknown: 0, behind: 0 };
+        for row in rows_of_tiles {
+            footprint.tiles.extend(row.tiles);
+            footprint.unknown += row.unknown;
+            footprint.behind += row.behind;
         }
-        survey
+        footprint
     }
 
     /// Samples in the frame, at most.
@@ -87,42 +89,42 @@ impl Survey {
         top: f64,
         bottom: f64,
     ) -> Vec<Sample<C>> {
-        let mut landed = Landed::default();
+        let mut projected = Projected::default();
         let band = self.frame.band(top, bottom);
         for tile in self.reaching(band.rows, |_| 0.0) {
-            self.land(views, tile, &band, (f64::MIN, f64::MAX), &mut landed);
+            self.project(views, tile, &band, (f64::MIN, f64::MAX), &mut projected);
         }
-        landed.samples(views)
+        projected.samples(views)
     }
 
     /// The samples between two rows of the frame, the second excluded, and those that may hide them. Calls
     /// `with` after each tile.
-    pub(crate) fn land_between(
+    pub(crate) fn project_between(
         &self,
         views: &[CalibratedView<'_>],
         own: (f64, f64),
         test: &DepthTest,
-        landed: &mut Landed,
+        projected: &mut Projected,
         mut with: impl FnMut(&Points),
     ) {
-        landed.clear();
+        projected.clear();
         let band = self.band_around(own, test);
         for tile in self.reaching(own, |spacing| REACH * test.radius(spacing)) {
-            self.land(views, tile, &band, own, landed);
-            with(landed.points());
+            self.project(views, tile, &band, own, projected);
+            with(projected.points());
         }
     }
 
-    fn land(
+    fn project(
         &self,
         views: &[CalibratedView<'_>],
         tile: &Tile,
         band: &Frame,
         own: (f64, f64),
-        landed: &mut Landed,
+        projected: &mut Projected,
     ) {
         let view = usize::from(tile.view);
-        landed.push(&views[view], &self.maps[view], tile, band, own);
+        projected.push(&views[view], &self.maps[view], tile, band, own);
     }
 
     /// The part of the frame that holds all samples between two rows and those that may hide them.
@@ -131,7 +133,7 @@ impl Survey {
         self.frame.band(top - reach, bottom + reach)
     }
 
-    /// Places that [`Survey::land_between`] takes, at most.
+    /// Places that [`Footprint::project_between`] takes, at most.
     pub(crate) fn most_between(&self, own: (f64, f64), test: &DepthTest) -> usize {
         self.reaching(own, |spacing| REACH * test.radius(spacing)).count() * TILE
     }
@@ -156,33 +158,33 @@ pub fn calibrated<const C: usize>(
     camera: &Camera,
     frame: &Frame,
 ) -> (Vec<Sample<C>>, Dropped) {
-    let survey = Survey::new(views, camera, frame);
-    let samples = survey.samples_between(views, f64::MIN, f64::MAX);
-    let dropped = survey.dropped(samples.len());
+    let footprint = Footprint::new(views, camera, frame);
+    let samples = footprint.samples_between(views, f64::MIN, f64::MAX);
+    let dropped = footprint.dropped(samples.len());
     (samples, dropped)
 }
 
 /// The tiles of one row of a view, and its pixels that cannot be samples.
 #[derive(Default)]
-struct RowSurvey {
+struct RowFootprint {
     tiles: Vec<Tile>,
     unknown: usize,
     behind: usize,
 }
 
-impl RowSurvey {
+impl RowFootprint {
     fn new(view: &CalibratedView<'_>, index: u16, map: &Relative, y: usize, frame: &Frame) -> Self {
-        let (mut survey, row) = (Self::default(), RowMap::new(map, y));
+        let (mut footprint, row) = (Self::default(), RowMap::new(map, y));
         for (k, depths) in view.map.row(y).chunks(TILE).enumerate() {
             let column = k * TILE;
             let unknown = depths.iter().filter(|d| d.is_nan()).count();
-            survey.unknown += unknown;
+            footprint.unknown += unknown;
             if unknown == depths.len() {
                 continue;
             }
             let reach = row.corners(column, depths).unwrap_or_else(|| {
                 let (reach, behind) = row.each(column, depths, frame);
-                survey.behind += behind;
+                footprint.behind += behind;
                 reach
             });
             if reach.meets(frame) {
@@ -190,10 +192,10 @@ impl RowSurvey {
                 // Slopes are known as shares of depths, not of disparities with an offset.
                 let known = view.map.offset() == 0.0;
                 let spacing = if known { reach.spacing.min(LARGEST_SPACING) } else { LARGEST_SPACING };
-                survey.tiles.push(Tile { view: index, row, column, rows: reach.rows, spacing });
+                footprint.tiles.push(Tile { view: index, row, column, rows: reach.rows, spacing });
             }
         }
-        survey
+        footprint
     }
 }
 

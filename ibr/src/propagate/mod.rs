@@ -3,8 +3,8 @@
 mod calibrated;
 mod view;
 
-pub(crate) use calibrated::Landed;
-pub use calibrated::{Survey, calibrated};
+pub(crate) use calibrated::Projected;
+pub use calibrated::{Footprint, calibrated};
 pub use view::{CalibratedView, RectifiedView, View, Viewpoint};
 
 use crate::depth::{Reliefs, TILE};

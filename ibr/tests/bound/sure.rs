@@ -1,7 +1,7 @@
 //! The sure bound against the errors of random scenes whose second derivatives are known.
 
 use super::*;
-use hybank_ibr::analysis::{Limits, Predictor, survey};
+use hybank_ibr::analysis::{Limits, Predictor, collect_evidence};
 
 /// A board whose disparity is c + s X, with the texture level + height sin(rate X + phase). X is the column
 /// in the view at position 0.
@@ -86,7 +86,7 @@ fn trial(seed: u64, understated: f64) -> Vec<(f64, f64)> {
         intensity: limits.intensity * understated,
         disparity: limits.disparity * understated,
     };
-    let found = survey(&[view(0), view(1)], position, &settings, Some(&limits)).unwrap();
+    let found = collect_evidence(&[view(0), view(1)], position, &settings, Some(&limits)).unwrap();
     let error = |p: usize| {
         let truth = look(&layers, (p % SIZE.0) as f64, position).1;
         (f64::from(found.rendering.image.data()[p]) - truth).abs()

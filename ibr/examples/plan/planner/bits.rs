@@ -21,7 +21,7 @@ use super::random::{seeded, within};
 use hybank_ibr::analysis::with_noise;
 use hybank_ibr::depth::DepthMap;
 use hybank_ibr::image::Image;
-use hybank_ibr::pipeline::{Agreement, Balance, RenderError, RenderSettings, rectified};
+use hybank_ibr::pipeline::{Agreement, RenderError, RenderSettings, ViewWeights, rectified};
 use hybank_ibr::propagate::RectifiedView;
 
 /// Errors of intensity that are tried, in grey levels.
@@ -43,8 +43,8 @@ pub struct Sensitivity {
 /// from changed views are comparable.
 fn settled(views: &[RectifiedView<'_>], position: f64, settings: &RenderSettings) -> RenderSettings {
     let agreement = Agreement::of(views);
-    let balance = Balance::of(views, &position).with_noise(&agreement);
-    RenderSettings { keep_exposure: true, ..settings.suited_to(&agreement, &balance) }
+    let view_weights = ViewWeights::of(views, &position).with_noise(&agreement);
+    RenderSettings { keep_exposure: true, ..settings.suited_to(&agreement, &view_weights) }
 }
 
 /// The sensitivities of a view of a rectified rig: it is rendered from intensities and from disparities with

@@ -4,6 +4,7 @@
 mod bits;
 mod depth;
 mod placement;
+#[path = "../../thesis_views/theory/random.rs"]
 mod random;
 mod search;
 

@@ -16,7 +16,7 @@
 
 use super::search::Search;
 use hybank_ibr::depth::DepthMap;
-use hybank_ibr::pipeline::Balance;
+use hybank_ibr::pipeline::ViewWeights;
 use hybank_ibr::propagate::DOUBTFUL_WEIGHT;
 
 /// Disparities within this share of each other, or within a pixel, belong to one point.
@@ -93,7 +93,7 @@ impl Placement {
     fn mean_square(&self, sights: &[Sight], chosen: &[usize]) -> f64 {
         let sights: Vec<&Sight> = chosen.iter().filter_map(|i| sights.get(*i)).collect();
         let Some(pixels) = sights.first().map(|s| s.trust.len()) else { return self.costs.hole.powi(2) };
-        let weights = Balance::by_distance(&sights.iter().map(|s| s.distance).collect::<Vec<_>>());
+        let weights = ViewWeights::by_distance(&sights.iter().map(|s| s.distance).collect::<Vec<_>>());
         let of_pixel = |p: usize| {
             let (mut sum, mut square) = (0.0, 0.0);
             for (i, s) in sights.iter().enumerate().filter(|(_, s)| s.trust[p] > 0.0) {

@@ -221,8 +221,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     /// The values of the pixels where `inside` is true, all fitted together.
     fn fitted(self, inside: &(impl Fn(usize) -> bool + Sync), watch: Watch<'_>) -> (Vec<f32>, Convergence) {
         let (plane, grid) = (&self.settings.plane, self.grid());
-        let springs =
-            |direction, y| springs::of_row(&self.depth, grid, inside, &self.settings, (direction, y));
+        let springs = |direction, y| springs::of_row(&self.depth, grid, inside, &self.settings, direction, y);
         let connected = self.fit.connect(springs, |coefficient| !inside(grid.pixel(coefficient)));
         let iteration = Iteration { tolerance: plane.tolerance, steps: plane.iterations };
         let (values, ended) = connected.solve(&iteration, watch);

@@ -13,7 +13,8 @@ pub(super) fn of_row(
     grid: Grid,
     inside: &(impl Fn(usize) -> bool + Sync),
     settings: &Settings,
-    (direction, y): (Direction, usize),
+    direction: Direction,
+    y: usize,
 ) -> Springs {
     let (width, height) = grid.coefficients;
     let mut springs = Springs::none(width);
@@ -36,9 +37,9 @@ pub(super) fn of_row(
 fn spring(depths: &[f32; 3], joined: usize, settings: &Settings) -> (f32, f32) {
     let (plane, test) = (&settings.plane, &settings.depth_test);
     let pair = near_and_far(depths[0], depths[1]);
-    let edge = || plane.stiffness as f32 * share(pair, test) + plane.edge_stiffness as f32;
+    let edge = || plane.stiffness as f32 * share(pair.0, pair.1, test) + plane.edge_stiffness as f32;
     let next = near_and_far(depths[1], depths[2]);
-    let bend = || plane.bending as f32 * share((pair.0.min(next.0), pair.1.max(next.1)), test);
+    let bend = || plane.bending as f32 * share(pair.0.min(next.0), pair.1.max(next.1), test);
     (if joined > 1 { edge() } else { 0.0 }, if joined > 2 { bend() } else { 0.0 })
 }
 
@@ -50,7 +51,7 @@ fn near_and_far(a: f32, b: f32) -> (f32, f32) {
 
 /// 1 / (1 + (D / sigma)^2) for the range D of some depths and the sigma of the depth test.
 #[inline]
-fn share((near, far): (f32, f32), test: &DepthTest) -> f32 {
+fn share(near: f32, far: f32, test: &DepthTest) -> f32 {
     let range = far - near;
     if range > 0.0 {
         let sigma = test.relative as f32 * near + test.absolute as f32;

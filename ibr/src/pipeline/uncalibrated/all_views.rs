@@ -11,10 +11,10 @@ use nalgebra::{Matrix3x4, Vector4};
 const ROUNDS: usize = 8;
 
 /// Photographs that must show a point.
-const NEEDED: usize = 2;
+const FEWEST_PHOTOGRAPHS: usize = 2;
 
 /// Fewest positions of a camera that is adjusted.
-const FEWEST: usize = 12;
+const FEWEST_POSITIONS: usize = 12;
 
 /// Points of tracks with their positions in each image, those that do not fit left out.
 #[derive(PartialEq)]
@@ -34,7 +34,8 @@ pub(super) fn adjust(cameras: &mut [Matrix3x4<f64>], tracks: &[Vec<Option<Point>
         .collect();
     let mut cloud = intersect(cameras, &scales, tracks, threshold);
     for _ in 0..ROUNDS {
-        let is_seen = |i: usize| cloud.seen.iter().filter(|seen| seen[i].is_some()).count() >= FEWEST;
+        let is_seen =
+            |i: usize| cloud.seen.iter().filter(|seen| seen[i].is_some()).count() >= FEWEST_POSITIONS;
         if !(0..cameras.len()).all(is_seen) {
             return cloud;
         }
@@ -91,7 +92,7 @@ fn consistent(
 ) -> Option<Vector4<f64>> {
     let photographs = seen.len() - 1;
     loop {
-        if seen[..photographs].iter().flatten().count() < NEEDED {
+        if seen[..photographs].iter().flatten().count() < FEWEST_PHOTOGRAPHS {
             return None;
         }
         let observed: Vec<(usize, Point)> =

@@ -12,23 +12,23 @@ use crate::uncalibrated::chirality::{self, Handedness};
 use crate::uncalibrated::order::Order;
 
 /// Share of the range of chi by which two points lie on different surfaces.
-const APART: f64 = 0.2;
+const SURFACES_APART: f64 = 0.2;
 
 /// Largest difference of colours that counts, in grey levels.
-const LARGEST: f32 = 60.0;
+const LARGEST_DIFFERENCE: f32 = 60.0;
 
 /// Fewest pixels for a verdict.
-const FEWEST: usize = 40;
+const FEWEST_PIXELS: usize = 40;
 
 /// Standard deviations of a verdict against guessed calibrations. Neighbouring pixels err together, so
 /// they are many.
-const ALONE: f64 = 8.0;
+const DEVIATIONS_ALONE: f64 = 8.0;
 
 /// Standard deviations of a verdict that guessed calibrations share, or of an objection against them.
-const TOGETHER: f64 = 5.0;
+const DEVIATIONS_TOGETHER: f64 = 5.0;
 
 /// Mean advantage of a verdict, in grey levels: folds of the meshes at outlines favour one order by less.
-const LEAST: f64 = 10.0;
+const LEAST_ADVANTAGE: f64 = 10.0;
 
 /// How much better the colours fit if the order is kept, over all pixels on which two surfaces fall.
 #[derive(Debug, Clone, Copy, Default)]
@@ -76,10 +76,10 @@ impl Advantage {
     /// of 5 deviations needs both. Weaker hints of both together were wrong in 3 of 100 cropped pairs.
     pub(super) fn order(&self, guess: &Order) -> (Handedness, OrderBy) {
         let shown = if self.sum > 0.0 { Handedness::Kept } else { Handedness::Reversed };
-        let clear = self.pixels() >= FEWEST && self.mean().abs() >= LEAST;
+        let clear = self.pixels() >= FEWEST_PIXELS && self.mean().abs() >= LEAST_ADVANTAGE;
         let (deviations, agree) = (self.deviations().abs(), shown == guess.hand);
-        let firm = clear && deviations >= TOGETHER;
-        if clear && deviations >= ALONE {
+        let firm = clear && deviations >= DEVIATIONS_TOGETHER;
+        if clear && deviations >= DEVIATIONS_ALONE {
             (shown, OrderBy::Colours)
         } else if agree && firm {
             (shown, OrderBy::Both)
@@ -108,7 +108,7 @@ fn advantages(
     let mut samples: Vec<Sample<3>> = Vec::new();
     let frame = Frame::whole(width, height, 0.0, 0.0);
     propagate_chi(images[from], &chi, 0, &source.relative_to(&target), sign, &frame, &mut samples);
-    let apart = (APART * chi_range(&scene.features(to))) as f32;
+    let apart = (SURFACES_APART * chi_range(&scene.features(to))) as f32;
     let mut ends: Vec<Option<(Sample<3>, Sample<3>)>> = vec![None; width * height];
     for s in samples {
         let p = (s.y + 0.5) as usize * width + (s.x + 0.5) as usize;
@@ -125,7 +125,7 @@ fn advantages(
         let shown = images[to].pixel::<3>(p);
         let miss = |s: &Sample<3>| {
             let sum: f32 = s.value.iter().zip(shown).map(|(a, b)| (a - b).abs()).sum();
-            (sum / 3.0).min(LARGEST)
+            (sum / 3.0).min(LARGEST_DIFFERENCE)
         };
         Some(f64::from(miss(far) - miss(near)))
     };
@@ -148,7 +148,11 @@ mod tests {
         let guess = |hand, agreement| Order { hand, agreement };
         let (kept, reversed) = (Handedness::Kept, Handedness::Reversed);
         let (many, some, few) = (advantage(400, 1.0), advantage(64, 1.0), advantage(24, 1.0));
-        assert!(many.deviations() > ALONE && some.deviations() < ALONE && some.deviations() > TOGETHER);
+        assert!(
+            many.deviations() > DEVIATIONS_ALONE
+                && some.deviations() < DEVIATIONS_ALONE
+                && some.deviations() > DEVIATIONS_TOGETHER
+        );
         assert_eq!(many.order(&guess(reversed, 1.0)), (kept, OrderBy::Colours));
         assert_eq!(some.order(&guess(kept, 0.6)), (kept, OrderBy::Both));
         assert_eq!(some.order(&guess(reversed, 0.99)), (reversed, OrderBy::Nothing));

@@ -16,6 +16,7 @@ use crate::uncalibrated::{Point, RobustSettings};
 use colours::Advantage;
 use consistency::Surface;
 use reconstruction::Reconstruction;
+use synthesis::Goal;
 
 /// Shares of the work, about, that are done when the scene is reconstructed, when its surfaces are meshed,
 /// and when the order of depth is decided.
@@ -148,8 +149,8 @@ pub fn render_watched(
     let mut scene = reconstruction::reconstruct(images, &tracks, target, uncalibrated)?;
     scene.numbers = numbers;
     watch(RECONSTRUCTED);
-    let balance = synthesis::balance(&scene, images.len());
-    let surfaces = consistency::surfaces(images, &scene, balance.first_two())?;
+    let view_weights = synthesis::view_weights(&scene, images.len());
+    let surfaces = consistency::surfaces(images, &scene, view_weights.first_two())?;
     watch(SURFACES);
     decide(images, &surfaces, &mut scene)?;
     if uncalibrated.reverse_order {
@@ -165,7 +166,8 @@ pub fn render_watched(
         (Degree::Cubic, false) => synthesis::render::<4, 1>,
         (Degree::Cubic, true) => synthesis::render::<4, 3>,
     };
-    render(images, &surfaces, &scene, &balance, size, (settings, uncalibrated, &rest))
+    let goal = Goal { size, settings, plane: uncalibrated.plane, watch: &rest };
+    render(images, &surfaces, &scene, &view_weights, &goal)
 }
 
 /// Decides the order of depth from the photographs, which show what is in front, and the guessed

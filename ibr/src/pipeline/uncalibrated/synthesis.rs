@@ -1,15 +1,15 @@
 //! The virtual view from a reconstructed scene: propagation by chi, occlusion removal, plane fit.
 
+use super::UncalibratedRendering;
 use super::base_pair::{matches, parallax};
 use super::consistency::Surface;
 use super::reconstruction::Reconstruction;
-use super::{UncalibratedRendering, UncalibratedSettings};
 use crate::camera::Relative;
 use crate::image::Image;
-use crate::interpolate::plane::PlaneProblem;
-use crate::interpolate::{self, HoleCount};
+use crate::interpolate;
+use crate::interpolate::plane::{PlaneProblem, PlaneSettings};
 use crate::occlusion::{self, DepthTest};
-use crate::pipeline::{Agreement, Balance, RenderError, RenderSettings, Rendering, Report, Watch};
+use crate::pipeline::{Agreement, RenderError, RenderSettings, Rendering, Report, ViewWeights, Watch};
 use crate::propagate::Frame;
 use crate::sample::{Dropped, Sample};
 use crate::uncalibrated::Point;
@@ -24,18 +24,26 @@ const SIGMA_SHARE: f64 = 0.2;
 /// Share of the rendering, about, that is done when the visible samples are known.
 const GATHERED: f64 = 0.4;
 
+/// How the virtual view is rendered.
+pub(super) struct Goal<'a> {
+    pub(super) size: (usize, usize),
+    pub(super) settings: &'a RenderSettings,
+    pub(super) plane: PlaneSettings,
+    pub(super) watch: Watch<'a>,
+}
+
 /// Renders the virtual view from the reconstructed scene.
 pub(super) fn render<const ORDER: usize, const C: usize>(
     images: &[&Image],
     surfaces: &[Surface],
     scene: &Reconstruction,
-    balance: &Balance,
-    size: (usize, usize),
-    (settings, special, watch): (&RenderSettings, &UncalibratedSettings, Watch<'_>),
+    view_weights: &ViewWeights,
+    goal: &Goal<'_>,
 ) -> Result<UncalibratedRendering, RenderError> {
+    let Goal { size, settings, plane, watch } = *goal;
     let frame = Frame::whole(size.0, size.1, 0.5, settings.offset);
     let (mut samples, dropped) = propagated::<C>(images, surfaces, scene, &frame)?;
-    balance.apply(&mut samples, |view| images[view]);
+    view_weights.apply(&mut samples, |view| images[view]);
     let mut report = Report { dropped, propagated: samples.len(), ..Report::default() };
     let hull = hull_features(scene, images.len());
     let absolute = SIGMA_SHARE * chi_range(&hull);
@@ -44,20 +52,14 @@ pub(super) fn render<const ORDER: usize, const C: usize>(
     report.occluded = remove_occluded(&mut samples, &test);
     report.used = samples.len();
     let mut region: Vec<bool> = mesh::dense_chi(&hull, size).iter().map(|c| !c.is_nan()).collect();
-    let interpolation =
-        interpolate::Settings { depth_test: test, plane: special.plane, ..settings.interpolation };
+    let interpolation = interpolate::Settings { depth_test: test, plane, ..settings.interpolation };
     watch(GATHERED);
     let mut problem = PlaneProblem::<ORDER, C>::new(size, &interpolation)?;
     problem.add(&samples)?;
     problem.seen().zip(&mut region).for_each(|(seen, inside)| *inside |= seen);
     let fit = problem.solve_watched(Some(&region), &|share| watch(GATHERED + (1.0 - GATHERED) * share))?;
-    report.convergence = Some(fit.convergence);
-    report.holes = HoleCount::of(&fit.mask);
-    let image = Image::from_values(size, C, fit.values);
-    let agreement = Agreement::default();
-    let (mask, depth, counts) = (fit.mask, fit.depth, fit.counts);
     let views = (0..images.len()).collect();
-    let rendering = Rendering { image, mask, depth, counts, views, report, agreement };
+    let rendering = Rendering::of_plane::<C>(fit, report, views, Agreement::default());
     Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone() })
 }
 
@@ -103,9 +105,9 @@ fn remove_occluded<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTes
 
 /// Weights of the views: near ones count more, those beyond the two nearest far less, all alike of two. The
 /// distance of a view is the parallax between it and the virtual one, in pixels.
-pub(super) fn balance(scene: &Reconstruction, target: usize) -> Balance {
+pub(super) fn view_weights(scene: &Reconstruction, target: usize) -> ViewWeights {
     if target == 2 {
-        return Balance::by_distance(&[1.0, 1.0]);
+        return ViewWeights::by_distance(&[1.0, 1.0]);
     }
     let positions: Vec<Vec<Option<Point>>> = scene
         .points
@@ -120,7 +122,7 @@ pub(super) fn balance(scene: &Reconstruction, target: usize) -> Balance {
     let distance = |view| parallax(&matches(&positions, view, target));
     let distances: Option<Vec<f64>> = (0..target).map(distance).collect();
     // Too few points for a distance: all views count alike.
-    Balance::by_distance(&distances.unwrap_or_else(|| vec![1.0; target])).faded()
+    ViewWeights::by_distance(&distances.unwrap_or_else(|| vec![1.0; target])).faded()
 }
 
 /// All points in front of the virtual camera, projected into its image.

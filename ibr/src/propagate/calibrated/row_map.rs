@@ -44,7 +44,7 @@ pub(super) struct RowMap<'a> {
 }
 
 /// A pixel with depth at the virtual camera, without lenses.
-pub(super) struct Landing {
+pub(super) struct Projection {
     /// Position and depth.
     pub(super) at: (f64, f64, f64),
     /// A x~.
@@ -73,7 +73,7 @@ impl<'a> RowMap<'a> {
 
     /// Where a pixel would fall without lenses.
     #[inline(always)]
-    pub(super) fn land(&self, x: f64, depth: f64) -> Landing {
+    pub(super) fn project(&self, x: f64, depth: f64) -> Projection {
         // Written out: closures over the three coordinates are calls in this innermost loop.
         let ray = [
             self.start[0] + self.step[0] * x,
@@ -83,13 +83,13 @@ impl<'a> RowMap<'a> {
         let p =
             [ray[0] * depth + self.shift[0], ray[1] * depth + self.shift[1], ray[2] * depth + self.shift[2]];
         let inverse = 1.0 / p[2];
-        Landing { at: (p[0] * inverse, p[1] * inverse, p[2]), ray, inverse }
+        Projection { at: (p[0] * inverse, p[1] * inverse, p[2]), ray, inverse }
     }
 
     /// What one pixel of known depth becomes.
     #[inline]
     fn fate(&self, x: f64, depth: f32, frame: &Frame) -> Fate {
-        let (u, v, d) = if self.linear { self.land(x, f64::from(depth)).at } else { self.bend(x, depth) };
+        let (u, v, d) = if self.linear { self.project(x, f64::from(depth)).at } else { self.bend(x, depth) };
         let u = u + frame.offset;
         // NaN: outside the domain of the lens model.
         if d <= 0.0 || u.is_infinite() || v.is_infinite() {
@@ -107,14 +107,17 @@ impl<'a> RowMap<'a> {
     /// With q = A x~ and p = d q + b, dp = d A e + q d' and d(p.x / p.z) = (dp.x - p.x / p.z dp.z) / p.z.
     /// Lenses are left out: they change distances between neighbours by a few per cent.
     #[inline(always)]
-    pub(super) fn steps(&self, landing: &Landing, depth: f64, slopes: [f64; 2]) -> [[f64; 2]; 2] {
-        [self.moved(landing, depth, self.step, slopes[0]), self.moved(landing, depth, self.down, slopes[1])]
+    pub(super) fn steps(&self, projection: &Projection, depth: f64, slopes: [f64; 2]) -> [[f64; 2]; 2] {
+        [
+            self.moved(projection, depth, self.step, slopes[0]),
+            self.moved(projection, depth, self.down, slopes[1]),
+        ]
     }
 
     /// The displacement for the change `a` of A x~ and a change of the depth by `slope`.
     #[inline(always)]
-    fn moved(&self, landing: &Landing, depth: f64, a: [f64; 3], slope: f64) -> [f64; 2] {
-        let Landing { at, ray, inverse } = landing;
+    fn moved(&self, projection: &Projection, depth: f64, a: [f64; 3], slope: f64) -> [f64; 2] {
+        let Projection { at, ray, inverse } = projection;
         let away = a[2] * depth + ray[2] * slope;
         let across = a[0] * depth + ray[0] * slope - at.0 * away;
         let along = a[1] * depth + ray[1] * slope - at.1 * away;
@@ -127,7 +130,7 @@ impl<'a> RowMap<'a> {
         let (near, far) =
             depths.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), d| (a.min(*d), b.max(*d)));
         let ends = [column as f64, (column + depths.len() - 1) as f64];
-        let corners = ends.map(|x| [near, far].map(|d| self.land(x, f64::from(d)).at));
+        let corners = ends.map(|x| [near, far].map(|d| self.project(x, f64::from(d)).at));
         let all = || corners.iter().flatten();
         let bounds = |of: fn(&(f64, f64, f64)) -> f64| {
             all().map(of).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
@@ -157,7 +160,7 @@ impl<'a> RowMap<'a> {
     fn largest_spacing(&self, columns: [f64; 2], depths: [f64; 2]) -> f32 {
         let (mut ratio, mut inverse, mut moves) = (0.0_f64, 0.0_f64, [0.0_f64; 4]);
         for (x, d) in columns.into_iter().flat_map(|x| depths.map(|d| (x, d))) {
-            let Landing { at, ray: q, inverse: i } = self.land(x, d);
+            let Projection { at, ray: q, inverse: i } = self.project(x, d);
             (ratio, inverse) = (ratio.max(d / at.2), inverse.max(i));
             for (m, (k, a)) in
                 moves.iter_mut().zip([(0, self.step), (1, self.step), (0, self.down), (1, self.down)])

@@ -1,4 +1,4 @@
-//! The survey against the propagation of every pixel.
+//! The footprint against the propagation of every pixel.
 
 use super::*;
 use crate::depth::{DepthMap, Measure};
@@ -37,12 +37,12 @@ fn bands_together_are_the_whole() {
     let target = camera([0.0, 0.0, 0.4], 0.0);
     let frame = Frame::whole(SIZE.0, SIZE.1, 0.5, 0.0);
     let (all, dropped) = calibrated::<1>(&views, &target, &frame);
-    let survey = Survey::new(&views, &target, &frame);
-    assert_eq!(survey.dropped(all.len()), dropped);
-    assert!(survey.most_samples() >= all.len());
+    let footprint = Footprint::new(&views, &target, &frame);
+    assert_eq!(footprint.dropped(all.len()), dropped);
+    assert!(footprint.most_samples() >= all.len());
     assert_eq!(all.len() + dropped.total(), 2 * SIZE.0 * SIZE.1);
     for (top, bottom) in [(-1.0, 12.25), (12.25, 60.0), (88.0, 200.0), (40.0, 40.0)] {
-        let band = survey.samples_between::<1>(&views, top, bottom);
+        let band = footprint.samples_between::<1>(&views, top, bottom);
         let want: Vec<_> = all.iter().filter(|s| s.y >= top && s.y <= bottom).copied().collect();
         assert_eq!(band, want, "{top} {bottom}");
     }
@@ -57,12 +57,12 @@ fn the_spacing_of_a_tile_is_bounded() {
     let views = [camera([0.2, 0.0, 0.0], 0.05), camera([-0.3, 0.1, -0.2], -0.3), target]
         .map(|camera| CalibratedView { image: &image, map: &depth, camera });
     let frame = Frame::whole(SIZE.0, SIZE.1, 20.0, 0.0);
-    let survey = Survey::new(&views, &target, &frame);
+    let footprint = Footprint::new(&views, &target, &frame);
     let (mut found, mut near) = (0, 0);
-    for tile in &survey.tiles {
-        let mut landed = Landed::default();
-        survey.land(&views, tile, &frame, (f64::MIN, f64::MAX), &mut landed);
-        for s in landed.samples::<1>(&views) {
+    for tile in &footprint.tiles {
+        let mut projected = Projected::default();
+        footprint.project(&views, tile, &frame, (f64::MIN, f64::MAX), &mut projected);
+        for s in projected.samples::<1>(&views) {
             assert!(s.spacing <= tile.spacing, "{s:?} in {tile:?}");
             near += usize::from(tile.spacing < 2.0 * s.spacing);
             found += 1;
@@ -83,14 +83,15 @@ fn bands_hide_what_the_whole_hides() {
         let test = DepthTest { epsilon, ..DepthTest::default() };
         let (mut want, _) = calibrated::<1>(&views, &target, &frame);
         assert!(crate::occlusion::remove(&mut want, &test) > 100);
-        let survey = Survey::new(&views, &target, &frame);
-        let (mut landed, mut search, mut got) = (Landed::default(), PlaneSearch::default(), Vec::new());
+        let footprint = Footprint::new(&views, &target, &frame);
+        let (mut projected, mut search, mut got) = (Projected::default(), PlaneSearch::default(), Vec::new());
         for own in [(f64::MIN, 1.0), (1.0, 23.5), (23.5, 24.0), (24.0, 70.0), (70.0, f64::MAX)] {
-            search.clear(&survey.band_around(own, &test).extent(), survey.most_between(own, &test));
-            survey.land_between(&views, own, &test, &mut landed, |points| search.enter(points, &test));
-            landed.remove(search.hidden(landed.points(), &test));
-            assert!(landed.points().len() <= survey.most_between(own, &test));
-            got.extend(landed.samples::<1>(&views));
+            search.clear(&footprint.band_around(own, &test).extent(), footprint.most_between(own, &test));
+            footprint
+                .project_between(&views, own, &test, &mut projected, |points| search.enter(points, &test));
+            projected.remove(search.hidden(projected.points(), &test));
+            assert!(projected.points().len() <= footprint.most_between(own, &test));
+            got.extend(projected.samples::<1>(&views));
         }
         let order = |s: &Sample<1>| (s.view, s.pixel);
         got.sort_by_key(order);
@@ -108,12 +109,16 @@ fn every_pixel_is_looked_at_about_once() {
         camera,
     });
     let frame = Frame::whole(SIZE.0, SIZE.1, 0.5, 0.0);
-    let survey = Survey::new(&views, &camera([0.0, 0.0, 0.0], 0.0), &frame);
+    let footprint = Footprint::new(&views, &camera([0.0, 0.0, 0.0], 0.0), &frame);
     let looked_at: usize = (0..8)
         .map(|k| frame.band(k as f64 * 11.25, (k + 1) as f64 * 11.25))
-        .map(|band| survey.reaching(band.rows, |_| 0.0).count())
+        .map(|band| footprint.reaching(band.rows, |_| 0.0).count())
         .sum();
-    assert!(looked_at as f64 <= 1.3 * survey.tiles.len() as f64, "{looked_at} of {}", survey.tiles.len());
+    assert!(
+        looked_at as f64 <= 1.3 * footprint.tiles.len() as f64,
+        "{looked_at} of {}",
+        footprint.tiles.len()
+    );
 }
 
 /// Distances and areas against those of the neighbouring samples.

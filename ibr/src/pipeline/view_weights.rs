@@ -1,7 +1,7 @@
 //! The share of each view in the virtual one, and its exposure.
 
 use super::Agreement;
-use super::depth_errors::DisparityGain;
+use super::depth_errors::{DisparityGain, median};
 use crate::camera::Camera;
 use crate::depth::Measure;
 use crate::image::Image;
@@ -42,7 +42,7 @@ const NEGLIGIBLE: f64 = 0.02;
 /// distances of the first view that is left out and of the nearest, so that a view enters and leaves without
 /// a jump (Buehler et al., Unstructured Lumigraph Rendering, SIGGRAPH 2001).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Balance {
+pub struct ViewWeights {
     weights: Vec<f32>,
     distances: Vec<f64>,
     /// By how much errors of depth displace the samples of each view; empty if this is not known.
@@ -53,7 +53,7 @@ pub struct Balance {
     gains: Vec<f32>,
 }
 
-impl Balance {
+impl ViewWeights {
     /// From the distances of the views.
     pub fn by_distance(distances: &[f64]) -> Self {
         let mut sorted = distances.to_vec();
@@ -141,10 +141,11 @@ impl Balance {
         Self { disparity_gains: views.iter().map(gain).collect(), ..self }
     }
 
-    /// As [`Balance::of`], with the distances in position and direction.
+    /// As [`ViewWeights::of`], with the distances in position and direction.
     pub fn by_angle(views: &[CalibratedView<'_>], camera: &Camera) -> Self {
         let centre = camera.centre();
-        let Some(reach) = median(views.iter().filter_map(|v| v.map.middle()).map(f64::from)) else {
+        let mut reaches: Vec<f64> = views.iter().filter_map(|v| v.map.middle()).map(f64::from).collect();
+        let Some(reach) = median(&mut reaches) else {
             return Self::of(views, camera);
         };
         let pivot = centre + camera.axis() * reach;
@@ -325,13 +326,6 @@ impl Gradient {
     }
 }
 
-/// The middle one of some numbers.
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -345,7 +339,7 @@ mod tests {
         let weights = |noise: [f64; 2], pairs: Vec<PairAgreement>| {
             let textures = noise.map(texture).to_vec();
             let agreement = Agreement { pairs, gains: vec![1.0, 1.0], textures, ..Agreement::default() };
-            Balance::by_distance(&[0.5, 0.5]).with_noise(&agreement).weights
+            ViewWeights::by_distance(&[0.5, 0.5]).with_noise(&agreement).weights
         };
         assert_eq!(weights([5.0, 5.0], vec![pair]), [1.0, 1.0]);
         assert_eq!(weights([5.0, 9.0], Vec::new()), [1.0, 1.0]);
@@ -363,11 +357,12 @@ mod tests {
         let depth_errors = vec![0.0, 2.0];
         let agreement = Agreement { pairs: vec![pair], depth_errors, ..Agreement::default() };
         let disparity_gains = vec![DisparityGain::along_rows(0.5); 2];
-        let balance = Balance { disparity_gains, ..Balance::by_distance(&[0.5, 0.5]) }.with_noise(&agreement);
+        let view_weights =
+            ViewWeights { disparity_gains, ..ViewWeights::by_distance(&[0.5, 0.5]) }.with_noise(&agreement);
         let weights = |slope: f32| {
             let image = Image::new(5, 5, 1, (0..25).map(|p| slope * (p % 5) as f32).collect()).unwrap();
             let mut samples = [0, 1].map(|view| Sample::<1> { view, pixel: 12, ..Sample::BLANK });
-            balance.apply(&mut samples, |_| &image);
+            view_weights.apply(&mut samples, |_| &image);
             samples.map(|s| s.weight)
         };
         assert_eq!(weights(0.0), [1.0, 1.0]);
@@ -379,44 +374,44 @@ mod tests {
 
     #[test]
     fn half_way_all_is_equal_and_at_a_view_that_view_decides() {
-        assert_eq!(Balance::by_distance(&[0.5, 0.5]).weights, [1.0, 1.0]);
-        let at_first = Balance::by_distance(&[0.0, 2.0]).weights;
+        assert_eq!(ViewWeights::by_distance(&[0.5, 0.5]).weights, [1.0, 1.0]);
+        let at_first = ViewWeights::by_distance(&[0.0, 2.0]).weights;
         assert!(at_first[0] > 5.0 && at_first[1] < 0.2, "{at_first:?}");
-        assert_eq!(Balance::by_distance(&[3.0]).weights, [1.0]);
-        assert_eq!(Balance::by_distance(&[0.0, 0.0, 5.0]).weights, [1.0; 3]);
+        assert_eq!(ViewWeights::by_distance(&[3.0]).weights, [1.0]);
+        assert_eq!(ViewWeights::by_distance(&[0.0, 0.0, 5.0]).weights, [1.0; 3]);
     }
 
     #[test]
     fn exposures_are_matched() {
         let image = Image::filled(1, 1, 1, 0.0);
         let mut samples = [Sample::<1> { value: [100.0], view: 1, ..Sample::BLANK }];
-        Balance::by_distance(&[1.0, 1.0]).with_gains(&[1.0, 1.0]).apply(&mut samples, |_| &image);
+        ViewWeights::by_distance(&[1.0, 1.0]).with_gains(&[1.0, 1.0]).apply(&mut samples, |_| &image);
         assert_eq!(samples[0].value, [100.0]);
-        Balance::by_distance(&[1.0, 1.0]).with_gains(&[1.0, 1.5]).apply(&mut samples, |_| &image);
+        ViewWeights::by_distance(&[1.0, 1.0]).with_gains(&[1.0, 1.5]).apply(&mut samples, |_| &image);
         assert_eq!(samples[0].value, [150.0]);
     }
 
     #[test]
     fn the_nearest_views_are_used() {
-        let two = Balance::by_distance(&[3.0, 1.0, 2.0, 9.0]).nearest(Some(2));
+        let two = ViewWeights::by_distance(&[3.0, 1.0, 2.0, 9.0]).nearest(Some(2));
         assert_eq!(two.views(), [1, 2]);
         assert!(two.weights[1] > two.weights[2] && !two.uses(0));
-        let all = Balance::by_distance(&[3.0, 1.0]);
+        let all = ViewWeights::by_distance(&[3.0, 1.0]);
         assert_eq!((all.clone().nearest(Some(2)), all.clone().nearest(None)), (all.clone(), all));
-        assert_eq!(Balance::by_distance(&[1.0, 1.0, 1.0]).nearest(Some(2)).views(), [0, 1]);
+        assert_eq!(ViewWeights::by_distance(&[1.0, 1.0, 1.0]).nearest(Some(2)).views(), [0, 1]);
     }
 
     #[test]
     fn views_beyond_the_two_nearest_fade() {
-        let plain = Balance::by_distance(&[1.0, 2.0, 0.9, 1.1]);
+        let plain = ViewWeights::by_distance(&[1.0, 2.0, 0.9, 1.1]);
         let faded = plain.clone().faded();
         let factors: Vec<f32> = faded.weights.iter().zip(&plain.weights).map(|(a, b)| a / b).collect();
         let want = [1.0, 0.0625, 1.0, 1.1_f32.powi(-4)];
         assert!(factors.iter().zip(want).all(|(a, b)| (a - b).abs() < 1e-6), "{factors:?}");
-        let alone = Balance::by_distance(&[3.0]);
+        let alone = ViewWeights::by_distance(&[3.0]);
         assert_eq!(alone.clone().faded(), alone);
         // Continuous where two views change places.
-        let at = |d: f64| Balance::by_distance(&[1.0, 2.0 - d, 2.0 + d]).faded().weights;
+        let at = |d: f64| ViewWeights::by_distance(&[1.0, 2.0 - d, 2.0 + d]).faded().weights;
         let (a, b) = (at(-1e-4), at(1e-4));
         assert!(a.iter().zip(&b).all(|(a, b)| (a / b - 1.0).abs() < 2e-3), "{a:?} {b:?}");
     }
@@ -439,7 +434,7 @@ mod tests {
         let before = view([0.0, 0.0, 1.0], 0.0);
         let away = view([0.1, 0.0, 0.0], 3.0);
         let target = view([0.0; 3], 0.0).camera;
-        let found = Balance::by_angle(&[beside, before, away], &target);
+        let found = ViewWeights::by_angle(&[beside, before, away], &target);
         assert!(found.distances[1] < found.distances[0], "{:?}", found.distances);
         assert!(found.distances[0] < found.distances[2], "{:?}", found.distances);
         assert_eq!(found.nearest(Some(1)).views(), [1]);
@@ -448,9 +443,9 @@ mod tests {
     #[test]
     fn weights_change_continuously_along_a_path() {
         let cameras = [0.0, 1.0, 2.5];
-        let at = |c: f64| Balance::by_distance(&cameras.map(|p: f64| (p - c).abs())).weights;
+        let at = |c: f64| ViewWeights::by_distance(&cameras.map(|p: f64| (p - c).abs())).weights;
         let two =
-            |c: f64| Balance::by_distance(&cameras.map(|p: f64| (p - c).abs())).nearest(Some(2)).weights;
+            |c: f64| ViewWeights::by_distance(&cameras.map(|p: f64| (p - c).abs())).nearest(Some(2)).weights;
         for k in 0..2500 {
             let (a, b) = (two(f64::from(k) * 1e-3), two(f64::from(k + 1) * 1e-3));
             assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 0.05), "{k}: {a:?} {b:?}");

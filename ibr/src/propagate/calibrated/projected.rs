@@ -12,22 +12,22 @@ use crate::sample::Sample;
 /// The pixels of some tiles at their places in the virtual image, view by view and row by row. Its arrays
 /// are used again from band to band.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Landed {
+pub(crate) struct Projected {
     points: Points,
     weights: Vec<f32>,
     doubtful: Vec<bool>,
-    tiles: Vec<LandedTile>,
+    tiles: Vec<ProjectedTile>,
 }
 
 /// Where the pixels of a tile lie in the arrays.
 #[derive(Debug, Clone, Copy)]
-struct LandedTile {
+struct ProjectedTile {
     view: u16,
     first_pixel: u32,
     first_place: usize,
 }
 
-impl Landed {
+impl Projected {
     /// Removes all samples.
     pub(super) fn clear(&mut self) {
         self.points.resize(0);
@@ -62,7 +62,7 @@ impl Landed {
         }
         self.append_trust(&places, &reliefs, &doubtful, count);
         let first_place = self.doubtful.len() - count;
-        self.tiles.push(LandedTile { view: tile.view, first_pixel: first_pixel as u32, first_place });
+        self.tiles.push(ProjectedTile { view: tile.view, first_pixel: first_pixel as u32, first_place });
     }
 
     fn append(&mut self, places: &Places, count: usize) {
@@ -143,7 +143,13 @@ struct Run<'a> {
 impl Run<'_> {
     /// The sample of pixel i of the run that begins `start` pixels after the tile.
     #[inline]
-    fn sample<const C: usize>(&self, image: &Image, tile: &LandedTile, start: usize, i: usize) -> Sample<C> {
+    fn sample<const C: usize>(
+        &self,
+        image: &Image,
+        tile: &ProjectedTile,
+        start: usize,
+        i: usize,
+    ) -> Sample<C> {
         let pixel = tile.first_pixel + (start + i) as u32;
         Sample {
             x: self.x[i],
@@ -190,10 +196,10 @@ impl Places {
         let column = column as f64;
         for i in 0..count.min(TILE) {
             let depth = f64::from(depths[i]);
-            let landing = row.land(column + STEPS[i], depth);
+            let projection = row.project(column + STEPS[i], depth);
             let slopes = [f64::from(reliefs.across[i]), f64::from(reliefs.down[i])];
-            let [a, b] = row.steps(&landing, depth, slopes);
-            (places.x[i], places.y[i], places.depth[i]) = landing.at;
+            let [a, b] = row.steps(&projection, depth, slopes);
+            (places.x[i], places.y[i], places.depth[i]) = projection.at;
             places.distance[i] = ((a[0] * a[0] + a[1] * a[1] + b[0] * b[0] + b[1] * b[1]) / 2.0).sqrt();
             places.area[i] = (a[0] * b[1] - a[1] * b[0]).abs();
         }
