@@ -76,7 +76,7 @@ impl Cause {
         match self {
             Self::Density => "more views, or views of more pixels",
             Self::Texture => {
-                "less noise, equal exposure and white view_weights, views closer to the virtual one"
+                "less noise, equal exposure and white balance, views closer to the virtual one"
             }
             Self::Depth => "finer depth, and better calibrated cameras",
             Self::Edges => "depth maps that are sharp at outlines, and more views",
