@@ -75,9 +75,7 @@ impl Cause {
     pub fn remedy(self) -> &'static str {
         match self {
             Self::Density => "more views, or views of more pixels",
-            Self::Texture => {
-                "less noise, equal exposure and white balance, views closer to the virtual one"
-            }
+            Self::Texture => "less noise, equal exposure and white balance, views closer to the virtual one",
             Self::Depth => "finer depth, and better calibrated cameras",
             Self::Edges => "depth maps that are sharp at outlines, and more views",
             Self::Holes => "views that see behind the near surfaces",

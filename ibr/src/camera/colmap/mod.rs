@@ -144,6 +144,9 @@ fn inner(model: &str, size: (usize, usize), parameters: &[f64]) -> Result<Inner,
             "the {model} camera has an unsupported coefficient ({value}); undistort the images first"
         ));
     }
+    if size.0 == 0 || size.1 == 0 {
+        return Err(format!("the image has {} x {} pixels: both sides must be positive", size.0, size.1));
+    }
     let bend = |i: usize| bends.get(i).copied();
     Ok(Inner {
         fl_x: Some(*fx),
@@ -280,6 +283,7 @@ mod tests {
         assert!(message("1 PINHOLE 10 10 5 5 5 5 0.2\n", "").contains("unsupported coefficient (0.2)"));
         assert!(message("\n1 FOV 10 10 5 5 5 5 1\n", "").contains("cameras.txt:2: camera model FOV"));
         assert!(message("1 PINHOLE 10 10 5\n", "").contains("missing"));
+        assert!(message("1 PINHOLE 10 0 5 5 5 5\n", "").contains("10 x 0 pixels"));
         assert!(message(fine, "1 1 0 0 0 0 0 x 1 a.png\n\n").contains("images.txt:1: the TZ \"x\""));
         assert!(message(fine, "1 1 0 0 0 0 0 0 9 a.png\n\n").contains("camera 9"));
         assert!(message(fine, "1 0 0 0 0 0 0 0 1 a.png\n\n").contains("quaternion"));
