@@ -240,8 +240,9 @@ impl<'a> ErrorGrid<'a> {
         }
         for pair in self.frequencies.first.windows(2) {
             if gains[pair[0]].max(gains[pair[1]]) >= PRUNE_LEVEL * level {
-                for k in pair[0] + 1..pair[1] {
-                    gains[k] = gain(&self.error(s, k, taps))?;
+                let between = pair[0] + 1..pair[1];
+                for (k, known) in between.clone().zip(&mut gains[between]) {
+                    *known = gain(&self.error(s, k, taps))?;
                 }
             }
         }

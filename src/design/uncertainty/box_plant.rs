@@ -168,7 +168,7 @@ impl BoxPlant {
                 corner >> side & 1 == 1
             } else {
                 // Rows of a Hadamard matrix and their opposites.
-                ((corner / 2) & side).count_ones().is_multiple_of(2) == (corner % 2 == 0)
+                ((corner / 2) & side).count_ones().is_multiple_of(2) == corner.is_multiple_of(2)
             }
         };
         let of_corner = |corner: usize| {

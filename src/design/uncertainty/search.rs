@@ -234,8 +234,9 @@ impl BoxSearch {
             let (low, high) = (&all[pair[0]], &all[pair[1]]);
             if highest(low).max(highest(high)) >= level {
                 let starts = [combinations(low), combinations(high)].concat();
-                for k in pair[0] + 1..pair[1] {
-                    all[k] = self.climbed(starts.clone(), k, &filters.at(self.frequencies.all[k]))?;
+                let between = pair[0] + 1..pair[1];
+                for (k, found) in between.clone().zip(&mut all[between]) {
+                    *found = self.climbed(starts.clone(), k, &filters.at(self.frequencies.all[k]))?;
                 }
             }
         }
