@@ -16,7 +16,7 @@ use super::scheduled::{self, Scheduled, moved};
 use super::transfer::Transfer;
 use super::{ErrorBox, ErrorPoint, Taps};
 use crate::bank::{Bank, SynthesisFilters};
-use crate::units::RadiansPerSlowPeriod;
+use crate::units::{RadiansPerSlowPeriod, Seconds};
 use std::f64::consts::PI;
 use std::rc::Rc;
 
@@ -81,12 +81,7 @@ impl<'a> Judge<'a> {
         let grid = Grid::new(bank, errors, &on_grid(&halvings, taps))?;
         let memories = Memories::new(&grid, errors)?;
         let fast_period = fast_period(bank);
-        let mut channels: Vec<Channel> =
-            (0..bank.channel_count()).map(|i| Channel::new(&memories, i, errors, fast_period)).collect();
-        for i in 0..channels.len() {
-            let same = |&j: &usize| grid.has_equal_front_ends(i, j) && errors.cutoffs[i] == errors.cutoffs[j];
-            channels[i].like = (0..i).find(same).unwrap_or(i);
-        }
+        let channels = channels(&memories, errors, fast_period);
         let reference = memories.of_sample(0);
         let (target, signal) = (sampled_transfer(&grid, 0), signal_transfer(&grid));
         let n = grid.period.order();
@@ -109,12 +104,15 @@ impl<'a> Judge<'a> {
             operations: 0.0,
             limit: f64::INFINITY,
         };
-        let front_ends =
-            std::iter::once(judge.reference()).chain(judge.channels.iter().map(Channel::front_end));
-        let counts = front_ends.map(|front_end| front_end.aliases(bank.ratio));
-        judge.aliases =
-            counts.collect::<Option<Vec<_>>>().ok_or(VerifyError::LongMemory)?.into_iter().max().unwrap_or(0);
+        judge.aliases = judge.aliases_needed().ok_or(VerifyError::LongMemory)?;
         Ok((judge, reference))
+    }
+
+    /// Aliases on each side that all front ends need.
+    fn aliases_needed(&self) -> Option<usize> {
+        let front_ends = self.channels.iter().map(Channel::front_end).chain([self.reference()]);
+        let counts = front_ends.map(|front_end| front_end.aliases(self.bank.ratio));
+        counts.collect::<Option<Vec<_>>>()?.into_iter().max()
     }
 
     /// The filter of the reference samples.
@@ -338,6 +336,18 @@ impl<'a> Judge<'a> {
     }
 }
 
+/// The channels, each with the first one that is like it.
+fn channels(memories: &Memories<'_>, errors: &ErrorBox, fast_period: Seconds) -> Vec<Channel> {
+    let grid = memories.grid();
+    let channel = |i: usize| {
+        let same = |&j: &usize| grid.has_equal_front_ends(i, j) && errors.cutoffs[i] == errors.cutoffs[j];
+        let mut channel = Channel::new(memories, i, errors, fast_period);
+        channel.like = (0..i).find(same).unwrap_or(i);
+        channel
+    };
+    (0..grid.channels.len()).map(channel).collect()
+}
+
 /// A side of the box that a grid divides.
 #[derive(Debug, Clone, Copy)]
 enum Side {
@@ -378,7 +388,7 @@ fn slopes(bank: &Bank, taps: Taps) -> Vec<Option<SynthesisFilters>> {
     (0..bank.channel_count()).map(of).collect()
 }
 
-fn fast_period(bank: &Bank) -> crate::units::Seconds {
+fn fast_period(bank: &Bank) -> Seconds {
     bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period)
 }
 

@@ -171,7 +171,7 @@ fn random_case(trial: u64) -> (Bank, ErrorBox) {
             errors.gains[i] = size(0.02, part());
         }
         if kind == 2 || kind == 3 {
-            errors.cutoffs[i] = size(0.01, part());
+            errors.cutoffs[i] = size(0.002, part());
         }
     }
     (bank(&text), errors)
