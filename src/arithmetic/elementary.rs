@@ -116,7 +116,7 @@ fn power(x: Long, n: usize) -> Long {
         0 => Ball::from(1.0),
         _ => {
             let half = power(x, n / 2);
-            if n % 2 == 0 { half * half } else { half * half * x }
+            if n.is_multiple_of(2) { half * half } else { half * half * x }
         }
     }
 }
