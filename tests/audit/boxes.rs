@@ -290,7 +290,7 @@ fn uncertain(seed: u64, follows: bool) -> Tally {
             }
         }
     }
-    let printed = at(study, if follows { "/tracked/worst" } else { "/robust/worst" });
+    let printed = at(study, if follows { "/tracked/largest_found" } else { "/robust/largest_found" });
     if let Some(printed) = printed
         && found.gain > printed * (1.0 + SEARCH)
     {
