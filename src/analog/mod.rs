@@ -16,7 +16,7 @@
 //!
 //! Numerators and denominators are factored first, in 512 bits: multiple roots are found exactly, the others
 //! enclosed by discs that hold one root each. The design takes the nearest doubles to the real and imaginary
-//! parts of the roots. The proof takes the balls: [`enclosed`] realises a written filter with every rounding
+//! parts of the roots. The proof takes the balls: `enclosed` realises a written filter with every rounding
 //! error bounded, from the same formulas.
 //!
 //! Finally every state is scaled by a power of two so that its impulse response has unit energy up to

@@ -237,7 +237,7 @@ fn vertex(top: &Bracket) -> Option<(f64, f64)> {
     let (left, right) = ((fb - fa) / (b - a), (fc - fb) / (c - b));
     let bend = (right - left) / (c - a);
     let x = 0.5 * (a + b) - 0.5 * left / bend;
-    (bend < 0.0 && x > a && x < c).then(|| (x, fb + (x - b) * (left + bend * (x - a))))
+    (bend < 0.0 && x > a && x < c).then_some((x, fb + (x - b) * (left + bend * (x - a))))
 }
 
 /// The local maximum in a bracket, by parabolas, and by halving the longer side where they come too near to

@@ -1,8 +1,8 @@
 //! The samples of a bank's converters and of its target for white noise: their cross-correlations as exact
 //! quotients.
 //!
-//! Time in fast periods. Row a samples the output of G_a at the times k M + t_a: phase p of the target at p
-//! - m0, channel i at -D_i. For t >= 0 the correlation of G_a at time t with G_b at 0 is the sum over the
+//! Time in fast periods. Row a samples the output of G_a at the times k M + t_a: phase p of the target at
+//! p - m0, channel i at -D_i. For t >= 0 the correlation of G_a at time t with G_b at 0 is the sum over the
 //! poles of G_a of r e^{p t}, r = Res G_a(p) G_b(-p). Over the slow periods this is a geometric series, so
 //! with d = t_a - t_b and j0 the least j for which j M + d >= 0
 //!
@@ -109,8 +109,7 @@ impl Plant {
             rows.push(Row::new(mode(filter, errors.cutoffs[i]), -delay, gain));
         }
         for row in &mut rows {
-            let all = |time: &Real| modes.iter().map(|mode| mode.exponentials(time)).collect::<Vec<_>>();
-            row.growth = all(&row.time);
+            row.growth = modes.iter().map(|mode| mode.exponentials(&row.time)).collect();
             row.decay = row.growth.iter().map(|list| list.iter().map(Complex::inverse).collect()).collect();
         }
         let mut plant = Self { ratio, channels: rows.len() - ratio, modes, rows, pairs: Vec::new() };

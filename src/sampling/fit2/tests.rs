@@ -59,10 +59,10 @@ fn eliminate(mut a: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
 fn splines<const ORDER: usize>(position: f64, length: usize) -> Vec<f64> {
     let (first, w) = BSpline::<ORDER>::weights(position);
     let mut weights = vec![0.0; length];
-    for j in 0..ORDER {
+    for (j, &weight) in w.iter().enumerate().take(ORDER) {
         let index = first + j as i64 + (ORDER / 2 - 1) as i64;
         if let Some(k) = usize::try_from(index).ok().filter(|k| *k < length) {
-            weights[k] = w[j];
+            weights[k] = weight;
         }
     }
     weights
