@@ -1,8 +1,7 @@
 //! Reading input files: whole, up to a size limit since a device may never end, and what is wrong with them.
 
-use hybank::files::{Bound, FileError, bytes_of, read_bytes, text_in};
+use hybank::files::{self, Bound, FileError, read_bytes};
 use std::fmt;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// What to do about a path in a scene that cannot be opened.
@@ -74,11 +73,11 @@ pub(crate) fn read(path: &Path, remedy: &'static str) -> Result<Vec<u8>, InputEr
 
 /// The text of a file.
 pub(crate) fn read_text(path: &Path, remedy: &'static str) -> Result<String, InputError> {
-    hybank::files::read_text(path, TEXT).map_err(|source| InputError::Read { source, remedy })
+    files::read_text(path, TEXT).map_err(|source| InputError::Read { source, remedy })
 }
 
 /// The text of a stream called `name`.
 #[cfg(feature = "cli")]
-pub(crate) fn text(stream: impl Read, name: &str) -> Result<String, FileError> {
-    text_in(bytes_of(stream, name, TEXT)?, name)
+pub(crate) fn text(stream: impl std::io::Read, name: &str) -> Result<String, FileError> {
+    files::text_in(files::bytes_of(stream, name, TEXT)?, name)
 }
