@@ -19,7 +19,7 @@ const PLACES: [&str; 6] = ["sparse/0", "sparse", "0", "dense/0/sparse", "dense/s
 /// Reads the model in `folder`: the text files if cameras.txt is there, else the binary ones if cameras.bin
 /// is.
 ///
-/// Accepts pinhole models and models with up to two radial and two tangential coefficients ([`Lens`]).
+/// Accepts pinhole models and models with up to two radial and two tangential coefficients of the lens.
 /// Images of other models have to be undistorted first, so these are refused.
 ///
 /// # Errors

@@ -15,7 +15,7 @@ const STORED_PER_UNIT: f64 = 1000.0;
 /// `path` is the scene file.
 ///
 /// # Errors
-/// [`SceneError`] of the file.
+/// `SceneError` of the file.
 pub fn complete(spec: &SceneSpec, path: &Path) -> Loaded<SceneSpec> {
     let mut whole = spec.clone();
     let folder = path.parent().unwrap_or(Path::new(""));
