@@ -5,7 +5,7 @@ use super::problem::{Problem, common_delay};
 use crate::analog::{SignalFilter, resolved_band};
 use crate::quantity::readable;
 use crate::spec::{Band, FilterSpec, Passband, Spec};
-use crate::units::{Hertz, RadiansPerFastPeriod};
+use crate::units::{FastPeriods, Hertz, RadiansPerFastPeriod};
 use std::f64::consts::{PI, TAU};
 
 /// Bandwidths below this share of the output's Nyquist frequency are implausible.
@@ -153,7 +153,8 @@ fn same_instants(problem: &Problem) -> Option<String> {
     };
     let near = pairs.filter(|&(i, j)| i != j && apart(i, j) < SAME_SAMPLES);
     let (i, j) = near.min_by_key(|&(i, j)| (i.min(j), i.max(j)))?;
-    let distance = if apart(i, j) < problem.resolution() {
+    let [a, b] = [i, j].map(|i| problem.channels[i].delay);
+    let distance = if a.periods_since(b, FastPeriods(period)).is_some() {
         "at one instant".to_owned()
     } else {
         format!("{:.1e} fast periods apart", apart(i, j))

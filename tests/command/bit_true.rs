@@ -113,7 +113,7 @@ fn what_has_no_integers_is_refused() {
     let desk = Desk::with_spec(THESIS);
     desk.good(&["design", "spec.toml", "-o", "b.json"]);
     captures(&desk, 16);
-    desk.refused(1, &FUSE, &["b.json", "--bits"]);
+    desk.refused(1, &FUSE, &["b.json", "method = \"fir\" and bits"]);
     desk.good(&["design", "spec.toml", "-o", "b.json", "--bits", "12", "--force"]);
     desk.good(&["simulate", "b.json", "--source", "tones:0.3", "--samples", "100", "-o", "cap"]);
     let floats = ["fuse", "b.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "x.wav", "--bit-true"];

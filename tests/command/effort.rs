@@ -104,7 +104,7 @@ fn numbers_near_the_end_of_double_precision_are_refused_by_their_key() {
 #[cfg(target_os = "linux")]
 #[test]
 fn an_interrupt_ends_a_design_at_once_and_leaves_no_file() {
-    for signal in ["INT", "TERM", "HUP", "USR1"] {
+    for signal in crate::support::ending_signals() {
         let folder = tempfile::tempdir().unwrap();
         let mut command =
             design(folder.path(), &spec(2, 2, "taps = 900"), &["--latency", "400", "--no-limit"]);

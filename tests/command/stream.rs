@@ -191,7 +191,7 @@ fn cut_frames_and_unequal_channels_are_reported() {
 
 #[test]
 fn a_signal_ends_after_whole_frames_and_reports() {
-    ["INT", "TERM", "HUP", "XCPU", "ALRM", "USR1", "USR2"].into_iter().for_each(ends_after_whole_frames);
+    crate::support::ending_signals().for_each(ends_after_whole_frames);
 }
 
 fn ends_after_whole_frames(signal: &str) {

@@ -35,6 +35,18 @@ taps = 22
 /// N = M = 2, m0 = 3.
 pub(crate) const TAPS: [&[f32]; 2] = [&[1.0, 2.0, 3.0, 4.0], &[10.0, 20.0, 30.0, 0.0]];
 
+/// Signals that end a run in order, without those that this process ignores, as under `nohup`: the runs that
+/// it starts ignore them too.
+pub(crate) fn ending_signals() -> impl Iterator<Item = &'static str> {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.map_or(0, |mask| u64::from_str_radix(mask.trim(), 16).unwrap());
+    let signals =
+        [("INT", 2), ("TERM", 15), ("HUP", 1), ("XCPU", 24), ("ALRM", 14), ("USR1", 10), ("USR2", 12)];
+    let caught = move |&(name, number): &(&str, u32)| name != "HUP" || ignored >> (number - 1) & 1 == 0;
+    signals.into_iter().filter(caught).map(|(name, _)| name)
+}
+
 /// What a program printed.
 pub(crate) fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
