@@ -1,7 +1,7 @@
 //! Whether captures agree with a spec: levels, starts, polarities, gains, order and delays.
 
 use super::Settings;
-use super::blind::Blind;
+use super::blind::{Blind, unexplained_in_order};
 use super::contradiction::Contradiction;
 use super::estimates::ChannelEstimate;
 use super::model::{Fit, Model};
@@ -232,33 +232,41 @@ fn by_delays(spec: &Spec, model: &Model, records: &[Record]) -> Option<Vec<Contr
 /// as well as the given one and clearly better than any other: two channels swapped, all rotated, or
 /// reversed.
 fn other_order(blind: &Blind<'_>, channels: usize) -> Option<Vec<usize>> {
-    let bands = blind.single_bands();
     let given: Vec<usize> = (0..channels).collect();
-    let left = blind.unexplained_in_order(&bands, &given);
+    let others = other_orders(&given);
+    let bands = blind.single_bands(others.len());
+    let left = unexplained_in_order(&bands, &given);
     // NaN, without bands, says nothing.
     let is_doubtful = left > ORDER_DOUBTFUL;
     if !is_doubtful {
         return None;
     }
+    let weigh = |order: Vec<usize>| (unexplained_in_order(&bands, &order), order);
+    let mut weighed: Vec<_> = others.into_iter().map(weigh).collect();
+    weighed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let second = weighed.get(1).map_or(f64::INFINITY, |(left, _)| *left);
+    let (best, order) = weighed.into_iter().next()?;
+    (best <= CLEARLY_LESS * left && DISTINCT_ORDER * best <= second).then(|| from_one(order))
+}
+
+/// `given` with two channels swapped, all rotated, or reversed.
+fn other_orders(given: &[usize]) -> Vec<Vec<usize>> {
+    let channels = given.len();
     let mut orders: Vec<Vec<usize>> = Vec::new();
     for i in 0..channels {
-        let rotated: Vec<usize> = (0..channels).map(|j| (i + j) % channels).collect();
+        let rotated: Vec<usize> = (0..channels).map(|j| given[(i + j) % channels]).collect();
         orders.push(rotated.iter().rev().copied().collect());
         orders.push(rotated);
         orders.extend((0..i).map(|j| {
-            let mut swapped = given.clone();
+            let mut swapped = given.to_vec();
             swapped.swap(i, j);
             swapped
         }));
     }
     orders.sort();
     orders.dedup();
-    let weigh = |order: Vec<usize>| (blind.unexplained_in_order(&bands, &order), order);
-    let mut weighed: Vec<_> = orders.into_iter().filter(|order| *order != given).map(weigh).collect();
-    weighed.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let second = weighed.get(1).map_or(f64::INFINITY, |(left, _)| *left);
-    let (best, order) = weighed.into_iter().next()?;
-    (best <= CLEARLY_LESS * left && DISTINCT_ORDER * best <= second).then(|| from_one(order))
+    orders.retain(|order| order != given);
+    orders
 }
 
 #[cfg(test)]

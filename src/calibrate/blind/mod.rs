@@ -21,6 +21,7 @@
 //! estimation*, IEEE Trans. ASSP 38(10), 1990, for the score with S and s eliminated.
 
 mod likelihood;
+mod single;
 mod spectra;
 #[cfg(test)]
 mod tests;
@@ -32,11 +33,14 @@ use super::model::{Fit, Kind, Model, Point};
 use super::record::{Record, longest_run};
 use super::warning::Warning;
 use crate::linalg::least_squares::{LeastSquares, Minimum, NoMinimum, NormalEquations, StepLimits, minimise};
-use crate::linalg::{CMat, Complex, solve};
+use crate::linalg::solve;
 use crate::sine_fit::Estimate;
 use likelihood::{band_score, lowest_aliases};
+use single::bands_within;
+pub(super) use single::{SingleBand, unexplained_in_order};
 use spectra::occupied;
 pub(super) use spectra::{Band, Spectra};
+use std::ops::RangeInclusive;
 
 /// Least number of frames in a row.
 const LEAST_FRAMES: usize = 256;
@@ -186,25 +190,16 @@ impl<'a> Blind<'a> {
         Ok((maximum, minimum))
     }
 
-    /// The bands that hold one alias, with the phases of the nominal delays removed.
-    pub(super) fn single_bands(&self) -> Vec<Band> {
-        self.bands(&self.model.delays, FIRST_LEAST).into_iter().map(|used| used.band).collect()
-    }
-
-    /// The share of the power that one alias per band leaves unexplained if capture i is channel `order[i]`,
-    /// with the nominal values and whichever alias fits a band best. NaN without bands.
-    pub(super) fn unexplained_in_order(&self, bands: &[Band], order: &[usize]) -> f64 {
-        let (nominal, delays) = (self.nominal(), &self.model.delays);
-        let left = |band: &Band, alias: i32| {
-            let column = self.model.steering(&nominal, band.w, &[alias]);
-            // The phases that were removed are those of the channels in the given order.
-            let removed = |i: usize| band.w * (delays[order[i]] - delays[i]) / self.model.ratio as f64;
-            band.unexplained(&CMat::from_fn(order.len(), 1, |i, _| {
-                column[(order[i], 0)] * Complex::from_polar(1.0, -removed(i))
-            }))
-        };
-        let best = |band: &Band| self.least_over_aliases(|alias| left(band, alias));
-        bands.iter().map(best).sum::<f64>() / bands.iter().map(Band::power).sum::<f64>()
+    /// Bands that hold one alias, as the channels of the spec would show it, to compare so many orders of the
+    /// channels.
+    pub(super) fn single_bands(&self, orders: usize) -> Vec<SingleBand> {
+        let bands = self.bands(&self.model.delays, FIRST_LEAST);
+        let aliases = self.zones();
+        let products = orders * aliases.clone().count() * self.model.channels();
+        let every = bands.len().div_ceil(bands_within(products)).max(1);
+        let nominal = self.nominal();
+        let of = |used: Occupied| SingleBand::new(self.model, &nominal, &used.band, aliases.clone());
+        bands.into_iter().step_by(every).filter_map(of).collect()
     }
 
     /// The power that one alias per band leaves unexplained: with the nominal values and whichever alias
@@ -226,8 +221,13 @@ impl<'a> Blind<'a> {
     }
 
     fn least_over_aliases(&self, left: impl Fn(i32) -> f64) -> f64 {
+        self.zones().map(left).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The aliases k that a band may hold: up to the fast rate.
+    fn zones(&self) -> RangeInclusive<i32> {
         let reach = self.model.ratio as i32;
-        (-reach..=reach).map(left).fold(f64::INFINITY, f64::min)
+        -reach..=reach
     }
 }
 
