@@ -190,8 +190,8 @@ impl<'a> Blind<'a> {
         Ok((maximum, minimum))
     }
 
-    /// Bands that hold one alias, as the channels of the spec would show it, to compare so many orders of the
-    /// channels.
+    /// Bands that hold one alias, as the channels of the spec would show it, to compare so many orders of
+    /// the channels.
     pub(super) fn single_bands(&self, orders: usize) -> Vec<SingleBand> {
         let bands = self.bands(&self.model.delays, FIRST_LEAST);
         let aliases = self.zones();

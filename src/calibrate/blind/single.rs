@@ -1,9 +1,9 @@
 //! How well orders of the channels explain bands that hold one alias, whichever alias that is.
 //!
-//! The spectral matrix of such a band is `l u u*` and noise. With the channels in the order o, so that capture
-//! i is channel o(i), an alias of the signal shows as the column `c_o(i) e^{-j W (D_o(i) - D_i) / M}`, because
-//! the phases that were removed from the matrix are those of the given order. It explains `l |u* c|^2 / |c|^2`
-//! of the power. The factors of i and of o(i) part, so an order costs one product per channel, band and alias.
+//! The spectral matrix of such a band is `l u u*` and noise. Capture i is channel o(i) in the order o. An
+//! alias of the signal then shows as the column `c_o(i) e^{-j W (D_o(i) - D_i) / M}`, because the phases
+//! that were removed from the matrix are those of the given order. It explains `l |u* c|^2 / |c|^2` of the
+//! power. The factors of i and of o(i) part, so an order costs one product per channel, band and alias.
 
 use super::spectra::Band;
 use crate::calibrate::model::{Model, Point};
@@ -62,8 +62,8 @@ impl SingleBand {
     }
 }
 
-/// The share of the power that one alias per band leaves unexplained if capture i is channel `order[i]`, with
-/// the nominal values and whichever alias fits a band best. NaN without bands.
+/// The share of the power that one alias per band leaves unexplained if capture i is channel `order[i]`,
+/// with the nominal values and whichever alias fits a band best. NaN without bands.
 pub(in crate::calibrate) fn unexplained_in_order(bands: &[SingleBand], order: &[usize]) -> f64 {
     let left: f64 = bands.iter().map(|band| band.unexplained(order)).sum();
     left / bands.iter().map(|band| band.power).sum::<f64>()
