@@ -12,6 +12,9 @@
 //! ```
 
 use crate::units::{FastPeriods, Hertz, Seconds};
+use serde::{Serialize, Serializer};
+use std::fmt;
+use std::ops::RangeInclusive;
 
 /// A time as it is written: in seconds, or in units of the fast period.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,6 +64,70 @@ pub enum QuantityError {
     },
 }
 
+/// The numbers of a capture that are full scale, -1 to 1 everywhere else.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum FullScale {
+    /// The number that is full scale, in volts or in whatever the capture has.
+    Number(f64),
+    /// Codes of a converter of so many bits, from -2^(bits - 1): full scale is 2^(bits - 1).
+    Signed(u32),
+    /// The same with codes from 0: the middle is 2^(bits - 1).
+    Unsigned(u32),
+}
+
+impl FullScale {
+    /// The number that becomes 1, less the one that becomes 0.
+    pub fn amplitude(self) -> f64 {
+        match self {
+            Self::Number(number) => number,
+            Self::Signed(bits) | Self::Unsigned(bits) => 2f64.powi(bits as i32 - 1),
+        }
+    }
+
+    /// The number that becomes 0.
+    pub fn middle(self) -> f64 {
+        if let Self::Unsigned(_) = self { self.amplitude() } else { 0.0 }
+    }
+
+    /// Lowest and highest sample of codes, of full scale.
+    pub fn rails(self) -> Option<(f64, f64)> {
+        match self {
+            Self::Number(_) => None,
+            Self::Signed(_) | Self::Unsigned(_) => Some((-1.0, 1.0 - 1.0 / self.amplitude())),
+        }
+    }
+
+    /// The codes that reach from `least` to `most`, if a converter has such codes.
+    pub fn of_codes(least: f64, most: f64) -> Option<Self> {
+        let kinds = [Self::Signed, Self::Unsigned];
+        let first = usize::from(least >= 0.0);
+        (1..=CODE_BITS).map(kinds[first]).find(|codes| {
+            let reach = codes.amplitude();
+            least >= codes.middle() - reach && most < codes.middle() + reach
+        })
+    }
+}
+
+/// A number as a number, codes as text.
+impl Serialize for FullScale {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Number(number) => serializer.serialize_f64(*number),
+            codes => serializer.collect_str(codes),
+        }
+    }
+}
+
+impl fmt::Display for FullScale {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Signed(bits) => write!(f, "{bits}bits"),
+            Self::Unsigned(bits) => write!(f, "u{bits}bits"),
+        }
+    }
+}
+
 /// SI prefixes with their power of ten. Mu has two code points.
 const PREFIXES: [(&str, i32); 13] = [
     ("", 0),
@@ -81,6 +148,12 @@ const RELATIVE_UNITS: [(&str, i32); 3] = [("", 0), ("%", -2), ("ppm", -6)];
 const TIMES: &str = "a time such as 10ps, 2.5e-9 (seconds) or 0.01samples";
 const FREQUENCIES: &str = "a frequency such as 9kHz, 1.2GHz or 48000 (hertz)";
 const RATES: &str = "a rate such as 1GS/s, 48kHz or 48000 (hertz)";
+/// Most bits of codes: doubles hold those of more with gaps.
+const CODE_BITS: u32 = 53;
+/// Range of a number that is full scale: beyond it samples of full scale would lose digits in 32 bits.
+const FULL_SCALES: RangeInclusive<f64> = 1e-30..=1e30;
+const FULL_SCALE: &str = "the number that is full scale, 1e-30 to 1e30, such as 128 or 2.5, or the codes of a converter: \
+                          8bits from -128 to 127, u8bits from 0 to 255 (1 to 53 bits)";
 const SHARES: &str = "a share such as 1%, 540ppm or 0.01";
 
 /// A time: seconds with an SI prefix, or fast samples. A number without unit is in seconds.
@@ -111,6 +184,24 @@ pub fn rate(text: &str) -> Result<Hertz, QuantityError> {
     let written = Written::split(text, RATES)?;
     let unit = if written.unit.ends_with("S/s") { "S/s" } else { "Hz" };
     written.with_prefix(unit, RATES).map(Hertz)
+}
+
+/// The full scale of a capture: a number above 0, or the codes of a converter, `8bits` or `u8bits`.
+///
+/// # Errors
+/// [`QuantityError`].
+pub fn full_scale(text: &str) -> Result<FullScale, QuantityError> {
+    let trimmed = text.trim();
+    let codes = trimmed.strip_prefix('u');
+    let written = Written::split(codes.unwrap_or(trimmed), FULL_SCALE)?;
+    let number = written.scaled(0)?;
+    let bits = (1..=CODE_BITS).find(|&bits| f64::from(bits) == number);
+    match (written.unit, codes, bits) {
+        ("bits" | "bit", None, Some(bits)) => Ok(FullScale::Signed(bits)),
+        ("bits" | "bit", Some(_), Some(bits)) => Ok(FullScale::Unsigned(bits)),
+        ("", None, _) if FULL_SCALES.contains(&number) => Ok(FullScale::Number(number)),
+        _ => Err(written.unknown_unit(FULL_SCALE)),
+    }
 }
 
 /// The SI prefix for values up to `most`: the factor that brings them to it, and the unit with the prefix.
@@ -242,6 +333,38 @@ mod tests {
         assert_eq!(relative("1%"), Ok(0.01));
         assert_eq!(relative("540 ppm"), Ok(540e-6));
         assert_eq!(relative("-0.02"), Ok(-0.02));
+    }
+
+    #[test]
+    fn full_scale_is_a_number_or_codes() {
+        assert_eq!(full_scale("128"), Ok(FullScale::Number(128.0)));
+        assert_eq!(full_scale(" 2.5e-3 "), Ok(FullScale::Number(2.5e-3)));
+        assert_eq!(full_scale("8 bits"), Ok(FullScale::Signed(8)));
+        assert_eq!(full_scale("u12bits"), Ok(FullScale::Unsigned(12)));
+        for wrong in ["0", "-1", "1e31", "8V", "u128", "0bits", "54bits", "2.5bits", "-8bits", "bits", ""] {
+            assert!(full_scale(wrong).is_err(), "{wrong}");
+        }
+        for text in ["128", "8bits", "u12bits"] {
+            assert_eq!(full_scale(text).unwrap().to_string(), text);
+        }
+    }
+
+    #[test]
+    fn codes_are_those_of_the_fewest_bits() {
+        use FullScale::{Signed, Unsigned};
+        for (least, most, codes) in [
+            (-128.0, 3.0, Some(Signed(8))),
+            (-1.0, 127.0, Some(Signed(8))),
+            (-1.0, 128.0, Some(Signed(9))),
+            (0.0, 255.0, Some(Unsigned(8))),
+            (0.0, 256.0, Some(Unsigned(9))),
+            (2.0, 4095.0, Some(Unsigned(12))),
+            (-1e300, 0.0, None),
+        ] {
+            assert_eq!(FullScale::of_codes(least, most), codes, "{least} {most}");
+        }
+        assert_eq!((Unsigned(8).middle(), Unsigned(8).amplitude()), (128.0, 128.0));
+        assert_eq!(Signed(8).rails(), Some((-1.0, 127.0 / 128.0)));
     }
 
     #[test]

@@ -8,10 +8,10 @@ use super::file_kind::FileKind;
 use super::interrupt::interrupts;
 use super::match_bank::check_stdin;
 use super::measure::{ToneArg, tone, tones};
-use super::print::{Failure, is_dash, say_understood};
+use super::print::{Failure, is_dash, say_understood, warn};
 use super::written::{check_outputs, write_text};
 use crate::calibrate::{CalibrationSignal, Fit, Record, Settings, applied, calibrate};
-use crate::io::{MultiReader, PcmFormat, ReadOptions};
+use crate::io::{MultiReader, ReadOptions};
 use crate::spec::{DesignOverrides, Spec};
 use crate::units::{FastPeriods, Hertz};
 use std::path::{Path, PathBuf};
@@ -121,34 +121,47 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let text = read_kind(&args.spec, FileKind::Spec)?;
     let spec = parse_spec(&text, &args.spec, DesignOverrides::default())?.for_outputs(&[&args.output])?;
     say_understood(Some(&spec));
-    let settings = args.settings(&spec)?;
-    let signal = args.signal(&spec)?;
-    let (records, mut warnings) = args.read(&args.captures, &spec)?;
-    let found = calibrate(&spec, &records, signal.borrowed(), settings).map_err(Failure::input)?;
-    let (calibrated, more) = applied(&spec, &found);
-    let mut report = Report::new(&spec, &found);
-    report.add(&more);
-    if !args.check.is_empty() {
-        let (records, tolerated) = args.read(&args.check, &spec)?;
-        warnings.extend(tolerated);
-        let held_out = match signal.borrowed() {
-            // Held-out tones have other frequencies.
-            CalibrationSignal::Tones(_) => CalibrationSignal::Tones(&[]),
-            signal => signal,
-        };
-        let checked = calibrate(&calibrated, &records, held_out, settings)
-            .map_err(|error| Failure::Input(format!("the held-out captures: {error}")))?;
-        report.check(&calibrated, &found, &checked);
-    }
-    report.warnings.splice(0..0, warnings);
-    let written = calibrated.to_toml_like(&text).map_err(|problem| {
-        Failure::Input(format!("the values found make no spec: {problem}; nothing was written"))
-    })?;
+    let mut warnings = Vec::new();
+    let done = args.calibrated(&spec, &text, &mut warnings);
+    // What the captures have may explain why they do not fit; a report has these warnings.
+    let (written, report) = done.inspect_err(|_| warnings.iter().for_each(|warning| warn(warning)))?;
     write_text(&args.output, &written, args.force)?;
     report.print(&args.output, args.json)
 }
 
 impl Args {
+    /// The text of the calibrated spec, like the `text` of the given one, and the report. `warnings` are
+    /// those of the captures.
+    fn calibrated(
+        &self,
+        spec: &Spec,
+        text: &str,
+        warnings: &mut Vec<String>,
+    ) -> Result<(String, Report), Failure> {
+        let (settings, signal) = (self.settings(spec)?, self.signal(spec)?);
+        let records = self.read(&self.captures, spec, warnings)?;
+        let found = calibrate(spec, &records, signal.borrowed(), settings).map_err(Failure::input)?;
+        let (calibrated, more) = applied(spec, &found);
+        let mut report = Report::new(spec, &found);
+        report.add(&more);
+        if !self.check.is_empty() {
+            let records = self.read(&self.check, spec, warnings)?;
+            let held_out = match signal.borrowed() {
+                // Held-out tones have other frequencies.
+                CalibrationSignal::Tones(_) => CalibrationSignal::Tones(&[]),
+                signal => signal,
+            };
+            let checked = calibrate(&calibrated, &records, held_out, settings)
+                .map_err(|error| Failure::Input(format!("the held-out captures: {error}")))?;
+            report.check(&calibrated, &found, &checked);
+        }
+        report.warnings.splice(0..0, warnings.iter().cloned());
+        let written = calibrated.to_toml_like(text).map_err(|problem| {
+            Failure::Input(format!("the values found make no spec: {problem}; nothing was written"))
+        })?;
+        Ok((written, report))
+    }
+
     /// Refuses impossible combinations of options, before any file is read.
     fn check_usage(&self) -> Result<(), Failure> {
         self.turns.check(self.captures.len())?;
@@ -169,27 +182,34 @@ impl Args {
         check_outputs(&[&self.output], &inputs)
     }
 
-    /// One record per channel of `spec`, and what was tolerated.
-    fn read(&self, paths: &[PathBuf], spec: &Spec) -> Result<(Vec<Record>, Vec<String>), Failure> {
+    /// One record per channel of `spec`; what was tolerated joins the `warnings`.
+    fn read(
+        &self,
+        paths: &[PathBuf],
+        spec: &Spec,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<Record>, Failure> {
         let turns = self.turns.by_delay(&spec.delays_in_fast_periods(), spec.ratio, &self.spec)?;
         let captures = self.reading.options(paths.len(), spec.channels.len());
-        let mut reader =
-            start(paths, ReadOptions { interleaving: turns.as_ref(), ..captures }, interrupts())?;
+        let full_scale = captures.full_scale.or(spec.full_scale);
+        let captures = ReadOptions { interleaving: turns.as_ref(), full_scale, ..captures };
+        let mut reader = start(paths, captures, interrupts())?;
+        self.reading.scale.check(&reader)?;
         check_channels(spec, &reader)?;
         check_rate(spec, &reader)?;
         let parts = if reader.is_complex() { 2 } else { 1 };
         let most = MOST_SAMPLES / (parts * reader.channels()).max(1);
         let headers = reader.headers();
-        let formats = headers
-            .flat_map(|(_, header)| std::iter::repeat_n(header.layout.format, parts * header.channels));
-        let formats: Vec<PcmFormat> = formats.collect();
+        let rails =
+            headers.flat_map(|(_, header)| std::iter::repeat_n(header.rails, parts * header.channels));
+        let rails: Vec<_> = rails.collect();
         let Whole { channels, is_cut } = Whole::read_parts(&mut reader, most)?;
-        let mut warnings: Vec<String> = reader.warnings().iter().map(ToString::to_string).collect();
+        warnings.extend(reader.warnings().iter().map(ToString::to_string));
         if is_cut {
             warnings.push(format!("only the first {most} frames are used"));
         }
-        let records = channels.into_iter().zip(formats);
-        let mut records = records.map(|(samples, format)| record(samples, format, self.clip));
+        let records = channels.into_iter().zip(rails);
+        let mut records = records.map(|(samples, rails)| record(samples, rails, self.clip));
         let mut all = Vec::new();
         while let Some(real) = records.next() {
             let imaginary = if parts == 2 { records.next() } else { None };
@@ -198,7 +218,7 @@ impl Args {
                 None => real,
             });
         }
-        Ok((all, warnings))
+        Ok(all)
     }
 
     fn settings(&self, spec: &Spec) -> Result<Settings, Failure> {
@@ -262,25 +282,22 @@ fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
     }
 }
 
-/// Integers clip at the ends of their range. Floats within +-1 clip there, or at 1 - q if that is their
+/// Integers and codes clip at the rails. Floats within +-1 clip there, or at 1 - q if that is their
 /// largest value and all are multiples of q, a power of two: the steps of a converter.
-fn record(samples: Vec<f64>, format: PcmFormat, clip: Option<f64>) -> Record {
+fn record(samples: Vec<f64>, rails: Option<(f64, f64)>, clip: Option<f64>) -> Record {
     if let Some(level) = clip {
         return Record::within(samples, -level, level);
     }
-    match format {
-        _ if !format.is_float() => {
-            let step = 2f64.powi(1 - 8 * format.bytes() as i32);
-            Record::within(samples, -1.0, 1.0 - step)
-        }
-        _ if samples.iter().all(|x| x.is_nan() || x.abs() <= 1.0) => {
+    match rails {
+        Some((lowest, highest)) => Record::within(samples, lowest, highest),
+        None if samples.iter().all(|x| x.is_nan() || x.abs() <= 1.0) => {
             let top = samples.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             let step = 1.0 - top;
             let is_code = |x: &f64| x.is_nan() || (x / step).fract() == 0.0;
             let is_quantised = step > 0.0 && step.log2().fract() == 0.0 && samples.iter().all(is_code);
             Record::within(samples, -1.0, if is_quantised { top } else { 1.0 })
         }
-        _ => Record::new(samples),
+        None => Record::new(samples),
     }
 }
 
@@ -290,12 +307,13 @@ mod tests {
 
     #[test]
     fn integers_clip_at_the_ends_of_their_range_and_floats_at_one() {
-        let clipped = |samples: &[f64], format, clip| record(samples.to_vec(), format, clip).clipped;
-        assert_eq!(clipped(&[-1.0, 0.0, 32767.0 / 32768.0, 0.99], PcmFormat::S16Le, None), 2);
-        assert_eq!(clipped(&[-1.0, 0.0, 1.0, 0.99], PcmFormat::F32Le, None), 2);
-        assert_eq!(clipped(&[-1.0, 0.0, 2047.0 / 2048.0, 0.5], PcmFormat::F32Le, None), 2);
-        assert_eq!(clipped(&[-1.0, 0.0, 0.9375, 0.9], PcmFormat::F32Le, None), 1);
-        assert_eq!(clipped(&[-1.0, 0.0, 1.5, 0.99], PcmFormat::F32Le, None), 0);
-        assert_eq!(clipped(&[-1.0, 0.0, 1.5, 0.99], PcmFormat::F32Le, Some(0.99)), 3);
+        let clipped = |samples: &[f64], rails, clip| record(samples.to_vec(), rails, clip).clipped;
+        let s16 = Some((-1.0, 32767.0 / 32768.0));
+        assert_eq!(clipped(&[-1.0, 0.0, 32767.0 / 32768.0, 0.99], s16, None), 2);
+        assert_eq!(clipped(&[-1.0, 0.0, 1.0, 0.99], None, None), 2);
+        assert_eq!(clipped(&[-1.0, 0.0, 2047.0 / 2048.0, 0.5], None, None), 2);
+        assert_eq!(clipped(&[-1.0, 0.0, 0.9375, 0.9], None, None), 1);
+        assert_eq!(clipped(&[-1.0, 0.0, 1.5, 0.99], None, None), 0);
+        assert_eq!(clipped(&[-1.0, 0.0, 1.5, 0.99], None, Some(0.99)), 3);
     }
 }

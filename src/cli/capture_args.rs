@@ -2,21 +2,24 @@
 
 use super::print::Failure;
 use crate::bank::Bank;
-use crate::io::{Coding, ReadOptions, TimeInterleaving};
+use crate::io::{Coding, MultiReader, ReadOptions, TimeInterleaving};
+use crate::quantity::{self, FullScale};
 use crate::units::FastPeriods;
 use std::path::Path;
 
 /// Options of the commands that read captures.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(super) struct CaptureArgs {
-    /// Sample format of captures: wav, or a raw format as in ffmpeg (s16le, f32le, ..; with c before it for
-    /// complex samples: cf32, cs16). SigMF recordings, .csv, .npy, .mat (x.mat:name for one variable of
-    /// several) and .flac state their own
+    /// Sample format of captures: wav, csv, or a raw format as in ffmpeg (s16le, f32le, ..; with c before it
+    /// for complex samples: cf32, cs16). SigMF recordings, .csv, .npy, .mat (x.mat:name for one variable of
+    /// several) and .flac state their own; a text of numbers is a table, whatever its name
     #[arg(long, value_name = "FORMAT", default_value = "wav", value_parser = coding)]
     format: Coding,
     /// Interleaved channels of each raw capture [default: 1 each, or all in a single capture]
     #[arg(long, value_name = "C", value_parser = clap::value_parser!(u16).range(1..))]
     channels: Option<u16>,
+    #[command(flatten)]
+    pub(super) scale: ScaleArgs,
     /// Use only this channel of each capture, from 1
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
     channel: Option<u16>,
@@ -25,7 +28,7 @@ pub(super) struct CaptureArgs {
 /// Reads the name of a coding.
 pub(super) fn coding(name: &str) -> Result<Coding, String> {
     name.parse()
-        .map_err(|error| format!("{error}, wav, or one of these with c before it for complex samples"))
+        .map_err(|error| format!("{error}, wav, csv, or one of these with c before it for complex samples"))
 }
 
 impl CaptureArgs {
@@ -35,7 +38,7 @@ impl CaptureArgs {
             Self { channel: Some(_), .. } if takes_turns => {
                 "--channel and --interleaved: converters that take turns share one channel; extract it first"
             }
-            Self { channels: Some(_), format: Coding::Wav, .. } => {
+            Self { channels: Some(_), format: Coding::Wav | Coding::Csv, .. } => {
                 "--channels: captures with headers state their channels; give the --format of raw captures"
             }
             _ => return Ok(()),
@@ -48,7 +51,32 @@ impl CaptureArgs {
         let single = if inputs == 1 && self.channel.is_none() { wanted } else { 1 };
         let channels = self.channels.map_or(single, usize::from);
         let only = self.channel.map(|channel| usize::from(channel) - 1);
-        ReadOptions { coding: self.format, channels, only, ..ReadOptions::files() }
+        let full_scale = self.scale.full_scale;
+        ReadOptions { coding: self.format, channels, only, full_scale, ..ReadOptions::files() }
+    }
+}
+
+/// The full scale of captures.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct ScaleArgs {
+    /// Full scale of captures whose format does not say it, such as tables and floats that are not WAV: a
+    /// number (128, 2.5), or the codes of a converter: 8bits from -128 to 127, u8bits from 0 to 255
+    /// [default: that of the spec, or 1]
+    #[arg(long, value_name = "X", value_parser = quantity::full_scale)]
+    pub(super) full_scale: Option<FullScale>,
+}
+
+impl ScaleArgs {
+    /// Refuses a full scale for captures none of which lacks one.
+    pub(super) fn check(self, reader: &MultiReader) -> Result<(), Failure> {
+        match (self.full_scale, reader.headers().next()) {
+            (Some(scale), Some((input, _))) if reader.headers().all(|(_, header)| header.is_scaled) => {
+                Err(Failure::Usage(format!(
+                    "--full-scale {scale}: {input} states its full scale by its format; leave the option out"
+                )))
+            }
+            _ => Ok(()),
+        }
     }
 }
 

@@ -1,8 +1,9 @@
 //! Recordings in memory, with what must be known about their format.
 
+use super::capture_args::ScaleArgs;
 use super::file_kind::unreadable;
 use super::print::{Failure, is_dash, name, warn};
-use crate::io::{Arrival, MultiReader, PcmFormat, PcmFrames, ReadOptions};
+use crate::io::{Arrival, MultiReader, PcmFrames, ReadOptions};
 use crate::memory::available_memory;
 use crate::units::Hertz;
 use crossbeam_channel::Receiver;
@@ -21,7 +22,7 @@ pub(super) struct CaptureFile {
     /// The imaginary parts of complex samples, as many; only of [`CaptureFile::read_any`].
     pub(super) imaginary: Option<Vec<f64>>,
     pub(super) rate: Hertz,
-    /// Lowest and highest value of an integer format; `None` for floats.
+    /// Lowest and highest value of integers and codes; `None` for floats.
     pub(super) rails: Option<(f64, f64)>,
 }
 
@@ -61,6 +62,7 @@ impl CaptureFile {
         whole: fn(&mut MultiReader, usize) -> Result<Whole, Failure>,
     ) -> Result<Self, Failure> {
         let mut reader = start(&[path.to_owned()], reading.options, crossbeam_channel::never())?;
+        ScaleArgs { full_scale: reading.options.full_scale }.check(&reader)?;
         let channels = reader.channels();
         if channels != 1 {
             let file = name(path);
@@ -74,7 +76,7 @@ impl CaptureFile {
             let message = "it states no sample rate; record or convert it with its rate, or give --rate where there is one";
             Failure::of(path, message)
         })?;
-        let rails = header.and_then(|header| rails(header.layout.format));
+        let rails = header.and_then(|header| header.rails);
         let Whole { channels, is_cut } = whole(&mut reader, reading.most)?;
         reader.warnings().iter().for_each(|warning| warn(&warning.to_string()));
         let mut parts = channels.into_iter();
@@ -206,20 +208,6 @@ fn append(parts: &[PcmFrames<'_>], count: usize, channels: &mut [Vec<f64>]) {
             samples.extend(frames.map(|frame| format.decode(&frame[c * container..])));
         }
     }
-}
-
-/// The lowest and highest value of an integer format.
-fn rails(format: PcmFormat) -> Option<(f64, f64)> {
-    if format.is_float() {
-        return None;
-    }
-    // Encoding saturates.
-    let mut bytes = vec![0; format.bytes()];
-    let mut nearest = |value: f64| {
-        format.encode(value, &mut bytes);
-        format.decode(&bytes)
-    };
-    Some((nearest(-2.0), nearest(2.0)))
 }
 
 /// Refuses what cannot be read twice.

@@ -132,6 +132,7 @@ impl Args {
             output: &self.output,
             container: Container::Wav,
             format: self.bits.format(),
+            scale: self.reading.scale,
             dropped: if self.keep_latency { DroppedLatency::Added } else { DroppedLatency::All },
             is_live: false,
             flush: true,

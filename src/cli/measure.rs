@@ -41,9 +41,6 @@ pub(super) struct Args {
     /// Highest order of the harmonics in THD
     #[arg(long, value_name = "H", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1024))]
     harmonics: u16,
-    /// Amplitude of full scale; 1 is that of integer formats
-    #[arg(long, value_name = "X", default_value_t = 1.0)]
-    full_scale: f64,
     /// A recording of the same signal to compare with, of the same rate
     #[arg(long = "ref", value_name = "TARGET")]
     reference: Option<PathBuf>,
@@ -158,17 +155,13 @@ impl Args {
     }
 
     fn settings(&self, capture: &CaptureFile) -> Result<Settings, Failure> {
-        if !(self.full_scale > 0.0 && self.full_scale.is_finite()) {
-            let message = format!("--full-scale {} is not a positive number", self.full_scale);
-            return Err(Failure::Usage(message));
-        }
         Ok(Settings {
             tones: tones(&self.tone)?,
             converters: self.interleaved.into(),
             harmonics: self.harmonics.into(),
-            full_scale: self.full_scale,
-            rails: capture.rails.unwrap_or_else(|| float_rails(capture, self.full_scale)),
+            rails: capture.rails.unwrap_or_else(|| float_rails(capture)),
             window: self.window,
+            ..Settings::default()
         })
     }
 
@@ -193,8 +186,8 @@ impl Args {
 }
 
 /// The rails of floats: full scale, unless some sample lies beyond it and so nothing clipped there.
-fn float_rails(capture: &CaptureFile, full_scale: f64) -> (f64, f64) {
+fn float_rails(capture: &CaptureFile) -> (f64, f64) {
     let mut all = capture.samples.iter().chain(capture.imaginary.iter().flatten());
-    let top = if all.any(|x| x.abs() > full_scale) { f64::INFINITY } else { full_scale };
+    let top = if all.any(|x| x.abs() > 1.0) { f64::INFINITY } else { 1.0 };
     (-top, top)
 }

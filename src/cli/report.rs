@@ -86,7 +86,9 @@ const LEAST_FRAMES: usize = 16;
 
 /// The spectra of the captures, plainly interleaved and fused by the bank.
 fn spectra_of(bank: &Bank, args: &Args) -> Result<Figure, Failure> {
-    let mut reader = start(&args.inputs, ReadOptions::files(), crossbeam_channel::never())?;
+    let full_scale = bank.spec.as_ref().and_then(|spec| spec.full_scale);
+    let captures = ReadOptions { full_scale, ..ReadOptions::files() };
+    let mut reader = start(&args.inputs, captures, crossbeam_channel::never())?;
     check_channels(bank, &args.bank, &reader)?;
     let rate = Hertz(output_rate(bank, &reader)?);
     let Whole { mut channels, is_cut } = Whole::read(&mut reader, MOST_FRAMES)?;

@@ -1,7 +1,7 @@
 //! How `fuse` and `stream` run a bank: their common options, the run from its plan to its files, the report.
 
 use super::bank_file;
-use super::capture_args::InterleavedArgs;
+use super::capture_args::{InterleavedArgs, ScaleArgs};
 use super::file_kind::unreadable;
 use super::gaps::{GapArgs, say_gaps};
 use super::interrupt::interrupts;
@@ -122,6 +122,7 @@ pub(super) struct Job<'a> {
     pub(super) output: &'a Path,
     pub(super) container: Container,
     pub(super) format: PcmFormat,
+    pub(super) scale: ScaleArgs,
     pub(super) dropped: DroppedLatency,
     /// Samples are fused as they arrive: no algorithm may add latency, an interrupt ends the run in order,
     /// and warnings come at once.
@@ -162,10 +163,18 @@ impl Job<'_> {
         let turns = args.turns.turns(self.bank, self.bank_path)?;
         let stalls = observer.map(RunObserver::stall_watch);
         let block_bytes = args.threads.bytes(BLOCK_BYTES);
-        let files =
-            ReadOptions { block_bytes, interleaving: turns.as_ref(), stalls: stalls.as_ref(), ..captures };
+        let stated = self.bank.spec.as_ref().and_then(|spec| spec.full_scale);
+        let files = ReadOptions {
+            block_bytes,
+            interleaving: turns.as_ref(),
+            stalls: stalls.as_ref(),
+            full_scale: self.scale.full_scale.or(stated),
+            ..captures
+        };
         let started = MultiReader::start(inputs, args.gaps.read_options(&lost, files), interrupts());
-        started.map_err(unreadable)?.ok_or_else(|| interrupted(0))
+        let reader = started.map_err(unreadable)?.ok_or_else(|| interrupted(0))?;
+        self.scale.check(&reader)?;
+        Ok(reader)
     }
 
     fn settings(&self) -> Settings<'static> {

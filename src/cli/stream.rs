@@ -1,6 +1,6 @@
 //! `hybank stream`: fuses slow samples as they arrive.
 
-use super::capture_args::coding;
+use super::capture_args::{ScaleArgs, coding};
 use super::observer::RunObserver;
 use super::print::{say_line, say_understood};
 use super::run::{Finished, Job, RunArgs, RunReport, print_report};
@@ -18,7 +18,7 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Sample formats, as in ffmpeg:
-  s8 u8 s16le s16be s24le s24be s32le s32be f32le f32be f64le f64be, and wav; cf32, cs16, cu8, .. are complex
+  s8 u8 s16le s16be s24le s24be s32le s32be f32le f32be f64le f64be, wav, and csv for inputs; cf32, cs16, cu8, .. are complex
 
 Examples:
   capture | hybank stream bank.json --format s16le > fast.raw
@@ -35,9 +35,11 @@ pub(super) struct Args {
     /// Sample format of the input; with c before it for complex samples
     #[arg(long, value_name = "FORMAT", default_value = "f32le", value_parser = coding)]
     format: Coding,
-    /// Sample format of the output [default: that of the input]
-    #[arg(long, value_name = "FORMAT", value_parser = coding)]
+    /// Sample format of the output [default: that of the input; f32le for tables]
+    #[arg(long, value_name = "FORMAT", value_parser = output_coding)]
     output_format: Option<Coding>,
+    #[command(flatten)]
+    scale: ScaleArgs,
     /// A FIFO or file. Give the option once per channel, or once for an input that holds all channels. A
     /// SigMF recording (a name that ends in sigmf-meta) states its own format and channels
     #[arg(long, value_name = "FILE")]
@@ -51,6 +53,14 @@ pub(super) struct Args {
     flush: bool,
     #[command(flatten)]
     run: RunArgs,
+}
+
+/// The coding of the output; tables are only read.
+fn output_coding(name: &str) -> Result<Coding, String> {
+    match coding(name)? {
+        Coding::Csv => Err("csv is a format of inputs; write wav or a raw format such as f64le".into()),
+        coding => Ok(coding),
+    }
 }
 
 /// The report of a run.
@@ -89,6 +99,7 @@ impl Args {
             container: self.container(),
             // A WAV stream has 32-bit floats.
             format: self.output_coding().format().unwrap_or(PcmFormat::F32Le),
+            scale: self.scale,
             dropped: DroppedLatency::Nothing,
             is_live: true,
             flush: self.flush,
@@ -119,7 +130,7 @@ impl Args {
 
     /// Raw inputs are one interleaved or one per channel; other formats state their channels.
     fn check_inputs(&self, inputs: &[PathBuf], channels: usize) -> Result<(), Failure> {
-        let raw = self.format != Coding::Wav && !inputs.iter().any(|path| is_self_describing(path));
+        let raw = self.format.format().is_some() && !inputs.iter().any(|path| is_self_describing(path));
         if raw && inputs.len() != 1 && inputs.len() != channels {
             return Err(Failure::Usage(format!(
                 "--input is given {} times; the bank has {channels} channels, so give it {channels} times, once, or not at all",
@@ -134,7 +145,10 @@ impl Args {
     }
 
     fn output_coding(&self) -> Coding {
-        self.output_format.unwrap_or(self.format)
+        match self.format {
+            Coding::Csv => self.output_format.unwrap_or(Coding::Raw(PcmFormat::F32Le)),
+            format => self.output_format.unwrap_or(format),
+        }
     }
 
     /// Real samples cannot be written as complex ones.

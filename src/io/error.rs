@@ -1,6 +1,7 @@
 //! Errors of reading and writing samples, and faults of inputs that are tolerated.
 
 use crate::files::FileError;
+use crate::quantity::FullScale;
 use std::io;
 
 /// A fault of a file or stream; every sentence names the file, the place, the rule and the remedy.
@@ -86,7 +87,7 @@ impl From<IoError> for io::Error {
 }
 
 /// A fault that was tolerated; complete when the input has ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum InputFault {
     /// The file is shorter than its header says.
     #[error("the file is truncated: {missing_bytes} bytes that its header promises are missing")]
@@ -112,6 +113,17 @@ pub enum InputFault {
         /// Number of lines.
         lines: u64,
     },
+    /// Samples beyond full scale, which is 1, of an input that does not state its own.
+    #[error(
+        "its samples reach {peak}, and full scale is 1 unless it is stated{}",
+        .likely.map_or_else(String::new, |likely| format!("; as whole numbers they look like codes, with a full scale of {likely}"))
+    )]
+    BeyondFullScale {
+        /// The largest magnitude.
+        peak: f64,
+        /// The codes that whole numbers are.
+        likely: Option<FullScale>,
+    },
     /// The input is longer than the shortest one, which decided where to end.
     #[error(
         "longer than the shortest channel, {}{frames} samples per channel were not used",
@@ -126,7 +138,7 @@ pub enum InputFault {
 }
 
 /// A fault with the input that has it.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{input}: {fault}")]
 pub struct InputWarning {
     /// Name of the input.

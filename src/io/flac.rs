@@ -5,6 +5,7 @@
 
 use super::capture::{Blocks, Capture};
 use super::{IoError, PcmFormat, SampleLayout, StreamHeader};
+use crate::quantity::FullScale;
 use claxon::Error;
 use std::fs::File;
 use std::io::{self, Read};
@@ -30,6 +31,8 @@ impl FlacReader {
         let flac = claxon::FlacReader::new(file).map_err(|error| refused(name, 0, error))?;
         let info = flac.streaminfo();
         let real = StreamHeader::real(SampleLayout::packed(PcmFormat::F64Le), info.channels as usize);
+        let rails = FullScale::Signed(info.bits_per_sample).rails();
+        let real = StreamHeader { is_scaled: true, rails, ..real };
         let header = StreamHeader { promised: info.samples, ..real.at_whole_hertz(info.sample_rate) };
         let (name, blocks) = (name.to_owned(), Blocks::default());
         Ok(Self { name, flac, header, frames: 0, numbers: Vec::new(), blocks })

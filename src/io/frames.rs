@@ -2,9 +2,11 @@
 //! channel. Counts what was tolerated.
 
 use super::capture::{Capture, InputNotes};
+use super::full_scale::Scaling;
 use super::open::InputSource;
 use super::wav::WavChunk;
 use super::{InputFault, IoError, StreamHeader};
+use crate::quantity::FullScale;
 use std::io::{self, Read};
 
 /// Cuts a byte stream, which may come in pieces of any size, into whole frames of `frame` bytes.
@@ -58,6 +60,7 @@ pub(super) struct InputFrames {
     name: String,
     frames: FrameReader<Box<dyn Capture>>,
     stored: StreamHeader,
+    scaling: Option<Scaling>,
     /// As the consumer sees them.
     pub(super) header: StreamHeader,
 }
@@ -72,7 +75,9 @@ impl InputFrames {
         let stored = capture.stream_header();
         let header = source.chosen(stored)?;
         let frames = FrameReader::new(capture, stored.frame_bytes().max(1) * source.samples_per_frame());
-        Ok(Self { source: source.clone(), name: source.name(), frames, stored, header })
+        let wanted = source.full_scale.is_some() || source.may_hold_codes();
+        let scaling = Scaling::new(&stored, source.full_scale).filter(|_| wanted);
+        Ok(Self { source: source.clone(), name: source.name(), frames, stored, scaling, header })
     }
 
     pub(super) fn capture(&mut self) -> &mut dyn Capture {
@@ -89,7 +94,9 @@ impl InputFrames {
     pub(super) fn read_some(&mut self, bytes: &mut Vec<u8>) -> Result<usize, IoError> {
         bytes.resize(self.source.block.max(self.frames.frame), 0);
         let filled = self.frames.read_some(bytes).map_err(IoError::reading(&self.name))?;
-        Ok(self.source.arrange(&mut bytes[..filled], &self.stored))
+        let frames = &mut bytes[..filled];
+        self.scaling.iter_mut().for_each(|scaling| scaling.take(frames));
+        Ok(self.source.arrange(frames, &self.stored))
     }
 
     /// What was tolerated; complete at the end.
@@ -97,7 +104,8 @@ impl InputFrames {
         let (missing_bytes, bytes) = (self.frames.inner.missing_bytes(), self.frames.carry.len());
         let truncated = (missing_bytes > 0).then_some(InputFault::Truncated { missing_bytes });
         let cut = (bytes > 0).then_some(InputFault::CutFrame { bytes });
-        truncated.into_iter().chain(cut).collect()
+        let scale = self.scaling.as_ref().and_then(Scaling::fault);
+        truncated.into_iter().chain(cut).chain(scale).collect()
     }
 }
 
@@ -106,6 +114,8 @@ impl InputSource {
     /// only channel that is read.
     pub(super) fn chosen(&self, header: StreamHeader) -> Result<StreamHeader, IoError> {
         let unfit = |problem| Err(IoError::unfit(&self.name())(problem));
+        let codes = self.full_scale.filter(|_| !header.is_scaled).and_then(FullScale::rails);
+        let header = StreamHeader { rails: codes.or(header.rails), ..header };
         let channels = header.channels;
         if let Some(only) = self.only {
             if only >= channels {

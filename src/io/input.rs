@@ -6,9 +6,9 @@ use super::frames::{InputFrames, Message};
 use super::lost::{Dropout, Entry, LostInInput};
 use super::open::InputSource;
 use super::stall::Wait;
-use super::timestamps::{Timestamp, lost_between};
 #[cfg(target_os = "linux")]
-use super::{Coding, stdin_reader::read_stdin};
+use super::stdin_reader::read_stdin;
+use super::timestamps::{Timestamp, lost_between};
 use super::{InputFault, IoError, StreamHeader};
 use crossbeam_channel::{Receiver, Sender, bounded, select};
 use std::thread;
@@ -76,7 +76,7 @@ impl Input {
     /// The only input.
     #[cfg(target_os = "linux")]
     pub(super) fn alone(source: InputSource) -> Result<Self, IoError> {
-        if !source.is_stdin() || source.coding == Coding::Wav {
+        if !source.is_stdin() || source.coding.format().is_none() {
             return Self::on_thread(source);
         }
         let frames = Box::new(InputFrames::open(&source)?);

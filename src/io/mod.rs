@@ -12,6 +12,7 @@ mod error;
 #[cfg(feature = "flac")]
 mod flac;
 mod frames;
+mod full_scale;
 mod input;
 mod lost;
 mod mat;

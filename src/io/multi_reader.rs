@@ -70,6 +70,7 @@ impl MultiReader {
             coding: options.coding,
             channels: options.channels,
             only: options.only,
+            full_scale: options.full_scale,
             interleaving: interleaving.cloned(),
             block,
         };

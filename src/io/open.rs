@@ -7,8 +7,10 @@ use super::npy::open_npy;
 use super::pipe::{stdin_file, widen_pipe};
 use super::sigmf::is_sigmf;
 use super::sigmf_reader::SigmfReader;
+use super::table::is_table;
 use super::wav::WavReader;
 use super::{Coding, IoError, PcmFormat, SampleLayout, StreamHeader, TimeInterleaving};
+use crate::quantity::FullScale;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -35,14 +37,18 @@ impl Kind {
         match extension.map(str::to_ascii_lowercase).as_deref() {
             _ if is_sigmf(path) => Self::Sigmf,
             Some("sigmf") => Self::Archive,
-            Some("csv") => Self::Csv,
+            Some("csv" | "tsv") => Self::Csv,
             Some("npy") => Self::Npy,
             Some("flac") if cfg!(feature = "flac") => Self::Flac,
             Some("flac" | "mp3" | "aif" | "aiff" | "aifc" | "ogg" | "oga" | "opus" | "m4a") => Self::Encoded,
             _ if mat_variable(path).is_some() => Self::Mat,
             Some("wav" | "wave") => Self::Wav,
-            _ if coding == Coding::Wav => Self::Wav,
-            _ => Self::Raw,
+            _ => match coding {
+                Coding::Csv => Self::Csv,
+                Coding::Wav if is_table(path) => Self::Csv,
+                Coding::Wav => Self::Wav,
+                Coding::Raw(_) | Coding::Complex(_) => Self::Raw,
+            },
         }
     }
 }
@@ -64,6 +70,8 @@ pub(super) struct InputSource {
     pub(super) interleaving: Option<TimeInterleaving>,
     /// The only channel to read, from 0.
     pub(super) only: Option<usize>,
+    /// Full scale, if the format does not say it.
+    pub(super) full_scale: Option<FullScale>,
     /// Bytes of a block.
     pub(super) block: usize,
 }
@@ -76,6 +84,12 @@ impl InputSource {
 
     pub(super) fn is_stdin(&self) -> bool {
         self.path.as_os_str() == "-"
+    }
+
+    /// True for tables and arrays, whose numbers may be codes of a converter. Floats of streams have full
+    /// scale 1 by convention.
+    pub(super) fn may_hold_codes(&self) -> bool {
+        matches!(Kind::of(&self.path, self.coding), Kind::Csv | Kind::Npy | Kind::Mat)
     }
 
     /// Samples in a row that are a frame: one of each time-interleaved converter.
@@ -183,8 +197,15 @@ mod tests {
             let path = folder.path().join("x");
             std::fs::write(&path, bytes).unwrap();
             let coding = Coding::Raw(PcmFormat::U8);
-            let source =
-                InputSource { path, coding, channels: 1, interleaving: None, only: None, block: 4096 };
+            let source = InputSource {
+                path,
+                coding,
+                channels: 1,
+                interleaving: None,
+                only: None,
+                full_scale: None,
+                block: 4096,
+            };
             io::copy(&mut source.open().unwrap(), &mut io::sink())
         };
         let header = b"RIFF\x24\0\0\0WAVEfmt ";

@@ -2,6 +2,7 @@
 
 use super::timestamps::MAX_LOST;
 use super::{Coding, LiveLost, LostSamples, StallWatch};
+use crate::quantity::FullScale;
 
 /// Bytes of a block that suit one thread.
 pub const BLOCK_BYTES: usize = 128 << 10;
@@ -25,6 +26,8 @@ pub struct ReadOptions<'a> {
     pub channels: usize,
     /// The only channel to read of each input, from 0.
     pub only: Option<usize>,
+    /// Full scale of inputs whose [format does not say it](super::StreamHeader::is_scaled); 1 if `None`.
+    pub full_scale: Option<FullScale>,
     /// The time-interleaved converters of the only input, which has one channel then. Its frames are those
     /// of an input of M channels, at an M-th of its rate.
     pub interleaving: Option<&'a TimeInterleaving>,
@@ -50,6 +53,7 @@ impl ReadOptions<'_> {
             coding: Coding::Wav,
             channels: 1,
             only: None,
+            full_scale: None,
             interleaving: None,
             lost: None,
             live_lost: None,

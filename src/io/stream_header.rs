@@ -12,6 +12,8 @@ pub enum Coding {
     Complex(PcmFormat),
     /// As the WAV header states.
     Wav,
+    /// A table of numbers as text.
+    Csv,
 }
 
 impl Coding {
@@ -19,7 +21,7 @@ impl Coding {
     pub fn format(self) -> Option<PcmFormat> {
         match self {
             Self::Raw(format) | Self::Complex(format) => Some(format),
-            Self::Wav => None,
+            Self::Wav | Self::Csv => None,
         }
     }
 
@@ -29,7 +31,7 @@ impl Coding {
     }
 }
 
-/// `wav`, the name of a sample format, or that name with a `c` before it for complex samples. `cs16`,
+/// `wav`, `csv`, the name of a sample format, or that name with a `c` before it for complex samples. `cs16`,
 /// `cs32`, `cf32` and `cf64` are little-endian.
 impl FromStr for Coding {
     type Err = ParsePcmFormatError;
@@ -37,6 +39,7 @@ impl FromStr for Coding {
     fn from_str(name: &str) -> Result<Self, Self::Err> {
         match name.strip_prefix('c') {
             _ if name == "wav" => Ok(Self::Wav),
+            _ if name == "csv" => Ok(Self::Csv),
             Some(part @ ("s16" | "s32" | "f32" | "f64")) => format!("{part}le").parse().map(Self::Complex),
             Some(part) => part.parse().map(Self::Complex),
             None => name.parse().map(Self::Raw),
@@ -71,12 +74,26 @@ pub struct StreamHeader {
     pub rate_error: f64,
     /// Number of frames according to the header.
     pub promised: Option<u64>,
+    /// Full scale is 1 by the format: of integers, of WAV and FLAC files.
+    pub is_scaled: bool,
+    /// Lowest and highest sample of integers and of codes; `None` for floats.
+    pub rails: Option<(f64, f64)>,
 }
 
 impl StreamHeader {
     /// Real samples of which nothing else is known.
     pub fn real(layout: SampleLayout, channels: usize) -> Self {
-        Self { layout, channels, is_complex: false, rate: None, rate_error: 0.0, promised: None }
+        let is_scaled = !layout.format.is_float();
+        Self {
+            layout,
+            channels,
+            is_complex: false,
+            rate: None,
+            rate_error: 0.0,
+            promised: None,
+            is_scaled,
+            rails: is_scaled.then(|| rails(layout.format)),
+        }
     }
 
     /// The same stream at a rate that its header had to round to whole hertz.
@@ -105,6 +122,17 @@ impl StreamHeader {
     }
 }
 
+/// The lowest and highest value of an integer format.
+fn rails(format: PcmFormat) -> (f64, f64) {
+    let mut bytes = vec![0; format.bytes()];
+    // Encoding saturates.
+    let mut nearest = |value: f64| {
+        format.encode(value, &mut bytes);
+        format.decode(&bytes)
+    };
+    (nearest(-2.0), nearest(2.0))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -130,6 +158,7 @@ mod tests {
             ("cs16be", Coding::Complex(PcmFormat::S16Be)),
             ("cu8", Coding::Complex(PcmFormat::U8)),
             ("wav", Coding::Wav),
+            ("csv", Coding::Csv),
         ] {
             assert_eq!(name.parse::<Coding>().unwrap(), coding);
         }

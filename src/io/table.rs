@@ -4,12 +4,26 @@
 //! skipped.
 
 use super::IoError;
+use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
 
+/// Bytes that tell whether a file is a table.
+const LOOKED_AT: u64 = 4096;
+/// Lines among them, headings too.
+const LINES: usize = 3;
 /// Longest line.
 const LONGEST_LINE: u64 = 1 << 20;
 /// Characters of a cell that a message shows.
 const SHOWN: usize = 20;
+
+/// Whether the file at `path` reads as a table: a line of numbers is among the first.
+pub(super) fn is_table(path: &Path) -> bool {
+    let Some(file) = path.is_file().then(|| File::open(path).ok()).flatten() else { return false };
+    let mut table = Table::new(file.take(LOOKED_AT), "", "", LOOKED_AT as usize);
+    let line = |_| table.cells().ok().filter(|cells| !cells.is_empty());
+    (0..LINES).map_while(line).any(|cells| cells.iter().all(|cell| cell.parse::<f64>().is_ok()))
+}
 
 /// The lines that hold cells.
 #[derive(Debug)]

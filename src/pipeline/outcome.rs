@@ -30,7 +30,7 @@ pub struct Outcome {
 }
 
 /// A fault that was tolerated.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Warning {
     /// A fault of an input.
     Input(InputWarning),

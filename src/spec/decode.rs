@@ -10,12 +10,13 @@ use super::{ChannelSpec, DesignSpec, Fault, PerChannel, Spec, SpecProblem, Uncer
 use crate::quantity::Time;
 use crate::units::{Decibels, FastPeriods, Seconds};
 
-const TOP_KEYS: [&str; 10] = [
+const TOP_KEYS: [&str; 11] = [
     "name",
     "fast_period",
     "fast_rate",
     "ratio",
     "latency",
+    "full_scale",
     "target",
     "channel",
     "signal",
@@ -65,6 +66,7 @@ pub(crate) fn spec_with(
     let ratio = top.required("ratio", "give M, the number of fast samples per slow sample")?;
     let ratio = ratio.count_in("fast samples", limits::check_ratio)?;
     let latency = top.read("latency", |v| v.count_in("fast samples", limits::check_latency))?;
+    let full_scale = top.read("full_scale", |v| v.full_scale())?;
     let target = top
         .required("target", "describe the filter of the ideal fast converter, [target] filter = { .. }")?
         .fields(&["filter"])?;
@@ -87,7 +89,18 @@ pub(crate) fn spec_with(
         }
     })?;
     let target = target.filter;
-    Ok(Spec { name, fast_period: h, ratio, latency, target, channels, signal, uncertainty, design })
+    Ok(Spec {
+        name,
+        fast_period: h,
+        ratio,
+        latency,
+        full_scale,
+        target,
+        channels,
+        signal,
+        uncertainty,
+        design,
+    })
 }
 
 /// The errors of the channels' models as further half-widths of their gains. Without a table each channel

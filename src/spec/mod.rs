@@ -37,6 +37,7 @@ pub use uncertainty::{HALF_WIDTH, PerChannel, UncertaintySpec};
 pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
+use crate::quantity::{self, FullScale};
 use crate::units::{FastPeriods, Seconds};
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -55,6 +56,8 @@ pub struct Spec {
     pub latency: Option<usize>,
     /// Phi_0, the filter of the ideal fast converter.
     pub target: FilterSpec,
+    /// Full scale of captures whose format does not say it, such as tables; 1 if `None`.
+    pub full_scale: Option<FullScale>,
     /// The real channels, in the order of the recordings.
     pub channels: Vec<ChannelSpec>,
     /// What the analog signal is; `None` weighs every frequency alike.
@@ -190,6 +193,8 @@ impl Spec {
         limits::check_fast_period(self.fast_period)?;
         limits::check_ratio(self.ratio)?;
         self.latency.map_or(Ok(()), limits::check_latency)?;
+        // A full scale is right if what is written of it is.
+        self.full_scale.map_or(Ok(()), |scale| quantity::full_scale(&scale.to_string()).map(drop))?;
         self.target.check()?;
         limits::check_channel_count(self.channels.len())?;
         for channel in &self.channels {

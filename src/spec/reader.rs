@@ -3,7 +3,7 @@
 use super::Fault;
 use super::SpecProblem;
 use super::document::{Entry, Kind, Node};
-use crate::quantity::{self, QuantityError, Time};
+use crate::quantity::{self, FullScale, QuantityError, Time};
 use crate::units::{Hertz, Seconds};
 
 /// A value and its path.
@@ -87,6 +87,15 @@ impl<'a> Value<'a> {
     /// A time: a number of seconds, or a text such as `\"3 ns\"` or `\"0.3 samples\"`.
     pub(crate) fn time(&self) -> Result<Time, Fault> {
         self.quantity(quantity::time, |seconds| Time::Seconds(Seconds(seconds)))
+    }
+
+    /// Full scale: a number above 0, or a text such as `\"8bits\"`.
+    pub(crate) fn full_scale(&self) -> Result<FullScale, Fault> {
+        let text = match &self.node.kind {
+            Kind::Text(text) => text.clone(),
+            _ => self.number()?.to_string(),
+        };
+        quantity::full_scale(&text).map_err(|problem| self.fault(problem))
     }
 
     /// A frequency: a number of hertz, or a text such as `\"9 kHz\"`.

@@ -9,6 +9,7 @@ use super::reader::Value;
 use super::{
     ChannelSpec, DesignOverrides, DesignSpec, FilterSpec, SignalSpec, Spec, UncertaintySpec, decode,
 };
+use crate::quantity::FullScale;
 use crate::units::Seconds;
 
 /// The written form of a [`Spec`], with all times in seconds and all defaults filled in.
@@ -20,6 +21,8 @@ struct Document<'a> {
     ratio: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     latency: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    full_scale: Option<FullScale>,
     target: Target<'a>,
     channel: &'a [ChannelSpec],
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -41,6 +44,7 @@ impl Serialize for Spec {
             fast_period: self.fast_period,
             ratio: self.ratio,
             latency: self.latency,
+            full_scale: self.full_scale,
             target: Target { filter: &self.target },
             channel: &self.channels,
             signal: self.signal.as_ref(),

@@ -41,6 +41,7 @@ fn bank(
         fast_period: Seconds(1.0),
         ratio,
         latency: Some(latency),
+        full_scale: None,
         target,
         channels: filters.into_iter().zip(delays).map(channel).collect(),
         signal: None,

@@ -30,7 +30,7 @@ fn table(heading: &str, channels: &[&[f32]]) -> String {
 fn captures_of_every_kind_give_the_same_samples() {
     let desk = Desk::new();
     // More than one block of a table.
-    let both = frames(3000);
+    let both: Vec<f32> = frames(3000).iter().map(|x| x / 16.0).collect();
     let (a, b) = (channel(&both, 0), channel(&both, 1));
     desk.write("a.csv", table("", &[&a]));
     desk.write("b.CSV", table("# from a scope\nvolts\n", &[&b]));
@@ -279,4 +279,57 @@ fn complex_recordings_are_fused() {
     desk.refused(1, &mixed, &["0.sigmf-meta: complex samples, and 1.sigmf-meta holds real ones"]);
     let report: Value = desk.report(&["fuse", "bank.json", "both.npy", "-o", "x.wav", "--threads", "2"]);
     assert_eq!(report["samples"], 1000);
+}
+
+/// A tone as whole numbers of a converter, with `middle` for 0, one per line.
+fn codes(middle: i32) -> String {
+    let code = |k: u32| middle + (100.0 * (0.7 * f64::from(k)).sin()).round() as i32;
+    (0..4096).map(|k| format!("{}\n", code(k))).collect()
+}
+
+#[test]
+fn full_scale_of_tables_is_stated_or_warned_of() {
+    let desk = Desk::new();
+    desk.write("signed.txt", codes(0));
+    desk.write("unsigned.dat", codes(128));
+    let figures = |args: &[&str]| {
+        let args = [&["measure", "--rate", "1MHz", "--json"][..], args].concat();
+        serde_json::from_str::<Value>(&text(&desk.run(&args, &[]).stdout)).unwrap()
+    };
+    let level = 20.0 * (100.0f64 / 128.0).log10();
+    for args in [
+        &["signed.txt", "--full-scale", "8bits"][..],
+        &["signed.txt", "--full-scale", "128"],
+        &["unsigned.dat", "--full-scale", "u8bits"],
+        &["signed.txt", "--format", "csv", "--full-scale", "128"],
+    ] {
+        let found = figures(args);
+        let tone = found["tones"][0]["level_dbfs"].as_f64().unwrap();
+        assert!((tone - level).abs() < 0.01, "{args:?}: {tone}");
+        assert!(found["offset"]["value"].as_f64().unwrap().abs() < 1e-3, "{args:?}");
+    }
+    for (file, scale) in [("signed.txt", "8bits"), ("unsigned.dat", "u8bits")] {
+        let run = desk.run(&["measure", "--rate", "1MHz", file], &[]);
+        let warning = text(&run.stderr);
+        assert!(warning.contains(file) && warning.contains(&format!("full scale of {scale}")), "{warning}");
+    }
+}
+
+#[test]
+fn a_spec_states_the_full_scale_of_its_captures() {
+    let desk = Desk::with_spec(THESIS);
+    desk.write("codes.toml", THESIS.replacen("ratio", "full_scale = \"u8bits\"\nratio", 1));
+    desk.good(&["design", "spec.toml", "-o", "plain.json"]);
+    desk.good(&["design", "codes.toml", "-o", "codes.json"]);
+    let code = |k: u32| (k * 37) % 256;
+    let rows = |cell: &dyn Fn(u32) -> f64| -> String {
+        (0..500).map(|k| format!("{},{}\n", cell(2 * k), cell(2 * k + 1))).collect()
+    };
+    desk.write("codes.csv", rows(&|k| f64::from(code(k))));
+    desk.write("scaled.csv", rows(&|k| (f64::from(code(k)) - 128.0) / 128.0));
+    desk.good(&["fuse", "plain.json", "scaled.csv", "-o", "scaled.wav"]);
+    desk.good(&["fuse", "codes.json", "codes.csv", "-o", "codes.wav"]);
+    desk.good(&["fuse", "plain.json", "codes.csv", "-o", "option.wav", "--full-scale", "u8bits"]);
+    let read = |name: &str| std::fs::read(desk.path(name)).unwrap();
+    assert!(read("scaled.wav") == read("codes.wav") && read("scaled.wav") == read("option.wav"));
 }

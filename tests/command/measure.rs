@@ -210,7 +210,8 @@ fn what_cannot_be_measured_is_refused() {
     desk.refused(1, &["measure", "x.wav", "--tone", "-3"], &["x.wav", "-3", "above 0"]);
     desk.refused(2, &["measure", "x.wav", "--tone", "0"], &["other than 0"]);
     desk.refused(2, &["measure", "x.wav", "--tone", "auto,4321"], &["not both"]);
-    desk.refused(2, &["measure", "x.wav", "--full-scale", "0"], &["--full-scale 0", "positive"]);
+    desk.refused(2, &["measure", "x.wav", "--full-scale", "0"], &["--full-scale", "1e-30 to 1e30"]);
+    desk.refused(2, &["measure", "x.wav", "--full-scale", "128"], &["--full-scale 128", "by its format"]);
     desk.refused(2, &["measure", "x.wav", "--interleaved", "0"], &["0"]);
     desk.refused(1, &["measure", "none.wav"], &["none.wav"]);
 }

@@ -31,6 +31,7 @@ fn plant(seed: u64, method: Method) -> Spec {
     let channels = (0..channels).map(|_| channel(&mut dice)).collect();
     let taps = dice.count(1, 6 * ratio);
     Spec {
+        full_scale: None,
         name: String::new(),
         fast_period: Seconds(1.0),
         ratio,
@@ -141,6 +142,7 @@ fn four_at_48_khz(taps: usize) -> Spec {
     let filter = butterworth(6, TAU * 9.0 / 48.0);
     let channel = |&delay: &f64| ChannelSpec::new(Seconds(delay), filter.clone());
     Spec {
+        full_scale: None,
         name: String::new(),
         fast_period: Seconds(1.0),
         ratio: 4,
@@ -214,6 +216,7 @@ fn a_common_delay_adds_to_the_latency() {
         let filter = butterworth(2, 0.6);
         let channel = |delay: f64| ChannelSpec::new(Seconds(common + delay), filter.clone());
         Spec {
+            full_scale: None,
             name: String::new(),
             fast_period: Seconds(1.0),
             ratio: 2,

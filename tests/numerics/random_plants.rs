@@ -60,6 +60,7 @@ fn unreduced(seed: u64) -> Spec {
     let method = if dice.part() < 0.7 { Method::Fir } else { Method::Iir };
     let design = DesignSpec::new(method, (method == Method::Fir).then_some(taps));
     Spec {
+        full_scale: None,
         name: String::new(),
         fast_period: Seconds(1.0),
         ratio,

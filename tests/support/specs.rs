@@ -37,6 +37,7 @@ pub(crate) fn butterworth(order: usize, omega: f64) -> FilterSpec {
 pub(crate) fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &[f64]) -> Spec {
     let channel = |&delay: &f64| ChannelSpec::new(Seconds(delay), filter.clone());
     Spec {
+        full_scale: None,
         name: String::new(),
         fast_period: Seconds(1.0),
         ratio,

@@ -19,6 +19,7 @@ fn reader(
         channels: 1,
         interleaving: None,
         only: None,
+        full_scale: None,
         block: 4,
     }
     .raw_header();

@@ -49,7 +49,11 @@ impl<R: Read> Capture for WavReader<R> {
     fn stream_header(&self) -> StreamHeader {
         let WavHeader { layout, channels, rate, data_bytes, .. } = self.header;
         let promised = data_bytes.map(|bytes| bytes / self.header.frame_bytes() as u64);
-        StreamHeader { promised, ..StreamHeader::real(layout, channels).at_whole_hertz(rate) }
+        StreamHeader {
+            promised,
+            is_scaled: true,
+            ..StreamHeader::real(layout, channels).at_whole_hertz(rate)
+        }
     }
 
     fn missing_bytes(&self) -> u64 {

@@ -1,6 +1,7 @@
 //! What the tests of specs share: the thesis example and its variations.
 
 use super::*;
+use crate::quantity::FullScale;
 use crate::units::Hertz;
 
 mod edit;

@@ -25,6 +25,7 @@ fn the_thesis_example_is_read() {
         fast_period: Seconds(1.0),
         ratio: 2,
         latency: Some(10),
+        full_scale: None,
         target: thesis.clone(),
         channels: vec![ChannelSpec::new(Seconds(1.2), thesis), ChannelSpec::new(Seconds(0.6), zpk)],
         signal: None,
@@ -32,6 +33,18 @@ fn the_thesis_example_is_read() {
         design: DesignSpec::new(Method::Fir, Some(22)),
     };
     assert_eq!(spec, expected);
+}
+
+#[test]
+fn full_scale_is_a_number_or_codes() {
+    let full_scale = |value: &str| {
+        let text = thesis_with("latency = 10", &format!("latency = 10\nfull_scale = {value}"));
+        read(&text).full_scale
+    };
+    assert_eq!(full_scale("128"), Some(FullScale::Number(128.0)));
+    assert_eq!(full_scale("\"2.5\""), Some(FullScale::Number(2.5)));
+    assert_eq!(full_scale("\"u12bits\""), Some(FullScale::Unsigned(12)));
+    assert_eq!(read(THESIS).full_scale, None);
 }
 
 #[test]

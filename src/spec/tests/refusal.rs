@@ -130,6 +130,8 @@ fn every_mistake_has_its_line_and_its_message() {
         ("method = \"fir\"", "method = \"iir\"", 18, "taps has no meaning for the method iir"),
         ("taps = 22", "tap = 22", 18, "did you mean \"taps\""),
         ("[design]", "[[design]]", 16, "expected a table"),
+        ("latency = 10", "full_scale = 0", 5, "write the number that is full scale"),
+        ("latency = 10", "full_scale = '8V'", 5, "\"V\""),
     ] {
         refused(&thesis_with(from, to), line, words);
     }
