@@ -12,7 +12,6 @@
 //! ```
 
 use crate::units::{FastPeriods, Hertz, Seconds};
-use serde::{Serialize, Serializer};
 use std::fmt;
 use std::ops::RangeInclusive;
 
@@ -109,8 +108,9 @@ impl FullScale {
 }
 
 /// A number as a number, codes as text.
-impl Serialize for FullScale {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+#[cfg(feature = "runtime")]
+impl serde::Serialize for FullScale {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Number(number) => serializer.serialize_f64(*number),
             codes => serializer.collect_str(codes),
