@@ -38,6 +38,12 @@ pub enum CalibrateError {
         /// Why.
         source: Box<AnalogError>,
     },
+    /// The target's filter cannot be realised.
+    #[error("filter of the target: {source}")]
+    Target {
+        /// Why.
+        source: Box<AnalogError>,
+    },
     /// Not one record per channel.
     #[error(
         "the spec has {channels} channels, but there are {records} captures; give one per channel, in the order of the spec"
@@ -152,6 +158,36 @@ pub enum CalibrateError {
         /// The second best.
         other: Hertz,
     },
+    /// One acquisition of several.
+    #[error("{name}: {source}")]
+    Acquisition {
+        /// What it is called.
+        name: String,
+        /// What is wrong with it.
+        source: Box<CalibrateError>,
+    },
+    /// Several acquisitions, or none, of a signal that is not a tone.
+    #[error(
+        "{acquisitions} acquisitions: only those of tones are pooled; give the captures of one acquisition"
+    )]
+    NotPooled {
+        /// Their number.
+        acquisitions: usize,
+    },
+    /// An acquisition of several without any of the given tones.
+    #[error("it holds none of the tones given; its lines appear at {}", hertz(lines))]
+    NoneOfTheTones {
+        /// Where its lines appear, below half the slow rate.
+        lines: Vec<Hertz>,
+    },
+    /// A tone that no acquisition holds.
+    #[error("the tone at {tone} is in none of the {acquisitions} acquisitions; leave it out, or check it")]
+    ToneNowhere {
+        /// The frequency given.
+        tone: Hertz,
+        /// Number of acquisitions.
+        acquisitions: usize,
+    },
     /// A sine fit failed.
     #[error(transparent)]
     Tones(#[from] SineFitError),
@@ -196,9 +232,24 @@ pub enum CalibrateError {
     },
 }
 
+impl CalibrateError {
+    /// Says which of so many acquisitions has this fault, if there are several.
+    pub(super) fn within(self, name: &str, acquisitions: usize) -> Self {
+        match acquisitions {
+            1 => self,
+            _ => Self::Acquisition { name: name.to_owned(), source: Box::new(self) },
+        }
+    }
+}
+
 /// Numbers in a sentence.
 pub(super) fn list(order: &[usize]) -> String {
     order.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
+}
+
+/// Frequencies in a sentence.
+fn hertz(list: &[Hertz]) -> String {
+    list.iter().map(Hertz::to_string).collect::<Vec<_>>().join(", ")
 }
 
 impl From<NoMinimum> for CalibrateError {

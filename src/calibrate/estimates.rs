@@ -88,13 +88,10 @@ impl Fitted {
         if freedom == 0 {
             return None;
         }
-        let misfit = (squares / freedom as f64).sqrt();
-        self.misfit = Some(misfit);
-        let is_clear = squares > chi_squared_quantile(freedom, CHANCE);
-        if is_clear {
-            self.covariance *= misfit * misfit;
-        }
-        is_clear.then_some(misfit)
+        self.misfit = Some((squares / freedom as f64).sqrt());
+        let clear = contradiction(squares, freedom);
+        self.covariance *= clear.map_or(1.0, |misfit| misfit * misfit);
+        clear
     }
 
     /// The channels' values; nominal ones have no standard deviation.
@@ -115,6 +112,12 @@ impl Fitted {
         };
         (0..model.channels()).map(channel).collect()
     }
+}
+
+/// The square root of chi squared per degree of freedom, if it is more than chance.
+pub(super) fn contradiction(squares: f64, freedom: usize) -> Option<f64> {
+    let is_clear = freedom > 0 && squares > chi_squared_quantile(freedom, CHANCE);
+    is_clear.then(|| (squares / freedom as f64).sqrt())
 }
 
 /// The value that chi squared exceeds as rarely as a Gaussian exceeds `z` standard deviations (Wilson and

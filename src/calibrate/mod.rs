@@ -54,7 +54,7 @@ pub use error::CalibrateError;
 pub use estimates::{Calibration, ChannelEstimate, Tone, applied};
 pub use model::Fit;
 pub(crate) use model::Model;
-pub use record::Record;
+pub use record::{Acquisition, Record};
 pub use warning::Warning;
 
 use crate::spec::Spec;
@@ -99,15 +99,37 @@ pub fn calibrate(
     signal: CalibrationSignal<'_>,
     settings: Settings,
 ) -> Result<Calibration, CalibrateError> {
-    check(spec, records, settings)?;
-    check_parts(records, signal)?;
+    calibrate_pooled(spec, &[Acquisition { name: "the captures", records }], signal, settings)
+}
+
+/// Calibrates the channels of `spec` by several acquisitions of the same converters, each with tones of its
+/// own. One value of each channel fits all of them, and the offsets are their weighted means.
+///
+/// # Errors
+/// [`CalibrateError`], for signals other than tones also if there is more than one acquisition.
+pub fn calibrate_pooled(
+    spec: &Spec,
+    acquisitions: &[Acquisition<'_>],
+    signal: CalibrationSignal<'_>,
+    settings: Settings,
+) -> Result<Calibration, CalibrateError> {
+    for Acquisition { name, records } in acquisitions {
+        check(spec, records, settings)
+            .and_then(|()| check_parts(records, signal))
+            .map_err(|error| error.within(name, acquisitions.len()))?;
+    }
     let (model, reference) = (Model::new(spec)?, settings.reference);
-    let mut fitted = match signal {
-        CalibrationSignal::Tones(frequencies) => tones::fit(&model, records, frequencies, settings)?,
-        CalibrationSignal::Waveform { samples, spacing } => {
+    let mut fitted = match (signal, acquisitions) {
+        (CalibrationSignal::Tones(frequencies), _) => {
+            tones::fit(&model, acquisitions, frequencies, settings)?
+        }
+        (CalibrationSignal::Waveform { samples, spacing }, [Acquisition { records, .. }]) => {
             waveform::Training::new(&model, &spec.channels, records, samples, spacing, settings)?.fit()?
         }
-        CalibrationSignal::Any => blind::Blind::new(&model, records, usize::MAX)?.fit(settings)?,
+        (CalibrationSignal::Any, [Acquisition { records, .. }]) => {
+            blind::Blind::new(&model, records, usize::MAX)?.fit(settings)?
+        }
+        _ => return Err(CalibrateError::NotPooled { acquisitions: acquisitions.len() }),
     };
     // Tones compare phases, which they do before they take whole periods off a delay.
     if fitted.tones.is_empty()
@@ -116,7 +138,8 @@ pub fn calibrate(
     {
         return Err(CalibrateError::WrongOrder { order });
     }
-    let clipped: Vec<usize> = records.iter().map(|record| record.clipped).collect();
+    let clipped_in = |i: usize| acquisitions.iter().map(move |one| one.records[i].clipped).sum();
+    let clipped: Vec<usize> = (0..spec.channels.len()).map(clipped_in).collect();
     if clipped.iter().any(|&count| count > 0) {
         fitted.warnings.push(Warning::Clipped { counts: clipped.clone() });
     }

@@ -4,13 +4,17 @@
 use super::error::CalibrateError;
 use crate::analog::StrictlyProper;
 use crate::linalg::{CMat, Complex};
-use crate::spec::{ChannelSpec, Spec};
+use crate::spec::{Band, ChannelSpec, SignalSpec, Spec};
 use crate::units::{Hertz, RadiansPerFastPeriod, Seconds};
 use std::f64::consts::TAU;
 
 /// Step of ln(cut-off) for central differences: the error of the difference, its square over six, and the
 /// rounding, eps over it, are both far below a per cent of the slope.
 const CUTOFF_STEP: f64 = 1e-4;
+/// A filter is a low-pass if it passes constants with this share of its largest gain: all ripples are less.
+const LOW_PASS: f64 = 0.1;
+/// Most Nyquist zones of the fast rate below the signal: no converter's clock is steady enough for more.
+const MOST_ZONES: f64 = 1e6;
 
 /// Front ends, delays, gains and offsets of the channels, as the spec says.
 ///
@@ -34,6 +38,8 @@ pub(crate) struct Model {
     /// o_i.
     pub(super) offsets: Vec<f64>,
     pub(super) front_ends: Vec<StrictlyProper>,
+    /// The Nyquist zone of the fast rate, from 0, in which the signal lies.
+    pub(super) fast_zone: usize,
 }
 
 impl Model {
@@ -53,6 +59,7 @@ impl Model {
             gains: spec.channels.iter().map(|channel| channel.gain).collect(),
             offsets: spec.channels.iter().map(|channel| channel.offset).collect(),
             front_ends: spec.channels.iter().enumerate().map(realise).collect::<Result<_, _>>()?,
+            fast_zone: fast_zone(spec)?,
         })
     }
 
@@ -102,6 +109,24 @@ impl Model {
                 * Complex::from_polar(point.gain(i, self), -TAU * cycles)
         })
     }
+}
+
+/// The Nyquist zone of the fast rate, from 0, of the middle of the signal's band; without one of the
+/// frequency that the target passes best, where it is a band-pass.
+fn fast_zone(spec: &Spec) -> Result<usize, CalibrateError> {
+    let band = spec.signal.as_ref().and_then(SignalSpec::band);
+    let middle = match band {
+        Some(Band { low, high }) => 0.5 * (low + high).per_fast_period(spec.fast_period).0,
+        None => {
+            let target = StrictlyProper::new(&spec.target, spec.fast_period)
+                .map_err(|source| CalibrateError::Target { source: Box::new(source) })?;
+            let gain = |w: f64| target.response(RadiansPerFastPeriod(w)).norm();
+            let resonances = target.poles().iter().map(|pole| pole.im.abs());
+            let best = resonances.max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(0.0);
+            if gain(0.0) > LOW_PASS * gain(best) { 0.0 } else { best / TAU }
+        }
+    };
+    Ok((2.0 * middle).floor().min(MOST_ZONES) as usize)
 }
 
 /// Which values of the channels are fitted; the others keep those of the spec.

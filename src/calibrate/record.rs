@@ -5,6 +5,16 @@ use crate::sine_fit::Channel;
 /// Least share of equal samples in two records of the same recording.
 const SAME: f64 = 0.999;
 
+/// Captures that were taken together: one record per channel, whose samples of one index belong to one
+/// frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Acquisition<'a> {
+    /// What it is called in messages.
+    pub name: &'a str,
+    /// In the order of the spec.
+    pub records: &'a [Record],
+}
+
 /// The samples of one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {

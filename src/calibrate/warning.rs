@@ -40,6 +40,19 @@ pub enum Warning {
         /// The factor.
         misfit: f64,
     },
+    /// An acquisition contradicts the others.
+    #[error(
+        "{name} contradicts the other captures: with it all differ from the model {misfit:.1} times as much as their \
+         noise explains, without it {others:.1} times; leave it out, or find out what was different"
+    )]
+    Outlying {
+        /// What it is called.
+        name: String,
+        /// Square root of chi squared per degree of freedom with it.
+        misfit: f64,
+        /// The same without it.
+        others: f64,
+    },
     /// The lower and the upper half of the frequencies contradict each other by more than their noise.
     #[error(
         "low and high frequencies contradict each other {misfit:.1} times as much as their noise explains, and the \

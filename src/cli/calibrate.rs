@@ -10,7 +10,9 @@ use super::match_bank::check_stdin;
 use super::measure::{ToneArg, tone, tones};
 use super::print::{Failure, is_dash, say_understood, warn};
 use super::written::{check_outputs, write_text};
-use crate::calibrate::{CalibrationSignal, Fit, Record, Settings, applied, calibrate};
+use crate::calibrate::{
+    Acquisition, Calibration, CalibrationSignal, Fit, Record, Settings, Warning, applied, calibrate_pooled,
+};
 use crate::io::{MultiReader, ReadOptions};
 use crate::spec::{DesignOverrides, Spec};
 use crate::units::{FastPeriods, Hertz};
@@ -18,6 +20,9 @@ use std::path::{Path, PathBuf};
 
 /// Most samples of all channels together: 512 MiB as doubles.
 const MOST_SAMPLES: usize = 1 << 26;
+/// Values of a larger misfit are not written unless asked for: intervals that are widened by more than this
+/// no longer describe errors of the values.
+const MOST_MISFIT: f64 = 10.0;
 
 /// Measures delay, gain and offset of each channel from captures, with 95 % intervals
 ///
@@ -34,16 +39,19 @@ Examples:
   hybank calibrate spec.toml tones1.wav tones2.wav -o measured.toml --tone 1kHz,5kHz,9kHz \\
       --fit delay,gain,offset,cutoff
   hybank calibrate spec.toml adc.wav --interleaved 4 -o measured.toml --check other.wav
+  hybank calibrate spec.toml z?.csv --interleaved 4 --full-scale 8bits -o measured.toml
   hybank calibrate spec.toml ch1.wav ch2.wav -o measured.toml --training chirp.wav
   hybank calibrate spec.toml ch1.wav ch2.wav -o measured.toml --blind
 
-A tone may lie in any Nyquist zone of the slow rate. `auto` finds tones below half the fast rate and
-takes their zones from the delays of the spec.")]
+A tone may lie in any Nyquist zone of the slow rate. `auto` finds tones in the zone of the fast rate
+that holds the signal's band, or that the target passes, and takes their zones of the slow rate from
+the delays of the spec.")]
 pub(super) struct Args {
     /// The spec (TOML) with the nominal values; `-` is standard input
     spec: PathBuf,
     /// One mono recording per channel (WAV, SigMF, .csv, .npy, .mat, or raw with --format), in the order of
-    /// the spec, or one of N channels
+    /// the spec, or one of N channels. Several such sets, one after the other, are pooled: each has tones of
+    /// its own
     #[arg(required = true)]
     captures: Vec<PathBuf>,
     /// The calibrated spec; `-` is standard output
@@ -78,7 +86,7 @@ pub(super) struct Args {
     /// floats none of which is beyond]
     #[arg(long, value_name = "LEVEL")]
     clip: Option<f64>,
-    /// Replace an existing output
+    /// Replace an existing output, and write values that the captures contradict
     #[arg(long)]
     force: bool,
     /// Print a report as one JSON object on standard output
@@ -116,6 +124,18 @@ impl Signal {
     }
 }
 
+/// The captures of one acquisition.
+struct Captures {
+    name: String,
+    /// One per channel.
+    records: Vec<Record>,
+}
+
+/// As the library takes them.
+fn borrowed(all: &[Captures]) -> Vec<Acquisition<'_>> {
+    all.iter().map(|one| Acquisition { name: &one.name, records: &one.records }).collect()
+}
+
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check_usage()?;
     let text = read_kind(&args.spec, FileKind::Spec)?;
@@ -139,19 +159,21 @@ impl Args {
         warnings: &mut Vec<String>,
     ) -> Result<(String, Report), Failure> {
         let (settings, signal) = (self.settings(spec)?, self.signal(spec)?);
-        let records = self.read(&self.captures, spec, warnings)?;
-        let found = calibrate(spec, &records, signal.borrowed(), settings).map_err(Failure::input)?;
+        let captures = self.read(&self.captures, spec, warnings)?;
+        let found = calibrate_pooled(spec, &borrowed(&captures), signal.borrowed(), settings);
+        let found = found.map_err(Failure::input)?;
+        self.check_misfit(&found, warnings)?;
         let (calibrated, more) = applied(spec, &found);
         let mut report = Report::new(spec, &found);
         report.add(&more);
         if !self.check.is_empty() {
-            let records = self.read(&self.check, spec, warnings)?;
+            let captures = self.read(&self.check, spec, warnings)?;
             let held_out = match signal.borrowed() {
                 // Held-out tones have other frequencies.
                 CalibrationSignal::Tones(_) => CalibrationSignal::Tones(&[]),
                 signal => signal,
             };
-            let checked = calibrate(&calibrated, &records, held_out, settings)
+            let checked = calibrate_pooled(&calibrated, &borrowed(&captures), held_out, settings)
                 .map_err(|error| Failure::Input(format!("the held-out captures: {error}")))?;
             report.check(&calibrated, &found, &checked);
         }
@@ -162,13 +184,23 @@ impl Args {
         Ok((written, report))
     }
 
+    /// Refuses values that the captures contradict. Which capture does so joins the `warnings`.
+    fn check_misfit(&self, found: &Calibration, warnings: &mut Vec<String>) -> Result<(), Failure> {
+        let Some(misfit) = found.misfit.filter(|&misfit| misfit > MOST_MISFIT && !self.force) else {
+            return Ok(());
+        };
+        let outlying = found.warnings.iter().filter(|warning| matches!(warning, Warning::Outlying { .. }));
+        warnings.extend(outlying.map(ToString::to_string));
+        Err(Failure::Input(format!(
+            "the captures contradict the spec: they differ from its model {misfit:.0} times as much as their noise \
+             explains, so the values mean nothing and were not written; check the frequencies and their zones, the \
+             front ends and the order of the captures, or write them all the same with --force"
+        )))
+    }
+
     /// Refuses impossible combinations of options, before any file is read.
     fn check_usage(&self) -> Result<(), Failure> {
-        self.turns.check(self.captures.len())?;
         self.reading.check(self.turns.is_given())?;
-        if !self.check.is_empty() {
-            self.turns.check(self.check.len())?;
-        }
         if self.json && is_dash(&self.output) {
             let message = "--json and `-o -` both want standard output; write the spec to a file";
             return Err(Failure::Usage(message.into()));
@@ -182,13 +214,42 @@ impl Args {
         check_outputs(&[&self.output], &inputs)
     }
 
-    /// One record per channel of `spec`; what was tolerated joins the `warnings`.
+    /// The acquisitions in these files, each with one record per channel of `spec`; what was tolerated joins
+    /// the `warnings`.
     fn read(
         &self,
         paths: &[PathBuf],
         spec: &Spec,
         warnings: &mut Vec<String>,
-    ) -> Result<Vec<Record>, Failure> {
+    ) -> Result<Vec<Captures>, Failure> {
+        let files = self.files_of_one(paths, spec)?;
+        let most = MOST_SAMPLES / paths.len().div_ceil(files);
+        paths.chunks(files).map(|files| self.read_one(files, spec, most, warnings)).collect()
+    }
+
+    /// How many files are one acquisition: as many as have the channels of the spec.
+    fn files_of_one(&self, paths: &[PathBuf], spec: &Spec) -> Result<usize, Failure> {
+        let [first, _, ..] = paths else { return Ok(1) };
+        if self.turns.is_given() {
+            return Ok(1);
+        }
+        // What is no file cannot be read twice.
+        if !first.is_file() {
+            return Ok(paths.len());
+        }
+        let reader = start(std::slice::from_ref(first), self.reading.options(2, 1), interrupts())?;
+        let files = spec.channels.len() / reader.channels().max(1);
+        Ok(if files > 0 && paths.len().is_multiple_of(files) { files } else { paths.len() })
+    }
+
+    /// The captures of one acquisition, at most `most` samples of all channels.
+    fn read_one(
+        &self,
+        paths: &[PathBuf],
+        spec: &Spec,
+        most: usize,
+        warnings: &mut Vec<String>,
+    ) -> Result<Captures, Failure> {
         let turns = self.turns.by_delay(&spec.delays_in_fast_periods(), spec.ratio, &self.spec)?;
         let captures = self.reading.options(paths.len(), spec.channels.len());
         let full_scale = captures.full_scale.or(spec.full_scale);
@@ -198,27 +259,28 @@ impl Args {
         check_channels(spec, &reader)?;
         check_rate(spec, &reader)?;
         let parts = if reader.is_complex() { 2 } else { 1 };
-        let most = MOST_SAMPLES / (parts * reader.channels()).max(1);
+        let most = most / (parts * reader.channels()).max(1);
         let headers = reader.headers();
         let rails =
             headers.flat_map(|(_, header)| std::iter::repeat_n(header.rails, parts * header.channels));
         let rails: Vec<_> = rails.collect();
+        let name = reader.headers().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
         let Whole { channels, is_cut } = Whole::read_parts(&mut reader, most)?;
         warnings.extend(reader.warnings().iter().map(ToString::to_string));
         if is_cut {
-            warnings.push(format!("only the first {most} frames are used"));
+            warnings.push(format!("{name}: only the first {most} frames are used"));
         }
-        let records = channels.into_iter().zip(rails);
-        let mut records = records.map(|(samples, rails)| record(samples, rails, self.clip));
-        let mut all = Vec::new();
-        while let Some(real) = records.next() {
-            let imaginary = if parts == 2 { records.next() } else { None };
-            all.push(match imaginary {
+        let all = channels.into_iter().zip(rails).map(|(samples, rails)| record(samples, rails, self.clip));
+        let mut all = all.collect::<Vec<_>>().into_iter();
+        let mut records = Vec::new();
+        while let Some(real) = all.next() {
+            let imaginary = if parts == 2 { all.next() } else { None };
+            records.push(match imaginary {
                 Some(imaginary) => Record::complex(real, imaginary),
                 None => real,
             });
         }
-        Ok(all)
+        Ok(Captures { name, records })
     }
 
     fn settings(&self, spec: &Spec) -> Result<Settings, Failure> {

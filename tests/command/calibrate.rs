@@ -192,6 +192,77 @@ fn held_out_captures_and_one_file_of_all_converters_are_checked() {
     );
 }
 
+/// One file in which the converters take turns, as their codes, one per line.
+fn write_codes(desk: &Desk, name: &str, channels: &[Vec<f32>]) {
+    let turns = (0..4 * channels[0].len()).map(|n| f64::from(channels[n % 4][n / 4]) / STEP);
+    desk.write(name, turns.fold(String::new(), |text, code| format!("{text}{code}\n")));
+}
+
+/// Captures with tones of their own say more together, and one that contradicts the others is named.
+#[test]
+fn captures_of_the_same_converters_are_pooled() {
+    let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(5));
+    for (name, tone, amplitude) in
+        [("z1.txt", 61.3e6, 0.9), ("z2.txt", 83.9e6, 0.7), ("z3.txt", 161.3e6, 0.8)]
+    {
+        write_codes(&desk, name, &captured(&[tone], amplitude, 2048, &mut dice));
+    }
+    let calibrated = |names: &[&str], tail: &[&str]| {
+        let how = ["--interleaved", "4", "--full-scale", "12bits", "-o", "m.toml", "--json", "--force"];
+        desk.json(&[&["calibrate", "spec.toml"], names, &how, tail].concat())
+    };
+    let all = ["z1.txt", "z2.txt", "z3.txt"];
+    let (one, pooled) = (calibrated(&all[1..2], &[]), calibrated(&all, &[]));
+    assert_eq!((&pooled["frames"], pooled["tones"].as_array().unwrap().len()), (&Value::from(3 * 2048), 3));
+    for (i, (skew, gain)) in SKEWS.iter().zip(GAINS).enumerate().skip(1) {
+        for (what, truth) in [("delay_samples", (3 - i) as f64 + skew - SKEWS[0]), ("gain", gain / GAINS[0])]
+        {
+            let of = |report: &Value, part| number(report, &format!("/channels/{i}/{what}/{part}"));
+            assert!(of(&pooled, "half_width") < 0.8 * of(&one, "half_width"), "{i} {what}");
+            let error = (of(&pooled, "value") - truth).abs();
+            assert!(error < 2.0 * of(&pooled, "half_width"), "{i} {what}: {error}");
+        }
+    }
+    // Each tone is sought where it is.
+    let given = calibrated(&all, &["--tone", "161.3MHz,83.9MHz,61.3MHz"]);
+    for pointer in ["/channels/1/delay_samples/value", "/channels/3/gain/value"] {
+        assert!((number(&given, pointer) - number(&pooled, pointer)).abs() < 1e-9, "{pointer}: {given}");
+    }
+    let tail = ["--interleaved", "4", "--full-scale", "12bits", "-o", "x.toml", "--tone"];
+    let one_tone = [&["calibrate", "spec.toml"], &all[..], &tail, &["61.3MHz"]].concat();
+    desk.refused(1, &one_tone, &["z2.txt", "none of the tones given", "lines appear at"]);
+    // An amplifier of one channel was touched between the captures.
+    let mut touched = captured(&[113.9e6], 0.8, 2048, &mut dice);
+    touched[2].iter_mut().for_each(|x| *x = ((f64::from(*x) * 0.97 / STEP).round() * STEP) as f32);
+    write_codes(&desk, "z4.txt", &touched);
+    let four = ["z1.txt", "z2.txt", "z3.txt", "z4.txt"];
+    let refused = [&["calibrate", "spec.toml"], &four[..], &tail[..6]].concat();
+    let shown = desk.run(&refused, b"");
+    let shown = (shown.status.code(), text(&shown.stderr));
+    assert!(shown.0 == Some(1) && shown.1.contains("z4.txt contradicts the other captures"), "{shown:?}");
+}
+
+/// What the captures contradict is not written unless asked for.
+#[test]
+fn values_that_the_captures_contradict_are_not_written() {
+    let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(6));
+    let names = write(&desk, "t", &captured(&[61.3e6, 161.3e6, 231.7e6], 0.3, 4096, &mut dice));
+    let other = "[[channel]]\nfilter = { family = \"butterworth\", order = 4, cutoff = 200e6 }\ndelay = 0.0";
+    desk.write("wrong.toml", NOMINAL.replace("[[channel]]\ndelay = 0.0", other));
+    let command = |tail: &[&'static str]| {
+        with(
+            &["calibrate", "wrong.toml", "-o", "m.toml", "--tone", "61.3MHz,161.3MHz,231.7MHz"],
+            &names,
+            tail,
+        )
+    };
+    desk.refused(1, &command(&[]), &["contradict the spec", "times as much as their noise", "--force"]);
+    assert!(!desk.path("m.toml").exists());
+    let forced = desk.run(&command(&["--force"]), b"");
+    assert!(forced.status.success() && text(&forced.stderr).contains("contradict each other"), "{forced:?}");
+    assert!(desk.path("m.toml").exists());
+}
+
 #[test]
 fn what_cannot_be_calibrated_is_refused_with_the_reason() {
     let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(4));

@@ -38,20 +38,21 @@ struct Candidate {
 }
 
 impl Alias {
-    /// The frequencies below half the fast rate with this alias.
-    fn candidates(self, ratio: usize) -> Vec<Candidate> {
-        let alias = self.cycles;
+    /// The frequencies with this alias in a Nyquist zone (from 0) of the fast rate.
+    fn candidates(self, ratio: usize, fast_zone: usize) -> Vec<Candidate> {
+        let (alias, zones) = (self.cycles, ratio * fast_zone..ratio * (fast_zone + 1));
         if self.is_complex {
-            let most = 0.5 * ratio as f64;
-            let all = (-(ratio as i64)..=ratio as i64).map(|whole| whole as f64 + alias);
-            let inside = all.filter(|cycles| cycles.abs() < most);
+            let (least, most) = (0.5 * zones.start as f64, 0.5 * zones.end as f64);
+            let wholes = -(zones.end as i64)..=zones.end as i64;
+            let inside =
+                wholes.map(|whole| whole as f64 + alias).filter(|x| (least..most).contains(&x.abs()));
             return inside.map(|cycles| Candidate { cycles, is_conjugate: false }).collect();
         }
         let of_zone = |zone: usize| match zone % 2 {
             1 => Candidate { cycles: zone.div_ceil(2) as f64 - alias, is_conjugate: true },
             _ => Candidate { cycles: (zone / 2) as f64 + alias, is_conjugate: false },
         };
-        (0..ratio).map(of_zone).collect()
+        zones.map(of_zone).collect()
     }
 }
 
@@ -69,15 +70,15 @@ impl Candidate {
     }
 }
 
-/// The frequency, in cycles per slow sample, of a tone that appears at `alias` with `phases`: the one below
-/// half the fast rate whose nominal phases agree.
+/// The frequency, in cycles per slow sample, of a tone that appears at `alias` with `phases`: the one in the
+/// signal's zone of the fast rate whose nominal phases agree.
 pub(super) fn zone_of(
     model: &Model,
     alias: Alias,
     phases: &[f64],
     reference: usize,
 ) -> Result<f64, CalibrateError> {
-    let all = alias.candidates(model.ratio).into_iter();
+    let all = alias.candidates(model.ratio, model.fast_zone).into_iter();
     let mut all: Vec<(f64, f64)> =
         all.map(|candidate| (candidate.distance(model, phases, reference), candidate.cycles)).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -92,12 +93,12 @@ pub(super) fn zone_of(
 }
 
 /// The tone of the highest frequency.
-fn highest(tones: &[Measured]) -> Option<&Measured> {
-    tones.iter().max_by(|a, b| a.w.total_cmp(&b.w))
+fn highest<'a>(tones: &[&'a Measured]) -> Option<&'a Measured> {
+    tones.iter().copied().max_by(|a, b| a.w.total_cmp(&b.w))
 }
 
 /// The least change of a delay that leaves all phases as they are.
-pub(super) fn modulus(tones: &[Measured]) -> Option<FastPeriods> {
+pub(super) fn modulus(tones: &[&Measured]) -> Option<FastPeriods> {
     let period = TAU / highest(tones)?.w;
     let agrees = |shift: &f64| tones.iter().all(|tone| wrapped(tone.w * shift).abs() < SAME_PHASE);
     (1..=MOST_PERIODS).map(|m| m as f64 * period).find(agrees).map(FastPeriods)
@@ -105,7 +106,7 @@ pub(super) fn modulus(tones: &[Measured]) -> Option<FastPeriods> {
 
 /// The deviation of the delay of channel `i` from nominal, roughly: among those within `reach` fast periods
 /// the one nearest to 0 that agrees with the phases of all tones about as well as the best.
-pub(super) fn nearest_delay(tones: &[Measured], i: usize, reach: f64) -> f64 {
+pub(super) fn nearest_delay(tones: &[&Measured], i: usize, reach: f64) -> f64 {
     let Some(top) = highest(tones) else { return 0.0 };
     let (first, period) = (-top.ratios[i].arg() / top.w, TAU / top.w);
     let most = if tones.len() == 1 { 0 } else { ((reach / period) as i64).min(MOST_PERIODS as i64) };

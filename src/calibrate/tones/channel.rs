@@ -101,8 +101,8 @@ impl LeastSquares for ChannelFit<'_> {
 
 impl<'a> ChannelFit<'a> {
     /// Of the tones in a channel whose delay is near `delay` after its nominal one.
-    pub(super) fn new(model: &'a Model, channel: usize, fit: Fit, tones: &[Measured], delay: f64) -> Self {
-        let row = |tone: &Measured| {
+    pub(super) fn new(model: &'a Model, channel: usize, fit: Fit, tones: &[&Measured], delay: f64) -> Self {
+        let row = |tone: &&Measured| {
             let (ratio, phase) = (tone.ratios[channel], tone.w * delay);
             // Whole cycles of the delay are taken out before the angle is measured.
             let angle = (ratio * Complex::from_polar(1.0, phase)).arg() - phase;

@@ -9,10 +9,10 @@ use crate::sine_fit::{Direction, SineFit, alias};
 const HARMONICS: std::ops::RangeInclusive<usize> = 2..=10;
 /// Two frequencies closer than this, in cycles per record, disturb each other.
 const RESOLUTION: f64 = 1.5;
-/// Most phases that count as few. Of more, quantisation errors are as good as independent.
+/// Most phases of a tone that count as few: of more, errors of quantisation average as those of noise do.
 const FEW_PHASES: usize = 64;
-/// Constant, cosine and sine: what a fit takes out of the pattern of phases.
-const FITTED: usize = 3;
+/// Periods of a pattern that tell it from noise.
+const LEAST_PERIODS: usize = 8;
 
 /// The order of the harmonic of `fundamental` at a frequency (both cycles per sample) in a record.
 fn harmonic_at(cycles: f64, fundamental: f64, frames: usize) -> Option<usize> {
@@ -25,32 +25,56 @@ pub(super) fn is_harmonic(cycles: f64, fundamental: f64, frames: usize) -> bool 
     harmonic_at(cycles, fundamental, frames).is_some()
 }
 
-/// Harmonics that fall onto the tone, and few distinct phases, by which its errors are widened.
-pub(super) fn warnings(
-    tone: &mut Measured,
-    sines: &SineFit,
-    t: usize,
-    captures: &Captures<'_>,
-    reference: usize,
-) -> Vec<Warning> {
-    let frames = captures.frames();
+/// Harmonics that fall onto the tone, and few phases.
+pub(super) fn warnings(tone: &Measured, frames: usize) -> impl Iterator<Item = Warning> + use<> {
     let harmonic = harmonic_at(tone.cycles, tone.cycles, frames);
     let harmonic = harmonic.map(|order| Warning::HarmonicOnTone { tone: tone.frequency, order });
-    let phases = few_phases(tone.cycles, frames);
-    if let Some(phases) = phases.filter(|&phases| phases > FITTED) {
-        widen(tone, reference, |i| repeating_variance(sines, t, captures, i, phases));
-    }
-    let few = phases.map(|phases| Warning::FewPhases { tone: tone.frequency, phases });
-    harmonic.into_iter().chain(few).collect()
+    let few = repeats_after(&[tone.cycles], frames).filter(|&phases| phases <= FEW_PHASES);
+    let few = few.map(|phases| Warning::FewPhases { tone: tone.frequency, phases });
+    harmonic.into_iter().chain(few)
 }
 
-/// The number of distinct phases, if it is small: the record's phases stay near q values where q periods of
-/// the samples are a whole number of periods of the tone to less than a cycle per record.
-fn few_phases(cycles: f64, frames: usize) -> Option<usize> {
-    (1..=FEW_PHASES).find(|&q| {
-        let whole = q as f64 * cycles;
-        (whole - whole.round()).abs() * (frames as f64) < 1.0
-    })
+/// The number of samples after which tones of these frequencies repeat, if the record holds several such
+/// periods: q samples are a whole number of periods of each tone to less than a cycle per record.
+/// Quantisation then repeats as well, however large q is.
+fn repeats_after(cycles: &[f64], frames: usize) -> Option<usize> {
+    let is_whole = |whole: f64| (whole - whole.round()).abs() * (frames as f64) < 1.0;
+    (1..=frames / LEAST_PERIODS).find(|&q| cycles.iter().all(|cycles| is_whole(q as f64 * cycles)))
+}
+
+/// What the residual repeats also hides in tones and constants. A pattern of q values of variance u^2 adds
+/// u^2 / q to the variance of the constant, which is given here for each part of the records, and twice that
+/// to the variance of each part of an amplitude.
+pub(super) fn repeating_variances(sines: &SineFit, captures: &Captures<'_>) -> Vec<f64> {
+    let cycles: Vec<f64> = sines.frequencies.iter().map(|f| f.value / sines.rate).collect();
+    let fitted = 1 + 2 * cycles.len();
+    let phases = repeats_after(&cycles, captures.frames()).filter(|&phases| phases > fitted);
+    let Some(phases) = phases else { return vec![0.0; sines.channels.len()] };
+    let pattern = Pattern { phases, fitted };
+    let samples = captures.records.iter().flat_map(|one| one.parts().map(move |part| (part, &one.keep)));
+    let of_part = |(part, (samples, keep)): (usize, (&[f64], &Vec<bool>))| {
+        let residual = sines.residual(part, samples);
+        pattern.variance(&residual, keep, sines.channels[part].noise) / phases as f64
+    };
+    samples.enumerate().map(of_part).collect()
+}
+
+/// Widens the errors of tone `t` by what the parts of the records repeat. An exponential has a quarter of
+/// the variance of the real and of the imaginary part.
+pub(super) fn widen_repeating(
+    tone: &mut Measured,
+    t: usize,
+    sines: &SineFit,
+    captures: &Captures<'_>,
+    reference: usize,
+    repeating: &[f64],
+) {
+    widen(tone, reference, |i| {
+        let parts = captures.parts(i);
+        let share = 1.0 / parts.len().pow(2) as f64;
+        let amplitude = captures.tone(sines, i, t, Direction::Forward).amplitude.value;
+        2.0 * share * repeating[parts].iter().sum::<f64>() / amplitude.powi(2)
+    });
 }
 
 /// Adds a relative variance of each channel's phasor, with that of the reference, to the errors.
@@ -62,30 +86,25 @@ fn widen(tone: &mut Measured, reference: usize, variance: impl Fn(usize) -> f64)
     }
 }
 
-/// What the residual repeats with the phase also hides in the tone itself: a pattern of q values of variance
-/// u^2 adds 2 u^2 / q to the variance of each part of the amplitude, here relative to it. An exponential has
-/// a quarter of that of the real and of the imaginary part.
-fn repeating_variance(sines: &SineFit, t: usize, captures: &Captures<'_>, i: usize, phases: usize) -> f64 {
-    let (record, parts) = (&captures.records[i], captures.parts(i));
-    let share = 1.0 / parts.len().pow(2) as f64;
-    let variance = |(part, samples): (usize, &[f64])| {
-        let residual = sines.residual(part, samples);
-        share * pattern_variance(&residual, &record.keep, phases, sines.channels[part].noise)
-    };
-    let variance: f64 = parts.zip(record.parts()).map(variance).sum();
-    let amplitude = captures.tone(sines, i, t, Direction::Forward).amplitude.value;
-    2.0 * variance / phases as f64 / amplitude.powi(2)
+/// What the samples repeat: as many values as there are phases, of which a fit takes so many out.
+#[derive(Debug, Clone, Copy)]
+struct Pattern {
+    phases: usize,
+    fitted: usize,
 }
 
-/// The variance of what repeats with period `phases`, beyond that of noise of standard deviation `noise`.
-fn pattern_variance(residual: &[f64], keep: &[bool], phases: usize, noise: f64) -> f64 {
-    let (mut sums, mut counts) = (vec![0.0; phases], vec![0.0; phases]);
-    for (n, (r, _)) in residual.iter().zip(keep).enumerate().filter(|(_, (_, keep))| **keep) {
-        sums[n % phases] += r;
-        counts[n % phases] += 1.0;
+impl Pattern {
+    /// The variance of what repeats, beyond that of noise of standard deviation `noise`.
+    fn variance(self, residual: &[f64], keep: &[bool], noise: f64) -> f64 {
+        let Self { phases, fitted } = self;
+        let (mut sums, mut counts) = (vec![0.0; phases], vec![0.0; phases]);
+        for (n, (r, _)) in residual.iter().zip(keep).enumerate().filter(|(_, (_, keep))| **keep) {
+            sums[n % phases] += r;
+            counts[n % phases] += 1.0;
+        }
+        let means = sums.iter().zip(&counts).map(|(sum, count): (&f64, &f64)| sum / count.max(1.0));
+        let squares: f64 = means.map(|mean| mean * mean).sum();
+        let used: f64 = counts.iter().sum();
+        (squares / (phases - fitted) as f64 - noise * noise * phases as f64 / used.max(1.0)).max(0.0)
     }
-    let means = sums.iter().zip(&counts).map(|(sum, count): (&f64, &f64)| sum / count.max(1.0));
-    let squares: f64 = means.map(|mean| mean * mean).sum();
-    let used: f64 = counts.iter().sum();
-    (squares / (phases - FITTED) as f64 - noise * noise * phases as f64 / used.max(1.0)).max(0.0)
 }

@@ -20,19 +20,26 @@ mod tests;
 
 use super::Settings;
 use super::error::CalibrateError;
-use super::estimates::{Fitted, Tone};
+use super::estimates::{Fitted, Tone, contradiction};
 use super::model::{Model, Point};
 use super::order::{Distances, other_order};
-use super::record::Record;
+use super::record::{Acquisition, Record};
 use super::warning::Warning;
 use crate::linalg::{Complex, Mat};
-use crate::sine_fit::{self, Direction, SineFit};
+use crate::sine_fit::{self, ChannelFit as SineChannel, Direction, Estimate, alias};
 use crate::units::{Decibels, FastPeriods, Hertz};
 use ambiguity::{Alias, modulus, nearest_delay, zone_of};
-use channel::ChannelFit;
-use interference::is_harmonic;
+use channel::{ChannelFit, Solution};
+use interference::{is_harmonic, repeating_variances, widen_repeating};
 use phasors::{Captures, Measured};
 
+/// An acquisition contradicts the others if the misfit without it is this many times smaller ..
+const OUTLYING: f64 = 4.0;
+/// .. and there are at least so many: of two nobody can tell which one is right.
+const OUTLYING_OF: usize = 3;
+/// Tones of several acquisitions closer than this share of their frequency are one: they tell nothing of a
+/// cut-off together.
+const SAME_FREQUENCY: f64 = 1e-2;
 /// Most tones that are looked for, and how far below the largest.
 const MOST_TONES: usize = 16;
 const TONE_RANGE: Decibels = Decibels(30.0);
@@ -48,59 +55,167 @@ const CUTOFF_TONES: usize = 3;
 /// as far at most.
 const DOUBTFUL_SHARE: f64 = 0.25;
 
-/// Calibrates from tones near `given`, or from those that are found.
+/// Calibrates from tones near `given`, or from those that are found. Of several acquisitions each holds at
+/// least one of the tones.
 pub(super) fn fit(
     model: &Model,
-    records: &[Record],
+    acquisitions: &[Acquisition<'_>],
     given: &[Hertz],
     settings: Settings,
 ) -> Result<Fitted, CalibrateError> {
-    let (rate, reference) = (model.slow_rate(), settings.reference);
-    let captures = Captures::new(records);
-    let (channels, frames) = (captures.channels(), captures.frames());
-    let mut warnings = Vec::new();
-    let (starts, used) = match given {
-        [] => found(model, &captures, reference, &mut warnings)?,
-        _ => (located(&captures, rate, given)?, (0..given.len()).collect()),
+    let measure = |one: &Acquisition<'_>| {
+        let held = held(model, one.records, given, acquisitions.len() > 1)?;
+        Tones::measure(model, one.records, &held, settings.reference)
     };
-    let sines = sine_fit::fit(&channels, rate, &starts)?;
-    let is_image = |&t: &usize| captures.direction(&sines, t) == Direction::Backward;
-    if let Some(t) = (0..sines.tones()).find(is_image) {
-        return Err(CalibrateError::OtherSign { tone: sines.frequencies[t].value });
+    let count = acquisitions.len();
+    let measure = |one: &Acquisition<'_>| measure(one).map_err(|error| error.within(one.name, count));
+    let all: Vec<Tones> = acquisitions.iter().map(measure).collect::<Result<_, _>>()?;
+    let is_held = |tone: &Hertz| all.iter().any(|tones| tones.given.contains(tone));
+    if let Some(&tone) = given.iter().find(|tone| !is_held(tone)) {
+        return Err(CalibrateError::ToneNowhere { tone, acquisitions: count });
     }
-    if settings.fit.cutoff && used.len() < CUTOFF_TONES {
-        return Err(CalibrateError::TooFewTones { tones: used.len() });
+    let distinct = distinct(all.iter().flat_map(|tones| &tones.measured));
+    if settings.fit.cutoff && distinct < CUTOFF_TONES {
+        return Err(CalibrateError::TooFewTones { tones: distinct });
     }
-    let mut measured: Vec<Measured> =
-        used.iter().map(|&t| captures.measured(model, &sines, t, reference)).collect();
-    for (tone, &t) in measured.iter_mut().zip(&used) {
-        warnings.extend(interference::warnings(tone, &sines, t, &captures, reference));
+    let mut warnings: Vec<Warning> = Vec::new();
+    for warning in all.iter().flat_map(|tones| &tones.warnings) {
+        if !warnings.contains(warning) {
+            warnings.push(warning.clone());
+        }
     }
-    check_order(model, &measured, reference)?;
-    let mut fitted = solve(model, &measured, frames, settings, &mut warnings)?;
+    let names: Vec<&str> = acquisitions.iter().map(|one| one.name).collect();
+    let mut fitted = solve(model, &all, &names, settings, &mut warnings)?;
     if settings.fit.offset {
-        add_offsets(&mut fitted, &captures, &sines);
+        add_offsets(&mut fitted, &all);
     }
     fitted.warnings.extend(warnings);
-    let tone = |&t: &usize| Tone {
-        frequency: sines.frequencies[t],
-        zone: (2.0 * (sines.frequencies[t].value / rate).abs()).floor() as usize + 1,
-        amplitude: captures.tone(&sines, reference, t, Direction::Forward).amplitude,
-    };
-    fitted.tones = used.iter().map(tone).collect();
+    fitted.tones = all.into_iter().flat_map(|tones| tones.tones).collect();
     Ok(fitted)
 }
 
-/// Adds the offsets of real samples; those of complex ones are only reported.
-fn add_offsets(fitted: &mut Fitted, captures: &Captures<'_>, sines: &SineFit) {
-    let constants = sines.channels.iter().map(|channel| channel.constant);
-    if captures.is_complex {
-        let values: Vec<f64> = constants.map(|constant| constant.value).collect();
+/// The tones of one acquisition.
+struct Tones {
+    frames: usize,
+    /// Those of the given ones that it holds.
+    given: Vec<Hertz>,
+    tones: Vec<Tone>,
+    measured: Vec<Measured>,
+    /// The constant of each part of each record.
+    constants: Vec<Estimate<f64>>,
+    is_complex: bool,
+    warnings: Vec<Warning>,
+}
+
+impl Tones {
+    /// Of tones near `given`, or of those that are found.
+    fn measure(
+        model: &Model,
+        records: &[Record],
+        given: &[Hertz],
+        reference: usize,
+    ) -> Result<Self, CalibrateError> {
+        let (rate, captures) = (model.slow_rate(), Captures::new(records));
+        let channels = captures.channels();
+        let mut warnings = Vec::new();
+        let (starts, used) = match given {
+            [] => found(model, &captures, reference, &mut warnings)?,
+            _ => (located(&captures, rate, given)?, (0..given.len()).collect()),
+        };
+        let sines = sine_fit::fit(&channels, rate, &starts)?;
+        let is_image = |&t: &usize| captures.direction(&sines, t) == Direction::Backward;
+        if let Some(t) = (0..sines.tones()).find(is_image) {
+            return Err(CalibrateError::OtherSign { tone: sines.frequencies[t].value });
+        }
+        let measure = |&t: &usize| captures.measured(model, &sines, t, reference);
+        let mut measured: Vec<Measured> = used.iter().map(measure).collect();
+        let repeating = repeating_variances(&sines, &captures);
+        for (tone, &t) in measured.iter_mut().zip(&used) {
+            warnings.extend(interference::warnings(tone, captures.frames()));
+            widen_repeating(tone, t, &sines, &captures, reference, &repeating);
+        }
+        check_order(model, &measured, reference)?;
+        let constant = |(channel, repeating): (&SineChannel, f64)| {
+            let Estimate { value, sigma } = channel.constant;
+            Estimate { value, sigma: sigma.hypot(repeating.sqrt()) }
+        };
+        let tone = |&t: &usize| Tone {
+            frequency: sines.frequencies[t],
+            zone: (2.0 * (sines.frequencies[t].value / rate).abs()).floor() as usize + 1,
+            amplitude: captures.tone(&sines, reference, t, Direction::Forward).amplitude,
+        };
+        Ok(Self {
+            frames: captures.frames(),
+            given: given.to_vec(),
+            tones: used.iter().map(tone).collect(),
+            measured,
+            constants: sines.channels.iter().zip(repeating).map(constant).collect(),
+            is_complex: captures.is_complex,
+            warnings,
+        })
+    }
+}
+
+/// The given tones that an acquisition holds: all of them, unless it is one of several. Then those are there
+/// whose alias is among the lines.
+fn held(
+    model: &Model,
+    records: &[Record],
+    given: &[Hertz],
+    is_one_of_several: bool,
+) -> Result<Vec<Hertz>, CalibrateError> {
+    if !is_one_of_several || given.is_empty() {
+        return Ok(given.to_vec());
+    }
+    let (captures, rate) = (Captures::new(records), model.slow_rate());
+    let lines = sine_fit::find_tones(&captures.channels(), rate, MOST_TONES, TONE_RANGE)?;
+    let apart = |tone: Hertz, line: Hertz| match captures.is_complex {
+        true => ((tone - line) / rate - ((tone - line) / rate).round()).abs(),
+        false => (alias(tone / rate).abs() - alias(line / rate).abs()).abs(),
+    };
+    let is_held = |tone: &Hertz| {
+        let within = search(*tone, rate, captures.frames()) / rate;
+        lines.iter().any(|&line| apart(*tone, line) <= within)
+    };
+    let held: Vec<Hertz> = given.iter().copied().filter(is_held).collect();
+    if held.is_empty() { Err(CalibrateError::NoneOfTheTones { lines }) } else { Ok(held) }
+}
+
+/// Number of different frequencies.
+fn distinct<'a>(tones: impl Iterator<Item = &'a Measured>) -> usize {
+    let mut all: Vec<f64> = tones.map(|tone| tone.frequency.0).collect();
+    all.sort_by(f64::total_cmp);
+    all.dedup_by(|a, b| (*a - *b).abs() < SAME_FREQUENCY * b.abs());
+    all.len()
+}
+
+/// Adds the offsets of real samples, weighted by their variances; those of complex ones are only reported.
+fn add_offsets(fitted: &mut Fitted, all: &[Tones]) {
+    let parts = all.first().map_or(0, |tones| tones.constants.len());
+    let constants: Vec<Estimate<f64>> =
+        (0..parts).map(|k| mean(all.iter().map(|tones| tones.constants[k]))).collect();
+    if all.iter().all(|tones| tones.is_complex) {
+        let values: Vec<f64> = constants.iter().map(|constant| constant.value).collect();
         let offsets = values.chunks(2).map(<[f64]>::to_vec).collect();
         fitted.warnings.push(Warning::ComplexOffsets { offsets });
     } else {
-        fitted.offsets = Some(constants.collect());
+        fitted.offsets = Some(constants);
     }
+}
+
+/// The weighted mean of estimates of one value. Where they contradict each other by more than chance, its
+/// standard deviation is as much larger.
+fn mean(all: impl Iterator<Item = Estimate<f64>> + Clone) -> Estimate<f64> {
+    let count = all.clone().count();
+    if let (1, Some(one)) = (count, all.clone().next()) {
+        return one;
+    }
+    let weight = |one: &Estimate<f64>| one.sigma.powi(2).max(f64::MIN_POSITIVE).recip();
+    let weights: f64 = all.clone().map(|one| weight(&one)).sum();
+    let value = all.clone().map(|one| weight(&one) * one.value).sum::<f64>() / weights;
+    let squares: f64 = all.map(|one| weight(&one) * (one.value - value).powi(2)).sum();
+    let widening = contradiction(squares, count - 1).unwrap_or(1.0);
+    Estimate { value, sigma: widening / weights.sqrt() }
 }
 
 /// Starts of a fit near given frequencies.
@@ -108,10 +223,14 @@ fn located(captures: &Captures<'_>, rate: Hertz, given: &[Hertz]) -> Result<Vec<
     let (channels, frames) = (captures.channels(), captures.frames());
     let near = |&tone: &Hertz| {
         check_position(tone, rate, frames)?;
-        let within = Hertz(tone.0.abs()) * CLOCK_TOLERANCE + rate * (SEARCH_CYCLES / frames as f64);
-        Ok(sine_fit::locate(&channels, rate, tone, within)?)
+        Ok(sine_fit::locate(&channels, rate, tone, search(tone, rate, frames))?)
     };
     given.iter().map(near).collect()
+}
+
+/// How far a tone may be from the frequency given.
+fn search(tone: Hertz, rate: Hertz, frames: usize) -> Hertz {
+    Hertz(tone.0.abs()) * CLOCK_TOLERANCE + rate * (SEARCH_CYCLES / frames as f64)
 }
 
 /// Refuses a tone at a multiple of half the slow rate.
@@ -172,45 +291,98 @@ fn check_order(model: &Model, tones: &[Measured], reference: usize) -> Result<()
     other_order(&distances, reference).map_or(Ok(()), |order| Err(CalibrateError::WrongOrder { order }))
 }
 
-/// Least squares over the tones, channel by channel.
+/// Least squares over the tones of all acquisitions, which have these names, channel by channel.
 fn solve(
     model: &Model,
-    tones: &[Measured],
-    frames: usize,
+    all: &[Tones],
+    names: &[&str],
     settings: Settings,
     warnings: &mut Vec<Warning>,
 ) -> Result<Fitted, CalibrateError> {
     let Settings { fit, reference } = settings;
+    let tones: Vec<&Measured> = all.iter().flat_map(|tones| &tones.measured).collect();
+    let frames = all.iter().map(|tones| tones.frames).sum();
     let point = Point::nominal(model, fit, reference);
     let (count, parameters) = (fit.kinds().len(), point.parameters.len());
     let mut fitted = Fitted::new(point, Mat::zeros(parameters, parameters), frames);
-    fitted.modulus = modulus(tones);
-    let (mut squares, mut freedom, mut values) = (0.0, 0, Vec::new());
-    for i in model.others(reference) {
-        let delay = nearest_delay(tones, i, model.ratio as f64);
+    fitted.modulus = modulus(&tones);
+    let channels = solve_channels(model, &tones, settings)?;
+    for (k, i) in model.others(reference).enumerate() {
+        let delay = nearest_delay(&tones, i, model.ratio as f64);
         if let Some(modulus) = fitted.modulus.filter(|_| fit.delay)
             && delay.abs() > DOUBTFUL_SHARE * modulus.0
         {
             warnings.push(Warning::DelayModulo { channel: i + 1, modulus });
         }
-        let channel = ChannelFit::new(model, i, fit, tones, delay).solve()?;
-        let at = (values.len(), values.len());
-        fitted.covariance.view_mut(at, (count, count)).copy_from(&channel.covariance);
-        values.extend(channel.values);
-        squares += channel.squares;
-        freedom += channel.freedom;
+        let at = (k * count, k * count);
+        fitted.covariance.view_mut(at, (count, count)).copy_from(&channels[k].covariance);
     }
+    let values: Vec<f64> = channels.iter().flat_map(|channel| channel.values.iter().copied()).collect();
     fitted.point.advance(&values);
     if fit.delay && !fit.cutoff {
-        warnings.push(Warning::CutoffAssumed { delay: cutoff_effect(model, tones, reference) });
+        warnings.push(Warning::CutoffAssumed { delay: cutoff_effect(model, &tones, reference) });
     }
-    let misfit = fitted.widen(squares, freedom);
+    let misfit = fitted.widen(squares(&channels), freedom(&channels));
+    if let Some(misfit) = misfit {
+        warnings.extend(outlying(model, all, names, settings, misfit));
+    }
     fitted.warnings.extend(misfit.map(|misfit| Warning::TonesDisagree { misfit }));
     Ok(fitted)
 }
 
+/// The fits of all channels but the reference.
+fn solve_channels(
+    model: &Model,
+    tones: &[&Measured],
+    Settings { fit, reference }: Settings,
+) -> Result<Vec<Solution>, CalibrateError> {
+    let solve = |i| {
+        let delay = nearest_delay(tones, i, model.ratio as f64);
+        ChannelFit::new(model, i, fit, tones, delay).solve()
+    };
+    model.others(reference).map(solve).collect()
+}
+
+/// Chi squared of all channels.
+fn squares(channels: &[Solution]) -> f64 {
+    channels.iter().map(|channel| channel.squares).sum()
+}
+
+fn freedom(channels: &[Solution]) -> usize {
+    channels.iter().map(|channel| channel.freedom).sum()
+}
+
+/// The acquisitions without which the others agree: the one that explains most of the `misfit` of all, then
+/// among the others as long as at least [`OUTLYING_OF`] are left.
+fn outlying(
+    model: &Model,
+    all: &[Tones],
+    names: &[&str],
+    settings: Settings,
+    mut misfit: f64,
+) -> Vec<Warning> {
+    let (mut left, mut warnings): (Vec<usize>, _) = ((0..all.len()).collect(), Vec::new());
+    while left.len() >= OUTLYING_OF {
+        let without = |k: usize| {
+            let others = left.iter().filter(|&&other| other != k);
+            let tones: Vec<&Measured> = others.flat_map(|&other| &all[other].measured).collect();
+            // Tones that no longer determine the values tell nothing of their agreement.
+            let channels = solve_channels(model, &tones, settings).ok()?;
+            let freedom = freedom(&channels);
+            (freedom > 0).then(|| (squares(&channels) / freedom as f64).sqrt())
+        };
+        let best = left.iter().filter_map(|&k| Some((k, without(k)?)));
+        let best = best.min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((k, others)) = best.filter(|(_, others)| misfit > OUTLYING * others.max(1.0)) else { break };
+        warnings.push(Warning::Outlying { name: names[k].to_owned(), misfit, others });
+        left.retain(|&other| other != k);
+        misfit = others;
+    }
+    warnings
+}
+
 /// The largest change of a delay per per cent of cut-off: the mean of Im(s_it) / w_t over the tones.
-fn cutoff_effect(model: &Model, tones: &[Measured], reference: usize) -> FastPeriods {
+fn cutoff_effect(model: &Model, tones: &[&Measured], reference: usize) -> FastPeriods {
     let of = |i: usize| {
         let sum: f64 = tones.iter().map(|tone| model.cutoff_slope(i, tone.w, 0.0).im / tone.w).sum();
         0.01 * (sum / tones.len() as f64).abs()

@@ -1,6 +1,7 @@
 //! Tones against closed forms: the bound in every zone, coverage, and every trap.
 
 mod complex;
+mod pooled;
 
 use crate::calibrate::testbench::{
     assert_covers, errors, interleaved, random_errors, tones, trials, with_errors,
