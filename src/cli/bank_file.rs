@@ -9,7 +9,9 @@ use crate::files::{self, Bound};
 use crate::memory::available_memory;
 use crate::quantity::readable;
 use crate::runtime::{Options, Plan};
-use crate::spec::{DesignOverrides, FilterModel, MeasuredFilter, Measurement, Spec, SpecProblem};
+use crate::spec::{
+    DesignOverrides, FilterModel, MeasuredFilter, Measurement, Spec, SpecProblem, with_measurements_renamed,
+};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
@@ -51,19 +53,37 @@ fn check_memory(path: &Path, work: &str, bytes: f64, remedy: &str) -> Result<(),
     }
 }
 
-/// A spec, and the files of measurements that it names.
+/// A spec, and the measurements that it names.
 pub(super) struct SpecFile {
     spec: Spec,
-    measurements: Vec<PathBuf>,
+    models: Models,
 }
 
 impl SpecFile {
     /// The spec, unless one of these outputs is a file that it names.
-    pub(super) fn for_outputs(self, outputs: &[&Path]) -> Result<Spec, Failure> {
-        let inputs: Vec<&Path> = self.measurements.iter().map(PathBuf::as_path).collect();
+    pub(super) fn for_outputs(&self, outputs: &[&Path]) -> Result<Spec, Failure> {
+        let inputs = self.models.files();
+        let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
         let outputs: Vec<&Path> = outputs.iter().copied().filter(|path| !is_dash(path)).collect();
         files::refuse_overlaps(&outputs, &inputs).map_err(Failure::input)?;
-        Ok(self.spec)
+        Ok(self.spec.clone())
+    }
+
+    /// The `text` of this file with the values of `changed`, as [`Spec::to_toml_like`] writes it, for the
+    /// file `output`. In another folder it names the measurements by their whole paths.
+    pub(super) fn with_values(
+        &self,
+        text: &str,
+        changed: &Spec,
+        output: &Path,
+    ) -> Result<String, SpecProblem> {
+        let written = changed.to_toml_like(text, &|wanted| self.models.model(wanted))?;
+        let whole = |folder: &Path| Path::new(".").join(folder).canonicalize().ok();
+        let from = whole(&self.models.folder);
+        if is_dash(output) || from == whole(&folder(output)) {
+            return Ok(written);
+        }
+        Ok(with_measurements_renamed(&written, |path| Some(from.as_ref()?.join(path).to_str()?.to_owned())))
     }
 }
 
@@ -73,18 +93,21 @@ pub(super) fn load_spec(path: &Path, overrides: DesignOverrides) -> Result<SpecF
     parse_spec(&text, path, overrides)
 }
 
+/// The folder of a file; empty where that is the present one.
+fn folder(path: &Path) -> PathBuf {
+    path.parent().unwrap_or(Path::new("")).to_owned()
+}
+
 /// The spec in the text of the file `path`, with the measurements beside it.
 pub(super) fn parse_spec(text: &str, path: &Path, overrides: DesignOverrides) -> Result<SpecFile, Failure> {
-    let folder = path.parent().filter(|_| !is_dash(path)).unwrap_or(Path::new(""));
-    let models = Models { folder: folder.to_owned(), made: RefCell::default(), echo: RefCell::default() };
+    let models = Models::beside(path);
     let read = Spec::from_toml_and_files(text, &name(path), overrides, &|wanted| models.model(wanted));
     let spec = read.map_err(|error| match error.overridden() {
         Some(key) => bad_flag(key, error.problem()),
         None => Failure::input(error),
     })?;
-    models.echo.into_inner().iter().for_each(|line| say_line(line));
-    let measurements = models.made.into_inner().iter().map(|(made, _)| folder.join(&made.path)).collect();
-    Ok(SpecFile { spec, measurements })
+    models.echo.take().iter().for_each(|line| say_line(line));
+    Ok(SpecFile { spec, models })
 }
 
 /// A value of the command line that was given in place of the spec's `key`.
@@ -103,7 +126,7 @@ pub(super) fn load_spec_or_bank(path: &Path) -> Result<SpecFile, Failure> {
     let spec = bank.spec.ok_or_else(|| {
         Failure::of(path, "this bank carries no spec, so its front ends are unknown; give the spec file")
     })?;
-    Ok(SpecFile { spec: Spec { latency, ..spec }, measurements: Vec::new() })
+    Ok(SpecFile { spec: Spec { latency, ..spec }, models: Models::beside(path) })
 }
 
 /// The text of a file; `-` is standard input.
@@ -141,6 +164,17 @@ struct Models {
 }
 
 impl Models {
+    /// Of no measurement yet, for the spec in the file `path`.
+    fn beside(path: &Path) -> Self {
+        let folder = if is_dash(path) { PathBuf::new() } else { folder(path) };
+        Self { folder, made: RefCell::default(), echo: RefCell::default() }
+    }
+
+    /// The measurements that were read.
+    fn files(&self) -> Vec<PathBuf> {
+        self.made.borrow().iter().map(|(made, _)| self.folder.join(&made.path)).collect()
+    }
+
     /// The model of a measurement.
     fn model(&self, wanted: &MeasuredFilter) -> Result<FilterModel, String> {
         let known =

@@ -139,25 +139,23 @@ fn borrowed(all: &[Captures]) -> Vec<Acquisition<'_>> {
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check_usage()?;
     let text = read_kind(&args.spec, FileKind::Spec)?;
-    let spec = parse_spec(&text, &args.spec, DesignOverrides::default())?.for_outputs(&[&args.output])?;
+    let file = parse_spec(&text, &args.spec, DesignOverrides::default())?;
+    let spec = file.for_outputs(&[&args.output])?;
     say_understood(Some(&spec));
     let mut warnings = Vec::new();
-    let done = args.calibrated(&spec, &text, &mut warnings);
+    let done = args.calibrated(&spec, &mut warnings);
     // What the captures have may explain why they do not fit; a report has these warnings.
-    let (written, report) = done.inspect_err(|_| warnings.iter().for_each(|warning| warn(warning)))?;
+    let (calibrated, report) = done.inspect_err(|_| warnings.iter().for_each(|warning| warn(warning)))?;
+    let written = file.with_values(&text, &calibrated, &args.output).map_err(|problem| {
+        Failure::Input(format!("the values found make no spec: {problem}; nothing was written"))
+    })?;
     write_text(&args.output, &written, args.force)?;
     report.print(&args.output, args.json)
 }
 
 impl Args {
-    /// The text of the calibrated spec, like the `text` of the given one, and the report. `warnings` are
-    /// those of the captures.
-    fn calibrated(
-        &self,
-        spec: &Spec,
-        text: &str,
-        warnings: &mut Vec<String>,
-    ) -> Result<(String, Report), Failure> {
+    /// The calibrated spec and the report. `warnings` are those of the captures.
+    fn calibrated(&self, spec: &Spec, warnings: &mut Vec<String>) -> Result<(Spec, Report), Failure> {
         let (settings, signal) = (self.settings(spec)?, self.signal(spec)?);
         let captures = self.read(&self.captures, spec, warnings)?;
         let found = calibrate_pooled(spec, &borrowed(&captures), signal.borrowed(), settings);
@@ -178,10 +176,7 @@ impl Args {
             report.check(&calibrated, &found, &checked);
         }
         report.warnings.splice(0..0, warnings.iter().cloned());
-        let written = calibrated.to_toml_like(text).map_err(|problem| {
-            Failure::Input(format!("the values found make no spec: {problem}; nothing was written"))
-        })?;
-        Ok((written, report))
+        Ok((calibrated, report))
     }
 
     /// Refuses values that the captures contradict. Which capture does so joins the `warnings`.

@@ -3,8 +3,11 @@
 use std::ops::Range;
 
 use super::document::{Entry, Kind, Node};
-use super::{ChannelSpec, PerChannel, Spec, SpecProblem, UncertaintySpec};
-use crate::units::Seconds;
+use super::{
+    ChannelSpec, DesignOverrides, FilterModel, FilterModels, MeasuredFilter, PerChannel, Spec, SpecError,
+    SpecProblem, UncertaintySpec,
+};
+use crate::units::{Decibels, Seconds};
 
 /// Largest relative difference of two delays that differ only by the rounding of their unit.
 const ROUNDING: f64 = 1e-12;
@@ -17,23 +20,40 @@ struct Edits<'a> {
 
 impl Spec {
     /// The text of a spec file with the delays, gains, offsets and filters of the channels, the latency and
-    /// the uncertainty of this spec. Everything else of `text` is kept as it is. Delays have the unit that
-    /// the file gives them.
+    /// the uncertainty of this spec, whose measured filters are those of `models`. Everything else of `text`
+    /// is kept as it is, measurements by their files. Delays have the unit that the file gives them.
     ///
     /// Where the text cannot be edited (it describes another spec, or writes channels in an unusual way),
     /// the whole spec is rewritten.
     ///
     /// # Errors
     /// As [`Spec::to_toml`].
-    pub fn to_toml_like(&self, text: &str) -> Result<String, SpecProblem> {
+    pub fn to_toml_like(&self, text: &str, models: &FilterModels<'_>) -> Result<String, SpecProblem> {
         self.check()?;
-        let edited = self.edited(text).filter(|edited| self.is_what(edited));
+        let exact = |wanted: &MeasuredFilter| {
+            models(wanted).map(|model| FilterModel { error: Decibels(0.0), ..model })
+        };
+        let own = self.without_model_errors(text, models, &exact);
+        let edited = own.edited(text, &exact).filter(|edited| own.is_what(edited, &exact));
         edited.map_or_else(|| self.to_toml(), Ok)
     }
 
+    /// This spec with the half-widths of the gains that `text` has, if they differ from this spec's by the
+    /// errors of models alone: reading adds these again.
+    fn without_model_errors(&self, text: &str, models: &FilterModels<'_>, exact: &FilterModels<'_>) -> Self {
+        let mut own = self.clone();
+        let gain = |spec: &Self| spec.uncertainty.as_ref().and_then(|table| table.gain.clone());
+        if let (Ok(read), Ok(written)) = (read(text, models), read(text, exact))
+            && let Some(table) = own.uncertainty.as_mut().filter(|table| table.gain == gain(&read))
+        {
+            table.gain = gain(&written);
+        }
+        own
+    }
+
     /// Whether `text` reads as this spec, up to the rounding of delays.
-    fn is_what(&self, text: &str) -> bool {
-        let Ok(mut read) = Self::from_toml(text, "") else { return false };
+    fn is_what(&self, text: &str, models: &FilterModels<'_>) -> bool {
+        let Ok(mut read) = read(text, models) else { return false };
         if read.channels.len() != self.channels.len() {
             return false;
         }
@@ -48,7 +68,7 @@ impl Spec {
         read == *self
     }
 
-    fn edited(&self, text: &str) -> Option<String> {
+    fn edited(&self, text: &str, models: &FilterModels<'_>) -> Option<String> {
         let document = Node::from_toml(text).ok()?;
         let mut edits = Edits { text, list: Vec::new() };
         let top = entries(&document)?;
@@ -60,7 +80,7 @@ impl Spec {
             return None;
         }
         let in_samples = entries(channels.first()?).is_some_and(|keys| find(keys, "delay_samples").is_some());
-        let old = Self::from_toml(text, "").ok()?;
+        let old = read(text, models).ok()?;
         for ((node, channel), old) in channels.iter().zip(&self.channels).zip(&old.channels) {
             edits.channel(self, node, old, channel)?;
         }
@@ -70,6 +90,34 @@ impl Spec {
         }
         Some(edits.apply())
     }
+}
+
+/// The text of a spec file with the names of measurements as `renamed` says; as it is where it says nothing,
+/// or where the text is no TOML.
+pub fn with_measurements_renamed(text: &str, renamed: impl Fn(&str) -> Option<String>) -> String {
+    let mut edits = Edits { text, list: Vec::new() };
+    let mut nodes = Vec::from_iter(Node::from_toml(text));
+    while let Some(node) = nodes.pop() {
+        match node.kind {
+            Kind::List(items) => nodes.extend(items),
+            Kind::Table(entries) => {
+                for entry in entries {
+                    if let ("touchstone" | "response", Kind::Text(path)) = (&*entry.key, &entry.value.kind)
+                        && let Some(path) = renamed(path)
+                    {
+                        edits.replace(&entry, toml::Value::from(path).to_string());
+                    }
+                    nodes.push(entry.value);
+                }
+            }
+            _ => {}
+        }
+    }
+    edits.apply()
+}
+
+fn read(text: &str, models: &FilterModels<'_>) -> Result<Spec, SpecError> {
+    Spec::from_toml_and_files(text, "", DesignOverrides::default(), models)
 }
 
 fn rounded_to(read: Seconds, own: Seconds) -> Seconds {

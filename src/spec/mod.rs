@@ -21,6 +21,7 @@ mod word_lengths;
 mod write;
 
 pub use design::{DesignOverrides, DesignSpec, DesignTable, Method, Reduction, Solver, Tracking};
+pub use edit::with_measurements_renamed;
 pub(crate) use error::{Fault, shown_path};
 pub use error::{Location, SpecError, SpecProblem};
 pub use filter::{Family, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB};

@@ -161,6 +161,36 @@ fn the_spec_keeps_what_was_not_measured() {
 }
 
 #[test]
+fn the_spec_keeps_measured_filters_by_their_files() {
+    let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(7));
+    let spec = Spec::from_toml(NOMINAL, "spec.toml").unwrap();
+    let filter = StrictlyProper::new(&spec.target, spec.fast_period).unwrap();
+    let row = |f: f64| {
+        let response = filter.response(RadiansPerFastPeriod(TAU * f * 1e-9));
+        format!("{f},{},{}\n", 20.0 * response.norm().log10(), response.arg().to_degrees())
+    };
+    for folder in ["lab", "out"] {
+        std::fs::create_dir(desk.path(folder)).unwrap();
+    }
+    let rows: String = (1..=200).map(|k| row(5e6 * f64::from(k))).collect();
+    desk.write("lab/bode.csv", format!("frequency (Hz), gain (dB), phase (deg)\n{rows}"));
+    let measured = r#"filter = { response = "bode.csv", order = 4 } # by lab 2"#;
+    desk.write("lab/spec.toml", NOMINAL.replace("delay = 0.0", &format!("delay = 0.0\n{measured}")));
+    let names = write(&desk, "t", &captured(&[161.3e6], 0.9, 4096, &mut dice));
+    let calibrated = |from: &str, to: &str| {
+        let done = desk.run(&with(&["calibrate", from, "-o", to], &names, &[]), b"");
+        assert!(done.status.success() && text(&done.stderr).contains("4 poles fitted"), "{done:?}");
+    };
+    calibrated("lab/spec.toml", "lab/m.toml");
+    let beside = text(&desk.read("lab/m.toml"));
+    assert!(beside.contains(measured) && beside.contains("fast_rate = 1.0e9          # Hz"), "{beside}");
+    // In another folder the file is still found.
+    calibrated("lab/spec.toml", "out/m.toml");
+    assert!(text(&desk.read("out/m.toml")).contains(r#"lab/bode.csv", order = 4 }"#));
+    calibrated("out/m.toml", "out/n.toml");
+}
+
+#[test]
 fn held_out_captures_and_one_file_of_all_converters_are_checked() {
     let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(3));
     let first = captured(&[161.3e6], 0.9, 8192, &mut dice);
