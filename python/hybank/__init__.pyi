@@ -414,7 +414,7 @@ def calibrate(
     waveform: Sequence[float] | NDArray[Any] | None = None,
     rate: float | None = None,
     blind: bool = False,
-    fit: Sequence[Literal["delay", "gain", "offset", "cutoff"]] = ("delay", "gain", "offset"),
+    fit: Sequence[str] = ("delay", "gain", "offset"),
     reference: int | None = None,
     clip: float | None = None,
     axis: int = -1,

@@ -2,10 +2,10 @@
 
 use crate::arrays::{Held, Shape};
 use crate::background;
-use crate::errors::{HybankError, choose, refused};
+use crate::errors::{HybankError, refused};
 use crate::sources;
 use hybank::calibrate::{
-    self as calibration, CalibrationSignal, ChannelEstimate, Fit, Record, Settings, applied,
+    self as calibration, CalibrationSignal, ChannelEstimate, Fit, Fitting, Record, Settings, applied,
 };
 use hybank::sine_fit::Estimate;
 use hybank::spec::Spec;
@@ -163,13 +163,11 @@ fn records(held: &Held<'_>, channels: usize, clip: Option<f64>) -> PyResult<Vec<
 }
 
 fn fitted(names: &[String]) -> PyResult<Fit> {
-    let mut fit = Fit { delay: false, gain: false, offset: false, cutoff: false };
-    for name in names {
-        let known = [("delay", 0), ("gain", 1), ("offset", 2), ("cutoff", 3)];
-        let values = [&mut fit.delay, &mut fit.gain, &mut fit.offset, &mut fit.cutoff];
-        *values[choose("fit", name, &known)?] = true;
-    }
-    Ok(fit)
+    let value = |name: &String| {
+        name.parse::<Fitting>()
+            .map_err(|error| HybankError::new_err(format!("fit: \"{name}\" is unknown; {error}")))
+    };
+    names.iter().try_fold(Fit::NOTHING, |fit, name| Ok(fit.with(value(name)?)))
 }
 
 /// From 0.

@@ -4,7 +4,8 @@ use super::Settings;
 use super::blind::{Blind, unexplained_in_order};
 use super::contradiction::Contradiction;
 use super::estimates::ChannelEstimate;
-use super::model::{Fit, Model};
+use super::fit::Fit;
+use super::model::Model;
 use super::order::{from_one, order_of_delays};
 use super::record::{Record, repeated};
 use super::starts::{Starts, starts};
@@ -203,7 +204,7 @@ fn by_delays(spec: &Spec, model: &Model, records: &[Record]) -> Option<Vec<Contr
     if let Some(order) = other_order(&blind, records.len()) {
         return Some(vec![Contradiction::WrongOrder { order }]);
     }
-    let fit = Fit { delay: true, gain: true, offset: false, cutoff: false };
+    let fit = Fit { delay: true, gain: true, offset: false, cutoff: None };
     let fitted = blind.fit(Settings { fit, reference }).ok()?;
     let (nominal, found) = blind.unexplained(&fitted.point);
     let is_clear = found <= CLEARLY_LESS * nominal;

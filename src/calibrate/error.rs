@@ -38,6 +38,30 @@ pub enum CalibrateError {
         /// Why.
         source: Box<AnalogError>,
     },
+    /// A stage whose cut-off is to be fitted is none of a channel's filter.
+    #[error(
+        "channel {channel} has no stage {stage}: its filter has {stages}; fit the cut-off of another one"
+    )]
+    NoSuchStage {
+        /// From 1.
+        channel: usize,
+        /// From 1.
+        stage: usize,
+        /// Number of stages of its filter.
+        stages: usize,
+    },
+    /// A stage, or what remains of the filter without it, is no filter that can be realised alone.
+    #[error(
+        "channel {channel}: stage {stage} cannot be fitted apart from the others: {source}; fit `cutoff`"
+    )]
+    Stage {
+        /// From 1.
+        channel: usize,
+        /// From 1.
+        stage: usize,
+        /// Why.
+        source: Box<AnalogError>,
+    },
     /// The target's filter cannot be realised.
     #[error("filter of the target: {source}")]
     Target {

@@ -1,6 +1,7 @@
 //! What a calibration found, and a spec with these values.
 
-use super::model::{Kind, Model, Point};
+use super::fit::{Cutoff, Kind};
+use super::model::{Model, Point};
 use super::warning::Warning;
 use crate::linalg::Mat;
 use crate::sine_fit::Estimate;
@@ -20,6 +21,8 @@ pub struct Calibration {
     pub reference: usize,
     /// One per channel.
     pub channels: Vec<ChannelEstimate>,
+    /// The part of the front ends whose cut-offs were fitted.
+    pub cutoff: Option<Cutoff>,
     /// The tones, if there were any.
     pub tones: Vec<Tone>,
     /// Delays are known modulo this, if tones were used and leave a second value within a thousand periods
@@ -45,7 +48,7 @@ pub struct ChannelEstimate {
     pub gain: Option<Estimate<f64>>,
     /// o_i, in the unit of the samples.
     pub offset: Option<Estimate<f64>>,
-    /// The factor of the cut-off frequency of Phi_i.
+    /// The factor of the cut-off frequency of Phi_i, or of its stage that was fitted.
     pub cutoff: Option<Estimate<f64>>,
 }
 
@@ -94,6 +97,14 @@ impl Fitted {
         clear
     }
 
+    /// Widens the interval of a fitted value so that one standard deviation reaches to another value, so far
+    /// away.
+    pub(super) fn reach(&mut self, channel: usize, kind: Kind, distance: f64) {
+        if let Some(k) = self.point.index(channel, kind) {
+            self.covariance[(k, k)] += distance.powi(2);
+        }
+    }
+
     /// The channels' values; nominal ones have no standard deviation.
     pub(super) fn channels(&self, model: &Model) -> Vec<ChannelEstimate> {
         let sigma = |i, kind| self.point.index(i, kind).map(|k| self.covariance[(k, k)].max(0.0).sqrt());
@@ -137,8 +148,10 @@ pub fn applied(spec: &Spec, calibration: &Calibration) -> (Spec, Vec<Warning>) {
         channel.delay = found.delay.map_or(channel.delay, |delay| delay.value.in_seconds(h));
         channel.gain = found.gain.map_or(channel.gain, |gain| gain.value);
         channel.offset = found.offset.map_or(channel.offset, |offset| offset.value);
-        if let Some(cutoff) = found.cutoff {
-            channel.filter = channel.filter.with_cutoff_scaled(cutoff.value);
+        if let (Some(cutoff), Some(part)) = (found.cutoff, calibration.cutoff)
+            && let Some(filter) = part.scaled(&channel.filter, cutoff.value)
+        {
+            channel.filter = filter;
         }
     }
     let before = spec.uncertainty.clone().unwrap_or_default();

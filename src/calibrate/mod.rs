@@ -38,6 +38,7 @@ mod blind;
 mod contradiction;
 mod error;
 mod estimates;
+mod fit;
 mod model;
 mod order;
 mod record;
@@ -52,7 +53,7 @@ pub use agreement::{Agreement, ENOUGH_FRAMES, Verdict, agreement, frames_for_agr
 pub use contradiction::Contradiction;
 pub use error::CalibrateError;
 pub use estimates::{Calibration, ChannelEstimate, Tone, applied};
-pub use model::Fit;
+pub use fit::{Cutoff, Fit, Fitting, UnknownFitting};
 pub(crate) use model::Model;
 pub use record::{Acquisition, Record};
 pub use warning::Warning;
@@ -118,13 +119,16 @@ pub fn calibrate_pooled(
             .and_then(|()| check_parts(records, signal))
             .map_err(|error| error.within(name, acquisitions.len()))?;
     }
-    let (model, reference) = (Model::new(spec)?, settings.reference);
+    let (mut model, reference) = (Model::new(spec)?, settings.reference);
+    if let Some(part) = settings.fit.cutoff {
+        model = model.scaling(part, spec)?;
+    }
     let mut fitted = match (signal, acquisitions) {
         (CalibrationSignal::Tones(frequencies), _) => {
-            tones::fit(&model, acquisitions, frequencies, settings)?
+            tones::fit(&model, spec, acquisitions, frequencies, settings)?
         }
         (CalibrationSignal::Waveform { samples, spacing }, [Acquisition { records, .. }]) => {
-            waveform::Training::new(&model, &spec.channels, records, samples, spacing, settings)?.fit()?
+            waveform::Training::new(&model, records, samples, spacing, settings)?.fit()?
         }
         (CalibrationSignal::Any, [Acquisition { records, .. }]) => {
             blind::Blind::new(&model, records, usize::MAX)?.fit(settings)?
@@ -145,7 +149,8 @@ pub fn calibrate_pooled(
     }
     let channels = fitted.channels(&model);
     let Fitted { tones, modulus, misfit, frames, warnings, .. } = fitted;
-    Ok(Calibration { reference, channels, tones, modulus, frames, clipped, misfit, warnings })
+    let cutoff = settings.fit.cutoff;
+    Ok(Calibration { reference, channels, cutoff, tones, modulus, frames, clipped, misfit, warnings })
 }
 
 /// All records are real, or all are complex and hold tones.
@@ -173,8 +178,7 @@ fn check(spec: &Spec, records: &[Record], settings: Settings) -> Result<(), Cali
     if settings.reference >= channels {
         return Err(CalibrateError::NoSuchReference { reference: settings.reference + 1, channels });
     }
-    let Fit { delay, gain, offset, cutoff } = settings.fit;
-    if !(delay || gain || offset || cutoff) {
+    if settings.fit == Fit::NOTHING {
         return Err(CalibrateError::NothingToFit);
     }
     match record::repeated(records) {

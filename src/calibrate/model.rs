@@ -2,9 +2,10 @@
 //! and the present values. Time counts in fast periods.
 
 use super::error::CalibrateError;
-use crate::analog::StrictlyProper;
+use super::fit::{Cutoff, Fit, Kind};
+use crate::analog::{AnalogError, StableFilter, StrictlyProper};
 use crate::linalg::{CMat, Complex};
-use crate::spec::{Band, ChannelSpec, SignalSpec, Spec};
+use crate::spec::{Band, ChannelSpec, FilterSpec, SignalSpec, Spec};
 use crate::units::{Hertz, RadiansPerFastPeriod, Seconds};
 use std::f64::consts::TAU;
 
@@ -24,7 +25,7 @@ const MOST_ZONES: f64 = 1e6;
 /// g_i Phi_i(j w / c_i) e^{jw(kM - D_i)} + o_i,   c_i = 1
 /// ```
 ///
-/// where c_i scales the cut-off frequency of its front end.
+/// where c_i scales the cut-off frequency of its front end, or of one stage of it.
 #[derive(Debug, Clone)]
 pub(crate) struct Model {
     /// M.
@@ -38,6 +39,8 @@ pub(crate) struct Model {
     /// o_i.
     pub(super) offsets: Vec<f64>,
     pub(super) front_ends: Vec<StrictlyProper>,
+    /// The stages that c_i scales, if it does not scale the whole front ends.
+    stages: Option<Vec<Stage>>,
     /// The Nyquist zone of the fast rate, from 0, in which the signal lies.
     pub(super) fast_zone: usize,
 }
@@ -59,8 +62,31 @@ impl Model {
             gains: spec.channels.iter().map(|channel| channel.gain).collect(),
             offsets: spec.channels.iter().map(|channel| channel.offset).collect(),
             front_ends: spec.channels.iter().enumerate().map(realise).collect::<Result<_, _>>()?,
+            stages: None,
             fast_zone: fast_zone(spec)?,
         })
+    }
+
+    /// The same, where the cut-offs to be fitted are those of a part of the front ends of `spec`.
+    ///
+    /// # Errors
+    /// [`CalibrateError::NoSuchStage`], [`CalibrateError::Stage`].
+    pub(super) fn scaling(&self, part: Cutoff, spec: &Spec) -> Result<Self, CalibrateError> {
+        let Cutoff::Stage(number) = part else { return Ok(Self { stages: None, ..self.clone() }) };
+        let stage = |(i, channel): (usize, &ChannelSpec)| {
+            let (channel, stages) = (i + 1, channel.filter.stages());
+            if number >= stages.len() {
+                let stage = number + 1;
+                return Err(CalibrateError::NoSuchStage { channel, stage, stages: stages.len() });
+            }
+            Stage::new(stages, number, self.fast_period).map_err(|source| CalibrateError::Stage {
+                channel,
+                stage: number + 1,
+                source: Box::new(source),
+            })
+        };
+        let stages = spec.channels.iter().enumerate().map(stage).collect::<Result<_, _>>()?;
+        Ok(Self { stages: Some(stages), ..self.clone() })
     }
 
     /// N.
@@ -78,12 +104,16 @@ impl Model {
         (self.fast_period * self.ratio as f64).rate()
     }
 
-    /// Phi_i(j w / c) with c = e^`ln_cutoff`.
+    /// Phi_i(j w / c) with c = e^`ln_cutoff`, or this of one of its stages times the others at j w.
     pub(super) fn response(&self, i: usize, w: f64, ln_cutoff: f64) -> Complex<f64> {
-        self.front_ends[i].response(RadiansPerFastPeriod(w * (-ln_cutoff).exp()))
+        let scaled = RadiansPerFastPeriod(w * (-ln_cutoff).exp());
+        match &self.stages {
+            Some(stages) => stages[i].scaled.response(scaled) * stages[i].others_at(w),
+            None => self.front_ends[i].response(scaled),
+        }
     }
 
-    /// The derivative of ln Phi_i(j w / c) by ln c.
+    /// The derivative of the logarithm of [`Self::response`] by ln c.
     pub(super) fn cutoff_slope(&self, i: usize, w: f64, ln_cutoff: f64) -> Complex<f64> {
         let at = |step: f64| self.response(i, w, ln_cutoff + step);
         (at(CUTOFF_STEP) / at(-CUTOFF_STEP)).ln() / (2.0 * CUTOFF_STEP)
@@ -111,6 +141,28 @@ impl Model {
     }
 }
 
+/// One stage of a front end.
+#[derive(Debug, Clone)]
+struct Stage {
+    scaled: StableFilter,
+    /// The stages before and after it, if there are any.
+    others: Option<StableFilter>,
+}
+
+impl Stage {
+    /// Number `number` (from 0) of these.
+    fn new(stages: &[FilterSpec], number: usize, h: Seconds) -> Result<Self, AnalogError> {
+        let others = [&stages[..number], &stages[number + 1..]].concat();
+        let others =
+            (!others.is_empty()).then(|| StableFilter::new(&FilterSpec::Cascade { cascade: others }, h));
+        Ok(Self { scaled: StableFilter::new(&stages[number], h)?, others: others.transpose()? })
+    }
+
+    fn others_at(&self, w: f64) -> Complex<f64> {
+        self.others.as_ref().map_or(Complex::ONE, |others| others.response(RadiansPerFastPeriod(w)))
+    }
+}
+
 /// The Nyquist zone of the fast rate, from 0, of the middle of the signal's band; without one of the
 /// frequency that the target passes best, where it is a band-pass.
 fn fast_zone(spec: &Spec) -> Result<usize, CalibrateError> {
@@ -127,42 +179,6 @@ fn fast_zone(spec: &Spec) -> Result<usize, CalibrateError> {
         }
     };
     Ok((2.0 * middle).floor().min(MOST_ZONES) as usize)
-}
-
-/// Which values of the channels are fitted; the others keep those of the spec.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Fit {
-    /// Delays.
-    pub delay: bool,
-    /// Gains.
-    pub gain: bool,
-    /// Offsets.
-    pub offset: bool,
-    /// Cut-off frequencies of the front ends.
-    pub cutoff: bool,
-}
-
-impl Default for Fit {
-    /// Delays, gains and offsets.
-    fn default() -> Self {
-        Self { delay: true, gain: true, offset: true, cutoff: false }
-    }
-}
-
-/// A parameter of a channel. Gains and cut-offs are fitted by their logarithm.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
-    Delay,
-    Gain,
-    Cutoff,
-}
-
-impl Fit {
-    /// The fitted parameters of a channel that is not the reference.
-    pub(super) fn kinds(self) -> Vec<Kind> {
-        let all = [(self.delay, Kind::Delay), (self.gain, Kind::Gain), (self.cutoff, Kind::Cutoff)];
-        all.into_iter().filter_map(|(is_fitted, kind)| is_fitted.then_some(kind)).collect()
-    }
 }
 
 /// One fitted parameter.

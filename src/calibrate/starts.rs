@@ -14,7 +14,8 @@
 //! cross-correlations.
 
 use super::blind::{Band, Spectra};
-use super::model::{Fit, Model, Point};
+use super::fit::Fit;
+use super::model::{Model, Point};
 use super::record::{Record, longest_run};
 use crate::linalg::{CMat, Complex, fourier};
 use crate::sine_fit::Channel;

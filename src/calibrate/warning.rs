@@ -1,6 +1,7 @@
 //! What a reader of the estimates must know.
 
 use super::error::list;
+use super::fit::{Cutoff, Fit};
 use crate::units::{FastPeriods, Hertz};
 
 /// A property of the captures that limits what the estimates mean.
@@ -34,10 +35,22 @@ pub enum Warning {
     /// The tones contradict each other by more than their noise, so all intervals were widened.
     #[error(
         "the tones contradict each other {misfit:.1} times as much as their noise explains, and the intervals were \
-         widened by that; the front ends may differ from those of the spec: fit the cut-offs as well"
+         widened by that; the front ends may differ from those of the spec"
     )]
     TonesDisagree {
         /// The factor.
+        misfit: f64,
+    },
+    /// With the cut-off of a part of the front ends the tones agree.
+    #[error(
+        "a fit of {} agrees with the captures: --fit {fit} has a misfit of {misfit:.2}; until then the intervals reach \
+         to its values",
+        part(*fit)
+    )]
+    CutoffExplains {
+        /// What to fit.
+        fit: Fit,
+        /// Square root of chi squared per degree of freedom with it.
         misfit: f64,
     },
     /// An acquisition contradicts the others.
@@ -128,6 +141,13 @@ impl Warning {
     /// Whether it only says what the estimates mean; the others say that they are doubtful.
     pub fn is_note(&self) -> bool {
         matches!(self, Self::CutoffAssumed { .. } | Self::HarmonicsLeftOut { .. } | Self::Shifted { .. })
+    }
+}
+
+fn part(fit: Fit) -> String {
+    match fit.cutoff {
+        Some(Cutoff::Stage(stage)) => format!("the cut-offs of stage {} of the filters", stage + 1),
+        _ => "the cut-offs".to_owned(),
     }
 }
 

@@ -16,16 +16,15 @@ mod tests;
 use super::Settings;
 use super::error::CalibrateError;
 use super::estimates::{Fitted, WORST_CONDITION};
-use super::model::{Kind, Model, Point};
+use super::fit::Kind;
+use super::model::{Model, Point};
 use super::record::Record;
 use super::warning::Warning;
-use crate::analog::StrictlyProper;
 use crate::linalg::least_squares::{LeastSquares, NoMinimum, NormalEquations, StepLimits, minimise};
 use crate::linalg::{Mat, fourier};
 use crate::simulate::{Instants, Recording};
 use crate::sine_fit::{Channel, Estimate};
-use crate::spec::ChannelSpec;
-use crate::units::{FastPeriods, Seconds};
+use crate::units::{FastPeriods, RadiansPerFastPeriod};
 
 /// Least samples of a waveform, and least frames that it covers.
 const LEAST_SAMPLES: usize = 64;
@@ -52,7 +51,6 @@ const MOST_NOISE_LAGS: usize = 256;
 /// A known waveform, and the captures that hold it.
 pub(super) struct Training<'a> {
     model: &'a Model,
-    written: &'a [ChannelSpec],
     records: &'a [Record],
     settings: Settings,
     recording: Recording,
@@ -61,7 +59,6 @@ pub(super) struct Training<'a> {
 impl<'a> Training<'a> {
     pub(super) fn new(
         model: &'a Model,
-        written: &'a [ChannelSpec],
         records: &'a [Record],
         samples: &[f64],
         spacing: FastPeriods,
@@ -71,7 +68,7 @@ impl<'a> Training<'a> {
         if !(is_usable && spacing.0 > 0.0 && spacing.0.is_finite()) {
             return Err(CalibrateError::Waveform { samples: samples.len(), spacing });
         }
-        Ok(Self { model, written, records, settings, recording: Recording::new(samples, spacing) })
+        Ok(Self { model, records, settings, recording: Recording::new(samples, spacing) })
     }
 
     /// Calibrates. The reference comes first: its lag is the best start for the others.
@@ -124,12 +121,15 @@ impl<'a> Training<'a> {
             channel: i,
             record: &self.records[i],
             recording: &self.recording,
-            written: &self.written[i],
-            fast_period: self.model.fast_period,
+            model: self.model,
             ratio: self.model.ratio as f64,
             values: [lag + self.model.delays[i], self.model.gains[i], 0.0, 0.0],
             // The reference has the cut-off of the spec.
-            parameters: if self.settings.fit.cutoff && i != self.settings.reference { 4 } else { 3 },
+            parameters: if self.settings.fit.cutoff.is_some() && i != self.settings.reference {
+                4
+            } else {
+                3
+            },
             rest: Vec::new(),
             power: 0.0,
             noise: 0.0,
@@ -185,8 +185,7 @@ struct ChannelFit<'a> {
     channel: usize,
     record: &'a Record,
     recording: &'a Recording,
-    written: &'a ChannelSpec,
-    fast_period: Seconds,
+    model: &'a Model,
     ratio: f64,
     /// D + L, g, o, ln c.
     values: [f64; 4],
@@ -216,7 +215,7 @@ impl LeastSquares for ChannelFit<'_> {
     const WORST_CONDITION: f64 = WORST_CONDITION;
 
     fn equations(&mut self) -> Result<NormalEquations, CalibrateError> {
-        let (columns, kept, [_, gain, offset, _]) = (self.columns()?, self.covered()?, self.values);
+        let (columns, kept, [_, gain, offset, _]) = (self.columns(), self.covered()?, self.values);
         let mut equations = NormalEquations::new(self.parameters);
         self.rest.clear();
         for &k in &kept {
@@ -254,7 +253,7 @@ impl LeastSquares for ChannelFit<'_> {
 impl ChannelFit<'_> {
     fn solve(mut self) -> Result<Solved, CalibrateError> {
         // Gain and offset first: the derivative by the delay contains the gain.
-        let (waveform, mut linear) = (self.sampled(0.0, 0.0)?, NormalEquations::new(2));
+        let (waveform, mut linear) = (self.sampled(0.0, 0.0), NormalEquations::new(2));
         self.covered()?.iter().for_each(|&k| linear.add(&[waveform[k], 1.0], self.record.samples[k]));
         let start = linear.solve()?;
         (self.values[1], self.values[2]) = (start[0], start[1]);
@@ -284,29 +283,26 @@ impl ChannelFit<'_> {
         }
     }
 
-    /// v at the present values plus steps of the delay and of ln c. Phi(j w / c) is the filter of a fast
-    /// period that is c times as long.
-    fn sampled(&self, delay: f64, ln_cutoff: f64) -> Result<Vec<f64>, CalibrateError> {
-        let h = Seconds(self.fast_period.0 * (self.values[3] + ln_cutoff).exp());
-        let filter = StrictlyProper::new(&self.written.filter, h).map_err(|source| {
-            CalibrateError::Analog { channel: self.channel + 1, source: Box::new(source) }
-        })?;
+    /// v at the present values plus steps of the delay and of ln c.
+    fn sampled(&self, delay: f64, ln_cutoff: f64) -> Vec<f64> {
+        let response =
+            |w: RadiansPerFastPeriod| self.model.response(self.channel, w.0, self.values[3] + ln_cutoff);
         let first = FastPeriods(-(self.values[0] + delay));
         let instants = Instants { first, step: FastPeriods(self.ratio), count: self.record.samples.len() };
-        Ok(self.recording.sample(&filter, instants))
+        self.recording.sample_through(response, instants)
     }
 
     /// v' by the delay, v and, if the cut-off is fitted, v' by ln c.
-    fn columns(&self) -> Result<Vec<Vec<f64>>, CalibrateError> {
+    fn columns(&self) -> Vec<Vec<f64>> {
         let difference = |above: Vec<f64>, below: Vec<f64>| -> Vec<f64> {
             above.iter().zip(&below).map(|(a, b)| (a - b) / (2.0 * DIFFERENCE)).collect()
         };
-        let by_delay = difference(self.sampled(DIFFERENCE, 0.0)?, self.sampled(-DIFFERENCE, 0.0)?);
-        let mut columns = vec![by_delay, self.sampled(0.0, 0.0)?];
+        let by_delay = difference(self.sampled(DIFFERENCE, 0.0), self.sampled(-DIFFERENCE, 0.0));
+        let mut columns = vec![by_delay, self.sampled(0.0, 0.0)];
         if self.parameters == 4 {
-            columns.push(difference(self.sampled(0.0, DIFFERENCE)?, self.sampled(0.0, -DIFFERENCE)?));
+            columns.push(difference(self.sampled(0.0, DIFFERENCE), self.sampled(0.0, -DIFFERENCE)));
         }
-        Ok(columns)
+        columns
     }
 }
 

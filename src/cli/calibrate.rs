@@ -11,7 +11,8 @@ use super::measure::{ToneArg, tone, tones};
 use super::print::{Failure, is_dash, say_understood, warn};
 use super::written::{check_outputs, write_text};
 use crate::calibrate::{
-    Acquisition, Calibration, CalibrationSignal, Fit, Record, Settings, Warning, applied, calibrate_pooled,
+    Acquisition, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning, applied,
+    calibrate_pooled,
 };
 use crate::io::{MultiReader, ReadOptions};
 use crate::spec::{DesignOverrides, Spec};
@@ -72,9 +73,10 @@ pub(super) struct Args {
     /// or 1]
     #[arg(long, value_name = "I")]
     reference: Option<usize>,
-    /// What to fit; the rest keeps the values of the spec
-    #[arg(long, value_enum, value_delimiter = ',', default_value = "delay,gain,offset")]
-    fit: Vec<Value>,
+    /// What to fit: delay, gain, offset, cutoff, or cutoff:2 for the cut-offs of the second stages of the
+    /// filters' cascades; the rest keeps the values of the spec
+    #[arg(long, value_name = "VALUE,..", value_delimiter = ',', default_value = "delay,gain,offset")]
+    fit: Vec<Fitting>,
     /// Captures of the same converters to check the calibrated spec with, of the same kind of signal
     #[arg(long, value_name = "HOLDOUT", num_args = 1..)]
     check: Vec<PathBuf>,
@@ -92,19 +94,6 @@ pub(super) struct Args {
     /// Print a report as one JSON object on standard output
     #[arg(long)]
     json: bool,
-}
-
-/// A value of a channel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Value {
-    /// Delays
-    Delay,
-    /// Gains
-    Gain,
-    /// Offsets
-    Offset,
-    /// Cut-off frequencies of the front ends
-    Cutoff,
 }
 
 /// What is known of the signal that the captures hold.
@@ -179,13 +168,14 @@ impl Args {
         Ok((calibrated, report))
     }
 
-    /// Refuses values that the captures contradict. Which capture does so joins the `warnings`.
+    /// Refuses values that the captures contradict. What explains that joins the `warnings`.
     fn check_misfit(&self, found: &Calibration, warnings: &mut Vec<String>) -> Result<(), Failure> {
         let Some(misfit) = found.misfit.filter(|&misfit| misfit > MOST_MISFIT && !self.force) else {
             return Ok(());
         };
-        let outlying = found.warnings.iter().filter(|warning| matches!(warning, Warning::Outlying { .. }));
-        warnings.extend(outlying.map(ToString::to_string));
+        let reasons =
+            |warning: &&Warning| matches!(warning, Warning::Outlying { .. } | Warning::CutoffExplains { .. });
+        warnings.extend(found.warnings.iter().filter(reasons).map(ToString::to_string));
         Err(Failure::Input(format!(
             "the captures contradict the spec: they differ from its model {misfit:.0} times as much as their noise \
              explains, so the values mean nothing and were not written; check the frequencies and their zones, the \
@@ -279,13 +269,7 @@ impl Args {
     }
 
     fn settings(&self, spec: &Spec) -> Result<Settings, Failure> {
-        let fits = |value| self.fit.contains(&value);
-        let fit = Fit {
-            delay: fits(Value::Delay),
-            gain: fits(Value::Gain),
-            offset: fits(Value::Offset),
-            cutoff: fits(Value::Cutoff),
-        };
+        let fit = self.fit.iter().fold(Fit::NOTHING, |fit, &value| fit.with(value));
         let known = spec.uncertainty.as_ref().and_then(|table| table.reference_channel());
         let reference = match self.reference {
             Some(0) => return Err(Failure::Usage("--reference 0: channels count from 1".into())),

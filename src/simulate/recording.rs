@@ -56,10 +56,19 @@ impl Recording {
     /// The sum over the L/2 harmonics at equally spaced instants is a chirp-z transform (Bluestein, 1970):
     /// exact to rounding for any ratio of the two rates, in O(n log n).
     pub fn sample(&self, filter: &StrictlyProper, instants: Instants) -> Vec<f64> {
+        self.sample_through(|w| filter.response(w), instants)
+    }
+
+    /// The same of a front end with this `response`.
+    pub(crate) fn sample_through(
+        &self,
+        response: impl Fn(RadiansPerFastPeriod) -> Complex<f64>,
+        instants: Instants,
+    ) -> Vec<f64> {
         if instants.count == 0 || self.length == 0 {
             return vec![0.0; instants.count];
         }
-        chirp_z(&self.filtered(filter, instants.first), instants.step / self.duration(), instants.count)
+        chirp_z(&self.filtered(response, instants.first), instants.step / self.duration(), instants.count)
     }
 
     /// (phi * f)(t) at the given instants, each later by its shift: the Taylor series around the instants,
@@ -79,7 +88,7 @@ impl Recording {
         }
         let largest = shifts.iter().fold(0.0f64, |most, shift| most.max(shift.0.abs()));
         let (turn, step) = (PI / self.spacing.0, instants.step / self.duration());
-        let mut derivative = self.filtered(filter, instants.first);
+        let mut derivative = self.filtered(|w| filter.response(w), instants.first);
         let mut powers = vec![1.0; output.len()];
         let mut bound = 1.0;
         for order in (1..=MOST_TERMS).map(f64::from) {
@@ -111,12 +120,15 @@ impl Recording {
     }
 
     /// Coefficients of the filtered harmonics, with their phases at `first`.
-    fn filtered(&self, filter: &StrictlyProper, first: FastPeriods) -> Vec<Complex<f64>> {
+    fn filtered(
+        &self,
+        response: impl Fn(RadiansPerFastPeriod) -> Complex<f64>,
+        first: FastPeriods,
+    ) -> Vec<Complex<f64>> {
         let first = first / self.duration();
         let coefficient = |(k, bin): (usize, &Complex<f64>)| {
             let weight = if k == 0 { 1.0 } else { 2.0 };
-            bin * filter.response(RadiansPerFastPeriod(self.omega(k)))
-                * Complex::from_polar(weight, phase(k, first))
+            bin * response(RadiansPerFastPeriod(self.omega(k))) * Complex::from_polar(weight, phase(k, first))
         };
         self.spectrum.iter().enumerate().map(coefficient).collect()
     }

@@ -213,6 +213,25 @@ impl FilterSpec {
         }
     }
 
+    /// The filters that follow each other: those of a cascade, or this one.
+    pub fn stages(&self) -> &[Self] {
+        match self {
+            Self::Cascade { cascade } => cascade,
+            single => std::slice::from_ref(single),
+        }
+    }
+
+    /// [`Self::with_cutoff_scaled`] for one of the [`stages`](Self::stages), from 0; the others stay. `None`
+    /// without such a stage.
+    #[must_use]
+    pub fn with_stage_scaled(&self, stage: usize, factor: f64) -> Option<Self> {
+        let scaled = self.stages().get(stage)?.with_cutoff_scaled(factor);
+        let Self::Cascade { cascade } = self else { return Some(scaled) };
+        let mut cascade = cascade.clone();
+        cascade[stage] = scaled;
+        Some(Self::Cascade { cascade })
+    }
+
     /// The checks on the single entries of the table.
     fn check_parts(&self) -> Result<(), FilterProblem> {
         match self {

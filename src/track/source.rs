@@ -120,7 +120,7 @@ fn by_any_signal(
     reference: usize,
     records: &[Record],
 ) -> Result<Vec<Option<DelayMeasurement>>, NotMeasured> {
-    let fit = Fit { delay: true, gain: true, offset: false, cutoff: false };
+    let fit = Fit { delay: true, gain: true, offset: false, cutoff: None };
     let found = calibrate(spec, records, CalibrationSignal::Any, Settings { fit, reference })?;
     let h = spec.fast_period;
     let measured = |estimate: &crate::calibrate::ChannelEstimate| {

@@ -279,18 +279,26 @@ fn values_that_the_captures_contradict_are_not_written() {
     let names = write(&desk, "t", &captured(&[61.3e6, 161.3e6, 231.7e6], 0.3, 4096, &mut dice));
     let other = "[[channel]]\nfilter = { family = \"butterworth\", order = 4, cutoff = 200e6 }\ndelay = 0.0";
     desk.write("wrong.toml", NOMINAL.replace("[[channel]]\ndelay = 0.0", other));
-    let command = |tail: &[&'static str]| {
-        with(
-            &["calibrate", "wrong.toml", "-o", "m.toml", "--tone", "61.3MHz,161.3MHz,231.7MHz"],
-            &names,
-            tail,
-        )
+    let run = |tail: &[&str]| {
+        let head = ["calibrate", "wrong.toml", "-o", "m.toml", "--tone", "61.3MHz,161.3MHz,231.7MHz"];
+        let done = desk.run(&with(&head, &names, tail), b"");
+        (done.status.code(), text(&done.stderr))
     };
-    desk.refused(1, &command(&[]), &["contradict the spec", "times as much as their noise", "--force"]);
-    assert!(!desk.path("m.toml").exists());
-    let forced = desk.run(&command(&["--force"]), b"");
-    assert!(forced.status.success() && text(&forced.stderr).contains("contradict each other"), "{forced:?}");
-    assert!(desk.path("m.toml").exists());
+    let (code, shown) = run(&[]);
+    assert!(code == Some(1) && !desk.path("m.toml").exists(), "{shown}");
+    let refusal = ["contradict the spec", "times as much as their noise", "--force"];
+    let explanation = "--fit delay,gain,offset,cutoff has a misfit of";
+    assert!(refusal.iter().chain([&explanation]).all(|part| shown.contains(part)), "{shown}");
+    let (code, shown) = run(&["--force"]);
+    assert!(code == Some(0) && desk.path("m.toml").exists() && shown.contains(explanation), "{shown}");
+    // The fit that is named agrees.
+    let (code, shown) = run(&["--force", "--fit", "delay,gain,offset,cutoff:1"]);
+    assert_eq!((code, shown.as_str()), (Some(0), ""));
+    assert!(text(&desk.read("m.toml")).contains("cutoff = 25"), "{}", text(&desk.read("m.toml")));
+    let (code, shown) = run(&["--force", "--fit", "delay,cutoff:2"]);
+    assert!(code == Some(1) && shown.contains("channel 1 has no stage 2"), "{shown}");
+    let (code, shown) = run(&["--fit", "delay,cutof"]);
+    assert!(code == Some(2) && shown.contains("cutoff:2 for the second stage"), "{shown}");
 }
 
 #[test]

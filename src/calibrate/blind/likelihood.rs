@@ -1,7 +1,8 @@
 //! The Whittle likelihood of spectral matrices: its score and its Fisher information.
 
 use super::spectra::Band;
-use crate::calibrate::model::{Kind, Model, Parameter, Point};
+use crate::calibrate::fit::Kind;
+use crate::calibrate::model::{Model, Parameter, Point};
 use crate::linalg::least_squares::NormalEquations;
 use crate::linalg::{CMat, Complex, Mat, solve};
 

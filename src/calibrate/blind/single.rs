@@ -72,7 +72,7 @@ pub(in crate::calibrate) fn unexplained_in_order(bands: &[SingleBand], order: &[
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::model::Fit;
+    use crate::calibrate::Fit;
     use crate::spec::Spec;
 
     fn model() -> Model {

@@ -9,7 +9,7 @@ use crate::units::FastPeriods;
 use std::f64::consts::PI;
 
 const BLIND: Settings =
-    Settings { fit: Fit { delay: true, gain: true, offset: true, cutoff: false }, reference: 0 };
+    Settings { fit: Fit { delay: true, gain: true, offset: true, cutoff: None }, reference: 0 };
 
 fn spec(ratio: usize, delays: &[f64]) -> Spec {
     let channels: String = delays.iter().map(|d| format!("[[channel]]\ndelay = {d:?}\n")).collect();

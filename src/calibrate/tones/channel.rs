@@ -3,7 +3,8 @@
 use super::phasors::Measured;
 use crate::calibrate::error::CalibrateError;
 use crate::calibrate::estimates::WORST_CONDITION;
-use crate::calibrate::model::{Fit, Kind, Model};
+use crate::calibrate::fit::{Fit, Kind};
+use crate::calibrate::model::Model;
 use crate::linalg::least_squares::{LeastSquares, NoMinimum, NormalEquations, StepLimits, minimise};
 use crate::linalg::{Complex, Mat};
 
@@ -54,7 +55,8 @@ impl LeastSquares for ChannelFit<'_> {
     fn equations(&mut self) -> Result<NormalEquations, CalibrateError> {
         let ln_cutoff = self.ln_cutoff();
         let mut equations = NormalEquations::new(self.kinds.len());
-        let (magnitudes, phases) = (self.fit.gain || self.fit.cutoff, self.fit.delay || self.fit.cutoff);
+        let with_cutoff = self.fit.cutoff.is_some();
+        let (magnitudes, phases) = (self.fit.gain || with_cutoff, self.fit.delay || with_cutoff);
         for row in &self.rows {
             let response = |ln_cutoff| self.model.response(self.channel, row.w, ln_cutoff);
             let effect = |&kind: &Kind| match kind {

@@ -21,21 +21,24 @@ mod tests;
 use super::Settings;
 use super::error::CalibrateError;
 use super::estimates::{Fitted, Tone, contradiction};
+use super::fit::{Cutoff, Fit, Kind};
 use super::model::{Model, Point};
 use super::order::{Distances, other_order};
 use super::record::{Acquisition, Record};
 use super::warning::Warning;
 use crate::linalg::{Complex, Mat};
 use crate::sine_fit::{self, ChannelFit as SineChannel, Direction, Estimate, alias};
+use crate::spec::Spec;
 use crate::units::{Decibels, FastPeriods, Hertz};
 use ambiguity::{Alias, modulus, nearest_delay, zone_of};
 use channel::{ChannelFit, Solution};
 use interference::{is_harmonic, repeating_variances, widen_repeating};
 use phasors::{Captures, Measured};
 
-/// An acquisition contradicts the others if the misfit without it is this many times smaller ..
-const OUTLYING: f64 = 4.0;
-/// .. and there are at least so many: of two nobody can tell which one is right.
+/// What makes the misfit this many times smaller explains it: an acquisition that is left out, or a cut-off
+/// that is fitted.
+const EXPLAINED: f64 = 4.0;
+/// Least acquisitions of which one contradicts the others: of two nobody can tell which one is right.
 const OUTLYING_OF: usize = 3;
 /// Tones of several acquisitions closer than this share of their frequency are one: they tell nothing of a
 /// cut-off together.
@@ -59,6 +62,7 @@ const DOUBTFUL_SHARE: f64 = 0.25;
 /// least one of the tones.
 pub(super) fn fit(
     model: &Model,
+    spec: &Spec,
     acquisitions: &[Acquisition<'_>],
     given: &[Hertz],
     settings: Settings,
@@ -75,7 +79,7 @@ pub(super) fn fit(
         return Err(CalibrateError::ToneNowhere { tone, acquisitions: count });
     }
     let distinct = distinct(all.iter().flat_map(|tones| &tones.measured));
-    if settings.fit.cutoff && distinct < CUTOFF_TONES {
+    if settings.fit.cutoff.is_some() && distinct < CUTOFF_TONES {
         return Err(CalibrateError::TooFewTones { tones: distinct });
     }
     let mut warnings: Vec<Warning> = Vec::new();
@@ -85,7 +89,13 @@ pub(super) fn fit(
         }
     }
     let names: Vec<&str> = acquisitions.iter().map(|one| one.name).collect();
-    let mut fitted = solve(model, &all, &names, settings, &mut warnings)?;
+    let mut fitted = solve(model, &all, settings, &mut warnings)?;
+    if fitted.warnings.iter().any(|warning| matches!(warning, Warning::TonesDisagree { .. })) {
+        let outlying = outlying(model, &all, &names, settings);
+        let reason =
+            if outlying.is_empty() { explained(model, spec, &all, settings, &mut fitted) } else { None };
+        fitted.warnings.extend(outlying.into_iter().chain(reason));
+    }
     if settings.fit.offset {
         add_offsets(&mut fitted, &all);
     }
@@ -291,11 +301,10 @@ fn check_order(model: &Model, tones: &[Measured], reference: usize) -> Result<()
     other_order(&distances, reference).map_or(Ok(()), |order| Err(CalibrateError::WrongOrder { order }))
 }
 
-/// Least squares over the tones of all acquisitions, which have these names, channel by channel.
+/// Least squares over the tones of all acquisitions, channel by channel.
 fn solve(
     model: &Model,
     all: &[Tones],
-    names: &[&str],
     settings: Settings,
     warnings: &mut Vec<Warning>,
 ) -> Result<Fitted, CalibrateError> {
@@ -319,13 +328,11 @@ fn solve(
     }
     let values: Vec<f64> = channels.iter().flat_map(|channel| channel.values.iter().copied()).collect();
     fitted.point.advance(&values);
-    if fit.delay && !fit.cutoff {
+    if fit.delay && fit.cutoff.is_none() {
         warnings.push(Warning::CutoffAssumed { delay: cutoff_effect(model, &tones, reference) });
     }
-    let misfit = fitted.widen(squares(&channels), freedom(&channels));
-    if let Some(misfit) = misfit {
-        warnings.extend(outlying(model, all, names, settings, misfit));
-    }
+    let squares = channels.iter().map(|channel| channel.squares).sum();
+    let misfit = fitted.widen(squares, channels.iter().map(|channel| channel.freedom).sum());
     fitted.warnings.extend(misfit.map(|misfit| Warning::TonesDisagree { misfit }));
     Ok(fitted)
 }
@@ -343,42 +350,75 @@ fn solve_channels(
     model.others(reference).map(solve).collect()
 }
 
-/// Chi squared of all channels.
-fn squares(channels: &[Solution]) -> f64 {
-    channels.iter().map(|channel| channel.squares).sum()
+/// Square root of chi squared per degree of freedom of all channels, if there are any.
+fn misfit(channels: &[Solution]) -> Option<f64> {
+    let squares: f64 = channels.iter().map(|channel| channel.squares).sum();
+    let freedom: usize = channels.iter().map(|channel| channel.freedom).sum();
+    (freedom > 0).then(|| (squares / freedom as f64).sqrt())
 }
 
-fn freedom(channels: &[Solution]) -> usize {
-    channels.iter().map(|channel| channel.freedom).sum()
-}
-
-/// The acquisitions without which the others agree: the one that explains most of the `misfit` of all, then
+/// The acquisitions without which the others agree: the one that explains most of the misfit of all, then
 /// among the others as long as at least [`OUTLYING_OF`] are left.
-fn outlying(
-    model: &Model,
-    all: &[Tones],
-    names: &[&str],
-    settings: Settings,
-    mut misfit: f64,
-) -> Vec<Warning> {
+fn outlying(model: &Model, all: &[Tones], names: &[&str], settings: Settings) -> Vec<Warning> {
+    // Tones that no longer determine the values tell nothing of their agreement.
+    let misfit_of = |list: &[usize]| {
+        let tones: Vec<&Measured> = list.iter().flat_map(|&k| &all[k].measured).collect();
+        misfit(&solve_channels(model, &tones, settings).ok()?)
+    };
     let (mut left, mut warnings): (Vec<usize>, _) = ((0..all.len()).collect(), Vec::new());
-    while left.len() >= OUTLYING_OF {
-        let without = |k: usize| {
-            let others = left.iter().filter(|&&other| other != k);
-            let tones: Vec<&Measured> = others.flat_map(|&other| &all[other].measured).collect();
-            // Tones that no longer determine the values tell nothing of their agreement.
-            let channels = solve_channels(model, &tones, settings).ok()?;
-            let freedom = freedom(&channels);
-            (freedom > 0).then(|| (squares(&channels) / freedom as f64).sqrt())
-        };
-        let best = left.iter().filter_map(|&k| Some((k, without(k)?)));
+    while left.len() >= OUTLYING_OF
+        && let Some(misfit) = misfit_of(&left)
+    {
+        let without = |k: usize| left.iter().copied().filter(|&other| other != k).collect::<Vec<_>>();
+        let best = left.iter().filter_map(|&k| Some((k, misfit_of(&without(k))?)));
         let best = best.min_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((k, others)) = best.filter(|(_, others)| misfit > OUTLYING * others.max(1.0)) else { break };
+        let Some((k, others)) = best.filter(|(_, others)| misfit > EXPLAINED * others.max(1.0)) else {
+            break;
+        };
         warnings.push(Warning::Outlying { name: names[k].to_owned(), misfit, others });
-        left.retain(|&other| other != k);
-        misfit = others;
+        left = without(k);
     }
     warnings
+}
+
+/// The part of the front ends whose cut-offs, if they were fitted too, would make the tones agree. The
+/// intervals are widened so that they reach to the values of that fit.
+fn explained(
+    model: &Model,
+    spec: &Spec,
+    all: &[Tones],
+    settings: Settings,
+    fitted: &mut Fitted,
+) -> Option<Warning> {
+    let tones: Vec<&Measured> = all.iter().flat_map(|tones| &tones.measured).collect();
+    if distinct(tones.iter().copied()) < CUTOFF_TONES {
+        return None;
+    }
+    let stages = spec.channels.iter().map(|channel| channel.filter.stages().len()).min().unwrap_or(0);
+    let parts = (0..stages).filter(|_| stages > 1).map(Cutoff::Stage).chain([Cutoff::Whole]);
+    // A part that cannot be fitted explains nothing.
+    let candidate = |part: Cutoff| {
+        let fit = Fit { cutoff: Some(part), ..settings.fit };
+        let channels = solve_channels(&model.scaling(part, spec).ok()?, &tones, Settings { fit, ..settings });
+        let channels = channels.ok()?;
+        Some((fit, misfit(&channels)?, channels))
+    };
+    let all = parts.filter(|&part| settings.fit.cutoff != Some(part)).filter_map(candidate);
+    let (fit, misfit, channels) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    if fitted.misfit? < EXPLAINED * misfit.max(1.0) {
+        return None;
+    }
+    let own = solve_channels(model, &tones, settings).ok()?;
+    for ((i, own), other) in model.others(settings.reference).zip(own).zip(channels) {
+        for (kind, own) in settings.fit.kinds().into_iter().zip(own.values) {
+            let other = fit.kinds().into_iter().zip(&other.values).find(|(other, _)| *other == kind);
+            // Factors of different filters do not compare.
+            if let Some((_, other)) = other.filter(|_| kind != Kind::Cutoff) {
+                fitted.reach(i, kind, other - own);
+            }
+        }
+    }
+    Some(Warning::CutoffExplains { fit, misfit })
 }
 
 /// The largest change of a delay per per cent of cut-off: the mean of Im(s_it) / w_t over the tones.

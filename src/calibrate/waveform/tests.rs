@@ -2,12 +2,14 @@
 
 use super::*;
 use crate::analog::StrictlyProper;
+use crate::calibrate::Cutoff;
 use crate::calibrate::testbench::{
     assert_covers, errors, gaussian, interleaved, random_errors, trials, with_errors,
 };
 use crate::calibrate::{CalibrateError, Calibration, CalibrationSignal, Fit, calibrate};
 use crate::random::Random;
 use crate::simulate::Instants;
+use crate::spec::ChannelSpec;
 use crate::spec::Spec;
 
 /// A noise that fills the band up to half the fast rate and beyond, at 1.5 times that rate.
@@ -42,7 +44,7 @@ fn by_waveform(
     spec: &Spec,
     records: &[Record],
     samples: &[f64],
-    cutoff: bool,
+    cutoff: Option<Cutoff>,
 ) -> Result<Calibration, CalibrateError> {
     let settings = Settings { fit: Fit { cutoff, ..Fit::default() }, reference: 0 };
     calibrate(spec, records, CalibrationSignal::Waveform { samples, spacing: SPACING }, settings)
@@ -57,7 +59,7 @@ fn errors_are_at_the_bound_and_intervals_cover() {
         let samples = waveform(&mut dice, 3000);
         let truth = with_errors(&spec, &random_errors(&mut dice, 4, [0.02, 0.01, 0.002, 0.0]));
         let records = captures(&truth, &samples, 37.3 + (trial % 100) as f64 * 0.37, noise, &mut dice);
-        let found = by_waveform(&spec, &records, &samples, false).unwrap();
+        let found = by_waveform(&spec, &records, &samples, None).unwrap();
         scaled.extend(errors(&truth, &found).scaled);
         // White noise after a low-pass of 2 MHz, up to 0.75 MHz: the rms of v' from its spectrum.
         let slope: f64 = (1..750)
@@ -80,7 +82,7 @@ fn the_cutoff_is_found_with_the_delay() {
     let truth =
         with_errors(&spec, &[shift(0.0, 1.0), shift(0.01, 1.02), shift(-0.02, 0.99), shift(0.0, 1.01)]);
     let records = captures(&truth, &samples, 11.1, 1e-4, &mut dice);
-    let found = by_waveform(&spec, &records, &samples, true).unwrap();
+    let found = by_waveform(&spec, &records, &samples, Some(Cutoff::Whole)).unwrap();
     for (estimate, cutoff) in found.channels.iter().zip([1.0, 1.02, 0.99, 1.01]).skip(1) {
         let estimate = estimate.cutoff.unwrap();
         assert!(
@@ -96,7 +98,7 @@ fn another_waveform_is_refused() {
     let (spec, mut dice) = (interleaved(), Random(23));
     let (samples, other) = (waveform(&mut dice, 3000), waveform(&mut dice, 3000));
     let records = captures(&spec, &samples, 11.1, 1e-3, &mut dice);
-    let refused = by_waveform(&spec, &records, &other, false).unwrap_err();
+    let refused = by_waveform(&spec, &records, &other, None).unwrap_err();
     assert!(
         matches!(
             refused,
@@ -106,7 +108,7 @@ fn another_waveform_is_refused() {
         ),
         "{refused}"
     );
-    let few = by_waveform(&spec, &records, &other[..50], false).unwrap_err();
+    let few = by_waveform(&spec, &records, &other[..50], None).unwrap_err();
     assert!(matches!(few, CalibrateError::Waveform { samples: 50, .. }), "{few}");
 }
 
@@ -116,7 +118,7 @@ fn swapped_captures_are_recognised() {
     let samples = waveform(&mut dice, 3000);
     let mut records = captures(&spec, &samples, 5.0, 1e-3, &mut dice);
     records.swap(0, 3);
-    let refused = by_waveform(&spec, &records, &samples, false).unwrap_err();
+    let refused = by_waveform(&spec, &records, &samples, None).unwrap_err();
     assert_eq!(refused, CalibrateError::WrongOrder { order: vec![4, 2, 3, 1] });
 }
 

@@ -2,12 +2,13 @@
 
 mod complex;
 mod pooled;
+mod stages;
 
 use crate::calibrate::testbench::{
     assert_covers, errors, interleaved, random_errors, tones, trials, with_errors,
 };
 use crate::calibrate::{
-    CalibrateError, Calibration, CalibrationSignal, Fit, Record, Settings, Warning, calibrate,
+    CalibrateError, Calibration, CalibrationSignal, Cutoff, Fit, Record, Settings, Warning, calibrate,
 };
 use crate::random::Random;
 use crate::spec::Spec;
@@ -23,7 +24,7 @@ fn by_tones(spec: &Spec, records: &[Record], given: &[f64]) -> Result<Calibratio
 
 fn with_cutoff(spec: &Spec, records: &[Record], given: &[f64]) -> Result<Calibration, CalibrateError> {
     let given: Vec<Hertz> = given.iter().map(|&f| Hertz(f)).collect();
-    let settings = Settings { fit: Fit { cutoff: true, ..Fit::default() }, reference: 0 };
+    let settings = Settings { fit: Fit { cutoff: Some(Cutoff::Whole), ..Fit::default() }, reference: 0 };
     calibrate(spec, records, CalibrationSignal::Tones(&given), settings)
 }
 
