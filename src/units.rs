@@ -32,9 +32,15 @@
 //! let delay: FastPeriods = Seconds(25e-6);
 //! ```
 
+mod grid_time;
+mod timeline;
+
 use std::f64::consts::TAU;
 use std::fmt;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
+
+pub use grid_time::GridTime;
+pub use timeline::Timeline;
 
 /// Declares a newtype over f64 with the arithmetic that keeps its unit.
 macro_rules! quantity {
@@ -206,27 +212,7 @@ impl Seconds {
     }
 }
 
-/// When two samples are taken at one instant. A spec gives delays in seconds, or in samples that become
-/// seconds, and every number on the way is rounded to a double: three periods of 0.1 s are
-/// 0.30000000000000004 s. **Two instants are one, and a delay is whole, if they agree up to that rounding**:
-/// within [`rounding_of_difference`](Self::rounding_of_difference).
 impl FastPeriods {
-    /// What rounding may change in the difference of two times that were given as doubles, in seconds or in
-    /// fast periods: 4 eps (1 + |t_1| + |t_2|). One eps is that of the times, of h and of the quotients; the
-    /// others leave room for the few operations by which a spec was made.
-    pub fn rounding_of_difference(self, other: Self) -> Self {
-        Self(4.0 * f64::EPSILON * (1.0 + self.0.abs() + other.0.abs()))
-    }
-
-    /// How many times `period` this time is later than another, if that is a whole number up to rounding;
-    /// zero for times that are one.
-    pub fn periods_since(self, other: Self, period: Self) -> Option<f64> {
-        let apart = self - other;
-        let periods = (apart / period).round();
-        let rest = apart - period * periods;
-        (rest.0.abs() <= self.rounding_of_difference(other).0).then_some(periods)
-    }
-
     /// t = t' h.
     pub fn in_seconds(self, fast_period: Seconds) -> Seconds {
         Seconds(self.0 * fast_period.0)
@@ -368,21 +354,5 @@ mod tests {
         assert_eq!(format!("{:e}", Hertz(48e3)), "4.8e4 Hz");
         assert_eq!(format!("{:.2}", RadiansPerFastPeriod(1.23456)), "1.23 rad per fast period");
         assert_eq!(format!("{:.1}", Decibels(-3.01)), "-3.0 dB");
-    }
-
-    /// At any length and in any unit; a difference that is meant stays one.
-    #[test]
-    fn times_are_one_up_to_rounding_only() {
-        let period = FastPeriods(3.0);
-        for h in [1.0, 0.1, 1.0 / 48_000.0, 1e-9, 7.3e-12].map(Seconds) {
-            for whole in [0.0, 1.0, 999.0, 65_000.0] {
-                let written = |fraction: f64| FastPeriods(whole + fraction).in_seconds(h).in_fast_periods(h);
-                let (first, later) = (written(0.3), written(6.3));
-                assert_eq!(first.periods_since(first, period), Some(0.0));
-                assert_eq!(later.periods_since(first, period), Some(2.0), "{whole} {h}");
-                assert_eq!(written(0.3 + 1e-9).periods_since(first, period), None, "{whole} {h}");
-                assert_eq!(written(7.3).periods_since(first, period), None);
-            }
-        }
     }
 }

@@ -55,15 +55,6 @@ impl BigFloat {
         self.words[WORDS - 1] == 0 && !self.nan
     }
 
-    /// Sign of a number that is not NaN.
-    pub(crate) fn sign(&self) -> Ordering {
-        match (self.is_zero(), self.negative) {
-            (true, _) => Ordering::Equal,
-            (_, true) => Ordering::Less,
-            (_, false) => Ordering::Greater,
-        }
-    }
-
     /// |self| against |other|, neither NaN.
     pub(crate) fn compare_moduli(&self, other: &Self) -> Ordering {
         if self.is_zero() || other.is_zero() {

@@ -25,7 +25,7 @@ pub use taps::{FixedPoint, TapSlopes};
 pub use crate::runtime::StateSpace;
 
 use crate::spec::{Method, Spec};
-use crate::units::{FastPeriods, Seconds};
+use crate::units::{FastPeriods, GridTime, Seconds};
 
 /// `format` of a bank file.
 pub const FORMAT: &str = "hybank-bank";
@@ -166,10 +166,10 @@ impl Bank {
         self.fast_period == Seconds(1.0)
     }
 
-    /// D_i / h of every channel. A value that is whole up to rounding becomes exactly whole.
+    /// D_i / h of every channel.
     pub fn delays_in_fast_periods(&self) -> Vec<FastPeriods> {
         let h = self.fast_period;
-        self.delays.iter().map(|&delay| crate::spec::delay_in_fast_periods(delay, h)).collect()
+        self.delays.iter().map(|&delay| GridTime::new(delay, h).in_fast_periods()).collect()
     }
 }
 

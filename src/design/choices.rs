@@ -131,7 +131,7 @@ fn choose(spec: &Spec, compared: Compared<'_>) -> Result<Choice, DesignError> {
 
 /// The latency at which the output instant lies in the middle of the samples that the taps see.
 fn middle(problem: &Problem, taps: usize) -> Choice {
-    let delays: f64 = problem.channels.iter().map(|channel| channel.delay.0).sum();
+    let delays: f64 = problem.delays().iter().map(|delay| delay.0).sum();
     let mean = delays / problem.channels.len() as f64;
     Choice { taps, latency: (0.5 * (taps - 1) as f64 + mean).round() as usize }
 }

@@ -19,6 +19,7 @@ use super::lifting::JointState;
 use super::problem::{Channel, Problem};
 use crate::linalg::{self, Mat};
 use crate::lti::gramian::controllability_root;
+use crate::units::GridTime;
 use std::ops::RangeInclusive;
 
 /// Share of its mean square by which the error of a target sample may be too large where only errors are
@@ -127,23 +128,22 @@ struct Innovation {
 impl<'a> History<'a> {
     fn new(problem: &'a Problem, frames: usize, instants: RangeInclusive<i64>) -> Result<Self, DesignError> {
         let (ratio, joint) = (problem.ratio as i64, JointState::new(problem)?);
-        let targets = (0..ratio).map(|p| (p as f64, Source::Target(p)));
+        let at = |p: i64| GridTime::fast_sample(p as f64, problem.fast_period);
         let mut periods = (instants.start().div_euclid(ratio), instants.end().div_euclid(ratio));
-        let mut sources: Vec<(f64, Source)> = targets.collect();
+        let mut sources: Vec<(GridTime, Source)> = (0..ratio).map(|p| (at(p), Source::Target(p))).collect();
         for (channel, &Channel { delay, .. }) in problem.channels.iter().enumerate() {
-            let newest = (-delay.0 / ratio as f64).floor();
-            let phase = -delay.0 - newest * ratio as f64;
+            let (newest, phase) = delay.negative().in_slow_period(problem.ratio);
             sources.push((phase, Source::Channel { channel, newest: newest as i64 }));
             if frames > 0 {
                 let oldest = newest as i64 + 1 - frames as i64;
                 periods = (periods.0.min(oldest), periods.1.max(newest as i64));
             }
         }
-        sources.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let ends = sources.iter().skip(1).map(|slot| slot.0).chain([ratio as f64]).collect::<Vec<_>>();
-        let slot = |(&(phase, source), end): (&(f64, Source), f64)| {
-            let length = end - phase;
-            let segment = (length >= problem.resolution()).then(|| joint.over(length)).transpose()?;
+        sources.sort_by(|a, b| a.0.compare(b.0));
+        let ends = sources.iter().skip(1).map(|slot| slot.0).chain([at(ratio)]).collect::<Vec<_>>();
+        let slot = |(&(phase, source), end): (&(GridTime, Source), GridTime)| {
+            let length = end.since(phase).0;
+            let segment = (length > 0.0).then(|| joint.over(length)).transpose()?;
             Ok(Slot { source, segment })
         };
         let slots = sources.iter().zip(ends).map(slot).collect::<Result<_, DesignError>>()?;

@@ -161,7 +161,7 @@ fn is_covered(problem: &Problem, taps: usize) -> bool {
     let history = (taps.div_ceil(problem.ratio).saturating_sub(1) * problem.ratio) as f64;
     let mut instants = (0..taps.min(problem.ratio)).map(|p| p as f64 - problem.latency as f64);
     let sees = |newest: f64, instant: f64| (newest - history..=newest).contains(&instant);
-    instants.any(|instant| problem.channels.iter().any(|channel| sees(-channel.delay.0, instant)))
+    instants.any(|instant| problem.delays().iter().any(|delay| sees(-delay.0, instant)))
 }
 
 /// All latencies that may be worth a design: up to the oldest sample that a tap sees.

@@ -18,6 +18,7 @@ use super::problem::Problem;
 use crate::linalg::{self, Mat};
 use crate::lti::StateSpace;
 use crate::lti::exponential::{StateTransition, gramian_root};
+use crate::units::Timeline;
 use std::ops::Range;
 
 /// The lifted analysis side.
@@ -33,26 +34,24 @@ pub(super) struct Lifted {
     pub(super) delays: Vec<usize>,
 }
 
-/// When and where a sample is taken.
+/// What is sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct SamplingInstant {
+struct Sample {
     /// Index of the filter that is sampled.
     front_end: usize,
     /// The sample over that filter's output.
     gain: f64,
-    /// Fast periods after the beginning of the slow period, in (0, M].
-    time: f64,
-    /// Whole slow periods by which the sample is delayed in addition.
-    delay: usize,
+    /// Index of its instant.
+    instant: usize,
     /// Whether the derivative with respect to time is sampled.
     slope: bool,
 }
 
 /// The exactly equivalent lifted system of `problem`.
 pub(super) fn lift(problem: &Problem) -> Result<Lifted, DesignError> {
-    let instants = schedule(problem);
-    let delays: Vec<usize> = instants.iter().map(|instant| instant.delay).collect();
-    let undelayed = follow_state(problem, &instants)?;
+    let timeline = problem.timeline();
+    let delays = delays(&timeline);
+    let undelayed = follow_state(problem, &timeline, &samples(problem, &timeline))?;
     let ends = delays.iter().scan(undelayed.order(), |end, &delay| {
         *end += delay;
         Some(*end)
@@ -67,65 +66,52 @@ pub(super) fn lift(problem: &Problem) -> Result<Lifted, DesignError> {
 /// the measurements with respect to time, so -y' those with respect to the delays. Front ends of relative
 /// degree 1 have none: their slope contains the input itself, which is left out here.
 pub(super) fn lift_with_slopes(problem: &Problem) -> Result<(StateSpace, Vec<usize>), DesignError> {
-    let mut instants = schedule(problem);
-    let references = instants.split_off(problem.channels.len());
-    let slopes: Vec<SamplingInstant> =
-        instants.iter().map(|&instant| SamplingInstant { slope: true, ..instant }).collect();
-    instants.extend(slopes);
-    instants.extend(references);
-    let delays = instants.iter().map(|instant| instant.delay).collect();
-    Ok((follow_state(problem, &instants)?.compress_inputs(), delays))
+    let timeline = problem.timeline();
+    let mut samples = samples(problem, &timeline);
+    let slopes: Vec<Sample> =
+        samples[..problem.channels.len()].iter().map(|&sample| Sample { slope: true, ..sample }).collect();
+    let mut delays = delays(&timeline);
+    let at = problem.channels.len();
+    delays.splice(at..at, delays[..at].to_vec());
+    samples.splice(at..at, slopes);
+    Ok((follow_state(problem, &timeline, &samples)?.compress_inputs(), delays))
 }
 
-/// The instants of all outputs, the measurements first, relabelled so that the latest lies at the end of
-/// the period.
-fn schedule(problem: &Problem) -> Vec<SamplingInstant> {
-    let period = problem.ratio as f64;
-    let measurements = problem.channels.iter().map(|c| ((c.front_end, c.gain), -c.delay.0));
-    let target = (problem.target, 1.0);
-    let references = (0..problem.ratio).map(|p| (target, p as f64 - problem.latency as f64));
-    let times: Vec<((usize, f64), f64)> = measurements.chain(references).collect();
-    let latest = times.iter().map(|&(_, time)| time).fold(f64::NEG_INFINITY, f64::max);
-    let resolution = problem.resolution();
-    let scheduled = |&((front_end, gain), time): &((usize, f64), f64)| {
-        let (time, delay) = before_the_end(latest - time, period, resolution);
-        SamplingInstant { front_end, gain, time, delay, slope: false }
-    };
-    times.iter().map(scheduled).collect()
+/// The samples of all outputs, the measurements first.
+fn samples(problem: &Problem, timeline: &Timeline) -> Vec<Sample> {
+    let measured = problem.channels.iter().map(|channel| (channel.front_end, channel.gain));
+    let references = (0..problem.ratio).map(|_| (problem.target, 1.0));
+    let sample =
+        |(index, (front_end, gain))| Sample { front_end, gain, instant: timeline.of(index), slope: false };
+    measured.chain(references).enumerate().map(sample).collect()
 }
 
-/// The time in the slow period, and the whole slow periods of delay, of the instant that lies `age` fast
-/// periods before the end of the period.
-fn before_the_end(age: f64, period: f64, resolution: f64) -> (f64, usize) {
-    let nearest = (age / period).round();
-    if (age - nearest * period).abs() < resolution {
-        return (period, nearest as usize);
-    }
-    let delay = (age / period).floor();
-    (period - (age - delay * period), delay as usize)
+/// The whole slow periods by which each output is delayed in addition.
+fn delays(timeline: &Timeline) -> Vec<usize> {
+    timeline.delay_periods().iter().map(|&periods| periods as usize).collect()
 }
 
 /// Propagates the joint analog state through one period. The outputs of the returned system are the
 /// samples, without their delays by whole periods.
-fn follow_state(problem: &Problem, instants: &[SamplingInstant]) -> Result<StateSpace, DesignError> {
+fn follow_state(
+    problem: &Problem,
+    timeline: &Timeline,
+    samples: &[Sample],
+) -> Result<StateSpace, DesignError> {
     let joint = JointState::new(problem)?;
-    let mut order: Vec<usize> = (0..instants.len()).collect();
-    order.sort_by(|&i, &j| instants[i].time.total_cmp(&instants[j].time));
-    let mut rows = vec![(Mat::zeros(1, 0), Mat::zeros(1, 0)); instants.len()];
-    let (mut now, resolution) = (0.0, problem.resolution());
+    let mut rows = vec![(Mat::zeros(1, 0), Mat::zeros(1, 0)); samples.len()];
     let mut state = Mat::identity(joint.order(), joint.order());
     let mut input = Mat::zeros(joint.order(), 0);
-    for index in order {
-        let SamplingInstant { front_end, gain, time, slope, .. } = instants[index];
-        if time - now >= resolution {
-            (state, input) = joint.advance(&state, &input, time - now)?;
-            now = time;
+    let mut before = timeline.start();
+    for (instant, &now) in timeline.instants().iter().enumerate() {
+        (state, input) = joint.advance(&state, &input, now.since(before).0)?;
+        before = now;
+        for (row, sample) in rows.iter_mut().zip(samples).filter(|(_, sample)| sample.instant == instant) {
+            let outputs = if sample.slope { &joint.slopes } else { &joint.c };
+            let output = outputs.rows(sample.front_end, 1) * sample.gain;
+            *row = (&output * &state, &output * &input);
         }
-        let output = (if slope { &joint.slopes } else { &joint.c }).rows(front_end, 1) * gain;
-        rows[index] = (&output * &state, &output * &input);
     }
-    // The latest sample ends the period by construction; a remainder that is not resolved is ignored.
-    assert!(problem.ratio as f64 - now < resolution);
     let width = input.ncols();
     let (c, d): (Vec<Mat>, Vec<Mat>) =
         rows.into_iter().map(|(c, d)| (c, d.resize_horizontally(width, 0.0))).unzip();

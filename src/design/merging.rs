@@ -11,7 +11,6 @@ use super::problem::{Channel, Problem};
 use crate::linalg::{Mat, power_of_two};
 use crate::lti::gramian::controllability_root;
 use crate::spec::{Method, Spec};
-use crate::units::FastPeriods;
 
 /// Sizes of measurements within this factor of one are not changed: they lose no digits to one another.
 const USUAL_SIZE: f64 = 16.0;
@@ -102,27 +101,24 @@ impl Problem {
 
     fn repeats(&self, i: usize, j: usize, repeats: Repeats) -> bool {
         let (a, b) = (&self.channels[i], &self.channels[j]);
-        let apart = a.delay.0 - b.delay.0;
-        let period = self.ratio as f64;
-        let resolution = self.resolution();
-        let at_whole_periods = (apart - period * (apart / period).round()).abs() < resolution;
+        let apart = a.delay.periods_since(b.delay, self.ratio);
         let noisy = self.noise[i] > 0.0 || self.noise[j] > 0.0;
         let alike = match repeats {
             Repeats::Never => false,
-            Repeats::NoiselessAtWholePeriods if noisy => apart.abs() < resolution,
-            Repeats::NoiselessAtWholePeriods | Repeats::AtWholePeriods => at_whole_periods,
-            // Taps on both cost nothing, so only those that are meant to be one are.
-            Repeats::AtOneInstant => a.delay.periods_since(b.delay, FastPeriods(period)) == Some(0.0),
+            Repeats::NoiselessAtWholePeriods if noisy => apart == Some(0.0),
+            Repeats::NoiselessAtWholePeriods | Repeats::AtWholePeriods => apart.is_some(),
+            Repeats::AtOneInstant => apart == Some(0.0),
         };
         a.front_end == b.front_end && alike
     }
 
     /// The channels of `group` with the least delay.
     fn newest(&self, group: &[usize]) -> Vec<usize> {
-        let delay = |i: usize| self.channels[i].delay.0;
-        let least = group.iter().map(|&i| delay(i)).fold(f64::INFINITY, f64::min);
-        let resolution = self.resolution();
-        group.iter().copied().filter(|&i| delay(i) - least < resolution).collect()
+        let delay = |i: usize| self.channels[i].delay;
+        let least = group.iter().map(|&i| delay(i)).min_by(|a, b| a.compare(*b));
+        let is_least =
+            |&i: &usize| least.and_then(|least| delay(i).periods_since(least, self.ratio)) == Some(0.0);
+        group.iter().copied().filter(is_least).collect()
     }
 }
 
@@ -268,7 +264,7 @@ mod tests {
         let recursive = three.merge_channels(Repeats::AtWholePeriods);
         assert_eq!(shares(&recursive), [(0, 0.0), (1, 1.0), (0, 1.0)]);
         assert_eq!(recursive.representatives(), [2, 1]);
-        assert_eq!(recursive.problem.channels[0].delay.0, 0.3);
+        assert_eq!(recursive.problem.channels[0].delay.in_fast_periods().0, 0.3);
         // Taps reach only so far back, so an older sample adds to a newer one.
         assert!(three.merge_channels(Repeats::AtOneInstant).are_unchanged());
     }

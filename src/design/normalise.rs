@@ -21,7 +21,7 @@ impl Problem {
         };
         let (target, _) = intern(&mut front_ends, realise(&spec.target, &|| "target.filter".to_owned())?);
         let mut channels = Vec::with_capacity(spec.channels.len());
-        for (i, (channel, delay)) in spec.channels.iter().zip(spec.delays_in_fast_periods()).enumerate() {
+        for (i, (channel, delay)) in spec.channels.iter().zip(spec.delays()).enumerate() {
             let filter = realise(&channel.filter, &|| format!("filter of channel {}", i + 1))?;
             let (front_end, proportion) = intern(&mut front_ends, filter);
             let converter_gain = channel.gain;
@@ -29,7 +29,8 @@ impl Problem {
         }
         let scale = input_scale(spec, signal.as_ref(), &front_ends[target]);
         let noise = spec.channels.iter().map(|channel| channel.sample_noise().powi(2) * scale).collect();
-        let mut problem = Self { ratio: spec.ratio, latency, signal, front_ends, target, channels, noise };
+        let (fast_period, ratio) = (spec.fast_period, spec.ratio);
+        let mut problem = Self { fast_period, ratio, latency, signal, front_ends, target, channels, noise };
         problem.check_size()?;
         let jitter = problem.jitter_powers(spec)?;
         problem.noise.iter_mut().zip(jitter).for_each(|(power, jitter)| *power += jitter);
@@ -74,7 +75,7 @@ impl Problem {
         }
         let mut problem = Self::new(&moved, latency)?;
         for ((channel, delay), gain) in problem.channels.iter_mut().zip(&point.delays).zip(&point.gains) {
-            channel.delay += delay.in_fast_periods(spec.fast_period);
+            channel.delay = channel.delay.moved_by(delay.in_fast_periods(spec.fast_period));
             channel.gain *= 1.0 + gain;
             channel.converter_gain *= 1.0 + gain;
         }

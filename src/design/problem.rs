@@ -4,7 +4,7 @@ use super::DesignError;
 use crate::analog::{StableFilter, StrictlyProper};
 use crate::linalg::Complex;
 use crate::spec::Spec;
-use crate::units::{FastPeriods, RadiansPerFastPeriod};
+use crate::units::{FastPeriods, GridTime, RadiansPerFastPeriod, Seconds, Timeline};
 
 /// Maximum number of states of the delay chains of the lifted system. Its matrices are dense: at this size
 /// one matrix takes 128 MiB. A norm needs several of them, and its time grows with the cube of the states.
@@ -17,14 +17,12 @@ const KEPT_PERIODS: usize = 16;
 /// resolved: the difference of their samples has lost half of its digits or more, and a bank of large taps
 /// may gain by it what no computation in doubles shows.
 const DELAY_RESOLUTION: f64 = 1e-8;
-/// Instants closer than this (in fast periods) are one in the designer's arithmetic: what lies between them
-/// is lost in doubles. It is far below the resolution of any converter. Delays that are large enough for
-/// their rounding to exceed it are one within that.
-const UNRESOLVED: f64 = 1e-11;
 
 /// Front ends, delays and rates in units of the fast period (h = 1).
 #[derive(Debug, Clone)]
 pub struct Problem {
+    /// h: the grid of all instants.
+    pub fast_period: Seconds,
     /// M, the ratio of output rate to input rate.
     pub ratio: usize,
     /// The latency m0 in fast samples.
@@ -53,7 +51,7 @@ pub struct Channel {
     /// g_i, the converter's own gain.
     pub converter_gain: f64,
     /// D_i.
-    pub delay: FastPeriods,
+    pub delay: GridTime,
 }
 
 impl Problem {
@@ -61,7 +59,7 @@ impl Problem {
     /// neither the error nor the filters.
     pub(super) fn earlier(mut self, fast_periods: usize) -> Self {
         for channel in &mut self.channels {
-            channel.delay.0 -= fast_periods as f64;
+            channel.delay = channel.delay.later_by(-(fast_periods as f64));
         }
         self.latency -= fast_periods;
         self
@@ -81,7 +79,7 @@ impl Problem {
 
     /// The delays of the channels.
     pub fn delays(&self) -> Vec<FastPeriods> {
-        self.channels.iter().map(|channel| channel.delay).collect()
+        self.channels.iter().map(|channel| channel.delay.in_fast_periods()).collect()
     }
 
     /// Checks that the delay chains are not too long.
@@ -98,48 +96,44 @@ impl Problem {
         Err(DesignError::TooLate { latency, longest_delay, states, limit: MAX_CHAIN_STATES })
     }
 
+    /// The instants of the samples of one slow period: those of the channels, then those of the target.
+    pub(super) fn timeline(&self) -> Timeline {
+        let reference = |p: usize| GridTime::fast_sample(p as f64 - self.latency as f64, self.fast_period);
+        let sampled = self.channels.iter().map(|channel| channel.delay.negative());
+        Timeline::new(&sampled.chain((0..self.ratio).map(reference)).collect::<Vec<_>>(), self.ratio)
+    }
+
     /// States of all delay chains: one for each whole slow period by which a sample is older than the
     /// newest.
     pub(super) fn chain_states(&self) -> f64 {
-        let references = (0..self.ratio).map(|p| p as f64 - self.latency as f64);
-        let times: Vec<f64> =
-            self.channels.iter().map(|channel| -channel.delay.0).chain(references).collect();
-        let latest = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        times.into_iter().map(|time| ((latest - time) / self.ratio as f64).floor()).sum()
+        self.timeline().delay_periods().iter().sum()
     }
 
     /// Whether the delays of all channels with the same front end are equal or far enough apart for bounds
     /// that hold for all banks.
     pub(super) fn resolves_delays(&self) -> bool {
-        let period = FastPeriods(self.ratio as f64);
+        let resolved = |a: GridTime, b: GridTime| {
+            let (_, apart) = a.from_whole_periods(b, self.ratio);
+            a.periods_since(b, self.ratio).is_some() || apart.0.abs() >= DELAY_RESOLUTION
+        };
         self.channels.iter().enumerate().all(|(i, a)| {
-            self.channels[..i].iter().filter(|b| b.front_end == a.front_end).all(|b| {
-                let apart = a.delay - b.delay;
-                let from_whole_periods = (apart - period * (apart / period).round()).0.abs();
-                a.delay.periods_since(b.delay, period).is_some() || from_whole_periods >= DELAY_RESOLUTION
-            })
+            let mut alike = self.channels[..i].iter().filter(|b| b.front_end == a.front_end);
+            alike.all(|b| resolved(a.delay, b.delay))
         })
-    }
-
-    /// Instants closer than this, in fast periods, are one in the designer's arithmetic.
-    pub(super) fn resolution(&self) -> f64 {
-        let most =
-            FastPeriods(self.delays().iter().map(|delay| delay.0.abs()).fold(self.latency as f64, f64::max));
-        UNRESOLVED.max(most.rounding_of_difference(most).0)
     }
 
     /// The same problem with `errors[i]` added to the delays.
     pub fn with_delay_errors(&self, errors: &[FastPeriods]) -> Self {
         let mut moved = self.clone();
         for (channel, &error) in moved.channels.iter_mut().zip(errors) {
-            channel.delay += error;
+            channel.delay = channel.delay.moved_by(error);
         }
         moved
     }
 
     /// The largest delay.
     pub fn longest_delay(&self) -> FastPeriods {
-        FastPeriods(self.channels.iter().map(|channel| channel.delay.0).fold(0.0, f64::max))
+        FastPeriods(self.delays().iter().map(|delay| delay.0).fold(0.0, f64::max))
     }
 }
 

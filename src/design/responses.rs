@@ -6,7 +6,7 @@ use super::problem::{Channel, Problem};
 use super::{DesignError, LiftedPlant, filters};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::linalg::{self, Complex, Mat};
-use crate::units::{FastPeriods, Hertz, RadiansPerFastPeriod, RadiansPerSlowPeriod};
+use crate::units::{GridTime, Hertz, RadiansPerFastPeriod, RadiansPerSlowPeriod};
 use std::f64::consts::{PI, TAU};
 
 /// Energy of a recursive filter's response beyond which it counts as over, relative to all of it.
@@ -97,7 +97,8 @@ fn over_frequencies(bank: &Bank, points: usize, gains: impl Fn(f64) -> Vec<f64>)
 pub fn analysis_gains(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Vec<f64>)>, DesignError> {
     let problem = bank_problem(bank)?;
     // Delays change the phase only, and noise is none of the front ends'.
-    let undelayed = |channel: &Channel| Channel { delay: FastPeriods(0.0), ..*channel };
+    let delay = GridTime::fast_sample(0.0, problem.fast_period);
+    let undelayed = |channel: &Channel| Channel { delay, ..*channel };
     let channels: Vec<Channel> = problem.channels.iter().map(undelayed).collect();
     let noise = vec![0.0; channels.len()];
     let plant = LiftedPlant::new(&Problem { ratio: 1, latency: 0, channels, noise, ..problem })?;

@@ -5,7 +5,7 @@ use super::problem::{Problem, common_delay};
 use crate::analog::{SignalFilter, resolved_band};
 use crate::quantity::readable;
 use crate::spec::{Band, FilterSpec, Passband, Spec};
-use crate::units::{FastPeriods, Hertz, RadiansPerFastPeriod};
+use crate::units::{Hertz, RadiansPerFastPeriod};
 use std::f64::consts::{PI, TAU};
 
 /// Bandwidths below this share of the output's Nyquist frequency are implausible.
@@ -143,7 +143,7 @@ fn remedy(filter: &FilterSpec, edge: Hertz) -> &'static str {
 /// The first pair of channels whose samples nearly coincide.
 fn same_instants(problem: &Problem) -> Option<String> {
     let period = problem.ratio as f64;
-    let phase = |i: usize| problem.channels[i].delay.0.rem_euclid(period);
+    let phase = |i: usize| problem.channels[i].delay.in_fast_periods().0.rem_euclid(period);
     let mut order: Vec<usize> = (0..problem.channels.len()).collect();
     order.sort_by(|&i, &j| phase(i).total_cmp(&phase(j)).then(i.cmp(&j)));
     let pairs = order.iter().copied().zip(order.iter().copied().cycle().skip(1));
@@ -154,10 +154,10 @@ fn same_instants(problem: &Problem) -> Option<String> {
     let near = pairs.filter(|&(i, j)| i != j && apart(i, j) < SAME_SAMPLES);
     let (i, j) = near.min_by_key(|&(i, j)| (i.min(j), i.max(j)))?;
     let [a, b] = [i, j].map(|i| problem.channels[i].delay);
-    let distance = if a.periods_since(b, FastPeriods(period)).is_some() {
+    let distance = if a.periods_since(b, problem.ratio).is_some() {
         "at one instant".to_owned()
     } else {
-        format!("{:.1e} fast periods apart", apart(i, j))
+        format!("{:.1e} fast periods apart", a.from_whole_periods(b, problem.ratio).1.0.abs())
     };
     Some(format!(
         "channels {} and {} sample {distance} modulo the slow period: in a bank with enough taps or states such channels \
@@ -168,9 +168,8 @@ fn same_instants(problem: &Problem) -> Option<String> {
 }
 
 fn long_span(problem: &Problem) -> Option<String> {
-    let delays = problem.channels.iter().map(|channel| channel.delay.0);
-    let least = delays.clone().fold(f64::INFINITY, f64::min);
-    let span = delays.fold(0.0, f64::max) - least;
+    let least = problem.delays().iter().map(|delay| delay.0).fold(f64::INFINITY, f64::min);
+    let span = problem.longest_delay().0 - least;
     let ratio = problem.ratio;
     (span >= ratio as f64).then(|| {
         format!(

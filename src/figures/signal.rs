@@ -117,7 +117,7 @@ impl Signal {
             let passed: Vec<Complex<f64>> =
                 filters.clone().map(|i| self.problem.response(i, RadiansPerFastPeriod(w)) * size).collect();
             for (i, channel) in channels.iter().enumerate() {
-                let delayed = Complex::from_polar(channel.gain, -w * channel.delay.0);
+                let delayed = Complex::from_polar(channel.gain, -w * channel.delay.in_fast_periods().0);
                 measurement[(i, k)] = passed[channel.front_end] * delayed;
             }
             for p in 0..*ratio {

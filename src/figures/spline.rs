@@ -43,8 +43,8 @@ impl Spline {
             .iter()
             .enumerate()
             .map(|(channel, of)| {
-                let frames = (-of.delay.0 / period).floor();
-                (-of.delay.0 - frames * period, Sample { channel, lag: frames })
+                let (lag, phase) = of.delay.negative().in_slow_period(problem.ratio);
+                (phase.in_fast_periods().0, Sample { channel, lag })
             })
             .collect();
         taken.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -60,7 +60,8 @@ impl ToneResponse {
         let passed: Vec<Complex<f64>> =
             front_ends.iter().map(|filter| filter.response(RadiansPerFastPeriod(w))).collect();
         let samples = channels.iter().map(|channel| {
-            passed[channel.front_end] * Complex::from_polar(channel.gain, -w * channel.delay.0)
+            passed[channel.front_end]
+                * Complex::from_polar(channel.gain, -w * channel.delay.in_fast_periods().0)
         });
         let phases =
             self.filters.at(w * *ratio as f64) * nalgebra::DVector::from_iterator(channels.len(), samples);

@@ -46,7 +46,7 @@ pub fn recordings<'a>(
 ) -> impl Iterator<Item = Vec<f64>> + 'a {
     let slow = move |channel: &Channel| {
         let step = FastPeriods(problem.ratio as f64);
-        let instants = Instants { first: -channel.delay, step, count: periods };
+        let instants = Instants { first: -channel.delay.in_fast_periods(), step, count: periods };
         let samples = signal.filtered(&problem.front_ends[channel.front_end], instants);
         samples.into_iter().map(|sample| channel.gain * sample).collect()
     };

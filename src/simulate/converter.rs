@@ -102,7 +102,7 @@ impl Converter {
         let Problem { ratio, channels, front_ends, .. } = problem;
         let front_end = &front_ends[channels[channel].front_end];
         let instants = Instants {
-            first: -(channels[channel].delay + self.delay_error),
+            first: -(channels[channel].delay.in_fast_periods() + self.delay_error),
             step: FastPeriods(*ratio as f64 / (1.0 + self.drift)),
             count: periods,
         };

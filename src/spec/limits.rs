@@ -46,13 +46,6 @@ const MAX_GAIN: f64 = 1e6;
 /// Fast periods in seconds, and rates in hertz: rates and squares still fit a double.
 const FAST_PERIODS: RangeInclusive<f64> = 1e-100..=1e100;
 
-/// D / h, exactly whole where it is whole up to rounding: the fraction would become a channel state of size
-/// 1e-16.
-pub fn delay_in_fast_periods(delay: Seconds, fast_period: Seconds) -> FastPeriods {
-    let periods = delay.in_fast_periods(fast_period);
-    periods.periods_since(FastPeriods(0.0), FastPeriods(1.0)).map_or(periods, FastPeriods)
-}
-
 pub(super) fn range(value: f64, unit: &'static str, rule: impl Into<String>) -> SpecProblem {
     SpecProblem::Range { value, unit, rule: rule.into() }
 }
@@ -201,36 +194,4 @@ pub(crate) fn check_gamma_margin(gamma_margin: f64) -> Result<(), SpecProblem> {
          0.01 is one per cent"
     );
     within(gamma_margin, 0.0..=MAX_GAMMA_MARGIN, "(relative)", rule)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        /// A spec may give the delay k h as the rounded product: it must come back as k.
-        #[test]
-        fn whole_delays_are_whole_in_any_unit(periods in 0u32..65_536, decade in -99.0..99.0f64) {
-            let h = Seconds(10f64.powf(decade));
-            let delay = FastPeriods(periods.into()).in_seconds(h);
-            prop_assert_eq!(delay_in_fast_periods(delay, h), FastPeriods(periods.into()));
-        }
-
-        /// A fraction that is more than rounding stays.
-        #[test]
-        fn fractions_stay(periods in 1u32..1000, fraction in 1e-9..0.5f64, decade in -9.0..9.0f64) {
-            let h = Seconds(10f64.powf(decade));
-            let delay = FastPeriods(f64::from(periods) + fraction);
-            let back = delay_in_fast_periods(delay.in_seconds(h), h);
-            prop_assert!((back / delay - 1.0).abs() < 1e-15 && back.0.fract() != 0.0);
-        }
-    }
-
-    #[test]
-    fn three_tenths_of_a_second_are_three_periods() {
-        let h = Seconds(0.1);
-        assert_eq!(delay_in_fast_periods(h * 3.0, h), FastPeriods(3.0));
-        assert_eq!(delay_in_fast_periods(Seconds(0.0), h), FastPeriods(0.0));
-    }
 }

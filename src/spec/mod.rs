@@ -26,7 +26,7 @@ pub(crate) use error::{Fault, shown_path};
 pub use error::{Location, SpecError, SpecProblem};
 pub use filter::{Family, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use filter_problem::{FilterProblem, MAX_ORDER};
-pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
+pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES, MAX_TARGET_SNR_DB};
 pub(crate) use limits::{check_gain, check_offset};
 #[cfg(feature = "cli")]
@@ -39,7 +39,7 @@ pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
 use crate::quantity::{self, FullScale};
-use crate::units::{FastPeriods, Seconds};
+use crate::units::{FastPeriods, GridTime, Seconds};
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// A spec with the units resolved (seconds) and the omitted channel filters filled in.
@@ -228,20 +228,14 @@ impl Spec {
         self.fast_period == Seconds(1.0)
     }
 
-    /// D_i / h of every channel. Delays that are whole, one, or whole slow periods apart up to rounding are
-    /// exactly so.
+    /// D_i of every channel.
+    pub fn delays(&self) -> Vec<GridTime> {
+        self.channels.iter().map(|channel| GridTime::new(channel.delay, self.fast_period)).collect()
+    }
+
+    /// D_i / h of every channel.
     pub fn delays_in_fast_periods(&self) -> Vec<FastPeriods> {
-        let period = FastPeriods(self.ratio as f64);
-        let rounded = |channel: &ChannelSpec| delay_in_fast_periods(channel.delay, self.fast_period);
-        let mut delays: Vec<FastPeriods> = self.channels.iter().map(rounded).collect();
-        // The short ones have the most digits.
-        let mut order: Vec<usize> = (0..delays.len()).collect();
-        order.sort_by(|&i, &k| delays[i].0.abs().total_cmp(&delays[k].0.abs()));
-        for (count, &i) in order.iter().enumerate() {
-            let later = |&k: &usize| Some(delays[k] + period * delays[i].periods_since(delays[k], period)?);
-            delays[i] = order[..count].iter().find_map(later).unwrap_or(delays[i]);
-        }
-        delays
+        self.delays().into_iter().map(GridTime::in_fast_periods).collect()
     }
 }
 

@@ -6,7 +6,7 @@ use super::causal::{CausalPlant, Precision, Recursion};
 use super::error_system::{self, BlockForm, ErrorSystem};
 use super::front_ends::FrontEnds;
 use super::slow_period::SlowPeriod;
-use super::timeline::{SamplingInstant, Timeline};
+use super::timeline::{SamplingInstant, delay_periods, timeline};
 use super::{
     BoundedBanks, MAX_STATES, Strictness, Verified, VerifyError, fir_length, lower, positive, spectrum,
     statements, upper,
@@ -16,6 +16,7 @@ use crate::bank::{
     Bank, CausalWitness, Certificate, DualWitness, Gamma, LowerProof, Proof, SynthesisFilters,
 };
 use crate::linalg::Mat;
+use crate::units::Timeline;
 use std::sync::OnceLock;
 
 /// Maximum number of states of an error system whose certificate is checked in 512 bits: some seconds of
@@ -61,9 +62,8 @@ impl<'a> EnclosedErrorSystem<'a> {
         let (front_ends, samples) = FrontEnds::new(bank)?;
         front_ends.check_work(samples.len())?;
         let analog = front_ends.order();
-        let fast_period = bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period);
-        let timeline = Timeline::new(&samples, fast_period, bank.ratio)?;
-        let states = error_system::order(analog, timeline.delay_periods(), &bank.filters, bank.ratio);
+        let timeline = timeline(&samples, bank.ratio)?;
+        let states = error_system::order(analog, &delay_periods(&timeline), &bank.filters, bank.ratio);
         if states > MAX_STATES {
             return Err(VerifyError::TooLarge { states });
         }
@@ -97,16 +97,10 @@ impl<'a> EnclosedErrorSystem<'a> {
 
     /// Whole slow periods by which sample `j` is taken before sample `i`, if the two are multiples of each
     /// other up to that delay.
-    ///
-    /// Instants count as whole periods apart if they are so up to the rounding of the delays to doubles
-    /// ([`Timeline::resolution`]). A bank that told them apart would need coefficients as large as the
-    /// reciprocal of that.
     fn periods_between(&self, i: usize, j: usize) -> Option<f64> {
         let (a, b) = (self.samples[i], self.samples[j]);
-        let apart = self.timeline.between(b.time, a.time);
-        let periods = (apart / self.bank.ratio as f64).round();
-        let rest = (apart - periods * self.bank.ratio as f64).abs();
-        (a.filter == b.filter && rest <= self.timeline.resolution(a.time, b.time).0).then_some(periods)
+        let periods = a.time.periods_since(b.time, self.bank.ratio);
+        periods.filter(|_| a.filter == b.filter)
     }
 
     /// Whether two samples are always multiples of each other.
@@ -135,8 +129,8 @@ impl<'a> EnclosedErrorSystem<'a> {
     /// to whole slow periods, only the newest.
     fn newest_samples(&self) -> Vec<usize> {
         let mut rows: Vec<usize> = (self.bank.ratio..self.samples.len()).collect();
-        let delay = |s: usize| self.samples[s].time.delay.0;
-        rows.sort_by(|&i, &j| delay(i).total_cmp(&delay(j)));
+        let time = |s: usize| self.samples[s].time;
+        rows.sort_by(|&i, &j| time(j).compare(time(i)));
         let mut kept: Vec<usize> = Vec::new();
         for row in rows {
             if kept.iter().all(|&newer| !self.same_later(newer, row)) {

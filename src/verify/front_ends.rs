@@ -2,13 +2,13 @@
 //! enclosed.
 
 use super::ball::{self, Ball, Matrix};
-use super::timeline::{Instant, SamplingInstant};
+use super::timeline::SamplingInstant;
 use super::{MAX_ANALOG_STATES, MAX_WORK, VerifyError};
 use crate::analog::{Realisation, SignalFilter, StrictlyProper, enclosed, proportion, signal};
 use crate::arithmetic::{BigFloat, Number};
 use crate::bank::Bank;
 use crate::spec::FilterSpec;
-use crate::units::Seconds;
+use crate::units::GridTime;
 
 /// State equations of a filter.
 pub(super) type Equations = Realisation<Ball<BigFloat>>;
@@ -61,13 +61,13 @@ impl FrontEnds {
             Ok((seen.len() - 1, Ball::from(1.0)))
         };
         let (target, gain) = index(&spec.target, &|| "spec.target.filter".to_owned())?;
-        let reference = |p: usize| Instant { whole: p as f64 - bank.latency as f64, delay: Seconds(0.0) };
+        let reference = |p: usize| GridTime::fast_sample(p as f64 - bank.latency as f64, h);
         let mut samples: Vec<SamplingInstant> = (0..bank.ratio)
             .map(|p| SamplingInstant { filter: target, gain, converter_gain: 1.0, time: reference(p) })
             .collect();
         for (i, channel) in spec.channels.iter().enumerate() {
             let (filter, gain) = index(&channel.filter, &|| format!("spec.channel[{i}].filter"))?;
-            let time = Instant { whole: 0.0, delay: channel.delay };
+            let time = GridTime::new(channel.delay, h).negative();
             samples.push(SamplingInstant { filter, gain, converter_gain: channel.gain, time });
         }
         Ok((all, samples))

@@ -9,8 +9,9 @@
 use super::ball::{self, Matrix};
 use super::front_ends::FrontEnds;
 use super::state_transition::{StateTransition, state_transition};
-use super::timeline::{SamplingInstant, Timeline};
+use super::timeline::{SamplingInstant, between, delay_periods};
 use crate::arithmetic::{DoubleDouble, Number};
+use crate::units::{GridTime, Timeline};
 
 /// x+ = transition x + w, and for each sample s: s = outputs x + v, counted `delay_periods` slow periods
 /// later.
@@ -30,8 +31,9 @@ impl<F: Number> SlowPeriod<F> {
     /// Follows `front_ends` through the period of `timeline` with `samples`.
     pub(super) fn new(front_ends: &FrontEnds, timeline: &Timeline, samples: &[SamplingInstant]) -> Self {
         let (a, b) = front_ends.dynamics();
-        let since_start: Vec<StateTransition<F>> =
-            (0..timeline.len()).map(|k| state_transition(&a, &b, timeline.since_start(k))).collect();
+        let instants = timeline.instants();
+        let from_start = |&time| state_transition(&a, &b, between(timeline.start(), time));
+        let since_start: Vec<StateTransition<F>> = instants.iter().map(from_start).collect();
         let rows: Vec<Matrix<F>> = samples.iter().map(|sample| front_ends.output(sample)).collect();
         let n = front_ends.order();
         let mut outputs = ball::zeros(samples.len(), n);
@@ -42,11 +44,10 @@ impl<F: Number> SlowPeriod<F> {
         let end = &since_start[since_start.len() - 1];
         let mut gram = ball::zeros(n + samples.len(), n + samples.len());
         gram.view_mut((0, 0), (n, n)).copy_from(&end.gramian);
-        let between: Vec<Matrix<F>> = (1..timeline.len())
-            .map(|k| state_transition(&a, &b, timeline.since_previous(k)).transition)
-            .collect();
+        let transition = |pair: &[GridTime]| state_transition(&a, &b, between(pair[0], pair[1])).transition;
+        let between: Vec<Matrix<F>> = instants.windows(2).map(transition).collect();
         correlate(&mut gram, timeline, &since_start, &between, &rows);
-        let delay_periods = timeline.delay_periods().to_vec();
+        let delay_periods = delay_periods(timeline);
         Self { transition: end.transition.clone(), outputs, gram: ball::symmetric(&gram), delay_periods }
     }
 
@@ -74,7 +75,7 @@ fn correlate<F: Number>(
     for (b, row) in rows.iter().enumerate() {
         // Covariance of the state at a later instant with sample b.
         let mut common = ball::product_transposed(&since_start[timeline.of(b)].gramian, row);
-        for k in timeline.of(b)..timeline.len() {
+        for k in timeline.of(b)..timeline.instants().len() {
             if k > timeline.of(b) {
                 common = ball::product(&between[k - 1], &common);
             }

@@ -144,7 +144,11 @@ fn a_large_noise_gain_is_warned_of_and_unresolved_delays_have_no_bounds() {
     let (_, message) = designed(1e-4);
     assert!(message.contains("warning: noise gain") && message.contains("rounding of f32"), "{message}");
     let (report, message) = designed(3e-12);
-    assert!(message.contains("channels 1 and 2 sample 3.0e-12") && message.lines().count() == 1, "{message}");
+    // They are two instants, however near.
+    assert!(
+        message.contains("channels 1 and 2 sample 3.0e-12") && message.contains("noise gain"),
+        "{message}"
+    );
     // A bound may still be proven, but none is computed.
     assert!(report.contains("proven     [") || report.contains("lower      unknown (two delays"), "{report}");
 }

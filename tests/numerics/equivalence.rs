@@ -13,7 +13,7 @@ use hybank::design::problem::{Channel, Problem};
 use hybank::linalg::{Mat, singular_values};
 use hybank::simulate::{Instants, Source, sample};
 use hybank::spec::{Family, FilterSpec, Passband};
-use hybank::units::{FastPeriods, Hertz, Seconds};
+use hybank::units::{FastPeriods, GridTime, Hertz, Seconds};
 
 struct Case {
     problem: Problem,
@@ -30,6 +30,7 @@ fn tf(num: &[f64], den: &[f64]) -> FilterSpec {
 
 fn case(ratio: usize, latency: usize, front_ends: &[FilterSpec], channels: &[(usize, f64)]) -> Case {
     let problem = Problem {
+        fast_period: Seconds(1.0),
         ratio,
         latency,
         signal: None,
@@ -41,7 +42,7 @@ fn case(ratio: usize, latency: usize, front_ends: &[FilterSpec], channels: &[(us
                 front_end,
                 gain: 1.0,
                 converter_gain: 1.0,
-                delay: FastPeriods(delay),
+                delay: GridTime::new(Seconds(delay), Seconds(1.0)),
             })
             .collect(),
         noise: vec![0.0; channels.len()],
@@ -73,7 +74,7 @@ fn pulse_errors(case: &Case, frames: usize, fineness: usize) -> Mat {
     let reference = responses(case.problem.target, -(latency as f64));
     let mut errors = Mat::from_fn(frames * ratio, columns, |n, c| pulse(&reference, n * fineness, c));
     for (channel, taps) in case.problem.channels.iter().zip(&case.taps) {
-        let table = responses(channel.front_end, -channel.delay.0);
+        let table = responses(channel.front_end, -channel.delay.in_fast_periods().0);
         for n in 0..frames * ratio {
             for k in 0..=n / ratio {
                 let Some(tap) = taps.get(n - k * ratio) else { continue };

@@ -1,6 +1,6 @@
 //! The ready specs and banks in `filters/`: each spec designs, each bank keeps its promise.
 
-use hybank::bank::Bank;
+use hybank::bank::{Bank, Gamma};
 use hybank::design::{Options, analyze, certify, design};
 use hybank::spec::Spec;
 use std::fs;
@@ -53,10 +53,10 @@ fn a_fresh_design_agrees() {
         // `verify` proves the bounds of the files. The search for a proof of one of them takes 15 s.
         let designed = design(&spec, &Options::without_proof()).unwrap().bank.gamma;
         let values = [(designed.norm, bank.gamma.norm), (designed.noncausal, bank.gamma.noncausal)];
-        assert!(
-            designed.upper >= bank.gamma.norm && designed.lower <= bank.gamma.norm,
-            "{name}: {designed:?}"
-        );
+        let (norm, lower) = (bank.gamma.norm.unwrap(), designed.lower.unwrap());
+        assert!(designed.upper.unwrap() >= norm, "{name}: {designed:?}");
+        // Without a proof it has the accuracy of a norm.
+        assert!(lower <= norm * (1.0 + Gamma::NORM_ACCURACY), "{name}: {designed:?}");
         for (now, then) in values {
             let (now, then) = (now.unwrap(), then.unwrap());
             assert!((now / then - 1.0).abs() < 1e-6, "{name}: {now} instead of {then}");

@@ -14,6 +14,7 @@ mod golden;
 mod hard_designs;
 mod integer_taps;
 mod latency;
+mod near_instants;
 mod nearly_equal_delays;
 mod random_plants;
 mod reduction;

@@ -39,7 +39,11 @@ impl OnePole {
     /// |K|^2 = g_v |1 + e e^{-w (1 - d)} z^-1 / (1 - E z^-1)|^2 + g_u |e / (1 - E z^-1)|^2.
     fn norm(&self) -> f64 {
         let w = self.pole;
-        let d = ((self.latency as f64).mul_add(-self.fast_period, self.delay) / self.fast_period).abs();
+        let latency = self.latency as f64;
+        // The double nearest to a whole number of fast periods means that number.
+        let is_whole = self.delay == latency * self.fast_period;
+        let apart = if is_whole { 0.0 } else { latency.mul_add(-self.fast_period, self.delay) };
+        let d = (apart / self.fast_period).abs();
         let (g_v, g_u) = (-0.5 * w * (-2.0 * w * d).exp_m1(), -0.5 * w * (-2.0 * w * (1.0 - d)).exp_m1());
         let (decay, change, between) = ((-w).exp(), (-w * d).exp_m1(), (-w * (1.0 - d)).exp());
         let square = |angle: f64| {

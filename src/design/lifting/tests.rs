@@ -6,7 +6,7 @@ use crate::analog::StrictlyProper;
 use crate::design::problem::Channel;
 use crate::lti::gramian::controllability_root;
 use crate::spec::FilterSpec;
-use crate::units::{FastPeriods, Seconds};
+use crate::units::{GridTime, Seconds};
 
 fn one_pole(poles: &[f64], ratio: usize, latency: usize, channels: &[(usize, f64)]) -> Problem {
     let filter = |a: &f64| {
@@ -14,6 +14,7 @@ fn one_pole(poles: &[f64], ratio: usize, latency: usize, channels: &[(usize, f64
         StrictlyProper::new(&spec, Seconds(1.0)).unwrap()
     };
     Problem {
+        fast_period: Seconds(1.0),
         ratio,
         latency,
         signal: None,
@@ -25,7 +26,7 @@ fn one_pole(poles: &[f64], ratio: usize, latency: usize, channels: &[(usize, f64
                 front_end,
                 gain: 1.0,
                 converter_gain: 1.0,
-                delay: FastPeriods(delay),
+                delay: GridTime::new(Seconds(delay), Seconds(1.0)),
             })
             .collect(),
         noise: vec![0.0; channels.len()],
@@ -40,14 +41,15 @@ fn problems() -> Vec<Problem> {
         // Delayed by whole periods, at the border of a period, and longer than the latency.
         one_pole(&[0.1, 4.0], 2, 0, &[(0, 0.0), (1, 4.0), (0, 7.3)]),
         one_pole(&[0.7], 4, 13, &[(0, 0.25), (0, 0.25), (0, 9.0)]),
-        // Equal up to rounding.
+        // One rounding apart.
         one_pole(&[1.0], 2, 5, &[(0, 0.1 + 0.2), (0, 0.3)]),
     ]
 }
 
 /// (front end, time in fast periods) of the measurements, then the references, of one period.
 fn instants(problem: &Problem) -> Vec<(usize, f64)> {
-    let measurements = problem.channels.iter().map(|channel| (channel.front_end, -channel.delay.0));
+    let measurements =
+        problem.channels.iter().map(|channel| (channel.front_end, -channel.delay.in_fast_periods().0));
     let references = (0..problem.ratio).map(|p| (problem.target, p as f64 - problem.latency as f64));
     measurements.chain(references).collect()
 }
@@ -101,9 +103,16 @@ fn chains_are_read_at_their_ends() {
     }
 }
 
+/// E[(y_1 - y_2)^2] = a (1 - e^{-a t}) for one pole a sampled at two instants so short a time t apart.
 #[test]
-fn instants_that_differ_by_rounding_are_one() {
-    let same = lift(&one_pole(&[1.0], 2, 5, &[(0, 0.1 + 0.2), (0, 0.3)])).unwrap().system;
-    assert_eq!(same.c().row(0), same.c().row(1));
-    assert_eq!(same.d().row(0), same.d().row(1));
+fn instants_one_rounding_apart_are_two() {
+    for (pole, latency, late, near) in [(1.0, 2, 0.1 + 0.2, 0.3), (1e6, 60_001, 60_000.000000005, 60_000.0)] {
+        let system = lift(&one_pole(&[pole], 2, latency, &[(0, late), (0, near)])).unwrap().system;
+        let root = controllability_root(system.a(), system.b()).unwrap();
+        let state = (system.c().row(0) - system.c().row(1)) * root;
+        let input = system.d().row(0) - system.d().row(1);
+        let found = state.norm_squared() + input.norm_squared();
+        let want = -pole * (-pole * (late - near)).exp_m1();
+        assert!((found / want - 1.0).abs() < 1e-9, "{found} {want}");
+    }
 }

@@ -78,7 +78,7 @@ impl<'a> Samples<'a> {
 
     fn pair(&self, averaged: &Averaged<'_>, i: usize, k: usize, lag: i64) -> f64 {
         let (a, b) = (&self.problem.channels[i], &self.problem.channels[k]);
-        let later = lag as f64 * self.problem.ratio as f64 - a.delay.0 + b.delay.0;
+        let later = b.delay.later_by(lag as f64 * self.problem.ratio as f64).since(a.delay).0;
         let common = if i == k { 1.0 + self.deviations[i].gain.powi(2) } else { 1.0 };
         a.gain * b.gain * common * averaged.at(a.front_end, b.front_end, later)
     }
@@ -96,8 +96,8 @@ impl<'a> Samples<'a> {
         for (i, channel) in self.problem.channels.iter().enumerate() {
             let averaged = self.covariances.averaged(self.deviations[i].delay);
             for j in 0..frames {
-                let sampled = -(j as f64) * self.problem.ratio as f64 - channel.delay.0;
-                let later = instant as f64 - sampled;
+                let later = channel.delay.later_by((j * self.problem.ratio) as f64 + instant as f64);
+                let later = later.in_fast_periods().0;
                 all[j * channels + i] =
                     channel.gain * averaged.at(self.problem.target, channel.front_end, later);
             }

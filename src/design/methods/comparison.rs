@@ -6,7 +6,7 @@ use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::design::problem::{Channel, Problem};
 use crate::sampling::Recurrent;
-use crate::units::FastPeriods;
+use crate::units::{FastPeriods, GridTime};
 
 /// Yen's interpolation of the recurrent nonuniform samples, for ideal front ends and the gains of the
 /// converters, truncated to `settings.taps` taps per channel.
@@ -19,7 +19,7 @@ pub(crate) fn sinc(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis
     if channels != ratio {
         return Err(DesignError::SincNeedsNyquist { channels, ratio });
     }
-    let offsets: Vec<f64> = problem.channels.iter().map(|channel| -channel.delay.0).collect();
+    let offsets: Vec<f64> = problem.delays().iter().map(|delay| -delay.0).collect();
     let sets = Recurrent::new(&offsets, ratio)?;
     let taps = |i: usize| {
         let mut taps = sets.taps(i, problem.latency as f64, settings.taps);
@@ -64,7 +64,8 @@ fn on_grid(problem: &Problem, grid: &[usize], split: &Split) -> Problem {
     let mut on_grid = problem.clone();
     on_grid.latency -= split.periods * problem.ratio;
     for (channel, &delay) in on_grid.channels.iter_mut().zip(grid) {
-        *channel = Channel { delay: FastPeriods(delay as f64), gain: 1.0, converter_gain: 1.0, ..*channel };
+        let delay = GridTime::fast_sample(delay as f64, problem.fast_period);
+        *channel = Channel { delay, gain: 1.0, converter_gain: 1.0, ..*channel };
     }
     on_grid
 }
@@ -77,14 +78,19 @@ fn alone(slow: &Problem, i: usize, shift: FastPeriods, latency: usize) -> Proble
         ratio: 1,
         latency,
         target: channel.front_end,
-        channels: vec![Channel { delay: channel.delay - shift, gain: 1.0, converter_gain: 1.0, ..channel }],
+        channels: vec![Channel {
+            delay: channel.delay.moved_by(-shift),
+            gain: 1.0,
+            converter_gain: 1.0,
+            ..channel
+        }],
         ..slow.clone()
     }
 }
 
 /// Whole fast samples that all channels are late: they delay the result, and no filter undoes them.
 fn common_delay(problem: &Problem) -> usize {
-    let least = problem.channels.iter().map(|channel| channel.delay.0).fold(f64::INFINITY, f64::min);
+    let least = problem.delays().iter().map(|delay| delay.0).fold(f64::INFINITY, f64::min);
     least.max(0.0) as usize
 }
 
@@ -116,7 +122,7 @@ fn grid_delays(problem: &Problem) -> Vec<usize> {
     let mut taken = vec![false; problem.ratio];
     let common = common_delay(problem);
     let chosen = |channel: &Channel| {
-        let chosen = nearest(channel.delay.0 - common as f64, &taken);
+        let chosen = nearest(channel.delay.in_fast_periods().0 - common as f64, &taken);
         taken[chosen % problem.ratio] = true;
         common + chosen
     };

@@ -72,17 +72,21 @@ fn whole_delays_stay_whole_at_every_rate() {
     for rate in [1.0, 3.0, 10.0, 44.1e3, 96e3, 1e9, 7.77e11] {
         for samples in 0..200 {
             let (h, whole) = (Hertz(rate).period(), FastPeriods(f64::from(samples)));
-            assert_eq!(delay_in_fast_periods(whole.in_seconds(h), h), whole, "{rate} Hz");
+            assert_eq!(GridTime::new(whole.in_seconds(h), h).in_fast_periods(), whole, "{rate} Hz");
         }
     }
     // So do distances of whole slow periods between long delays, where an ulp is more than 1e-11.
     let text = thesis_with("fast_period = 1.0", "fast_rate = 44_100")
         .replace("delay = 1.2", "delay_samples = 60000.3")
         .replace("delay = 0.6", "delay_samples = 65000.3");
-    let delays = read(&text).delays_in_fast_periods();
-    assert_eq!(delays[1].0 - delays[0].0, 5000.0);
+    let delays = read(&text).delays();
+    assert_eq!(delays[1].periods_since(delays[0], 2), Some(2500.0));
     // A fraction that is meant is kept.
-    assert_eq!(delay_in_fast_periods(Seconds(3.0 + 1e-9), Seconds(1.0)), FastPeriods(3.0 + 1e-9));
+    let meant = GridTime::new(Seconds(3.0 + 1e-9), Seconds(1.0));
+    assert_eq!(
+        (meant.in_fast_periods(), meant.periods_since(GridTime::fast_sample(3.0, Seconds(1.0)), 1)),
+        (FastPeriods(3.0 + 1e-9), None)
+    );
 }
 
 #[test]

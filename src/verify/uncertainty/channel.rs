@@ -106,7 +106,7 @@ impl Channel {
             gain: errors.gains[i],
             half: errors.delays[i].in_fast_periods(fast_period).0,
             like: i,
-            delay: grid.samples[first].time.delay.in_fast_periods(fast_period).0.abs(),
+            delay: grid.samples[first].time.in_fast_periods().0.abs(),
         }
     }
 

@@ -4,7 +4,7 @@
 use super::super::VerifyError;
 use super::super::front_ends::FrontEnds;
 use super::super::slow_period::SlowPeriod;
-use super::super::timeline::{Instant, SamplingInstant, Timeline};
+use super::super::timeline::{SamplingInstant, timeline};
 use super::{ErrorBox, ErrorPoint};
 use crate::bank::Bank;
 use crate::units::Seconds;
@@ -88,7 +88,7 @@ impl Grid {
                 speeds.iter().map(|&speed| front_ends.with_speed(sample.filter, speed)).collect();
             let mut rows = Vec::with_capacity(errors.len());
             for &error in &errors {
-                let time = Instant { delay: sample.time.delay + error, ..sample.time };
+                let time = sample.time.moved_by(-error.in_fast_periods(sample.time.fast_period()));
                 rows.push(
                     filters
                         .iter()
@@ -102,8 +102,7 @@ impl Grid {
             channels.push(ChannelGrid { errors, speeds, rows });
         }
         front_ends.check_work(samples.len())?;
-        let fast_period = bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period);
-        let timeline = Timeline::new(&samples, fast_period, bank.ratio)?;
+        let timeline = timeline(&samples, bank.ratio)?;
         let period = SlowPeriod::new(&front_ends, &timeline, &samples);
         Ok(Self { front_ends, samples, period, channels })
     }
