@@ -3,7 +3,8 @@
 use super::design_studies::{BandHint, Words, known, number, order_text, robust_text, tracking_text};
 use crate::bank::{Bank, Gamma, SynthesisFilters};
 use crate::design::{
-    Design, DesignError, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, TrackingStudy, analyze_mean,
+    Design, DesignError, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, TrackingStudy, Unfinished,
+    analyze_mean,
 };
 use crate::figures::Figures;
 use crate::overview::{Fact, counted, decibels, figure_facts, frequency, six_digits, understood, warnings};
@@ -43,6 +44,9 @@ pub(super) struct Report<'a> {
     peak_hertz: Hertz,
     #[serde(skip)]
     is_normalised: bool,
+    /// What the search for the least gamma left open.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unfinished: Option<Unfinished>,
     iterations: usize,
     seconds: f64,
     #[serde(flatten)]
@@ -143,6 +147,7 @@ impl<'a> Report<'a> {
             judged,
             peak_hertz: design.peak_frequency.in_hertz(bank.slow_period()),
             is_normalised: bank.is_normalised(),
+            unfinished: design.unfinished,
             iterations: design.iterations,
             seconds,
             proof: ProofReport::of(design),
@@ -153,12 +158,13 @@ impl<'a> Report<'a> {
     pub(super) fn text(&self, verbose: bool) -> String {
         let terms = [self.heading(), figure_text(&self.judged.figures, self.is_normalised)].concat();
         if !verbose {
-            return terms + &self.gamma_line() + &self.hint();
+            return terms + &self.gamma_line() + &self.unfinished_text() + &self.hint();
         }
         let parts = [
             format!("{}\n", self.understood),
             terms,
             self.gamma_text(),
+            self.unfinished_text(),
             self.mean_text(),
             self.hint(),
             self.words.as_ref().map(Words::text).unwrap_or_default(),
@@ -189,6 +195,10 @@ impl Report<'_> {
             self.size(),
             self.latency,
         )
+    }
+
+    fn unfinished_text(&self) -> String {
+        self.unfinished.map_or_else(String::new, |left| format!("unfinished {left}\n"))
     }
 
     fn hint(&self) -> String {

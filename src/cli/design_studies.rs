@@ -109,7 +109,7 @@ const TABLE_ROWS: usize = 32;
 
 /// Full and reduced order, and the error for each number of states.
 pub(super) fn order_text(reduction: &OrderReduction, method: Method) -> String {
-    let OrderReduction { full, reduced, orders } = reduction;
+    let OrderReduction { full, reduced, orders, unrefined } = reduction;
     let lost = if method == Method::H2 { "of H2 error" } else { "of gamma" };
     let mut text = format!(
         "order      {} of {} states: gamma {} instead of {}, {:.4} dB {lost} lost\n",
@@ -127,6 +127,9 @@ pub(super) fn order_text(reduction: &OrderReduction, method: Method) -> String {
     if orders.len() <= TABLE_ROWS {
         text += &format!("{:>10} {:>14} {:>14} {:>13}\n", "states", "gamma", "H2 error", "loss");
         text.extend(orders.iter().map(row));
+    }
+    if let Some(failure) = unrefined {
+        text += &format!("{:>10} not all poles were refined: {failure}\n", "");
     }
     text
 }

@@ -10,17 +10,18 @@
 use super::DesignError;
 use super::effort;
 use super::filters;
-use super::least_errors::{LeastErrors, candidates, check_reach, manageable};
+use super::least_errors::{LeastErrors, candidates, check_reach, is_almost, manageable, shortest};
 use super::limits::Limits;
 use super::merging::Repeats;
 use super::methods::scenarios::RobustProblem;
 use super::methods::{self, Deviations, Filters, Settings};
 use super::plant::LiftedPlant;
 use super::problem::{Problem, common_delay};
+use super::realise::realise;
 use crate::analog::SignalFilter;
 use crate::lti::StateSpace;
 use crate::lti::gramian::h2_norm;
-use crate::spec::{MAX_OPTIMISED_TAPS, Method, Spec};
+use crate::spec::{MAX_OPTIMISED_TAPS, Method, Reduction, Spec};
 use crate::units::Seconds;
 
 /// Bits of a converter of which nothing is said.
@@ -35,6 +36,10 @@ const FIRST_FRAMES: usize = 8;
 const MOST_FRAMES: usize = 2048;
 /// Lengths that are designed at most for a wanted SNR, each a tenth longer than the one before.
 const LENGTHENINGS: usize = 16;
+
+/// Slow periods of latency without a better bank of the wanted order that end the search for one: the error
+/// of reduced banks is not monotonic in the latency.
+const FRUITLESS_PERIODS: usize = 4;
 
 /// Called with the number of designs that were compared; an error ends the choice.
 type Compared<'a> = &'a dyn Fn(usize) -> Result<(), DesignError>;
@@ -110,8 +115,8 @@ fn choose(spec: &Spec, compared: Compared<'_>) -> Result<Choice, DesignError> {
     let wanted = spec.design.target_snr_db;
     // A wanted SNR is that of the noise which the spec states; without one the usual rounding limits it.
     let noisy = if wanted.is_some() { with_uncertain_instants(spec) } else { with_usual_noise(spec) };
-    let problem = Problem::new(&noisy, spec.latency.unwrap_or(common))?.earlier(common);
-    let merged = problem.merge_channels(Repeats::of(spec)).of_unit_size()?.problem;
+    let whole = Problem::new(&noisy, spec.latency.unwrap_or(common))?.earlier(common);
+    let merged = whole.merge_channels(Repeats::of(spec)).of_unit_size()?.problem;
     let problem = if wanted.is_some() { merged.clone() } else { manageable(merged.clone()) };
     let mut chosen = match (spec.design.method, spec.design.taps) {
         (Method::Sinc | Method::Separation, taps) => middle(&problem, taps.unwrap_or_default()),
@@ -120,7 +125,14 @@ fn choose(spec: &Spec, compared: Compared<'_>) -> Result<Choice, DesignError> {
             Choice { taps, latency: errors.shortest() }
         }
         (_, None) if spec.is_fir() => fewest_taps(spec, &problem)?,
-        (_, None) => Choice { taps: 0, latency: LeastErrors::causal(&problem)?.shortest() },
+        (_, None) => {
+            let errors = LeastErrors::causal(&problem)?;
+            let latency = match spec.design.reduction {
+                Some(Reduction::Order(_)) => latency_of_order(&noisy, &whole, &errors, compared)?,
+                _ => errors.shortest(),
+            };
+            Choice { taps: 0, latency }
+        }
     };
     let is_minimax = spec.design.method == Method::Fir && RobustProblem::of(spec).is_none();
     if let Some(wanted) = wanted.filter(|_| is_minimax) {
@@ -134,6 +146,88 @@ fn middle(problem: &Problem, taps: usize) -> Choice {
     let delays: f64 = problem.delays().iter().map(|delay| delay.0).sum();
     let mean = delays / problem.channels.len() as f64;
     Choice { taps, latency: (0.5 * (taps - 1) as f64 + mean).round() as usize }
+}
+
+/// The shortest latency at which a bank with as few states as `spec` asks for is almost the best. The states
+/// that a long latency takes are missing elsewhere, so there is a best latency, which only designs show.
+/// `errors` are those of banks with any number of states: a latency at which these are worse than a bank
+/// that was found needs no design.
+///
+/// # Errors
+/// [`DesignError`] of a design, where none succeeds.
+fn latency_of_order(
+    spec: &Spec,
+    problem: &Problem,
+    errors: &LeastErrors,
+    compared: Compared<'_>,
+) -> Result<usize, DesignError> {
+    let first = errors.shortest();
+    let mut tried = Tried { errors: vec![f64::INFINITY; errors.longest() + 1], best: first, refused: None };
+    for latency in first..=errors.longest() {
+        let in_vain = latency > tried.best + FRUITLESS_PERIODS * problem.ratio;
+        if in_vain || is_almost(tried.least(), errors.lasting) {
+            break;
+        }
+        compared(tried.count())?;
+        tried.note(latency, error_of_order(spec, &Problem { latency, ..problem.clone() }));
+    }
+    for latency in (0..first).rev() {
+        if is_almost(errors.rms(latency), tried.least()) {
+            compared(tried.count())?;
+            tried.note(latency, error_of_order(spec, &Problem { latency, ..problem.clone() }));
+        }
+    }
+    tried.shortest()
+}
+
+/// Latencies at which banks were designed.
+struct Tried {
+    /// Whole errors of the banks, infinite without one.
+    errors: Vec<f64>,
+    /// The latency of the least one.
+    best: usize,
+    /// Why a latency has no bank.
+    refused: Option<DesignError>,
+}
+
+impl Tried {
+    fn least(&self) -> f64 {
+        self.errors[self.best]
+    }
+
+    fn count(&self) -> usize {
+        self.errors.iter().filter(|error| error.is_finite()).count()
+    }
+
+    fn note(&mut self, latency: usize, error: Result<f64, DesignError>) {
+        match error {
+            Ok(error) => self.errors[latency] = error,
+            Err(refused) => self.refused = Some(refused),
+        }
+        if self.errors[latency] < self.least() {
+            self.best = latency;
+        }
+    }
+
+    /// The shortest latency that is almost the best.
+    fn shortest(self) -> Result<usize, DesignError> {
+        match self.refused {
+            Some(refused) if self.errors[self.best].is_infinite() => Err(refused),
+            _ => Ok(shortest(&self.errors)),
+        }
+    }
+}
+
+/// The whole error of the bank of least mean square with as few states as `spec` asks for.
+fn error_of_order(spec: &Spec, problem: &Problem) -> Result<f64, DesignError> {
+    let mut spec = spec.clone();
+    spec.design.method = Method::H2;
+    let merged = problem.merge_channels(Repeats::of(&spec)).of_unit_size()?;
+    let plant = LiftedPlant::new(&merged.problem)?;
+    let synthesis = methods::synthesise(Method::H2, &plant, &settings(&spec)?)?;
+    let realised = realise(&spec, problem, &merged, &plant, &synthesis)?;
+    let system = filters::lifted(&realised.filters, problem.ratio)?;
+    whole_error(&LiftedPlant::new(problem)?, &Filters::StateSpace(system))
 }
 
 /// The fewest taps per channel whose least error reaches the SNR that `spec` asks for, or which is within

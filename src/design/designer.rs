@@ -12,6 +12,7 @@ use super::problem::Problem;
 use super::quantise::WordStudy;
 use super::realise::{Realised, realise};
 use super::reduction::OrderReduction;
+use super::unfinished::Unfinished;
 use super::{DesignError, filters, prove, uncertainty};
 use crate::bank::{Bank, Gamma, SynthesisFilters};
 use crate::spec::{DesignSpec, Method, Spec, SpecProblem};
@@ -31,6 +32,9 @@ pub struct Design {
     pub taps_chosen: bool,
     /// Frequency of the worst case.
     pub peak_frequency: RadiansPerSlowPeriod,
+    /// What the search for the least gamma left open; `None` also for methods that do not minimise gamma and
+    /// for a gamma of zero up to rounding.
+    pub unfinished: Option<Unfinished>,
     /// Number of Riccati equations solved, or of interior-point iterations.
     pub iterations: usize,
     /// For integer taps, the increase of the error that they cause.
@@ -190,6 +194,7 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
         latency_chosen: spec.latency.is_none(),
         taps_chosen: spec.is_fir() && spec.design.taps.is_none(),
         peak_frequency: RadiansPerSlowPeriod(peak.frequency),
+        unfinished: synthesis.unfinished.filter(|_| synthesis.peak.gain > rounding),
         iterations: synthesis.iterations,
         words,
         reduction,

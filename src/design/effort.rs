@@ -14,7 +14,7 @@ use super::methods::{Deviations, scenarios::RobustProblem};
 use super::problem::{Problem, common_delay};
 use super::prove::{MAX_LONG_STATES, MAX_SEARCHED_STATES, max_witnesses};
 use crate::memory::available_memory;
-use crate::spec::{Method, Solver, Spec};
+use crate::spec::{Method, Reduction, Solver, Spec};
 
 /// Operations at that rate for an interior-point block, relative to the square of its order: a cube, but the
 /// rate of complex decompositions grows with the order.
@@ -33,6 +33,8 @@ const ITERATIONS: f64 = 25.0;
 const HISTORIES: [f64; 2] = [24.0, 2.0];
 /// Samples of the target whose errors may still fall at one instant of such a history.
 const OPEN_TARGETS: f64 = 64.0;
+/// Slow periods of latency at which banks of a wanted order are designed where the latency is open.
+const PERIODS_COMPARED: f64 = 6.0;
 /// Frames of a history that stands for all past samples, and of a bank whose taps are still to be chosen.
 const LONG_HISTORY: f64 = 256.0;
 const USUAL_FRAMES: usize = 24;
@@ -58,6 +60,10 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
     if spec.design.reduction.is_some() {
         // A norm for each order that is visited, and the refinement of its poles.
         effort.seconds += 2.0 * sizes.states.min(40.0) * sizes.norms().seconds;
+    }
+    if matches!(spec.design.reduction, Some(Reduction::Order(_))) && spec.latency.is_none() {
+        // The banks of some slow periods of latency are compared.
+        effort.seconds *= PERIODS_COMPARED * sizes.ratio;
     }
     if spec.is_fir() && spec.design.taps.is_none() {
         effort = effort.then(sizes.smoother(HISTORIES[0], sizes.lags(), OPEN_TARGETS));

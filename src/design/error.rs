@@ -1,6 +1,8 @@
 //! Errors of design and analysis.
 
 use super::limits::{Effort, memory_text};
+use super::methods::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS};
+use super::prove::MAX_LONG_STATES;
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
 use crate::lmi::LmiError;
@@ -49,10 +51,16 @@ pub enum DesignError {
     },
     /// No certificate was found, not even for a gamma up to 10 % above the computed norm.
     #[error(
-        "the computed gamma could not be proven: no certificate passes up to 10 % above it; the front ends are too stiff or \
-         the channels too nearly equal for double precision"
+        "the computed gamma could not be proven: no certificate passes up to 10 % above it, {}{}; the front ends may be too \
+         stiff or the channels too nearly equal",
+        certificate_digits(*.states), failure_text(.failure.as_deref())
     )]
-    NotCertified,
+    NotCertified {
+        /// States of the error system.
+        states: usize,
+        /// The first computation of the search that failed, if one did.
+        failure: Option<Box<DesignError>>,
+    },
     /// The caller did not ask for a proof.
     #[error("no proof was looked for")]
     ProofSkipped,
@@ -234,11 +242,62 @@ pub enum DesignError {
     },
     /// No Riccati equation could be solved, not even at the largest gamma.
     #[error(
-        "the Riccati equation could not be solved at gamma = {gamma}: the front ends are too stiff or the \
-         channels too nearly equal for double precision; try method = \"fir\", or move nearly equal delays apart"
+        "no filters were found: the Riccati equation of {states} states could not be solved {}, in double precision{}; try \
+         method = \"fir\", a shorter latency, or move nearly equal delays apart",
+        level_text(*.gamma), digits_text(*.states)
     )]
     RiccatiFailed {
-        /// The largest gamma tried.
-        gamma: f64,
+        /// The largest gamma tried; `None` for the mean-square optimum.
+        gamma: Option<f64>,
+        /// States of the plant.
+        states: usize,
     },
+}
+
+fn level_text(gamma: Option<f64>) -> String {
+    gamma.map_or_else(|| "for the least mean square".to_owned(), |gamma| format!("at gamma = {gamma}"))
+}
+
+/// The precisions beyond doubles in which the Riccati equation of so many states is tried.
+fn digits_text(states: usize) -> String {
+    match states {
+        _ if states <= MOST_STATES_AT_512_BITS => ", 106 or 512 bits".to_owned(),
+        _ if states <= MOST_STATES_AT_106_BITS => {
+            format!(" or 106 bits (512 bits are tried up to {MOST_STATES_AT_512_BITS} states)")
+        }
+        _ => format!(" (more digits are tried up to {MOST_STATES_AT_106_BITS} states)"),
+    }
+}
+
+/// The precisions in which the certificate of an error system of so many states is searched.
+fn certificate_digits(states: usize) -> String {
+    if states <= MAX_LONG_STATES {
+        return "neither in double precision nor in 512 bits".to_owned();
+    }
+    format!("in double precision (512 bits are tried up to {MAX_LONG_STATES} states, these are {states})")
+}
+
+fn failure_text(failure: Option<&DesignError>) -> String {
+    failure.map_or_else(String::new, |failure| format!(" ({failure})"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The message of many states said that the precision had not been enough, though 512 bits were not
+    /// tried; that of the mean square said "gamma = inf".
+    #[test]
+    fn messages_say_what_was_tried() {
+        let unproven = |states: usize| DesignError::NotCertified { states, failure: None }.to_string();
+        assert!(unproven(MAX_LONG_STATES).contains("neither in double precision nor in 512 bits"));
+        assert!(unproven(MAX_LONG_STATES + 1).contains("512 bits are tried up to 96 states, these are 97"));
+        let failed = |gamma: Option<f64>, states: usize| DesignError::RiccatiFailed { gamma, states };
+        let mean_square = failed(None, MOST_STATES_AT_106_BITS + 1).to_string();
+        assert!(!mean_square.contains("inf"), "{mean_square}");
+        assert!(mean_square.contains("more digits are tried up to 96 states"), "{mean_square}");
+        assert!(
+            failed(Some(0.5), 3).to_string().contains("at gamma = 0.5, in double precision, 106 or 512 bits")
+        );
+    }
 }

@@ -22,6 +22,7 @@
 
 use super::DesignError;
 use super::limits::Stop;
+use super::unfinished::{EndOfSearch, Unfinished};
 use crate::linalg::{self, CMat};
 use crate::lmi::sampled::{self, Covered, LowerBound, MeanSquareObjective, Point, Problem, Taps};
 use crate::lmi::{LmiError, Outcome, Settings};
@@ -188,6 +189,8 @@ pub(super) struct Exchange<E: AffineError> {
     pub(super) dual: Vec<DualPoint>,
     /// Ends the exchange between two rounds, with the best unknowns so far.
     pub(super) stop: Stop,
+    /// What the last search for the least gamma left open, unless it was stopped.
+    pub(super) unfinished: Option<Unfinished>,
     /// Problems solved.
     pub(super) rounds: usize,
     /// Interior-point iterations of all rounds.
@@ -224,6 +227,7 @@ impl<E: AffineError> Exchange<E> {
             lower_for_all: 0.0,
             dual: Vec::new(),
             stop: Stop::default(),
+            unfinished: None,
             rounds: 0,
             iterations: 0,
         })
@@ -293,6 +297,7 @@ impl<E: AffineError> Exchange<E> {
         let mut tolerance = tolerances.tolerance(f64::INFINITY);
         let mut last = self.round(tolerances, tolerance)?;
         let mut best = last.candidate.clone();
+        let mut reason = EndOfSearch::Rounds;
         for _ in 1..tolerances.rounds {
             let gamma = best.peaks.estimate;
             if gamma <= self.lower * (1.0 + tolerances.accuracy) || self.stop.is_due() {
@@ -302,6 +307,7 @@ impl<E: AffineError> Exchange<E> {
             // it cannot be, that is the end.
             let added = self.add(&last.above)?;
             if !added && (last.outcome != Outcome::Solved || tolerance <= tolerances.finest()) {
+                reason = EndOfSearch::of(last.outcome);
                 break;
             }
             tolerance = tolerances.tolerance(if added { gamma / self.lower - 1.0 } else { 0.0 });
@@ -310,6 +316,11 @@ impl<E: AffineError> Exchange<E> {
                 best = last.candidate.clone();
             }
         }
+        self.unfinished = if self.stop.is_due() {
+            None
+        } else {
+            Unfinished::of(self.lower, best.peaks.estimate, tolerances.accuracy, reason)
+        };
         Ok(best)
     }
 

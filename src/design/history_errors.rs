@@ -34,7 +34,7 @@ const KNOWN_INNOVATION: f64 = 1e-15;
 pub(super) struct HistoryErrors {
     first: i64,
     /// The errors at the instants `first`, `first` + 1, ..
-    squares: Vec<f64>,
+    errors: Vec<TargetError>,
     /// The mean square of the target, its error without any sample.
     pub(super) power: f64,
 }
@@ -53,14 +53,32 @@ impl HistoryErrors {
         let first = *instants.start();
         let history = History::new(problem, frames, instants)?;
         let power = (history.joint.c().row(problem.target) * &history.prior).norm_squared();
-        Ok(Self { first, squares: history.smooth(ERROR_ACCURACY, |_| ()), power })
+        Ok(Self { first, errors: history.smooth(ERROR_ACCURACY, |_| ()), power })
     }
 
     /// The error at `instant`; without samples for instants that were not asked for.
     pub(super) fn at(&self, instant: i64) -> f64 {
-        let index = usize::try_from(instant - self.first).ok();
-        index.and_then(|index| self.squares.get(index)).copied().unwrap_or(self.power)
+        self.target(instant).map_or(self.power, |error| error.square)
     }
+
+    /// What no sample after the history lowers of the error at `instant`: at least this remains at any
+    /// latency.
+    pub(super) fn lasting(&self, instant: i64) -> f64 {
+        self.target(instant).map_or(0.0, |error| error.lasting)
+    }
+
+    fn target(&self, instant: i64) -> Option<&TargetError> {
+        self.errors.get(usize::try_from(instant - self.first).ok()?)
+    }
+}
+
+/// Mean squares of the error of one sample of the target.
+#[derive(Debug, Clone, Copy)]
+struct TargetError {
+    /// With the samples of the history.
+    square: f64,
+    /// With all samples that could follow it too.
+    lasting: f64,
 }
 
 /// The taps of least mean-square error on the newest `frames` frames of all channels, for the target at each
@@ -175,7 +193,7 @@ impl<'a> History<'a> {
     /// Smooths the samples. `found` receives the innovation of each in turn; `None` for those that are known
     /// already. A target sample is settled when the state can still lower its mean square by no more than
     /// the share `settled`. The result is the errors of all target samples.
-    fn smooth(&self, settled: f64, mut found: impl FnMut(Option<Innovation>)) -> Vec<f64> {
+    fn smooth(&self, settled: f64, mut found: impl FnMut(Option<Innovation>)) -> Vec<TargetError> {
         let count = usize::try_from(self.instants.end() - self.instants.start() + 1).unwrap_or(0);
         let (root, squares) = (self.prior.clone(), vec![0.0; count]);
         let mut smoother = Smoother { root, open: Vec::new(), squares };
@@ -196,10 +214,7 @@ impl<'a> History<'a> {
                 smoother.advance(transition, input, settled);
             }
         }
-        for open in &smoother.open {
-            smoother.squares[open.index] = open.fixed + norm(&open.row).powi(2);
-        }
-        smoother.squares
+        smoother.errors()
     }
 
     /// The taps of the target sample `index`.
@@ -306,6 +321,16 @@ impl Smoother {
             open.row = row[..order].to_vec();
         }
         self.settle(settled);
+    }
+
+    /// The errors of all target samples after the last slot.
+    fn errors(self) -> Vec<TargetError> {
+        let settled = |lasting| TargetError { square: lasting, lasting };
+        let mut errors: Vec<TargetError> = self.squares.into_iter().map(settled).collect();
+        for Open { index, row, fixed } in self.open {
+            errors[index] = TargetError { square: fixed + norm(&row).powi(2), lasting: fixed };
+        }
+        errors
     }
 
     /// Closes the target samples whose mean square the state can lower by no more than this share.

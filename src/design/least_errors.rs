@@ -27,8 +27,8 @@ const MOST_STATES: usize = 128;
 const PERIODS: RangeInclusive<usize> = 8..=512;
 /// Frames of history that stand for all past samples, for each of these periods.
 const HISTORY: usize = 6;
-/// Share of [`WORTHWHILE_DB`] by which twice the latency must lower the least error to be looked at.
-const STILL_FALLING: f64 = 0.25;
+/// Share of [`WORTHWHILE_DB`] that latencies beyond the search may gain: too little to be seen.
+const LEFT_BEYOND: f64 = 0.02;
 
 /// The least root mean squares over all phases at a range of latencies.
 #[derive(Debug)]
@@ -37,6 +37,8 @@ pub(super) struct LeastErrors {
     rms: Vec<f64>,
     /// Whether some phase can remove a noticeable part of the target, at each latency.
     removes: Vec<bool>,
+    /// What remains of the error at any latency.
+    pub(super) lasting: f64,
     /// The rms of the target, the error of a bank that outputs zeros.
     pub(super) zero_output: f64,
 }
@@ -58,47 +60,46 @@ impl LeastErrors {
         let long = errors(taps.div_ceil(ratio))?;
         let short = if taps.is_multiple_of(ratio) { long.clone() } else { errors(taps / ratio)? };
         let has_most = |p: usize| taps.saturating_sub(p).div_ceil(ratio) == taps.div_ceil(ratio);
+        let floor = SAME_ERROR * SAME_ERROR * long.power;
         let (mut rms, mut removes) = (Vec::new(), Vec::new());
         for latency in latencies.clone() {
             let phase = |p: usize| (if has_most(p) { &long } else { &short }).at(p as i64 - latency as i64);
-            let squares: Vec<f64> =
-                (0..ratio).map(|p| phase(p).max(SAME_ERROR * SAME_ERROR * long.power)).collect();
+            let squares: Vec<f64> = (0..ratio).map(|p| phase(p).max(floor)).collect();
             rms.push((squares.iter().sum::<f64>() / ratio as f64).sqrt());
             removes.push(squares.iter().any(|square| *square <= (1.0 - LEAST_REMOVED) * long.power));
         }
-        Ok(Self { first: *latencies.start(), rms, removes, zero_output: long.power.sqrt() })
+        let at_longest = |p: usize| long.lasting(p as i64 - *latencies.end() as i64).max(floor);
+        let lasting = ((0..ratio).map(at_longest).sum::<f64>() / ratio as f64).sqrt();
+        Ok(Self { first: *latencies.start(), rms, removes, lasting, zero_output: long.power.sqrt() })
     }
 
-    /// Of all causal banks, up to a latency from which on the error falls no more. A bank that delays its
-    /// output by one fast sample is a bank of one more sample of latency, so the error does not grow with
-    /// the latency.
+    /// Of all causal banks, up to a latency beyond which no latency gains more than [`LEFT_BEYOND`]. A bank
+    /// that delays its output by one fast sample is a bank of one more sample of latency, so the error does
+    /// not grow with the latency.
     ///
     /// # Errors
     /// As [`HistoryErrors::new`].
     pub(super) fn causal(problem: &Problem) -> Result<Self, DesignError> {
-        let up_to = |periods: usize| {
+        let mut periods = *PERIODS.start();
+        loop {
             let latency = problem.longest_delay().0.ceil() as usize + periods * problem.ratio;
             let frames = latency.div_ceil(problem.ratio) + HISTORY * periods;
-            Self::new(problem, frames * problem.ratio, 0..=latency.min(MAX_LATENCY))
-        };
-        let mut periods = *PERIODS.start();
-        let mut errors = up_to(periods)?;
-        while periods < *PERIODS.end() {
-            periods *= 2;
-            let more = up_to(periods)?;
-            let gain = errors.least() / more.least() - 1.0;
-            errors = more;
-            if gain.is_nan() || gain <= STILL_FALLING * (worthwhile() - 1.0) {
-                break;
+            let errors = Self::new(problem, frames * problem.ratio, 0..=latency.min(MAX_LATENCY))?;
+            if errors.least() <= errors.lasting * worthwhile(LEFT_BEYOND) || periods >= *PERIODS.end() {
+                return Ok(errors);
             }
+            periods *= 2;
         }
-        Ok(errors)
     }
 
     /// The error at a latency of the range.
-    #[cfg(test)]
     pub(super) fn rms(&self, latency: usize) -> f64 {
         self.rms[latency - self.first]
+    }
+
+    /// The longest latency of the range.
+    pub(super) fn longest(&self) -> usize {
+        self.first + self.rms.len() - 1
     }
 
     /// The least error of all latencies.
@@ -115,12 +116,17 @@ impl LeastErrors {
 /// The index of the first error that is within [`WORTHWHILE_DB`] of the least.
 pub(super) fn shortest(rms: &[f64]) -> usize {
     let least = rms.iter().copied().fold(f64::INFINITY, f64::min);
-    rms.iter().position(|rms| *rms <= least * worthwhile()).unwrap_or(0)
+    rms.iter().position(|rms| is_almost(*rms, least)).unwrap_or(0)
 }
 
-/// [`WORTHWHILE_DB`] as a factor.
-fn worthwhile() -> f64 {
-    10f64.powf(WORTHWHILE_DB / 20.0)
+/// Whether an error is within [`WORTHWHILE_DB`] of the least one.
+pub(super) fn is_almost(rms: f64, least: f64) -> bool {
+    rms <= least * worthwhile(1.0)
+}
+
+/// A share of [`WORTHWHILE_DB`] as a factor.
+fn worthwhile(share: f64) -> f64 {
+    10f64.powf(share * WORTHWHILE_DB / 20.0)
 }
 
 /// The problem with few analog states: where there are many, all channels get the filter of the target.

@@ -25,6 +25,7 @@ mod realise;
 pub mod reduction;
 pub mod responses;
 pub mod uncertainty;
+mod unfinished;
 mod warnings;
 
 pub use analysis::{
@@ -42,6 +43,7 @@ pub use problem::Problem;
 pub use prove::{Certified, certify};
 pub use reduction::{OrderErrorPoint, OrderReduction};
 pub use responses::error_response;
+pub use unfinished::{EndOfSearch, Unfinished};
 pub use warnings::warnings;
 
 use crate::bank::{Bank, Proof};

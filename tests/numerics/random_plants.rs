@@ -120,7 +120,7 @@ fn refused(seed: u64, refusal: &DesignError, end: End) -> End {
     // is a fault of ours.
     let too_hard = matches!(
         refusal,
-        DesignError::NotCertified
+        DesignError::NotCertified { .. }
             | DesignError::NotSearched { .. }
             | DesignError::OutOfReach { .. }
             | DesignError::RiccatiFailed { .. }

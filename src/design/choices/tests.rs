@@ -242,3 +242,31 @@ fn signals_in_a_band_get_the_latency_that_their_samples_need() {
         assert_eq!(latency(&fir), Ok(expected));
     }
 }
+
+/// A wide low-pass beside a resonance with 1 / damping radians: under noise the error falls by little at
+/// each doubling of the latency, and by more than 0.1 dB in all.
+#[test]
+fn a_slow_gain_at_long_latencies_counts() {
+    struct Resonance {
+        damping: f64,
+        gain: f64,
+        noise: f64,
+    }
+    let resonances = [
+        Resonance { damping: 0.004, gain: 3.0, noise: 1.0 },
+        Resonance { damping: 0.001, gain: 5.0, noise: 0.5 },
+        Resonance { damping: 0.002, gain: 3.0, noise: 3.0 },
+    ];
+    for Resonance { damping, gain, noise } in resonances {
+        let (pole, square, width) = (0.5, 0.64, 2.0 * gain * damping);
+        // pole / (s + pole) + width s / (s^2 + 2 damping s + square)
+        let num = [pole + width, 2.0 * pole * damping + pole * width, pole * square];
+        let den = [1.0, 2.0 * damping + pole, square + 2.0 * damping * pole, pole * square];
+        let mut problem = problem(&format!("{{ num = {num:?}, den = {den:?} }}"), 1, &[0.3]);
+        problem.noise = vec![noise * noise];
+        let chosen = LeastErrors::causal(&problem).unwrap().shortest();
+        let all = LeastErrors::new(&problem, 3600, 0..=512).unwrap();
+        let excess = 20.0 * (all.rms(chosen) / all.least()).log10();
+        assert!(excess < 0.1025, "latency {chosen}: {excess} dB, {} is enough", all.shortest());
+    }
+}

@@ -4,7 +4,7 @@
 
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
-use crate::linalg::{self, Mat};
+use crate::linalg::{self, LinalgError, Mat};
 use crate::lti::gramian::controllability_root;
 use crate::lti::riccati::{RiccatiSolution, solve_doubling};
 use crate::lti::{LtiError, StateSpace};
@@ -97,9 +97,14 @@ pub(super) trait RiccatiSolver {
 
 impl RiccatiSolver for Innovations {
     fn h_infinity(&self, gamma: f64) -> Trial {
-        let Some((f, g, h)) = self.weights(gamma) else {
+        let margin = self.margin(gamma);
+        if !margin.iter().all(|entry| entry.is_finite()) {
+            return Trial::Unresolved;
+        }
+        if linalg::cholesky(&margin).is_err() {
             return if self.conclusive { Trial::Impossible } else { Trial::Unresolved };
-        };
+        }
+        let Ok((f, g, h)) = self.weights(&margin) else { return Trial::Unresolved };
         solve_doubling(&f.transpose(), &g, &h).map_or(Trial::Unresolved, |solution| self.evaluate(&solution))
     }
 }
@@ -239,19 +244,21 @@ impl Innovations {
         Some(solve_doubling(&self.f.transpose(), &g, &h)?.x + &self.p0)
     }
 
-    /// (F, G, H) of the Riccati equation Delta = F Delta (I + G Delta)^-1 F' + H; `None` unless
-    /// E = gamma^2 I - Y Y' > 0.
-    fn weights(&self, gamma: f64) -> Option<(Mat, Mat, Mat)> {
+    /// E = gamma^2 I - Y Y'; a filter needs it positive.
+    fn margin(&self, gamma: f64) -> Mat {
         let references = self.y.nrows();
-        let e = Mat::identity(references, references) * (gamma * gamma) - &self.y * self.y.transpose();
-        linalg::cholesky(&e).ok()?;
-        let solved = linalg::solve_positive(&e, &linalg::hstack(&[&self.c1, &self.y]).ok()?).ok()?;
+        Mat::identity(references, references) * (gamma * gamma) - &self.y * self.y.transpose()
+    }
+
+    /// (F, G, H) of the Riccati equation Delta = F Delta (I + G Delta)^-1 F' + H for a positive E.
+    fn weights(&self, e: &Mat) -> Result<(Mat, Mat, Mat), LinalgError> {
+        let solved = linalg::solve_positive(e, &linalg::hstack(&[&self.c1, &self.y])?)?;
         let (ec, ey) = (solved.columns(0, self.c1.ncols()), solved.columns(self.c1.ncols(), self.y.ncols()));
         let by = &self.b2 * self.y.transpose();
         let f = &self.f + &by * ec;
         let g = self.c2.transpose() * &self.c2 - self.c1.transpose() * ec;
         let h = &self.b2 * self.b2.transpose() + &by * ey * self.b2.transpose() + self.shift_of_q();
-        Some((f, linalg::symmetric_part(&g), linalg::symmetric_part(&h)))
+        Ok((f, linalg::symmetric_part(&g), linalg::symmetric_part(&h)))
     }
 
     /// gamma is achieved iff P >= 0 and C1 P+ C1' < E with the a-posteriori covariance P+. As gamma

@@ -12,6 +12,7 @@ use crate::design::error_grid::ErrorGrid;
 use crate::design::exchange::{DualSolution, Exchange, LEAST_MARGIN, Location};
 use crate::design::filters::impulse_responses;
 use crate::design::plant::LiftedPlant;
+use crate::design::unfinished::{EndOfSearch, Unfinished};
 use crate::lmi::sampled::{MeanSquareObjective, Problem};
 use crate::lti::peak::Peak;
 
@@ -32,9 +33,14 @@ const MISSED_PEAK_LIMIT: usize = 8;
 pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
     let mut exchange = exchange(plant, settings)?;
     let best = least_gamma(plant, settings.taps, &mut exchange)?;
+    let unfinished = if best.is_missed() {
+        Unfinished::of(exchange.lower, best.peak.gain, GAMMA_ACCURACY, EndOfSearch::MissedPeaks)
+    } else {
+        exchange.unfinished
+    };
     let found = Synthesis::of_least_gamma(plant, best.taps, best.peak, exchange.lower_for_all)?;
     let dual = DualSolution { points: exchange.dual, bound: exchange.lower };
-    Ok(Synthesis { dual, iterations: exchange.iterations, ..found })
+    Ok(Synthesis { dual, unfinished, iterations: exchange.iterations, ..found })
 }
 
 /// The taps of [`synthesise`] alone.
@@ -85,6 +91,13 @@ struct Evaluated {
     peak: Peak,
 }
 
+impl Evaluated {
+    /// Whether the grid missed the peak of the norm.
+    fn is_missed(&self) -> bool {
+        self.peak.gain > self.estimate * (1.0 + GAMMA_ACCURACY)
+    }
+}
+
 /// The exchange. If the grid missed the peak of the norm, the exchange is repeated with that peak as a
 /// further point.
 fn least_gamma(
@@ -94,8 +107,7 @@ fn least_gamma(
 ) -> Result<Evaluated, DesignError> {
     let mut best = judged(plant, length, exchange)?;
     for _ in 0..MISSED_PEAK_LIMIT {
-        let missed = best.peak.gain > best.estimate * (1.0 + GAMMA_ACCURACY);
-        if !missed
+        if !best.is_missed()
             || exchange.stop.is_due()
             || !exchange.add(&[Location { frequency: best.peak.frequency, scenario: 0 }])?
         {

@@ -5,6 +5,7 @@ use super::{Filters, GAMMA_ACCURACY, Synthesis};
 use crate::design::DesignError;
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
+use crate::design::unfinished::{EndOfSearch, Unfinished};
 use crate::linalg::{self, Complex};
 use crate::lti::LtiError;
 use crate::lti::peak::{Peak, hinf_norm};
@@ -203,7 +204,7 @@ impl<'a> GammaIteration<'a> {
     }
 
     fn try_below(&mut self) -> Result<(), DesignError> {
-        let start = self.ceiling();
+        let start = self.ceiling()?;
         let ratio = self.floor() / start;
         for k in 1..=TRIALS_BELOW {
             let gamma = start * ratio.powf(k as f64 / (TRIALS_BELOW + 1) as f64);
@@ -218,7 +219,7 @@ impl<'a> GammaIteration<'a> {
     /// was not resolved.
     fn bisect_once(&mut self) -> Result<bool, DesignError> {
         let mut is_impossible = true;
-        let (mut floor, mut ceiling) = (self.floor(), self.ceiling());
+        let (mut floor, mut ceiling) = (self.floor(), self.ceiling()?);
         for _ in 0..TRIAL_LIMIT {
             if self.done() || ceiling <= floor * (1.0 + 0.5 * GAMMA_ACCURACY) {
                 break;
@@ -248,14 +249,13 @@ impl<'a> GammaIteration<'a> {
     }
 
     /// A gamma that some filter achieves.
-    fn ceiling(&self) -> f64 {
-        if self.upper().is_finite() { self.upper() } else { self.zero_output_norm() }
+    fn ceiling(&self) -> Result<f64, DesignError> {
+        if self.upper().is_finite() { Ok(self.upper()) } else { self.zero_output_norm() }
     }
 
     /// ||W||, the gamma of the bank that outputs zeros.
-    fn zero_output_norm(&self) -> f64 {
-        let norm = self.plant.reference().and_then(|w| Ok(hinf_norm(&w)?));
-        norm.map_or(f64::MAX.sqrt(), |peak| peak.gain)
+    fn zero_output_norm(&self) -> Result<f64, DesignError> {
+        Ok(hinf_norm(&self.plant.reference()?)?.gain)
     }
 
     /// The filters of least norm that were found.
@@ -263,7 +263,23 @@ impl<'a> GammaIteration<'a> {
     /// # Errors
     /// [`DesignError::RiccatiFailed`] if there are none.
     pub(super) fn best(&self) -> Result<Evaluated, DesignError> {
-        self.best.clone().ok_or_else(|| DesignError::RiccatiFailed { gamma: self.zero_output_norm() })
+        match &self.best {
+            Some(best) => Ok(best.clone()),
+            None => Err(self.failed(Some(self.zero_output_norm()?))),
+        }
+    }
+
+    /// No Riccati equation could be solved; `None` for that of the mean-square optimum.
+    pub(super) fn failed(&self, gamma: Option<f64>) -> DesignError {
+        DesignError::RiccatiFailed { gamma, states: self.plant.system().order() }
+    }
+
+    /// What the search for the least gamma left open, unless it was stopped.
+    pub(super) fn unfinished(&self) -> Option<Unfinished> {
+        if self.is_stopped() || self.is_negligible(self.upper()) {
+            return None;
+        }
+        Unfinished::of(self.lower, self.upper(), GAMMA_ACCURACY, EndOfSearch::Riccati)
     }
 
     /// `chosen` with the bounds that were found.
@@ -275,6 +291,7 @@ impl<'a> GammaIteration<'a> {
             lower: self.lower.min(peak.gain),
             noncausal: self.noncausal.gain.min(peak.gain),
             dual: super::DualSolution::default(),
+            unfinished: None,
             iterations: self.trials,
             robust: None,
             affine: None,

@@ -9,6 +9,7 @@ use crate::arithmetic::{BigFloat, DoubleDouble, Number};
 use crate::design::DesignError;
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
+use crate::lti::LtiError;
 use crate::lti::gramian::h2_norm;
 use std::rc::Rc;
 
@@ -36,12 +37,15 @@ pub(crate) fn synthesise(plant: &LiftedPlant) -> Result<Synthesis, DesignError> 
         candidates.extend(precise::<BigFloat>(&noisy, MOST_STATES_AT_512_BITS)?);
     }
     candidates.extend(precise_filter);
-    let rms: Vec<f64> = candidates.iter().map(|filter| rms_error(&noisy, filter)).collect();
+    let rms = candidates.iter().map(|filter| rms_error(&noisy, filter)).collect::<Result<Vec<_>, _>>()?;
     let enough = SAME_ERROR * rms.iter().copied().fold(f64::INFINITY, f64::min);
     // Those of double precision come first: they keep the delay lines of the plant.
     let good = candidates.into_iter().zip(rms).filter(|(_, rms)| *rms <= enough);
     iteration.start_from(good.map(|(filter, _)| filter))?;
-    let optimum = iteration.best().map_err(|_| DesignError::RiccatiFailed { gamma: f64::INFINITY })?;
+    let optimum = iteration.best().map_err(|error| match error {
+        DesignError::RiccatiFailed { .. } => iteration.failed(None),
+        other => other,
+    })?;
     Ok(iteration.synthesis(optimum))
 }
 
@@ -54,7 +58,9 @@ fn precise<F: Number>(plant: &LiftedPlant, limit: usize) -> Result<Option<Filter
 }
 
 /// ||K||_2 with the noise; infinite for a filter that rounding made unstable.
-fn rms_error(plant: &LiftedPlant, filter: &Filter) -> f64 {
-    let error = plant.error_system(filter).ok();
-    error.and_then(|error| h2_norm(&error).ok()).unwrap_or(f64::INFINITY)
+fn rms_error(plant: &LiftedPlant, filter: &Filter) -> Result<f64, DesignError> {
+    match h2_norm(&plant.error_system(filter)?) {
+        Err(LtiError::Unstable { .. }) => Ok(f64::INFINITY),
+        norm => Ok(norm?),
+    }
 }

@@ -29,10 +29,12 @@ pub(crate) use super::exchange::{DualPoint, DualSolution, GAMMA_ACCURACY};
 use super::limits::Stop;
 use super::plant::LiftedPlant;
 use super::problem::Problem;
+use super::unfinished::Unfinished;
 use crate::lti::StateSpace;
 use crate::lti::peak::Peak;
 use crate::spec::{Method, Solver, Spec, Tracking};
 use crate::units::FastPeriods;
+pub(super) use precise_filtering::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS};
 
 /// Settings of a method, in addition to the plant.
 #[derive(Debug, Clone, Default)]
@@ -99,6 +101,8 @@ pub(crate) struct Synthesis {
     /// For `fir` the dual solution, else empty. Its bound may be above `lower`, but taps of any size are not
     /// covered then: `verify` decides.
     pub(crate) dual: DualSolution,
+    /// What the search for the least gamma left open.
+    pub(crate) unfinished: Option<Unfinished>,
     /// Number of interior-point iterations or of Riccati equations solved.
     pub(crate) iterations: usize,
     /// For a robust design.
@@ -122,10 +126,17 @@ impl Synthesis {
         lower: f64,
     ) -> Result<Self, DesignError> {
         let noncausal = plant.noncausal_bound()?.gain.min(peak.gain);
-        let filters = Filters::Fir(taps);
-        let (dual, iterations) = (DualSolution::default(), 0);
-        let lower = lower.min(peak.gain).max(noncausal);
-        Ok(Self { filters, peak, lower, noncausal, dual, iterations, robust: None, affine: None })
+        Ok(Self {
+            filters: Filters::Fir(taps),
+            lower: lower.min(peak.gain).max(noncausal),
+            peak,
+            noncausal,
+            dual: DualSolution::default(),
+            unfinished: None,
+            iterations: 0,
+            robust: None,
+            affine: None,
+        })
     }
 }
 

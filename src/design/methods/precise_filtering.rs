@@ -37,9 +37,9 @@ const SEMIDEFINITE: f64 = 1e-15;
 const STATE_NOISE: f64 = 1e-40;
 /// Maximum number of states of a plant for 106 bits; a step then takes tens of milliseconds, and a trial
 /// about a second unless a channel is delayed by many periods.
-pub(super) const MOST_STATES_AT_106_BITS: usize = 96;
+pub(in crate::design) const MOST_STATES_AT_106_BITS: usize = 96;
 /// The same for 512 bits.
-pub(super) const MOST_STATES_AT_512_BITS: usize = 40;
+pub(in crate::design) const MOST_STATES_AT_512_BITS: usize = 40;
 /// Relative change of the covariance in one more step of the difference equation beyond which digits were
 /// lost.
 const FIXED_POINT_ACCURACY: f64 = 1e-7;

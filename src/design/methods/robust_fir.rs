@@ -15,6 +15,7 @@ use crate::design::filters::{impulse_responses, polyphase};
 use crate::design::plant::LiftedPlant;
 use crate::design::uncertainty::box_plant::Combination;
 use crate::design::uncertainty::search::{BoxSearch, MovingFilters};
+use crate::design::unfinished::Unfinished;
 use crate::linalg::{self, CMat};
 use crate::lmi::sampled::{MeanSquareObjective, Point, Problem as SampledProblem, Taps};
 use crate::lti::peak::Peak;
@@ -79,6 +80,7 @@ pub(crate) fn synthesise(
         lower: nominal.lower.min(found.peak.gain),
         noncausal: nominal.noncausal.min(found.peak.gain),
         iterations: nominal.iterations + found.iterations,
+        unfinished: found.unfinished,
         filters: Filters::Fir(found.taps),
         peak: found.peak,
         dual: nominal.dual,
@@ -133,6 +135,7 @@ struct RobustTaps {
     scenarios: usize,
     pairs: usize,
     iterations: usize,
+    unfinished: Option<Unfinished>,
 }
 
 /// The exchange. Where the taps are worse between the errors or frequencies that the search looks at, it is
@@ -165,7 +168,16 @@ fn least_worst_norm(
     let mut scenarios: Vec<_> = exchange.locations().iter().map(|location| &location.scenario).collect();
     scenarios.sort();
     scenarios.dedup();
-    Ok(RobustTaps { peak, norms, lower, scenarios: scenarios.len(), pairs, iterations, taps })
+    Ok(RobustTaps {
+        peak,
+        norms,
+        lower,
+        scenarios: scenarios.len(),
+        pairs,
+        iterations,
+        taps,
+        unfinished: exchange.unfinished,
+    })
 }
 
 /// The error of fixed taps over the box.

@@ -117,6 +117,7 @@ pub(crate) fn synthesise(
         lower: fixed.lower.min(peak.gain),
         noncausal: fixed.noncausal.min(peak.gain),
         iterations: fixed.iterations + exchange.iterations,
+        unfinished: exchange.unfinished,
         dual: fixed.dual,
         robust: None,
         affine: Some(AffineDesign { slopes: found.slopes, study }),

@@ -54,7 +54,8 @@ pub(super) fn certificate(error: &EnclosedErrorSystem<'_>, bank: &Bank) -> Resul
     if error.states() > MAX_SEARCHED_STATES {
         return Err(DesignError::NotSearched { states: error.states(), limit: MAX_SEARCHED_STATES });
     }
-    let raw = error.midpoint().ok_or(DesignError::NotCertified)?;
+    let states = error.states();
+    let raw = error.midpoint().ok_or(DesignError::NotCertified { states, failure: None })?;
     let units = Units::of(&raw, error.scale())?;
     let middle = units.of_one(&raw);
     let system = StateSpace::new(middle.a.clone(), middle.b.clone(), middle.c.clone(), middle.d.clone())?;
@@ -69,12 +70,22 @@ pub(super) fn certificate(error: &EnclosedErrorSystem<'_>, bank: &Bank) -> Resul
     let floor = FLOOR * error.scale() / units.reference;
     let search = Search { error, units: &units, middle: &middle, peak: peak_witness };
     let level = |excess: &f64| Level { norm, excess: excess * norm.max(floor) };
-    let doubles = |excesses: &[f64]| excesses.iter().find_map(|excess| search.in_doubles(level(excess)));
+    let mut failure = None;
+    let mut in_doubles = |excess: &f64| match search.in_doubles(level(excess)) {
+        Ok(found) => found,
+        Err(failed) => {
+            failure.get_or_insert(Box::new(failed));
+            None
+        }
+    };
     let long = || LONG_EXCESSES.iter().find_map(|excess| search.in_512_bits(level(excess)));
     let is_zero = norm <= floor;
     let (fine, coarse) =
         if is_zero { (&FLOOR_EXCESSES[..], &[][..]) } else { EXCESSES.split_at(FINE_EXCESSES) };
-    doubles(fine).or_else(long).or_else(|| doubles(coarse)).ok_or(DesignError::NotCertified)
+    let found = fine.iter().find_map(&mut in_doubles).or_else(long);
+    found
+        .or_else(|| coarse.iter().find_map(&mut in_doubles))
+        .ok_or(DesignError::NotCertified { states, failure })
 }
 
 /// A gamma that is tried.
@@ -114,14 +125,14 @@ impl Search<'_> {
         self.error.keeps(&found).then_some(found)
     }
 
-    fn in_doubles(&self, level: Level) -> Option<Certificate> {
+    fn in_doubles(&self, level: Level) -> Result<Option<Certificate>, DesignError> {
         let noise = STATE_NOISE * (level.excess * level.gamma()).sqrt();
-        let riccati = Riccati::new(self.middle, noise).ok()?;
+        let riccati = Riccati::new(self.middle, noise)?;
         let tried = |weight: &f64| {
             let factor = riccati.factor(level.middle(), weight * level.excess)?;
             DIGITS.iter().find_map(|&digits| self.passes(level, rounded(&factor, digits), Vec::new()))
         };
-        STATE_WEIGHTS.iter().find_map(tried)
+        Ok(STATE_WEIGHTS.iter().find_map(tried))
     }
 
     /// In 512 bits, R as two doubles per entry where one does not do. `None` also for many states.

@@ -18,7 +18,7 @@
 
 use super::lattice::{Span, closest};
 use super::problem::TapError;
-use crate::linalg::{self, CMat, Complex, Mat};
+use crate::linalg::{self, CMat, Complex, LinalgError, Mat};
 use crate::spec::WordLengths;
 
 /// Most taps that may differ from zero, in all channels.
@@ -66,26 +66,35 @@ impl<'a> Enumeration<'a> {
     }
 
     /// Whether integers of this scale are large enough for a gamma below `bar`.
-    pub(super) fn may_reach(&self, fraction_bits: i32, bar: f64) -> bool {
+    ///
+    /// # Errors
+    /// [`LinalgError`] if a decomposition fails.
+    pub(super) fn may_reach(&self, fraction_bits: i32, bar: f64) -> Result<bool, LinalgError> {
         let most = self.spans.iter().map(|span| span.most.max(-span.least)).fold(0.0, f64::max);
         let taps = most * (-f64::from(fraction_bits)).exp2();
         let zero_output = vec![0.0; self.spans.len()];
-        (0..self.errors.count()).all(|k| {
-            let gain = linalg::largest_singular_value(&self.errors.at(k, &zero_output));
-            gain.is_ok_and(|gain| gain - self.errors.reach(k, taps) < bar)
-        })
+        for k in 0..self.errors.count() {
+            let gain = linalg::largest_singular_value(&self.errors.at(k, &zero_output))?;
+            if gain - self.errors.reach(k, taps) >= bar {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Integers with a smaller gamma than `bar`, the best last.
-    pub(super) fn better_than(&self, bar: f64, fraction_bits: i32) -> Vec<Integers> {
+    ///
+    /// # Errors
+    /// As [`Self::may_reach`].
+    pub(super) fn better_than(&self, bar: f64, fraction_bits: i32) -> Result<Vec<Integers>, LinalgError> {
         let step = (-f64::from(fraction_bits)).exp2();
         let mut tree = Tree::new(&self.errors, &self.spans, step, bar);
-        tree.find_bounds(self.error.real_gamma);
+        tree.find_bounds(self.error.real_gamma)?;
         if !tree.bounds.is_empty() {
             let costs: Vec<f64> = tree.bounds.iter().map(|bound| bound.least).collect();
-            tree.decide(self.spans.len(), &mut vec![0.0; self.spans.len()], &costs);
+            tree.decide(self.spans.len(), &mut vec![0.0; self.spans.len()], &costs)?;
         }
-        tree.found.iter().map(|values| self.integers(values, step)).collect()
+        Ok(tree.found.iter().map(|values| self.integers(values, step)).collect())
     }
 
     fn integers(&self, values: &[f64], step: f64) -> Integers {
@@ -122,30 +131,28 @@ impl<'a> Tree<'a> {
 
     /// Bounds with weights on the frequencies where the integers closest to the last bound's centre are
     /// worst. These integers are candidates, too.
-    fn find_bounds(&mut self, floor: f64) {
+    fn find_bounds(&mut self, floor: f64) -> Result<(), LinalgError> {
         let mut weights = self.errors.uniform();
         for _ in 0..BOUND_COUNT {
             let Some(bound) = self.errors.bound(&weights) else { break };
             let centre: Vec<f64> = bound.centre.iter().map(|value| value / self.step).collect();
             let near: Vec<f64> =
                 closest(&bound.factor, &centre, self.spans).iter().map(|x| x * self.step).collect();
-            self.compare(&near);
+            self.compare(&near)?;
             self.bounds.push(bound);
-            let Some(moved) = self.errors.emphasise(&weights, &near, floor) else { break };
+            let Some(moved) = self.errors.emphasise(&weights, &near, floor)? else { break };
             weights = moved;
         }
+        Ok(())
     }
 
     /// Decides the taps below `undecided`, those from there on being decided. `costs` are the bounds so far.
-    fn decide(&mut self, undecided: usize, values: &mut Vec<f64>, costs: &[f64]) {
-        let Some(i) = undecided.checked_sub(1) else {
-            self.compare(values);
-            return;
-        };
+    fn decide(&mut self, undecided: usize, values: &mut Vec<f64>, costs: &[f64]) -> Result<(), LinalgError> {
+        let Some(i) = undecided.checked_sub(1) else { return self.compare(values) };
         let bests: Vec<f64> = self.bounds.iter().map(|bound| bound.best(i, values)).collect();
         for integer in self.within_bounds(i, &bests, costs) {
             if self.left == 0 {
-                return;
+                break;
             }
             self.left -= 1;
             let value = integer * self.step;
@@ -157,9 +164,10 @@ impl<'a> Tree<'a> {
                 .collect();
             if after.iter().all(|cost| *cost < self.bar * self.bar) {
                 values[i] = value;
-                self.decide(i, values, &after);
+                self.decide(i, values, &after)?;
             }
         }
+        Ok(())
     }
 
     /// The integers of tap i that no bound excludes, from the middle of their interval outward.
@@ -179,20 +187,20 @@ impl<'a> Tree<'a> {
     }
 
     /// Keeps the values if their gamma is below the bar.
-    fn compare(&mut self, values: &[f64]) {
+    fn compare(&mut self, values: &[f64]) -> Result<(), LinalgError> {
         self.left = self.left.saturating_sub(DECISIONS_PER_COMPARISON);
         let mut worst = 0.0f64;
         for at in 0..self.order.len() {
-            let gain = linalg::largest_singular_value(&self.errors.at(self.order[at], values));
-            let gain = gain.unwrap_or(f64::INFINITY);
+            let gain = linalg::largest_singular_value(&self.errors.at(self.order[at], values))?;
             if gain >= self.bar {
                 self.order[..=at].rotate_right(1);
-                return;
+                return Ok(());
             }
             worst = worst.max(gain);
         }
         self.bar = worst * (1.0 - LEAST_IMPROVEMENT);
         self.found.push(values.to_vec());
+        Ok(())
     }
 }
 
@@ -281,24 +289,23 @@ impl AffineErrors {
 
     /// Moves `weights` towards the worst points and directions of the error of `taps`, which exceeds
     /// `floor`.
-    fn emphasise(&self, weights: &Weights, taps: &[f64], floor: f64) -> Option<Weights> {
+    fn emphasise(&self, weights: &Weights, taps: &[f64], floor: f64) -> Result<Option<Weights>, LinalgError> {
         let errors: Vec<CMat> = (0..self.count()).map(|k| self.at(k, taps)).collect();
-        let gains: Vec<f64> =
-            errors.iter().map(linalg::largest_singular_value).collect::<Result<_, _>>().ok()?;
+        let gains: Vec<f64> = errors.iter().map(linalg::largest_singular_value).collect::<Result<_, _>>()?;
         let worst = gains.iter().copied().fold(0.0, f64::max);
         let shares: Vec<f64> =
             gains.iter().map(|gain| ((gain - floor) / (worst - floor)).max(0.0).powi(2)).collect();
         let total: f64 = shares.iter().sum();
         if !(worst > floor && total.is_finite()) {
-            return None;
+            return Ok(None);
         }
         let mut moved: Vec<CMat> =
             weights.0.iter().map(|weight| weight * Complex::from(1.0 - REPLACED_SHARE)).collect();
         for (k, share) in shares.iter().enumerate().filter(|(_, share)| **share > UNWEIGHTED_SHARE) {
-            let direction = linalg::svd(&errors[k]).ok()?.u.column(0).into_owned();
+            let direction = linalg::svd(&errors[k])?.u.column(0).into_owned();
             moved[k] += &direction * direction.adjoint() * Complex::from(REPLACED_SHARE * share / total);
         }
-        Some(Weights(moved))
+        Ok(Some(Weights(moved)))
     }
 
     /// The bound that `weights` give; none if rounding errors make the form indefinite.

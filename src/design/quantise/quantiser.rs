@@ -50,7 +50,7 @@ impl Quantised {
 pub(super) struct Quantiser<'a> {
     pub(super) error: TapError<'a>,
     /// Computed when first needed.
-    smaller: OnceLock<Vec<SmallerTaps>>,
+    smaller: OnceLock<Result<Vec<SmallerTaps>, DesignError>>,
 }
 
 impl<'a> Quantiser<'a> {
@@ -102,7 +102,8 @@ impl<'a> Quantiser<'a> {
         found: &mut Vec<Candidate>,
     ) -> Result<(), DesignError> {
         let mut last = finest;
-        for smaller in self.smaller.get_or_init(|| smaller_taps(&self.error)) {
+        let smaller = self.smaller.get_or_init(|| smaller_taps(&self.error));
+        for smaller in smaller.as_ref().map_err(DesignError::clone)? {
             let scale = self.finest_that_holds(&smaller.taps, bits);
             if least_gamma(found) <= smaller.gamma {
                 break;
@@ -128,10 +129,10 @@ impl<'a> Quantiser<'a> {
         let Some(enumeration) = Enumeration::new(&self.error, bits) else { return Ok(()) };
         for fraction_bits in scales {
             let bar = least_gamma(found);
-            if !enumeration.may_reach(fraction_bits, bar) {
+            if !enumeration.may_reach(fraction_bits, bar)? {
                 break;
             }
-            for integers in enumeration.better_than(bar, fraction_bits) {
+            for integers in enumeration.better_than(bar, fraction_bits)? {
                 found.push(self.error.candidate(FixedPoint {
                     bits: bits.clone(),
                     fraction_bits,

@@ -83,6 +83,14 @@ pub struct OrderReduction {
     /// The order/error trade-off: all orders searched, ascending. All orders below the full one where that
     /// is cheap.
     pub orders: Vec<OrderErrorPoint>,
+    /// The first computation that failed while the poles of a truncated bank were refined, if one did. A
+    /// better bank of that order may exist.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "text_of")]
+    pub unrefined: Option<DesignError>,
+}
+
+fn text_of<S: serde::Serializer>(failure: &Option<DesignError>, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&failure.as_ref().map(ToString::to_string).unwrap_or_default())
 }
 
 /// The reduced bank and the order/error trade-off. No bank is returned if the full one is chosen.

@@ -59,6 +59,8 @@ pub(super) struct OrderSearch<'a> {
     splits: Vec<Dynamics>,
     full: Figures,
     banks: BTreeMap<usize, ReducedBank<'a>>,
+    /// The first failure of a pole refinement.
+    failure: Option<DesignError>,
     zero: f64,
 }
 
@@ -71,6 +73,7 @@ impl<'a> OrderSearch<'a> {
             splits: splits(problem)?,
             full: figures(problem, &FirWithTail::new(problem.bank)?)?,
             banks: BTreeMap::new(),
+            failure: None,
             zero: ZERO_ERROR * (system.c().norm() * system.b().norm() + system.d().norm()),
         })
     }
@@ -228,7 +231,8 @@ impl<'a> OrderSearch<'a> {
         let refine = |start: &Dynamics| {
             refined(self.problem.aim, &truncation.samples, start, affordable.min(EVALUATIONS))
         };
-        let mut ends = vec![refine(&truncation.dynamics)?.dynamics];
+        let Refined { dynamics, failure, .. } = refine(&truncation.dynamics)?;
+        let mut ends = vec![dynamics];
         if affordable >= MULTI_START {
             let promising = self.promising_start(order, &truncation.samples.coarse())?;
             ends.extend(promising.map(|start| refine(&start)).transpose()?.map(|end| end.dynamics));
@@ -241,6 +245,7 @@ impl<'a> OrderSearch<'a> {
             }
         }
         self.banks.insert(order, best);
+        self.failure = self.failure.take().or(failure);
         Ok(())
     }
 
@@ -284,7 +289,8 @@ impl<'a> OrderSearch<'a> {
             |found: &ReducedBank<'_>| found.dynamics.tail_order() + found.dynamics.lags * self.problem.width;
         let reduced = chosen.map_or(full, |found| self.point(states(found), found.figures));
         let orders = self.banks.keys().filter_map(|&k| Some(self.point(k, self.best(k)?.figures)));
-        let record = OrderReduction { full, reduced, orders: orders.chain([full]).collect() };
+        let orders = orders.chain([full]).collect();
+        let record = OrderReduction { full, reduced, orders, unrefined: self.failure.clone() };
         (chosen.map(|found| found.bank.clone()), record)
     }
 }

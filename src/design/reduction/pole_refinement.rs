@@ -29,6 +29,8 @@ const STABILITY_MARGIN: f64 = 1e-3;
 pub(super) struct Refined {
     pub(super) dynamics: Dynamics,
     pub(super) error: f64,
+    /// The first computation that failed, if one did. The descent goes no further there.
+    pub(super) failure: Option<DesignError>,
 }
 
 /// Dynamics with a smaller error of the best output matrices, by at most `budget` evaluations.
@@ -39,7 +41,7 @@ pub(super) fn refined(
     budget: usize,
 ) -> Result<Refined, DesignError> {
     if start.tail_order() == 0 || budget == 0 {
-        return Ok(Refined { dynamics: start.clone(), error: f64::INFINITY });
+        return Ok(Refined { dynamics: start.clone(), error: f64::INFINITY, failure: None });
     }
     let (start, sizes) = normalised(samples.plant, start)?;
     let largest_radius = (1.0 - STABILITY_MARGIN).max(start.spectral_radius());
@@ -50,18 +52,27 @@ pub(super) fn refined(
     // In units of the channels, so that neither their gains nor the unit of the signal matter.
     let (r, n) = start.b.shape();
     let units = Mat::from_fn(r * (r + n), 1, |k, _| if k < r * r { 1.0 } else { sizes[k / r - r] });
+    let mut failure = None;
     let mut f = |x: &Mat| {
         let dynamics = unpacked(&start, &x.component_div(&units));
-        let inside = dynamics.spectral_radius() <= largest_radius;
-        let (value, gradient) = inside.then(|| error_and_gradient(&dynamics).ok()).flatten()?;
-        Some((value, gradient.component_div(&units)))
+        if dynamics.spectral_radius() > largest_radius {
+            return None;
+        }
+        match error_and_gradient(&dynamics) {
+            Ok((value, gradient)) => Some((value, gradient.component_div(&units))),
+            Err(error) => {
+                failure.get_or_insert(error);
+                None
+            }
+        }
     };
     let x = packed(&start.a, &start.b).component_mul(&units);
     let Some((value, gradient)) = f(&x) else {
-        return Ok(Refined { dynamics: start, error: f64::INFINITY });
+        return Ok(Refined { dynamics: start, error: f64::INFINITY, failure });
     };
     let end = descend(&mut f, Evaluated { x, value, gradient }, budget);
-    Ok(Refined { dynamics: unpacked(&start, &end.x.component_div(&units)), error: end.value })
+    let dynamics = unpacked(&start, &end.x.component_div(&units));
+    Ok(Refined { dynamics, error: end.value, failure })
 }
 
 fn packed(a: &Mat, b: &Mat) -> Mat {

@@ -195,3 +195,19 @@ fn the_same_bits_every_time() {
     let once = || reduce(&problem(&plant, &bank, Aim::WorstCase), Reduction::Order(2)).unwrap();
     assert_eq!(once(), once());
 }
+
+/// A refinement whose computations failed ended as one that had nothing to gain.
+#[test]
+fn a_refinement_that_fails_says_so() {
+    let plant = thesis(4);
+    let bank = bank_of(Method::Iir, &plant);
+    let root = state_covariance_root(&plant, &bank).unwrap();
+    let start = Dynamics::balanced(&bank, 0, &root).unwrap().truncated(2);
+    let mut samples = PlantSamples::new(&plant).unwrap();
+    let refine =
+        |samples: &PlantSamples<'_>| pole_refinement::refined(Aim::WorstCase, samples, &start, 4).unwrap();
+    assert_eq!(refine(&samples).failure, None);
+    samples.samples[0].w[(0, 0)].re = f64::NAN;
+    let failed = refine(&samples);
+    assert!(matches!(failed.failure, Some(DesignError::Lmi(_))), "{:?}", failed.failure);
+}
