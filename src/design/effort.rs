@@ -7,12 +7,12 @@
 
 use super::DesignError;
 use super::error_grid::{FINE, coarse_intervals};
-use super::limits::{Effort, Limits, TIME_LIMIT};
+use super::limits::{Effort, Limits, MAX_LONG_STATES, TIME_LIMIT};
 use super::merging::Repeats;
 use super::methods::fir_kyp::MAX_STATES;
 use super::methods::{Deviations, scenarios::RobustProblem};
 use super::problem::{Problem, common_delay};
-use super::prove::{MAX_LONG_STATES, MAX_SEARCHED_STATES, max_witnesses};
+use super::prove::{MAX_SEARCHED_STATES, max_witnesses};
 use crate::memory::available_memory;
 use crate::spec::{Method, Reduction, Solver, Spec};
 

@@ -1,8 +1,6 @@
 //! Errors of design and analysis.
 
-use super::limits::{Effort, memory_text};
-use super::methods::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS};
-use super::prove::MAX_LONG_STATES;
+use super::limits::{Effort, MAX_LONG_STATES, MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, memory_text};
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
 use crate::lmi::LmiError;

@@ -13,6 +13,15 @@ pub const TIME_LIMIT: Duration = Duration::from_secs(600);
 /// (docs/figures.md).
 const RATE: f64 = 1e10;
 
+/// Maximum number of states of an error system whose certificate is searched in 512 bits: some seconds per
+/// gamma that is tried.
+pub(super) const MAX_LONG_STATES: usize = 96;
+/// Maximum number of states of a plant whose filtering Riccati equation is solved with 106 bits; a step then
+/// takes tens of milliseconds, and a trial about a second unless a channel is delayed by many periods.
+pub(super) const MOST_STATES_AT_106_BITS: usize = 96;
+/// The same for 512 bits.
+pub(super) const MOST_STATES_AT_512_BITS: usize = 40;
+
 /// Whether a design is refused when its estimate exceeds [`TIME_LIMIT`] or the free memory, and ended at
 /// that time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

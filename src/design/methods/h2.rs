@@ -4,10 +4,10 @@
 use super::Synthesis;
 use super::filtering::{Filter, Innovations};
 use super::gamma_iteration::GammaIteration;
-use super::precise_filtering::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, PreciseFiltering};
+use super::precise_filtering::PreciseFiltering;
 use crate::arithmetic::{BigFloat, DoubleDouble, Number};
 use crate::design::DesignError;
-use crate::design::limits::Stop;
+use crate::design::limits::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, Stop};
 use crate::design::plant::LiftedPlant;
 use crate::lti::LtiError;
 use crate::lti::gramian::h2_norm;

@@ -3,10 +3,11 @@
 
 use super::filtering::{Filter, Innovations, RiccatiSolver, Trial};
 use super::gamma_iteration::{Evaluated, GammaIteration};
-use super::precise_filtering::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, PreciseFiltering};
+use super::precise_filtering::PreciseFiltering;
 use super::{Settings, Synthesis};
 use crate::arithmetic::{BigFloat, DoubleDouble, Number};
 use crate::design::DesignError;
+use crate::design::limits::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS};
 use crate::design::plant::LiftedPlant;
 use std::rc::Rc;
 

@@ -34,7 +34,6 @@ use crate::lti::StateSpace;
 use crate::lti::peak::Peak;
 use crate::spec::{Method, Solver, Spec, Tracking};
 use crate::units::FastPeriods;
-pub(super) use precise_filtering::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS};
 
 /// Settings of a method, in addition to the plant.
 #[derive(Debug, Clone, Default)]

@@ -35,11 +35,6 @@ const SEMIDEFINITE: f64 = 1e-15;
 /// Share of white noise in the filter's states in the choice of coordinates, or 100 roundings if these are
 /// more. With it no driven state is unreachable.
 const STATE_NOISE: f64 = 1e-40;
-/// Maximum number of states of a plant for 106 bits; a step then takes tens of milliseconds, and a trial
-/// about a second unless a channel is delayed by many periods.
-pub(in crate::design) const MOST_STATES_AT_106_BITS: usize = 96;
-/// The same for 512 bits.
-pub(in crate::design) const MOST_STATES_AT_512_BITS: usize = 40;
 /// Relative change of the covariance in one more step of the difference equation beyond which digits were
 /// lost.
 const FIXED_POINT_ACCURACY: f64 = 1e-7;

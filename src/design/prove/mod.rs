@@ -14,8 +14,8 @@ use crate::lti::FrequencyResponse;
 use crate::verify::{EnclosedErrorSystem, Strictness, Verified};
 use lower::lower_proof;
 pub(super) use lower::max_witnesses;
+pub(super) use upper::MAX_SEARCHED_STATES;
 use upper::certificate;
-pub(super) use upper::{MAX_LONG_STATES, MAX_SEARCHED_STATES};
 
 /// Relative distance below the designer's bound at which a proven bound still counts as its proof.
 const SHORTFALL: f64 = 0.5e-6;

@@ -9,6 +9,7 @@ use crate::arithmetic::dense::{cholesky, product, riccati_limit, select, solve, 
 use crate::arithmetic::{BigFloat, Number};
 use crate::bank::{Bank, Certificate, DualWitness};
 use crate::design::DesignError;
+use crate::design::limits::MAX_LONG_STATES;
 use crate::linalg::{self, Complex, Mat, power_of_two};
 use crate::lti::gramian::{controllability_root, observability_root};
 use crate::lti::peak::hinf_norm;
@@ -36,9 +37,6 @@ const DIGITS: [usize; 4] = [9, 12, 15, 17];
 const CORRECTION_DIGITS: [usize; 2] = [9, 17];
 /// Part of the excess that white noise on the states may take in 512 bits.
 const NOISE: f64 = 1e-3;
-/// Maximum number of states of an error system whose certificate is searched in 512 bits: some seconds per
-/// gamma that is tried.
-pub(in crate::design) const MAX_LONG_STATES: usize = 96;
 /// Maximum number of states of an error system for which the search tries to find a certificate. It needs
 /// eigenvalues of matrices twice as large.
 pub(in crate::design) const MAX_SEARCHED_STATES: usize = 512;
