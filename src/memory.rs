@@ -1,6 +1,45 @@
 //! The memory that this process may use.
 
+use std::fmt;
 use std::fs;
+
+/// Estimates of memory are low by this factor at most, with what the allocator adds.
+const ESTIMATES_LOW_BY: f64 = 1.2;
+
+/// Work that takes more memory than this process may use.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MemoryShortage {
+    /// Bytes that the work takes.
+    pub needed: f64,
+    /// Bytes that the process may use.
+    pub available: f64,
+}
+
+impl fmt::Display for MemoryShortage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let size = |bytes: f64| match bytes {
+            _ if bytes < 1e9 => format!("{:.0} MB", bytes / 1e6),
+            _ => format!("{:.1} GB", bytes / 1e9),
+        };
+        write!(f, "about {} of memory, and this process may use {}", size(self.needed), size(self.available))
+    }
+}
+
+/// Refuses work that takes more bytes than this process may use; the system would end the process. Where
+/// addresses are limited it is tried whether the system hands out so much in one piece.
+///
+/// # Errors
+/// [`MemoryShortage`] with both numbers.
+pub fn check_memory(needed: f64) -> Result<(), MemoryShortage> {
+    let (wanted, free) = (ESTIMATES_LOW_BY * needed, available_memory().unwrap_or(f64::INFINITY));
+    // Without a limit of addresses the system hands out what it has not.
+    let is_told = physical().is_some() && address_space().is_none();
+    let is_given = || is_told || Vec::<u8>::new().try_reserve_exact(wanted as usize).is_ok();
+    if wanted <= free && is_given() {
+        return Ok(());
+    }
+    Err(MemoryShortage { needed, available: free.min(wanted) / ESTIMATES_LOW_BY })
+}
 
 /// Bytes of memory that are free on the machine, or fewer where the process is limited (`ulimit -v`, a
 /// control group, addresses of 32 bits); `None` where the system does not say. A process that takes more is
@@ -55,5 +94,17 @@ mod tests {
         if cfg!(target_os = "linux") {
             assert!(available_memory().is_some_and(|bytes| bytes > 1e8));
         }
+    }
+
+    #[test]
+    fn little_is_there_and_no_machine_has_everything() {
+        assert_eq!(check_memory(1e6), Ok(()));
+        let shortage = check_memory(1e19).unwrap_err();
+        assert!(shortage.available > 1e6 && shortage.available < 1e19, "{shortage:?}");
+        let message = shortage.to_string();
+        assert!(
+            message.starts_with("about 10000000000.0 GB of memory, and this process may use"),
+            "{message}"
+        );
     }
 }

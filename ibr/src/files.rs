@@ -1,6 +1,7 @@
 //! Reading input files: whole, up to a size limit since a device may never end, and what is wrong with them.
 
 use hybank::files::{self, Bound, FileError, read_bytes};
+use hybank::memory::check_memory;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -71,9 +72,30 @@ pub(crate) fn read(path: &Path, remedy: &'static str) -> Result<Vec<u8>, InputEr
     read_bytes(path, IMAGE).map_err(|source| InputError::Read { source, remedy })
 }
 
-/// The text of a file.
-pub(crate) fn read_text(path: &Path, remedy: &'static str) -> Result<String, InputError> {
-    files::read_text(path, TEXT).map_err(|source| InputError::Read { source, remedy })
+/// The bytes of a file, if there is `room` for what is made of them, in bytes.
+pub(crate) fn read_with_room(
+    path: &Path,
+    remedy: &'static str,
+    room: impl Fn(&[u8]) -> f64,
+) -> Result<Vec<u8>, InputError> {
+    let bytes = read(path, remedy)?;
+    refuse_without_memory(path, room(&bytes)).map(|()| bytes)
+}
+
+/// The text of a file, if there is `room` for what is made of it, in bytes.
+pub(crate) fn read_text(
+    path: &Path,
+    remedy: &'static str,
+    room: impl Fn(&str) -> f64,
+) -> Result<String, InputError> {
+    let text = files::read_text(path, TEXT).map_err(|source| InputError::Read { source, remedy })?;
+    refuse_without_memory(path, room(&text)).map(|()| text)
+}
+
+/// Refuses a file that takes more memory, in bytes, than this process may use.
+pub(crate) fn refuse_without_memory(path: &Path, bytes: f64) -> Result<(), InputError> {
+    let refused = |shortage| format!("to read it takes {shortage}; is it the right file?");
+    check_memory(bytes).map_err(|shortage| InputError::content(path, Location::File, refused(shortage)))
 }
 
 /// The text of a stream called `name`.

@@ -6,6 +6,7 @@ use super::regressors::{CAUSE_OF, REGRESSORS, Regressors, difference};
 use super::sure::Limits;
 use super::variogram::Variogram;
 use crate::image::Image;
+use crate::pipeline::memory::Extent;
 use crate::pipeline::{RenderError, RenderSettings, Rendering};
 use crate::propagate::{View, Viewpoint};
 use std::ops::Range;
@@ -163,6 +164,9 @@ pub trait Predicted: Viewpoint {
         size: Self::Size,
         study: &Study<'_>,
     ) -> Result<Examined, RenderError>;
+
+    /// The sizes of a prediction of a view, and the bytes that it takes.
+    fn memory(views: &[View<'_, Self>], size: Self::Size, settings: &RenderSettings) -> (Extent, f64);
 
     /// Mean distance between neighbouring views; of views at one point that from this camera, or one.
     fn spacing(&self, views: &[View<'_, Self>]) -> f64;

@@ -8,8 +8,9 @@ use super::regressors::{hole_distances, slopes};
 use crate::camera::Camera;
 use crate::depth::DepthMap;
 use crate::image::Image;
+use crate::pipeline::memory::Extent;
 use crate::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights, calibrated as pipeline};
-use crate::propagate::{CalibratedView, Viewpoint};
+use crate::propagate::{CalibratedView, Nearest, Viewpoint};
 use nalgebra::{Matrix3x4, Vector3};
 
 /// Largest share of its depth by which a noisy depth is wrong, in standard deviations.
@@ -64,13 +65,19 @@ impl Predicted for Camera {
         Ok(Examined { rendering, regressors, sure_bound: Vec::new(), local_limit })
     }
 
+    fn memory(
+        views: &[CalibratedView<'_>],
+        size: (usize, usize),
+        settings: &RenderSettings,
+    ) -> (Extent, f64) {
+        let extent = pipeline::extent(views, size, settings);
+        (extent, extent.of_camera_prediction(settings))
+    }
+
     /// Mean distance between a view and the one nearest to it.
     fn spacing(&self, views: &[CalibratedView<'_>]) -> f64 {
-        let nearest = |i: usize| {
-            let others = views.iter().enumerate().filter(|(j, _)| *j != i);
-            others.map(|(_, v)| v.camera.distance(&views[i].camera)).fold(f64::INFINITY, f64::min)
-        };
-        let mean = (0..views.len()).map(nearest).sum::<f64>() / views.len() as f64;
+        let nearest = Nearest::new(views);
+        let mean = (0..views.len()).map(|i| nearest.distance(i)).sum::<f64>() / views.len() as f64;
         let away = views.iter().map(|v| v.camera.distance(self)).fold(f64::INFINITY, f64::min);
         [mean, away].into_iter().find(|s| *s > 0.0 && s.is_finite()).unwrap_or(1.0)
     }

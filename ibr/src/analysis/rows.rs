@@ -5,6 +5,7 @@ use super::evidence::{Evidence, collect_evidence};
 use super::jitter::depth_jitter;
 use super::regressors::regressors;
 use crate::image::Image;
+use crate::pipeline::memory::Extent;
 use crate::pipeline::{RenderError, RenderSettings, Rendering, rectified as pipeline};
 use crate::propagate::RectifiedView;
 
@@ -38,6 +39,11 @@ impl Predicted for f64 {
         let reach = (REACH * known.noise) as f32;
         let local_limit = found.evidence.iter().map(|e| local_limit(e, reach)).collect();
         Ok(Examined { rendering: found.rendering, regressors, sure_bound: found.sure, local_limit })
+    }
+
+    fn memory(views: &[RectifiedView<'_>], (): (), settings: &RenderSettings) -> (Extent, f64) {
+        let extent = pipeline::extent(views, settings);
+        (extent, extent.of_rig_prediction(settings))
     }
 
     fn spacing(&self, views: &[RectifiedView<'_>]) -> f64 {

@@ -5,6 +5,7 @@ use super::{Camera, Lens};
 use crate::files::{InputError, Location};
 use nalgebra::{Matrix3, Matrix3x4};
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The images of a COLMAP model or of a transforms file.
@@ -13,6 +14,8 @@ pub struct CameraList {
     pub(super) path: PathBuf,
     /// The images in their order.
     pub frames: Vec<Frame>,
+    /// The numbers of the images by their file names without extension.
+    by_stem: BTreeMap<String, Vec<usize>>,
 }
 
 /// An image, its pose and the inner parameters of its camera.
@@ -60,6 +63,15 @@ pub struct ListedCamera {
 }
 
 impl CameraList {
+    pub(super) fn new(path: PathBuf, frames: Vec<Frame>) -> Self {
+        let mut by_stem: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+        for (number, frame) in frames.iter().enumerate() {
+            let stem = names::stem_of(&frame.image.to_string_lossy()).to_owned();
+            by_stem.entry(stem).or_default().push(number);
+        }
+        Self { path, frames, by_stem }
+    }
+
     /// The file, or the folder of a model.
     pub fn path(&self) -> &Path {
         &self.path
@@ -70,10 +82,15 @@ impl CameraList {
     /// # Errors
     /// [`NameError`].
     pub fn find(&self, image: &str) -> Result<(&Frame, Found), NameError> {
-        let images: Vec<_> = self.frames.iter().map(|frame| frame.image.to_string_lossy()).collect();
+        // Only these can fit. If there is none, the message names the images that are most like it.
+        let fitting = self.by_stem.get(names::stem_of(image)).map(Vec::as_slice);
+        let all = || (0..self.frames.len()).collect();
+        let numbers = fitting.map_or_else(all, <[usize]>::to_vec);
+        let images: Vec<_> = numbers.iter().map(|k| self.frames[*k].image.to_string_lossy()).collect();
         let images: Vec<&str> = images.iter().map(AsRef::as_ref).collect();
         let found = names::find(&images, image)?;
-        Ok((&self.frames[found.index], found))
+        let index = numbers[found.index];
+        Ok((&self.frames[index], Found { index, ..found }))
     }
 
     /// The camera of a frame. `fallback` is the size of its image if the list does not give it.

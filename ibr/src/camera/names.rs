@@ -86,6 +86,11 @@ impl Fit {
     }
 }
 
+/// The file name of a path without its extension: names that differ in it do not fit.
+pub(super) fn stem_of(path: &str) -> &str {
+    stem(parts(path).last().copied().unwrap_or(""))
+}
+
 /// The parts of a path, whichever slash is between them, without `.`.
 fn parts(path: &str) -> Vec<&str> {
     path.split(['/', '\\']).filter(|part| !part.is_empty() && *part != ".").collect()

@@ -13,6 +13,9 @@ use std::path::{Path, PathBuf};
 /// Most columns or rows of an image, and the largest focal length in pixels.
 const LARGEST: f64 = 1e6;
 
+/// Bytes of memory per byte of a file while it is parsed: a number of two bytes takes 64.
+const PARSED: f64 = 40.0;
+
 #[derive(Deserialize)]
 struct FileSpec {
     #[serde(flatten)]
@@ -35,7 +38,7 @@ struct FrameSpec {
 /// # Errors
 /// [`InputError`], with the line or the frame.
 pub fn read_transforms(path: &Path) -> Result<CameraList, InputError> {
-    parse_transforms(&files::read_text(path, CHECK_THE_PATH)?, path)
+    parse_transforms(&files::read_text(path, CHECK_THE_PATH, |text| PARSED * text.len() as f64)?, path)
 }
 
 /// The same from the text of the file; `path` appears in messages.
@@ -64,7 +67,7 @@ pub fn parse_transforms(text: &str, path: &Path) -> Result<CameraList, InputErro
         Ok(Frame { image: image_path(&spec.file_path), depth: spec.depth_file_path, number, pose, inner })
     };
     let frames = file.frames.into_iter().enumerate().map(one).collect::<Result<_, _>>()?;
-    Ok(CameraList { path: path.into(), frames })
+    Ok(CameraList::new(path.into(), frames))
 }
 
 /// The path of an image; the synthetic scenes of NeRF leave the extension out.

@@ -8,7 +8,7 @@ use super::progress::Progress;
 use super::summary::Summary;
 use crate::camera::Camera;
 use crate::depth::DepthMap;
-use crate::image::{Image, Levels, quality};
+use crate::image::{Image, ImageError, Levels, quality};
 use crate::partial::{Densify, densify};
 use crate::pipeline::{RenderSettings, Rendering, rectified};
 use crate::propagate::RectifiedView;
@@ -18,6 +18,9 @@ use std::time::Instant;
 
 /// Step of the coarse depth in the second rendering.
 const STEP: usize = 6;
+
+/// Bytes per pixel of a view: six pictures, the sheet of them, and its file.
+const SHEET: f64 = 300.0;
 
 #[derive(Debug, Serialize)]
 struct DemoSummary {
@@ -36,6 +39,7 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
         ));
     }
     output::name_leftovers(&[&arguments.output]);
+    ImageError::refuse_without_memory(&arguments.output, arguments.size, SHEET).map_err(Failure::input)?;
     let progress = Progress::new(4);
     progress.step("drawing the scene");
     let (left, left_map) = view(0.0, arguments.size)?;

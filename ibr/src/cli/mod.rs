@@ -7,7 +7,6 @@ mod demo;
 mod failure;
 mod heat;
 mod inputs;
-mod memory;
 mod output;
 mod progress;
 mod render;
@@ -17,10 +16,14 @@ mod summary;
 use arguments::{Arguments, Command};
 use clap::Parser;
 use failure::Failure;
+use hybank::memory::check_memory;
 use std::process::ExitCode;
 
 /// More threads than cores would only use memory for stacks.
 const MOST_THREADS: usize = 1024;
+
+/// Bytes of memory that every command takes beside what it counts.
+const LEAST_MEMORY: f64 = 16e6;
 
 /// Reads the arguments, runs the command and maps its outcome to an exit code: 0 success, 1 input error, 2
 /// usage error.
@@ -53,14 +56,32 @@ fn show(message: &clap::Error) -> ExitCode {
 /// Runs the work on the given number of threads, by default on all cores; on this thread if none can be
 /// started.
 fn in_pool(threads: Option<usize>, work: impl FnOnce() -> Result<(), Failure> + Send) -> Result<(), Failure> {
-    let Some(threads) = threads else {
-        let builder = || rayon::ThreadPoolBuilder::new();
-        let pool = builder().build().or_else(|_| builder().num_threads(1).use_current_thread().build());
-        return pool.map_err(Failure::input)?.install(work);
-    };
-    if !(1..=MOST_THREADS).contains(&threads) {
+    if threads.is_some_and(|threads| !(1..=MOST_THREADS).contains(&threads)) {
+        let threads = threads.unwrap_or_default();
         return Err(Failure::Usage(format!("--threads {threads}: it must be 1 to {MOST_THREADS}")));
     }
-    let refused = |error| Failure::Input(format!("--threads {threads}: {error}; ask for fewer"));
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(refused)?.install(work)
+    refuse_without_memory()?;
+    let builder = rayon::ThreadPoolBuilder::new;
+    let pool = match threads {
+        Some(threads) => builder()
+            .num_threads(threads)
+            .build()
+            .map_err(|error| Failure::Input(format!("--threads {threads}: {error}; ask for fewer"))),
+        None => builder()
+            .build()
+            .or_else(|_| builder().num_threads(1).use_current_thread().build())
+            .map_err(Failure::input),
+    }?;
+    // The allocator gives each thread a part of the address space at its first request. Now that is counted
+    // when work is compared with what is free.
+    pool.broadcast(|_| drop(std::hint::black_box(Vec::<u8>::with_capacity(1))));
+    refuse_without_memory()?;
+    pool.install(work)
+}
+
+/// Refuses to begin with less memory than text, small tables and the stacks of threads take: an allocation
+/// that fails there would end the process.
+fn refuse_without_memory() -> Result<(), Failure> {
+    let refused = |shortage| format!("every command takes {shortage}; allow more, or use --threads 1");
+    check_memory(LEAST_MEMORY).map_err(|shortage| Failure::Input(refused(shortage)))
 }

@@ -8,11 +8,10 @@ mod path;
 use super::arguments::RenderArguments;
 use super::failure::Failure;
 use super::inputs;
-use super::memory::{self, Work};
 use super::output;
 use super::progress::Progress;
 use super::summary::Summary;
-use crate::image::{Image, quality};
+use crate::image::{Image, ImageError, quality};
 use crate::pipeline::uncalibrated::{Target, UncalibratedSettings};
 use crate::pipeline::{RenderSettings, Rendering, Watch, calibrated, rectified, uncalibrated};
 use crate::scene::{self, Kind, Scene, SourceView};
@@ -34,11 +33,9 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let progress = Progress::new(1);
     progress.step("reading");
     let start = Instant::now();
-    let scene = read(arguments)?;
+    let scene = read(arguments, &|share| progress.within(share))?;
     let preparation = start.elapsed().as_secs_f64();
     check_nearest(&scene.kind, arguments)?;
-    let method = arguments.settings(scene.offset).method;
-    memory::check(&scene, Work::Render(method)).map_err(|e| e.in_file(&arguments.scene.file))?;
     let frames = scene.kind.frames();
     path::check(arguments, frames)?;
     let files = path::outputs(arguments, frames);
@@ -125,7 +122,7 @@ fn check_nearest(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure
     Ok(())
 }
 
-fn read(arguments: &RenderArguments) -> Result<Scene, Failure> {
+fn read(arguments: &RenderArguments, watch: Watch<'_>) -> Result<Scene, Failure> {
     let source = arguments.scene.source()?;
     let frames: usize = match arguments.scene.view {
         Some(_) => 1,
@@ -136,7 +133,7 @@ fn read(arguments: &RenderArguments) -> Result<Scene, Failure> {
     let film = Some(arguments.output.as_path()).filter(|path| path::is_film(path, frames));
     let film = film.filter(|path| !output::is_standard(path));
     source.refuse_overlaps(&all.iter().flat_map(Outputs::files).chain(film).collect::<Vec<_>>())?;
-    arguments.scene.load(&source, arguments.densify, !arguments.drop_unknown)
+    arguments.scene.load(&source, arguments.densify, !arguments.drop_unknown, watch)
 }
 
 /// The virtual view `frame` of a list or path; 0 if there is one.
@@ -190,6 +187,8 @@ fn render_uncalibrated(
 fn compare(summary: &mut Summary, done: &Rendered, truth: &Image, path: &Path) -> Result<(), Failure> {
     let named = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", path.display()));
     let image = &done.rendering.image;
+    // Both are rounded.
+    ImageError::refuse_without_memory(path, image.size(), 24.0).map_err(Failure::input)?;
     let whole = quality::compare(image, truth, None).map_err(|e| named(&e))?;
     let Some(hull) = &done.hull else {
         whole.iter().for_each(|q| summary.compare(q));

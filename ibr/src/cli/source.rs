@@ -7,7 +7,7 @@ use super::output;
 use crate::files;
 use crate::image::{Image, read_image_within};
 use crate::partial::Densify;
-use crate::pipeline::RenderSettings;
+use crate::pipeline::{RenderSettings, Watch};
 use crate::scene::{self, LoadOptions, Scene, SceneSpec};
 use std::path::{Path, PathBuf};
 
@@ -52,7 +52,13 @@ impl SceneArguments {
     }
 
     /// Loads the scene, and prints what was decided on the way.
-    pub(super) fn load(&self, source: &Source, densify: Densify, fill: bool) -> Result<Scene, Failure> {
+    pub(super) fn load(
+        &self,
+        source: &Source,
+        densify: Densify,
+        fill: bool,
+        watch: Watch<'_>,
+    ) -> Result<Scene, Failure> {
         let options = LoadOptions {
             view: self.view.clone(),
             depth_step: self.depth_step,
@@ -60,7 +66,8 @@ impl SceneArguments {
             fill,
             max_pixels: self.max_pixels,
         };
-        let scene = scene::load(&source.spec, &source.path, &options).map_err(Failure::input)?;
+        let scene =
+            scene::load_watched(&source.spec, &source.path, &options, watch).map_err(Failure::input)?;
         inputs::notes(&scene);
         Ok(scene)
     }
@@ -78,7 +85,12 @@ impl Source {
 fn text(path: &Path) -> Result<(PathBuf, String), Failure> {
     if output::is_standard(path) {
         let text = files::text(std::io::stdin().lock(), "standard input").map_err(Failure::input)?;
-        return Ok((PathBuf::from("<stdin>"), text));
+        let name = PathBuf::from("<stdin>");
+        files::refuse_without_memory(&name, scene::room_to_parse(&text)).map_err(Failure::input)?;
+        return Ok((name, text));
     }
-    Ok((path.to_owned(), files::read_text(path, "check the path").map_err(Failure::input)?))
+    Ok((
+        path.to_owned(),
+        files::read_text(path, "check the path", scene::room_to_parse).map_err(Failure::input)?,
+    ))
 }

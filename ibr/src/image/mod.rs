@@ -13,13 +13,13 @@ pub mod y4m;
 
 pub use dynamic::Levels;
 pub use frame_rate::FrameRate;
-pub(crate) use read::unavailable_memory;
 pub use read::{MOST_PIXELS, read_image, read_image_within, read_map, read_map_within};
 pub use texture::Texture;
 pub use write::{begin, encode, encode_levels, encode_with_alpha, save};
 
 use crate::files::InputError;
-use std::path::PathBuf;
+use hybank::memory::{MemoryShortage, check_memory};
+use std::path::{Path, PathBuf};
 
 /// Errors of image files, and of images that do not fit together.
 #[derive(Debug, thiserror::Error)]
@@ -47,8 +47,8 @@ pub enum ImageError {
         /// Most pixels.
         most: usize,
     },
-    /// The system has no memory for the work on so many pixels.
-    #[error("{}: a rendering of {width} x {height} pixels takes {:.1} GB of memory, more than the system gives; crop or shrink the image", path.display(), *bytes as f64 / 1e9)]
+    /// There is no memory to unpack or to pack so many pixels.
+    #[error("{}: {width} x {height} pixels take {shortage}; crop or shrink the image", path.display())]
     Memory {
         /// The file.
         path: PathBuf,
@@ -56,8 +56,8 @@ pub enum ImageError {
         width: usize,
         /// Height in pixels.
         height: usize,
-        /// Bytes that the work would take.
-        bytes: usize,
+        /// What the work takes, and what there is.
+        shortage: MemoryShortage,
     },
     /// The file cannot be created or get its name.
     #[error(transparent)]
@@ -119,6 +119,18 @@ pub enum ImageError {
         /// Values given.
         given: usize,
     },
+}
+
+impl ImageError {
+    /// Refuses an image of a file that takes more memory, by its bytes per pixel, than this process may use.
+    pub(crate) fn refuse_without_memory(
+        path: &Path,
+        (width, height): (usize, usize),
+        per_pixel: f64,
+    ) -> Result<(), Self> {
+        let refused = |shortage| Self::Memory { path: path.into(), width, height, shortage };
+        check_memory(per_pixel * width as f64 * height as f64).map_err(refused)
+    }
 }
 
 /// A grey or RGB image, rows from the top, channels interleaved; black is 0 and white 255.

@@ -30,8 +30,8 @@ pub fn compare(image: &Image, truth: &Image, mask: Option<&[bool]>) -> Result<Op
         return Err(ImageError::Buffer { width, height, channels: 1, expected, given: mask.len() });
     }
     let grey = image.channels() != truth.channels();
-    let (a, b) = if grey { (image.to_grey(), truth.to_grey()) } else { (image.clone(), truth.clone()) };
-    let (a, b) = (a.quantised(), b.quantised());
+    let rounded = |image: &Image| if grey { image.to_grey().quantised() } else { image.quantised() };
+    let (a, b) = (rounded(image), rounded(truth));
     let inside = |i: usize| mask.is_none_or(|m| m[i]);
     let pixels = (0..width * height).filter(|i| inside(*i)).count();
     if pixels == 0 {

@@ -2,23 +2,16 @@
 
 use super::{Image, ImageError, colmap_map, pfm};
 use crate::files::{self, CHECK_THE_PATH};
-use hybank::memory::available_memory;
 use image::{DynamicImage, ImageReader};
 use std::io::Cursor;
 use std::path::Path;
 
-/// Default of the most pixels of an image or map: 5792 x 5792, whose rendering takes about two gigabytes.
+/// Default of the most pixels of an image or map: 5792 x 5792, whose rendering takes 2 to 4 gigabytes.
 pub const MOST_PIXELS: usize = 1 << 25;
 
-/// Bytes of work memory per pixel of a rendering, at most.
-const PIXEL_BYTES: usize = 64;
-
-/// Bytes that the work on so many pixels takes, if there is less memory or the system refuses them.
-pub(crate) fn unavailable_memory(pixels: usize) -> Option<usize> {
-    let bytes = pixels.saturating_mul(PIXEL_BYTES);
-    let lacks = available_memory().is_some_and(|memory| bytes as f64 > memory);
-    (lacks || Vec::<u8>::new().try_reserve_exact(bytes).is_err()).then_some(bytes)
-}
+/// Bytes per pixel while an image is unpacked and converted: four channels of 16 bits, three as they are
+/// needed, and three numbers.
+const READING: f64 = 30.0;
 
 /// Reads a grey or RGB image of at most [`MOST_PIXELS`] pixels; 16-bit values are scaled to 0..255, PFM
 /// values (white = 1) times 255.
@@ -92,6 +85,8 @@ enum Loaded {
 fn load(path: &Path, most: usize) -> Result<Loaded, ImageError> {
     let bytes = files::read(path, CHECK_THE_PATH)?;
     let decode = |reason: String| ImageError::Decode { path: path.into(), reason };
+    // The numbers of a float map are as many bytes again.
+    files::refuse_without_memory(path, bytes.len() as f64)?;
     let float = match &bytes[..] {
         [b'P', b'F' | b'f', ..] => Some(pfm::decode(&bytes)),
         _ => colmap_map::is_map(&bytes).then(|| colmap_map::decode(&bytes)),
@@ -105,8 +100,10 @@ fn load(path: &Path, most: usize) -> Result<Loaded, ImageError> {
     let (width, height) =
         open().map_err(|e| decode(e.to_string()))?.into_dimensions().map_err(|e| decode(e.to_string()))?;
     check_size(path, (width as usize, height as usize), most)?;
-    let picture = open().map_err(|e| decode(e.to_string()))?.decode().map_err(|e| decode(e.to_string()))?;
-    Ok(Loaded::Whole(picture))
+    let mut reader = open().map_err(|e| decode(e.to_string()))?;
+    // The size was checked; the decoders have limits of their own, without a way to allow more.
+    reader.no_limits();
+    Ok(Loaded::Whole(reader.decode().map_err(|e| decode(e.to_string()))?))
 }
 
 /// Refuses too many pixels, and such that the system has no memory for.
@@ -115,10 +112,7 @@ fn check_size(path: &Path, (width, height): (usize, usize), most: usize) -> Resu
     if pixels > most {
         return Err(ImageError::TooLarge { path: path.into(), width, height, most });
     }
-    match unavailable_memory(pixels) {
-        Some(bytes) => Err(ImageError::Memory { path: path.into(), width, height, bytes }),
-        None => Ok(()),
-    }
+    ImageError::refuse_without_memory(path, (width, height), READING)
 }
 
 fn is_deep(picture: &DynamicImage) -> bool {

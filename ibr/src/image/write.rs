@@ -20,18 +20,29 @@ pub fn encode(image: &Image, path: &Path, levels: Levels) -> Result<Vec<u8>, Ima
         "png" => ImageFormat::Png,
         "jpg" | "jpeg" => ImageFormat::Jpeg,
         "ppm" | "pgm" | "pnm" => ImageFormat::Pnm,
-        "pfm" => return Ok(encode_float(image)),
+        "pfm" => {
+            let room = 12.0 * image.channels() as f64;
+            return ImageError::refuse_without_memory(path, image.size(), room).map(|()| encode_float(image));
+        }
         _ => return Err(ImageError::UnknownFormat { path: path.into() }),
     };
     if levels == Levels::Sixteen && format != ImageFormat::Png {
         return Err(ImageError::Levels { path: path.into() });
     }
+    ImageError::refuse_without_memory(path, image.size(), packing(image.channels(), levels))?;
     // A .ppm is always written in colour, a .pgm in grey.
     match ending.as_str() {
         "ppm" => write_picture(&image.to_rgb().to_dynamic(levels), format, path),
         "pgm" => write_picture(&image.to_grey().to_dynamic(levels), format, path),
         _ => write_picture(&image.to_dynamic(levels), format, path),
     }
+}
+
+/// Bytes per pixel while a picture is packed: the picture, what the encoder makes of it in pieces that double,
+/// and the file.
+fn packing(channels: usize, levels: Levels) -> f64 {
+    let bytes = if levels == Levels::Sixteen { 2 } else { 1 };
+    (6 * bytes * channels.max(3)) as f64
 }
 
 /// Writes the image to a file that appears only when it is whole, in the place of one that exists.
@@ -69,6 +80,7 @@ pub fn encode_levels(
     path: &Path,
 ) -> Result<Vec<u8>, ImageError> {
     fills(numbers, (width, height))?;
+    ImageError::refuse_without_memory(path, (width, height), packing(1, Levels::Sixteen))?;
     let grey = ImageBuffer::from_raw(width as u32, height as u32, numbers.to_vec());
     write_picture(&grey.map(DynamicImage::ImageLuma16).unwrap_or_default(), ImageFormat::Png, path)
 }
@@ -85,6 +97,7 @@ pub fn encode_with_alpha(
     levels: Levels,
 ) -> Result<Vec<u8>, ImageError> {
     fills(alpha, image.size())?;
+    ImageError::refuse_without_memory(path, image.size(), packing(image.channels() + 1, levels))?;
     let pixels = image.data().chunks_exact(image.channels()).zip(alpha);
     let values = pixels.flat_map(|(pixel, alpha)| pixel.iter().copied().chain([255.0 * alpha]));
     let picture = picture(values, image.size(), image.channels() + 1, levels);

@@ -61,18 +61,28 @@ const ROWS: usize = 4;
 /// fills its holes for itself, and without this the fillings form a comb of teeth one row high.
 pub(crate) fn join_rows<const C: usize>(mask: &[Cover], width: usize, values: &mut [f32]) {
     let pixels = values.as_chunks_mut::<C>().0;
-    let uncovered = |p: &usize| mask.get(*p) == Some(&Cover::Disocclusion);
-    let mean = |p: usize| {
-        let rows = (p / width).saturating_sub(ROWS)..p / width + ROWS + 1;
-        let (mut sum, mut count) = ([0.0; C], 0.0);
-        for q in rows.map(|y| y * width + p % width).filter(uncovered) {
-            sum.iter_mut().zip(pixels[q]).for_each(|(s, v)| *s += v);
-            count += 1.0;
+    let height = mask.len() / width.max(1);
+    // The rows above as they were, the latest ones.
+    let mut above = vec![[0.0; C]; width * ROWS.min(height.saturating_sub(1))];
+    let kept = |y: usize, x: usize| y % ROWS * width + x;
+    for y in 0..height {
+        for x in 0..width {
+            let here = pixels[y * width + x];
+            if mask[y * width + x] == Cover::Disocclusion {
+                let (mut sum, mut count) = ([0.0; C], 0.0);
+                let rows = y.saturating_sub(ROWS)..(y + ROWS + 1).min(height);
+                for row in rows.filter(|row| mask[row * width + x] == Cover::Disocclusion) {
+                    let value = if row < y { above[kept(row, x)] } else { pixels[row * width + x] };
+                    sum.iter_mut().zip(value).for_each(|(s, v)| *s += v);
+                    count += 1.0;
+                }
+                pixels[y * width + x] = sum.map(|s| s / count);
+            }
+            if let Some(above) = above.get_mut(kept(y, x)) {
+                *above = here;
+            }
         }
-        (p, sum.map(|s| s / count))
-    };
-    let joined: Vec<(usize, [f32; C])> = (0..pixels.len()).filter(uncovered).map(mean).collect();
-    joined.into_iter().for_each(|(p, value)| pixels[p] = value);
+    }
 }
 
 /// Pixels in holes, by kind.

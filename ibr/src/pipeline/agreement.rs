@@ -4,7 +4,7 @@
 use super::depth_errors::{self, FEWEST_POINTS, Lookups};
 use crate::depth::{DepthMap, Measure};
 use crate::image::{Image, Texture};
-use crate::propagate::{View, Viewpoint};
+use crate::propagate::{Nearest, View, Viewpoint};
 use rayon::prelude::*;
 
 /// Pixels of each view that are compared, about.
@@ -67,8 +67,9 @@ impl Agreement {
         let textures = views.par_iter().map(|view| Texture::of(view.image)).collect();
         let mut agreement = Self { gains: vec![1.0; views.len()], textures, ..Self::default() };
         let mut errors = vec![Vec::new(); views.len()];
+        let nearest = Nearest::new(views);
         for j in 1..views.len() {
-            let Some(i) = View::nearest_before(views, j) else { continue };
+            let Some(i) = nearest.before(j) else { continue };
             let found = Comparison::new(&views[i], &views[j]).verdict([i, j]);
             let Some(pair) = found else { continue };
             // Brightness at points that do not correspond says nothing.

@@ -1,5 +1,6 @@
 //! A view from any number of calibrated cameras with depth.
 
+use super::memory::Extent;
 use super::{
     Agreement, Method, RenderError, RenderSettings, Rendering, Report, ViewWeights, Watch, check_counts,
     check_size,
@@ -46,7 +47,9 @@ pub fn render_watched(
     settings: &RenderSettings,
     watch: Watch<'_>,
 ) -> Result<Rendering, RenderError> {
-    check(views, settings)?;
+    check(views, size, settings)?;
+    let extent = extent(views, size, settings);
+    extent.check(extent.of_cameras(settings))?;
     let colour = views.iter().any(|v| v.image.channels() == 3);
     match (settings.interpolation.plane.degree, colour) {
         (Degree::Linear, false) => render_with::<2, 1>(views, camera, size, settings, watch),
@@ -56,9 +59,27 @@ pub fn render_watched(
     }
 }
 
-fn check(views: &[CalibratedView<'_>], settings: &RenderSettings) -> Result<(), RenderError> {
+/// The sizes of a view of `size` between others.
+pub(crate) fn extent(
+    views: &[CalibratedView<'_>],
+    size: (usize, usize),
+    settings: &RenderSettings,
+) -> Extent {
+    Extent::new(size, &views.iter().map(|view| view.image).collect::<Vec<_>>(), settings.nearest)
+}
+
+/// Bands of rows for views of so many pixels in all.
+pub(super) fn bands_of(pixels: usize, height: usize) -> usize {
+    pixels.div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS)).max(1)
+}
+
+fn check(
+    views: &[CalibratedView<'_>],
+    size: (usize, usize),
+    settings: &RenderSettings,
+) -> Result<(), RenderError> {
     let largest = views.iter().map(|v| v.image.width() * v.image.height()).max().unwrap_or(0);
-    check_counts(views.len(), largest)?;
+    check_counts(views.len(), largest.max(size.0.saturating_mul(size.1)))?;
     settings.check()?;
     if settings.method == Method::Rows {
         return Err(RenderError::RowsOfGeneralCameras);
@@ -88,7 +109,7 @@ fn render_with<const ORDER: usize, const C: usize>(
     let footprint = Footprint::of(views, &chosen, camera, &whole);
     let view_weights =
         if settings.keep_exposure { view_weights } else { view_weights.with_gains(&agreement.gains) };
-    let count = footprint.most_samples().div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS)).max(1);
+    let count = bands_of(footprint.most_samples(), height);
     let bands: Vec<Range<usize>> =
         (0..count).map(|band| band * height / count..(band + 1) * height / count).collect();
     let (ready, propagated) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -107,6 +128,7 @@ fn render_with<const ORDER: usize, const C: usize>(
     })?;
     let propagated = propagated.into_inner();
     let (used, dropped) = (problem.samples(), footprint.dropped(propagated));
+    drop((pool, footprint));
     if propagated == 0 {
         return Err(RenderError::NoOverlap { pixels, dropped });
     }

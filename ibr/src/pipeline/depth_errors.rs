@@ -38,7 +38,8 @@ impl Lookups {
     /// depth to the other view.
     pub(crate) fn of(from: &DepthMap, to: &DepthMap, map: impl Fn(f64, f64, f64) -> (f64, f64, f64)) -> Self {
         let (width, height) = from.size();
-        let mut all = Self::default();
+        let mut all =
+            Self { differences: Vec::with_capacity((width * height).div_ceil(LOOKUP_STEP)), kept: 0.0 };
         for p in (0..width * height).step_by(LOOKUP_STEP).filter(|p| !from.is_guessed(*p)) {
             let depth = f64::from(from.data()[p]);
             let (u, v, d) = map((p % width) as f64, (p / width) as f64, depth);

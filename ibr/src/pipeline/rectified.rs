@@ -1,10 +1,11 @@
 //! A view from a rectified rig: the three stages run row by row, rows in parallel.
 
+use super::memory::Extent;
 use super::{
     Agreement, Method, RenderError, RenderSettings, Rendering, Report, ViewWeights, Watch, check_counts,
     check_size,
 };
-use crate::depth::{DepthMap, Measure};
+use crate::depth::{DepthMap, Measure, TILE};
 use crate::image::Image;
 use crate::interpolate::plane::PlaneProblem;
 use crate::interpolate::rows::{self, RowWork, nearest_depths};
@@ -43,6 +44,8 @@ pub fn render_watched(
 ) -> Result<Rendering, RenderError> {
     check(views, position)?;
     settings.check()?;
+    let extent = extent(views, settings);
+    extent.check(extent.of_rig(settings))?;
     let colour = views.iter().any(|v| v.image.channels() == 3);
     match (settings.interpolation.fit.degree, colour) {
         (Degree::Linear, false) => render_with::<2, 1>(views, position, settings, watch),
@@ -62,6 +65,13 @@ fn check(views: &[RectifiedView<'_>], position: f64) -> Result<(), RenderError> 
     }
     let positions = views.iter().map(|v| v.camera).chain([position]);
     positions.into_iter().try_for_each(|position| Ok(FINITE.check("position", position)?))
+}
+
+/// The sizes of a view between others.
+pub(crate) fn extent(views: &[RectifiedView<'_>], settings: &RenderSettings) -> Extent {
+    let images: Vec<&Image> = views.iter().map(|view| view.image).collect();
+    let size = images.first().map_or((0, 0), |image| image.size());
+    Extent::new(size, &images, settings.nearest)
 }
 
 /// The inputs that all rows share.
@@ -207,7 +217,9 @@ pub(crate) struct Strip<const C: usize> {
 
 impl<const C: usize> Strip<C> {
     pub(crate) fn new(job: &Job<'_>) -> Self {
-        let samples = Vec::with_capacity(job.frame.width * job.views.len());
+        let used = (0..job.views.len()).filter(|view| job.view_weights.uses(*view)).count();
+        // The last tile of a row asks for the place of a whole one.
+        let samples = Vec::with_capacity(job.frame.width * used + TILE);
         Self { samples, scratch: RowScratch::default() }
     }
 

@@ -241,6 +241,11 @@ impl ViewWeights {
         }
     }
 
+    /// Views from one to the next of those that stand for all in the sums over the views.
+    fn stride(&self) -> usize {
+        self.weights.len().div_ceil(MOST_SUMMED)
+    }
+
     /// Weights of samples of one view over those without slope, where the weights of all views have the same
     /// sum as without slope: the smoothing of the fit does not grow with the errors of depth.
     fn shares<const C: usize>(
@@ -254,15 +259,18 @@ impl ViewWeights {
         for (gradient, s) in gradients.iter_mut().zip(samples) {
             *gradient = Gradient::of(image, s.pixel as usize, gain, own.noise);
         }
-        let mut sums = [0.0; PART];
-        for (errors, weight) in self.errors.iter().zip(&self.weights) {
+        let (mut sums, mut total) = ([0.0; PART], 0.0);
+        for (errors, weight) in self.errors.iter().zip(&self.weights).step_by(self.stride()) {
             let weight = f64::from(*weight);
             sums.iter_mut().zip(&gradients).for_each(|(sum, g)| *sum += weight * errors.share(g));
+            total += weight;
         }
-        let total = self.total();
         std::array::from_fn(|k| (own.share(&gradients[k]) * total / sums[k]) as f32)
     }
 }
+
+/// Views over which the weights of each sample are summed: of more, evenly chosen ones show the same.
+const MOST_SUMMED: usize = 256;
 
 /// Samples whose weights are computed together: the compiler turns loops of a fixed length into vector
 /// instructions.

@@ -61,7 +61,8 @@ impl Footprint {
             .map(|&(i, y)| RowFootprint::new(&views[i], i as u16, &maps[i], y, frame))
             .collect();
         let pixels = rows.iter().map(|&(i, _)| views[i].image.width()).sum();
-        let mut footprint = Self { maps, frame: *frame, tiles: Vec::new(), pixels, unknown: 0, behind: 0 };
+        let tiles = Vec::with_capacity(rows_of_tiles.iter().map(|row| row.tiles.len()).sum());
+        let mut footprint = Self { maps, frame: *frame, tiles, pixels, unknown: 0, behind: 0 };
         for row in rows_of_tiles {
             footprint.tiles.extend(row.tiles);
             footprint.unknown += row.unknown;
@@ -165,7 +166,6 @@ pub fn calibrated<const C: usize>(
 }
 
 /// The tiles of one row of a view, and its pixels that cannot be samples.
-#[derive(Default)]
 struct RowFootprint {
     tiles: Vec<Tile>,
     unknown: usize,
@@ -174,7 +174,8 @@ struct RowFootprint {
 
 impl RowFootprint {
     fn new(view: &CalibratedView<'_>, index: u16, map: &Relative, y: usize, frame: &Frame) -> Self {
-        let (mut footprint, row) = (Self::default(), RowMap::new(map, y));
+        let tiles = Vec::with_capacity(view.image.width().div_ceil(TILE));
+        let (mut footprint, row) = (Self { tiles, unknown: 0, behind: 0 }, RowMap::new(map, y));
         for (k, depths) in view.map.row(y).chunks(TILE).enumerate() {
             let column = k * TILE;
             let unknown = depths.iter().filter(|d| d.is_nan()).count();

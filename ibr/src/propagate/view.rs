@@ -3,6 +3,7 @@
 use crate::camera::Camera;
 use crate::depth::DepthMap;
 use crate::image::Image;
+use nalgebra::Vector3;
 
 /// A photograph with its map. The camera is the position on the line of a rectified rig, or a matrix.
 #[derive(Debug, Clone, Copy)]
@@ -25,14 +26,23 @@ pub type CalibratedView<'a> = View<'a, Camera>;
 
 /// The camera of a view.
 pub trait Viewpoint: Copy + Send + Sync {
+    /// The centre: a point, or a place on the x axis.
+    fn centre(&self) -> Vector3<f64>;
+
     /// Distance of the centres of two cameras.
-    fn distance(&self, other: &Self) -> f64;
+    fn distance(&self, other: &Self) -> f64 {
+        (self.centre() - other.centre()).norm()
+    }
 
     /// The map of pixels with the numbers of their map from this camera to another one.
     fn map_to(&self, other: &Self) -> impl Fn(f64, f64, f64) -> (f64, f64, f64) + Sync;
 }
 
 impl Viewpoint for f64 {
+    fn centre(&self) -> Vector3<f64> {
+        Vector3::new(*self, 0.0, 0.0)
+    }
+
     fn distance(&self, other: &Self) -> f64 {
         (self - other).abs()
     }
@@ -44,20 +54,12 @@ impl Viewpoint for f64 {
 }
 
 impl Viewpoint for Camera {
-    fn distance(&self, other: &Self) -> f64 {
-        (self.centre() - other.centre()).norm()
+    fn centre(&self) -> Vector3<f64> {
+        Camera::centre(self)
     }
 
     fn map_to(&self, other: &Self) -> impl Fn(f64, f64, f64) -> (f64, f64, f64) + Sync {
         let map = self.relative_to(other);
         move |x, y, depth| map.map(x, y, depth)
-    }
-}
-
-impl<P: Viewpoint> View<'_, P> {
-    /// Of the views before one, by number, the one that is nearest to it.
-    pub(crate) fn nearest_before(views: &[Self], view: usize) -> Option<usize> {
-        let distance = |other: &usize| views[*other].camera.distance(&views[view].camera);
-        (0..view).min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
 }

@@ -17,12 +17,16 @@ use super::{Kind, Scene, SceneError};
 use crate::camera::middlebury::Calibration;
 use crate::depth::{DepthMap, Measure, fill_unknown};
 use crate::files::{InputError, Location};
-use crate::image::{Image, MOST_PIXELS, read_image_within, read_map_within};
+use crate::image::{Image, ImageError, MOST_PIXELS, read_image_within, read_map_within};
 use crate::partial::{Densify, densify};
+use crate::pipeline::Watch;
 use goals::Goal;
+use hybank::memory::check_memory;
 use left_out::LeftOut;
 use models::Models;
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// How a scene is read.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,9 +65,22 @@ pub fn parse(text: &str, path: &Path) -> Result<SceneSpec, SceneError> {
 /// # Errors
 /// [`SceneError`], naming file, view and numbers.
 pub fn load(spec: &SceneSpec, path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
+    load_watched(spec, path, options, &|_| ())
+}
+
+/// As [`load`]; `watch` is called with the share of the views that are read.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_watched(
+    spec: &SceneSpec,
+    path: &Path,
+    options: &LoadOptions,
+    watch: Watch<'_>,
+) -> Result<Scene, SceneError> {
     let spec = &complete(spec, path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    Loader { spec, path, folder, options, models: Models::default() }.load()
+    Loader { spec, path, folder, options, watch, models: Models::default() }.load()
 }
 
 struct Loader<'a> {
@@ -71,6 +88,7 @@ struct Loader<'a> {
     path: &'a Path,
     folder: &'a Path,
     options: &'a LoadOptions,
+    watch: Watch<'a>,
     models: Models,
 }
 
@@ -186,15 +204,51 @@ impl Loader<'_> {
             let filled = if self.options.fill { fill_unknown(&mut map) } else { 0 };
             return Ok((image, map, filled));
         }
+        ImageError::refuse_without_memory(&path, image.size(), LOADING_BYTES)?;
         let coarse = if given == 1 { map.decimated(step).map_err(depth_error)? } else { map };
         let dense = densify(&coarse, step, &image, self.options.densify).map_err(depth_error)?;
         Ok((image, dense, coarse.unknown()))
     }
 }
 
-/// The values, or the first error in the order of the views, so that every run reports the same error.
-fn in_order<T>(results: Vec<Loaded<T>>) -> Loaded<Vec<T>> {
-    results.into_iter().collect()
+/// Bytes per pixel of a view that is there, and of one that is being read and made dense.
+const VIEW_BYTES: f64 = 20.0;
+const LOADING_BYTES: f64 = 110.0;
+
+/// Bytes of memory in which the text of a scene file can be parsed.
+#[cfg(feature = "cli")]
+pub(crate) fn room_to_parse(text: &str) -> f64 {
+    const PARSED: f64 = 60.0;
+    PARSED * text.len() as f64
+}
+
+/// What `read` makes of each view, or the first error in the order of the views, so that every run reports the
+/// same error. Views are read at the same time if there is memory for that, judged by the first one.
+fn each<V: Sync, T: Send>(
+    views: &[V],
+    read: impl Fn(&V) -> Loaded<T> + Sync,
+    pixels: impl Fn(&T) -> usize,
+    watch: Watch<'_>,
+) -> Loaded<Vec<T>> {
+    let Some((first, others)) = views.split_first() else { return Ok(Vec::new()) };
+    let ready = AtomicUsize::new(0);
+    let read = |view: &V| {
+        let done = read(view);
+        watch((ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / views.len() as f64);
+        done
+    };
+    let first = read(first)?;
+    let at_a_time = rayon::current_num_threads().min(others.len()) as f64;
+    let bytes = pixels(&first) as f64 * (VIEW_BYTES * others.len() as f64 + LOADING_BYTES * at_a_time);
+    let read: Vec<Loaded<T>> = match check_memory(bytes) {
+        Ok(()) => others.par_iter().map(read).collect(),
+        Err(_) => others.iter().map(read).collect(),
+    };
+    std::iter::once(Ok(first)).chain(read).collect()
+}
+
+fn pixels(image: &Image) -> usize {
+    image.width() * image.height()
 }
 
 #[cfg(test)]

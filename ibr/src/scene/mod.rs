@@ -3,7 +3,9 @@
 mod load;
 mod spec;
 
-pub use load::{LoadOptions, MOST_FRAMES, complete, load, parse};
+#[cfg(feature = "cli")]
+pub(crate) use load::room_to_parse;
+pub use load::{LoadOptions, MOST_FRAMES, complete, load, load_watched, parse};
 pub use spec::{SceneSpec, TargetSpec, ViewSpec};
 
 use crate::camera::middlebury::Calibration;

@@ -25,19 +25,19 @@ pub(super) type Watch<'a> = &'a (dyn Fn(f64) + Sync);
 /// A number for each channel.
 type PerChannel<const C: usize> = [f64; C];
 
-/// Solves A u = rhs for every channel.
+/// Solves A u = rhs for every channel. Nothing is left of A then, which takes most of the memory.
 pub(super) fn solve<const C: usize>(
-    a: &Stencil,
+    a: Stencil,
     rhs: Planes,
     iteration: &Iteration,
     watch: Watch<'_>,
 ) -> (Planes, Convergence) {
-    let mut work = Work::<C>::new(a, rhs);
+    let mut work = Work::<C>::new(&a, rhs);
     let first = Iteration { steps: iteration.steps.min(DIAGONAL_STEPS), ..*iteration };
-    let (mut progress, mut steps) = work.solve(a, &first, watch);
+    let (mut progress, mut steps) = work.solve(&a, &first, watch);
     if progress.any_open() && steps < iteration.steps {
-        let mut multigrid = Multigrid::new(a);
-        steps = work.continue_with(a, &mut multigrid, &mut progress, iteration.steps, steps, watch);
+        let mut multigrid = Multigrid::new(&a);
+        steps = work.continue_with(&a, &mut multigrid, &mut progress, iteration.steps, steps, watch);
     }
     (work.u, progress.ended(steps))
 }
@@ -138,16 +138,15 @@ impl<const C: usize> Work<C> {
         mut steps: usize,
         watch: Watch<'_>,
     ) -> usize {
-        multigrid.apply(a, &self.residual, &mut self.direction);
-        let mut preconditioned = Planes::zeros(a.grid(), C);
+        self.direction.clone_from(multigrid.apply(a, &self.residual, &mut self.image));
         let mut product = dot(&self.residual, &self.direction);
         while steps < most && progress.any_open() {
             let curvature = a.multiply(&self.direction, &mut self.image);
             let Some(lengths) = progress.lengths(product, curvature) else { break };
             progress.energy = self.step(lengths);
-            multigrid.apply(a, &self.residual, &mut preconditioned);
-            let next = dot(&self.residual, &preconditioned);
-            add_multiple(&preconditioned, ratio(next, product), &mut self.direction);
+            let preconditioned = multigrid.apply(a, &self.residual, &mut self.image);
+            let next = dot(&self.residual, preconditioned);
+            add_multiple(preconditioned, ratio(next, product), &mut self.direction);
             product = next;
             steps += 1;
             watch(progress.done());

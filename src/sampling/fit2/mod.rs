@@ -58,6 +58,17 @@ pub enum Direction {
     Down,
 }
 
+/// Bytes that a fit holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Memory {
+    /// The equations, from the first sample on.
+    pub equations: f64,
+    /// The same while they are solved.
+    pub solving: f64,
+    /// The same if multigrid takes over, for large holes.
+    pub with_multigrid: f64,
+}
+
 /// Accumulates samples into the normal equations of one image and solves them.
 ///
 /// ORDER = degree + 1, 2 (bilinear) or 4 (bicubic); C values per sample.
@@ -75,9 +86,19 @@ impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
     /// An empty problem for an image of `width` x `height` pixels.
     pub fn new(width: usize, height: usize) -> Self {
         const { assert!(ORDER == 2 || ORDER == 4, "the fit of an image is bilinear or bicubic") }
-        let grid = Grid { width: width + ORDER - 2, height: height + ORDER - 2 };
+        let grid = Grid::of_image::<ORDER>(width, height);
         let (matrix, rhs) = (Stencil::new(grid, offsets::<ORDER>()), Planes::zeros(grid, C));
         Self { size: (width, height), matrix, rhs }
+    }
+
+    /// What a fit of an image of `width` x `height` pixels will hold.
+    pub fn memory(width: usize, height: usize) -> Memory {
+        let grid = Grid::of_image::<ORDER>(width, height);
+        // The right-hand sides become the residual. The solution, the direction and its image are as many;
+        // the inverse of the diagonal and the zeros of the matrix are one more.
+        let equations = grid.bytes(offsets::<ORDER>().len() + C);
+        let solving = equations + grid.bytes(3 * C + 1);
+        Memory { equations, solving, with_multigrid: solving + multigrid::bytes::<C>(grid, ORDER - 1) }
     }
 
     /// Width and height of the grid of coefficients. It has ORDER / 2 - 1 coefficients more than pixels on
@@ -88,9 +109,7 @@ impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
 
     /// All rows, to add samples.
     pub fn rows(&mut self) -> Fit2Rows<'_, ORDER, C> {
-        // Samples on the last row have weights of 0 below it.
-        let rows = self.matrix.grid().height + ORDER - 1;
-        Fit2Rows::new(self.size, self.matrix.planes_mut().first_rows(rows), self.rhs.first_rows(rows))
+        Fit2Rows::new(self.size, self.matrix.planes_mut().all_rows(), self.rhs.all_rows())
     }
 
     /// Weight of the samples at a coefficient, the sum of its row in the normal equations without
@@ -120,7 +139,7 @@ impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
     /// Solves the equations: J at the pixels, C values each, row by row. `watch` is called with the share of
     /// the way that is done, 0 to 1.
     pub fn solve(self, iteration: &Iteration, watch: &(dyn Fn(f64) + Sync)) -> (Vec<f32>, Convergence) {
-        let (solution, convergence) = conjugate::solve::<C>(&self.matrix, self.rhs, iteration, watch);
+        let (solution, convergence) = conjugate::solve::<C>(self.matrix, self.rhs, iteration, watch);
         (at_pixels::<ORDER, C>(&solution, self.size.0, self.size.1), convergence)
     }
 }

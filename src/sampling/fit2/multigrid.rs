@@ -4,8 +4,8 @@
 //! Coarse unknowns stand for blocks of 2 x 2 (unsmoothed aggregation, Galerkin matrices). A block that moves
 //! as a whole is too stiff, so the coarse correction is multiplied by a factor (Braess 1995).
 
-use super::planes::{Planes, ROWS_AT_ONCE};
-use super::stencil::Stencil;
+use super::planes::{Grid, Planes, ROWS_AT_ONCE};
+use super::stencil::{Stencil, couplings_within};
 use rayon::prelude::*;
 
 /// Damping of the Jacobi steps. The eigenvalues of D^{-1} A stay below 8/3 (bending), so the steps contract.
@@ -16,68 +16,82 @@ const CORRECTION: f32 = 1.5;
 const COARSEST: usize = 64;
 const COARSEST_STEPS: usize = 40;
 
-/// The matrices from the second finest down, with work memory for all levels.
+/// The solution of the finest level, and the levels below it.
 pub(super) struct Multigrid<const C: usize> {
-    coarse: Vec<Stencil>,
-    work: Vec<Work<C>>,
+    solution: Planes,
+    coarse: Vec<Level<C>>,
 }
 
-/// Vectors of one level.
-struct Work<const C: usize> {
+/// A level below the finest.
+struct Level<const C: usize> {
+    a: Stencil,
     rhs: Planes,
     solution: Planes,
-    image: Planes,
 }
 
-impl<const C: usize> Work<C> {
-    fn of(stencil: &Stencil) -> Self {
-        let zeros = || Planes::zeros(stencil.grid(), C);
-        Self { rhs: zeros(), solution: zeros(), image: zeros() }
+impl<const C: usize> Level<C> {
+    fn of(a: Stencil) -> Self {
+        let zeros = || Planes::zeros(a.grid(), C);
+        Self { rhs: zeros(), solution: zeros(), a }
     }
+}
+
+/// Bytes of the preconditioner of a matrix that couples neighbours within `reach`.
+pub(super) fn bytes<const C: usize>(finest: Grid, mut reach: usize) -> f64 {
+    let (mut grid, mut bytes) = (finest, finest.bytes(C));
+    while grid.len() > COARSEST {
+        (grid, reach) = (grid.halved(), reach.div_ceil(2));
+        bytes += grid.bytes(couplings_within(reach, grid).count() + 2 * C);
+    }
+    bytes
 }
 
 impl<const C: usize> Multigrid<C> {
     pub(super) fn new(finest: &Stencil) -> Self {
-        let mut coarse: Vec<Stencil> = Vec::new();
+        let mut coarse: Vec<Level<C>> = Vec::new();
         loop {
-            let last = coarse.last().unwrap_or(finest);
+            let last = coarse.last().map_or(finest, |level| &level.a);
             if last.grid().len() <= COARSEST {
                 break;
             }
-            coarse.push(last.coarsened());
+            let next = Level::of(last.coarsened());
+            coarse.push(next);
         }
-        let work = std::iter::once(finest).chain(&coarse).map(Work::of).collect();
-        Self { coarse, work }
+        Self { solution: Planes::zeros(finest.grid(), C), coarse }
     }
 
-    /// out = M^{-1} residual: one symmetric V-cycle.
-    pub(super) fn apply(&mut self, finest: &Stencil, residual: &Planes, out: &mut Planes) {
-        self.work[0].rhs.clone_from(residual);
-        self.cycle(finest, 0);
-        out.clone_from(&self.work[0].solution);
-    }
-
-    fn cycle(&mut self, finest: &Stencil, level: usize) {
-        let last = level == self.coarse.len();
-        let a = if level == 0 { finest } else { &self.coarse[level - 1] };
-        self.work[level].start(a);
-        if last {
-            (1..COARSEST_STEPS).for_each(|_| self.work[level].smooth(a));
-            return;
-        }
-        let (above, below) = self.work.split_at_mut(level + 1);
-        above[level].restrict(a, &mut below[0]);
-        self.cycle(finest, level + 1);
-        let a = if level == 0 { finest } else { &self.coarse[level - 1] };
-        let (above, below) = self.work.split_at_mut(level + 1);
-        above[level].correct(&below[0].solution);
-        above[level].smooth(a);
+    /// M^{-1} residual: one symmetric V-cycle. `scratch` has the size of the residual.
+    pub(super) fn apply(&mut self, finest: &Stencil, residual: &Planes, scratch: &mut Planes) -> &Planes {
+        Step::<C> { a: finest, rhs: residual, solution: &mut self.solution }.cycle(&mut self.coarse, scratch);
+        &self.solution
     }
 }
 
-impl<const C: usize> Work<C> {
+/// The equations of one level and their solution so far. `image` in its methods is work memory.
+struct Step<'a, const C: usize> {
+    a: &'a Stencil,
+    rhs: &'a Planes,
+    solution: &'a mut Planes,
+}
+
+impl<const C: usize> Step<'_, C> {
+    fn cycle(&mut self, coarse: &mut [Level<C>], image: &mut Planes) {
+        image.reshape(self.a.grid());
+        self.start();
+        let Some((next, rest)) = coarse.split_first_mut() else {
+            (1..COARSEST_STEPS).for_each(|_| self.smooth(image));
+            return;
+        };
+        self.restrict(image, &mut next.rhs);
+        Step::<C> { a: &next.a, rhs: &next.rhs, solution: &mut next.solution }.cycle(rest, image);
+        image.reshape(self.a.grid());
+        self.correct(&next.solution);
+        self.smooth(image);
+    }
+
     /// The Jacobi step from 0: solution = DAMPING D^{-1} rhs.
-    fn start(&mut self, a: &Stencil) {
+    fn start(&mut self) {
+        let a = self.a;
         let rows = self.solution.par_rows_mut().zip(self.rhs.par_rows());
         rows.enumerate().with_min_len(ROWS_AT_ONCE).for_each(|(y, (solution, rhs))| {
             let diagonal = a.diagonal_row(y);
@@ -91,9 +105,10 @@ impl<const C: usize> Work<C> {
     }
 
     /// A Jacobi step: solution += DAMPING D^{-1} (rhs - A solution).
-    fn smooth(&mut self, a: &Stencil) {
-        a.multiply::<C>(&self.solution, &mut self.image);
-        let rows = self.solution.par_rows_mut().zip(self.rhs.par_rows()).zip(self.image.par_rows());
+    fn smooth(&mut self, image: &mut Planes) {
+        let a = self.a;
+        a.multiply::<C>(self.solution, image);
+        let rows = self.solution.par_rows_mut().zip(self.rhs.par_rows()).zip(image.par_rows());
         rows.enumerate().with_min_len(ROWS_AT_ONCE).for_each(|(y, ((solution, rhs), image))| {
             let diagonal = a.diagonal_row(y);
             let stride = diagonal.len();
@@ -108,12 +123,11 @@ impl<const C: usize> Work<C> {
     }
 
     /// The residual of this level, summed over blocks: the right-hand side of the next.
-    fn restrict(&mut self, a: &Stencil, next: &mut Self) {
-        a.multiply::<C>(&self.solution, &mut self.image);
-        let height = self.rhs.grid().height;
-        let (rhs, image) = (&self.rhs, &self.image);
-        let stride = next.rhs.grid().stride();
-        next.rhs.par_rows_mut().enumerate().with_min_len(ROWS_AT_ONCE).for_each(|(y, out)| {
+    fn restrict(&self, image: &mut Planes, next: &mut Planes) {
+        self.a.multiply::<C>(self.solution, image);
+        let (height, rhs, image) = (self.rhs.grid().height, self.rhs, &*image);
+        let stride = next.grid().stride();
+        next.par_rows_mut().enumerate().with_min_len(ROWS_AT_ONCE).for_each(|(y, out)| {
             out.fill(0.0);
             for (c, out) in out.chunks_mut(stride).enumerate() {
                 for y in 2 * y..(2 * y + 2).min(height) {

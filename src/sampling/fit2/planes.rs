@@ -1,13 +1,12 @@
-//! Images of one size in memory: rows of all images in turn, with zeros around.
+//! Images of one size in memory: rows of all images in turn, with zeros beside them.
 
 use rayon::prelude::*;
 
 /// Numbers that loops treat at once: a few vector registers.
 pub(super) const LANES: usize = 16;
 
-/// Zeros above and below the images, and to the right of each row, so that neighbours across the border are
-/// there and count nothing.
-pub(super) const BORDER: usize = 3;
+/// Zeros to the right of each row, so that neighbours across the border are there and count nothing.
+const BORDER: usize = 3;
 
 /// Rows that are treated without asking for another thread.
 pub(super) const ROWS_AT_ONCE: usize = 8;
@@ -23,6 +22,21 @@ pub(super) struct Grid {
 }
 
 impl Grid {
+    /// That of the splines of an image.
+    pub(super) fn of_image<const ORDER: usize>(width: usize, height: usize) -> Self {
+        Self { width: width + ORDER - 2, height: height + ORDER - 2 }
+    }
+
+    /// That of blocks of 2 x 2.
+    pub(super) fn halved(self) -> Self {
+        Self { width: self.width.div_ceil(2), height: self.height.div_ceil(2) }
+    }
+
+    /// Bytes of so many images.
+    pub(super) fn bytes(self, count: usize) -> f64 {
+        (count * size_of::<f32>()) as f64 * self.stride() as f64 * self.height as f64
+    }
+
     /// Numbers of a row in memory, with its zeros: whole blocks of [`LANES`].
     pub(super) fn stride(self) -> usize {
         (self.width + BORDER).next_multiple_of(LANES)
@@ -44,9 +58,8 @@ pub(super) struct Planes {
 impl Planes {
     /// `count` images of zeros.
     pub(super) fn zeros(grid: Grid, count: usize) -> Self {
-        let rows = grid.height + 2 * BORDER;
         // A block before and after, for neighbours of the first and of the last numbers.
-        let mut data = vec![0.0; rows * count * grid.stride() + 2 * LANES];
+        let mut data = vec![0.0; grid.height * count * grid.stride() + 2 * LANES];
         // The system gives memory page by page, at the first access. A page that is read first and written
         // later costs it two turns and interrupts the other threads, so all are written now, in parallel.
         data.par_chunks_mut(PAGES).for_each(|part| part.fill(0.0));
@@ -57,16 +70,24 @@ impl Planes {
         self.grid
     }
 
-    /// Where row y of image k begins. Row -[`BORDER`] is there too, as are the neighbours left and right.
+    /// Where row y of image k begins. Its neighbours left and right are there too.
     #[inline]
     pub(super) fn start(&self, y: usize, k: usize) -> usize {
-        LANES + ((y + BORDER) * self.count + k) * self.grid.stride()
+        LANES + (y * self.count + k) * self.grid.stride()
     }
 
-    /// Distance in memory of a neighbour in the same image.
+    /// Where the neighbours of a row begin that lie so many columns to the left and rows above it; none
+    /// above the image.
     #[inline]
-    pub(super) fn distance(&self, (columns, rows): (isize, usize)) -> isize {
-        (rows * self.count * self.grid.stride()) as isize + columns
+    pub(super) fn before(&self, y: usize, k: usize, (columns, rows): (isize, usize)) -> Option<usize> {
+        Some(self.start(y.checked_sub(rows)?, k).wrapping_add_signed(-columns))
+    }
+
+    /// The same to the right and below it; none below the image.
+    #[inline]
+    pub(super) fn after(&self, y: usize, k: usize, (columns, rows): (isize, usize)) -> Option<usize> {
+        let row = Some(y + rows).filter(|row| *row < self.grid.height)?;
+        Some(self.start(row, k).wrapping_add_signed(columns))
     }
 
     /// All numbers.
@@ -96,11 +117,14 @@ impl Planes {
         &mut self.data[range]
     }
 
-    /// The first rows of all images, and below them rows of zeros, as many as [`BORDER`] at most.
-    pub(super) fn first_rows(&mut self, rows: usize) -> RowsMut<'_> {
-        let (stride, count) = (self.grid.stride(), self.count);
-        let range = self.start(0, 0)..self.start(rows, 0);
-        RowsMut { stride, count, data: &mut self.data[range] }
+    /// All rows of all images, to be split.
+    pub(super) fn all_rows(&mut self) -> RowsMut<'_> {
+        RowsMut { stride: self.grid.stride(), count: self.count, data: self.rows_mut() }
+    }
+
+    /// Takes another size, no larger than the one that was made. What the images hold is not defined then.
+    pub(super) fn reshape(&mut self, grid: Grid) {
+        self.grid = grid;
     }
 
     /// Numbers of one row of all images in memory.

@@ -57,19 +57,33 @@ impl<'a, const ORDER: usize, const C: usize> Fit2Rows<'a, ORDER, C> {
     pub fn add(&mut self, sample: &Fit2Sample<C>) {
         let (column, across) = span::<ORDER>(sample.x, self.size.0);
         let (row, down) = span::<ORDER>(sample.y, self.size.1);
-        let row = row - self.first;
-        let weighted = self.add_couplings(column, row, &product(&down, &across), sample.weight);
-        for (i, own) in weighted.iter().enumerate() {
+        let rows = self.rows_from(row);
+        let weighted = self.add_couplings(column, &rows, &product(&down, &across), sample.weight);
+        for (row, own) in rows.iter().zip(&weighted) {
             for (c, value) in sample.values.iter().enumerate() {
-                let sums = self.rhs.at::<ORDER>(c, column, row + i);
+                let sums = self.rhs.at::<ORDER>(c, column, *row);
                 (0..ORDER).for_each(|j| sums[j] += own[j] * value);
             }
         }
     }
 
+    /// The ORDER rows of coefficients from `row` on, counted from the first of these. An image of one row has
+    /// one less, and 0 is added to its last one instead.
+    #[inline(always)]
+    fn rows_from(&self, row: usize) -> [usize; ORDER] {
+        let last = self.size.1.max(1) + ORDER - 3;
+        std::array::from_fn(|i| (row + i).min(last) - self.first)
+    }
+
     /// Adds weight b b', b the values of the splines from a coefficient on; returns weight b.
     #[inline(always)]
-    fn add_couplings(&mut self, column: usize, row: usize, b: &Tensor<ORDER>, weight: f32) -> Tensor<ORDER> {
+    fn add_couplings(
+        &mut self,
+        column: usize,
+        rows: &[usize; ORDER],
+        b: &Tensor<ORDER>,
+        weight: f32,
+    ) -> Tensor<ORDER> {
         let weighted = b.map(|row| row.map(|b| weight * b));
         for (i, own) in weighted.iter().enumerate() {
             let mut plane = 0;
@@ -77,7 +91,7 @@ impl<'a, const ORDER: usize, const C: usize> Fit2Rows<'a, ORDER, C> {
                 // Along the row to the right only, in rows below to both sides.
                 let left = if plane == 0 { 0 } else { ORDER - 1 };
                 for shift in 0..ORDER + left {
-                    let couplings = self.matrix.at::<ORDER>(plane, column, row + i);
+                    let couplings = self.matrix.at::<ORDER>(plane, column, rows[i]);
                     for j in 0..ORDER {
                         if (left..left + ORDER).contains(&(j + shift)) {
                             couplings[j] += own[j] * other[j + shift - left];

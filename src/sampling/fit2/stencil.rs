@@ -13,6 +13,11 @@ pub(super) fn half_square(reach: usize) -> impl Iterator<Item = Offset> {
     (0..=reach).flat_map(move |row| columns(row).map(move |column| (column, row)))
 }
 
+/// The same as far as a grid has them: one of few rows has no neighbours farther down.
+pub(super) fn couplings_within(reach: usize, grid: Grid) -> impl Iterator<Item = Offset> {
+    half_square(reach).filter(move |offset| offset.1 < grid.height)
+}
+
 /// A = sum_k (a_k shifted by o_k, and its transpose): plane k holds the couplings of each coefficient with
 /// the one at offset k, plane 0 the diagonal. f32 suffices: rounding an entry changes the fit by parts in
 /// 10^7 of the range of the values, and these entries take most of the memory.
@@ -20,13 +25,15 @@ pub(super) fn half_square(reach: usize) -> impl Iterator<Item = Offset> {
 pub(super) struct Stencil {
     offsets: Vec<Offset>,
     planes: Planes,
+    /// A row of zeros, in place of rows above and below the grid.
+    zeros: Vec<f32>,
 }
 
 impl Stencil {
     /// The matrix 0 with these couplings, of which the first is that of a coefficient with itself.
     pub(super) fn new(grid: Grid, offsets: Vec<Offset>) -> Self {
         let planes = Planes::zeros(grid, offsets.len());
-        Self { offsets, planes }
+        Self { offsets, planes, zeros: vec![0.0; grid.stride()] }
     }
 
     pub(super) fn grid(&self) -> Grid {
@@ -61,49 +68,48 @@ impl Stencil {
     /// earlier ones store, two offsets at a time.
     fn multiply_row<const C: usize>(&self, y: usize, u: &Planes, out: &mut [f32]) -> [f64; C] {
         let stride = self.grid().stride();
-        let a = |start: usize| blocks(&self.planes.data()[start..start + stride]);
         std::array::from_fn(|c| {
-            let values = |start: usize| blocks(&u.data()[start + c * stride..start + (c + 1) * stride]);
             let out = blocks_mut(&mut out[c * stride..(c + 1) * stride]);
-            let here = values(u.start(y, 0));
-            set_product(out, a(self.planes.start(y, 0)), here);
+            let here = self.row_from(u, Some(u.start(y, c)));
+            set_product(out, blocks(self.diagonal_row(y)), here);
             for k in (1..self.offsets.len()).step_by(2) {
-                let [one, two] = [k, k + 1].map(|k| self.pair(y, k, u));
-                let terms = [one[0], one[1], two[0], two[1]].map(|(entry, at)| (a(entry), values(at)));
-                add_products(out, terms);
+                let [one, two] = [k, k + 1].map(|k| self.pair(y, k, u, c));
+                add_products(out, [one[0], one[1], two[0], two[1]]);
             }
             dot(out, here)
         })
     }
 
-    /// Where a row's couplings at offset k begin, and the coefficients of the first channel that they belong
-    /// to: those that the row stores, and those that an earlier row does. Zeros if there is no offset k.
+    /// A row's couplings at offset k, and the coefficients of channel c that they belong to: those that the
+    /// row stores, and those that an earlier row does. Zeros if there is no offset k or no such row.
     #[inline]
-    fn pair(&self, y: usize, k: usize, u: &Planes) -> [(usize, usize); 2] {
-        let Some(offset) = self.offsets.get(k) else { return [(0, 0); 2] };
-        let (entry, centre) = (self.planes.start(y, k), u.start(y, 0));
-        let (back, ahead) = (self.planes.distance(*offset), u.distance(*offset));
-        [
-            (entry, centre.wrapping_add_signed(ahead)),
-            (entry.wrapping_add_signed(-back), centre.wrapping_add_signed(-ahead)),
-        ]
+    fn pair<'a>(&'a self, y: usize, k: usize, u: &'a Planes, c: usize) -> [(Blocks<'a>, Blocks<'a>); 2] {
+        let a = |start| self.row_from(&self.planes, start);
+        let Some(offset) = self.offsets.get(k) else { return [(a(None), a(None)); 2] };
+        let (entry, ahead) = (self.planes.start(y, k), u.after(y, c, *offset));
+        let (earlier, behind) = (self.planes.before(y, k, *offset), u.before(y, c, *offset));
+        [(a(Some(entry)), self.row_from(u, ahead)), (a(earlier), self.row_from(u, behind))]
+    }
+
+    /// The row of some images that begins there, zeros if there is none.
+    #[inline]
+    fn row_from<'a>(&'a self, planes: &'a Planes, start: Option<usize>) -> Blocks<'a> {
+        blocks(start.map_or(&self.zeros[..], |start| &planes.data()[start..start + self.zeros.len()]))
     }
 
     /// A 1, the sums of the rows of A, for one row of the grid and its zeros.
     pub(super) fn row_sums(&self, y: usize, sums: &mut [f32]) {
         sums.fill(0.0);
-        let stride = self.grid().stride();
         let mut add = |start: usize| {
-            let row = blocks(&self.planes.data()[start..start + stride]);
+            let row = self.row_from(&self.planes, Some(start));
             for (sum, a) in blocks_mut(sums).iter_mut().zip(row) {
                 (0..LANES).for_each(|l| sum[l] += a[l]);
             }
         };
         for (k, offset) in self.offsets.iter().enumerate() {
-            let entry = self.planes.start(y, k);
-            add(entry);
+            add(self.planes.start(y, k));
             if k > 0 {
-                add(entry.wrapping_add_signed(-self.planes.distance(*offset)));
+                self.planes.before(y, k, *offset).into_iter().for_each(&mut add);
             }
         }
     }
@@ -112,9 +118,8 @@ impl Stencil {
     pub(super) fn row_sum(&self, x: usize, y: usize, couplings: usize) -> f32 {
         let at = |start: usize| self.planes.data()[start + x];
         let sum = |(k, offset): (usize, &Offset)| {
-            let entry = self.planes.start(y, k);
-            let earlier = entry.wrapping_add_signed(-self.planes.distance(*offset));
-            at(entry) + if k > 0 { at(earlier) } else { 0.0 }
+            let earlier = self.planes.before(y, k, *offset).filter(|_| k > 0);
+            at(self.planes.start(y, k)) + earlier.map_or(0.0, at)
         };
         self.offsets[..couplings].iter().enumerate().map(sum).sum()
     }
@@ -122,10 +127,10 @@ impl Stencil {
     /// The matrix of blocks of 2 x 2 coefficients that move together: the sums of the entries between the
     /// blocks.
     pub(super) fn coarsened(&self) -> Self {
-        let Grid { width, height } = self.grid();
+        let height = self.grid().height;
         let reach = self.offsets.iter().map(|o| o.0.unsigned_abs().max(o.1)).max().unwrap_or(0).div_ceil(2);
-        let grid = Grid { width: width.div_ceil(2), height: height.div_ceil(2) };
-        let mut coarse = Self::new(grid, half_square(reach).collect());
+        let grid = self.grid().halved();
+        let mut coarse = Self::new(grid, couplings_within(reach, grid).collect());
         for y in 0..height {
             for (k, (columns, rows)) in self.offsets.iter().enumerate() {
                 let row = self.planes.row(y, k);

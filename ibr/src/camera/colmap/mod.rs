@@ -13,6 +13,9 @@ use std::path::Path;
 /// What to do if a file of a model cannot be opened.
 const FILES: &str = "a COLMAP model has cameras.txt and images.txt, or cameras.bin and images.bin";
 
+/// Bytes that a listed image takes, while it is read and later.
+const LISTED: f64 = 1500.0;
+
 /// Where COLMAP puts models in its folders.
 const PLACES: [&str; 6] = ["sparse/0", "sparse", "0", "dense/0/sparse", "dense/sparse", "colmap/sparse/0"];
 
@@ -29,10 +32,13 @@ pub fn read_model(folder: &Path) -> Result<CameraList, InputError> {
         return Err(no_model(folder));
     }
     if !folder.join("cameras.txt").exists() && folder.join("cameras.bin").exists() {
-        let load = |name: &str| files::read(&folder.join(name), FILES);
+        let room = |bytes: &[u8]| LISTED * binary::most_records(bytes) as f64;
+        let load = |name: &str| files::read_with_room(&folder.join(name), FILES, room);
         return parse_binary(&load("cameras.bin")?, &load("images.bin")?, folder);
     }
-    let load = |name: &str| files::read_text(&folder.join(name), FILES);
+    // Two lines per image.
+    let room = |text: &str| LISTED / 2.0 * text.lines().count() as f64;
+    let load = |name: &str| files::read_text(&folder.join(name), FILES, room);
     parse_model(&load("cameras.txt")?, &load("images.txt")?, folder)
 }
 
@@ -90,7 +96,7 @@ fn join(
             .ok_or_else(|| (at, format!("image {name:?} has camera {id}, which the cameras do not list")))?;
         frames.insert(name.clone(), Frame { image: name.into(), depth: None, number: k + 1, pose, inner });
     }
-    Ok(CameraList { path: folder.into(), frames: frames.into_values().collect() })
+    Ok(CameraList::new(folder.into(), frames.into_values().collect()))
 }
 
 /// Lines with content, with their numbers.

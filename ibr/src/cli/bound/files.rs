@@ -6,7 +6,7 @@ use crate::cli::arguments::BoundArguments;
 use crate::cli::failure::Failure;
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded};
-use crate::image::{Image, Levels, pfm};
+use crate::image::{Image, ImageError, Levels, pfm};
 use std::path::{Path, PathBuf};
 
 /// The files of one virtual view.
@@ -50,6 +50,9 @@ impl Outputs {
     ) -> Result<(Vec<Encoded<'_>>, Option<f32>), Failure> {
         let (mut all, mut white) = (Vec::new(), None);
         if let Some(path) = &self.map {
+            // A picture or three numbers per pixel, and the file.
+            let size = predicted.rendering.image.size();
+            ImageError::refuse_without_memory(path, size, 36.0).map_err(Failure::input)?;
             let (map, largest) = map(predicted, path)?;
             white = largest;
             all.push(map);

@@ -8,13 +8,12 @@ mod report;
 use super::arguments::BoundArguments;
 use super::failure::Failure;
 use super::inputs;
-use super::memory::{self, Work};
 use super::output;
 use super::progress::Progress;
 use crate::analysis::{Limits, ViewError};
 use crate::image::Image;
 use crate::partial::Densify;
-use crate::pipeline::RenderError;
+use crate::pipeline::{RenderError, Watch};
 use crate::scene::{self, Kind, Scene};
 use files::Outputs;
 use predictor::Predictor;
@@ -25,16 +24,17 @@ pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
     let limits = check(arguments)?;
     let progress = Progress::new(3);
     progress.step("reading");
-    let (scene, truth) = read(arguments)?;
+    let (scene, truth) = read(arguments, &|share| progress.within(share))?;
     progress.step("calibrating");
     let settings = arguments.scene.settings(scene.offset);
-    let predictor = Predictor::new(&scene.kind, &settings, limits).map_err(Failure::input)?;
+    let named = |e: RenderError| Failure::input(e).in_file(&arguments.scene.file);
+    let predictor = Predictor::new(&scene.kind, &settings, limits).map_err(named)?;
     progress.step("predicting");
     let frames = scene.kind.frames();
     let (mut summaries, mut written) = (Vec::new(), Vec::new());
     let mut worst: Option<(usize, f64, ViewError)> = None;
     for frame in 0..frames {
-        let predicted = predictor.at(frame).map_err(Failure::input)?;
+        let predicted = predictor.at(frame).map_err(named)?;
         let mut summary = Summary::new(&predicted, predictor.agreement());
         summary.measure(&predicted, truth.as_ref(), arguments.scene.truth.as_deref())?;
         let outputs = Outputs::of(arguments, (frames > 1).then_some(frame));
@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
         progress.within((frame + 1) as f64 / (frames + 1) as f64);
     }
     let Some((worst, _, now)) = worst else { return Err(Failure::input(RenderError::NoViews)) };
-    summaries[worst].advice = Some(predictor.advice(worst, &now).map_err(Failure::input)?);
+    summaries[worst].advice = Some(predictor.advice(worst, &now).map_err(named)?);
     output::commit(written)?;
     drop(progress);
     inputs::warn_of_contradictions(predictor.agreement(), &scene.kind);
@@ -76,17 +76,15 @@ fn check(arguments: &BoundArguments) -> Result<Option<Limits>, Failure> {
     }))
 }
 
-fn read(arguments: &BoundArguments) -> Result<(Scene, Option<Image>), Failure> {
-    let file = &arguments.scene.file;
+fn read(arguments: &BoundArguments, watch: Watch<'_>) -> Result<(Scene, Option<Image>), Failure> {
     let source = arguments.scene.source()?;
-    let scene = arguments.scene.load(&source, Densify::default(), true)?;
+    let scene = arguments.scene.load(&source, Densify::default(), true, watch)?;
     refuse_what_has_no_prediction(&scene, arguments)?;
     let frames = scene.kind.frames();
     let numbers = (0..frames.min(scene::MOST_FRAMES)).map(|frame| (frames > 1).then_some(frame));
     let all: Vec<Outputs> = numbers.map(|frame| Outputs::of(arguments, frame)).collect();
     source.refuse_overlaps(&all.iter().flat_map(Outputs::files).collect::<Vec<_>>())?;
     all.iter().try_for_each(|outputs| outputs.refuse_existing(arguments.scene.force))?;
-    memory::check(&scene, Work::Bound).map_err(|e| e.in_file(file))?;
     Ok((scene, arguments.scene.truth()?))
 }
 

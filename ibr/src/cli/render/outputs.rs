@@ -4,7 +4,7 @@ use crate::cli::arguments::RenderArguments;
 use crate::cli::failure::Failure;
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded};
-use crate::image::{Image, Levels, encode_levels, encode_with_alpha, pfm};
+use crate::image::{Image, ImageError, Levels, encode_levels, encode_with_alpha, pfm};
 use crate::interpolate::Cover;
 use crate::pipeline::Rendering;
 use std::path::{Path, PathBuf};
@@ -134,6 +134,8 @@ impl Outputs {
     ) -> Result<(Vec<Encoded<'_>>, Option<f32>), Failure> {
         let (mut all, mut white) = (Vec::new(), None);
         for (part, path) in &self.parts {
+            // Numbers or a picture, and the file.
+            ImageError::refuse_without_memory(path, rendering.image.size(), 20.0).map_err(Failure::input)?;
             all.push(match part {
                 Part::View => self.view(rendering, path)?,
                 Part::Mask => output::encoded(&mask_image(rendering), path, Levels::Eight)?,

@@ -4,7 +4,7 @@ use crate::interpolate::Cover;
 use crate::occlusion::DepthTest;
 
 /// The known pixel next to `p` in each of the four directions, as an index; `NONE` where there is none.
-const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 
 /// Calls `visit(p, neighbours)` for every unknown pixel with its nearest known pixels to the left,
 /// right, above and below.
@@ -42,35 +42,32 @@ fn nearest_below(depth: &[f32], width: usize) -> Vec<u32> {
     below
 }
 
-/// Distance between a hole pixel and a pixel in its row or column.
-fn distance(p: usize, q: u32, width: usize) -> usize {
-    let q = q as usize;
-    (p % width).abs_diff(q % width) + (p / width).abs_diff(q / width)
-}
-
-/// For every unknown pixel the known pixel to continue from.
+/// For every unknown pixel the known pixel to continue from, [`NONE`] if there is none.
 ///
 /// If the closest known pixel has no counterpart on the other side, the hole is open to the border of the
 /// image there, and the closest pixel is continued. Otherwise the hole lies between surfaces, and the
 /// closest pixel of the farthest of them is: background that the camera uncovers.
-pub(super) fn sources(depth: &[f32], width: usize, test: &DepthTest) -> Vec<Option<u32>> {
-    let mut sources = vec![None; depth.len()];
+pub(super) fn sources(depth: &[f32], width: usize, test: &DepthTest) -> Vec<u32> {
+    let mut sources = vec![NONE; depth.len()];
     for_holes(depth, width, |p, around| {
-        let closest = |among: &[u32]| {
-            among.iter().copied().filter(|q| *q != NONE).min_by_key(|q| distance(p, *q, width))
-        };
-        let enclosed = |pair: &&[u32]| pair[0] != NONE && pair[1] != NONE;
-        let Some(nearest) = closest(&around) else { return };
-        let pairs = around.chunks_exact(2);
-        if pairs.clone().any(|pair| pair.contains(&nearest) && !enclosed(&pair)) {
-            sources[p] = Some(nearest);
+        let p32 = p as u32;
+        let [left, right, above, below] = around.map(|q| p32.abs_diff(q));
+        let width = width as u32;
+        let distances = [left, right, above / width, below / width];
+        let all = around.into_iter().zip(distances).filter(|(q, _)| *q != NONE);
+        let closest = |(q, _): (u32, u32)| q;
+        let Some(nearest) = all.min_by_key(|(_, distance)| *distance).map(closest) else { return };
+        let enclosed = |pair: &[u32]| pair[0] != NONE && pair[1] != NONE;
+        if around.chunks_exact(2).any(|pair| pair.contains(&nearest) && !enclosed(pair)) {
+            sources[p] = nearest;
             return;
         }
-        let sides: Vec<u32> = pairs.filter(enclosed).flatten().copied().collect();
-        let of = |q: &u32| f64::from(depth[*q as usize]);
-        let far = sides.iter().map(of).fold(f64::MIN, f64::max);
-        let farthest: Vec<u32> = sides.into_iter().filter(|q| !test.hides(of(q), far)).collect();
-        sources[p] = closest(&farthest);
+        let is_side = |k: usize| enclosed(&around[k / 2 * 2..k / 2 * 2 + 2]);
+        let sides = (0..4).filter(|k| is_side(*k)).map(|k| (around[k], distances[k]));
+        let of = |q: u32| f64::from(depth[q as usize]);
+        let far = sides.clone().map(|(q, _)| of(q)).fold(f64::MIN, f64::max);
+        let farthest = sides.filter(|(q, _)| !test.hides(of(*q), far));
+        sources[p] = farthest.min_by_key(|(_, distance)| *distance).map_or(NONE, closest);
     });
     sources
 }
@@ -105,10 +102,10 @@ mod tests {
         ];
         let test = DepthTest::default();
         let sources = sources(&depth, 3, &test);
-        assert_eq!(sources[4], Some(7));
-        assert!(sources[0] == Some(1) || sources[0] == Some(3));
-        assert_eq!(sources[1], None);
-        assert_eq!(super::sources(&[U; 4], 2, &test), [None; 4]);
+        assert_eq!(sources[4], 7);
+        assert!(sources[0] == 1 || sources[0] == 3);
+        assert_eq!(sources[1], NONE);
+        assert_eq!(super::sources(&[U; 4], 2, &test), [NONE; 4]);
     }
 
     /// Of a slanted surface on both sides the closest pixel is continued, not the one that is a little
@@ -117,9 +114,9 @@ mod tests {
     fn of_one_surface_the_closest_pixel_is_continued() {
         let test = DepthTest::default();
         let row = [2.0, U, U, U, 4.0, 4.01, 4.02];
-        assert_eq!(sources(&row, 7, &test)[1..4], [Some(4); 3]);
+        assert_eq!(sources(&row, 7, &test)[1..4], [4; 3]);
         let slanted = [4.0, U, U, U, U, 4.02];
-        assert_eq!(sources(&slanted, 6, &test)[1..5], [Some(0), Some(0), Some(5), Some(5)]);
+        assert_eq!(sources(&slanted, 6, &test)[1..5], [0, 0, 5, 5]);
     }
 
     /// A hole that is open to the border continues the closest pixel of its row, whatever lies above.
@@ -132,7 +129,7 @@ mod tests {
             U, U, 2.0, 2.0, 2.0, //
         ];
         let sources = sources(&depth, 5, &DepthTest::default());
-        assert_eq!([sources[11], sources[16]], [Some(12), Some(17)]);
+        assert_eq!([sources[11], sources[16]], [12, 17]);
     }
 
     #[test]

@@ -101,6 +101,9 @@ const LEAST_SOURCE_WEIGHT: f32 = 0.3;
 pub struct PlaneProblem<const ORDER: usize, const C: usize> {
     width: usize,
     height: usize,
+    /// Whether rows and columns are exchanged in all fields: the equations of a narrow image would be mostly
+    /// the zeros beside its rows.
+    turned: bool,
     fit: Fit2<ORDER, C>,
     /// Depth of the sample nearest to each pixel centre, NaN where none lies within half a gap.
     depth: Vec<f32>,
@@ -118,6 +121,8 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     /// [`InterpolationError::Setting`].
     pub fn new((width, height): (usize, usize), settings: &Settings) -> Result<Self, InterpolationError> {
         settings.check()?;
+        let turned = Self::is_turned((width, height));
+        let (width, height) = if turned { (height, width) } else { (width, height) };
         let pixels = width * height;
         // Written at once: pages that are read first and written later take the system twice the time.
         let mut counts = vec![0; pixels];
@@ -125,6 +130,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         Ok(Self {
             width,
             height,
+            turned,
             fit: Fit2::new(width, height),
             depth: vec![f32::NAN; pixels],
             distance: vec![f32::INFINITY; pixels],
@@ -139,9 +145,17 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         self.added
     }
 
+    /// Whether an image takes less than half of the memory with rows and columns exchanged.
+    pub(crate) fn is_turned((width, height): (usize, usize)) -> bool {
+        let bytes = |width, height| Fit2::<ORDER, C>::memory(width, height).equations;
+        bytes(width, height) > 2.0 * bytes(height, width)
+    }
+
     /// Whether a sample lies within half a gap of each pixel.
     pub fn seen(&self) -> impl Iterator<Item = bool> + '_ {
-        self.depth.iter().map(|d| !d.is_nan())
+        let upright = |p: usize| p % self.height * self.width + p / self.height;
+        let index = move |p: usize| if self.turned { upright(p) } else { p };
+        (0..self.depth.len()).map(move |p| !self.depth[index(p)].is_nan())
     }
 
     /// Fits the image. With `region`, only the pixels where it is true are filled and fitted together;
@@ -162,22 +176,26 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         region: Option<&[bool]>,
         watch: Watch<'_>,
     ) -> Result<PlaneFit, InterpolationError> {
-        let (width, height) = (self.width, self.height);
+        let (width, height, turned) = (self.width, self.height, self.turned);
         if self.added == 0 {
+            let (width, height) = if turned { (height, width) } else { (width, height) };
             return Err(InterpolationError::NoSamples { width, height });
         }
-        let inside = |p: usize| region.is_none_or(|r| r.get(p).copied().unwrap_or(false));
-        let mut mask = background::classify(&self.depth, width, &self.settings.depth_test);
+        let given = |p: usize| if turned { p % width * height + p / width } else { p };
+        let inside = |p: usize| region.is_none_or(|r| r.get(given(p)).copied().unwrap_or(false));
         self.distance = Vec::new();
-        let depth = DepthMap::from_known((width, height), self.depth.clone(), Measure::Depth);
+        let mut mask = background::classify(&self.depth, width, &self.settings.depth_test);
         let background = self.settings.holes.fill == HoleFill::Background;
         if background && mask.contains(&Cover::Disocclusion) {
             self.fill_background(&mask, &inside);
         }
         let left_out = self.settings.holes.fill == HoleFill::Leave;
         let fitted = |p: usize| inside(p) && !(left_out && mask[p] != Cover::Seen);
-        let counts = std::mem::take(&mut self.counts);
-        let (mut values, convergence) = self.fitted(&fitted, watch);
+        let (counts, mut depth) = (std::mem::take(&mut self.counts), std::mem::take(&mut self.depth));
+        let (mut values, convergence) = self.fitted(&depth, &fitted, watch);
+        // The depths that were continued into holes are those of the springs only.
+        let holes = depth.iter_mut().zip(&mask).filter(|(_, cover)| **cover != Cover::Seen);
+        holes.for_each(|(depth, _)| *depth = f32::NAN);
         (0..width * height).filter(|p| !inside(*p)).for_each(|p| {
             mask[p] = Cover::Disocclusion;
             values[p * C..(p + 1) * C].fill(0.0);
@@ -186,7 +204,13 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
             super::rows::blacken(&mask, &mut values, C);
         }
         values.iter_mut().for_each(|v| *v = v.clamp(0.0, 255.0));
-        Ok(PlaneFit { values, mask, depth, counts, convergence })
+        if !turned {
+            let depth = DepthMap::from_known((width, height), depth, Measure::Depth);
+            return Ok(PlaneFit { values, mask, depth, counts, convergence });
+        }
+        let depth = DepthMap::from_known((height, width), by_columns(depth, width, 1), Measure::Depth);
+        let (values, mask) = (by_columns(values, width, C), by_columns(mask, width, 1));
+        Ok(PlaneFit { values, mask, depth, counts: by_columns(counts, width, 1), convergence })
     }
 
     /// Gives every disoccluded pixel a sample with value and depth of the surface that continues into it.
@@ -198,18 +222,23 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         };
         let sound: Vec<f32> = self.depth.par_iter().enumerate().map(sound).collect();
         let sources = background::sources(&sound, self.width, &self.settings.depth_test);
+        let mut is_source = vec![false; sound.len()];
+        drop(sound);
         let holes = (0..mask.len()).filter(|p| mask[*p] == Cover::Disocclusion && inside(*p));
-        let found = holes.filter_map(|p| Some((p, sources[p]? as usize)));
+        let holes = holes.filter(|p| sources[*p] != background::NONE);
+        holes.clone().for_each(|p| is_source[sources[p] as usize] = true);
         // The value of a seen pixel before the fit: its share of the right-hand side. The new samples must
         // not count in it.
-        let continued: Vec<(usize, usize, [f32; C])> = found
-            .map(|(p, source)| {
-                let (weight, values) = self.fit.local_sums(grid.coefficient(source));
-                (p, source, values.map(|v| v / weight))
-            })
-            .collect();
-        for (p, source, values) in continued {
-            self.depth[p] = self.depth[source];
+        let value = |source: usize| {
+            let (weight, values) = self.fit.local_sums(grid.coefficient(source));
+            (source as u32, values.map(|v| v / weight))
+        };
+        let sources_used = (0..mask.len()).filter(|p| is_source[*p]);
+        let continued: Vec<(u32, [f32; C])> = sources_used.map(value).collect();
+        for p in holes {
+            let Ok(at) = continued.binary_search_by_key(&sources[p], |(source, _)| *source) else { continue };
+            let (source, values) = continued[at];
+            self.depth[p] = self.depth[source as usize];
             self.add_on_pixel(p, values);
         }
     }
@@ -219,15 +248,34 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     }
 
     /// The values of the pixels where `inside` is true, all fitted together.
-    fn fitted(self, inside: &(impl Fn(usize) -> bool + Sync), watch: Watch<'_>) -> (Vec<f32>, Convergence) {
+    fn fitted(
+        self,
+        depth: &[f32],
+        inside: &(impl Fn(usize) -> bool + Sync),
+        watch: Watch<'_>,
+    ) -> (Vec<f32>, Convergence) {
         let (plane, grid) = (&self.settings.plane, self.grid());
-        let springs = |direction, y| springs::of_row(&self.depth, grid, inside, &self.settings, direction, y);
+        let springs = |direction, y| springs::of_row(depth, grid, inside, &self.settings, direction, y);
         let connected = self.fit.connect(springs, |coefficient| !inside(grid.pixel(coefficient)));
         let iteration = Iteration { tolerance: plane.tolerance, steps: plane.iterations };
         let (values, ended) = connected.solve(&iteration, watch);
         let hybank::sampling::fit2::Convergence { steps, residual, reached } = ended;
         (values, Convergence { steps, residual, reached })
     }
+}
+
+/// The pixels of an image by columns, from those by rows of `width`.
+fn by_columns<T: Copy>(pixels: Vec<T>, width: usize, channels: usize) -> Vec<T> {
+    let height = pixels.len() / (width * channels);
+    if width == 1 || height == 1 {
+        return pixels;
+    }
+    let mut columns = Vec::with_capacity(pixels.len());
+    for (x, y) in (0..width).flat_map(|x| (0..height).map(move |y| (x, y))) {
+        let first = (y * width + x) * channels;
+        columns.extend_from_slice(&pixels[first..first + channels]);
+    }
+    columns
 }
 
 /// The complete third stage for samples at any position: a value for every pixel, and the mask.

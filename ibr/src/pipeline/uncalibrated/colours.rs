@@ -91,6 +91,9 @@ impl Advantage {
     }
 }
 
+/// A pixel on which no sample falls.
+const NO_SAMPLE: u32 = u32::MAX;
+
 /// For each pixel of view `to` on which points of two surfaces of view `from` fall: by how much the one that
 /// is nearer if the order is kept has the better colour.
 fn advantages(
@@ -105,23 +108,27 @@ fn advantages(
     let chi = surface.chi(images[from].size());
     let (width, height) = images[to].size();
     let sign = chirality::order_sign(&scene.cameras[to], Handedness::Kept);
-    let mut samples: Vec<Sample<3>> = Vec::new();
+    let mut samples: Vec<Sample<3>> = Vec::with_capacity(chi.len());
     let frame = Frame::whole(width, height, 0.0, 0.0);
     propagate_chi(images[from], &chi, 0, &source.relative_to(&target), sign, &frame, &mut samples);
     let apart = (SURFACES_APART * chi_range(&scene.features(to))) as f32;
-    let mut ends: Vec<Option<(Sample<3>, Sample<3>)>> = vec![None; width * height];
-    for s in samples {
+    drop(chi);
+    // The nearest and the farthest sample on each pixel, by number.
+    let mut ends = vec![[NO_SAMPLE; 2]; width * height];
+    for (number, s) in samples.iter().enumerate() {
         let p = (s.y + 0.5) as usize * width + (s.x + 0.5) as usize;
-        let Some(slot) = ends.get_mut(p) else { continue };
-        *slot = Some(match *slot {
-            None => (s, s),
-            Some((near, far)) => {
-                (if s.depth < near.depth { s } else { near }, if s.depth > far.depth { s } else { far })
-            }
-        });
+        let Some([near, far]) = ends.get_mut(p) else { continue };
+        let depth = |number: u32| samples.get(number as usize).map(|s| s.depth);
+        if depth(*near).is_none_or(|near| s.depth < near) {
+            *near = number as u32;
+        }
+        if depth(*far).is_none_or(|far| s.depth > far) {
+            *far = number as u32;
+        }
     }
-    let advantage = |(p, slot): (usize, &Option<(Sample<3>, Sample<3>)>)| {
-        let (near, far) = slot.as_ref().filter(|(near, far)| far.depth - near.depth > apart)?;
+    let advantage = |(p, ends): (usize, &[u32; 2])| {
+        let [near, far] = ends.map(|number| samples.get(number as usize));
+        let (near, far) = near.zip(far).filter(|(near, far)| far.depth - near.depth > apart)?;
         let shown = images[to].pixel::<3>(p);
         let miss = |s: &Sample<3>| {
             let sum: f32 = s.value.iter().zip(shown).map(|(a, b)| (a - b).abs()).sum();

@@ -7,6 +7,7 @@ mod consistency;
 mod reconstruction;
 mod synthesis;
 
+use super::memory::Extent;
 use super::{RenderError, RenderSettings, Rendering, Watch};
 use crate::image::Image;
 use crate::interpolate::Degree;
@@ -138,6 +139,8 @@ pub fn render_watched(
         return Err(RenderError::Tracks { images: images.len(), columns });
     }
     settings.check()?;
+    let extent = Extent::new(size, images, None);
+    extent.check(extent.of_tracks(uncalibrated.plane.degree))?;
     let numbers = match target {
         Target::Tracks(_) if images.len() > 2 => base_pair::order(tracks, columns, uncalibrated),
         _ => (0..columns).collect(),

@@ -56,6 +56,7 @@ pub(super) fn render<const ORDER: usize, const C: usize>(
     watch(GATHERED);
     let mut problem = PlaneProblem::<ORDER, C>::new(size, &interpolation)?;
     problem.add(&samples)?;
+    drop(samples);
     problem.seen().zip(&mut region).for_each(|(seen, inside)| *inside |= seen);
     let fit = problem.solve_watched(Some(&region), &|share| watch(GATHERED + (1.0 - GATHERED) * share))?;
     let views = (0..images.len()).collect();
@@ -72,7 +73,8 @@ fn propagated<const C: usize>(
 ) -> Result<(Vec<Sample<C>>, Dropped), RenderError> {
     let target = scene.camera(images.len())?;
     let sign = chirality::order_sign(&scene.cameras[images.len()], scene.hand);
-    let (mut samples, mut dropped) = (Vec::new(), Dropped::default());
+    let pixels = images.iter().map(|i| i.width() * i.height()).sum();
+    let (mut samples, mut dropped) = (Vec::with_capacity(pixels), Dropped::default());
     for (i, (image, surface)) in images.iter().zip(surfaces).enumerate() {
         let map = scene.camera(i)?.relative_to(&target);
         let first = samples.len();
@@ -82,7 +84,6 @@ fn propagated<const C: usize>(
         samples[first..].iter_mut().for_each(|s: &mut Sample<C>| s.doubtful = doubtful[s.pixel as usize]);
     }
     if samples.is_empty() {
-        let pixels = images.iter().map(|i| i.width() * i.height()).sum();
         return Err(RenderError::NoOverlap { pixels, dropped });
     }
     Ok((samples, dropped))

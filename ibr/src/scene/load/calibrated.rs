@@ -2,14 +2,13 @@
 
 use super::left_out::LeftOut;
 use super::models::Source;
-use super::{Goal, Inputs, Loaded, Loader, in_order};
+use super::{Goal, Inputs, Loaded, Loader, each, pixels};
 use crate::camera::Camera;
 use crate::camera::ListedCamera;
 use crate::camera::resize::{Size, factors};
 use crate::depth::Measure;
 use crate::scene::{Kind, SceneError, SourceView, ViewSpec};
 use nalgebra::Matrix3x4;
-use rayon::prelude::*;
 
 type Matrix = [[f64; 4]; 3];
 
@@ -45,7 +44,7 @@ impl Loader<'_> {
         goals: &[Goal],
     ) -> Loaded<Inputs> {
         self.a_camera_each()?;
-        let sources = in_order(views.par_iter().map(|view| self.source(view)).collect())?;
+        let sources = each(views, |view| self.source(view), |source| pixels(&source.0.image), self.watch)?;
         let first = First { size: sources[0].0.image.size(), resized: sources[0].2 };
         let (cameras, size) = match left_out {
             Some(place) => self.at_place(place, first, goals)?,

@@ -1,11 +1,14 @@
 //! The virtual views of a scene: one, a list, or paths.
 
 use super::{Loaded, Loader};
-use crate::image::unavailable_memory;
 use crate::scene::{SceneError, TargetSpec};
+use hybank::memory::check_memory;
 
 /// Most virtual views of a scene.
 pub const MOST_FRAMES: usize = 9999;
+
+/// Bytes per pixel that every rendering takes.
+const LEAST_BYTES: f64 = 11.0;
 
 /// One `[virtual]` table.
 pub(super) struct Goal {
@@ -119,14 +122,8 @@ impl Loader<'_> {
                 "more than the limit of {most}; make it smaller, or allow so many with --max-pixels"
             )));
         }
-        match unavailable_memory(pixels) {
-            Some(bytes) => {
-                let gigabytes = bytes as f64 / 1e9;
-                Err(refused(format!(
-                    "they take {gigabytes:.1} GB of memory, more than the system gives; make it smaller"
-                )))
-            }
-            None => Ok((w, h)),
-        }
+        // Before the views are read; the rendering knows what it takes.
+        let refuse = |shortage| refused(format!("they take more than {shortage}; make it smaller"));
+        check_memory(LEAST_BYTES * pixels as f64).map_err(refuse).map(|()| (w, h))
     }
 }

@@ -1,10 +1,9 @@
 //! Scenes of a rectified rig: positions and disparities.
 
-use super::{Goal, Inputs, Loaded, Loader, in_order};
+use super::{Goal, Inputs, Loaded, Loader, each, pixels};
 use crate::camera::middlebury::{Calibration, read_calibration};
 use crate::depth::Measure;
 use crate::scene::{Kind, SourceView, ViewSpec};
-use rayon::prelude::*;
 
 impl Loader<'_> {
     pub(super) fn rectified(
@@ -32,7 +31,7 @@ impl Loader<'_> {
                 self.image_with_map(view, map, view.disparity_scale.unwrap_or(1.0), Measure::Disparity)?;
             Ok((SourceView { image, map: disparity, camera: position }, filled))
         };
-        let sources = in_order(views.par_iter().map(one).collect())?;
+        let sources = each(views, one, |source| pixels(&source.0.image), self.watch)?;
         let first = sources[0].0.image.size();
         for (view, (source, _)) in views.iter().zip(&sources) {
             let (name, first_name) =

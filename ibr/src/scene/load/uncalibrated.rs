@@ -1,11 +1,11 @@
 //! Scenes without cameras: images and tracks.
 
-use super::{Goal, Inputs, Loaded, Loader, in_order};
+use super::{Goal, Inputs, Loaded, Loader, each, pixels};
 use crate::pipeline::uncalibrated::Target;
 use crate::scene::{Kind, ViewSpec};
 use crate::uncalibrated::Point;
 use crate::uncalibrated::tracks::Tracks;
-use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 impl Loader<'_> {
@@ -22,7 +22,7 @@ impl Loader<'_> {
             None => goals.iter().filter_map(|goal| goal.target.from_tracks).collect(),
         };
         let columns = self.columns(views, &virtual_columns, tracks.columns())?;
-        let images = in_order(views.par_iter().map(|v| self.image(&v.image)).collect())?;
+        let images = each(views, |view| self.image(&view.image), pixels, self.watch)?;
         let pick = |row: &Vec<Option<Point>>| columns.iter().map(|c| row[c - 1]).collect();
         let in_column =
             |column: usize| Target::Tracks(tracks.rows().iter().map(|row| row[column - 1]).collect());
@@ -94,11 +94,11 @@ impl Loader<'_> {
     fn columns(&self, views: &[&ViewSpec], virtual_columns: &[usize], count: usize) -> Loaded<Vec<usize>> {
         let given: Vec<usize> =
             views.iter().filter_map(|v| v.column).chain(virtual_columns.iter().copied()).collect();
-        let mut free = (1..=count).filter(|c| !given.contains(c));
+        let different: BTreeSet<usize> = given.iter().copied().collect();
+        let mut free = (1..=count).filter(|c| !different.contains(c));
         let columns: Vec<usize> = views.iter().filter_map(|v| v.column.or_else(|| free.next())).collect();
-        let different = given.iter().enumerate().all(|(i, c)| !given[..i].contains(c));
         let known = given.iter().all(|c| (1..=count).contains(c));
-        if different && known && columns.len() == views.len() {
+        if different.len() == given.len() && known && columns.len() == views.len() {
             return Ok(columns);
         }
         let and = match virtual_columns {

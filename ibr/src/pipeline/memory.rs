@@ -1,0 +1,174 @@
+//! The memory that a rendering takes beside its views, before it begins.
+//!
+//! The largest arrays are counted: those of the equations and of the pixels, and the samples that are held at a
+//! time. Whether multigrid takes over is not known before; the estimate lies between.
+
+use super::calibrated::bands_of;
+use super::{Method, RenderError, RenderSettings};
+use crate::interpolate::Degree;
+use crate::interpolate::plane::PlaneProblem;
+use crate::sample::Sample;
+use hybank::memory::check_memory;
+use hybank::sampling::Fit2;
+
+/// What a rendering of any kind takes: threads, points that are compared, and whatever is small.
+const BASE: f64 = 5e5;
+
+/// Bytes of a row of a rectified rig: its counts.
+const ROW: f64 = 41.0;
+
+/// Bytes of a sample beside itself while a row of samples is sorted, tested and fitted: keys, cells, the
+/// survivors' weights and sums.
+const ROW_SAMPLE: f64 = 67.0;
+
+/// Bytes of a place in a band beside its sample: positions, depths, weights, cells.
+const PLACE: f64 = 45.0;
+
+/// Bytes per pixel of a prediction: of the evidence of a row fit, of the regressors with slopes, distances and
+/// jitter, of the search for local limits, and of the errors that are its result.
+const ROW_EVIDENCE: f64 = 60.0;
+const REGRESSORS: f64 = 76.0;
+const LIMITS: f64 = 52.0;
+const ERRORS: f64 = 16.0;
+
+/// The sizes on which the memory depends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Width and height of the virtual view.
+    pub size: (usize, usize),
+    /// Views that are used.
+    pub views: usize,
+    /// Pixels of all of them.
+    pub pixels: usize,
+    /// Pixels of the largest.
+    pub largest: usize,
+    /// 1 for grey, 3 for RGB.
+    pub channels: usize,
+}
+
+impl Extent {
+    /// Of views of these sizes, all of which are used, or so many.
+    pub fn new(size: (usize, usize), images: &[&crate::image::Image], nearest: Option<usize>) -> Self {
+        let mut pixels: Vec<usize> = images.iter().map(|image| image.width() * image.height()).collect();
+        pixels.sort_unstable_by(|a, b| b.cmp(a));
+        pixels.truncate(nearest.unwrap_or(usize::MAX));
+        let channels = images.iter().map(|image| image.channels()).max().unwrap_or(1);
+        let largest = pixels.first().copied().unwrap_or(0);
+        Self { size, views: pixels.len(), pixels: pixels.iter().sum(), largest, channels }
+    }
+
+    fn virtual_pixels(&self) -> f64 {
+        self.size.0 as f64 * self.size.1 as f64
+    }
+
+    fn sample(&self) -> f64 {
+        if self.channels == 3 { size_of::<Sample<3>>() as f64 } else { size_of::<Sample<1>>() as f64 }
+    }
+
+    /// A rendered view: values, depths, counts and the mask.
+    pub(crate) fn rendering(&self) -> f64 {
+        (4.0 * self.channels as f64 + 7.0) * self.virtual_pixels()
+    }
+
+    /// What the comparison of two views takes: every seventh difference of both.
+    fn agreement(&self) -> f64 {
+        16.0 / 7.0 * self.largest as f64
+    }
+
+    /// A row of samples, its equations, and work memory.
+    fn strip(&self, order: usize) -> f64 {
+        let knot = 8.0 * (order + self.channels) as f64;
+        self.size.0 as f64 * (knot + self.views as f64 * (2.0 * self.sample() + ROW_SAMPLE))
+    }
+
+    /// Bytes of a view of a rectified rig.
+    pub fn of_rig(&self, settings: &RenderSettings) -> f64 {
+        let order = order(settings.interpolation.fit.degree);
+        if settings.method == Method::Plane {
+            return BASE + self.plane(settings.interpolation.plane.degree, self.strip(order));
+        }
+        let strips = rayon::current_num_threads().min(self.size.1) as f64 * self.strip(order);
+        BASE + self.agreement().max(self.rendering() + ROW * self.size.1 as f64 + strips)
+    }
+
+    /// Bytes of a view of general cameras.
+    pub fn of_cameras(&self, settings: &RenderSettings) -> f64 {
+        let bands = bands_of(self.pixels, self.size.1);
+        let at_a_time = rayon::current_num_threads().min(bands.div_ceil(2)) as f64 / bands as f64;
+        let samples = self.pixels as f64 * at_a_time.min(1.0) * (self.sample() + PLACE);
+        BASE + self
+            .agreement()
+            .max(self.plane(settings.interpolation.plane.degree, samples + self.pixels as f64))
+    }
+
+    /// Bytes of a view of views without cameras, all of whose samples are held at a time.
+    pub fn of_tracks(&self, degree: Degree) -> f64 {
+        let (pixels, sample) = (self.pixels as f64, self.sample());
+        let decided = 64.0 * self.largest as f64 + 4.0 * pixels;
+        let tested = (sample + PLACE) * pixels;
+        let fitted = self.virtual_pixels() + self.plane(degree, sample * pixels);
+        BASE + decided.max(tested).max(fitted)
+    }
+
+    /// Bytes of the prediction of a view of a rectified rig, with what is known of views before it.
+    pub fn of_rig_prediction(&self, settings: &RenderSettings) -> f64 {
+        let order = order(settings.interpolation.fit.degree);
+        let strips = 2.0 * rayon::current_num_threads().min(self.size.1) as f64 * self.strip(order);
+        let found = (ROW_EVIDENCE + REGRESSORS) * self.virtual_pixels();
+        BASE + self.predicted() + self.rendering() + found + strips
+    }
+
+    /// Bytes of the prediction of a view of general cameras, with what is known of views before it.
+    pub fn of_camera_prediction(&self, settings: &RenderSettings) -> f64 {
+        let found = (REGRESSORS + LIMITS) * self.virtual_pixels();
+        self.predicted() + self.rendering() + self.of_cameras(settings).max(found)
+    }
+
+    /// Photographs with one exposure and maps with errors, a view that is predicted, and another one that is
+    /// imagined.
+    fn predicted(&self) -> f64 {
+        let view = 4.0 * self.channels as f64 + 5.0;
+        view * self.pixels as f64 + self.rendering() + (view + ERRORS) * self.virtual_pixels()
+    }
+
+    /// The plane fit, with other memory while samples are added.
+    fn plane(&self, degree: Degree, gathering: f64) -> f64 {
+        let Self { size, .. } = *self;
+        let memory = match (degree, self.channels) {
+            (Degree::Linear, 3) => plane_memory::<2, 3>(size),
+            (Degree::Linear, _) => plane_memory::<2, 1>(size),
+            (Degree::Cubic, 3) => plane_memory::<4, 3>(size),
+            (Degree::Cubic, _) => plane_memory::<4, 1>(size),
+        };
+        let pixels = self.virtual_pixels();
+        // Depths, their distances, and counts; then the mask instead of the distances.
+        let gathered = memory.equations + 10.0 * pixels + gathering;
+        let solved = (memory.solving + memory.with_multigrid) / 2.0 + 7.0 * pixels;
+        gathered.max(solved)
+    }
+
+    /// Refuses work for which this process has too little memory.
+    ///
+    /// # Errors
+    /// [`RenderError::Memory`].
+    pub fn check(&self, bytes: f64) -> Result<(), RenderError> {
+        let Self { size, views, .. } = *self;
+        check_memory(bytes).map_err(|shortage| RenderError::Memory { size, views, shortage })
+    }
+}
+
+fn order(degree: Degree) -> usize {
+    match degree {
+        Degree::Linear => 2,
+        Degree::Cubic => 4,
+    }
+}
+
+fn plane_memory<const ORDER: usize, const C: usize>(
+    (width, height): (usize, usize),
+) -> hybank::sampling::fit2::Memory {
+    match PlaneProblem::<ORDER, C>::is_turned((width, height)) {
+        true => Fit2::<ORDER, C>::memory(height, width),
+        false => Fit2::<ORDER, C>::memory(width, height),
+    }
+}
