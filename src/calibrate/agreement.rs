@@ -110,8 +110,9 @@ pub fn agreement(spec: &Spec, records: &[Record]) -> Agreement {
     if records.len() != channels || !(2..=MOST_CHANNELS).contains(&channels) {
         return nothing(Verdict::Channels);
     }
-    let delays = spec.delays_in_fast_periods();
-    if let Some((i, j)) = repeated(records).filter(|&(i, j)| delays[i] != delays[j]) {
+    let delays = spec.delays();
+    let is_one = |i: usize, j: usize| delays[i].periods_since(delays[j], spec.ratio) == Some(0.0);
+    if let Some((i, j)) = repeated(records).filter(|&(i, j)| !is_one(i, j)) {
         return contradicted(vec![Contradiction::Repeated { first: i + 1, second: j + 1 }]);
     }
     let shortest = records.iter().map(|record| record.samples.len()).min().unwrap_or(0);

@@ -43,8 +43,8 @@ pub enum Warning {
     },
     /// With the cut-off of a part of the front ends the tones agree.
     #[error(
-        "a fit of {} agrees with the captures: --fit {fit} has a misfit of {misfit:.2}; until then the intervals reach \
-         to its values",
+        "a fit of {} agrees with the captures: {fit} together have a misfit of {misfit:.2}; until then the intervals \
+         reach to their values",
         part(*fit)
     )]
     CutoffExplains {

@@ -9,6 +9,7 @@ use super::interrupt::interrupts;
 use super::match_bank::check_stdin;
 use super::measure::{ToneArg, tone, tones};
 use super::print::{Failure, is_dash, say_understood, warn};
+use super::remedy::explained;
 use super::written::{check_outputs, write_text};
 use crate::calibrate::{
     Acquisition, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning, applied,
@@ -175,7 +176,7 @@ impl Args {
         };
         let reasons =
             |warning: &&Warning| matches!(warning, Warning::Outlying { .. } | Warning::CutoffExplains { .. });
-        warnings.extend(found.warnings.iter().filter(reasons).map(ToString::to_string));
+        warnings.extend(found.warnings.iter().filter(reasons).map(explained));
         Err(Failure::Input(format!(
             "the captures contradict the spec: they differ from its model {misfit:.0} times as much as their noise \
              explains, so the values mean nothing and were not written; check the frequencies and their zones, the \

@@ -1,6 +1,7 @@
 //! What `calibrate` prints.
 
 use super::print::{Failure, is_dash, show, warn};
+use super::remedy::explained;
 use crate::calibrate::{Calibration, ChannelEstimate, Warning};
 use crate::sine_fit::Estimate;
 use crate::spec::{HALF_WIDTH, Spec};
@@ -139,7 +140,7 @@ impl Report {
     pub(super) fn add(&mut self, warnings: &[Warning]) {
         for warning in warnings {
             let list = if warning.is_note() { &mut self.notes } else { &mut self.warnings };
-            list.push(warning.to_string());
+            list.push(explained(warning));
         }
     }
 

@@ -1,7 +1,7 @@
 //! The options of this program that remedy an error of the library. The library itself names keys of the
 //! spec and fields, because its errors are also read in Python, in C and in a browser.
 
-use crate::calibrate::CalibrateError;
+use crate::calibrate::{CalibrateError, Warning};
 use crate::design::DesignError;
 use crate::files::FileError;
 use crate::interchange::ExportError;
@@ -12,7 +12,7 @@ use crate::verify::VerifyError;
 use std::any::Any;
 use std::fmt::Display;
 
-/// The text of an error, followed by the option that remedies it.
+/// The text of an error or a warning, followed by the option that remedies it.
 pub(super) fn explained(error: &(impl Display + 'static)) -> String {
     option(error).map_or_else(|| error.to_string(), |option| format!("{error}; {option}"))
 }
@@ -34,6 +34,10 @@ fn option(error: &dyn Any) -> Option<&'static str> {
         .or_else(|| of_design(error.downcast_ref()?))
         .or_else(|| of_proof(error.downcast_ref()?))
         .or_else(|| of_calibration(error.downcast_ref()?))
+        .or_else(|| match error.downcast_ref()? {
+            Warning::CutoffExplains { .. } => Some("--fit takes that list"),
+            _ => None,
+        })
         .or_else(|| match error.downcast_ref()? {
             ExportError::NoIntegers { .. } => Some("`hybank design --method fir --bits B` designs them"),
             _ => None,

@@ -189,7 +189,8 @@ pub(super) struct Exchange<E: AffineError> {
     pub(super) dual: Vec<DualPoint>,
     /// Ends the exchange between two rounds, with the best unknowns so far.
     pub(super) stop: Stop,
-    /// What the last search for the least gamma left open, unless it was stopped.
+    /// What the last search for the least gamma left open, or that for the least mean square after it, unless
+    /// it was stopped.
     pub(super) unfinished: Option<Unfinished>,
     /// Problems solved.
     pub(super) rounds: usize,
@@ -275,6 +276,14 @@ impl<E: AffineError> Exchange<E> {
     /// As [`Exchange::optimise`].
     pub(super) fn compare(&mut self, accuracy: f64) -> Result<Candidate<E::Scenario>, DesignError> {
         self.minimise_gamma(Tolerances::steady(accuracy))
+    }
+
+    /// What is left open by taps of the norm `gamma`, which `is_missed` if the peaks do not explain it.
+    pub(super) fn unfinished_at(&self, gamma: f64, is_missed: bool, accuracy: f64) -> Option<Unfinished> {
+        if !is_missed || self.stop.is_due() {
+            return self.unfinished;
+        }
+        Unfinished::of(self.lower, gamma, accuracy, EndOfSearch::MissedPeaks)
     }
 
     /// Adds points at the given locations, except where there is one. Returns whether any was added.
@@ -371,9 +380,10 @@ impl<E: AffineError> Exchange<E> {
         let cap = start.peaks.estimate * (1.0 + self.gamma_margin);
         let cap_at_points = start.peaks.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);
         let settings = Settings { tol_gap_rel: tolerances.mean_square, ..Settings::SAMPLED };
+        let mut left = None;
         for _ in 0..tolerances.rounds {
             if self.stop.is_due() {
-                break;
+                return Ok(start);
             }
             let found = sampled::mean_square_under_cap(
                 &self.problem,
@@ -385,18 +395,27 @@ impl<E: AffineError> Exchange<E> {
             let found = match found {
                 Ok(found) => found,
                 // Gamma is zero up to rounding, so no cap lies above it, and no other unknowns are better.
-                Err(LmiError::Cap { .. }) => break,
+                Err(LmiError::Cap { .. }) => return Ok(start),
                 Err(error) => return Err(error.into()),
             };
             self.count_round(found.iterations);
+            let (lower, square) = (found.lower, found.mean_square);
             let candidate = self.judge(found.taps, found.gamma, cap_at_points)?;
             if candidate.peaks.estimate <= cap {
+                let reason = EndOfSearch::of(found.outcome);
+                let left = Unfinished::of_mean_square(lower, square, reason);
+                self.unfinished = self.unfinished.or(left);
                 return Ok(candidate);
             }
+            let of_start = self.problem.mean_square(&start.taps, &self.objective);
+            let unfinished = |reason| Unfinished::of_mean_square(lower, of_start, reason);
+            left = unfinished(EndOfSearch::Rounds);
             if !self.add(&candidate.peaks.above(cap_at_points))? {
+                left = unfinished(EndOfSearch::MissedPeaks);
                 break;
             }
         }
+        self.unfinished = self.unfinished.or(left);
         Ok(start)
     }
 

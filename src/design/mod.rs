@@ -43,7 +43,7 @@ pub use problem::Problem;
 pub use prove::{Certified, certify};
 pub use reduction::{OrderErrorPoint, OrderReduction};
 pub use responses::error_response;
-pub use unfinished::{EndOfSearch, Unfinished};
+pub use unfinished::{EndOfSearch, Objective, Unfinished};
 pub use warnings::warnings;
 
 use crate::bank::{Bank, Proof};

@@ -3,8 +3,9 @@
 use crate::design::Problem;
 use crate::linalg::{self, CMat, Complex};
 
-/// Knots closer than this, in fast periods, become one with the mean of their samples.
-const SAME_INSTANT: f64 = 1e-6;
+/// Knots closer than this, in fast periods, become one with the mean of their samples: the slope between two
+/// would be their noise over their distance.
+const LEAST_DISTANCE: f64 = 1e-6;
 
 /// The spline of the knots of a problem, which repeat with the slow period.
 pub(super) struct Spline {
@@ -51,7 +52,7 @@ impl Spline {
         let mut knots: Vec<Knot> = Vec::new();
         for (time, sample) in taken {
             match knots.last_mut() {
-                Some(knot) if time - knot.time < SAME_INSTANT => knot.samples.push(sample),
+                Some(knot) if time - knot.time < LEAST_DISTANCE => knot.samples.push(sample),
                 _ => knots.push(Knot { time, samples: vec![sample] }),
             }
         }

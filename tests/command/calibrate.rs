@@ -287,8 +287,8 @@ fn values_that_the_captures_contradict_are_not_written() {
     let (code, shown) = run(&[]);
     assert!(code == Some(1) && !desk.path("m.toml").exists(), "{shown}");
     let refusal = ["contradict the spec", "times as much as their noise", "--force"];
-    let explanation = "--fit delay,gain,offset,cutoff has a misfit of";
-    assert!(refusal.iter().chain([&explanation]).all(|part| shown.contains(part)), "{shown}");
+    let explanation = "delay,gain,offset,cutoff together have a misfit of";
+    assert!(refusal.iter().chain([&explanation, &"--fit takes that list"]).all(|part| shown.contains(part)), "{shown}");
     let (code, shown) = run(&["--force"]);
     assert!(code == Some(0) && desk.path("m.toml").exists() && shown.contains(explanation), "{shown}");
     // The fit that is named agrees.

@@ -12,7 +12,6 @@ use crate::design::error_grid::ErrorGrid;
 use crate::design::exchange::{DualSolution, Exchange, LEAST_MARGIN, Location};
 use crate::design::filters::impulse_responses;
 use crate::design::plant::LiftedPlant;
-use crate::design::unfinished::{EndOfSearch, Unfinished};
 use crate::lmi::sampled::{MeanSquareObjective, Problem};
 use crate::lti::peak::Peak;
 
@@ -33,11 +32,7 @@ const MISSED_PEAK_LIMIT: usize = 8;
 pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
     let mut exchange = exchange(plant, settings)?;
     let best = least_gamma(plant, settings.taps, &mut exchange)?;
-    let unfinished = if best.is_missed() {
-        Unfinished::of(exchange.lower, best.peak.gain, GAMMA_ACCURACY, EndOfSearch::MissedPeaks)
-    } else {
-        exchange.unfinished
-    };
+    let unfinished = exchange.unfinished_at(best.peak.gain, best.is_missed(), GAMMA_ACCURACY);
     let found = Synthesis::of_least_gamma(plant, best.taps, best.peak, exchange.lower_for_all)?;
     let dual = DualSolution { points: exchange.dual, bound: exchange.lower };
     Ok(Synthesis { dual, unfinished, iterations: exchange.iterations, ..found })
@@ -54,15 +49,13 @@ pub(super) fn taps_of_least_gamma(
     Ok(least_gamma(plant, settings.taps, &mut exchange(plant, settings)?)?.taps)
 }
 
-/// Bounds of the least gamma of `taps` taps per channel, at most `accuracy` (relative) apart, on the grid of
-/// the exchange.
+/// The least gamma of `taps` taps per channel within `accuracy` (relative), on the grid of the exchange.
 ///
 /// # Errors
 /// As [`synthesise`].
-pub(crate) fn bracket(plant: &LiftedPlant, taps: usize, accuracy: f64) -> Result<(f64, f64), DesignError> {
+pub(super) fn estimate(plant: &LiftedPlant, taps: usize, accuracy: f64) -> Result<f64, DesignError> {
     let mut exchange = exchange(plant, &Settings { taps, ..Settings::default() })?;
-    let upper = exchange.compare(accuracy)?.peaks.estimate;
-    Ok((exchange.lower.min(upper), upper))
+    Ok(exchange.compare(accuracy)?.peaks.estimate)
 }
 
 fn exchange<'a>(plant: &'a LiftedPlant, settings: &Settings) -> Result<Exchange<ErrorGrid<'a>>, DesignError> {

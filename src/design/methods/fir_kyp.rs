@@ -14,6 +14,7 @@
 use super::{Settings, Synthesis};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
+use crate::design::unfinished::{EndOfSearch, Unfinished};
 use crate::linalg::Mat;
 use crate::lmi;
 use crate::lmi::kyp::{self, Problem};
@@ -38,8 +39,10 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
     let solution = kyp::minimise(&problem(plant, settings.taps, stored)?, &lmi::Settings::KYP)?;
     let taps: Vec<Vec<f64>> = solution.x.chunks(settings.taps).map(<[f64]>::to_vec).collect();
     let peak = plant.fir_norm(&taps)?;
+    let reason = EndOfSearch::of(solution.outcome);
+    let unfinished = Unfinished::of(solution.lower, peak.gain, lmi::Settings::KYP.tol_gap_rel, reason);
     let found = Synthesis::of_least_gamma(plant, taps, peak, solution.lower)?;
-    Ok(Synthesis { iterations: solution.iterations, ..found })
+    Ok(Synthesis { iterations: solution.iterations, unfinished, ..found })
 }
 
 /// The error as an affine function of the taps, those of the first channel first.

@@ -100,7 +100,7 @@ pub(crate) struct Synthesis {
     /// For `fir` the dual solution, else empty. Its bound may be above `lower`, but taps of any size are not
     /// covered then: `verify` decides.
     pub(crate) dual: DualSolution,
-    /// What the search for the least gamma left open.
+    /// What the search for the least gamma, or for the least mean square beside it, left open.
     pub(crate) unfinished: Option<Unfinished>,
     /// Number of interior-point iterations or of Riccati equations solved.
     pub(crate) iterations: usize,

@@ -147,20 +147,22 @@ fn least_worst_norm(
 ) -> Result<RobustTaps, DesignError> {
     let mut exchange = exchange(plant, search, settings)?;
     let mut rounds = 0;
-    let (taps, largest_found) = loop {
+    let (taps, largest_found, is_missed) = loop {
         let found = exchange.optimise_at(Tolerances::gradual(ACCURACY))?;
         let taps = impulse_responses(&found.taps, settings.taps);
         let worst = worst_of(&exchange.error().search, &taps)?;
         let enough = found.peaks.estimate.max(exchange.lower) * (1.0 + ACCURACY);
+        let is_missed = worst.peak.gain > enough;
         rounds += 1;
-        if worst.peak.gain <= enough || rounds == MISSED_ERROR_LIMIT || exchange.stop.is_due() {
-            break (taps, worst.peak.gain);
+        if !is_missed || rounds == MISSED_ERROR_LIMIT || exchange.stop.is_due() {
+            break (taps, worst.peak.gain, is_missed);
         }
         let scenario = exchange.error_mut().search.include(&worst.point)?;
         if !exchange.add(&[Location { frequency: worst.peak.frequency, scenario }])? {
-            break (taps, worst.peak.gain);
+            break (taps, worst.peak.gain, is_missed);
         }
     };
+    let unfinished = exchange.unfinished_at(largest_found, is_missed, ACCURACY);
     let peak = plant.fir_norm(&taps)?;
     let norms = RobustNorms { nominal: peak.gain, largest_found };
     let (lower, iterations) = (exchange.lower_for_all, exchange.iterations);
@@ -176,7 +178,7 @@ fn least_worst_norm(
         pairs,
         iterations,
         taps,
-        unfinished: exchange.unfinished,
+        unfinished,
     })
 }
 

@@ -98,7 +98,7 @@ pub(crate) fn synthesise(
     let found = sides.least_ratio(&mut exchange, &search, &reach, settings)?;
     let of_fixed = worst_of(&search, fixed_taps)?.peak.gain;
     let worst = &exchange.error().scenarios()[found.worst];
-    let (_, redesigned) = fir::bracket(&worst.plant, settings.taps, ACCURACY)?;
+    let redesigned = fir::estimate(&worst.plant, settings.taps, ACCURACY)?;
     let peak = found.peaks[0];
     let study = TrackingStudy {
         errors: problem.errors.clone(),
@@ -117,7 +117,7 @@ pub(crate) fn synthesise(
         lower: fixed.lower.min(peak.gain),
         noncausal: fixed.noncausal.min(peak.gain),
         iterations: fixed.iterations + exchange.iterations,
-        unfinished: exchange.unfinished,
+        unfinished: exchange.unfinished_at(found.ratio, found.is_missed, ACCURACY),
         dual: fixed.dual,
         robust: None,
         affine: Some(AffineDesign { slopes: found.slopes, study }),
@@ -162,6 +162,9 @@ struct Scheduled {
     worst: usize,
     /// The largest ratio of a norm to what is within reach.
     ratio: f64,
+    /// Whether the exchange ended at errors or frequencies for which the taps are worse than for those that
+    /// it knows.
+    is_missed: bool,
 }
 
 /// The delays that move.
@@ -222,9 +225,10 @@ impl Sides {
                     exchange.error_mut().add(scenario);
                 }
             }
-            let scheduled = self.judged(exchange.error().scenarios(), taps, slopes)?;
+            let mut scheduled = self.judged(exchange.error().scenarios(), taps, slopes)?;
+            scheduled.is_missed = scheduled.ratio > enough;
             rounds += 1;
-            if scheduled.ratio <= enough || rounds == MISSED_ERROR_LIMIT || exchange.stop.is_due() {
+            if !scheduled.is_missed || rounds == MISSED_ERROR_LIMIT || exchange.stop.is_due() {
                 return Ok(scheduled);
             }
             let missed: Vec<Location<usize>> = exchange
@@ -255,7 +259,7 @@ impl Sides {
         let worst = (0..peaks.len()).max_by(|&a, &b| peaks[a].gain.total_cmp(&peaks[b].gain)).unwrap_or(0);
         let ratios = peaks.iter().zip(scenarios).map(|(peak, scenario)| peak.gain * scenario.weight);
         let ratio = ratios.fold(0.0, f64::max);
-        Ok(Scheduled { taps, slopes, peaks, worst, ratio })
+        Ok(Scheduled { taps, slopes, peaks, worst, ratio, is_missed: false })
     }
 
     /// F_0 as taps per channel, and the slopes per fast period.
