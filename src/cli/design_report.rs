@@ -158,7 +158,8 @@ impl<'a> Report<'a> {
     pub(super) fn text(&self, verbose: bool) -> String {
         let terms = [self.heading(), figure_text(&self.judged.figures, self.is_normalised)].concat();
         if !verbose {
-            return terms + &self.gamma_line() + &self.unfinished_text() + &self.hint();
+            let unfinished = if self.is_far_from_finished() { self.unfinished_text() } else { String::new() };
+            return terms + &self.gamma_line() + &unfinished + &self.hint();
         }
         let parts = [
             format!("{}\n", self.understood),
@@ -195,6 +196,11 @@ impl Report<'_> {
             self.size(),
             self.latency,
         )
+    }
+
+    /// Whether the least gamma may be lower by an amount that decides anything: 1 % is 0.09 dB.
+    fn is_far_from_finished(&self) -> bool {
+        self.unfinished.is_some_and(|left| left.width > 0.01)
     }
 
     fn unfinished_text(&self) -> String {

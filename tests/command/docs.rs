@@ -43,8 +43,10 @@ fn snippets(markdown: &str) -> Vec<Snippet> {
 fn pages() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut pages = vec![root.join("README.md")];
-    let folder = fs::read_dir(root.join("docs")).expect("the folder docs");
-    pages.extend(folder.map(|entry| entry.expect("an entry").path()));
+    for folder in ["docs", "docs/tutorials"] {
+        let folder = fs::read_dir(root.join(folder)).expect("a folder of pages");
+        pages.extend(folder.map(|entry| entry.expect("an entry").path()));
+    }
     pages.retain(|page| page.extension().is_some_and(|extension| extension == "md"));
     pages.sort();
     pages
@@ -73,6 +75,9 @@ impl Folder {
             // Python has tests of its own; Rust is a documentation test; lines of lost samples run with the
             // stream that reads them.
             "rust" | "text" | "jsonl" | "python" => {}
+            "c" => self.desk.write(self.name(snippet, "// "), &snippet.text),
+            // Directives of the site.
+            directive if directive.starts_with('{') => {}
             other => panic!("{}: no check for a snippet of {other:?}", self.place(snippet)),
         }
     }
@@ -81,10 +86,14 @@ impl Folder {
         format!("{}:{}", self.page.display(), snippet.line)
     }
 
-    /// A spec names its file in its first line, `# NAME.toml`.
+    /// A file is named in its first line, after the mark of a comment.
+    fn name<'a>(&self, snippet: &'a Snippet, comment: &str) -> &'a str {
+        let name = snippet.text.lines().next().and_then(|line| line.strip_prefix(comment));
+        name.unwrap_or_else(|| panic!("{}: the first line names no file", self.place(snippet)))
+    }
+
     fn check_spec(&self, snippet: &Snippet) {
-        let name = snippet.text.lines().next().and_then(|line| line.strip_prefix("# "));
-        let name = name.unwrap_or_else(|| panic!("{}: the first line names no file", self.place(snippet)));
+        let name = self.name(snippet, "# ");
         let spec = Spec::from_toml(&snippet.text, name);
         assert!(spec.is_ok(), "{}: {spec:?}", self.place(snippet));
         self.desk.write(name, &snippet.text);
@@ -95,9 +104,12 @@ impl Folder {
         assert!(bank.is_ok(), "{}: {bank:?}", self.place(snippet));
     }
 
-    /// Runs the lines that call `hybank`; `cargo` lines are the business of a fresh clone.
+    /// Runs the lines that call `hybank`, the C compiler and what it made; `cargo` lines are the business of a
+    /// fresh clone.
     fn run(&self, snippet: &Snippet) {
-        for line in snippet.text.lines().filter(|line| line.starts_with("hybank ")) {
+        let programs = ["hybank ", "cc ", "./"];
+        let runs = |line: &&str| programs.iter().any(|program| line.starts_with(program));
+        for line in snippet.text.lines().filter(runs) {
             let binary = Path::new(env!("CARGO_BIN_EXE_hybank")).parent().expect("the folder of the binary");
             let path = std::env::join_paths([binary, Path::new("/usr/bin"), Path::new("/bin")]);
             let output = Command::new("sh")

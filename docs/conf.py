@@ -1,0 +1,32 @@
+"""The site made from the pages of the repository by `tools/site.sh`. No text is copied: Sphinx reads the
+pages where they lie, so their links work here and in the repository alike."""
+
+project = "hybank"
+author = "the hybank developers"
+copyright = author
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc"]
+
+# The source folder is the repository; the site consists of these pages.
+root_doc = "docs/index"
+include_patterns = [
+    "README.md",
+    "ARCHITECTURE.md",
+    "CHANGELOG.md",
+    "docs/*.md",
+    "docs/tutorials/*.md",
+    "benches/README.md",
+    "filters/README.md",
+    "ibr/README.md",
+    "playground/README.md",
+]
+
+myst_heading_anchors = 3
+# Links to programs, folders and sources lead to the repository and not to pages.
+suppress_warnings = ["myst.xref_missing", "myst.header", "misc.highlighting_failure"]
+
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+
+html_theme = "furo"
+html_title = "hybank"
