@@ -5,6 +5,7 @@
 #[cfg(feature = "files")]
 pub mod files;
 pub mod memory;
+pub mod messages;
 pub mod quantity;
 pub mod sampling;
 pub mod units;

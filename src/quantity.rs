@@ -11,6 +11,7 @@
 //! assert_eq!(quantity::relative("0.5%"), Ok(0.005));
 //! ```
 
+use crate::messages::Quoted;
 use crate::units::{FastPeriods, Hertz, Seconds};
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -38,7 +39,7 @@ impl Time {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum QuantityError {
     /// There is no number at the beginning.
-    #[error("\"{text}\" does not begin with a number; write {example}")]
+    #[error("\"{}\" does not begin with a number; write {example}", Quoted(.text))]
     NoNumber {
         /// The text.
         text: String,
@@ -46,13 +47,13 @@ pub enum QuantityError {
         example: &'static str,
     },
     /// The number does not fit a double.
-    #[error("\"{text}\" does not fit a double; write a number below 1e308")]
+    #[error("\"{}\" does not fit a double; write a number below 1e308", Quoted(.text))]
     TooLarge {
         /// The text.
         text: String,
     },
     /// The unit is not known here.
-    #[error("\"{text}\" has the unit \"{unit}\", which is not known here; write {example}")]
+    #[error("\"{}\" has the unit \"{}\", which is not known here; write {example}", Quoted(.text), Quoted(.unit))]
     Unit {
         /// The text.
         text: String,

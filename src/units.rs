@@ -35,6 +35,7 @@
 mod grid_time;
 mod timeline;
 
+use crate::messages::Number;
 use std::f64::consts::TAU;
 use std::fmt;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
@@ -62,9 +63,9 @@ macro_rules! quantity {
         }
 
         impl fmt::Display for $name {
-            /// The value, formatted as an f64 is, and its unit.
+            /// The value, formatted as a [`Number`] is, and its unit.
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                fmt::Display::fmt(&self.0, f)?;
+                fmt::Display::fmt(&Number(self.0), f)?;
                 write!(f, " {}", Self::UNIT)
             }
         }

@@ -5,6 +5,7 @@ mod abi;
 
 use hybank::bank::Bank;
 use hybank::files::{Bound, read_text};
+use hybank::messages::shown;
 use hybank::runtime::{Algorithm, Options, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, Stream};
 use std::cell::RefCell;
 use std::ffi::CString;
@@ -56,7 +57,7 @@ fn kept<T>(result: Result<T, String>) -> Option<T> {
 }
 
 fn keep(text: &str) {
-    // A text without zeros is a C string.
-    let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
+    // A text without zeros is a C string, and none is left in what is shown.
+    let text = CString::new(shown(text)).unwrap_or_default();
     FAILURE.with_borrow_mut(|kept| *kept = text);
 }

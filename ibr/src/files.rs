@@ -2,6 +2,7 @@
 
 use hybank::files::{self, Bound, FileError, read_bytes};
 use hybank::memory::check_memory;
+use hybank::messages::Quoted;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -23,7 +24,7 @@ pub enum InputError {
         remedy: &'static str,
     },
     /// Its content cannot be used.
-    #[error("{}{at}: {reason}", path.display())]
+    #[error("{}{at}: {reason}", Quoted(path))]
     Content {
         /// The file.
         path: PathBuf,
@@ -41,6 +42,8 @@ pub enum Location {
     File,
     /// In a line.
     Line(usize),
+    /// In a line and a column of it.
+    Column(usize, usize),
     /// In a record of a binary file.
     Record(usize),
     /// In a frame of transforms.json, with the name of its image.
@@ -54,9 +57,10 @@ impl fmt::Display for Location {
         match self {
             Self::File => Ok(()),
             Self::Line(line) => write!(f, ":{line}"),
+            Self::Column(line, column) => write!(f, ":{line}:{column}"),
             Self::Record(record) => write!(f, ": record {record}"),
-            Self::Frame(frame, image) => write!(f, ": frame {frame} ({image:?})"),
-            Self::Image(image) => write!(f, ": image {image:?}"),
+            Self::Frame(frame, image) => write!(f, ": frame {frame} (\"{}\")", Quoted(image)),
+            Self::Image(image) => write!(f, ": image \"{}\"", Quoted(image)),
         }
     }
 }

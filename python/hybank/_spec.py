@@ -26,7 +26,7 @@ def design(source=None, /, *, proof=True, limits=True, progress=None, **keywords
     if source is None:
         source = _of_keywords(keywords)
     elif keywords:
-        raise TypeError(f"give a spec or keywords, not both: {', '.join(keywords)}")
+        raise TypeError(f"give a spec or keywords, not both: {', '.join(ascii(key)[:200] for key in keywords)}")
     return _design(source, proof=proof, limits=limits, progress=progress)
 
 

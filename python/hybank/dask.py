@@ -395,13 +395,13 @@ def _check_sink(sink, source):
     """Refuses a sink that would replace a source, or anything that is no array."""
     sources = source if isinstance(source, list) else [source[0] if isinstance(source, tuple) else source]
     if os.path.realpath(sink) in map(os.path.realpath, sources):
-        raise HybankError(f"{sink} is the source; give another sink")
+        raise HybankError(f"{sink!r} is the source; give another sink")
     if _is_npy(sink):
         return
     if sink.lower().endswith(_OTHER_FILES) or os.path.isfile(sink):
-        raise HybankError(f"{sink}: a sink is an .npy file or a zarr array, not another kind of file")
+        raise HybankError(f"{sink!r}: a sink is an .npy file or a zarr array, not another kind of file")
     if os.path.isdir(sink) and os.listdir(sink) and not _is_zarr_array(sink):
-        raise HybankError(f"{sink} is a folder that is no zarr array, and its files would be lost; give another sink")
+        raise HybankError(f"{sink!r} is a folder that is no zarr array, and its files would be lost; give another sink")
 
 
 def _is_zarr_array(folder):

@@ -1,6 +1,6 @@
 //! Arrays as inputs of a bank, without a copy.
 
-use crate::errors::{HybankError, refused};
+use crate::errors::refused;
 use crate::formats::{Format, Number};
 use crate::samples::Samples;
 use bytemuck::AnyBitPattern;
@@ -90,7 +90,7 @@ impl<'py> Held<'py> {
         if dtype.getattr("char")?.eq("e")? {
             return Self::new(&array.call_method1("astype", ("f4",))?, shape);
         }
-        Err(HybankError::new_err(format!(
+        Err(refused(format!(
             "samples of {dtype} cannot be read; convert them to float32, float64, int16, int32, int8, uint8, complex64 or \
              complex128"
         )))
@@ -168,7 +168,7 @@ impl Shape {
         if (-2..2).contains(&self.axis) {
             return Ok(());
         }
-        Err(HybankError::new_err(format!("axis {} is not the axis of time; give 0 or 1", self.axis)))
+        Err(refused(format!("axis {} is not the axis of time; give 0 or 1", self.axis)))
     }
 
     /// N and T of an array.
@@ -180,7 +180,7 @@ impl Shape {
             [frames, channels] if self.time_first() => [channels, frames],
             [channels, frames] => [channels, frames],
             _ => {
-                return Err(HybankError::new_err(format!(
+                return Err(refused(format!(
                     "an array of {} dimensions is no signal; give one of shape (N, T), or (T, N) with axis=0",
                     sizes.len()
                 )));
@@ -194,7 +194,7 @@ impl Shape {
             (true, false) => "; give axis=0 if the columns are channels",
             (false, _) => "",
         };
-        Err(HybankError::new_err(format!(
+        Err(refused(format!(
             "the samples {sizes:?} have {channels} channels (time along axis {}) instead of {wanted}{remedy}",
             self.axis
         )))
@@ -205,7 +205,7 @@ impl Shape {
 fn plain<'py>(x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let numpy = x.py().import("numpy")?;
     if numpy.getattr("ma")?.call_method1("is_masked", (x,))?.extract()? {
-        return Err(HybankError::new_err(
+        return Err(refused(
             "samples are masked; x.filled(np.nan) marks them as missing, x.data takes them as they are",
         ));
     }

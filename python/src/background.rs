@@ -1,6 +1,6 @@
 //! Long computations that Ctrl-C interrupts.
 
-use crate::errors::HybankError;
+use crate::errors::refused;
 use hybank::design::{Stage, Stop};
 use pyo3::prelude::*;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
@@ -60,9 +60,7 @@ pub(crate) fn run<T: Send + 'static>(
             Ok(Message::Stage(stage, seconds)) => report(progress, stage, seconds)?,
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => {
-                return Err(HybankError::new_err(
-                    "the computation ended without a result; this is a fault of hybank",
-                ));
+                return Err(refused("the computation ended without a result; this is a fault of hybank"));
             }
         }
         py.check_signals()?;

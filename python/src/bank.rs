@@ -2,7 +2,7 @@
 
 use crate::arrays::Shape;
 use crate::background;
-use crate::errors::{HybankError, choose, file_error, refused};
+use crate::errors::{choose, file_error, refused};
 use crate::fuse::{self, Request};
 use crate::results::{Figures, Gamma};
 use crate::sources;
@@ -173,9 +173,10 @@ impl Bank {
     /// The largest gain of the error system at `n` frequencies from 0 to half the slow rate: (hertz, gain).
     #[pyo3(signature = (n = 512))]
     fn error_response<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Array<'py>, Array<'py>)> {
-        let count = usize::try_from(n).ok().filter(|&count| count <= MOST_FREQUENCIES).ok_or_else(|| {
-            HybankError::new_err(format!("n: {n} frequencies; give 0 to {MOST_FREQUENCIES}"))
-        })?;
+        let count = usize::try_from(n)
+            .ok()
+            .filter(|&count| count <= MOST_FREQUENCIES)
+            .ok_or_else(|| refused(format!("n: {n} frequencies; give 0 to {MOST_FREQUENCIES}")))?;
         let bank = Arc::clone(&self.bank);
         let points = background::run(py, None, move |_| design::error_response(&bank, count))?;
         let points = points.map_err(refused)?;
@@ -283,7 +284,7 @@ impl Bank {
         let lags = taps.iter().map(|f| f.len().div_ceil(self.bank.ratio)).max().unwrap_or(1);
         let states = lags.saturating_sub(1).saturating_mul(taps.len());
         if states > MOST_DENSE_STATES {
-            return Err(HybankError::new_err(format!(
+            return Err(refused(format!(
                 "ss would have {states} states, and dense matrices of at most {MOST_DENSE_STATES} are made; use taps"
             )));
         }

@@ -2,7 +2,7 @@
 
 use crate::arrays::{Held, Shape};
 use crate::background;
-use crate::errors::{HybankError, refused};
+use crate::errors::refused;
 use crate::sources;
 use hybank::calibrate::{
     self as calibration, CalibrationSignal, ChannelEstimate, Fit, Fitting, Record, Settings, applied,
@@ -102,7 +102,7 @@ impl Signal {
         rate: Option<f64>,
         blind: bool,
     ) -> PyResult<Self> {
-        let wrong = |message: &str| Err(HybankError::new_err(message.to_owned()));
+        let wrong = |message: &str| Err(refused(message.to_owned()));
         match (tones, waveform, blind) {
             (tones, None, false) => {
                 Ok(Self::Tones(tones.unwrap_or_default().into_iter().map(Hertz).collect()))
@@ -122,7 +122,7 @@ impl Signal {
 
     /// Refuses what real samples, or complex ones, cannot hold.
     fn check(&self, is_complex: bool) -> PyResult<()> {
-        let refuse = |message| Err(HybankError::new_err(message));
+        let refuse = |message| Err(refused(message));
         let is_frequency = |tone: &Hertz| tone.0.is_finite() && (tone.0 > 0.0 || is_complex && tone.0 < 0.0);
         match self {
             Self::Tones(tones) if tones.iter().all(is_frequency) => Ok(()),
@@ -147,7 +147,7 @@ impl Signal {
 /// One record per channel. Integers clip at the ends of their range, floats where `clip` says.
 fn records(held: &Held<'_>, channels: usize, clip: Option<f64>) -> PyResult<Vec<Record>> {
     if clip.is_some_and(|level| level.is_nan() || level <= 0.0) {
-        return Err(HybankError::new_err("clip: give a positive level"));
+        return Err(refused("clip: give a positive level"));
     }
     let unbounded = (f64::NEG_INFINITY, f64::INFINITY);
     let (lowest, highest) = clip.map(|level| (-level, level)).or(held.rails()).unwrap_or(unbounded);
@@ -164,8 +164,7 @@ fn records(held: &Held<'_>, channels: usize, clip: Option<f64>) -> PyResult<Vec<
 
 fn fitted(names: &[String]) -> PyResult<Fit> {
     let value = |name: &String| {
-        name.parse::<Fitting>()
-            .map_err(|error| HybankError::new_err(format!("fit: \"{name}\" is unknown; {error}")))
+        name.parse::<Fitting>().map_err(|error| refused(format!("fit: \"{name}\" is unknown; {error}")))
     };
     names.iter().try_fold(Fit::NOTHING, |fit, name| Ok(fit.with(value(name)?)))
 }
@@ -173,7 +172,7 @@ fn fitted(names: &[String]) -> PyResult<Fit> {
 /// From 0.
 fn reference_of(spec: &Spec, given: Option<usize>) -> PyResult<usize> {
     match given {
-        Some(0) => Err(HybankError::new_err("reference: channels count from 1")),
+        Some(0) => Err(refused("reference: channels count from 1")),
         Some(channel) => Ok(channel - 1),
         None => Ok(spec.uncertainty.as_ref().and_then(|table| table.reference_channel()).unwrap_or(0)),
     }

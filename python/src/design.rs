@@ -5,6 +5,7 @@ use crate::bank::Bank;
 use crate::errors::{refused, spec_problem};
 use crate::sources;
 use hybank::design::{Design, DesignError, Limits, Options, ProofSearch, warnings};
+use hybank::messages::shown;
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use std::ffi::CString;
@@ -44,6 +45,6 @@ pub(crate) fn design(
 
 /// A warning at the line of the caller: the one that calls `hybank.design`.
 fn warn(py: Python<'_>, message: &impl Display) -> PyResult<()> {
-    let text = CString::new(message.to_string().replace('\0', " "))?;
+    let text = CString::new(shown(&message.to_string()))?;
     PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 2)
 }

@@ -1,6 +1,7 @@
 //! Errors of the library as Python exceptions.
 
 use hybank::files::FileError;
+use hybank::messages::{Quoted, shown};
 use hybank::spec;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyFileExistsError, PyOSError, PyValueError};
@@ -21,14 +22,14 @@ create_exception!(
      in the text, or None for a spec that has no text."
 );
 
-/// A refusal of the library.
+/// A refusal of the library. Every message of this package comes this way, or through [`shown`].
 pub(crate) fn refused(error: impl Display) -> PyErr {
-    HybankError::new_err(error.to_string())
+    HybankError::new_err(shown(&error.to_string()))
 }
 
 /// A refusal that names the file first.
 pub(crate) fn refused_in(name: &str, error: impl Display) -> PyErr {
-    HybankError::new_err(format!("{name}: {error}"))
+    refused(format!("{}: {error}", Quoted(name)))
 }
 
 /// The value of a name among the `known` ones; `keyword` is the argument that names it.
@@ -37,19 +38,19 @@ pub(crate) fn choose<T: Copy>(keyword: &str, name: &str, known: &[(&str, T)]) ->
         let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
         let (last, others) = names.split_last().unwrap_or((&"", &[]));
         let choice = format!("{} or {last}", others.join(", "));
-        HybankError::new_err(format!("{keyword}: \"{name}\" is unknown; choose {choice}"))
+        refused(format!("{keyword}: \"{}\" is unknown; choose {choice}", Quoted(name)))
     })
 }
 
 /// A spec that was refused, with its place.
 pub(crate) fn spec_error(py: Python<'_>, error: &spec::SpecError) -> PyErr {
     let place = error.location().map(|location| (location.line, location.column));
-    with_place(py, SpecError::new_err(error.to_string()), error.path(), place)
+    with_place(py, SpecError::new_err(shown(&error.to_string())), error.path(), place)
 }
 
 /// A rule for specs that a design found broken.
 pub(crate) fn spec_problem(py: Python<'_>, problem: &spec::SpecProblem) -> PyErr {
-    with_place(py, SpecError::new_err(problem.to_string()), "", None)
+    with_place(py, SpecError::new_err(shown(&problem.to_string())), "", None)
 }
 
 fn with_place(py: Python<'_>, error: PyErr, path: &str, place: Option<(usize, usize)>) -> PyErr {
@@ -72,10 +73,11 @@ pub(crate) fn file_error(error: FileError) -> PyErr {
                 let reason = text.split(" (os error").next().unwrap_or_default().to_owned();
                 PyOSError::new_err((number, reason, file.clone()))
             }
-            None => PyOSError::new_err(error.to_string()),
+            None => PyOSError::new_err(shown(&error.to_string())),
         },
         FileError::Exists { file } => PyFileExistsError::new_err(format!(
-            "{file}: the file exists; give another name or overwrite=True"
+            "{}: the file exists; give another name or overwrite=True",
+            Quoted(file)
         )),
         _ => refused(error),
     }

@@ -1,6 +1,6 @@
 //! The number types of samples in arrays.
 
-use crate::errors::HybankError;
+use crate::errors::refused;
 use hybank::runtime::{PcmFormat, Precision};
 use numpy::{PyArrayDescr, PyArrayDescrMethods, dtype};
 use pyo3::prelude::*;
@@ -81,7 +81,7 @@ impl Format {
         let Some(dtype) = dtype else { return Ok(Self { number: input.number.float(), ..input }) };
         let asked = Self::of_dtype(dtype)?;
         match (input.complex, asked.complex) {
-            (false, true) => Err(HybankError::new_err(
+            (false, true) => Err(refused(
                 "dtype: the samples are real, and so is the output; give a real dtype, or convert the samples",
             )),
             // f4 of complex samples means c8.
@@ -127,7 +127,7 @@ impl Format {
                 return Ok(Self { number: Number::F64, complex: true });
             }
             () => {
-                return Err(HybankError::new_err(format!(
+                return Err(refused(format!(
                     "dtype {descr} is not one of f4 f8 i1 u1 i2 i4 c8 c16 in the byte order of this machine; choose one"
                 )));
             }
@@ -137,7 +137,7 @@ impl Format {
 
     fn checked(self) -> PyResult<Self> {
         if self.complex && !self.number.format().is_float() {
-            return Err(HybankError::new_err("dtype: complex samples are floats; choose c8 or c16"));
+            return Err(refused("dtype: complex samples are floats; choose c8 or c16"));
         }
         Ok(self)
     }

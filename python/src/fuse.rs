@@ -1,7 +1,7 @@
 //! Fuses arrays.
 
 use crate::arrays::{Held, Shape};
-use crate::errors::{HybankError, refused};
+use crate::errors::refused;
 use crate::formats::Format;
 use crate::outputs::NewArray;
 use crate::results::FuseReport;
@@ -35,9 +35,7 @@ impl Request {
             Some("hold") => Some(GapPolicy::Hold),
             Some("zero") => Some(GapPolicy::Zero),
             Some(other) => {
-                return Err(HybankError::new_err(format!(
-                    "gaps: \"{other}\" is unknown; choose \"hold\" or \"zero\""
-                )));
+                return Err(refused(format!("gaps: \"{other}\" is unknown; choose \"hold\" or \"zero\"")));
             }
         };
         Ok(Self { workers: workers(threads)?, gaps, algorithm: parse_algorithm(algorithm)?, keep_latency })
@@ -54,7 +52,7 @@ fn workers(threads: i64) -> PyResult<Option<ThreadPool>> {
     match usize::try_from(threads) {
         Ok(1) => Ok(None),
         Ok(count) if threads <= MOST_THREADS => Ok(Some(ThreadPool::new(count)?)),
-        _ => Err(HybankError::new_err(format!(
+        _ => Err(refused(format!(
             "threads: {threads} is not from 1 to {MOST_THREADS}, or 0 for one per processor"
         ))),
     }
@@ -62,7 +60,7 @@ fn workers(threads: i64) -> PyResult<Option<ThreadPool>> {
 
 /// The algorithm of a name.
 pub(crate) fn parse_algorithm(name: &str) -> PyResult<Algorithm> {
-    name.parse().map_err(|error| HybankError::new_err(format!("algorithm: {error}")))
+    name.parse().map_err(|error| refused(format!("algorithm: {error}")))
 }
 
 /// The bank made ready for outputs of a format, in a run with `settings`.

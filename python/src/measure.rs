@@ -2,7 +2,7 @@
 
 use crate::arrays::{Held, Shape};
 use crate::background;
-use crate::errors::{HybankError, choose, refused};
+use crate::errors::{choose, refused};
 use hybank::measure::{self as quality, Imbalance, Settings, Window};
 use hybank::units::{Decibels, Hertz};
 use numpy::PyArray1;
@@ -69,7 +69,7 @@ pub(crate) fn measure(
     window: &str,
 ) -> PyResult<Measurement> {
     if !(rate > 0.0 && rate.is_finite()) {
-        return Err(HybankError::new_err(format!("rate: {rate} is no sample rate; give samples per second")));
+        return Err(refused(format!("rate: {rate} is no sample rate; give samples per second")));
     }
     let settings = Settings {
         tones: tones.unwrap_or_default().into_iter().map(Hertz).collect(),

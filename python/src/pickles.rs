@@ -1,6 +1,6 @@
 //! Pickles and copies of results: the name of the class and its attributes.
 
-use crate::errors::HybankError;
+use crate::errors::refused;
 use crate::{calibrate, ibr, measure, results};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -19,7 +19,7 @@ pub(crate) fn restored<'py>(name: &str, attributes: &Bound<'py, PyAny>) -> PyRes
         "Figures" => result::<results::Figures>(attributes),
         "Verified" => result::<results::Verified>(attributes),
         "View" => result::<ibr::View>(attributes),
-        _ => Err(HybankError::new_err(format!("a pickle of {name} is of another version of hybank"))),
+        _ => Err(refused(format!("a pickle of {name} is of another version of hybank"))),
     }
 }
 

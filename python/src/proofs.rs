@@ -2,7 +2,7 @@
 
 use crate::background;
 use crate::bank::Bank;
-use crate::errors::{HybankError, refused, refused_in};
+use crate::errors::{refused, refused_in};
 use crate::results::{Analysis, Verified};
 use crate::sources;
 use hybank::bank::{self, check_digest};
@@ -39,7 +39,7 @@ pub(crate) fn analyze(bank: &Bound<'_, PyAny>, delay_error: Option<Vec<f64>>) ->
     let given = Given::new(bank)?;
     let errors: Vec<Seconds> = delay_error.unwrap_or_default().into_iter().map(Seconds).collect();
     if errors.iter().any(|error| !error.0.is_finite()) {
-        return Err(HybankError::new_err("delay_error: errors of delays are finite numbers, in seconds"));
+        return Err(refused("delay_error: errors of delays are finite numbers, in seconds"));
     }
     let bank_in = Arc::clone(&given.bank);
     let analysis = background::run(bank.py(), None, move |_| design::analyze(&bank_in, &errors))?;
@@ -64,7 +64,7 @@ impl Given {
             });
         }
         let Some(path) = sources::path(given) else {
-            return Err(HybankError::new_err("a bank is given as a hybank.Bank or as the path of its file"));
+            return Err(refused("a bank is given as a hybank.Bank or as the path of its file"));
         };
         let (text, name) = (sources::read(&path)?, path.display().to_string());
         let bank = bank::Bank::from_json(&text, &name).map_err(refused)?;

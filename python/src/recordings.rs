@@ -1,6 +1,6 @@
 //! `hybank.Recording`: frames of a WAV or SigMF file from any place, for workers that read spans of it.
 
-use crate::errors::{HybankError, refused};
+use crate::errors::refused;
 use hybank::io::wav::WavReader;
 use hybank::io::{SigmfMeta, StreamHeader, is_sigmf, sigmf_files};
 use hybank::runtime::{Input, Isa, PcmFormat, PcmFrames};
@@ -93,7 +93,7 @@ impl Recording {
         let name = meta_path.display().to_string();
         let meta = SigmfMeta::read(&meta_path).map_err(refused)?;
         if lost(&meta) {
-            return Err(HybankError::new_err(format!(
+            return Err(refused(format!(
                 "{name}: frames were lost (core:global_index jumps); fuse the recording with `hybank fuse`, which fills them"
             )));
         }
@@ -153,6 +153,6 @@ fn system(path: &Path, error: std::io::Error) -> PyErr {
         Some(number) => {
             pyo3::exceptions::PyOSError::new_err((number, error.kind().to_string(), path.to_owned()))
         }
-        None => HybankError::new_err(format!("{}: {error}", path.display())),
+        None => refused(format!("{}: {error}", path.display())),
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::arrays::{Held, Shape};
 use crate::background;
-use crate::errors::{HybankError, refused};
+use crate::errors::refused;
 use crate::results::Capture;
 use crate::sources;
 use hybank::design::Problem;
@@ -25,7 +25,7 @@ pub(crate) fn simulate(
 ) -> PyResult<Capture> {
     let py = source.py();
     if !gain.is_finite() {
-        return Err(HybankError::new_err(format!("gain: {gain} is not a finite number")));
+        return Err(refused(format!("gain: {gain} is not a finite number")));
     }
     let spec = sources::spec(source)?;
     // As the command does: the converters do not know what the spec says of the signal. Without latency the
@@ -61,16 +61,13 @@ impl Signal {
         let fast = spec.fast_period.rate();
         let rate = rate.map_or(fast, Hertz);
         if !(rate.0 > 0.0 && rate.0.is_finite()) {
-            return Err(HybankError::new_err(format!(
-                "rate: {} is no sample rate; give samples per second",
-                rate.0
-            )));
+            return Err(refused(format!("rate: {} is no sample rate; give samples per second", rate.0)));
         }
         let held = Held::new(signal, Shape { axis: -1, channels: 1 })?;
         let part = |part| -> PyResult<Analog> {
             let samples = held.doubles(part)?;
             if let Some(n) = samples.iter().position(|x| !x.is_finite()) {
-                return Err(HybankError::new_err(format!(
+                return Err(refused(format!(
                     "sample {n} of the signal is {}; give finite samples",
                     samples[n]
                 )));

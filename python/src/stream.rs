@@ -2,7 +2,7 @@
 
 use crate::arrays::{Held, Shape};
 use crate::bank::Bank as PyBank;
-use crate::errors::{HybankError, refused};
+use crate::errors::refused;
 use crate::formats::{Format, Number};
 use crate::fuse::{parse_algorithm, plan};
 use crate::outputs::NewArray;
@@ -239,10 +239,10 @@ impl Stream {
 impl Stream {
     fn check_parts(&self, given: Format) -> PyResult<()> {
         match (given.complex, self.format.complex) {
-            (true, false) => Err(HybankError::new_err(
+            (true, false) => Err(refused(
                 "the samples are complex, the stream is real; make it with bank.stream(dtype=\"c8\") or \"c16\"",
             )),
-            (false, true) => Err(HybankError::new_err(
+            (false, true) => Err(refused(
                 "the samples are real, the stream is complex; make it with bank.stream(dtype=\"f4\") or \"f8\"",
             )),
             _ => Ok(()),

@@ -1,5 +1,6 @@
 //! Python objects as the tables, lists, numbers and texts of a spec.
 
+use hybank::messages::{Quoted, shown};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyBytes, PyComplex, PyFloat, PyInt, PyMapping, PyString};
@@ -117,7 +118,7 @@ impl Place<'_> {
 
 fn wrong(place: Place<'_>, problem: &str) -> PyErr {
     let path = if place.path.is_empty() { "the spec" } else { place.path };
-    PyTypeError::new_err(format!("{path}: {problem}"))
+    PyTypeError::new_err(shown(&format!("{}: {problem}", Quoted(path))))
 }
 
 fn type_name(object: &Bound<'_, PyAny>) -> String {

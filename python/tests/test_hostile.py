@@ -217,3 +217,34 @@ def test_threads_may_call_anything_of_one_stream(fir):
     assert not failures
     s.reset()
     np.testing.assert_array_equal(s.process(np.ones((50, 2), "f4")), fir.stream(axis=0).process(np.ones((50, 2), "f4")))
+
+
+HOSTILE = "\x1b[2J\x9b31m\u202e\x07\r\nhybank: forged"
+
+
+@pytest.mark.parametrize("text", [HOSTILE, "x" * 1_000_000, HOSTILE * 1000])
+def test_messages_quote_what_is_foreign(fir, tmp_path, text):
+    path = tmp_path / "bank.json"
+    path.write_text('{"format": "hybank-bank", "version": 1, "spec": null, "' + "x" * 1000 + '": 1}')
+    runs = [
+        lambda: hb.design({**SPEC, text: 2}),
+        lambda: hb.design({**SPEC, "design": {"method": text}}),
+        lambda: hb.design({**SPEC, "channel": [hb.Channel(delay=text)]}),
+        lambda: hb.design({text: object()}),
+        lambda: hb.design(f"ratio = 2\n{text} = 3\n"),
+        lambda: hb.design(fir, **{text: 2}),
+        lambda: hb.load(path),
+        lambda: hb.simulate(fir, text),
+        lambda: fir.fuse(np.zeros((2, 4)), gaps=text),
+        lambda: fir.fuse(np.zeros((2, 4)), algorithm=text),
+        lambda: hb.measure(np.zeros(100), 1.0, window=text),
+    ]
+    for run in runs:
+        with pytest.raises((ValueError, TypeError)) as caught:
+            run()
+        message = str(caught.value)
+        assert len(message) <= 6000
+        # A message may show the line that it is about.
+        lines = message.split("\n")
+        assert all(line.replace(" ", "").lstrip("0123456789").startswith("|") for line in lines[1:]), message
+        assert not any(ord(c) < 32 or 127 <= ord(c) < 160 or c == "\u202e" for line in lines for c in line), message

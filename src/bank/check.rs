@@ -1,7 +1,8 @@
 //! The invariants of every bank, read or designed.
 
 use crate::spec::{
-    MAX_CHANNELS, MAX_RATIO, Spec, SpecProblem, check_fraction_bits, check_gain, check_offset,
+    MAX_CHANNELS, MAX_ENTRY, MAX_RATIO, Spec, SpecProblem, check_fast_period, check_fraction_bits,
+    check_gain, check_offset,
 };
 use crate::units::Seconds;
 
@@ -39,12 +40,12 @@ fn check_length(
     if found == expected { Ok(()) } else { refuse(path, BankProblem::Length { found, expected, unit, rule }) }
 }
 
-/// A certified norm is zero or more, and finite.
+/// A certified norm is zero or more, and not too large.
 fn check_norm(path: &str, gamma: f64) -> Checked {
-    if gamma.is_finite() && gamma >= 0.0 {
+    if (0.0..=MAX_ENTRY).contains(&gamma) {
         return Ok(());
     }
-    out_of_range(path, gamma, "(h = 1)", "a norm is zero or more, and finite")
+    out_of_range(path, gamma, "(h = 1)", format!("a norm is zero or more, and at most {MAX_ENTRY:e}"))
 }
 
 impl Bank {
@@ -57,7 +58,7 @@ impl Bank {
     /// [`BankError`] with an empty file name and the JSON place of the first thing that is wrong.
     pub fn check(&self) -> Result<(), BankError> {
         self.check_scalars()?;
-        check_delays(&self.delays)?;
+        check_delays(&self.delays, self.fast_period)?;
         check_converters("gain", &self.gains, self.channel_count(), check_gain)?;
         check_converters("offset", &self.offsets, self.channel_count(), check_offset)?;
         check_gamma(&self.gamma)?;
@@ -89,7 +90,7 @@ impl Bank {
             for (i, list) in by_delay.iter().enumerate() {
                 let path = format!("{path}[{i}]");
                 check(&path, list.len(), taps[i].len(), "tap slopes")?;
-                check_finite(&path, list)?;
+                check_sizes(&path, list)?;
             }
         }
         Ok(())
@@ -147,10 +148,7 @@ impl Bank {
     }
 
     fn check_scalars(&self) -> Checked {
-        if !(self.fast_period.0.is_normal() && self.fast_period > Seconds(0.0)) {
-            let rule = "h must be a positive, finite number of seconds";
-            return out_of_range("fast_period", self.fast_period.0, "s", rule);
-        }
+        check_fast_period(self.fast_period).or_else(|problem| refuse("fast_period", problem))?;
         if !(1..=MAX_RATIO).contains(&self.ratio) {
             let rule =
                 format!("ratio counts the fast samples for each slow one and must be 1 to {MAX_RATIO}");
@@ -206,14 +204,15 @@ fn agree(path: impl Into<String>, bank: f64, spec: f64, size: f64) -> Checked {
     refuse(path, BankProblem::SpecDiffers { bank, spec })
 }
 
-fn check_delays(delays: &[Seconds]) -> Checked {
+fn check_delays(delays: &[Seconds], fast_period: Seconds) -> Checked {
     if !(1..=MAX_CHANNELS).contains(&delays.len()) {
         let rule = format!("a bank has 1 to {MAX_CHANNELS} channels");
         return out_of_range("channels", delays.len() as f64, "channels", rule);
     }
-    match delays.iter().position(|d| !(d.0.is_finite() && *d >= Seconds(0.0))) {
+    let most = MAX_BANK_LATENCY as f64;
+    match delays.iter().position(|delay| !(0.0..=most).contains(&delay.in_fast_periods(fast_period).0)) {
         Some(i) => {
-            let rule = "a delay is zero or more, and finite";
+            let rule = format!("a delay is zero or more, and at most {most} fast periods; check its unit");
             out_of_range(format!("channels[{i}].delay"), delays[i].0, "s", rule)
         }
         None => Ok(()),
@@ -240,8 +239,9 @@ fn check_gamma(gamma: &Gamma) -> Checked {
     let norms = [("norm", gamma.norm), ("upper", gamma.upper)];
     let worst = [("worst_case", gamma.worst_case), ("tracked", gamma.tracked)];
     for (key, value) in norms.into_iter().chain(worst).chain(bounds) {
-        if let Some(value) = value.filter(|x| !(x.is_finite() && *x >= 0.0)) {
-            let rule = "a norm is zero or more, and finite; null says that it is not known";
+        if let Some(value) = value.filter(|x| !(0.0..=MAX_ENTRY).contains(x)) {
+            let rule =
+                format!("a norm is zero or more, and at most {MAX_ENTRY:e}; null says that it is not known");
             return out_of_range(format!("gamma.{key}"), value, "(h = 1)", rule);
         }
     }
@@ -265,16 +265,20 @@ fn check_taps(taps: &[Vec<f64>], channels: usize) -> Checked {
         let path = format!("channels[{i}].taps");
         let rule = "all filters are as long as the first one; append zeros to the shorter ones";
         check_length(&path, list.len(), expected, "taps", rule)?;
-        check_finite(&path, list)?;
+        check_sizes(&path, list)?;
     }
     Ok(())
 }
 
-fn check_finite(path: &str, values: &[f64]) -> Checked {
-    match values.iter().position(|x| !x.is_finite()) {
-        Some(j) => refuse(format!("{path}[{j}]"), BankProblem::NotFinite { value: values[j] }),
-        None => Ok(()),
+/// Finite numbers of a size for which the filters are tested.
+fn check_sizes(path: &str, values: &[f64]) -> Checked {
+    let Some(j) = values.iter().position(|x| !(0.0..=MAX_ENTRY).contains(&x.abs())) else { return Ok(()) };
+    let (path, value) = (format!("{path}[{j}]"), values[j]);
+    if value.is_finite() {
+        let rule = format!("coefficients are at most {MAX_ENTRY:e} in size; scale the filters");
+        return out_of_range(path, value, "(coefficient)", rule);
     }
+    refuse(path, BankProblem::NotFinite { value })
 }
 
 fn check_block(block: &StateSpace, ratio: usize, channels: usize) -> Checked {
@@ -296,7 +300,7 @@ fn check_matrix(
     for (i, row) in rows.iter().enumerate() {
         let path = format!("{path}[{i}]");
         check_length(&path, row.len(), columns, "columns", rule)?;
-        check_finite(&path, row)?;
+        check_sizes(&path, row)?;
     }
     Ok(())
 }
@@ -317,7 +321,7 @@ fn check_triangle(path: &str, rows: &[Vec<f64>]) -> Checked {
         let path = format!("{path}[{i}]");
         let rule = "the matrix is lower triangular, each row one longer";
         check_length(&path, row.len(), i + 1, "columns", rule)?;
-        check_finite(&path, row)?;
+        check_sizes(&path, row)?;
     }
     Ok(())
 }
@@ -332,7 +336,7 @@ fn check_causal(witness: &CausalWitness) -> Checked {
 }
 
 fn check_witness(path: &str, witness: &DualWitness, reference: usize, measured: usize) -> Checked {
-    check_finite(&format!("{path}.half"), &witness.half)?;
+    check_sizes(&format!("{path}.half"), &witness.half)?;
     if witness.half == [0.0; 2] {
         let rule = "half is about cos(w/2), sin(w/2); both cannot be zero";
         return out_of_range(format!("{path}.half"), 0.0, "", rule);
@@ -344,7 +348,7 @@ fn check_witness(path: &str, witness: &DualWitness, reference: usize, measured: 
         let rule = "a witness has one weight for each sample of a slow period";
         check_length(&path, list.len(), expected, "weights", rule)?;
         for (i, pair) in list.iter().enumerate() {
-            check_finite(&format!("{path}[{i}]"), pair)?;
+            check_sizes(&format!("{path}[{i}]"), pair)?;
         }
     }
     if witness.reference.iter().flatten().all(|&x| x == 0.0) {

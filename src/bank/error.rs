@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::messages::{Number, Quoted};
 use crate::spec::{SpecProblem, WordLengths, shown_path};
 
 use super::{FORMAT, VERSION};
@@ -25,14 +26,15 @@ struct Inner {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BankProblem {
     /// The text is not JSON.
-    #[error("{message}; is this a bank written by `hybank design`, and is it whole?")]
+    #[error("{}; is this a bank written by `hybank design`, and is it whole?", Quoted(.message))]
     Syntax {
         /// The parser's words, with line and column.
         message: String,
     },
     /// The JSON is not a bank.
     #[error(
-        "the file says format \"{found}\", a bank says \"{FORMAT}\"; give a file written by `hybank design`"
+        "the file says format \"{}\", a bank says \"{FORMAT}\"; give a file written by `hybank design`",
+        Quoted(.found)
     )]
     Format {
         /// What the file says.
@@ -47,7 +49,7 @@ pub enum BankProblem {
         found: usize,
     },
     /// The text is not a digest.
-    #[error("\"{found}\" is no digest, which is sha256: with 64 hexadecimal digits; leave it out")]
+    #[error("\"{}\" is no digest, which is sha256: with 64 hexadecimal digits; leave it out", Quoted(.found))]
     Digest {
         /// What the file says.
         found: String,
@@ -67,7 +69,7 @@ pub enum BankProblem {
         value: f64,
     },
     /// A number out of its range.
-    #[error("{value} {unit} is out of range: {rule}")]
+    #[error("{} {unit} is out of range: {rule}", Number(*.value))]
     Range {
         /// The offending value.
         value: f64,
@@ -122,7 +124,8 @@ pub enum BankProblem {
     },
     /// The bank and its spec contain different numbers.
     #[error(
-        "the bank says {bank}, its spec says {spec}; they must agree, design the bank again or set spec to null"
+        "the bank says {}, its spec says {}; they must agree, design the bank again or set spec to null",
+        Number(*.bank), Number(*.spec)
     )]
     SpecDiffers {
         /// The bank's number.
@@ -166,7 +169,7 @@ impl fmt::Display for BankError {
         let Inner { file, path, problem } = &*self.inner;
         for part in [file, &shown_path(path)] {
             if !part.is_empty() {
-                write!(f, "{part}: ")?;
+                write!(f, "{}: ", Quoted(part))?;
             }
         }
         write!(f, "{problem}")

@@ -1,5 +1,6 @@
 //! Reads JSON text into a checked [`Bank`].
 
+use crate::messages::of_json;
 use crate::spec::Fault;
 use crate::spec::document::Node;
 use crate::spec::reader::{Fields, Value};
@@ -65,8 +66,7 @@ fn stated_digest(value: &Value<'_>) -> Result<String, BankError> {
     if is_digest(text) {
         return Ok(text.to_owned());
     }
-    let found = text.chars().take(80).collect();
-    Err(BankError::new("", value.path().to_owned(), BankProblem::Digest { found }))
+    Err(BankError::new("", value.path().to_owned(), BankProblem::Digest { found: text.to_owned() }))
 }
 
 impl From<Fault> for BankError {
@@ -78,7 +78,7 @@ impl From<Fault> for BankError {
 pub(super) fn parse(text: &str) -> Result<Node, BankError> {
     // Some editors put a byte-order mark in front.
     serde_json::from_str(text.trim_start_matches('\u{feff}')).map_err(|error| {
-        let problem = BankProblem::Syntax { message: error.to_string() };
+        let problem = BankProblem::Syntax { message: of_json(&error.to_string()) };
         BankError::new("", String::new(), problem)
     })
 }
@@ -119,7 +119,7 @@ fn check_header(document: &Value<'_>) -> Result<(), BankError> {
     let format = document.entry("format")?;
     let found = format.text()?;
     if found != FORMAT {
-        let problem = BankProblem::Format { found: found.chars().take(60).collect() };
+        let problem = BankProblem::Format { found: found.to_owned() };
         return Err(BankError::new("", format.path().to_owned(), problem));
     }
     let version = document.entry("version")?;

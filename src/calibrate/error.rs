@@ -2,6 +2,7 @@
 
 use crate::analog::AnalogError;
 use crate::linalg::least_squares::NoMinimum;
+use crate::messages::Quoted;
 use crate::sine_fit::SineFitError;
 use crate::units::{FastPeriods, Hertz};
 
@@ -171,8 +172,9 @@ pub enum CalibrateError {
     },
     /// The Nyquist zone of a tone does not follow from the nominal delays.
     #[error(
-        "the tone that appears at {alias} could be at {best} or at {other}: the delays of the spec are too far from the true ones, or \
-         too symmetric, to tell; give the frequency"
+        "the tone that appears at {alias} could be at {best} or at {other}: it lies outside of {} to {}, the zone of the band, or \
+         the delays of the spec are too far from the true ones, or too symmetric, to tell; give the frequency",
+        zone[0], zone[1]
     )]
     AmbiguousZone {
         /// Where it appears, below half the slow rate.
@@ -181,9 +183,11 @@ pub enum CalibrateError {
         best: Hertz,
         /// The second best.
         other: Hertz,
+        /// The ends of the zone of the fast rate that holds the band, in which tones are looked for.
+        zone: [Hertz; 2],
     },
     /// One acquisition of several.
-    #[error("{name}: {source}")]
+    #[error("{}: {source}", Quoted(.name))]
     Acquisition {
         /// What it is called.
         name: String,

@@ -1,6 +1,6 @@
 //! `hybank analyze`: the error of a bank, with its own delays or with others.
 
-use super::bank_file::load;
+use super::bank_file::{bad_flag, load};
 use super::design_report::{against, figure_text};
 use super::print::{Failure, InFile, is_dash, show};
 use super::worst_case::{self, Questions, Sweep};
@@ -10,6 +10,7 @@ use crate::design::{self, Analysis, Certified, GammaScale, MeanAnalysis};
 use crate::figures::Figures;
 use crate::overview::{decibels, frequency, six_digits, understood};
 use crate::quantity::{self, Time};
+use crate::spec::check_delay_half_width;
 use crate::units::Seconds;
 use crate::verify::uncertainty::ErrorBox;
 use std::path::PathBuf;
@@ -268,10 +269,18 @@ impl Flags {
             return Err(Failure::Usage(message));
         }
         Ok(ErrorBox {
-            delays: self.relative("--delay-box", &in_seconds(&self.delay_box, bank), channels)?,
+            delays: self.relative("--delay-box", &self.half_widths(bank)?, channels)?,
             gains: self.relative("--gain-box", &self.gain_box, channels)?,
             cutoffs: self.relative("--cutoff-box", &self.cutoff_box, channels)?,
         })
+    }
+
+    /// Half-widths of the delays, by the rule for specs.
+    fn half_widths(&self, bank: &Bank) -> Result<Vec<Seconds>, Failure> {
+        let delays = in_seconds(&self.delay_box, bank);
+        let check = |delay: &Seconds| check_delay_half_width(delay.in_fast_periods(bank.fast_period), *delay);
+        delays.iter().try_for_each(check).map_err(|problem| bad_flag("delay_box", &problem))?;
+        Ok(delays)
     }
 
     /// Values of all channels, 0 for the reference.

@@ -7,6 +7,7 @@ use crate::bank::Bank;
 use crate::design::filters;
 use crate::files::{self, Bound};
 use crate::memory::available_memory;
+use crate::messages::Quoted;
 use crate::quantity::readable;
 use crate::runtime::{Options, Plan};
 use crate::spec::{
@@ -184,7 +185,7 @@ impl Models {
         }
         let path = self.folder.join(&wanted.path);
         let text = files::read_text(&path, MEASUREMENT).map_err(|error| error.to_string())?;
-        let named = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
+        let named = |error: &dyn std::fmt::Display| format!("{}: {error}", Quoted(&path));
         let measured = response(&path, &text, wanted).map_err(|error| named(&error))?;
         let fitted = vector_fit(&measured.without_delay(wanted.deembed), wanted.order);
         let fitted = fitted.map_err(|error| named(&error))?;
@@ -192,7 +193,7 @@ impl Models {
         let at = |k: usize| points.get(k).map_or(0.0, |point| point.0.0);
         self.echo.borrow_mut().push(format!(
             "{}: {} poles fitted to {} frequencies, {} to {}; error at most {:.2e} dB",
-            path.display(),
+            Quoted(&path),
             wanted.order,
             points.len(),
             readable(at(0), "Hz"),

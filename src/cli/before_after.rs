@@ -7,6 +7,7 @@ use super::print::{Failure, is_dash};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::io::{MultiReader, is_pipe};
 use crate::measure::{Measurement, Settings, measure};
+use crate::messages::Quoted;
 use crate::simulate::interleaved;
 use crate::units::Hertz;
 use std::fmt::Write as _;
@@ -52,7 +53,7 @@ impl BeforeAfterArgs {
         check_files_on_disk(inputs, "--measure")?;
         if is_pipe(output) {
             let message =
-                format!("--measure reads the output once more, which {} cannot give", output.display());
+                format!("--measure reads the output once more, which {} cannot give", Quoted(output));
             return Err(Failure::Usage(message));
         }
         Ok(())
@@ -82,7 +83,7 @@ impl BeforeAfterArgs {
         let of = |which: &str, samples: &[f64]| {
             let part = inner(bank, samples);
             measure(part, Hertz(fused.rate.0), &settings).map_err(|error| {
-                let output = output.display();
+                let output = Quoted(output);
                 Failure::Input(format!("{output} is written, but --measure cannot measure {which}: {error}"))
             })
         };

@@ -7,6 +7,7 @@ use crate::bank::Bank;
 use crate::files::commit_all;
 use crate::interchange::{BitTrue, WordSizes};
 use crate::io::{Container, MultiReader, OutputHeader, PcmFormat, PcmFrames, SampleWriter};
+use crate::messages::Quoted;
 use crate::pipeline::DroppedLatency;
 use crate::runtime::{Input, Isa};
 
@@ -115,14 +116,17 @@ fn integer_format(reader: &MultiReader) -> Result<PcmFormat, Failure> {
     };
     let Some(bits) = bits else {
         return Err(Failure::Input(format!(
-            "{first}: --bit-true takes real integers of 16, 24 or 32 bits, and these are {}; convert the capture",
+            "{}: --bit-true takes real integers of 16, 24 or 32 bits, and these are {}; convert the capture",
+            Quoted(first),
             format.name()
         )));
     };
     match formats.find(|(_, other, _)| other.bytes() != format.bytes() || other.is_float()) {
         Some((input, other, _)) => Err(Failure::Input(format!(
-            "{input}: its samples are {}, and those of {first} are {}; --bit-true needs words of the same bits",
+            "{}: its samples are {}, and those of {} are {}; --bit-true needs words of the same bits",
+            Quoted(input),
             other.name(),
+            Quoted(first),
             format.name()
         ))),
         None => Ok(bits.format()),

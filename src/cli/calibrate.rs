@@ -12,10 +12,11 @@ use super::print::{Failure, is_dash, say_understood, warn};
 use super::remedy::explained;
 use super::written::{check_outputs, write_text};
 use crate::calibrate::{
-    Acquisition, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning, applied,
-    calibrate_pooled,
+    Acquisition, CalibrateError, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning,
+    applied, calibrate_pooled,
 };
 use crate::io::{MultiReader, ReadOptions};
+use crate::messages::{Number, Quoted};
 use crate::spec::{DesignOverrides, Spec};
 use crate::units::{FastPeriods, Hertz};
 use std::path::{Path, PathBuf};
@@ -121,6 +122,14 @@ struct Captures {
     records: Vec<Record>,
 }
 
+/// A failed calibration; what is wrong with the tones of one acquisition is said of its files.
+fn of_captures(captures: &[Captures], error: CalibrateError) -> Failure {
+    match (captures, &error) {
+        ([one], CalibrateError::Tones(_)) => Failure::Input(format!("{}: {error}", Quoted(&one.name))),
+        _ => Failure::input(error),
+    }
+}
+
 /// As the library takes them.
 fn borrowed(all: &[Captures]) -> Vec<Acquisition<'_>> {
     all.iter().map(|one| Acquisition { name: &one.name, records: &one.records }).collect()
@@ -149,7 +158,7 @@ impl Args {
         let (settings, signal) = (self.settings(spec)?, self.signal(spec)?);
         let captures = self.read(&self.captures, spec, warnings)?;
         let found = calibrate_pooled(spec, &borrowed(&captures), signal.borrowed(), settings);
-        let found = found.map_err(Failure::input)?;
+        let found = found.map_err(|error| of_captures(&captures, error))?;
         self.check_misfit(&found, warnings)?;
         let (calibrated, more) = applied(spec, &found);
         let mut report = Report::new(spec, &found);
@@ -254,7 +263,7 @@ impl Args {
         let Whole { channels, is_cut } = Whole::read_parts(&mut reader, most)?;
         warnings.extend(reader.warnings().iter().map(ToString::to_string));
         if is_cut {
-            warnings.push(format!("{name}: only the first {most} frames are used"));
+            warnings.push(format!("{}: only the first {most} frames are used", Quoted(&name)));
         }
         let all = channels.into_iter().zip(rails).map(|(samples, rails)| record(samples, rails, self.clip));
         let mut all = all.collect::<Vec<_>>().into_iter();
@@ -308,7 +317,7 @@ fn check_channels(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
     Err(Failure::Input(format!(
         "the spec has {wanted} channels, but the captures have {given} ({}); give one mono recording per channel, \
          one of {wanted} channels, or one in which the converters take turns and --interleaved {wanted}",
-        names.join(", ")
+        Quoted(names.join(", "))
     )))
 }
 
@@ -318,7 +327,10 @@ fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
     let wrong = reader.headers().find_map(|(name, header)| Some((name, header.other_rate(wanted)?)));
     match wrong {
         Some((name, rate)) if !spec.is_normalised() => Err(Failure::Input(format!(
-            "{name}: the sample rate is {rate} Hz, but the spec says {wanted} Hz; record at that rate or correct the spec"
+            "{}: the sample rate is {} Hz, but the spec says {} Hz; record at that rate or correct the spec",
+            Quoted(name),
+            Number(rate),
+            Number(wanted)
         ))),
         _ => Ok(()),
     }

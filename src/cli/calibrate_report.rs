@@ -3,6 +3,7 @@
 use super::print::{Failure, is_dash, show, warn};
 use super::remedy::explained;
 use crate::calibrate::{Calibration, ChannelEstimate, Warning};
+use crate::messages::Quoted;
 use crate::sine_fit::Estimate;
 use crate::spec::{HALF_WIDTH, Spec};
 use crate::units::FastPeriods;
@@ -213,7 +214,7 @@ impl Report {
         self.notes.iter().for_each(|note| {
             let _ = writeln!(text, "note: {note}");
         });
-        let _ = writeln!(text, "{}", output.display());
+        let _ = writeln!(text, "{}", Quoted(output));
         text
     }
 }

@@ -1,8 +1,10 @@
 //! How captures are read whose header does not say it, and converters that take turns in one recording.
 
+use super::output::WAV;
 use super::print::Failure;
 use crate::bank::Bank;
 use crate::io::{Coding, MultiReader, ReadOptions, TimeInterleaving};
+use crate::messages::Quoted;
 use crate::quantity::{self, FullScale};
 use crate::units::FastPeriods;
 use std::path::Path;
@@ -46,6 +48,18 @@ impl CaptureArgs {
         Err(Failure::Usage(message.into()))
     }
 
+    /// For a recording that the one called `file` is compared with: what the options say of the format holds
+    /// for both, unless its name says that it is WAV.
+    pub(super) fn of_reference(self, file: &Path, reference: &Path) -> ReadOptions<'static> {
+        let ending = |path: &Path| path.extension().unwrap_or_default().to_ascii_lowercase();
+        let own = self.options(1, 1);
+        match (ending(file), ending(reference)) {
+            (own_ending, ending) if own_ending == ending => own,
+            (_, ending) if WAV.iter().any(|known| ending == *known) => ReadOptions::files(),
+            _ => ReadOptions { full_scale: None, ..own },
+        }
+    }
+
     /// For `inputs` captures of `wanted` channels in all.
     pub(super) fn options(self, inputs: usize, wanted: usize) -> ReadOptions<'static> {
         let single = if inputs == 1 && self.channel.is_none() { wanted } else { 1 };
@@ -72,7 +86,8 @@ impl ScaleArgs {
         match (self.full_scale, reader.headers().next()) {
             (Some(scale), Some((input, _))) if reader.headers().all(|(_, header)| header.is_scaled) => {
                 Err(Failure::Usage(format!(
-                    "--full-scale {scale}: {input} states its full scale by its format; leave the option out"
+                    "--full-scale {scale}: {} states its full scale by its format; leave the option out",
+                    Quoted(input)
                 )))
             }
             _ => Ok(()),
@@ -126,7 +141,7 @@ impl InterleavedArgs {
             return Err(Failure::Usage(format!(
                 "--interleaved {converters}: {} has {channels} channels, and each of them is one converter; \
                  give --interleaved {channels}",
-                path.display()
+                Quoted(path)
             )));
         }
         let delays: Vec<f64> = delays.iter().map(|delay| delay.0).collect();
@@ -136,7 +151,7 @@ impl InterleavedArgs {
             return Err(Failure::Input(format!(
                 "{}: the delays lie {apart} fast periods apart, so converters with a slow period of {} do not \
                  sample in turn; give one recording per channel",
-                path.display(),
+                Quoted(path),
                 ratio
             )));
         }

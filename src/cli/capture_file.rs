@@ -5,6 +5,7 @@ use super::file_kind::unreadable;
 use super::print::{Failure, is_dash, name, warn};
 use crate::io::{Arrival, MultiReader, PcmFrames, ReadOptions};
 use crate::memory::available_memory;
+use crate::messages::Quoted;
 use crate::units::Hertz;
 use crossbeam_channel::Receiver;
 use std::path::{Path, PathBuf};
@@ -65,7 +66,7 @@ impl CaptureFile {
         ScaleArgs { full_scale: reading.options.full_scale }.check(&reader)?;
         let channels = reader.channels();
         if channels != 1 {
-            let file = name(path);
+            let file = Quoted(name(path));
             return Err(Failure::Input(format!(
                 "{file} has {channels} channels, and one is needed; give its number, --channel 1 to {channels}"
             )));
@@ -85,7 +86,7 @@ impl CaptureFile {
             return Err(Failure::of(path, "no samples (the length is zero)"));
         }
         if is_cut {
-            warn(&format!("{}: only the first {} samples are used", name(path), samples.len()));
+            warn(&format!("{}: only the first {} samples are used", Quoted(name(path)), samples.len()));
         }
         Ok(Self { samples, imaginary, rate, rails })
     }
@@ -109,7 +110,7 @@ impl CaptureFile {
         if 2 * skip >= count {
             return Err(Failure::Usage(format!(
                 "--skip {skip} leaves nothing of {} with {count} samples; skip fewer than {}",
-                name(path),
+                Quoted(name(path)),
                 count.div_ceil(2)
             )));
         }
@@ -144,7 +145,8 @@ impl Whole {
     pub(super) fn read(reader: &mut MultiReader, most: usize) -> Result<Self, Failure> {
         if let Some((input, _)) = reader.headers().find(|(_, header)| header.is_complex) {
             return Err(Failure::Input(format!(
-                "{input}: complex samples, which `fuse`, `stream`, `measure` and `calibrate` take; extract the real or the imaginary part"
+                "{}: complex samples, which `fuse`, `stream`, `measure` and `calibrate` take; extract the real or the imaginary part",
+                Quoted(input)
             )));
         }
         Self::read_parts(reader, most)
@@ -216,7 +218,7 @@ pub(super) fn check_files_on_disk(paths: &[PathBuf], option: &str) -> Result<(),
         None => Ok(()),
         Some(path) => Err(Failure::Usage(format!(
             "{option} reads inputs and output once more, which {} cannot give; use files",
-            name(path)
+            Quoted(name(path))
         ))),
     }
 }

@@ -4,6 +4,7 @@ use super::contenders::{Contender, Parts, SETTLING, contend};
 use super::print::{Failure, show};
 use super::written::{Mono, create_folder, write_recordings, write_text};
 use crate::design::{self, Problem};
+use crate::messages::Quoted;
 use crate::plot::{Chart, Marks, PlotError, Series};
 use crate::simulate::{Analog, Captured, Source, Tone, capture};
 use crate::spec::Spec;
@@ -124,7 +125,7 @@ fn text(folder: &Path, contenders: &[Contender]) -> String {
         text,
         "\nThe third row has no [signal] in its spec: that bank counts inputs of any frequency alike."
     );
-    let _ = writeln!(text, "The WAV files, step.svg and error.svg are in {}.", folder.display());
+    let _ = writeln!(text, "The WAV files, step.svg and error.svg are in {}.", Quoted(folder));
     text
 }
 

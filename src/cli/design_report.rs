@@ -7,6 +7,7 @@ use crate::design::{
     analyze_mean,
 };
 use crate::figures::Figures;
+use crate::messages::Quoted;
 use crate::overview::{Fact, counted, decibels, figure_facts, frequency, six_digits, understood, warnings};
 use crate::spec::Method;
 use crate::units::Hertz;
@@ -189,7 +190,7 @@ impl Report<'_> {
         let chosen = if self.latency_chosen { " (chosen; set `latency` to change it)" } else { "" };
         format!(
             "{}: {}, {}, ratio {}, {}, latency {}{chosen}\n",
-            self.bank,
+            Quoted(&self.bank),
             self.method.name(),
             counted(self.channels, "channel"),
             self.ratio,

@@ -3,6 +3,7 @@
 use super::print::{Failure, is_dash};
 use crate::files::FileError;
 use crate::io::{Stall, Stdout, is_pipe};
+use crate::messages::Quoted;
 use crate::pipeline::{Gap, LISTED_GAPS};
 use crossbeam_channel::Sender;
 use std::fmt;
@@ -91,8 +92,8 @@ impl Wait {
     fn who(&self) -> String {
         let Self { input, channels: [first, last], .. } = self;
         match first == last {
-            true => format!("channel {first} ({input})"),
-            false => format!("channels {first} to {last} ({input})"),
+            true => format!("channel {first} ({})", Quoted(input)),
+            false => format!("channels {first} to {last} ({})", Quoted(input)),
         }
     }
 }

@@ -6,6 +6,7 @@ use super::written::{check_outputs, write_bytes};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::design::analyze;
 use crate::interchange::{Format, block_of_sections, export, sections};
+use crate::messages::Quoted;
 use clap::ValueEnum;
 use std::path::PathBuf;
 
@@ -53,7 +54,7 @@ impl Args {
         };
         self.to.or(meant).ok_or_else(|| {
             let message = "the name does not say which format it is to have; give --to c, csv, npz, mat, coe, mem or sos";
-            Failure::Usage(format!("{}: {message}", self.output.display()))
+            Failure::Usage(format!("{}: {message}", Quoted(&self.output)))
         })
     }
 }

@@ -3,6 +3,7 @@
 use super::print::Failure;
 use crate::bank::FORMAT;
 use crate::io::IoError;
+use crate::messages::Quoted;
 use std::fmt;
 use std::fs::File;
 use std::io::Read;
@@ -89,6 +90,7 @@ impl fmt::Display for FileKind {
 
 /// A file that is known, but is not the bank or spec that is wanted.
 pub(super) fn refuse_other(file: &str, found: FileKind, wanted: FileKind) -> Result<(), Failure> {
+    let file = Quoted(file);
     let remedy = match (wanted, found) {
         _ if found == wanted => return Ok(()),
         (_, FileKind::Unknown) => return Ok(()),
@@ -106,10 +108,12 @@ pub(super) fn unreadable(error: IoError) -> Failure {
     match FileKind::of_file(Path::new(file)) {
         FileKind::Unknown => Failure::input(error),
         found @ (FileKind::Bank | FileKind::Spec) => Failure::Input(format!(
-            "{file}: this is {found}, and a recording is needed; give the captures after the bank or the spec"
+            "{}: this is {found}, and a recording is needed; give the captures after the bank or the spec",
+            Quoted(file)
         )),
         found => Failure::Input(format!(
-            "{file}: this is {found}, and neither its name nor --format says so; rename it to the usual ending"
+            "{}: this is {found}, and neither its name nor --format says so; rename it to the usual ending",
+            Quoted(file)
         )),
     }
 }

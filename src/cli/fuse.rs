@@ -11,6 +11,7 @@ use super::print::{Failure, is_dash};
 use super::run::{Finished, Job, RunArgs, RunReport, print_report};
 use crate::bank::Bank;
 use crate::io::{Container, MultiReader};
+use crate::messages::Quoted;
 use crate::overview::counted;
 use crate::pipeline::DroppedLatency;
 use crate::quantity::readable;
@@ -107,7 +108,7 @@ impl Report<'_> {
         let clipped = if clipped == 0 { "none".to_owned() } else { clipped.to_string() };
         format!(
             "{figures}{}: {samples} at {} = {length}, peak {:.4}{level}, {clipped} clipped\n{}\n",
-            output.display(),
+            Quoted(output),
             readable(rate, "S/s"),
             self.peak,
             self.captures

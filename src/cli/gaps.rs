@@ -2,6 +2,7 @@
 
 use super::print::Failure;
 use super::print::say_line;
+use super::written::begin_beside;
 use crate::files::AtomicFile;
 use crate::io::{LiveLost, LostSamples, MAX_LOST, ReadOptions, Until, is_pipe};
 use crate::pipeline::{GapPolicy, GapSummary};
@@ -19,20 +20,20 @@ pub(super) struct GapArgs {
     #[arg(long, value_enum, value_name = "POLICY")]
     gaps: Option<Policy>,
     /// Write one byte per output sample: 1 if a missing sample affects it, 0 if not
-    #[arg(long, value_name = "FILE", requires = "gaps")]
+    #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
     /// File of JSON lines that name lost samples. {"channel": 1, "sample_start": 5, "global_index": 8}:
     /// sample 5 of the input was number 8 at the converter. {"channel": 2, "first": 40, "length": 3}:
     /// samples 40 to 42 are invalid. From a FIFO `stream` takes lines as they come, each before its samples,
     /// and waits for none
-    #[arg(long, value_name = "FILE", requires = "gaps")]
+    #[arg(long, value_name = "FILE")]
     lost: Option<PathBuf>,
     /// The most frames (one sample of each channel of an input) that an input may leave out in all; more are
-    /// an error, because a number is probably wrong
-    #[arg(long, value_name = "FRAMES", requires = "gaps", default_value_t = MAX_LOST)]
-    max_lost: u64,
+    /// an error, because a number is probably wrong [default: 67108864]
+    #[arg(long, value_name = "FRAMES")]
+    max_lost: Option<u64>,
     /// Continue until the last channel ends; the missing ends of the other channels are filled as gaps
-    #[arg(long, requires = "gaps")]
+    #[arg(long)]
     longest: bool,
 }
 
@@ -50,6 +51,12 @@ enum Policy {
 impl GapArgs {
     /// Refuses impossible combinations of options, before any file is read.
     pub(super) fn check(&self) -> Result<(), Failure> {
+        if let (None, Some(option)) = (self.gaps, self.only_with_gaps()) {
+            return Err(Failure::Usage(format!(
+                "{option} is about missing samples, which nothing replaces without --gaps; give --gaps hold, zero or \
+                 mask, or leave {option} out"
+            )));
+        }
         if self.gaps == Some(Policy::Mask) && self.mask.is_none() {
             return Err(Failure::Usage("--gaps mask needs --mask FILE for the marks".into()));
         }
@@ -58,6 +65,17 @@ impl GapArgs {
             return Err(Failure::Usage(message.into()));
         }
         Ok(())
+    }
+
+    /// An option that is given and means nothing without --gaps.
+    fn only_with_gaps(&self) -> Option<&'static str> {
+        let given = [
+            ("--mask", self.mask.is_some()),
+            ("--lost", self.lost.is_some()),
+            ("--max-lost", self.max_lost.is_some()),
+            ("--longest", self.longest),
+        ];
+        given.into_iter().find_map(|(option, is_given)| is_given.then_some(option))
     }
 
     /// Reads the file of lost samples, if one is given; in a `live` run it begins to read a FIFO and waits
@@ -88,7 +106,7 @@ impl GapArgs {
     pub(super) fn read_options<'a>(&self, lost: &'a Lost, options: ReadOptions<'a>) -> ReadOptions<'a> {
         let until = if self.longest { Until::Longest } else { Until::Shortest };
         let (lost, live_lost) = (lost.read.as_ref(), lost.live.as_ref());
-        ReadOptions { lost, live_lost, until, max_lost: self.max_lost, ..options }
+        ReadOptions { lost, live_lost, until, max_lost: self.max_lost.unwrap_or(MAX_LOST), ..options }
     }
 
     /// The replacement of a missing sample, if gaps are to be filled.
@@ -101,7 +119,7 @@ impl GapArgs {
 
     /// Begins the mask file.
     pub(super) fn begin_mask(&self, force: bool) -> Result<Option<AtomicFile>, Failure> {
-        self.mask().map(|path| AtomicFile::create(path, force)).transpose().map_err(Failure::input)
+        self.mask().map(|path| begin_beside(path, force)).transpose()
     }
 }
 

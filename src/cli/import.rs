@@ -7,6 +7,7 @@ use super::written::{check_outputs, write_text};
 use crate::design::{self, ProofSearch};
 use crate::files::{Bound, read_bytes};
 use crate::interchange::{TapsError, taps_of_csv, taps_of_npy};
+use crate::messages::Quoted;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -75,7 +76,7 @@ fn read(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
         "csv" => taps_of_csv,
         "npy" => taps_of_npy,
         _ => {
-            let path = path.display();
+            let path = Quoted(path);
             return Err(Failure::Usage(format!("{path}: taps are read from .csv and .npy files")));
         }
     };

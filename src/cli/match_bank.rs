@@ -3,6 +3,7 @@
 use super::print::{Failure, is_dash};
 use crate::bank::Bank;
 use crate::io::{MultiReader, StreamHeader, is_same_rate};
+use crate::messages::{Number, Quoted};
 use std::path::Path;
 
 /// `-` may be given once.
@@ -20,10 +21,10 @@ pub(super) fn check_channels(bank: &Bank, path: &Path, reader: &MultiReader) -> 
         return Ok(());
     }
     let files: Vec<_> =
-        reader.headers().map(|(name, header)| format!("{name}: {}", header.channels)).collect();
+        reader.headers().map(|(name, header)| format!("{}: {}", Quoted(name), header.channels)).collect();
     Err(Failure::Input(format!(
         "{} has {wanted} channels, but the input has {given} ({}); give one mono recording per channel or one of {wanted} channels",
-        path.display(),
+        Quoted(path),
         files.join(", ")
     )))
 }
@@ -51,14 +52,21 @@ fn input_rate<'a>(
     let differs = |other: f64, error: f64| !is_same_rate(other, rate, error.max(header.rate_error));
     if let Some((name, _, other)) = inputs.find(|(_, other, rate)| differs(*rate, other.rate_error)) {
         return Err(Failure::Input(format!(
-            "{name}: the sample rate is {other} Hz, but {first} has {rate} Hz; all channels need the same rate"
+            "{}: the sample rate is {} Hz, but {} has {} Hz; all channels need the same rate",
+            Quoted(name),
+            Number(other),
+            Quoted(first),
+            Number(rate)
         )));
     }
     let wanted = 1.0 / bank.slow_period().0;
     if !bank.is_normalised() && header.other_rate(wanted).is_some() {
         return Err(Failure::Input(format!(
-            "{first}: the sample rate is {rate} Hz, but the bank is designed for slow channels of {wanted} Hz; \
-             record at that rate or design a bank for this one"
+            "{}: the sample rate is {} Hz, but the bank is designed for slow channels of {} Hz; \
+             record at that rate or design a bank for this one",
+            Quoted(first),
+            Number(rate),
+            Number(wanted)
         )));
     }
     Ok(Some(rate))

@@ -9,6 +9,7 @@ use super::print::{Failure, InFile, is_dash, name, show, warn};
 use super::written::{check_outputs, write_bytes};
 use crate::io::is_same_rate;
 use crate::measure::{MeasureError, Measurement, Settings, Window, compare, measure, measure_complex};
+use crate::messages::Quoted;
 use crate::quantity;
 use crate::units::Hertz;
 use std::path::{Path, PathBuf};
@@ -123,7 +124,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         let format = PictureFormat::of(path).unwrap_or(PictureFormat::Svg);
         write_bytes(path, &format.file(&chart, &marks).in_file(&args.file)?, args.force)?;
     }
-    report.warnings.iter().for_each(|warning| warn(&format!("{}: {warning}", report.file)));
+    report.warnings.iter().for_each(|warning| warn(&format!("{}: {warning}", Quoted(&report.file))));
     show(&report, args.json, Report::text)
 }
 
@@ -166,9 +167,10 @@ impl Args {
     }
 
     fn compared(&self, capture: &CaptureFile, path: &Path) -> Result<ReferenceReport, Failure> {
-        let reading = Reading::channel(None, MOST_MEASURED);
+        let options = self.reading.of_reference(&self.file, path);
+        let reading = Reading { options, ..self.reading() };
         let reference = CaptureFile::read(path, reading)?.trimmed(path, self.skip)?;
-        let file = name(&self.file);
+        let file = Quoted(name(&self.file));
         let (own, other) = (capture.rate, reference.rate);
         if !is_same_rate(other.0, own.0, 0.0) {
             return Err(Failure::of(
@@ -179,8 +181,8 @@ impl Args {
             ));
         }
         let comparison = compare(&capture.samples, &reference.samples, own, self.window);
-        let comparison =
-            comparison.map_err(|error| Failure::Input(format!("{file} against {}: {error}", name(path))))?;
+        let comparison = comparison
+            .map_err(|error| Failure::Input(format!("{file} against {}: {error}", Quoted(name(path)))))?;
         Ok(ReferenceReport { file: name(path), comparison })
     }
 }

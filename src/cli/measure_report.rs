@@ -2,6 +2,7 @@
 
 use super::capture_file::CaptureFile;
 use crate::measure::{Cause, Comparison, Imbalance, Measurement, Quadrature, Settings, Spectrum, Spur};
+use crate::messages::Quoted;
 use crate::plot::{Chart, Marks, Series};
 use crate::quantity::{readable, scale_of};
 use crate::units::{Decibels, Hertz};
@@ -187,8 +188,9 @@ fn six_decimals(value: f64) -> String {
 fn write_comparison(text: &mut String, file: &str, found: &Comparison) {
     let _ = writeln!(
         text,
-        "{}against {file}, {} samples:",
+        "{}against {}, {} samples:",
         if text.is_empty() { "" } else { "\n" },
+        Quoted(file),
         found.compared
     );
     if let Some(ends) = &found.unsettled_ends {

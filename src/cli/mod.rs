@@ -46,8 +46,10 @@ mod virtual_signal;
 mod worst_case;
 mod written;
 
-use clap::{Parser, Subcommand};
+use crate::messages::usage;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use print::Failure;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Lets several slow, imperfectly timed converters do the work of one fast converter
@@ -104,7 +106,7 @@ enum Command {
 pub fn run() -> ExitCode {
     #[cfg(unix)]
     crate::files::fail_at_file_size_limit();
-    match Cli::try_parse() {
+    match parsed() {
         Ok(cli) => match dispatch(cli.command) {
             Ok(()) => ExitCode::SUCCESS,
             Err(failure) => failure.report(),
@@ -113,9 +115,30 @@ pub fn run() -> ExitCode {
     }
 }
 
+/// The arguments that were typed.
+fn parsed() -> Result<Cli, clap::Error> {
+    let matches = Cli::command().mut_subcommands(taking_negative_values).try_get_matches()?;
+    Cli::from_arg_matches(&matches)
+}
+
+/// What follows an option is its value, a negative one too, so the message about it says what is wrong with
+/// it. After an option that takes a path it is the next option.
+fn taking_negative_values(command: clap::Command) -> clap::Command {
+    let path = clap::value_parser!(PathBuf).type_id();
+    command.mut_args(|arg| {
+        let has_value = !arg.is_positional() && arg.get_action().takes_values();
+        let is_path = arg.get_value_parser().type_id() == path;
+        if has_value && !is_path { arg.allow_hyphen_values(true) } else { arg }
+    })
+}
+
 /// Shows help, version, or what is wrong with the usage.
 fn show(message: &clap::Error) -> ExitCode {
-    match message.print() {
+    let text = message.to_string();
+    let quoted = usage(&text, std::env::args_os());
+    // Only clap knows the colours.
+    let printed = if quoted == text { message.print() } else { Ok(print::say(&quoted)) };
+    match printed {
         Err(error) if !message.use_stderr() => print::print_failure(&error).report(),
         _ => ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2)),
     }

@@ -6,6 +6,7 @@ use crate::files::refuse_overlaps;
 use crate::io::{
     Container, IoError, OutputHeader, PcmFormat, SampleWriter, is_pipe, is_sigmf, mat_variable, sigmf_files,
 };
+use crate::messages::Quoted;
 use crate::runtime::Precision;
 use std::path::Path;
 
@@ -58,7 +59,7 @@ pub(super) fn begin_samples(path: &Path, header: OutputHeader, force: bool) -> R
 /// Encoded formats, which are not written.
 const ENCODED: [&str; 9] = ["flac", "mp3", "ogg", "oga", "opus", "m4a", "aac", "aif", "aiff"];
 /// Endings of WAV files.
-const WAV: [&str; 4] = ["wav", "wave", "bwf", "rf64"];
+pub(super) const WAV: [&str; 4] = ["wav", "wave", "bwf", "rf64"];
 /// Formats with a structure, which are not written either.
 const STRUCTURED: [&str; 10] = ["npy", "npz", "mat", "csv", "txt", "json", "toml", "h5", "hdf5", "zip"];
 
@@ -70,26 +71,26 @@ fn check_extension(output: &Path, container: Container) -> Result<(), Failure> {
         _ if is_pipe(output) => return Ok(()),
         ("sigmf-meta", _) => return Ok(()),
         ("sigmf" | "sigmf-data", _) => {
-            format!("name it {}", output.with_extension("sigmf-meta").display())
+            format!("name it {}", Quoted(output.with_extension("sigmf-meta")))
         }
         (encoded, _) if ENCODED.contains(&encoded) => {
-            format!("write it to a pipe: hybank fuse .. -o - | sox -t wav - {}", output.display())
+            format!("write it to a pipe: hybank fuse .. -o - | sox -t wav - {}", Quoted(output))
         }
         (other, Container::Wav) if other.is_empty() || WAV.contains(&other) || is_pipe(output) => {
             return Ok(());
         }
         (_, Container::Wav) => {
             let raw = "hybank stream BANK.json --input CH1.wav .. --output-format f32le";
-            format!("name it {}, or write raw samples: {raw}", output.with_extension("wav").display())
+            format!("name it {}, or write raw samples: {raw}", Quoted(output.with_extension("wav")))
         }
         (wav, Container::Raw) if WAV.contains(&wav) => "give --output-format wav".to_owned(),
         (other, Container::Raw) if STRUCTURED.contains(&other) => {
-            format!("name it {}", output.with_extension("raw").display())
+            format!("name it {}", Quoted(output.with_extension("raw")))
         }
         (_, Container::Raw) => return Ok(()),
     };
     let written = if container == Container::Wav { "WAV" } else { "raw samples" };
-    let name = output.display();
+    let (name, extension) = (Quoted(output), Quoted(&extension));
     Err(Failure::Usage(format!("{name}: the output is {written}, not {extension}; {remedy}")))
 }
 

@@ -3,6 +3,7 @@
 
 use super::remedy::explained;
 use crate::files::leftovers;
+use crate::messages::{Quoted, printable, shown};
 use crate::overview::understood;
 use crate::pipeline::PipelineError;
 use crate::spec::Spec;
@@ -30,7 +31,7 @@ impl Failure {
 
     /// A failure of the file at `path`.
     pub(super) fn of(path: &Path, problem: impl Display + 'static) -> Self {
-        Self::Input(format!("{}: {}", name(path), explained(&problem)))
+        Self::Input(format!("{}: {}", Quoted(name(path)), explained(&problem)))
     }
 
     /// A failure of a run. A closed output pipe is not reported as an error.
@@ -100,7 +101,7 @@ pub(super) fn show<R: serde::Serialize>(
     json: bool,
     text: impl FnOnce(&R) -> String,
 ) -> Result<(), Failure> {
-    if json { print_json(report) } else { print(&text(report)) }
+    if json { print_json(report) } else { print(&printable(&text(report))) }
 }
 
 /// Why standard output could not be written.
@@ -113,12 +114,23 @@ pub(super) fn print_failure(error: &std::io::Error) -> Failure {
 
 /// Prints text to standard error. Errors are ignored, so that no result is lost.
 pub(super) fn say(text: &str) {
-    let _ = crate::io::stderr().write_all(text.as_bytes());
+    put(&printable(text));
 }
 
 /// A line on standard error with the program's name before it.
 pub(super) fn say_line(line: &str) {
-    say(&format!("hybank: {line}\n"));
+    put(&format!("hybank: {}\n", shown(line)));
+}
+
+/// One JSON object on standard error.
+pub(super) fn say_json(report: &impl serde::Serialize) -> Result<(), Failure> {
+    put(&(serde_json::to_string(report).map_err(Failure::input)? + "\n"));
+    Ok(())
+}
+
+/// Every word on standard error comes this way, and nothing foreign is left in it.
+fn put(text: &str) {
+    let _ = crate::io::stderr().write_all(text.as_bytes());
 }
 
 /// A warning on standard error.

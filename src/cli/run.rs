@@ -10,7 +10,7 @@ use super::observer::{ObserverArgs, RunObserver};
 use super::output::{begin_samples, check_files, precision};
 use super::print::print_json;
 use super::print::{Failure, is_dash};
-use super::print::{say, warn};
+use super::print::{say_json, warn};
 use super::track::{TrackArgs, TrackRecord, Tracked};
 use crate::bank::Bank;
 use crate::io::{
@@ -428,6 +428,5 @@ pub(super) fn print_report(report: &impl serde::Serialize, samples: &Path) -> Re
     if !is_dash(samples) {
         return print_json(report);
     }
-    say(&(serde_json::to_string(report).map_err(Failure::input)? + "\n"));
-    Ok(())
+    say_json(report)
 }

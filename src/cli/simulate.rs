@@ -7,6 +7,7 @@ use super::virtual_signal::{Signal, SignalArgs};
 use super::written::{Mono, begin_recording, check_outputs, write_together};
 use crate::design::Problem;
 use crate::io::{Container, SampleWriter, is_same_rate};
+use crate::messages::Quoted;
 use crate::overview::{counted, understood};
 use crate::quantity::readable;
 use crate::simulate::{Converter, target};
@@ -114,10 +115,9 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     run.write(recordings, kind.container())?;
     let files: Vec<String> = outputs.iter().map(|output| output.path.display().to_string()).collect();
     let clipped = files.iter().zip(&reports).filter(|(_, report)| report.clipped > 0);
-    warnings.extend(
-        clipped
-            .map(|(file, report)| format!("{file}: {} samples were clipped at full scale", report.clipped)),
-    );
+    warnings.extend(clipped.map(|(file, report)| {
+        format!("{}: {} samples were clipped at full scale", Quoted(file), report.clipped)
+    }));
     let report = Report {
         understood: understood(&spec),
         is_complex: signal.is_complex(),
@@ -243,7 +243,7 @@ impl Report {
             counted(self.frames, "frame"),
             rate(&self.slow_rate),
             rate(&self.fast_rate),
-            self.files.join("\n  "),
+            self.files.iter().map(|file| Quoted(file).to_string()).collect::<Vec<_>>().join("\n  "),
             self.common.text()
         )
     }

@@ -3,6 +3,7 @@
 use super::print::print;
 use super::written::{begin_file, write_text, write_together};
 use super::{Cli, Failure};
+use crate::messages::Quoted;
 use clap::CommandFactory;
 use clap_complete::Shell;
 use std::path::PathBuf;
@@ -88,7 +89,7 @@ pub(super) fn help(args: &HelpArgs) -> Result<(), Failure> {
 fn unknown(name: &str) -> String {
     let program = Cli::command();
     let commands: Vec<&str> = program.get_subcommands().map(|command| command.get_name()).collect();
-    format!("there is no help on \"{name}\"; the topics are spec, {}", commands.join(", "))
+    format!("there is no help on \"{}\"; the topics are spec, {}", Quoted(name), commands.join(", "))
 }
 
 /// Prints the JSON schema (draft 2020-12) of spec files, bank files or reports

@@ -4,9 +4,11 @@
 use super::bank_file::read_text;
 use super::event::{Event, Events};
 use super::print::Failure;
+use super::written::begin_beside;
 use crate::bank::Bank;
 use crate::files::AtomicFile;
 use crate::io::IoError;
+use crate::messages::Quoted;
 use crate::pipeline::{Change, PipelineError, Retuner};
 use crate::quantity;
 use crate::runtime::{Algorithm, Options, Stream};
@@ -121,13 +123,13 @@ impl TrackArgs {
             rate_change: wander * unit,
         };
         let follower = Follower::new(bank, source, settings);
-        follower.map(Some).map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
+        follower.map(Some).map_err(|error| Failure::Input(format!("{}: {error}", Quoted(path))))
     }
 
     /// Begins the log; warnings go to `events`.
     pub(super) fn begin(&self, force: bool, events: Events) -> Result<Tracked, Failure> {
-        let log = self.log().map(|path| AtomicFile::create(path, force)).transpose();
-        let record = TrackRecord { log: log.map_err(Failure::input)?, warnings: Vec::new() };
+        let log = self.log().map(|path| begin_beside(path, force)).transpose()?;
+        let record = TrackRecord { log, warnings: Vec::new() };
         Ok(Tracked { record: Arc::new(Mutex::new(record)), events })
     }
 }

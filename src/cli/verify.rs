@@ -5,6 +5,7 @@ use super::file_kind::FileKind;
 use super::print::{Failure, InFile, name, show};
 use crate::bank::{Bank, FixedPoint, SynthesisFilters, check_digest};
 use crate::design;
+use crate::messages::Quoted;
 use crate::overview::counted;
 use crate::verify::uncertainty::check_stated;
 use crate::verify::{BoundedBanks, Verified, verify};
@@ -146,7 +147,7 @@ impl Report {
              lower      {}   {}\n\
              noncausal  {}   no bank at all is better\n\
              {}{}{}digest     {digest}\n",
-            self.bank,
+            Quoted(&self.bank),
             number(lower),
             number(upper),
             number(upper),

@@ -3,6 +3,7 @@
 use super::capture_file::{CaptureFile, Reading};
 use super::print::Failure;
 use crate::design::Problem;
+use crate::messages::Quoted;
 use crate::simulate::{Analog, ComplexSource, MOST_SAMPLES, Recording, Source, frames};
 use crate::spec::Spec;
 use crate::units::FastPeriods;
@@ -54,7 +55,7 @@ impl Signal {
         if quadrature.is_some() {
             return Err(Failure::Usage(format!(
                 "--imaginary: the source {} has an imaginary part of its own; give one of the two",
-                args.source
+                Quoted(&args.source)
             )));
         }
         let (imaginary, its_text) = reader.imaginary(part)?;
@@ -90,7 +91,7 @@ impl Signal {
         let samples = samples.unwrap_or_else(usual);
         let count = |part| frames(problem, part, samples, jittered);
         let counts = self.parts().map(count).collect::<Result<Vec<_>, _>>();
-        let counts = counts.map_err(|error| Failure::Input(format!("{}: {error}", self.given)))?;
+        let counts = counts.map_err(|error| Failure::Input(format!("{}: {error}", Quoted(&self.given))))?;
         Ok(counts.into_iter().max().unwrap_or(0))
     }
 }
@@ -108,7 +109,7 @@ impl Reader<'_> {
             Some(channel) if !given.into_iter().flatten().any(|source| is_recording(source)) => {
                 Err(Failure::Usage(format!(
                     "--channel {channel}: the source {} is no WAV recording; leave the option out",
-                    self.args.source
+                    Quoted(&self.args.source)
                 )))
             }
             _ => Ok(()),
@@ -119,7 +120,7 @@ impl Reader<'_> {
     fn source(&self) -> Result<(Analog, Option<Analog>, String), Failure> {
         let text = &self.args.source;
         if is_recording(text) {
-            return Ok((self.recording(text)?, None, text.clone()));
+            return Ok((self.recording(text)?, None, Quoted(text).to_string()));
         }
         let source: ComplexSource =
             text.parse().map_err(|error| Failure::Usage(format!("--source: {error}")))?;
@@ -130,7 +131,7 @@ impl Reader<'_> {
 
     fn imaginary(&self, text: &str) -> Result<(Analog, String), Failure> {
         if is_recording(text) {
-            return Ok((self.recording(text)?, text.to_owned()));
+            return Ok((self.recording(text)?, Quoted(text).to_string()));
         }
         let source: Source = text.parse().map_err(|error| Failure::Usage(format!("--imaginary: {error}")))?;
         Ok((self.known(&source), source.to_string()))

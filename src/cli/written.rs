@@ -2,7 +2,7 @@
 
 use super::interrupt::remove_unfinished;
 use super::print::{Failure, is_dash, name_leftovers, print_bytes};
-use crate::files::{AtomicFile, commit_all, refuse_overlaps};
+use crate::files::{AtomicFile, FileError, commit_all, refuse_overlaps};
 use crate::io::{Container, OutputHeader, PcmFormat, SampleWriter, is_pipe, is_sigmf};
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -36,6 +36,14 @@ pub(super) fn begin_file(path: &Path, bytes: &[u8], force: bool) -> Result<Atomi
     Ok(file)
 }
 
+/// Begins a file beside the output, which cannot go to standard output.
+pub(super) fn begin_beside(path: &Path, force: bool) -> Result<AtomicFile, Failure> {
+    AtomicFile::create(path, force).map_err(|error| match error {
+        FileError::Special { .. } => Failure::Input(error.to_string()),
+        other => Failure::input(other),
+    })
+}
+
 /// Writes the files of each item to `folder` as soon as the item is known; all files appear together. A
 /// folder that was made for them is removed if they do not.
 pub(super) fn write_together<T>(
@@ -61,8 +69,18 @@ pub(super) fn write_together<T>(
 
 /// Makes a folder, if it is not there.
 pub(super) fn create_folder(folder: &Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder)
-        .map_err(|error| Failure::of(folder, format!("cannot create the folder: {error}")))
+    std::fs::create_dir_all(folder).map_err(|error| {
+        let is_file = folder.ancestors().any(|part| part.exists() && !part.is_dir());
+        Failure::of(
+            folder,
+            match is_file {
+                true => {
+                    "a file has this name, or that of a folder above; give the name of a folder".to_owned()
+                }
+                false => format!("cannot create the folder: {error}"),
+            },
+        )
+    })
 }
 
 /// A recording of one channel to be written with 32-bit floats.

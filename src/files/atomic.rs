@@ -10,8 +10,6 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Maximum length of a chain of links, as in Linux.
 const MOST_LINKS: usize = 40;
 
-const OTHER_KIND: &str = "a device, pipe or socket, not a file; write to `-` and redirect";
-
 /// Unfinished files of this process.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
@@ -70,9 +68,9 @@ impl AtomicFile {
     /// its permission bits. A link is followed to the file that it leads to.
     ///
     /// # Errors
-    /// [`FileError::Exists`] if there is one already and `replace` is not set, [`FileError::NotAFile`] for
-    /// what is no plain file (a folder, device, pipe, socket, link to nothing or open descriptor), or the
-    /// system's refusal.
+    /// [`FileError::Exists`] if there is one already and `replace` is not set, [`FileError::NotAFile`] for a
+    /// folder or a link to nothing, [`FileError::Special`] for a device, pipe, socket or open descriptor, or
+    /// the system's refusal.
     pub fn create(target: &Path, replace: bool) -> Result<Self, FileError> {
         let name = target.display().to_string();
         let (target, known) = destination(target)?;
@@ -259,40 +257,38 @@ fn destination(path: &Path) -> Result<(PathBuf, Option<Metadata>), FileError> {
         // A name that is too long, for example, of which the hidden name knows nothing.
         found => found.map_err(FileError::system(&path.display().to_string(), "create it"))?,
     };
-    let (target, found) = if found.is_symlink() {
-        match follow(path) {
-            Ok(end) => end,
-            Err(what) => return refused(what),
-        }
-    } else {
-        (path.to_owned(), found)
-    };
+    let (target, found) = if found.is_symlink() { follow(path)? } else { (path.to_owned(), found) };
     match found {
         _ if found.is_file() => Ok((target, Some(found))),
         _ if found.is_dir() => refused("a folder; give the name of a file in it"),
         // A rename would put a plain file in the place of /dev/full or of a pipe that somebody listens to.
-        _ => refused(OTHER_KIND),
+        _ => Err(special(path, "a device, pipe or socket")),
     }
 }
 
+fn special(path: &Path, what: &'static str) -> FileError {
+    FileError::Special { file: path.display().to_string(), what }
+}
+
 /// The end of a chain of links, or what is wrong with it.
-fn follow(link: &Path) -> Result<(PathBuf, Metadata), &'static str> {
-    const NOTHING: &str = "a link to nothing; remove the link, or give the name that it should lead to";
+fn follow(link: &Path) -> Result<(PathBuf, Metadata), FileError> {
+    let refused = |what| FileError::NotAFile { file: link.display().to_string(), what };
+    let nothing = || refused("a link to nothing; remove the link, or give the name that it should lead to");
     let mut path = link.to_owned();
     for _ in 0..MOST_LINKS {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let folder = folder.unwrap_or(Path::new(".")).to_owned();
         // Links there stand for open files (/dev/stdout), not for names.
         if folder.canonicalize().is_ok_and(|folder| folder.starts_with("/proc")) {
-            return Err("a link to an open file; write to `-` and redirect");
+            return Err(special(link, "a link to an open file"));
         }
-        path = folder.join(fs::read_link(&path).map_err(|_| NOTHING)?);
-        let found = path.symlink_metadata().map_err(|_| NOTHING)?;
+        path = folder.join(fs::read_link(&path).map_err(|_| nothing())?);
+        let found = path.symlink_metadata().map_err(|_| nothing())?;
         if !found.is_symlink() {
             return Ok((path, found));
         }
     }
-    Err("a link that leads back to itself; remove it")
+    Err(refused("a link that leads back to itself; remove it"))
 }
 
 /// Opens a new file next to `target`, under an unused name; `private` until its permissions are set.

@@ -1,12 +1,13 @@
 //! Errors of reading and writing whole files.
 
+use crate::messages::Quoted;
 use std::io;
 
 /// A fault of a file; every sentence names the file, the reason and, where there is one, the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// The operating system refused.
-    #[error("{file}: cannot {action}: {source}")]
+    #[error("{}: cannot {action}: {}", Quoted(.file), .source)]
     System {
         /// Name of the file.
         file: String,
@@ -16,21 +17,29 @@ pub enum FileError {
         source: io::Error,
     },
     /// The output exists, or appeared while it was being written, and was not to be replaced.
-    #[error("{file}: the file exists; give another name, or allow it to be replaced")]
+    #[error("{}: the file exists; give another name, or allow it to be replaced", Quoted(.file))]
     Exists {
         /// Name of the file.
         file: String,
     },
-    /// The output is not a plain file and must not be replaced by one.
-    #[error("{file}: cannot replace it: it is {what}")]
+    /// The output is a folder or a link to nothing, and must not be replaced by a file.
+    #[error("{}: cannot replace it: it is {what}", Quoted(.file))]
     NotAFile {
         /// Name of the file.
         file: String,
         /// What it is, and the remedy.
         what: &'static str,
     },
+    /// A device, pipe, socket or open descriptor, whose place no finished file can take.
+    #[error("{}: cannot replace it: it is {what}; give the name of a file", Quoted(.file))]
+    Special {
+        /// Name of the output.
+        file: String,
+        /// What it is.
+        what: &'static str,
+    },
     /// An output is also an input.
-    #[error("{output}: it is also the input {input}; give the output another name")]
+    #[error("{}: it is also the input {}; give the output another name", Quoted(.output), Quoted(.input))]
     InputIsOutput {
         /// Name of the output.
         output: String,
@@ -38,7 +47,7 @@ pub enum FileError {
         input: String,
     },
     /// Two outputs are one file.
-    #[error("{first} and {second} are the same file; give the outputs different names")]
+    #[error("{} and {} are the same file; give the outputs different names", Quoted(.first), Quoted(.second))]
     SameOutput {
         /// Name of one output.
         first: String,
@@ -46,7 +55,7 @@ pub enum FileError {
         second: String,
     },
     /// The file is longer than its kind may be.
-    #[error("{file}: longer than {most} bytes, the most that {kind} may have; {remedy}")]
+    #[error("{}: longer than {most} bytes, the most that {kind} may have; {remedy}", Quoted(.file))]
     TooLong {
         /// Name of the file.
         file: String,
@@ -58,7 +67,7 @@ pub enum FileError {
         remedy: &'static str,
     },
     /// A text that is not UTF-8.
-    #[error("{file}: byte {offset} is not UTF-8, so this is no text file; give the file that was meant")]
+    #[error("{}: byte {offset} is not UTF-8, so this is no text file; give the file that was meant", Quoted(.file))]
     NotText {
         /// Name of the file.
         file: String,

@@ -1,5 +1,7 @@
 //! Why a bank cannot be exported.
 
+use crate::messages::Quoted;
+
 /// A format that cannot hold a bank.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
@@ -45,7 +47,7 @@ pub enum ExportError {
     #[error("no second-order sections: {0}")]
     NoSections(&'static str),
     /// A name that C does not allow.
-    #[error("\"{name}\" is no C identifier; use letters, digits and underscores, a letter first")]
+    #[error("\"{}\" is no C identifier; use letters, digits and underscores, a letter first", Quoted(.name))]
     Name {
         /// The name.
         name: String,

@@ -3,6 +3,7 @@
 use super::layout::PolyphaseTaps;
 use crate::io::table::Table;
 use crate::io::{ArrayHeader, IoError, npy_header};
+use crate::messages::Quoted;
 
 /// Headings of the table that [`export`](super::export) writes.
 const HEADINGS: [&str; 4] = ["channel", "phase", "lag", "value"];
@@ -14,7 +15,7 @@ const BUFFER: usize = 1 << 16;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TapsError {
     /// A cell is no finite number.
-    #[error("line {line}, column {column}: \"{text}\" is no finite number")]
+    #[error("line {line}, column {column}: \"{}\" is no finite number", Quoted(.text))]
     NoNumber {
         /// Line, from 1.
         line: u64,
@@ -28,7 +29,8 @@ pub enum TapsError {
     Broken(String),
     /// An array of another shape.
     #[error(
-        "the array has the shape {shape:?}; give (channels, taps), or (channels, phases, lags) as export writes it"
+        "the array has the shape {}; give (channels, taps), or (channels, phases, lags) as export writes it",
+        Quoted(format!("{:?}", .shape))
     )]
     Shape {
         /// The shape found.

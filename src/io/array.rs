@@ -4,6 +4,7 @@
 use super::capture::{Blocks, Capture};
 use super::stream_header::MOST_CHANNELS;
 use super::{IoError, PcmFormat, SampleLayout, StreamHeader};
+use crate::messages::Quoted;
 use std::io::{self, Read, Seek, SeekFrom, Take};
 
 /// No disk holds as many bytes: a shape that needs them is damaged, and the products below cannot overflow.
@@ -37,21 +38,31 @@ impl ArrayHeader {
         let shape = &self.shape;
         let (rows, columns) = self.rows_and_columns().ok_or_else(|| {
             format!(
-                "it has {} axes, of the shape {shape:?}; give (samples), (channels, samples) or (samples, channels)",
-                shape.len()
+                "it has {} axes, of the shape {}; give (samples), (channels, samples) or (samples, channels)",
+                shape.len(),
+                self.shape_text()
             )
         })?;
         let (channels, frames) = (rows.min(columns), rows.max(columns));
         if !(1..=MOST_CHANNELS).contains(&channels) {
             return Err(format!(
-                "the shape {shape:?} has {channels} channels; it may be 1 to {MOST_CHANNELS}"
+                "the shape {} has {channels} channels; it may be 1 to {MOST_CHANNELS}",
+                self.shape_text()
             ));
         }
         let bytes = frames.checked_mul(channels * self.sample_bytes() as u64);
         if bytes.is_none_or(|bytes| bytes > MOST_BYTES) {
-            return Err(format!("the shape {shape:?} has more numbers than any disk; the file is damaged"));
+            return Err(format!(
+                "the shape {} has more numbers than any disk; the file is damaged",
+                self.shape_text()
+            ));
         }
         Ok((channels, frames))
+    }
+
+    /// A shape may have any number of axes.
+    fn shape_text(&self) -> String {
+        Quoted(format!("{:?}", self.shape)).to_string()
     }
 
     /// Further axes have one element.

@@ -1,6 +1,7 @@
 //! Errors of reading and writing samples, and faults of inputs that are tolerated.
 
 use crate::files::FileError;
+use crate::messages::{Number, Quoted};
 use crate::quantity::FullScale;
 use std::io;
 
@@ -12,7 +13,8 @@ pub enum IoError {
     File(#[from] FileError),
     /// The thread that read an input ended before the input did. This is a bug of this program.
     #[error(
-        "{file}: its reader ended before the input did, so the rest is not known; this is a fault of hybank, please report it"
+        "{}: its reader ended before the input did, so the rest is not known; this is a fault of hybank, please report it",
+        Quoted(.file)
     )]
     ReaderDied {
         /// Name of the input.
@@ -20,7 +22,8 @@ pub enum IoError {
     },
     /// The first bytes are not those of a WAV file.
     #[error(
-        "{file}: not a WAV file (byte 0 holds {found}, where RIFF, RF64 or BW64 is expected); raw samples need a format name such as f32le"
+        "{}: not a WAV file (byte 0 holds {found}, where RIFF, RF64 or BW64 is expected); raw samples need a format name such as f32le",
+        Quoted(.file)
     )]
     NotWav {
         /// Name of the file.
@@ -29,7 +32,7 @@ pub enum IoError {
         found: String,
     },
     /// A file that is not of its kind, or holds no samples that can be read.
-    #[error("{file}: not {kind} that can be read: {problem}")]
+    #[error("{}: not {kind} that can be read: {problem}", Quoted(.file))]
     Malformed {
         /// Name of the file.
         file: String,
@@ -39,7 +42,7 @@ pub enum IoError {
         problem: String,
     },
     /// Inputs that do not fit the settings, one another, or the output.
-    #[error("{file}: {problem}")]
+    #[error("{}: {problem}", Quoted(.file))]
     Unfit {
         /// Name of the file.
         file: String,
@@ -115,7 +118,7 @@ pub enum InputFault {
     },
     /// Samples beyond full scale, which is 1, of an input that does not state its own.
     #[error(
-        "its samples reach {peak}, and full scale is 1 unless it is stated{}",
+        "its samples reach {}, and full scale is 1 unless it is stated{}", Number(*.peak),
         .likely.map_or_else(String::new, |likely| format!("; as whole numbers they look like codes, with a full scale of {likely}"))
     )]
     BeyondFullScale {
@@ -139,7 +142,7 @@ pub enum InputFault {
 
 /// A fault with the input that has it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{input}: {fault}")]
+#[error("{}: {fault}", Quoted(.input))]
 pub struct InputWarning {
     /// Name of the input.
     pub input: String,

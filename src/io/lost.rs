@@ -3,6 +3,7 @@
 use super::IoError;
 use super::timestamps::{MAX_LOST_AT_ONCE, Timestamp, Timestamps};
 use crate::files::{Bound, read_text};
+use crate::messages::of_document;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -104,8 +105,9 @@ pub(super) struct LostLine {
 impl LostLine {
     /// Line `number` of a file, or what is wrong with it.
     pub(super) fn parse(line: &str, number: usize) -> Result<Self, String> {
-        let line: Line = serde_json::from_str(line)
-            .map_err(|error| format!("not an object that says what was lost: {}", without_place(&error)))?;
+        let line: Line = serde_json::from_str(line).map_err(|error| {
+            format!("not an object that says what was lost: {}", of_document(&error.to_string()))
+        })?;
         if line.channel == Some(0) {
             return Err("channel is 0; channels count from 1".into());
         }
@@ -226,13 +228,6 @@ impl LostSamples {
     pub(super) fn fault(&self, problem: String) -> IoError {
         IoError::unfit(&self.file)(problem)
     }
-}
-
-/// The parser reads each line as a separate text, so the location in its message is meaningless.
-fn without_place(error: &serde_json::Error) -> String {
-    let text = error.to_string();
-    let place = format!(" at line {} column {}", error.line(), error.column());
-    text.strip_suffix(&place).unwrap_or(&text).to_owned()
 }
 
 /// A pipe of lines as [`LostSamples`](super::LostSamples) has them, read while the samples arrive.

@@ -8,6 +8,7 @@ use super::array::{ArrayHeader, ArrayReader};
 use super::mat_element::{COMPRESSED, MATRIX, Numbers, Order, Tag, unreadable};
 use super::{IoError, PcmFormat};
 use crate::files::fill;
+use crate::messages::Quoted;
 use flate2::read::ZlibDecoder;
 use std::fmt;
 use std::io::{Cursor, Read, Seek, SeekFrom};
@@ -54,7 +55,7 @@ pub fn open_mat(
     let order = header(file).map_err(fault())?;
     let all = variables(file, order).map_err(fault())?;
     let variable = chosen(&all, wanted, name).map_err(fault())?;
-    let of_variable = |problem: String| fault()(format!("variable {}: {problem}", variable.name));
+    let of_variable = |problem: String| fault()(format!("variable {}: {problem}", Quoted(&variable.name)));
     let array = variable.array().map_err(of_variable)?;
     let samples = variable.samples(file, order, array.format).map_err(of_variable)?;
     let rate = rate(file, order, &all).map_err(fault())?;
@@ -111,7 +112,8 @@ fn chosen<'a>(all: &'a [Variable], wanted: Option<&str>, file: &str) -> Result<&
     let everything: Vec<&Variable> = all.iter().collect();
     if let Some(wanted) = wanted {
         let found = all.iter().find(|variable| variable.name == wanted);
-        return found.ok_or_else(|| format!("it has no variable {wanted}; it holds {}", list(&everything)));
+        return found
+            .ok_or_else(|| format!("it has no variable {}; it holds {}", Quoted(wanted), list(&everything)));
     }
     let is_array = |variable: &&Variable| variable.is_numeric() && variable.count() != Some(1);
     let arrays: Vec<&Variable> = all.iter().filter(is_array).collect();
@@ -121,7 +123,12 @@ fn chosen<'a>(all: &'a [Variable], wanted: Option<&str>, file: &str) -> Result<&
             "it holds no array of samples but {}; save one as double or single",
             list(&everything)
         )),
-        [first, ..] => Err(format!("it holds {}; choose one, as {file}:{}", list(&arrays), first.name)),
+        [first, ..] => Err(format!(
+            "it holds {}; choose one, as {}:{}",
+            list(&arrays),
+            Quoted(file),
+            Quoted(&first.name)
+        )),
     }
 }
 
@@ -267,7 +274,7 @@ impl Variable {
     }
 
     fn shape_text(&self) -> String {
-        self.shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x ")
+        Quoted(self.shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x ")).to_string()
     }
 }
 
@@ -287,7 +294,7 @@ fn put(format: PcmFormat, number: f64, bytes: &mut Vec<u8>) {
 impl fmt::Display for Variable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let complex = if self.is_complex { "complex " } else { "" };
-        write!(f, "{} ({}, {complex}{})", self.name, self.shape_text(), self.class_name())
+        write!(f, "{} ({}, {complex}{})", Quoted(&self.name), self.shape_text(), self.class_name())
     }
 }
 

@@ -5,6 +5,7 @@
 
 use super::array::{ArrayHeader, ArrayReader};
 use super::{IoError, PcmFormat};
+use crate::messages::Quoted;
 use std::io::{self, Read, Seek};
 
 /// Longest header; those of arrays of numbers have a hundred bytes.
@@ -92,12 +93,10 @@ fn format(descr: &str) -> Result<PcmFormat, String> {
         ">f4" => Ok(F32Be),
         "<f8" => Ok(F64Le),
         ">f8" => Ok(F64Be),
-        other => {
-            let shown: String = other.chars().take(20).collect();
-            Err(format!(
-                "its numbers are {shown}; save i1, u1, i2, i4, f4, f8, c8 or c16, for example with x.astype(\"f4\")"
-            ))
-        }
+        other => Err(format!(
+            "its numbers are {}; save i1, u1, i2, i4, f4, f8, c8 or c16, for example with x.astype(\"f4\")",
+            Quoted(other)
+        )),
     }
 }
 
@@ -105,8 +104,9 @@ fn shape(text: &str) -> Result<Vec<u64>, String> {
     let inside = text.strip_prefix('(').and_then(|rest| rest.split_once(')')).map(|(inside, _)| inside);
     let sizes = inside.ok_or("its header has no shape; save it with numpy.save")?.split(',');
     let sizes = sizes.map(str::trim).filter(|size| !size.is_empty());
-    let size =
-        |size: &str| size.parse().map_err(|_| format!("the size \"{size}\" in its shape is no number"));
+    let size = |size: &str| {
+        size.parse().map_err(|_| format!("the size \"{}\" in its shape is no number", Quoted(size)))
+    };
     sizes.map(size).collect()
 }
 

@@ -10,6 +10,7 @@ use super::sigmf_reader::SigmfReader;
 use super::table::is_table;
 use super::wav::WavReader;
 use super::{Coding, IoError, PcmFormat, SampleLayout, StreamHeader, TimeInterleaving};
+use crate::messages::Quoted;
 use crate::quantity::FullScale;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -143,7 +144,8 @@ fn encoded(path: &Path) -> IoError {
     let flac = if cfg!(feature = "flac") { "" } else { "FLAC with the feature flac, " };
     let problem = format!(
         "hybank does not decode it: lossy formats do not keep time to the picosecond; give PCM ({flac}WAV, or a \
-         pipe: ffmpeg -i {file} -f wav -c:a pcm_f32le - | hybank fuse BANK.json -)"
+         pipe: ffmpeg -i {} -f wav -c:a pcm_f32le - | hybank fuse BANK.json -)",
+        Quoted(&file)
     );
     IoError::Unfit { file, problem }
 }

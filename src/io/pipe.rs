@@ -2,6 +2,7 @@
 
 use super::IoError;
 use crate::files::is_same_file;
+use crate::messages::Quoted;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -159,7 +160,7 @@ pub(super) fn refuse_shared_pipes(paths: &[PathBuf]) -> Result<(), IoError> {
         if let Some(first) = pipes[..i].iter().find(|first| is_same_file(first, second)) {
             return Err(IoError::unfit(&second.display().to_string())(format!(
                 "the same pipe as {}, each byte of which only one of them would get; give each channel a pipe of its own",
-                first.display()
+                Quoted(first)
             )));
         }
     }

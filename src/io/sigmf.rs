@@ -7,6 +7,7 @@ use super::stream_header::MOST_CHANNELS;
 use super::timestamps::{Timestamp, Timestamps};
 use super::{IoError, PcmFormat, SampleLayout, StreamHeader};
 use crate::files::{Bound, read_text};
+use crate::messages::{Number, Quoted, of_json};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::path::{Component, Path, PathBuf};
@@ -130,7 +131,7 @@ impl SigmfMeta {
     /// [`IoError::Malformed`] if it is malformed, including its data type and captures.
     pub fn parse(text: &str, file: &str) -> Result<Self, IoError> {
         let fault = |problem| malformed(file, problem);
-        let meta: Self = serde_json::from_str(text).map_err(|error| fault(error.to_string()))?;
+        let meta: Self = serde_json::from_str(text).map_err(|error| fault(of_json(&error.to_string())))?;
         meta.format(file)?;
         meta.timestamps(file)?;
         if meta.global.metadata_only {
@@ -140,12 +141,14 @@ impl SigmfMeta {
         }
         if let Some(name) = meta.required_extension() {
             return Err(fault(format!(
-                "it needs the extension {name:?}, which is unknown here; convert the recording to one without"
+                "it needs the extension \"{}\", which is unknown here; convert the recording to one without",
+                Quoted(name)
             )));
         }
         if let Some(name) = meta.global.dataset.as_deref().filter(|name| !is_file_name(name)) {
             return Err(fault(format!(
-                "core:dataset is {name:?}; it must be the name of a file in the same folder, without any path"
+                "core:dataset is \"{}\"; it must be the name of a file in the same folder, without any path",
+                Quoted(name)
             )));
         }
         match (meta.global.num_channels, meta.global.sample_rate) {
@@ -153,7 +156,7 @@ impl SigmfMeta {
                 Err(fault(format!("core:num_channels is {count}; it may be 1 to {MOST_CHANNELS}")))
             }
             (_, Some(rate)) if !(rate.is_finite() && rate > 0.0) => {
-                Err(fault(format!("core:sample_rate is {rate}; a rate is greater than 0 Hz")))
+                Err(fault(format!("core:sample_rate is {}; a rate is greater than 0 Hz", Number(rate))))
             }
             _ => Ok(meta),
         }
@@ -175,7 +178,7 @@ impl SigmfMeta {
             .into_iter()
             .find(|&format| self.global.datatype.strip_prefix(['r', 'c']) == Some(datatype(format).as_str()))
             .ok_or_else(|| {
-                let datatype = &self.global.datatype;
+                let datatype = Quoted(&self.global.datatype);
                 malformed(file, format!(
                     "core:datatype is {datatype}; use ri8, ru8, ri16_le, ri32_le, rf32_le, rf64_le, their _be forms, or complex ones (cf32_le)",
                 ))

@@ -6,7 +6,8 @@ use super::tar::{TarFile, tar_files};
 use super::timestamps::Timestamps;
 use super::{IoError, StreamHeader};
 use crate::files::{bytes_of, text_in};
-use std::fs::File;
+use crate::messages::Quoted;
+use std::fs::{File, Metadata};
 use std::io::{self, Read, Seek, SeekFrom, Take};
 use std::path::Path;
 
@@ -25,9 +26,18 @@ impl SigmfReader<Take<File>> {
         let meta = SigmfMeta::read(&meta_path)?;
         let (_, data_path) = file_pair(path, Some(&meta));
         let file = open_file(&data_path)?;
-        let bytes = file.metadata().ok().filter(|data| data.is_file()).map(|data| data.len());
-        if let (Some(name), None) = (&meta.global.dataset, bytes) {
-            let problem = format!("core:dataset leads to {name:?}, which is no file; give one with samples");
+        let found = file.metadata().ok();
+        let bytes = found.as_ref().filter(|data| data.is_file()).map(Metadata::len);
+        // Without core:dataset the samples may come from a pipe.
+        let problem = match &meta.global.dataset {
+            Some(name) if bytes.is_none() => Some(format!("core:dataset leads to \"{}\"", Quoted(name))),
+            None if found.as_ref().is_some_and(|data| data.is_dir()) => {
+                Some(format!("its samples would be in {}", Quoted(&data_path)))
+            }
+            _ => None,
+        };
+        if let Some(problem) = problem {
+            let problem = format!("{problem}, which is no file; give one with samples");
             return Err(malformed(&meta_path.display().to_string(), problem));
         }
         // A file may grow while it is read.
@@ -95,12 +105,12 @@ fn archived(archive: &mut (impl Read + Seek), file: &str) -> Result<(SigmfMeta, 
         let count = metas.len();
         return Err(fault(format!("it holds {count} recordings; extract the one that is meant (tar -xf)")));
     };
-    let name = format!("{file} ({})", meta.name);
+    let name = format!("{file} ({})", Quoted(&meta.name));
     archive.seek(SeekFrom::Start(meta.offset)).map_err(IoError::system(file, "read it"))?;
     let text = text_in(bytes_of(archive.take(meta.size), &name, META_FILE)?, &name)?;
     let parsed = SigmfMeta::parse(&text, &name)?;
     let (_, data) = file_pair(Path::new(&meta.name), Some(&parsed));
     let found = files.iter().find(|file| Path::new(&file.name) == data);
-    let found = found.ok_or_else(|| fault(format!("{} is not in it; pack both files", data.display())))?;
+    let found = found.ok_or_else(|| fault(format!("{} is not in it; pack both files", Quoted(&data))))?;
     Ok((parsed, name, found.clone()))
 }

@@ -4,6 +4,7 @@
 //! skipped.
 
 use super::IoError;
+use crate::messages::Quoted;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -14,8 +15,6 @@ const LOOKED_AT: u64 = 4096;
 const LINES: usize = 3;
 /// Longest line.
 const LONGEST_LINE: u64 = 1 << 20;
-/// Characters of a cell that a message shows.
-const SHOWN: usize = 20;
 
 /// Whether the file at `path` reads as a table: a line of numbers is among the first.
 pub(super) fn is_table(path: &Path) -> bool {
@@ -100,10 +99,10 @@ impl<R: Read> Table<R> {
     pub(crate) fn numbers(&self, cells: &[String]) -> Result<Vec<f64>, IoError> {
         let of_cell = |(column, cell): (usize, &String)| {
             number(cell).ok_or_else(|| {
-                let shown: String = cell.chars().take(SHOWN).collect();
                 self.fault(&format!(
-                    "column {}: \"{shown}\" is no number; decimals have a point, cells are separated by , ; tab or space",
-                    column + 1
+                    "column {}: \"{}\" is no number; decimals have a point, cells are separated by , ; tab or space",
+                    column + 1,
+                    Quoted(cell)
                 ))
             })
         };

@@ -1,6 +1,7 @@
 //! How sources are written on the command line: `step@0.3+tones:440Hz,1kHz+chirp:100Hz..8kHz@2s`.
 
 use super::source::{Source, Tone};
+use crate::messages::Quoted;
 use crate::quantity::{self, Time};
 use crate::units::{RadiansPerSecond, Seconds};
 use std::f64::consts::TAU;
@@ -11,15 +12,16 @@ use std::str::FromStr;
 pub enum ParseSourceError {
     /// No such kind of source.
     #[error(
-        "`{text}` is not a source; write step@0.3, tones:0.3,0.8 (rad/s), tones:440Hz,1kHz, ctones:-2kHz (complex), \
-         chirp:100Hz..8kHz@2s, several joined by `+`, or the name of a WAV file"
+        "`{}` is not a source; write step@0.3, tones:0.3,0.8 (rad/s), tones:440Hz,1kHz, ctones:-2kHz (complex), \
+         chirp:100Hz..8kHz@2s, several joined by `+`, or the name of a WAV file",
+        Quoted(.text)
     )]
     Unknown {
         /// The text as given.
         text: String,
     },
     /// Not a finite number.
-    #[error("`{number}` in source `{text}` is not a finite number{hint}")]
+    #[error("`{}` in source `{}` is not a finite number{hint}", Quoted(.number), Quoted(.text))]
     Number {
         /// The text as given.
         text: String,

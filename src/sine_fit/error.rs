@@ -67,9 +67,7 @@ pub enum SineFitError {
         second: Hertz,
     },
     /// Nothing stands out of the noise.
-    #[error(
-        "no tone found{}: the largest peak of the spectrum is not above its noise; give a record with a sine wave", near_text(*near)
-    )]
+    #[error("no tone found{}", no_tone_text(*near))]
     NoTone {
         /// Where it was looked for; `None` for anywhere.
         near: Option<Hertz>,
@@ -86,6 +84,11 @@ pub enum SineFitError {
     },
 }
 
-fn near_text(frequency: Option<Hertz>) -> String {
-    frequency.map_or_else(String::new, |frequency| format!(" near {frequency}"))
+fn no_tone_text(near: Option<Hertz>) -> String {
+    let anywhere =
+        ": the largest peak of the spectrum is not above its noise; give a record with a sine wave";
+    near.map_or_else(
+        || anywhere.to_owned(),
+        |near| format!(" near {near}: no peak of the spectrum is above the noise there; check the frequency"),
+    )
 }

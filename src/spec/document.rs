@@ -6,6 +6,7 @@ use std::collections::HashSet;
 use std::fmt;
 use std::ops::Range;
 
+use crate::messages::Quoted;
 use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
 use toml::de::{DeTable, DeValue};
 
@@ -52,6 +53,26 @@ impl Kind {
             Self::Table(_) => "a table",
         }
     }
+}
+
+/// What is wrong with a TOML text, and where.
+pub(super) fn syntax(error: &toml::de::Error, text: &str) -> (String, Option<Range<usize>>) {
+    let is_deep = error.message().contains("recur");
+    if !is_deep {
+        return (error.message().to_owned(), error.span());
+    }
+    let rule = "tables and lists are nested too deeply; a spec needs no more than five levels";
+    (rule.to_owned(), error.span().or_else(|| deepest_line(text)))
+}
+
+/// The line with the most dots, which the parser does not give for a key of too many parts.
+fn deepest_line(text: &str) -> Option<Range<usize>> {
+    let mut begin = 0;
+    let lines = text.split_inclusive('\n').map(|line| {
+        begin += line.len();
+        begin - line.len()..begin
+    });
+    lines.max_by_key(|span| text[span.clone()].matches('.').count())
 }
 
 impl Node {
@@ -156,7 +177,10 @@ impl<'de> Visitor<'de> for KindVisitor {
         let mut keys = HashSet::new();
         while let Some(key) = map.next_key::<String>()? {
             if !keys.insert(key.clone()) {
-                return Err(A::Error::custom(format!("the key \"{key}\" is given twice; keep one of them")));
+                return Err(A::Error::custom(format!(
+                    "the key \"{}\" is given twice; keep one of them",
+                    Quoted(key)
+                )));
             }
             entries.push(Entry { key, key_span: None, value: map.next_value()? });
         }

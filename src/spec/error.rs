@@ -4,6 +4,7 @@ use std::fmt;
 use std::ops::Range;
 
 use super::FilterProblem;
+use crate::messages::{Location, Number, Quoted};
 use crate::quantity::QuantityError;
 
 /// The error of a spec that cannot be used: the file, the location in it, and the problem.
@@ -41,24 +42,11 @@ impl Fault {
     }
 }
 
-/// A location in a text file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Location {
-    /// Line, from 1.
-    pub line: usize,
-    /// Column in characters, from 1.
-    pub column: usize,
-    /// Length in characters on that line, at least 1.
-    pub width: usize,
-    /// The line, without its line break.
-    pub text: String,
-}
-
 /// The rule that a spec violates, with the offending value and the remedy.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SpecProblem {
     /// The text is not TOML (or JSON) at all.
-    #[error("{message}")]
+    #[error("{}", Quoted(.message))]
     Syntax {
         /// The parser's message.
         message: String,
@@ -70,7 +58,7 @@ pub enum SpecProblem {
         message: String,
     },
     /// A key that no table of this kind has.
-    #[error("unknown key \"{key}\"{}; the keys here are {}", suggestion(.nearest), .known.join(", "))]
+    #[error("unknown key \"{}\"{}; the keys here are {}", Quoted(.key), suggestion(.nearest), .known.join(", "))]
     UnknownKey {
         /// The key as written.
         key: String,
@@ -96,7 +84,7 @@ pub enum SpecProblem {
         found: &'static str,
     },
     /// A name that is not on the list.
-    #[error("unknown {what} \"{name}\"{}; choose one of {}", suggestion(.nearest), .known.join(", "))]
+    #[error("unknown {what} \"{}\"{}; choose one of {}", Quoted(.name), suggestion(.nearest), .known.join(", "))]
     UnknownName {
         /// What the name stands for.
         what: &'static str,
@@ -118,7 +106,7 @@ pub enum SpecProblem {
         remedy: &'static str,
     },
     /// A number outside its range.
-    #[error("{value} {unit} is out of range: {rule}")]
+    #[error("{} {unit} is out of range: {rule}", Number(*.value))]
     Range {
         /// The offending value.
         value: f64,
@@ -239,6 +227,7 @@ impl std::error::Error for SpecError {}
 impl fmt::Display for SpecError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Inner { file, path, location, problem, overridden } = &*self.inner;
+        let file = Quoted(file);
         if *overridden {
             return write!(f, "{file}: the {path} that overrides the file's: {problem}");
         }
@@ -247,49 +236,9 @@ impl fmt::Display for SpecError {
             write!(f, "{}:{}:", location.line, location.column)?;
         }
         if !path.is_empty() {
-            write!(f, " {}:", shown_path(path))?;
+            write!(f, " {}:", Quoted(shown_path(path)))?;
         }
         write!(f, " {problem}")?;
         location.as_ref().map_or(Ok(()), |location| write!(f, "\n{location}"))
-    }
-}
-
-/// Most characters of a line that a message shows.
-const SHOWN_CHARACTERS: usize = 100;
-
-impl Location {
-    /// The location of the byte range `span` in `text`; a range that exceeds the text is clipped to it.
-    pub(crate) fn find(text: &str, span: Range<usize>) -> Self {
-        let start = boundary(text, span.start);
-        let line_start = text[..start].rfind('\n').map_or(0, |i| i + 1);
-        let line_end = text[start..].find('\n').map_or(text.len(), |i| start + i);
-        let end = boundary(text, span.end).clamp(start, line_end);
-        Self {
-            line: text[..start].matches('\n').count() + 1,
-            column: text[line_start..start].chars().count() + 1,
-            width: text[start..end].chars().count().max(1),
-            text: text[line_start..line_end].trim_end_matches('\r').to_owned(),
-        }
-    }
-}
-
-/// The nearest character boundary at or below `index`.
-fn boundary(text: &str, index: usize) -> usize {
-    let index = index.min(text.len());
-    (0..=index).rev().find(|&i| text.is_char_boundary(i)).unwrap_or(0)
-}
-
-impl fmt::Display for Location {
-    /// The line with its number and carets under the location. Of a long line, the part around it.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let skipped = (self.column - 1).saturating_sub(SHOWN_CHARACTERS / 2);
-        // A tab would misalign the carets.
-        let shown = |c: char| if c.is_control() { ' ' } else { c };
-        let line: String = self.text.chars().skip(skipped).take(SHOWN_CHARACTERS).map(shown).collect();
-        let number = self.line.to_string();
-        let margin = " ".repeat(number.len());
-        let indent = " ".repeat(self.column - 1 - skipped);
-        let carets = "^".repeat(self.width.min(SHOWN_CHARACTERS / 2));
-        write!(f, "{margin} |\n{number} | {line}\n{margin} | {indent}{carets}")
     }
 }

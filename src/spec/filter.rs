@@ -2,7 +2,9 @@
 //! family parameters, degrees. [`crate::analog`] checks the poles.
 
 use super::filter_problem::MAX_ORDER;
+use super::limits::MAX_ENTRY;
 use super::{FilterProblem, Passband};
+use crate::messages::Number;
 use serde::{Deserialize, Serialize};
 
 /// Least ripple or attenuation in decibels; less is numerically none.
@@ -10,6 +12,10 @@ pub const MIN_RIPPLE_DB: f64 = 1e-6;
 
 /// Most ripple or attenuation in decibels: 300 dB is the precision of double arithmetic.
 pub const MAX_RIPPLE_DB: f64 = 300.0;
+
+/// Largest coefficient of a polynomial, and largest gain: they have the dimension of a power of a frequency,
+/// and enter in 512 bits.
+const MAX_COEFFICIENT: f64 = 1e300;
 
 /// An analog filter as written; stability is checked by [`crate::analog`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -319,9 +325,13 @@ fn check_stage(stage: &FilterSpec) -> Result<(), FilterProblem> {
     Ok(())
 }
 
-fn check_finite(key: &'static str, values: impl IntoIterator<Item = f64>) -> Result<(), FilterProblem> {
-    match values.into_iter().find(|x| !x.is_finite()) {
-        Some(value) => Err(FilterProblem::not_finite(key, value)),
+fn check_sizes(
+    key: &'static str,
+    values: impl IntoIterator<Item = f64>,
+    most: f64,
+) -> Result<(), FilterProblem> {
+    match values.into_iter().find(|x| !(0.0..=most).contains(&x.abs())) {
+        Some(value) => Err(FilterProblem::too_large(key, value, most)),
         None => Ok(()),
     }
 }
@@ -331,7 +341,7 @@ fn check_polynomials(num: &[f64], den: &[f64]) -> Result<(), FilterProblem> {
         if list.is_empty() {
             return Err(empty(key, "list its coefficients in descending powers of s"));
         }
-        check_finite(key, list.iter().copied())?;
+        check_sizes(key, list.iter().copied(), MAX_COEFFICIENT)?;
     }
     if den.iter().all(|&x| x == 0.0) {
         let count = den.len();
@@ -344,9 +354,9 @@ fn check_polynomials(num: &[f64], den: &[f64]) -> Result<(), FilterProblem> {
 }
 
 fn check_zpk(zeros: &[[f64; 2]], poles: &[[f64; 2]], gain: f64) -> Result<(), FilterProblem> {
-    check_finite("zeros", zeros.iter().flatten().copied())?;
-    check_finite("poles", poles.iter().flatten().copied())?;
-    check_finite("gain", [gain])?;
+    check_sizes("zeros", zeros.iter().flatten().copied(), MAX_ENTRY)?;
+    check_sizes("poles", poles.iter().flatten().copied(), MAX_ENTRY)?;
+    check_sizes("gain", [gain], MAX_COEFFICIENT)?;
     check_nonzero("gain", [gain].into_iter())
 }
 
@@ -364,7 +374,7 @@ fn check_matrices(a: &[Vec<f64>], b: &[Vec<f64>], c: &[Vec<f64>]) -> Result<(), 
             );
             return Err(FilterProblem::of(key, rule));
         }
-        check_finite(key, matrix.iter().flatten().copied())?;
+        check_sizes(key, matrix.iter().flatten().copied(), MAX_ENTRY)?;
     }
     check_nonzero("b", b.iter().flatten().copied())?;
     check_nonzero("c", c.iter().flatten().copied())
@@ -396,7 +406,9 @@ fn check_ripples(family: Family, ripple: Option<f64>, attenuation: Option<f64>) 
     match (ripple, attenuation) {
         (Some(ripple), Some(attenuation)) if attenuation <= ripple => {
             let rule = format!(
-                "attenuation_db = {attenuation} dB: the stop-band attenuation must exceed the pass-band ripple of {ripple} dB"
+                "attenuation_db = {} dB: the stop-band attenuation must exceed the pass-band ripple of {} dB",
+                Number(attenuation),
+                Number(ripple)
             );
             Err(FilterProblem::of("attenuation_db", rule))
         }
@@ -413,10 +425,13 @@ fn check_decibels(family: Family, key: &'static str, value: Option<f64>) -> Resu
     let rule = match value {
         None if is_read => return Err(missing(family, key, meaning)),
         Some(value) if !is_read => {
-            format!("{key} = {value} has no meaning for a {} filter; remove it", family.name())
+            format!("{key} = {} has no meaning for a {} filter; remove it", Number(value), family.name())
         }
         Some(value) if !(MIN_RIPPLE_DB..=MAX_RIPPLE_DB).contains(&value) => {
-            format!("{key} = {value} dB: it must lie between {MIN_RIPPLE_DB:e} and {MAX_RIPPLE_DB} dB")
+            format!(
+                "{key} = {} dB: it must lie between {MIN_RIPPLE_DB:e} and {MAX_RIPPLE_DB} dB",
+                Number(value)
+            )
         }
         _ => return Ok(()),
     };

@@ -1,5 +1,7 @@
 //! Errors of a written filter.
 
+use crate::messages::Number;
+
 /// Most poles of a filter. Real front ends have fewer than a dozen. The product of 32 poles, each of at
 /// most 1e9 rad per fast period, still fits a double.
 pub const MAX_ORDER: usize = 32;
@@ -44,9 +46,13 @@ impl FilterProblem {
         Self::Rule { key: Some(key), rule: rule.into() }
     }
 
-    /// A number that is NaN or infinite.
-    pub(super) fn not_finite(key: &'static str, value: f64) -> Self {
-        Self::of(key, format!("{key} holds {value}; every coefficient must be a finite number"))
+    /// A number that is NaN, or larger than `most`.
+    pub(super) fn too_large(key: &'static str, value: f64, most: f64) -> Self {
+        let rule = "every coefficient must be a finite number";
+        Self::of(
+            key,
+            format!("{key} holds {}; {rule}, at most {most:e} in size; check its unit", Number(value)),
+        )
     }
 
     /// The key of the filter table that the problem concerns, if it is a single one.

@@ -43,6 +43,9 @@ const MAX_JITTER: f64 = 1.0;
 /// four bits left or clips nearly always, so such a number is in the wrong unit.
 const MAX_GAIN: f64 = 1e6;
 
+/// Largest entry of a matrix, pole, zero, tap or gamma: squares and their sums still fit a double.
+pub(crate) const MAX_ENTRY: f64 = 1e150;
+
 /// Fast periods in seconds, and rates in hertz: rates and squares still fit a double.
 const FAST_PERIODS: RangeInclusive<f64> = 1e-100..=1e100;
 

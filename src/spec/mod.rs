@@ -20,24 +20,28 @@ mod uncertainty;
 mod word_lengths;
 mod write;
 
+pub use crate::messages::Location;
 pub use design::{DesignOverrides, DesignSpec, DesignTable, Method, Reduction, Solver, Tracking};
 pub use edit::with_measurements_renamed;
 pub(crate) use error::{Fault, shown_path};
-pub use error::{Location, SpecError, SpecProblem};
+pub use error::{SpecError, SpecProblem};
 pub use filter::{Family, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use filter_problem::{FilterProblem, MAX_ORDER};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS};
+pub(crate) use limits::{MAX_ENTRY, check_fast_period, check_gain, check_offset};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES, MAX_TARGET_SNR_DB};
-pub(crate) use limits::{check_gain, check_offset};
 #[cfg(feature = "cli")]
 pub(crate) use limits::{check_noise, within};
 pub use measured::{FilterModel, FilterModels, MeasuredFilter, Measurement};
 pub use passband::Passband;
 pub use signal::{Band, SignalSpec, SignalSpectrum, USUAL_RMS};
+#[cfg(feature = "cli")]
+pub(crate) use uncertainty::check_delay_half_width;
 pub use uncertainty::{HALF_WIDTH, PerChannel, UncertaintySpec};
 pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
+use crate::messages::of_document;
 use crate::quantity::{self, FullScale};
 use crate::units::{FastPeriods, GridTime, Seconds};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -156,8 +160,8 @@ impl Spec {
         models: &FilterModels<'_>,
     ) -> Result<Self, SpecError> {
         let document = document::Node::from_toml(text).map_err(|error| {
-            let problem = SpecProblem::Syntax { message: error.message().to_owned() };
-            SpecError::new(file_name, text, error.span(), String::new(), problem)
+            let (message, span) = document::syntax(&error, text);
+            SpecError::new(file_name, text, span, String::new(), SpecProblem::Syntax { message })
         })?;
         decode::spec_with(&reader::Value::root(&document), overrides, models)
             .map_err(|fault| SpecError::of(file_name, text, fault))
@@ -170,7 +174,7 @@ impl Spec {
     /// As [`Spec::from_toml`], without a location; the path of keys says where.
     pub fn from_data<'de, D: Deserializer<'de>>(data: D, name: &str) -> Result<Self, SpecError> {
         let document = document::Node::deserialize(data).map_err(|error| {
-            let problem = SpecProblem::Syntax { message: error.to_string() };
+            let problem = SpecProblem::Syntax { message: of_document(&error.to_string()) };
             SpecError::new(name, "", None, String::new(), problem)
         })?;
         decode::spec(&reader::Value::root(&document), DesignOverrides::default())

@@ -3,6 +3,8 @@
 use serde::{Serialize, Serializer};
 
 use super::FilterProblem;
+use super::limits::MAX_ENTRY;
+use crate::messages::Number;
 use crate::units::Hertz;
 
 /// The edges of a family member, with scipy.signal's meaning for the family. Written as the key `cutoff` or
@@ -64,8 +66,8 @@ impl Passband {
     /// Checks the order of the edges.
     pub(super) fn check(self) -> Result<(), FilterProblem> {
         match self {
-            Self::LowPass { cutoff } if !cutoff.0.is_finite() => {
-                Err(FilterProblem::not_finite("cutoff", cutoff.0))
+            Self::LowPass { cutoff } if is_too_large(cutoff) => {
+                Err(FilterProblem::too_large("cutoff", cutoff.0, MAX_ENTRY))
             }
             Self::LowPass { cutoff } if cutoff.0 <= 0.0 => {
                 Err(refused("cutoff", cutoff, "the cutoff must be a positive frequency in hertz".into()))
@@ -76,14 +78,19 @@ impl Passband {
     }
 }
 
+/// True for NaN too.
+fn is_too_large(frequency: Hertz) -> bool {
+    !(0.0..=MAX_ENTRY).contains(&frequency.0.abs())
+}
+
 fn check_band(low: Hertz, high: Hertz) -> Result<(), FilterProblem> {
-    if let Some(edge) = [low, high].into_iter().find(|edge| !edge.0.is_finite()) {
-        return Err(FilterProblem::not_finite("band", edge.0));
+    if let Some(edge) = [low, high].into_iter().find(|&edge| is_too_large(edge)) {
+        return Err(FilterProblem::too_large("band", edge.0, MAX_ENTRY));
     }
     if low.0 <= 0.0 {
         let rule = format!(
             "a band-pass begins above 0 Hz; for the low-pass from 0 to {high} Hz write cutoff = {high}",
-            high = high.0
+            high = Number(high.0)
         );
         return Err(refused("band", low, rule));
     }
@@ -94,8 +101,8 @@ fn check_band(low: Hertz, high: Hertz) -> Result<(), FilterProblem> {
     if high < low {
         let rule = format!(
             "the upper edge is below the lower one, {low} Hz; write band = [{high}, {low}]",
-            low = low.0,
-            high = high.0
+            low = Number(low.0),
+            high = Number(high.0)
         );
         return Err(refused("band", high, rule));
     }
@@ -103,5 +110,5 @@ fn check_band(low: Hertz, high: Hertz) -> Result<(), FilterProblem> {
 }
 
 fn refused(key: &'static str, value: Hertz, rule: String) -> FilterProblem {
-    FilterProblem::of(key, format!("{key} = {value} Hz: {rule}", value = value.0))
+    FilterProblem::of(key, format!("{key} = {value} Hz: {rule}", value = Number(value.0)))
 }

@@ -4,6 +4,7 @@ use super::filter_reader::proper_filter;
 use super::limits::{range, within};
 use super::reader::{Either, Fields, Value};
 use super::{Fault, FilterSpec, SpecProblem};
+use crate::messages::Number;
 use crate::units::Hertz;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
@@ -159,8 +160,10 @@ fn check_band(band: Band) -> Result<(), SpecProblem> {
         return Err(range(high.0, "Hz", "the band of the signal must end at a positive, finite frequency"));
     }
     if !(low.0 >= 0.0 && low.0 < high.0) {
-        let rule =
-            format!("the band of the signal must begin at 0 or above, and below its end at {} Hz", high.0);
+        let rule = format!(
+            "the band of the signal must begin at 0 or above, and below its end at {} Hz",
+            Number(high.0)
+        );
         return Err(range(low.0, "Hz", rule));
     }
     Ok(())

@@ -137,7 +137,7 @@ impl UncertaintySpec {
 
     /// Checks all numbers for a spec of `channels` channels.
     pub(super) fn check(&self, channels: usize, h: Seconds) -> Result<(), KeyProblem> {
-        let time = |value: &Seconds| check_time(value.in_fast_periods(h), *value);
+        let time = |value: &Seconds| check_delay_half_width(value.in_fast_periods(h), *value);
         blame("delay", check_list(self.delay.as_ref(), channels, time))?;
         let shares =
             [("gain", &self.gain, 1e6), ("offset", &self.offset, 1.0), ("cutoff", &self.cutoff, 0.5)];
@@ -168,7 +168,8 @@ fn check_list<T>(
     written.values().iter().try_for_each(check)
 }
 
-fn check_time(periods: FastPeriods, written: Seconds) -> Result<(), SpecProblem> {
+/// The half-width of a delay.
+pub(crate) fn check_delay_half_width(periods: FastPeriods, written: Seconds) -> Result<(), SpecProblem> {
     if (0.0..=MAX_DELAY).contains(&periods.0) {
         return Ok(());
     }

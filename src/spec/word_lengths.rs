@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::SpecProblem;
 use super::limits::{range, within};
+use crate::messages::Quoted;
 
 /// Most bits of a tap. Such integers are exact in a double and far finer than the error of any bank.
 pub const MAX_BITS: u32 = 32;
@@ -119,7 +120,7 @@ impl std::str::FromStr for WordLengths {
     fn from_str(text: &str) -> Result<Self, String> {
         let number = |text: &str| {
             text.trim().parse::<u32>().map_err(|_| {
-                format!("\"{text}\" is not a number of bits; give one number, or one for each tap separated by commas")
+                format!("\"{}\" is not a number of bits; give one number, or one for each tap separated by commas", Quoted(text))
             })
         };
         match text.contains(',') {

@@ -1,6 +1,7 @@
 //! Why delays cannot be followed.
 
 use crate::calibrate::CalibrateError;
+use crate::messages::Quoted;
 use crate::sine_fit::SineFitError;
 use crate::units::Hertz;
 
@@ -42,7 +43,7 @@ pub enum TrackError {
         half: Hertz,
     },
     /// A line of a file of delays.
-    #[error("{file}: line {line}: {problem}")]
+    #[error("{}: line {line}: {problem}", Quoted(.file))]
     Reading {
         /// The file.
         file: String,

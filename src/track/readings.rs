@@ -1,6 +1,7 @@
 //! Delays that were measured elsewhere, as JSON lines.
 
 use super::{ReadingProblem, TrackError};
+use crate::messages::of_document;
 use crate::spec::HALF_WIDTH;
 use crate::units::Seconds;
 use serde::Deserialize;
@@ -25,7 +26,7 @@ struct Line {
 }
 
 #[derive(Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "half_width is one number for all channels, or a list")]
 enum HalfWidths {
     Same(f64),
     Each(Vec<Option<f64>>),
@@ -60,7 +61,8 @@ impl Reading {
     }
 
     fn of_line(line: &str, channels: usize) -> Result<Self, ReadingProblem> {
-        let syntax = |error: serde_json::Error| ReadingProblem::Syntax { reason: error.to_string() };
+        let syntax =
+            |error: serde_json::Error| ReadingProblem::Syntax { reason: of_document(&error.to_string()) };
         let line: Line = serde_json::from_str(line).map_err(syntax)?;
         if line.delay.len() != channels {
             return Err(ReadingProblem::DelayCount { given: line.delay.len(), channels });

@@ -27,6 +27,7 @@ mod live;
 mod long_files;
 mod lost;
 mod measure;
+mod messages;
 mod notes;
 #[cfg(unix)]
 mod outputs;

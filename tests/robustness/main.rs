@@ -1,4 +1,5 @@
-//! Campaigns of random trials: killed runs, failing system calls, full disks, forged banks, damaged inputs.
+//! Campaigns of random trials: killed runs, failing system calls, full disks, forged banks, damaged inputs,
+//! foreign text.
 //!
 //! Every run makes a short campaign with the same seeds.
 //! `HYBANK_CAMPAIGN=50 cargo test --release --test robustness -- --nocapture` makes 50 times as many trials;
@@ -13,6 +14,7 @@ mod kill_campaign;
 
 #[cfg(target_os = "linux")]
 mod disks;
+mod foreign;
 mod forged;
 mod inputs;
 #[cfg(unix)]

@@ -7,6 +7,7 @@ use hybank::bank::Bank;
 use hybank::interchange::{taps_of_csv, taps_of_npy};
 use hybank::io::wav::WavReader;
 use hybank::io::{CsvReader, LostSamples, SigmfMeta, npy_header, open_mat, tar_files};
+use hybank::messages::shown;
 use hybank::spec::Spec;
 use std::fs;
 use std::io::{Cursor, Read};
@@ -31,7 +32,7 @@ fn fault(dice: &mut Random, bytes: &mut Vec<u8>) {
         1 => drop(bytes.drain(place..place + length)),
         2 => bytes.splice(place..place, bytes[place..place + length].to_vec()).for_each(drop),
         3 => bytes.insert(place, dice.below(256) as u8),
-        4 => bytes[place..place + length].fill(dice.of(&[0, 0xFF, 0x7F, 0x80, b'9', b'"'])),
+        4 => bytes[place..place + length].fill(dice.of(&[0, 0xFF, 0x7F, 0x80, 0x1B, b'9', b'"'])),
         _ => bytes[place..place + length.min(1)].iter_mut().for_each(|byte| *byte ^= 1 << dice.below(8)),
     }
 }
@@ -50,9 +51,14 @@ fn damaged(target: &str, mut check: impl FnMut(&[u8])) {
     }
 }
 
-/// A message is one that names its file; gives whether there was an answer.
+/// A message is one that names its file, and nothing foreign is left in it; gives whether there was an
+/// answer.
 fn answered<T, E: std::fmt::Display>(result: Result<T, E>) -> Option<T> {
-    result.map_err(|error| assert!(error.to_string().starts_with("seed"), "{error}")).ok()
+    let check = |error: E| {
+        let message = error.to_string();
+        assert!(message.starts_with("seed") && shown(&message) == message, "{message:?}");
+    };
+    result.map_err(check).ok()
 }
 
 #[test]

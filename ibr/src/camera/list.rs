@@ -72,7 +72,7 @@ impl CameraList {
         Self { path, frames, by_stem }
     }
 
-    /// The file, or the folder of a model.
+    /// The file that lists the images.
     pub fn path(&self) -> &Path {
         &self.path
     }

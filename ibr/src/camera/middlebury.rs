@@ -2,6 +2,7 @@
 //! baseline and the difference of the principal points.
 
 use crate::files::{self, CHECK_THE_PATH, InputError, Location};
+use hybank::messages::Quoted;
 use std::path::Path;
 
 /// Difference between `doffs` and the principal points that rounding explains, in pixels.
@@ -103,7 +104,7 @@ impl<'a> Keys<'a> {
         let (line, value) = self.value(key)?;
         match value.parse::<f64>() {
             Ok(number) if number.is_finite() => Ok(number),
-            _ => self.at(line, format!("{key} is {value:?}: it must be a finite number")),
+            _ => self.at(line, format!("{key} is \"{}\": it must be a finite number", Quoted(value))),
         }
     }
 
@@ -111,7 +112,10 @@ impl<'a> Keys<'a> {
         let (line, value) = self.value(key)?;
         match value.parse::<usize>() {
             Ok(side) if side > 0 => Ok(side),
-            _ => self.at(line, format!("{key} is {value:?}: it must be a positive whole number of pixels")),
+            _ => self.at(
+                line,
+                format!("{key} is \"{}\": it must be a positive whole number of pixels", Quoted(value)),
+            ),
         }
     }
 

@@ -1,5 +1,6 @@
 //! Which image of a list a path means: one rule for COLMAP models, transforms files and `--view`.
 
+use hybank::messages::Quoted;
 use std::cmp::Reverse;
 
 /// Most names that a message lists.
@@ -18,7 +19,7 @@ pub struct Found {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NameError {
     /// No name of the list has this file name.
-    #[error("there is no image {wanted:?}; the images are {known}")]
+    #[error("there is no image \"{}\"; the images are {known}", Quoted(wanted))]
     Unknown {
         /// The path.
         wanted: String,
@@ -26,7 +27,7 @@ pub enum NameError {
         known: String,
     },
     /// Several names fit equally well.
-    #[error("{wanted:?} may be {candidates}; write as many of its folders as tell them apart")]
+    #[error("\"{}\" may be {candidates}; write as many of its folders as tell them apart", Quoted(wanted))]
     Ambiguous {
         /// The path.
         wanted: String,
@@ -114,7 +115,8 @@ fn most_like(names: &[&str], wanted: &str) -> String {
 
 /// At most eight names, and how many more there are.
 pub(crate) fn list(names: &[&str], between: &str) -> String {
-    let shown = names.iter().take(MOST_NAMES).copied().collect::<Vec<_>>().join(between);
+    let shown: Vec<String> = names.iter().take(MOST_NAMES).map(|name| Quoted(name).to_string()).collect();
+    let shown = shown.join(between);
     match names.len().saturating_sub(MOST_NAMES) {
         0 => shown,
         more => format!("{shown} and {more} more"),

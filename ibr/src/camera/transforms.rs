@@ -6,6 +6,7 @@
 
 use super::list::{CameraList, Frame, Inner};
 use crate::files::{self, CHECK_THE_PATH, InputError, Location};
+use hybank::messages::{Quoted, of_json};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -47,12 +48,13 @@ pub fn read_transforms(path: &Path) -> Result<CameraList, InputError> {
 /// [`InputError`].
 pub fn parse_transforms(text: &str, path: &Path) -> Result<CameraList, InputError> {
     let json = |reason: String| InputError::content(path, Location::File, reason);
-    let file: FileSpec = serde_json::from_str(text).map_err(|e| json(e.to_string()))?;
+    let file: FileSpec = serde_json::from_str(text).map_err(|e| json(of_json(&e.to_string())))?;
     let straight = ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE"];
     if let Some(model) = file.camera_model.filter(|model| !straight.contains(&model.as_str())) {
         let known = straight.join(", ");
         return Err(json(format!(
-            "camera_model {model:?} is not supported (supported are {known}); undistort the images first"
+            "camera_model \"{}\" is not supported (supported are {known}); undistort the images first",
+            Quoted(model)
         )));
     }
     if file.frames.is_empty() {

@@ -5,6 +5,7 @@ mod render;
 pub(super) use render::RenderArguments;
 
 use clap::{Args, Parser, Subcommand};
+use hybank::messages::Quoted;
 use std::path::PathBuf;
 
 /// Renders new views from photographs with depth (image-based rendering).
@@ -156,7 +157,7 @@ fn size(text: &str) -> Result<(usize, usize), String> {
     let (w, h) = text.split_once('x').ok_or("write it as WIDTHxHEIGHT, for example 480x360")?;
     let side = |s: &str| match s.parse() {
         Ok(n) if SIDES.contains(&n) => Ok(n),
-        _ => Err(format!("{s:?} is not a number from {} to {}", SIDES.start(), SIDES.end())),
+        _ => Err(format!("\"{}\" is not a number from {} to {}", Quoted(s), SIDES.start(), SIDES.end())),
     };
     Ok((side(w)?, side(h)?))
 }

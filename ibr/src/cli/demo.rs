@@ -13,6 +13,7 @@ use crate::partial::{Densify, densify};
 use crate::pipeline::{RenderSettings, Rendering, rectified};
 use crate::propagate::RectifiedView;
 use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
+use hybank::messages::Quoted;
 use serde::Serialize;
 use std::time::Instant;
 
@@ -101,7 +102,7 @@ fn report(summary: &DemoSummary, arguments: &DemoArguments) -> Result<(), Failur
         let (full, partial) = (summary.full_depth.text(), summary.partial_depth.text());
         format!(
             "exact depth at every pixel\n{full}\nexact depth at one pixel in {STEP} x {STEP}\n{partial}\n{}: left, exact, right; rendered, its error and that of partial depth (times 4)\n",
-            arguments.output.display()
+            Quoted(&arguments.output)
         )
     };
     output::report(arguments.json, summary, text, Some(&arguments.output))

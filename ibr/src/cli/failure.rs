@@ -1,6 +1,7 @@
 //! Failure of a command: one message on stderr and an exit code.
 
-use std::io::Write;
+use hybank::messages::{Quoted, printable, shown};
+use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 
 /// A failure with the one message that the user sees.
@@ -23,7 +24,7 @@ impl Failure {
     /// The same failure, said of a file.
     pub(super) fn in_file(self, path: &std::path::Path) -> Self {
         match self {
-            Self::Input(message) => Self::Input(format!("{}: {message}", path.display())),
+            Self::Input(message) => Self::Input(format!("{}: {message}", Quoted(path))),
             other => other,
         }
     }
@@ -48,21 +49,30 @@ impl Failure {
 
     /// Prints the message and gives the exit code.
     pub(super) fn report(&self) -> ExitCode {
-        match self {
-            Self::Input(message) => {
-                say(&format!("hybank-ibr: {message}\n"));
-                ExitCode::from(1)
-            }
-            Self::Usage(message) => {
-                say(&format!("hybank-ibr: {message}\n"));
-                ExitCode::from(2)
-            }
-            Self::ClosedPipe => ExitCode::SUCCESS,
-        }
+        let (message, code) = match self {
+            Self::Input(message) => (message, 1),
+            Self::Usage(message) => (message, 2),
+            Self::ClosedPipe => return ExitCode::SUCCESS,
+        };
+        say_line(message);
+        ExitCode::from(code)
     }
 }
 
-/// Writes text to standard error; one that cannot be written is no reason to lose a result.
+/// Writes text of several lines to standard error.
 pub(super) fn say(text: &str) {
+    put(&printable(text));
+}
+
+/// A line on standard error with the program's name before it, in place of a progress bar that a terminal
+/// shows there.
+pub(super) fn say_line(line: &str) {
+    let clear = if std::io::stderr().is_terminal() { "\r\x1b[2K" } else { "" };
+    put(&format!("{clear}hybank-ibr: {}\n", shown(line)));
+}
+
+/// Every word on standard error comes this way, and nothing foreign is left in it. What cannot be written is
+/// no reason to lose a result.
+fn put(text: &str) {
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }

@@ -3,22 +3,15 @@
 use super::failure;
 use crate::pipeline::Agreement;
 use crate::scene::{Kind, Scene};
-use std::io::IsTerminal;
 
 /// Prints a warning on standard error.
 pub(super) fn warn(text: &str) {
-    say("warning", text);
+    failure::say_line(&format!("warning: {text}"));
 }
 
 /// Prints what was decided on reading a scene and the user may not expect.
 pub(super) fn notes(scene: &Scene) {
-    scene.notes.iter().for_each(|note| say("note", note));
-}
-
-/// A line on standard error, in place of a progress bar that a terminal shows there.
-fn say(kind: &str, text: &str) {
-    let clear = if std::io::stderr().is_terminal() { "\r\x1b[2K" } else { "" };
-    failure::say(&format!("{clear}hybank-ibr: {kind}: {text}\n"));
+    scene.notes.iter().for_each(|note| failure::say_line(&format!("note: {note}")));
 }
 
 /// Warns of every pair of views that agrees in too few points, and names the keys to check.

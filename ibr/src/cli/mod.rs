@@ -17,6 +17,7 @@ use arguments::{Arguments, Command};
 use clap::Parser;
 use failure::Failure;
 use hybank::memory::check_memory;
+use hybank::messages::usage;
 use std::process::ExitCode;
 
 /// More threads than cores would only use memory for stacks.
@@ -47,7 +48,11 @@ pub fn run() -> ExitCode {
 
 /// Shows help, version or what is wrong with the usage.
 fn show(message: &clap::Error) -> ExitCode {
-    match message.print() {
+    let text = message.to_string();
+    let quoted = usage(&text, std::env::args_os());
+    // Only clap knows the colours.
+    let printed = if quoted == text { message.print() } else { Ok(failure::say(&quoted)) };
+    match printed {
         Err(error) if !message.use_stderr() => Failure::printing(&error).report(),
         _ => ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2)),
     }

@@ -3,6 +3,7 @@
 use super::failure::{self, Failure};
 use crate::image::{self, Image, Levels};
 use hybank::files::{AtomicFile, commit_all};
+use hybank::messages::{Quoted, printable};
 use serde::Serialize;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -20,7 +21,7 @@ pub(super) fn refuse_overlaps(outputs: &[&Path], inputs: &[&Path]) -> Result<(),
 /// Refuses a file that exists, before any work is done.
 pub(super) fn refuse_existing(path: &Path, force: bool) -> Result<(), Failure> {
     if !force && !is_standard(path) && path.exists() {
-        return Err(Failure::Input(format!("{} exists; use --force to overwrite it", path.display())));
+        return Err(Failure::Input(format!("{} exists; use --force to overwrite it", Quoted(path))));
     }
     Ok(())
 }
@@ -28,7 +29,7 @@ pub(super) fn refuse_existing(path: &Path, force: bool) -> Result<(), Failure> {
 /// Names the unfinished files that killed runs left beside `outputs`.
 pub(super) fn name_leftovers(outputs: &[&Path]) {
     for left in hybank::files::leftovers(outputs) {
-        failure::say(&format!("hybank-ibr: warning: {left}\n"));
+        failure::say_line(&format!("warning: {left}"));
     }
 }
 
@@ -106,13 +107,13 @@ pub(super) fn report(
         failure::say(&text());
         return Ok(());
     }
-    print_bytes(text().as_bytes())
+    print_bytes(printable(&text()).as_bytes())
 }
 
 /// Refuses files beside the first that go to standard output or have its name, by their options.
 pub(super) fn check_names(files: &[(&str, &Path)]) -> Result<(), Failure> {
     for (k, (option, path)) in files.iter().enumerate() {
-        let (name, shown) = (option.trim_start_matches('-'), path.display());
+        let (name, shown) = (option.trim_start_matches('-'), Quoted(path));
         if name != "o" && is_standard(path) {
             return Err(Failure::Usage(format!(
                 "{option} -: the {name} cannot go to standard output; give it a file"

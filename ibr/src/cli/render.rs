@@ -16,6 +16,7 @@ use crate::pipeline::uncalibrated::{Target, UncalibratedSettings};
 use crate::pipeline::{RenderSettings, Rendering, Watch, calibrated, rectified, uncalibrated};
 use crate::scene::{self, Kind, Scene, SourceView};
 use concerns::Concerns;
+use hybank::messages::Quoted;
 use outputs::Outputs;
 use path::Film;
 use std::path::Path;
@@ -185,7 +186,7 @@ fn render_uncalibrated(
 
 /// Figures of merit over the region of the rendering, and over the whole image if the two differ.
 fn compare(summary: &mut Summary, done: &Rendered, truth: &Image, path: &Path) -> Result<(), Failure> {
-    let named = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", path.display()));
+    let named = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", Quoted(path)));
     let image = &done.rendering.image;
     // Both are rounded.
     ImageError::refuse_without_memory(path, image.size(), 24.0).map_err(Failure::input)?;

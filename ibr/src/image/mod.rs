@@ -20,6 +20,7 @@ pub use write::{begin, encode, encode_levels, encode_with_alpha, save};
 use crate::files::InputError;
 use hybank::memory::{MemoryShortage, check_memory};
 use std::path::{Path, PathBuf};
+use hybank::messages::Quoted;
 
 /// Errors of image files, and of images that do not fit together.
 #[derive(Debug, thiserror::Error)]
@@ -28,7 +29,7 @@ pub enum ImageError {
     #[error(transparent)]
     Read(#[from] InputError),
     /// The file is not an image of a known format, or is damaged.
-    #[error("{}: {reason}; the readable formats are PNG, JPEG, PPM, PGM and PFM", path.display())]
+    #[error("{}: {}; the readable formats are PNG, JPEG, PPM, PGM and PFM", Quoted(path), Quoted(reason))]
     Decode {
         /// The file.
         path: PathBuf,
@@ -36,7 +37,10 @@ pub enum ImageError {
         reason: String,
     },
     /// The file has too many pixels.
-    #[error("{}: {width} x {height} pixels are more than the limit of {most}; crop or shrink the image, or allow so many with --max-pixels", path.display())]
+    #[error(
+        "{}: {width} x {height} pixels are more than the limit of {most}; crop or shrink the image, or allow so many with --max-pixels",
+        Quoted(path)
+    )]
     TooLarge {
         /// The file.
         path: PathBuf,
@@ -48,7 +52,7 @@ pub enum ImageError {
         most: usize,
     },
     /// There is no memory to unpack or to pack so many pixels.
-    #[error("{}: {width} x {height} pixels take {shortage}; crop or shrink the image", path.display())]
+    #[error("{}: {width} x {height} pixels take {shortage}; crop or shrink the image", Quoted(path))]
     Memory {
         /// The file.
         path: PathBuf,
@@ -63,7 +67,7 @@ pub enum ImageError {
     #[error(transparent)]
     File(#[from] hybank::files::FileError),
     /// The file cannot be written.
-    #[error("{}: {reason}", path.display())]
+    #[error("{}: {reason}", Quoted(path))]
     Write {
         /// The file.
         path: PathBuf,
@@ -71,13 +75,13 @@ pub enum ImageError {
         reason: String,
     },
     /// The extension of the output file is not a known format.
-    #[error("{}: the extension is not an image format; use .png, .jpg, .ppm, .pgm or .pfm", path.display())]
+    #[error("{}: the extension is not an image format; use .png, .jpg, .ppm, .pgm or .pfm", Quoted(path))]
     UnknownFormat {
         /// The file.
         path: PathBuf,
     },
     /// 16 bits per value in a format that this crate writes with 8.
-    #[error("{}: 16 bits per value are written to .png files only; .pfm files have floats", path.display())]
+    #[error("{}: 16 bits per value are written to .png files only; .pfm files have floats", Quoted(path))]
     Levels {
         /// The file.
         path: PathBuf,
@@ -85,7 +89,7 @@ pub enum ImageError {
     /// A depth or disparity map with colours.
     #[error(
         "{}: a depth or disparity map has one value per pixel, but pixel ({x}, {y}) has different red, green and blue; save it as a grey image",
-        path.display()
+        Quoted(path)
     )]
     ColouredMap {
         /// The file.

@@ -3,6 +3,7 @@
 //! The sign of the scale gives the byte order (negative: little endian); its magnitude is not applied.
 
 use super::Image;
+use hybank::messages::Quoted;
 
 /// Reads a float map, values as stored.
 ///
@@ -13,7 +14,7 @@ pub fn decode(bytes: &[u8]) -> Result<Image, String> {
     let channels = match word(&mut rest)? {
         "PF" => 3,
         "Pf" => 1,
-        other => return Err(format!("starts with {other:?} instead of \"PF\" or \"Pf\"")),
+        other => return Err(format!("starts with \"{}\" instead of \"PF\" or \"Pf\"", Quoted(other))),
     };
     let width = side(word(&mut rest)?, "width")?;
     let height = side(word(&mut rest)?, "height")?;
@@ -66,7 +67,7 @@ fn word<'a>(rest: &mut &'a [u8]) -> Result<&'a str, String> {
 }
 
 fn parse<T: std::str::FromStr>(word: &str, name: &str) -> Result<T, String> {
-    word.parse().map_err(|_| format!("the {name} {word:?} is not a number"))
+    word.parse().map_err(|_| format!("the {name} \"{}\" is not a number", Quoted(word)))
 }
 
 fn side(word: &str, name: &str) -> Result<usize, String> {

@@ -22,6 +22,7 @@ use crate::partial::{Densify, densify};
 use crate::pipeline::Watch;
 use goals::Goal;
 use hybank::memory::check_memory;
+use hybank::messages::{self, Number, Quoted, of_document};
 use left_out::LeftOut;
 use models::Models;
 use rayon::prelude::*;
@@ -55,8 +56,12 @@ impl Default for LoadOptions {
 /// [`SceneError::Input`] with line, column and the keys known there.
 pub fn parse(text: &str, path: &Path) -> Result<SceneSpec, SceneError> {
     toml::from_str(text).map_err(|e| {
-        let reason = e.to_string().trim_end().to_string() + &keys::hint(e.message());
-        InputError::content(path, Location::File, reason).into()
+        let reason = of_document(e.message()) + &keys::hint(e.message());
+        let Some(place) = e.span().map(|span| messages::Location::find(text, span)) else {
+            return incomplete(path, reason);
+        };
+        InputError::content(path, Location::Column(place.line, place.column), format!("{reason}\n{place}"))
+            .into()
     })
 }
 
@@ -141,7 +146,8 @@ impl Loader<'_> {
         let mut seen = std::collections::BTreeSet::new();
         match self.spec.view.iter().filter_map(|v| v.name.as_ref()).find(|name| !seen.insert(*name)) {
             Some(name) => {
-                Err(self.incomplete(format!("two views are named {name:?}; give each its own name")))
+                Err(self
+                    .incomplete(format!("two views are named \"{}\"; give each its own name", Quoted(name))))
             }
             None => Ok(()),
         }
@@ -151,8 +157,8 @@ impl Loader<'_> {
     fn no_other_kind(&self, view: &ViewSpec, kind: &str, others: &[(&str, bool)]) -> Loaded<()> {
         match others.iter().find(|(_, given)| *given) {
             Some((key, _)) => Err(self.incomplete(format!(
-                "view {:?} has `{key}`, which has no meaning in a {kind} scene; remove it, or give all views the keys of one kind",
-                view.label()
+                "{} has `{key}`, which has no meaning in a {kind} scene; remove it, or give all views the keys of one kind",
+                view.named()
             ))),
             None => Ok(()),
         }
@@ -162,7 +168,7 @@ impl Loader<'_> {
         if value.is_finite() {
             return Ok(value);
         }
-        Err(self.incomplete(format!("{whose}: position = {value}: it must be a finite number")))
+        Err(self.incomplete(format!("{whose}: position = {}: it must be a finite number", Number(value))))
     }
 
     fn file(&self, path: &Path) -> PathBuf {
@@ -174,8 +180,7 @@ impl Loader<'_> {
     }
 
     fn need<T>(&self, value: Option<T>, view: &ViewSpec, key: &str, kind: &str) -> Loaded<T> {
-        let reason =
-            || format!("view {:?} has no `{key}`, which every view of a {kind} scene needs", view.label());
+        let reason = || format!("{} has no `{key}`, which every view of a {kind} scene needs", view.named());
         value.ok_or_else(|| self.incomplete(reason()))
     }
 

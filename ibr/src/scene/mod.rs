@@ -16,6 +16,7 @@ use crate::image::{Image, ImageError};
 use crate::pipeline::uncalibrated::Target;
 use crate::propagate::View;
 use crate::uncalibrated::Point;
+use hybank::messages::Quoted;
 use std::path::PathBuf;
 
 /// A scene, read and checked.
@@ -107,7 +108,7 @@ impl<P: Copy> SourceView<P> {
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// A camera of the scene.
-    #[error("{}: {which}: {source}", path.display())]
+    #[error("{}: {which}: {source}", Quoted(path))]
     Camera {
         /// The scene file.
         path: PathBuf,
@@ -117,7 +118,7 @@ pub enum SceneError {
         source: CameraError,
     },
     /// A depth map of the scene.
-    #[error("view {view:?}: {}: {source}", path.display())]
+    #[error("view \"{}\": {}: {source}", Quoted(view), Quoted(path))]
     Depth {
         /// The view.
         view: String,

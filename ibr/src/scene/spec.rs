@@ -1,5 +1,6 @@
 //! A scene file as written.
 
+use hybank::messages::Quoted;
 use serde::Deserialize;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
@@ -132,6 +133,11 @@ impl ViewSpec {
     /// The name, or the image file's.
     pub fn label(&self) -> String {
         self.name.clone().unwrap_or_else(|| self.image.display().to_string())
+    }
+
+    /// The view in messages.
+    pub(super) fn named(&self) -> String {
+        format!("view \"{}\"", Quoted(self.label()))
     }
 }
 

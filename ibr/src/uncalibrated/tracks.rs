@@ -2,6 +2,7 @@
 
 use super::Point;
 use crate::files::{self, CHECK_THE_PATH, InputError, Location};
+use hybank::messages::Quoted;
 use std::path::Path;
 
 /// What a line has, for messages.
@@ -33,8 +34,9 @@ impl Tracks {
         let mut lines = Vec::new();
         for (i, line) in text.lines().enumerate() {
             let content = line.split('#').next().unwrap_or("");
-            let words = words(content)
-                .map_err(|word| fault(i + 1, format!("{word:?} is neither a finite number nor \"-\"")))?;
+            let words = words(content).map_err(|word| {
+                fault(i + 1, format!("\"{}\" is neither a finite number nor \"-\"", Quoted(word)))
+            })?;
             if !words.is_empty() {
                 lines.push((i + 1, words));
             }

@@ -1,5 +1,6 @@
 //! Why a measurement cannot be read or modelled.
 
+use crate::messages::Quoted;
 use crate::quantity::readable;
 use crate::units::{Decibels, Hertz, Seconds};
 
@@ -15,7 +16,7 @@ pub enum MeasurementError {
         what: String,
     },
     /// A line that is no data.
-    #[error("line {line}: {wanted} are expected, and the line is \"{found}\"")]
+    #[error("line {line}: {wanted} are expected, and the line is \"{}\"", Quoted(.found))]
     Line {
         /// Line, from 1.
         line: usize,
@@ -33,7 +34,7 @@ pub enum MeasurementError {
         value: Hertz,
     },
     /// A parameter that the file does not have.
-    #[error("there is no parameter \"{name}\"; this file has {known}")]
+    #[error("there is no parameter \"{}\"; this file has {known}", Quoted(.name))]
     Parameter {
         /// What was asked for.
         name: String,
@@ -43,7 +44,8 @@ pub enum MeasurementError {
     /// A heading without a unit.
     #[error(
         "the first line must name the columns and their units, as in \"frequency (MHz), gain (dB), phase (deg)\", and \
-         it is \"{found}\""
+         it is \"{}\"",
+        Quoted(.found)
     )]
     Heading {
         /// The first line.

@@ -1,14 +1,14 @@
 //! Comma-separated frequency, gain and phase.
 
 use super::MeasurementError;
-use super::text::{MOST_POINTS, Point, hertz, numbers, of_decibels, point, quoted};
+use super::text::{MOST_POINTS, Point, hertz, numbers, of_decibels, point};
 
 /// The points with their lines.
 pub(super) fn read(text: &str) -> Result<Vec<Point>, MeasurementError> {
     let lines = (1..).zip(text.trim_start_matches('\u{feff}').lines());
     let mut lines = lines.filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
     let Some((_, heading)) = lines.next() else { return Err(MeasurementError::Empty) };
-    let unit = unit(heading).ok_or_else(|| MeasurementError::Heading { found: quoted(heading) })?;
+    let unit = unit(heading).ok_or_else(|| MeasurementError::Heading { found: heading.to_owned() })?;
     let mut points = Vec::new();
     for (number, line) in lines {
         let row = numbers(cells(line)).and_then(|row| <[f64; 3]>::try_from(row).ok());
@@ -16,7 +16,7 @@ pub(super) fn read(text: &str) -> Result<Vec<Point>, MeasurementError> {
         points.push(made.ok_or_else(|| MeasurementError::Line {
             line: number,
             wanted: "a frequency, a gain in dB and a phase in degrees".to_owned(),
-            found: quoted(line),
+            found: line.to_owned(),
         })?);
         if points.len() > MOST_POINTS {
             return Err(MeasurementError::TooMany { most: MOST_POINTS });

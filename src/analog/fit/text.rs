@@ -20,11 +20,6 @@ pub(super) fn of_decibels(gain: f64, degrees: f64) -> Complex<f64> {
     Complex::from_polar(10f64.powf(gain / 20.0), degrees.to_radians())
 }
 
-/// A line as it is quoted in messages.
-pub(super) fn quoted(line: &str) -> String {
-    line.chars().filter(|c| !c.is_control()).take(60).collect()
-}
-
 /// All numbers of a line, if they are finite numbers and nothing else.
 pub(super) fn numbers<'a>(words: impl Iterator<Item = &'a str>) -> Option<Vec<f64>> {
     words.map(|word| word.parse().ok().filter(|number: &f64| number.is_finite())).collect()

@@ -3,8 +3,9 @@
 //! Source: *Touchstone File Format Specification*, version 1.1, EIA/IBIS Open Forum.
 
 use super::MeasurementError;
-use super::text::{MOST_POINTS, Point, hertz, numbers, of_decibels, point, quoted};
+use super::text::{MOST_POINTS, Point, hertz, numbers, of_decibels, point};
 use crate::linalg::Complex;
+use crate::messages::Quoted;
 
 /// How a pair of numbers is a complex one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,7 +115,7 @@ impl Network {
 
     fn malformed(&self, line: usize, found: &str) -> MeasurementError {
         let wanted = format!("a frequency and {} numbers", self.width() - 1);
-        MeasurementError::Line { line, wanted, found: quoted(found) }
+        MeasurementError::Line { line, wanted, found: found.to_owned() }
     }
 
     fn add(&mut self, point: Point) -> Result<(), MeasurementError> {
@@ -132,7 +133,7 @@ fn column(ports: usize, parameter: Option<&str>) -> Result<usize, MeasurementErr
         if ports == 1 { (&["S11"], "S11") } else { (&["S11", "S21", "S12", "S22"], "S11, S21, S12 and S22") };
     let name = parameter.unwrap_or(if ports == 1 { "S11" } else { "S21" });
     let place = names.iter().position(|known| known.eq_ignore_ascii_case(name));
-    place.ok_or_else(|| MeasurementError::Parameter { name: quoted(name), known })
+    place.ok_or_else(|| MeasurementError::Parameter { name: name.to_owned(), known })
 }
 
 /// `# GHz S MA R 50`, its parts in any order and each with a default.
@@ -152,12 +153,13 @@ fn option_line(line: usize, words: &str) -> Result<Options, MeasurementError> {
             // The resistance does not matter: a ratio of waves is the gain between matched ports.
             "R" => drop(words.next()),
             "Y" | "Z" | "G" | "H" => {
-                let what = format!("{word} parameters are no gains; export scattering parameters (S)");
+                let what =
+                    format!("{} parameters are no gains; export scattering parameters (S)", Quoted(word));
                 return Err(MeasurementError::Unsupported { line, what });
             }
             _ => {
                 let wanted = "a unit of frequency, S, MA, DB or RI, and R with a resistance".to_owned();
-                return Err(MeasurementError::Line { line, wanted, found: quoted(word) });
+                return Err(MeasurementError::Line { line, wanted, found: word.to_owned() });
             }
         }
     }

@@ -85,7 +85,9 @@ pub(super) fn zone_of(
     match all[..] {
         [best, second, ..] if best.0 > CLEAR_SHARE * second.0 || best.0 > CLEAR_PHASE => {
             let [alias, best, other] = [alias.cycles, best.1, second.1].map(|x| model.slow_rate() * x);
-            Err(CalibrateError::AmbiguousZone { alias, best, other })
+            let ends = [model.fast_zone, model.fast_zone + 1];
+            let zone = ends.map(|end| model.slow_rate() * (0.5 * (model.ratio * end) as f64));
+            Err(CalibrateError::AmbiguousZone { alias, best, other, zone })
         }
         [best, ..] => Ok(best.1),
         [] => Ok(alias.cycles),

@@ -6,6 +6,7 @@ mod binary;
 
 use super::list::{CameraList, Frame, Inner};
 use crate::files::{self, CHECK_THE_PATH, InputError, Location};
+use hybank::messages::{Number, Quoted};
 use nalgebra::{Matrix3x4, Quaternion, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -50,7 +51,7 @@ fn is_model(folder: &Path) -> bool {
 /// That there is no model in a folder, with those that are in folders below it.
 fn no_model(folder: &Path) -> InputError {
     let below = PLACES.iter().map(|place| folder.join(place)).filter(|place| is_model(place));
-    let below: Vec<String> = below.map(|place| place.display().to_string()).collect();
+    let below: Vec<String> = below.map(|place| Quoted(place).to_string()).collect();
     let remedy = match (below.is_empty(), folder.is_file(), folder.exists()) {
         (false, ..) => format!("name the folder with the model: {}", below.join(" or ")),
         (_, true, _) => "it is a file; name the folder that holds it".into(),
@@ -67,7 +68,7 @@ fn parse_binary(cameras: &[u8], images: &[u8], folder: &Path) -> Result<CameraLi
     };
     let inners = binary::cameras(cameras).map_err(|e| fault("cameras.bin", e))?;
     let poses = binary::images(images).map_err(|e| fault("images.bin", e))?;
-    join(&inners, poses, folder).map_err(|e| fault("images.bin", e))
+    join(&inners, poses, &folder.join("images.bin")).map_err(|e| fault("images.bin", e))
 }
 
 /// The same from the texts of the two files; `folder` appears in messages.
@@ -80,23 +81,20 @@ pub fn parse_model(cameras: &str, images: &str, folder: &Path) -> Result<CameraL
     };
     let inners = parse_cameras(cameras).map_err(|e| fault("cameras.txt", e))?;
     let poses = parse_images(images).map_err(|e| fault("images.txt", e))?;
-    join(&inners, poses, folder).map_err(|e| fault("images.txt", e))
+    join(&inners, poses, &folder.join("images.txt")).map_err(|e| fault("images.txt", e))
 }
 
-/// The images by their names; the error is the line or record of one whose camera is not listed.
-fn join(
-    inners: &BTreeMap<u64, Inner>,
-    poses: Vec<Pose>,
-    folder: &Path,
-) -> Result<CameraList, (usize, String)> {
+/// The images of the file `path` by their names; the error is the line or record of one whose camera is not
+/// listed.
+fn join(inners: &BTreeMap<u64, Inner>, poses: Vec<Pose>, path: &Path) -> Result<CameraList, (usize, String)> {
     let mut frames = BTreeMap::new();
     for (k, (at, id, pose, name)) in poses.into_iter().enumerate() {
-        let inner = *inners
-            .get(&id)
-            .ok_or_else(|| (at, format!("image {name:?} has camera {id}, which the cameras do not list")))?;
+        let inner = *inners.get(&id).ok_or_else(|| {
+            (at, format!("image \"{}\" has camera {id}, which the cameras do not list", Quoted(&name)))
+        })?;
         frames.insert(name.clone(), Frame { image: name.into(), depth: None, number: k + 1, pose, inner });
     }
-    Ok(CameraList::new(folder.into(), frames.into_values().collect()))
+    Ok(CameraList::new(path.into(), frames.into_values().collect()))
 }
 
 /// Lines with content, with their numbers.
@@ -106,7 +104,7 @@ fn content(text: &str) -> impl Iterator<Item = (usize, &str)> {
 
 fn number<T: std::str::FromStr>(word: Option<&str>, name: &str) -> Result<T, String> {
     let word = word.ok_or_else(|| format!("the {name} is missing"))?;
-    word.parse().map_err(|_| format!("the {name} {word:?} is not a number"))
+    word.parse().map_err(|_| format!("the {name} \"{}\" is not a number", Quoted(word)))
 }
 
 /// CAMERA_ID MODEL WIDTH HEIGHT PARAMS...
@@ -136,7 +134,8 @@ fn inner(model: &str, size: (usize, usize), parameters: &[f64]) -> Result<Inner,
         "OPENCV" | "FULL_OPENCV" => (2, 4),
         other => {
             return Err(format!(
-                "camera model {other} is not supported (supported are SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, and FULL_OPENCV without k3 to k6); undistort the images first"
+                "camera model {} is not supported (supported are SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, and FULL_OPENCV without k3 to k6); undistort the images first",
+                Quoted(other)
             ));
         }
     };
@@ -147,7 +146,8 @@ fn inner(model: &str, size: (usize, usize), parameters: &[f64]) -> Result<Inner,
     let (bends, beyond) = parameters[focal + 2..].split_at(most.min(parameters.len() - focal - 2));
     if let Some(value) = beyond.iter().find(|v| **v != 0.0) {
         return Err(format!(
-            "the {model} camera has an unsupported coefficient ({value}); undistort the images first"
+            "the {model} camera has an unsupported coefficient ({}); undistort the images first",
+            Number(*value)
         ));
     }
     if size.0 == 0 || size.1 == 0 {

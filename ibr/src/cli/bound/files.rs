@@ -7,6 +7,7 @@ use crate::cli::failure::Failure;
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded};
 use crate::image::{Image, ImageError, Levels, pfm};
+use hybank::messages::Quoted;
 use std::path::{Path, PathBuf};
 
 /// The files of one virtual view.
@@ -33,7 +34,7 @@ impl Outputs {
         output::check_names(&named.collect::<Vec<_>>())?;
         if let Some(plot) = self.plot.as_ref().filter(|plot| chart::Format::of(plot).is_none()) {
             let message = "a plot is written as .svg or .png";
-            return Err(Failure::Usage(format!("--plot {}: {message}", plot.display())));
+            return Err(Failure::Usage(format!("--plot {}: {message}", Quoted(plot))));
         }
         self.map.as_ref().map_or(Ok(()), |map| output::refuse_format(map, Levels::Eight))
     }

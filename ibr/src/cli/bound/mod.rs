@@ -16,6 +16,7 @@ use crate::partial::Densify;
 use crate::pipeline::{RenderError, Watch};
 use crate::scene::{self, Kind, Scene};
 use files::Outputs;
+use hybank::messages::Quoted;
 use predictor::Predictor;
 use report::{Frames, Summary};
 use std::path::Path;
@@ -89,7 +90,7 @@ fn read(arguments: &BoundArguments, watch: Watch<'_>) -> Result<(Scene, Option<I
 }
 
 fn refuse_what_has_no_prediction(scene: &Scene, arguments: &BoundArguments) -> Result<(), Failure> {
-    let named = |path: &Path, reason: &str| Failure::Input(format!("{}: {reason}", path.display()));
+    let named = |path: &Path, reason: &str| Failure::Input(format!("{}: {reason}", Quoted(path)));
     let file = &arguments.scene.file;
     match &scene.kind {
         Kind::Uncalibrated { .. } => Err(named(

@@ -6,6 +6,7 @@ use crate::cli::failure::Failure;
 use crate::cli::{inputs, output};
 use crate::image::{Image, quality};
 use crate::pipeline::Agreement;
+use hybank::messages::Quoted;
 use serde::Serialize;
 use std::path::Path;
 
@@ -84,7 +85,7 @@ impl Summary {
         path: Option<&Path>,
     ) -> Result<(), Failure> {
         let (Some(truth), Some(path)) = (truth, path) else { return Ok(()) };
-        let named = |e| Failure::Input(format!("{}: {e}", path.display()));
+        let named = |e| Failure::Input(format!("{}: {e}", Quoted(path)));
         let image = &predicted.rendering.image;
         let Some(found) = quality::compare(image, truth, None).map_err(named)? else { return Ok(()) };
         self.measured = Some(Measured {

@@ -7,6 +7,7 @@ use crate::cli::output::{self, Encoded};
 use crate::image::{Image, ImageError, Levels, encode_levels, encode_with_alpha, pfm};
 use crate::interpolate::Cover;
 use crate::pipeline::Rendering;
+use hybank::messages::Quoted;
 use std::path::{Path, PathBuf};
 
 /// What a file shows of a virtual view.
@@ -43,7 +44,7 @@ impl Part {
         if allowed.iter().any(|ending| path.extension().is_some_and(|e| e == *ending)) {
             return Ok(());
         }
-        let (option, path) = (self.option(), path.display());
+        let (option, path) = (self.option(), Quoted(path));
         let name = option.trim_start_matches('-');
         let endings: Vec<String> = allowed.iter().map(|ending| format!(".{ending}")).collect();
         Err(Failure::Usage(format!("{option} {path}: {name} is written as {}", endings.join(" or "))))
@@ -62,11 +63,11 @@ fn is_packed_film(path: &Path) -> bool {
 }
 
 fn packed_film(path: &Path) -> Failure {
-    let (shown, film) = (path.display(), path.with_extension("y4m"));
+    let (shown, film) = (Quoted(path), path.with_extension("y4m"));
     Failure::Usage(format!(
         "-o {shown}: films are written uncompressed, as .y4m; write `-o {}`, or give an encoder the frames: \
          `-o - | ffmpeg -i - {shown}`",
-        film.display()
+        Quoted(&film)
     ))
 }
 
@@ -117,7 +118,7 @@ impl Outputs {
         let view = &self.parts[0].1;
         let png = output::is_standard(view) || view.extension().is_some_and(|ending| ending == "png");
         if self.alpha && !png {
-            let view = view.display();
+            let view = Quoted(view);
             return Err(Failure::Usage(format!("--alpha: {view} has no alpha channel; write a .png")));
         }
         if is_film(view) && self.levels == Levels::Sixteen {

@@ -8,6 +8,7 @@ use crate::camera::ListedCamera;
 use crate::camera::resize::{Size, factors};
 use crate::depth::Measure;
 use crate::scene::{Kind, SceneError, SourceView, ViewSpec};
+use hybank::messages::Quoted;
 use nalgebra::Matrix3x4;
 
 type Matrix = [[f64; 4]; 3];
@@ -145,7 +146,7 @@ impl Loader<'_> {
 
     /// The camera of a view whose image has this size.
     fn camera_of(&self, view: &ViewSpec, size: Size) -> Loaded<(Camera, Option<Resized>)> {
-        let which = format!("view {:?}", view.label());
+        let which = view.named();
         match (&view.camera, self.source_of(view)) {
             (Some(rows), _) => Ok((self.matrix(rows, &which)?, None)),
             (None, Some(source)) => {
@@ -175,7 +176,7 @@ impl Loader<'_> {
             "{which}: the image has {} x {} pixels, but {} lists its camera for {} x {}; use the image that was calibrated, or one that was resized by the same factor in both directions",
             size.0,
             size.1,
-            source.path.display(),
+            Quoted(&source.path),
             found.size.0,
             found.size.1
         )))

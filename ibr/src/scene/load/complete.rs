@@ -5,6 +5,7 @@ use crate::camera::Frame;
 use crate::camera::middlebury::read_calibration;
 use crate::camera::transforms::read_transforms;
 use crate::scene::{SceneSpec, ViewSpec};
+use hybank::messages::{Number, Quoted};
 use std::path::Path;
 
 /// Stored numbers per unit of depth of a depth map with whole numbers, unless the scene says another one:
@@ -31,10 +32,11 @@ pub fn complete(spec: &SceneSpec, path: &Path) -> Loaded<SceneSpec> {
             let offset = *view.disparity_offset.get_or_insert(calibration.offset);
             if offset != calibration.offset {
                 let reason = format!(
-                    "view {:?} has disparity_offset = {offset}, but {} says {}; remove one of them",
-                    view.label(),
-                    file.display(),
-                    calibration.offset
+                    "{} has disparity_offset = {}, but {} says {}; remove one of them",
+                    view.named(),
+                    Number(offset),
+                    Quoted(file),
+                    Number(calibration.offset)
                 );
                 return Err(incomplete(path, reason));
             }
@@ -87,7 +89,7 @@ fn pair_views(file: &Path, folder: &Path) -> (Vec<ViewSpec>, Vec<String>) {
             let note = format!(
                 "there is no disp{}.pfm beside {}: the view is rendered from im{only}.png alone",
                 1 - only,
-                file.display()
+                Quoted(file)
             );
             (vec![view(only)], vec![note])
         }

@@ -10,9 +10,9 @@ pub(super) fn hint(message: &str) -> String {
     let Some(unknown) = quoted.next() else { return String::new() };
     let tables = tables_with(unknown);
     if !tables.is_empty() {
-        return format!("\n`{unknown}` belongs {}", tables.join(" or "));
+        return format!("; `{unknown}` belongs {}", tables.join(" or "));
     }
-    nearest(unknown, quoted).map_or(String::new(), |key| format!("\ndid you mean `{key}`?"))
+    nearest(unknown, quoted).map_or(String::new(), |key| format!("; did you mean `{key}`?"))
 }
 
 /// The tables that have a key.

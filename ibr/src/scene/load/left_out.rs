@@ -3,6 +3,7 @@
 use super::{Loaded, Loader};
 use crate::camera::names::{self, NameError};
 use crate::scene::{SceneError, ViewSpec};
+use hybank::messages::Quoted;
 
 /// What `--view` names.
 pub(super) enum LeftOut {
@@ -39,8 +40,9 @@ impl Loader<'_> {
     }
 
     pub(super) fn no_such_view(&self, name: &str) -> SceneError {
-        let known = self.spec.view.iter().map(ViewSpec::label).collect::<Vec<_>>().join(", ");
-        self.incomplete(format!("there is no view {name:?}; the views are {known}"))
+        let labels: Vec<String> = self.spec.view.iter().map(ViewSpec::label).collect();
+        let known = names::list(&labels.iter().map(String::as_str).collect::<Vec<_>>(), ", ");
+        self.incomplete(format!("there is no view \"{}\"; the views are {known}", Quoted(name)))
     }
 }
 

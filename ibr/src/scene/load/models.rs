@@ -8,6 +8,7 @@ use crate::camera::transforms::read_transforms;
 use crate::camera::{CameraList, ListedCamera};
 use crate::files::InputError;
 use crate::scene::ViewSpec;
+use hybank::messages::Quoted;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -59,8 +60,8 @@ impl Loader<'_> {
         fallback: Size,
         which: &str,
     ) -> Loaded<ListedCamera> {
-        let refused = |e: NameError| self.incomplete(format!("{which}: {}: {e}", source.path.display()));
         let list = self.models.get(source)?;
+        let refused = |e: NameError| self.incomplete(format!("{which}: {}: {e}", Quoted(list.path())));
         let (frame, _) = list.find(image).map_err(refused)?;
         Ok(list.camera(frame, fallback)?)
     }
@@ -77,7 +78,7 @@ impl Loader<'_> {
         let list = self.models.get(source)?;
         let images: Vec<_> = list.frames.iter().map(|frame| frame.image.to_string_lossy()).collect();
         let listed = names::list(&images.iter().map(AsRef::as_ref).collect::<Vec<_>>(), ", ");
-        Ok(format!("{} lists {listed}", source.path.display()))
+        Ok(format!("{} lists {listed}", Quoted(list.path())))
     }
 
     /// Whether the scene's file of cameras lists an image.
@@ -101,10 +102,11 @@ impl Loader<'_> {
                 && !(sure && whole)
             {
                 return Err(self.incomplete(format!(
-                    "{}: views {:?} and {:?} would both have the camera of image {name:?}, the only one of that file name; give the other one a `camera`, or remove its [[view]]",
-                    file.display(),
-                    other.label(),
-                    view.label()
+                    "{}: {} and {} would both have the camera of image \"{}\", the only one of that file name; give the other one a `camera`, or remove its [[view]]",
+                    Quoted(file),
+                    other.named(),
+                    view.named(),
+                    Quoted(name)
                 )));
             }
         }

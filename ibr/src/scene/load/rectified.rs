@@ -1,6 +1,7 @@
 //! Scenes of a rectified rig: positions and disparities.
 
 use super::{Goal, Inputs, Loaded, Loader, each, pixels};
+use hybank::messages::Quoted;
 use crate::camera::middlebury::{Calibration, read_calibration};
 use crate::depth::Measure;
 use crate::scene::{Kind, SourceView, ViewSpec};
@@ -25,7 +26,7 @@ impl Loader<'_> {
             ];
             self.no_other_kind(view, "rectified", &others)?;
             let position = self.need(view.position, view, "position", "rectified")?;
-            let position = self.finite(position, &format!("view {:?}", view.label()))?;
+            let position = self.finite(position, &view.named())?;
             let map = self.need(view.disparity.as_deref(), view, "disparity", "rectified")?;
             let (image, disparity, filled) =
                 self.image_with_map(view, map, view.disparity_scale.unwrap_or(1.0), Measure::Disparity)?;
@@ -34,9 +35,7 @@ impl Loader<'_> {
         let sources = each(views, one, |source| pixels(&source.0.image), self.watch)?;
         let first = sources[0].0.image.size();
         for (view, (source, _)) in views.iter().zip(&sources) {
-            let (name, first_name) =
-                (format!("view {:?}", view.label()), format!("view {:?}", views[0].label()));
-            source.image.same_size(&name, first, &first_name)?;
+            source.image.same_size(&view.named(), first, &views[0].named())?;
         }
         let calibration = self.calibration(first)?;
         let filled = sources.iter().map(|s| s.1).sum();
@@ -75,7 +74,7 @@ impl Loader<'_> {
         }
         Err(self.incomplete(format!(
             "{} is for images of {width} x {height} pixels, but the views have {} x {}; use the calibration of that size, or give `disparity_offset` (in pixels of these images) in the views instead of `calib`",
-            file.display(),
+            Quoted(file),
             size.0,
             size.1
         )))
