@@ -3,15 +3,19 @@
 use super::bank_file::{bad_flag, load_spec};
 use super::design_report::{Judged, Report};
 use super::design_studies::BandHint;
-use super::interrupt::end_at_interrupt;
+use super::interrupt::{end_at_interrupt, end_with};
 use super::print::{Failure, InFile, check_strict, is_dash, say, say_understood, show, warn};
 use super::progress::Progress;
 use super::written::{check_outputs, write_text};
-use crate::design::{self, Limits, Options};
+use crate::design::{self, DesignError, Limits, Options};
+use crate::messages::Quoted;
 use crate::spec::{DesignOverrides, Method, Reduction, Solver, Spec, Tracking, WordLengths};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// A design is ended between two steps of its searches; so much later it is given up.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Designs the synthesis filters for a spec
 ///
@@ -132,7 +136,9 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let limits = if args.no_limit { Limits::Off } else { Limits::Enforced };
     let options =
         Options { limits, observer: &|stage, seconds| progress.note(stage, seconds), ..Options::default() };
-    let found = progress.during(|| design::design(&spec, &options)).in_file(&args.spec)?;
+    let give_up = || give_up(&args.spec, &spec);
+    let limit = limits.time().map(|limit| limit + PATIENCE);
+    let found = progress.during(limit, give_up, || design::design(&spec, &options)).in_file(&args.spec)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
     let mut judged = Judged::new(&found.bank).in_file(&args.spec)?;
     warn_or_refuse(&judged.warnings(&found.bank), args.strict)?;
@@ -146,10 +152,17 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     show(&report, args.json, |report| report.text(args.verbose))
 }
 
+/// Ends a design that its time limit cannot end, because one step of it takes too long.
+fn give_up(path: &Path, spec: &Spec) {
+    let error = DesignError::StoppedWithoutBank { remedy: design::remedy(spec) };
+    let Failure::Input(message) = Failure::of(path, error) else { return };
+    end_with(&message);
+}
+
 /// What in the spec is probably not meant. A spec that is wrong is refused by the design.
 fn spec_warnings(spec: &Spec, path: &Path) -> Vec<String> {
     let found = design::warnings(spec).unwrap_or_default();
-    found.iter().map(|problem| format!("{}: {problem}", path.display())).collect()
+    found.iter().map(|problem| format!("{}: {problem}", Quoted(path))).collect()
 }
 
 /// Prints the warnings; with `strict` the first one is an error.

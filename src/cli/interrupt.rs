@@ -1,12 +1,13 @@
 //! Interrupts: Ctrl-C, SIGTERM and the other signals that end a process. In a run the first one requests an
 //! orderly end, and the second one ends the process at once. In a computation the first one ends it at once.
 
+use super::print::say_line;
+use crate::files::remove_unfinished as remove_unfinished_files;
 use crossbeam_channel::Receiver;
 
 #[cfg(unix)]
 mod watch {
-    use crate::cli::print::say_line;
-    use crate::files::remove_unfinished;
+    use super::end_with;
     use crate::files::signals::{end, watch};
     use crate::io::is_output_stalled;
     use crossbeam_channel::{Receiver, Sender, bounded, never};
@@ -28,15 +29,7 @@ mod watch {
     pub(super) fn end_at_first() {
         watch(|mut signals| {
             if signals.forever().next().is_some() {
-                // The message may wait for its reader, the files must not.
-                let written = remove_unfinished();
-                let after = if written.is_empty() {
-                    String::new()
-                } else {
-                    format!(" after {} was written", written.join(" and "))
-                };
-                say_line(&format!("interrupted{after}; no unfinished file is left"));
-                std::process::exit(1);
+                end_with("interrupted");
             }
         });
     }
@@ -82,6 +75,19 @@ pub(super) fn end_at_interrupt() {}
 #[cfg(not(unix))]
 pub(super) fn interrupts() -> Receiver<()> {
     crossbeam_channel::never()
+}
+
+/// Ends the process with a message and exit code 1. Unfinished files are removed.
+pub(super) fn end_with(reason: &str) -> ! {
+    // The message may wait for its reader, the files must not.
+    let written = remove_unfinished_files();
+    let after = if written.is_empty() {
+        String::new()
+    } else {
+        format!(" after {} was written", written.join(" and "))
+    };
+    say_line(&format!("{reason}{after}; no unfinished file is left"));
+    std::process::exit(1);
 }
 
 /// From now on an interrupt removes unfinished files before it ends the process; for commands whose work

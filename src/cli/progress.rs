@@ -29,17 +29,28 @@ impl Progress {
         *self.now.lock().unwrap_or_else(PoisonError::into_inner) = Some((stage, seconds));
     }
 
-    /// Runs `work` and shows meanwhile what it does. Without a thread for that, nothing is shown.
-    pub(super) fn during<T>(&self, work: impl FnOnce() -> T) -> T {
+    /// Runs `work` and shows meanwhile what it does; calls `give_up` if it has not ended by the `limit`.
+    /// Without threads for that, nothing is shown and nothing limited.
+    pub(super) fn during<T>(
+        &self,
+        limit: Option<Duration>,
+        give_up: impl FnOnce() + Send,
+        work: impl FnOnce() -> T,
+    ) -> T {
         thread::scope(|scope| {
             let (done_sender, done): (Sender<()>, _) = bounded(0);
+            let end = done.clone();
+            let overdue = move || {
+                if limit.is_some_and(|limit| wait(&end, limit)) {
+                    give_up()
+                }
+            };
             // A thread that cannot be started is no reason to fail.
-            let display = thread::Builder::new()
-                .name("progress".into())
-                .spawn_scoped(scope, move || self.report(&done));
+            let begin = |name: &str| thread::Builder::new().name(name.into());
+            let display = begin("progress").spawn_scoped(scope, move || self.report(&done));
+            let limiter = begin("limit").spawn_scoped(scope, overdue);
             let result = work();
-            drop(done_sender);
-            drop(display);
+            drop((done_sender, display, limiter));
             result
         })
     }
@@ -103,6 +114,15 @@ mod tests {
 
     #[test]
     fn the_result_of_the_work_comes_back() {
-        assert_eq!(Progress::default().during(|| 7), 7);
+        assert_eq!(Progress::default().during(None, || (), || 7), 7);
+    }
+
+    #[test]
+    fn work_that_does_not_end_in_time_is_given_up() {
+        let (given_up, done) = bounded(1);
+        let waited = || done.recv_timeout(Duration::from_secs(60));
+        let waited = Progress::default().during(Some(Duration::ZERO), || given_up.send(()).unwrap(), waited);
+        assert_eq!(waited, Ok(()));
+        Progress::default().during(Some(Duration::from_secs(60)), || panic!("in time"), || ());
     }
 }

@@ -20,6 +20,7 @@ pub(super) fn explained(error: &(impl Display + 'static)) -> String {
 fn option(error: &dyn Any) -> Option<&'static str> {
     let of_file = |error: &FileError| match error {
         FileError::Exists { .. } => Some("--force replaces it"),
+        FileError::Special { .. } => Some("or write to `-` and redirect"),
         _ => None,
     };
     None.or_else(|| of_file(error.downcast_ref()?))
@@ -51,6 +52,7 @@ fn option(error: &dyn Any) -> Option<&'static str> {
 fn of_design(error: &DesignError) -> Option<&'static str> {
     match error {
         DesignError::TooLong { .. } | DesignError::TooLarge { .. } => Some("--no-limit runs it all the same"),
+        DesignError::StoppedWithoutBank { .. } => Some("--no-limit runs it to its end"),
         DesignError::Verify(error) => of_proof(error),
         _ => None,
     }

@@ -11,7 +11,7 @@ use super::DesignError;
 use super::effort;
 use super::filters;
 use super::least_errors::{LeastErrors, candidates, check_reach, is_almost, manageable, shortest};
-use super::limits::Limits;
+use super::limits::{Limits, Stop};
 use super::merging::Repeats;
 use super::methods::scenarios::RobustProblem;
 use super::methods::{self, Deviations, Filters, Settings};
@@ -225,7 +225,7 @@ fn error_of_order(spec: &Spec, problem: &Problem) -> Result<f64, DesignError> {
     let merged = problem.merge_channels(Repeats::of(&spec)).of_unit_size()?;
     let plant = LiftedPlant::new(&merged.problem)?;
     let synthesis = methods::synthesise(Method::H2, &plant, &settings(&spec)?)?;
-    let realised = realise(&spec, problem, &merged, &plant, &synthesis)?;
+    let realised = realise(&spec, problem, &merged, &plant, &synthesis, &Stop::default())?;
     let system = filters::lifted(&realised.filters, problem.ratio)?;
     whole_error(&LiftedPlant::new(problem)?, &Filters::StateSpace(system))
 }

@@ -93,15 +93,23 @@ impl Options<'_> {
 /// Designs the bank that `spec` asks for, with the proof of its gammas. `options` say how.
 ///
 /// A design that reaches its time limit or is ended by [`Options::stop`] gives the best bank so far, whose
-/// gamma may lie above the least; [`Design::proof`] is then [`DesignError::Stopped`].
+/// gamma may lie above the least; [`Design::proof`] is then [`DesignError::Stopped`]. It ends between two
+/// steps of its searches; a single equation or norm is computed to its end.
 ///
 /// # Errors
 /// [`DesignError`] if the spec breaks a rule of [`Spec::check`], a filter of the spec is not a valid front
-/// end, a comparison method does not apply, the design would take more than ten minutes or more memory than
-/// there is, or no bank was found for numerical reasons or before the end. A bank without a proof is not an
-/// error: see [`Design::proof`].
+/// end, a comparison method does not apply, the design would take longer than its limit or more memory than
+/// there is, no bank was found for numerical reasons, or the design was ended before there was one:
+/// [`DesignError::StoppedWithoutBank`]. A bank without a proof is not an error: see [`Design::proof`].
 pub fn design(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
     spec.check()?;
+    designed(spec, options).map_err(|error| match error {
+        DesignError::Stopped => DesignError::StoppedWithoutBank { remedy: effort::remedy(spec) },
+        other => other,
+    })
+}
+
+fn designed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
     let stop = options.stop.within(options.limits);
     let (complete, problem, seconds) = complete(spec, options, &stop)?;
     (options.observer)(Stage::Filters, seconds);
@@ -114,13 +122,13 @@ pub fn design(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError>
     let plant = LiftedPlant::new(&merged.problem)?;
     let synthesis = methods::synthesise(spec.design.method, &plant, &settings)?;
     (options.observer)(Stage::Realisation, seconds);
-    let realised = realise(&complete, &problem, &merged, &plant, &synthesis)?;
+    let realised = realise(&complete, &problem, &merged, &plant, &synthesis, &stop)?;
     let judged = judge(spec, complete, realised, &synthesis).without_unresolved_bounds(&problem);
     if stop.is_due() {
         return Ok(Design { proof: Err(DesignError::Stopped), ..judged });
     }
     (options.observer)(Stage::Proof, seconds);
-    Ok(judged.proved(&synthesis.dual, options.proof))
+    Ok(judged.proved(&synthesis.dual, options.proof, &stop))
 }
 
 /// Judges FIR filters that were designed elsewhere, `taps[i][n]` = `f_i[n]`, with the front ends, the delays
@@ -147,9 +155,11 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
     let filters = SynthesisFilters::Fir(taps);
     let rounding = plant.rounding(&filters::lifted(&filters, problem.ratio)?)?;
     let realised = Realised { filters, peak: synthesis.peak, rounding, reduction: None, integers: None };
-    Ok(judge(&complete, complete.clone(), realised, &synthesis)
-        .without_unresolved_bounds(&problem)
-        .proved(&DualSolution::default(), search))
+    Ok(judge(&complete, complete.clone(), realised, &synthesis).without_unresolved_bounds(&problem).proved(
+        &DualSolution::default(),
+        search,
+        &Stop::default(),
+    ))
 }
 
 /// The spec with all defaults filled in, its problem in normalised time, and the estimate of its design in
@@ -218,13 +228,13 @@ impl Design {
     }
 
     /// Adds the proof to the bank, if `search` asks for one and it is found.
-    fn proved(mut self, dual: &DualSolution, search: ProofSearch) -> Self {
+    fn proved(mut self, dual: &DualSolution, search: ProofSearch, stop: &Stop) -> Self {
         if search == ProofSearch::Run {
             let begin = Instant::now();
-            self.proof = prove::attach_proof(&mut self.bank, dual);
+            self.proof = prove::attach_proof(&mut self.bank, dual, stop);
             if self.proof.is_ok() {
                 // `verify` proves it only with the rest.
-                self.prove_worst_case();
+                self.prove_worst_case(stop);
             }
             self.proof_time = begin.elapsed();
         }
@@ -234,9 +244,11 @@ impl Design {
 
 impl Design {
     /// States the worst case over the box of the spec, or says why there is none.
-    fn prove_worst_case(&mut self) {
+    fn prove_worst_case(&mut self, stop: &Stop) {
         let mut gamma = self.bank.gamma;
-        let proven = if let Some(study) = &self.robust {
+        let proven = if stop.is_due() && (self.robust.is_some() || self.tracking.is_some()) {
+            Err(DesignError::Stopped)
+        } else if let Some(study) = &self.robust {
             let proven = proven_worst_case(&self.bank, &study.errors, Taps::Fixed);
             gamma.worst_case = proven.as_ref().ok().copied();
             proven

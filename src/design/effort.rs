@@ -7,7 +7,7 @@
 
 use super::DesignError;
 use super::error_grid::{FINE, coarse_intervals};
-use super::limits::{Effort, Limits, MAX_LONG_STATES, TIME_LIMIT};
+use super::limits::{Effort, Limits, MAX_LONG_STATES};
 use super::merging::Repeats;
 use super::methods::fir_kyp::MAX_STATES;
 use super::methods::{Deviations, scenarios::RobustProblem};
@@ -74,23 +74,25 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
     Ok(Effort { bytes: effort.bytes + BASE_BYTES, ..effort })
 }
 
-/// Refuses what cannot end in ten minutes or needs more memory than is free.
+/// Refuses what cannot end in time or needs more memory than is free.
 ///
 /// # Errors
 /// [`DesignError::TooLong`] or [`DesignError::TooLarge`], with the figures and the way out.
 pub(super) fn check(spec: &Spec, proving: bool, limits: Limits) -> Result<Effort, DesignError> {
     let (effort, memory) = (estimate(spec, proving)?, available_memory());
     let remedy = remedy(spec);
-    match (limits, memory) {
-        (Limits::Off, _) => Ok(effort),
+    match (limits.time(), memory) {
+        (None, _) => Ok(effort),
         (_, Some(memory)) if effort.bytes > memory => Err(DesignError::TooLarge { effort, memory, remedy }),
-        _ if effort.seconds > TIME_LIMIT.as_secs_f64() => Err(DesignError::TooLong { effort, remedy }),
+        (Some(limit), _) if effort.seconds > limit.as_secs_f64() => {
+            Err(DesignError::TooLong { effort, limit, remedy })
+        }
         _ => Ok(effort),
     }
 }
 
-/// The way out.
-fn remedy(spec: &Spec) -> &'static str {
+/// What makes the design of a spec shorter.
+pub fn remedy(spec: &Spec) -> &'static str {
     match spec.design.method {
         Method::Fir if spec.design.bits.is_some() => {
             "use fewer taps, leave out bits, take a smaller ratio or fewer channels"

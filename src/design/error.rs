@@ -1,6 +1,8 @@
 //! Errors of design and analysis.
 
-use super::limits::{Effort, MAX_LONG_STATES, MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, memory_text};
+use super::limits::{
+    Effort, MAX_LONG_STATES, MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, memory_text, time_text,
+};
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
 use crate::lmi::LmiError;
@@ -9,6 +11,7 @@ use crate::sampling::SamplingError;
 use crate::spec::SpecProblem;
 use crate::units::FastPeriods;
 use crate::verify::VerifyError;
+use std::time::Duration;
 
 /// Why a bank could not be designed or analysed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -68,6 +71,12 @@ pub enum DesignError {
          least"
     )]
     Stopped,
+    /// The time limit or the caller ended the design before it had a bank.
+    #[error("the design was ended before it had a bank: {remedy}")]
+    StoppedWithoutBank {
+        /// The way out.
+        remedy: &'static str,
+    },
     /// The error system is too large for the search for a proof.
     #[error("a proof is looked for up to {limit} states of the error system, this bank's has {states}")]
     NotSearched {
@@ -184,11 +193,13 @@ pub enum DesignError {
         /// The longest of them.
         taps: usize,
     },
-    /// The design would take longer than ten minutes.
-    #[error("this design would take about {effort}, and ten minutes are allowed: {remedy}")]
+    /// The design would take longer than its limit.
+    #[error("this design would take about {effort}, and {} are allowed: {remedy}", time_text(*.limit))]
     TooLong {
         /// The estimate.
         effort: Effort,
+        /// The time that it may take.
+        limit: Duration,
         /// The way out.
         remedy: &'static str,
     },

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// A design whose estimate is longer is refused, and one that takes longer ends with what it has.
+/// The usual limit: a design whose estimate is longer is refused, and one that takes longer ends with what
+/// it has.
 pub const TIME_LIMIT: Duration = Duration::from_secs(600);
 
 /// Operations per second of factorisations and products of large real matrices on one core
@@ -22,15 +23,27 @@ pub(super) const MOST_STATES_AT_106_BITS: usize = 96;
 /// The same for 512 bits.
 pub(super) const MOST_STATES_AT_512_BITS: usize = 40;
 
-/// Whether a design is refused when its estimate exceeds [`TIME_LIMIT`] or the free memory, and ended at
-/// that time.
+/// Whether a design is refused when its estimate exceeds a time or the free memory, and ended at that time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Limits {
-    /// It is.
+    /// It is, at [`TIME_LIMIT`].
     #[default]
     Enforced,
+    /// It is, at another time.
+    Within(Duration),
     /// It runs all the same.
     Off,
+}
+
+impl Limits {
+    /// The time, if there is a limit.
+    pub fn time(self) -> Option<Duration> {
+        match self {
+            Self::Enforced => Some(TIME_LIMIT),
+            Self::Within(time) => Some(time),
+            Self::Off => None,
+        }
+    }
 }
 
 /// A step of a design that may take long.
@@ -80,9 +93,9 @@ impl Stop {
         self.asked.load(Ordering::Relaxed) || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 
-    /// The same, due after [`TIME_LIMIT`] as well where the limits hold.
+    /// The same, due after the time of the limits as well where they hold.
     pub(super) fn within(&self, limits: Limits) -> Self {
-        let deadline = (limits == Limits::Enforced).then(|| Instant::now() + TIME_LIMIT);
+        let deadline = limits.time().and_then(|time| Instant::now().checked_add(time));
         Self { deadline, asked: Arc::clone(&self.asked) }
     }
 }
@@ -108,13 +121,19 @@ impl Effort {
     }
 }
 
+const TIMES: [(f64, &str); 5] =
+    [(1e-3, "ms"), (1.0, "seconds"), (60.0, "minutes"), (3600.0, "hours"), (86_400.0, "days")];
+
 impl fmt::Display for Effort {
     /// "35 minutes and 8.7 GB", to two digits.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let times =
-            [(1e-3, "ms"), (1.0, "seconds"), (60.0, "minutes"), (3600.0, "hours"), (86_400.0, "days")];
-        write!(f, "{} and {}", rounded(self.seconds, &times), memory_text(self.bytes))
+        write!(f, "{} and {}", rounded(self.seconds, &TIMES), memory_text(self.bytes))
     }
+}
+
+/// So long, to two digits.
+pub(super) fn time_text(time: Duration) -> String {
+    rounded(time.as_secs_f64(), &TIMES)
 }
 
 /// So many bytes, to two digits.

@@ -33,6 +33,7 @@ pub use analysis::{
 };
 pub use choices::latency;
 pub use designer::{Design, Options, ProofSearch, design, judge_taps};
+pub use effort::remedy;
 pub use error::DesignError;
 pub use limits::{Effort, Limits, Stage, Stop, TIME_LIMIT};
 pub use methods::robust_fir::RobustStudy;
@@ -55,5 +56,5 @@ use crate::verify::Verified;
 /// # Errors
 /// As [`analyze`]; [`DesignError::NotCertified`] if no certificate was found.
 pub fn prove(bank: &Bank) -> Result<(Proof, Verified), DesignError> {
-    prove::prove(bank, &bank.gamma, &methods::DualSolution::default())
+    prove::prove(bank, &bank.gamma, &methods::DualSolution::default(), &Stop::default())
 }

@@ -2,6 +2,7 @@
 //! reduces the order or quantises the taps if the spec asks for it, and chooses the realisation that runs
 //! fastest.
 
+use super::limits::Stop;
 use super::merging::{MergedChannels, Repeats};
 use super::methods::{Filters, Synthesis};
 use super::plant::LiftedPlant;
@@ -36,6 +37,7 @@ impl Realised {
 }
 
 /// Extends the filters of `synthesis`, designed for the `merged` channels, to all channels of `problem`.
+/// When `stop` is due, the searches end with the best that they have.
 ///
 /// # Errors
 /// [`DesignError`] if the order reduction, the quantisation or the norm fails.
@@ -45,9 +47,10 @@ pub(super) fn realise(
     merged: &MergedChannels,
     merged_plant: &LiftedPlant,
     synthesis: &Synthesis,
+    stop: &Stop,
 ) -> Result<Realised, DesignError> {
     let whole = if merged.are_unchanged() { merged_plant.clone() } else { LiftedPlant::new(problem)? };
-    let realisation = Realisation { spec, problem, whole: &whole, merged };
+    let realisation = Realisation { spec, problem, whole: &whole, merged, stop };
     let realised = match &synthesis.filters {
         Filters::Fir(taps) => realisation.with_integers(realisation.fir(taps, synthesis.peak)?),
         Filters::StateSpace(system) => realisation.state_space(system, synthesis.peak.gain),
@@ -63,6 +66,8 @@ struct Realisation<'a> {
     /// The plant of all channels.
     whole: &'a LiftedPlant,
     merged: &'a MergedChannels,
+    /// Ends the searches.
+    stop: &'a Stop,
 }
 
 impl Realisation<'_> {
@@ -83,6 +88,7 @@ impl Realisation<'_> {
             taps,
             noise: &self.whole.problem().noise,
             gamma_margin: self.spec.design.gamma_margin.unwrap_or(0.0),
+            stop: self.stop,
         };
         let (integers, study) = quantise(problem, real.peak.gain, bits, self.spec.design.fraction_bits)?;
         let evaluated = evaluate(self.whole, SynthesisFilters::Fir(integers.taps()))?;
@@ -109,6 +115,7 @@ impl Realisation<'_> {
             width: self.whole.channels(),
             aim: if self.spec.design.method == Method::H2 { Aim::MeanSquare } else { Aim::WorstCase },
             gamma_margin: self.spec.design.gamma_margin.unwrap_or(0.0),
+            stop: self.stop,
         };
         let (smaller, record) = reduce(&problem, reduction)?;
         let evaluated = match smaller {

@@ -110,7 +110,68 @@ fn a_design_that_is_ended_before_it_has_a_bank_says_so() {
     open.latency = None;
     let options = Options::default();
     options.stop.now();
-    assert_eq!(design(&open, &options).err(), Some(DesignError::Stopped));
+    let refused = design(&open, &options).unwrap_err();
+    assert!(matches!(refused, DesignError::StoppedWithoutBank { .. }), "{refused}");
+    assert!(refused.to_string().ends_with("use fewer taps, a smaller ratio or fewer channels"), "{refused}");
+}
+
+/// Every search ends when it is told to: those of the filters, of fewer states, of integers and of the
+/// proof. The bank is whole, and no better than the complete one.
+#[test]
+fn a_design_ends_at_every_stage_with_a_bank() {
+    let designs = [
+        "method = \"fir\", taps = 22",
+        "method = \"fir\", taps = 22, bits = 9",
+        "method = \"iir\"",
+        "method = \"iir\", order = 4",
+        "method = \"iir\", reduction_loss_db = 0.5",
+        "method = \"h2\"",
+    ];
+    for text in designs {
+        let spec = spec(text, THESIS);
+        let complete = design(&spec, &Options::without_proof()).unwrap().bank;
+        for last in [Stage::Filters, Stage::Realisation, Stage::Proof] {
+            let stop = Stop::default();
+            let observer = |stage, _| {
+                if stage == last {
+                    stop.now()
+                }
+            };
+            let options = Options { observer: &observer, stop: stop.clone(), ..Options::default() };
+            let ended = design(&spec, &options).unwrap();
+            assert_eq!(ended.proof, Err(DesignError::Stopped), "{text} {last}");
+            assert_eq!(ended.bank.check(), Ok(()), "{text} {last}");
+            let [norm, least] = [&ended.bank, &complete].map(|bank| bank.gamma.norm.unwrap());
+            assert!(
+                norm < 0.5 && (text.contains("h2") || norm >= least * (1.0 - 1e-6)),
+                "{text} {last}: {norm} {least}"
+            );
+            if let (SynthesisFilters::StateSpace(block), true) = (&ended.bank.filters, text.contains("order"))
+            {
+                assert!(block.a.len() <= 4, "{text} {last}");
+            }
+        }
+    }
+}
+
+/// The limit is one of the time that passes, not of the estimate.
+#[test]
+fn a_design_that_takes_longer_than_its_limit_is_ended() {
+    let limit = Duration::from_secs(3);
+    let spec = spec("method = \"fir\", taps = 22", THESIS);
+    let late = |stage, seconds: f64| {
+        assert!(seconds < limit.as_secs_f64(), "the estimate is within the limit: {seconds}");
+        if stage == Stage::Filters {
+            std::thread::sleep(limit);
+        }
+    };
+    let options = Options { observer: &late, limits: Limits::Within(limit), ..Options::default() };
+    assert_eq!(design(&spec, &options).unwrap().proof, Err(DesignError::Stopped));
+    let unlimited = Options { limits: Limits::Off, ..Options::default() };
+    assert!(design(&spec, &unlimited).unwrap().proof.is_ok());
+    let short = Options { limits: Limits::Within(Duration::from_millis(2)), ..Options::default() };
+    let refused = design(&spec, &short).unwrap_err();
+    assert!(refused.to_string().contains("and 2.0 ms are allowed: use fewer taps"), "{refused}");
 }
 
 /// 66 taps may be bound by 67 directions; with 64 of them the proven lower end was 9e-4 below. With

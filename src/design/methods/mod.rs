@@ -167,7 +167,7 @@ pub(crate) fn synthesise(
             Some(deviations) => averaged_fir::synthesise(plant, settings.taps, deviations),
             None => mean_square_fir::synthesise(plant, settings),
         },
-        Method::H2 => h2::synthesise(plant),
+        Method::H2 => h2::synthesise(plant, &settings.stop),
         Method::Sinc => comparison::sinc(plant, settings),
         Method::Separation => comparison::separation(plant, settings),
     }

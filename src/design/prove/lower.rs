@@ -10,8 +10,9 @@
 use super::witness;
 use crate::arithmetic::{BigFloat, Number, dense};
 use crate::bank::{Bank, CausalWitness, DualWitness, LowerProof, SynthesisFilters};
+use crate::design::limits::Stop;
 use crate::design::merging::Repeats;
-use crate::design::methods::DualPoint;
+use crate::design::methods::{DualPoint, DualSolution};
 use crate::design::plant::LiftedPlant;
 use crate::design::{DesignError, analysis};
 use crate::linalg::{self, CMat, Complex, Mat, power_of_two};
@@ -59,16 +60,18 @@ const LONG_BISECTIONS: usize = 6;
 pub(super) fn lower_proof(
     error: &EnclosedErrorSystem<'_>,
     bank: &Bank,
-    dual: &[DualPoint],
+    dual: &DualSolution,
     wanted: Option<f64>,
     interval: (f64, f64),
+    stop: &Stop,
 ) -> Result<Option<LowerProof>, DesignError> {
+    let dual = &dual.points[..];
     let bound = bank.method == Method::Fir && !dual.is_empty();
     let mut witnesses = if bound { binding_witnesses(bank, dual)? } else { Vec::new() };
     let mut reached = error.fir_bound(&witnesses).unwrap_or(0.0);
     let suffices = |reached: f64| wanted.is_none_or(|wanted| reached >= wanted);
     for ridge in RIDGES.into_iter().filter(|_| bound) {
-        if suffices(reached) {
+        if suffices(reached) || stop.is_due() {
             break;
         }
         let longer = long_witnesses(error, bank, dual, ridge)?.unwrap_or_default();
@@ -79,7 +82,7 @@ pub(super) fn lower_proof(
     }
     let enough =
         suffices(reached) || (error.states() > MANY_STATES && reached >= interval.1 * (1.0 - CLOSE_BOUND));
-    let causal = if reached > interval.0 && enough { None } else { causal_witness(error, interval) };
+    let causal = if reached > interval.0 && enough { None } else { causal_witness(error, interval, stop) };
     Ok(match causal {
         Some(witness) if witness.gamma > reached => Some(LowerProof::Causal(witness)),
         _ => (reached > interval.0).then_some(LowerProof::Fir(witnesses)),
@@ -378,8 +381,15 @@ fn pairs(count: usize) -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// The largest gamma found in the interval that no causal bank achieves.
-fn causal_witness(error: &EnclosedErrorSystem<'_>, (lower, upper): (f64, f64)) -> Option<CausalWitness> {
+fn causal_witness(
+    error: &EnclosedErrorSystem<'_>,
+    (lower, upper): (f64, f64),
+    stop: &Stop,
+) -> Option<CausalWitness> {
     let refuted = |gamma: f64, precision: Precision| {
+        if stop.is_due() {
+            return None;
+        }
         let limit = if precision == Precision::Short { SHORT_PERIODS } else { LONG_PERIODS };
         match error.causal_recursion(gamma, limit, precision) {
             Recursion::Refuted { periods } => Some(CausalWitness { gamma, periods }),

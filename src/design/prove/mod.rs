@@ -4,6 +4,7 @@
 mod lower;
 mod upper;
 
+use super::limits::Stop;
 use super::merging::Repeats;
 use super::methods::DualSolution;
 use super::plant::LiftedPlant;
@@ -40,7 +41,7 @@ pub struct Certified {
 /// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found.
 pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {
     let error = EnclosedErrorSystem::new(bank)?;
-    let upper = certificate(&error, bank)?;
+    let upper = certificate(&error, bank, &Stop::default())?;
     let proof = Proof { upper: Some(upper), ..Proof::default() };
     let Verified { upper, attained, states, .. } =
         error.judge(&bank.gamma, &proof, Strictness::NotRefuted)?;
@@ -54,14 +55,16 @@ pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {
 ///
 /// # Errors
 /// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found;
-/// [`DesignError::Verify`] if the proof refutes the stated gamma.
+/// [`DesignError::Verify`] if the proof refutes the stated gamma; [`DesignError::Stopped`] if `stop` ended
+/// the search.
 pub(crate) fn prove(
     bank: &Bank,
     stated: &Gamma,
     dual: &DualSolution,
+    stop: &Stop,
 ) -> Result<(Proof, Verified), DesignError> {
     let error = EnclosedErrorSystem::new(bank)?;
-    let upper = certificate(&error, bank)?;
+    let upper = certificate(&error, bank, stop)?;
     let witness = noncausal_witness(bank)?;
     let noncausal = error.noncausal_bound(&witness);
     let above = noncausal.unwrap_or(0.0);
@@ -69,7 +72,10 @@ pub(crate) fn prove(
     let wanted = bank.gamma.lower.map(|stated| stated.max(dual.bound) * (1.0 - SHORTFALL));
     let explained = wanted.is_some_and(|wanted| above >= wanted);
     let interval = (above, upper.gamma);
-    let lower = if explained { None } else { lower_proof(&error, bank, &dual.points, wanted, interval)? };
+    let lower = if explained { None } else { lower_proof(&error, bank, dual, wanted, interval, stop)? };
+    if stop.is_due() {
+        return Err(DesignError::Stopped);
+    }
     let proof = Proof { upper: Some(upper), lower, noncausal: noncausal.map(|_| witness) };
     let verified = error.judge(stated, &proof, Strictness::NotRefuted)?;
     Ok((proof, verified))
@@ -80,8 +86,12 @@ pub(crate) fn prove(
 ///
 /// # Errors
 /// As [`prove`]; `bank` is then unchanged.
-pub(crate) fn attach_proof(bank: &mut Bank, dual: &DualSolution) -> Result<Verified, DesignError> {
-    let (proof, verified) = prove(bank, &Gamma::default(), dual)?;
+pub(crate) fn attach_proof(
+    bank: &mut Bank,
+    dual: &DualSolution,
+    stop: &Stop,
+) -> Result<Verified, DesignError> {
+    let (proof, verified) = prove(bank, &Gamma::default(), dual, stop)?;
     let stated = |proven: f64| Some(proven * (1.0 - STATED_BELOW));
     bank.gamma = Gamma {
         norm: bank.gamma.norm.map(|norm| norm.max(verified.attained).min(verified.upper)),

@@ -9,7 +9,7 @@ use crate::arithmetic::dense::{cholesky, product, riccati_limit, select, solve, 
 use crate::arithmetic::{BigFloat, Number};
 use crate::bank::{Bank, Certificate, DualWitness};
 use crate::design::DesignError;
-use crate::design::limits::MAX_LONG_STATES;
+use crate::design::limits::{MAX_LONG_STATES, Stop};
 use crate::linalg::{self, Complex, Mat, power_of_two};
 use crate::lti::gramian::{controllability_root, observability_root};
 use crate::lti::peak::hinf_norm;
@@ -47,8 +47,12 @@ const STATE_NOISE: f64 = 0.1;
 /// Relative excess of a stated norm over the one computed here that counts as rounding.
 const SAME_NORM: f64 = 1e-6;
 
-/// The certificate with the least gamma, of those tried, that passes.
-pub(super) fn certificate(error: &EnclosedErrorSystem<'_>, bank: &Bank) -> Result<Certificate, DesignError> {
+/// The certificate with the least gamma, of those tried until `stop` is due, that passes.
+pub(super) fn certificate(
+    error: &EnclosedErrorSystem<'_>,
+    bank: &Bank,
+    stop: &Stop,
+) -> Result<Certificate, DesignError> {
     if error.states() > MAX_SEARCHED_STATES {
         return Err(DesignError::NotSearched { states: error.states(), limit: MAX_SEARCHED_STATES });
     }
@@ -69,21 +73,27 @@ pub(super) fn certificate(error: &EnclosedErrorSystem<'_>, bank: &Bank) -> Resul
     let search = Search { error, units: &units, middle: &middle, peak: peak_witness };
     let level = |excess: &f64| Level { norm, excess: excess * norm.max(floor) };
     let mut failure = None;
-    let mut in_doubles = |excess: &f64| match search.in_doubles(level(excess)) {
-        Ok(found) => found,
-        Err(failed) => {
+    let mut in_doubles = |excess: &f64| {
+        if stop.is_due() {
+            return None;
+        }
+        search.in_doubles(level(excess)).unwrap_or_else(|failed| {
             failure.get_or_insert(Box::new(failed));
             None
-        }
+        })
     };
-    let long = || LONG_EXCESSES.iter().find_map(|excess| search.in_512_bits(level(excess)));
+    let long = || {
+        let mut excesses = LONG_EXCESSES.iter().take_while(|_| !stop.is_due());
+        excesses.find_map(|excess| search.in_512_bits(level(excess)))
+    };
     let is_zero = norm <= floor;
     let (fine, coarse) =
         if is_zero { (&FLOOR_EXCESSES[..], &[][..]) } else { EXCESSES.split_at(FINE_EXCESSES) };
     let found = fine.iter().find_map(&mut in_doubles).or_else(long);
-    found
-        .or_else(|| coarse.iter().find_map(&mut in_doubles))
-        .ok_or(DesignError::NotCertified { states, failure })
+    found.or_else(|| coarse.iter().find_map(&mut in_doubles)).ok_or_else(|| match stop.is_due() {
+        true => DesignError::Stopped,
+        false => DesignError::NotCertified { states, failure },
+    })
 }
 
 /// A gamma that is tried.

@@ -3,6 +3,7 @@
 use super::lattice::Span;
 use crate::design::DesignError;
 use crate::design::error_grid::error_at;
+use crate::design::limits::Stop;
 use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lmi::sampled::Point;
 
@@ -61,11 +62,11 @@ impl<'a> Descent<'a> {
 
     /// Descends until no move helps, or the relative excess over gamma of the real taps is at most
     /// `negligible`.
-    pub(super) fn run(mut self, negligible: f64) -> Result<Vec<Vec<f64>>, DesignError> {
+    pub(super) fn run(mut self, negligible: f64, stop: &Stop) -> Result<Vec<Vec<f64>>, DesignError> {
         let floor = self.real * (1.0 + negligible);
         for _ in 0..ROUNDS {
-            while self.worst > floor && self.sweep()? {}
-            if self.worst <= floor || !self.pairs()? {
+            while self.worst > floor && !stop.is_due() && self.sweep()? {}
+            if self.worst <= floor || stop.is_due() || !self.pairs()? {
                 break;
             }
         }

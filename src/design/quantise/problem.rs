@@ -5,6 +5,7 @@ use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::design::error_grid::ErrorGrid;
 use crate::design::filters::polyphase;
+use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
 use crate::lmi::sampled::Point;
 
@@ -19,6 +20,8 @@ pub struct QuantisationProblem<'a> {
     pub noise: &'a [f64],
     /// Relative excess of gamma granted to the mean square.
     pub gamma_margin: f64,
+    /// Ends the search with the best integers so far.
+    pub stop: &'a Stop,
 }
 
 /// Integer taps with their error.

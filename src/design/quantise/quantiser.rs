@@ -80,7 +80,8 @@ impl<'a> Quantiser<'a> {
         if fraction_bits.is_none() && finest < MAX_FRACTION_BITS {
             found.extend(Search::new(self.error.problem.taps, &self.error, bits, finest + 1).run()?);
         }
-        if least_gamma(&found) > self.error.real_gamma * (1.0 + LOSS_FOR_MORE_SCALES) {
+        let is_worse = least_gamma(&found) > self.error.real_gamma * (1.0 + LOSS_FOR_MORE_SCALES);
+        if is_worse && !self.error.problem.stop.is_due() {
             match fraction_bits {
                 None => self.search_finer_scales(bits, finest, &mut found)?,
                 Some(scale) => self.search_few_taps(bits, scale..=scale, &mut found)?,

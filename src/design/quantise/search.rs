@@ -62,7 +62,7 @@ impl<'a> Search<'a> {
         let lags = polyphase(&start.taps(), self.error.ratio);
         let real = self.error.real_gamma;
         let descent = Descent::new(points, &self.spans, start.step(), integers, &lags, real)?;
-        Ok(self.fixed_point(&descent.run(NEGLIGIBLE_LOSS)?))
+        Ok(self.fixed_point(&descent.run(NEGLIGIBLE_LOSS, self.error.problem.stop)?))
     }
 
     /// All taps zero.
@@ -83,7 +83,7 @@ impl<'a> Search<'a> {
     fn reweighted(&self, found: &mut Vec<Candidate>) -> Result<(), DesignError> {
         let real = self.error.real_gamma;
         let mut weights = vec![1.0; self.error.points.len()];
-        for _ in 0..ROUNDS {
+        for _ in (0..ROUNDS).take_while(|_| !self.error.problem.stop.is_due()) {
             let candidate = self.error.candidate(self.fixed_point(&self.closest(&weights)?))?;
             let lags = polyphase(&candidate.fixed_point.taps(), self.error.ratio);
             let excess_of_worst = candidate.gamma - real;

@@ -5,8 +5,11 @@ use crate::bank::SynthesisFilters;
 use crate::design::error_grid::ErrorGrid;
 use crate::design::filters::polyphase;
 use crate::design::plant::LiftedPlant;
-use crate::design::{Options, Problem, design};
+use crate::design::{Options, Problem, Stop, design};
 use crate::spec::{MAX_FRACTION_BITS, Spec};
+use std::sync::LazyLock;
+
+static NEVER: LazyLock<Stop> = LazyLock::new(Stop::default);
 
 const THESIS: &str = include_str!("../../../filters/thesis-fir.toml");
 
@@ -19,7 +22,7 @@ fn optimum(spec: &str) -> (LiftedPlant, Vec<Vec<f64>>) {
 }
 
 fn problem<'a>(plant: &'a LiftedPlant, taps: &'a [Vec<f64>]) -> QuantisationProblem<'a> {
-    QuantisationProblem { plant, taps, noise: &[], gamma_margin: 0.0 }
+    QuantisationProblem { plant, taps, noise: &[], gamma_margin: 0.0, stop: &NEVER }
 }
 
 fn quantiser<'a>(plant: &'a LiftedPlant, taps: &'a [Vec<f64>]) -> Result<Quantiser<'a>, DesignError> {

@@ -19,6 +19,7 @@ mod plant_samples;
 mod pole_refinement;
 
 use crate::design::DesignError;
+use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
 use crate::lti::{FirWithTail, StateSpace};
 use crate::spec::Reduction;
@@ -49,6 +50,8 @@ pub struct ReductionProblem<'a> {
     pub aim: Aim,
     /// Relative excess of gamma granted to the mean square.
     pub gamma_margin: f64,
+    /// Ends the search with the best banks so far.
+    pub stop: &'a Stop,
 }
 
 /// The error of a bank in normalised time (h = 1).

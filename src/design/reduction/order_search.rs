@@ -81,7 +81,7 @@ impl<'a> OrderSearch<'a> {
     /// The order of the best bank of at most `order` states.
     pub(super) fn at_most(&mut self, order: usize) -> Result<usize, DesignError> {
         if self.is_cheap() {
-            (0..self.problem.order).try_for_each(|order| self.visit(order))?;
+            self.visit_all()?;
         }
         if order >= self.problem.order {
             return Ok(self.problem.order);
@@ -102,7 +102,7 @@ impl<'a> OrderSearch<'a> {
         let allowed = db + ROUNDING_DB;
         let mut order = if self.is_cheap() { self.first_within(allowed)? } else { self.bisect(allowed)? };
         // Pole refinement may bring a smaller order within the loss.
-        while order > 0 {
+        while order > 0 && !self.problem.stop.is_due() {
             self.visit(order - 1)?;
             self.refine_poles(order - 1)?;
             if self.loss_of(order - 1) > allowed {
@@ -124,15 +124,21 @@ impl<'a> OrderSearch<'a> {
         (plant.ratio() * (order + plant.channels())) as f64
     }
 
+    /// Every order below the full one, unless the search is ended.
+    fn visit_all(&mut self) -> Result<(), DesignError> {
+        let stop = self.problem.stop;
+        (0..self.problem.order).take_while(|_| !stop.is_due()).try_for_each(|order| self.visit(order))
+    }
+
     fn first_within(&mut self, allowed: f64) -> Result<usize, DesignError> {
-        (0..self.problem.order).try_for_each(|order| self.visit(order))?;
+        self.visit_all()?;
         let within = |order: &usize| self.loss_of(*order) <= allowed;
         Ok((0..self.problem.order).find(within).unwrap_or(self.problem.order))
     }
 
     fn bisect(&mut self, allowed: f64) -> Result<usize, DesignError> {
         let (mut low, mut high) = (0, self.problem.order);
-        while low < high {
+        while low < high && !self.problem.stop.is_due() {
             let middle = low + (high - low) / 2;
             self.visit(middle)?;
             if self.loss_of(middle) <= allowed { high = middle } else { low = middle + 1 }
@@ -224,6 +230,9 @@ impl<'a> OrderSearch<'a> {
     /// truncation and, as far as the effort allows, from random poles.
     fn refine_poles(&mut self, order: usize) -> Result<(), DesignError> {
         let Some(truncation) = self.banks.get(&order) else { return Ok(()) };
+        if self.problem.stop.is_due() {
+            return Ok(());
+        }
         if self.merit(&truncation.figures) <= self.merit(&self.full).max(self.zero) {
             return Ok(());
         }

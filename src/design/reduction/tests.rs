@@ -11,6 +11,9 @@ use crate::lti::gramian::balanced;
 use crate::lti::gramian::h2_norm;
 use crate::lti::peak::hinf_norm;
 use crate::spec::{Method, Spec};
+use std::sync::LazyLock;
+
+static NEVER: LazyLock<Stop> = LazyLock::new(Stop::default);
 
 /// The thesis example with other delays and latency.
 fn plant(latency: usize, delays: &str) -> LiftedPlant {
@@ -36,7 +39,7 @@ fn bank_of(method: Method, plant: &LiftedPlant) -> StateSpace {
 
 fn problem<'a>(plant: &'a LiftedPlant, bank: &'a StateSpace, aim: Aim) -> ReductionProblem<'a> {
     let order = FirWithTail::new(bank).unwrap().realise().unwrap().order();
-    ReductionProblem { plant, bank, order, width: plant.channels(), aim, gamma_margin: 0.0 }
+    ReductionProblem { plant, bank, order, width: plant.channels(), aim, gamma_margin: 0.0, stop: &NEVER }
 }
 
 fn error(plant: &LiftedPlant, bank: &StateSpace) -> StateSpace {
