@@ -139,13 +139,12 @@ fn expected_type(name: &str) -> String {
 
 /// The value that serde found.
 fn found_value(found: &str) -> String {
-    let number = |text: &str| text.trim_matches('`').parse().map(Number);
     match found.split_once([' ', '`']).unwrap_or((found, "")) {
         ("string", text) => format!("the text {}", Quoted(text)),
         ("integer", digits) => Quoted(digits.trim_matches('`')).to_string(),
         ("floating", point) => {
-            let text = point.trim_start_matches("point ");
-            number(text).map_or_else(|_| Quoted(text).to_string(), |number| number.to_string())
+            let text = point.trim_start_matches("point ").trim_matches('`');
+            text.parse::<f64>().map_or_else(|_| Quoted(text).to_string(), |number| Number(number).to_string())
         }
         ("boolean", word) => word.trim_matches('`').to_owned(),
         ("map", _) => "a table".into(),
@@ -161,7 +160,7 @@ pub fn usage(text: &str, arguments: impl Iterator<Item = OsString>) -> String {
         let argument = argument.to_string_lossy();
         for part in [&*argument].into_iter().chain(argument.split(['=', ','])) {
             let quoted = Quoted(part).to_string();
-            if quoted != part {
+            if quoted != part && !part.trim().is_empty() {
                 text = text.replace(part, &quoted);
             }
         }

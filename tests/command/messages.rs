@@ -1,5 +1,6 @@
 //! Messages that once misled, one test each: they name what is wrong, where it is, and what to do.
 
+use crate::support::random::Random;
 use crate::support::{Desk, THESIS, wav};
 use std::process::Command;
 
@@ -150,8 +151,12 @@ fn a_folder_is_no_dataset() {
 #[test]
 fn a_tone_that_is_not_there_is_named_with_the_recordings() {
     let desk = Desk::with_spec(THESIS);
-    let tone = |phase: f32| (0..4000).map(|n| (0.7 * n as f32 + phase).sin() * 0.5).collect::<Vec<_>>();
-    wav::write_pair(&desk, &tone(0.0), &tone(0.4));
+    let mut dice = Random(7);
+    let mut tone = |phase: f64| -> Vec<f32> {
+        (0..4000).map(|n| (0.5 * (0.7 * f64::from(n) + phase).sin() + 1e-3 * dice.sample()) as f32).collect()
+    };
+    let (a, b) = (tone(0.0), tone(0.4));
+    wav::write_pair(&desk, &a, &b);
     let args = ["calibrate", "spec.toml", "a.wav", "b.wav", "-o", "out.toml", "--tone", "0.01Hz"];
     desk.refused(1, &args, &["a.wav, b.wav: no tone found near 0.01 Hz", "check the frequency"]);
     desk.refused(1, &["measure", "a.wav", "--tone", "7kHz"], &["a.wav: no tone found near 7000 Hz"]);

@@ -19,8 +19,8 @@ pub use write::{begin, encode, encode_levels, encode_with_alpha, save};
 
 use crate::files::InputError;
 use hybank::memory::{MemoryShortage, check_memory};
-use std::path::{Path, PathBuf};
 use hybank::messages::Quoted;
+use std::path::{Path, PathBuf};
 
 /// Errors of image files, and of images that do not fit together.
 #[derive(Debug, thiserror::Error)]

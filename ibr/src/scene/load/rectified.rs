@@ -1,10 +1,10 @@
 //! Scenes of a rectified rig: positions and disparities.
 
 use super::{Goal, Inputs, Loaded, Loader, each, pixels};
-use hybank::messages::Quoted;
 use crate::camera::middlebury::{Calibration, read_calibration};
 use crate::depth::Measure;
 use crate::scene::{Kind, SourceView, ViewSpec};
+use hybank::messages::Quoted;
 
 impl Loader<'_> {
     pub(super) fn rectified(
