@@ -1,9 +1,10 @@
 //! What may be wrong with the imports, one line each.
 
+use crate::api;
 use crate::imports::{File, Imports};
 use petgraph::{algo::tarjan_scc, graphmap::DiGraphMap};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The crates that ARCHITECTURE.md names, each with its folder. `hybank` is divided into rooms, the modules
 /// at its top; the other crates are rooms themselves.
@@ -33,18 +34,64 @@ fn allowed(text: &str) -> Result<BTreeMap<String, BTreeSet<String>>, String> {
     Ok(allowed)
 }
 
-/// Every fault of the workspace in this folder.
-pub(crate) fn faults(root: &Path) -> Result<Vec<String>, String> {
-    let rules = std::fs::read_to_string(root.join("ARCHITECTURE.md")).map_err(|error| error.to_string())?;
-    let mut imports = Imports::default();
+/// The crates that are there.
+fn read(root: &Path) -> Result<(Imports, Vec<&'static str>), String> {
+    let (mut imports, mut names) = (Imports::default(), Vec::new());
     for (name, folder) in CRATES {
         let path = root.join(folder).join("lib.rs");
         if path.is_file() {
             imports.read(&path, vec![name.to_owned()])?;
+            names.push(name);
         }
     }
+    Ok((imports, names))
+}
+
+/// Every fault of the workspace in this folder.
+pub(crate) fn faults(root: &Path) -> Result<Vec<String>, String> {
+    let rules = std::fs::read_to_string(root.join("ARCHITECTURE.md")).map_err(|error| error.to_string())?;
+    let (imports, names) = read(root)?;
+    let promised = names.iter().map(|name| differences(root, &imports, name)).collect::<Vec<_>>().concat();
     let checks = Checks { root, rules: allowed(&rules)?, arrows: imports.arrows(), files: imports.files };
-    Ok([checks.unnamed(), checks.forbidden(), checks.circles()].concat())
+    Ok([checks.unnamed(), checks.forbidden(), checks.circles(), promised].concat())
+}
+
+/// The list of what users of a crate can name.
+fn list(root: &Path, name: &str) -> PathBuf {
+    root.join("tools/arrows/api").join(name).with_extension("txt")
+}
+
+/// Writes the lists as the crates are now.
+pub(crate) fn accept(root: &Path) -> Result<Vec<String>, String> {
+    let (imports, names) = read(root)?;
+    for name in names {
+        let lines = api::listing(&imports, name).join("\n") + "\n";
+        let path = list(root, name);
+        std::fs::write(&path, lines).map_err(|error| format!("{}: {error}", path.display()))?;
+    }
+    Ok(Vec::new())
+}
+
+/// Where the public interface of a crate is not the one of its list.
+fn differences(root: &Path, imports: &Imports, name: &str) -> Vec<String> {
+    let path = list(root, name);
+    if path.parent().is_none_or(|folder| !folder.is_dir()) {
+        return Vec::new();
+    }
+    let listed = std::fs::read_to_string(path).unwrap_or_default();
+    let listed: BTreeSet<&str> = listed.lines().collect();
+    let found = api::listing(imports, name);
+    let found: BTreeSet<&str> = found.iter().map(String::as_str).collect();
+    let gone = listed.difference(&found).map(|line| format!("- {line}"));
+    let added = found.difference(&listed).map(|line| format!("+ {line}"));
+    let lines: Vec<String> = gone.chain(added).collect();
+    if lines.is_empty() {
+        return lines;
+    }
+    let remedy = format!(
+        "{name}: its public interface is not the listed one; if that is meant, `cargo run -p arrows accept`"
+    );
+    [vec![remedy], lines].concat()
 }
 
 struct Checks<'a> {
@@ -165,6 +212,58 @@ mod tests {
             found,
             ["b", "c"].map(|room| format!("{room} is not both a room and a rule of ARCHITECTURE.md"))
         );
+    }
+
+    #[test]
+    fn what_users_can_name_is_compared_with_its_list() {
+        let files = [
+            (
+                "src/a.rs",
+                "pub mod c { pub use super::d::*; pub struct S { pub x: u8, y: u8 } }\nmod d; pub use d::E as F;",
+            ),
+            (
+                "src/a/d.rs",
+                "/// E\n#[derive(Debug)] #[non_exhaustive] pub enum E { A, B { n: u8 } }\n\
+                impl E { pub fn f(\n&self,\nn: u8,\n) -> u8 { n } fn g() {} }\nimpl Clone for E {}",
+            ),
+            (
+                "src/b.rs",
+                "pub(crate) fn no() {} #[doc(hidden)] pub fn hidden() {} #[cfg(test)] pub fn test() {}\n\
+                pub trait T { const C: u8; fn f(&self) -> u8 { 1 } }\nm! { /// Of a macro.\n M, \"s\" }",
+            ),
+            ("tools/arrows/api/hybank.txt", "pub fn hybank::b::gone()\npub enum hybank::a::F\n"),
+        ];
+        let found = faults(&files);
+        let own = |path: &str| {
+            [
+                format!("+ #[non_exhaustive] hybank::a::{path}"),
+                format!("+ impl Clone for hybank::a::{path}"),
+                format!("+ impl Debug for hybank::a::{path}"),
+                format!("+ pub enum hybank::a::{path}"),
+                format!("+ pub fn hybank::a::{path}::f(&self, n: u8) -> u8"),
+                format!("+ pub hybank::a::{path}::A"),
+                format!("+ pub hybank::a::{path}::B {{ n: u8 }}"),
+            ]
+        };
+        let mut want = [own("F"), own("c::E")].concat();
+        want.retain(|line| line != "+ pub enum hybank::a::F");
+        want.extend(
+            [
+                "- pub fn hybank::b::gone()",
+                "+ m! hybank::b::M M,\"s\"",
+                "+ pub hybank::b::T::C: u8",
+                "+ pub fn hybank::b::T::f(&self) -> u8 { .. }",
+                "+ pub hybank::a::c::S::x: u8",
+                "+ pub struct hybank::a::c::S { .. }",
+                "+ pub trait hybank::b::T",
+            ]
+            .map(str::to_owned),
+        );
+        let mut lines = found[1..].to_vec();
+        want.sort();
+        lines.sort();
+        assert!(found[0].contains("cargo run -p arrows accept"), "{found:?}");
+        assert_eq!(lines, want);
     }
 
     #[test]

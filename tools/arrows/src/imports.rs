@@ -26,6 +26,7 @@ struct Module {
     /// The names that `use` brought in, with the path of each.
     used: HashMap<String, Vec<String>>,
     globs: Vec<Vec<String>>,
+    items: Vec<Item>,
 }
 
 #[derive(Default)]
@@ -44,7 +45,7 @@ impl Imports {
         let file = self.files.len();
         self.files.push(File { path: path.to_owned(), module: module.clone() });
         let mut reader = Reader { file, module: module.clone(), children: Vec::new(), imports: self };
-        reader.here();
+        reader.here().items.clone_from(&syntax.items);
         reader.visit_file(&syntax);
         let is_root = path.ends_with("mod.rs") || path.ends_with("lib.rs");
         let folder = if is_root { path.with_file_name("") } else { path.with_extension("") };
@@ -59,41 +60,66 @@ impl Imports {
     /// All pairs of a file and another one that it imports from.
     pub(crate) fn arrows(&self) -> BTreeSet<(usize, usize)> {
         let arrow = |import: &Import| {
-            let (module, is_item) = self.resolve(&import.module, &import.path, 0)?;
+            let (module, item) = self.resolve(&import.module, &import.path, 0)?;
             // The name of a module is no import yet: what is reached through it is.
             let to = self.modules[&module].file;
-            (import.file != to && (is_item || import.is_glob)).then_some((import.file, to))
+            (import.file != to && (item.is_some() || import.is_glob)).then_some((import.file, to))
         };
         self.imports.iter().filter_map(arrow).collect()
     }
 
-    /// The module to which a path leads that stands in a module, and whether it names something inside it;
-    /// `None` outside of the crates read.
-    fn resolve(&self, module: &[String], path: &[String], depth: usize) -> Option<(Vec<String>, bool)> {
+    /// The items of a module.
+    pub(crate) fn items(&self, module: &[String]) -> &[Item] {
+        self.modules.get(module).map_or(&[], |module| &module.items)
+    }
+
+    /// The items of all modules of a crate, each with its module.
+    pub(crate) fn all_items(&self, krate: &str) -> impl Iterator<Item = (&[String], &Item)> {
+        let modules = self.modules.iter().filter(move |(name, _)| name[0] == krate);
+        modules.flat_map(|(name, module)| module.items.iter().map(|item| (&**name, item)))
+    }
+
+    /// The module to which a path leads that stands in a module, and what the path names inside it.
+    pub(crate) fn leads_to(
+        &self,
+        module: &[String],
+        path: &[String],
+    ) -> Option<(Vec<String>, Option<String>)> {
+        self.resolve(module, path, 0)
+    }
+
+    /// The module to which a path leads that stands in a module, and what the path names inside it; `None`
+    /// outside of the crates read.
+    fn resolve(
+        &self,
+        module: &[String],
+        path: &[String],
+        depth: usize,
+    ) -> Option<(Vec<String>, Option<String>)> {
         // Names that `use` brings in may lead in circles.
         const DEEPEST: usize = 24;
         let (first, rest) = path.split_first().filter(|_| depth < DEEPEST)?;
         let start = match first.as_str() {
-            "crate" => (module[..1].to_vec(), false),
-            "self" => (module.to_vec(), false),
-            "super" => (module[..module.len() - 1].to_vec(), false),
+            "crate" => (module[..1].to_vec(), None),
+            "self" => (module.to_vec(), None),
+            "super" => (module[..module.len() - 1].to_vec(), None),
             _ => self.named(module, first, depth).or_else(|| {
-                self.modules.contains_key(std::slice::from_ref(first)).then(|| (vec![first.clone()], false))
+                self.modules.contains_key(std::slice::from_ref(first)).then(|| (vec![first.clone()], None))
             })?,
         };
-        Some(rest.iter().fold(start, |(path, is_item), name| match name.as_str() {
-            _ if is_item => (path, true),
-            "super" => (path[..path.len() - 1].to_vec(), false),
-            "self" => (path, false),
-            _ => self.named(&path, name, depth).unwrap_or((path, true)),
+        Some(rest.iter().fold(start, |(path, item), name| match name.as_str() {
+            _ if item.is_some() => (path, item),
+            "super" => (path[..path.len() - 1].to_vec(), None),
+            "self" => (path, None),
+            _ => self.named(&path, name, depth).unwrap_or_else(|| (path, Some(name.clone()))),
         }))
     }
 
     /// What a name in a module leads to: a module below, or what `use` brought in.
-    fn named(&self, module: &[String], name: &String, depth: usize) -> Option<(Vec<String>, bool)> {
+    fn named(&self, module: &[String], name: &String, depth: usize) -> Option<(Vec<String>, Option<String>)> {
         let child = [module, std::slice::from_ref(name)].concat();
         if self.modules.contains_key(&child) {
-            return Some((child, false));
+            return Some((child, None));
         }
         let Module { used, globs, .. } = self.modules.get(module)?;
         if let Some(target) = used.get(name) {
@@ -105,7 +131,7 @@ impl Imports {
             };
         }
         globs.iter().find_map(|glob| match self.resolve(module, glob, depth + 1)? {
-            (inside, false) if inside != module => self.named(&inside, name, depth + 1),
+            (inside, None) if inside != module => self.named(&inside, name, depth + 1),
             _ => None,
         })
     }
@@ -169,8 +195,8 @@ impl<'ast> Visit<'ast> for Reader<'_> {
 
     fn visit_item_mod(&mut self, item: &'ast syn::ItemMod) {
         self.module.push(item.ident.to_string());
-        if item.content.is_some() {
-            self.here();
+        if let Some((_, items)) = &item.content {
+            self.here().items.clone_from(items);
             visit::visit_item_mod(self, item);
         } else {
             self.children.push(self.module.clone());
@@ -204,7 +230,7 @@ impl<'ast> Visit<'ast> for Reader<'_> {
 }
 
 /// `#[cfg(test)]` or `#[cfg(all(test, ..))]`, but not `any` or `not`.
-fn is_test(attribute: &Attribute) -> bool {
+pub(crate) fn is_test(attribute: &Attribute) -> bool {
     let Meta::List(list) = &attribute.meta else { return false };
     let text = list.tokens.to_string();
     list.path.is_ident("cfg") && text.contains("test") && !text.contains("any") && !text.contains("not")
