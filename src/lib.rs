@@ -1,5 +1,6 @@
 #![cfg_attr(feature = "design", doc = include_str!("../README.md"))]
 #![cfg_attr(not(feature = "design"), doc = "Runs hybrid multirate filter banks with fractional delays.")]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "files")]
@@ -67,3 +68,7 @@ pub mod cli;
 #[cfg(test)]
 #[path = "../tests/support/random.rs"]
 mod random;
+
+#[cfg(test)]
+#[allow(dead_code, unreachable_pub)]
+mod trials;

@@ -21,3 +21,7 @@ pub mod segment;
 pub mod setting;
 pub mod synthetic;
 pub mod uncalibrated;
+
+#[cfg(test)]
+#[allow(dead_code, unreachable_pub)]
+mod trials;

@@ -1,13 +1,4 @@
-//! Matrix decompositions and Fourier transforms: one interface to nalgebra, faer and the FFT crates.
-//!
-//! Matrices are nalgebra's [`DMatrix`]; every decomposition of run-time size is faer's, because nalgebra's
-//! SVD is wrong on rank-deficient matrices and its Schur form may never end on delay lines. Both libraries
-//! store matrices column-major, so faer reads nalgebra's memory without a copy. Everything here is
-//! sequential and therefore gives the same bits on every run.
-//!
-//! It is a separate crate to save compile time: the generic code of these libraries is compiled here once,
-//! and not again with every change of the crates that use it.
-
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
 mod assemble;
@@ -42,6 +33,7 @@ pub type CMat = DMatrix<Complex<f64>>;
 
 /// Why a decomposition failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LinalgError {
     /// A Cholesky factorisation met a pivot that is not positive.
     #[error("the matrix is not positive definite (pivot {pivot})")]

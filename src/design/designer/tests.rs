@@ -178,7 +178,7 @@ fn a_design_that_takes_longer_than_its_limit_is_ended() {
 /// HYBANK_SLOW set: the proof takes 12 s.
 #[test]
 fn the_proven_lower_end_uses_all_directions_that_bind_the_taps() {
-    if !trials::is_slow("the proof of a bank that 67 directions bind") {
+    if !crate::trials::is_slow("the proof of a bank that 67 directions bind") {
         return;
     }
     let text = "fast_period = 1.0\nratio = 1\nlatency = 1\n\

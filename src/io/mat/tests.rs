@@ -4,7 +4,7 @@ use super::*;
 use crate::io::StreamHeader;
 
 fn bytes(name: &str) -> Vec<u8> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/mat");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/mat");
     std::fs::read(folder.join(name).with_extension("mat")).unwrap()
 }
 

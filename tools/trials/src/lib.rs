@@ -1,8 +1,10 @@
 //! What the tests of all crates read from the environment, and the list of what they skipped.
 //!
+//! Unit tests have this file as a module, through a link, because their packages stand without this crate.
+//!
 //! | variable | meaning |
 //! | --- | --- |
-//! | `HYBANK_DATA` | the folder of recordings and photographs, `../shared/data` beside the repository if not set |
+//! | `HYBANK_DATA` | the folder of recordings and photographs, `shared/data` beside the repository if not set |
 //! | `HYBANK_TRIALS` | the trials of a random test in place of its usual ones: so many (`1000`) or these (`124..125`) |
 //! | `HYBANK_CAMPAIGN` | times as many rounds of damage and faults as usual |
 //! | `HYBANK_SLOW` | set: also what takes minutes |
@@ -46,13 +48,18 @@ pub fn is_slow(left_out: &str) -> bool {
 /// A file or folder of the data, or `None` if it is not there; then the test goes to the list of skipped
 /// tests.
 pub fn data(name: &str) -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let path = env::var_os("HYBANK_DATA").map_or(beside, PathBuf::from).join(name);
-    if !path.exists() {
+    let path = env::var_os("HYBANK_DATA").map(PathBuf::from).or_else(beside).map(|folder| folder.join(name));
+    let found = path.filter(|path| path.exists());
+    if found.is_none() {
         skipped(&format_args!("{}: {name} is not in the data folder", current_test()));
-        return None;
     }
-    Some(path)
+    found
+}
+
+/// The folder `shared/data` beside the repository or a folder above it.
+fn beside() -> Option<PathBuf> {
+    let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
+    above.map(|folder| folder.join("shared/data")).find(|folder| folder.is_dir())
 }
 
 /// Notes what a test skipped: printed, and appended to `skipped-tests` in the folder of what is built. What
