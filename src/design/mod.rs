@@ -22,7 +22,7 @@ pub mod problem;
 mod prove;
 pub mod quantise;
 mod realise;
-pub mod reduction;
+mod reduction;
 pub mod responses;
 pub mod uncertainty;
 mod unfinished;

@@ -5,6 +5,7 @@ use crate::lti::LtiError;
 
 /// Why data do not form a problem, or why it could not be solved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LmiError {
     /// There is no point, or a dimension is zero.
     #[error(

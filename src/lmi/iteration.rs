@@ -5,6 +5,7 @@ use super::LmiError;
 /// How an iteration ended. Bounds, residuals and iterates are returned beside it; a hard problem is not an
 /// error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Outcome {
     /// The duality gap is within the tolerance.
     Solved,

@@ -19,20 +19,20 @@ pub(crate) const NODES: [(f64, f64); 8] = [
 /// e^{A t} of a block-diagonal A, computed block by block. Scaling and squaring of the whole matrix would
 /// scale for the largest block, and the slow blocks would lose digits.
 #[derive(Debug, Clone)]
-pub struct StateTransition {
+pub(crate) struct StateTransition {
     blocks: Vec<Mat>,
     order: usize,
 }
 
 impl StateTransition {
     /// The transition of dx/dt = diag(blocks) x; the blocks are square.
-    pub fn new(blocks: Vec<Mat>) -> Self {
+    pub(crate) fn new(blocks: Vec<Mat>) -> Self {
         let order = blocks.iter().map(Mat::nrows).sum();
         Self { blocks, order }
     }
 
     /// e^{A t}, n x n.
-    pub fn over(&self, t: f64) -> Mat {
+    pub(crate) fn over(&self, t: f64) -> Mat {
         let mut transition = Mat::zeros(self.order, self.order);
         let mut start = 0;
         for block in &self.blocks {
@@ -58,7 +58,7 @@ impl StateTransition {
 ///
 /// # Errors
 /// [`LinalgError::Sizes`] never.
-pub fn gramian_root(transition: &StateTransition, b: &Mat, t: f64) -> Result<Mat, LinalgError> {
+pub(crate) fn gramian_root(transition: &StateTransition, b: &Mat, t: f64) -> Result<Mat, LinalgError> {
     let halvings = halvings(transition, t);
     let mut step = t * 0.5_f64.powi(halvings as i32);
     let mut root = quadrature_root(transition, b, step);

@@ -18,7 +18,7 @@ const TRUNCATION_TOLERANCE: f64 = f64::EPSILON / 4.0;
 
 /// An FIR head with a recursive tail: `y[k] = sum h_j u[k - j] + c x[k]`, `x[k + 1] = a x[k] + b u[k - q]`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FirWithTail {
+pub(crate) struct FirWithTail {
     /// h_0 .. h_q, p x m each.
     head: Vec<Mat>,
     /// a, b, c, with d = 0.
@@ -31,7 +31,7 @@ impl FirWithTail {
     ///
     /// # Errors
     /// [`LtiError`] if the system is not stable.
-    pub fn new(system: &StateSpace) -> Result<Self, LtiError> {
+    pub(crate) fn new(system: &StateSpace) -> Result<Self, LtiError> {
         let chains = Chains::new(system.a());
         let Self { head, tail } = Self::split(system, chains.longest)?;
         let tail = tail.select_states(chains.core)?;
@@ -44,7 +44,7 @@ impl FirWithTail {
     ///
     /// # Errors
     /// [`StateSpaceError`] never: the parts fit.
-    pub fn split(system: &StateSpace, length: usize) -> Result<Self, StateSpaceError> {
+    pub(crate) fn split(system: &StateSpace, length: usize) -> Result<Self, StateSpaceError> {
         let mut head = vec![system.d().clone()];
         let mut c = system.c().clone();
         for _ in 0..length {
@@ -59,7 +59,12 @@ impl FirWithTail {
     ///
     /// # Errors
     /// [`StateSpaceError`] if the shapes do not fit.
-    pub fn with_outputs(outputs: &Mat, length: usize, a: &Mat, b: &Mat) -> Result<Self, StateSpaceError> {
+    pub(crate) fn with_outputs(
+        outputs: &Mat,
+        length: usize,
+        a: &Mat,
+        b: &Mat,
+    ) -> Result<Self, StateSpaceError> {
         let (p, n, m) = (outputs.nrows(), a.nrows(), b.ncols());
         let tap = |j: usize| outputs.columns(n + (length - j) * m, m).into_owned();
         let c = outputs.columns(0, n).into_owned();
@@ -71,13 +76,13 @@ impl FirWithTail {
     ///
     /// # Errors
     /// [`StateSpaceError::Gain`] unless `gain` has a row for each input.
-    pub fn map_inputs(&self, gain: &Mat) -> Result<Self, StateSpaceError> {
+    pub(crate) fn map_inputs(&self, gain: &Mat) -> Result<Self, StateSpaceError> {
         let tail = self.tail.map_inputs(gain)?;
         Ok(Self { head: self.head.iter().map(|tap| tap * gain).collect(), tail })
     }
 
     /// a, b, c of the tail, with d = 0.
-    pub fn tail(&self) -> &StateSpace {
+    pub(crate) fn tail(&self) -> &StateSpace {
         &self.tail
     }
 
@@ -85,7 +90,7 @@ impl FirWithTail {
     ///
     /// # Errors
     /// As [`parallel_form`].
-    pub fn parallel_form(&self) -> Result<Option<Self>, LtiError> {
+    pub(crate) fn parallel_form(&self) -> Result<Option<Self>, LtiError> {
         let tail = parallel_form(&self.tail)?;
         Ok(tail.map(|tail| Self { head: self.head.clone(), tail }))
     }
@@ -94,12 +99,12 @@ impl FirWithTail {
     ///
     /// # Errors
     /// As [`triangular_form`].
-    pub fn triangular_form(&self) -> Result<Self, LtiError> {
+    pub(crate) fn triangular_form(&self) -> Result<Self, LtiError> {
         Ok(Self { head: self.head.clone(), tail: triangular_form(&self.tail)? })
     }
 
     /// q, the steps by which the input of the tail is delayed.
-    pub fn head_length(&self) -> usize {
+    pub(crate) fn head_length(&self) -> usize {
         self.head.len() - 1
     }
 
@@ -108,7 +113,7 @@ impl FirWithTail {
     ///
     /// # Errors
     /// [`StateSpaceError`] never for a value made by [`FirWithTail::new`]: its parts fit.
-    pub fn realise(&self) -> Result<StateSpace, StateSpaceError> {
+    pub(crate) fn realise(&self) -> Result<StateSpace, StateSpaceError> {
         let (q, m, n) = (self.head_length(), self.tail.inputs(), self.tail.order());
         let line = StateSpace::delay_line(m, q);
         let unity = Mat::identity(self.tail.outputs(), self.tail.outputs());

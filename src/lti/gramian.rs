@@ -11,7 +11,7 @@ const DOUBLING_LIMIT: usize = 60;
 /// the squared Smith iteration on the factor: S <- [S, a S], a <- a^2.
 ///
 /// Fails with [`LtiError::IterationLimit`] when `a` is not stable.
-pub fn controllability_root(a: &Mat, b: &Mat) -> Result<Mat, LtiError> {
+pub(crate) fn controllability_root(a: &Mat, b: &Mat) -> Result<Mat, LtiError> {
     let mut root = linalg::lq_factor(b);
     let mut power = a.clone();
     let mut change = f64::INFINITY;
@@ -34,12 +34,12 @@ pub fn controllability_root(a: &Mat, b: &Mat) -> Result<Mat, LtiError> {
 ///
 /// # Errors
 /// [`LtiError::IterationLimit`] when `a` is not stable.
-pub fn observability_root(a: &Mat, c: &Mat) -> Result<Mat, LtiError> {
+pub(crate) fn observability_root(a: &Mat, c: &Mat) -> Result<Mat, LtiError> {
     controllability_root(&a.transpose(), &c.transpose())
 }
 
 /// The H2 norm: square root of `trace(c P c' + d d')`, P the controllability Gramian.
-pub fn h2_norm(system: &StateSpace) -> Result<f64, LtiError> {
+pub(crate) fn h2_norm(system: &StateSpace) -> Result<f64, LtiError> {
     let root = controllability_root(system.a(), system.b())?;
     Ok(((system.c() * root).norm_squared() + system.d().norm_squared()).sqrt())
 }
@@ -47,15 +47,15 @@ pub fn h2_norm(system: &StateSpace) -> Result<f64, LtiError> {
 /// Coordinates xi of the controllable states x (n of them) with the identity as controllability Gramian,
 /// `A A' + B B' = I`: `x = basis xi` and `xi = inverse x`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GramianCoordinates {
+pub(crate) struct GramianCoordinates {
     /// n x r.
-    pub basis: Mat,
+    pub(crate) basis: Mat,
     /// r x n, `inverse basis = I`.
-    pub inverse: Mat,
+    pub(crate) inverse: Mat,
     /// A in these coordinates, `inverse A basis`.
-    pub a: Mat,
+    pub(crate) a: Mat,
     /// B in these coordinates, `inverse B`.
-    pub b: Mat,
+    pub(crate) b: Mat,
 }
 
 impl GramianCoordinates {
@@ -65,7 +65,7 @@ impl GramianCoordinates {
     /// # Errors
     /// [`LtiError::IterationLimit`] if A is not stable, [`LtiError::Linalg`] if the decomposition does not
     /// converge.
-    pub fn new(a: &Mat, b: &Mat, tol_rank: f64) -> Result<Self, LtiError> {
+    pub(crate) fn new(a: &Mat, b: &Mat, tol_rank: f64) -> Result<Self, LtiError> {
         let root = controllability_root(a, b)?;
         let n = a.nrows();
         let deviation: Vec<f64> = (0..n).map(|i| root.row(i).norm()).collect();
@@ -89,7 +89,7 @@ impl GramianCoordinates {
 ///
 /// # Errors
 /// [`LtiError`] if the system is not stable.
-pub fn balanced(system: &StateSpace, floor: f64) -> Result<StateSpace, LtiError> {
+pub(crate) fn balanced(system: &StateSpace, floor: f64) -> Result<StateSpace, LtiError> {
     balanced_when_driven(system, &controllability_root(system.a(), system.b())?, floor)
 }
 
@@ -102,7 +102,7 @@ pub fn balanced(system: &StateSpace, floor: f64) -> Result<StateSpace, LtiError>
 ///
 /// # Errors
 /// [`LtiError`] if the system is not stable.
-pub fn balanced_when_driven(
+pub(crate) fn balanced_when_driven(
     system: &StateSpace,
     controllability_root: &Mat,
     floor: f64,

@@ -12,14 +12,14 @@ use std::ops::Range;
 
 impl StateSpace {
     /// The static system y = `d` u, without states.
-    pub fn gain(d: Mat) -> Self {
+    pub(crate) fn gain(d: Mat) -> Self {
         let (p, m) = d.shape();
         Self { a: Mat::zeros(0, 0), b: Mat::zeros(0, m), c: Mat::zeros(p, 0), d }
     }
 
     /// `diag(z^-k_1, z^-k_2, ..)`: output i is input i, `steps[i]` steps later. The states of a delay are
     /// ordered from the newest sample to the oldest.
-    pub fn delays(steps: &[usize]) -> Self {
+    pub(crate) fn delays(steps: &[usize]) -> Self {
         let shift = |n: usize| Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j + 1)));
         let first = |n: usize| Mat::from_fn(n, 1, |i, _| f64::from(u8::from(i == 0)));
         let last = |n: usize| Mat::from_fn(1, n, |_, j| f64::from(u8::from(j + 1 == n)));
@@ -34,7 +34,7 @@ impl StateSpace {
 
     /// The present and the past `steps` samples of `width` inputs u: `[u[k - steps]; ..; u[k - 1]; u[k]]`.
     /// The states are the past inputs, the oldest first.
-    pub fn delay_line(width: usize, steps: usize) -> Self {
+    pub(crate) fn delay_line(width: usize, steps: usize) -> Self {
         let order = width * steps;
         let ahead = |i: usize, j: usize| f64::from(u8::from(j == i + width));
         Self {
@@ -51,7 +51,7 @@ impl StateSpace {
     /// # Errors
     /// [`StateSpaceError::Linalg`] if the shapes of the `F_j` differ; an empty list gives the system
     /// without inputs and outputs.
-    pub fn fir(taps: &[Mat]) -> Result<Self, StateSpaceError> {
+    pub(crate) fn fir(taps: &[Mat]) -> Result<Self, StateSpaceError> {
         let Some(d) = taps.first() else { return Ok(Self::gain(Mat::zeros(0, 0))) };
         let (stored, inputs) = (taps.len() - 1, d.ncols());
         linalg::vstack(&taps.iter().collect::<Vec<_>>())?;
@@ -68,7 +68,7 @@ impl StateSpace {
     ///
     /// # Errors
     /// [`StateSpaceError::Connection`] unless `next` has an input for each output.
-    pub fn series(&self, next: &Self) -> Result<Self, StateSpaceError> {
+    pub(crate) fn series(&self, next: &Self) -> Result<Self, StateSpaceError> {
         if self.outputs() != next.inputs() {
             let (first, second) = (self.d.shape(), next.d.shape());
             return Err(StateSpaceError::Connection { first, second });
@@ -90,7 +90,7 @@ impl StateSpace {
     /// # Errors
     /// [`StateSpaceError::Connection`] unless `next` has an input for each of the `outputs`,
     /// [`StateSpaceError::Selection`] if there are no such outputs.
-    pub fn cascade(&self, outputs: Range<usize>, next: &Self) -> Result<Self, StateSpaceError> {
+    pub(crate) fn cascade(&self, outputs: Range<usize>, next: &Self) -> Result<Self, StateSpaceError> {
         let driven = self.select_outputs(outputs)?.series(next)?;
         let unread = Mat::zeros(self.outputs(), next.order());
         Ok(Self {
@@ -104,7 +104,7 @@ impl StateSpace {
     ///
     /// # Errors
     /// [`StateSpaceError::Gain`] unless `gain` has a column for each output.
-    pub fn map_outputs(&self, gain: &Mat) -> Result<Self, StateSpaceError> {
+    pub(crate) fn map_outputs(&self, gain: &Mat) -> Result<Self, StateSpaceError> {
         if gain.ncols() != self.outputs() {
             let (count, gain) = (self.outputs(), gain.shape());
             return Err(StateSpaceError::Gain { ports: "outputs", count, gain });
@@ -116,7 +116,7 @@ impl StateSpace {
     ///
     /// # Errors
     /// [`StateSpaceError::Gain`] unless `gain` has a row for each input.
-    pub fn map_inputs(&self, gain: &Mat) -> Result<Self, StateSpaceError> {
+    pub(crate) fn map_inputs(&self, gain: &Mat) -> Result<Self, StateSpaceError> {
         if gain.nrows() != self.inputs() {
             let (count, gain) = (self.inputs(), gain.shape());
             return Err(StateSpaceError::Gain { ports: "inputs", count, gain });
@@ -128,7 +128,7 @@ impl StateSpace {
     ///
     /// # Errors
     /// [`StateSpaceError::Gain`] unless there is a gain for each input.
-    pub fn scale_inputs(&self, gains: &[f64]) -> Result<Self, StateSpaceError> {
+    pub(crate) fn scale_inputs(&self, gains: &[f64]) -> Result<Self, StateSpaceError> {
         self.map_inputs(&Mat::from_diagonal(&DVector::from_column_slice(gains)))
     }
 
@@ -136,7 +136,7 @@ impl StateSpace {
     ///
     /// # Errors
     /// [`StateSpaceError::Gain`] unless there is a gain for each output.
-    pub fn scale_outputs(&self, gains: &[f64]) -> Result<Self, StateSpaceError> {
+    pub(crate) fn scale_outputs(&self, gains: &[f64]) -> Result<Self, StateSpaceError> {
         self.map_outputs(&Mat::from_diagonal(&DVector::from_column_slice(gains)))
     }
 
@@ -144,7 +144,10 @@ impl StateSpace {
     ///
     /// # Errors
     /// [`StateSpaceError::Selection`] if one of them is not there.
-    pub fn select_outputs(&self, outputs: impl IntoIterator<Item = usize>) -> Result<Self, StateSpaceError> {
+    pub(crate) fn select_outputs(
+        &self,
+        outputs: impl IntoIterator<Item = usize>,
+    ) -> Result<Self, StateSpaceError> {
         let rows = selection("outputs", self.outputs(), outputs)?;
         let (c, d) = (self.c.select_rows(&rows), self.d.select_rows(&rows));
         Ok(Self { a: self.a.clone(), b: self.b.clone(), c, d })
@@ -155,7 +158,10 @@ impl StateSpace {
     ///
     /// # Errors
     /// [`StateSpaceError::Selection`] if one of them is not there.
-    pub fn select_states(&self, states: impl IntoIterator<Item = usize>) -> Result<Self, StateSpaceError> {
+    pub(crate) fn select_states(
+        &self,
+        states: impl IntoIterator<Item = usize>,
+    ) -> Result<Self, StateSpaceError> {
         let kept = selection("states", self.order(), states)?;
         Ok(Self {
             a: self.a.select_rows(&kept).select_columns(&kept),

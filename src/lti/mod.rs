@@ -3,27 +3,29 @@
 //! This module does not depend on filter banks: a system has inputs, outputs and states. Continuous-time
 //! helpers ([`exponential`]) serve exact discretisation.
 
-pub mod exponential;
+pub(crate) mod exponential;
 mod fir_with_tail;
-pub mod gramian;
+pub(crate) mod gramian;
 mod interconnect;
-pub mod parallel_form;
-pub mod peak;
+pub(crate) mod parallel_form;
+pub(crate) mod peak;
 mod refine;
 mod response;
-pub mod riccati;
+pub(crate) mod riccati;
 mod state_space;
 
-pub use fir_with_tail::FirWithTail;
-pub use gramian::GramianCoordinates;
+pub(crate) use fir_with_tail::FirWithTail;
+pub(crate) use gramian::GramianCoordinates;
+pub use refine::Peak;
 pub use response::FrequencyResponse;
-pub use riccati::bounded_real_riccati;
+pub(crate) use riccati::bounded_real_riccati;
 pub use state_space::{StateSpace, StateSpaceError};
 
 use crate::linalg::LinalgError;
 
 /// Why a property of a system could not be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LtiError {
     /// The property exists for stable systems only.
     #[error("the system is not stable: spectral radius {radius} (must be below 1)")]

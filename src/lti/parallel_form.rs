@@ -18,7 +18,7 @@ const CONDITION_LIMIT: f64 = 1e4;
 ///
 /// # Errors
 /// [`LtiError`] if the system is not stable or its eigenvectors cannot be computed.
-pub fn parallel_form(system: &StateSpace) -> Result<Option<StateSpace>, LtiError> {
+pub(crate) fn parallel_form(system: &StateSpace) -> Result<Option<StateSpace>, LtiError> {
     let modes = modes(system.a())?;
     // Complex poles of a real matrix come in pairs. If rounding has separated a pair, there is no real
     // basis.
@@ -43,7 +43,7 @@ pub fn parallel_form(system: &StateSpace) -> Result<Option<StateSpace>, LtiError
 ///
 /// # Errors
 /// [`LtiError`] if the iteration does not converge.
-pub fn triangular_form(system: &StateSpace) -> Result<StateSpace, LtiError> {
+pub(crate) fn triangular_form(system: &StateSpace) -> Result<StateSpace, LtiError> {
     let (q, t) = linalg::real_schur(system.a())?;
     Ok(StateSpace::new(t, q.transpose() * system.b(), system.c() * q, system.d().clone())?)
 }

@@ -11,14 +11,14 @@
 //! reported value is evaluated from the response itself and refined between its neighbours.
 
 use super::refine::{FLAT_GAIN, higher, upper_estimate};
-pub use super::refine::{Peak, local_maxima, refine};
+pub(crate) use super::refine::{Peak, local_maxima, refine};
 use super::{FrequencyResponse, LtiError, StateSpace};
 use crate::linalg::{self, CMat, Complex, LinalgError, Scalar};
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
 
 /// Relative accuracy of the returned peak.
-pub const PEAK_ACCURACY: f64 = 1e-9;
+pub(crate) const PEAK_ACCURACY: f64 = 1e-9;
 /// Distances from the angle of a pole, relative to the distance of the pole from the unit circle.
 const WIDTHS: [f64; 5] = [-1.5, -0.5, 0.0, 0.5, 1.5];
 
@@ -44,14 +44,14 @@ const NEAR_LEVEL: f64 = 1e-2;
 const CENTRES: usize = 16;
 
 /// The H-infinity norm of a stable system with its peak frequency.
-pub fn hinf_norm(system: &StateSpace) -> Result<Peak, LtiError> {
+pub(crate) fn hinf_norm(system: &StateSpace) -> Result<Peak, LtiError> {
     unexplained_peak(system, 0)
 }
 
 /// max over w of sigma_max of the part of the references (rows from `measurements` on) that no
 /// combination of the measurements (the first rows) explains, causal or not:
 /// G_z (I - G_y* (G_y G_y*)^+ G_y).
-pub fn unexplained_peak(system: &StateSpace, measurements: usize) -> Result<Peak, LtiError> {
+pub(crate) fn unexplained_peak(system: &StateSpace, measurements: usize) -> Result<Peak, LtiError> {
     let poles = stable_poles(system)?;
     let system = system.compress_inputs();
     let response = FrequencyResponse::new(&system);
@@ -61,7 +61,7 @@ pub fn unexplained_peak(system: &StateSpace, measurements: usize) -> Result<Peak
 /// The H-infinity norm of a system that is known to be stable, with a response that is cheaper than its
 /// own: `response(w)` has the singular values of G(e^{jw}), and `initial` are frequencies where it may be
 /// large (see [`resonances`]).
-pub fn hinf_norm_with_response(
+pub(crate) fn hinf_norm_with_response(
     system: &StateSpace,
     response: &dyn Fn(f64) -> CMat,
     initial: Vec<f64>,
@@ -71,7 +71,7 @@ pub fn hinf_norm_with_response(
 
 /// The peaks of a stable system above `level`: at least one in each frequency interval in which the gain
 /// exceeds it.
-pub fn peaks_above(system: &StateSpace, level: f64) -> Result<Vec<Peak>, LtiError> {
+pub(crate) fn peaks_above(system: &StateSpace, level: f64) -> Result<Vec<Peak>, LtiError> {
     let poles = stable_poles(system)?;
     let system = system.compress_inputs();
     let response = FrequencyResponse::new(&system);
@@ -82,7 +82,7 @@ pub fn peaks_above(system: &StateSpace, level: f64) -> Result<Vec<Peak>, LtiErro
 ///
 /// # Errors
 /// [`LtiError::Unstable`] if one of them is not inside the unit circle.
-pub fn stable_poles(system: &StateSpace) -> Result<Vec<Complex<f64>>, LtiError> {
+pub(crate) fn stable_poles(system: &StateSpace) -> Result<Vec<Complex<f64>>, LtiError> {
     let poles = linalg::eigenvalues(system.a())?;
     let radius = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
     if radius >= 1.0 { Err(LtiError::Unstable { radius }) } else { Ok(poles) }
@@ -90,14 +90,14 @@ pub fn stable_poles(system: &StateSpace) -> Result<Vec<Complex<f64>>, LtiError> 
 
 /// Angles of the poles that may cause a peak, and angles near them at multiples of the pole's distance from
 /// the unit circle, which is the width of its resonance.
-pub fn resonances(poles: &[Complex<f64>]) -> Vec<f64> {
+pub(crate) fn resonances(poles: &[Complex<f64>]) -> Vec<f64> {
     let near = poles.iter().filter(|p| p.im >= 0.0 && p.norm() > 0.5);
     let about = |p: &Complex<f64>| WIDTHS.map(|width| p.arg() + width * (1.0 - p.norm()));
     near.flat_map(about).filter(|w| (0.0..=PI).contains(w)).collect()
 }
 
 /// The gain at one frequency: see [`unexplained_peak`].
-pub fn unexplained_gain(response: &CMat, measurements: usize) -> Result<f64, LtiError> {
+pub(crate) fn unexplained_gain(response: &CMat, measurements: usize) -> Result<f64, LtiError> {
     let references = response.nrows() - measurements;
     if references == 0 || response.ncols() == 0 {
         return Ok(0.0);

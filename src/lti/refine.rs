@@ -30,7 +30,7 @@ impl Peak {
 /// Refines the peak between the outer of three neighbouring points by parabolas through the last three
 /// points, falling back on golden sections; `at` evaluates the gain. The gain is flat at its peak: its
 /// value converges twice as fast as the frequency. Ends at relative differences of gains below `flat`.
-pub fn refine<E>(
+pub(crate) fn refine<E>(
     at: impl Fn(f64) -> Result<Peak, E>,
     [mut low, start, mut high]: [Peak; 3],
     flat: f64,
@@ -82,7 +82,7 @@ pub(super) fn higher(a: Peak, b: Peak) -> Peak {
 
 /// The local maxima between their neighbours. The gain is even about 0 and about pi, so the neighbours
 /// there are mirror images.
-pub fn local_maxima(grid: &[Peak]) -> Vec<[Peak; 3]> {
+pub(crate) fn local_maxima(grid: &[Peak]) -> Vec<[Peak; 3]> {
     let last = grid.len() - 1;
     let neighbours = |k: usize| {
         let mirror = |about: f64, peak: Peak| Peak { frequency: 2.0 * about - peak.frequency, ..peak };

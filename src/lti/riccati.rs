@@ -18,16 +18,16 @@ const RESIDUAL_LIMIT: f64 = 1e-3;
 
 /// A stabilising solution: the eigenvalues of (I + G X)^-1 F lie inside the unit circle.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RiccatiSolution {
+pub(crate) struct RiccatiSolution {
     /// X, n x n, symmetric.
-    pub x: Mat,
+    pub(crate) x: Mat,
     /// ||F' X (I + G X)^-1 F + H - X||: X solves the equation exactly for an H that differs by this much.
-    pub residual: f64,
+    pub(crate) residual: f64,
 }
 
 /// Solves X = F' X (I + G X)^-1 F + H for the stabilising X; all matrices n x n. `None` if the doubling does
 /// not converge or ends at no solution; one may still exist.
-pub fn solve_doubling(f: &Mat, g: &Mat, h: &Mat) -> Option<RiccatiSolution> {
+pub(crate) fn solve_doubling(f: &Mat, g: &Mat, h: &Mat) -> Option<RiccatiSolution> {
     let mut iterate = Iterate { f: f.clone(), g: g.clone(), x: h.clone() };
     for _ in 0..DOUBLING_LIMIT {
         let change = iterate.double();
@@ -123,7 +123,7 @@ fn inverse_weight(g: &Mat, x: &Mat) -> Mat {
 /// `F = A + B R^-1 D'C/g`, `G = -B R^-1 B'`, `H = C'C/g + C'D R^-1 D'C/g^2 + weight I`.
 ///
 /// `None` if g is not above the norm of D, or if the doubling finds no stabilising solution.
-pub fn bounded_real_riccati(a: &Mat, b: &Mat, c: &Mat, d: &Mat, g: f64, weight: f64) -> Option<Mat> {
+pub(crate) fn bounded_real_riccati(a: &Mat, b: &Mat, c: &Mat, d: &Mat, g: f64, weight: f64) -> Option<Mat> {
     let m = b.ncols();
     let r = Mat::identity(m, m) * g - d.tr_mul(d) / g;
     let dc = d.tr_mul(c) / g;

@@ -13,6 +13,7 @@ pub struct StateSpace {
 
 /// Why matrices or systems do not form a system.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum StateSpaceError {
     /// The shapes of the matrices do not match.
     #[error(
@@ -112,7 +113,7 @@ impl StateSpace {
     }
 
     /// `G G*` is unchanged when the inputs are rotated: compresses them to at most n + p.
-    pub fn compress_inputs(&self) -> Self {
+    pub(crate) fn compress_inputs(&self) -> Self {
         let (n, p) = (self.order(), self.outputs());
         if self.inputs() <= n + p {
             return self.clone();
@@ -131,7 +132,7 @@ impl StateSpace {
     /// The same system with balanced states, divided by powers of two, which is exact. Orthogonal changes
     /// of coordinates mix all states, so without this the small states would be lost in the rounding errors
     /// of the large ones.
-    pub fn rescaled(&self) -> Self {
+    pub(crate) fn rescaled(&self) -> Self {
         let scales = linalg::state_scales(&self.a, &self.b, &self.c);
         let scaled = Self {
             a: Mat::from_fn(self.order(), self.order(), |i, j| self.a[(i, j)] * (scales[j] / scales[i])),
@@ -145,7 +146,7 @@ impl StateSpace {
     }
 
     /// Largest modulus of the poles.
-    pub fn spectral_radius(&self) -> Result<f64, linalg::LinalgError> {
+    pub(crate) fn spectral_radius(&self) -> Result<f64, linalg::LinalgError> {
         linalg::spectral_radius(&self.a)
     }
 

@@ -27,7 +27,7 @@ use order_search::OrderSearch;
 
 /// The quantity that a reduction minimises.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Aim {
+pub(crate) enum Aim {
     /// gamma, the H-infinity norm of the error.
     WorstCase,
     /// The H2 norm of the error.
@@ -36,22 +36,22 @@ pub enum Aim {
 
 /// A bank to be reduced.
 #[derive(Debug, Clone, Copy)]
-pub struct ReductionProblem<'a> {
+pub(crate) struct ReductionProblem<'a> {
     /// The plant whose error counts.
-    pub plant: &'a LiftedPlant,
+    pub(crate) plant: &'a LiftedPlant,
     /// The full bank.
-    pub bank: &'a StateSpace,
+    pub(crate) bank: &'a StateSpace,
     /// States of the full bank in the form that is written.
-    pub order: usize,
+    pub(crate) order: usize,
     /// States per slow period of FIR head: the channels of the written bank. The plant may have fewer,
     /// because equal channels are merged.
-    pub width: usize,
+    pub(crate) width: usize,
     /// The quantity that is minimised.
-    pub aim: Aim,
+    pub(crate) aim: Aim,
     /// Relative excess of gamma granted to the mean square.
-    pub gamma_margin: f64,
+    pub(crate) gamma_margin: f64,
     /// Ends the search with the best banks so far.
-    pub stop: &'a Stop,
+    pub(crate) stop: &'a Stop,
 }
 
 /// The error of a bank in normalised time (h = 1).
@@ -100,7 +100,7 @@ fn text_of<S: serde::Serializer>(failure: &Option<DesignError>, serializer: S) -
 ///
 /// # Errors
 /// [`DesignError`] if the bank is not stable or a decomposition fails.
-pub fn reduce(
+pub(crate) fn reduce(
     problem: &ReductionProblem<'_>,
     reduction: Reduction,
 ) -> Result<(Option<FirWithTail>, OrderReduction), DesignError> {

@@ -23,9 +23,9 @@ pub struct Solution {
     /// Value of the dual covariance: a lower bound on gamma for all unknowns, up to rounding errors.
     pub lower: f64,
     /// P, r x r, in `coordinates`.
-    pub p: Mat,
+    pub(crate) p: Mat,
     /// The coordinates of P: those of the controllable states.
-    pub coordinates: GramianCoordinates,
+    pub(crate) coordinates: GramianCoordinates,
     /// Number of steps.
     pub iterations: usize,
 }

@@ -61,7 +61,7 @@ impl LowerBound {
 /// module's text; the rounding errors of the sums are included.
 ///
 /// Fails if the number or the size of the matrices does not fit.
-pub fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Result<LowerBound, LmiError> {
+pub(crate) fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Result<LowerBound, LmiError> {
     let points = problem.points();
     check_count("dual matrices", dual.len(), points.len())?;
     let mut nuclear = 0.0;

@@ -38,7 +38,7 @@ const WAY_TO_CAP: f64 = 0.999;
 /// among directions weaker than `tol_rank` times the strongest.
 ///
 /// Fails if weights or noise do not fit: see [`MeanSquareObjective`].
-pub fn least_squares(
+pub(crate) fn least_squares(
     problem: &Problem,
     square: &MeanSquareObjective,
     tol_rank: f64,

@@ -43,8 +43,12 @@ mod quadratic;
 mod tests;
 mod worst_case;
 
-pub use bound::{Covered, LowerBound, lower_bound};
-pub use mean_square::{MeanSquare, least_squares, mean_square_under_cap};
+#[cfg(test)]
+pub(crate) use bound::lower_bound;
+pub use bound::{Covered, LowerBound};
+#[cfg(test)]
+pub(crate) use mean_square::least_squares;
+pub use mean_square::{MeanSquare, mean_square_under_cap};
 pub(crate) use problem::response;
 pub use problem::{MeanSquareObjective, Point, Problem, Taps};
 pub use worst_case::{Solution, minimise};

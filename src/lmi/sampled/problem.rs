@@ -64,22 +64,22 @@ impl Problem {
     }
 
     /// The points.
-    pub fn points(&self) -> &[Point] {
+    pub(crate) fn points(&self) -> &[Point] {
         &self.points
     }
 
     /// Number of lags of each row.
-    pub fn lags(&self) -> &[usize] {
+    pub(crate) fn lags(&self) -> &[usize] {
         &self.lags
     }
 
     /// Largest number of lags of any row.
-    pub fn max_lags(&self) -> usize {
+    pub(crate) fn max_lags(&self) -> usize {
         self.lags.iter().copied().max().unwrap_or(0)
     }
 
     /// M, the rows of `W_l` and of the taps.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.points[0].w.nrows()
     }
 
@@ -89,28 +89,28 @@ impl Problem {
     }
 
     /// q, the columns of `W_l` and `H_l`.
-    pub fn inputs(&self) -> usize {
+    pub(crate) fn inputs(&self) -> usize {
         self.points[0].w.ncols()
     }
 
     /// Taps that are all zero.
-    pub fn zero_taps(&self) -> Taps {
+    pub(crate) fn zero_taps(&self) -> Taps {
         vec![Mat::zeros(self.rows(), self.channels()); self.max_lags()]
     }
 
     /// The same problem with more points.
-    pub fn with_points(&self, more: impl IntoIterator<Item = Point>) -> Result<Self, LmiError> {
+    pub(crate) fn with_points(&self, more: impl IntoIterator<Item = Point>) -> Result<Self, LmiError> {
         Self::new(self.points.iter().cloned().chain(more).collect(), self.lags.clone())
     }
 
     /// `K_l = W_l - sum_j e^{-i omega_l j} F_j H_l`.
-    pub fn error_at(&self, l: usize, taps: &Taps) -> CMat {
+    pub(crate) fn error_at(&self, l: usize, taps: &Taps) -> CMat {
         let point = &self.points[l];
         &point.w - response(taps, point.omega, self.rows(), self.channels()) * &point.h
     }
 
     /// Largest `sigma_max(K_l)` over the points, and the index of the point where it is attained.
-    pub fn worst(&self, taps: &Taps) -> Result<(f64, usize), LmiError> {
+    pub(crate) fn worst(&self, taps: &Taps) -> Result<(f64, usize), LmiError> {
         let mut worst = (0.0, 0);
         for l in 0..self.points.len() {
             let sigma = linalg::largest_singular_value(&self.error_at(l, taps))?;
@@ -122,7 +122,7 @@ impl Problem {
     }
 
     /// Value of the secondary objective: see [`MeanSquareObjective`].
-    pub fn mean_square(&self, taps: &Taps, square: &MeanSquareObjective) -> f64 {
+    pub(crate) fn mean_square(&self, taps: &Taps, square: &MeanSquareObjective) -> f64 {
         let error = |l: usize| self.error_at(l, taps).iter().map(|z| z.norm_sqr()).sum::<f64>();
         let errors: f64 = square.weights.iter().enumerate().map(|(l, w)| w * error(l)).sum();
         let noise =
@@ -131,7 +131,7 @@ impl Problem {
     }
 
     /// Refuses taps of the wrong size or with entries beyond a row's number of lags.
-    pub fn check_taps(&self, taps: &Taps) -> Result<(), LmiError> {
+    pub(crate) fn check_taps(&self, taps: &Taps) -> Result<(), LmiError> {
         let (m, n) = (self.rows(), self.channels());
         if let Some(f) = taps.iter().find(|f| f.shape() != (m, n)) {
             return Err(LmiError::Size { name: "a tap".into(), given: f.shape(), wanted: (m, n) });
