@@ -1,7 +1,10 @@
 //! Why a bank could not be made ready, a call was refused, or a plan was not taken over.
 
+use crate::sample::Shape;
+
 /// A bank that cannot run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum BuildError {
     /// M is 0.
     #[error("the bank's ratio M is 0; a frame must give at least one output sample")]
@@ -101,6 +104,7 @@ pub enum BuildError {
 
 /// A call whose slices do not fit together; nothing was processed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ProcessError {
     /// The input is not a whole number of frames.
     #[error("the input holds {samples} samples, which is not a multiple of the {channels} channels")]
@@ -150,16 +154,17 @@ pub enum ProcessError {
 
 /// Coefficients by which a stream cannot go on; it runs as before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SwapError {
     /// The plans have other numbers of channels or output samples.
     #[error(
-        "the stream has N = {} channels and M = {}, the new plan {} and {}; a stream keeps its shape", from[0], from[1], to[0], to[1]
+        "the stream has N = {} channels and M = {}, the new plan {} and {}; a stream keeps its shape", from.channels, from.ratio, to.channels, to.ratio
     )]
     Shape {
-        /// N and M of the stream.
-        from: [usize; 2],
-        /// N and M of the new plan.
-        to: [usize; 2],
+        /// Shape of the stream.
+        from: Shape,
+        /// Shape of the new plan.
+        to: Shape,
     },
     /// The state of the stream does not tell the state of the new plan.
     #[error(
@@ -175,6 +180,7 @@ pub enum SwapError {
 
 /// Bytes from which a stream cannot go on; it is as before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum StateError {
     /// Other bytes, part of a state, or a state of another version.
     #[error("these bytes are no state of a stream of this version of hybank; give what `state` returned")]

@@ -5,7 +5,7 @@ use crate::algorithms::choice::{ChosenAlgorithm, check_recursive};
 use crate::algorithms::{Direct, Facts, OverlapSave, Recursive};
 use crate::engine::{Engine, Fir, Running};
 use crate::state::Digest;
-use crate::{Algorithm, BuildError, Isa, Precision, Sample, StateSpace};
+use crate::{Algorithm, BuildError, Isa, Precision, Sample, Shape, StateSpace};
 use std::sync::Arc;
 
 /// How a bank is made ready to run.
@@ -99,27 +99,28 @@ impl Plan {
             Precision::Single => Engine::F32(choice.filter(taps, ratio, isa)?),
             Precision::Double => Engine::F64(choice.filter(taps, ratio, isa)?),
         };
-        let mut plan = Self::new(start, [taps.len(), ratio], latency, isa);
+        let mut plan = Self::new(start, Shape { channels: taps.len(), ratio }, latency, isa);
         plan.digest.add_lists(taps);
         Ok(plan)
     }
 
-    /// Recursive filters for N = `channels` and M = `ratio`; `latency` as in [`Plan::from_taps`].
+    /// Recursive filters of a shape; `latency` as in [`Plan::from_taps`].
     ///
     /// # Errors
     /// [`BuildError`] if N or M is 0, the matrices do not fit together, an entry is not finite, or an
     /// algorithm for FIR filters is asked for.
     pub fn from_state_space(
         filter: &StateSpace,
-        [channels, ratio]: [usize; 2],
+        shape: Shape,
         latency: usize,
         options: Options,
     ) -> Result<Self, BuildError> {
+        let Shape { channels, ratio } = shape;
         check_counts(channels, ratio)?;
         check_recursive(options.algorithm)?;
         let isa = options.isa;
         let start = Engine::Recursive(Running::new(Recursive::new(filter, channels, ratio, isa)?));
-        let mut plan = Self::new(start, [channels, ratio], latency, isa);
+        let mut plan = Self::new(start, shape, latency, isa);
         let StateSpace { a, b, c, d } = filter;
         [a, b, c, d].into_iter().for_each(|rows| plan.digest.add_lists(rows));
         Ok(plan)
@@ -141,7 +142,7 @@ impl Plan {
         Ok(Self { offsets, digest, ..self })
     }
 
-    fn new(start: Engine, [channels, ratio]: [usize; 2], latency: usize, isa: Isa) -> Self {
+    fn new(start: Engine, Shape { channels, ratio }: Shape, latency: usize, isa: Isa) -> Self {
         let facts = start.facts();
         let mut digest = Digest::new(facts.name, start.numbers());
         let (transform, _) = facts.transform.unwrap_or_default();

@@ -1,6 +1,15 @@
-//! The two number types that kernels run in.
+//! The two number types that kernels run in, and how many samples a frame has.
 
 use crate::simd::Element;
+
+/// The numbers of samples per frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shape {
+    /// N, channels of the input.
+    pub channels: usize,
+    /// M, output samples.
+    pub ratio: usize,
+}
 
 /// f32 or f64: what kernels compute in, and what samples in memory are. No other type can be one.
 #[allow(private_bounds, reason = "the private bound closes the trait")]

@@ -5,7 +5,7 @@ use crate::adapters::SplitOutput;
 use crate::adapters::{Input, Interleaved, Output, WithoutOffsets, Zeros};
 use crate::engine::Engine;
 use crate::state::{Count, Header, Numbers};
-use crate::{Plan, ProcessError, Sample, StateError, SwapError};
+use crate::{Plan, ProcessError, Sample, Shape, StateError, SwapError};
 
 /// Filters the frames of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0 before the
 /// first frame, and x_i the samples without the [offsets](Plan::with_offsets) of their converters.
@@ -244,8 +244,7 @@ impl Stream {
         Ok(wanted)
     }
 
-    /// N and M.
-    fn shape(&self) -> [usize; 2] {
-        [self.channels(), self.ratio()]
+    fn shape(&self) -> Shape {
+        Shape { channels: self.channels(), ratio: self.ratio() }
     }
 }

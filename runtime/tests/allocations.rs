@@ -3,7 +3,7 @@
 
 use hybank_runtime::{
     Algorithm, Input, Interleaved, Options, Output, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision,
-    SampleLayout, StateSpace, Stream, Zeros,
+    SampleLayout, Shape, StateSpace, Stream, Zeros,
 };
 
 const N: usize = 2;
@@ -38,7 +38,7 @@ fn plans_of(channels: usize, precision: Precision) -> Vec<Plan> {
             c: vec![vec![1.0; order]; M],
             d: vec![vec![0.5; channels]; M],
         };
-        Plan::from_state_space(&system, [channels, M], 4, options(Algorithm::Direct)).unwrap()
+        Plan::from_state_space(&system, Shape { channels, ratio: M }, 4, options(Algorithm::Direct)).unwrap()
     };
     fir.map(by).into_iter().chain([2, 5].map(recursive)).collect()
 }

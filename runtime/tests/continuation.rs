@@ -1,8 +1,8 @@
 //! Streams that go on by other coefficients, and the parts of complex samples.
 
 use hybank_runtime::{
-    Algorithm, Options, Output, PcmFormat, PcmFrames, PcmOutput, Plan, Precision, SampleLayout, StateSpace,
-    Stream, SwapError,
+    Algorithm, Options, Output, PcmFormat, PcmFrames, PcmOutput, Plan, Precision, SampleLayout, Shape,
+    StateSpace, Stream, SwapError,
 };
 
 const N: usize = 2;
@@ -71,10 +71,14 @@ fn what_cannot_go_on_is_refused() {
         c: vec![vec![1.0]; M],
         d: vec![vec![0.0; N]; M],
     };
-    let recursion = Plan::from_state_space(&system, [N, M], 0, Options::default()).unwrap();
+    let recursion =
+        Plan::from_state_space(&system, Shape { channels: N, ratio: M }, 0, Options::default()).unwrap();
     let mut running = Stream::new(&direct);
     process(&mut running, &numbers(30 * N, 3));
-    assert_eq!(go_on(&running, &wider).unwrap_err(), SwapError::Shape { from: [N, M], to: [N + 1, M] });
+    assert_eq!(
+        go_on(&running, &wider).unwrap_err(),
+        SwapError::Shape { from: Shape { channels: N, ratio: M }, to: Shape { channels: N + 1, ratio: M } }
+    );
     for other in [&double, &overlap, &recursion] {
         let refused = SwapError::State { from: "direct", to: other.algorithm() };
         assert_eq!(go_on(&running, other).unwrap_err(), refused);

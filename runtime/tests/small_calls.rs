@@ -2,8 +2,8 @@
 //! (`tools/miri.sh`), which checks each load and store of the portable kernels.
 
 use hybank_runtime::{
-    Algorithm, Isa, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Precision, SampleLayout, StateSpace,
-    Stream,
+    Algorithm, Isa, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Precision, SampleLayout, Shape,
+    StateSpace, Stream,
 };
 
 /// y[k M + p] = sum_i sum_j f_i[p + j M] x_i[k - j].
@@ -95,7 +95,7 @@ fn recursions_follow_the_definition() {
         }
         for isa in Isa::available() {
             let options = Options { isa, ..Options::default() };
-            let plan = Plan::from_state_space(&filter, [2, 2], 0, options).unwrap();
+            let plan = Plan::from_state_space(&filter, Shape { channels: 2, ratio: 2 }, 0, options).unwrap();
             assert_close(&run(&plan, &input), &want, 1e-13, &format!("mixed {mixed} {isa}"));
         }
     }

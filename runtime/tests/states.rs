@@ -1,7 +1,9 @@
 //! States as bytes: a stream goes on from them with the bits of the one that never stopped, and refuses what
 //! is no state of its plan.
 
-use hybank_runtime::{Algorithm, Options, Plan, Precision, STATE_COUNTS, StateError, StateSpace, Stream};
+use hybank_runtime::{
+    Algorithm, Options, Plan, Precision, STATE_COUNTS, Shape, StateError, StateSpace, Stream,
+};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
@@ -39,7 +41,7 @@ fn recursion(channels: usize, order: usize) -> Plan {
     b[order + 1] = (0..channels).map(|i| if i == 0 { 1.0 } else { 0.0 }).collect();
     let (c, d) = ((0..M).map(|i| numbers(size, 11 + i)).collect(), vec![vec![0.5; channels]; M]);
     let system = StateSpace { a, b, c, d };
-    Plan::from_state_space(&system, [channels, M], 4, Options::default()).unwrap()
+    Plan::from_state_space(&system, Shape { channels, ratio: M }, 4, Options::default()).unwrap()
 }
 
 /// Every algorithm in both precisions, with K odd and even, with and without offsets.

@@ -1,7 +1,7 @@
 //! Compiles a bank into a plan of the runtime.
 
 use super::{Bank, SynthesisFilters};
-use crate::runtime::{BuildError, Options, Plan};
+use crate::runtime::{BuildError, Options, Plan, Shape};
 
 impl Bank {
     /// Compiles the bank into a plan, which any number of streams of the runtime may share. Its streams
@@ -18,7 +18,7 @@ impl Bank {
             }
             SynthesisFilters::Fir(taps) => Plan::from_taps(taps, self.ratio, self.latency, options),
             SynthesisFilters::StateSpace(filter) => {
-                Plan::from_state_space(filter, [channels, self.ratio], self.latency, options)
+                Plan::from_state_space(filter, Shape { channels, ratio: self.ratio }, self.latency, options)
             }
         };
         plan?.with_offsets(&self.offsets)

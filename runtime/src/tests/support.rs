@@ -1,6 +1,6 @@
 //! Banks, inputs and the definition of the sum.
 
-use crate::{Algorithm, BuildError, Isa, Options, Plan, Precision, Sample, StateSpace, Stream};
+use crate::{Algorithm, BuildError, Isa, Options, Plan, Precision, Sample, Shape, StateSpace, Stream};
 
 /// A generator whose stream never changes (Knuth's MMIX).
 pub(crate) struct Noise(pub(crate) u64);
@@ -41,9 +41,12 @@ impl Bank {
     pub(crate) fn plan(&self, options: Options) -> Result<Plan, BuildError> {
         match &self.filters {
             Filters::Fir(taps) => Plan::from_taps(taps, self.ratio, self.latency, options),
-            Filters::StateSpace(filter) => {
-                Plan::from_state_space(filter, [self.channel_count(), self.ratio], self.latency, options)
-            }
+            Filters::StateSpace(filter) => Plan::from_state_space(
+                filter,
+                Shape { channels: self.channel_count(), ratio: self.ratio },
+                self.latency,
+                options,
+            ),
         }
     }
 }
