@@ -3,6 +3,18 @@
 use std::io;
 
 /// Threads that wait for work; any number of streams may use them.
+///
+/// ```
+/// use hybank_runtime::{Interleaved, Options, Plan, Stream, ThreadPool};
+///
+/// let pool = ThreadPool::new(2)?;
+/// let taps = [vec![0.5, 1.0, 0.5, 0.0], vec![0.0, 0.5, 1.0, 0.5]];
+/// let plan = Plan::from_taps(&taps, 2, 1, Options::default())?;
+/// let (input, mut output) = (vec![0.5f32; 2000], vec![0.0f32; 2000]);
+/// Stream::new(&plan).run_parallel(&Interleaved::new(&input, 2)?, &mut output[..], &pool)?;
+/// assert_eq!(output[1998..], [1.0, 1.0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct ThreadPool {
     pool: rayon::ThreadPool,
