@@ -37,6 +37,7 @@ impl Time {
 
 /// A text that is not the quantity it should be.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum QuantityError {
     /// There is no number at the beginning.
     #[error("\"{}\" does not begin with a number; write {example}", Quoted(.text))]

@@ -14,6 +14,7 @@ const TEXT: Bound = Bound { bytes: 1 << 28, kind: "a text file", remedy: "is it 
 
 /// What is wrong with an input file: a scene, tracks, cameras, images or maps.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum InputError {
     /// It cannot be read.
     #[error("{source}; {remedy}")]

@@ -8,6 +8,7 @@ use super::{MAX_GAIN, MAX_NORMALISED_POLE, MIN_DAMPING_RATIO, MIN_GAIN, MIN_NORM
 
 /// Why a filter was refused. Poles and zeros are given in rad/s, as the user wrote them.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum AnalogError {
     /// The fast period is not positive and finite.
     #[error("the fast period is {value}; it must be a positive, finite number of seconds")]

@@ -24,6 +24,7 @@ struct Inner {
 
 /// The rule that a bank breaks, with the offending value and the remedy.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum BankProblem {
     /// The text is not JSON.
     #[error("{}; is this a bank written by `hybank design`, and is it whole?", Quoted(.message))]

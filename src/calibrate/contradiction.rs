@@ -8,6 +8,7 @@ use std::fmt;
 
 /// In what captures contradict a spec.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Contradiction {
     /// Two captures hold the same samples.
     Repeated {

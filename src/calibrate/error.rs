@@ -8,6 +8,7 @@ use crate::units::{FastPeriods, Hertz};
 
 /// Why captures do not calibrate a spec.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CalibrateError {
     /// Complex samples beside real ones, or without tones.
     #[error(

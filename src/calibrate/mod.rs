@@ -64,6 +64,7 @@ use estimates::Fitted;
 
 /// The kind of signal that was captured.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub enum CalibrationSignal<'a> {
     /// Tones near these analog frequencies; an empty list for tones below half the fast rate that are to be
     /// found.

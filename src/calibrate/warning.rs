@@ -6,6 +6,7 @@ use crate::units::{FastPeriods, Hertz};
 
 /// A property of the captures that limits what the estimates mean.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Warning {
     /// Clipped samples were left out.
     #[error("clipped samples were left out, per channel: {}", list(counts))]

@@ -263,9 +263,7 @@ impl Report<'_> {
             _ if self.proof.proven.is_some_and(|proven| proven.lower_banks == BoundedBanks::Causal) => {
                 "no causal bank is better; this method does not aim at gamma"
             }
-            Method::H2 | Method::Sinc | Method::Separation => {
-                "no bank at all is better; this method does not aim at gamma"
-            }
+            _ => "no bank at all is better; this method does not aim at gamma",
         }
     }
 

@@ -329,7 +329,7 @@ fn kind(spur: &Spur) -> &'static str {
         Some(Cause::HarmonicImage { .. }) => "harmonic, displaced",
         Some(Cause::Image { .. }) => "image",
         Some(Cause::Intermodulation { .. }) => "intermodulation",
-        Some(Cause::Unknown) | None => "unknown",
+        _ => "unknown",
     }
 }
 

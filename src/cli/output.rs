@@ -87,7 +87,7 @@ fn check_extension(output: &Path, container: Container) -> Result<(), Failure> {
         (other, Container::Raw) if STRUCTURED.contains(&other) => {
             format!("name it {}", Quoted(output.with_extension("raw")))
         }
-        (_, Container::Raw) => return Ok(()),
+        _ => return Ok(()),
     };
     let written = if container == Container::Wav { "WAV" } else { "raw samples" };
     let (name, extension) = (Quoted(output), Quoted(&extension));

@@ -60,6 +60,7 @@ fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
             Algorithm::OverlapSave { .. } => {
                 "Fourier transforms of blocks; faster for long filters, adds latency"
             }
+            _ => "",
         })
     });
     PossibleValuesParser::new(names).try_map(|name| name.parse())

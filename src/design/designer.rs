@@ -55,6 +55,7 @@ pub struct Design {
 
 /// Whether [`design`] searches for a proof of the gammas. The search may take longer than the design.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ProofSearch {
     /// Search. The bank carries the proof if one is found.
     Run,

@@ -15,6 +15,7 @@ use std::time::Duration;
 
 /// Why a bank could not be designed or analysed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DesignError {
     /// The spec breaks a rule for specs.
     #[error(transparent)]

@@ -48,6 +48,7 @@ impl Limits {
 
 /// A step of a design that may take long.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Stage {
     /// The latency or the number of taps is chosen; so many designs were compared.
     Latency {

@@ -35,6 +35,7 @@ pub enum Objective {
 /// Why a search ended before its bounds met.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum EndOfSearch {
     /// Every round that it may take was taken.
     Rounds,

@@ -12,6 +12,7 @@ const MOST_ALONE: usize = 8;
 /// A way to use the slow samples without a bank.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum SimpleWay {
     /// One channel through its best filter: least mean-square error, with samples of all time.
     OneChannel,

@@ -5,6 +5,7 @@ use std::io;
 
 /// A fault of a file; every sentence names the file, the reason and, where there is one, the remedy.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FileError {
     /// The operating system refused.
     #[error("{}: cannot {action}: {}", Quoted(.file), .source)]

@@ -4,6 +4,7 @@ use crate::messages::Quoted;
 
 /// A format that cannot hold a bank.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ExportError {
     /// The format holds integers.
     #[error(

@@ -28,6 +28,7 @@ use crate::bank::Bank;
 /// A format of [`export`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[non_exhaustive]
 pub enum Format {
     /// A C99 header with a streaming function
     #[cfg_attr(feature = "cli", value(name = "c"))]

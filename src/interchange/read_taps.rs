@@ -13,6 +13,7 @@ const BUFFER: usize = 1 << 16;
 
 /// Why a file holds no taps.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TapsError {
     /// A cell is no finite number.
     #[error("line {line}, column {column}: \"{}\" is no finite number", Quoted(.text))]

@@ -7,6 +7,7 @@ use std::io;
 
 /// A fault of a file or stream; every sentence names the file, the place, the rule and the remedy.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum IoError {
     /// The operating system refused, or a file could not be read or written as a whole.
     #[error(transparent)]
@@ -91,6 +92,7 @@ impl From<IoError> for io::Error {
 
 /// A fault that was tolerated; complete when the input has ended.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum InputFault {
     /// The file is shorter than its header says.
     #[error("the file is truncated: {missing_bytes} bytes that its header promises are missing")]

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// The container format of an output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Container {
     /// A WAV header.
     Wav,

@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 /// The coding of the inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Coding {
     /// Raw real samples.
     Raw(PcmFormat),

@@ -6,6 +6,7 @@ use std::fmt;
 /// The cause of a spur. Tones count from 1; 0 stands for the only tone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Cause {
     /// Unequal offsets of `of` converters in turn: a line at k fs / of.
     Offset {

@@ -111,6 +111,7 @@ impl Settings {
 
 /// Why a record cannot be measured.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeasureError {
     /// No tone could be fitted.
     #[error(transparent)]

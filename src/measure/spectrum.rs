@@ -10,6 +10,7 @@ const J: Complex<f64> = Complex::new(0.0, 1.0);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[non_exhaustive]
 pub enum Window {
     /// No window
     None,

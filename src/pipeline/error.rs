@@ -6,6 +6,7 @@ use crate::runtime::{BuildError, ProcessError, SwapError};
 
 /// An error of one of the stages.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PipelineError {
     /// The bank's parts do not fit together.
     #[error(transparent)]

@@ -37,6 +37,7 @@ pub struct GapSummary {
 /// The replacement of a missing sample. What is replaced are the samples as the converters deliver them, so
 /// a converter without a signal delivers its offset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum GapPolicy {
     /// Zero after the offset is subtracted: the channel's offset.
     Zero,

@@ -31,6 +31,7 @@ pub struct Outcome {
 
 /// A fault that was tolerated.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Warning {
     /// A fault of an input.
     Input(InputWarning),

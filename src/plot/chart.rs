@@ -67,6 +67,7 @@ pub struct Chart {
 
 /// A chart that could not be drawn.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlotError {
     /// No finite point in any series.
     #[error("the chart `{title}` has no finite point to draw")]

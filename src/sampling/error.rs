@@ -2,6 +2,7 @@
 
 /// Faults of sample sets, offsets and settings handed to the sampling core.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SamplingError {
     /// The number of recurrent sample sets is not the period.
     #[error(

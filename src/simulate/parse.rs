@@ -9,6 +9,7 @@ use std::str::FromStr;
 
 /// A text that describes no source.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ParseSourceError {
     /// No such kind of source.
     #[error(

@@ -27,6 +27,7 @@ use std::f64::consts::TAU;
 /// let signal = Analog::Known(Source::Step { at: Seconds(0.3), height: 1.0 });
 /// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Source<T: Time = Seconds> {
     /// f(t) = 0 for t < at, `height` for t >= at (thesis 5.42).
     Step {

@@ -15,6 +15,7 @@ const MOST_PANELS: f64 = 2e7;
 
 /// A simulation that is refused before it starts.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum WorkloadError {
     /// No sample at all.
     #[error("shorter than one slow sample, so there is nothing to capture")]

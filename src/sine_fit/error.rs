@@ -4,6 +4,7 @@ use crate::units::Hertz;
 
 /// Why sines cannot be fitted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SineFitError {
     /// No record or no tone was given, or the rate is not a positive number.
     #[error(

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 /// How the synthesis filters are designed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Method {
     /// Finite impulse responses of given length, least gamma.
     Fir,
@@ -25,6 +26,7 @@ pub enum Method {
 /// The optimisation method of FIR designs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Solver {
     /// The exchange algorithm: frequencies are added until gamma meets its lower bound. The secondary
     /// objective chooses among the optimal taps.
@@ -36,6 +38,7 @@ pub enum Solver {
 /// How the taps of an FIR bank follow delays that change while it runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Tracking {
     /// The taps are affine functions of the delays, optimal over the box of delays of the `[uncertainty]`
     /// table.
@@ -82,6 +85,7 @@ pub type DesignOverrides = DesignTable<Option<Method>>;
 
 /// By how much the order of a recursive bank is reduced.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub enum Reduction {
     /// To at most this many states, with the least error.
     #[serde(rename = "order")]

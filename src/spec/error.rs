@@ -44,6 +44,7 @@ impl Fault {
 
 /// The rule that a spec violates, with the offending value and the remedy.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SpecProblem {
     /// The text is not TOML (or JSON) at all.
     #[error("{}", Quoted(.message))]

@@ -20,6 +20,7 @@ const MAX_COEFFICIENT: f64 = 1e300;
 /// An analog filter as written; stability is checked by [`crate::analog`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
+#[non_exhaustive]
 pub enum FilterSpec {
     /// Numerator over denominator in descending powers of s (rad/s).
     TransferFunction {
@@ -74,6 +75,7 @@ pub enum FilterSpec {
 /// The classical families.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Family {
     /// Maximally flat magnitude.
     Butterworth,

@@ -8,6 +8,7 @@ pub const MAX_ORDER: usize = 32;
 
 /// The rule that a written filter violates.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FilterProblem {
     /// A rule for one key of the filter table, or for the whole table.
     #[error("{rule}")]

@@ -18,6 +18,7 @@ pub struct MeasuredFilter {
 
 /// The kinds of files.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Measurement {
     /// Touchstone; the scattering parameter, if it is named.
     Touchstone(Option<String>),

@@ -30,6 +30,7 @@ pub struct SignalSpec {
 
 /// The spectrum of a signal.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum SignalSpectrum {
     /// Flat in a band, and below a floor outside.
     Band(Band),

@@ -7,6 +7,7 @@ use crate::units::Hertz;
 
 /// Why delays cannot be followed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TrackError {
     /// The taps are fixed.
     #[error(
@@ -56,6 +57,7 @@ pub enum TrackError {
 
 /// What is wrong with a line of a file of delays.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReadingProblem {
     /// It is no JSON object with the keys of a reading.
     #[error("{reason}")]

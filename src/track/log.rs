@@ -73,6 +73,7 @@ impl Logged {
 
 /// What a user should know at once.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum TrackWarning {
     /// Measurements contradicted a delay again and again; it was taken from the last of them.
     Lost {

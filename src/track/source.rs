@@ -27,6 +27,7 @@ const LEAST_CYCLES: f64 = 2.0;
 
 /// What the delays are measured by.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum DelaySource {
     /// A tone near this analog frequency that sounds all the time.
     Pilot(Hertz),

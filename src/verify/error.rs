@@ -5,6 +5,7 @@ use crate::analog::AnalogError;
 
 /// The file states something that is not proven, or the bank cannot be checked.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum VerifyError {
     /// The file carries no spec, so the front ends are unknown.
     #[error(

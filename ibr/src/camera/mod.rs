@@ -19,6 +19,7 @@ const SMALLEST_DETERMINANT: f64 = 1e-12;
 
 /// Errors of cameras.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CameraError {
     /// The left 3 x 3 part is singular.
     #[error(

@@ -17,6 +17,7 @@ pub struct Found {
 
 /// Why a path means no image of a list, or several.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NameError {
     /// No name of the list has this file name.
     #[error("there is no image \"{}\"; the images are {known}", Quoted(wanted))]

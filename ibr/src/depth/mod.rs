@@ -30,6 +30,7 @@ impl Measure {
 
 /// Errors of depth maps.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DepthError {
     /// The scale that turns stored numbers into depth is not a positive number.
     #[error("the scale is {scale}: it must be a positive number (stored value / scale = depth or disparity)")]

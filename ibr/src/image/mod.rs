@@ -24,6 +24,7 @@ use std::path::{Path, PathBuf};
 
 /// Errors of image files, and of images that do not fit together.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ImageError {
     /// The file cannot be opened or read.
     #[error(transparent)]

@@ -64,6 +64,7 @@ pub struct Settings {
 
 /// Invalid settings or samples of the third stage.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum InterpolationError {
     /// A weight or length outside its range.
     #[error(transparent)]

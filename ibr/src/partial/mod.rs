@@ -10,6 +10,7 @@ use crate::segment::segment;
 /// How a coarse map is made dense.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[non_exhaustive]
 pub enum Densify {
     /// Interpolate within segments of image and depth.
     #[default]

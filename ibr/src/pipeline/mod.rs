@@ -25,6 +25,7 @@ use hybank::memory::MemoryShortage;
 /// The method of the third stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[non_exhaustive]
 pub enum Method {
     /// rows for rectified rigs, plane for other scenes.
     #[default]
@@ -74,6 +75,7 @@ impl RenderSettings {
 
 /// Errors of a rendering.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RenderError {
     /// No view was given.
     #[error("there is no view to render from: give at least one")]

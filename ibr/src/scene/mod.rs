@@ -106,6 +106,7 @@ impl<P: Copy> SourceView<P> {
 
 /// Errors of a scene.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SceneError {
     /// A camera of the scene.
     #[error("{}: {which}: {source}", Quoted(path))]

@@ -37,6 +37,7 @@ pub struct Match {
 
 /// Errors of estimating the geometry of the views.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum GeometryError {
     /// Not enough correspondences.
     #[error("{found} {what} are too few, at least {needed} are needed; give more tracks")]

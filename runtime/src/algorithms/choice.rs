@@ -17,6 +17,7 @@ use std::str::FromStr;
 ///
 /// The names are those of [`FromStr`] and [`Display`](fmt::Display): `auto`, `direct` and `overlap-save`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Algorithm {
     /// Every product is computed; no sample is later than the bank's latency.
     #[default]

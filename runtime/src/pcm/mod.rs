@@ -12,6 +12,7 @@ use std::str::FromStr;
 
 /// How one sample is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum PcmFormat {
     /// Signed 8 bit.
     S8,

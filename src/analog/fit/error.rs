@@ -6,6 +6,7 @@ use crate::units::{Decibels, Hertz, Seconds};
 
 /// A text that is no measured response.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeasurementError {
     /// A Touchstone file of another kind.
     #[error("line {line}: {what}")]
@@ -64,6 +65,7 @@ pub enum MeasurementError {
 
 /// A measurement without a model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FitError {
     /// The model has more parameters than the measurement determines.
     #[error("too few frequencies above 0 Hz for order {order}: {points}; measure at {} or more, or give a lower order", 2 * .order)]
