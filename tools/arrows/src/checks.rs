@@ -34,14 +34,16 @@ fn allowed(text: &str) -> Result<BTreeMap<String, BTreeSet<String>>, String> {
     Ok(allowed)
 }
 
-/// The crates that are there.
+/// The crates that are there, and the names of those that are libraries.
 fn read(root: &Path) -> Result<(Imports, Vec<&'static str>), String> {
     let (mut imports, mut names) = (Imports::default(), Vec::new());
     for (name, folder) in CRATES {
-        let path = root.join(folder).join("lib.rs");
-        if path.is_file() {
-            imports.read(&path, vec![name.to_owned()])?;
+        let [library, program] = ["lib.rs", "main.rs"].map(|file| root.join(folder).join(file));
+        if library.is_file() {
+            imports.read(&library, vec![name.to_owned()])?;
             names.push(name);
+        } else if program.is_file() {
+            imports.read(&program, vec![name.to_owned()])?;
         }
     }
     Ok((imports, names))

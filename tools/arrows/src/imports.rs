@@ -47,7 +47,7 @@ impl Imports {
         let mut reader = Reader { file, module: module.clone(), children: Vec::new(), imports: self };
         reader.here().items.clone_from(&syntax.items);
         reader.visit_file(&syntax);
-        let is_root = path.ends_with("mod.rs") || path.ends_with("lib.rs");
+        let is_root = ["mod.rs", "lib.rs", "main.rs"].iter().any(|root| path.ends_with(root));
         let folder = if is_root { path.with_file_name("") } else { path.with_extension("") };
         for child in reader.children {
             let below = folder.join(child[module.len()..].iter().collect::<PathBuf>());
