@@ -1,6 +1,7 @@
 /* Runs filter banks that hybank designed: N slow channels in, one stream M times as fast out.
  *
- * A frame is one sample of each of the N channels; it gives M output samples. Link with libhybank.a or libhybank.so.
+ * A frame is one sample of each of the N channels; it gives M output samples. Of converters with rates of their own a
+ * frame holds several samples each, in a row and converter after converter, and N counts all of them. Link with libhybank.a or libhybank.so.
  *
  *     hybank *bank = hybank_open("bank.json", "auto", 0);
  *     if (!bank) { puts(hybank_error()); return 1; }
@@ -33,7 +34,7 @@ hybank *hybank_open(const char *path, const char *algorithm, int double_sums);
 /* Ends a bank; NULL is ignored. */
 void hybank_close(hybank *bank);
 
-size_t hybank_channels(const hybank *bank);      /* N */
+size_t hybank_channels(const hybank *bank);      /* N, samples per frame */
 size_t hybank_ratio(const hybank *bank);         /* M */
 size_t hybank_latency(const hybank *bank);       /* output sample n belongs to fast sample n - latency */
 size_t hybank_flush_frames(const hybank *bank);  /* frames of zeros that bring out the last samples */

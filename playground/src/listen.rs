@@ -2,7 +2,7 @@
 
 use crate::answer::{Answer, Refusal, bank};
 use hybank::analog::StrictlyProper;
-use hybank::bank::Bank;
+use hybank::bank::{Bank, FrameSample};
 use hybank::design::Problem;
 use hybank::io::wav::WavReader;
 use hybank::overview;
@@ -67,13 +67,14 @@ pub(crate) fn listen(signal: &str, input: &[u8]) -> Result<Answer, Refusal> {
 
 fn playback(bank: &Bank, spec: &Spec, signal: &Signal) -> Result<Answer, Refusal> {
     // Latency 0: what is fused lines up with the time of the signal.
-    let problem = Problem::new(spec, 0).map_err(Refusal::new)?;
+    let problem = Problem::new(spec, spec.wait()).map_err(Refusal::new)?;
     let frames = frames(&problem, &signal.analog, signal.samples, false).map_err(Refusal::new)?;
     let Captured { mut channels, target } = capture(&problem, &signal.analog, frames);
     for (samples, channel) in channels.iter_mut().zip(&spec.channels) {
         samples.iter_mut().for_each(|x| *x += channel.offset);
     }
-    let before = interleaved(&bank.delays_in_fast_periods(), bank.ratio, 0, &channels);
+    let channels = samples_of_frames(bank, &channels);
+    let before = interleaved(&bank.sample_delays(), bank.ratio, bank.wait(), &channels);
     let after = fused(bank, &channels)?;
     let snr_of = |output: &[f64]| snr(&target, output, SETTLING + bank.latency);
     let chart =
@@ -87,6 +88,14 @@ fn playback(bank: &Bank, spec: &Spec, signal: &Signal) -> Result<Answer, Refusal
         svg: chart.to_svg().map_err(Refusal::new)?,
     };
     Answer::with_samples(&playback, &[&target, &before, &after])
+}
+
+/// The samples of each place in the frames, which converters with rates of their own fill in a row.
+fn samples_of_frames(bank: &Bank, converters: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let of = |FrameSample { converter, number }: FrameSample| {
+        converters[converter].iter().skip(number).step_by(bank.samples[converter]).copied().collect()
+    };
+    bank.layout().iter().map(of).collect()
 }
 
 fn fused(bank: &Bank, channels: &[Vec<f64>]) -> Result<Vec<f64>, Refusal> {

@@ -163,7 +163,7 @@ class Analysis:
 @final
 class Capture:
     @property
-    def channels(self) -> NDArray[Any]: ...
+    def channels(self) -> Any: ...
     @property
     def target(self) -> NDArray[Any]: ...
 
@@ -262,6 +262,8 @@ class Bank:
     ) -> None: ...
     @property
     def channels(self) -> int: ...
+    @property
+    def samples(self) -> list[int]: ...
     @property
     def ratio(self) -> int: ...
     @property
@@ -367,6 +369,7 @@ class Channel(dict[str, Any]):
         filter: _Filter | None = None,
         *,
         delay_samples: float | np.number[Any] | None = None,
+        rate: _Quantity | None = None,
         noise: float | np.number[Any] | None = None,
         bits: int | np.integer[Any] | None = None,
         jitter: _Quantity | None = None,

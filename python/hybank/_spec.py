@@ -65,12 +65,13 @@ class Channel(dict):
     """One slow converter: its delay in seconds (or as a text with a unit), and what differs from the default."""
 
     def __init__(
-        self, delay=None, filter=None, *, delay_samples=None, noise=None, bits=None, jitter=None, gain=None, offset=None
+        self, delay=None, filter=None, *, delay_samples=None, rate=None, noise=None, bits=None, jitter=None, gain=None,
+        offset=None
     ):
         super().__init__(
             _given(
-                delay=delay, filter=filter, delay_samples=delay_samples, noise=noise, bits=bits, jitter=jitter,
-                gain=gain, offset=offset,
+                delay=delay, filter=filter, delay_samples=delay_samples, rate=rate, noise=noise, bits=bits,
+                jitter=jitter, gain=gain, offset=offset,
             )
         )
 

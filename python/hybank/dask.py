@@ -55,8 +55,8 @@ def fuse(bank, source, sink, *, client=None, axis=-1, dtype=None, algorithm="aut
     source, sink = _located(source), _location(sink)
     _check_sink(sink, source)
     reader = _open(source, axis)
-    if reader.channels != bank.channels:
-        raise HybankError(f"the source has {reader.channels} channels, the bank has {bank.channels}")
+    if reader.channels != sum(bank.samples):
+        raise HybankError(f"the source has {reader.channels} channels, the bank has {sum(bank.samples)}")
     plan = _plan(bank, reader.dtype, dtype, algorithm)
     span = _usual_span(reader.frames, client) if span is None else span
     job = _job(bank, source, sink, axis, plan, reader.frames, span)
@@ -131,7 +131,7 @@ class _End:
 
 def _plan(bank, given, dtype, algorithm):
     """The plan that ``bank.fuse`` would choose."""
-    shape = (bank.channels, 0)
+    shape = (sum(bank.samples), 0)
     y, info = bank.fuse(np.zeros(shape, given), dtype=dtype, algorithm=algorithm, full_output=True)
     asked = info.algorithm if bank.taps is not None else "auto"
     # Integers are made of the floats that the sums are in, so that what saturates is counted where it is written.

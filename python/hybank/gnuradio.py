@@ -12,6 +12,8 @@ class fuse(gr.interp_block):  # noqa: N801
 
     def __init__(self, bank, dtype="f4", algorithm="auto"):
         kind = np.dtype(dtype)
+        if max(bank.samples) > 1:
+            raise ValueError("converters with rates of their own: streams of a block have one rate; use bank.stream")
         gr.interp_block.__init__(self, "hybank", [kind] * bank.channels, [kind], bank.ratio)
         self._stream = bank.stream(dtype=kind, algorithm=algorithm)
         self._ratio = bank.ratio

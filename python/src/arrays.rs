@@ -4,13 +4,14 @@ use crate::errors::refused;
 use crate::formats::{Format, Number};
 use crate::samples::Samples;
 use bytemuck::AnyBitPattern;
+use hybank::bank::FrameLayout;
 use hybank::memory::available_memory;
 use hybank::runtime::{Input, Interleaved, Isa, PcmFrames, SampleLayout};
 use numpy::ndarray::Axis;
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
-use pyo3::types::{PyList, PyTuple};
+use pyo3::types::{PyList, PySlice, PyTuple};
 
 /// Lists of doubles that a computation on samples holds at once, about: the samples, those of each channel,
 /// transforms and spectra.
@@ -199,6 +200,64 @@ impl Shape {
             self.axis
         )))
     }
+}
+
+/// The frames of `x` and their shape. Converters with rates of their own may come as a list of signals, each of its
+/// own length; then the frames are put together, as many as the shortest has. `is_whole` refuses what is beyond.
+pub(crate) fn framed<'py>(
+    x: &Bound<'py, PyAny>,
+    layout: &FrameLayout,
+    axis: isize,
+    is_whole: bool,
+) -> PyResult<(Bound<'py, PyAny>, Shape)> {
+    let shape = Shape { axis, channels: layout.count() };
+    let converters = layout.samples();
+    let given: Vec<Bound<'py, PyAny>> = match (x.cast::<PyList>(), x.cast::<PyTuple>()) {
+        _ if layout.is_plain() => return Ok((x.clone(), shape)),
+        (Ok(list), _) => list.iter().collect(),
+        (_, Ok(tuple)) => tuple.iter().collect(),
+        _ => return Ok((x.clone(), shape)),
+    };
+    if given.len() != converters.len() {
+        return Err(HybankError::new_err(format!(
+            "{} signals for {} converters with rates of their own; give a list with one for each",
+            given.len(),
+            converters.len()
+        )));
+    }
+    let numpy = x.py().import("numpy")?;
+    let arrays =
+        given.iter().map(|one| numpy.call_method1("asarray", (one,))).collect::<PyResult<Vec<_>>>()?;
+    let length = |one: &Bound<'py, PyAny>| -> PyResult<usize> {
+        match one.getattr("shape")?.extract::<Vec<usize>>()?[..] {
+            [length] => Ok(length),
+            _ => Err(HybankError::new_err("each signal of a list is an array of one dimension")),
+        }
+    };
+    let lengths = arrays.iter().map(length).collect::<PyResult<Vec<_>>>()?;
+    let frames = lengths.iter().zip(converters).map(|(length, samples)| length / samples).min().unwrap_or(0);
+    if is_whole && lengths.iter().zip(converters).any(|(length, samples)| *length != frames * samples) {
+        return Err(HybankError::new_err(format!(
+            "signals of {lengths:?} samples are no whole frames, which hold {converters:?}; keep the rest for the next block"
+        )));
+    }
+    let mut rows = Vec::new();
+    for (array, samples) in arrays.iter().zip(converters) {
+        if !array.getattr("dtype")?.eq(arrays[0].getattr("dtype")?)? {
+            return Err(HybankError::new_err(
+                "the signals of a list have different types; convert them to one",
+            ));
+        }
+        let part = array.get_item(PySlice::new(x.py(), 0, (frames * samples) as isize, 1))?;
+        rows.push(part.call_method1("reshape", (frames, *samples))?);
+    }
+    let all = numpy.call_method1("concatenate", (PyList::new(x.py(), rows)?, 1))?;
+    let is_list = given[0].is_instance_of::<PyList>() || given[0].is_instance_of::<PyTuple>();
+    let all = match is_list && all.getattr("dtype")?.getattr("kind")?.eq("i")? {
+        true => all.call_method1("astype", ("f8",))?,
+        false => all,
+    };
+    Ok((all, Shape { axis: 0, ..shape }))
 }
 
 /// The array of a list, of an object of another package, or of a subclass.

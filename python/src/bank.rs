@@ -1,6 +1,6 @@
 //! `hybank.Bank` and `hybank.load`.
 
-use crate::arrays::Shape;
+use crate::arrays::framed;
 use crate::background;
 use crate::errors::{choose, file_error, refused};
 use crate::fuse::{self, Request};
@@ -81,13 +81,19 @@ impl Bank {
         write_file(&path, &bytes, overwrite)
     }
 
-    /// N.
+    /// The number of converters.
     #[getter]
     fn channels(&self) -> usize {
         self.bank.channel_count()
     }
 
-    /// M, fast samples per slow sample.
+    /// Samples of each converter per frame: 1, unless converters have rates of their own.
+    #[getter]
+    fn samples(&self) -> Vec<usize> {
+        self.bank.samples.clone()
+    }
+
+    /// M, fast samples per frame.
     #[getter]
     fn ratio(&self) -> usize {
         self.bank.ratio
@@ -148,7 +154,7 @@ impl Bank {
         read_only(PyArray1::from_slice(py, &self.bank.offsets))
     }
 
-    /// Taps at the fast rate, (N, L); None for a recursive bank.
+    /// Taps at the fast rate, (N, L), a row for each sample of a frame; None for a recursive bank.
     #[getter]
     fn taps<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         let SynthesisFilters::Fir(taps) = &self.bank.filters else { return Ok(None) };
@@ -161,7 +167,7 @@ impl Bank {
     #[getter]
     fn ss<'py>(&self, py: Python<'py>) -> PyResult<Matrices<'py>> {
         let StateSpace { a, b, c, d } = self.block()?;
-        let (states, channels) = (a.len(), self.bank.channel_count());
+        let (states, channels) = (a.len(), self.bank.frame_samples());
         Ok((
             matrix(py, a, states)?,
             matrix(py, b, channels)?,
@@ -218,9 +224,9 @@ impl Bank {
         keep_latency: bool,
         full_output: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let shape = Shape { axis, channels: self.bank.channel_count() };
+        let (frames, shape) = framed(x, &self.bank.layout(), axis, false)?;
         let request = Request::new(threads, gaps, algorithm, keep_latency)?;
-        let (y, report) = fuse::fuse(&self.bank, x, shape, dtype.as_ref(), &request)?;
+        let (y, report) = fuse::fuse(&self.bank, &frames, shape, dtype.as_ref(), &request)?;
         if full_output { Ok((y, report).into_pyobject(x.py())?.into_any()) } else { Ok(y) }
     }
 

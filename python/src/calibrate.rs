@@ -1,6 +1,6 @@
 //! `hybank.calibrate`.
 
-use crate::arrays::{Held, Shape};
+use crate::arrays::{Held, framed};
 use crate::background;
 use crate::errors::refused;
 use crate::sources;
@@ -75,10 +75,15 @@ pub(crate) fn calibrate(
 ) -> PyResult<Calibration> {
     let py = x.py();
     let spec = sources::spec(spec)?;
-    let held = Held::new(x, Shape { axis, channels: spec.channels.len() })?;
+    let layout = spec.layout();
+    let (frames, shape) = framed(x, &layout, axis, false)?;
+    let held = Held::new(&frames, shape)?;
     let signal = Signal::new(&spec, tones, waveform, rate, blind)?;
     signal.check(held.format.complex)?;
-    let records = records(&held, spec.channels.len(), clip)?;
+    let mut records = records(&held, layout.count(), clip)?;
+    if !layout.is_plain() {
+        records = layout.ranges().into_iter().map(|samples| Record::in_a_row(&records[samples])).collect();
+    }
     let settings = Settings { fit: fitted(&fit)?, reference: reference_of(&spec, reference)? };
     let nominal = spec.clone();
     let found = background::run(py, None, move |_| {

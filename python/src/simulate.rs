@@ -11,7 +11,7 @@ use hybank::spec::Spec;
 use hybank::units::{FastPeriods, Hertz};
 use numpy::{Complex64, PyArray1, PyArray2};
 use pyo3::prelude::*;
-use pyo3::types::PyString;
+use pyo3::types::{PyList, PyString};
 
 /// What virtual converters capture of a signal: a text like `chirp:50Hz..8kHz@1s`, or samples.
 #[pyfunction]
@@ -31,7 +31,7 @@ pub(crate) fn simulate(
     // As the command does: the converters do not know what the spec says of the signal. Without latency the
     // target lies on the time axis of the output of `Bank.fuse`.
     let unweighted = Spec { signal: None, ..spec.clone() };
-    let problem = Problem::new(&unweighted, 0).map_err(refused)?;
+    let problem = Problem::new(&unweighted, spec.wait()).map_err(refused)?;
     let signal = Signal::new(&spec, signal, rate)?;
     let frames = signal.frames(&problem, samples).map_err(refused)?;
     let (real, imaginary) = background::run(py, None, move |_| {
@@ -98,20 +98,25 @@ fn delivered(
 ) -> PyResult<Capture> {
     let real = amplified(real, spec, gain);
     let (channels, target) = match imaginary.map(|part| amplified(part, spec, gain)) {
-        None => (
-            PyArray2::from_vec2(py, &real.channels)?.into_any(),
-            PyArray1::from_vec(py, real.target).into_any(),
-        ),
+        None => (rows(py, real.channels)?, PyArray1::from_vec(py, real.target).into_any()),
         Some(imaginary) => {
             let rows = real.channels.iter().zip(&imaginary.channels);
             let rows: Vec<_> = rows.map(|(real, imaginary)| complex(real, imaginary)).collect();
             (
-                PyArray2::from_vec2(py, &rows)?.into_any(),
+                self::rows(py, rows)?,
                 PyArray1::from_vec(py, complex(&real.target, &imaginary.target)).into_any(),
             )
         }
     };
     Ok(Capture { channels: channels.unbind(), target: target.unbind() })
+}
+
+/// An array with a row for each converter; a list of arrays where these have rates of their own.
+fn rows<T: numpy::Element + Clone>(py: Python<'_>, rows: Vec<Vec<T>>) -> PyResult<Bound<'_, PyAny>> {
+    if rows.windows(2).all(|pair| pair[0].len() == pair[1].len()) {
+        return Ok(PyArray2::from_vec2(py, &rows)?.into_any());
+    }
+    Ok(PyList::new(py, rows.into_iter().map(|row| PyArray1::from_vec(py, row)))?.into_any())
 }
 
 fn amplified(captured: Captured, spec: &Spec, gain: f64) -> Captured {

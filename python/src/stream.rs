@@ -1,6 +1,6 @@
 //! `hybank.Stream`: a causal stream, block by block.
 
-use crate::arrays::{Held, Shape};
+use crate::arrays::{Held, Shape, framed};
 use crate::bank::Bank as PyBank;
 use crate::errors::refused;
 use crate::formats::{Format, Number};
@@ -50,7 +50,7 @@ impl Stream {
     ) -> PyResult<Self> {
         let default = Format { number: Number::F32, complex: false };
         let format = dtype.map_or(Ok(default), Format::of_dtype)?;
-        let shape = Shape { axis, channels: bank.channel_count() };
+        let shape = Shape { axis, channels: bank.frame_samples() };
         shape.check()?;
         let algorithm_asked = parse_algorithm(algorithm)?.without_added_latency();
         let plan = plan(bank, format, algorithm_asked, Settings::default())?;
@@ -82,7 +82,8 @@ impl Stream {
 impl Stream {
     /// Filters a block of frames; M output samples for each of them.
     fn process<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        let held = Held::new(x, self.shape)?;
+        let (frames, shape) = framed(x, &self.bank.layout(), self.shape.axis, true)?;
+        let held = Held::new(&frames, shape)?;
         self.check_parts(held.format)?;
         let mut array = NewArray::new(x.py(), held.frames() * self.plan.ratio(), self.format)?;
         let (parts, mut room) = (held.parts()?, array.room()?);
@@ -103,7 +104,7 @@ impl Stream {
         py.detach(|| self.lock().reset());
     }
 
-    /// N.
+    /// N, the samples of a frame.
     #[getter]
     fn channels(&self) -> usize {
         self.plan.channels()

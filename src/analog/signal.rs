@@ -98,7 +98,7 @@ pub fn signal(spec: &Spec) -> Result<Option<StableFilter>, AnalogError> {
 
 /// f_N: half the fast rate, or half the mean rate of all samples where there are fewer of them.
 pub fn resolved_band(spec: &Spec) -> Hertz {
-    let share = (spec.channels.len() as f64 / spec.ratio as f64).min(1.0);
+    let share = (spec.layout().count() as f64 / spec.ratio as f64).min(1.0);
     Hertz(0.5 * share / spec.fast_period.0)
 }
 

@@ -1,7 +1,7 @@
 //! The invariants of every bank, read or designed.
 
 use crate::spec::{
-    MAX_CHANNELS, MAX_ENTRY, MAX_RATIO, Spec, SpecProblem, check_fast_period, check_fraction_bits,
+    FrameSample, MAX_CHANNELS, MAX_ENTRY, MAX_RATIO, Spec, SpecProblem, check_fast_period, check_fraction_bits,
     check_gain, check_offset,
 };
 use crate::units::Seconds;
@@ -59,13 +59,14 @@ impl Bank {
     pub fn check(&self) -> Result<(), BankError> {
         self.check_scalars()?;
         check_delays(&self.delays, self.fast_period)?;
+        self.check_samples()?;
         check_converters("gain", &self.gains, self.channel_count(), check_gain)?;
         check_converters("offset", &self.offsets, self.channel_count(), check_offset)?;
         check_gamma(&self.gamma)?;
         self.check_method()?;
         match &self.filters {
-            SynthesisFilters::Fir(taps) => check_taps(taps, self.channel_count())?,
-            SynthesisFilters::StateSpace(block) => check_block(block, self.ratio, self.channel_count())?,
+            SynthesisFilters::Fir(taps) => self.check_taps(taps)?,
+            SynthesisFilters::StateSpace(block) => check_block(block, self.ratio, self.frame_samples())?,
         }
         self.tap_slopes.as_ref().map_or(Ok(()), |slopes| self.check_tap_slopes(slopes))?;
         self.fixed_point.as_ref().map_or(Ok(()), |words| self.check_fixed_point(words))?;
@@ -83,7 +84,7 @@ impl Bank {
             let rule = "there is a slope for each tap of each channel, or none for the delay of a channel";
             check_length(path, found, expected, unit, rule)
         };
-        check("channels", slopes.by_delay.len(), taps.len(), "lists of tap slopes")?;
+        check("channels", slopes.by_delay.len(), self.channel_count(), "lists of tap slopes")?;
         for (j, by_delay) in slopes.by_delay.iter().enumerate().filter(|(_, list)| !list.is_empty()) {
             let path = format!("channels[{j}].tap_slopes");
             check(&path, by_delay.len(), taps.len(), "lists of tap slopes")?;
@@ -119,10 +120,65 @@ impl Bank {
                     return out_of_range(path, integer as f64, "(integer tap)", rule);
                 }
                 if tap != integer as f64 * words.step() {
-                    let path = format!("channels[{i}].taps[{n}]");
+                    let path = format!("{}[{n}]", self.taps_path(i));
                     return refuse(path, BankProblem::NotTheInteger { tap, integer, step: words.step() });
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// Each converter has a sample in a frame, and a latency covers the wait for the last one.
+    fn check_samples(&self) -> Checked {
+        let rule = "every channel has a number of samples per frame";
+        check_length("channels", self.samples.len(), self.channel_count(), "numbers of samples", rule)?;
+        if let Some(i) = self.samples.iter().position(|&samples| !(1..=MAX_CHANNELS).contains(&samples)) {
+            let rule = format!("a converter has 1 to {MAX_CHANNELS} samples per frame");
+            return out_of_range(format!("channels[{i}].samples"), self.samples[i] as f64, "samples", rule);
+        }
+        let count = self.frame_samples();
+        if count > MAX_CHANNELS {
+            let rule = format!("a frame has at most {MAX_CHANNELS} samples");
+            return out_of_range("channels", count as f64, "samples", rule);
+        }
+        if self.latency < self.wait() {
+            let rule = format!(
+                "the last sample of a frame comes {} fast samples after the first, which the latency includes",
+                self.wait()
+            );
+            return out_of_range("latency", self.latency as f64, "fast samples", rule);
+        }
+        Ok(())
+    }
+
+    /// The place of the taps of sample `i` of a frame.
+    fn taps_path(&self, i: usize) -> String {
+        match self.layout().iter().nth(i) {
+            Some(FrameSample { converter, number }) if self.samples[converter] > 1 => {
+                format!("channels[{converter}].taps[{number}]")
+            }
+            Some(FrameSample { converter, .. }) => format!("channels[{converter}].taps"),
+            None => format!("channels[{i}].taps"),
+        }
+    }
+
+    fn check_taps(&self, taps: &[Vec<f64>]) -> Checked {
+        check_length(
+            "channels",
+            taps.len(),
+            self.frame_samples(),
+            "tap lists",
+            "every channel has a filter",
+        )?;
+        let expected = taps[0].len();
+        if expected == 0 {
+            return out_of_range(self.taps_path(0), 0.0, "taps", "a filter has at least one tap");
+        }
+        for (i, list) in taps.iter().enumerate() {
+            let path = self.taps_path(i);
+            let rule = "all filters are as long as the first one; append zeros to the shorter ones";
+            check_length(&path, list.len(), expected, "taps", rule)?;
+            check_sizes(&path, list)?;
         }
         Ok(())
     }
@@ -138,7 +194,7 @@ impl Bank {
         match &proof.lower {
             Some(LowerProof::Fir(witnesses)) => {
                 for (k, witness) in witnesses.iter().enumerate() {
-                    check(&format!("proof.lower[{k}]"), witness, self.channel_count())?;
+                    check(&format!("proof.lower[{k}]"), witness, self.frame_samples())?;
                 }
             }
             Some(LowerProof::Causal(witness)) => check_causal(witness)?,
@@ -181,6 +237,9 @@ impl Bank {
         }
         let rule = "the spec must describe every channel of the bank";
         check_length("spec.channel", spec.channels.len(), self.channel_count(), "channels", rule)?;
+        for (i, (&own, &samples)) in self.samples.iter().zip(spec.layout().samples()).enumerate() {
+            agree(format!("channels[{i}].samples"), own as f64, samples as f64, 0.0)?;
+        }
         for (i, (&delay, channel)) in self.delays.iter().zip(&spec.channels).enumerate() {
             let path = |key: &str| format!("spec.channel[{i}].{key}");
             agree(path("delay"), delay.0, channel.delay.0, (self.fast_period + delay).0)?;
@@ -251,21 +310,6 @@ fn check_gamma(gamma: &Gamma) -> Checked {
             let rule = format!("a lower bound is at most gamma.upper, {upper}");
             return out_of_range(format!("gamma.{key}"), value, "(h = 1)", rule);
         }
-    }
-    Ok(())
-}
-
-fn check_taps(taps: &[Vec<f64>], channels: usize) -> Checked {
-    check_length("channels", taps.len(), channels, "tap lists", "every channel has a filter")?;
-    let expected = taps[0].len();
-    if expected == 0 {
-        return out_of_range("channels[0].taps", 0.0, "taps", "a filter has at least one tap");
-    }
-    for (i, list) in taps.iter().enumerate() {
-        let path = format!("channels[{i}].taps");
-        let rule = "all filters are as long as the first one; append zeros to the shorter ones";
-        check_length(&path, list.len(), expected, "taps", rule)?;
-        check_sizes(&path, list)?;
     }
     Ok(())
 }

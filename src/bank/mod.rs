@@ -23,6 +23,7 @@ pub use read::check_digest;
 pub use taps::{FixedPoint, TapSlopes};
 
 pub use crate::runtime::StateSpace;
+pub use crate::spec::{FrameLayout, FrameSample};
 
 use crate::spec::{Method, Spec};
 use crate::units::{FastPeriods, GridTime, Seconds};
@@ -40,20 +41,22 @@ pub struct Bank {
     pub spec: Option<Spec>,
     /// The fast period h.
     pub fast_period: Seconds,
-    /// M, the number of fast samples per slow sample.
+    /// M, the number of fast samples per frame.
     pub ratio: usize,
-    /// The latency m0 in fast samples.
+    /// The latency m0 in fast samples, with the [wait](Bank::wait) for the rest of a frame.
     pub latency: usize,
     /// The design method.
     pub method: Method,
-    /// The delay D_i of each channel.
+    /// L_i, the samples of each converter per frame: one, unless the converters have unequal rates.
+    pub samples: Vec<usize>,
+    /// The delay D_i of each converter.
     pub delays: Vec<Seconds>,
     /// The gain g_i of each converter relative to nominal. The filters are designed for it.
     pub gains: Vec<f64>,
     /// The offset o_i of each converter, relative to full scale. It is subtracted from the samples before
     /// the filters.
     pub offsets: Vec<f64>,
-    /// The synthesis filters F_1 .. F_N.
+    /// The synthesis filters, one for each sample of a frame.
     pub filters: SynthesisFilters,
     /// How the delays schedule the taps, for an FIR bank that was designed for it.
     pub tap_slopes: Option<TapSlopes>,
@@ -68,7 +71,7 @@ pub struct Bank {
 /// The synthesis filters: FIR taps or a state-space block.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SynthesisFilters {
-    /// `taps[i][n]` = `f_i[n]` at the fast rate.
+    /// `taps[i][n]` = `f_i[n]` at the fast rate, i in the order of [`FrameLayout::iter`].
     Fir(Vec<Vec<f64>>),
     /// One block per slow period.
     StateSpace(StateSpace),
@@ -140,6 +143,7 @@ impl Bank {
             ratio,
             latency: 0,
             method,
+            samples: vec![1; channels],
             delays: vec![Seconds(0.0); channels],
             gains: vec![1.0; channels],
             offsets: vec![0.0; channels],
@@ -151,12 +155,41 @@ impl Bank {
         }
     }
 
-    /// N, the number of slow channels.
+    /// The number of converters.
     pub fn channel_count(&self) -> usize {
         self.delays.len()
     }
 
-    /// The slow period M h.
+    /// The frames of the converters' samples.
+    pub fn layout(&self) -> FrameLayout {
+        FrameLayout::new(self.ratio, self.samples.clone())
+    }
+
+    /// N, the number of samples of a frame, each with a filter of its own.
+    pub fn frame_samples(&self) -> usize {
+        self.samples.iter().sum()
+    }
+
+    /// S, the part of the latency for which a frame waits for its last sample; 0 for converters of one rate.
+    pub fn wait(&self) -> usize {
+        self.layout().wait(&self.grid_delays())
+    }
+
+    /// The fast samples by which the output lies behind the time axis of the converters.
+    pub fn output_delay(&self) -> usize {
+        self.latency.saturating_sub(self.wait())
+    }
+
+    /// The delay of each sample of a frame as the designer counts it, [`FrameLayout::waited_delays`].
+    pub fn sample_delays(&self) -> Vec<FastPeriods> {
+        self.layout().waited_delays(&self.grid_delays()).into_iter().map(GridTime::in_fast_periods).collect()
+    }
+
+    fn grid_delays(&self) -> Vec<GridTime> {
+        self.delays.iter().map(|&delay| GridTime::new(delay, self.fast_period)).collect()
+    }
+
+    /// The slow period M h, in which a frame is taken.
     pub fn slow_period(&self) -> Seconds {
         self.fast_period * self.ratio as f64
     }
@@ -168,8 +201,7 @@ impl Bank {
 
     /// D_i / h of every channel.
     pub fn delays_in_fast_periods(&self) -> Vec<FastPeriods> {
-        let h = self.fast_period;
-        self.delays.iter().map(|&delay| GridTime::new(delay, h).in_fast_periods()).collect()
+        self.grid_delays().into_iter().map(GridTime::in_fast_periods).collect()
     }
 }
 

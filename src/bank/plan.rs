@@ -11,17 +11,17 @@ impl Bank {
     /// [`BuildError`] if the bank's parts do not fit together, hold values that are not finite, or cannot
     /// run with `options`.
     pub fn plan(&self, options: Options) -> Result<Plan, BuildError> {
-        let channels = self.channel_count();
+        let channels = self.frame_samples();
         let plan = match &self.filters {
             SynthesisFilters::Fir(taps) if taps.len() != channels => {
                 Err(BuildError::FilterCount { delays: channels, filters: taps.len() })
             }
-            SynthesisFilters::Fir(taps) => Plan::from_taps(taps, self.ratio, self.latency, options),
+            SynthesisFilters::Fir(taps) => Plan::from_taps(taps, self.ratio, self.output_delay(), options),
             SynthesisFilters::StateSpace(filter) => {
-                Plan::from_state_space(filter, Shape { channels, ratio: self.ratio }, self.latency, options)
+                Plan::from_state_space(filter, Shape { channels, ratio: self.ratio }, self.output_delay(), options)
             }
         };
-        plan?.with_offsets(&self.offsets)
+        plan?.with_offsets(&self.layout().each(&self.offsets))
     }
 
     /// Bytes of memory that the plan of an FIR bank and one of its streams take, about; 0 for recursive
@@ -46,7 +46,9 @@ mod tests {
     fn a_bank_needs_as_many_filters_as_delays() {
         let bank = Bank::bare(SynthesisFilters::Fir(vec![vec![1.0], vec![1.0]]), 2);
         assert_eq!(bank.plan(Options::default()).unwrap().channels(), 2);
-        let refused = Bank { delays: vec![Seconds(0.0)], ..bank }.plan(Options::default()).unwrap_err();
+        let refused = Bank { delays: vec![Seconds(0.0)], samples: vec![1], ..bank }
+            .plan(Options::default())
+            .unwrap_err();
         assert_eq!(refused, BuildError::FilterCount { delays: 1, filters: 2 });
     }
 

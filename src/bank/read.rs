@@ -29,7 +29,7 @@ const KEYS: [&str; 14] = [
     "digest",
     "meta",
 ];
-const CHANNEL_KEYS: [&str; 5] = ["delay", "gain", "offset", "taps", "tap_slopes"];
+const CHANNEL_KEYS: [&str; 6] = ["delay", "samples", "gain", "offset", "taps", "tap_slopes"];
 const REWRITE: &str = "a bank without it cannot be run; give a file written by `hybank design`";
 
 impl Bank {
@@ -100,6 +100,10 @@ fn read(document: &Value<'_>) -> Result<Bank, BankError> {
         ratio: top.required("ratio", REWRITE)?.count("fast samples")?,
         latency: top.required("latency", REWRITE)?.count("fast samples")?,
         method: top.required("method", REWRITE)?.name("method", &method)?,
+        samples: channels
+            .iter()
+            .map(|c| c.optional("samples").map_or(Ok(1), |v| v.count("samples")))
+            .collect::<Result<_, _>>()?,
         delays: channels
             .iter()
             .map(|c| c.required("delay", REWRITE)?.number().map(Seconds))
@@ -133,8 +137,24 @@ fn check_header(document: &Value<'_>) -> Result<(), BankError> {
 fn filters(top: &Fields<'_>, channels: &[Fields<'_>]) -> Result<SynthesisFilters, BankError> {
     let Some(block) = top.optional("state_space") else {
         let remedy = "give the taps of every channel, or a state_space for all";
-        let taps = channels.iter().map(|channel| channel.required("taps", remedy)?.numbers());
-        return Ok(SynthesisFilters::Fir(taps.collect::<Result<_, Fault>>()?));
+        let taps = channels.iter().map(|channel| {
+            let taps = channel.required("taps", remedy)?;
+            let samples = channel.optional("samples").map_or(Ok(1), |v| v.count("samples"))?;
+            if samples == 1 {
+                return Ok(vec![taps.numbers()?]);
+            }
+            let lists = taps.matrix()?;
+            let rule = "a converter with several samples per frame has a list of taps for each of them";
+            let (found, expected, unit) = (lists.len(), samples, "tap lists");
+            let problem = BankProblem::Length { found, expected, unit, rule };
+            if found == expected {
+                Ok(lists)
+            } else {
+                Err(BankError::new("", taps.path().to_owned(), problem))
+            }
+        });
+        let taps = taps.collect::<Result<Vec<_>, BankError>>()?;
+        return Ok(SynthesisFilters::Fir(taps.into_iter().flatten().collect()));
     };
     if let Some(taps) = channels.iter().find_map(|channel| channel.optional("taps")) {
         let remedy = "a bank runs by the one or the other, keep what goes with its method";

@@ -19,6 +19,7 @@ fn fir() -> Bank {
         ratio: 2,
         latency: 10,
         method: Method::Fir,
+        samples: vec![1; 2],
         delays: vec![Seconds(1.2), Seconds(0.6)],
         gains: vec![1.0; 2],
         offsets: vec![0.0; 2],

@@ -39,13 +39,23 @@ struct Document<'a> {
 struct Channel<'a> {
     delay: Seconds,
     #[serde(skip_serializing_if = "Option::is_none")]
+    samples: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     gain: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     offset: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    taps: Option<&'a [f64]>,
+    taps: Option<Taps<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     tap_slopes: Option<&'a [Vec<f64>]>,
+}
+
+/// The taps of a converter: one list, or one for each of several samples per frame.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Taps<'a> {
+    One(&'a [f64]),
+    Several(&'a [Vec<f64>]),
 }
 
 impl Bank {
@@ -73,7 +83,11 @@ impl Bank {
             SynthesisFilters::Fir(taps) => (Some(taps), None),
             SynthesisFilters::StateSpace(block) => (None, Some(block)),
         };
-        let taps_of = |i: usize| taps.and_then(|lists| lists.get(i)).map(Vec::as_slice);
+        let first = |i: usize| self.samples[..i].iter().sum::<usize>();
+        let taps_of = |i: usize| match taps?.get(first(i)..first(i) + self.samples[i])? {
+            [one] => Some(Taps::One(one)),
+            several => Some(Taps::Several(several)),
+        };
         // What a reader takes for granted is left out.
         let unless = |value: f64, default: f64| (value != default).then_some(value);
         let slopes_of = |j: usize| {
@@ -82,6 +96,7 @@ impl Bank {
         };
         let channel = |i: usize| Channel {
             delay: self.delays[i],
+            samples: (self.samples[i] != 1).then_some(self.samples[i]),
             gain: unless(self.gains[i], 1.0),
             offset: unless(self.offsets[i], 0.0),
             taps: taps_of(i),

@@ -70,6 +70,9 @@ pub enum CalibrateError {
         /// Why.
         source: Box<AnalogError>,
     },
+    /// Converters with rates of their own, and a signal that is not made of tones.
+    #[error("converters with sample rates of their own are calibrated by tones only; capture tones")]
+    OwnRates,
     /// Not one record per channel.
     #[error(
         "the spec has {channels} channels, but there are {records} captures; give one per channel, in the order of the spec"

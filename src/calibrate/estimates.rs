@@ -186,8 +186,11 @@ fn half_widths<T: Default>(
 fn raise(spec: &mut Spec, h: Seconds) -> Option<usize> {
     let least = spec.channels.iter().map(|channel| channel.delay / h).fold(0.0, f64::min);
     let periods = (-least).ceil() as usize;
+    // Later delays leave less to wait for in a frame.
+    let before = spec.wait();
     spec.channels.iter_mut().for_each(|channel| channel.delay += h * periods as f64);
-    spec.latency = spec.latency.map(|latency| latency + periods);
+    let waited = spec.wait() + periods;
+    spec.latency = spec.latency.map(|latency| (latency + waited).saturating_sub(before));
     (periods > 0).then_some(periods)
 }
 

@@ -91,7 +91,7 @@ pub struct Settings {
 }
 
 /// Calibrates the channels of `spec` by `records`, one per channel in the order of the spec, whose samples
-/// of one index belong to one frame.
+/// of one index belong to one frame; of converters with rates of their own as many in a row as make a frame.
 ///
 /// # Errors
 /// [`CalibrateError`].
@@ -128,6 +128,7 @@ pub fn calibrate_pooled(
         (CalibrationSignal::Tones(frequencies), _) => {
             tones::fit(&model, spec, acquisitions, frequencies, settings)?
         }
+        _ if !spec.layout().is_plain() => return Err(CalibrateError::OwnRates),
         (CalibrationSignal::Waveform { samples, spacing }, [Acquisition { records, .. }]) => {
             waveform::Training::new(&model, records, samples, spacing, settings)?.fit()?
         }

@@ -73,7 +73,7 @@ impl BeforeAfterArgs {
     ) -> Result<BeforeAfter, Failure> {
         let fused = CaptureFile::read(output, Reading::channel(None, MOST_MEASURED))?;
         let channels = Whole::read(&mut reader, MOST_MEASURED)?.channels;
-        let plain = interleaved(&bank.delays_in_fast_periods(), bank.ratio, 0, &channels);
+        let plain = interleaved(&bank.sample_delays(), bank.ratio, bank.wait(), &channels);
         let settings = Settings {
             tones: tones(&self.tone)?,
             converters: bank.ratio,

@@ -56,14 +56,14 @@ impl BitTrueArgs {
             .map_err(|error| Failure::Input(format!("{}: {error}", name(job.bank_path))))?;
         let header = OutputHeader { container: Container::Wav, format, is_complex: false, rate };
         let output = begin_samples(job.output, header, job.args.force).map_err(Failure::running)?;
-        let skip = if job.dropped == DroppedLatency::All { job.bank.latency } else { 0 };
+        let skip = if job.dropped == DroppedLatency::All { job.bank.output_delay() } else { 0 };
         let mut run = Run::new(model, output, format, skip, job.bank);
         let is_stopped = each_block(reader, |recordings| run.process(recordings))?;
         let frames = reader.consumed();
         if is_stopped {
             return Err(interrupted(frames));
         }
-        run.flush(job.bank.channel_count())?;
+        run.flush(job.bank.frame_samples())?;
         let report = Report {
             samples: run.samples,
             rate: rate.round() as u64,

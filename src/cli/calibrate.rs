@@ -6,7 +6,7 @@ use super::capture_args::{CaptureArgs, InterleavedArgs};
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, Whole, start};
 use super::file_kind::FileKind;
 use super::interrupt::interrupts;
-use super::match_bank::check_stdin;
+use super::match_bank::{channels_of_raw, check_stdin, samples_per_frame};
 use super::measure::{ToneArg, tone, tones};
 use super::print::{Failure, is_dash, say_understood, warn};
 use super::remedy::explained;
@@ -245,19 +245,23 @@ impl Args {
         most: usize,
         warnings: &mut Vec<String>,
     ) -> Result<Captures, Failure> {
-        let turns = self.turns.by_delay(&spec.delays_in_fast_periods(), spec.ratio, &self.spec)?;
-        let captures = self.reading.options(paths.len(), spec.channels.len());
+        let layout = spec.layout();
+        let turns = self.turns.by_delay(&spec.delays_in_fast_periods(), &layout, &self.spec)?;
+        let captures = self.reading.options(paths.len(), channels_of_raw(&layout, paths.len()));
+        let samples_per_frame = samples_per_frame(&layout, paths.len());
         let full_scale = captures.full_scale.or(spec.full_scale);
-        let captures = ReadOptions { interleaving: turns.as_ref(), full_scale, ..captures };
+        let captures =
+            ReadOptions { interleaving: turns.as_ref(), samples_per_frame, full_scale, ..captures };
         let mut reader = start(paths, captures, interrupts())?;
         self.reading.scale.check(&reader)?;
         check_channels(spec, &reader)?;
         check_rate(spec, &reader)?;
         let parts = if reader.is_complex() { 2 } else { 1 };
         let most = most / (parts * reader.channels()).max(1);
-        let headers = reader.headers();
-        let rails =
-            headers.flat_map(|(_, header)| std::iter::repeat_n(header.rails, parts * header.channels));
+        let headers = reader.headers().zip(reader.samples_per_frame());
+        let rails = headers.flat_map(|((_, header), samples)| {
+            std::iter::repeat_n(header.rails, parts * header.channels * samples)
+        });
         let rails: Vec<_> = rails.collect();
         let name = reader.headers().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
         let Whole { channels, is_cut } = Whole::read_parts(&mut reader, most)?;
@@ -274,6 +278,10 @@ impl Args {
                 Some(imaginary) => Record::complex(real, imaginary),
                 None => real,
             });
+        }
+        if !layout.is_plain() {
+            records =
+                layout.ranges().into_iter().map(|samples| Record::in_a_row(&records[samples])).collect();
         }
         Ok(Captures { name, records })
     }
@@ -309,11 +317,19 @@ impl Args {
 }
 
 fn check_channels(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
-    let (wanted, given) = (spec.channels.len(), reader.channels());
+    let (wanted, given) = (spec.layout().count(), reader.channels());
     if given == wanted {
         return Ok(());
     }
     let names: Vec<&str> = reader.headers().map(|(name, _)| name).collect();
+    if !spec.layout().is_plain() {
+        return Err(Failure::Input(format!(
+            "the spec has {} converters with rates of their own and {wanted} samples per frame, but the captures have \
+             {given} ({}); give one mono recording per converter",
+            spec.channels.len(),
+            names.join(", ")
+        )));
+    }
     Err(Failure::Input(format!(
         "the spec has {wanted} channels, but the captures have {given} ({}); give one mono recording per channel, \
          one of {wanted} channels, or one in which the converters take turns and --interleaved {wanted}",
@@ -323,10 +339,13 @@ fn check_channels(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
 
 /// The captures have the slow rate of the spec, as far as they state it; any for a spec in normalised time.
 fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
-    let wanted = (spec.fast_period * spec.ratio as f64).rate().0;
-    let wrong = reader.headers().find_map(|(name, header)| Some((name, header.other_rate(wanted)?)));
+    let frames = (spec.fast_period * spec.ratio as f64).rate().0;
+    let wrong = reader.headers().zip(reader.samples_per_frame()).find_map(|((name, header), samples)| {
+        let wanted = frames * samples as f64;
+        Some((name, header.other_rate(wanted)?, wanted))
+    });
     match wrong {
-        Some((name, rate)) if !spec.is_normalised() => Err(Failure::Input(format!(
+        Some((name, rate, wanted)) if !spec.is_normalised() => Err(Failure::Input(format!(
             "{}: the sample rate is {} Hz, but the spec says {} Hz; record at that rate or correct the spec",
             Quoted(name),
             Number(rate),

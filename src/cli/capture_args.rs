@@ -2,7 +2,7 @@
 
 use super::output::WAV;
 use super::print::Failure;
-use crate::bank::Bank;
+use crate::bank::{Bank, FrameLayout};
 use crate::io::{Coding, MultiReader, ReadOptions, TimeInterleaving};
 use crate::messages::Quoted;
 use crate::quantity::{self, FullScale};
@@ -124,19 +124,26 @@ impl InterleavedArgs {
 
     /// The channels of `bank` in the order in which they sample, if they take turns.
     pub(super) fn turns(self, bank: &Bank, path: &Path) -> Result<Option<TimeInterleaving>, Failure> {
-        self.by_delay(&bank.delays_in_fast_periods(), bank.ratio, path)
+        self.by_delay(&bank.delays_in_fast_periods(), &bank.layout(), path)
     }
 
-    /// Channels of the given delays, with `ratio` fast periods per slow period, in the order in which they
-    /// sample, if they take turns. `path` is the file that says so.
+    /// Channels of the given delays in the order in which they sample, if they take turns. `path` is the file
+    /// that says so.
     pub(super) fn by_delay(
         self,
         delays: &[FastPeriods],
-        ratio: usize,
+        layout: &FrameLayout,
         path: &Path,
     ) -> Result<Option<TimeInterleaving>, Failure> {
         let Some(converters) = self.interleaved else { return Ok(None) };
-        let channels = delays.len();
+        if !layout.is_plain() {
+            return Err(Failure::Usage(format!(
+                "--interleaved: the converters of {} have rates of their own, so they do not sample in turn; give one \
+                 recording per converter",
+                path.display()
+            )));
+        }
+        let (channels, ratio) = (delays.len(), layout.ratio());
         if channels != usize::from(converters) {
             return Err(Failure::Usage(format!(
                 "--interleaved {converters}: {} has {channels} channels, and each of them is one converter; \

@@ -48,6 +48,9 @@ impl CaptureCheck {
             _ if !comparable => State::Idle(
                 "captures are not compared with the spec where they are complex or their delays are followed",
             ),
+            _ if !bank.layout().is_plain() => {
+                State::Idle("captures of converters with rates of their own are not compared with the spec")
+            }
             None => State::Idle("the bank carries no spec with which the captures could be compared"),
             Some(spec) => State::Collecting { spec: Box::new(spec), samples: vec![Vec::new(); channels] },
         };

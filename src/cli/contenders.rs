@@ -107,7 +107,7 @@ pub(super) fn contend(spec: &Spec, problem: &Problem, parts: &Parts) -> Result<V
 
 fn designed(spec: &Spec, method: Method, knows_the_band: bool) -> Result<Bank, Failure> {
     let mut variant = spec.clone();
-    variant.design = spec.design.with_method(method, spec.channels.len()).map_err(Failure::input)?;
+    variant.design = spec.design.with_method(method, &spec.layout()).map_err(Failure::input)?;
     variant.signal = variant.signal.filter(|_| knows_the_band);
     Ok(design::design(&variant, &design::Options::without_proof()).map_err(Failure::input)?.bank)
 }

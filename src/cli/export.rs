@@ -75,7 +75,7 @@ fn gamma_of_sections(bank: &Bank) -> Result<String, Box<dyn std::error::Error>> 
     if bank.spec.is_none() {
         return Ok(String::new());
     }
-    let block = block_of_sections(&sections(bank)?, bank.channel_count(), bank.ratio);
+    let block = block_of_sections(&sections(bank)?, bank.frame_samples(), bank.ratio);
     let written = Bank { filters: SynthesisFilters::StateSpace(block), ..bank.clone() };
     let gamma = analyze(&written, &[])?.gamma;
     let bank = bank.gamma.norm.map_or_else(String::new, |gamma| format!("; of the bank {gamma:e}"));

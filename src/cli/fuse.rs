@@ -169,7 +169,10 @@ impl Args {
     }
 
     fn start_reader(&self, job: &Job<'_>, observer: Option<&RunObserver>) -> Result<MultiReader, Failure> {
-        let captures = self.reading.options(self.inputs.len(), job.bank.channel_count());
+        let captures = self.reading.options(
+            self.inputs.len(),
+            super::match_bank::channels_of_raw(&job.bank.layout(), self.inputs.len()),
+        );
         job.start_reader(&self.inputs, captures, observer)
     }
 

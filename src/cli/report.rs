@@ -108,7 +108,7 @@ fn spectra_of(bank: &Bank, args: &Args) -> Result<Figure, Failure> {
     // What was lost is a zero, as `fuse` has it without --gaps.
     channels.iter_mut().flatten().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
     let fused = fused(bank, &channels, Settings::default())?;
-    let interleaved = interleaved(&bank.delays_in_fast_periods(), bank.ratio, 0, &channels);
+    let interleaved = interleaved(&bank.sample_delays(), bank.ratio, bank.wait(), &channels);
     let chart = spectra(rate, &[("plain interleaving", &interleaved[..]), ("fused", &fused)]);
     let caption = format!(
         "The spectra of {part}, interleaved as if they were taken in turn, and fused by the bank. Lines that only \

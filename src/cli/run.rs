@@ -165,9 +165,11 @@ impl Job<'_> {
         let stalls = observer.map(RunObserver::stall_watch);
         let block_bytes = args.threads.bytes(BLOCK_BYTES);
         let stated = self.bank.spec.as_ref().and_then(|spec| spec.full_scale);
+        let layout = self.bank.layout();
         let files = ReadOptions {
             block_bytes,
             interleaving: turns.as_ref(),
+            samples_per_frame: match_bank::samples_per_frame(&layout, inputs.len()),
             stalls: stalls.as_ref(),
             full_scale: self.scale.full_scale.or(stated),
             ..captures
@@ -244,9 +246,12 @@ impl Job<'_> {
         let TrackRecord { log, warnings, .. } = tracked.take();
         let checked = observer.checked();
         let report = RunReport::new(outcome, self.tolerated(reader), self.lossless);
+        // A frame may hold several samples of a converter.
+        let report = RunReport { channels: self.bank.channel_count(), ..report };
         let report = report.with(checked.warnings, self.is_live, warnings);
         let shift = (latency - dropped) as u64;
-        let placement = Placement { ratio: self.bank.ratio as u64, shift, samples: report.samples };
+        let (ratio, samples) = (self.bank.ratio as u64, report.samples);
+        let placement = Placement { ratio, per_frame: 1, shift, samples };
         outputs.annotate(self.notes(reader, &report, placement)?);
         let peak = outputs.peak();
         self.complete(outputs.with_log(log), &report, observer)?;
@@ -321,6 +326,8 @@ impl Job<'_> {
             notes.record_bank(&self.bank.digest().map_err(Failure::input)?);
             for gap in report.gaps.iter().flat_map(|gaps| &gaps.list) {
                 let comment = format!("channel {}: {} samples missing", gap.channel, gap.length);
+                let per_frame = self.bank.samples.get(gap.channel - 1).map_or(1, |&samples| samples as u64);
+                let placement = Placement { per_frame, ..placement };
                 notes.annotate(placement, gap.first, gap.length, "gap", &comment);
             }
         }

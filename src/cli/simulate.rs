@@ -11,7 +11,7 @@ use crate::messages::Quoted;
 use crate::overview::{counted, understood};
 use crate::quantity::readable;
 use crate::simulate::{Converter, target};
-use crate::spec::Spec;
+use crate::spec::{ChannelSpec, Spec};
 use crate::units::Hertz;
 use std::path::PathBuf;
 
@@ -98,14 +98,14 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let spec = load_spec_or_bank(&args.spec)?.for_outputs(&[])?;
     // The converters do not know what the spec says of the signal. Without latency the target lies on the
     // time axis of the output of `fuse`.
-    let problem = Problem::new(&Spec { signal: None, ..spec.clone() }, 0).in_file(&args.spec)?;
+    let problem = Problem::new(&Spec { signal: None, ..spec.clone() }, spec.wait()).in_file(&args.spec)?;
     let signal = Signal::read(&args.signal, &spec)?;
     let kind = args.kind(signal.is_complex())?;
     let (rates, mut warnings) = Rates::of(&spec, kind).in_file(&args.spec)?;
     warnings.extend(signal.warning(&spec));
     let Converters { common, each } = args.converters.converters(&spec, signal.parts())?;
     let frames = signal.frames(&problem, args.samples, args.converters.is_jittered())?;
-    let outputs = args.outputs(kind, signal.is_complex(), &rates, spec.channels.len());
+    let outputs = args.outputs(kind, signal.is_complex(), &rates);
     args.check_outputs(&outputs)?;
     let (converters, mut reports): (Vec<_>, Vec<_>) = each.into_iter().unzip();
     let run = Run { args, problem: &problem, signal: &signal, frames };
@@ -124,7 +124,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         source: signal.text,
         files,
         frames,
-        slow_rate: number(rates.slow),
+        slow_rate: rates.shown(),
         fast_rate: number(rates.fast),
         latency: spec.latency,
         common,
@@ -135,8 +135,11 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     show(&report, args.json, Report::text)
 }
 
-/// A rate with its unit.
+/// A rate, or one for each converter, with its unit.
 fn rate(hertz: &serde_json::Value) -> String {
+    if let Some(list) = hertz.as_array() {
+        return list.iter().map(rate).collect::<Vec<_>>().join(" and ");
+    }
     hertz.as_f64().map_or_else(|| hertz.to_string(), |hertz| readable(hertz, "S/s"))
 }
 
@@ -214,8 +217,8 @@ impl Args {
     }
 
     /// The recordings of the channels and of the target, in this order.
-    fn outputs(&self, kind: Kind, is_complex: bool, rates: &Rates, channels: usize) -> Vec<Output> {
-        let slow = (1..=channels).map(|i| (format!("ch{i}"), rates.slow));
+    fn outputs(&self, kind: Kind, is_complex: bool, rates: &Rates) -> Vec<Output> {
+        let slow = rates.slow.iter().zip(1..).map(|(&rate, i)| (format!("ch{i}"), rate));
         let names = slow.chain([("target".to_owned(), rates.fast)]);
         let extension = kind.extension(is_complex);
         names
@@ -287,7 +290,8 @@ struct Output {
 
 /// Rates of the headers, hertz.
 struct Rates {
-    slow: f64,
+    /// Of each converter.
+    slow: Vec<f64>,
     fast: f64,
 }
 
@@ -295,17 +299,27 @@ impl Rates {
     /// Of a spec; WAV headers hold whole hertz, and the warnings say so.
     fn of(spec: &Spec, kind: Kind) -> Result<(Self, Vec<String>), String> {
         let ratio = spec.ratio as f64;
-        let exact = if spec.is_normalised() {
+        let frames = if spec.is_normalised() {
             (NORMALISED_RATE / ratio).0.round().max(1.0)
         } else {
             (spec.fast_period * ratio).rate().0
         };
-        let exact = Self { slow: exact, fast: exact * ratio };
+        let own = |(channel, &samples): (&ChannelSpec, &usize)| match channel.rate {
+            Some(rate) if !spec.is_normalised() => rate.0,
+            _ => frames * samples as f64,
+        };
+        let slow = spec.channels.iter().zip(spec.layout().samples()).map(own).collect();
+        let fast = match spec.layout().is_plain() || spec.is_normalised() {
+            true => frames * ratio,
+            false => spec.fast_period.rate().0,
+        };
+        let exact = Self { slow, fast };
         if kind == Kind::Wav { exact.whole() } else { Ok((exact, Vec::new())) }
     }
 
     fn whole(self) -> Result<(Self, Vec<String>), String> {
-        let Self { slow, fast } = self;
+        let Self { slow: all, fast } = self;
+        let slow = all.iter().copied().fold(f64::INFINITY, f64::min);
         if fast > f64::from(u32::MAX) || slow < 0.5 {
             return Err(format!(
                 "the rates of {slow} Hz and {fast} Hz do not fit a WAV header (1 to {} Hz); write SigMF recordings \
@@ -313,11 +327,21 @@ impl Rates {
                 u32::MAX
             ));
         }
-        let uneven = [slow, fast].into_iter().filter(|rate| !is_same_rate(rate.round(), *rate, 0.0));
+        let mut rates = [all.as_slice(), &[fast]].concat();
+        rates.dedup();
+        let uneven = rates.into_iter().filter(|rate| !is_same_rate(rate.round(), *rate, 0.0));
         let warning =
             |rate: f64| format!("WAV headers hold whole hertz: {rate} Hz is written as {} Hz", rate.round());
         let warnings = uneven.map(warning).collect();
-        Ok((Self { slow: slow.round(), fast: fast.round() }, warnings))
+        Ok((Self { slow: all.iter().map(|rate| rate.round()).collect(), fast: fast.round() }, warnings))
+    }
+
+    /// The common slow rate, or that of each converter.
+    fn shown(&self) -> serde_json::Value {
+        match self.slow.as_slice() {
+            [first, others @ ..] if others.iter().all(|rate| rate == first) => number(*first),
+            all => all.iter().map(|&rate| number(rate)).collect(),
+        }
     }
 }
 

@@ -109,7 +109,7 @@ impl Args {
 
     fn stream(&self, job: &Job<'_>, inputs: &[PathBuf], observer: &mut RunObserver) -> Result<(), Failure> {
         let plan = job.plan()?;
-        let channels = if inputs.len() == 1 { job.bank.channel_count() } else { 1 };
+        let channels = super::match_bank::channels_of_raw(&job.bank.layout(), inputs.len());
         let raw = ReadOptions { coding: self.format, channels, ..ReadOptions::files() };
         let mut reader = job.start_reader(inputs, raw, Some(observer))?;
         self.check_output(reader.is_complex())?;

@@ -47,13 +47,15 @@ pub struct MeanAnalysis {
 /// [`DesignError::Lti`] for unstable filters.
 pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, DesignError> {
     let problem = bank_problem(bank)?;
-    let count = problem.channels.len();
+    let count = bank.channel_count();
     if !delay_errors.is_empty() && delay_errors.len() != count {
         return Err(DesignError::DelayErrorCount { given: delay_errors.len(), channels: count });
     }
-    let normalised: Vec<FastPeriods> =
-        delay_errors.iter().map(|error| error.in_fast_periods(bank.fast_period)).collect();
-    let shifted = problem.with_delay_errors(&normalised);
+    let mut errors = vec![FastPeriods(0.0); count];
+    for (error, given) in errors.iter_mut().zip(delay_errors) {
+        *error = given.in_fast_periods(bank.fast_period);
+    }
+    let shifted = problem.with_delay_errors(&errors);
     shifted.check_size()?;
     let plant = LiftedPlant::new(&shifted)?;
     let peak = plant.bank_norm(&bank.filters)?;

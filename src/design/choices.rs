@@ -145,7 +145,7 @@ fn choose(spec: &Spec, compared: Compared<'_>) -> Result<Choice, DesignError> {
 fn middle(problem: &Problem, taps: usize) -> Choice {
     let delays: f64 = problem.delays().iter().map(|delay| delay.0).sum();
     let mean = delays / problem.channels.len() as f64;
-    Choice { taps, latency: (0.5 * (taps - 1) as f64 + mean).round() as usize }
+    Choice { taps, latency: ((0.5 * (taps - 1) as f64 + mean).round() as usize).max(problem.wait) }
 }
 
 /// The shortest latency at which a bank with as few states as `spec` asks for is almost the best. The states
@@ -171,7 +171,7 @@ fn latency_of_order(
         compared(tried.count())?;
         tried.note(latency, error_of_order(spec, &Problem { latency, ..problem.clone() }));
     }
-    for latency in (0..first).rev() {
+    for latency in (problem.wait..first).rev() {
         if is_almost(errors.rms(latency), tried.least()) {
             compared(tried.count())?;
             tried.note(latency, error_of_order(spec, &Problem { latency, ..problem.clone() }));
@@ -240,7 +240,7 @@ fn fewest_taps(spec: &Spec, problem: &Problem) -> Result<Choice, DesignError> {
         LeastErrors::new(problem, taps, latencies)
     };
     let most = match spec.design.method {
-        Method::Fir => MAX_OPTIMISED_TAPS / (spec.channels.len() * ratio),
+        Method::Fir => MAX_OPTIMISED_TAPS / (spec.layout().count() * ratio),
         _ => MOST_FRAMES,
     };
     let most = most.clamp(1, MOST_FRAMES) * ratio;
@@ -287,7 +287,7 @@ fn lengthened(
     compared: Compared<'_>,
 ) -> Result<Choice, DesignError> {
     let Choice { mut taps, mut latency } = chosen;
-    let most = MAX_OPTIMISED_TAPS / spec.channels.len();
+    let most = MAX_OPTIMISED_TAPS / spec.layout().count();
     let mut best = f64::NEG_INFINITY;
     for designs in 0..LENGTHENINGS {
         compared(designs)?;
@@ -317,7 +317,7 @@ fn lengthened(
 pub(super) fn settings(spec: &Spec) -> Result<Settings, DesignError> {
     let at_slow_rate = || {
         let signal = SignalFilter::written_out(spec);
-        let slow = Spec { fast_period: spec.fast_period * spec.ratio as f64, signal, ..spec.clone() };
+        let slow = Spec { fast_period: spec.fast_period * spec.ratio as f64, signal, ..spec.per_sample() };
         // The method replaces the latency. With this one no delay chain is long.
         let problem = Problem::new(&slow, common_delay(&slow))?;
         Ok::<_, DesignError>(problem.merge_channels(Repeats::AtOneInstant).of_unit_size()?.problem)

@@ -191,6 +191,7 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
         ratio: complete.ratio,
         latency: complete.latency.unwrap_or_default(),
         method: complete.design.method,
+        samples: complete.layout().samples().to_vec(),
         delays: complete.channels.iter().map(|channel| channel.delay).collect(),
         gains: complete.channels.iter().map(|channel| channel.gain).collect(),
         offsets: complete.channels.iter().map(|channel| channel.offset).collect(),

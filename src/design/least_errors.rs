@@ -84,7 +84,7 @@ impl LeastErrors {
         loop {
             let latency = problem.longest_delay().0.ceil() as usize + periods * problem.ratio;
             let frames = latency.div_ceil(problem.ratio) + HISTORY * periods;
-            let errors = Self::new(problem, frames * problem.ratio, 0..=latency.min(MAX_LATENCY))?;
+            let errors = Self::new(problem, frames * problem.ratio, problem.wait..=latency.min(MAX_LATENCY))?;
             if errors.least() <= errors.lasting * worthwhile(LEFT_BEYOND) || periods >= *PERIODS.end() {
                 return Ok(errors);
             }
@@ -156,9 +156,9 @@ pub(super) fn check_reach(problem: Problem, taps: usize) -> Result<(), DesignErr
     if LeastErrors::new(&problem, taps, latency..=latency)?.removes[0] {
         return Ok(());
     }
-    let removes = LeastErrors::new(&problem, taps, candidates(&problem, taps))?.removes;
-    let shortest = removes.iter().position(|removes| *removes).unwrap_or_default();
-    let longest = removes.iter().rposition(|removes| *removes).unwrap_or_default();
+    let LeastErrors { first, removes, .. } = LeastErrors::new(&problem, taps, candidates(&problem, taps))?;
+    let shortest = first + removes.iter().position(|removes| *removes).unwrap_or_default();
+    let longest = first + removes.iter().rposition(|removes| *removes).unwrap_or_default();
     Err(DesignError::OutOfReach { latency, taps, shortest, longest })
 }
 
@@ -170,7 +170,8 @@ fn is_covered(problem: &Problem, taps: usize) -> bool {
     instants.any(|instant| problem.delays().iter().any(|delay| sees(-delay.0, instant)))
 }
 
-/// All latencies that may be worth a design: up to the oldest sample that a tap sees.
+/// All latencies that may be worth a design: from the wait for a whole frame up to the oldest sample that a tap
+/// sees.
 pub(super) fn candidates(problem: &Problem, taps: usize) -> RangeInclusive<usize> {
-    0..=(taps + problem.longest_delay().0.ceil() as usize).min(MAX_LATENCY)
+    problem.wait..=(taps + problem.longest_delay().0.ceil() as usize).min(MAX_LATENCY)
 }

@@ -4,7 +4,8 @@ use super::DesignError;
 use super::covariances::Covariances;
 use super::problem::{Channel, Problem};
 use crate::analog::{StableFilter, StrictlyProper, signal};
-use crate::spec::{ChannelSpec, FilterSpec, Spec};
+use crate::spec::{FilterSpec, Spec};
+use crate::units::GridTime;
 use crate::verify::uncertainty::ErrorPoint;
 
 impl Problem {
@@ -20,17 +21,26 @@ impl Problem {
             StrictlyProper::driven_by(signal.as_ref(), filter, spec.fast_period).map_err(refused(place))
         };
         let (target, _) = intern(&mut front_ends, realise(&spec.target, &|| "target.filter".to_owned())?);
-        let mut channels = Vec::with_capacity(spec.channels.len());
-        for (i, (channel, delay)) in spec.channels.iter().zip(spec.delays()).enumerate() {
+        let (layout, delays) = (spec.layout(), spec.delays());
+        let mut converters = Vec::with_capacity(spec.channels.len());
+        for (i, channel) in spec.channels.iter().enumerate() {
             let filter = realise(&channel.filter, &|| format!("filter of channel {}", i + 1))?;
             let (front_end, proportion) = intern(&mut front_ends, filter);
-            let converter_gain = channel.gain;
-            channels.push(Channel { front_end, gain: proportion * converter_gain, converter_gain, delay });
+            converters.push((front_end, proportion * channel.gain));
         }
+        let channel = |(converter, delay): (usize, GridTime)| {
+            let (front_end, gain) = converters[converter];
+            let converter_gain = spec.channels[converter].gain;
+            Channel { front_end, gain, converter_gain, converter, delay }
+        };
+        let channels = layout.owners().into_iter().zip(layout.waited_delays(&delays)).map(channel).collect();
         let scale = input_scale(spec, signal.as_ref(), &front_ends[target]);
-        let noise = spec.channels.iter().map(|channel| channel.sample_noise().powi(2) * scale).collect();
+        let noise: Vec<f64> =
+            spec.channels.iter().map(|channel| channel.sample_noise().powi(2) * scale).collect();
         let (fast_period, ratio) = (spec.fast_period, spec.ratio);
-        let mut problem = Self { fast_period, ratio, latency, signal, front_ends, target, channels, noise };
+        let (wait, noise) = (layout.wait(&delays), layout.each(&noise));
+        let mut problem =
+            Self { fast_period, ratio, latency, signal, front_ends, target, channels, wait, noise };
         problem.check_size()?;
         let jitter = problem.jitter_powers(spec)?;
         problem.noise.iter_mut().zip(jitter).for_each(|(power, jitter)| *power += jitter);
@@ -45,14 +55,14 @@ impl Problem {
             return Ok(vec![0.0; self.channels.len()]);
         }
         let covariances = Covariances::new(self)?;
-        let power = |(channel, written): (&Channel, &ChannelSpec)| {
-            let deviation = written.jitter.in_fast_periods(spec.fast_period);
+        let power = |channel: &Channel| {
+            let deviation = spec.channels[channel.converter].jitter.in_fast_periods(spec.fast_period);
             channel.gain * channel.gain * covariances.change(channel.front_end, deviation)
         };
-        Ok(self.channels.iter().zip(&spec.channels).map(power).collect())
+        Ok(self.channels.iter().map(power).collect())
     }
 
-    /// The jitter's part of the noise of each channel of `spec`, over the power of the target.
+    /// The jitter's part of the noise of each sample of a frame of `spec`, over the power of the target.
     ///
     /// # Errors
     /// As [`Problem::new`].
@@ -62,7 +72,7 @@ impl Problem {
         Ok(problem.jitter_powers(spec)?.into_iter().map(|jitter| jitter / power).collect())
     }
 
-    /// The problem of `spec` with errors of its channels; the delays may become negative.
+    /// The problem of `spec` with errors of its converters; the delays may become negative.
     ///
     /// # Errors
     /// As [`Problem::new`].
@@ -74,7 +84,8 @@ impl Problem {
             }
         }
         let mut problem = Self::new(&moved, latency)?;
-        for ((channel, delay), gain) in problem.channels.iter_mut().zip(&point.delays).zip(&point.gains) {
+        for channel in &mut problem.channels {
+            let (delay, gain) = (point.delays[channel.converter], point.gains[channel.converter]);
             channel.delay = channel.delay.moved_by(delay.in_fast_periods(spec.fast_period));
             channel.gain *= 1.0 + gain;
             channel.converter_gain *= 1.0 + gain;

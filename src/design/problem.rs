@@ -5,6 +5,7 @@ use crate::analog::{StableFilter, StrictlyProper};
 use crate::linalg::Complex;
 use crate::spec::Spec;
 use crate::units::{FastPeriods, GridTime, RadiansPerFastPeriod, Seconds, Timeline};
+use std::ops::Range;
 
 /// Maximum number of states of the delay chains of the lifted system. Its matrices are dense: at this size
 /// one matrix takes 128 MiB. A norm needs several of them, and its time grows with the cube of the states.
@@ -35,13 +36,16 @@ pub struct Problem {
     pub front_ends: Vec<StrictlyProper>,
     /// Index of Phi_0 in `front_ends`.
     pub target: usize,
-    /// The slow channels.
+    /// The slow channels, in the order of [`FrameLayout::iter`](crate::spec::FrameLayout::iter).
     pub channels: Vec<Channel>,
+    /// The wait S for the last sample of a frame, which is part of the delays and of the latency; 0 for
+    /// converters of one rate.
+    pub wait: usize,
     /// Power s_i^2 of the noise that each channel adds to its samples, relative to an input of unit density.
     pub noise: Vec<f64>,
 }
 
-/// One slow channel of a [`Problem`].
+/// One slow channel of a [`Problem`]: a converter, or one of its samples in a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Channel {
     /// Index of a filter in [`Problem::front_ends`] to which Phi_i is proportional.
@@ -50,7 +54,9 @@ pub struct Channel {
     pub gain: f64,
     /// g_i, the converter's own gain.
     pub converter_gain: f64,
-    /// D_i.
+    /// The converter.
+    pub converter: usize,
+    /// D_i, or D_ij + S.
     pub delay: GridTime,
 }
 
@@ -80,6 +86,17 @@ impl Problem {
     /// The delays of the channels.
     pub fn delays(&self) -> Vec<FastPeriods> {
         self.channels.iter().map(|channel| channel.delay.in_fast_periods()).collect()
+    }
+
+    /// The channels of each converter.
+    pub fn converters(&self) -> Vec<Range<usize>> {
+        let of_one = self.channels.chunk_by(|a, b| a.converter == b.converter);
+        let next = |first: &mut usize, channels: &[Channel]| {
+            let range = *first..*first + channels.len();
+            *first = range.end;
+            Some(range)
+        };
+        of_one.scan(0, next).collect()
     }
 
     /// Checks that the delay chains are not too long.
@@ -122,11 +139,11 @@ impl Problem {
         })
     }
 
-    /// The same problem with `errors[i]` added to the delays.
+    /// The same problem with `errors[i]` added to the delay of converter i.
     pub fn with_delay_errors(&self, errors: &[FastPeriods]) -> Self {
         let mut moved = self.clone();
-        for (channel, &error) in moved.channels.iter_mut().zip(errors) {
-            channel.delay = channel.delay.moved_by(error);
+        for channel in &mut moved.channels {
+            channel.delay = channel.delay.moved_by(errors[channel.converter]);
         }
         moved
     }
@@ -140,7 +157,9 @@ impl Problem {
 /// The delay in whole slow periods that all channels have, in fast periods, beyond [`KEPT_PERIODS`] of them.
 /// A bank of less latency would predict the target from samples that much older.
 pub(super) fn common_delay(spec: &Spec) -> usize {
-    let least = spec.delays_in_fast_periods().iter().map(|delay| delay.0).fold(f64::INFINITY, f64::min);
+    let delays =
+        spec.layout().waited_delays(&spec.delays()).into_iter().map(|delay| delay.in_fast_periods().0);
+    let least = delays.fold(f64::INFINITY, f64::min);
     let periods = (least / spec.ratio as f64).floor().max(0.0) as usize;
     periods.saturating_sub(KEPT_PERIODS) * spec.ratio
 }

@@ -71,10 +71,12 @@ pub fn fir_response(taps: &[f64], w: RadiansPerFastPeriod) -> (Complex<f64>, f64
 /// [`DesignError::NoSpec`] for a bank without front ends.
 pub fn front_end_gains(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Vec<f64>)>, DesignError> {
     let problem = bank_problem(bank)?;
+    let first: Vec<usize> = problem.converters().into_iter().map(|channels| channels.start).collect();
     let gains = |cycles: f64| {
         let w = RadiansPerFastPeriod(TAU * cycles);
         let gain = |front_end: usize| problem.front_ends[front_end].response(w).norm();
-        let channels = problem.channels.iter().map(|channel| channel.gain.abs() * gain(channel.front_end));
+        let converters = first.iter().map(|&i| &problem.channels[i]);
+        let channels = converters.map(|channel| channel.gain.abs() * gain(channel.front_end));
         std::iter::once(gain(problem.target)).chain(channels).collect()
     };
     Ok(over_frequencies(bank, points, gains))
@@ -99,7 +101,8 @@ pub fn analysis_gains(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Vec<f64>
     // Delays change the phase only, and noise is none of the front ends'.
     let delay = GridTime::fast_sample(0.0, problem.fast_period);
     let undelayed = |channel: &Channel| Channel { delay, ..*channel };
-    let channels: Vec<Channel> = problem.channels.iter().map(undelayed).collect();
+    let first = problem.converters().into_iter().map(|channels| &problem.channels[channels.start]);
+    let channels: Vec<Channel> = first.map(undelayed).collect();
     let noise = vec![0.0; channels.len()];
     let plant = LiftedPlant::new(&Problem { ratio: 1, latency: 0, channels, noise, ..problem })?;
     let gains = |cycles: f64| {

@@ -31,15 +31,21 @@ pub fn warnings(spec: &Spec) -> Result<Vec<String>, DesignError> {
     found.extend(signal_band(spec));
     let other = |i: &usize| spec.channels[*i].filter != spec.target;
     found.extend((0..spec.channels.len()).filter(other).filter_map(|i| band(spec, &problem, Some(i))));
-    found.extend(same_instants(&problem));
-    found.extend(long_span(&problem));
+    // Of converters with unequal rates some samples coincide, and each has others.
+    if spec.layout().is_plain() {
+        found.extend(same_instants(&problem));
+    }
+    found.extend(long_span(spec));
     Ok(found)
 }
 
 /// The band of the target (`None`) or of a channel.
 fn band(spec: &Spec, problem: &Problem, channel: Option<usize>) -> Option<String> {
     let (filter, front_end) = match channel {
-        Some(i) => (&spec.channels[i].filter, problem.channels[i].front_end),
+        Some(i) => {
+            let channel = problem.channels.iter().find(|channel| channel.converter == i)?;
+            (&spec.channels[i].filter, channel.front_end)
+        }
         None => (&spec.target, problem.target),
     };
     let place = channel.map_or_else(|| "the target".to_owned(), |i| format!("channel {}", i + 1));
@@ -167,10 +173,11 @@ fn same_instants(problem: &Problem) -> Option<String> {
     ))
 }
 
-fn long_span(problem: &Problem) -> Option<String> {
-    let least = problem.delays().iter().map(|delay| delay.0).fold(f64::INFINITY, f64::min);
-    let span = problem.longest_delay().0 - least;
-    let ratio = problem.ratio;
+fn long_span(spec: &Spec) -> Option<String> {
+    let delays: Vec<f64> = spec.delays_in_fast_periods().iter().map(|delay| delay.0).collect();
+    let extreme = |of: fn(f64, f64) -> f64| delays.iter().copied().reduce(of).unwrap_or_default();
+    let span = extreme(f64::max) - extreme(f64::min);
+    let ratio = spec.ratio;
     (span >= ratio as f64).then(|| {
         format!(
             "the delays span {span:.6} fast periods, more than the ratio {ratio}: to a bank with enough taps or states a \

@@ -6,6 +6,7 @@ use super::reconstruction::Reconstruction;
 use super::signal::{Columns, Signal};
 use crate::linalg::{CMat, Complex};
 use crate::units::FastPeriods;
+use std::ops::Range;
 
 /// Multiply-adds that an integral may take, about: a second or two.
 const MOST_WORK: f64 = 1e9;
@@ -81,8 +82,11 @@ impl Conditions<'_> {
         let signal = error(columns, &filters, &columns.measurement);
         let uncertain = match late.filter(|_| way.knows_delays()) {
             Some(late) => {
-                let spread = per_channel.iter().zip(&late.spread).map(|(gain, power)| gain * power);
-                error(columns, &filters, &late.mean) + spread.sum::<f64>()
+                let spread = |samples: &Range<usize>| match samples.len() {
+                    1 => per_channel[samples.start] * late.spread[samples.start],
+                    _ => late.spread_of(&filters, samples),
+                };
+                error(columns, &filters, &late.mean) + late.converters.iter().map(spread).sum::<f64>()
             }
             None => signal,
         };
@@ -92,26 +96,42 @@ impl Conditions<'_> {
 
     /// A delay that is late by a Gaussian error of deviation s turns a sample of the frequency w by a
     /// random phase. Its mean is the sample times chi = e^{-(w s)^2 / 2}, and the rest has the power 1 -
-    /// chi^2; it is coherent in one channel, and independent between channels.
+    /// chi^2; it is coherent in one converter, and independent between converters.
     fn late(&self, columns: &Columns) -> Late {
         let mut mean = columns.measurement.clone();
-        let mut spread = vec![0.0; self.spread.len()];
-        for (i, s) in self.spread.iter().enumerate() {
-            for (k, w) in columns.frequencies.iter().enumerate() {
-                let exponent = -(w * s.0).powi(2);
-                spread[i] -= mean[(i, k)].norm_sqr() * exponent.exp_m1();
-                mean[(i, k)] *= (0.5 * exponent).exp();
+        let converters = self.signal.problem().converters();
+        let mut rest = mean.clone();
+        let mut spread = vec![0.0; mean.nrows()];
+        for (samples, s) in converters.iter().zip(&self.spread) {
+            for i in samples.clone() {
+                for (k, w) in columns.frequencies.iter().enumerate() {
+                    let exponent = -(w * s.0).powi(2);
+                    spread[i] -= mean[(i, k)].norm_sqr() * exponent.exp_m1();
+                    rest[(i, k)] *= (-exponent.exp_m1()).sqrt();
+                    mean[(i, k)] *= (0.5 * exponent).exp();
+                }
             }
         }
-        Late { mean, spread }
+        Late { mean, rest, spread, converters }
     }
 }
 
 /// Measurements with delays that are not known exactly.
 struct Late {
     mean: CMat,
-    /// Power of each channel beside its mean.
+    /// What each sample has beside its mean at each frequency, and its power.
+    rest: CMat,
     spread: Vec<f64>,
+    /// The samples of each converter.
+    converters: Vec<Range<usize>>,
+}
+
+impl Late {
+    /// The power of the sum of what the samples of a converter have beside their means: they turn together.
+    fn spread_of(&self, filters: &CMat, samples: &Range<usize>) -> f64 {
+        let (first, count) = (samples.start, samples.len());
+        (filters.columns(first, count) * self.rest.rows(first, count)).norm_squared()
+    }
 }
 
 /// The squared Frobenius norm of W - F H, from amplitudes: nothing of size 1 is subtracted from a square.

@@ -6,7 +6,8 @@ use super::spline::Spline;
 use crate::design::Problem;
 use crate::design::filters::FilterResponse;
 use crate::design::{NearestSample, nearest_samples};
-use crate::linalg::{CMat, Complex};
+use crate::linalg::{self, CMat, Complex};
+use std::ops::Range;
 
 /// A way from the N slow samples of a period to its M fast samples, linear and periodic.
 pub(super) enum Reconstruction {
@@ -16,8 +17,13 @@ pub(super) enum Reconstruction {
     Interleaving(Vec<NearestSample>),
     /// The cubic spline through all slow samples.
     Spline(Spline),
-    /// The Wiener filter of one channel: the least mean-square error with samples of all time.
-    OneChannel(usize),
+    /// The Wiener filter of one converter: the least mean-square error with samples of all time.
+    OneChannel {
+        /// The converter, from 0.
+        converter: usize,
+        /// Its samples in a frame.
+        samples: Range<usize>,
+    },
 }
 
 impl Reconstruction {
@@ -35,7 +41,7 @@ impl Reconstruction {
             Self::Bank(filters) => filters.at(theta),
             Self::Interleaving(nearest) => interleaved(nearest, noise.len(), theta),
             Self::Spline(spline) => spline.at(theta),
-            Self::OneChannel(channel) => wiener(columns, noise, *channel),
+            Self::OneChannel { samples, .. } => wiener(columns, noise, samples.clone()),
         }
     }
 
@@ -46,7 +52,7 @@ impl Reconstruction {
 
     /// Whether an error of a delay counts: a channel alone has nothing to be late against.
     pub(super) fn knows_delays(&self) -> bool {
-        !matches!(self, Self::OneChannel(_))
+        !matches!(self, Self::OneChannel { .. })
     }
 }
 
@@ -58,13 +64,23 @@ fn interleaved(nearest: &[NearestSample], channels: usize, theta: f64) -> CMat {
     filters
 }
 
-/// W H_i* / (H_i H_i* + s_i^2) in the column of channel i.
-fn wiener(columns: &Columns, noise: &[f64], channel: usize) -> CMat {
-    let row = columns.measurement.row(channel);
+/// W H* (H H* + S)^-1 in the columns of the samples of a converter, with their rows H and noise S.
+fn wiener(columns: &Columns, noise: &[f64], samples: Range<usize>) -> CMat {
+    let rows = columns.measurement.rows(samples.start, samples.len());
     let mut filters = CMat::zeros(columns.reference.nrows(), noise.len());
-    let power = row.norm_squared() + noise[channel];
-    if power > 0.0 {
-        filters.set_column(channel, &(&columns.reference * row.adjoint() / Complex::new(power, 0.0)));
+    if samples.len() == 1 {
+        let power = rows.norm_squared() + noise[samples.start];
+        if power > 0.0 {
+            let column = &columns.reference * rows.adjoint() / Complex::new(power, 0.0);
+            filters.set_column(samples.start, &column.column(0));
+        }
+        return filters;
+    }
+    let mut powers = rows * rows.adjoint();
+    samples.clone().enumerate().for_each(|(j, i)| powers[(j, j)] += Complex::from(noise[i]));
+    let weights = linalg::solve(&powers, &(rows * columns.reference.adjoint())).adjoint();
+    if weights.iter().all(|weight| weight.re.is_finite() && weight.im.is_finite()) {
+        filters.columns_mut(samples.start, samples.len()).copy_from(&weights);
     }
     filters
 }

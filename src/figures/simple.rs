@@ -5,8 +5,9 @@ use super::snr::Ratios;
 use super::spline::Spline;
 use crate::design::Problem;
 use crate::units::Decibels;
+use std::ops::Range;
 
-/// Channels that are tried alone, at most: one of each kind of front end, gain and noise.
+/// Channels that are tried alone, at most: one of each kind of front end, gain, noise and rate.
 const MOST_ALONE: usize = 8;
 
 /// A way to use the slow samples without a bank.
@@ -49,22 +50,25 @@ pub struct SimpleFigure {
 /// All simple ways for a problem.
 pub(super) fn ways(problem: &Problem) -> Vec<Reconstruction> {
     let spline = Reconstruction::Spline(Spline::new(problem));
-    let alone = kinds(problem).into_iter().map(Reconstruction::OneChannel);
+    let alone = kinds(problem)
+        .into_iter()
+        .map(|(converter, samples)| Reconstruction::OneChannel { converter, samples });
     Reconstruction::interleaving(problem).into_iter().chain([spline]).chain(alone).collect()
 }
 
 /// The first channel of each kind: a delay does not change what a channel gives alone. None where there is
 /// one channel only: that is the bank.
-fn kinds(problem: &Problem) -> Vec<usize> {
-    let mut kinds: Vec<usize> = Vec::new();
-    let alike = |i: usize, j: usize| {
-        let (a, b) = (problem.channels[i], problem.channels[j]);
-        (a.front_end, a.gain, problem.noise[i]) == (b.front_end, b.gain, problem.noise[j])
+fn kinds(problem: &Problem) -> Vec<(usize, Range<usize>)> {
+    let mut kinds: Vec<(usize, Range<usize>)> = Vec::new();
+    let kind = |samples: &Range<usize>| {
+        let (channel, noise) = (problem.channels[samples.start], problem.noise[samples.start]);
+        (channel.front_end, channel.gain, noise, samples.len())
     };
-    let choices = if problem.channels.len() > 1 { problem.channels.len() } else { 0 };
-    for i in 0..choices {
-        if kinds.len() < MOST_ALONE && !kinds.iter().any(|&j| alike(i, j)) {
-            kinds.push(i);
+    let converters = problem.converters();
+    let choices = if converters.len() > 1 { converters } else { Vec::new() };
+    for (converter, samples) in choices.into_iter().enumerate() {
+        if kinds.len() < MOST_ALONE && !kinds.iter().any(|(_, other)| kind(other) == kind(&samples)) {
+            kinds.push((converter, samples));
         }
     }
     kinds
@@ -77,7 +81,7 @@ pub(super) fn figures(ways: &[Reconstruction], ratios: &[Ratios]) -> Vec<SimpleF
             Reconstruction::Bank(_) => return None,
             Reconstruction::Interleaving(_) => (SimpleWay::Interleaving, None),
             Reconstruction::Spline(_) => (SimpleWay::CubicSpline, None),
-            Reconstruction::OneChannel(channel) => (SimpleWay::OneChannel, Some(channel + 1)),
+            Reconstruction::OneChannel { converter, .. } => (SimpleWay::OneChannel, Some(converter + 1)),
         };
         Some(SimpleFigure { way, channel, snr_db: ratios.with_noise() })
     };

@@ -52,7 +52,7 @@ pub(super) struct Setting {
     /// Of the converters, in the scale of the signal: as the spec says, or that of 16 bits.
     noise: Vec<f64>,
     noise_is_stated: bool,
-    /// Deviations of the delays.
+    /// Deviations of the delays of the converters.
     spread: Vec<FastPeriods>,
     /// Those that the bank does not follow.
     not_followed: Vec<FastPeriods>,
@@ -66,6 +66,7 @@ impl Setting {
     pub(super) fn new(bank: &Bank, spec: &Spec, band: &FigureBand) -> Result<Self, DesignError> {
         let plain = without_signal(spec, bank.latency)?;
         let stated: Vec<f64> = spec.channels.iter().map(|channel| channel.sample_noise().powi(2)).collect();
+        let stated = spec.layout().each(&stated);
         let jitter = Problem::jitter_shares(spec, bank.latency)?;
         let signal = match spec.signal.as_ref().map(|signal| &signal.spectrum) {
             Some(SignalSpectrum::Band(_)) => {

@@ -22,7 +22,7 @@ fn arrays(bank: &Bank) -> Vec<Array> {
             vec![Array { name: "taps", shape, values: taps.values }]
         }
         SynthesisFilters::StateSpace(block) => {
-            let columns = [block.a.len(), bank.channel_count(), block.a.len(), bank.channel_count()];
+            let columns = [block.a.len(), bank.frame_samples(), block.a.len(), bank.frame_samples()];
             let matrices = [("a", &block.a), ("b", &block.b), ("c", &block.c), ("d", &block.d)];
             let matrix = |((name, rows), columns): ((&'static str, &Vec<Vec<f64>>), usize)| Array {
                 name,
@@ -34,8 +34,8 @@ fn arrays(bank: &Bank) -> Vec<Array> {
     };
     all.push(Array {
         name: "offsets",
-        shape: vec![1, bank.offsets.len() as u64],
-        values: bank.offsets.clone(),
+        shape: vec![1, bank.frame_samples() as u64],
+        values: bank.layout().each(&bank.offsets),
     });
     all.push(scalar("ratio", bank.ratio as f64));
     all.push(scalar("latency", bank.latency as f64));

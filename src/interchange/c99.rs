@@ -36,17 +36,28 @@ fn about(bank: &Bank, name: &str) -> String {
     let bound = |value: Option<f64>| value.map_or_else(|| "unknown".to_owned(), |value| format!("{value:e}"));
     format!(
         "/* {title}\n   Written by hybank. C99, no allocation, no library.\n\n   \
-         {name}_reset clears a state. {name}_process takes the samples of one slow period, one of each of the {}\n   \
+         {name}_reset clears a state. {name}_process takes the samples of one slow period, {}\n   \
          channels, and writes the {} output samples of that period. Its latency is {} (output samples).\n   \
          gamma of these coefficients in exact arithmetic: {}, upper bound {}, lower bound {}.\n   \
          Sums are taken in the order written; -ffp-contract=off gives the same bits with every compiler. */\n",
-        bank.channel_count(),
+        samples_of(bank),
         bank.ratio,
         bank.latency,
         bound(bank.gamma.norm),
         bound(bank.gamma.upper),
         bound(bank.gamma.lower),
     )
+}
+
+/// The input of one call in words, which "channels" follows.
+fn samples_of(bank: &Bank) -> String {
+    match bank.layout().is_plain() {
+        true => format!("one of each of the {}", bank.channel_count()),
+        false => {
+            let counts: Vec<String> = bank.samples.iter().map(usize::to_string).collect();
+            format!("{} in a row of the {}", counts.join(" and "), bank.channel_count())
+        }
+    }
 }
 
 fn table<T>(values: &[T], write: impl Fn(&T) -> String) -> String {
@@ -73,7 +84,7 @@ fn real_fir(bank: &Bank, taps: &PolyphaseTaps<f64>, name: &str) -> String {
         sample: "double",
         tap: "double",
         taps: table(&taps.values, double),
-        offsets: Some(table(&bank.offsets, double)),
+        offsets: Some(table(&bank.layout().each(&bank.offsets), double)),
         helper: String::new(),
         finish: "sum".to_owned(),
     })
@@ -210,7 +221,7 @@ fn recursive(bank: &Bank, block: &SparseBlock, name: &str) -> String {
         columns = table(&columns, decimal),
         boundaries = starts.len(),
         starts = table(&starts, decimal),
-        offsets = table(&bank.offsets, double),
+        offsets = table(&bank.layout().each(&bank.offsets), double),
         width = (*states).max(1),
         all = states + inputs,
     )

@@ -47,7 +47,7 @@ pub fn sections(bank: &Bank) -> Result<Vec<Section>, ExportError> {
     };
     let structure = Structure::of(block)?;
     let mut all = Vec::new();
-    for channel in 0..bank.channel_count() {
+    for channel in 0..bank.frame_samples() {
         for phase in 0..bank.ratio {
             all.extend(structure.entry(block, channel, phase));
         }

@@ -112,11 +112,6 @@ impl AlignedInput {
         self.ended
     }
 
-    /// True if a block must come before this input can go on.
-    pub(super) fn waits(&self) -> bool {
-        self.ready() == 0 && !self.ended
-    }
-
     /// True if there is nothing left, not even lost frames.
     pub(super) fn is_over(&self) -> bool {
         self.ready() == 0 && self.ended
@@ -319,7 +314,7 @@ mod tests {
         let mut blocks = bytes.chunks(2 * channels * block);
         let mut out = Vec::new();
         loop {
-            if input.waits() {
+            if input.ready() == 0 && !input.ended() {
                 match blocks.next() {
                     Some(bytes) => drop(input.refill(Block { bytes: bytes.to_vec(), filled: bytes.len() })),
                     None => input.end(),

@@ -38,6 +38,8 @@ pub(super) struct InputNotes {
     pub(super) timestamps: Timestamps,
     /// Samples per frame of time-interleaved converters, or 1.
     pub(super) samples_per_frame: usize,
+    /// Samples per frame of a converter that samples more often than there are frames, or 1.
+    pub(super) per_frame: usize,
     /// Chunks of a WAV file.
     pub(super) chunks: Vec<WavChunk>,
 }

@@ -126,6 +126,12 @@ impl InputSource {
             }
             return Ok(StreamHeader { channels: 1, ..header });
         }
+        if self.per_frame > 1 && channels != 1 {
+            return unfit(format!(
+                "{channels} channels, but a converter with a sample rate of its own needs a recording of its own; extract \
+                 its channel first"
+            ));
+        }
         let converters = self.samples_per_frame();
         if self.interleaving.is_some() && channels != 1 {
             return unfit(format!(

@@ -3,6 +3,7 @@
 use super::aligned_input::{AlignedInput, Block};
 use super::capture::InputNotes;
 use super::frames::{InputFrames, Message};
+use super::grouped::GroupedInput;
 use super::lost::{Dropout, Entry, LostInInput};
 use super::open::InputSource;
 use super::stall::Wait;
@@ -44,7 +45,7 @@ fn send_all(source: &InputSource, messages: &Sender<Result<Message, IoError>>, p
 /// One input on the side of the consumer.
 pub(super) struct Input {
     pub(super) name: String,
-    pub(super) aligned: AlignedInput,
+    pub(super) grouped: GroupedInput,
     source: Source,
     live: Live,
     /// What it says besides its samples.
@@ -80,7 +81,8 @@ impl Input {
             return Self::on_thread(source);
         }
         let frames = Box::new(InputFrames::open(&source)?);
-        Ok(Self::new(source.name(), frames.header, Source::Stdin { frames, spare: Vec::new() }))
+        let per_frame = source.per_frame;
+        Ok(Self::new(source.name(), frames.header, per_frame, Source::Stdin { frames, spare: Vec::new() }))
     }
 
     /// The only input.
@@ -93,13 +95,17 @@ impl Input {
         // Until the header comes, the channels are those of the settings; they may not fit these.
         let settings = source.raw_header();
         let header = source.chosen(settings).unwrap_or(settings);
-        Self::on_thread_of(source.name(), header, move |messages, pool| send_all(&source, &messages, &pool))
+        let name = source.name();
+        let per_frame = source.per_frame;
+        let send = move |messages, pool| send_all(&source, &messages, &pool);
+        Self::on_thread_of(name, header, per_frame, send)
     }
 
     /// An input whose messages a new thread sends, with a pool of blocks to fill.
     pub(super) fn on_thread_of(
         name: String,
         header: StreamHeader,
+        per_frame: usize,
         send_all: impl FnOnce(Sender<Result<Message, IoError>>, Receiver<Vec<u8>>) + Send + 'static,
     ) -> Result<Self, IoError> {
         let (message_sender, messages) = bounded(BLOCKS + 2);
@@ -112,14 +118,13 @@ impl Input {
         thread
             .spawn(move || send_all(message_sender, pool_out))
             .map_err(IoError::system(&name, "start a thread that reads it"))?;
-        Ok(Self::new(name, header, Source::Thread { messages, pool }))
+        Ok(Self::new(name, header, per_frame, Source::Thread { messages, pool }))
     }
 
-    fn new(name: String, header: StreamHeader, source: Source) -> Self {
-        let aligned = AlignedInput::new(header);
+    fn new(name: String, header: StreamHeader, per_frame: usize, source: Source) -> Self {
         Self {
             name,
-            aligned,
+            grouped: GroupedInput::new(AlignedInput::new(header), per_frame),
             source,
             live: Live::default(),
             notes: InputNotes::default(),
@@ -160,15 +165,15 @@ impl Input {
     fn take(&mut self, message: Message) {
         match message {
             Message::Header { header, notes } => {
-                self.aligned = AlignedInput::new(header);
-                self.notes = *notes;
+                self.grouped = GroupedInput::new(AlignedInput::new(header), self.grouped.per_frame());
+                self.notes = InputNotes { per_frame: self.grouped.per_frame(), ..*notes };
             }
             Message::Frames { bytes, filled } => {
-                let used = self.aligned.refill(Block { bytes, filled });
+                let used = self.grouped.aligned.refill(Block { bytes, filled });
                 self.give_back(used);
             }
             Message::End { faults, chunks } => {
-                self.aligned.end();
+                self.grouped.aligned.end();
                 self.faults = faults;
                 self.notes.chunks.extend(chunks);
             }
@@ -176,8 +181,8 @@ impl Input {
     }
 
     pub(super) fn advance(&mut self, frames: usize) {
-        self.aligned.advance(frames);
-        if let Some(used) = self.aligned.take_used() {
+        self.grouped.advance(frames);
+        if let Some(used) = self.grouped.aligned.take_used() {
             self.give_back(used);
         }
     }
@@ -217,7 +222,9 @@ impl Input {
         max_lost: u64,
     ) -> Result<(), String> {
         let is_late = match entry {
-            Entry::Invalid(frames) => self.aligned.invalidate(Dropout { channel, frames: frames.clone() }),
+            Entry::Invalid(frames) => {
+                self.grouped.aligned.invalidate(Dropout { channel, frames: frames.clone() })
+            }
             Entry::Timestamp(next) => {
                 let Some(last) = self.live.last.replace(*next) else { return Ok(()) };
                 let lost = lost_between(last, *next)?;
@@ -225,7 +232,7 @@ impl Input {
                 if self.live.lost > max_lost {
                     return Err(too_many_lost(self.live.lost, max_lost));
                 }
-                self.aligned.leave_out(next.frame, lost)
+                self.grouped.aligned.leave_out(next.frame, lost)
             }
         };
         self.live.late += u64::from(is_late);
@@ -237,9 +244,9 @@ impl Input {
     }
 
     pub(super) fn faults(&self) -> impl Iterator<Item = InputFault> {
-        let beyond = self.aligned.is_over() && self.aligned.has_unreached_breaks();
+        let beyond = self.grouped.is_over() && self.grouped.aligned.has_unreached_breaks();
         let late = (self.live.late > 0).then_some(InputFault::LateLostLines { lines: self.live.late });
-        let unrated = self.notes.sigmf.is_some() && self.aligned.header.rate.is_none();
+        let unrated = self.notes.sigmf.is_some() && self.grouped.aligned.header.rate.is_none();
         let unrated = unrated.then_some(InputFault::NoRate);
         unrated
             .into_iter()
@@ -250,10 +257,12 @@ impl Input {
 
     /// Frames that were not used.
     pub(super) fn unused(&self) -> Option<InputFault> {
-        let seen = self.aligned.seen();
-        let promised = if self.aligned.is_over() { None } else { self.aligned.header.promised };
-        let frames = promised.unwrap_or(0).max(seen) - (seen - self.aligned.left() as u64);
-        let at_least = promised.is_none() && !self.aligned.ended();
+        let aligned = &self.grouped.aligned;
+        let seen = aligned.seen();
+        let promised = if aligned.is_over() { None } else { aligned.header.promised };
+        let left = (aligned.left() + self.grouped.begun()) as u64;
+        let frames = promised.unwrap_or(0).max(seen) - (seen.saturating_sub(left));
+        let at_least = promised.is_none() && !aligned.ended();
         (frames > 0).then_some(InputFault::Unused { frames, at_least })
     }
 }

@@ -13,6 +13,7 @@ mod error;
 mod flac;
 mod frames;
 mod full_scale;
+mod grouped;
 mod input;
 mod lost;
 mod mat;

@@ -4,7 +4,7 @@
 //! Memory is bounded: each input has a pool of a few blocks that circulate between its thread and the
 //! consumer. If the consumer is slow, reading stops, and so do the writers of the pipes.
 
-use super::aligned_input::AlignedInput;
+use super::grouped::GroupedInput;
 use super::input::{BLOCKS, Input, too_many_lost};
 use super::lost::{Entry, LiveLost, LostInInput, LostLine, LostSamples};
 use super::notes::{OutputNotes, Placement};
@@ -65,19 +65,24 @@ impl MultiReader {
         refuse_shared_pipes(paths)?;
         let block = (ALL_BYTES / BLOCKS / paths.len().max(1)).min(options.block_bytes).max(4096);
         let interleaving = options.interleaving.filter(|_| paths.len() == 1);
-        let source = |path: &PathBuf| InputSource {
+        let source = |(i, path): (usize, &PathBuf)| InputSource {
             path: path.clone(),
             coding: options.coding,
             channels: options.channels,
             only: options.only,
             full_scale: options.full_scale,
             interleaving: interleaving.cloned(),
+            per_frame: options.samples_per_frame.get(i).copied().unwrap_or(1),
             block,
         };
         let inputs = match paths {
-            [path] => vec![Input::alone(source(path))?],
+            [path] => vec![Input::alone(source((0, path)))?],
             // All threads first: opening a FIFO waits for its writer, in whatever order they come.
-            _ => paths.iter().map(|path| Input::on_thread(source(path))).collect::<Result<_, _>>()?,
+            _ => paths
+                .iter()
+                .enumerate()
+                .map(|input| Input::on_thread(source(input)))
+                .collect::<Result<_, _>>()?,
         };
         let ReadOptions { until, max_lost, lost, .. } = options;
         let (stalls, live) = (options.stalls.cloned(), options.live_lost.cloned());
@@ -93,9 +98,12 @@ impl MultiReader {
         Ok(Some(reader))
     }
 
-    /// N, the channels of all inputs together.
+    /// N, the samples of a frame: those of all channels of all inputs.
     pub fn channels(&self) -> usize {
-        self.headers().map(|(_, header)| header.channels).sum()
+        self.inputs
+            .iter()
+            .map(|input| input.grouped.aligned.header.channels * input.grouped.per_frame())
+            .sum()
     }
 
     /// True if the samples are complex; then each part is a channel of [`MultiReader::frames`].
@@ -105,12 +113,18 @@ impl MultiReader {
 
     /// Name and header of each input.
     pub fn headers(&self) -> impl Iterator<Item = (&str, &StreamHeader)> {
-        self.inputs.iter().map(|input| (input.name.as_str(), &input.aligned.header))
+        self.inputs.iter().map(|input| (input.name.as_str(), &input.grouped.aligned.header))
+    }
+
+    /// Samples of each channel of each input in a frame.
+    pub fn samples_per_frame(&self) -> Vec<usize> {
+        self.inputs.iter().map(|input| input.grouped.per_frame()).collect()
     }
 
     /// Number of frames according to the headers, if any header states it.
     pub fn promised_frames(&self) -> Option<u64> {
-        self.headers().filter_map(|(_, header)| header.promised).min()
+        let grouped = self.inputs.iter().map(|input| &input.grouped);
+        grouped.filter_map(|input| Some(input.aligned.header.promised? / input.per_frame() as u64)).min()
     }
 
     /// Waits until every input has a frame.
@@ -120,29 +134,37 @@ impl MultiReader {
     /// of [`ReadOptions::live_lost`] that is malformed or does not fit the inputs.
     pub fn wait(&mut self) -> Result<Arrival, IoError> {
         for i in 0..self.inputs.len() {
-            while self.inputs[i].aligned.waits() {
+            self.inputs[i].grouped.gather(false);
+            while self.inputs[i].grouped.waits() {
                 if !self.receive(i)? {
                     return Ok(Arrival::Stopped);
                 }
+                self.inputs[i].grouped.gather(false);
             }
         }
         // Now, not before: what is said while the samples are waited for holds for them.
         self.take_live_lines()?;
-        let aligned = || self.inputs.iter().map(|input| &input.aligned);
-        let over = aligned().filter(|input| input.is_over()).count();
+        if self.until == Until::Longest {
+            self.inputs
+                .iter_mut()
+                .filter(|input| input.grouped.is_over())
+                .for_each(|input| input.grouped.gather(true));
+        }
+        let grouped = || self.inputs.iter().map(|input| &input.grouped);
+        let over = grouped().filter(|input| input.is_over()).count();
         let end = if self.until == Until::Shortest { over > 0 } else { over == self.inputs.len() };
         if end {
             self.ready = 0;
             return Ok(Arrival::End);
         }
-        self.ready = aligned().filter(|input| !input.is_over()).map(AlignedInput::ready).min().unwrap_or(0);
-        self.inputs.iter_mut().for_each(|input| input.aligned.prepare(self.ready));
+        self.ready = grouped().filter(|input| !input.is_over()).map(GroupedInput::ready).min().unwrap_or(0);
+        self.inputs.iter_mut().for_each(|input| input.grouped.prepare(self.ready));
         Ok(Arrival::Frames(self.ready))
     }
 
     /// The ready frames, as many as [`MultiReader::wait`] returned. Lost samples are NaN.
     pub fn frames(&self) -> Vec<PcmFrames<'_>> {
-        self.inputs.iter().map(|input| input.aligned.view(self.ready)).collect()
+        self.inputs.iter().map(|input| input.grouped.view(self.ready)).collect()
     }
 
     /// Releases the first `frames` frames, at most those that are ready.
@@ -166,7 +188,7 @@ impl MultiReader {
 
     /// The faults tolerated so far.
     pub fn warnings(&self) -> Vec<InputWarning> {
-        let one_ended = self.inputs.iter().any(|input| input.aligned.is_over());
+        let one_ended = self.inputs.iter().any(|input| input.grouped.is_over());
         let of_input = |input: &Input| {
             let unused = if one_ended { input.unused() } else { None };
             let name = input.name.clone();
@@ -178,9 +200,9 @@ impl MultiReader {
 
     /// Waits for the next message of input i; false if a stop was asked for first.
     fn receive(&mut self, i: usize) -> Result<bool, IoError> {
-        let before: usize = self.inputs[..i].iter().map(|input| input.aligned.header.channels).sum();
+        let before: usize = self.inputs[..i].iter().map(|input| input.grouped.aligned.header.channels).sum();
         let input = &mut self.inputs[i];
-        let channels = before + 1..=before + input.aligned.header.channels;
+        let channels = before + 1..=before + input.grouped.aligned.header.channels;
         let wait = Wait::new(self.stalls.as_ref(), &input.name, channels);
         input.receive(&self.stop, wait)
     }
@@ -193,7 +215,7 @@ impl MultiReader {
             let mut first = 0;
             let mut is_named = channel.is_none();
             for input in &mut self.inputs {
-                let here = first..first + input.aligned.header.channels;
+                let here = first..first + input.grouped.aligned.header.channels;
                 first = here.end;
                 if channel.is_some_and(|channel| !here.contains(&channel)) {
                     continue;
@@ -204,7 +226,8 @@ impl MultiReader {
                     return Err(fault(problem.into()));
                 }
                 let within = channel.map(|channel| channel - here.start);
-                input.lose_live(within, &entry, self.max_lost).map_err(fault)?;
+                let max_lost = self.max_lost.saturating_mul(input.grouped.per_frame() as u64);
+                input.lose_live(within, &entry, max_lost).map_err(fault)?;
             }
             if !is_named {
                 let channel = channel.map_or(0, |channel| channel + 1);
@@ -236,15 +259,20 @@ impl MultiReader {
         for (input, lost) in &mut inputs {
             input.take_timestamps(lost)?;
         }
-        let origin = inputs.iter().filter_map(|(_, lost)| lost.timestamps.beginning()).min().unwrap_or(0);
+        // The frames of all inputs begin together, their samples count for themselves.
+        let begins = inputs.iter().filter_map(|(input, lost)| {
+            Some(lost.timestamps.beginning()? / input.grouped.per_frame() as u64)
+        });
+        let origin = begins.min().unwrap_or(0);
         for (input, lost) in inputs {
-            let breaks = lost.timestamps.breaks(origin);
+            let per_frame = input.grouped.per_frame() as u64;
+            let breaks = lost.timestamps.breaks(origin.saturating_mul(per_frame));
             let breaks = breaks.map_err(|problem| input.timing_fault(problem))?;
             let frames = breaks.iter().map(|next| next.lost).fold(0, u64::saturating_add);
-            if frames > max_lost {
-                return Err(input.timing_fault(too_many_lost(frames, max_lost)));
+            if frames / per_frame > max_lost {
+                return Err(input.timing_fault(too_many_lost(frames / per_frame, max_lost)));
             }
-            input.aligned.lose(breaks, lost);
+            input.grouped.aligned.lose(breaks, lost);
         }
         self.origin = origin;
         Ok(())

@@ -22,8 +22,8 @@ fn moved(chunk: &WavChunk, placement: Placement) -> WavChunk {
     let mut chunk = chunk.clone();
     if let (b"bext", Some(Ok(field))) = (&chunk.id, chunk.bytes.get(TIME_REFERENCE).map(<[u8; 8]>::try_from))
     {
-        let samples =
-            u64::from_le_bytes(field).saturating_mul(placement.ratio).saturating_sub(placement.shift);
+        let samples = u64::from_le_bytes(field).saturating_mul(placement.ratio) / placement.per_frame.max(1);
+        let samples = samples.saturating_sub(placement.shift);
         chunk.bytes[TIME_REFERENCE].copy_from_slice(&samples.to_le_bytes());
     }
     chunk
@@ -34,6 +34,8 @@ fn moved(chunk: &WavChunk, placement: Placement) -> WavChunk {
 pub struct Placement {
     /// M, output samples per frame.
     pub ratio: u64,
+    /// Samples of the input per frame.
+    pub per_frame: u64,
     /// Output samples before those of frame 0.
     pub shift: u64,
     /// Output samples in all.
@@ -60,6 +62,9 @@ impl OutputNotes {
     pub(super) fn of(inputs: &[&InputNotes], origin: u64, placement: Placement) -> Self {
         let mut notes = Self::default();
         for input in inputs {
+            let per_frame = input.per_frame.max(1) as u64;
+            let (origin, placement) =
+                (origin.saturating_mul(per_frame), Placement { per_frame, ..placement });
             if notes.chunks.is_empty() {
                 notes.chunks = input.chunks.iter().map(|chunk| moved(chunk, placement)).collect();
             }
@@ -93,10 +98,12 @@ impl OutputNotes {
         }
     }
 
-    /// Adds an annotation about `frames` frames from `first` on.
+    /// Adds an annotation about `frames` samples of the input from `first` on, which are its frames unless it has
+    /// several per frame.
     pub fn annotate(&mut self, placement: Placement, first: u64, frames: u64, label: &str, comment: &str) {
-        let begin = first.saturating_mul(placement.ratio).saturating_add(placement.shift);
-        let end = begin.saturating_add(frames.saturating_mul(placement.ratio)).min(placement.samples);
+        let place = |sample: u64| sample.saturating_mul(placement.ratio) / placement.per_frame.max(1);
+        let begin = place(first).saturating_add(placement.shift);
+        let end = place(first.saturating_add(frames)).saturating_add(placement.shift).min(placement.samples);
         if begin < end {
             let other = [("core:label", label), ("core:comment", comment), ("core:generator", "hybank")];
             let other = other.into_iter().map(|(key, text)| (key.to_owned(), text.into())).collect();
@@ -123,7 +130,7 @@ impl Axis<'_> {
     fn place(&self, sample: u64) -> Option<u64> {
         let frame = sample.checked_sub(self.offset)? / self.input.samples_per_frame as u64;
         let time = self.input.timestamps.time_of(frame, self.origin);
-        time.checked_mul(self.placement.ratio)?.checked_add(self.placement.shift)
+        (time.checked_mul(self.placement.ratio)? / self.placement.per_frame).checked_add(self.placement.shift)
     }
 
     /// Captures that say more than where they begin; the first begins at 0.

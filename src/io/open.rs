@@ -69,6 +69,8 @@ pub(super) struct InputSource {
     pub(super) channels: usize,
     /// The converters whose samples are time-interleaved in the input, if they are.
     pub(super) interleaving: Option<TimeInterleaving>,
+    /// Samples of each channel in a row that are a frame of the consumer.
+    pub(super) per_frame: usize,
     /// The only channel to read, from 0.
     pub(super) only: Option<usize>,
     /// Full scale, if the format does not say it.
@@ -204,6 +206,7 @@ mod tests {
                 coding,
                 channels: 1,
                 interleaving: None,
+                per_frame: 1,
                 only: None,
                 full_scale: None,
                 block: 4096,

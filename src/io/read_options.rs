@@ -31,6 +31,9 @@ pub struct ReadOptions<'a> {
     /// The time-interleaved converters of the only input, which has one channel then. Its frames are those
     /// of an input of M channels, at an M-th of its rate.
     pub interleaving: Option<&'a TimeInterleaving>,
+    /// Samples of each input in a row that are a frame, where converters sample more often than there are
+    /// frames; empty for one of each.
+    pub samples_per_frame: &'a [usize],
     /// The lost samples, if a file lists them.
     pub lost: Option<&'a LostSamples>,
     /// Lost samples that become known during the run.
@@ -55,6 +58,7 @@ impl ReadOptions<'_> {
             only: None,
             full_scale: None,
             interleaving: None,
+            samples_per_frame: &[],
             lost: None,
             live_lost: None,
             max_lost: MAX_LOST,

@@ -8,6 +8,7 @@ use crate::figures::{Tone, tone_curve};
 use crate::linalg::Complex;
 use crate::plot::{Chart, Series};
 use crate::quantity::scale_of;
+use crate::spec::FrameSample;
 use crate::units::{FastPeriods, Hertz, RadiansPerFastPeriod};
 use crate::verify::uncertainty::{ErrorPoint, Taps};
 use std::f64::consts::{PI, TAU};
@@ -66,7 +67,7 @@ pub fn pictures(bank: &Bank) -> Result<Vec<Picture>, DesignError> {
         picture(
             "impulse-responses",
             "What each synthesis filter gives for one sample; its phases are the polyphase filters.",
-            impulses(&responses),
+            impulses(bank, &responses),
         ),
         picture(
             "error",
@@ -108,6 +109,16 @@ fn decibels(gain: f64) -> f64 {
 
 fn channel(i: usize) -> String {
     format!("channel {}", i + 1)
+}
+
+/// The synthesis filters' names: that of the channel, and the number of its sample where it has several per
+/// frame.
+fn filter_names(bank: &Bank) -> Vec<String> {
+    let name = |FrameSample { converter, number }| match bank.samples[converter] {
+        1 => channel(converter),
+        _ => format!("{}, sample {}", channel(converter), number + 1),
+    };
+    bank.layout().iter().map(name).collect()
 }
 
 /// The unit of a frequency axis up to `most`, and the factor that brings hertz there.
@@ -155,15 +166,16 @@ fn by_frequency(
     value: impl Fn(Complex<f64>, f64) -> f64,
 ) -> (String, Vec<Series>) {
     let (factor, x_label) = axis(nyquist(bank));
-    let curve = |(i, taps): (usize, &Vec<f64>)| {
+    let curve = |(label, taps): (String, &Vec<f64>)| {
         let point = |k: usize| {
             let share = k as f64 / (POINTS - 1) as f64;
             let (response, delay) = fir_response(taps, RadiansPerFastPeriod(PI * share));
             (share * nyquist(bank).0 * factor, value(response, delay))
         };
-        Series { label: channel(i), points: (0..POINTS).map(point).collect() }
+        Series { label, points: (0..POINTS).map(point).collect() }
     };
-    (x_label, responses.iter().enumerate().take(MOST_CHANNELS).map(curve).collect())
+    let series = filter_names(bank).into_iter().zip(responses).take(MOST_CHANNELS).map(curve);
+    (x_label, series.collect())
 }
 
 fn gains(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
@@ -202,16 +214,16 @@ fn pass_band(bank: &Bank, responses: &[Vec<f64>]) -> f64 {
     largest * 10f64.powf(-PASS_BAND_DB / 20.0)
 }
 
-fn impulses(responses: &[Vec<f64>]) -> Chart {
-    let curve = |(i, taps): (usize, &Vec<f64>)| Series {
-        label: channel(i),
+fn impulses(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
+    let curve = |(label, taps): (String, &Vec<f64>)| Series {
+        label,
         points: taps.iter().enumerate().map(|(n, tap)| (n as f64, *tap)).collect(),
     };
     Chart {
         title: "Impulse responses of the synthesis filters".into(),
         x_label: "fast samples".into(),
         y_label: "tap".into(),
-        series: responses.iter().enumerate().take(MOST_CHANNELS).map(curve).collect(),
+        series: filter_names(bank).into_iter().zip(responses).take(MOST_CHANNELS).map(curve).collect(),
     }
 }
 

@@ -17,6 +17,12 @@ pub fn understood(spec: &Spec) -> String {
 
 fn rates(spec: &Spec) -> String {
     let (converters, ratio) = (spec.channels.len(), spec.ratio);
+    let rates: Vec<f64> = spec.channels.iter().filter_map(|channel| Some(channel.rate?.0)).collect();
+    if !rates.is_empty() {
+        let shown: Vec<String> = rates.iter().map(|rate| readable(*rate, "S/s")).collect();
+        let output = readable(spec.fast_period.rate().0, "S/s");
+        return format!("{output} from {}, in frames of {ratio} samples", shown.join(" and "));
+    }
     if spec.is_normalised() {
         let who = if converters == 1 { "one converter".into() } else { format!("{converters} converters") };
         let rate =

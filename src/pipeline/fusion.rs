@@ -87,7 +87,7 @@ impl<'a> Fusion<'a> {
             skip: settings.dropped.samples(plan),
             kept: 0..0,
             replaced: 0,
-            offsets: bank.offsets.clone(),
+            offsets: bank.layout().each(&bank.offsets),
         })
     }
 

@@ -5,19 +5,19 @@
 //! has left the history of the filters. A recursive bank has infinite history, so all later outputs count
 //! as affected.
 
-use crate::bank::{Bank, SynthesisFilters};
+use crate::bank::{Bank, FrameLayout, FrameSample, SynthesisFilters};
 use crate::runtime::{BuildError, Input, Isa};
 use std::ops::Range;
 
 /// Maximum number of gaps that a report lists; further gaps are only counted, so that memory stays bounded.
 pub const LISTED_GAPS: usize = 65_536;
 
-/// A run of missing samples of one channel.
+/// A run of missing samples of one converter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct Gap {
     /// The channel, from 1.
     pub channel: usize,
-    /// Frame of its first sample, from 0.
+    /// Number of its first sample among those of the converter, from 0: its frame, for converters of one rate.
     pub first: u64,
     /// Samples that are missing.
     pub length: u64,
@@ -41,19 +41,27 @@ pub struct GapSummary {
 pub enum GapPolicy {
     /// Zero after the offset is subtracted: the channel's offset.
     Zero,
-    /// The channel's last good sample (as [`GapPolicy::Zero`] before the first).
+    /// The converter's last good sample (as [`GapPolicy::Zero`] before the first).
     Hold,
 }
 
-/// The state of a channel.
+/// The state of a converter.
 #[derive(Debug, Clone, Copy)]
-struct Channel {
-    /// What the converter delivers without a signal.
+struct Converter {
+    /// What it delivers without a signal.
     offset: f64,
     /// The last good sample: a real one, or both parts of a complex one.
     last: [f64; 2],
     /// The gap that has not ended.
     open: Option<Gap>,
+}
+
+/// A sample of a frame.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    of: FrameSample,
+    /// It is missing in the last frame.
+    is_missing: bool,
 }
 
 /// Fills gaps frame by frame.
@@ -66,7 +74,9 @@ pub(super) struct GapFiller {
     ratio: usize,
     /// `None` for a recursion.
     affected: Option<AffectedOutputs>,
-    channels: Vec<Channel>,
+    layout: FrameLayout,
+    places: Vec<Place>,
+    converters: Vec<Converter>,
     summary: GapSummary,
     frame: u64,
     /// The filled frames of each part of the samples.
@@ -96,12 +106,15 @@ impl GapFiller {
         if bank.channel_count() == 0 {
             return Err(BuildError::NoChannels);
         }
-        let channel = |&offset: &f64| Channel { offset, last: [offset; 2], open: None };
+        let converter = |&offset: &f64| Converter { offset, last: [offset; 2], open: None };
+        let layout = bank.layout();
         Ok(Self {
             policy,
             ratio,
             affected: nonzero_phases(bank).map(|nonzero| AffectedOutputs::new(ratio, &nonzero)),
-            channels: bank.offsets.iter().map(channel).collect(),
+            places: layout.iter().map(|of| Place { of, is_missing: false }).collect(),
+            layout,
+            converters: bank.offsets.iter().map(converter).collect(),
             summary: GapSummary::default(),
             frame: 0,
             numbers: vec![Vec::new(); parts],
@@ -120,7 +133,7 @@ impl GapFiller {
             self.pass(parts, frames);
             return false;
         }
-        let n = self.channels.len();
+        let n = self.places.len();
         for (numbers, part) in self.numbers.iter_mut().zip(parts) {
             numbers.resize(frames * n, 0.0);
             part.load(Isa::detect(), 0, numbers);
@@ -150,12 +163,12 @@ impl GapFiller {
 
     /// The gaps that have not ended, with their length so far.
     pub(super) fn open(&self) -> impl Iterator<Item = Gap> {
-        self.channels.iter().filter_map(|channel| channel.open)
+        self.converters.iter().filter_map(|converter| converter.open)
     }
 
     /// All gaps, once the input is over: those that are open end there.
     pub(super) fn finish(mut self) -> GapSummary {
-        (0..self.channels.len()).for_each(|i| self.end_gap(i));
+        (0..self.converters.len()).for_each(|converter| self.end_gap(converter));
         self.summary
     }
 
@@ -164,6 +177,7 @@ impl GapFiller {
     fn is_at_rest(&self) -> bool {
         self.affected.as_ref().is_none_or(|affected| affected.unchanged_from <= self.frame)
             && self.open().next().is_none()
+            && !self.places.iter().any(|place| place.is_missing)
     }
 
     /// Frames without a gap, while at rest: only the last samples matter.
@@ -175,39 +189,47 @@ impl GapFiller {
             return;
         }
         for (p, (numbers, part)) in self.numbers.iter_mut().zip(parts).enumerate() {
-            numbers.resize(self.channels.len(), 0.0);
+            numbers.resize(self.places.len(), 0.0);
             part.load(Isa::detect(), frames - 1, numbers);
-            self.channels.iter_mut().zip(numbers).for_each(|(channel, last)| channel.last[p] = *last);
+            // In the order of time, so that the last sample of a converter remains.
+            self.places.iter().zip(numbers).for_each(|(place, last)| {
+                self.converters[place.of.converter].last[p] = *last;
+            });
         }
     }
 
-    /// Sample number `index` of the block, which is one of channel i.
+    /// Sample number `index` of the block, which is sample i of its frame.
     fn fill_sample(&mut self, index: usize, i: usize) {
+        let FrameSample { converter, number } = self.places[i].of;
+        let was_missing = self.places[i].is_missing;
         if self.numbers.iter().all(|part| part[index].is_finite()) {
-            let channel = &mut self.channels[i];
-            channel.last.iter_mut().zip(&self.numbers).for_each(|(last, part)| *last = part[index]);
-            return self.end_gap(i);
+            let last = self.converters[converter].last.iter_mut();
+            last.zip(&self.numbers).for_each(|(last, part)| *last = part[index]);
+            self.places[i].is_missing = false;
+            if let (true, Some(affected)) = (was_missing, &mut self.affected) {
+                affected.end(i, self.frame);
+            }
+            return self.end_gap(converter);
         }
-        let Channel { offset, last, .. } = self.channels[i];
+        let Converter { offset, last, .. } = self.converters[converter];
         for (part, last) in self.numbers.iter_mut().zip(last) {
             part[index] = if self.policy == GapPolicy::Hold { last } else { offset };
         }
-        if let (None, Some(affected)) = (self.channels[i].open, &mut self.affected) {
+        self.places[i].is_missing = true;
+        if let (false, Some(affected)) = (was_missing, &mut self.affected) {
             affected.begin(i, self.frame);
         }
-        let new = Gap { channel: i + 1, first: self.frame, length: 0 };
-        self.channels[i].open.get_or_insert(new).length += 1;
+        let first = self.frame * self.layout.samples()[converter] as u64 + number as u64;
+        let new = Gap { channel: converter + 1, first, length: 0 };
+        self.converters[converter].open.get_or_insert(new).length += 1;
         self.summary.missing += 1;
     }
 
-    fn end_gap(&mut self, i: usize) {
-        let Some(gap) = self.channels[i].open.take() else { return };
+    fn end_gap(&mut self, converter: usize) {
+        let Some(gap) = self.converters[converter].open.take() else { return };
         self.summary.count += 1;
         if self.summary.list.len() < LISTED_GAPS {
             self.summary.list.push(gap);
-        }
-        if let Some(affected) = &mut self.affected {
-            affected.end(i, self.frame);
         }
     }
 
@@ -232,7 +254,7 @@ fn nonzero_phases(bank: &Bank) -> Option<Vec<Vec<Vec<usize>>>> {
             let outputs = 0..block.d.len().min(bank.ratio);
             let enters = |i: usize| move |&p: &usize| block.d[p].get(i).is_some_and(|x| *x != 0.0);
             let phases = |i| vec![outputs.clone().filter(enters(i)).collect()];
-            Some((0..bank.channel_count()).map(phases).collect())
+            Some((0..bank.frame_samples()).map(phases).collect())
         }
         SynthesisFilters::StateSpace(_) => None,
     }

@@ -6,9 +6,9 @@ use super::source::NormalisedSource;
 use super::walk::sample_at;
 use crate::analog::StrictlyProper;
 use crate::design::Problem;
-use crate::design::problem::Channel;
 use crate::design::{NearestSample, nearest_samples};
 use crate::units::FastPeriods;
+use std::ops::Range;
 
 /// An analog signal in normalised time.
 #[derive(Debug, Clone)]
@@ -22,15 +22,15 @@ pub enum Analog {
 /// The slow samples of all channels and the reference fast samples over the same time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Captured {
-    /// `channels[i][k]` = g_i (phi_i * f)(k M - D_i), with the gain g_i of the converter and without its
-    /// offset.
+    /// `channels[i][k]` = g_i (phi_i * f)(k T_i - D_i), with the gain g_i of the converter and without its
+    /// offset; T_i = M unless converters have rates of their own.
     pub channels: Vec<Vec<f64>>,
-    /// `target[n]` = (phi_0 * f)(n - m0), M samples per slow period.
+    /// `target[n]` = (phi_0 * f)(n - m0), M samples per slow period, m0 without the wait for a frame.
     pub target: Vec<f64>,
 }
 
-/// Captures `periods` slow periods of `signal`: slow samples k = 0 .. periods of each channel, and M times
-/// as many reference samples.
+/// Captures `periods` slow periods of `signal`, or frames: slow samples k = 0 .. periods of each channel, or so
+/// many times the samples that it has in a frame, and M times as many reference samples.
 pub fn capture(problem: &Problem, signal: &Analog, periods: usize) -> Captured {
     let mut channels: Vec<_> = recordings(problem, signal, periods).collect();
     let target = channels.pop().unwrap_or_default();
@@ -44,20 +44,27 @@ pub fn recordings<'a>(
     signal: &'a Analog,
     periods: usize,
 ) -> impl Iterator<Item = Vec<f64>> + 'a {
-    let slow = move |channel: &Channel| {
-        let step = FastPeriods(problem.ratio as f64);
-        let instants = Instants { first: -channel.delay.in_fast_periods(), step, count: periods };
+    let slow = move |samples: Range<usize>| {
+        let channel = &problem.channels[samples.start];
+        let instants = instants(problem, &samples, periods);
         let samples = signal.filtered(&problem.front_ends[channel.front_end], instants);
         samples.into_iter().map(|sample| channel.gain * sample).collect()
     };
     let target = move || target(problem, signal, periods);
-    problem.channels.iter().map(slow).chain(std::iter::once_with(target))
+    problem.converters().into_iter().map(slow).chain(std::iter::once_with(target))
 }
 
-/// The reference samples (phi_0 * f)(n - m0), M per slow period, with the latency m0 of the problem. With
-/// m0 = 0 they lie on the time axis of the channels, as `fuse` gives its output.
+/// The instants of the samples of a converter, whose `samples` per frame these are, on its own time axis.
+pub(super) fn instants(problem: &Problem, samples: &Range<usize>, periods: usize) -> Instants {
+    let delay = problem.channels[samples.start].delay.later_by(-(problem.wait as f64));
+    let step = FastPeriods(problem.ratio as f64 / samples.len() as f64);
+    Instants { first: -delay.in_fast_periods(), step, count: periods * samples.len() }
+}
+
+/// The reference samples (phi_0 * f)(n - m0), M per slow period, with the latency m0 of the problem without its
+/// wait. With m0 = 0 they lie on the time axis of the channels, as `fuse` gives its output.
 pub fn target(problem: &Problem, signal: &Analog, periods: usize) -> Vec<f64> {
-    let (first, step) = (FastPeriods(-(problem.latency as f64)), FastPeriods(1.0));
+    let (first, step) = (FastPeriods(problem.wait as f64 - problem.latency as f64), FastPeriods(1.0));
     let instants = Instants { first, step, count: periods * problem.ratio };
     signal.filtered(&problem.front_ends[problem.target], instants)
 }

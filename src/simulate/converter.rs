@@ -1,6 +1,6 @@
 //! A virtual converter with errors of its own.
 
-use super::capture::Analog;
+use super::capture::{Analog, instants};
 use super::normal::{Normal, Purpose};
 use super::quantiser::Quantiser;
 use super::response::Instants;
@@ -12,7 +12,7 @@ use crate::units::FastPeriods;
 ///
 /// ```text
 /// q(level g_i (1 + gain error) (phi_i * f)(t_k) + offset + noise n_k)
-/// t_k = k M / (1 + drift) - D_i - delay error + jitter j_k
+/// t_k = k T_i / (1 + drift) - D_i - delay error + jitter j_k
 /// ```
 ///
 /// with independent normal numbers n_k and j_k of variance 1 and the quantiser q. The numbers depend on the
@@ -65,7 +65,7 @@ impl Converter {
         }
     }
 
-    /// Captures `periods` samples of channel `channel` of `problem`, from 0, with the signal times `level`.
+    /// Captures `periods` frames of converter `channel` of `problem`, from 0, with the signal times `level`.
     pub fn capture(
         &self,
         problem: &Problem,
@@ -99,25 +99,24 @@ impl Converter {
         periods: usize,
         noise: Purpose,
     ) -> Delivered {
-        let Problem { ratio, channels, front_ends, .. } = problem;
-        let front_end = &front_ends[channels[channel].front_end];
-        let instants = Instants {
-            first: -(channels[channel].delay.in_fast_periods() + self.delay_error),
-            step: FastPeriods(*ratio as f64 / (1.0 + self.drift)),
-            count: periods,
-        };
-        let analog = match self.shifts(channel, periods) {
+        let samples = &problem.converters()[channel];
+        let of = &problem.channels[samples.start];
+        let front_end = &problem.front_ends[of.front_end];
+        let Instants { first, step, count } = instants(problem, samples, periods);
+        let (first, step) = (first - self.delay_error, FastPeriods(step.0 / (1.0 + self.drift)));
+        let instants = Instants { first, step, count };
+        let analog = match self.shifts(channel, count) {
             Some(shifts) => signal.filtered_near(front_end, instants, &shifts),
             None => signal.filtered(front_end, instants),
         };
-        let gain = level * channels[channel].gain * (1.0 + self.gain_error);
+        let gain = level * of.gain * (1.0 + self.gain_error);
         self.convert(Normal::new(self.seed, channel, noise), analog, gain)
     }
 
     /// The jitter of each sample.
-    fn shifts(&self, channel: usize, periods: usize) -> Option<Vec<FastPeriods>> {
+    fn shifts(&self, channel: usize, count: usize) -> Option<Vec<FastPeriods>> {
         let normal = Normal::new(self.seed, channel, Purpose::Jitter);
-        let shifts = || (0..periods).map(|k| self.jitter * normal.at(k)).collect();
+        let shifts = || (0..count).map(|k| self.jitter * normal.at(k)).collect();
         (self.jitter.0 > 0.0).then(shifts)
     }
 

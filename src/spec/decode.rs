@@ -6,9 +6,12 @@ use super::filter_reader::{FILTER_FORMS, filter};
 use super::measured::{FilterModel, FilterModels, MeasuredFilter, Measurement, no_models};
 use super::reader::{Either, Fields, Value};
 use super::word_lengths::{WordLengths, check_fraction_bits};
-use super::{ChannelSpec, DesignSpec, Fault, PerChannel, Spec, SpecProblem, UncertaintySpec, limits, signal};
+use super::{
+    ChannelSpec, DesignSpec, Fault, FrameLayout, PerChannel, Spec, SpecProblem, UncertaintySpec, frames,
+    limits, signal,
+};
 use crate::quantity::Time;
-use crate::units::{Decibels, FastPeriods, Seconds};
+use crate::units::{Decibels, FastPeriods, GridTime, Hertz, Seconds};
 
 const TOP_KEYS: [&str; 11] = [
     "name",
@@ -23,8 +26,8 @@ const TOP_KEYS: [&str; 11] = [
     "uncertainty",
     "design",
 ];
-const CHANNEL_KEYS: [&str; 8] =
-    ["delay", "delay_samples", "filter", "noise", "bits", "jitter", "gain", "offset"];
+const CHANNEL_KEYS: [&str; 9] =
+    ["delay", "delay_samples", "rate", "filter", "noise", "bits", "jitter", "gain", "offset"];
 const DESIGN_KEYS: [&str; 11] = [
     "method",
     "taps",
@@ -63,8 +66,11 @@ pub(crate) fn spec_with(
     let top = document.fields(&TOP_KEYS)?;
     let name = top.read("name", |v| v.text())?.unwrap_or_default().to_owned();
     let h = fast_period(&top)?;
-    let ratio = top.required("ratio", "give M, the number of fast samples per slow sample")?;
-    let ratio = ratio.count_in("fast samples", limits::check_ratio)?;
+    let ratio = top.read("ratio", |v| v.count_in("fast samples", limits::check_ratio))?;
+    if ratio.is_none() && !has_rates(&top) {
+        let remedy = "give M, the number of fast samples per slow sample, or the rate of every channel";
+        return Err(top.whole().fault(SpecProblem::MissingKey { key: "ratio", remedy }));
+    }
     let latency = top.read("latency", |v| v.count_in("fast samples", limits::check_latency))?;
     let full_scale = top.read("full_scale", |v| v.full_scale())?;
     let target = top
@@ -74,13 +80,19 @@ pub(crate) fn spec_with(
     let signal = top.read("signal", |v| signal::read(&v))?;
     let table = top.read("design", |v| v.fields(&DESIGN_KEYS))?;
     let noise = table.as_ref().map_or(Ok(None), noise)?.unwrap_or(0.0);
-    let (channels, errors): (Vec<_>, Vec<_>) =
+    let (mut channels, errors): (Vec<_>, Vec<_>) =
         channels(&top, &Common { h, target: &target, noise, models })?.into_iter().unzip();
+    let ratio = frame_ratio(&top, h, ratio, &mut channels)?;
+    let layout = frames::of_channels(h, ratio, &channels);
+    let delays: Vec<_> = channels.iter().map(|channel| GridTime::new(channel.delay, h)).collect();
+    frames::check_latency(latency, layout.wait(&delays))
+        .map_err(|problem| top.fault_at(Some("latency"), problem))?;
     let uncertainty = top.read("uncertainty", |v| uncertainty(&v, channels.len(), h))?;
     let uncertainty = with_model_errors(uncertainty, &errors);
     // A table that is absent is blamed as the whole document.
     let blamed = table.as_ref().unwrap_or(&top);
-    let design = design(table.as_ref(), blamed, &overrides, channels.len())?;
+    let design = design(table.as_ref(), blamed, &overrides, &layout)?;
+    frames::check_method(&layout, &design, h).map_err(|problem| top.fault_at(Some("channel"), problem))?;
     design.check_beside(uncertainty.as_ref(), channels.len()).map_err(|KeyProblem { key, problem }| {
         if matches!(key, "tracking" | "solver") && overrides.gives(key) {
             Fault::overriding(key, problem)
@@ -143,6 +155,48 @@ fn seconds(period: &Value<'_>) -> Result<Seconds, Fault> {
     Ok(h)
 }
 
+/// Whether every channel has a rate of its own.
+fn has_rates(top: &Fields<'_>) -> bool {
+    let list = top.optional("channel").and_then(|list| list.items("a list").ok()).unwrap_or_default();
+    !list.is_empty() && list.iter().all(|item| item.entry("rate").is_ok())
+}
+
+/// Fast samples per frame. Channels without a rate have that of the `ratio`; where all have one rate, none
+/// keeps it.
+fn frame_ratio(
+    top: &Fields<'_>,
+    h: Seconds,
+    ratio: Option<usize>,
+    channels: &mut [ChannelSpec],
+) -> Result<usize, Fault> {
+    if let Some(ratio) = ratio
+        && channels.iter().all(|channel| channel.rate.is_none())
+    {
+        return Ok(ratio);
+    }
+    let common = ratio.map(|ratio| (h * ratio as f64).rate());
+    let rates: Vec<Hertz> = channels.iter().filter_map(|channel| channel.rate.or(common)).collect();
+    let layout = frames::layout(h, &rates).map_err(|refused| {
+        let list = top.optional("channel").and_then(|list| list.items("a list").ok());
+        let channel = refused.channel.and_then(|i| list?.get(i)?.entry("rate").ok());
+        let blamed = channel.or_else(|| top.optional("channel")).unwrap_or_else(|| top.whole().clone());
+        blamed.fault(refused.problem)
+    })?;
+    if let Some(ratio) = ratio.filter(|&ratio| ratio != layout.ratio())
+        && channels.iter().all(|channel| channel.rate.is_some())
+    {
+        let rule = format!(
+            "every channel has a rate, and these make frames of {} fast samples; leave ratio out",
+            layout.ratio()
+        );
+        return Err(top.fault_at(Some("ratio"), limits::range(ratio as f64, "fast samples", rule)));
+    }
+    for (channel, rate) in channels.iter_mut().zip(rates) {
+        channel.rate = (!layout.is_plain()).then_some(rate);
+    }
+    Ok(layout.ratio())
+}
+
 /// Defaults of a channel.
 struct Common<'a> {
     h: Seconds,
@@ -173,6 +227,7 @@ fn channel(item: &Value<'_>, common: &Common<'_>) -> Result<(ChannelSpec, Decibe
     // Noise of -0.0 is noise of 0.0, and so are offset and jitter.
     let channel = ChannelSpec {
         delay,
+        rate: fields.read("rate", |v| v.rate())?,
         filter,
         noise: noise(&fields)?.unwrap_or(common.noise) + 0.0,
         gain: fields.read("gain", |v| v.number_in(limits::check_gain))?.unwrap_or(1.0),
@@ -255,11 +310,11 @@ fn design(
     table: Option<&Fields<'_>>,
     blamed: &Fields<'_>,
     overrides: &DesignOverrides,
-    channels: usize,
+    layout: &FrameLayout,
 ) -> Result<DesignSpec, Fault> {
     let written = table.map_or(Ok(DesignOverrides::default()), written)?;
     let design = overrides.clone().over(written).resolved();
-    match design.check(channels) {
+    match design.check(layout) {
         Ok(()) => Ok(design),
         Err(KeyProblem { key, problem }) => Err(match overriding(overrides, key, &problem) {
             Some(given) => Fault::overriding(given, problem),

@@ -3,7 +3,7 @@
 use super::error::{KeyProblem, blame};
 use super::limits;
 use super::word_lengths::{WordLengths, check_fraction_bits};
-use super::{SpecProblem, UncertaintySpec};
+use super::{FrameLayout, SpecProblem, UncertaintySpec};
 use serde::{Deserialize, Serialize};
 
 /// How the synthesis filters are designed.
@@ -235,27 +235,27 @@ impl DesignSpec {
     /// The same design by another method; keys that it does not read are dropped.
     ///
     /// # Errors
-    /// [`SpecProblem`] if the method needs taps and there are none, or too many for `channels`.
-    pub fn with_method(&self, method: Method, channels: usize) -> Result<Self, SpecProblem> {
-        self.overridden(DesignOverrides { method: Some(method), ..Default::default() }, channels)
+    /// [`SpecProblem`] if the method needs taps and there are none, or too many for frames of this `layout`.
+    pub fn with_method(&self, method: Method, layout: &FrameLayout) -> Result<Self, SpecProblem> {
+        self.overridden(DesignOverrides { method: Some(method), ..Default::default() }, layout)
     }
 
     /// The same design with another number of taps per channel, in place of a wanted SNR too.
     ///
     /// # Errors
     /// [`SpecProblem`] if the method makes no FIR filters, or the number is out of range.
-    pub fn with_taps(&self, taps: usize, channels: usize) -> Result<Self, SpecProblem> {
-        self.overridden(DesignOverrides { taps: Some(taps), ..Default::default() }, channels)
+    pub fn with_taps(&self, taps: usize, layout: &FrameLayout) -> Result<Self, SpecProblem> {
+        self.overridden(DesignOverrides { taps: Some(taps), ..Default::default() }, layout)
     }
 
-    fn overridden(&self, overrides: DesignOverrides, channels: usize) -> Result<Self, SpecProblem> {
+    fn overridden(&self, overrides: DesignOverrides, layout: &FrameLayout) -> Result<Self, SpecProblem> {
         let design = overrides.over(self.clone().with(Some(self.method))).resolved();
-        design.check(channels)?;
+        design.check(layout)?;
         Ok(design)
     }
 
     /// Checks the numbers, and that the method reads every key.
-    pub(super) fn check(&self, channels: usize) -> Result<(), KeyProblem> {
+    pub(super) fn check(&self, layout: &FrameLayout) -> Result<(), KeyProblem> {
         self.check_keys()?;
         blame("taps", self.taps.map_or(Ok(()), limits::check_taps))?;
         blame("gamma_margin", self.gamma_margin.map_or(Ok(()), limits::check_gamma_margin))?;
@@ -272,10 +272,10 @@ impl DesignSpec {
         }
         blame("target_snr_db", self.target_snr_db.map_or(Ok(()), limits::check_target_snr))?;
         // Taps that follow the delays are functions of all delays but one.
-        let functions = if self.tracking.is_some() { channels } else { 1 };
+        let functions = if self.tracking.is_some() { layout.samples().len() } else { 1 };
         match (self.method, self.taps) {
             (Method::Fir, Some(taps)) => {
-                blame("taps", limits::check_optimised_taps(taps, channels.saturating_mul(functions)))
+                blame("taps", limits::check_optimised_taps(taps, layout.count().saturating_mul(functions)))
             }
             _ => Ok(()),
         }

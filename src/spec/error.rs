@@ -131,6 +131,34 @@ pub enum SpecProblem {
         "the filter is empty; give num and den, or poles and gain, or a, b and c, or family and cutoff, or cascade"
     )]
     EmptyFilter,
+    /// A sample rate in no simple ratio to the fast rate.
+    #[error(
+        "a rate of {rate} Hz is in no simple ratio to the fast rate of {fast} Hz, so that the instants of the samples \
+         do not repeat; a rate near it is {}", rates(.near)
+    )]
+    Rate {
+        /// The offending rate.
+        rate: f64,
+        /// The fast rate.
+        fast: f64,
+        /// A rate near it.
+        near: Vec<f64>,
+    },
+    /// Sample rates whose frames are too long.
+    #[error(
+        "the rates make frames of {ratio} fast samples, with {} samples of the converters; {rule}; rates near these \
+         with short frames are {}", list(.samples), rates(.near)
+    )]
+    Frame {
+        /// Fast samples per frame.
+        ratio: u64,
+        /// Samples of each converter per frame.
+        samples: Vec<u64>,
+        /// The limit and other remedies.
+        rule: String,
+        /// Rates near these, in hertz.
+        near: Vec<f64>,
+    },
     /// A text that is not the quantity it should be.
     #[error(transparent)]
     Quantity(#[from] QuantityError),
@@ -154,6 +182,14 @@ impl From<KeyProblem> for SpecProblem {
 
 pub(super) fn blame(key: &'static str, checked: Result<(), SpecProblem>) -> Result<(), KeyProblem> {
     checked.map_err(|problem| KeyProblem { key, problem })
+}
+
+fn list(samples: &[u64]) -> String {
+    samples.iter().map(u64::to_string).collect::<Vec<_>>().join(" and ")
+}
+
+fn rates(near: &[f64]) -> String {
+    near.iter().map(|rate| format!("{rate} Hz")).collect::<Vec<_>>().join(" and ")
 }
 
 fn suggestion(nearest: &Option<&'static str>) -> String {

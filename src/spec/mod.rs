@@ -11,6 +11,7 @@ mod error;
 mod filter;
 mod filter_problem;
 mod filter_reader;
+mod frames;
 mod limits;
 mod measured;
 mod passband;
@@ -27,6 +28,7 @@ pub(crate) use error::{Fault, shown_path};
 pub use error::{SpecError, SpecProblem};
 pub use filter::{Family, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use filter_problem::{FilterProblem, MAX_ORDER};
+pub use frames::{FrameLayout, FrameSample};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS};
 pub(crate) use limits::{MAX_ENTRY, check_fast_period, check_gain, check_offset};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES, MAX_TARGET_SNR_DB};
@@ -43,7 +45,7 @@ pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
 use crate::messages::of_document;
 use crate::quantity::{self, FullScale};
-use crate::units::{FastPeriods, GridTime, Seconds};
+use crate::units::{FastPeriods, GridTime, Hertz, Seconds};
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// A spec with the units resolved (seconds) and the omitted channel filters filled in.
@@ -55,9 +57,11 @@ pub struct Spec {
     pub name: String,
     /// h, the period of the fast samples.
     pub fast_period: Seconds,
-    /// M, fast samples per slow sample.
+    /// M, fast samples per slow sample; where converters have [rates](ChannelSpec::rate) of their own, P, fast
+    /// samples per frame.
     pub ratio: usize,
-    /// m0, the latency in fast samples; `None` lets the designer choose.
+    /// m0, the latency in fast samples, with the [wait](FrameLayout::wait) for the rest of a frame; `None` lets
+    /// the designer choose.
     pub latency: Option<usize>,
     /// Phi_0, the filter of the ideal fast converter.
     pub target: FilterSpec,
@@ -78,6 +82,10 @@ pub struct Spec {
 pub struct ChannelSpec {
     /// D_i >= 0.
     pub delay: Seconds,
+    /// The converter's own sample rate. `None` for all channels, with one sample of each in a frame, or for
+    /// none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate: Option<Hertz>,
     /// Phi_i.
     pub filter: FilterSpec,
     /// sigma_i: rms of the converter's own white noise, relative to full scale.
@@ -101,7 +109,16 @@ pub struct ChannelSpec {
 impl ChannelSpec {
     /// A converter without noise, gain error and offset.
     pub fn new(delay: Seconds, filter: FilterSpec) -> Self {
-        Self { delay, filter, noise: 0.0, bits: None, jitter: Seconds(0.0), gain: 1.0, offset: 0.0 }
+        Self {
+            delay,
+            rate: None,
+            filter,
+            noise: 0.0,
+            bits: None,
+            jitter: Seconds(0.0),
+            gain: 1.0,
+            offset: 0.0,
+        }
     }
 
     /// Rms of the noise and of the rounding together, relative to full scale: a step of 2^(1 - bits) is an
@@ -212,10 +229,13 @@ impl Spec {
             limits::check_offset(channel.offset)?;
         }
         self.signal.as_ref().map_or(Ok(()), SignalSpec::check)?;
+        let layout = frames::checked(self.fast_period, self.ratio, &self.channels)?;
+        frames::check_latency(self.latency, layout.wait(&self.delays()))?;
         if let Some(uncertainty) = &self.uncertainty {
             uncertainty.check(self.channels.len(), self.fast_period)?;
         }
-        self.design.check(self.channels.len())?;
+        self.design.check(&layout)?;
+        frames::check_method(&layout, &self.design, self.fast_period)?;
         Ok(self.design.check_beside(self.uncertainty.as_ref(), self.channels.len())?)
     }
 
@@ -230,6 +250,36 @@ impl Spec {
     /// True in normalised time: times are in fast periods, and the rates of recordings are free.
     pub fn is_normalised(&self) -> bool {
         self.fast_period == Seconds(1.0)
+    }
+
+    /// The frames of the converters' samples.
+    pub fn layout(&self) -> FrameLayout {
+        frames::of_channels(self.fast_period, self.ratio, &self.channels)
+    }
+
+    /// The same front ends with a channel of the common slow rate for each sample of a frame, whose delays are
+    /// rounded to seconds; without the uncertainty, which these channels share.
+    pub fn per_sample(&self) -> Self {
+        let layout = self.layout();
+        let delays = layout.waited_delays(&self.delays()).into_iter();
+        let channel = |(converter, delay): (usize, GridTime)| ChannelSpec {
+            delay: delay.in_fast_periods().in_seconds(self.fast_period),
+            rate: None,
+            ..self.channels[converter].clone()
+        };
+        match layout.is_plain() {
+            true => self.clone(),
+            false => Self {
+                channels: layout.owners().into_iter().zip(delays).map(channel).collect(),
+                uncertainty: None,
+                ..self.clone()
+            },
+        }
+    }
+
+    /// S, the part of a latency for which a frame waits for its last sample; 0 for converters of one rate.
+    pub fn wait(&self) -> usize {
+        self.layout().wait(&self.delays())
     }
 
     /// D_i of every channel.

@@ -18,7 +18,8 @@ struct Document<'a> {
     #[serde(skip_serializing_if = "str::is_empty")]
     name: &'a str,
     fast_period: Seconds,
-    ratio: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ratio: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     latency: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -42,7 +43,8 @@ impl Serialize for Spec {
         Document {
             name: &self.name,
             fast_period: self.fast_period,
-            ratio: self.ratio,
+            // The rates say it.
+            ratio: self.layout().is_plain().then_some(self.ratio),
             latency: self.latency,
             full_scale: self.full_scale,
             target: Target { filter: &self.target },

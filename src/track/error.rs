@@ -14,6 +14,11 @@ pub enum TrackError {
         "the taps of this bank do not follow delays; design it with tracking = \"affine\" in [design] and with [uncertainty] delay in its spec"
     )]
     NoTapSlopes,
+    /// Converters with rates of their own.
+    #[error(
+        "the converters of this bank have sample rates of their own, and delays are followed only for converters of one rate"
+    )]
+    OwnRates,
     /// The filters are recursive.
     #[error(
         "this bank is recursive: its states belong to its coefficients, so it cannot follow delays; design an FIR bank with \

@@ -106,6 +106,9 @@ impl Follower {
         if matches!(bank.filters, SynthesisFilters::StateSpace(_)) {
             return Err(TrackError::Recursive);
         }
+        if !bank.layout().is_plain() {
+            return Err(TrackError::OwnRates);
+        }
         let slopes = bank.tap_slopes.as_ref().ok_or(TrackError::NoTapSlopes)?;
         let spec = bank.spec.clone().ok_or(TrackError::NoSpec)?;
         let table = spec.uncertainty.clone().unwrap_or_default();

@@ -117,7 +117,7 @@ impl<'a> EnclosedErrorSystem<'a> {
     fn first_channels(&self, equal: impl Fn(usize, usize) -> bool) -> Vec<usize> {
         let m = self.bank.ratio;
         let mut kept: Vec<usize> = Vec::new();
-        for i in 0..self.bank.channel_count() {
+        for i in 0..self.bank.frame_samples() {
             if kept.iter().all(|&j| !equal(m + i, m + j)) {
                 kept.push(i);
             }

@@ -65,10 +65,19 @@ impl FrontEnds {
         let mut samples: Vec<SamplingInstant> = (0..bank.ratio)
             .map(|p| SamplingInstant { filter: target, gain, converter_gain: 1.0, time: reference(p) })
             .collect();
+        let mut converters = Vec::with_capacity(spec.channels.len());
         for (i, channel) in spec.channels.iter().enumerate() {
-            let (filter, gain) = index(&channel.filter, &|| format!("spec.channel[{i}].filter"))?;
-            let time = GridTime::new(channel.delay, h).negative();
-            samples.push(SamplingInstant { filter, gain, converter_gain: channel.gain, time });
+            converters.push(index(&channel.filter, &|| format!("spec.channel[{i}].filter"))?);
+        }
+        let layout = spec.layout();
+        for (converter, delay) in layout.owners().into_iter().zip(layout.waited_delays(&spec.delays())) {
+            let ((filter, gain), time) = (converters[converter], delay.negative());
+            samples.push(SamplingInstant {
+                filter,
+                gain,
+                converter_gain: spec.channels[converter].gain,
+                time,
+            });
         }
         Ok((all, samples))
     }

@@ -54,6 +54,7 @@ fn bank(
         ratio,
         latency,
         method: Method::Fir,
+        samples: vec![1; delays.len()],
         delays: delays.iter().copied().map(Seconds).collect(),
         gains: vec![1.0; delays.len()],
         offsets: vec![0.0; delays.len()],

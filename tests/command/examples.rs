@@ -80,6 +80,16 @@ fn decibels(line: &str) -> f64 {
     line.split_whitespace().next().unwrap().parse().unwrap()
 }
 
+/// Two sensors of 100 Hz and 60 Hz become one of 300 Hz.
+#[test]
+#[cfg(unix)]
+fn two_inertial_sensors_become_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let shown = run_script("inertial", folder.path());
+    let snr = shown.lines().find_map(|line| line.strip_prefix("SNR")).map(decibels);
+    assert!(snr.is_some_and(|snr| snr > 50.0), "{shown}");
+}
+
 /// Two recordings with clocks of their own become one; the last line is that of the log.
 #[test]
 #[cfg(unix)]

@@ -18,6 +18,7 @@ mod latency;
 mod near_instants;
 mod nearly_equal_delays;
 mod random_plants;
+mod rates;
 mod reduction;
 mod repeated_channels;
 mod second_opinion;

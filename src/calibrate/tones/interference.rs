@@ -69,10 +69,11 @@ pub(super) fn widen_repeating(
     reference: usize,
     repeating: &[f64],
 ) {
-    widen(tone, reference, |i| {
-        let parts = captures.parts(i);
+    widen(tone, reference, |converter| {
+        let parts = captures.parts_of(converter);
         let share = 1.0 / parts.len().pow(2) as f64;
-        let amplitude = captures.tone(sines, i, t, Direction::Forward).amplitude.value;
+        let first = captures.records_of(converter).start;
+        let amplitude = captures.tone(sines, first, t, Direction::Forward).amplitude.value;
         2.0 * share * repeating[parts].iter().sum::<f64>() / amplitude.powi(2)
     });
 }

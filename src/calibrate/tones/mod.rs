@@ -24,7 +24,7 @@ use super::estimates::{Fitted, Tone, contradiction};
 use super::fit::{Cutoff, Fit, Kind};
 use super::model::{Model, Point};
 use super::order::{Distances, other_order};
-use super::record::{Acquisition, Record};
+use super::record::Acquisition;
 use super::warning::Warning;
 use crate::linalg::{Complex, Mat};
 use crate::sine_fit::{self, ChannelFit as SineChannel, Direction, Estimate, alias};
@@ -34,6 +34,7 @@ use ambiguity::{Alias, modulus, nearest_delay, zone_of};
 use channel::{ChannelFit, Solution};
 use interference::{is_harmonic, repeating_variances, widen_repeating};
 use phasors::{Captures, Measured};
+use std::borrow::Cow;
 
 /// What makes the misfit this many times smaller explains it: an acquisition that is left out, or a cut-off
 /// that is fitted.
@@ -67,9 +68,18 @@ pub(super) fn fit(
     given: &[Hertz],
     settings: Settings,
 ) -> Result<Fitted, CalibrateError> {
+    let layout = spec.layout();
+    // Of converters of one rate it is the same model.
+    let of_frames = if layout.is_plain() { model.clone() } else { Model::new(&spec.per_sample())? };
     let measure = |one: &Acquisition<'_>| {
-        let held = held(model, one.records, given, acquisitions.len() > 1)?;
-        Tones::measure(model, one.records, &held, settings.reference)
+        let split = || {
+            let records = one.records.iter().zip(layout.samples());
+            records.flat_map(|(one, &samples)| one.of_frames(samples)).collect()
+        };
+        let records = if layout.is_plain() { Cow::Borrowed(one.records) } else { Cow::Owned(split()) };
+        let captures = Captures::new(&records, &layout);
+        let held = held(model, &captures, given, acquisitions.len() > 1)?;
+        Tones::measure(model, &of_frames, &captures, &held, settings.reference)
     };
     let count = acquisitions.len();
     let measure = |one: &Acquisition<'_>| measure(one).map_err(|error| error.within(one.name, count));
@@ -111,7 +121,7 @@ struct Tones {
     given: Vec<Hertz>,
     tones: Vec<Tone>,
     measured: Vec<Measured>,
-    /// The constant of each part of each record.
+    /// The constant of each part of each converter.
     constants: Vec<Estimate<f64>>,
     is_complex: bool,
     warnings: Vec<Warning>,
@@ -119,18 +129,21 @@ struct Tones {
 
 impl Tones {
     /// Of tones near `given`, or of those that are found.
+    /// `of_frames` is the model of the records, one for each sample of a frame.
     fn measure(
         model: &Model,
-        records: &[Record],
+        of_frames: &Model,
+        captures: &Captures<'_>,
         given: &[Hertz],
         reference: usize,
     ) -> Result<Self, CalibrateError> {
-        let (rate, captures) = (model.slow_rate(), Captures::new(records));
+        let rate = model.slow_rate();
+        let first = captures.records_of(reference).start;
         let channels = captures.channels();
         let mut warnings = Vec::new();
         let (starts, used) = match given {
-            [] => found(model, &captures, reference, &mut warnings)?,
-            _ => (located(&captures, rate, given)?, (0..given.len()).collect()),
+            [] => found(of_frames, captures, first, &mut warnings)?,
+            _ => (located(captures, rate, given)?, (0..given.len()).collect()),
         };
         let sines = sine_fit::fit(&channels, rate, &starts)?;
         let is_image = |&t: &usize| captures.direction(&sines, t) == Direction::Backward;
@@ -139,10 +152,10 @@ impl Tones {
         }
         let measure = |&t: &usize| captures.measured(model, &sines, t, reference);
         let mut measured: Vec<Measured> = used.iter().map(measure).collect();
-        let repeating = repeating_variances(&sines, &captures);
+        let repeating = repeating_variances(&sines, captures);
         for (tone, &t) in measured.iter_mut().zip(&used) {
             warnings.extend(interference::warnings(tone, captures.frames()));
-            widen_repeating(tone, t, &sines, &captures, reference, &repeating);
+            widen_repeating(tone, t, &sines, captures, reference, &repeating);
         }
         check_order(model, &measured, reference)?;
         let constant = |(channel, repeating): (&SineChannel, f64)| {
@@ -152,14 +165,15 @@ impl Tones {
         let tone = |&t: &usize| Tone {
             frequency: sines.frequencies[t],
             zone: (2.0 * (sines.frequencies[t].value / rate).abs()).floor() as usize + 1,
-            amplitude: captures.tone(&sines, reference, t, Direction::Forward).amplitude,
+            amplitude: captures.tone(&sines, first, t, Direction::Forward).amplitude,
         };
         Ok(Self {
             frames: captures.frames(),
             given: given.to_vec(),
             tones: used.iter().map(tone).collect(),
             measured,
-            constants: sines.channels.iter().zip(repeating).map(constant).collect(),
+            constants: captures
+                .constants(&sines.channels.iter().zip(repeating).map(constant).collect::<Vec<_>>()),
             is_complex: captures.is_complex,
             warnings,
         })
@@ -170,14 +184,14 @@ impl Tones {
 /// whose alias is among the lines.
 fn held(
     model: &Model,
-    records: &[Record],
+    captures: &Captures<'_>,
     given: &[Hertz],
     is_one_of_several: bool,
 ) -> Result<Vec<Hertz>, CalibrateError> {
     if !is_one_of_several || given.is_empty() {
         return Ok(given.to_vec());
     }
-    let (captures, rate) = (Captures::new(records), model.slow_rate());
+    let rate = model.slow_rate();
     let lines = sine_fit::find_tones(&captures.channels(), rate, MOST_TONES, TONE_RANGE)?;
     let apart = |tone: Hertz, line: Hertz| match captures.is_complex {
         true => ((tone - line) / rate - ((tone - line) / rate).round()).abs(),
@@ -197,6 +211,18 @@ fn distinct<'a>(tones: impl Iterator<Item = &'a Measured>) -> usize {
     all.sort_by(f64::total_cmp);
     all.dedup_by(|a, b| (*a - *b).abs() < SAME_FREQUENCY * b.abs());
     all.len()
+}
+
+impl Captures<'_> {
+    /// The constant of each part of each converter, from those of the parts of all records.
+    fn constants(&self, of_records: &[Estimate<f64>]) -> Vec<Estimate<f64>> {
+        let parts = self.parts(0).len();
+        let converters = (0..self.converters()).map(|converter| self.parts_of(converter));
+        let part = |records: std::ops::Range<usize>, part| {
+            mean(records.skip(part).step_by(parts).map(|k| of_records[k]))
+        };
+        converters.flat_map(|records| (0..parts).map(move |k| part(records.clone(), k))).collect()
+    }
 }
 
 /// Adds the offsets of real samples, weighted by their variances; those of complex ones are only reported.

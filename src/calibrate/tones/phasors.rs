@@ -7,12 +7,16 @@ use crate::calibrate::model::Model;
 use crate::calibrate::record::Record;
 use crate::linalg::Complex;
 use crate::sine_fit::{Channel, Component, Direction, SineFit, ToneFit};
+use crate::spec::FrameLayout;
 use crate::units::Hertz;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
-/// Records of real or of complex samples.
+/// Records of real or of complex samples, one for each sample of a frame.
 pub(super) struct Captures<'a> {
     pub(super) records: &'a [Record],
+    /// The records of each converter.
+    converters: Vec<Range<usize>>,
     pub(super) is_complex: bool,
 }
 
@@ -30,8 +34,9 @@ pub(super) struct Measured {
 }
 
 impl<'a> Captures<'a> {
-    pub(super) fn new(records: &'a [Record]) -> Self {
-        Self { records, is_complex: records.iter().all(|record| record.imaginary.is_some()) }
+    pub(super) fn new(records: &'a [Record], layout: &FrameLayout) -> Self {
+        let is_complex = records.iter().all(|record| record.imaginary.is_some());
+        Self { records, converters: layout.ranges(), is_complex }
     }
 
     /// The parts of all records, one after the other.
@@ -45,9 +50,25 @@ impl<'a> Captures<'a> {
     }
 
     /// The channels of a fit that are the parts of record `i`.
-    pub(super) fn parts(&self, i: usize) -> std::ops::Range<usize> {
+    pub(super) fn parts(&self, i: usize) -> Range<usize> {
         let count = if self.is_complex { 2 } else { 1 };
         count * i..count * (i + 1)
+    }
+
+    /// The parts of the records of a converter.
+    pub(super) fn parts_of(&self, converter: usize) -> Range<usize> {
+        let records = &self.converters[converter];
+        self.parts(records.start).start..self.parts(records.end - 1).end
+    }
+
+    /// Number of converters.
+    pub(super) fn converters(&self) -> usize {
+        self.converters.len()
+    }
+
+    /// The records of a converter.
+    pub(super) fn records_of(&self, converter: usize) -> Range<usize> {
+        self.converters[converter].clone()
     }
 
     fn component(&self, i: usize, direction: Direction) -> Component {
@@ -63,26 +84,47 @@ impl<'a> Captures<'a> {
         sines.phasor(self.component(i, direction), t)
     }
 
-    /// The ratios of tone `t` to the reference, and their errors.
+    /// The ratios of tone `t` to the reference converter, and their errors. Of a converter with several samples
+    /// per frame the phasors are turned to the first one and averaged.
     pub(super) fn measured(&self, model: &Model, sines: &SineFit, t: usize, reference: usize) -> Measured {
         let frequency = sines.frequencies[t].value;
         let w = TAU * frequency.per_fast_period(model.fast_period).0.abs();
-        let phasor = |i: usize| {
+        let of_record = |i: usize| {
             let tone = self.tone(sines, i, t, Direction::Forward);
             let phasor = Complex::from_polar(tone.amplitude.value, tone.phase.value.0);
             if self.is_complex && frequency.0 < 0.0 { phasor.conj() } else { phasor }
         };
+        let phasor = |converter: usize| {
+            let records = self.records_of(converter);
+            let (count, step) = (records.len() as f64, model.ratio as f64 / records.len() as f64);
+            let turned =
+                |(j, i): (usize, usize)| of_record(i) * Complex::from_polar(1.0, -w * step * j as f64);
+            records.enumerate().map(turned).sum::<Complex<f64>>() / count
+        };
         let expected = |i: usize| model.nominal(i, w) / model.nominal(reference, w);
         let ratio = |i: usize| phasor(i) / phasor(reference) / expected(i);
-        let sigmas = |i: usize| {
-            let [own, other] = [i, reference].map(|i| self.component(i, Direction::Forward));
+        let sigmas = |converter: usize| {
+            let [i, r] = [converter, reference].map(|converter| self.records_of(converter).start);
+            let [own, other] = [i, r].map(|i| self.component(i, Direction::Forward));
             let ratio = sines.ratio(own, other, t);
             let phase = match self.is_complex {
                 true => ratio.phase.sigma.0,
                 // A phase becomes a delay by the fitted frequency, whose error counts.
-                false => TAU * frequency.0 * sines.lag_between(i, reference, t).sigma.0,
+                false => TAU * frequency.0 * sines.lag_between(i, r, t).sigma.0,
             };
-            Complex::new(ratio.gain.sigma / ratio.gain.value, phase)
+            let single = Complex::new(ratio.gain.sigma / ratio.gain.value, phase);
+            // The noise of several records averages, the error of the frequency does not.
+            let averaged = |converter: usize| {
+                let records = self.records_of(converter);
+                let amplitude = self.tone(sines, records.start, t, Direction::Forward).amplitude;
+                (amplitude.sigma / amplitude.value).powi(2) * (1.0 - 1.0 / records.len() as f64)
+            };
+            let less = averaged(converter) + averaged(reference);
+            if less == 0.0 {
+                return single;
+            }
+            let reduced = |sigma: f64| (sigma * sigma - less).max(0.0).sqrt();
+            Complex::new(reduced(single.re), reduced(single.im))
         };
         let all = 0..model.channels();
         let (ratios, sigmas) = (all.clone().map(ratio).collect(), all.map(sigmas).collect());

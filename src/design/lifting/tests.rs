@@ -22,13 +22,16 @@ fn one_pole(poles: &[f64], ratio: usize, latency: usize, channels: &[(usize, f64
         target: 0,
         channels: channels
             .iter()
-            .map(|&(front_end, delay)| Channel {
+            .enumerate()
+            .map(|(converter, &(front_end, delay))| Channel {
                 front_end,
+                converter,
                 gain: 1.0,
                 converter_gain: 1.0,
                 delay: GridTime::new(Seconds(delay), Seconds(1.0)),
             })
             .collect(),
+        wait: 0,
         noise: vec![0.0; channels.len()],
     }
 }

@@ -79,14 +79,16 @@ impl<'a> Samples<'a> {
     fn pair(&self, averaged: &Averaged<'_>, i: usize, k: usize, lag: i64) -> f64 {
         let (a, b) = (&self.problem.channels[i], &self.problem.channels[k]);
         let later = b.delay.later_by(lag as f64 * self.problem.ratio as f64).since(a.delay).0;
-        let common = if i == k { 1.0 + self.deviations[i].gain.powi(2) } else { 1.0 };
+        let is_one = a.converter == b.converter;
+        let common = if is_one { 1.0 + self.deviations[a.converter].gain.powi(2) } else { 1.0 };
         a.gain * b.gain * common * averaged.at(a.front_end, b.front_end, later)
     }
 
     /// The deviation of the difference of the errors of two samples; those of one converter share theirs.
     fn difference(&self, i: usize, k: usize) -> FastPeriods {
-        let [a, b] = [i, k].map(|channel| self.deviations[channel].delay.0);
-        FastPeriods(if i == k { 0.0 } else { a.hypot(b) })
+        let [one, other] = [i, k].map(|channel| self.problem.channels[channel].converter);
+        let [a, b] = [one, other].map(|converter| self.deviations[converter].delay.0);
+        FastPeriods(if one == other { 0.0 } else { a.hypot(b) })
     }
 
     /// b: of the samples with the target at `instant`.
@@ -94,7 +96,7 @@ impl<'a> Samples<'a> {
         let channels = self.problem.channels.len();
         let mut all = Mat::zeros(frames * channels, 1);
         for (i, channel) in self.problem.channels.iter().enumerate() {
-            let averaged = self.covariances.averaged(self.deviations[i].delay);
+            let averaged = self.covariances.averaged(self.deviations[channel.converter].delay);
             for j in 0..frames {
                 let later = channel.delay.later_by((j * self.problem.ratio) as f64 + instant as f64);
                 let later = later.in_fast_periods().0;

@@ -47,7 +47,7 @@ pub(crate) struct Settings {
     pub(crate) solver: Option<Solver>,
     /// The errors that `fir` has to expect; `None` if there are none.
     pub(crate) robust: Option<scenarios::RobustProblem>,
-    /// For mean-square designs, how well each channel is known; `None` if all are exact.
+    /// For mean-square designs, how well each converter is known; `None` if all are exact.
     pub(crate) deviations: Option<Vec<Deviations>>,
     /// Ends the search with the best filters so far.
     pub(crate) stop: Stop,

@@ -118,7 +118,7 @@ pub(super) fn worst_of(search: &BoxSearch, taps: &[Vec<f64>]) -> Result<WorstErr
         let peak = search.plant().moved(&point)?.fir_norm(taps)?;
         Ok::<_, DesignError>(WorstErrors { point, peak })
     };
-    let without_errors = norm(ErrorPoint::none(taps.len()))?;
+    let without_errors = norm(ErrorPoint::none(search.plant().errors.delays.len()))?;
     search.worst_points(&filters)?.into_iter().try_fold(without_errors, |worst, point| {
         let other = norm(point)?;
         Ok(if other.peak.gain > worst.peak.gain { other } else { worst })
@@ -193,8 +193,9 @@ impl AffineError for BoxError {
     type Scenario = Combination;
 
     fn at(&self, location: &Location<Combination>) -> Result<Point, DesignError> {
-        let (response, count) = (self.search.plant().response(location.frequency), location.scenario.len());
+        let response = self.search.plant().response(location.frequency);
         let h = self.search.plant().measurements(&response, &location.scenario);
+        let count = h.nrows();
         let g = linalg::lq_factor(&linalg::vstack(&[&h, &response.references])?);
         let rows = |first: usize, rows: usize| -> CMat {
             g.rows(first, rows).into_owned().resize_horizontally(self.inputs, Default::default())
@@ -218,7 +219,7 @@ fn exchange(
     let noise = plant.problem().noise.clone();
     let margin = settings.gamma_margin.unwrap_or(MARGIN).max(MARGIN);
     let problem = SampledProblem::new(points, lags)?;
-    let without_errors = std::iter::repeat(vec![0; plant.channels()]);
+    let without_errors = std::iter::repeat(vec![0; search.plant().errors.delays.len()]);
     let error = BoxError { search, inputs: plant.channels() + plant.ratio() };
     let objective = MeanSquareObjective { weights, noise };
     let mut exchange = Exchange::new(error, problem, without_errors, objective, margin)?;

@@ -174,7 +174,9 @@ struct Sides {
     /// By how much the delay of each of them may be off.
     halves: Vec<Seconds>,
     fast_period: Seconds,
-    /// N.
+    /// Of converters.
+    converters: usize,
+    /// N, the samples of a frame.
     count: usize,
 }
 
@@ -183,7 +185,8 @@ impl Sides {
         let delays = &problem.errors.delays;
         let channels: Vec<usize> = (0..delays.len()).filter(|&j| delays[j].0 > 0.0).collect();
         let halves = channels.iter().map(|&j| delays[j]).collect();
-        Self { channels, halves, fast_period: problem.spec.fast_period, count: delays.len() }
+        let (fast_period, count) = (problem.spec.fast_period, problem.spec.layout().count());
+        Self { channels, halves, fast_period, converters: delays.len(), count }
     }
 
     /// Of one scenario: 1, and the share of each half-width.
@@ -194,7 +197,7 @@ impl Sides {
 
     /// The errors of the delays of a scenario.
     fn errors(&self, scenario: &Scenario<'_>) -> Vec<FastPeriods> {
-        let mut errors = vec![FastPeriods(0.0); self.count];
+        let mut errors = vec![FastPeriods(0.0); self.converters];
         for (k, (&j, half)) in self.channels.iter().zip(&self.halves).enumerate() {
             errors[j] = half.in_fast_periods(self.fast_period) * scenario.factors[k + 1];
         }
@@ -269,7 +272,7 @@ impl Sides {
                 found.iter().map(|lag| lag.columns(k * self.count, self.count) / scale).collect();
             impulse_responses(&lags, length)
         };
-        let mut by_delay = vec![Vec::new(); self.count];
+        let mut by_delay = vec![Vec::new(); self.converters];
         for (k, (&j, half)) in self.channels.iter().zip(&self.halves).enumerate() {
             by_delay[j] = part(k + 1, half.in_fast_periods(self.fast_period).0);
         }
@@ -284,7 +287,7 @@ impl Sides {
         reach: &Reach,
         settings: &Settings,
     ) -> Result<ErrorGrid<'a>, DesignError> {
-        let none = self.factors(&ErrorPoint::none(self.count));
+        let none = self.factors(&ErrorPoint::none(self.converters));
         let mut scenarios = vec![Scenario::new(Cow::Borrowed(plant), none, 1.0 / reach.without_errors())];
         for MovedPlant { plant, point } in moved {
             let weight = 1.0 / reach.of(&plant)?;

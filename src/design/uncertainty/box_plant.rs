@@ -1,7 +1,7 @@
 //! One plant for all errors of a box.
 //!
-//! Row i of H depends on the errors of channel i alone. So one lifted plant whose measurements are the
-//! samples of every channel with several errors, its nodes, holds the rows of all combinations of nodes,
+//! The rows of H for a converter depend on its errors alone. So one lifted plant whose measurements are the
+//! samples of every converter with several errors, its nodes, holds the rows of all combinations of nodes,
 //! with one input for all. Errors of gains are factors of rows. No other plant is lifted while the worst
 //! combination is searched.
 
@@ -12,6 +12,7 @@ use crate::linalg::{CMat, Complex};
 use crate::spec::Spec;
 use crate::units::Seconds;
 use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
+use std::ops::Range;
 
 /// Errors of a channel as shares of the half-width, beside none: of the delay and of the cut-off. The
 /// remainder of a row between two nodes falls with the square of their distance.
@@ -34,14 +35,16 @@ pub(in crate::design) struct BoxPlant {
     spec: Spec,
     latency: usize,
     pub(in crate::design) errors: ErrorBox,
-    /// Its measurements are the nodes.
+    /// Its measurements are the samples of the nodes.
     plant: LiftedPlant,
     nodes: Vec<Node>,
-    /// For each channel.
+    /// Samples of each converter per frame.
+    samples: Vec<usize>,
+    /// For each converter.
     options: Vec<Vec<ChannelError>>,
 }
 
-/// A channel with errors of its delay and cut-off.
+/// A converter with errors of its delay and cut-off, which all its samples share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Node {
     channel: usize,
@@ -112,8 +115,8 @@ impl BoxPlant {
                 std::iter::once(first).chain(others).collect()
             })
             .collect();
-        let (spec, errors) = (spec.clone(), errors.clone());
-        Ok(Self { spec, latency, errors, plant, nodes, options })
+        let (spec, errors, samples) = (spec.clone(), errors.clone(), spec.layout().samples().to_vec());
+        Ok(Self { spec, latency, errors, plant, nodes, samples, options })
     }
 
     /// Makes the errors of `point` a combination. All other combinations stay what they are.
@@ -122,6 +125,7 @@ impl BoxPlant {
     /// As [`BoxPlant::new`].
     pub(in crate::design) fn include(&mut self, point: &ErrorPoint) -> Result<Combination, DesignError> {
         let mut combination = Combination::new();
+        let lifted = self.nodes.len();
         for channel in 0..self.options.len() {
             let (delay, cutoff, gain) = (point.delays[channel], point.cutoffs[channel], point.gains[channel]);
             let node = self.node_at(Node { channel, delay, cutoff });
@@ -132,8 +136,8 @@ impl BoxPlant {
             }
             combination.push(known.unwrap_or(options.len() - 1));
         }
-        if self.nodes.len() > self.plant.channels() {
-            self.plant = lifted(&self.spec, self.latency, &self.nodes)?;
+        if self.nodes.len() > lifted {
+            self.plant = self::lifted(&self.spec, self.latency, &self.nodes)?;
         }
         Ok(combination)
     }
@@ -232,7 +236,7 @@ impl BoxPlant {
     /// All responses at a frequency in radians per slow period.
     pub(in crate::design) fn response(&self, omega: f64) -> BoxResponse {
         let all = self.plant.at_frequency(omega);
-        let count = self.nodes.len();
+        let count = self.plant.channels();
         BoxResponse {
             nodes: all.rows(0, count).into_owned(),
             references: all.rows(count, self.ratio()).into_owned(),
@@ -241,14 +245,30 @@ impl BoxPlant {
 
     /// H of a combination.
     pub(in crate::design) fn measurements(&self, response: &BoxResponse, combination: &[usize]) -> CMat {
-        let choice = |i: usize| self.options[i][combination[i]];
-        CMat::from_fn(combination.len(), response.nodes.ncols(), |i, column| {
-            response.nodes[(choice(i).node, column)] * Complex::from(1.0 + choice(i).gain)
+        let chosen = combination.iter().enumerate().map(|(i, &choice)| self.options[i][choice]);
+        let rows: Vec<(usize, f64)> = chosen
+            .flat_map(|choice| self.rows(choice.node).map(move |row| (row, 1.0 + choice.gain)))
+            .collect();
+        CMat::from_fn(rows.len(), response.nodes.ncols(), |i, column| {
+            response.nodes[(rows[i].0, column)] * Complex::from(rows[i].1)
         })
+    }
+
+    /// The rows of a node's samples.
+    pub(super) fn rows(&self, node: usize) -> Range<usize> {
+        let count = |node: &Node| self.samples[node.channel];
+        let first = self.nodes[..node].iter().map(count).sum();
+        first..first + count(&self.nodes[node])
+    }
+
+    /// The columns of the filters of a converter.
+    pub(super) fn columns(&self, converter: usize) -> Range<usize> {
+        let first = self.samples[..converter].iter().sum();
+        first..first + self.samples[converter]
     }
 }
 
-/// The plant whose measurements are the nodes.
+/// The plant whose measurements are the samples of the nodes.
 fn lifted(spec: &Spec, latency: usize, nodes: &[Node]) -> Result<LiftedPlant, DesignError> {
     let channels = nodes.iter().map(|node| spec.channels[node.channel].clone()).collect();
     let errors = ErrorPoint {

@@ -71,11 +71,17 @@ pub fn delay_derivatives(bank: &Bank) -> Result<DelayDerivatives, DesignError> {
         let slope: Complex<f64> = response.row(n + i).iter().zip(v.iter()).map(|(h, v)| h * v).sum();
         (from_error * slope).re
     };
+    // The samples of a converter have one delay.
+    let of_converter = |of: usize| {
+        let own = (0..n).filter(|&i| problem.channels[i].converter == of);
+        own.map(&derivative).sum::<f64>()
+    };
+    let converters = (0..bank.channel_count()).map(of_converter);
     let others = peaks_above(&plant.error_system(&block)?, peak.gain * (1.0 - EQUAL_PEAKS))?;
     let other = others.iter().any(|other| (other.frequency - peak.frequency).abs() > SAME_PEAK);
     let single = svd.s.get(1).is_none_or(|&second| second < peak.gain * (1.0 - EQUAL_PEAKS));
     Ok(DelayDerivatives {
-        per_fast_period: (0..n).map(derivative).collect(),
+        per_fast_period: converters.collect(),
         peak_hertz: RadiansPerSlowPeriod(peak.frequency).in_hertz(bank.slow_period()),
         simple: single && !other,
     })

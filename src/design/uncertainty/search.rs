@@ -1,8 +1,8 @@
 //! The search for the errors of a box for which a bank is worst, in double precision.
 //!
-//! At one frequency K = W - sum_i f_i h_i, and each row h_i is one of those that a [`BoxPlant`] holds. Let
-//! (u, v) be the singular vectors of the largest gain of one combination. The rows that maximise Re (u* K v)
-//! are found channel by channel, and their gain is no smaller: |K'| >= Re (u* K' v) >= Re (u* K v) = |K|.
+//! At one frequency K = W - sum_i f_i h_i, and the rows h_i of a converter are those of a node that a
+//! [`BoxPlant`] holds. Let (u, v) be the singular vectors of the largest gain of one combination. The rows
+//! that maximise Re (u* K v) are found converter by converter, and their gain is no smaller: |K'| >= Re (u* K' v) >= Re (u* K v) = |K|.
 //! From several combinations at many frequencies this ends at the local maxima. Each of the largest is
 //! then followed between the nodes, and the norm of its plant is computed.
 //!
@@ -451,9 +451,14 @@ impl Direction {
     fn output(&self, plant: &BoxPlant, combination: &[usize]) -> f64 {
         let chosen = |i: usize| plant.options()[i][combination[i]];
         let term = |i: usize| {
-            let slopes = self.slopes.iter().map(|(j, slope)| slope[i] * Complex::from(chosen(*j).delay.0));
-            let filter = slopes.fold(self.nominal[i], |sum, slope| sum + slope);
-            (filter * self.samples[chosen(i).node] * Complex::from(1.0 + chosen(i).gain)).re
+            let gain = Complex::from(1.0 + chosen(i).gain);
+            let of = |(column, row): (usize, usize)| {
+                let slope = |(j, slope): &(usize, CMat)| slope[column] * Complex::from(chosen(*j).delay.0);
+                let filter =
+                    self.slopes.iter().map(slope).fold(self.nominal[column], |sum, slope| sum + slope);
+                (filter * self.samples[row] * gain).re
+            };
+            plant.columns(i).zip(plant.rows(chosen(i).node)).map(of).sum::<f64>()
         };
         (0..combination.len()).map(term).sum()
     }

@@ -18,12 +18,13 @@ fn reader(
         coding: raw(1).coding,
         channels: 1,
         interleaving: None,
+        per_frame: 1,
         only: None,
         full_scale: None,
         block: 4,
     }
     .raw_header();
-    let input = Input::on_thread_of("dying".into(), header, send_all).unwrap();
+    let input = Input::on_thread_of("dying".into(), header, 1, send_all).unwrap();
     let (stop, until) = (crossbeam_channel::never(), Until::Shortest);
     let inputs = vec![input];
     let (stalls, live) = (None, None);

@@ -20,7 +20,7 @@ fn filler(bank: &Bank, policy: GapPolicy) -> GapFiller {
 
 /// Fills whole frames; their marks, and whether they were filled.
 fn fill(filler: &mut GapFiller, frames: &mut [f64]) -> (Vec<u8>, bool) {
-    let n = filler.channels.len();
+    let n = filler.places.len();
     let is_filled = filler.fill(&[Interleaved::new(frames, n).unwrap()]);
     if is_filled {
         frames.copy_from_slice(filler.filled(0));

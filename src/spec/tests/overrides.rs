@@ -37,11 +37,12 @@ fn the_command_line_overrides_the_design() {
         SpecProblem::NeedlessKey { key: "reduction_loss_db", .. }
     ));
 
+    let pair = FrameLayout::new(2, vec![1, 1]);
     let design = read(THESIS).design;
-    assert_eq!(design.with_method(Method::Iir, 2).unwrap().taps, None);
-    assert_eq!(design.with_taps(9, 2).unwrap(), DesignSpec::new(Method::Fir, Some(9)));
-    assert!(design.with_taps(0, 2).is_err());
-    let iir = design.with_method(Method::Iir, 2).unwrap();
-    assert!(iir.with_taps(9, 2).is_err());
-    assert_eq!(iir.with_method(Method::Fir, 2), Ok(DesignSpec::new(Method::Fir, None)));
+    assert_eq!(design.with_method(Method::Iir, &pair).unwrap().taps, None);
+    assert_eq!(design.with_taps(9, &pair).unwrap(), DesignSpec::new(Method::Fir, Some(9)));
+    assert!(design.with_taps(0, &pair).is_err());
+    let iir = design.with_method(Method::Iir, &pair).unwrap();
+    assert!(iir.with_taps(9, &pair).is_err());
+    assert_eq!(iir.with_method(Method::Fir, &pair), Ok(DesignSpec::new(Method::Fir, None)));
 }

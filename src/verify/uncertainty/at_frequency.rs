@@ -1,7 +1,7 @@
 //! The largest gain of the error system at one frequency, over a box of errors.
 //!
 //! At a fixed frequency K = W - sum_i F_i h_i with the columns F_i of the filters and the rows h_i of the
-//! channels. Over a part of the box each h_i is a convex mix of its rows at the ends of the part plus a
+//! samples of a frame. The rows of one converter have one error, so they are chosen together. Over a part of the box each h_i is a convex mix of its rows at the ends of the part plus a
 //! remainder (`remainder`). The gain is convex, so it is at most the largest gain at a vertex plus what the
 //! remainders add. Gains enter h_i as factors, so their box adds vertices and no remainder. Where the bound
 //! is too large, the part is halved along the side that matters most (`vertex_tree`).
@@ -11,6 +11,7 @@ use super::super::spectrum::ComplexMatrix;
 use super::grid::{ChannelGrid, Halvings};
 use super::remainder::Remainders;
 use std::collections::HashMap;
+use std::ops::Range;
 
 /// Maximum number of boxes at one frequency.
 pub(super) const MAX_BOXES: usize = 4096;
@@ -24,14 +25,16 @@ pub(super) struct AtFrequency<'a> {
     /// Bounds of |F_i|.
     pub(super) columns: Vec<f64>,
     pub(super) channels: &'a [ChannelGrid],
-    /// Largest relative error of the gain of each channel.
+    /// The columns of each converter.
+    pub(super) converters: &'a [Range<usize>],
+    /// Largest relative error of the gain of each converter.
     pub(super) gains: &'a [f64],
 }
 
 /// A row h as a sum of rows of the Gram matrix.
 pub(super) type Mix = Vec<(usize, f64)>;
 
-/// One vertex of a channel's set.
+/// One vertex of a converter's set.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Vertex {
     /// Index of the delay error.
@@ -109,7 +112,7 @@ pub(super) struct Span {
     halvings: u32,
 }
 
-/// A part of the errors of a channel.
+/// A part of the errors of a converter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Part {
     pub(super) delays: Span,
@@ -207,11 +210,11 @@ impl<'a> Limits<'a> {
 impl AtFrequency<'_> {
     /// The whole box.
     pub(super) fn whole(&self) -> Vec<Part> {
-        let part = |channel: &ChannelGrid| Part {
-            delays: Span::whole(channel.errors.len()),
-            cutoffs: Span::whole(channel.speeds.len()),
+        let part = |columns: &Range<usize>| Part {
+            delays: Span::whole(self.channels[columns.start].errors.len()),
+            cutoffs: Span::whole(self.channels[columns.start].speeds.len()),
         };
-        self.channels.iter().map(part).collect()
+        self.converters.iter().map(part).collect()
     }
 
     /// Whether the grid has points between the ends of the box.
@@ -219,7 +222,7 @@ impl AtFrequency<'_> {
         self.channels.iter().any(|channel| channel.errors.len() > 2 || channel.speeds.len() > 2)
     }
 
-    /// The vertices of a channel.
+    /// The vertices of a converter.
     pub(super) fn vertices(&self, i: usize, part: &Part) -> Vec<Vertex> {
         let gain = self.gains[i];
         let gains = if gain == 0.0 { vec![1.0] } else { vec![1.0 - gain, 1.0 + gain] };

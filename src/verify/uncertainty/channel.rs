@@ -1,4 +1,4 @@
-//! The bounds of one channel: what the cut of its memory leaves out, and its row with the range of its
+//! The bounds of one sample of a frame: what the cut of its memory leaves out, and its row with the range of its
 //! errors.
 
 use super::super::VerifyError;
@@ -15,7 +15,7 @@ use super::transfer::Transfer;
 use crate::units::Seconds;
 use std::rc::Rc;
 
-/// A channel with the range of its errors.
+/// A sample of a frame with the range of its errors.
 pub(super) struct Channel {
     transfer: Transfer,
     /// Of the signal's filter, if the spec has a signal.
@@ -93,8 +93,15 @@ pub(super) fn signal_transfer(grid: &Grid) -> Option<Transfer> {
 }
 
 impl Channel {
-    /// Channel `i` of `grid`, with the largest errors of its delay, gain and cut-off.
-    pub(super) fn new(memories: &Memories<'_>, i: usize, errors: &ErrorBox, fast_period: Seconds) -> Self {
+    /// Sample `i` of a frame of `grid`, with the largest errors that the delay, the gain and the cut-off of its
+    /// `converter` have.
+    pub(super) fn new(
+        memories: &Memories<'_>,
+        i: usize,
+        converter: usize,
+        errors: &ErrorBox,
+        fast_period: Seconds,
+    ) -> Self {
         let grid = memories.grid;
         // The row of the slowest variant is the first one.
         let first = grid.channels[i].rows[0][0];
@@ -102,9 +109,9 @@ impl Channel {
             transfer: transfer(grid, i),
             signal: signal_transfer(grid),
             memory: memories.of_sample(first),
-            cutoff: errors.cutoffs[i],
-            gain: errors.gains[i],
-            half: errors.delays[i].in_fast_periods(fast_period).0,
+            cutoff: errors.cutoffs[converter],
+            gain: errors.gains[converter],
+            half: errors.delays[converter].in_fast_periods(fast_period).0,
             like: i,
             delay: grid.samples[first].time.in_fast_periods().0.abs(),
         }

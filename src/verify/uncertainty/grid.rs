@@ -1,5 +1,6 @@
-//! The analog side of a bank whose channels may be sampled at several instants and with several cut-offs:
-//! one slow period that holds all these samples together, so that all their Gram matrices are parts of one.
+//! The analog side of a bank whose converters may sample at several instants and with several cut-offs: one slow
+//! period that holds all these samples together, so that all their Gram matrices are parts of one. The samples
+//! that a converter takes in a frame share its errors.
 
 use super::super::VerifyError;
 use super::super::front_ends::FrontEnds;
@@ -8,18 +9,22 @@ use super::super::timeline::{SamplingInstant, timeline};
 use super::{ErrorBox, ErrorPoint};
 use crate::bank::Bank;
 use crate::units::Seconds;
+use std::ops::Range;
 
 /// The samples of a bank, those of each channel at equidistant delays.
 #[derive(Debug, Clone)]
 pub(super) struct Grid {
     pub(super) front_ends: FrontEnds,
-    /// The M reference samples, then the variants of each channel.
+    /// The M reference samples, then the variants of each sample of a frame.
     pub(super) samples: Vec<SamplingInstant>,
     pub(super) period: SlowPeriod,
+    /// One for each sample of a frame.
     pub(super) channels: Vec<ChannelGrid>,
+    /// Those of each converter.
+    pub(super) converters: Vec<Range<usize>>,
 }
 
-/// The variants of one channel.
+/// The variants of one sample of a frame.
 #[derive(Debug, Clone)]
 pub(super) struct ChannelGrid {
     /// Errors of the delay, ascending; one if the delay is certain.
@@ -30,7 +35,7 @@ pub(super) struct ChannelGrid {
     pub(super) rows: Vec<Vec<usize>>,
 }
 
-/// Halvings of the delay and of the cut-off of a channel.
+/// Halvings of the delay and of the cut-off of a converter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Halvings {
     pub(super) delay: u32,
@@ -39,13 +44,13 @@ pub(super) struct Halvings {
 
 impl Halvings {
     /// The whole box.
-    pub(super) fn none(channels: usize) -> Vec<Self> {
-        vec![Self { delay: 0, cutoff: 0 }; channels]
+    pub(super) fn none(converters: usize) -> Vec<Self> {
+        vec![Self { delay: 0, cutoff: 0 }; converters]
     }
 }
 
 impl Grid {
-    /// The box with the delay and the cut-off of each channel cut into 2^k equal parts.
+    /// The box with the delay and the cut-off of each converter cut into 2^k equal parts.
     ///
     /// # Errors
     /// As [`super::super::EnclosedErrorSystem::new`].
@@ -80,8 +85,9 @@ impl Grid {
     }
 
     fn of(bank: &Bank, variants: Vec<(Vec<Seconds>, Vec<f64>)>) -> Result<Self, VerifyError> {
-        let (mut front_ends, nominal) = FrontEnds::new(bank)?;
+        let (layout, (mut front_ends, nominal)) = (bank.layout(), FrontEnds::new(bank)?);
         let mut samples: Vec<SamplingInstant> = nominal[..bank.ratio].to_vec();
+        let variants = layout.each(&variants);
         let mut channels = Vec::with_capacity(variants.len());
         for ((errors, speeds), sample) in variants.into_iter().zip(&nominal[bank.ratio..]) {
             let filters: Vec<usize> =
@@ -104,6 +110,6 @@ impl Grid {
         front_ends.check_work(samples.len())?;
         let timeline = timeline(&samples, bank.ratio)?;
         let period = SlowPeriod::new(&front_ends, &timeline, &samples);
-        Ok(Self { front_ends, samples, period, channels })
+        Ok(Self { front_ends, samples, period, channels, converters: layout.ranges() })
     }
 }

@@ -18,6 +18,7 @@ use super::{ErrorBox, ErrorPoint, Taps};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::units::{RadiansPerSlowPeriod, Seconds};
 use std::f64::consts::PI;
+use std::ops::Range;
 use std::rc::Rc;
 
 /// Most grids, each finer than the one before.
@@ -28,20 +29,22 @@ const SHARE_OF_WORST: f64 = 0.25;
 const MAX_ROWS: usize = 250;
 /// Operations for a grid, over its samples times the cube of its states.
 const GRID_OPERATIONS: f64 = 20.0;
-/// From this many channels on, the worst point so far is tried at each frequency before all others.
-const MANY_CHANNELS: usize = 5;
+/// From this many converters on, the worst point so far is tried at each frequency before all others.
+const MANY_CONVERTERS: usize = 5;
 
 /// All that is needed to judge one frequency, and the largest gain seen.
 pub(super) struct Judge<'a> {
     bank: &'a Bank,
     errors: &'a ErrorBox,
     taps: Taps,
-    /// S_j by channel, where the taps depend on its delay.
+    /// S_j by converter, where the taps depend on its delay.
     slopes: Vec<Option<SynthesisFilters>>,
     /// Half-widths of the delays in fast periods.
     halves: Vec<Ball>,
     /// Made when needed, each finer than the one before.
     grids: Vec<(Vec<Halvings>, Grid)>,
+    /// The converter of each sample of a frame.
+    owners: Vec<usize>,
     pub(super) channels: Vec<Channel>,
     /// The filters of the target and of the signal.
     target: Transfer,
@@ -81,7 +84,8 @@ impl<'a> Judge<'a> {
         let grid = Grid::new(bank, errors, &on_grid(&halvings, taps))?;
         let memories = Memories::new(&grid, errors)?;
         let fast_period = fast_period(bank);
-        let channels = channels(&memories, errors, fast_period);
+        let owners = bank.layout().owners();
+        let channels = channels(&memories, &owners, errors, fast_period);
         let reference = memories.of_sample(0);
         let (target, signal) = (sampled_transfer(&grid, 0), signal_transfer(&grid));
         let n = grid.period.order();
@@ -93,6 +97,7 @@ impl<'a> Judge<'a> {
             slopes: slopes(bank, taps),
             halves: errors.delays.iter().map(|half| fast_periods(half.0, fast_period.0)).collect(),
             grids: vec![(halvings, grid)],
+            owners,
             channels,
             target,
             signal,
@@ -196,7 +201,7 @@ impl<'a> Judge<'a> {
         near: &Frequency,
         threshold: f64,
     ) -> Result<Option<Attained>, VerifyError> {
-        if self.taps == Taps::Scheduled || self.channels.len() < MANY_CHANNELS {
+        if self.taps == Taps::Scheduled || self.errors.delays.len() < MANY_CONVERTERS {
             return Ok(None);
         }
         let Some(point) = self.best.as_ref().map(|best| best.point.clone()) else { return Ok(None) };
@@ -229,8 +234,8 @@ impl<'a> Judge<'a> {
         let filters = spectrum::filter_response(&self.bank.filters, self.bank.ratio, &near.z);
         let fixed: Vec<f64> = (0..self.channels.len()).map(|i| column_norm(&filters, i)).collect();
         let columns = scheduled::columns(&fixed, &self.slopes_at(near), &self.halves);
-        let reference = response(self.reference())?;
-        Ok(Remainders::new(rows.collect(), &reference, columns, self.bank.ratio, self.taps))
+        let (reference, owners) = (response(self.reference())?, self.owners.clone());
+        Ok(Remainders::new(rows.collect(), &reference, columns, owners, self.bank.ratio, self.taps))
     }
 
     /// The verdict on one grid, the work that it took and the largest gain seen.
@@ -302,9 +307,9 @@ impl<'a> Judge<'a> {
 
     /// The sides of the box that can be halved.
     fn sides(&self) -> Vec<Side> {
-        let channels = 0..self.channels.len();
-        let delays = channels.clone().filter(|&i| self.errors.delays[i].0 > 0.0).map(Side::Delay);
-        let cutoffs = channels.filter(|&i| self.errors.cutoffs[i] > 0.0).map(Side::Cutoff);
+        let converters = 0..self.errors.delays.len();
+        let delays = converters.clone().filter(|&i| self.errors.delays[i].0 > 0.0).map(Side::Delay);
+        let cutoffs = converters.filter(|&i| self.errors.cutoffs[i] > 0.0).map(Side::Cutoff);
         delays.chain(cutoffs).collect()
     }
 
@@ -312,7 +317,8 @@ impl<'a> Judge<'a> {
     fn rows(&self, halvings: &[Halvings]) -> usize {
         let points = |half: f64, halvings: u32| if half > 0.0 { (1usize << halvings) + 1 } else { 1 };
         let of = |(i, at): (usize, &Halvings)| {
-            points(self.errors.delays[i].0, at.delay) * points(self.errors.cutoffs[i], at.cutoff)
+            let samples = self.bank.samples[i];
+            samples * points(self.errors.delays[i].0, at.delay) * points(self.errors.cutoffs[i], at.cutoff)
         };
         self.bank.ratio + on_grid(halvings, self.taps).iter().enumerate().map(of).sum::<usize>()
     }
@@ -331,17 +337,25 @@ impl<'a> Judge<'a> {
             columns: (0..self.channels.len()).map(|i| column_norm(&filters, i)).collect(),
             filters,
             channels: &grid.channels,
+            converters: &grid.converters,
             gains: &self.errors.gains,
         }
     }
 }
 
-/// The channels, each with the first one that is like it.
-fn channels(memories: &Memories<'_>, errors: &ErrorBox, fast_period: Seconds) -> Vec<Channel> {
+/// The samples of a frame, each with the first one that is like it.
+fn channels(
+    memories: &Memories<'_>,
+    owners: &[usize],
+    errors: &ErrorBox,
+    fast_period: Seconds,
+) -> Vec<Channel> {
     let grid = memories.grid();
     let channel = |i: usize| {
-        let same = |&j: &usize| grid.has_equal_front_ends(i, j) && errors.cutoffs[i] == errors.cutoffs[j];
-        let mut channel = Channel::new(memories, i, errors, fast_period);
+        let cutoff = |i: usize| errors.cutoffs[owners[i]];
+        // Errors of delay and gain do not matter to the response.
+        let same = |&j: &usize| grid.has_equal_front_ends(i, j) && cutoff(i) == cutoff(j);
+        let mut channel = Channel::new(memories, i, owners[i], errors, fast_period);
         channel.like = (0..i).find(same).unwrap_or(i);
         channel
     };
@@ -375,11 +389,14 @@ fn on_grid(halvings: &[Halvings], taps: Taps) -> Vec<Halvings> {
 
 /// The rows of a grid of one point.
 fn mixes_at(grid: &Grid, point: &ErrorPoint) -> Vec<Mix> {
-    let mix = |(i, gain): (usize, &f64)| vec![(grid.channels[i].rows[0][0], 1.0 + gain)];
-    point.gains.iter().enumerate().map(mix).collect()
+    let mix = |(columns, gain): (&Range<usize>, &f64)| {
+        let gain = 1.0 + gain;
+        columns.clone().map(move |column| vec![(grid.channels[column].rows[0][0], gain)])
+    };
+    grid.converters.iter().zip(&point.gains).flat_map(mix).collect()
 }
 
-/// The slopes of the taps by channel; `None` where they do not depend on its delay.
+/// The slopes of the taps by converter; `None` where they do not depend on its delay.
 fn slopes(bank: &Bank, taps: Taps) -> Vec<Option<SynthesisFilters>> {
     let of = |j: usize| {
         let slopes = bank.tap_slopes.as_ref().filter(|slopes| slopes.follows(j))?;
@@ -401,7 +418,8 @@ fn best_of(grid: &Grid, attained: &Attained) -> Option<Best> {
     if attained.vertices.is_empty() {
         return None;
     }
-    let vertices = attained.vertices.iter().zip(&grid.channels);
+    let channels = grid.converters.iter().map(|columns| &grid.channels[columns.start]);
+    let vertices = attained.vertices.iter().zip(channels);
     let point = ErrorPoint {
         delays: vertices.clone().map(|(vertex, channel)| channel.errors[vertex.error]).collect(),
         gains: vertices.clone().map(|(vertex, _)| vertex.gain - 1.0).collect(),

@@ -316,11 +316,13 @@ mod tests {
             };
             let rows = ComplexMatrix { re: near(&rows.re), im: near(&rows.im) };
             let gains = vec![0.0, 0.02, 0.0];
+            let converters: Vec<_> = (0..count).map(|i| i..i + 1).collect();
             let at = AtFrequency {
                 gram: rows.product(&rows.adjoint()),
                 filters: random(&mut source, OUTPUTS, count, 0.5),
                 columns: vec![1.0; count],
                 channels: &grid,
+                converters: &converters,
                 gains: &gains,
             };
             let parts = at.whole();

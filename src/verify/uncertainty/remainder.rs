@@ -55,6 +55,8 @@ pub(super) struct Remainders {
     rows: Vec<UncertainRow>,
     /// Bounds of |F_i|.
     columns: Vec<f64>,
+    /// The converter of each row.
+    owners: Vec<usize>,
     taps: Taps,
     /// kappa_k at the near aliases, and as a decay over the far ones.
     sizes: Vec<f64>,
@@ -143,6 +145,7 @@ impl Remainders {
         rows: Vec<UncertainRow>,
         reference: &Aliases,
         columns: Vec<f64>,
+        owners: Vec<usize>,
         outputs: usize,
         taps: Taps,
     ) -> Self {
@@ -158,7 +161,7 @@ impl Remainders {
         let longest = all.iter().map(|(aliases, _)| aliases.far.decay.len()).max().unwrap_or(0);
         let sizes = (0..reference.near.len()).map(near).collect();
         let decay = (0..longest).map(far).collect();
-        Self { rows, columns, taps, sizes, decay }
+        Self { rows, columns, owners, taps, sizes, decay }
     }
 
     /// The gain up to which K_mix may go, so that K does not exceed `threshold` after these halvings; not
@@ -177,10 +180,10 @@ impl Remainders {
     }
 
     fn bounds(&self, halvings: &[Halvings]) -> Bounds {
-        let rows = || self.rows.iter().zip(halvings);
+        let rows = || self.rows.iter().zip(self.owners.iter().map(|&converter| halvings[converter]));
         let taps = self.taps;
         let crossed = |far: &FarAliases, decay: &[f64], weight| far.inner(&self.decay, decay, weight);
-        let near: Vec<Vec<f64>> = rows().map(|(row, &at)| row.near(taps, at)).collect();
+        let near: Vec<Vec<f64>> = rows().map(|(row, at)| row.near(taps, at)).collect();
         let squares = |r: &Vec<f64>| -> Vec<f64> {
             let sums = r.iter().scan(0.0, |sum, r| {
                 *sum += r * r;
@@ -191,8 +194,8 @@ impl Remainders {
         Bounds {
             squares: near.iter().map(squares).collect(),
             near,
-            far: rows().map(|(row, &at)| row.far(taps, at, FarAliases::norm)).collect(),
-            crossed: rows().map(|(row, &at)| row.far(taps, at, crossed)).collect(),
+            far: rows().map(|(row, at)| row.far(taps, at, FarAliases::norm)).collect(),
+            crossed: rows().map(|(row, at)| row.far(taps, at, crossed)).collect(),
         }
     }
 

@@ -1,6 +1,7 @@
 //! The largest gain of the error system at one frequency over a box of errors, with delay-scheduled taps.
 //!
-//! The filters are F(delta) = F_0 + sum_j delta_j S_j, so K(delta) = W - sum_i F_i(delta) h_i(delta_i). In a
+//! The filters are F(delta) = F_0 + sum_j delta_j S_j, so K(delta) = W - sum_i F_i(delta) h_i(delta_i), written
+//! for converters with one sample per frame; each sample of a converter adds such a term. In a
 //! part of the box with the half-widths d let t be the distances from its centre. Between -d_i and d_i the
 //! row h_i is the parabola through its values at -d_i, 0 and d_i, h_i(0) + t_i b_i + t_i^2 q_i, plus a
 //! remainder r_i ([`super::aliases::Weight::Parabola`]). Put
@@ -26,6 +27,7 @@ use super::super::spectrum::ComplexMatrix;
 use super::at_frequency::{AtFrequency, Attained, Limits, MAX_BOXES, Part, Verdict, Vertex, Work};
 use super::channel::column_norm;
 use super::gain::{lower_gain, upper_gain};
+use super::grid::ChannelGrid;
 use super::quick::{self, Columns, Compared, Quick, Terms};
 use super::remainder::Remainders;
 
@@ -35,9 +37,9 @@ const HALVED: usize = 4;
 /// One frequency, with delay-scheduled taps.
 pub(super) struct Scheduled<'a> {
     at: AtFrequency<'a>,
-    /// S_j by channel, M x N, per fast period; `None` where the taps do not depend on the delay.
+    /// S_j by converter, M x N, per fast period; `None` where the taps do not depend on the delay.
     slopes: Vec<Option<ComplexMatrix>>,
-    /// Half-width of the box by channel, fast periods.
+    /// Half-width of the box by converter, fast periods.
     halves: &'a [Ball],
     doubles: Doubles,
 }
@@ -47,11 +49,11 @@ struct Doubles {
     quick: Quick,
     filters: Columns,
     slopes: Vec<Option<Columns>>,
-    /// Errors of the delays by channel and point of the grid, with bounds of their rounding.
+    /// Errors of the delays by converter and point of the grid, with bounds of their rounding.
     deltas: Vec<Vec<[f64; 2]>>,
 }
 
-/// What a channel does at a vertex.
+/// What a converter does at a vertex.
 #[derive(Debug, Clone, Copy)]
 struct Choice {
     vertex: Vertex,
@@ -64,7 +66,7 @@ type Term = (ComplexMatrix, usize);
 
 impl<'a> Scheduled<'a> {
     pub(super) fn new(at: AtFrequency<'a>, slopes: Vec<Option<ComplexMatrix>>, halves: &'a [Ball]) -> Self {
-        let points = |i: usize| (0..at.channels[i].errors.len()).map(move |point| (i, point));
+        let points = |i: usize| (0..grid_of(&at, i).errors.len()).map(move |point| (i, point));
         let rounded = |(i, point)| {
             let exact = delta(&at, halves, i, point);
             [exact.nearest(), quick::off(exact)]
@@ -157,21 +159,21 @@ impl<'a> Scheduled<'a> {
     fn square(&self, parts: &[Part], chosen: &[Choice]) -> ComplexMatrix {
         let deltas: Vec<Ball> = (0..chosen.len()).map(|i| self.delta(i, chosen[i].vertex.error)).collect();
         let filters = moved(&self.at.filters, &self.slopes, &deltas);
-        let mut terms: Vec<Term> = Vec::with_capacity(3 * chosen.len());
-        for (i, (part, choice)) in parts.iter().zip(chosen).enumerate() {
-            let (part, Choice { vertex, bowed }) = (part.delays, *choice);
-            let row = |error: usize| self.at.channels[i].rows[error][vertex.speed];
+        let mut terms: Vec<Term> = Vec::with_capacity(3 * self.at.channels.len());
+        for (c, i) in self.columns() {
+            let (part, Choice { vertex, bowed }) = (parts[i].delays, chosen[i]);
+            let row = |error: usize| self.at.channels[c].rows[error][vertex.speed];
             let gain = Ball::from(vertex.gain);
-            let column = scaled(&column(&filters, i), gain);
+            let column = scaled(&column(&filters, c), gain);
             terms.push((scaled(&column, Ball::from(-1.0)), row(vertex.error)));
             if bowed {
                 let half = Ball::from(0.5);
                 let bow = scaled(&column, half);
-                // d_i / 2 S_ii.
+                // d_i / 2 S_ic for the column c of converter i.
                 let width = self.delta(i, part.last) - self.delta(i, part.first);
                 let lean = self.slopes[i]
                     .as_ref()
-                    .map(|slope| scaled(&self::column(slope, i), gain * width * Ball::from(0.25)));
+                    .map(|slope| scaled(&self::column(slope, c), gain * width * Ball::from(0.25)));
                 let ends = [(part.last, 1.0), (part.first, -1.0)];
                 for (error, sign) in ends {
                     let leaning = lean.as_ref().map(|lean| scaled(lean, Ball::from(sign)));
@@ -184,6 +186,12 @@ impl<'a> Scheduled<'a> {
         self.at.square_of(&terms)
     }
 
+    /// The columns of the filters, each with its converter.
+    fn columns(&self) -> impl Iterator<Item = (usize, usize)> {
+        let converters = self.at.converters.iter().enumerate();
+        converters.flat_map(|(i, columns)| columns.clone().map(move |column| (column, i)))
+    }
+
     fn delta(&self, i: usize, point: usize) -> Ball {
         delta(&self.at, self.halves, i, point)
     }
@@ -191,10 +199,10 @@ impl<'a> Scheduled<'a> {
     /// As [`Scheduled::square`], in doubles.
     fn terms(&self, parts: &[Part], chosen: &[Choice], terms: &mut Terms) {
         terms.clear();
-        for (i, (part, Choice { vertex, bowed })) in parts.iter().zip(chosen).enumerate() {
-            let part = part.delays;
-            let row = |error: usize| self.at.channels[i].rows[error][vertex.speed];
-            let column = self.doubles.column(i, chosen);
+        for (c, i) in self.columns() {
+            let (part, Choice { vertex, bowed }) = (parts[i].delays, chosen[i]);
+            let row = |error: usize| self.at.channels[c].rows[error][vertex.speed];
+            let column = self.doubles.column(c, chosen);
             let gain = vertex.gain;
             terms.push(row(vertex.error), -gain, column.iter().copied());
             if !bowed {
@@ -208,7 +216,7 @@ impl<'a> Scheduled<'a> {
                 let mut bow = column.clone();
                 bow.iter_mut().flatten().for_each(|x| *x *= 0.5);
                 if let Some(slope) = &self.doubles.slopes[i] {
-                    add(&mut bow, slope.column(i), [0.25 * sign * width[0], 0.25 * width[1]]);
+                    add(&mut bow, slope.column(c), [0.25 * sign * width[0], 0.25 * width[1]]);
                 }
                 terms.push(row(error), gain, bow.into_iter());
             }
@@ -218,12 +226,12 @@ impl<'a> Scheduled<'a> {
 }
 
 impl Doubles {
-    /// F_i at the chosen delays.
-    fn column(&self, i: usize, chosen: &[Choice]) -> Vec<[f64; 3]> {
-        let mut column: Vec<[f64; 3]> = self.filters.column(i).collect();
+    /// Column c of F at the chosen delays.
+    fn column(&self, c: usize, chosen: &[Choice]) -> Vec<[f64; 3]> {
+        let mut column: Vec<[f64; 3]> = self.filters.column(c).collect();
         for (j, slope) in self.slopes.iter().enumerate() {
             if let Some(slope) = slope {
-                add(&mut column, slope.column(i), self.deltas[j][chosen[j].vertex.error]);
+                add(&mut column, slope.column(c), self.deltas[j][chosen[j].vertex.error]);
             }
         }
         column
@@ -242,9 +250,14 @@ fn add(sum: &mut [[f64; 3]], column: impl Iterator<Item = [f64; 3]>, [factor, of
     }
 }
 
-/// The error of the delay of channel `i` at a point of its grid, in fast periods.
+/// The grid of converter `i`, which its samples share.
+fn grid_of<'a>(at: &AtFrequency<'a>, i: usize) -> &'a ChannelGrid {
+    &at.channels[at.converters[i].start]
+}
+
+/// The error of the delay of converter `i` at a point of its grid, in fast periods.
 fn delta(at: &AtFrequency<'_>, halves: &[Ball], i: usize, point: usize) -> Ball {
-    let last = at.channels[i].errors.len() - 1;
+    let last = grid_of(at, i).errors.len() - 1;
     if last == 0 {
         return Ball::ZERO;
     }

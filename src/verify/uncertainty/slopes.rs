@@ -28,7 +28,7 @@ pub struct Slopes {
     /// over omega of |F_i| g_i`, `g_i^2 = (1/M) sum_k nu_k^2 |Phi_i(j nu_k)|^2`. Infinite for front ends of
     /// relative degree 1.
     pub lipschitz: Vec<f64>,
-    /// max over omega of |F_i|.
+    /// max over omega of |F_i|, summed over the samples of a converter.
     pub columns: Vec<f64>,
     /// max over omega of g_i.
     pub steepness: Vec<f64>,
@@ -62,12 +62,18 @@ pub fn slopes(bank: &Bank, errors: &ErrorBox) -> Result<Slopes, VerifyError> {
     let memories = Memories::new(&grid, errors)?;
     let lags = Lags::new(&bank.filters, bank.ratio, FILTER_TAIL).ok_or(VerifyError::LongMemory)?;
     let mut found = Slopes { lipschitz: Vec::new(), columns: Vec::new(), steepness: Vec::new() };
-    for i in 0..bank.channel_count() {
-        let [lipschitz, column, steep] = of_channel(bank, &memories, &lags, i, errors.cutoffs[i])?;
+    for (i, samples) in bank.layout().ranges().into_iter().enumerate() {
+        let of = |sample| of_channel(bank, &memories, &lags, sample, errors.cutoffs[i]);
+        let all = samples.map(of).collect::<Result<Vec<_>, _>>()?;
+        // The samples of a converter move together, and have one front end.
+        let sum = |part: usize| match all.as_slice() {
+            [one] => one[part],
+            all => outward(all.iter().map(|bounds| bounds[part]).sum()),
+        };
         let gain = 1.0 + errors.gains[i];
-        found.lipschitz.push(outward(gain * lipschitz));
-        found.columns.push(column);
-        found.steepness.push(outward(gain * steep));
+        found.lipschitz.push(outward(gain * sum(0)));
+        found.columns.push(sum(1));
+        found.steepness.push(outward(gain * all.iter().map(|bounds| bounds[2]).fold(0.0, ball::nan_max)));
     }
     Ok(found)
 }

@@ -1,12 +1,13 @@
 //! The comparison of the gains over a box with a threshold: a search among the vertices of its parts.
 //!
-//! The vertices form a tree, channel by channel. With channel i still free, h_i lies within r_i of the mean
-//! of its vertices, so sigma of the mean plus sum |F_i| r_i bounds the whole branch. Where a branch has many
+//! The vertices form a tree, converter by converter. With a converter still free, each of its rows h_i lies
+//! within r_i of the mean of its vertices, so sigma of the mean plus sum |F_i| r_i bounds the whole branch. Where a branch has many
 //! vertices, multipliers bound them all at once and far better (`multipliers`).
 //!
 //! Most gains are compared in double precision (`quick`). Balls decide where that does not suffice, and give
 //! the gains that are reported.
 
+use super::angle::outward;
 use super::at_frequency::{AtFrequency, Attained, Limits, MAX_BOXES, Mix, Part, Verdict, Vertex, Work};
 use super::gain::{lower_gain, upper_gain};
 use super::multipliers::{self, Vertices};
@@ -64,16 +65,17 @@ impl AtFrequency<'_> {
     }
 }
 
-/// The vertices of a channel over a part of its delays.
+/// The vertices of a converter over a part of its delays.
 #[derive(Debug, Clone)]
 struct Set {
     vertices: Vec<Vertex>,
-    mean: Mix,
-    /// Bounds |F_i| times the distance of the rows from their mean.
+    /// Of the rows of each of its columns.
+    means: Vec<Mix>,
+    /// Bounds the sum of |F_i| times the distance of the rows from their mean.
     radius: f64,
 }
 
-/// The sets of all parts so far, by channel and ends.
+/// The sets of all parts so far, by converter and ends.
 struct Sets<'a, 'b> {
     at: &'a AtFrequency<'b>,
     known: HashMap<(usize, Part), Set>,
@@ -85,9 +87,14 @@ impl Sets<'_, '_> {
         let set = |(i, part): (usize, &Part)| {
             let make = || {
                 let vertices = at.vertices(i, part);
-                let mean = at.mean(i, &vertices);
-                let radius = at.columns[i] * at.radius(i, &vertices, &mean);
-                Set { vertices, mean, radius }
+                let columns = at.converters[i].clone();
+                let means: Vec<Mix> = columns.clone().map(|column| at.mean(column, &vertices)).collect();
+                let radius =
+                    |(column, mean): (usize, &Mix)| at.columns[column] * at.radius(column, &vertices, mean);
+                let radii = columns.zip(&means).map(radius);
+                let radius =
+                    radii.fold(0.0, |sum, radius| if sum == 0.0 { radius } else { outward(sum + radius) });
+                Set { vertices, means, radius }
             };
             self.known.entry((i, *part)).or_insert_with(make).clone()
         };
@@ -129,19 +136,19 @@ impl Tree<'_, '_> {
         // spread[i] bounds what the channels from i on may add to their means.
         let mut spread = vec![0.0; self.sets.len() + 1];
         for (i, set) in self.sets.iter().enumerate().rev() {
-            spread[i] = super::angle::outward(spread[i + 1] + set.radius);
+            spread[i] = outward(spread[i + 1] + set.radius);
         }
-        let mut mixes: Vec<Mix> = self.sets.iter().map(|set| set.mean.clone()).collect();
+        let mut mixes: Vec<Mix> = self.sets.iter().flat_map(|set| set.means.clone()).collect();
         self.branch(&spread, &mut mixes, &mut Vec::new())
     }
 
-    /// `mixes` are the chosen vertices of the first channels and the means of the others.
+    /// `mixes` are the rows of the chosen vertices of the first converters and the means of the others.
     fn branch(&mut self, spread: &[f64], mixes: &mut [Mix], chosen: &mut Vec<Vertex>) -> Found {
-        let channel = chosen.len();
+        let converter = chosen.len();
         if self.work.is_used_up() {
             return Found::UsedUp;
         }
-        if let Some(found) = self.judge(spread[channel], mixes, chosen) {
+        if let Some(found) = self.judge(spread[converter], mixes, chosen) {
             return found;
         }
         match self.are_bounded(chosen) {
@@ -149,9 +156,9 @@ impl Tree<'_, '_> {
             Some(false) => return Found::UsedUp,
             None => {}
         }
-        let sets = self.sets;
-        for vertex in &sets[channel].vertices {
-            mixes[channel] = self.at.mix(channel, vertex);
+        let (sets, columns) = (self.sets, self.at.converters[converter].clone());
+        for vertex in &sets[converter].vertices {
+            columns.clone().for_each(|column| mixes[column] = self.at.mix(column, vertex));
             chosen.push(*vertex);
             let found = self.branch(spread, mixes, chosen);
             chosen.pop();
@@ -159,7 +166,7 @@ impl Tree<'_, '_> {
                 return found;
             }
         }
-        mixes[channel].clone_from(&sets[channel].mean);
+        mixes[columns].clone_from_slice(&sets[converter].means);
         Found::Nothing
     }
 
@@ -169,14 +176,18 @@ impl Tree<'_, '_> {
         let sets = self.sets;
         let chosen_sets = chosen.iter().map(std::slice::from_ref);
         let others = sets[chosen.len()..].iter().map(|set| set.vertices.as_slice());
-        let channels: Vec<Vertices<'_>> = chosen_sets.chain(others).collect();
-        let count = channels.iter().fold(1usize, |all, vertices| all.saturating_mul(vertices.len()));
+        let converters: Vec<Vertices<'_>> = chosen_sets.chain(others).collect();
+        let count = converters.iter().fold(1usize, |all, vertices| all.saturating_mul(vertices.len()));
         if count < MANY_VERTICES {
             return None;
         }
         if count > MOST_DIVIDED && self.at.is_divided() {
             return Some(false);
         }
+        // Multipliers bound the rows of a converter as if each had errors of its own.
+        let columns = self.at.converters.iter().zip(converters);
+        let channels: Vec<Vertices<'_>> =
+            columns.flat_map(|(columns, vertices)| std::iter::repeat_n(vertices, columns.len())).collect();
         let order = multipliers::order(self.at.filters.re.nrows(), &channels);
         self.work.count_multipliers(order, self.at.gram.re.nrows());
         let is_proven = multipliers::proves(self.at, &channels, self.gains.most);

@@ -4,6 +4,7 @@
 //! the samples that the taps reach, with covariances by the matrix exponential. They are the rms of the
 //! error per fast sample, signal and noise together, for white noise of unit density at the analog input.
 
+use crate::bank::SynthesisFilters;
 use crate::design::analysis::bank_problem;
 use crate::design::filters::lifted;
 use crate::design::{Design, LiftedPlant, Options, analyze_mean, design};
@@ -109,6 +110,38 @@ fn shifted(mut case: Case) -> Case {
     case
 }
 
+/// The same converters with rates of their own, each with the period of its samples, and a latency without the wait
+/// for a frame.
+fn own_rates(case: &Case, converters: &[(&Converter, f64)]) -> Spec {
+    let channel = |&(converter, period): &(&Converter, f64)| ChannelSpec {
+        rate: Some(Hertz(1.0 / period)),
+        noise: converter.noise,
+        ..ChannelSpec::new(Seconds(converter.delay), converter.filter.clone())
+    };
+    let spec = Spec { channels: converters.iter().map(channel).collect(), ..case.spec() };
+    Spec { latency: Some(case.latency + spec.wait()), ..spec }
+}
+
+/// The golden number of virtual channels written by hand and of rates, whose banks have the same taps.
+fn check_rates(mut case: Case, converters: &[(&Converter, f64)], golden: f64) {
+    let frame = case.ratio as f64;
+    case.converters = converters
+        .iter()
+        .flat_map(|(converter, period)| virtual_channels(frame, *period, converter))
+        .collect();
+    let own = design(&own_rates(&case, converters), &Options::without_proof()).unwrap();
+    let by_hand = shifted(case);
+    check(&by_hand, golden);
+    assert!((total(&own) - golden).abs() < 1e-10, "{} instead of {golden}", total(&own));
+    let by_hand = design(&by_hand.spec(), &Options::without_proof()).unwrap().bank;
+    assert_eq!((own.bank.latency, own.bank.channel_count()), (by_hand.latency, converters.len()));
+    let (SynthesisFilters::Fir(a), SynthesisFilters::Fir(b)) = (&own.bank.filters, &by_hand.filters) else {
+        panic!("taps")
+    };
+    let apart = a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(a.len() == b.len() && apart < 1e-9, "{apart}");
+}
+
 fn check(case: &Case, golden: f64) {
     let found = case.rms();
     // Ten decimals are printed.
@@ -129,7 +162,7 @@ fn the_thesis_example_with_noise() {
 
 /// 24 kHz and 16 kHz into 48 kHz.
 #[test]
-fn two_rates_as_virtual_channels() {
+fn two_rates_are_virtual_channels() {
     let goldens = [
         (0.0, [0.0528751882, 0.0470057306, 0.0469987756]),
         (1e-2, [0.0595395839, 0.0550370025, 0.0550324897]),
@@ -139,11 +172,8 @@ fn two_rates_as_virtual_channels() {
             let (a, b) = (butterworth(4, 9.0 / 48.0), butterworth(4, 7.0 / 48.0));
             let first = Converter { delay: 4.3, noise, filter: a.clone() };
             let second = Converter { delay: 4.1, noise, filter: b };
-            let converters =
-                virtual_channels(6.0, 2.0, &first).into_iter().chain(virtual_channels(6.0, 3.0, &second));
-            let case =
-                Case { ratio: 6, latency, taps: Some(48), target: a, converters: converters.collect() };
-            check(&shifted(case), golden);
+            let case = Case { ratio: 6, latency, taps: Some(48), target: a, converters: Vec::new() };
+            check_rates(case, &[(&first, 2.0), (&second, 3.0)], golden);
         }
     }
 }
@@ -152,16 +182,17 @@ fn two_rates_as_virtual_channels() {
 #[test]
 fn many_virtual_channels() {
     let filter = butterworth(2, 20.0 / 300.0);
-    let case = |periods: [f64; 2], noise: [f64; 2]| {
+    for (periods, noise, golden) in [
+        ([3.0, 5.0], [1e-3; 2], 0.0460010907),
+        ([3.0, 5.0], [1e-2; 2], 0.0482508302),
+        ([2.5, 3.0], [1e-2, 1e-3], 0.0314942102),
+    ] {
         let converter =
             |k: usize| Converter { delay: [0.4, 1.7][k], noise: noise[k], filter: filter.clone() };
-        let channels = (0..2).flat_map(|k| virtual_channels(15.0, periods[k], &converter(k)));
-        let (target, converters) = (filter.clone(), channels.collect());
-        shifted(Case { ratio: 15, latency: 20, taps: Some(90), target, converters })
-    };
-    check(&case([3.0, 5.0], [1e-3; 2]), 0.0460010907);
-    check(&case([3.0, 5.0], [1e-2; 2]), 0.0482508302);
-    check(&case([2.5, 3.0], [1e-2, 1e-3]), 0.0314942102);
+        let (target, converters) = (filter.clone(), Vec::new());
+        let case = Case { ratio: 15, latency: 20, taps: Some(90), target, converters };
+        check_rates(case, &[(&converter(0), periods[0]), (&converter(1), periods[1])], golden);
+    }
 }
 
 /// A Butterworth band-pass from the poles of its low-pass, both cut-offs in hertz.
@@ -204,13 +235,13 @@ fn no_other_taps_are_better() {
         (spec.channels[1].gain, spec.channels[3].gain) = (-1.7, 1e-3);
         let designed = design(&spec, &Options::without_proof()).unwrap();
         let least = total(&designed);
-        let crate::bank::SynthesisFilters::Fir(best) = &designed.bank.filters else { panic!("taps") };
+        let SynthesisFilters::Fir(best) = &designed.bank.filters else { panic!("taps") };
         for (i, n) in (0..4).flat_map(|i| (0..taps).map(move |n| (i, n))) {
             for change in [-1e-3, 1e-3] {
                 let mut bank = designed.bank.clone();
                 let mut changed = best.clone();
                 changed[i][n] += change / spec.channels[i].gain;
-                bank.filters = crate::bank::SynthesisFilters::Fir(changed);
+                bank.filters = SynthesisFilters::Fir(changed);
                 let mean = analyze_mean(&bank).unwrap();
                 let other = mean.rms_error.hypot(mean.output_noise);
                 assert!(other >= least * (1.0 - 1e-13), "{taps} taps, {i} {n}: {other} {least}");
@@ -293,7 +324,7 @@ fn uncertain_delays_make_h2_fir() {
     spec.uncertainty =
         Some(UncertaintySpec { delay: Some(PerChannel::Same(Seconds(0.1))), ..UncertaintySpec::default() });
     let design = design(&spec, &Options::without_proof()).unwrap();
-    assert!(design.taps_chosen && matches!(design.bank.filters, crate::bank::SynthesisFilters::Fir(_)));
+    assert!(design.taps_chosen && matches!(design.bank.filters, SynthesisFilters::Fir(_)));
     spec.design.reduction = Some(crate::spec::Reduction::Order(3));
     assert!(spec.check().is_err());
 }

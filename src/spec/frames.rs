@@ -1,0 +1,334 @@
+//! Frames of converters with sample rates of their own.
+//!
+//! A converter takes sample m at m T_i - D_i, with T_i = p_i / q_i fast periods. The pattern of all converters
+//! repeats after P fast periods, the least common multiple of the p_i. A frame holds what they take in that
+//! time: L_i = P / T_i samples of converter i, from which a bank makes P fast samples. Sample j of a frame is
+//! that of a channel of ratio P with the delay D_ij = D_i - j T_i. So a bank for converters of unequal rates is
+//! a bank for sum L_i channels of one rate.
+//!
+//! A frame is complete when its last sample is there. The delays of these channels are D_ij + S, where S is the
+//! least whole number of fast periods for which none is negative. So the latency counts from the instant of a
+//! sample, the wait for the rest of its frame included. With equal rates L_i = 1 and S = 0.
+
+use super::limits::{self, range};
+use super::{ChannelSpec, DesignSpec, Method, SpecProblem};
+use crate::units::{FastPeriods, GridTime, Hertz, Seconds};
+use std::ops::Range;
+
+/// Rounding of a rate and of the fast period in a file, relative to their product.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// Most samples per frame for the near rates that a refusal names.
+const NEAR_FRAME: usize = 64;
+
+/// How the samples of the converters make frames.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FrameLayout {
+    ratio: usize,
+    samples: Vec<usize>,
+}
+
+/// One sample of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameSample {
+    /// Its converter, from 0.
+    pub converter: usize,
+    /// Its number j among the samples of that converter.
+    pub number: usize,
+}
+
+impl FrameLayout {
+    /// Frames of P = `ratio` fast samples, with L_i = `samples[i]` samples of converter i.
+    pub fn new(ratio: usize, samples: Vec<usize>) -> Self {
+        Self { ratio, samples }
+    }
+
+    /// P.
+    pub fn ratio(&self) -> usize {
+        self.ratio
+    }
+
+    /// L_i.
+    pub fn samples(&self) -> &[usize] {
+        &self.samples
+    }
+
+    /// Samples of a frame.
+    pub fn count(&self) -> usize {
+        self.samples.iter().sum()
+    }
+
+    /// Whether a frame has one sample of each converter: all have one rate.
+    pub fn is_plain(&self) -> bool {
+        self.samples.iter().all(|&samples| samples == 1)
+    }
+
+    /// The samples of a frame, converter by converter.
+    pub fn iter(&self) -> impl Iterator<Item = FrameSample> + '_ {
+        let of = |(converter, &samples): (usize, &usize)| {
+            (0..samples).map(move |number| FrameSample { converter, number })
+        };
+        self.samples.iter().enumerate().flat_map(of)
+    }
+
+    /// The samples of each converter among those of a frame.
+    pub fn ranges(&self) -> Vec<Range<usize>> {
+        let end = |first: &mut usize, samples: &usize| {
+            let range = *first..*first + samples;
+            *first = range.end;
+            Some(range)
+        };
+        self.samples.iter().scan(0, end).collect()
+    }
+
+    /// The converter of each sample of a frame.
+    pub fn owners(&self) -> Vec<usize> {
+        self.iter().map(|sample| sample.converter).collect()
+    }
+
+    /// The value that each sample of a frame has from its converter.
+    pub fn each<T: Clone>(&self, of_converters: &[T]) -> Vec<T> {
+        self.iter().filter_map(|sample| of_converters.get(sample.converter).cloned()).collect()
+    }
+
+    /// D_ij of each sample of a frame, from the delays of the converters.
+    pub fn delays(&self, delays: &[GridTime]) -> Vec<GridTime> {
+        let of = |FrameSample { converter, number }: FrameSample| {
+            // j P / L_i fast periods: the whole part is exact.
+            let (steps, samples) = (number * self.ratio, self.samples[converter]);
+            let (whole, part) = (steps / samples, steps % samples);
+            let earlier = delays.get(converter)?.later_by(-(whole as f64));
+            Some(if part == 0 {
+                earlier
+            } else {
+                earlier.moved_by(FastPeriods(-(part as f64) / samples as f64))
+            })
+        };
+        self.iter().filter_map(of).collect()
+    }
+
+    /// S, the fast samples from the instant of a frame to that of its last sample.
+    pub fn wait(&self, delays: &[GridTime]) -> usize {
+        let late = |delay: &GridTime| {
+            let ahead = -delay.in_fast_periods().0;
+            // A whole number may have been rounded up.
+            (ahead - 4.0 * f64::EPSILON * (1.0 + ahead.abs() + self.ratio as f64)).ceil().max(0.0) as usize
+        };
+        if self.is_plain() { 0 } else { self.delays(delays).iter().map(late).max().unwrap_or(0) }
+    }
+
+    /// D_ij + S.
+    pub fn waited_delays(&self, delays: &[GridTime]) -> Vec<GridTime> {
+        let wait = self.wait(delays) as f64;
+        self.delays(delays).into_iter().map(|delay| delay.later_by(wait)).collect()
+    }
+}
+
+/// T = p / q fast periods.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    p: usize,
+    q: usize,
+}
+
+impl Step {
+    /// The step of a converter of this rate, if it is a fraction of small numbers.
+    fn of(rate: Hertz, fast_period: Seconds) -> Option<Self> {
+        let step = 1.0 / (rate.0 * fast_period.0);
+        let fraction = |q: usize| {
+            let (scaled, nearest) = (step * q as f64, (step * q as f64).round());
+            let is_near = (scaled - nearest).abs() <= ROUNDING * scaled && nearest >= 1.0;
+            (is_near && nearest <= limits::MAX_RATIO as f64).then_some(Self { p: nearest as usize, q })
+        };
+        (1..=limits::MAX_CHANNELS).find_map(fraction)
+    }
+}
+
+/// The frames of converters with these rates.
+///
+/// # Errors
+/// [`SpecProblem::Rate`] for a rate that is in no simple ratio to the fast rate, [`SpecProblem::Frame`] for
+/// frames beyond [`limits::MAX_RATIO`] fast samples or [`limits::MAX_CHANNELS`] samples.
+pub(super) fn layout(fast_period: Seconds, rates: &[Hertz]) -> Result<FrameLayout, Refused> {
+    let step = |(channel, &rate): (usize, &Hertz)| {
+        limits::check_fast_rate(rate).map_err(|_| {
+            let rule = "a sample rate is positive, between 1e-100 and 1e100 hertz";
+            Refused { channel: Some(channel), problem: range(rate.0, "Hz", rule) }
+        })?;
+        Step::of(rate, fast_period).ok_or_else(|| {
+            let (fast, near) = (fast_period.rate().0, near_rates(fast_period, &[rate]));
+            Refused { channel: Some(channel), problem: SpecProblem::Rate { rate: rate.0, fast, near } }
+        })
+    };
+    let steps: Vec<Step> = rates.iter().enumerate().map(step).collect::<Result<_, _>>()?;
+    // Factors are at most MAX_RATIO, so that products fit.
+    let common = steps.iter().try_fold(1u64, |all, step| {
+        let common = all / greatest_common_divisor(all, step.p as u64) * step.p as u64;
+        (common <= u64::from(u32::MAX)).then_some(common)
+    });
+    let ratio = common.unwrap_or(u64::MAX);
+    let samples = |step: &Step| (ratio / step.p as u64).saturating_mul(step.q as u64);
+    let samples: Vec<u64> = steps.iter().map(samples).collect();
+    let count = samples.iter().fold(0u64, |sum, &samples| sum.saturating_add(samples));
+    if ratio > limits::MAX_RATIO as u64 || count > limits::MAX_CHANNELS as u64 {
+        let near = near_rates(fast_period, rates);
+        let rule = format!(
+            "at most {} fast samples and {} samples make a frame",
+            limits::MAX_RATIO,
+            limits::MAX_CHANNELS
+        );
+        return Err(Refused { channel: None, problem: SpecProblem::Frame { ratio, samples, rule, near } });
+    }
+    let samples = samples.into_iter().map(|samples| samples as usize).collect();
+    Ok(FrameLayout::new(ratio as usize, samples))
+}
+
+/// What is wrong with rates: that of a channel, from 0, or all together.
+pub(super) struct Refused {
+    pub(super) channel: Option<usize>,
+    pub(super) problem: SpecProblem,
+}
+
+/// Rates near these, in hertz, whose frames are short.
+pub(super) fn near_rates(fast_period: Seconds, rates: &[Hertz]) -> Vec<f64> {
+    let shares: Vec<f64> = rates.iter().map(|rate| rate.0 * fast_period.0).collect();
+    let samples = |ratio: usize| {
+        shares.iter().map(|share| (share * ratio as f64).round().max(1.0)).collect::<Vec<f64>>()
+    };
+    let fits = |ratio: &usize| samples(*ratio).iter().sum::<f64>() + *ratio as f64 <= NEAR_FRAME as f64;
+    let farthest = |ratio: usize| {
+        let off = samples(ratio).into_iter().zip(&shares);
+        off.map(|(samples, share)| (samples / (share * ratio as f64)).ln().abs()).fold(0.0, f64::max)
+    };
+    let best = (1..NEAR_FRAME).filter(fits).min_by(|&a, &b| farthest(a).total_cmp(&farthest(b)));
+    let Some(ratio) = best else { return Vec::new() };
+    let rate = |samples: f64| samples / (ratio as f64 * fast_period.0);
+    samples(ratio).into_iter().map(rate).collect()
+}
+
+fn greatest_common_divisor(a: u64, b: u64) -> u64 {
+    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
+}
+
+/// The frames of the channels of a spec made in memory.
+///
+/// # Errors
+/// As [`layout`]; [`SpecProblem::MissingKey`] if some channels have a rate and others have none, and
+/// [`SpecProblem::Range`] for a ratio that is not that of the frames.
+pub(super) fn checked(
+    fast_period: Seconds,
+    ratio: usize,
+    channels: &[ChannelSpec],
+) -> Result<FrameLayout, SpecProblem> {
+    let rates: Vec<Hertz> = channels.iter().filter_map(|channel| channel.rate).collect();
+    if rates.is_empty() {
+        return Ok(of_channels(fast_period, ratio, channels));
+    }
+    if rates.len() < channels.len() {
+        let remedy = "some channels have a rate of their own; give that of each, or none";
+        return Err(SpecProblem::MissingKey { key: "rate", remedy });
+    }
+    let layout = layout(fast_period, &rates).map_err(|refused| refused.problem)?;
+    if layout.ratio == ratio {
+        return Ok(layout);
+    }
+    let rule = format!("the rates of the channels make frames of {} fast samples", layout.ratio);
+    Err(range(ratio as f64, "fast samples", rule))
+}
+
+/// A latency is no shorter than the wait S for the last sample of a frame.
+pub(super) fn check_latency(latency: Option<usize>, wait: usize) -> Result<(), SpecProblem> {
+    let Some(latency) = latency.filter(|&latency| latency < wait) else { return Ok(()) };
+    let rule = format!(
+        "the last sample of a frame comes {wait} fast samples after the first, and the latency includes this \
+         wait; give {wait} or more"
+    );
+    Err(range(latency as f64, "fast samples", rule))
+}
+
+/// A design that couples all samples of a frame takes no more than [`limits::MAX_COUPLED_FRAME`].
+pub(super) fn check_method(
+    layout: &FrameLayout,
+    design: &DesignSpec,
+    fast_period: Seconds,
+) -> Result<(), SpecProblem> {
+    let is_coupled = !(design.method == Method::H2 && design.is_fir());
+    if layout.is_plain() || !is_coupled || layout.ratio + layout.count() <= limits::MAX_COUPLED_FRAME {
+        return Ok(());
+    }
+    let rate = |&samples: &usize| Hertz(samples as f64 / (layout.ratio as f64 * fast_period.0));
+    let rates: Vec<Hertz> = layout.samples.iter().map(rate).collect();
+    let rule = format!(
+        "this design takes at most {} of both together, and the method h2 with taps takes more",
+        limits::MAX_COUPLED_FRAME
+    );
+    Err(SpecProblem::Frame {
+        ratio: layout.ratio as u64,
+        samples: layout.samples.iter().map(|&samples| samples as u64).collect(),
+        rule,
+        near: near_rates(fast_period, &rates),
+    })
+}
+
+/// The frames of checked channels.
+pub(super) fn of_channels(fast_period: Seconds, ratio: usize, channels: &[ChannelSpec]) -> FrameLayout {
+    let samples = |channel: &ChannelSpec| {
+        let in_frame = |rate: Hertz| (ratio as f64 * fast_period.0 * rate.0).round().max(1.0) as usize;
+        channel.rate.map_or(1, in_frame)
+    };
+    FrameLayout::new(ratio, channels.iter().map(samples).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn made(fast: f64, rates: &[f64]) -> FrameLayout {
+        let rates: Vec<Hertz> = rates.iter().copied().map(Hertz).collect();
+        layout(Hertz(fast).period(), &rates).map_err(|refused| refused.problem).unwrap()
+    }
+
+    /// Against the definition: the instants of all samples in three frames.
+    #[test]
+    fn frames_hold_what_the_converters_take_until_the_pattern_repeats() {
+        for (fast, rates, ratio, samples) in [
+            (48e3, [24e3, 16e3], 6, [3, 2]),
+            (300.0, [100.0, 60.0], 15, [5, 3]),
+            (96e3, [44.1e3, 48e3], 320, [147, 160]),
+            (30.0, [12.0, 10.0], 15, [6, 5]),
+            (8.0, [8.0, 12.0], 2, [2, 3]),
+            (2.0, [1.0, 1.0], 2, [1, 1]),
+        ] {
+            let layout = made(fast, &rates);
+            assert_eq!(layout, FrameLayout::new(ratio, samples.to_vec()), "{fast} {rates:?}");
+            let h = Hertz(fast).period();
+            let own = [0.4, 1.7].map(|delay| GridTime::new(FastPeriods(delay).in_seconds(h), h));
+            let delays = layout.waited_delays(&own);
+            let wait = layout.wait(&own) as f64;
+            for (sample, delay) in layout.iter().zip(&delays) {
+                let (i, j) = (sample.converter, sample.number as f64);
+                let written = [0.4, 1.7][i] - j * fast / rates[i] + wait;
+                assert!((delay.in_fast_periods().0 - written).abs() < 1e-12 * ratio as f64, "{written}");
+            }
+            let least = delays.iter().map(|delay| delay.in_fast_periods().0).fold(f64::INFINITY, f64::min);
+            assert!((0.0..1.0).contains(&least) || wait == 0.0, "{least}");
+        }
+    }
+
+    #[test]
+    fn whole_steps_are_exact() {
+        let layout = made(300.0, &[100.0, 60.0]);
+        let h = Hertz(300.0).period();
+        let delays = layout.waited_delays(&[GridTime::fast_sample(0.0, h), GridTime::fast_sample(2.0, h)]);
+        let whole: Vec<f64> = delays.iter().map(|delay| delay.whole()).collect();
+        assert_eq!(whole, [12.0, 9.0, 6.0, 3.0, 0.0, 14.0, 9.0, 4.0]);
+        assert!(delays.iter().all(|delay| delay.rest() == Seconds(0.0)));
+    }
+
+    #[test]
+    fn near_rates_have_short_frames() {
+        let near = near_rates(Hertz(96e3).period(), &[Hertz(44.1e3), Hertz(48e3)]);
+        assert!((near[0] / 44e3 - 1.0).abs() < 1e-12 && (near[1] / 48e3 - 1.0).abs() < 1e-12, "{near:?}");
+        let near = near_rates(Hertz(48e3).period(), &[Hertz(16_000.5)]);
+        assert!((near[0] / 16e3 - 1.0).abs() < 1e-12, "{near:?}");
+    }
+}

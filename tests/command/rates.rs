@@ -1,0 +1,318 @@
+//! Converters with rates of their own, from the spec to the fused recording, as a user runs it.
+
+use crate::support::{Desk, text, wav};
+
+/// 24 kHz and 16 kHz into 48 kHz; frames of 6 samples from 3 and 2.
+const SPEC: &str = r#"
+name = "two rates"
+fast_rate = 48000
+latency = 22
+
+[target]
+filter = { family = "butterworth", order = 4, cutoff = 14000 }
+
+[[channel]]
+delay_samples = 0.3
+rate = "24 kHz"
+
+[[channel]]
+delay_samples = 1.1
+rate = "16 kHz"
+gain = 1.05
+offset = 0.01
+
+[signal]
+band = "13 kHz"
+
+[design]
+method = "h2"
+taps = 72
+noise = 3e-4
+"#;
+const SOURCE: &str = "tones:0.9kHz,4.3kHz,8.9kHz,12.1kHz";
+const WAIT: usize = 4;
+
+fn desk() -> Desk {
+    let desk = Desk::with_spec(SPEC);
+    desk.good(&["design", "spec.toml", "-o", "bank.json", "--json"]);
+    desk
+}
+
+/// Captures of `samples` fast samples in the folder `cap`.
+fn captured(desk: &Desk, more: &[&str]) {
+    let args =
+        ["simulate", "spec.toml", "--source", SOURCE, "--gain", "0.2", "-o", "cap", "--force", "--json"];
+    desk.good(&[&args[..], more].concat());
+}
+
+fn level(samples: &[f32]) -> f64 {
+    (samples.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>() / samples.len() as f64).sqrt()
+}
+
+#[test]
+fn the_promised_snr_is_measured() {
+    let desk = Desk::with_spec(SPEC);
+    let promised = desk.report(&["design", "spec.toml", "-o", "bank.json"]);
+    let noise_db = promised["figures"]["snr"]["noise_db"].as_f64().unwrap();
+    let signal_db = promised["figures"]["snr"]["signal_db"].as_f64().unwrap();
+    assert!(signal_db > noise_db + 10.0, "{promised}");
+    captured(&desk, &["--samples", "96000", "--noise", "3e-4"]);
+    let rates: Vec<u32> =
+        ["ch1", "ch2", "target"].map(|n| wav::read(&desk.path(&format!("cap/{n}.wav"))).0.sample_rate).into();
+    assert_eq!(rates, [24_000, 16_000, 48_000]);
+    let lengths = ["ch1", "ch2", "target"].map(|n| wav::samples(&desk, &format!("cap/{n}.wav")).len());
+    assert_eq!(lengths, [48_000, 32_000, 96_000]);
+    desk.report(&["fuse", "bank.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "fused.wav"]);
+    let measured = desk.json(&["measure", "fused.wav", "--ref", "cap/target.wav", "--json"]);
+    // The promise is for a signal of 0.25 rms at the target.
+    let expected = noise_db + 20.0 * (level(&wav::samples(&desk, "cap/target.wav")) / 0.25).log10();
+    let snr =
+        measured["snr"].as_f64().or(measured["snr_db"].as_f64()).unwrap_or_else(|| panic!("{measured}"));
+    assert!((snr - expected).abs() < 0.3, "{snr} instead of {expected}: {measured}");
+}
+
+/// A stream of interleaved frames, of one file or pipe per converter, and `fuse` give the same bits.
+#[test]
+fn streams_have_the_bits_of_files() {
+    let desk = desk();
+    captured(&desk, &["--samples", "3000"]);
+    desk.report(&[
+        "fuse",
+        "bank.json",
+        "cap/ch1.wav",
+        "cap/ch2.wav",
+        "-o",
+        "late.wav",
+        "--keep-latency",
+        "--algorithm",
+        "direct",
+    ]);
+    let fused = wav::samples(&desk, "late.wav");
+    let [a, b] = ["cap/ch1.wav", "cap/ch2.wav"].map(|name| wav::samples(&desk, name));
+    let bytes = |samples: &[f32]| samples.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+    let frames: Vec<f32> = a.chunks(3).zip(b.chunks(2)).flat_map(|(a, b)| [a, b].concat()).collect();
+    let streamed = desk.run(&["stream", "bank.json", "--format", "f32le"], &bytes(&frames));
+    assert!(streamed.status.success(), "{streamed:?}");
+    assert_eq!(streamed.stdout, bytes(&fused[..streamed.stdout.len() / 4]));
+    assert_eq!(streamed.stdout.len() / 4, a.len() * 2);
+    desk.write("a.raw", bytes(&a));
+    desk.write("b.raw", bytes(&b));
+    let inputs = ["stream", "bank.json", "--format", "f32le", "--input", "a.raw", "--input", "b.raw"];
+    assert_eq!(desk.run(&inputs, &[]).stdout, streamed.stdout);
+    // One file of whole frames.
+    wav::write(&desk, "frames.wav", 5, 8000, &frames);
+    desk.report(&[
+        "fuse",
+        "bank.json",
+        "frames.wav",
+        "-o",
+        "again.wav",
+        "--keep-latency",
+        "--algorithm",
+        "direct",
+    ]);
+    assert_eq!(wav::samples(&desk, "again.wav"), fused);
+    // The output of `fuse` lies on the time axis of the converters: the wait is no part of what is dropped.
+    let report = desk.report(&[
+        "fuse",
+        "bank.json",
+        "cap/ch1.wav",
+        "cap/ch2.wav",
+        "-o",
+        "fused.wav",
+        "--algorithm",
+        "direct",
+    ]);
+    assert_eq!(report["latency_dropped"], 22 - WAIT);
+    assert_eq!(wav::samples(&desk, "fused.wav")[..2900], fused[22 - WAIT..][..2900]);
+}
+
+/// The shortest recording counts, in whole frames.
+#[test]
+fn recordings_of_unequal_length_are_cut_to_whole_frames() {
+    let desk = desk();
+    captured(&desk, &["--samples", "3000"]);
+    let [a, b] = ["cap/ch1.wav", "cap/ch2.wav"].map(|name| wav::samples(&desk, name));
+    wav::write(&desk, "a.wav", 1, 24_000, &a[..1000]);
+    wav::write(&desk, "b.wav", 1, 16_000, &b[..601]);
+    let output = desk.run(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav"], &[]);
+    let message = text(&output.stderr);
+    assert!(
+        output.status.success() && message.contains("a.wav: 100") && message.contains("b.wav: 1"),
+        "{message}"
+    );
+    assert_eq!(wav::samples(&desk, "out.wav").len(), 300 * 6);
+    let longest = desk.report(&[
+        "fuse",
+        "bank.json",
+        "a.wav",
+        "b.wav",
+        "-o",
+        "long.wav",
+        "--longest",
+        "--gaps",
+        "zero",
+    ]);
+    assert_eq!(longest["samples"], 334 * 6);
+    // 334 frames need 1002 and 668 samples.
+    assert_eq!(longest["gaps"]["missing"], 2 + 67, "{longest}");
+}
+
+/// Any number of samples may be lost; they count for their converter.
+#[test]
+fn lost_samples_count_for_their_converter() {
+    let desk = desk();
+    captured(&desk, &["--samples", "6000"]);
+    let [a, b] = ["cap/ch1.wav", "cap/ch2.wav"].map(|name| wav::samples(&desk, name));
+    let (mut nan, mut left_out) = (a.clone(), a.clone());
+    nan[100..107].fill(f32::NAN);
+    left_out.drain(100..107);
+    wav::write(&desk, "nan.wav", 1, 24_000, &nan);
+    wav::write(&desk, "out.wav", 1, 24_000, &left_out);
+    wav::write(&desk, "b.wav", 1, 16_000, &b);
+    let lines = "{\"channel\": 1, \"sample_start\": 100, \"global_index\": 107}\n{\"channel\": 2, \"first\": 40, \"length\": 3}\n";
+    desk.write("lost.jsonl", lines);
+    desk.write("invalid.jsonl", lines.lines().last().unwrap());
+    for policy in ["hold", "zero"] {
+        let fuse = |a: &str, lost: &str, output: &str| {
+            desk.report(&["fuse", "bank.json", a, "b.wav", "--lost", lost, "--gaps", policy, "-o", output])
+        };
+        let marked = fuse("nan.wav", "invalid.jsonl", "one.wav");
+        let cut = fuse("out.wav", "lost.jsonl", "two.wav");
+        for report in [&marked, &cut] {
+            assert_eq!(report["gaps"]["count"], 2, "{report}");
+            let mut list = report["gaps"]["list"].as_array().unwrap().clone();
+            list.sort_by_key(|gap| gap["channel"].as_u64());
+            assert_eq!(list[0], serde_json::json!({ "channel": 1, "first": 100, "length": 7 }));
+            assert_eq!(list[1], serde_json::json!({ "channel": 2, "first": 40, "length": 3 }));
+        }
+        let [one, two] = ["one.wav", "two.wav"].map(|name| wav::samples(&desk, name));
+        assert_eq!(one[..5900], two[..5900], "{policy}");
+        // What stands in is the last good sample of the converter.
+        let mut held = a.clone();
+        held[100..107].fill(if policy == "hold" { a[99] } else { 0.0 });
+        let mut other = b.clone();
+        other[40..43].fill(if policy == "hold" { b[39] } else { 0.01 });
+        wav::write(&desk, "held.wav", 1, 24_000, &held);
+        wav::write(&desk, "other.wav", 1, 16_000, &other);
+        desk.report(&[
+            "fuse",
+            "bank.json",
+            "held.wav",
+            "other.wav",
+            "-o",
+            "want.wav",
+            "--algorithm",
+            "direct",
+        ]);
+        let apart =
+            one.iter().zip(wav::samples(&desk, "want.wav")).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(apart < 1e-6, "{policy}: {apart}");
+    }
+}
+
+#[test]
+fn recordings_must_have_the_rates_of_their_converters() {
+    let desk = desk();
+    captured(&desk, &["--samples", "600"]);
+    desk.refused(
+        1,
+        &["fuse", "bank.json", "cap/ch2.wav", "cap/ch1.wav", "-o", "x.wav"],
+        &["ch2.wav", "16000 Hz", "24000 Hz", "in the order"],
+    );
+    desk.refused(
+        1,
+        &["fuse", "bank.json", "cap/ch1.wav", "-o", "x.wav"],
+        &["converters with rates of their own"],
+    );
+    desk.refused(
+        2,
+        &["fuse", "bank.json", "cap/ch1.wav", "-o", "x.wav", "--interleaved", "2"],
+        &["rates of their own"],
+    );
+}
+
+/// Sizes beyond a minimax design are named, with near rates and the way out.
+#[test]
+fn long_frames_are_refused_with_their_numbers() {
+    let long = "fast_rate = 96000\ntarget = { filter = { family = \"butterworth\", order = 4, cutoff = 18000 } }\n\
+                channel = [{ delay = 0, rate = 44100 }, { delay = 0, rate = 48000 }]\n";
+    let desk = Desk::with_spec(&format!("{long}design = {{ method = \"iir\" }}\n"));
+    let near = ["320 fast samples", "147 and 160", "44000 Hz and 48000 Hz", "h2 with taps"];
+    desk.refused(1, &["design", "spec.toml", "-o", "x.json"], &near);
+    desk.write("odd.toml", long.replace("44100", "44100.5"));
+    desk.refused(1, &["design", "odd.toml", "-o", "x.json"], &["44100.5 Hz", "no simple ratio", "line 3"]);
+    desk.write("early.toml", SPEC.replace("latency = 22", "latency = 3"));
+    desk.refused(1, &["design", "early.toml", "-o", "x.json"], &["latency", "give 4 or more"]);
+    desk.write("both.toml", SPEC.replace("latency = 22", "latency = 22\nratio = 4"));
+    desk.refused(1, &["design", "both.toml", "-o", "x.json"], &["ratio", "leave ratio out"]);
+    desk.write("none.toml", SPEC.replace("rate = \"16 kHz\"\n", ""));
+    desk.refused(1, &["design", "none.toml", "-o", "x.json"], &["ratio", "the rate of every channel"]);
+}
+
+/// Delays, gains and offsets per converter, from recordings at their own rates.
+#[test]
+fn converters_of_unequal_rates_are_calibrated_by_tones() {
+    let desk = Desk::with_spec(SPEC);
+    let errors =
+        ["--delay-error", "0,0.05samples", "--gain-error", "0,2%", "--noise", "1e-4", "--samples", "96000"];
+    let args = [
+        "simulate",
+        "spec.toml",
+        "--source",
+        "tones:1.1kHz,2.3kHz,9.7kHz",
+        "--gain",
+        "0.2",
+        "-o",
+        "cap",
+        "--json",
+    ];
+    desk.good(&[&args[..], &errors[..]].concat());
+    let report = desk.report(&[
+        "calibrate",
+        "spec.toml",
+        "cap/ch1.wav",
+        "cap/ch2.wav",
+        "--tone",
+        "1.1kHz,2.3kHz,9.7kHz",
+        "-o",
+        "measured.toml",
+    ]);
+    let channels = report["channels"].as_array().unwrap();
+    assert_eq!(channels.len(), 2, "{report}");
+    let near = |key: &str, want: f64, most: f64| {
+        let found = &channels[1][key];
+        let (value, half) = (found["value"].as_f64().unwrap(), found["half_width"].as_f64().unwrap());
+        // Three standard deviations, and intervals that say something.
+        assert!((value - want).abs() < 1.6 * half && half < most, "{key}: {found}, {want}");
+    };
+    near("delay_samples", 1.15, 2e-3);
+    near("gain", 1.05 * 1.02, 2e-3);
+    near("offset", 0.01, 1e-4);
+    let written = text(&desk.read("measured.toml"));
+    assert!(
+        written.contains("rate = \"16 kHz\"") && written.contains("# ") == SPEC.contains("# "),
+        "{written}"
+    );
+    // Found tones, and the misfit of a right model.
+    let found = desk.report(&["calibrate", "spec.toml", "cap/ch1.wav", "cap/ch2.wav", "-o", "found.toml"]);
+    assert!(found["misfit"].as_f64().unwrap() < 2.0, "{found}");
+    assert_eq!(found["tones"].as_array().unwrap().len(), 3, "{found}");
+    desk.refused(
+        1,
+        &["calibrate", "spec.toml", "cap/ch1.wav", "cap/ch2.wav", "--blind", "-o", "x.toml"],
+        &["by tones"],
+    );
+}
+
+/// Errors of one converter are one number on the command line.
+#[test]
+fn worst_cases_take_one_error_per_converter() {
+    let spec = SPEC.replace("method = \"h2\"\ntaps = 72\nnoise = 3e-4", "method = \"fir\"\ntaps = 18");
+    let desk = Desk::with_spec(&spec);
+    desk.report(&["design", "spec.toml", "-o", "bank.json"]);
+    let plain = desk.report(&["analyze", "bank.json"]);
+    let moved = desk.report(&["analyze", "bank.json", "--delay-error", "0,0.02samples"]);
+    assert!(moved["gamma"].as_f64().unwrap() > plain["gamma"].as_f64().unwrap(), "{plain} {moved}");
+    desk.refused(1, &["analyze", "bank.json", "--delay-error", "0,0,0,1ns,1ns"], &["2"]);
+}
