@@ -202,8 +202,9 @@ impl Shape {
     }
 }
 
-/// The frames of `x` and their shape. Converters with rates of their own may come as a list of signals, each of its
-/// own length; then the frames are put together, as many as the shortest has. `is_whole` refuses what is beyond.
+/// The frames of `x` and their shape. Converters with rates of their own may come as a list of signals, each
+/// of its own length; then the frames are put together, as many as the shortest has. `is_whole` refuses what
+/// is beyond.
 pub(crate) fn framed<'py>(
     x: &Bound<'py, PyAny>,
     layout: &FrameLayout,

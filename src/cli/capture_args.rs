@@ -127,8 +127,8 @@ impl InterleavedArgs {
         self.by_delay(&bank.delays_in_fast_periods(), &bank.layout(), path)
     }
 
-    /// Channels of the given delays in the order in which they sample, if they take turns. `path` is the file
-    /// that says so.
+    /// Channels of the given delays in the order in which they sample, if they take turns. `path` is the
+    /// file that says so.
     pub(super) fn by_delay(
         self,
         delays: &[FastPeriods],

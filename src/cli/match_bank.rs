@@ -14,8 +14,8 @@ pub(super) fn check_stdin<'a>(inputs: impl Iterator<Item = &'a Path>) -> Result<
     Ok(())
 }
 
-/// Samples per frame of each of so many inputs, for the reader: those of the converters, where each has an input
-/// and a rate of its own.
+/// Samples per frame of each of so many inputs, for the reader: those of the converters, where each has an
+/// input and a rate of its own.
 pub(super) fn samples_per_frame(layout: &FrameLayout, inputs: usize) -> &[usize] {
     if !layout.is_plain() && inputs == layout.samples().len() { layout.samples() } else { &[] }
 }

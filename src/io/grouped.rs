@@ -1,8 +1,8 @@
-//! An input as frames of the consumer: one sample of each of its channels, or several in a row where a converter
-//! samples more often than there are frames.
+//! An input as frames of the consumer: one sample of each of its channels, or several in a row where a
+//! converter samples more often than there are frames.
 //!
-//! What was lost is counted in samples, so a frame may have some of its samples in one block and some in the next,
-//! or some that are lost. Such a frame is put together; all others stay where they were read.
+//! What was lost is counted in samples, so a frame may have some of its samples in one block and some in the
+//! next, or some that are lost. Such a frame is put together; all others stay where they were read.
 
 use super::aligned_input::AlignedInput;
 use super::{PcmFormat, PcmFrames, SampleLayout};
@@ -50,7 +50,8 @@ impl GroupedInput {
         }
     }
 
-    /// Puts a frame together from what is at hand, if no whole frame is; with `end` from what is left in all.
+    /// Puts a frame together from what is at hand, if no whole frame is; with `end` from what is left in
+    /// all.
     pub(super) fn gather(&mut self, end: bool) {
         while self.ready() == 0 && self.aligned.ready() > 0 {
             let count = self.aligned.ready().min(self.per_frame - self.begun());

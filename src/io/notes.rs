@@ -98,8 +98,8 @@ impl OutputNotes {
         }
     }
 
-    /// Adds an annotation about `frames` samples of the input from `first` on, which are its frames unless it has
-    /// several per frame.
+    /// Adds an annotation about `frames` samples of the input from `first` on, which are its frames unless
+    /// it has several per frame.
     pub fn annotate(&mut self, placement: Placement, first: u64, frames: u64, label: &str, comment: &str) {
         let place = |sample: u64| sample.saturating_mul(placement.ratio) / placement.per_frame.max(1);
         let begin = place(first).saturating_add(placement.shift);

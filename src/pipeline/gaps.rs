@@ -17,7 +17,8 @@ pub const LISTED_GAPS: usize = 65_536;
 pub struct Gap {
     /// The channel, from 1.
     pub channel: usize,
-    /// Number of its first sample among those of the converter, from 0: its frame, for converters of one rate.
+    /// Number of its first sample among those of the converter, from 0: its frame, for converters of one
+    /// rate.
     pub first: u64,
     /// Samples that are missing.
     pub length: u64,

@@ -29,8 +29,8 @@ pub struct Captured {
     pub target: Vec<f64>,
 }
 
-/// Captures `periods` slow periods of `signal`, or frames: slow samples k = 0 .. periods of each channel, or so
-/// many times the samples that it has in a frame, and M times as many reference samples.
+/// Captures `periods` slow periods of `signal`, or frames: slow samples k = 0 .. periods of each channel, or
+/// so many times the samples that it has in a frame, and M times as many reference samples.
 pub fn capture(problem: &Problem, signal: &Analog, periods: usize) -> Captured {
     let mut channels: Vec<_> = recordings(problem, signal, periods).collect();
     let target = channels.pop().unwrap_or_default();
@@ -61,8 +61,8 @@ pub(super) fn instants(problem: &Problem, samples: &Range<usize>, periods: usize
     Instants { first: -delay.in_fast_periods(), step, count: periods * samples.len() }
 }
 
-/// The reference samples (phi_0 * f)(n - m0), M per slow period, with the latency m0 of the problem without its
-/// wait. With m0 = 0 they lie on the time axis of the channels, as `fuse` gives its output.
+/// The reference samples (phi_0 * f)(n - m0), M per slow period, with the latency m0 of the problem without
+/// its wait. With m0 = 0 they lie on the time axis of the channels, as `fuse` gives its output.
 pub fn target(problem: &Problem, signal: &Analog, periods: usize) -> Vec<f64> {
     let (first, step) = (FastPeriods(problem.wait as f64 - problem.latency as f64), FastPeriods(1.0));
     let instants = Instants { first, step, count: periods * problem.ratio };

@@ -1,14 +1,14 @@
 //! Frames of converters with sample rates of their own.
 //!
-//! A converter takes sample m at m T_i - D_i, with T_i = p_i / q_i fast periods. The pattern of all converters
-//! repeats after P fast periods, the least common multiple of the p_i. A frame holds what they take in that
-//! time: L_i = P / T_i samples of converter i, from which a bank makes P fast samples. Sample j of a frame is
-//! that of a channel of ratio P with the delay D_ij = D_i - j T_i. So a bank for converters of unequal rates is
-//! a bank for sum L_i channels of one rate.
+//! A converter takes sample m at m T_i - D_i, with T_i = p_i / q_i fast periods. The pattern of all
+//! converters repeats after P fast periods, the least common multiple of the p_i. A frame holds what they
+//! take in that time: L_i = P / T_i samples of converter i, from which a bank makes P fast samples. Sample j
+//! of a frame is that of a channel of ratio P with the delay D_ij = D_i - j T_i. So a bank for converters of
+//! unequal rates is a bank for sum L_i channels of one rate.
 //!
-//! A frame is complete when its last sample is there. The delays of these channels are D_ij + S, where S is the
-//! least whole number of fast periods for which none is negative. So the latency counts from the instant of a
-//! sample, the wait for the rest of its frame included. With equal rates L_i = 1 and S = 0.
+//! A frame is complete when its last sample is there. The delays of these channels are D_ij + S, where S is
+//! the least whole number of fast periods for which none is negative. So the latency counts from the instant
+//! of a sample, the wait for the rest of its frame included. With equal rates L_i = 1 and S = 0.
 
 use super::limits::{self, range};
 use super::{ChannelSpec, DesignSpec, Method, SpecProblem};

@@ -11,8 +11,8 @@ pub const MAX_RATIO: usize = 1024;
 /// Largest number of channels N; see [`MAX_RATIO`].
 pub const MAX_CHANNELS: usize = 1024;
 
-/// Most fast samples and samples of the converters per frame, together, of converters with rates of their own,
-/// except for mean-square taps: a minimax design couples all of them.
+/// Most fast samples and samples of the converters per frame, together, of converters with rates of their
+/// own, except for mean-square taps: a minimax design couples all of them.
 pub(super) const MAX_COUPLED_FRAME: usize = 128;
 
 /// Most taps per channel, for every FIR method.

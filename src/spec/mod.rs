@@ -57,11 +57,11 @@ pub struct Spec {
     pub name: String,
     /// h, the period of the fast samples.
     pub fast_period: Seconds,
-    /// M, fast samples per slow sample; where converters have [rates](ChannelSpec::rate) of their own, P, fast
-    /// samples per frame.
+    /// M, fast samples per slow sample; where converters have [rates](ChannelSpec::rate) of their own, P,
+    /// fast samples per frame.
     pub ratio: usize,
-    /// m0, the latency in fast samples, with the [wait](FrameLayout::wait) for the rest of a frame; `None` lets
-    /// the designer choose.
+    /// m0, the latency in fast samples, with the [wait](FrameLayout::wait) for the rest of a frame; `None`
+    /// lets the designer choose.
     pub latency: Option<usize>,
     /// Phi_0, the filter of the ideal fast converter.
     pub target: FilterSpec,
@@ -257,8 +257,8 @@ impl Spec {
         frames::of_channels(self.fast_period, self.ratio, &self.channels)
     }
 
-    /// The same front ends with a channel of the common slow rate for each sample of a frame, whose delays are
-    /// rounded to seconds; without the uncertainty, which these channels share.
+    /// The same front ends with a channel of the common slow rate for each sample of a frame, whose delays
+    /// are rounded to seconds; without the uncertainty, which these channels share.
     pub fn per_sample(&self) -> Self {
         let layout = self.layout();
         let delays = layout.waited_delays(&self.delays()).into_iter();

@@ -1,5 +1,5 @@
-//! Converters with rates of their own: banks against those for the same samples as channels written by hand, and
-//! errors that the samples of a converter share against brute force.
+//! Converters with rates of their own: banks against those for the same samples as channels written by hand,
+//! and errors that the samples of a converter share against brute force.
 
 use crate::support::random::Random;
 use hybank::bank::{Bank, SynthesisFilters};
@@ -75,8 +75,8 @@ fn equal_rates_are_no_rates() {
     assert!(!json.contains("rate\"") && !json.contains("samples"), "{json}");
 }
 
-/// Against the norms at points of the box, with one error per converter; errors that each sample has for itself
-/// are worse.
+/// Against the norms at points of the box, with one error per converter; errors that each sample has for
+/// itself are worse.
 #[test]
 fn the_samples_of_a_converter_share_its_errors() {
     let own = spec("design = { method = \"fir\", taps = 12 }");
@@ -151,8 +151,8 @@ fn robust_and_tracked_designs_know_one_error_per_converter() {
     }
 }
 
-/// The mean over Gaussian errors of one delay, which the samples of its converter share, by the rule of Gauss and
-/// Hermite with seven points: no other bank tried is better.
+/// The mean over Gaussian errors of one delay, which the samples of its converter share, by the rule of
+/// Gauss and Hermite with seven points: no other bank tried is better.
 #[test]
 fn mean_square_banks_average_over_one_error_per_converter() {
     let deviation = 0.2;

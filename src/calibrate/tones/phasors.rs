@@ -84,8 +84,8 @@ impl<'a> Captures<'a> {
         sines.phasor(self.component(i, direction), t)
     }
 
-    /// The ratios of tone `t` to the reference converter, and their errors. Of a converter with several samples
-    /// per frame the phasors are turned to the first one and averaged.
+    /// The ratios of tone `t` to the reference converter, and their errors. Of a converter with several
+    /// samples per frame the phasors are turned to the first one and averaged.
     pub(super) fn measured(&self, model: &Model, sines: &SineFit, t: usize, reference: usize) -> Measured {
         let frequency = sines.frequencies[t].value;
         let w = TAU * frequency.per_fast_period(model.fast_period).0.abs();

@@ -2,9 +2,9 @@
 //!
 //! At one frequency K = W - sum_i f_i h_i, and the rows h_i of a converter are those of a node that a
 //! [`BoxPlant`] holds. Let (u, v) be the singular vectors of the largest gain of one combination. The rows
-//! that maximise Re (u* K v) are found converter by converter, and their gain is no smaller: |K'| >= Re (u* K' v) >= Re (u* K v) = |K|.
-//! From several combinations at many frequencies this ends at the local maxima. Each of the largest is
-//! then followed between the nodes, and the norm of its plant is computed.
+//! that maximise Re (u* K v) are found converter by converter, and their gain is no smaller: |K'| >= Re (u*
+//! K' v) >= Re (u* K v) = |K|. From several combinations at many frequencies this ends at the local maxima.
+//! Each of the largest is then followed between the nodes, and the norm of its plant is computed.
 //!
 //! So what is found is attained. That nothing larger was missed is not proven; `verify` has an upper bound.
 

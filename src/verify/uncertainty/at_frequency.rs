@@ -1,10 +1,11 @@
 //! The largest gain of the error system at one frequency, over a box of errors.
 //!
 //! At a fixed frequency K = W - sum_i F_i h_i with the columns F_i of the filters and the rows h_i of the
-//! samples of a frame. The rows of one converter have one error, so they are chosen together. Over a part of the box each h_i is a convex mix of its rows at the ends of the part plus a
-//! remainder (`remainder`). The gain is convex, so it is at most the largest gain at a vertex plus what the
-//! remainders add. Gains enter h_i as factors, so their box adds vertices and no remainder. Where the bound
-//! is too large, the part is halved along the side that matters most (`vertex_tree`).
+//! samples of a frame. The rows of one converter have one error, so they are chosen together. Over a part of
+//! the box each h_i is a convex mix of its rows at the ends of the part plus a remainder (`remainder`). The
+//! gain is convex, so it is at most the largest gain at a vertex plus what the remainders add. Gains enter
+//! h_i as factors, so their box adds vertices and no remainder. Where the bound is too large, the part is
+//! halved along the side that matters most (`vertex_tree`).
 
 use super::super::ball::{self, Ball, Matrix};
 use super::super::spectrum::ComplexMatrix;

@@ -1,5 +1,5 @@
-//! The bounds of one sample of a frame: what the cut of its memory leaves out, and its row with the range of its
-//! errors.
+//! The bounds of one sample of a frame: what the cut of its memory leaves out, and its row with the range of
+//! its errors.
 
 use super::super::VerifyError;
 use super::super::ball::{self, Ball, Matrix};
@@ -93,8 +93,8 @@ pub(super) fn signal_transfer(grid: &Grid) -> Option<Transfer> {
 }
 
 impl Channel {
-    /// Sample `i` of a frame of `grid`, with the largest errors that the delay, the gain and the cut-off of its
-    /// `converter` have.
+    /// Sample `i` of a frame of `grid`, with the largest errors that the delay, the gain and the cut-off of
+    /// its `converter` have.
     pub(super) fn new(
         memories: &Memories<'_>,
         i: usize,

@@ -1,6 +1,6 @@
-//! The analog side of a bank whose converters may sample at several instants and with several cut-offs: one slow
-//! period that holds all these samples together, so that all their Gram matrices are parts of one. The samples
-//! that a converter takes in a frame share its errors.
+//! The analog side of a bank whose converters may sample at several instants and with several cut-offs: one
+//! slow period that holds all these samples together, so that all their Gram matrices are parts of one. The
+//! samples that a converter takes in a frame share its errors.
 
 use super::super::VerifyError;
 use super::super::front_ends::FrontEnds;

@@ -1,12 +1,11 @@
 //! The largest gain of the error system at one frequency over a box of errors, with delay-scheduled taps.
 //!
-//! The filters are F(delta) = F_0 + sum_j delta_j S_j, so K(delta) = W - sum_i F_i(delta) h_i(delta_i), written
-//! for converters with one sample per frame; each sample of a converter adds such a term. In a
-//! part of the box with the half-widths d let t be the distances from its centre. Between -d_i and d_i the
-//! row h_i is the parabola through its values at -d_i, 0 and d_i, h_i(0) + t_i b_i + t_i^2 q_i, plus a
-//! remainder r_i ([`super::aliases::Weight::Parabola`]). Put
-//! t_i^2 = d_i^2 - (d_i^2 - t_i^2). The first part leaves a function that is affine in each t_i, so it is a
-//! convex mix of the K at the vertices; the second part is
+//! The filters are F(delta) = F_0 + sum_j delta_j S_j, so K(delta) = W - sum_i F_i(delta) h_i(delta_i),
+//! written for converters with one sample per frame; each sample of a converter adds such a term. In a part
+//! of the box with the half-widths d let t be the distances from its centre. Between -d_i and d_i the row
+//! h_i is the parabola through its values at -d_i, 0 and d_i, h_i(0) + t_i b_i + t_i^2 q_i, plus a remainder
+//! r_i ([`super::aliases::Weight::Parabola`]). Put t_i^2 = d_i^2 - (d_i^2 - t_i^2). The first part leaves a
+//! function that is affine in each t_i, so it is a convex mix of the K at the vertices; the second part is
 //!
 //! ```text
 //! s_i d_i^2 (F_i(delta) q_i + S_ii b_i),   s_i = 1 - t_i^2 / d_i^2 in [0, 1],

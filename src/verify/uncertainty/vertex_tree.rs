@@ -1,8 +1,8 @@
 //! The comparison of the gains over a box with a threshold: a search among the vertices of its parts.
 //!
 //! The vertices form a tree, converter by converter. With a converter still free, each of its rows h_i lies
-//! within r_i of the mean of its vertices, so sigma of the mean plus sum |F_i| r_i bounds the whole branch. Where a branch has many
-//! vertices, multipliers bound them all at once and far better (`multipliers`).
+//! within r_i of the mean of its vertices, so sigma of the mean plus sum |F_i| r_i bounds the whole branch.
+//! Where a branch has many vertices, multipliers bound them all at once and far better (`multipliers`).
 //!
 //! Most gains are compared in double precision (`quick`). Balls decide where that does not suffice, and give
 //! the gains that are reported.

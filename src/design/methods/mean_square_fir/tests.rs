@@ -110,8 +110,8 @@ fn shifted(mut case: Case) -> Case {
     case
 }
 
-/// The same converters with rates of their own, each with the period of its samples, and a latency without the wait
-/// for a frame.
+/// The same converters with rates of their own, each with the period of its samples, and a latency without
+/// the wait for a frame.
 fn own_rates(case: &Case, converters: &[(&Converter, f64)]) -> Spec {
     let channel = |&(converter, period): &(&Converter, f64)| ChannelSpec {
         rate: Some(Hertz(1.0 / period)),
