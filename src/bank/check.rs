@@ -1,8 +1,8 @@
 //! The invariants of every bank, read or designed.
 
 use crate::spec::{
-    FrameSample, MAX_CHANNELS, MAX_ENTRY, MAX_RATIO, Spec, SpecProblem, check_fast_period, check_fraction_bits,
-    check_gain, check_offset,
+    FrameSample, MAX_CHANNELS, MAX_ENTRY, MAX_RATIO, Spec, SpecProblem, check_fast_period,
+    check_fraction_bits, check_gain, check_offset,
 };
 use crate::units::Seconds;
 

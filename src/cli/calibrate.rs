@@ -327,7 +327,7 @@ fn check_channels(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
             "the spec has {} converters with rates of their own and {wanted} samples per frame, but the captures have \
              {given} ({}); give one mono recording per converter",
             spec.channels.len(),
-            names.join(", ")
+            Quoted(names.join(", "))
         )));
     }
     Err(Failure::Input(format!(

@@ -140,7 +140,7 @@ impl InterleavedArgs {
             return Err(Failure::Usage(format!(
                 "--interleaved: the converters of {} have rates of their own, so they do not sample in turn; give one \
                  recording per converter",
-                path.display()
+                Quoted(path)
             )));
         }
         let (channels, ratio) = (delays.len(), layout.ratio());

@@ -133,8 +133,8 @@ pub enum SpecProblem {
     EmptyFilter,
     /// A sample rate in no simple ratio to the fast rate.
     #[error(
-        "a rate of {rate} Hz is in no simple ratio to the fast rate of {fast} Hz, so that the instants of the samples \
-         do not repeat; a rate near it is {}", rates(.near)
+        "a rate of {} Hz is in no simple ratio to the fast rate of {} Hz, so that the instants of the samples \
+         do not repeat; a rate near it is {}", Number(*.rate), Number(*.fast), rates(.near)
     )]
     Rate {
         /// The offending rate.
@@ -189,7 +189,7 @@ fn list(samples: &[u64]) -> String {
 }
 
 fn rates(near: &[f64]) -> String {
-    near.iter().map(|rate| format!("{rate} Hz")).collect::<Vec<_>>().join(" and ")
+    near.iter().map(|rate| format!("{} Hz", Number(*rate))).collect::<Vec<_>>().join(" and ")
 }
 
 fn suggestion(nearest: &Option<&'static str>) -> String {
