@@ -28,7 +28,8 @@ mod hidden;
 mod identity;
 mod rename;
 #[cfg(all(unix, feature = "signals"))]
-pub(crate) mod signals;
+#[doc(hidden)]
+pub mod signals;
 
 pub use atomic::{AtomicFile, commit_all, remove_unfinished};
 #[cfg(feature = "runtime")]

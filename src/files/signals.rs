@@ -33,7 +33,7 @@ pub fn fail_at_file_size_limit() {
 }
 
 /// Hands the signals that end a process to `handle` on a thread of its own; false if that is impossible.
-pub(crate) fn watch(handle: impl FnOnce(Signals) + Send + 'static) -> bool {
+pub fn watch(handle: impl FnOnce(Signals) + Send + 'static) -> bool {
     let (sender, signals) = sync_channel::<Signals>(1);
     // The thread is started first: if that fails, signals keep their default effect.
     let run = move || signals.recv().map_or((), handle);
@@ -57,7 +57,7 @@ fn outlives_terminal() -> bool {
 }
 
 /// Ends the process as `signal` asks, without unfinished files.
-pub(crate) fn end(signal: i32) -> ! {
+pub fn end(signal: i32) -> ! {
     remove_unfinished();
     std::process::exit(128 + signal)
 }

@@ -27,11 +27,11 @@ use crate::bank::Bank;
 
 /// A format of [`export`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[non_exhaustive]
 pub enum Format {
     /// A C99 header with a streaming function
-    #[cfg_attr(feature = "cli", value(name = "c"))]
+    #[cfg_attr(feature = "clap", value(name = "c"))]
     C99,
     /// Comma-separated values, one coefficient per line
     Csv,

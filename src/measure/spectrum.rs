@@ -9,7 +9,7 @@ const J: Complex<f64> = Complex::new(0.0, 1.0);
 /// A window w(n) = sum over k of (-1)^k a_k cos(2 pi k n / N), after Harris (1978) and Albrecht (2001).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[non_exhaustive]
 pub enum Window {
     /// No window

@@ -58,7 +58,10 @@ pub(super) fn range(value: f64, unit: &'static str, rule: impl Into<String>) -> 
 }
 
 /// A value within its range, or the rule. NaN is outside.
-pub(crate) fn within(
+///
+/// # Errors
+/// [`SpecProblem`] with the rule.
+pub fn within(
     value: f64,
     range_of: RangeInclusive<f64>,
     unit: &'static str,
@@ -125,8 +128,11 @@ pub(crate) fn check_optimised_taps(taps: usize, channels: usize) -> Result<(), S
     within(taps.saturating_mul(channels) as f64, 0.0..=MAX_OPTIMISED_TAPS as f64, "taps in all", rule)
 }
 
-/// sigma_i.
-pub(crate) fn check_noise(noise: f64) -> Result<(), SpecProblem> {
+/// sigma_i, the rms of a converter's noise.
+///
+/// # Errors
+/// [`SpecProblem`] with the rule.
+pub fn check_noise(noise: f64) -> Result<(), SpecProblem> {
     let rule =
         "noise is the rms of the converter's noise relative to full scale, from 0 to 1; 1e-4 is -80 dB";
     within(noise, 0.0..=1.0, "of full scale", rule)
@@ -162,7 +168,10 @@ pub(crate) fn check_gain(gain: f64) -> Result<(), SpecProblem> {
 }
 
 /// o_i: a converter whose offset exceeds full scale delivers nothing but clipped samples.
-pub(crate) fn check_offset(offset: f64) -> Result<(), SpecProblem> {
+///
+/// # Errors
+/// [`SpecProblem`] with the rule.
+pub fn check_offset(offset: f64) -> Result<(), SpecProblem> {
     let rule = "offset is what the converter adds to its samples relative to full scale, -1 to 1; 5 steps of a \
                 12-bit converter are 5 / 2048";
     within(offset, -1.0..=1.0, "of full scale", rule)

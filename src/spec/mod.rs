@@ -30,10 +30,9 @@ pub use filter::{Family, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use filter_problem::{FilterProblem, MAX_ORDER};
 pub use frames::{FrameLayout, FrameSample};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS};
-pub(crate) use limits::{MAX_ENTRY, check_fast_period, check_gain, check_offset};
+pub(crate) use limits::{MAX_ENTRY, check_fast_period, check_gain};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES, MAX_TARGET_SNR_DB};
-#[cfg(feature = "cli")]
-pub(crate) use limits::{check_noise, within};
+pub use limits::{check_noise, check_offset, within};
 pub use measured::{FilterModel, FilterModels, MeasuredFilter, Measurement};
 pub use passband::Passband;
 pub use signal::{Band, SignalSpec, SignalSpectrum, USUAL_RMS};
