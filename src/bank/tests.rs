@@ -23,7 +23,7 @@ fn fir() -> Bank {
         delays: vec![Seconds(1.2), Seconds(0.6)],
         gains: vec![1.0; 2],
         offsets: vec![0.0; 2],
-        filters: SynthesisFilters::Fir(vec![vec![0.1, -2.5e-9, 1.0 / 3.0], vec![5e-324, -0.0, 1.7e308]]),
+        filters: SynthesisFilters::Fir(vec![vec![0.1, -2.5e-9, 1.0 / 3.0], vec![5e-324, -0.0, 1.7e149]]),
         gamma: Gamma {
             norm: None,
             upper: Some(0.0399320),
@@ -89,7 +89,7 @@ const FIR_TEXT: &str = r#"{
     "taps": [0.1, -2.5e-9, 0.3333333333333333]
   }, {
     "delay": 0.6,
-    "taps": [5e-324, -0.0, 1.7e+308]
+    "taps": [5e-324, -0.0, 1.7e+149]
   }],
   "state_space": null,
   "gamma": {
@@ -301,7 +301,7 @@ fn every_mistake_names_its_json_place_and_the_remedy() {
         ss.replacen(from, to, 1)
     };
     for (text, path, words) in [
-        (String::new(), "", "EOF"),
+        (String::new(), "", "the text ends"),
         ("[]".into(), "", "expected a table"),
         (FIR_TEXT[..400].into(), "", "line"),
         (fir_with("\"latency\": 10,", "\"latency\": 10, \"latency\": 10,"), "", "given twice"),
@@ -314,7 +314,7 @@ fn every_mistake_names_its_json_place_and_the_remedy() {
         ),
         (fir_with("\"version\": 1", "\"version\": \"1\""), "version", "expected a whole number"),
         (fir_with("\"state_space\"", "\"statespace\""), "", "did you mean \"state_space\""),
-        (last("\"fast_period\": 1.0", "\"fast_period\": 0.0"), "fast_period", "must be a positive"),
+        (last("\"fast_period\": 1.0", "\"fast_period\": 0.0"), "fast_period", "must be positive"),
         (last("\"fast_period\": 1.0", "\"fast_period\": 1e999"), "", "out of range"),
         (last("\"fast_period\": 1.0", "\"fast_period\": null"), "", "the key fast_period is missing"),
         (
@@ -336,9 +336,9 @@ fn every_mistake_names_its_json_place_and_the_remedy() {
         (last("\"delay\": 0.6", "\"dealy\": 0.6"), "channels[1]", "did you mean \"delay\""),
         (last("0.3333333333333333", "null"), "channels[0].taps[2]", "perhaps written for NaN"),
         (last("-0.0", "\"x\""), "channels[1].taps[1]", "expected a number, found a text"),
-        (last(", 1.7e+308", ""), "channels[1].taps", "2 taps, but there must be 3: all filters are as long"),
+        (last(", 1.7e+149", ""), "channels[1].taps", "2 taps, but there must be 3: all filters are as long"),
         (
-            last("\"taps\": [5e-324, -0.0, 1.7e+308]", "\"taps\": null"),
+            last("\"taps\": [5e-324, -0.0, 1.7e+149]", "\"taps\": null"),
             "channels[1]",
             "the key taps is missing",
         ),
@@ -403,9 +403,9 @@ fn deep_nesting_is_an_error() {
     assert!(matches!(refused(&text).problem(), BankProblem::Syntax { .. }));
 }
 
-/// Every finite bit pattern.
+/// Every bit pattern of a number of a bank.
 fn any_double() -> impl Strategy<Value = f64> {
-    any::<u64>().prop_map(f64::from_bits).prop_filter("finite", |x| x.is_finite())
+    any::<u64>().prop_map(f64::from_bits).prop_filter("in range", |x| x.abs() <= 1e150)
 }
 
 proptest! {
@@ -415,10 +415,10 @@ proptest! {
     fn any_bits_survive_the_file(
         taps in prop::collection::vec(prop::collection::vec(any_double(), 17), 1..4),
         gamma in prop::option::of(any_double().prop_map(f64::abs)),
-        fast_period in 1e-300..1e300f64,
+        fast_period in 1e-100..1e100f64,
         latency in 0usize..1000,
     ) {
-        let delays = taps.iter().map(|list| Seconds(list[0].abs())).collect();
+        let delays = taps.iter().map(|list| Seconds(fast_period * (list[0].abs() % 1.0))).collect();
         let gains = taps.iter().map(|list| -1.0 - (list[1] % 1.0).abs()).collect();
         let offsets = taps.iter().map(|list| list[2] % 1.0).collect();
         let gamma = Gamma { upper: gamma, ..Gamma::default() };

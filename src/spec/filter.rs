@@ -14,8 +14,8 @@ pub const MIN_RIPPLE_DB: f64 = 1e-6;
 pub const MAX_RIPPLE_DB: f64 = 300.0;
 
 /// Largest coefficient of a polynomial, and largest gain: they have the dimension of a power of a frequency,
-/// and enter in 512 bits.
-const MAX_COEFFICIENT: f64 = 1e300;
+/// and enter in 512 bits, so only the gain that they have in fast periods has a range.
+const MAX_COEFFICIENT: f64 = f64::MAX;
 
 /// An analog filter as written; stability is checked by [`crate::analog`].
 #[derive(Debug, Clone, PartialEq, Serialize)]

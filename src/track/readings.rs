@@ -111,7 +111,7 @@ mod tests {
     #[test]
     fn what_is_wrong_is_named_with_its_line() {
         for (text, words) in [
-            ("{\"frame\": 3}", "missing field"),
+            ("{\"frame\": 3}", "the key delay is missing"),
             ("{\"frame\": 3, \"delay\": [1], \"half_width\": 1}", "1 delays for 2 channels"),
             ("{\"frame\": 3, \"delay\": [1, 2], \"half_width\": -1}", "zero or more"),
             ("{\"frame\": 3, \"delay\": [1, 2], \"half_width\": [1]}", "no half_width"),

@@ -203,7 +203,7 @@ mod tests {
     #[test]
     fn faults_are_named_with_their_frames() {
         for (from, to, words) in [
-            ("\"frames\"", "\"frame\"", "missing field `frames`"),
+            ("\"frames\"", "\"frame\"", "the key frames is missing"),
             ("[0, 0, 1, 4]", "[0, 0, 1, 1e999]", "line"),
             ("[0, 0, 1, 4]", "[0, 0, 9, 4]", "frame 1 (\"./train/r_0\"): the left part"),
             ("[0, 0, 0, 1]]},", "[0, 0, 1, 1]]},", "last row"),

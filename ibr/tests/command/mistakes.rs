@@ -215,7 +215,12 @@ fn the_scale_of_all_maps_is_one_line() {
     let own = psnr(&format!("{top}{}{target}", tables.replace("depth =", "depth_scale = 100.0\ndepth =")));
     assert!(scaled > 30.0 && scaled == listed && scaled == own, "{scaled} {listed} {own}");
     write(dir.path(), "s.toml", &format!("{top}step = 2\n{target}"));
-    refused(dir.path(), &["render", "s.toml", "-o", "x.png"], 1, &["`step` belongs in [[view]]", "line 2"]);
+    refused(
+        dir.path(),
+        &["render", "s.toml", "-o", "x.png"],
+        1,
+        &["s.toml:2:1: ", "`step` belongs in [[view]]"],
+    );
 }
 
 /// Without `[virtual]` the message names the key to write; a frame without depth is a place too.
