@@ -220,7 +220,7 @@ pub(crate) fn framed<'py>(
         _ => return Ok((x.clone(), shape)),
     };
     if given.len() != converters.len() {
-        return Err(HybankError::new_err(format!(
+        return Err(refused(format!(
             "{} signals for {} converters with rates of their own; give a list with one for each",
             given.len(),
             converters.len()
@@ -232,22 +232,20 @@ pub(crate) fn framed<'py>(
     let length = |one: &Bound<'py, PyAny>| -> PyResult<usize> {
         match one.getattr("shape")?.extract::<Vec<usize>>()?[..] {
             [length] => Ok(length),
-            _ => Err(HybankError::new_err("each signal of a list is an array of one dimension")),
+            _ => Err(refused("each signal of a list is an array of one dimension")),
         }
     };
     let lengths = arrays.iter().map(length).collect::<PyResult<Vec<_>>>()?;
     let frames = lengths.iter().zip(converters).map(|(length, samples)| length / samples).min().unwrap_or(0);
     if is_whole && lengths.iter().zip(converters).any(|(length, samples)| *length != frames * samples) {
-        return Err(HybankError::new_err(format!(
+        return Err(refused(format!(
             "signals of {lengths:?} samples are no whole frames, which hold {converters:?}; keep the rest for the next block"
         )));
     }
     let mut rows = Vec::new();
     for (array, samples) in arrays.iter().zip(converters) {
         if !array.getattr("dtype")?.eq(arrays[0].getattr("dtype")?)? {
-            return Err(HybankError::new_err(
-                "the signals of a list have different types; convert them to one",
-            ));
+            return Err(refused("the signals of a list have different types; convert them to one"));
         }
         let part = array.get_item(PySlice::new(x.py(), 0, (frames * samples) as isize, 1))?;
         rows.push(part.call_method1("reshape", (frames, *samples))?);

@@ -17,9 +17,12 @@ impl Bank {
                 Err(BuildError::FilterCount { delays: channels, filters: taps.len() })
             }
             SynthesisFilters::Fir(taps) => Plan::from_taps(taps, self.ratio, self.output_delay(), options),
-            SynthesisFilters::StateSpace(filter) => {
-                Plan::from_state_space(filter, Shape { channels, ratio: self.ratio }, self.output_delay(), options)
-            }
+            SynthesisFilters::StateSpace(filter) => Plan::from_state_space(
+                filter,
+                Shape { channels, ratio: self.ratio },
+                self.output_delay(),
+                options,
+            ),
         };
         plan?.with_offsets(&self.layout().each(&self.offsets))
     }

@@ -94,7 +94,10 @@ impl fmt::Display for Unfinished {
             return write!(f, "the search found no bound below {objective}; it ended because {reason}");
         }
         let width = 100.0 * self.width;
-        write!(f, "{objective} may lie up to {width:.2e} % above the least; the search ended because {reason}")
+        write!(
+            f,
+            "{objective} may lie up to {width:.2e} % above the least; the search ended because {reason}"
+        )
     }
 }
 
@@ -112,6 +115,8 @@ mod tests {
         assert!(open.to_string().contains("gamma may lie up to 1.00e2 % above the least"), "{open}");
         let square = |lower: f64| Unfinished::of_mean_square(lower, 1.0, EndOfSearch::Rounding);
         assert_eq!(square(0.995), None);
-        assert!(square(0.5).unwrap().to_string().contains("the mean square of error and noise may lie up to"));
+        assert!(
+            square(0.5).unwrap().to_string().contains("the mean square of error and noise may lie up to")
+        );
     }
 }

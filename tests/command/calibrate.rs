@@ -288,7 +288,10 @@ fn values_that_the_captures_contradict_are_not_written() {
     assert!(code == Some(1) && !desk.path("m.toml").exists(), "{shown}");
     let refusal = ["contradict the spec", "times as much as their noise", "--force"];
     let explanation = "delay,gain,offset,cutoff together have a misfit of";
-    assert!(refusal.iter().chain([&explanation, &"--fit takes that list"]).all(|part| shown.contains(part)), "{shown}");
+    assert!(
+        refusal.iter().chain([&explanation, &"--fit takes that list"]).all(|part| shown.contains(part)),
+        "{shown}"
+    );
     let (code, shown) = run(&["--force"]);
     assert!(code == Some(0) && desk.path("m.toml").exists() && shown.contains(explanation), "{shown}");
     // The fit that is named agrees.

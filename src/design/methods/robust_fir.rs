@@ -170,16 +170,7 @@ fn least_worst_norm(
     let mut scenarios: Vec<_> = exchange.locations().iter().map(|location| &location.scenario).collect();
     scenarios.sort();
     scenarios.dedup();
-    Ok(RobustTaps {
-        peak,
-        norms,
-        lower,
-        scenarios: scenarios.len(),
-        pairs,
-        iterations,
-        taps,
-        unfinished,
-    })
+    Ok(RobustTaps { peak, norms, lower, scenarios: scenarios.len(), pairs, iterations, taps, unfinished })
 }
 
 /// The error of fixed taps over the box.
