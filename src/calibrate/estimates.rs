@@ -1,11 +1,11 @@
 //! What a calibration found, and a spec with these values.
 
-use super::fit::{Cutoff, Kind};
+use super::fit::Kind;
 use super::model::{Model, Point};
 use super::warning::Warning;
 use crate::linalg::Mat;
 use crate::sine_fit::Estimate;
-use crate::spec::{HALF_WIDTH, PerChannel, Spec, UncertaintySpec};
+use crate::spec::{Cutoff, HALF_WIDTH, PerChannel, Spec, UncertaintySpec};
 use crate::units::{FastPeriods, Hertz, Seconds};
 
 /// Largest condition of an information matrix with unit diagonal. Beyond it two parameters have the same

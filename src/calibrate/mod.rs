@@ -53,10 +53,12 @@ pub use agreement::{Agreement, ENOUGH_FRAMES, Verdict, agreement, frames_for_agr
 pub use contradiction::Contradiction;
 pub use error::CalibrateError;
 pub use estimates::{Calibration, ChannelEstimate, Tone, applied};
-pub use fit::{Cutoff, Fit, Fitting, UnknownFitting};
+pub use fit::Fit;
 pub(crate) use model::Model;
 pub use record::{Acquisition, Record};
 pub use warning::Warning;
+
+pub use crate::spec::{Cutoff, Fitting, UnknownFitting};
 
 use crate::spec::Spec;
 use crate::units::{FastPeriods, Hertz};

@@ -2,10 +2,10 @@
 //! and the present values. Time counts in fast periods.
 
 use super::error::CalibrateError;
-use super::fit::{Cutoff, Fit, Kind};
+use super::fit::{Fit, Kind};
 use crate::analog::{AnalogError, StableFilter, StrictlyProper};
 use crate::linalg::{CMat, Complex};
-use crate::spec::{Band, ChannelSpec, FilterSpec, SignalSpec, Spec};
+use crate::spec::{Band, ChannelSpec, Cutoff, FilterSpec, SignalSpec, Spec};
 use crate::units::{Hertz, RadiansPerFastPeriod, Seconds};
 use std::f64::consts::TAU;
 

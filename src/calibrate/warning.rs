@@ -1,7 +1,8 @@
 //! What a reader of the estimates must know.
 
 use super::error::list;
-use super::fit::{Cutoff, Fit};
+use super::fit::Fit;
+use crate::spec::Cutoff;
 use crate::units::{FastPeriods, Hertz};
 
 /// A property of the captures that limits what the estimates mean.

@@ -80,6 +80,13 @@ pub struct Measurement {
     pub spectrum: Spectrum,
 }
 
+impl Measurement {
+    /// The largest line of interleaving, also if it is below the noise; `None` for a single converter.
+    pub fn worst_interleaving(&self) -> Option<&Spur> {
+        self.spurs.iter().find(|spur| spur.causes.first().is_some_and(|cause| cause.is_interleaving()))
+    }
+}
+
 /// A fitted tone.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Tone {
@@ -155,7 +162,7 @@ fn measured(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Mea
         Err(MeasureError::Fit(TonesCoincide { .. } | AtEdge { .. } | NoTone { .. }))
             if settings.tones.is_empty() =>
         {
-            Err(MeasureError::Fit(NoTone { near: None }))
+            Err(MeasureError::Fit(NoTone { near: None, lines: Vec::new() }))
         }
         result => result,
     }

@@ -68,10 +68,12 @@ pub enum SineFitError {
         second: Hertz,
     },
     /// Nothing stands out of the noise.
-    #[error("no tone found{}", no_tone_text(*near))]
+    #[error("no tone found{}", nothing(*near, lines))]
     NoTone {
         /// Where it was looked for; `None` for anywhere.
         near: Option<Hertz>,
+        /// Where lines are instead, from the largest, below half the rate.
+        lines: Vec<Hertz>,
     },
     /// Gauss-Newton did not settle, or left the neighbourhood of its start.
     #[error(
@@ -85,11 +87,18 @@ pub enum SineFitError {
     },
 }
 
-fn no_tone_text(near: Option<Hertz>) -> String {
-    let anywhere =
-        ": the largest peak of the spectrum is not above its noise; give a record with a sine wave";
-    near.map_or_else(
-        || anywhere.to_owned(),
-        |near| format!(" near {near}: no peak of the spectrum is above the noise there; check the frequency"),
-    )
+/// Where there is no tone, and where there are lines.
+fn nothing(near: Option<Hertz>, lines: &[Hertz]) -> String {
+    let Some(near) = near else {
+        return ": the largest peak of the spectrum is not above its noise; give a record with a sine wave".into();
+    };
+    let list: Vec<String> = lines.iter().map(|line| format!("{line:.3}")).collect();
+    match &list[..] {
+        [] => format!(" near {near}: no peak of the spectrum is above the noise there; check the frequency"),
+        [one] => format!(" near {near}: the only line of the record appears at {one}; give its frequency"),
+        more => format!(
+            " near {near}: the lines of the record appear at {} (largest first); give the frequency of one of them",
+            more.join(", ")
+        ),
+    }
 }

@@ -114,7 +114,9 @@ impl LeastSquares for State<'_> {
 
     fn error(&self, why: NoMinimum) -> SineFitError {
         match why {
-            NoMinimum::WithoutEffect(k) => SineFitError::NoTone { near: Some(self.tone(k)) },
+            NoMinimum::WithoutEffect(k) => {
+                SineFitError::NoTone { near: Some(self.tone(k)), lines: Vec::new() }
+            }
             NoMinimum::Dependent => self.dependent(self.frequencies.len() - 1),
             NoMinimum::NoConvergence(iterations) => {
                 SineFitError::NoConvergence { frequency: self.tones[0], iterations }

@@ -5,12 +5,16 @@ use super::{Channel, SineFitError, alias};
 use crate::linalg::fourier;
 use crate::units::{Decibels, Hertz};
 use std::f64::consts::{LN_2, TAU};
+use std::ops::Range;
 
 /// A peak is a tone if its power is this many times ln(bins) times the mean noise power per bin. The largest
 /// of B bins of Gaussian noise exceeds c ln B times the mean with probability B^(1-c).
 const SIGNIFICANCE: f64 = 4.0;
 /// A peak below this share of the largest sample is the rounding of the transform.
 const ROUNDING: f64 = 1e-13;
+/// Lines that are named where a tone is missing, and how far below the largest.
+const NAMED_LINES: usize = 5;
+const NAMED_RANGE: Decibels = Decibels(60.0);
 /// Half the width of the main lobe of a Hann window in bins.
 const LOBE: usize = 2;
 
@@ -48,7 +52,7 @@ pub fn find_tones(
         tones = found.frequencies.iter().map(|f| f.value).collect();
         records = channels.iter().enumerate().map(|(i, c)| found.residual(i, c.samples)).collect();
     }
-    if tones.is_empty() { Err(SineFitError::NoTone { near: None }) } else { Ok(tones) }
+    if tones.is_empty() { Err(SineFitError::NoTone { near: None, lines: Vec::new() }) } else { Ok(tones) }
 }
 
 /// The start for a fit of the tone near `near`, in any Nyquist zone: the largest peak whose alias is within
@@ -66,8 +70,11 @@ pub fn locate(
     let power = Power::of(&records);
     let (cycles, width) = (near / rate, within / rate);
     let folded = alias(cycles);
-    let found = power.peak(folded - width..folded + width, power.largest);
-    let found = found.ok_or(SineFitError::NoTone { near: Some(near) })?;
+    let found = power.maximum(folded - width..folded + width, power.largest);
+    let Some(found) = found else {
+        let lines = find_tones(channels, rate, NAMED_LINES, NAMED_RANGE).unwrap_or_default();
+        return Err(SineFitError::NoTone { near: Some(near), lines });
+    };
     let zone = cycles.round();
     let sign = if cycles >= zone { 1.0 } else { -1.0 };
     Ok(rate * (zone + sign * found))
@@ -102,15 +109,30 @@ impl Power {
 
     /// The largest significant peak with an alias in `range`, in cycles per sample, interpolated. `largest`
     /// is the size of the samples, which bounds the rounding errors.
-    fn peak(&self, range: std::ops::Range<f64>, largest: f64) -> Option<f64> {
+    fn peak(&self, range: Range<f64>, largest: f64) -> Option<f64> {
+        let at = self.largest_bin(range)?;
+        self.is_significant(at, largest).then(|| self.interpolated(at))
+    }
+
+    /// The same, if it is a maximum: the skirt of a line outside the range is none. Its bin may be the next
+    /// one outside.
+    fn maximum(&self, range: Range<f64>, largest: f64) -> Option<f64> {
+        let at = self.largest_bin(range)?;
+        let inner = 1..self.bins.len().saturating_sub(1);
+        let power = |m: usize| if inner.contains(&m) { self.bins[m] } else { 0.0 };
+        let at = [at - 1, at + 1].into_iter().fold(at, |at, m| if power(m) > power(at) { m } else { at });
+        let is_maximum = power(at) >= power(at - 1) && power(at) >= power(at + 1);
+        (is_maximum && self.is_significant(at, largest)).then(|| self.interpolated(at))
+    }
+
+    /// The largest bin with an alias in `range`.
+    fn largest_bin(&self, range: Range<f64>) -> Option<usize> {
         let bin = |cycles: f64| (cycles * self.length as f64).max(0.0);
         // The first bins hold the rest of the constant, the last one is half the rate.
         let first = (bin(range.start).floor() as usize).max(1);
         let last = (bin(range.end).ceil() as usize).min(self.bins.len().saturating_sub(2));
         let inside = first..=last.max(first);
-        let at =
-            inside.filter(|&m| m < self.bins.len()).max_by(|&a, &b| self.bins[a].total_cmp(&self.bins[b]))?;
-        self.is_significant(at, largest).then(|| self.interpolated(at))
+        inside.filter(|&m| m < self.bins.len()).max_by(|&a, &b| self.bins[a].total_cmp(&self.bins[b]))
     }
 
     fn is_significant(&self, at: usize, largest: f64) -> bool {

@@ -76,7 +76,7 @@ fn noise_and_constants_hold_no_tone() {
     for seed in 0..20 {
         let samples = noisy(&vec![1.0; 3000], 1.0, &mut Random(seed));
         let found = find_tones(&[Channel::new(&samples)], RATE, 3, Decibels(60.0));
-        assert!(matches!(found, Err(SineFitError::NoTone { near: None })), "{seed}: {found:?}");
+        assert!(matches!(found, Err(SineFitError::NoTone { near: None, .. })), "{seed}: {found:?}");
     }
     for constant in [0.0, 1.0, 0.1, -1e9] {
         let found = find_tones(&[Channel::new(&[constant; 777])], RATE, 1, Decibels(60.0));
@@ -316,7 +316,7 @@ fn what_cannot_be_fitted_is_refused() {
     let refused = fit(&one, RATE, &[RATE * 0.4]);
     assert!(refused.is_err(), "{refused:?}");
     let zero = [Channel::new(&[0.0; 100])];
-    assert!(matches!(fit(&zero, RATE, &tone), Err(SineFitError::NoTone { near: Some(_) })));
+    assert!(matches!(fit(&zero, RATE, &tone), Err(SineFitError::NoTone { near: Some(_), .. })));
     let refused = locate(&one, RATE, RATE * 0.4, RATE * 0.01);
-    assert!(matches!(refused, Err(SineFitError::NoTone { near: Some(_) })), "{refused:?}");
+    assert!(matches!(refused, Err(SineFitError::NoTone { near: Some(_), .. })), "{refused:?}");
 }

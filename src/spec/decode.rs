@@ -7,25 +7,27 @@ use super::measured::{FilterModel, FilterModels, MeasuredFilter, Measurement, no
 use super::reader::{Either, Fields, Value};
 use super::word_lengths::{WordLengths, check_fraction_bits};
 use super::{
-    ChannelSpec, DesignSpec, Fault, FrameLayout, PerChannel, Spec, SpecProblem, UncertaintySpec, frames,
-    limits, signal,
+    ChannelSpec, DesignSpec, Fault, FrameLayout, PerChannel, Spec, SpecProblem, UncertaintySpec, fitting,
+    frames, limits, signal,
 };
 use crate::quantity::Time;
 use crate::units::{Decibels, FastPeriods, GridTime, Hertz, Seconds};
 
-const TOP_KEYS: [&str; 11] = [
+const TOP_KEYS: [&str; 12] = [
     "name",
     "fast_period",
     "fast_rate",
     "ratio",
     "latency",
     "full_scale",
+    "fit",
     "target",
     "channel",
     "signal",
     "uncertainty",
     "design",
 ];
+const TARGET_KEYS: [&str; 1] = ["filter"];
 const CHANNEL_KEYS: [&str; 9] =
     ["delay", "delay_samples", "rate", "filter", "noise", "bits", "jitter", "gain", "offset"];
 const DESIGN_KEYS: [&str; 11] = [
@@ -63,6 +65,30 @@ pub(crate) fn spec_with(
     overrides: DesignOverrides,
     models: &FilterModels<'_>,
 ) -> Result<Spec, Fault> {
+    whole(document, overrides, models).map_err(|mut fault| {
+        if let SpecProblem::UnknownKey { key, homes, .. } = &mut *fault.problem {
+            *homes = tables_with(key);
+        }
+        fault
+    })
+}
+
+/// The tables that have a key of this name.
+fn tables_with(key: &str) -> Vec<&'static str> {
+    let filter = FILTER_FORMS.concat();
+    let all: [(&[&str], &'static str); 7] = [
+        (&TOP_KEYS, "at the top of the file, before the first table"),
+        (&TARGET_KEYS, "under [target]"),
+        (&CHANNEL_KEYS, "under [[channel]]"),
+        (&signal::KEYS, "under [signal]"),
+        (&DESIGN_KEYS, "under [design]"),
+        (&UNCERTAINTY_KEYS, "under [uncertainty]"),
+        (&filter, "in a filter, filter = { .. }"),
+    ];
+    all.iter().filter(|(keys, _)| keys.contains(&key)).map(|(_, home)| *home).collect()
+}
+
+fn whole(document: &Value<'_>, overrides: DesignOverrides, models: &FilterModels<'_>) -> Result<Spec, Fault> {
     let top = document.fields(&TOP_KEYS)?;
     let name = top.read("name", |v| v.text())?.unwrap_or_default().to_owned();
     let h = fast_period(&top)?;
@@ -73,9 +99,10 @@ pub(crate) fn spec_with(
     }
     let latency = top.read("latency", |v| v.count_in("fast samples", limits::check_latency))?;
     let full_scale = top.read("full_scale", |v| v.full_scale())?;
+    let fit = top.read("fit", |v| fitting::read(&v))?.unwrap_or_default();
     let target = top
         .required("target", "describe the filter of the ideal fast converter, [target] filter = { .. }")?
-        .fields(&["filter"])?;
+        .fields(&TARGET_KEYS)?;
     let target = front_end(&target.required("filter", "give the target's analog filter")?, h, models)?;
     let signal = top.read("signal", |v| signal::read(&v))?;
     let table = top.read("design", |v| v.fields(&DESIGN_KEYS))?;
@@ -107,6 +134,7 @@ pub(crate) fn spec_with(
         ratio,
         latency,
         full_scale,
+        fit,
         target,
         channels,
         signal,
@@ -214,6 +242,9 @@ fn noise(fields: &Fields<'_>) -> Result<Option<f64>, Fault> {
 fn channels(top: &Fields<'_>, common: &Common<'_>) -> Result<Vec<(ChannelSpec, Decibels)>, Fault> {
     let list = top
         .required("channel", "describe every slow converter in a table of its own, [[channel]] delay = ..")?;
+    if list.is_table() {
+        return Err(list.fault(SpecProblem::SingleTable { key: "channel" }));
+    }
     let items = list.items("a list of tables, each headed [[channel]]")?;
     limits::check_channel_count(items.len()).map_err(|problem| list.fault(problem))?;
     items.iter().map(|item| channel(item, common)).collect()

@@ -59,10 +59,18 @@ pub enum SpecProblem {
         message: String,
     },
     /// A key that no table of this kind has.
-    #[error("unknown key \"{}\"{}; the keys here are {}", Quoted(.key), suggestion(.nearest), .known.join(", "))]
+    #[error(
+        "unknown key \"{}\"{}{}; the keys here are {}",
+        Quoted(.key),
+        suggestion(.nearest),
+        elsewhere(.homes),
+        .known.join(", ")
+    )]
     UnknownKey {
         /// The key as written.
         key: String,
+        /// The tables that have this very key.
+        homes: Vec<&'static str>,
         /// A known key with a similar spelling.
         nearest: Option<&'static str>,
         /// All known keys.
@@ -125,6 +133,20 @@ pub enum SpecProblem {
         method: &'static str,
         /// Names of methods that read the key.
         remedy: &'static str,
+    },
+    /// A list of values to fit that cannot be.
+    #[error("{message}")]
+    Fit {
+        /// The rule and the remedy.
+        message: String,
+    },
+    /// One table where there is one for each converter.
+    #[error(
+        "[{key}] is a single table, and each converter has one of its own; head each with two brackets, [[{key}]]"
+    )]
+    SingleTable {
+        /// The key of the tables.
+        key: &'static str,
     },
     /// A filter table without any filter.
     #[error(
@@ -194,6 +216,15 @@ fn rates(near: &[f64]) -> String {
 
 fn suggestion(nearest: &Option<&'static str>) -> String {
     nearest.map(|key| format!(", did you mean \"{key}\"?")).unwrap_or_default()
+}
+
+/// Where a key would be right.
+fn elsewhere(homes: &[&str]) -> String {
+    match homes {
+        [] => String::new(),
+        [one] => format!(", which belongs {one}"),
+        [more @ .., last] => format!(", which belongs {} or {last}", more.join(", ")),
+    }
 }
 
 /// A path of keys as people read it: channels count from 1, `channel[0].delay` is `channel 1.delay`.

@@ -11,6 +11,7 @@ mod error;
 mod filter;
 mod filter_problem;
 mod filter_reader;
+mod fitting;
 mod frames;
 mod limits;
 mod measured;
@@ -28,6 +29,7 @@ pub(crate) use error::{Fault, shown_path};
 pub use error::{SpecError, SpecProblem};
 pub use filter::{Family, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use filter_problem::{FilterProblem, MAX_ORDER};
+pub use fitting::{Cutoff, Fitting, UnknownFitting};
 pub use frames::{FrameLayout, FrameSample};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS};
 pub(crate) use limits::{MAX_ENTRY, check_fast_period, check_gain};
@@ -46,6 +48,7 @@ use crate::messages::of_document;
 use crate::quantity::{self, FullScale};
 use crate::units::{FastPeriods, GridTime, Hertz, Seconds};
 use serde::{Deserialize, Deserializer, Serialize};
+use std::ops::Range;
 
 /// A spec with the units resolved (seconds) and the omitted channel filters filled in.
 ///
@@ -66,6 +69,8 @@ pub struct Spec {
     pub target: FilterSpec,
     /// Full scale of captures whose format does not say it, such as tables; 1 if `None`.
     pub full_scale: Option<FullScale>,
+    /// What a calibration fits unless it is told otherwise; empty for delays, gains and offsets.
+    pub fit: Vec<Fitting>,
     /// The real channels, in the order of the recordings.
     pub channels: Vec<ChannelSpec>,
     /// What the analog signal is; `None` weighs every frequency alike.
@@ -140,6 +145,16 @@ fn is_one(gain: &f64) -> bool {
     *gain == 1.0
 }
 
+/// The problem of a text that is no TOML, and where it is. A second heading [channel] is one.
+fn unparsed(text: &str, error: &toml::de::Error) -> (SpecProblem, Option<Range<usize>>) {
+    let (message, span) = document::syntax(error, text);
+    let place = error.span().and_then(|span| text.get(span)).unwrap_or_default();
+    let is_channel = place.trim_matches(['[', ']', ' ']) == "channel";
+    let is_second = is_channel && error.message().contains("duplicate");
+    let single = SpecProblem::SingleTable { key: "channel" };
+    (if is_second { single } else { SpecProblem::Syntax { message } }, span)
+}
+
 impl Spec {
     /// Reads a spec file's text; `file_name` is used only in messages.
     ///
@@ -176,8 +191,8 @@ impl Spec {
         models: &FilterModels<'_>,
     ) -> Result<Self, SpecError> {
         let document = document::Node::from_toml(text).map_err(|error| {
-            let (message, span) = document::syntax(&error, text);
-            SpecError::new(file_name, text, span, String::new(), SpecProblem::Syntax { message })
+            let (problem, span) = unparsed(text, &error);
+            SpecError::new(file_name, text, span, String::new(), problem)
         })?;
         decode::spec_with(&reader::Value::root(&document), overrides, models)
             .map_err(|fault| SpecError::of(file_name, text, fault))
@@ -216,6 +231,7 @@ impl Spec {
         self.latency.map_or(Ok(()), limits::check_latency)?;
         // A full scale is right if what is written of it is.
         self.full_scale.map_or(Ok(()), |scale| quantity::full_scale(&scale.to_string()).map(drop))?;
+        fitting::check(&self.fit)?;
         self.target.check()?;
         limits::check_channel_count(self.channels.len())?;
         for channel in &self.channels {

@@ -189,6 +189,11 @@ impl<'a> Value<'a> {
         matches!(self.node.kind, Kind::List(_))
     }
 
+    /// Whether it is a table.
+    pub(crate) fn is_table(&self) -> bool {
+        matches!(self.node.kind, Kind::Table(_))
+    }
+
     /// A list of numbers. Paths are built only for errors, since tap lists are long.
     pub(crate) fn numbers(&self) -> Result<Vec<f64>, Fault> {
         let Kind::List(items) = &self.node.kind else { return Err(self.wrong_type("a list of numbers")) };
@@ -231,7 +236,7 @@ impl<'a> Value<'a> {
         match entries.iter().find(|entry| !known.contains(&entry.key.as_str())) {
             Some(Entry { key, key_span, .. }) => {
                 let (key, nearest, known) = (key.clone(), nearest(key, known), known.to_vec());
-                let problem = SpecProblem::UnknownKey { key, nearest, known };
+                let problem = SpecProblem::UnknownKey { key, homes: Vec::new(), nearest, known };
                 Err(Fault { span: key_span.clone(), ..self.fault(problem) })
             }
             None => Ok(Fields { entries, whole: self.clone() }),

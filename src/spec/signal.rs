@@ -97,9 +97,12 @@ impl SignalSpec {
     }
 }
 
+/// The keys of the table.
+pub(super) const KEYS: [&str; 4] = ["band", "filter", "floor_db", "rms"];
+
 /// Reads the table.
 pub(super) fn read(item: &Value<'_>) -> Result<SignalSpec, Fault> {
-    let fields = item.fields(&["band", "filter", "floor_db", "rms"])?;
+    let fields = item.fields(&KEYS)?;
     let spectrum = spectrum(&fields)?;
     let floor_db = fields.read("floor_db", |v| match &spectrum {
         SignalSpectrum::Filter(_) => Err(v.fault(needless_floor())),

@@ -7,7 +7,7 @@ use super::document::Node;
 use super::filter_reader::filter;
 use super::reader::Value;
 use super::{
-    ChannelSpec, DesignOverrides, DesignSpec, FilterSpec, SignalSpec, Spec, UncertaintySpec, decode,
+    ChannelSpec, DesignOverrides, DesignSpec, FilterSpec, Fitting, SignalSpec, Spec, UncertaintySpec, decode,
 };
 use crate::quantity::FullScale;
 use crate::units::Seconds;
@@ -24,6 +24,8 @@ struct Document<'a> {
     latency: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     full_scale: Option<FullScale>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    fit: &'a [Fitting],
     target: Target<'a>,
     channel: &'a [ChannelSpec],
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -47,6 +49,7 @@ impl Serialize for Spec {
             ratio: self.layout().is_plain().then_some(self.ratio),
             latency: self.latency,
             full_scale: self.full_scale,
+            fit: &self.fit,
             target: Target { filter: &self.target },
             channel: &self.channels,
             signal: self.signal.as_ref(),

@@ -42,6 +42,7 @@ fn bank(
         ratio,
         latency: Some(latency),
         full_scale: None,
+        fit: Vec::new(),
         target,
         channels: filters.into_iter().zip(delays).map(channel).collect(),
         signal: None,

@@ -32,6 +32,7 @@ fn plant(seed: u64, method: Method) -> Spec {
     let taps = dice.count(1, 6 * ratio);
     Spec {
         full_scale: None,
+        fit: Vec::new(),
         name: String::new(),
         fast_period: Seconds(1.0),
         ratio,
@@ -168,6 +169,7 @@ fn four_at_48_khz(taps: usize) -> Spec {
     let channel = |&delay: &f64| ChannelSpec::new(Seconds(delay), filter.clone());
     Spec {
         full_scale: None,
+        fit: Vec::new(),
         name: String::new(),
         fast_period: Seconds(1.0),
         ratio: 4,
@@ -242,6 +244,7 @@ fn a_common_delay_adds_to_the_latency() {
         let channel = |delay: f64| ChannelSpec::new(Seconds(common + delay), filter.clone());
         Spec {
             full_scale: None,
+            fit: Vec::new(),
             name: String::new(),
             fast_period: Seconds(1.0),
             ratio: 2,

@@ -61,6 +61,7 @@ fn unreduced(seed: u64) -> Spec {
     let design = DesignSpec::new(method, (method == Method::Fir).then_some(taps));
     Spec {
         full_scale: None,
+        fit: Vec::new(),
         name: String::new(),
         fast_period: Seconds(1.0),
         ratio,

@@ -38,6 +38,7 @@ pub(crate) fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &
     let channel = |&delay: &f64| ChannelSpec::new(Seconds(delay), filter.clone());
     Spec {
         full_scale: None,
+        fit: Vec::new(),
         name: String::new(),
         fast_period: Seconds(1.0),
         ratio,

@@ -327,7 +327,7 @@ fn what_cannot_be_measured_is_refused() {
     let refused = with(Settings { converters: 16, ..Settings::default() });
     assert!(matches!(refused, MeasureError::TooShort { samples: 100, .. }), "{refused}");
     let refused = with(Settings { tones: vec![RATE * 0.4], ..Settings::default() });
-    assert!(matches!(refused, MeasureError::Fit(SineFitError::NoTone { near: Some(_) })), "{refused}");
+    assert!(matches!(refused, MeasureError::Fit(SineFitError::NoTone { near: Some(_), .. })), "{refused}");
     for empty in [vec![], vec![1.0; 50], vec![f64::NAN; 50]] {
         assert!(matches!(measure(&empty, RATE, &Settings::default()), Err(MeasureError::Fit(_))));
     }

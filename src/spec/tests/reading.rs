@@ -26,6 +26,7 @@ fn the_thesis_example_is_read() {
         ratio: 2,
         latency: Some(10),
         full_scale: None,
+        fit: Vec::new(),
         target: thesis.clone(),
         channels: vec![ChannelSpec::new(Seconds(1.2), thesis), ChannelSpec::new(Seconds(0.6), zpk)],
         signal: None,
@@ -45,6 +46,14 @@ fn full_scale_is_a_number_or_codes() {
     assert_eq!(full_scale("\"2.5\""), Some(FullScale::Number(2.5)));
     assert_eq!(full_scale("\"u12bits\""), Some(FullScale::Unsigned(12)));
     assert_eq!(read(THESIS).full_scale, None);
+}
+
+#[test]
+fn what_is_fitted_is_a_list_of_names() {
+    let text = thesis_with("latency = 10", "latency = 10\nfit = [\"delay\", \"cutoff:2\"]");
+    let spec = read(&text);
+    assert_eq!(spec.fit, [Fitting::Delay, Fitting::Cutoff(Cutoff::Stage(1))]);
+    assert_eq!(read(&spec.to_toml().unwrap()), spec);
 }
 
 #[test]

@@ -25,6 +25,33 @@ fn an_unknown_key_is_named_with_line_neighbour_and_all_known_keys() {
     assert_eq!(text, expected);
 }
 
+/// A key in the wrong table is named with the right one, and so is a single table of the channels.
+#[test]
+fn keys_and_tables_in_the_wrong_place_are_sent_to_the_right_one() {
+    let design = thesis_with("latency = 10", "").replace("[design]", "[design]\nlatency = 10");
+    let line = 1 + design[..design.find("latency").unwrap()].matches('\n').count();
+    refused(
+        &design,
+        line,
+        "\"latency\", which belongs at the top of the file, before the first table; the keys",
+    );
+    let bare = thesis_with("[target]\nfilter", "filter");
+    refused(
+        &bare,
+        7,
+        "\"filter\", which belongs under [target], under [[channel]] or under [signal]; the keys",
+    );
+    refused(&thesis_with("[target]", "[filter]"), 7, "which belongs under [target]");
+    refused(&thesis_with("ratio = 2", "ratio = 2\ntaps = 8"), 5, "which belongs under [design]");
+    refused(&thesis_with("ratio = 2", "ratio = 2\ncutoff = 8"), 5, "or in a filter, filter = { .. }");
+    let single = "head each with two brackets, [[channel]]";
+    let twice = THESIS.replace("[[channel]]", "[channel]");
+    let second = 1 + twice[..twice.rfind("[channel]").unwrap()].matches('\n').count();
+    refused(&twice, second, single);
+    let once = &twice[..twice.rfind("[channel]").unwrap()];
+    assert!(message(once).contains(single), "{}", message(once));
+}
+
 #[test]
 fn every_mistake_has_its_line_and_its_message() {
     for (from, to, line, words) in [
@@ -132,6 +159,9 @@ fn every_mistake_has_its_line_and_its_message() {
         ("[design]", "[[design]]", 16, "expected a table"),
         ("latency = 10", "full_scale = 0", 5, "write the number that is full scale"),
         ("latency = 10", "full_scale = '8V'", 5, "\"V\""),
+        ("latency = 10", "fit = ['delay', 'cutoff:0']", 5, "delay, gain, offset and cutoff can be fitted"),
+        ("latency = 10", "fit = ['cutoff', 'cutoff:2']", 5, "cutoff and cutoff:2 have one factor for each"),
+        ("latency = 10", "fit = 'delay'", 5, "expected a list of names"),
     ] {
         refused(&thesis_with(from, to), line, words);
     }

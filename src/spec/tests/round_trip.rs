@@ -90,6 +90,7 @@ prop_compose! {
         let by_snr = method.reads("target_snr_db") && ratio % 3 == 0;
         Spec {
             name, fast_period, ratio, latency, target,
+            fit: [vec![], vec![Fitting::Gain, Fitting::Cutoff(Cutoff::Stage(ratio))]][ratio % 2].clone(),
             full_scale: [None, Some(FullScale::Number(1e3 * fast_period.0.fract() + 0.1)), Some(FullScale::Unsigned(12))][ratio % 3],
             channels: channels.into_iter().map(|(d, filter)| ChannelSpec { noise: 1e-4 * d.fract(), bits: (d > 5.0).then_some(d as u32), jitter: fast_period * (0.1 * d.fract()), gain: 0.9 + d.floor() % 3.0 / 10.0, offset: (d % 2.0 - 1.0).min(0.0), ..ChannelSpec::new(fast_period * d, filter) }).collect(),
             signal,

@@ -1,0 +1,120 @@
+//! The values of the channels that a calibration fits.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Serialize, Serializer};
+
+use super::reader::Value;
+use super::{Fault, FilterSpec, SpecProblem};
+
+/// A value of a channel that can be fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fitting {
+    /// The delay.
+    Delay,
+    /// The gain.
+    Gain,
+    /// The offset.
+    Offset,
+    /// The cut-off frequency of the front end, or of a part of it.
+    Cutoff(Cutoff),
+}
+
+/// The part of a front end whose frequencies one factor scales.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cutoff {
+    /// The whole filter.
+    Whole,
+    /// One stage of a cascade, from 0.
+    Stage(usize),
+}
+
+impl Cutoff {
+    /// `filter` with the frequencies of this part multiplied by `factor`; `None` if it has no such stage.
+    pub fn scaled(self, filter: &FilterSpec, factor: f64) -> Option<FilterSpec> {
+        match self {
+            Self::Whole => Some(filter.with_cutoff_scaled(factor)),
+            Self::Stage(stage) => filter.with_stage_scaled(stage, factor),
+        }
+    }
+}
+
+/// The list of a spec.
+pub(super) fn read(value: &Value<'_>) -> Result<Vec<Fitting>, Fault> {
+    let one = |item: &Value<'_>| {
+        item.text()?.parse().map_err(|error| item.fault(SpecProblem::Fit { message: format!("{error}") }))
+    };
+    let list = value.items("a list of names, as in [\"delay\", \"gain\", \"cutoff:2\"]")?;
+    let list = list.iter().map(one).collect::<Result<Vec<_>, _>>()?;
+    check(&list).map_err(|problem| value.fault(problem))?;
+    Ok(list)
+}
+
+/// One factor of each channel scales one part of its front end.
+pub(super) fn check(list: &[Fitting]) -> Result<(), SpecProblem> {
+    let cutoffs: Vec<String> =
+        list.iter().filter(|value| matches!(value, Fitting::Cutoff(_))).map(Fitting::to_string).collect();
+    if cutoffs.len() < 2 {
+        return Ok(());
+    }
+    let message = format!("{} have one factor for each channel; keep one of them", cutoffs.join(" and "));
+    Err(SpecProblem::Fit { message })
+}
+
+/// As it is written: `cutoff`, or `cutoff:2` for the second stage.
+impl fmt::Display for Fitting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Delay => f.write_str("delay"),
+            Self::Gain => f.write_str("gain"),
+            Self::Offset => f.write_str("offset"),
+            Self::Cutoff(Cutoff::Whole) => f.write_str("cutoff"),
+            Self::Cutoff(Cutoff::Stage(stage)) => write!(f, "cutoff:{}", stage + 1),
+        }
+    }
+}
+
+impl Serialize for Fitting {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl FromStr for Fitting {
+    type Err = UnknownFitting;
+
+    fn from_str(text: &str) -> Result<Self, UnknownFitting> {
+        let stage = |text: &str| text.parse::<usize>().ok()?.checked_sub(1);
+        match (text, text.strip_prefix("cutoff:").and_then(stage)) {
+            (_, Some(stage)) => Ok(Self::Cutoff(Cutoff::Stage(stage))),
+            ("delay", _) => Ok(Self::Delay),
+            ("gain", _) => Ok(Self::Gain),
+            ("offset", _) => Ok(Self::Offset),
+            ("cutoff", _) => Ok(Self::Cutoff(Cutoff::Whole)),
+            _ => Err(UnknownFitting),
+        }
+    }
+}
+
+/// A name that is none of a value that can be fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "delay, gain, offset and cutoff can be fitted, and cutoff:2 for the second stage of the filters' cascades"
+)]
+pub struct UnknownFitting;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_go_both_ways_and_a_wrong_one_is_refused() {
+        for name in ["delay", "gain", "offset", "cutoff", "cutoff:1", "cutoff:12"] {
+            assert_eq!(name.parse::<Fitting>().unwrap().to_string(), name);
+        }
+        for wrong in ["", "cutoff:", "cutoff:0", "cutoff:-1", "cutoff:99999999999999999999", "delays"] {
+            assert_eq!(wrong.parse::<Fitting>(), Err(UnknownFitting), "{wrong}");
+        }
+    }
+}
