@@ -5,7 +5,7 @@ use crate::{Banks, Figure, Outcome};
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::design::error_response;
 use hybank::design::responses::{analysis_gains, fir_response, front_end_gains, impulse_responses};
-use hybank::plot::{Chart, Series};
+use hybank::plot::{AxisScale, Chart, Series};
 use hybank::units::{Hertz, RadiansPerFastPeriod};
 use std::f64::consts::{PI, TAU};
 
@@ -93,10 +93,11 @@ fn frequency(k: usize) -> f64 {
 /// |Phi| and the row norms of the norm-equivalent H_i. H_i itself depends on the choice of a square
 /// root, its row norm does not.
 fn analysis(bank: &Bank) -> Outcome<Chart> {
-    let analog = front_end_gains(bank, POINTS)?;
-    let equivalent = analysis_gains(bank, POINTS)?;
-    let curve = |all: &[(Hertz, Vec<f64>)], index: usize| {
-        all.iter().map(|(f, gains)| (TAU * f.0, decibels(gains[index]))).collect()
+    let frequencies: Vec<Hertz> = (0..POINTS).map(|k| Hertz(frequency(k) / TAU)).collect();
+    let analog = front_end_gains(bank, &frequencies)?;
+    let equivalent = analysis_gains(bank, &frequencies)?;
+    let curve = |all: &[Vec<f64>], index: usize| {
+        frequencies.iter().zip(all).map(|(f, gains)| (TAU * f.0, decibels(gains[index]))).collect()
     };
     let mut curves = vec![("front end Phi".to_owned(), curve(&analog, 0))];
     curves.extend((0..=bank.channel_count()).map(|i| (format!("H_{i}"), curve(&equivalent, i))));
@@ -161,7 +162,7 @@ fn error(banks: &Banks) -> Outcome<Chart> {
 /// A chart of named curves.
 pub(super) fn chart(title: &str, x: &str, y: &str, curves: Vec<(String, Vec<(f64, f64)>)>) -> Chart {
     let series = curves.into_iter().map(|(label, points)| Series { label, points }).collect();
-    Chart { title: title.into(), x_label: x.into(), y_label: y.into(), series }
+    Chart { title: title.into(), x_label: x.into(), x_scale: AxisScale::Linear, y_label: y.into(), series }
 }
 
 /// States of a recursive bank.

@@ -2,6 +2,7 @@
 
 use crate::answer::{Answer, Refusal, text};
 use hybank::bank::Bank;
+use hybank::figures::Figures;
 use hybank::design::{Design, GammaScale, Options, Stage, analyze_mean};
 use hybank::overview::{self, Facts, counted};
 use hybank::spec::Spec;
@@ -68,6 +69,7 @@ impl Designed {
 fn warnings(spec: &Spec, bank: &Bank) -> Result<Vec<String>, Refusal> {
     let mean = analyze_mean(bank).map_err(Refusal::new)?;
     let scale = GammaScale::new(bank).map_err(Refusal::new)?;
+    let figures = Figures::new(bank).map_err(Refusal::new)?;
     let found = hybank::design::warnings(spec).unwrap_or_default();
-    Ok(found.into_iter().chain(overview::warnings(bank, &mean, &scale)).collect())
+    Ok(found.into_iter().chain(overview::warnings(bank, &mean, &scale, &figures)).collect())
 }

@@ -258,6 +258,7 @@ class Bank:
         *,
         format: Literal["c99", "csv", "npz", "mat", "coe", "mem"],
         name: str = "bank",
+        input_bits: int | None = None,
         overwrite: bool = True,
     ) -> None: ...
     @property

@@ -74,10 +74,18 @@ impl Bank {
     }
 
     /// Writes the bank for another tool: `c99`, `csv`, `npz`, `mat`, `coe` or `mem`. `name` is the prefix of
-    /// C identifiers.
-    #[pyo3(signature = (path, *, format, name = "bank", overwrite = true))]
-    fn export(&self, path: PathBuf, format: &str, name: &str, overwrite: bool) -> PyResult<()> {
-        let bytes = export(&self.bank, choose("format", format, &FORMATS)?, name).map_err(refused)?;
+    /// C identifiers, and `input_bits` are those of the samples from which integer code subtracts offsets.
+    #[pyo3(signature = (path, *, format, name = "bank", input_bits = None, overwrite = true))]
+    fn export(
+        &self,
+        path: PathBuf,
+        format: &str,
+        name: &str,
+        input_bits: Option<u32>,
+        overwrite: bool,
+    ) -> PyResult<()> {
+        let bytes =
+            export(&self.bank, choose("format", format, &FORMATS)?, name, input_bits).map_err(refused)?;
         write_file(&path, &bytes, overwrite)
     }
 

@@ -1,7 +1,8 @@
 //! `fuse --bit-true`: integer taps on the integers of the captures, as hardware has them.
 
+use super::before_after::BeforeAfter;
 use super::output::{Bits, begin_samples};
-use super::print::{Failure, name, warn};
+use super::print::{Failure, name, print, warn};
 use super::run::{Job, each_block, interrupted, print_report};
 use crate::bank::Bank;
 use crate::files::commit_all;
@@ -17,7 +18,7 @@ pub(super) struct BitTrueArgs {
     /// Run the integer taps of the bank on the integers of the captures, as hardware and the exported C do:
     /// exact sums, each rounded to the nearest integer, halves upwards, and saturated at the bits of the
     /// captures. The output has their bits
-    #[arg(long, conflicts_with_all = ["gaps", "track", "measure", "algorithm", "bits", "threads", "report"])]
+    #[arg(long, conflicts_with_all = ["gaps", "track", "algorithm", "bits", "threads", "report"])]
     bit_true: bool,
     /// Bits of the accumulator with --bit-true; sums that do not fit wrap around
     #[arg(long, value_name = "BITS", requires = "bit_true", default_value_t = 64, value_parser = clap::value_parser!(u8).range(8..=64))]
@@ -39,6 +40,9 @@ struct Report {
     wrapped: u64,
     /// Output samples that saturated.
     saturated: u64,
+    /// The figures of plain interleaving and of the output, with --measure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    measure: Option<BeforeAfter>,
 }
 
 impl BitTrueArgs {
@@ -47,11 +51,16 @@ impl BitTrueArgs {
     }
 
     /// Fuses all that `reader` gives.
-    pub(super) fn fuse(self, job: &Job<'_>, reader: &mut MultiReader) -> Result<(), Failure> {
+    pub(super) fn fuse(
+        self,
+        job: &Job<'_>,
+        reader: &mut MultiReader,
+        measured: impl FnOnce() -> Result<Option<BeforeAfter>, Failure>,
+    ) -> Result<(), Failure> {
         let rate = job.output_rate(reader)?;
         let format = integer_format(reader)?;
         let bits = 8 * format.bytes() as u32;
-        let words = WordSizes { accumulator: self.accumulator.into(), output: bits };
+        let words = WordSizes { input: bits, accumulator: self.accumulator.into(), output: bits };
         let model = BitTrue::new(job.bank, words)
             .map_err(|error| Failure::Input(format!("{}: {error}", name(job.bank_path))))?;
         let header = OutputHeader { container: Container::Wav, format, is_complex: false, rate };
@@ -63,17 +72,18 @@ impl BitTrueArgs {
         if is_stopped {
             return Err(interrupted(frames));
         }
-        run.flush(job.bank.frame_samples())?;
-        let report = Report {
+        run.flush()?;
+        let mut report = Report {
             samples: run.samples,
             rate: rate.round() as u64,
             frames,
             latency_dropped: skip,
             bits,
             accumulator_bits: self.accumulator.into(),
-            needed_accumulator_bits: run.model.needed_bits(bits),
+            needed_accumulator_bits: run.model.needed_bits(),
             wrapped: run.model.wraps(),
             saturated: run.model.saturations(),
+            measure: None,
         };
         let warnings: Vec<String> =
             reader.warnings().iter().map(ToString::to_string).chain(report.warnings()).collect();
@@ -82,7 +92,12 @@ impl BitTrueArgs {
         }
         commit_all(run.output.finish().map_err(Failure::running)?).map_err(Failure::input)?;
         warnings.iter().for_each(|warning| warn(warning));
-        if job.args.json { print_report(&report, job.output) } else { Ok(()) }
+        report.measure = measured()?;
+        match &report.measure {
+            _ if job.args.json => print_report(&report, job.output),
+            Some(figures) => print(&figures.text()),
+            None => Ok(()),
+        }
     }
 }
 
@@ -151,10 +166,10 @@ impl Run {
         Self { model, output, format, skip, owed: skip, ratio: bank.ratio, samples: 0 }
     }
 
-    /// Frames of zeros, until M samples have come out for each frame of the captures.
-    fn flush(&mut self, channels: usize) -> Result<(), Failure> {
-        let frames = self.owed.div_ceil(self.ratio);
-        let mut fast = self.filtered(&vec![0; frames * channels], channels);
+    /// Frames without a signal, until M samples have come out for each frame of the captures.
+    fn flush(&mut self) -> Result<(), Failure> {
+        let (frames, resting) = (self.owed.div_ceil(self.ratio), self.model.resting());
+        let mut fast = self.filtered(&resting.repeat(frames), resting.len());
         fast.truncate(self.owed);
         self.write(&fast)
     }

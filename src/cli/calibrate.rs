@@ -1,9 +1,9 @@
 //! `hybank calibrate`: delays, gains, offsets and cut-offs of the channels from captures.
 
-use super::bank_file::{parse_spec, read_kind};
+use super::bank_file::{bad_flag, parse_spec, read_kind};
 use super::calibrate_report::Report;
 use super::capture_args::{CaptureArgs, InterleavedArgs};
-use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, Whole, start};
+use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, Whole, rails_of, start};
 use super::file_kind::FileKind;
 use super::interrupt::interrupts;
 use super::match_bank::{channels_of_raw, check_stdin, samples_per_frame};
@@ -76,8 +76,9 @@ pub(super) struct Args {
     #[arg(long, value_name = "I")]
     reference: Option<usize>,
     /// What to fit: delay, gain, offset, cutoff, or cutoff:2 for the cut-offs of the second stages of the
-    /// filters' cascades; the rest keeps the values of the spec
-    #[arg(long, value_name = "VALUE,..", value_delimiter = ',', default_value = "delay,gain,offset")]
+    /// filters' cascades; the rest keeps the values of the spec [default: `fit` of the spec, or
+    /// delay,gain,offset]
+    #[arg(long, value_name = "VALUE,..", value_delimiter = ',')]
     fit: Vec<Fitting>,
     /// Captures of the same converters to check the calibrated spec with, of the same kind of signal
     #[arg(long, value_name = "HOLDOUT", num_args = 1..)]
@@ -287,7 +288,11 @@ impl Args {
     }
 
     fn settings(&self, spec: &Spec) -> Result<Settings, Failure> {
-        let fit = self.fit.iter().fold(Fit::NOTHING, |fit, &value| fit.with(value));
+        Spec { fit: self.fit.clone(), ..spec.clone() }
+            .check()
+            .map_err(|problem| bad_flag("fit", &problem))?;
+        let given = if self.fit.is_empty() { &spec.fit } else { &self.fit };
+        let fit = if given.is_empty() { Fit::default() } else { given.iter().copied().collect() };
         let known = spec.uncertainty.as_ref().and_then(|table| table.reference_channel());
         let reference = match self.reference {
             Some(0) => return Err(Failure::Usage("--reference 0: channels count from 1".into())),
@@ -355,21 +360,11 @@ fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
     }
 }
 
-/// Integers and codes clip at the rails. Floats within +-1 clip there, or at 1 - q if that is their
-/// largest value and all are multiples of q, a power of two: the steps of a converter.
-fn record(samples: Vec<f64>, rails: Option<(f64, f64)>, clip: Option<f64>) -> Record {
-    if let Some(level) = clip {
-        return Record::within(samples, -level, level);
-    }
-    match rails {
+/// Samples beyond the rails, or of this size if a level is given, are clipped.
+fn record(samples: Vec<f64>, of_format: Option<(f64, f64)>, clip: Option<f64>) -> Record {
+    let rails = clip.map(|level| (-level, level));
+    match rails.or_else(|| rails_of(samples.iter().copied(), of_format)) {
         Some((lowest, highest)) => Record::within(samples, lowest, highest),
-        None if samples.iter().all(|x| x.is_nan() || x.abs() <= 1.0) => {
-            let top = samples.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let step = 1.0 - top;
-            let is_code = |x: &f64| x.is_nan() || (x / step).fract() == 0.0;
-            let is_quantised = step > 0.0 && step.log2().fract() == 0.0 && samples.iter().all(is_code);
-            Record::within(samples, -1.0, if is_quantised { top } else { 1.0 })
-        }
         None => Record::new(samples),
     }
 }
@@ -383,6 +378,8 @@ mod tests {
         let clipped = |samples: &[f64], rails, clip| record(samples.to_vec(), rails, clip).clipped;
         let s16 = Some((-1.0, 32767.0 / 32768.0));
         assert_eq!(clipped(&[-1.0, 0.0, 32767.0 / 32768.0, 0.99], s16, None), 2);
+        // A converter of 12 bits in words of 16.
+        assert_eq!(clipped(&[-1.0, 0.0, 2047.0 / 2048.0, 0.5], s16, None), 2);
         assert_eq!(clipped(&[-1.0, 0.0, 1.0, 0.99], None, None), 2);
         assert_eq!(clipped(&[-1.0, 0.0, 2047.0 / 2048.0, 0.5], None, None), 2);
         assert_eq!(clipped(&[-1.0, 0.0, 0.9375, 0.9], None, None), 1);

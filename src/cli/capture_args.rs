@@ -36,16 +36,21 @@ pub(super) fn coding(name: &str) -> Result<Coding, String> {
 impl CaptureArgs {
     /// Refuses impossible combinations; `takes_turns` with --interleaved.
     pub(super) fn check(self, takes_turns: bool) -> Result<(), Failure> {
-        let message = match self {
-            Self { channel: Some(_), .. } if takes_turns => {
-                "--channel and --interleaved: converters that take turns share one channel; extract it first"
-            }
-            Self { channels: Some(_), format: Coding::Wav | Coding::Csv, .. } => {
-                "--channels: captures with headers state their channels; give the --format of raw captures"
-            }
-            _ => return Ok(()),
-        };
-        Err(Failure::Usage(message.into()))
+        if self.channel.is_some() && takes_turns {
+            let message =
+                "--channel and --interleaved: converters that take turns share one channel; extract it first";
+            return Err(Failure::Usage(message.into()));
+        }
+        check_channels(self.channels, self.format)
+    }
+
+    /// What was given, as it is typed.
+    pub(super) fn typed(self) -> String {
+        let format = (self.format != Coding::Wav).then(|| format!(" --format {}", self.format));
+        let channels = self.channels.map(|channels| format!(" --channels {channels}"));
+        let scale = self.scale.given().map(|scale| format!(" --full-scale {scale}"));
+        let channel = self.channel.map(|channel| format!(" --channel {channel}"));
+        [format, channels, scale, channel].into_iter().flatten().collect()
     }
 
     /// For a recording that the one called `file` is compared with: what the options say of the format holds
@@ -65,8 +70,19 @@ impl CaptureArgs {
         let single = if inputs == 1 && self.channel.is_none() { wanted } else { 1 };
         let channels = self.channels.map_or(single, usize::from);
         let only = self.channel.map(|channel| usize::from(channel) - 1);
-        let full_scale = self.scale.full_scale;
+        let full_scale = self.scale.given();
         ReadOptions { coding: self.format, channels, only, full_scale, ..ReadOptions::files() }
+    }
+}
+
+/// Refuses a number of channels for captures that state theirs.
+pub(super) fn check_channels(channels: Option<u16>, format: Coding) -> Result<(), Failure> {
+    match (channels, format) {
+        (Some(_), Coding::Wav | Coding::Csv) => Err(Failure::Usage(
+            "--channels: captures with headers state their channels; give the --format of raw captures"
+                .into(),
+        )),
+        _ => Ok(()),
     }
 }
 
@@ -77,21 +93,42 @@ pub(super) struct ScaleArgs {
     /// number (128, 2.5), or the codes of a converter: 8bits from -128 to 127, u8bits from 0 to 255
     /// [default: that of the spec, or 1]
     #[arg(long, value_name = "X", value_parser = quantity::full_scale)]
-    pub(super) full_scale: Option<FullScale>,
+    full_scale: Option<FullScale>,
+    /// Bits of a converter whose codes such captures are: --full-scale 8bits is the same as 8
+    #[arg(long, value_name = "B", value_parser = codes, conflicts_with = "full_scale")]
+    sample_bits: Option<FullScale>,
+}
+
+/// Signed codes of so many bits.
+fn codes(bits: &str) -> Result<FullScale, String> {
+    let scale = quantity::full_scale(&format!("{}bits", bits.trim())).ok();
+    scale
+        .filter(|scale| matches!(scale, FullScale::Signed(_)))
+        .ok_or_else(|| "give the bits of a converter, 1 to 53; for codes from 0 --full-scale u8bits".into())
 }
 
 impl ScaleArgs {
+    /// The full scale, if it is given.
+    pub(super) fn given(self) -> Option<FullScale> {
+        self.full_scale.or(self.sample_bits)
+    }
+
     /// Refuses a full scale for captures none of which lacks one.
     pub(super) fn check(self, reader: &MultiReader) -> Result<(), Failure> {
-        match (self.full_scale, reader.headers().next()) {
-            (Some(scale), Some((input, _))) if reader.headers().all(|(_, header)| header.is_scaled) => {
-                Err(Failure::Usage(format!(
-                    "--full-scale {scale}: {} states its full scale by its format; leave the option out",
-                    Quoted(input)
-                )))
-            }
-            _ => Ok(()),
+        check_scale(self.given(), reader)
+    }
+}
+
+/// Refuses a full scale on the command line for captures none of which lacks one.
+pub(super) fn check_scale(given: Option<FullScale>, reader: &MultiReader) -> Result<(), Failure> {
+    match (given, reader.headers().next()) {
+        (Some(scale), Some((input, _))) if reader.headers().all(|(_, header)| header.is_scaled) => {
+            Err(Failure::Usage(format!(
+                "--full-scale {scale}: {} states its full scale by its format; leave the option out",
+                Quoted(input)
+            )))
         }
+        _ => Ok(()),
     }
 }
 
@@ -109,6 +146,11 @@ impl InterleavedArgs {
     /// True if converters take turns.
     pub(super) fn is_given(self) -> bool {
         self.interleaved.is_some()
+    }
+
+    /// What was given, as it is typed.
+    pub(super) fn typed(self) -> String {
+        self.interleaved.map_or_else(String::new, |converters| format!(" --interleaved {converters}"))
     }
 
     /// Refuses more than one input, before any file is read.

@@ -1,6 +1,6 @@
 //! Recordings in memory, with what must be known about their format.
 
-use super::capture_args::ScaleArgs;
+use super::capture_args::check_scale;
 use super::file_kind::unreadable;
 use super::print::{Failure, is_dash, name, warn};
 use crate::io::{Arrival, MultiReader, PcmFrames, ReadOptions};
@@ -39,10 +39,11 @@ pub(super) struct Reading {
 }
 
 impl Reading {
-    /// Channel `channel` (from 1) of a file with a header.
+    /// Channel `channel` (from 1) of a file with a header and a full scale of its own.
     pub(super) fn channel(channel: Option<usize>, most: usize) -> Self {
         let only = channel.map(|channel| channel.saturating_sub(1));
-        Self { options: ReadOptions { only, ..ReadOptions::files() }, rate: None, most }
+        let options = ReadOptions { only, ..ReadOptions::files() };
+        Self { options, rate: None, most }
     }
 }
 
@@ -63,7 +64,7 @@ impl CaptureFile {
         whole: fn(&mut MultiReader, usize) -> Result<Whole, Failure>,
     ) -> Result<Self, Failure> {
         let mut reader = start(&[path.to_owned()], reading.options, crossbeam_channel::never())?;
-        ScaleArgs { full_scale: reading.options.full_scale }.check(&reader)?;
+        check_scale(reading.options.full_scale, &reader)?;
         let channels = reader.channels();
         if channels != 1 {
             let file = Quoted(name(path));
@@ -120,6 +121,24 @@ impl CaptureFile {
         }
         Ok(self)
     }
+}
+
+/// The lowest and the highest value of samples, at which they clip: those of their format. If no sample is
+/// beyond full scale, and all are multiples of the distance q from the largest one to 1, a power of two,
+/// they are the steps of a converter and the rails are -1 and 1 - q. `None` for floats some of which are
+/// beyond.
+pub(super) fn rails_of(
+    samples: impl Iterator<Item = f64> + Clone,
+    of_format: Option<(f64, f64)>,
+) -> Option<(f64, f64)> {
+    if samples.clone().any(|x| x.abs() > 1.0) {
+        return of_format;
+    }
+    let top = samples.clone().fold(f64::NEG_INFINITY, f64::max);
+    let step = 1.0 - top;
+    let is_code = |x: f64| x.is_nan() || (x / step).fract() == 0.0;
+    let is_quantised = step > 0.0 && step.log2().fract() == 0.0 && samples.clone().all(is_code);
+    if is_quantised { Some((-1.0, top)) } else { of_format.or(Some((-1.0, 1.0))) }
 }
 
 /// A reader of the headers of all inputs.

@@ -5,7 +5,7 @@ use super::print::{Failure, show};
 use super::written::{Mono, create_folder, write_recordings, write_text};
 use crate::design::{self, Problem};
 use crate::messages::Quoted;
-use crate::plot::{Chart, Marks, PlotError, Series};
+use crate::plot::{AxisScale, Chart, Marks, PlotError, Series};
 use crate::simulate::{Analog, Captured, Source, Tone, capture};
 use crate::spec::Spec;
 use crate::units::{Decibels, Hertz, Seconds};
@@ -164,11 +164,14 @@ impl Pictures<'_> {
         };
         let marks = |contender: &Contender| Marks {
             label: contender.name.into(),
+            colour: None,
+            are_rings: false,
             points: window.clone().map(|n| (time(n) * 1e3, contender.samples[n], String::new())).collect(),
         };
         let chart = Chart {
             title: "Around the step: chirp, tones and step through the converters".into(),
             x_label: "time after the step, ms".into(),
+            x_scale: AxisScale::Linear,
             y_label: "amplitude, 1 = full scale".into(),
             series: vec![
                 curve("ideal fast converter", &self.captured.target),
@@ -200,6 +203,7 @@ impl Pictures<'_> {
         Chart {
             title: "Error while the chirp rises from 50 Hz to 13 kHz, step at 1 s".into(),
             x_label: "time, s".into(),
+            x_scale: AxisScale::Linear,
             y_label: "RMS error in 20 ms, dB of full scale".into(),
             series: self.contenders.iter().map(curve).collect(),
         }

@@ -83,7 +83,8 @@ pub(super) struct Args {
     /// Make every warning about the spec and the bank an error
     #[arg(long)]
     strict: bool,
-    /// Replace an existing bank file
+    /// Replace an existing bank file, and write a bank that is of no use: its gamma above 0.9 of that of
+    /// zero output, or less than 10 dB of the signal's SNR
     #[arg(long)]
     force: bool,
     /// Print all figures: gamma with its scale and its bounds, the mean errors, word lengths, order,
@@ -141,6 +142,9 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let found = progress.during(limit, give_up, || design::design(&spec, &options)).in_file(&args.spec)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
     let mut judged = Judged::new(&found.bank).in_file(&args.spec)?;
+    if !args.force {
+        judged.check_useful(&found.bank).in_file(&args.spec)?;
+    }
     warn_or_refuse(&judged.warnings(&found.bank), args.strict)?;
     write_text(&args.output, &found.bank.to_json().map_err(Failure::input)?, args.force)?;
     judged.hint = BandHint::new(&found, seconds).in_file(&args.spec)?;

@@ -8,7 +8,9 @@ use crate::design::{
 };
 use crate::figures::Figures;
 use crate::messages::Quoted;
-use crate::overview::{Fact, counted, decibels, figure_facts, frequency, six_digits, understood, warnings};
+use crate::overview::{
+    Fact, counted, decibels, figure_facts, frequency, six_digits, understood, uselessness, warnings,
+};
 use crate::spec::Method;
 use crate::units::Hertz;
 use crate::verify::{BoundedBanks, Verified};
@@ -75,7 +77,17 @@ impl Judged {
 
     /// What a user of the bank should know.
     pub(super) fn warnings(&self, bank: &Bank) -> Vec<String> {
-        warnings(bank, &self.mean, &self.scale)
+        warnings(bank, &self.mean, &self.scale, &self.figures)
+    }
+
+    /// Refuses a bank that is of no use.
+    pub(super) fn check_useful(&self, bank: &Bank) -> Result<(), String> {
+        match uselessness(bank, &self.scale, &self.figures) {
+            Some(reason) => {
+                Err(format!("the bank would be of no use, so it is not written: {reason}; --force writes it"))
+            }
+            None => Ok(()),
+        }
     }
 }
 

@@ -13,16 +13,18 @@ use std::path::PathBuf;
 /// Writes a bank for other tools: C99, CSV, NumPy, MATLAB, FPGA memory
 ///
 /// The order of FIR taps is the same in every format: channel, then phase of the output, then lag in slow
-/// periods. coe and mem hold integer taps (`hybank design --bits`). sos is a table of the second-order
-/// sections of a recursive bank at the slow rate: the filter from a channel to a phase of the output is the
-/// sum of its sections z^-delay (b0 + b1 z^-1 + b2 z^-2) / (a0 + a1 z^-1 + a2 z^-2). Its first line is a
-/// comment with the gamma of the sections as they are written.
+/// periods. coe and mem hold integer taps (`hybank design --bits`), and with offsets the constants that
+/// their sums need, as comments. sos is a table of the second-order sections of a recursive bank at the
+/// slow rate: the filter from a channel to a phase of the output is the sum of its sections z^-delay (b0 +
+/// b1 z^-1 + b2 z^-2) / (a0 + a1 z^-1 + a2 z^-2). Its first line is a comment with the gamma of the
+/// sections as they are written.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   hybank export bank.json --to c -o bank.h
   hybank export bank.json -o bank.npz
   hybank export fixed.json -o taps.coe
+  hybank export fixed.json -o bank.h --input-bits 12
   hybank export recursive.json --to sos -o sections.csv")]
 pub(super) struct Args {
     /// The bank (JSON); `-` is standard input
@@ -33,6 +35,9 @@ pub(super) struct Args {
     /// The file to write; `-` is standard output
     #[arg(short, long)]
     output: PathBuf,
+    /// Bits of the samples that integer code takes: offsets are relative to their full scale (c, coe, mem)
+    #[arg(long, value_name = "B")]
+    input_bits: Option<u32>,
     /// Prefix of the C identifiers
     #[arg(long, default_value = "bank")]
     name: String,
@@ -63,7 +68,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let format = args.format()?;
     check_outputs(&[&args.output], &[&args.bank])?;
     let bank = load(&args.bank)?;
-    let mut bytes = export(&bank, format, &args.name).in_file(&args.bank)?;
+    let mut bytes = export(&bank, format, &args.name, args.input_bits).in_file(&args.bank)?;
     if format == Format::Sos {
         bytes.splice(0..0, gamma_of_sections(&bank).in_file(&args.bank)?.bytes());
     }

@@ -31,7 +31,7 @@ Examples:
   hybank fuse bank.json left.wav right.wav -o fused.wav
   hybank fuse bank.json both.wav -o fused.wav --bits 24 --force
   hybank fuse bank.json capture.wav -o fused.wav --interleaved 4
-  hybank fuse bank.json tone1.wav tone2.wav -o fused.wav --measure
+  hybank fuse bank.json tone1.wav tone2.wav -o fused.wav --measure --plot spectra.svg
   hybank fuse fixed.json ch1.wav ch2.wav -o fused.wav --bit-true --accumulator 40
   hybank fuse bank.json ch1.wav ch2.wav -o fused.wav --track blind --track-log delays.jsonl
   sox capture.flac -t wav - | hybank fuse bank.json - -o - | play -t wav -")]
@@ -120,7 +120,7 @@ impl Args {
     /// Refuses impossible combinations of options, before any file is read.
     fn check(&self) -> Result<(), Failure> {
         self.reading.check(self.run.turns.is_given())?;
-        self.before_after.check(&self.inputs, &self.output)?;
+        self.before_after.check(&self.inputs, &self.output, self.run.force)?;
         let prints = self.before_after.is_wanted();
         self.run.check(&self.bank, &self.inputs, &self.output, Container::Wav, prints)
     }
@@ -145,7 +145,7 @@ impl Args {
         let begin = Instant::now();
         let mut reader = self.start_reader(job, Some(observer))?;
         if self.bit_true.is_wanted() {
-            return self.bit_true.fuse(job, &mut reader);
+            return self.bit_true.fuse(job, &mut reader, || self.measured(job));
         }
         let rate = job.output_rate(&reader)?;
         let progress = progress_bar(reader.promised_frames());
@@ -181,7 +181,8 @@ impl Args {
         if !self.before_after.is_wanted() {
             return Ok(None);
         }
-        self.before_after.measured(job.bank, self.start_reader(job, None)?, &self.output).map(Some)
+        let reader = self.start_reader(job, None)?;
+        self.before_after.measured(job.bank, reader, &self.output, self.run.force).map(Some)
     }
 }
 

@@ -1,11 +1,12 @@
 //! `hybank measure`: the quality of a recording.
 
 use super::capture_args::CaptureArgs;
-use super::capture_file::{CaptureFile, MOST_MEASURED, Reading};
+use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, rails_of};
 use super::match_bank::check_stdin;
-use super::measure_report::{ReferenceReport, Report, chart, warnings};
+use super::measure_report::{ReferenceReport, Report, warnings};
 use super::plot::PictureFormat;
 use super::print::{Failure, InFile, is_dash, name, show, warn};
+use super::spur_chart::chart;
 use super::written::{check_outputs, write_bytes};
 use crate::io::is_same_rate;
 use crate::measure::{MeasureError, Measurement, Settings, Window, compare, measure, measure_complex};
@@ -42,7 +43,8 @@ pub(super) struct Args {
     /// Highest order of the harmonics in THD
     #[arg(long, value_name = "H", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1024))]
     harmonics: u16,
-    /// A recording of the same signal to compare with, of the same rate
+    /// A recording of the same signal to compare with, of the same rate; --format and the other options of
+    /// the recording hold for it too, unless its name says its format
     #[arg(long = "ref", value_name = "TARGET")]
     reference: Option<PathBuf>,
     #[command(flatten)]
@@ -152,15 +154,17 @@ impl Args {
     }
 
     fn reading(&self) -> Reading {
-        Reading { options: self.reading.options(1, 1), rate: self.rate, most: MOST_MEASURED }
+        let options = self.reading.options(1, 1);
+        Reading { options, rate: self.rate, most: MOST_MEASURED }
     }
 
     fn settings(&self, capture: &CaptureFile) -> Result<Settings, Failure> {
+        let all = capture.samples.iter().chain(capture.imaginary.iter().flatten()).copied();
         Ok(Settings {
             tones: tones(&self.tone)?,
             converters: self.interleaved.into(),
             harmonics: self.harmonics.into(),
-            rails: capture.rails.unwrap_or_else(|| float_rails(capture)),
+            rails: rails_of(all, capture.rails).unwrap_or((f64::NEG_INFINITY, f64::INFINITY)),
             window: self.window,
             ..Settings::default()
         })
@@ -185,11 +189,4 @@ impl Args {
             .map_err(|error| Failure::Input(format!("{file} against {}: {error}", Quoted(name(path)))))?;
         Ok(ReferenceReport { file: name(path), comparison })
     }
-}
-
-/// The rails of floats: full scale, unless some sample lies beyond it and so nothing clipped there.
-fn float_rails(capture: &CaptureFile) -> (f64, f64) {
-    let mut all = capture.samples.iter().chain(capture.imaginary.iter().flatten());
-    let top = if all.any(|x| x.abs() > 1.0) { f64::INFINITY } else { 1.0 };
-    (-top, top)
 }

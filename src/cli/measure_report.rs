@@ -1,11 +1,8 @@
-//! The figures of a measurement as text, and the spectrum of the recording with its spurs marked.
+//! The figures of a measurement as text.
 
-use super::capture_file::CaptureFile;
-use crate::measure::{Cause, Comparison, Imbalance, Measurement, Quadrature, Settings, Spectrum, Spur};
+use crate::measure::{Comparison, Imbalance, Measurement, Quadrature, Spur};
 use crate::messages::Quoted;
-use crate::plot::{Chart, Marks, Series};
-use crate::quantity::{readable, scale_of};
-use crate::units::{Decibels, Hertz};
+use crate::quantity::readable;
 use std::fmt::Write as _;
 
 /// Spurs that the text lists.
@@ -35,7 +32,7 @@ pub(super) struct Figure {
     pub(super) name: &'static str,
     pub(super) value: String,
     pub(super) unit: &'static str,
-    meaning: &'static str,
+    pub(super) meaning: String,
 }
 
 /// What the user should know beside the figures.
@@ -71,11 +68,11 @@ pub(super) fn warnings(measured: &Measurement) -> Vec<String> {
 
 /// The figures of a measurement in the order of the report.
 pub(super) fn column(measured: &Measurement) -> Vec<Figure> {
-    let figure = |name, value: f64, digits: usize, unit, meaning| Figure {
+    let figure = |name, value: f64, digits: usize, unit, meaning: &str| Figure {
         name,
         value: format!("{value:.digits$}"),
         unit,
-        meaning,
+        meaning: meaning.to_owned(),
     };
     let db = |name, value: f64, meaning| figure(name, value, 2, "dB", meaning);
     let mut figures = vec![
@@ -93,6 +90,11 @@ pub(super) fn column(measured: &Measurement) -> Vec<Figure> {
     ];
     if let Some(interleaving) = measured.interleaving {
         figures.push(db("interleaving", interleaving.0, "interleaving spurs over tone"));
+    }
+    if let Some(spur) = measured.worst_interleaving() {
+        let noise = if spur.above_noise { "" } else { ", below the noise" };
+        let meaning = format!("at {:.3}: {}{noise}", spur.frequency, causes(spur));
+        figures.push(figure("worst of these", spur.level.0, 2, "dBc", &meaning));
     }
     figures.push(figure("SFDR", measured.sfdr.0, 2, "dBc", "tone over the largest spur"));
     if let Some(sfdr) = measured.sfdr_without_interleaving {
@@ -171,12 +173,16 @@ fn write_spurs(text: &mut String, measured: &Measurement) {
         _ => writeln!(text, "\nspurs above the noise (Hz, dBc, cause):"),
     };
     for spur in above.iter().take(MOST_SPURS) {
-        let causes: Vec<String> = spur.causes.iter().map(ToString::to_string).collect();
-        let _ = writeln!(text, "{:>18.3} {:>8.2}   {}", spur.frequency.0, spur.level.0, causes.join("; "));
+        let _ = writeln!(text, "{:>18.3} {:>8.2}   {}", spur.frequency.0, spur.level.0, causes(spur));
     }
     if above.len() > MOST_SPURS {
         let _ = writeln!(text, "  and {} smaller ones (--json lists all)", above.len() - MOST_SPURS);
     }
+}
+
+/// All that is expected at a spur's frequency.
+pub(super) fn causes(spur: &Spur) -> String {
+    spur.causes.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
 }
 
 /// Six digits after the point; a zero has no sign.
@@ -225,125 +231,4 @@ fn write_comparison(text: &mut String, file: &str, found: &Comparison) {
         "error            {:.3e} rms, at most {:.3e} (sample {})",
         found.error_rms, found.largest_error, found.largest_error_at
     );
-}
-
-/// Points of a curve; of several bins the largest is drawn.
-const COLUMNS: usize = 1900;
-/// Spurs that are marked.
-const MOST_MARKS: usize = 24;
-/// Decibels below the largest bin at which the picture ends.
-const DEPTH: f64 = 180.0;
-
-/// The chart of a report and its marks.
-pub(super) fn chart(report: &Report, settings: &Settings, capture: &CaptureFile) -> (Chart, Vec<Marks>) {
-    let own;
-    let spectrum = match &report.measurement {
-        Some(measured) => &measured.spectrum,
-        None => {
-            let finite: Vec<f64> =
-                capture.samples.iter().map(|x| if x.is_finite() { *x } else { 0.0 }).collect();
-            own = Spectrum::new(&finite, capture.rate, settings.window);
-            &own
-        }
-    };
-    let scale = Scale::of(spectrum, settings.full_scale);
-    let mut series = vec![Series { label: report.file.clone(), points: scale.points(spectrum) }];
-    if let Some(reference) = &report.reference {
-        let points = scale.points(&reference.comparison.error_spectrum);
-        series.push(Series { label: format!("error against {}", reference.file), points });
-    }
-    let marks = report.measurement.as_ref().map(|measured| scale.marks(measured)).unwrap_or_default();
-    let chart = Chart {
-        title: title(report),
-        x_label: format!("frequency ({})", scale.unit),
-        y_label: format!("dBFS (window: {:.2} bins of noise)", settings.window.noise_bandwidth()),
-        series,
-    };
-    (chart, marks)
-}
-
-fn title(report: &Report) -> String {
-    match (&report.measurement, &report.reference) {
-        (Some(m), _) => {
-            format!("SINAD {:.2} dB, ENOB {:.2} bits, SFDR {:.2} dBc", m.sinad.0, m.enob, m.sfdr.0)
-        }
-        (None, Some(reference)) => {
-            format!("SNR {:.2} dB against {}", reference.comparison.snr.0, reference.file)
-        }
-        (None, None) => report.file.clone(),
-    }
-}
-
-/// The axes of a picture.
-struct Scale {
-    unit: String,
-    /// Units per hertz.
-    factor: f64,
-    full_scale: f64,
-    /// The lowest level that is drawn, dBFS.
-    floor: f64,
-}
-
-impl Scale {
-    fn of(spectrum: &Spectrum, full_scale: f64) -> Self {
-        let end = spectrum.frequency(spectrum.amplitudes.len()).0;
-        // Below 1 kHz the unit is hertz.
-        let (factor, unit) = if end < 1e3 { (1.0, "Hz".to_owned()) } else { scale_of(end, "Hz") };
-        let largest = spectrum.amplitudes.iter().fold(0.0, |most: f64, a| most.max(*a));
-        Self { unit, factor, full_scale, floor: Decibels::of_amplitude(largest / full_scale).0 - DEPTH }
-    }
-
-    fn level(&self, amplitude: f64) -> f64 {
-        Decibels::of_amplitude(amplitude / self.full_scale).0.max(self.floor)
-    }
-
-    /// The largest bin of each column.
-    fn points(&self, spectrum: &Spectrum) -> Vec<(f64, f64)> {
-        let point = |(frequency, amplitude): (Hertz, f64)| (frequency.0 * self.factor, self.level(amplitude));
-        spectrum.columns(COLUMNS).into_iter().map(point).collect()
-    }
-
-    /// The tones and the largest spurs above the noise, by cause.
-    fn marks(&self, measured: &Measurement) -> Vec<Marks> {
-        let tones = measured.tones.iter();
-        let tones =
-            tones.map(|tone| (tone.alias.0 * self.factor, self.level(tone.amplitude.value), String::new()));
-        let mut marks = vec![Marks { label: "tone".into(), points: tones.collect() }];
-        for spur in measured.spurs.iter().filter(|spur| spur.above_noise).take(MOST_MARKS) {
-            let point = (spur.frequency.0 * self.factor, self.level(spur.amplitude), short(spur));
-            let label = kind(spur);
-            match marks.iter_mut().find(|marks| marks.label == label) {
-                Some(marks) => marks.points.push(point),
-                None => marks.push(Marks { label: label.into(), points: vec![point] }),
-            }
-        }
-        marks
-    }
-}
-
-fn kind(spur: &Spur) -> &'static str {
-    match spur.causes.first() {
-        Some(Cause::Offset { .. }) => "offset",
-        Some(Cause::GainOrSkew { .. }) => "gain or skew",
-        Some(Cause::Harmonic { .. }) => "harmonic",
-        Some(Cause::HarmonicImage { .. }) => "harmonic, displaced",
-        Some(Cause::Image { .. }) => "image",
-        Some(Cause::Intermodulation { .. }) => "intermodulation",
-        _ => "unknown",
-    }
-}
-
-/// A short text beside a mark.
-fn short(spur: &Spur) -> String {
-    match spur.causes.first() {
-        Some(Cause::Offset { k, of }) => format!("{k}/{of}"),
-        Some(Cause::GainOrSkew { k, of, is_sum, .. }) => {
-            format!("{k}/{of}{}f", if *is_sum { '+' } else { '-' })
-        }
-        Some(Cause::Harmonic { order, .. }) => format!("H{order}"),
-        Some(Cause::HarmonicImage { order, k, of }) => format!("H{order} {k}/{of}"),
-        Some(Cause::Image { order: 1, .. }) => "-f".into(),
-        Some(Cause::Image { order, .. }) => format!("-H{order}"),
-        _ => String::new(),
-    }
 }

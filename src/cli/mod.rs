@@ -37,6 +37,7 @@ mod remedy;
 mod report;
 mod run;
 mod simulate;
+mod spur_chart;
 mod stream;
 mod texts;
 mod track;

@@ -63,6 +63,12 @@ pub(super) const WAV: [&str; 4] = ["wav", "wave", "bwf", "rf64"];
 /// Formats with a structure, which are not written either.
 const STRUCTURED: [&str; 10] = ["npy", "npz", "mat", "csv", "txt", "json", "toml", "h5", "hdf5", "zip"];
 
+/// Whether the name of a file says that it is WAV; pipes have any name.
+pub(super) fn is_wav(output: &Path) -> bool {
+    let extension = output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    WAV.contains(&extension.to_ascii_lowercase().as_str()) && !is_pipe(output)
+}
+
 /// Refuses a name that promises another format than the one written; pipes have any name.
 fn check_extension(output: &Path, container: Container) -> Result<(), Failure> {
     let extension = output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();

@@ -6,7 +6,7 @@ use super::written::{begin_file, check_outputs, write_together};
 use crate::bank::Bank;
 use crate::design::{DesignError, Options, design};
 use crate::overview::{Picture, pictures};
-use crate::plot::{Chart, Marks, PlotError, Series};
+use crate::plot::{AxisScale, Chart, Marks, PlotError, Series};
 use crate::spec::{DesignSpec, Spec};
 use std::path::{Path, PathBuf};
 
@@ -154,5 +154,11 @@ fn chart(title: &str, x_label: &str, points: Vec<(f64, f64)>, bank: &Bank) -> Ch
     let level = own.map(|gamma| Series { label: "this bank".into(), points: level(gamma) });
     let best = Series { label: "the best of each".into(), points };
     let series = std::iter::once(best).chain(level).collect();
-    Chart { title: title.into(), x_label: x_label.into(), y_label: "gamma, dB (h = 1)".into(), series }
+    Chart {
+        title: title.into(),
+        x_label: x_label.into(),
+        x_scale: AxisScale::Linear,
+        y_label: "gamma, dB (h = 1)".into(),
+        series,
+    }
 }

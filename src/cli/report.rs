@@ -1,19 +1,25 @@
 //! `hybank report`: all that is known of a bank, on one page.
 
 use super::bank_file::load;
+use super::before_after::BeforeAfter;
+use super::capture_args::{CaptureArgs, InterleavedArgs};
 use super::capture_file::{Whole, start};
 use super::fused::fused;
 use super::match_bank::{check_channels, output_rate};
+use super::measure_report::{causes, column};
 use super::print::{Failure, InFile, name, warn};
+use super::spur_chart::before_after;
 use super::written::{check_outputs, write_text};
 use crate::bank::Bank;
 use crate::design::DesignError;
 use crate::io::ReadOptions;
+use crate::measure::{Cause, Measurement, Spur};
 use crate::overview::{ChannelFact, Fact, Facts, change, pictures, spectra};
 use crate::pipeline::Settings;
-use crate::plot::{Chart, PlotError};
+use crate::plot::{Chart, Marks, PlotError};
+use crate::quantity::readable;
 use crate::simulate::interleaved;
-use crate::units::Hertz;
+use crate::units::{Decibels, Hertz};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::path::{Path, PathBuf};
 
@@ -21,12 +27,13 @@ use std::path::{Path, PathBuf};
 /// cost
 ///
 /// The page is one file that loads nothing. With captures it also shows their spectra, plainly interleaved
-/// and fused by the bank.
+/// and fused by the bank, and of a tone the figures and the spurs before and after.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   hybank report bank.json -o report.html
-  hybank report bank.json ch1.wav ch2.wav -o report.html")]
+  hybank report bank.json ch1.wav ch2.wav -o report.html
+  hybank report quad.json codes.csv --interleaved 4 --sample-bits 8 -o report.html")]
 pub(super) struct Args {
     /// The bank (JSON)
     bank: PathBuf,
@@ -35,12 +42,18 @@ pub(super) struct Args {
     /// The page; `-` is standard output
     #[arg(short, long)]
     output: PathBuf,
+    #[command(flatten)]
+    reading: CaptureArgs,
+    #[command(flatten)]
+    turns: InterleavedArgs,
     /// Replace an existing file
     #[arg(long)]
     force: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    args.reading.check(args.turns.is_given())?;
+    args.turns.check(args.inputs.len())?;
     let inputs: Vec<&Path> = args.inputs.iter().chain([&args.bank]).map(PathBuf::as_path).collect();
     check_outputs(&[&args.output], &inputs)?;
     let bank = load(&args.bank)?;
@@ -49,11 +62,11 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     for picture in pictures(&bank).in_file(&args.bank)? {
         figures.push(Figure::new(&picture.chart, picture.caption).in_file(&args.bank)?);
     }
-    let spectra = if args.inputs.is_empty() { None } else { Some(spectra_of(&bank, args)?) };
+    let captures = if args.inputs.is_empty() { None } else { Some(Captures::new(&bank, args)?) };
     let page = Page {
         facts: Facts::new(&bank, spec).in_file(&args.bank)?,
         figures,
-        spectra,
+        captures,
         spec: spec.to_toml().in_file(&args.bank)?,
         commands: args.commands(),
     };
@@ -65,6 +78,7 @@ impl Args {
     fn commands(&self) -> Vec<String> {
         let bank = self.bank.display();
         let inputs: String = self.inputs.iter().map(|path| format!(" {}", path.display())).collect();
+        let inputs = inputs + &self.reading.typed() + &self.turns.typed();
         let mut commands = vec![
             "hybank design spec.toml -o bank.json  # the spec above, saved as spec.toml".to_owned(),
             format!("hybank verify {bank}"),
@@ -81,40 +95,144 @@ impl Args {
 
 /// Frames that are used; more would only make the lines denser.
 const MOST_FRAMES: usize = 1 << 20;
+/// Signal over all else above which captures are those of a tone.
+const LEAST_TONE: Decibels = Decibels(0.0);
 /// Frames that the spectra need.
 const LEAST_FRAMES: usize = 16;
 
-/// The spectra of the captures, plainly interleaved and fused by the bank.
-fn spectra_of(bank: &Bank, args: &Args) -> Result<Figure, Failure> {
-    let full_scale = bank.spec.as_ref().and_then(|spec| spec.full_scale);
-    let captures = ReadOptions { full_scale, ..ReadOptions::files() };
-    let mut reader = start(&args.inputs, captures, crossbeam_channel::never())?;
-    check_channels(bank, &args.bank, &reader)?;
-    let rate = Hertz(output_rate(bank, &reader)?);
-    let Whole { mut channels, is_cut } = Whole::read(&mut reader, MOST_FRAMES)?;
-    reader.warnings().iter().for_each(|warning| warn(&warning.to_string()));
-    let names = args.inputs.iter().map(|input| name(input)).collect::<Vec<_>>().join(", ");
-    let frames = channels.iter().map(Vec::len).min().unwrap_or(0);
-    if frames < LEAST_FRAMES {
-        return Err(Failure::Input(format!(
-            "{names}: {frames} frames, and a spectrum needs {LEAST_FRAMES}; give longer captures, or none"
-        )));
+/// What the page shows of captures.
+struct Captures {
+    spectra: Figure,
+    /// Of the tone that they hold.
+    measured: Option<BeforeAfter>,
+}
+
+impl Captures {
+    /// Those of `args`, plainly interleaved and fused by the bank.
+    fn new(bank: &Bank, args: &Args) -> Result<Self, Failure> {
+        let full_scale = bank.spec.as_ref().and_then(|spec| spec.full_scale);
+        let turns = args.turns.turns(bank, &args.bank)?;
+        let captures = args.reading.options(args.inputs.len(), bank.channel_count());
+        let full_scale = captures.full_scale.or(full_scale);
+        let captures = ReadOptions { full_scale, interleaving: turns.as_ref(), ..captures };
+        let mut reader = start(&args.inputs, captures, crossbeam_channel::never())?;
+        args.reading.scale.check(&reader)?;
+        check_channels(bank, &args.bank, &reader)?;
+        let rate = Hertz(output_rate(bank, &reader)?);
+        let Whole { mut channels, is_cut } = Whole::read(&mut reader, MOST_FRAMES)?;
+        reader.warnings().iter().for_each(|warning| warn(&warning.to_string()));
+        let names = args.inputs.iter().map(|input| name(input)).collect::<Vec<_>>().join(", ");
+        let frames = channels.iter().map(Vec::len).min().unwrap_or(0);
+        if frames < LEAST_FRAMES {
+            return Err(Failure::Input(format!(
+                "{names}: {frames} frames, and a spectrum needs {LEAST_FRAMES}; give longer captures, or none"
+            )));
+        }
+        let mut part = "the captures".to_owned();
+        if is_cut {
+            warn(&format!("{names}: only the first {frames} frames are on the page"));
+            part = format!("the first {frames} frames of the captures");
+        }
+        // What was lost is a zero, as `fuse` has it without --gaps.
+        channels.iter_mut().flatten().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
+        let fused = fused(bank, &channels, Settings::default())?;
+        let measured = BeforeAfter::of(bank, rate, &channels, &fused, Vec::new());
+        let measured = measured.map_err(|reason| reason.to_string()).and_then(|measured| {
+            let is_tone = measured.after.sinad > LEAST_TONE;
+            if is_tone { Ok(measured) } else { Err("they hold more than a tone".to_owned()) }
+        });
+        let what = format!(
+            "The spectra of {part}, interleaved as if they were taken in turn, and fused by the bank."
+        );
+        let (spectra, measured) = match measured {
+            Ok(measured) => {
+                let (chart, marks) = before_after(&measured.before, &measured.after);
+                let caption = format!("{what} Each cause of spurs has one colour.");
+                (Figure::marked(&chart, &marks, &caption), Some(measured))
+            }
+            Err(reason) => {
+                let plain = interleaved(&bank.sample_delays(), bank.ratio, bank.wait(), &channels);
+                let chart = spectra(rate, &[("plain interleaving", &plain[..]), ("fused", &fused)]);
+                let caption = format!(
+                    "{what} Lines that only the first has are images of the signal: errors of the converters' \
+                     instants and filters. No tone was measured ({reason})."
+                );
+                (Figure::new(&chart, &caption), None)
+            }
+        };
+        Ok(Self { spectra: spectra.map_err(Failure::input)?, measured })
     }
-    let mut part = "the captures".to_owned();
-    if is_cut {
-        warn(&format!("{names}: only the first {frames} frames are on the page"));
-        part = format!("the first {frames} frames of the captures");
+
+    fn html(&self) -> Markup {
+        html! {
+            (self.spectra.html())
+            @if let Some(measured) = &self.measured {
+                (figures_before_after(measured))
+                (spurs_before_after(measured))
+            }
+        }
     }
-    // What was lost is a zero, as `fuse` has it without --gaps.
-    channels.iter_mut().flatten().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
-    let fused = fused(bank, &channels, Settings::default())?;
-    let interleaved = interleaved(&bank.sample_delays(), bank.ratio, bank.wait(), &channels);
-    let chart = spectra(rate, &[("plain interleaving", &interleaved[..]), ("fused", &fused)]);
-    let caption = format!(
-        "The spectra of {part}, interleaved as if they were taken in turn, and fused by the bank. Lines that only \
-         the first has are images of the signal: errors of the converters' instants and filters."
-    );
-    Figure::new(&chart, &caption).map_err(Failure::input)
+}
+
+/// The tone and the figures of both.
+fn figures_before_after(measured: &BeforeAfter) -> Markup {
+    let BeforeAfter { before, after } = measured;
+    let level = |measured: &Measurement| {
+        measured.tones.first().map_or_else(String::new, |tone| format!("{:.2} dBFS", tone.level.0))
+    };
+    let tone = after.tones.first().map(|tone| readable(tone.frequency.value.0, "Hz")).unwrap_or_default();
+    html! {
+        table {
+            tr { th { "" } th { "interleaved" } th { "fused" } th { "" } }
+            tr {
+                th { "tone" }
+                td class="value" { (level(before)) }
+                td class="value" { (level(after)) }
+                td { "at " (tone) }
+            }
+            @for (own, fused) in column(before).iter().zip(column(after)) {
+                tr {
+                    th { (fused.name) }
+                    td class="value" { (own.value) " " (own.unit) }
+                    td class="value" { (fused.value) " " (fused.unit) }
+                    td { (fused.meaning) }
+                }
+            }
+            tr {
+                th { "offset" }
+                td class="value" { (format!("{:.2e}", before.offset.value)) }
+                td class="value" { (format!("{:.2e}", after.offset.value)) }
+                td { "the mean, of full scale" }
+            }
+        }
+    }
+}
+
+/// Most lines of the table of spurs.
+const MOST_SPURS: usize = 24;
+
+/// The spurs of both, the largest of the captures first.
+fn spurs_before_after(measured: &BeforeAfter) -> Markup {
+    let BeforeAfter { before, after } = measured;
+    let level = |spur: &Spur| {
+        let noise = if spur.above_noise { "" } else { " (noise)" };
+        format!("{:.2} dBc{noise}", spur.level.0)
+    };
+    let same = |spur: &Spur| after.spurs.iter().find(|other| other.causes == spur.causes);
+    let rows = before.spurs.iter().filter(|spur| spur.causes != [Cause::Unknown]).take(MOST_SPURS);
+    html! {
+        table {
+            tr { th { "spur" } th { "frequency" } th { "interleaved" } th { "fused" } }
+            @for spur in rows {
+                tr {
+                    th { (causes(spur)) }
+                    td class="value" { (readable(spur.frequency.0, "Hz")) }
+                    td class="value" { (level(spur)) }
+                    td class="value" { (same(spur).map(level).unwrap_or_default()) }
+                }
+            }
+        }
+    }
 }
 
 const STYLE: &str = "
@@ -141,7 +259,11 @@ struct Figure {
 
 impl Figure {
     fn new(chart: &Chart, caption: &str) -> Result<Self, PlotError> {
-        Ok(Self { svg: chart.to_svg()?, caption: caption.to_owned() })
+        Self::marked(chart, &[], caption)
+    }
+
+    fn marked(chart: &Chart, marks: &[Marks], caption: &str) -> Result<Self, PlotError> {
+        Ok(Self { svg: chart.to_svg_with(marks)?, caption: caption.to_owned() })
     }
 
     fn html(&self) -> Markup {
@@ -158,8 +280,7 @@ impl Figure {
 struct Page {
     facts: Facts,
     figures: Vec<Figure>,
-    /// The captures, if there are any.
-    spectra: Option<Figure>,
+    captures: Option<Captures>,
     /// TOML.
     spec: String,
     commands: Vec<String>,
@@ -188,9 +309,9 @@ impl Page {
                     (facts(cost))
                     h2 { "Channels" }
                     (channel_table(channels))
-                    @if let Some(spectra) = &self.spectra {
+                    @if let Some(captures) = &self.captures {
                         h2 { "Captures" }
-                        (spectra.html())
+                        (captures.html())
                     }
                     h2 { "Pictures" }
                     @for figure in &self.figures { (figure.html()) }
@@ -219,12 +340,13 @@ fn facts(facts: &[Fact]) -> Markup {
 fn channel_table(channels: &[ChannelFact]) -> Markup {
     html! {
         table {
-            tr { th { "channel" } th { "delay" } th { "gain" } th { "gamma, if the delay is 0.001 samples longer" } }
+            tr { th { "channel" } th { "delay" } th { "gain" } th { "offset" } th { "gamma, if the delay is 0.001 samples longer" } }
             @for (channel, number) in channels.iter().zip(1..) {
                 tr {
                     td { (number) }
                     td class="value" { (channel.delay) }
                     td class="value" { (channel.gain) }
+                    td class="value" { (channel.offset) }
                     td class="value" {
                         @match channel.sensitivity {
                             Some(share) => { (change(share)) }

@@ -171,7 +171,7 @@ impl Job<'_> {
             interleaving: turns.as_ref(),
             samples_per_frame: match_bank::samples_per_frame(&layout, inputs.len()),
             stalls: stalls.as_ref(),
-            full_scale: self.scale.full_scale.or(stated),
+            full_scale: self.scale.given().or(stated),
             ..captures
         };
         let started = MultiReader::start(inputs, args.gaps.read_options(&lost, files), interrupts());

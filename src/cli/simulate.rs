@@ -6,7 +6,7 @@ use super::virtual_converters::{CommonReport, ConverterArgs, ConverterReport, Co
 use super::virtual_signal::{Signal, SignalArgs};
 use super::written::{Mono, begin_recording, check_outputs, write_together};
 use crate::design::Problem;
-use crate::io::{Container, SampleWriter, is_same_rate};
+use crate::io::{Container, PcmFormat, SampleWriter, is_same_rate};
 use crate::messages::Quoted;
 use crate::overview::{counted, understood};
 use crate::quantity::readable;
@@ -22,7 +22,8 @@ use std::path::PathBuf;
 /// recording is treated as a periodic, band-limited analog signal. The converters have the gains and
 /// offsets of the spec, and the errors that are asked for; the target is ideal. Complex signals, as a
 /// quadrature receiver delivers them, are written as SigMF recordings or raw: both parts pass the same
-/// front ends and clocks.
+/// front ends and clocks. WAV files of converters with --bits hold integers of 16 or 24 bits, all others
+/// 32-bit floats.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Sources:
@@ -98,7 +99,8 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let spec = load_spec_or_bank(&args.spec)?.for_outputs(&[])?;
     // The converters do not know what the spec says of the signal. Without latency the target lies on the
     // time axis of the output of `fuse`.
-    let problem = Problem::new(&Spec { signal: None, ..spec.clone() }, spec.wait()).in_file(&args.spec)?;
+    let truth = args.converters.true_spec(&spec)?;
+    let problem = Problem::new(&Spec { signal: None, ..truth }, spec.wait()).in_file(&args.spec)?;
     let signal = Signal::read(&args.signal, &spec)?;
     let kind = args.kind(signal.is_complex())?;
     let (rates, mut warnings) = Rates::of(&spec, kind).in_file(&args.spec)?;
@@ -185,7 +187,7 @@ impl Run<'_> {
         let checked = recordings.map(|(output, samples)| Ok((output, self.checked(samples)?)));
         write_together(&self.args.output, checked, |(output, parts)| {
             let (samples, imaginary) = (&parts.0, parts.1.as_deref());
-            let mono = Mono { samples, imaginary, rate: output.rate, container };
+            let mono = Mono { samples, imaginary, rate: output.rate, format: output.format, container };
             begin_recording(&output.path, mono, self.args.force)
         })
     }
@@ -218,12 +220,16 @@ impl Args {
 
     /// The recordings of the channels and of the target, in this order.
     fn outputs(&self, kind: Kind, is_complex: bool, rates: &Rates) -> Vec<Output> {
-        let slow = rates.slow.iter().zip(1..).map(|(&rate, i)| (format!("ch{i}"), rate));
-        let names = slow.chain([("target".to_owned(), rates.fast)]);
+        // A WAV file has the integers of the converters.
+        let codes = self.converters.integers().filter(|_| kind == Kind::Wav).unwrap_or(PcmFormat::F32Le);
+        let slow = rates.slow.iter().zip(1..).map(|(&rate, i)| (format!("ch{i}"), rate, codes));
+        let names = slow.chain([("target".to_owned(), rates.fast, PcmFormat::F32Le)]);
         let extension = kind.extension(is_complex);
-        names
-            .map(|(name, rate)| Output { path: self.output.join(format!("{name}.{extension}")), rate })
-            .collect()
+        let output = |(name, rate, format): (String, f64, PcmFormat)| {
+            let path = self.output.join(format!("{name}.{extension}"));
+            Output { path, rate, format }
+        };
+        names.map(output).collect()
     }
 
     /// Refuses outputs that are inputs.
@@ -286,6 +292,7 @@ struct Output {
     path: PathBuf,
     /// Hertz.
     rate: f64,
+    format: PcmFormat,
 }
 
 /// Rates of the headers, hertz.

@@ -1,7 +1,8 @@
 //! `hybank stream`: fuses slow samples as they arrive.
 
-use super::capture_args::{ScaleArgs, coding};
+use super::capture_args::{ScaleArgs, check_channels, coding};
 use super::observer::RunObserver;
+use super::output::is_wav;
 use super::print::{say_line, say_understood};
 use super::run::{Finished, Job, RunArgs, RunReport, print_report};
 use super::{Failure, bank_file};
@@ -23,6 +24,7 @@ Sample formats, as in ffmpeg:
 Examples:
   capture | hybank stream bank.json --format s16le > fast.raw
   hybank stream bank.json --input ch1.fifo --input ch2.fifo --format f32le | analyse
+  hybank stream quad.json --input left.raw --input right.raw --channels 2 --format s16le -o fast.wav
   hybank stream bank.json --input ch1.sigmf-meta --input ch2.sigmf-meta -o fast.sigmf-meta
   capture | hybank stream bank.json --format s16le --interleaved 4 > fast.raw
   receive | hybank stream bank.json --format cs16 --output-format cf32 > fast.iq
@@ -35,11 +37,15 @@ pub(super) struct Args {
     /// Sample format of the input; with c before it for complex samples
     #[arg(long, value_name = "FORMAT", default_value = "f32le", value_parser = coding)]
     format: Coding,
-    /// Sample format of the output [default: that of the input; f32le for tables]
+    /// Sample format of the output [default: wav for the name x.wav, else that of the input; f32le for
+    /// tables]
     #[arg(long, value_name = "FORMAT", value_parser = output_coding)]
     output_format: Option<Coding>,
     #[command(flatten)]
     scale: ScaleArgs,
+    /// Interleaved channels of each raw input [default: 1 each, or all in a single input]
+    #[arg(long, value_name = "C", value_parser = clap::value_parser!(u16).range(1..))]
+    channels: Option<u16>,
     /// A FIFO or file. Give the option once per channel, or once for an input that holds all channels. A
     /// SigMF recording (a name that ends in sigmf-meta) states its own format and channels
     #[arg(long, value_name = "FILE")]
@@ -80,6 +86,7 @@ struct Report<'a> {
 /// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let inputs = args.inputs();
+    check_channels(args.channels, args.format)?;
     args.run.check(&args.bank, &inputs, &args.output, args.container(), false)?;
     let bank = bank_file::load(&args.bank)?;
     say_understood(bank.spec.as_ref());
@@ -109,7 +116,7 @@ impl Args {
 
     fn stream(&self, job: &Job<'_>, inputs: &[PathBuf], observer: &mut RunObserver) -> Result<(), Failure> {
         let plan = job.plan()?;
-        let channels = super::match_bank::channels_of_raw(&job.bank.layout(), inputs.len());
+        let channels = self.channels_of_each(inputs, job.bank);
         let raw = ReadOptions { coding: self.format, channels, ..ReadOptions::files() };
         let mut reader = job.start_reader(inputs, raw, Some(observer))?;
         self.check_output(reader.is_complex())?;
@@ -128,12 +135,20 @@ impl Args {
         if self.input.is_empty() { vec!["-".into()] } else { self.input.clone() }
     }
 
-    /// Raw inputs are one interleaved or one per channel; other formats state their channels.
+    /// Channels of each raw input.
+    fn channels_of_each(&self, inputs: &[PathBuf], bank: &Bank) -> usize {
+        let usual = super::match_bank::channels_of_raw(&bank.layout(), inputs.len());
+        self.channels.map_or(usual, usize::from)
+    }
+
+    /// Raw inputs are one interleaved or one per channel, or have --channels each; other formats state
+    /// theirs.
     fn check_inputs(&self, inputs: &[PathBuf], channels: usize) -> Result<(), Failure> {
         let raw = self.format.format().is_some() && !inputs.iter().any(|path| is_self_describing(path));
-        if raw && inputs.len() != 1 && inputs.len() != channels {
+        if raw && self.channels.is_none() && inputs.len() != 1 && inputs.len() != channels {
             return Err(Failure::Usage(format!(
-                "--input is given {} times; the bank has {channels} channels, so give it {channels} times, once, or not at all",
+                "--input is given {} times; the bank has {channels} channels, so give it {channels} times, once, \
+                 or not at all, or say with --channels how many each input holds",
                 inputs.len()
             )));
         }
@@ -145,10 +160,12 @@ impl Args {
     }
 
     fn output_coding(&self) -> Coding {
-        match self.format {
-            Coding::Csv => self.output_format.unwrap_or(Coding::Raw(PcmFormat::F32Le)),
-            format => self.output_format.unwrap_or(format),
-        }
+        let of_input = match self.format {
+            _ if is_wav(&self.output) => Coding::Wav,
+            Coding::Csv => Coding::Raw(PcmFormat::F32Le),
+            format => format,
+        };
+        self.output_format.unwrap_or(of_input)
     }
 
     /// Real samples cannot be written as complex ones.

@@ -3,9 +3,12 @@
 use super::analyze::of_channels;
 use super::bank_file::bad_flag;
 use super::print::Failure;
+use crate::io::PcmFormat;
 use crate::quantity::{self, Time, readable};
 use crate::simulate::{Analog, Converter, Quantiser};
-use crate::spec::{ChannelSpec, MAX_LATENCY, Spec, SpecProblem, check_noise, check_offset, within};
+use crate::spec::{
+    ChannelSpec, Cutoff, Fitting, MAX_LATENCY, Spec, SpecProblem, check_noise, check_offset, within,
+};
 use crate::units::{FastPeriods, Seconds};
 
 /// Largest rms of the jitter in fast periods: more than a tenth leaves no signal, so the unit is wrong.
@@ -14,6 +17,8 @@ const MOST_JITTER: f64 = 0.1;
 const MOST_DRIFT: f64 = 1e5;
 /// Largest relative error of a gain.
 const MOST_GAIN_ERROR: f64 = 1.0;
+/// Largest relative error of a cut-off: filters that differ by more are other filters.
+const MOST_CUTOFF_ERROR: f64 = 0.5;
 
 /// How the converters differ from what the spec says.
 #[derive(Debug, clap::Args)]
@@ -38,6 +43,10 @@ pub(super) struct ConverterArgs {
     /// Relative errors of the gains, as 1% or 0.01, one value for all or one per channel
     #[arg(long, value_name = "SHARE,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
     gain_error: Vec<f64>,
+    /// Relative errors of the cut-offs of the front ends, as 1% or 0.01, one value for all or one per
+    /// channel; of the stage that `fit` of the spec names, if it names one
+    #[arg(long, value_name = "SHARE,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
+    cutoff_error: Vec<f64>,
     /// Offsets relative to full scale, added to those of the spec, one value for all or one per channel
     #[arg(long, value_name = "O,..", value_delimiter = ',', allow_hyphen_values = true)]
     offset: Vec<f64>,
@@ -77,6 +86,8 @@ pub(super) struct ConverterReport {
     /// True gain relative to nominal.
     gain: f64,
     gain_error: f64,
+    /// Relative error of the cut-off.
+    cutoff_error: f64,
     /// Of full scale.
     offset: f64,
     /// Parts per million by which the clock is too fast.
@@ -112,6 +123,7 @@ impl ConverterArgs {
             self.delay_error.iter().map(|e| e.in_seconds(spec.fast_period).0).collect();
         let delay_error = checked("delay-error", &delay_error, channels, |x| check_delay(x, most_delay))?;
         let gain_error = checked("gain-error", &self.gain_error, channels, check_gain_error)?;
+        let cutoff_error = self.cutoff_errors(channels)?;
         let offset = checked("offset", &self.offset, channels, check_offset)?;
         let each = |(i, channel): (usize, &ChannelSpec)| {
             let report = ConverterReport {
@@ -119,6 +131,7 @@ impl ConverterArgs {
                 delay_error: delay_error[i],
                 gain: channel.gain * (1.0 + gain_error[i]),
                 gain_error: gain_error[i],
+                cutoff_error: cutoff_error[i],
                 offset: channel.offset + offset[i],
                 drift: drift[i],
                 clipped: 0,
@@ -129,6 +142,36 @@ impl ConverterArgs {
         let (noise, jitter, seed) = (self.noise, jitter.0, self.seed);
         let common = CommonReport { noise, bits: self.bits.map(|(bits, _)| bits), jitter, seed };
         Ok(Converters { common, each })
+    }
+
+    /// The spec whose front ends have the true cut-offs.
+    pub(super) fn true_spec(&self, spec: &Spec) -> Result<Spec, Failure> {
+        let part = spec.fit.iter().find_map(|value| match value {
+            Fitting::Cutoff(part) => Some(*part),
+            _ => None,
+        });
+        let part = part.unwrap_or(Cutoff::Whole);
+        let mut truth = spec.clone();
+        let errors = self.cutoff_errors(spec.channels.len())?;
+        for (channel, error) in truth.channels.iter_mut().zip(errors).filter(|(_, error)| *error != 0.0) {
+            channel.filter = part.scaled(&channel.filter, 1.0 + error).ok_or_else(|| {
+                let part = Fitting::Cutoff(part);
+                Failure::Input(format!(
+                    "--cutoff-error: `fit` of the spec names {part}, and a filter has no such stage"
+                ))
+            })?;
+        }
+        Ok(truth)
+    }
+
+    fn cutoff_errors(&self, channels: usize) -> Result<Vec<f64>, Failure> {
+        checked("cutoff-error", &self.cutoff_error, channels, check_cutoff_error)
+    }
+
+    /// The format of the converters' codes, if they have any.
+    pub(super) fn integers(&self) -> Option<PcmFormat> {
+        let (bits, _) = self.bits?;
+        Some(if bits <= 16 { PcmFormat::S16Le } else { PcmFormat::S24Le })
     }
 
     /// Rms of the jitter.
@@ -206,6 +249,13 @@ fn check_gain_error(error: f64) -> Result<(), SpecProblem> {
     within(error, -MOST_GAIN_ERROR..=MOST_GAIN_ERROR, "(relative)", rule)
 }
 
+fn check_cutoff_error(error: f64) -> Result<(), SpecProblem> {
+    let rule = format!(
+        "an error of a cut-off is relative, -{MOST_CUTOFF_ERROR} to {MOST_CUTOFF_ERROR}; 0.01 is one per cent"
+    );
+    within(error, -MOST_CUTOFF_ERROR..=MOST_CUTOFF_ERROR, "(relative)", rule)
+}
+
 impl CommonReport {
     /// What differs from an ideal converter, in one line.
     pub(super) fn text(&self) -> String {
@@ -223,13 +273,15 @@ impl CommonReport {
 impl ConverterReport {
     /// What differs from an ideal converter, in one line.
     pub(super) fn text(&self, channel: usize) -> String {
-        let Self { delay, delay_error, gain, offset, drift, .. } = *self;
-        if (delay_error, gain, offset, drift) == (0.0, 1.0, 0.0, 0.0) {
+        let Self { delay, delay_error, gain, cutoff_error, offset, drift, .. } = *self;
+        if (delay_error, gain, cutoff_error, offset, drift) == (0.0, 1.0, 0.0, 0.0, 0.0) {
             return String::new();
         }
         let (delay, error) = (readable(delay, "s"), readable(delay_error, "s"));
         format!(
-            "converter {channel}: delay {delay} (error {error}), gain {gain}, offset {offset}, drift {drift} ppm\n"
+            "converter {channel}: delay {delay} (error {error}), gain {gain}, cut-off x {}, offset {offset}, \
+             drift {drift} ppm\n",
+            1.0 + cutoff_error
         )
     }
 }

@@ -6,7 +6,7 @@ use super::written::write_bytes;
 use crate::bank::Bank;
 use crate::design::DesignError;
 use crate::design::uncertainty::{self, DelayDerivatives, Floor, norm_at};
-use crate::plot::{Chart, Series};
+use crate::plot::{AxisScale, Chart, Series};
 use crate::quantity::readable;
 use crate::units::{Hertz, Seconds};
 use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Slopes, Taps, WorstCase, slopes};
@@ -309,6 +309,7 @@ impl Sweep {
         Chart {
             title: "gamma with delays that are not those of the bank".into(),
             x_label: format!("error, in units of the box ({} s)", widths.join(", ")),
+            x_scale: AxisScale::Linear,
             y_label: "gamma".into(),
             series: self.curves.iter().map(series).collect(),
         }

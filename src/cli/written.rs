@@ -83,7 +83,7 @@ pub(super) fn create_folder(folder: &Path) -> Result<(), Failure> {
     })
 }
 
-/// A recording of one channel to be written with 32-bit floats.
+/// A recording of one channel to be written.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mono<'a> {
     pub(super) samples: &'a [f64],
@@ -91,6 +91,8 @@ pub(super) struct Mono<'a> {
     pub(super) imaginary: Option<&'a [f64]>,
     /// Hertz.
     pub(super) rate: f64,
+    /// 32-bit floats, or integers of 16 or 24 bits.
+    pub(super) format: PcmFormat,
     /// SigMF recordings are so by their name.
     pub(super) container: Container,
 }
@@ -99,15 +101,15 @@ pub(super) struct Mono<'a> {
 const CHUNK: usize = 1 << 16;
 
 impl<'a> Mono<'a> {
-    /// Real samples in a WAV file.
+    /// Real samples in a WAV file of floats.
     pub(super) fn wav(samples: &'a [f64], rate: f64) -> Self {
-        Self { samples, imaginary: None, rate, container: Container::Wav }
+        Self { samples, imaginary: None, rate, format: PcmFormat::F32Le, container: Container::Wav }
     }
 
     /// The header of an ordinary WAV file, if the recording at `path` is to be one: sizes and bytes per
     /// second are numbers of 32 bits there.
     fn ordinary_wav(&self, path: &Path) -> Option<hound::WavSpec> {
-        const BYTES: u64 = 4;
+        let bytes = self.format.bytes() as u64;
         let is_small = |bytes: u64| bytes < u64::from(u32::MAX - 1024);
         let sample_rate = self.rate.round() as u32;
         let is_ordinary = self.container == Container::Wav
@@ -115,23 +117,27 @@ impl<'a> Mono<'a> {
             && !is_sigmf(path)
             && !is_pipe(path)
             && sample_rate > 0
-            && is_small(BYTES * u64::from(sample_rate))
-            && is_small(BYTES * self.samples.len() as u64);
-        let sample_format = hound::SampleFormat::Float;
-        is_ordinary.then_some(hound::WavSpec { channels: 1, sample_rate, bits_per_sample: 32, sample_format })
+            && is_small(bytes * u64::from(sample_rate))
+            && is_small(bytes * self.samples.len() as u64);
+        let is_float = self.format.is_float();
+        let sample_format = if is_float { hound::SampleFormat::Float } else { hound::SampleFormat::Int };
+        let bits_per_sample = 8 * bytes as u16;
+        is_ordinary.then_some(hound::WavSpec { channels: 1, sample_rate, bits_per_sample, sample_format })
     }
 
     /// Any other recording.
     fn write(&self, path: &Path, force: bool) -> Result<Vec<AtomicFile>, Failure> {
-        let Self { container, rate, imaginary, .. } = *self;
-        let header =
-            OutputHeader { container, format: PcmFormat::F32Le, is_complex: imaginary.is_some(), rate };
+        let Self { container, format, rate, imaginary, .. } = *self;
+        let header = OutputHeader { container, format, is_complex: imaginary.is_some(), rate };
         let mut writer = SampleWriter::create(path, header, force).map_err(Failure::input)?;
         for from in (0..self.samples.len()).step_by(CHUNK) {
             let to = (from + CHUNK).min(self.samples.len());
             let parts = |k: usize| [Some(self.samples[k]), imaginary.map(|imaginary| imaginary[k])];
-            let numbers = (from..to).flat_map(parts).flatten();
-            let bytes: Vec<u8> = numbers.flat_map(|x| (x as f32).to_le_bytes()).collect();
+            let numbers: Vec<f64> = (from..to).flat_map(parts).flatten().collect();
+            let mut bytes = vec![0; numbers.len() * format.bytes()];
+            for (slot, x) in bytes.chunks_exact_mut(format.bytes()).zip(numbers) {
+                format.encode(x, slot);
+            }
             writer.write(&bytes).map_err(Failure::input)?;
         }
         writer.finish().map_err(Failure::input)
@@ -164,6 +170,13 @@ pub(super) fn begin_recording(path: &Path, mono: Mono<'_>, force: bool) -> Resul
 
 fn write_wav(file: &mut AtomicFile, samples: &[f64], spec: hound::WavSpec) -> hound::Result<()> {
     let mut writer = hound::WavWriter::new(BufWriter::new(file), spec)?;
-    samples.iter().try_for_each(|&x| writer.write_sample(x as f32))?;
+    let full_scale = 2f64.powi(i32::from(spec.bits_per_sample) - 1);
+    match spec.sample_format {
+        hound::SampleFormat::Float => samples.iter().try_for_each(|&x| writer.write_sample(x as f32))?,
+        // Steps of a converter that are whole steps of the file.
+        hound::SampleFormat::Int => {
+            samples.iter().try_for_each(|&x| writer.write_sample((x * full_scale) as i32))?;
+        }
+    }
     writer.finalize()
 }

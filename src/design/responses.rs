@@ -7,7 +7,7 @@ use super::{DesignError, LiftedPlant, filters};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::linalg::{self, Complex, Mat};
 use crate::units::{GridTime, Hertz, RadiansPerFastPeriod, RadiansPerSlowPeriod};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 /// Energy of a recursive filter's response beyond which it counts as over, relative to all of it.
 const TAIL: f64 = 1e-12;
@@ -64,39 +64,32 @@ pub fn fir_response(taps: &[f64], w: RadiansPerFastPeriod) -> (Complex<f64>, f64
     (sum.0, (sum.1 / sum.0).re)
 }
 
-/// |Phi(2 pi f)| of the target and of each channel, gains included, at `points` frequencies from 0 to
-/// 1/(2 h).
+/// |Phi(2 pi f)| of the target and of each channel, gains included, at these frequencies.
 ///
 /// # Errors
 /// [`DesignError::NoSpec`] for a bank without front ends.
-pub fn front_end_gains(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Vec<f64>)>, DesignError> {
+pub fn front_end_gains(bank: &Bank, frequencies: &[Hertz]) -> Result<Vec<Vec<f64>>, DesignError> {
     let problem = bank_problem(bank)?;
     let first: Vec<usize> = problem.converters().into_iter().map(|channels| channels.start).collect();
-    let gains = |cycles: f64| {
-        let w = RadiansPerFastPeriod(TAU * cycles);
+    let gains = |frequency: &Hertz| {
+        let w = frequency.angular().per_fast_period(bank.fast_period);
         let gain = |front_end: usize| problem.front_ends[front_end].response(w).norm();
         let converters = first.iter().map(|&i| &problem.channels[i]);
         let channels = converters.map(|channel| channel.gain.abs() * gain(channel.front_end));
         std::iter::once(gain(problem.target)).chain(channels).collect()
     };
-    Ok(over_frequencies(bank, points, gains))
-}
-
-/// `gains` at so many frequencies from 0 to half a cycle per fast period.
-fn over_frequencies(bank: &Bank, points: usize, gains: impl Fn(f64) -> Vec<f64>) -> Vec<(Hertz, Vec<f64>)> {
-    let cycles = |k: usize| 0.5 * k as f64 / points.saturating_sub(1).max(1) as f64;
-    (0..points).map(cycles).map(|cycles| (Hertz(cycles / bank.fast_period.0), gains(cycles))).collect()
+    Ok(frequencies.iter().map(gains).collect())
 }
 
 /// The gains `||H_i(e^{j w})||` of the norm-equivalent analysis filters (thesis 5.16) of the target and of
-/// each channel at the fast rate, gains included, at `points` frequencies from 0 to 1/(2 h).
+/// each channel at the fast rate, gains included, at these frequencies of at most 1/(2 h).
 ///
 /// H_i is a row whose entries depend on the choice of a square root; its norm does not. It is the gain of
 /// the front end with all its aliases: the square is the sum over k of `|Phi_i(j (w + 2 pi k))|^2`.
 ///
 /// # Errors
 /// As [`front_end_gains`].
-pub fn analysis_gains(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Vec<f64>)>, DesignError> {
+pub fn analysis_gains(bank: &Bank, frequencies: &[Hertz]) -> Result<Vec<Vec<f64>>, DesignError> {
     let problem = bank_problem(bank)?;
     // Delays change the phase only, and noise is none of the front ends'.
     let delay = GridTime::fast_sample(0.0, problem.fast_period);
@@ -105,11 +98,11 @@ pub fn analysis_gains(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Vec<f64>
     let channels: Vec<Channel> = first.map(undelayed).collect();
     let noise = vec![0.0; channels.len()];
     let plant = LiftedPlant::new(&Problem { ratio: 1, latency: 0, channels, noise, ..problem })?;
-    let gains = |cycles: f64| {
-        let (h, w) = plant.response(TAU * cycles);
+    let gains = |frequency: &Hertz| {
+        let (h, w) = plant.response(frequency.angular().per_fast_period(bank.fast_period).0);
         w.row_iter().chain(h.row_iter()).map(|row| row.norm()).collect()
     };
-    Ok(over_frequencies(bank, points, gains))
+    Ok(frequencies.iter().map(gains).collect())
 }
 
 /// The largest singular value of the error system K = W - F H at `points` equidistant frequencies from 0 to
@@ -140,6 +133,7 @@ pub fn error_response(bank: &Bank, points: usize) -> Result<Vec<(Hertz, f64)>, D
 mod tests {
     use super::*;
     use crate::bank::StateSpace;
+    use std::f64::consts::TAU;
 
     /// The sum over 20,000 aliases on either side; the rest is below (0.5 / (2 pi 20,000))^3.
     #[test]
@@ -149,7 +143,8 @@ mod tests {
              target = { filter = { num = [1.0], den = [1.0, 2.0, 1.0] } }\ndesign = { method = \"sinc\", taps = 4 }";
         let spec = crate::spec::Spec::from_toml(text, "spec.toml").unwrap();
         let bank = crate::design::design(&spec, &crate::design::Options::without_proof()).unwrap().bank;
-        for (hertz, gains) in analysis_gains(&bank, 5).unwrap() {
+        let frequencies = [0.0, 0.25, 0.5, 0.75, 1.0].map(Hertz);
+        for (hertz, gains) in frequencies.iter().zip(analysis_gains(&bank, &frequencies).unwrap()) {
             // h = 0.5: 1 / (s + 1)^2 is 0.25 / (s + 0.5)^2 in fast periods.
             let square = |w: f64| (0.25 / (w * w + 0.25)).powi(2);
             let w = TAU * hertz.0 * 0.5;
@@ -200,11 +195,11 @@ mod tests {
     fn front_ends_have_their_cutoffs() {
         let bank =
             Bank::from_json(include_str!("../../filters/interleaved-4x250M.json"), "bank.json").unwrap();
-        let gains = front_end_gains(&bank, 3).unwrap();
-        // A quarter of the fast rate is the target's cutoff.
-        assert!((gains[1].0.0 - 250e6).abs() < 1.0 && gains[1].1.len() == 5);
-        assert!((gains[1].1[0] - 0.5_f64.sqrt()).abs() < 1e-9, "{gains:?}");
-        assert!(gains[0].1.iter().all(|gain| (gain - 1.0).abs() < 1e-9));
+        // A quarter of the fast rate is the target's cutoff; above half of it the filter goes on.
+        let gains = front_end_gains(&bank, &[Hertz(0.0), Hertz(250e6), Hertz(2.5e9)]).unwrap();
+        assert!(gains[0].iter().all(|gain| (gain - 1.0).abs() < 1e-9) && gains[1].len() == 5);
+        assert!((gains[1][0] - 0.5_f64.sqrt()).abs() < 1e-9, "{gains:?}");
+        assert!((gains[2][0] - (1.0 + 1e8_f64).powf(-0.5)).abs() < 1e-12, "{gains:?}");
     }
 
     /// The definition: the whole error system, evaluated by a solve at each frequency.

@@ -7,6 +7,8 @@ use crate::bank::{Bank, FixedPoint};
 /// Bits of the words. Samples and outputs have the same step, 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WordSizes {
+    /// Of the samples, 2 to 32: 2^(input - 1) is full scale.
+    pub input: u32,
     /// Of the accumulator, 2 to 64: sums wrap around in two's complement.
     pub accumulator: u32,
     /// Of the outputs, 2 to 32: they saturate.
@@ -15,17 +17,21 @@ pub struct WordSizes {
 
 /// A bank of integer taps as it runs in hardware, and as the exported C has it with words of 64 and 32 bits.
 ///
-/// With the integer taps q and f fraction bits, and all sums exact before they wrap,
+/// With the integer taps q, f fraction bits, offsets o relative to full scale, B bits of the samples, and
+/// all sums exact before they wrap,
 ///
 /// ```text
-/// s[kM+p] = sum over j and i of  q_i[p + j M] x_i[k - j]      modulo 2^accumulator
+/// c[p]    = sum over j and i of  q_i[p + j M] o_i 2^(B-1)     rounded to the nearest integer
+/// s[kM+p] = sum over j and i of  q_i[p + j M] x_i[k - j]  -  c[p]      modulo 2^accumulator
 /// y[kM+p] = floor(s 2^-f + 1/2)                               saturated: to the nearest, halves upwards
 /// ```
 ///
-/// Nothing but these two steps loses bits.
+/// Nothing but these steps loses bits. The offsets are subtracted from the sums, where they are exact to
+/// 2^-f of a step; subtracted from the samples they would be rounded to whole steps. Samples before the
+/// first frame are the offsets, rounded to whole steps.
 #[derive(Debug, Clone)]
 pub struct BitTrue {
-    taps: PolyphaseTaps<i64>,
+    filters: IntegerFilters,
     fraction_bits: i32,
     words: WordSizes,
     /// The samples of the last `lags` frames, a ring.
@@ -36,47 +42,51 @@ pub struct BitTrue {
 }
 
 impl BitTrue {
-    /// Of a bank with integer taps; the history is zero.
+    /// Of a bank with integer taps, before the first frame.
     ///
     /// # Errors
-    /// [`ExportError::Words`] for sizes out of range, [`ExportError::NoIntegers`], [`ExportError::Offset`],
+    /// [`ExportError::Words`] for sizes out of range, [`ExportError::NoIntegers`],
     /// [`ExportError::Accumulator`] for taps whose sums of 32-bit samples may not fit 64 bits.
     pub fn new(bank: &Bank, words: WordSizes) -> Result<Self, ExportError> {
-        let sizes = [("the accumulator", words.accumulator, 64), ("the outputs", words.output, 32)];
-        if let Some((word, bits, most)) =
-            sizes.into_iter().find(|(_, bits, most)| !(2..=*most).contains(bits))
-        {
-            return Err(ExportError::Words { word, bits, most });
-        }
+        let WordSizes { input, accumulator, output } = words;
+        check_word("the samples", input, 32)?;
+        check_word("the accumulator", accumulator, 64)?;
+        check_word("the outputs", output, 32)?;
         let integers = bank.fixed_point.as_ref().ok_or(ExportError::NoIntegers { format: "bit-true" })?;
-        let taps = integer_taps(bank, integers)?;
-        let history = vec![0; taps.channels * taps.lags];
+        let filters = IntegerFilters::new(bank, integers, Some(input))?;
+        let history = filters.resting.repeat(filters.taps.lags);
         let fraction_bits = integers.fraction_bits;
-        Ok(Self { taps, fraction_bits, words, history, newest: 0, wraps: 0, saturated: 0 })
+        Ok(Self { filters, fraction_bits, words, history, newest: 0, wraps: 0, saturated: 0 })
     }
 
-    /// Bits of an accumulator that no sum of samples of so many bits can leave.
-    pub fn needed_bits(&self, sample_bits: u32) -> u32 {
-        sample_bits + growth_bits(&self.taps)
+    /// Bits of an accumulator that no sum can leave.
+    pub fn needed_bits(&self) -> u32 {
+        self.filters.needed_bits(self.words.input)
+    }
+
+    /// The sample of each channel where there is no signal.
+    pub fn resting(&self) -> Vec<i32> {
+        self.filters.resting.iter().map(|x| *x as i32).collect()
     }
 
     /// Takes N samples, one of each channel, and writes M output samples. Further values are left alone.
     pub fn process(&mut self, input: &[i32], output: &mut [i32]) {
-        let n = self.taps.channels;
-        self.newest = self.newest.checked_sub(1).unwrap_or(self.taps.lags - 1);
+        let PolyphaseTaps { channels: n, ratio, lags, .. } = self.filters.taps;
+        self.newest = self.newest.checked_sub(1).unwrap_or(lags - 1);
         let newest = &mut self.history[self.newest * n..][..n];
         newest.iter_mut().zip(input).for_each(|(slot, x)| *slot = i64::from(*x));
-        for (p, y) in output.iter_mut().take(self.taps.ratio).enumerate() {
+        for (p, y) in output.iter_mut().take(ratio).enumerate() {
             let sum = self.wrapped(self.sum(p));
             *y = self.saturated(rounded(sum, self.fraction_bits));
         }
     }
 
     fn sum(&self, phase: usize) -> i64 {
-        let PolyphaseTaps { channels, lags, .. } = self.taps;
-        let frame = |j: usize| (self.newest + j) % lags * channels;
-        let product = |i: usize, j: usize| self.taps.get(i, phase, j) * self.history[frame(j) + i];
-        (0..lags).map(|j| (0..channels).map(|i| product(i, j)).sum::<i64>()).sum()
+        let taps = &self.filters.taps;
+        let frame = |j: usize| (self.newest + j) % taps.lags * taps.channels;
+        let product = |i: usize, j: usize| taps.get(i, phase, j) * self.history[frame(j) + i];
+        let sum = (0..taps.lags).map(|j| (0..taps.channels).map(|i| product(i, j)).sum::<i64>());
+        sum.sum::<i64>() - self.filters.constants[phase]
     }
 
     /// The sum as the accumulator holds it.
@@ -105,6 +115,11 @@ impl BitTrue {
     }
 }
 
+/// Refuses bits of a word outside 2 to `most`.
+fn check_word(word: &'static str, bits: u32, most: u32) -> Result<(), ExportError> {
+    if (2..=most).contains(&bits) { Ok(()) } else { Err(ExportError::Words { word, bits, most }) }
+}
+
 /// floor(sum 2^-f + 1/2).
 fn rounded(sum: i64, fraction_bits: i32) -> i128 {
     let sum = i128::from(sum);
@@ -117,30 +132,67 @@ fn rounded(sum: i64, fraction_bits: i32) -> i128 {
     }
 }
 
-/// The integers by channel, phase and lag, where sums of 32-bit samples fit 64 bits.
-///
-/// # Errors
-/// [`ExportError::Offset`] and [`ExportError::Accumulator`].
-pub(super) fn integer_taps(bank: &Bank, words: &FixedPoint) -> Result<PolyphaseTaps<i64>, ExportError> {
-    let nonzero = |(_, offset): &(usize, &f64)| **offset != 0.0;
-    if let Some((i, &offset)) = bank.offsets.iter().enumerate().find(nonzero) {
-        return Err(ExportError::Offset { channel: i + 1, offset });
+/// The integers that run a bank.
+#[derive(Debug, Clone)]
+pub(super) struct IntegerFilters {
+    pub(super) taps: PolyphaseTaps<i64>,
+    /// What the offsets add to the sum of each phase.
+    pub(super) constants: Vec<i64>,
+    /// The sample of each channel where there is no signal.
+    pub(super) resting: Vec<i64>,
+}
+
+impl IntegerFilters {
+    /// Of a bank with offsets only for samples of so many bits.
+    ///
+    /// # Errors
+    /// [`ExportError::Offset`] without these bits, [`ExportError::Words`], and [`ExportError::Accumulator`]
+    /// where sums of 32-bit samples may not fit 64 bits.
+    pub(super) fn new(bank: &Bank, words: &FixedPoint, input_bits: Option<u32>) -> Result<Self, ExportError> {
+        let nonzero = |(_, offset): &(usize, &f64)| **offset != 0.0;
+        let full_scale = match (input_bits, bank.offsets.iter().enumerate().find(nonzero)) {
+            (None, Some((i, &offset))) => return Err(ExportError::Offset { channel: i + 1, offset }),
+            (None, None) => 0.0,
+            (Some(bits), _) => {
+                check_word("the samples", bits, 32)?;
+                2f64.powi(bits as i32 - 1)
+            }
+        };
+        let taps = PolyphaseTaps::new(&words.integers, bank.ratio);
+        let steps: Vec<f64> =
+            bank.layout().each(&bank.offsets).iter().map(|offset| offset * full_scale).collect();
+        // Sums of 62 bits in doubles: their rounding is far below a step of the outputs.
+        let constant = |p: usize| {
+            let of_channel = |i: usize| (0..taps.lags).map(move |j| (i, j));
+            let entries = (0..taps.channels).flat_map(of_channel);
+            entries.map(|(i, j)| taps.get(i, p, j) as f64 * steps[i]).sum::<f64>().round() as i64
+        };
+        let constants: Vec<i64> = (0..taps.ratio).map(constant).collect();
+        let resting = steps.iter().map(|step| step.round().clamp(-full_scale, (full_scale - 1.0).max(0.0)));
+        let filters = Self { resting: resting.map(|x| x as i64).collect(), constants, taps };
+        // Rounding adds half of the largest sum at most.
+        let sum = filters.largest_sum(32);
+        if sum >= 1 << 62 { Err(ExportError::Accumulator { sum: (sum >> 31) as u64 }) } else { Ok(filters) }
     }
-    let taps = PolyphaseTaps::new(&words.integers, bank.ratio);
-    let sum = largest_sum(&taps);
-    if sum >= 1 << 31 { Err(ExportError::Accumulator { sum }) } else { Ok(taps) }
-}
 
-/// Bits by which a sum is wider than its samples.
-pub(super) fn growth_bits(taps: &PolyphaseTaps<i64>) -> u32 {
-    u64::BITS - largest_sum(taps).leading_zeros()
-}
+    /// Whether the samples have offsets.
+    pub(super) fn has_offsets(&self) -> bool {
+        self.constants.iter().chain(&self.resting).any(|x| *x != 0)
+    }
 
-/// Largest sum of the moduli of the taps of a phase.
-fn largest_sum(taps: &PolyphaseTaps<i64>) -> u64 {
-    let of_phase = |p: usize| -> u64 {
-        let entries = (0..taps.channels).flat_map(|i| (0..taps.lags).map(move |j| (i, j)));
-        entries.map(|(i, j)| taps.get(i, p, j).unsigned_abs()).sum()
-    };
-    (0..taps.ratio).map(of_phase).max().unwrap_or(0)
+    /// Bits of an accumulator that no sum of samples of so many bits can leave.
+    pub(super) fn needed_bits(&self, sample_bits: u32) -> u32 {
+        1 + u128::BITS - self.largest_sum(sample_bits).leading_zeros()
+    }
+
+    /// The largest modulus of a sum of samples of so many bits.
+    fn largest_sum(&self, sample_bits: u32) -> u128 {
+        let taps = &self.taps;
+        let of_phase = |p: usize| {
+            let entries = (0..taps.channels).flat_map(|i| (0..taps.lags).map(move |j| (i, j)));
+            let moduli: u128 = entries.map(|(i, j)| u128::from(taps.get(i, p, j).unsigned_abs())).sum();
+            (moduli << (sample_bits - 1)) + u128::from(self.constants[p].unsigned_abs())
+        };
+        (0..taps.ratio).map(of_phase).max().unwrap_or(0)
+    }
 }

@@ -1,7 +1,7 @@
 //! A C99 header with the coefficients of a bank and a streaming function.
 
 use super::ExportError;
-use super::bit_true::{growth_bits, integer_taps};
+use super::bit_true::IntegerFilters;
 use super::layout::{PolyphaseTaps, SparseBlock};
 use crate::bank::{Bank, FixedPoint, SynthesisFilters};
 use std::fmt::Display;
@@ -10,10 +10,10 @@ use std::fmt::Display;
 const PER_LINE: usize = 4;
 
 /// The header. `name` is the prefix of its identifiers.
-pub(super) fn header(bank: &Bank, name: &str) -> Result<String, ExportError> {
+pub(super) fn header(bank: &Bank, name: &str, input_bits: Option<u32>) -> Result<String, ExportError> {
     check_name(name)?;
     let body = match (&bank.filters, &bank.fixed_point) {
-        (SynthesisFilters::Fir(_), Some(words)) => integer_fir(bank, words, name)?,
+        (SynthesisFilters::Fir(_), Some(words)) => integer_fir(bank, words, name, input_bits)?,
         (SynthesisFilters::Fir(taps), None) => real_fir(bank, &PolyphaseTaps::new(taps, bank.ratio), name),
         (SynthesisFilters::StateSpace(block), _) => recursive(bank, &SparseBlock::new(block), name),
     };
@@ -84,20 +84,51 @@ fn real_fir(bank: &Bank, taps: &PolyphaseTaps<f64>, name: &str) -> String {
         sample: "double",
         tap: "double",
         taps: table(&taps.values, double),
-        offsets: Some(table(&bank.layout().each(&bank.offsets), double)),
+        constants: format!(
+            "static const double {name}_offsets[{}] = {};\n\n",
+            taps.channels,
+            table(&bank.layout().each(&bank.offsets), double)
+        ),
+        reset: String::new(),
+        sample_of: format!("input[i] - {name}_offsets[i]"),
+        start: "0".to_owned(),
         helper: String::new(),
         finish: "sum".to_owned(),
     })
 }
 
-fn integer_fir(bank: &Bank, words: &FixedPoint, name: &str) -> Result<String, ExportError> {
-    let taps = integer_taps(bank, words)?;
-    let growth = growth_bits(&taps);
+fn integer_fir(
+    bank: &Bank,
+    words: &FixedPoint,
+    name: &str,
+    input_bits: Option<u32>,
+) -> Result<String, ExportError> {
+    let filters = IntegerFilters::new(bank, words, input_bits)?;
+    let taps = &filters.taps;
+    let of_offsets = |text: String| if filters.has_offsets() { text } else { String::new() };
+    let reset = format!(
+        "    for (int j = 0; j < {}; j++)\n        \
+         for (int i = 0; i < {}; i++) state->history[j][i] = {name}_resting[i];\n",
+        taps.lags, taps.channels
+    );
+    let sums = match input_bits {
+        Some(bits) => format!("Sums of {bits}-bit samples need {} bits", filters.needed_bits(bits)),
+        None => format!("Sums of B-bit samples need B + {} bits", filters.needed_bits(32).saturating_sub(32)),
+    };
+    let constants = format!(
+        "/* What the offsets add to the sums of the phases, and samples without a signal. */\n\
+         static const int64_t {name}_constants[{}] = {};\n\
+         static const int32_t {name}_resting[{}] = {};\n\n",
+        taps.ratio,
+        table(&filters.constants, constant),
+        taps.channels,
+        table(&filters.resting, decimal)
+    );
     Ok(fir(&Fir {
         name,
         sizes: [taps.channels, taps.ratio, taps.lags],
         comment: format!(
-            "{} integer taps times 2^{}, {} not zero. Sums of B-bit samples need B + {growth} bits; 64 are used.\n   \
+            "{} integer taps times 2^{}, {} not zero. {sums}; 64 are used.\n   \
              Each sum is rounded to the nearest integer, halves upwards, and saturates at 32 bits",
             taps.values.len(),
             -words.fraction_bits,
@@ -108,10 +139,18 @@ fn integer_fir(bank: &Bank, words: &FixedPoint, name: &str) -> Result<String, Ex
         sample: "int32_t",
         tap: "int32_t",
         taps: table(&taps.values, decimal),
-        offsets: None,
+        constants: of_offsets(constants),
+        reset: of_offsets(reset),
+        sample_of: "input[i]".to_owned(),
+        start: if filters.has_offsets() { format!("-{name}_constants[p]") } else { "0".to_owned() },
         helper: rounding(name, words.fraction_bits),
         finish: format!("{name}_rounded(sum)"),
     }))
+}
+
+/// A number of 64 bits.
+fn constant(value: &i64) -> String {
+    format!("INT64_C({value})")
 }
 
 /// The function that turns a sum into an output sample.
@@ -149,32 +188,32 @@ struct Fir<'a> {
     sample: &'a str,
     tap: &'a str,
     taps: String,
-    offsets: Option<String>,
+    /// Tables for the offsets.
+    constants: String,
+    /// What the history is before the first frame, if not zero.
+    reset: String,
+    /// What the history keeps of a sample.
+    sample_of: String,
+    /// The value from which a sum starts.
+    start: String,
     helper: String,
     /// The output sample of a sum.
     finish: String,
 }
 
 fn fir(parts: &Fir<'_>) -> String {
-    let Fir {
-        name, sizes: [n, m, lags], comment, include, number, sample, tap, taps, helper, finish, ..
-    } = parts;
-    let offsets = parts
-        .offsets
-        .as_ref()
-        .map_or_else(String::new, |table| format!("static const double {name}_offsets[{n}] = {table};\n\n"));
-    let centred =
-        if parts.offsets.is_some() { format!("input[i] - {name}_offsets[i]") } else { "input[i]".into() };
+    let Fir { name, sizes: [n, m, lags], comment, include, number, sample, tap, taps, .. } = parts;
+    let Fir { constants, reset, sample_of, start, helper, finish, .. } = parts;
     format!(
         "{include}\n\n\
          /* {comment}.\n   taps[channel][phase][lag]: tap phase + lag * {m} of the channel's filter. */\n\
-         static const {tap} {name}_taps[{count}] = {taps};\n\n{offsets}\
+         static const {tap} {name}_taps[{count}] = {taps};\n\n{constants}\
          typedef struct {{\n    {sample} history[{lags}][{n}]; /* a ring of slow periods */\n    int newest;\n}} {name}_state;\n\n\
-         static inline void {name}_reset({name}_state *state) {{\n    memset(state, 0, sizeof *state);\n}}\n\n{helper}\
+         static inline void {name}_reset({name}_state *state) {{\n    memset(state, 0, sizeof *state);\n{reset}}}\n\n{helper}\
          static inline void {name}_process({name}_state *state, const {sample} input[{n}], {sample} output[{m}]) {{\n    \
          state->newest = state->newest == 0 ? {last} : state->newest - 1;\n    \
-         for (int i = 0; i < {n}; i++) state->history[state->newest][i] = {centred};\n    \
-         for (int p = 0; p < {m}; p++) {{\n        {number} sum = 0;\n        \
+         for (int i = 0; i < {n}; i++) state->history[state->newest][i] = {sample_of};\n    \
+         for (int p = 0; p < {m}; p++) {{\n        {number} sum = {start};\n        \
          for (int j = 0; j < {lags}; j++) {{\n            \
          int k = state->newest + j;\n            if (k >= {lags}) k -= {lags};\n            \
          for (int i = 0; i < {n}; i++)\n                \

@@ -14,10 +14,10 @@ pub enum ExportError {
         /// Name of the format.
         format: &'static str,
     },
-    /// Integer code has no full scale to which an offset is relative.
+    /// Integer code needs the full scale to which an offset is relative.
     #[error(
-        "channel {channel} has the offset {offset}, which integer code cannot subtract: its full scale is unknown; \
-         subtract the offset from the samples and set it to 0 in the spec"
+        "channel {channel} has the offset {offset} of full scale, and integers need the bits of the samples to \
+         subtract it; state them"
     )]
     Offset {
         /// Number of the channel, from 1.
@@ -37,13 +37,18 @@ pub enum ExportError {
     /// A word that the model does not have.
     #[error("{bits} bits for {word}; give 2 to {most}")]
     Words {
-        /// The word: that of the accumulator or of the outputs.
+        /// The word: that of the samples, of the accumulator or of the outputs.
         word: &'static str,
         /// Its bits.
         bits: u32,
         /// The most bits.
         most: u32,
     },
+    /// Bits of samples for a format without integers.
+    #[error(
+        "bits of the samples have no meaning here: only the integer code of a bank with integer taps has words"
+    )]
+    NoWords,
     /// The bank is no sum of sections.
     #[error("no second-order sections: {0}")]
     NoSections(&'static str),

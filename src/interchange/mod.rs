@@ -47,19 +47,39 @@ pub enum Format {
     Sos,
 }
 
-/// The bytes of `bank` in `format`. `name` is the prefix of the C identifiers.
+impl Format {
+    /// Whether integer taps are written as code for integer samples.
+    fn is_integer_code(self, bank: &Bank) -> bool {
+        matches!(self, Self::C99 | Self::Coe | Self::Mem) && bank.fixed_point.is_some()
+    }
+}
+
+/// The bytes of `bank` in `format`. `name` is the prefix of the C identifiers. Integer code subtracts the
+/// offsets from samples of `input_bits`, of which 2^(`input_bits` - 1) is full scale; without offsets it may
+/// have any bits.
 ///
 /// # Errors
 /// [`ExportError`] if the format cannot hold the bank.
-pub fn export(bank: &Bank, format: Format, name: &str) -> Result<Vec<u8>, ExportError> {
+pub fn export(
+    bank: &Bank,
+    format: Format,
+    name: &str,
+    input_bits: Option<u32>,
+) -> Result<Vec<u8>, ExportError> {
+    if input_bits.is_some() && !format.is_integer_code(bank) {
+        return Err(ExportError::NoWords);
+    }
     match format {
-        Format::C99 => c99::header(bank, name).map(String::into_bytes),
+        Format::C99 => c99::header(bank, name, input_bits).map(String::into_bytes),
         Format::Csv => Ok(tables::csv(bank).into_bytes()),
         Format::Npz => arrays::npz(bank),
         Format::Mat => arrays::mat(bank),
-        Format::Coe => tables::coe(bank).map(String::into_bytes),
-        Format::Mem => tables::mem(bank).map(String::into_bytes),
-        Format::Sos => sections(bank).map(|list| sections::table(&list).into_bytes()),
+        Format::Coe => tables::coe(bank, input_bits).map(String::into_bytes),
+        Format::Mem => tables::mem(bank, input_bits).map(String::into_bytes),
+        Format::Sos => {
+            let list = sections(bank)?;
+            Ok((tables::offsets(bank) + &sections::table(&list)).into_bytes())
+        }
     }
 }
 

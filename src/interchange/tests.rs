@@ -18,7 +18,7 @@ fn integers(bits: u32, list: Vec<Vec<i64>>) -> Bank {
 }
 
 fn text(bank: &Bank, format: Format) -> String {
-    String::from_utf8(export(bank, format, "bank").unwrap()).unwrap()
+    String::from_utf8(export(bank, format, "bank", None).unwrap()).unwrap()
 }
 
 #[test]
@@ -43,14 +43,14 @@ fn integers_are_written_as_words_of_their_bits() {
 #[test]
 fn archives_hold_the_same_numbers() {
     let bank = fir();
-    let bytes = export(&bank, Format::Npz, "bank").unwrap();
+    let bytes = export(&bank, Format::Npz, "bank", None).unwrap();
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).unwrap();
     let mut taps = Vec::new();
     archive.by_name("taps.npy").unwrap().read_to_end(&mut taps).unwrap();
     let array = npyz::NpyFile::new(&taps[..]).unwrap();
     assert_eq!(array.shape(), [2, 2, 2]);
     assert_eq!(array.into_vec::<f64>().unwrap(), [0.5, 1.0, -0.25, 0.0, 0.0, -1.5, 2.0, 0.0]);
-    let mat = export(&bank, Format::Mat, "bank").unwrap();
+    let mat = export(&bank, Format::Mat, "bank", None).unwrap();
     // Type, rows, columns, no imaginary part, length of the name; then the first column.
     let header: Vec<u32> = mat[..20].chunks(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect();
     assert_eq!(header, [0, 2, 4, 0, 5]);
@@ -61,18 +61,55 @@ fn archives_hold_the_same_numbers() {
 #[test]
 fn what_a_format_cannot_hold_is_refused() {
     for format in [Format::Coe, Format::Mem] {
-        assert!(matches!(export(&fir(), format, "b"), Err(ExportError::NoIntegers { .. })));
+        assert!(matches!(export(&fir(), format, "b", None), Err(ExportError::NoIntegers { .. })));
     }
     for name in ["", "1a", "a-b", "a b", "_", "é"] {
-        assert!(matches!(export(&fir(), Format::C99, name), Err(ExportError::Name { .. })), "{name}");
+        assert!(matches!(export(&fir(), Format::C99, name, None), Err(ExportError::Name { .. })), "{name}");
     }
     let mut bank = integers(6, vec![vec![1], vec![1]]);
     bank.offsets[1] = 0.5;
-    assert!(matches!(export(&bank, Format::C99, "b"), Err(ExportError::Offset { channel: 2, .. })));
+    for format in [Format::C99, Format::Coe, Format::Mem] {
+        let refused = export(&bank, format, "b", None);
+        assert!(matches!(refused, Err(ExportError::Offset { channel: 2, .. })), "{format:?}");
+        assert!(export(&bank, format, "b", Some(12)).is_ok(), "{format:?}");
+        let wide = export(&bank, format, "b", Some(33));
+        assert!(matches!(wide, Err(ExportError::Words { bits: 33, .. })), "{format:?}");
+    }
+    for format in [Format::Csv, Format::Npz, Format::Mat] {
+        let refused = export(&bank, format, "b", Some(12));
+        assert!(matches!(refused, Err(ExportError::NoWords)), "{format:?}");
+    }
     let large = integers(32, vec![vec![1 << 30], vec![-(1 << 30)]]);
-    assert!(
-        matches!(export(&large, Format::C99, "b"), Err(ExportError::Accumulator { sum }) if sum == 1 << 31)
-    );
+    let refused = export(&large, Format::C99, "b", None);
+    assert!(matches!(refused, Err(ExportError::Accumulator { sum }) if sum == 1 << 31));
+    // The constants of offsets are part of the sums.
+    let mut large = integers(31, vec![vec![1 << 29], vec![1 << 29]]);
+    assert!(export(&large, Format::C99, "b", Some(32)).is_ok());
+    large.offsets = vec![1.0, 1.0];
+    assert!(matches!(export(&large, Format::C99, "b", Some(32)), Err(ExportError::Accumulator { .. })));
+}
+
+/// 2 * 0.5 + 31 * 0.5 .. at full scale 2^4, and 0.5 of full scale is 8 steps.
+#[test]
+fn offsets_are_constants_of_the_sums_or_comments() {
+    let mut bank = integers(6, vec![vec![2, -1, 31], vec![0, -32, 5]]);
+    bank.offsets = vec![0.5, -0.28125];
+    let of_phases = [33.0 * 8.0 - 5.0 * 4.5, -8.0 + 32.0 * 4.5].map(f64::round);
+    assert_eq!(of_phases, [242.0, 136.0]);
+    let lines = "offsets, for samples of 5 bits: subtract from the sums of the phases 242 136\n";
+    for (format, comment) in [(Format::Coe, "; "), (Format::Mem, "// ")] {
+        let text = String::from_utf8(export(&bank, format, "b", Some(5)).unwrap()).unwrap();
+        let rest = format!("{comment}and begin with samples of the channels that are 8 -5\n");
+        assert!(text.contains(&format!("{comment}{lines}{rest}")), "{text}");
+    }
+    let c = String::from_utf8(export(&bank, Format::C99, "b", Some(5)).unwrap()).unwrap();
+    assert!(c.contains("b_constants[2] = {\n    INT64_C(242), INT64_C(136)\n}"), "{c}");
+    assert!(c.contains("b_resting[2] = {\n    8, -5\n}"), "{c}");
+    let comments = "# subtract 5e-1 of full scale from the samples of channel 1\n\
+                    # subtract -2.8125e-1 of full scale from the samples of channel 2\nchannel,phase";
+    let csv = text(&bank, Format::Csv);
+    assert!(csv.starts_with(comments), "{csv}");
+    assert_eq!(taps_of_csv(csv.as_bytes()).unwrap().len(), 2);
 }
 
 fn csv(text: &str) -> Result<Vec<Vec<f64>>, TapsError> {
@@ -138,14 +175,15 @@ fn arrays_are_read_in_both_orders() {
 #[test]
 fn words_out_of_range_are_refused_and_not_clamped() {
     let bank = integers(4, vec![vec![1, 2, 3], vec![-4, 5, -6]]);
-    for (accumulator, output, part) in [
-        (65, 16, "65 bits for the accumulator; give 2 to 64"),
-        (1, 16, "1 bits for the accumulator"),
-        (32, 33, "33 bits for the outputs; give 2 to 32"),
-        (32, 0, "0 bits for the outputs"),
+    for (input, accumulator, output, part) in [
+        (16, 65, 16, "65 bits for the accumulator; give 2 to 64"),
+        (16, 1, 16, "1 bits for the accumulator"),
+        (16, 32, 33, "33 bits for the outputs; give 2 to 32"),
+        (16, 32, 0, "0 bits for the outputs"),
+        (33, 32, 16, "33 bits for the samples; give 2 to 32"),
     ] {
-        let error = BitTrue::new(&bank, WordSizes { accumulator, output }).unwrap_err().to_string();
+        let error = BitTrue::new(&bank, WordSizes { input, accumulator, output }).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
     }
-    assert!(BitTrue::new(&bank, WordSizes { accumulator: 64, output: 2 }).is_ok());
+    assert!(BitTrue::new(&bank, WordSizes { input: 2, accumulator: 64, output: 2 }).is_ok());
 }

@@ -1,6 +1,7 @@
 //! The format of an input.
 
 use super::{ParsePcmFormatError, PcmFormat, SampleLayout};
+use std::fmt;
 use std::str::FromStr;
 
 /// The coding of the inputs.
@@ -29,6 +30,18 @@ impl Coding {
     /// True for complex samples.
     pub fn is_complex(self) -> bool {
         matches!(self, Self::Complex(_))
+    }
+}
+
+/// The name that reads as it.
+impl fmt::Display for Coding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Wav => f.write_str("wav"),
+            Self::Csv => f.write_str("csv"),
+            Self::Raw(format) => f.write_str(format.name()),
+            Self::Complex(format) => write!(f, "c{}", format.name()),
+        }
     }
 }
 

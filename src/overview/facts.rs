@@ -6,10 +6,11 @@ use super::understood::understood;
 use crate::bank::{Bank, FixedPoint, SynthesisFilters};
 use crate::design::uncertainty::{DelayDerivatives, delay_derivatives};
 use crate::design::{DesignError, GammaScale, MeanAnalysis, analyze_mean};
-use crate::figures::Figures;
+use crate::figures::{Figures, Snr};
 use crate::quantity::readable;
 use crate::runtime::Options;
 use crate::spec::{Method, Spec};
+use crate::units::Decibels;
 use crate::verify::{BoundedBanks, verify};
 
 /// The error of a delay, fast samples, for which the change of gamma is stated.
@@ -22,6 +23,8 @@ pub struct ChannelFact {
     pub delay: String,
     /// Of the converter.
     pub gain: String,
+    /// Of full scale.
+    pub offset: String,
     /// Relative change of gamma per thousandth of a fast sample; none where gamma has no derivative.
     pub sensitivity: Option<f64>,
 }
@@ -179,6 +182,7 @@ fn channel_facts(bank: &Bank, spec: &Spec, derivatives: &DelayDerivatives) -> Ve
             ChannelFact {
                 delay: if spec.is_normalised() { samples } else { format!("{samples} = {time}") },
                 gain: six_digits(channel.gain),
+                offset: six_digits(channel.offset),
                 sensitivity: gamma.map(|gamma| slope * SMALL_ERROR / gamma).filter(|share| share.is_finite()),
             }
         })
@@ -189,14 +193,12 @@ fn channel_facts(bank: &Bank, spec: &Spec, derivatives: &DelayDerivatives) -> Ve
 const ALL_ZERO: &str = "all integer taps are zero, so the output is zero: no better integers of these bits were found; \
                         give more bits or another fraction_bits";
 
-/// Warning for a bank that reaches nothing.
-const USELESS_BANK: &str = "gamma is no better than that of zero output: the front ends or the delays leave nothing to \
-                            reconstruct, or the latency does not suit the taps";
-
 /// Noise gains above this cause a warning: 20 dB.
 const LARGE_NOISE_GAIN: f64 = 10.0;
-/// A gamma above this share of that of zero output is no better than zero output.
-const USELESS: f64 = 0.99;
+/// A gamma above this share of that of zero output is hardly better than zero output.
+const USELESS: f64 = 0.9;
+/// A bank whose own errors leave less than this in the band of the signal reconstructs nothing.
+const LEAST_SNR: Decibels = Decibels(10.0);
 
 /// Warning for a bank with large coefficients.
 fn large_noise_gain(bank: &Bank, noise_gain: f64) -> String {
@@ -220,12 +222,34 @@ fn large_noise_gain(bank: &Bank, noise_gain: f64) -> String {
     )
 }
 
-/// What a user of the bank should know: that it does nothing, is no better than silence, or amplifies noise.
-pub fn warnings(bank: &Bank, mean: &MeanAnalysis, scale: &GammaScale) -> Vec<String> {
-    let is_useless = bank.gamma.norm.is_some_and(|gamma| gamma > USELESS * scale.zero_output);
+/// Why a bank is of no use, if it is: it is hardly better than silence, or leaves little of the signal that
+/// the spec states. The noise of the converters, which no bank removes, does not count.
+pub fn uselessness(bank: &Bank, scale: &GammaScale, figures: &Figures) -> Option<String> {
+    let gamma = bank.gamma.norm.filter(|gamma| *gamma > USELESS * scale.zero_output);
+    if let Some(gamma) = gamma.filter(|_| scale.zero_output > 0.0) {
+        return Some(format!(
+            "gamma is {:.0} % of that of zero output: the front ends or the delays leave nothing to reconstruct, or the \
+             latency does not suit the taps",
+            100.0 * gamma / scale.zero_output
+        ));
+    }
+    let Snr { signal_db, delays_db, .. } = figures.snr;
+    let share = |db: Decibels| 10f64.powf(-0.1 * db.0);
+    let error = share(signal_db) + delays_db.map_or(0.0, share);
+    (bank.spec.as_ref()?.signal.is_some() && error > share(LEAST_SNR)).then(|| {
+        format!(
+            "the SNR of the signal is {:.1} dB, without the noise of the converters: the channels do not hold its band, \
+             the taps or the latency are too few, or the delays too uncertain",
+            -10.0 * error.log10() + 0.0
+        )
+    })
+}
+
+/// What a user of the bank should know: that it does nothing, is of no use, or amplifies noise.
+pub fn warnings(bank: &Bank, mean: &MeanAnalysis, scale: &GammaScale, figures: &Figures) -> Vec<String> {
     let warnings = [
         bank.fixed_point.as_ref().is_some_and(FixedPoint::is_zero).then(|| ALL_ZERO.to_owned()),
-        is_useless.then(|| USELESS_BANK.to_owned()),
+        uselessness(bank, scale, figures),
         (mean.noise_gain > LARGE_NOISE_GAIN).then(|| large_noise_gain(bank, mean.noise_gain)),
     ];
     warnings.into_iter().flatten().collect()

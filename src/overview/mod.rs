@@ -8,7 +8,7 @@ mod terms;
 mod text;
 mod understood;
 
-pub use facts::{ChannelFact, Facts, warnings};
+pub use facts::{ChannelFact, Facts, uselessness, warnings};
 pub use pictures::{Picture, pictures};
 pub use spectra::spectra;
 pub use terms::{Fact, band, figure_facts, rounded as decibels_of};

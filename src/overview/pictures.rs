@@ -6,15 +6,19 @@ use crate::design::uncertainty::{delay_derivatives, norm_at};
 use crate::design::{self, DesignError};
 use crate::figures::{Tone, tone_curve};
 use crate::linalg::Complex;
-use crate::plot::{Chart, Series};
+use crate::plot::{AxisScale, Chart, Series};
 use crate::quantity::scale_of;
 use crate::spec::FrameSample;
-use crate::units::{FastPeriods, Hertz, RadiansPerFastPeriod};
+use crate::units::{FastPeriods, Hertz};
 use crate::verify::uncertainty::{ErrorPoint, Taps};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// Frequencies of a curve.
 const POINTS: usize = 601;
+/// Decades of a logarithmic axis of frequencies, and those of them above half the fast rate in the picture
+/// of the front ends.
+const DECADES: f64 = 3.0;
+const ABOVE_NYQUIST: f64 = 0.5;
 /// Gains below this are drawn there, in decibels.
 const FLOOR_DB: f64 = -200.0;
 /// Group delays are drawn where the gain is within this many decibels of the largest.
@@ -95,6 +99,7 @@ fn tones(bank: &Bank) -> Result<Chart, DesignError> {
     Ok(Chart {
         title: "Images and error of gain".into(),
         x_label: format!("input {x_label}"),
+        x_scale: AxisScale::Linear,
         y_label: "relative to the tone, dB".into(),
         series: vec![
             curve("largest image", |tone| tone.image),
@@ -131,29 +136,41 @@ fn nyquist(bank: &Bank) -> Hertz {
     Hertz(0.5 / bank.fast_period.0)
 }
 
+/// Over decades up to `top`, where a curve has [`POINTS`].
+fn decades(top: Hertz) -> Vec<Hertz> {
+    let step = DECADES / (POINTS - 1) as f64;
+    (0..POINTS).rev().map(|k| top * 10f64.powf(-step * k as f64)).collect()
+}
+
+/// Analog filters go on above half the fast rate.
 fn front_ends(bank: &Bank) -> Result<Chart, DesignError> {
-    Ok(of_target_and_channels(bank, "Gain of the front ends", &front_end_gains(bank, POINTS)?))
+    let frequencies = decades(nyquist(bank) * 10f64.powf(ABOVE_NYQUIST));
+    let gains = front_end_gains(bank, &frequencies)?;
+    Ok(of_target_and_channels(bank, "Gain of the front ends", &frequencies, &gains))
 }
 
 fn analysis(bank: &Bank) -> Result<Chart, DesignError> {
-    Ok(of_target_and_channels(
-        bank,
-        "Gain of the equivalent analysis filters",
-        &analysis_gains(bank, POINTS)?,
-    ))
+    let frequencies = decades(nyquist(bank));
+    let gains = analysis_gains(bank, &frequencies)?;
+    Ok(of_target_and_channels(bank, "Gain of the equivalent analysis filters", &frequencies, &gains))
 }
 
 /// Gains of the target and of each channel.
-fn of_target_and_channels(bank: &Bank, title: &str, all: &[(Hertz, Vec<f64>)]) -> Chart {
-    let (factor, x_label) = axis(nyquist(bank));
+fn of_target_and_channels(bank: &Bank, title: &str, frequencies: &[Hertz], all: &[Vec<f64>]) -> Chart {
+    let (factor, x_label) = axis(frequencies.last().copied().unwrap_or(nyquist(bank)));
     let curve = |index: usize| Series {
         label: index.checked_sub(1).map_or_else(|| "target".to_owned(), channel),
-        points: all.iter().map(|(f, gains)| (f.0 * factor, decibels(gains[index]))).collect(),
+        points: frequencies
+            .iter()
+            .zip(all)
+            .map(|(f, gains)| (f.0 * factor, decibels(gains[index])))
+            .collect(),
     };
     let count = 1 + bank.channel_count().min(MOST_CHANNELS - 1);
     Chart {
         title: title.into(),
         x_label,
+        x_scale: AxisScale::Decades,
         y_label: "gain, dB".into(),
         series: (0..count).map(curve).collect(),
     }
@@ -163,39 +180,59 @@ fn of_target_and_channels(bank: &Bank, title: &str, all: &[(Hertz, Vec<f64>)]) -
 fn by_frequency(
     bank: &Bank,
     responses: &[Vec<f64>],
+    frequencies: &[Hertz],
     value: impl Fn(Complex<f64>, f64) -> f64,
 ) -> (String, Vec<Series>) {
     let (factor, x_label) = axis(nyquist(bank));
     let curve = |(label, taps): (String, &Vec<f64>)| {
-        let point = |k: usize| {
-            let share = k as f64 / (POINTS - 1) as f64;
-            let (response, delay) = fir_response(taps, RadiansPerFastPeriod(PI * share));
-            (share * nyquist(bank).0 * factor, value(response, delay))
+        let point = |frequency: &Hertz| {
+            let w = frequency.angular().per_fast_period(bank.fast_period);
+            let (response, delay) = fir_response(taps, w);
+            (frequency.0 * factor, value(response, delay))
         };
-        Series { label, points: (0..POINTS).map(point).collect() }
+        Series { label, points: frequencies.iter().map(point).collect() }
     };
     let series = filter_names(bank).into_iter().zip(responses).take(MOST_CHANNELS).map(curve);
     (x_label, series.collect())
 }
 
+/// Evenly from 0 to half the fast rate.
+fn evenly(bank: &Bank) -> Vec<Hertz> {
+    (0..POINTS).map(|k| nyquist(bank) * (k as f64 / (POINTS - 1) as f64)).collect()
+}
+
 fn gains(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
-    let (x_label, series) = by_frequency(bank, responses, |response, _| decibels(response.norm()));
-    Chart { title: "Gain of the synthesis filters".into(), x_label, y_label: "gain, dB".into(), series }
+    let frequencies = decades(nyquist(bank));
+    let (x_label, series) =
+        by_frequency(bank, responses, &frequencies, |response, _| decibels(response.norm()));
+    Chart {
+        title: "Gain of the synthesis filters".into(),
+        x_label,
+        x_scale: AxisScale::Decades,
+        y_label: "gain, dB".into(),
+        series,
+    }
 }
 
 fn group_delays(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
     let least = pass_band(bank, responses);
     let delay = |response: Complex<f64>, delay: f64| if response.norm() >= least { delay } else { f64::NAN };
-    let (x_label, series) = by_frequency(bank, responses, delay);
+    let (x_label, series) = by_frequency(bank, responses, &evenly(bank), delay);
     let y_label = "group delay, fast samples".to_owned();
-    Chart { title: "Group delay of the synthesis filters, where they pass".into(), x_label, y_label, series }
+    Chart {
+        title: "Group delay of the synthesis filters, where they pass".into(),
+        x_label,
+        x_scale: AxisScale::Linear,
+        y_label,
+        series,
+    }
 }
 
 /// The phases without jumps of whole turns; where a filter does not pass they have no meaning.
 fn phases(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
     let least = pass_band(bank, responses);
     let phase = |response: Complex<f64>, _| if response.norm() >= least { response.arg() } else { f64::NAN };
-    let (x_label, mut series) = by_frequency(bank, responses, phase);
+    let (x_label, mut series) = by_frequency(bank, responses, &evenly(bank), phase);
     for curve in &mut series {
         let mut last = 0.0;
         for (_, phase) in curve.points.iter_mut().filter(|point| point.1.is_finite()) {
@@ -204,12 +241,18 @@ fn phases(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
         }
     }
     let y_label = "phase, rad".to_owned();
-    Chart { title: "Phase of the synthesis filters, where they pass".into(), x_label, y_label, series }
+    Chart {
+        title: "Phase of the synthesis filters, where they pass".into(),
+        x_label,
+        x_scale: AxisScale::Linear,
+        y_label,
+        series,
+    }
 }
 
 /// The least gain at which a filter passes.
 fn pass_band(bank: &Bank, responses: &[Vec<f64>]) -> f64 {
-    let (_, gains) = by_frequency(bank, responses, |response, _| response.norm());
+    let (_, gains) = by_frequency(bank, responses, &evenly(bank), |response, _| response.norm());
     let largest = gains.iter().flat_map(|curve| &curve.points).map(|point| point.1).fold(0.0, f64::max);
     largest * 10f64.powf(-PASS_BAND_DB / 20.0)
 }
@@ -222,6 +265,7 @@ fn impulses(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
     Chart {
         title: "Impulse responses of the synthesis filters".into(),
         x_label: "fast samples".into(),
+        x_scale: AxisScale::Linear,
         y_label: "tap".into(),
         series: filter_names(bank).into_iter().zip(responses).take(MOST_CHANNELS).map(curve).collect(),
     }
@@ -245,6 +289,7 @@ fn error(bank: &Bank) -> Result<Chart, DesignError> {
     Ok(Chart {
         title,
         x_label: x_label + ", modulo the slow rate",
+        x_scale: AxisScale::Linear,
         y_label: "gain, dB (h = 1)".into(),
         series,
     })
@@ -266,6 +311,7 @@ fn delay_error(bank: &Bank) -> Result<Chart, DesignError> {
     Ok(Chart {
         title: "gamma with delays that are not those of the bank".into(),
         x_label: "error of each delay, fast samples".into(),
+        x_scale: AxisScale::Linear,
         y_label: "gamma (h = 1)".into(),
         series: vec![Series {
             label: "gamma".into(),

@@ -1,6 +1,9 @@
 //! Line charts, and their SVG text.
 
+use super::axis::{AxisScale, Labels, extent, widened};
+use super::labels::{MARK_FONT, RADIUS, Room};
 use super::legend::{Dashes, Entry, Legend, Look, OVERSIZE, letters};
+use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use std::ops::Range;
@@ -13,8 +16,6 @@ pub(super) const ENLARGED: (u32, u32) = (WIDTH * OVERSIZE, HEIGHT * OVERSIZE);
 const SIDE: u32 = 10;
 /// Curves that differ by less than this share of their values are drawn as level.
 const LEAST_SHARE: f64 = 1e-3;
-/// Share of an axis by which it goes on after its last point.
-const END: f64 = 1e-9;
 /// Curves nearer to each other than this share of the height look like one.
 const SAME_PLACE: f64 = 0.005;
 const COLOURS: [RGBColor; 6] = [
@@ -38,14 +39,18 @@ pub struct Series {
 /// Points of one kind, each with a text beside it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marks {
-    /// Legend text.
+    /// Legend text; of several marks with one text the legend has the first.
     pub label: String,
+    /// Red, green, blue; `None` for the colour that follows those of the curves.
+    pub colour: Option<[u8; 3]>,
+    /// Rings in place of discs.
+    pub are_rings: bool,
     /// Points (x, y) and their texts; points that are not finite are left out.
     pub points: Vec<(f64, f64, String)>,
 }
 
 /// The axes of a chart that is being drawn.
-type Axes<'a, B> = ChartContext<'a, B, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+type Axes<'a, B, X> = ChartContext<'a, B, Cartesian2d<X, RangedCoordf64>>;
 
 /// The ranges of both axes.
 pub(super) type Ranges = (Range<f64>, Range<f64>);
@@ -59,6 +64,8 @@ pub struct Chart {
     pub title: String,
     /// Text under the x axis, with its unit.
     pub x_label: String,
+    /// Of the x axis.
+    pub x_scale: AxisScale,
     /// Text beside the y axis, with its unit.
     pub y_label: String,
     /// The curves, drawn in this order.
@@ -107,12 +114,21 @@ impl Chart {
     pub(super) fn ranges(&self, marks: &[Marks]) -> Result<Ranges, PlotError> {
         let marked = || marks.iter().flat_map(|m| &m.points).map(|(x, y, _)| (*x, *y));
         let drawn = || self.series.iter().flat_map(|s| &s.points).copied().chain(marked());
-        let points = || drawn().filter(|p| p.0.is_finite() && p.1.is_finite());
+        let points = || drawn().filter(|(x, y)| self.is_drawn(*x, *y));
         if points().next().is_none() {
             return Err(PlotError::Empty { title: self.title.clone() });
         }
         let (across, up) = (extent(points().map(|p| p.0)), extent(points().map(|p| p.1)));
-        Ok((widened(&across, 0.0, 0.0), widened(&up, 0.06, LEAST_SHARE)))
+        let across = match self.x_scale {
+            AxisScale::Linear => widened(&across, 0.0, 0.0),
+            AxisScale::Decades if across.start == across.end => 0.5 * across.start..2.0 * across.end,
+            AxisScale::Decades => across,
+        };
+        Ok((across, widened(&up, 0.06, LEAST_SHARE)))
+    }
+
+    fn is_drawn(&self, x: f64, y: f64) -> bool {
+        x.is_finite() && y.is_finite() && (self.x_scale == AxisScale::Linear || x > 0.0)
     }
 
     fn looks(&self, height: f64) -> Vec<Look> {
@@ -123,11 +139,26 @@ impl Chart {
     }
 
     fn entries<'a>(&'a self, looks: &'a [Look], marks: &'a [Marks]) -> impl Iterator<Item = Entry<'a>> {
-        let lines = self.series.iter().zip(looks).map(|(series, look)| (series.label.as_str(), *look));
-        let points = marks.iter().map(|marks| (marks.label.as_str(), Look::Points));
-        lines.chain(points).zip(COLOURS.iter().cycle()).map(|((label, look), colour)| {
-            let style = if look == Look::Points { colour.filled() } else { line_style(colour) };
-            Entry { label, look, style }
+        let line = |((series, look), colour): ((&'a Series, &Look), &RGBColor)| Entry {
+            label: &series.label,
+            look: *look,
+            style: line_style(colour),
+        };
+        let lines = self.series.iter().zip(looks).zip(COLOURS.iter().cycle()).map(line);
+        let is_first = |k: usize| !marks[..k].iter().any(|earlier| earlier.label == marks[k].label);
+        let points = self.styled(marks).enumerate().filter(move |(k, _)| is_first(*k));
+        lines.chain(points.map(|(_, (marks, style))| Entry {
+            label: &marks.label,
+            look: Look::Points,
+            style,
+        }))
+    }
+
+    /// The marks with the style of their circles.
+    fn styled<'a>(&self, marks: &'a [Marks]) -> impl Iterator<Item = (&'a Marks, ShapeStyle)> + use<'a> {
+        marks.iter().zip(COLOURS.iter().cycle().skip(self.series.len())).map(|(marks, next)| {
+            let colour = marks.colour.map_or(*next, |[r, g, b]| RGBColor(r, g, b));
+            (marks, if marks.are_rings { line_style(&colour) } else { colour.filled() })
         })
     }
 
@@ -142,21 +173,39 @@ impl Chart {
         title.draw(&Text::new(self.title.as_str(), (8 * OVERSIZE as i32, 3 * OVERSIZE as i32), text(18)))?;
         let (above, below) = below.split_vertically(legend.height());
         legend.draw(&above)?;
-        let mut chart = ChartBuilder::on(&below)
+        let mut builder = ChartBuilder::on(&below);
+        builder
             .margin_top(4 * OVERSIZE)
             .margin_right(14 * OVERSIZE)
             .x_label_area_size(44 * OVERSIZE)
-            .y_label_area_size(72 * OVERSIZE)
-            .build_cartesian_2d(x, y)?;
-        self.draw_axes(&mut chart)?;
-        self.draw_lines(&mut chart, &looks)?;
-        self.draw_marks(&mut chart, marks)?;
+            .y_label_area_size(72 * OVERSIZE);
+        match self.x_scale {
+            AxisScale::Linear => self.draw_on(builder.build_cartesian_2d(x, y)?, &looks, marks)?,
+            AxisScale::Decades => {
+                self.draw_on(builder.build_cartesian_2d(x.log_scale(), y)?, &looks, marks)?;
+            }
+        }
         root.present()?;
         Ok(())
     }
 
-    fn draw_axes<B: DrawingBackend>(&self, chart: &mut Axes<'_, B>) -> Drawn<B> {
-        let (across, up) = (Labels::over(&chart.x_range()), Labels::over(&chart.y_range()));
+    fn draw_on<B: DrawingBackend, X: Across>(
+        &self,
+        mut chart: Axes<'_, B, X>,
+        looks: &[Look],
+        marks: &[Marks],
+    ) -> Drawn<B> {
+        self.draw_axes(&mut chart)?;
+        self.draw_lines(&mut chart, looks)?;
+        self.draw_marks(&mut chart, marks)
+    }
+
+    fn draw_axes<B: DrawingBackend, X: Across>(&self, chart: &mut Axes<'_, B, X>) -> Drawn<B> {
+        let across = match self.x_scale {
+            AxisScale::Linear => Labels::over(&chart.x_range()),
+            AxisScale::Decades => Labels::OfDecades,
+        };
+        let up = Labels::over(&chart.y_range());
         chart
             .configure_mesh()
             .x_desc(&self.x_label)
@@ -170,9 +219,13 @@ impl Chart {
         Ok(())
     }
 
-    fn draw_lines<B: DrawingBackend>(&self, chart: &mut Axes<'_, B>, looks: &[Look]) -> Drawn<B> {
+    fn draw_lines<B: DrawingBackend, X: Across>(
+        &self,
+        chart: &mut Axes<'_, B, X>,
+        looks: &[Look],
+    ) -> Drawn<B> {
         for ((series, look), colour) in self.series.iter().zip(looks).zip(COLOURS.iter().cycle()) {
-            let points = series.points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite());
+            let points = series.points.iter().copied().filter(|(x, y)| self.is_drawn(*x, *y));
             let style = line_style(colour);
             match *look {
                 Look::Line(Some(Dashes { on, off })) => {
@@ -184,22 +237,38 @@ impl Chart {
         Ok(())
     }
 
-    /// Circles with their texts above them.
-    fn draw_marks<B: DrawingBackend>(&self, chart: &mut Axes<'_, B>, marks: &[Marks]) -> Drawn<B> {
-        let text_style = TextStyle::from(text(12)).color(&RGBColor(60, 60, 60));
-        for (marks, colour) in marks.iter().zip(COLOURS.iter().cycle().skip(self.series.len())) {
-            let points = || marks.points.iter().filter(|p| p.0.is_finite() && p.1.is_finite());
-            let radius = 3 * OVERSIZE as i32;
-            chart.draw_series(points().map(|(x, y, _)| Circle::new((*x, *y), radius, colour.filled())))?;
-            let above = |(x, y, text): &(f64, f64, String)| {
-                let place = (-(text.chars().count() as i32) * radius, -16 * OVERSIZE as i32);
-                EmptyElement::at((*x, *y)) + Text::new(text.clone(), place, text_style.clone())
-            };
-            chart.draw_series(points().filter(|(.., text)| !text.is_empty()).map(above))?;
+    /// Circles with their texts beside them, where these cover neither each other nor a circle. A text for
+    /// which there is no room is left out.
+    fn draw_marks<B: DrawingBackend, X: Across>(
+        &self,
+        chart: &mut Axes<'_, B, X>,
+        marks: &[Marks],
+    ) -> Drawn<B> {
+        let text_style = TextStyle::from(text(MARK_FONT)).color(&RGBColor(60, 60, 60));
+        let (across, down) = chart.plotting_area().get_pixel_range();
+        let mut room = Room::new(across, down);
+        let mut texts = Vec::new();
+        for (marks, style) in self.styled(marks) {
+            for (x, y, text) in marks.points.iter().filter(|(x, y, _)| self.is_drawn(*x, *y)) {
+                room.take_circle(chart.backend_coord(&(*x, *y)));
+                chart.draw_series([Circle::new((*x, *y), RADIUS, style)])?;
+                texts.push((*x, *y, text));
+            }
+        }
+        for (x, y, text) in texts.into_iter().filter(|(.., text)| !text.is_empty()) {
+            if let Some(place) = room.beside(chart.backend_coord(&(x, y)), text) {
+                let text = Text::new(text.clone(), place, text_style.clone());
+                chart.draw_series([EmptyElement::at((x, y)) + text])?;
+            }
         }
         Ok(())
     }
 }
+
+/// The coordinates of an x axis.
+trait Across: Ranged<ValueType = f64> + ValueFormatter<f64> {}
+
+impl<T: Ranged<ValueType = f64> + ValueFormatter<f64>> Across for T {}
 
 fn text(size: u32) -> FontDesc<'static> {
     letters(size * OVERSIZE)
@@ -223,48 +292,6 @@ fn line_style(colour: &RGBColor) -> ShapeStyle {
     colour.stroke_width(OVERSIZE + OVERSIZE / 2)
 }
 
-/// Numbers at an axis, with the decimals that tell neighbours apart.
-struct Labels {
-    decimals: usize,
-    is_scientific: bool,
-}
-
-impl Labels {
-    fn over(range: &Range<f64>) -> Self {
-        let size = (range.end - range.start).log10();
-        Self {
-            decimals: (2.0 - size).ceil().clamp(0.0, 12.0) as usize,
-            is_scientific: !(-9.0..7.0).contains(&size),
-        }
-    }
-
-    fn text(&self, value: f64) -> String {
-        if self.is_scientific {
-            return format!("{value:.3e}");
-        }
-        let text = format!("{value:.*}", self.decimals);
-        let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-        // A rounded zero may have a sign.
-        if text == "-0" { "0".to_owned() } else { text.to_owned() }
-    }
-}
-
-fn extent(values: impl Iterator<Item = f64>) -> Range<f64> {
-    values.fold(f64::INFINITY..f64::NEG_INFINITY, |range, v| range.start.min(v)..range.end.max(v))
-}
-
-/// With `share` of the length on both sides; at least `least` of the size of the numbers long.
-fn widened(range: &Range<f64>, share: f64, least: f64) -> Range<f64> {
-    let (low, high, size) = (range.start, range.end, range.start.abs().max(range.end.abs()));
-    let margin = match high - low {
-        0.0 => 0.5 * size.max(1.0),
-        span => (share * span).max(0.5 * (least * size - span)),
-    };
-    // A tick at the end must not be lost by rounding.
-    let slack = END * (high - low);
-    low - margin - slack..high + margin + slack
-}
-
 fn scale_by_view_box(svg: &str) -> String {
     let large = format!("width=\"{}\" height=\"{}\"", ENLARGED.0, ENLARGED.1);
     svg.replacen(&large, &format!("width=\"{WIDTH}\" height=\"{HEIGHT}\""), 1)
@@ -276,17 +303,49 @@ mod tests {
 
     fn chart(points: Vec<(f64, f64)>) -> Chart {
         let series = vec![Series { label: "error <1>".into(), points }];
-        Chart { title: "t".into(), x_label: "x".into(), y_label: "y".into(), series }
+        let x_scale = AxisScale::Linear;
+        Chart { title: "t".into(), x_label: "x".into(), x_scale, y_label: "y".into(), series }
     }
 
     #[test]
     fn marks_are_drawn_with_their_texts() {
         let points = vec![(1.0, 2.0, "spur".to_owned()), (f64::NAN, 0.0, "absent".to_owned())];
-        let marks = [Marks { label: "offset".into(), points }];
+        let marks = [Marks { label: "offset".into(), colour: None, are_rings: false, points }];
         let svg = chart(vec![(0.0, 1.0), (2.0, 3.0)]).to_svg_with(&marks).unwrap();
         // One circle for the point and one in the legend.
         assert_eq!(svg.matches("<circle").count(), 2);
         assert!(svg.contains("spur") && svg.contains("offset") && !svg.contains("absent"));
+    }
+
+    /// Marks of one cause, before and after, have one colour and one line in the legend.
+    #[test]
+    fn marks_of_one_label_share_colour_and_legend() {
+        let of = |y: f64, are_rings| Marks {
+            label: "offset".into(),
+            colour: Some([255, 127, 14]),
+            are_rings,
+            points: vec![(1.0, y, "1/4".to_owned())],
+        };
+        let svg = chart(vec![(0.0, 1.0), (2.0, 3.0)]).to_svg_with(&[of(2.0, true), of(1.0, false)]).unwrap();
+        assert_eq!(svg.matches("<circle").count(), 3);
+        assert_eq!(svg.matches("#FF7F0E").count(), 3, "{svg}");
+        assert_eq!(svg.matches("offset").count(), 1);
+    }
+
+    #[test]
+    fn decades_are_evenly_apart_and_zero_is_left_out() {
+        let points = (0..=1000).map(|k| (f64::from(k), 1.0)).collect();
+        let decades = Chart { x_scale: AxisScale::Decades, ..chart(points) };
+        assert_eq!(decades.ranges(&[]).unwrap().0, 1.0..1000.0);
+        let svg = decades.to_svg().unwrap();
+        let at = |label: &str| -> f64 {
+            let before = svg[..svg.find(&format!("\n{label}\n")).unwrap()].rfind("x=\"").unwrap() + 3;
+            svg[before..].split('"').next().unwrap().parse().unwrap()
+        };
+        let places = ["1", "10", "100", "1000"].map(at);
+        let step = places[1] - places[0];
+        assert!(step > 100.0 && places.windows(2).all(|p| (p[1] - p[0] - step).abs() < 3.0), "{places:?}");
+        assert!(Chart { x_scale: AxisScale::Decades, ..chart(vec![(0.0, 1.0)]) }.to_svg().is_err());
     }
 
     #[test]
@@ -320,16 +379,6 @@ mod tests {
         };
         assert!((0.02..0.04).contains(&height(1e-7)), "{}", height(1e-7));
         assert!((1.0..1.2).contains(&height(1.0)), "{}", height(1.0));
-    }
-
-    #[test]
-    fn labels_tell_neighbours_apart() {
-        let label = |range: Range<f64>, value: f64| Labels::over(&range).text(value);
-        assert_eq!(label(-1.0..1.0, -1e-17), "0");
-        assert_eq!(label(-1.0..1.0, 0.300_000_000_000_000_04), "0.3");
-        assert_eq!(label(0.0..1200.0, 400.0), "400");
-        assert_eq!(label(0.031_29..0.031_31, 0.031_295), "0.031295");
-        assert_eq!(label(0.0..1e-12, 5e-13), "5.000e-13");
     }
 
     #[test]

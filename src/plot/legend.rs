@@ -15,7 +15,7 @@ const SAMPLE: i32 = 26;
 const GAP: i32 = 8;
 const FONT: u32 = 15;
 /// Mean width of a letter over its height.
-const LETTER: f64 = 0.56;
+pub(super) const LETTER: f64 = 0.56;
 
 /// Dashes of a line, enlarged pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -90,7 +90,8 @@ pub enum SineFitError {
 /// Where there is no tone, and where there are lines.
 fn nothing(near: Option<Hertz>, lines: &[Hertz]) -> String {
     let Some(near) = near else {
-        return ": the largest peak of the spectrum is not above its noise; give a record with a sine wave".into();
+        return ": the largest peak of the spectrum is not above its noise; give a record with a sine wave"
+            .into();
     };
     let list: Vec<String> = lines.iter().map(|line| format!("{line:.3}")).collect();
     match &list[..] {

@@ -6,7 +6,11 @@ use hound::{SampleFormat, WavReader, WavSpec, WavWriter};
 
 /// A desk with a bank of 8-bit taps of wild values, so that sums round and saturate.
 fn desk(fraction_bits: i32) -> Desk {
-    let desk = Desk::with_spec(THESIS);
+    desk_of(THESIS, fraction_bits)
+}
+
+fn desk_of(spec: &str, fraction_bits: i32) -> Desk {
+    let desk = Desk::with_spec(spec);
     desk.good(&["design", "spec.toml", "-o", "b.json", "--taps", "22", "--bits", "8"]);
     let designed = with_wild_integers(bank(&desk), fraction_bits);
     desk.write("b.json", designed.to_json().unwrap());
@@ -55,6 +59,89 @@ fn the_model_has_the_bits_of_the_exported_c() {
         let shifted = output(&desk);
         assert!(shifted.len() == c.len() && shifted[..c.len() - 10] == c[10..]);
     }
+}
+
+/// Offsets are constants of the sums: the model has the bits of the exported C, and of 128-bit integers.
+#[test]
+fn offsets_are_subtracted_from_the_sums() {
+    let offsets = [0.0123456, -0.2];
+    let spec = THESIS.replace("delay = 1.2", &format!("delay = 1.2\noffset = {}", offsets[0]));
+    let spec = spec.replace("delay = 0.6", &format!("delay = 0.6\noffset = {}", offsets[1]));
+    for (bits, fraction_bits) in [(16, 7), (24, 6), (32, 9)] {
+        let desk = desk_of(&spec, fraction_bits);
+        let input = captures(&desk, bits);
+        let to_c = ["export", "b.json", "--to", "c", "-o", "bank.h"];
+        desk.refused(1, &to_c, &["channel 1 has the offset 0.0123456 of full scale", "--input-bits B"]);
+        desk.good(&[&to_c[..], &["--input-bits", &bits.to_string()]].concat());
+        let report = desk.report(&[&FUSE[..], &["--keep-latency"]].concat());
+        let (model, most) = (output(&desk), (1_i128 << (bits - 1)) - 1);
+        let words = bank(&desk).fixed_point.unwrap();
+        let steps = offsets.map(|offset: f64| offset * (most + 1) as f64);
+        let mut want = Vec::new();
+        let mut largest = 0;
+        for k in 0..input.len() / 2 {
+            for p in 0..2 {
+                let tap = |i: usize, j: usize| i128::from(words.integers[i][p + 2 * j]);
+                let sample = |i: usize, j: usize| match k.checked_sub(j) {
+                    Some(k) => i128::from(input[2 * k + i]),
+                    None => steps[i].round() as i128,
+                };
+                let all = || (0..11).flat_map(|j| [(0, j), (1, j)]);
+                let constant: f64 = all().map(|(i, j)| tap(i, j) as f64 * steps[i]).sum();
+                let sum: i128 = all().map(|(i, j)| tap(i, j) * sample(i, j)).sum();
+                let sum = sum - constant.round() as i128;
+                largest = largest.max(sum.abs());
+                want.push(((sum + (1 << (fraction_bits - 1))) >> fraction_bits).clamp(-most - 1, most) as i32);
+            }
+        }
+        assert!(model == want, "{bits} bits");
+        let needed = number(&report, "/needed_accumulator_bits");
+        assert!(number(&report, "/wrapped") == 0.0 && 1 + largest.ilog2() < needed as u32, "{report}");
+        if compiled(&desk, "int32_t", 2, 2) {
+            let c = piped(&desk, input.iter().flat_map(|x| x.to_le_bytes()).collect());
+            let c = c.chunks_exact(4).map(|b| i32::from_le_bytes(b.try_into().unwrap()));
+            assert!(c.map(|y| i128::from(y).clamp(-most - 1, most) as i32).eq(want), "{bits} bits");
+        }
+    }
+}
+
+/// From virtual converters of 12 bits to the spurs that are left: without the constants that of the offsets
+/// stays. An output of 16 bits has the same spurs as the floats.
+#[test]
+fn integers_of_converters_with_offsets_have_no_spurs() {
+    let desk = Desk::empty();
+    let spec = "fast_rate = 1e9\nratio = 4\n[target]\n\
+                filter = { family = \"butterworth\", order = 2, cutoff = 600e6 }\n[signal]\nband = 400e6\n\
+                [design]\nmethod = \"fir\"\ntaps = 48\nbits = 16\n";
+    let offsets = [0.002, -0.001, 0.0015, 0.0];
+    let channel =
+        |(i, offset): (usize, f64)| format!("[[channel]]\ndelay = {}e-9\noffset = {offset}\n", 3 - i);
+    let channels: String = offsets.into_iter().enumerate().map(channel).collect();
+    desk.write("spec.toml", format!("{spec}{channels}"));
+    let zero: String = (0..4).map(|i| channel((i, 0.0))).collect();
+    desk.write("zero.toml", format!("{spec}{zero}"));
+    let simulate = ["simulate", "spec.toml", "--source", "tones:183.1MHz", "--gain", "0.9", "--bits", "12"];
+    desk.good(&[&simulate[..], &["--samples", "65536", "-o", "cap"]].concat());
+    let spurs = |spec: &str, how: &[&str]| {
+        desk.report(&["design", spec, "-o", "b.json"]);
+        let fuse =
+            ["fuse", "b.json", "cap/ch1.wav", "cap/ch2.wav", "cap/ch3.wav", "cap/ch4.wav", "-o", "y.wav"];
+        let report = desk.report(&[&fuse[..], &["--measure", "--tone", "183.1MHz"], how].concat());
+        let worst = |which: &str| -> f64 {
+            let spurs = report["measure"][which]["spurs"].as_array().unwrap();
+            let is_offset = |spur: &&serde_json::Value| spur["causes"][0]["kind"] == "offset";
+            spurs.iter().find(is_offset).map(|spur| number(spur, "/level_dbc")).unwrap()
+        };
+        (worst("before"), worst("after"))
+    };
+    let (before, floats) = spurs("spec.toml", &[]);
+    let (_, integers) = spurs("spec.toml", &["--bit-true"]);
+    let (_, dropped) = spurs("zero.toml", &["--bit-true"]);
+    println!(
+        "offsets: {before:.1} dBc before, {floats:.1} floats, {integers:.1} integers, {dropped:.1} dropped"
+    );
+    assert!(before > -56.0 && dropped > -60.0, "{before} {dropped}");
+    assert!(floats < -95.0 && integers < -95.0, "{floats} {integers}");
 }
 
 /// M output samples for each frame, also where captures are shorter than a latency that is no multiple of M.
@@ -119,5 +206,7 @@ fn what_has_no_integers_is_refused() {
     let floats = ["fuse", "b.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "x.wav", "--bit-true"];
     desk.refused(1, &floats, &["cap/ch1.wav", "f32le", "16, 24 or 32 bits"]);
     desk.refused(2, &[&FUSE[..], &["--bits", "16"]].concat(), &["--bit-true", "--bits"]);
+    let words = ["export", "b.json", "--to", "csv", "-o", "x.csv", "--input-bits", "12"];
+    desk.refused(1, &words, &["only the integer code", "leave out --input-bits"]);
     desk.refused(2, &["fuse", "b.json", "in.wav", "-o", "x.wav", "--accumulator", "40"], &["--bit-true"]);
 }

@@ -272,6 +272,37 @@ fn captures_of_the_same_converters_are_pooled() {
     assert!(shown.0 == Some(1) && shown.1.contains("z4.txt contradicts the other captures"), "{shown:?}");
 }
 
+/// Bits of the converter for its codes in a table, and `fit` of the spec in place of the option.
+#[test]
+fn bits_of_codes_and_what_the_spec_fits() {
+    let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(8));
+    write_codes(&desk, "z.txt", &captured(&[61.3e6], 0.9, 4096, &mut dice));
+    let calibrated = |spec: &str, more: &[&str]| {
+        let how = ["z.txt", "--interleaved", "4", "-o", "m.toml", "--json", "--force", "--tone", "61.3MHz"];
+        desk.json(&[&["calibrate", spec], &how[..], more].concat())
+    };
+    let bits = calibrated("spec.toml", &["--sample-bits", "12"]);
+    assert_eq!(bits["channels"], calibrated("spec.toml", &["--full-scale", "12bits"])["channels"]);
+    assert!((number(&bits, "/channels/1/offset/value") + 4.0 * STEP).abs() < 0.1 * STEP, "{bits}");
+    desk.write("fit.toml", format!("full_scale = \"12bits\"\nfit = [\"gain\"]\n{NOMINAL}"));
+    let gains = calibrated("fit.toml", &[]);
+    let told = calibrated("spec.toml", &["--sample-bits", "12", "--fit", "gain"]);
+    assert_eq!(gains["channels"], told["channels"]);
+    assert!(gains["channels"][1]["delay"].is_null() && gains["channels"][1]["offset"].is_null(), "{gains}");
+    assert!(!calibrated("fit.toml", &["--fit", "delay"])["channels"][1]["delay"].is_null());
+    assert!(text(&desk.read("m.toml")).contains("fit = [\"gain\"]\n"));
+    let refused = |more: &[&str], code: i32, parts: &[&str]| {
+        let how = ["calibrate", "spec.toml", "z.txt", "--interleaved", "4", "-o", "x.toml"];
+        desk.refused(code, &[&how[..], more].concat(), parts);
+    };
+    refused(&["--sample-bits", "u12"], 2, &["--sample-bits", "1 to 53", "--full-scale u8bits"]);
+    refused(&["--sample-bits", "12", "--full-scale", "8bits"], 2, &["cannot be used with"]);
+    refused(&["--sample-bits", "12", "--fit", "cutoff,cutoff:1"], 1, &["--fit", "keep one of them"]);
+    // The lines that are there are named where a tone is missing.
+    let missing = ["no tone found near 62300000 Hz", "the only line of the record appears at 613"];
+    refused(&["--sample-bits", "12", "--tone", "62.3MHz"], 1, &missing);
+}
+
 /// What the captures contradict is not written unless asked for.
 #[test]
 fn values_that_the_captures_contradict_are_not_written() {

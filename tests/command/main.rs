@@ -31,6 +31,7 @@ mod messages;
 mod notes;
 #[cfg(unix)]
 mod outputs;
+mod pooled;
 mod rates;
 mod report;
 mod schema;

@@ -205,7 +205,9 @@ fn what_cannot_be_measured_is_refused() {
     }
     desk.refused(1, &["measure", "empty.wav"], &["empty.wav", "no samples"]);
     desk.refused(1, &["measure", "short.wav", "--interleaved", "16"], &["short.wav", "too few", "harmonics"]);
-    desk.refused(1, &["measure", "x.wav", "--tone", "9kHz"], &["x.wav", "no tone found near 9000 Hz"]);
+    let missing =
+        ["x.wav", "no tone found near 9000 Hz", "the lines of the record appear at 4321.0", "19679."];
+    desk.refused(1, &["measure", "x.wav", "--tone", "9kHz"], &missing);
     desk.refused(2, &["measure", "x.wav", "--tone", "fast"], &["fast", "auto"]);
     desk.refused(1, &["measure", "x.wav", "--tone", "-3"], &["x.wav", "-3", "above 0"]);
     desk.refused(2, &["measure", "x.wav", "--tone", "0"], &["other than 0"]);
@@ -214,6 +216,51 @@ fn what_cannot_be_measured_is_refused() {
     desk.refused(2, &["measure", "x.wav", "--full-scale", "128"], &["--full-scale 128", "by its format"]);
     desk.refused(2, &["measure", "x.wav", "--interleaved", "0"], &["0"]);
     desk.refused(1, &["measure", "none.wav"], &["none.wav"]);
+}
+
+/// Raw recordings have raw references, unless the name of one says its format.
+#[test]
+fn a_reference_has_the_format_of_the_recording() {
+    let desk = Desk::with_spec(THESIS);
+    let samples = capture(4000, 4321.0);
+    let codes: Vec<u8> = samples.iter().flat_map(|x| ((x * 32768.0) as i16).to_le_bytes()).collect();
+    desk.write("x.raw", &codes);
+    desk.write("target.raw", &codes);
+    let table = |scale: f32| samples.iter().fold(String::new(), |text, x| format!("{text}{}\n", x * scale));
+    desk.write("x.csv", table(2.5));
+    desk.write("target.csv", table(2.5));
+    wav::write(&desk, "target.wav", 1, 48_000, &samples);
+    let rate = ["--rate", "48kHz"];
+    for (recording, target, how) in [
+        ("x.raw", "target.raw", &["--format", "s16le"][..]),
+        ("x.raw", "target.wav", &["--format", "s16le"]),
+        ("x.csv", "target.csv", &["--full-scale", "2.5"]),
+        ("x.csv", "target.wav", &["--full-scale", "2.5"]),
+    ] {
+        let found = desk.json(&[&["measure", recording, "--ref", target, "--json"], how, &rate].concat());
+        let reference = &found["reference"];
+        assert!(number(reference, "/snr_db") > 80.0, "{recording} {target}: {reference}");
+        assert!((number(reference, "/gain/value") - 1.0).abs() < 1e-4, "{recording} {target}: {reference}");
+    }
+}
+
+/// The worst interleaving spur stays in the text, though a fit of it is in the noise.
+#[test]
+fn the_worst_interleaving_spur_is_said_in_the_noise_too() {
+    let desk = Desk::with_spec(THESIS);
+    let mut random = Random(11);
+    let mut noisy = |x: f64| (x + 1e-3 * random.sample()) as f32;
+    let tone: Vec<f32> = (0..20_000).map(|n| noisy(0.5 * (TAU * 0.0901 * f64::from(n)).cos())).collect();
+    wav::write(&desk, "x.wav", 1, 48_000, &tone);
+    let text = desk.good(&["measure", "x.wav", "--interleaved", "2"]);
+    assert!(text.contains("no spur above the noise"), "{text}");
+    let line = text.lines().find(|line| line.starts_with("worst of these")).unwrap();
+    assert!(line.contains("dBc") && line.contains("1/2 fs") && line.ends_with(", below the noise"), "{text}");
+    wav::write(&desk, "y.wav", 1, 48_000, &capture(20_000, 4321.0));
+    let text = desk.good(&["measure", "y.wav", "--interleaved", "2"]);
+    let line = text.lines().find(|line| line.starts_with("worst of these")).unwrap();
+    assert!(line.contains("-30.97 dBc") && line.ends_with("at 24000.000 Hz: offset, 1/2 fs"), "{text}");
+    assert!(!desk.good(&["measure", "y.wav"]).contains("worst of these"));
 }
 
 /// Two channels 0.4 fast samples off their places: plain interleaving has the spurs of that skew, the bank
@@ -247,5 +294,18 @@ fn fuse_measures_before_and_after() {
         &["--measure"],
     );
     desk.refused(2, &[&fuse[..6], &["--tone", "9kHz"]].concat(), &["--measure"]);
+    // Both over one axis: rings before and discs after, and one line in the legend for each cause.
+    assert!(report.lines().any(|line| line.starts_with("worst of these")), "{report}");
+    desk.good(&[&fuse[..], &["--force", "--plot", "both.svg"]].concat());
+    let svg = String::from_utf8(desk.read("both.svg")).unwrap();
+    for label in ["interleaved (rings)", "fused (discs)", "gain or skew", "SFDR"] {
+        assert_eq!(svg.matches(label).count(), 1, "{label}");
+    }
+    let (rings, discs) = (svg.matches("fill=\"none\"").count(), svg.matches("<circle").count());
+    assert!(rings > 1 && discs > rings, "{rings} {discs}");
+    desk.refused(1, &[&fuse[..], &["--plot", "both.svg"]].concat(), &["both.svg", "exists", "--force"]);
+    desk.refused(1, &[&fuse[..], &["--force", "--plot", "cap/ch1.wav"]].concat(), &["cap/ch1.wav"]);
+    desk.refused(2, &[&fuse[..6], &["--plot", "z.svg"]].concat(), &["--measure"]);
+    desk.refused(2, &[&fuse[..], &["--plot", "-"]].concat(), &["--plot -"]);
     assert!(!desk.path("z.wav").exists());
 }

@@ -267,6 +267,68 @@ fn noise_jitter_and_bits_have_their_powers_and_their_seed() {
     assert_ne!(again("other", "9"), recording(&desk.path("noise/ch2.wav")).1);
 }
 
+/// Cut-offs off by their errors are those of a spec that says so; with `fit` of one stage, of that stage.
+#[test]
+fn errors_of_cut_offs_are_those_of_other_front_ends() {
+    let desk = Desk::empty();
+    let cascade = |first: &str, second: &str| {
+        let stage = |cutoff: &str| format!("{{ family = \"rc\", cutoff = \"{cutoff}\" }}");
+        format!("filter = {{ cascade = [{}, {}] }}\n", stage(first), stage(second))
+    };
+    let spec = |head: &str, second: String| {
+        format!(
+            "fast_rate = \"48 kHz\"\nratio = 2\n{head}[target]\n{}[[channel]]\ndelay = \"3 us\"\n\
+             [[channel]]\ndelay = 0\n{second}",
+            cascade("8 kHz", "20 kHz")
+        )
+    };
+    let fit = "fit = [\"delay\", \"cutoff:2\"]\n";
+    desk.write("nominal.toml", spec("", String::new()));
+    desk.write("both.toml", spec("", cascade("8.08 kHz", "20.2 kHz")));
+    desk.write("fit.toml", spec(fit, String::new()));
+    desk.write("second.toml", spec("", cascade("8 kHz", "20.2 kHz")));
+    desk.write("single.toml", spec(fit, "filter = { family = \"rc\", cutoff = 8000 }\n".to_owned()));
+    let captured = |spec: &str, more: &[&str]| {
+        let args = ["simulate", spec, "--source", "tones:7.1kHz", "--samples", "400", "-o", "cap"];
+        desk.report(&[&args[..], more].concat());
+        ["ch1.wav", "ch2.wav", "target.wav"].map(|name| recording(&desk.path("cap").join(name)).1)
+    };
+    let error = ["--cutoff-error", "0,1%"];
+    let nominal = captured("nominal.toml", &[]);
+    for (given, truth) in [("nominal.toml", "both.toml"), ("fit.toml", "second.toml")] {
+        let (found, want) = (captured(given, &error), captured(truth, &[]));
+        let differs = |a: &[f64], b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - b).abs() > 1e-7);
+        assert!(!differs(&found[1], &want[1]) && differs(&found[1], &nominal[1]), "{given}");
+        assert!(found[0] == nominal[0] && found[2] == nominal[2], "{given}");
+    }
+    let args = ["simulate", "single.toml", "--source", "tones:7kHz", "-o", "new"];
+    desk.refused(1, &[&args[..], &error].concat(), &["--cutoff-error", "cutoff:2", "no such stage"]);
+    desk.refused(
+        1,
+        &[&args[..], &["--cutoff-error", "0.6"]].concat(),
+        &["--cutoff-error: 0.6", "-0.5 to 0.5"],
+    );
+}
+
+/// The codes of converters, in words of 16 and 24 bits; the target stays a float.
+#[test]
+fn converters_of_some_bits_write_integers() {
+    let desk = Desk::with_spec(THESIS);
+    for (bits, word) in [("8", 16), ("16", 16), ("17", 24), ("24", 24)] {
+        let args = ["simulate", "spec.toml", "--source", "tones:0.7", "--samples", "300", "-o", "cap"];
+        let floats = [&args[..], &["--to", "sigmf", "--force", "--bits", bits]].concat();
+        desk.good(&floats);
+        let raw = desk.read("cap/ch2.sigmf-data");
+        let raw: Vec<f32> = raw.chunks_exact(4).map(|x| f32::from_le_bytes(x.try_into().unwrap())).collect();
+        desk.good(&[&args[..], &["--force", "--bits", bits]].concat());
+        let (spec, samples) = wav::read(&desk.path("cap/ch2.wav"));
+        assert_eq!((spec.bits_per_sample, spec.sample_format), (word, hound::SampleFormat::Int), "{bits}");
+        assert_eq!(samples, raw, "{bits}");
+        let (target, _) = wav::read(&desk.path("cap/target.wav"));
+        assert_eq!(target.sample_format, hound::SampleFormat::Float);
+    }
+}
+
 #[test]
 fn clipped_samples_are_counted_and_reported() {
     let desk = Desk::with_spec(THESIS);

@@ -307,6 +307,46 @@ fn a_closed_pipe_ends_quietly() {
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
 }
 
+/// A name that ends in wav says the format; --output-format says it too, and must agree.
+#[test]
+fn the_name_of_the_output_implies_wav() {
+    let bench = Bench::new();
+    let frames: Vec<f32> = frames(50);
+    for (name, how) in [("y.wav", &[][..]), ("z.WAV", &["--output-format", "wav"])] {
+        let output = bench.run(&[&["-o", name], how].concat(), &bytes(&frames));
+        assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+        assert_eq!(crate::support::wav::read(&bench.path(name)).1, fused(&frames), "{name}");
+    }
+    let output = bench.run(&["-o", "x.wav", "--output-format", "f32le"], &bytes(&frames));
+    assert!(text(&output.stderr).contains("the output is raw samples, not wav"), "{output:?}");
+    assert!(!bench.path("x.wav").exists());
+}
+
+/// Two inputs of two channels each are the four channels of a bank, as one input of four is.
+#[test]
+fn inputs_have_several_channels_each() {
+    let desk = crate::support::Desk::empty();
+    let channel = |delay: f64| format!("[[channel]]\ndelay = {delay}\n");
+    let channels: String = [3.0, 2.0, 1.0, 0.0].map(channel).concat();
+    let head =
+        "fast_period = 1.0\nratio = 4\nlatency = 8\n[target]\nfilter = { num = [1.0], den = [1.0, 1.0] }\n";
+    desk.write("spec.toml", format!("{head}[design]\nmethod = \"fir\"\ntaps = 16\n{channels}"));
+    desk.good(&["design", "spec.toml", "-o", "b.json"]);
+    let samples: Vec<f32> = (0..400).map(|n| ((n * n * 7) % 101) as f32 / 101.0 - 0.5).collect();
+    let pair = |from: usize| -> Vec<f32> { samples.chunks(4).flat_map(|x| [x[from], x[from + 1]]).collect() };
+    desk.write("left.raw", bytes(&pair(0)));
+    desk.write("right.raw", bytes(&pair(2)));
+    let stream = ["stream", "b.json", "--input", "left.raw", "--input", "right.raw"];
+    let output = desk.run(&[&stream[..], &["--channels", "2"]].concat(), b"");
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    assert_eq!(output.stdout, desk.run(&["stream", "b.json"], &bytes(&samples)).stdout);
+    assert!(output.stdout.len() == 4 * 400);
+    desk.refused(2, &stream, &["given 2 times", "4 channels", "--channels how many each input holds"]);
+    desk.refused(1, &[&stream[..], &["--channels", "3"]].concat(), &["4 channels"]);
+    let wav = ["stream", "b.json", "--format", "wav", "--channels", "2"];
+    desk.refused(2, &wav, &["--channels", "state their channels"]);
+}
+
 #[test]
 fn wrong_usage_and_missing_inputs_are_reported() {
     let bench = Bench::new();

@@ -1,4 +1,4 @@
-//! WAV files of floats, written and read by a crate that is not ours.
+//! WAV files, written and read by a crate that is not ours.
 
 use super::Desk;
 use hound::{SampleFormat, WavReader, WavSpec, WavWriter};
@@ -17,10 +17,18 @@ pub(crate) fn write_pair(desk: &Desk, a: &[f32], b: &[f32]) {
     write(desk, "b.wav", 1, 24_000, b);
 }
 
+/// Integers are shares of full scale.
 pub(crate) fn read(path: &Path) -> (WavSpec, Vec<f32>) {
     let mut reader = WavReader::open(path).unwrap();
-    let samples = reader.samples::<f32>().map(Result::unwrap).collect();
-    (reader.spec(), samples)
+    let spec = reader.spec();
+    let full_scale = 2f64.powi(i32::from(spec.bits_per_sample) - 1);
+    let samples = match spec.sample_format {
+        SampleFormat::Float => reader.samples::<f32>().map(Result::unwrap).collect(),
+        SampleFormat::Int => {
+            reader.samples::<i32>().map(|x| (f64::from(x.unwrap()) / full_scale) as f32).collect()
+        }
+    };
+    (spec, samples)
 }
 
 pub(crate) fn samples(desk: &Desk, name: &str) -> Vec<f32> {

@@ -126,3 +126,27 @@ fn bits_that_make_no_sense_are_refused() {
     desk.refused(1, &design(&["--bits", "8", "--method", "h2"]), &["bits", "fir"]);
     desk.refused(2, &design(&["--bits", "eight"]), &["eight"]);
 }
+
+/// A bank that is hardly better than silence, or leaves hardly any of the signal, is written only if asked
+/// for.
+#[test]
+fn banks_of_no_use_are_refused() {
+    let desk = Desk::with_spec(THESIS);
+    // Two samples at one instant for two fast samples, of a signal up to the end of the fast rate.
+    desk.write(
+        "late.toml",
+        THESIS.replace("latency = 10", "latency = 0").replace("1.2", "40").replace("0.6", "41"),
+    );
+    let wide = THESIS.replace("0.6", "1.2").replace("[design]", "[signal]\nband = 0.5\n[design]");
+    desk.write("wide.toml", wide);
+    for (spec, reason) in
+        [("late.toml", "% of that of zero output"), ("wide.toml", "the SNR of the signal is")]
+    {
+        let parts = [spec, "of no use, so it is not written", reason, "--force writes it"];
+        desk.refused(1, &["design", spec, "-o", "b.json"], &parts);
+        let output = desk.run(&["design", spec, "-o", "b.json", "--force"], b"");
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success() && said.contains(reason), "{said}");
+        std::fs::remove_file(desk.path("b.json")).unwrap();
+    }
+}

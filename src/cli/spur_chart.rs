@@ -1,0 +1,165 @@
+//! The spectra of measured recordings with their spurs marked.
+
+use super::capture_file::CaptureFile;
+use super::measure_report::Report;
+use crate::measure::{Cause, Measurement, Settings, Spectrum, Spur};
+use crate::plot::{AxisScale, Chart, Marks, Series};
+use crate::quantity::scale_of;
+use crate::units::{Decibels, Hertz};
+
+/// Points of a curve; of several bins the largest is drawn.
+const COLUMNS: usize = 1900;
+/// Spurs of a recording that are marked.
+const MOST_MARKS: usize = 24;
+/// Decibels below the largest bin at which the picture ends.
+const DEPTH: f64 = 180.0;
+
+/// The chart of a report and its marks.
+pub(super) fn chart(report: &Report, settings: &Settings, capture: &CaptureFile) -> (Chart, Vec<Marks>) {
+    let own;
+    let spectrum = match &report.measurement {
+        Some(measured) => &measured.spectrum,
+        None => {
+            let finite: Vec<f64> =
+                capture.samples.iter().map(|x| if x.is_finite() { *x } else { 0.0 }).collect();
+            own = Spectrum::new(&finite, capture.rate, settings.window);
+            &own
+        }
+    };
+    let scale = Scale::of(&[spectrum], settings.full_scale);
+    let mut series = vec![Series { label: report.file.clone(), points: scale.points(spectrum) }];
+    if let Some(reference) = &report.reference {
+        let points = scale.points(&reference.comparison.error_spectrum);
+        series.push(Series { label: format!("error against {}", reference.file), points });
+    }
+    let marks = report.measurement.as_ref();
+    let marks = marks.map(|measured| scale.marks(measured, false, &|_| true)).unwrap_or_default();
+    (scale.chart(title(report), settings, series), marks)
+}
+
+fn title(report: &Report) -> String {
+    match (&report.measurement, &report.reference) {
+        (Some(m), _) => {
+            format!("SINAD {:.2} dB, ENOB {:.2} bits, SFDR {:.2} dBc", m.sinad.0, m.enob, m.sfdr.0)
+        }
+        (None, Some(reference)) => {
+            format!("SNR {:.2} dB against {}", reference.comparison.snr.0, reference.file)
+        }
+        (None, None) => report.file.clone(),
+    }
+}
+
+/// Two measurements of one signal over one axis: the spurs of the first one are rings, those of the second
+/// one discs, and each cause has one colour. A spur that both have is named once.
+pub(super) fn before_after(before: &Measurement, after: &Measurement) -> (Chart, Vec<Marks>) {
+    let scale = Scale::of(&[&before.spectrum, &after.spectrum], after.full_scale);
+    let series = [("interleaved (rings)", before), ("fused (discs)", after)];
+    let series = series
+        .map(|(label, measured)| Series { label: label.into(), points: scale.points(&measured.spectrum) });
+    let named: Vec<&Spur> = marked(before).collect();
+    let is_new = |spur: &Spur| !named.iter().any(|other| other.causes == spur.causes);
+    let mut marks = scale.marks(before, true, &|_| true);
+    marks.extend(scale.marks(after, false, &is_new));
+    let title = format!(
+        "SFDR {:.1} -> {:.1} dBc, SINAD {:.1} -> {:.1} dB",
+        before.sfdr.0, after.sfdr.0, before.sinad.0, after.sinad.0
+    );
+    let settings = Settings { window: after.window, ..Settings::default() };
+    (scale.chart(title, &settings, series.into()), marks)
+}
+
+/// The spurs of a recording that are marked: those above the noise, and the worst one of interleaving.
+fn marked(measured: &Measurement) -> impl Iterator<Item = &Spur> {
+    let worst = measured.worst_interleaving();
+    let is_marked = move |spur: &&Spur| spur.above_noise || worst == Some(*spur);
+    measured.spurs.iter().filter(is_marked).take(MOST_MARKS)
+}
+
+/// The axes of a picture.
+struct Scale {
+    unit: String,
+    /// Units per hertz.
+    factor: f64,
+    full_scale: f64,
+    /// The lowest level that is drawn, dBFS.
+    floor: f64,
+}
+
+impl Scale {
+    fn of(spectra: &[&Spectrum], full_scale: f64) -> Self {
+        let ends = spectra.iter().map(|spectrum| spectrum.frequency(spectrum.amplitudes.len()).0);
+        let end = ends.fold(0.0, f64::max);
+        // Below 1 kHz the unit is hertz.
+        let (factor, unit) = if end < 1e3 { (1.0, "Hz".to_owned()) } else { scale_of(end, "Hz") };
+        let all = spectra.iter().flat_map(|spectrum| &spectrum.amplitudes);
+        let largest = all.fold(0.0, |most: f64, a| most.max(*a));
+        Self { unit, factor, full_scale, floor: Decibels::of_amplitude(largest / full_scale).0 - DEPTH }
+    }
+
+    fn chart(&self, title: String, settings: &Settings, series: Vec<Series>) -> Chart {
+        Chart {
+            title,
+            x_label: format!("frequency ({})", self.unit),
+            x_scale: AxisScale::Linear,
+            y_label: format!("dBFS (window: {:.2} bins of noise)", settings.window.noise_bandwidth()),
+            series,
+        }
+    }
+
+    fn level(&self, amplitude: f64) -> f64 {
+        Decibels::of_amplitude(amplitude / self.full_scale).0.max(self.floor)
+    }
+
+    /// The largest bin of each column.
+    fn points(&self, spectrum: &Spectrum) -> Vec<(f64, f64)> {
+        let point = |(frequency, amplitude): (Hertz, f64)| (frequency.0 * self.factor, self.level(amplitude));
+        spectrum.columns(COLUMNS).into_iter().map(point).collect()
+    }
+
+    /// The tones and the largest spurs, by cause; those that are `named` have a text.
+    fn marks(&self, measured: &Measurement, are_rings: bool, named: &dyn Fn(&Spur) -> bool) -> Vec<Marks> {
+        let marks = |(label, colour), points| Marks { label, colour: Some(colour), are_rings, points };
+        let tones = measured.tones.iter();
+        let tones =
+            tones.map(|tone| (tone.alias.0 * self.factor, self.level(tone.amplitude.value), String::new()));
+        let mut all = vec![marks(("tone".to_owned(), [0, 0, 0]), tones.collect())];
+        for spur in marked(measured) {
+            let text = if named(spur) { short(spur) } else { String::new() };
+            let point = (spur.frequency.0 * self.factor, self.level(spur.amplitude), text);
+            let (label, colour) = kind(spur);
+            match all.iter_mut().find(|marks| marks.label == label) {
+                Some(marks) => marks.points.push(point),
+                None => all.push(marks((label.to_owned(), colour), vec![point])),
+            }
+        }
+        all
+    }
+}
+
+/// The cause in the legend, and its colour, which no curve has.
+fn kind(spur: &Spur) -> (&'static str, [u8; 3]) {
+    match spur.causes.first() {
+        Some(Cause::Offset { .. }) => ("offset", [255, 127, 14]),
+        Some(Cause::GainOrSkew { .. }) => ("gain or skew", [148, 103, 189]),
+        Some(Cause::Harmonic { .. }) => ("harmonic", [44, 160, 44]),
+        Some(Cause::HarmonicImage { .. }) => ("harmonic, displaced", [140, 86, 75]),
+        Some(Cause::Image { .. }) => ("image", [227, 119, 194]),
+        Some(Cause::Intermodulation { .. }) => ("intermodulation", [23, 190, 207]),
+        Some(Cause::Unknown) | None => ("unknown", [127, 127, 127]),
+    }
+}
+
+/// A short text beside a mark.
+fn short(spur: &Spur) -> String {
+    match spur.causes.first() {
+        Some(Cause::Offset { k, of }) => format!("{k}/{of}"),
+        Some(Cause::GainOrSkew { k, of, is_sum, .. }) => {
+            format!("{k}/{of}{}f", if *is_sum { '+' } else { '-' })
+        }
+        Some(Cause::Harmonic { order, .. }) => format!("H{order}"),
+        Some(Cause::HarmonicImage { order, k, of }) => format!("H{order} {k}/{of}"),
+        Some(Cause::Image { order: 1, .. }) => "-f".into(),
+        Some(Cause::Image { order, .. }) => format!("-H{order}"),
+        _ => String::new(),
+    }
+}

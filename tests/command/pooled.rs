@@ -1,0 +1,183 @@
+//! Captures of interleaved converters as users have them: codes of 8 bits in tables, pooled; and an
+//! intermediate frequency.
+
+use crate::support::{Desk, number};
+use serde_json::Value;
+
+/// Four converters of 750 MS/s in turn.
+const QUAD: &str = r#"fast_rate = "3 GS/s"
+ratio = 4
+full_scale = "8bits"
+[target]
+filter = { family = "butterworth", order = 2, cutoff = "2.2 GHz" }
+[[channel]]
+delay_samples = 3
+[[channel]]
+delay_samples = 2
+[[channel]]
+delay_samples = 1
+[[channel]]
+delay_samples = 0
+[signal]
+band = "1.4 GHz"
+[design]
+method = "fir"
+taps = 64
+"#;
+
+/// What two units really are: skews, gains and offsets of each converter.
+const UNITS: [[&str; 3]; 2] = [
+    ["1.9ps,-1.3ps,0.8ps,0", "0.9%,-0.6%,0.4%,0", "0.012,-0.007,0.004,-0.01"],
+    ["-2.6ps,0.7ps,1.8ps,0", "-0.5%,1.1%,-0.8%,0", "-0.009,0.011,0.003,0.006"],
+];
+/// Tones of nine captures, and of the one to judge by, MHz.
+const TONES: [&str; 9] =
+    ["97.13", "241.57", "389.91", "533.77", "701.33", "853.19", "1011.67", "1187.41", "1361.83"];
+const HELD_OUT: &str = "1123.61";
+/// Samples of a capture of 8 bits, and of the one to judge by.
+const SHORT: &str = "32768";
+const LONG: &str = "262144";
+
+/// The codes of one unit in a table, one per line, in the order in which they were taken.
+fn capture(desk: &Desk, [skews, gains, offsets]: [&str; 3], tone: &str, samples: &str, name: &str) {
+    let source = format!("tones:{tone}MHz");
+    let seed = (tone.len() + name.len() * 31 + name.bytes().map(usize::from).sum::<usize>()).to_string();
+    let simulate = ["simulate", "quad.toml", "--source", &source, "--samples", samples, "--gain", "0.9"];
+    let errors = ["--delay-error", skews, "--gain-error", gains, "--offset", offsets];
+    // With the rounding 41 dB below the tone.
+    let rest = ["--bits", "8", "--noise", "5.2e-3", "--seed", &seed, "--force", "-o", "cap"];
+    desk.good(&[&simulate[..], &errors, &rest].concat());
+    let codes = |i: usize| -> Vec<i16> {
+        let path = desk.path(&format!("cap/ch{i}.wav"));
+        let samples = hound::WavReader::open(path).unwrap().into_samples::<i16>();
+        samples.map(|x| x.unwrap() >> 8).collect()
+    };
+    let channels = [1, 2, 3, 4].map(codes);
+    let turns = (0..4 * channels[0].len()).map(|n| channels[n % 4][n / 4].to_string() + "\n");
+    desk.write(name, turns.collect::<String>());
+}
+
+/// The largest spur of interleaving, dBc.
+fn worst(measured: &Value) -> f64 {
+    let spurs = measured["spurs"].as_array().unwrap();
+    let is_own = |spur: &&Value| {
+        let kind = &spur["causes"][0]["kind"];
+        kind == "offset" || kind == "gain_or_skew" || kind == "harmonic_image"
+    };
+    spurs.iter().find(is_own).map(|spur| number(spur, "/level_dbc")).unwrap()
+}
+
+/// The held-out capture through the bank of a spec.
+fn judged(desk: &Desk, spec: &str) -> (f64, f64) {
+    desk.report(&["design", spec, "-o", "b.json"]);
+    desk.report(&["fuse", "b.json", "held.csv", "--interleaved", "4", "-o", "y.wav"]);
+    let tone = format!("{HELD_OUT}MHz");
+    let found =
+        desk.json(&["measure", "y.wav", "--interleaved", "4", "--tone", &tone, "--skip", "200", "--json"]);
+    (worst(&found), number(&found, "/sinad_db"))
+}
+
+/// Nine captures of 8 bits, each with a tone of its own, say more together than one.
+#[test]
+fn pooled_captures_of_quad_converters() {
+    for (unit, errors) in UNITS.into_iter().enumerate() {
+        let desk = Desk::empty();
+        desk.write("quad.toml", QUAD);
+        let names: Vec<String> = (0..9).map(|k| format!("z{k}.csv")).collect();
+        for (tone, name) in TONES.into_iter().zip(&names) {
+            capture(&desk, errors, tone, SHORT, name);
+        }
+        capture(&desk, errors, HELD_OUT, LONG, "held.csv");
+        let calibrated = |captures: &[String]| {
+            let captures: Vec<&str> = captures.iter().map(String::as_str).collect();
+            let how = ["--interleaved", "4", "--reference", "4", "-o", "m.toml"];
+            desk.report(&[&["calibrate", "quad.toml"], &captures[..], &how].concat());
+            judged(&desk, "m.toml")
+        };
+        let before = judged(&desk, "quad.toml");
+        let single = [0, 4, 8].map(|k| calibrated(&names[k..=k]));
+        let pooled = calibrated(&names);
+        let shown = |(spur, sinad): (f64, f64)| format!("{spur:.1} dBc, {sinad:.2} dB");
+        println!(
+            "unit {}: {} before; one capture {}; nine {}",
+            unit + 1,
+            shown(before),
+            single.map(shown).join(" | "),
+            shown(pooled)
+        );
+        let worst_single = single.iter().map(|found| found.0).fold(f64::NEG_INFINITY, f64::max);
+        assert!(before.0 > -45.0 && before.1 < 37.0, "{before:?}");
+        assert!(pooled.0 < -76.0 && pooled.0 < worst_single - 3.0, "{single:?} {pooled:?}");
+        assert!(pooled.1 > 40.0, "{pooled:?}");
+    }
+}
+
+/// Four 250 MS/s converters behind a band-pass above half the fast rate.
+const IF: &str = r#"fast_rate = "1 GS/s"
+ratio = 4
+[target]
+filter = { family = "butterworth", order = 4, band = ["600 MHz", "900 MHz"] }
+[[channel]]
+delay = "3 ns"
+[[channel]]
+delay = "2 ns"
+[[channel]]
+delay = "1 ns"
+[[channel]]
+delay = 0
+[signal]
+band = ["640 MHz", "860 MHz"]
+[design]
+method = "fir"
+taps = 64
+"#;
+
+/// From captures of an intermediate frequency, whose tones are found in their zone, to a recording without
+/// spurs. Frequencies of another zone are refused.
+#[test]
+fn an_intermediate_frequency_is_calibrated_and_fused() {
+    let desk = Desk::empty();
+    desk.write("if.toml", IF);
+    let errors = ["--delay-error", "3ps,-2.8ps,2.5ps,0", "--gain-error", "0.5%,-0.4%,0.3%,0"];
+    let more = ["--offset", "0.002,-0.001,0.0015,0", "--bits", "12", "--samples", "262144", "--force"];
+    let capture = |tones: &str, gain: &str, folder: &str| {
+        let simulate =
+            ["simulate", "if.toml", "--source", tones, "--gain", gain, "--seed", "3", "-o", folder];
+        desk.good(&[&simulate[..], &errors, &more].concat());
+        [1, 2, 3, 4].map(|channel| format!("{folder}/ch{channel}.wav"))
+    };
+    let with = |head: &[&'static str], files: &[String; 4], rest: &[&'static str]| -> Vec<String> {
+        let head = head.iter().map(|word| (*word).to_owned());
+        head.chain(files.iter().cloned()).chain(rest.iter().map(|word| (*word).to_owned())).collect()
+    };
+    let report = |words: &[String]| desk.report(&words.iter().map(String::as_str).collect::<Vec<_>>());
+    let training = capture("tones:663.17MHz,741.93MHz,829.37MHz", "0.3", "training");
+    let words = with(&["calibrate", "if.toml", "-o", "m.toml"], &training, &["--reference", "4"]);
+    let found = report(&words);
+    let zones: Vec<i64> =
+        found["tones"].as_array().unwrap().iter().map(|tone| tone["zone"].as_i64().unwrap()).collect();
+    assert!(zones.iter().all(|zone| (6..8).contains(zone)) && zones.len() == 3, "{found}");
+    let wrong =
+        with(&["calibrate", "if.toml", "-o", "x.toml"], &training, &["--tone", "336.83MHz,258.07MHz"]);
+    let wrong: Vec<&str> = wrong.iter().map(String::as_str).collect();
+    desk.refused(1, &wrong, &["the captures contradict the spec", "their zones", "--force"]);
+    let measured = |spec: &str, tone: &'static str, files: &[String; 4]| {
+        desk.report(&["design", spec, "-o", "b.json"]);
+        let fuse = with(&["fuse", "b.json"], files, &["-o", "y.wav", "--measure", "--tone", tone]);
+        report(&fuse)["measure"].take()
+    };
+    for tone in ["671.3MHz", "702.1MHz", "851.9MHz"] {
+        let files = capture(&format!("tones:{tone}"), "0.9", "held");
+        let nominal = measured("if.toml", tone, &files);
+        let calibrated = measured("m.toml", tone, &files);
+        let sfdr = |found: &Value, which: &str| number(found, &format!("/{which}/sfdr_db"));
+        println!(
+            "{tone}: SFDR {:.1} dBc interleaved, {:.1} with the nominal bank, {:.1} calibrated",
+            sfdr(&calibrated, "before"),
+            sfdr(&nominal, "after"),
+            sfdr(&calibrated, "after")
+        );
+        assert!(sfdr(&calibrated, "after") > 95.0, "{tone}: {calibrated}");
+        assert!(sfdr(&nominal, "after") < 55.0, "{tone}");
+    }
+}
