@@ -278,10 +278,10 @@ impl ConverterReport {
             return String::new();
         }
         let (delay, error) = (readable(delay, "s"), readable(delay_error, "s"));
+        let cutoff = 1.0 + cutoff_error;
+        let cutoff = if cutoff == 1.0 { String::new() } else { format!(", cut-off x {cutoff}") };
         format!(
-            "converter {channel}: delay {delay} (error {error}), gain {gain}, cut-off x {}, offset {offset}, \
-             drift {drift} ppm\n",
-            1.0 + cutoff_error
+            "converter {channel}: delay {delay} (error {error}), gain {gain}{cutoff}, offset {offset}, drift {drift} ppm\n"
         )
     }
 }

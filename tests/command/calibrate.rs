@@ -74,7 +74,7 @@ fn with<'a>(head: &[&'a str], names: &'a [String], tail: &[&'a str]) -> Vec<&'a 
 }
 
 /// `bank.json` for a spec, without the search for its proof.
-fn design(desk: &Desk, spec: &str) {
+pub(crate) fn design(desk: &Desk, spec: &str) {
     let text = String::from_utf8(desk.read(spec)).unwrap();
     let bank = hybank::design::design(&Spec::from_toml(&text, spec).unwrap(), &Options::without_proof())
         .unwrap()

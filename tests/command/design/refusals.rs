@@ -131,20 +131,19 @@ fn bits_that_make_no_sense_are_refused() {
 /// for.
 #[test]
 fn banks_of_no_use_are_refused() {
-    let desk = Desk::with_spec(THESIS);
-    // Two samples at one instant for two fast samples, of a signal up to the end of the fast rate.
-    desk.write(
-        "late.toml",
-        THESIS.replace("latency = 10", "latency = 0").replace("1.2", "40").replace("0.6", "41"),
-    );
-    let wide = THESIS.replace("0.6", "1.2").replace("[design]", "[signal]\nband = 0.5\n[design]");
-    desk.write("wide.toml", wide);
-    for (spec, reason) in
-        [("late.toml", "% of that of zero output"), ("wide.toml", "the SNR of the signal is")]
-    {
-        let parts = [spec, "of no use, so it is not written", reason, "--force writes it"];
-        desk.refused(1, &["design", spec, "-o", "b.json"], &parts);
-        let output = desk.run(&["design", spec, "-o", "b.json", "--force"], b"");
+    let desk = Desk::empty();
+    let spec = |latency: usize| {
+        format!(
+            "fast_period = 1.0\nratio = 2\nlatency = {latency}\n[target]\n\
+             filter = {{ family = \"butterworth\", order = 2, cutoff = 0.45 }}\n[[channel]]\ndelay = 1.4\n\
+             [[channel]]\ndelay = 0.6\n[signal]\nband = 0.45\n[design]\nmethod = \"fir\"\ntaps = 2\n"
+        )
+    };
+    for (latency, reason) in [(0, "% of that of zero output"), (1, "the SNR of the signal is 3.")] {
+        desk.write("spec.toml", spec(latency));
+        let parts = ["spec.toml", "of no use, so it is not written", reason, "--force writes it"];
+        desk.refused(1, &["design", "spec.toml", "-o", "b.json"], &parts);
+        let output = desk.run(&["design", "spec.toml", "-o", "b.json", "--force"], b"");
         let said = String::from_utf8(output.stderr).unwrap();
         assert!(output.status.success() && said.contains(reason), "{said}");
         std::fs::remove_file(desk.path("b.json")).unwrap();
