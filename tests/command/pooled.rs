@@ -23,7 +23,7 @@ delay_samples = 0
 band = "1.4 GHz"
 [design]
 method = "fir"
-taps = 48
+taps = 64
 "#;
 
 /// What two units really are: skews, gains and offsets of each converter.
