@@ -80,12 +80,19 @@ impl Tally {
         self.excesses.extend(other.excesses);
     }
 
-    /// A row of the table in docs/audit.md, and the details. Fails if a statement was refuted.
-    pub(crate) fn report(&self, campaign: &str) {
-        let all = [&self.refused, &self.unproven, &self.notes, &self.refuted];
-        for (list, kind) in all.into_iter().zip(["refused", "not proven", "note", "REFUTED"]) {
+    /// The findings of one case, with the details.
+    fn tell(&self, campaign: &str, seed: u64) {
+        let Self { cases, refused, unproven, refuted, notes, widths, excesses } = self;
+        let lists = [refused, unproven, refuted, notes];
+        let [refusals, proofs, falsehoods, _] = lists.map(Vec::len);
+        println!("{campaign} {seed}: {cases} {refusals} {proofs} {falsehoods} {widths:?} {excesses:?}");
+        for (list, kind) in lists.into_iter().zip(["refused", "not proven", "REFUTED", "note"]) {
             list.iter().for_each(|line| println!("{campaign}: {kind}: {}", line.trim_end()));
         }
+    }
+
+    /// A row of the table in docs/audit.md. Fails if a statement was refuted.
+    pub(crate) fn report(&self, campaign: &str) {
         let ends = |list: &[f64]| {
             let mut list = list.to_vec();
             list.sort_by(f64::total_cmp);
@@ -108,7 +115,13 @@ impl Tally {
 /// All cases of a campaign, `usual` ones unless the environment asks for others.
 pub(crate) fn campaign(usual: usize, name: &str, task: impl Fn(u64) -> Tally + Sync) {
     let mut whole = Tally::default();
-    each(trials::trials(trials::rounds(usual) as u64), task).into_iter().for_each(|tally| whole.add(tally));
+    // Each case as it ends, so that what an interrupted campaign found is not lost.
+    let told = |seed: u64| {
+        let tally = task(seed);
+        tally.tell(name, seed);
+        tally
+    };
+    each(trials::trials(trials::rounds(usual) as u64), told).into_iter().for_each(|tally| whole.add(tally));
     whole.report(name);
 }
 

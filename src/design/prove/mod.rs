@@ -9,10 +9,11 @@ use super::merging::Repeats;
 use super::methods::DualSolution;
 use super::plant::LiftedPlant;
 use super::{DesignError, analysis};
-use crate::bank::{Bank, DualWitness, Gamma, Proof};
-use crate::linalg::{self, CMat};
-use crate::lti::FrequencyResponse;
-use crate::verify::{EnclosedErrorSystem, Strictness, Verified};
+use crate::bank::{Bank, DualWitness, Gamma, LowerProof, Proof};
+use crate::linalg::{self, CMat, Complex};
+use crate::lti::peak::{Peak, hinf_norm, refine};
+use crate::lti::{FrequencyResponse, StateSpace};
+use crate::verify::{EnclosedErrorSystem, Midpoint, Strictness, Verified};
 use lower::lower_proof;
 pub(super) use lower::max_witnesses;
 pub(super) use upper::MAX_SEARCHED_STATES;
@@ -23,6 +24,11 @@ const SHORTFALL: f64 = 0.5e-6;
 /// Relative distance of a stated lower bound below the proven one: another machine may round an approximate
 /// inverse differently.
 const STATED_BELOW: f64 = 1e-12;
+/// Distances from a peak in doubles at which the enclosed gain is looked at, in radians: from the rounding of
+/// a frequency to the width of a wide resonance.
+const DISTANCES: [f64; 6] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
+/// Relative change of a gain at which the refinement of an enclosed peak ends.
+const FLAT_GAIN: f64 = 1e-11;
 
 /// A gamma that is proven, not only computed.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -65,43 +71,104 @@ pub(crate) fn prove(
 ) -> Result<(Proof, Verified), DesignError> {
     let error = EnclosedErrorSystem::new(bank)?;
     let upper = certificate(&error, bank, stop)?;
+    let below = lower_ends(&error, bank, dual, upper.gamma, stop)?;
+    let proof = Proof { upper: Some(upper), ..below };
+    let verified = error.judge(stated, &proof, Strictness::NotRefuted)?;
+    Ok((proof, verified))
+}
+
+/// The witnesses of the lower ends of a bank whose norm is at most `upper`.
+fn lower_ends(
+    error: &EnclosedErrorSystem<'_>,
+    bank: &Bank,
+    dual: &DualSolution,
+    upper: f64,
+    stop: &Stop,
+) -> Result<Proof, DesignError> {
     let witness = noncausal_witness(bank)?;
     let noncausal = error.noncausal_bound(&witness);
     let above = noncausal.unwrap_or(0.0);
     // What the noncausal bound does not explain is looked for.
     let wanted = bank.gamma.lower.map(|stated| stated.max(dual.bound) * (1.0 - SHORTFALL));
     let explained = wanted.is_some_and(|wanted| above >= wanted);
-    let interval = (above, upper.gamma);
-    let lower = if explained { None } else { lower_proof(&error, bank, dual, wanted, interval, stop)? };
+    let found = || lower_proof(error, bank, dual, wanted, (above, upper), stop);
+    let lower = if explained { None } else { found()? };
     if stop.is_due() {
         return Err(DesignError::Stopped);
     }
-    let proof = Proof { upper: Some(upper), lower, noncausal: noncausal.map(|_| witness) };
-    let verified = error.judge(stated, &proof, Strictness::NotRefuted)?;
-    Ok((proof, verified))
+    Ok(Proof { upper: None, lower, noncausal: noncausal.map(|_| witness) })
 }
 
 /// Adds a proof to `bank` and sets the gammas to the proven bounds. A computed norm outside of the proven
 /// interval, which rounding displaces where the error is a tiny difference, becomes the nearer end of it.
 ///
 /// # Errors
-/// As [`prove`]; `bank` is then unchanged.
+/// As [`prove`]; the gammas are then those of [`without_certificate`], if there are any.
 pub(crate) fn attach_proof(
     bank: &mut Bank,
     dual: &DualSolution,
     stop: &Stop,
 ) -> Result<Verified, DesignError> {
-    let (proof, verified) = prove(bank, &Gamma::default(), dual, stop)?;
-    let stated = |proven: f64| Some(proven * (1.0 - STATED_BELOW));
+    let (proof, verified) = match prove(bank, &Gamma::default(), dual, stop) {
+        Ok(found) => found,
+        Err(reason) => {
+            if matches!(reason, DesignError::NotCertified { .. }) {
+                bank.gamma = without_certificate(bank, dual, stop)?;
+            }
+            return Err(reason);
+        }
+    };
     bank.gamma = Gamma {
         norm: bank.gamma.norm.map(|norm| norm.max(verified.attained).min(verified.upper)),
         upper: Some(verified.upper),
-        lower: stated(verified.lower),
-        noncausal: stated(verified.noncausal),
+        lower: Some(stated(verified.lower)),
+        noncausal: Some(stated(verified.noncausal)),
         ..bank.gamma
     };
     bank.proof = Some(proof);
     Ok(verified)
+}
+
+/// The gammas of a bank for which no certificate was found. In double precision a gamma that is a small
+/// difference may be off by more than its stated error, so the norm is the largest gain near the peak in the
+/// arithmetic of `verify`, and the lower ends are those that it proves.
+fn without_certificate(bank: &Bank, dual: &DualSolution, stop: &Stop) -> Result<Gamma, DesignError> {
+    let error = EnclosedErrorSystem::new(bank)?;
+    let Some(peak) = enclosed_peak(&error)? else { return Ok(bank.gamma) };
+    let norm = peak.gain;
+    let proof = lower_ends(&error, bank, dual, norm, stop)?;
+    let noncausal = proof.noncausal.as_ref().and_then(|witness| error.noncausal_bound(witness));
+    let lower = match &proof.lower {
+        Some(LowerProof::Fir(witnesses)) => error.fir_bound(witnesses),
+        Some(LowerProof::Causal(witness)) => Some(witness.gamma),
+        None => noncausal,
+    };
+    let [lower, noncausal] = [lower, noncausal].map(|proven| proven.map(stated));
+    let computed = Gamma::computed(norm, 0.0, 0.0, 0.0).upper;
+    let upper = [computed, bank.gamma.upper, lower, noncausal].into_iter().flatten().reduce(f64::max);
+    Ok(Gamma { norm: Some(norm), upper, lower, noncausal, ..bank.gamma })
+}
+
+/// The largest gain that `verify` proves beside the peak of the system in doubles; `None` if there is none.
+fn enclosed_peak(error: &EnclosedErrorSystem<'_>) -> Result<Option<Peak>, DesignError> {
+    let Some(Midpoint { a, b, c, d }) = error.midpoint() else { return Ok(None) };
+    let system = StateSpace::new(a, b, c, d)?;
+    let at = |frequency: f64| {
+        let response = system.response_at(Complex::from_polar(1.0, frequency));
+        let gain = error.attains(&witness(frequency, &leading_direction(&response)?));
+        Ok::<_, DesignError>(Peak { gain: gain.unwrap_or(0.0), frequency })
+    };
+    let centre = hinf_norm(&system)?.frequency;
+    let sides = DISTANCES.map(|distance| -distance).into_iter().rev().chain([0.0]).chain(DISTANCES);
+    let near = sides.map(|distance| at(centre + distance)).collect::<Result<Vec<_>, _>>()?;
+    let best = near.windows(3).max_by(|x, y| x[1].gain.total_cmp(&y[1].gain));
+    let Some(&[low, middle, high]) = best else { return Ok(None) };
+    Ok(Some(refine(at, [low, middle, high], FLAT_GAIN)?).filter(|peak| peak.gain > 0.0))
+}
+
+/// A stated lower end of a proven one.
+fn stated(proven: f64) -> f64 {
+    proven * (1.0 - STATED_BELOW)
 }
 
 /// The frequency and direction in which the largest part of the reference samples cannot be estimated from
