@@ -38,9 +38,7 @@ pub use limits::{check_noise, check_offset, within};
 pub use measured::{FilterModel, FilterModels, MeasuredFilter, Measurement};
 pub use passband::Passband;
 pub use signal::{Band, SignalSpec, SignalSpectrum, USUAL_RMS};
-#[cfg(feature = "cli")]
-pub(crate) use uncertainty::check_delay_half_width;
-pub use uncertainty::{HALF_WIDTH, PerChannel, UncertaintySpec};
+pub use uncertainty::{HALF_WIDTH, PerChannel, UncertaintySpec, check_delay_half_width};
 pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 

@@ -168,8 +168,11 @@ fn check_list<T>(
     written.values().iter().try_for_each(check)
 }
 
-/// The half-width of a delay.
-pub(crate) fn check_delay_half_width(periods: FastPeriods, written: Seconds) -> Result<(), SpecProblem> {
+/// The half-width of a delay, as written and in fast periods.
+///
+/// # Errors
+/// [`SpecProblem`] with the rule.
+pub fn check_delay_half_width(periods: FastPeriods, written: Seconds) -> Result<(), SpecProblem> {
     if (0.0..=MAX_DELAY).contains(&periods.0) {
         return Ok(());
     }
