@@ -202,10 +202,7 @@ pub(super) fn near_rates(fast_period: Seconds, rates: &[Hertz]) -> Vec<f64> {
     let best = (1..NEAR_FRAME).filter(fits).min_by(|&a, &b| farthest(a).total_cmp(&farthest(b)));
     let Some(ratio) = best else { return Vec::new() };
     // In as many digits as nobody counts, so that 44 kHz are 44000 Hz.
-    let rounded = |rate: f64| {
-        let unit = 10f64.powi(rate.log10().ceil() as i32 - 12);
-        (rate / unit).round() * unit
-    };
+    let rounded = |rate: f64| format!("{rate:.11e}").parse().unwrap_or(rate);
     let rate = |samples: f64| samples / (ratio as f64 * fast_period.0);
     samples(ratio).into_iter().map(rate).map(rounded).collect()
 }
