@@ -33,12 +33,15 @@ fn case(ratio: usize, latency: usize, front_ends: &[FilterSpec], channels: &[(us
         fast_period: Seconds(1.0),
         ratio,
         latency,
+        wait: 0,
         signal: None,
         front_ends: front_ends.iter().map(filter).collect(),
         target: 0,
         channels: channels
             .iter()
-            .map(|&(front_end, delay)| Channel {
+            .enumerate()
+            .map(|(converter, &(front_end, delay))| Channel {
+                converter,
                 front_end,
                 gain: 1.0,
                 converter_gain: 1.0,
