@@ -119,7 +119,8 @@ fn whole(document: &Value<'_>, overrides: DesignOverrides, models: &FilterModels
     // A table that is absent is blamed as the whole document.
     let blamed = table.as_ref().unwrap_or(&top);
     let design = design(table.as_ref(), blamed, &overrides, &layout)?;
-    frames::check_method(&layout, &design, h).map_err(|problem| top.fault_at(Some("channel"), problem))?;
+    frames::check_size(&layout, design.is_coupled(), h)
+        .map_err(|problem| top.fault_at(Some("channel"), problem))?;
     design.check_beside(uncertainty.as_ref(), channels.len()).map_err(|KeyProblem { key, problem }| {
         if matches!(key, "tracking" | "solver") && overrides.gives(key) {
             Fault::overriding(key, problem)

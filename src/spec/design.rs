@@ -254,6 +254,12 @@ impl DesignSpec {
         Ok(design)
     }
 
+    /// Whether the design couples all samples of a frame. The taps of the mean-square optimum are independent
+    /// for each output sample.
+    pub(super) fn is_coupled(&self) -> bool {
+        !(self.method == Method::H2 && self.is_fir())
+    }
+
     /// Checks the numbers, and that the method reads every key.
     pub(super) fn check(&self, layout: &FrameLayout) -> Result<(), KeyProblem> {
         self.check_keys()?;

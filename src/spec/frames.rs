@@ -11,7 +11,7 @@
 //! of a sample, the wait for the rest of its frame included. With equal rates L_i = 1 and S = 0.
 
 use super::limits::{self, range};
-use super::{ChannelSpec, DesignSpec, Method, SpecProblem};
+use super::{ChannelSpec, SpecProblem};
 use crate::units::{FastPeriods, GridTime, Hertz, Seconds};
 use std::ops::Range;
 
@@ -201,7 +201,7 @@ pub(super) fn near_rates(fast_period: Seconds, rates: &[Hertz]) -> Vec<f64> {
     };
     let best = (1..NEAR_FRAME).filter(fits).min_by(|&a, &b| farthest(a).total_cmp(&farthest(b)));
     let Some(ratio) = best else { return Vec::new() };
-    // In as many digits as nobody counts, so that 44 kHz are 44000 Hz.
+    // Twelve digits, so that 44 kHz are 44000 Hz.
     let rounded = |rate: f64| format!("{rate:.11e}").parse().unwrap_or(rate);
     let rate = |samples: f64| samples / (ratio as f64 * fast_period.0);
     samples(ratio).into_iter().map(rate).map(rounded).collect()
@@ -248,12 +248,11 @@ pub(super) fn check_latency(latency: Option<usize>, wait: usize) -> Result<(), S
 }
 
 /// A design that couples all samples of a frame takes no more than [`limits::MAX_COUPLED_FRAME`].
-pub(super) fn check_method(
+pub(super) fn check_size(
     layout: &FrameLayout,
-    design: &DesignSpec,
+    is_coupled: bool,
     fast_period: Seconds,
 ) -> Result<(), SpecProblem> {
-    let is_coupled = !(design.method == Method::H2 && design.is_fir());
     if layout.is_plain() || !is_coupled || layout.ratio + layout.count() <= limits::MAX_COUPLED_FRAME {
         return Ok(());
     }

@@ -248,7 +248,7 @@ impl Spec {
             uncertainty.check(self.channels.len(), self.fast_period)?;
         }
         self.design.check(&layout)?;
-        frames::check_method(&layout, &self.design, self.fast_period)?;
+        frames::check_size(&layout, self.design.is_coupled(), self.fast_period)?;
         Ok(self.design.check_beside(self.uncertainty.as_ref(), self.channels.len())?)
     }
 
