@@ -189,8 +189,8 @@ pub(super) struct Exchange<E: AffineError> {
     pub(super) dual: Vec<DualPoint>,
     /// Ends the exchange between two rounds, with the best unknowns so far.
     pub(super) stop: Stop,
-    /// What the last search for the least gamma left open, or that for the least mean square after it, unless
-    /// it was stopped.
+    /// What the last search for the least gamma left open, or that for the least mean square after it,
+    /// unless it was stopped.
     pub(super) unfinished: Option<Unfinished>,
     /// Problems solved.
     pub(super) rounds: usize,

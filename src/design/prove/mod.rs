@@ -24,8 +24,8 @@ const SHORTFALL: f64 = 0.5e-6;
 /// Relative distance of a stated lower bound below the proven one: another machine may round an approximate
 /// inverse differently.
 const STATED_BELOW: f64 = 1e-12;
-/// Distances from a peak in doubles at which the enclosed gain is looked at, in radians: from the rounding of
-/// a frequency to the width of a wide resonance.
+/// Distances from a peak in doubles at which the enclosed gain is looked at, in radians: from the rounding
+/// of a frequency to the width of a wide resonance.
 const DISTANCES: [f64; 6] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
 /// Relative change of a gain at which the refinement of an enclosed peak ends.
 const FLAT_GAIN: f64 = 1e-11;
@@ -112,7 +112,7 @@ pub(crate) fn attach_proof(
     let (proof, verified) = match prove(bank, &Gamma::default(), dual, stop) {
         Ok(found) => found,
         Err(reason) => {
-            if matches!(reason, DesignError::NotCertified { .. }) {
+            if matches!(reason, DesignError::NotCertified { .. } | DesignError::Verify(_)) {
                 bank.gamma = without_certificate(bank, dual, stop)?;
             }
             return Err(reason);
