@@ -119,7 +119,7 @@ pub(crate) fn attach_proof(
         }
     };
     bank.gamma = Gamma {
-        norm: bank.gamma.norm.map(|norm| norm.max(verified.attained).min(verified.upper)),
+        norm: bank.gamma.norm.map(|norm| resolved_norm(bank, norm, &verified)).transpose()?,
         upper: Some(verified.upper),
         lower: Some(stated(verified.lower)),
         noncausal: Some(stated(verified.noncausal)),
@@ -127,6 +127,14 @@ pub(crate) fn attach_proof(
     };
     bank.proof = Some(proof);
     Ok(verified)
+}
+
+/// The norm that was computed in double precision, within the proven interval. Where it is not the enclosed
+/// gain at its peak, the largest enclosed gain near there takes its place.
+fn resolved_norm(bank: &Bank, norm: f64, verified: &Verified) -> Result<f64, DesignError> {
+    let is_resolved = (norm - verified.attained).abs() <= Gamma::NORM_ACCURACY * norm;
+    let peak = if is_resolved { None } else { enclosed_peak(&EnclosedErrorSystem::new(bank)?)? };
+    Ok(peak.map_or(norm, |peak| peak.gain).max(verified.attained).min(verified.upper))
 }
 
 /// The gammas of a bank for which no certificate was found. In double precision a gamma that is a small
