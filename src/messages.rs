@@ -12,7 +12,7 @@
 //! assert_eq!(format!("{} {}", Number(0.25), Number(1e300)), "0.25 1e300");
 //! ```
 
-use std::ffi::{OsStr, OsString};
+use std::ffi::OsStr;
 use std::fmt;
 use std::ops::Range;
 
@@ -154,10 +154,9 @@ fn found_value(found: &str) -> String {
 }
 
 /// What is wrong with the usage of a program, with the arguments in it quoted; `text` has lines of its own.
-pub fn usage(text: &str, arguments: impl Iterator<Item = OsString>) -> String {
+pub fn usage(text: &str, arguments: impl Iterator<Item = String>) -> String {
     let mut text = text.to_owned();
     for argument in arguments {
-        let argument = argument.to_string_lossy();
         for part in [&*argument].into_iter().chain(argument.split(['=', ','])) {
             let quoted = Quoted(part).to_string();
             if quoted != part && !part.trim().is_empty() {
@@ -308,7 +307,7 @@ mod tests {
         let message = format!("spec\nhybank: forged: no\n{location}");
         assert_eq!(shown(&message), format!("spec\\nhybank: forged: no\n{location}"));
         assert_eq!(shown("a\n1 | b\nc"), "a\n1 | b\\nc");
-        let arguments = ["hybank", "--taps=7\nhybank: forged", &"y".repeat(5000)].map(OsString::from);
+        let arguments = ["hybank", "--taps=7\nhybank: forged", &"y".repeat(5000)].map(str::to_owned);
         let text = format!("error: invalid value '7\nhybank: forged'\n\nUsage: {}", "y".repeat(5000));
         let said = usage(&text, arguments.into_iter());
         assert!(

@@ -48,8 +48,10 @@ mod worst_case;
 mod written;
 
 use crate::messages::usage;
+use clap::builder::StyledStr;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use print::Failure;
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -133,10 +135,16 @@ fn taking_negative_values(command: clap::Command) -> clap::Command {
     })
 }
 
+/// An argument as it was typed, and as clap shows it: without the sequences that colour a terminal.
+fn as_shown(argument: OsString) -> [String; 2] {
+    let typed = argument.to_string_lossy().into_owned();
+    [StyledStr::from(typed.clone()).to_string(), typed]
+}
+
 /// Shows help, version, or what is wrong with the usage.
 fn show(message: &clap::Error) -> ExitCode {
     let text = message.to_string();
-    let quoted = usage(&text, std::env::args_os());
+    let quoted = usage(&text, std::env::args_os().flat_map(as_shown));
     // Only clap knows the colours.
     let printed = if quoted == text { message.print() } else { Ok(print::say(&quoted)) };
     match printed {

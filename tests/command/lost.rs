@@ -270,7 +270,7 @@ fn faults_are_reported_with_their_place() {
     let lost = [&args[..], &["--gaps", "zero", "--lost", "lost"]].concat();
     desk.refused(1, &lost, &["lost: cannot read it"]);
     for (line, parts) in [
-        ("{\"channel\": 1,\n", &["lost: line 1", "EOF"][..]),
+        ("{\"channel\": 1,\n", &["lost: line 1", "the text ends inside"][..]),
         ("\n{\"channel\": 3, \"first\": 0, \"length\": 1}", &["lost: channel 3", "there are 2"]),
         ("{\"sample_start\": 4, \"global_index\": 3}", &["before 0"]),
         (

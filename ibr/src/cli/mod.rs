@@ -15,9 +15,11 @@ mod summary;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
+use clap::builder::StyledStr;
 use failure::Failure;
 use hybank::memory::check_memory;
 use hybank::messages::usage;
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 /// More threads than cores would only use memory for stacks.
@@ -46,10 +48,16 @@ pub fn run() -> ExitCode {
     }
 }
 
+/// An argument as it was typed, and as clap shows it: without the sequences that colour a terminal.
+fn as_shown(argument: OsString) -> [String; 2] {
+    let typed = argument.to_string_lossy().into_owned();
+    [StyledStr::from(typed.clone()).to_string(), typed]
+}
+
 /// Shows help, version or what is wrong with the usage.
 fn show(message: &clap::Error) -> ExitCode {
     let text = message.to_string();
-    let quoted = usage(&text, std::env::args_os());
+    let quoted = usage(&text, std::env::args_os().flat_map(as_shown));
     // Only clap knows the colours.
     let printed = if quoted == text { message.print() } else { Ok(failure::say(&quoted)) };
     match printed {
