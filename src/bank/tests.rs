@@ -98,7 +98,7 @@ const FIR_TEXT: &str = r#"{
     "lower": null,
     "noncausal": 0.03
   },
-  "digest": "sha256:6fea3a4664a7b21ce5801b8927fcfab469c6d4d584da5c4eae8db338f824bd7b"
+  "digest": "sha256:1738fddf0912eb1cabe5ac6dcd92100846b3aec4602af8b057756c4af1b0bf3e"
 }
 "#;
 
@@ -422,9 +422,11 @@ proptest! {
         let gains = taps.iter().map(|list| -1.0 - (list[1] % 1.0).abs()).collect();
         let offsets = taps.iter().map(|list| list[2] % 1.0).collect();
         let gamma = Gamma { upper: gamma, ..Gamma::default() };
+        let samples = vec![1; taps.len()];
         let filters = SynthesisFilters::Fir(taps.clone());
         let fast_period = Seconds(fast_period);
-        let bank = Bank { spec: None, fast_period, latency, delays, gains, offsets, filters, gamma, ..fir() };
+        let converters = Bank { delays, gains, offsets, samples, ..fir() };
+        let bank = Bank { spec: None, fast_period, latency, filters, gamma, ..converters };
         let back = Bank::from_json(&bank.to_json().unwrap(), "b.json").unwrap();
         let SynthesisFilters::Fir(read) = &back.filters else { panic!("taps expected") };
         let bits = |lists: &[Vec<f64>]| lists.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();

@@ -351,7 +351,7 @@ mod tests {
             (r#"{"first": -1, "length": 1}"#, "expected a whole number, zero or more, found -1"),
             (r#"{"first": 1, "lenght": 1}"#, "unknown key \"lenght\""),
             ("1,2,3", "expected a JSON object"),
-            (r#"{"first": 1, "length": 3} {}"#, "trailing characters"),
+            (r#"{"first": 1, "length": 3} {}"#, "more text after the end"),
         ] {
             let error = LostSamples::parse(&format!("\n{line}\n"), "lost.jsonl").unwrap_err().to_string();
             assert!(error.starts_with("lost.jsonl: line 2: ") && error.contains(part), "{error}");

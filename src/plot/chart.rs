@@ -339,7 +339,7 @@ mod tests {
         assert_eq!(decades.ranges(&[]).unwrap().0, 1.0..1000.0);
         let svg = decades.to_svg().unwrap();
         let at = |label: &str| -> f64 {
-            let before = svg[..svg.find(&format!("\n{label}\n")).unwrap()].rfind("x=\"").unwrap() + 3;
+            let before = svg[..svg.rfind(&format!("\n{label}\n")).unwrap()].rfind("x=\"").unwrap() + 3;
             svg[before..].split('"').next().unwrap().parse().unwrap()
         };
         let places = ["1", "10", "100", "1000"].map(at);

@@ -60,15 +60,17 @@ impl Room {
         let height = (MARK_FONT * OVERSIZE) as i32;
         let width = (f64::from(height) * LETTER * text.chars().count() as f64).ceil() as i32;
         let away = RADIUS + GAP;
-        let above = (-width / 2, -away - height);
+        // Texts above and below leave the rows beside the circle free.
+        let clear = away.max(height / 2);
+        let above = (-width / 2, -clear - height);
         let places = [
             above,
             (away, -height / 2),
             (-away - width, -height / 2),
-            (-width / 2, away),
+            (-width / 2, clear),
             (above.0, above.1 - height),
-            (away, -away - height),
-            (-away - width, -away - height),
+            (away, -clear - height),
+            (-away - width, -clear - height),
         ];
         let area = |(right, down): Pixel| {
             let (left, top) = (x + right, y + down);

@@ -116,7 +116,7 @@ fn a_design_that_is_ended_before_it_has_a_bank_says_so() {
 }
 
 /// Every search ends when it is told to: those of the filters, of fewer states, of integers and of the
-/// proof. The bank is whole, and no better than the complete one.
+/// proof. The bank is whole, and no better than the complete one unless that gave up gamma for fewer states.
 #[test]
 fn a_design_ends_at_every_stage_with_a_bank() {
     let designs = [
@@ -143,7 +143,9 @@ fn a_design_ends_at_every_stage_with_a_bank() {
             assert_eq!(ended.bank.check(), Ok(()), "{text} {last}");
             let [norm, least] = [&ended.bank, &complete].map(|bank| bank.gamma.norm.unwrap());
             assert!(
-                norm < 0.5 && (text.contains("h2") || norm >= least * (1.0 - 1e-6)),
+                norm < 0.5
+                    && (["h2", "loss"].iter().any(|word| text.contains(word))
+                        || norm >= least * (1.0 - 1e-6)),
                 "{text} {last}: {norm} {least}"
             );
             if let (SynthesisFilters::StateSpace(block), true) = (&ended.bank.filters, text.contains("order"))
