@@ -170,7 +170,7 @@ fn lost_samples_count_for_their_converter() {
     wav::write(&desk, "nan.wav", 1, 24_000, &nan);
     wav::write(&desk, "out.wav", 1, 24_000, &left_out);
     wav::write(&desk, "b.wav", 1, 16_000, &b);
-    let lines = "{\"channel\": 1, \"sample_start\": 100, \"global_index\": 107}\n{\"channel\": 2, \"first\": 40, \"length\": 3}\n";
+    let lines = "{\"channel\": 1, \"sample_start\": 0, \"global_index\": 0}\n{\"channel\": 1, \"sample_start\": 100, \"global_index\": 107}\n{\"channel\": 2, \"first\": 40, \"length\": 3}\n";
     desk.write("lost.jsonl", lines);
     desk.write("invalid.jsonl", lines.lines().last().unwrap());
     for policy in ["hold", "zero"] {
