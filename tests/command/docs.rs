@@ -109,7 +109,7 @@ impl Folder {
     fn run(&self, snippet: &Snippet) {
         let programs = ["hybank ", "cc ", "./"];
         let runs = |line: &&str| programs.iter().any(|program| line.starts_with(program));
-        for line in snippet.text.lines().filter(runs) {
+        for line in snippet.text.replace("\\\n", "").lines().filter(runs) {
             let binary = Path::new(env!("CARGO_BIN_EXE_hybank")).parent().expect("the folder of the binary");
             let path = std::env::join_paths([binary, Path::new("/usr/bin"), Path::new("/bin")]);
             let output = Command::new("sh")
