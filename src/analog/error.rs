@@ -33,9 +33,10 @@ pub enum AnalogError {
     /// A pole so slow or so fast that samples do not distinguish it from an integrator or from a constant
     /// gain.
     #[error(
-        "the pole {re:e} {im:+e}j rad/s is {normalised:e}; the supported range is {MIN_NORMALISED_POLE:e} to \
-         {MAX_NORMALISED_POLE:e}: slower poles look like integrators to the samples, faster ones like a constant gain. \
-         Check the units (rad/s for poles, hertz for cutoffs, seconds for periods) or leave the pole out"
+        "{}; the supported range is {MIN_NORMALISED_POLE:e} to {MAX_NORMALISED_POLE:e}: slower poles look like \
+         integrators to the samples, faster ones like a constant gain. Check the units (rad/s for poles, hertz for \
+         cutoffs, seconds for periods) or leave the pole out",
+        pole(*.re, *.im, *.normalised)
     )]
     PoleOutOfRange {
         /// Real part in rad/s.
@@ -84,4 +85,12 @@ pub enum AnalogError {
     /// An eigenvalue computation failed.
     #[error("the poles could not be computed: {0}")]
     Numerical(#[from] LinalgError),
+}
+
+/// A pole and its modulus. A first coefficient near the smallest double puts a pole beyond the largest.
+fn pole(re: f64, im: f64, normalised: RadiansPerFastPeriod) -> String {
+    if re.is_finite() && im.is_finite() {
+        return format!("the pole {re:e} {im:+e}j rad/s is {normalised:e}");
+    }
+    "a pole is beyond the largest number, as if the first coefficient of den were 0".to_owned()
 }

@@ -158,7 +158,7 @@ fn a_tone_that_is_not_there_is_named_with_the_recordings() {
     let (a, b) = (tone(0.0), tone(0.4));
     wav::write_pair(&desk, &a, &b);
     let args = ["calibrate", "spec.toml", "a.wav", "b.wav", "-o", "out.toml", "--tone", "0.01Hz"];
-    desk.refused(1, &args, &["a.wav, b.wav: no tone found near 0.01 Hz", "check the frequency"]);
+    desk.refused(1, &args, &["a.wav, b.wav: no tone found near 0.01 Hz", "give its frequency"]);
     desk.refused(1, &["measure", "a.wav", "--tone", "7kHz"], &["a.wav: no tone found near 7000 Hz"]);
 }
 

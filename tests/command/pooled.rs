@@ -156,8 +156,11 @@ fn an_intermediate_frequency_is_calibrated_and_fused() {
     let zones: Vec<i64> =
         found["tones"].as_array().unwrap().iter().map(|tone| tone["zone"].as_i64().unwrap()).collect();
     assert!(zones.iter().all(|zone| (6..8).contains(zone)) && zones.len() == 3, "{found}");
-    let wrong =
-        with(&["calibrate", "if.toml", "-o", "x.toml"], &training, &["--tone", "336.83MHz,258.07MHz"]);
+    let wrong = with(
+        &["calibrate", "if.toml", "-o", "x.toml"],
+        &training,
+        &["--tone", "336.83MHz,258.07MHz,170.63MHz"],
+    );
     let wrong: Vec<&str> = wrong.iter().map(String::as_str).collect();
     desk.refused(1, &wrong, &["the captures contradict the spec", "their zones", "--force"]);
     for (spec, bank) in [("if.toml", "nominal.json"), ("m.toml", "measured.json")] {

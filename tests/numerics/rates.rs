@@ -122,7 +122,7 @@ fn the_samples_of_a_converter_share_its_errors() {
         cutoffs: vec![0.0, 0.0, 0.0, 0.01, 0.01],
     };
     let looser = worst_case(&untied, &each, Taps::Fixed, 0.01).unwrap();
-    assert!(looser.lower > found.upper, "{looser:?} {found:?}");
+    assert!(looser.lower > 1.002 * most, "{looser:?} {most}");
 }
 
 /// Designs for errors are better at their worst than those that do not know of them, and prove it.
