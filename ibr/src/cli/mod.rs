@@ -59,7 +59,12 @@ fn show(message: &clap::Error) -> ExitCode {
     let text = message.to_string();
     let quoted = usage(&text, std::env::args_os().flat_map(as_shown));
     // Only clap knows the colours.
-    let printed = if quoted == text { message.print() } else { Ok(failure::say(&quoted)) };
+    let printed = if quoted == text {
+        message.print()
+    } else {
+        failure::say(&quoted);
+        Ok(())
+    };
     match printed {
         Err(error) if !message.use_stderr() => Failure::printing(&error).report(),
         _ => ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2)),
