@@ -94,9 +94,9 @@ impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
     /// What a fit of an image of `width` x `height` pixels will hold.
     pub fn memory(width: usize, height: usize) -> Memory {
         let grid = Grid::of_image::<ORDER>(width, height);
-        // The right-hand sides become the residual. The solution, the direction and its image are as many;
-        // the inverse of the diagonal and the zeros of the matrix are one more.
-        let equations = grid.bytes(offsets::<ORDER>().len() + C);
+        // The right-hand sides become the residual. The solution, the direction and its image are as many,
+        // and the inverse of the diagonal is one more. The matrix has a row of zeros.
+        let equations = grid.bytes(offsets::<ORDER>().len() + C) + grid.row_bytes();
         let solving = equations + grid.bytes(3 * C + 1);
         Memory { equations, solving, with_multigrid: solving + multigrid::bytes::<C>(grid, ORDER - 1) }
     }

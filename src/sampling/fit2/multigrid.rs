@@ -41,7 +41,7 @@ pub(super) fn bytes<const C: usize>(finest: Grid, mut reach: usize) -> f64 {
     let (mut grid, mut bytes) = (finest, finest.bytes(C));
     while grid.len() > COARSEST {
         (grid, reach) = (grid.halved(), reach.div_ceil(2));
-        bytes += grid.bytes(couplings_within(reach, grid).count() + 2 * C);
+        bytes += grid.bytes(couplings_within(reach, grid).count() + 2 * C) + grid.row_bytes();
     }
     bytes
 }

@@ -34,7 +34,12 @@ impl Grid {
 
     /// Bytes of so many images.
     pub(super) fn bytes(self, count: usize) -> f64 {
-        (count * size_of::<f32>()) as f64 * self.stride() as f64 * self.height as f64
+        count as f64 * self.height as f64 * self.row_bytes()
+    }
+
+    /// Bytes of a row.
+    pub(super) fn row_bytes(self) -> f64 {
+        (size_of::<f32>() * self.stride()) as f64
     }
 
     /// Numbers of a row in memory, with its zeros: whole blocks of [`LANES`].

@@ -171,3 +171,46 @@ fn large_holes_converge_and_are_harmonic_inside() {
     let got = f64::from(fit.values[y * side + x]);
     assert!((got - tone(x as f64, y as f64)).abs() < 0.5, "{got}");
 }
+
+/// A narrow image is fitted with rows and columns exchanged: the same as a flat one of exchanged samples,
+/// with holes, a region, and what is seen.
+#[test]
+fn narrow_images_are_flat_ones_turned() {
+    fn check<const ORDER: usize>(plane: PlaneSettings, width: usize) {
+        let length = 70;
+        let settings = with(plane);
+        assert!(PlaneProblem::<ORDER, 1>::is_turned((width, length)));
+        assert!(!PlaneProblem::<ORDER, 1>::is_turned((length, width)));
+        let samples: Vec<_> = scattered(length, |x, y| 100.0 + x - 0.5 * y)
+            .into_iter()
+            .map(|s| Sample { x: s.x * (width as f64 - 1.0) / (length as f64 - 1.0), depth: 3.0, ..s })
+            .filter(|s| !(20.0..30.0).contains(&s.y))
+            .collect();
+        let exchanged: Vec<_> = samples.iter().map(|s| Sample { x: s.y, y: s.x, ..*s }).collect();
+        let turned = |p: usize| p % width * length + p / width;
+        let region: Vec<bool> = (0..width * length).map(|p| p / width < 60).collect();
+        let flat_region: Vec<bool> = (0..width * length).map(|q| q % length < 60).collect();
+        let fitted = |samples: &[Sample<1>], size, region: &[bool]| {
+            let mut problem = PlaneProblem::<ORDER, 1>::new(size, &settings).unwrap();
+            problem.add(samples).unwrap();
+            let seen: Vec<bool> = problem.seen().collect();
+            (problem.solve(Some(region)).unwrap(), seen)
+        };
+        let (narrow, seen) = fitted(&samples, (width, length), &region);
+        let (flat, seen_flat) = fitted(&exchanged, (length, width), &flat_region);
+        assert_eq!((narrow.depth.size(), narrow.convergence), ((width, length), flat.convergence));
+        for p in 0..width * length {
+            let q = turned(p);
+            assert_eq!((narrow.values[p], narrow.mask[p]), (flat.values[q], flat.mask[q]), "{p}");
+            assert_eq!((narrow.counts[p], seen[p]), (flat.counts[q], seen_flat[q]), "{p}");
+            let depths = [narrow.depth.data()[p], flat.depth.data()[q]].map(f32::to_bits);
+            assert_eq!(depths[0], depths[1], "{p}");
+        }
+        let values = narrow.values.iter().zip(&region).filter(|(_, inside)| **inside);
+        assert!(values.into_iter().all(|(v, _)| *v > 40.0), "{:?}", narrow.values);
+    }
+    for width in [1, 2, 5] {
+        check::<2>(PlaneSettings::LINEAR, width);
+        check::<4>(PlaneSettings::CUBIC, width);
+    }
+}
