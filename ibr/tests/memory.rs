@@ -1,0 +1,234 @@
+//! What renderings allocate at most, beside what they are estimated to take: sizes, shapes, views, methods.
+
+use hybank_ibr::analysis::{Advice, Predictor};
+use hybank_ibr::camera::Camera;
+use hybank_ibr::depth::{DepthMap, Measure};
+use hybank_ibr::image::Image;
+use hybank_ibr::interpolate::Degree;
+use hybank_ibr::interpolate::plane::PlaneSettings;
+use hybank_ibr::pipeline::memory::Extent;
+use hybank_ibr::pipeline::uncalibrated::{self, Target, UncalibratedSettings};
+use hybank_ibr::pipeline::{Method, RenderError, RenderSettings, calibrated, rectified};
+use hybank_ibr::propagate::{CalibratedView, RectifiedView};
+use hybank_ibr::synthetic::{SyntheticScene, rig_camera};
+use nalgebra::{Matrix3x4, Vector3};
+
+type Size = (usize, usize);
+
+/// Runs `work` on one thread, whose allocations are counted; the most bytes at a time.
+fn peak(pool: &rayon::ThreadPool, work: impl FnOnce() + Send) -> f64 {
+    let mut most = 0.0;
+    pool.install(|| most = allocation_counter::measure(work).bytes_max as f64);
+    most
+}
+
+fn pool() -> rayon::ThreadPool {
+    rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build().unwrap()
+}
+
+/// The estimate is true within a quarter.
+fn close(name: &str, size: Size, estimate: f64, measured: f64) {
+    let (pixels, ratio) = ((size.0 * size.1) as f64, estimate / measured);
+    println!("{name}: {:.1} MB, {:.1} bytes per pixel, ratio {ratio:.2}", measured / 1e6, measured / pixels);
+    assert!((0.75..1.25).contains(&ratio), "{name}: {estimate:.3e} estimated, {measured:.3e} measured");
+}
+
+fn picture((width, height): Size, channels: usize) -> Image {
+    let value = |i: usize| 120.0 + 80.0 * ((i / channels % width) as f32 * 0.4).sin() + (i % 7) as f32;
+    Image::new(width, height, channels, (0..width * height * channels).map(value).collect()).unwrap()
+}
+
+fn map(size: Size, value: f32, measure: Measure) -> DepthMap {
+    DepthMap::new(size, vec![value; size.0 * size.1], 1.0, measure).unwrap()
+}
+
+/// Large views in every campaign, smaller ones always.
+fn scaled((width, height): Size) -> Size {
+    let factor = if std::env::var_os("HYBANK_CAMPAIGN").is_some() { 2 } else { 1 };
+    (if width > 16 { factor * width } else { width }, if height > 16 { factor * height } else { height })
+}
+
+#[test]
+fn rows_take_what_is_estimated() {
+    let pool = pool();
+    for (size, views, channels) in [
+        ((700, 500), 2, 3),
+        ((700, 500), 1, 1),
+        ((500, 700), 5, 3),
+        ((60_000, 6), 2, 3),
+        ((120_000, 1), 2, 1),
+        ((6, 60_000), 3, 3),
+        ((1, 200_000), 2, 1),
+    ] {
+        let (size, settings) = (scaled(size), RenderSettings::default());
+        let (image, map) = (picture(size, channels), map(size, 0.3, Measure::Disparity));
+        let view = |camera: usize| RectifiedView { image: &image, map: &map, camera: camera as f64 };
+        let views: Vec<_> = (0..views).map(view).collect();
+        let images: Vec<&Image> = views.iter().map(|view| view.image).collect();
+        let estimate = pool.install(|| Extent::new(size, &images, None).of_rig(&settings));
+        let measured = peak(&pool, || drop(rectified::render(&views, 0.4, &settings).unwrap()));
+        close(
+            &format!("rows, {size:?}, {} views, {channels} channels", views.len()),
+            size,
+            estimate,
+            measured,
+        );
+    }
+}
+
+fn looking(x: f64, (width, height): Size) -> Camera {
+    let focal = 0.8 * width.max(height) as f64;
+    let centre = Vector3::new(x, 0.0, 0.0);
+    let k = nalgebra::Matrix3::new(
+        focal,
+        0.0,
+        (width as f64 - 1.0) / 2.0,
+        0.0,
+        focal,
+        (height as f64 - 1.0) / 2.0,
+        0.0,
+        0.0,
+        1.0,
+    );
+    let mut matrix = Matrix3x4::zeros();
+    matrix.fixed_columns_mut::<3>(0).copy_from(&k);
+    matrix.set_column(3, &-(k * centre));
+    Camera::metric(matrix, false).unwrap()
+}
+
+/// Virtual views that the photographs cover, and such that are mostly holes, where multigrid takes over.
+#[test]
+fn planes_take_what_is_estimated() {
+    let pool = pool();
+    for (size, of_views, views, channels, degree) in [
+        ((600, 500), (600, 500), 2, 3, Degree::Linear),
+        ((600, 500), (600, 500), 2, 1, Degree::Cubic),
+        ((600, 500), (24, 16), 2, 3, Degree::Linear),
+        ((600, 500), (24, 16), 3, 3, Degree::Cubic),
+        ((300, 200), (600, 500), 6, 3, Degree::Linear),
+        ((1, 300_000), (24, 16), 2, 3, Degree::Linear),
+        ((300_000, 1), (24, 16), 2, 1, Degree::Linear),
+        ((3, 100_000), (24, 16), 2, 3, Degree::Cubic),
+        ((12, 30_000), (24, 16), 2, 3, Degree::Linear),
+        ((100_000, 3), (24, 16), 2, 1, Degree::Cubic),
+    ] {
+        let (size, of_views) = (scaled(size), scaled(of_views));
+        let mut settings = RenderSettings::default();
+        if degree == Degree::Cubic {
+            settings.interpolation.plane = PlaneSettings::CUBIC;
+        }
+        // Few steps: the memory does not depend on them.
+        settings.interpolation.plane.iterations = 60;
+        let (image, map) = (picture(of_views, channels), map(of_views, 5.0, Measure::Depth));
+        let view = |k: usize| CalibratedView {
+            image: &image,
+            map: &map,
+            camera: looking(0.02 * k as f64, of_views),
+        };
+        let (views, target): (Vec<_>, _) = ((0..views).map(view).collect(), looking(0.01, of_views));
+        let images: Vec<&Image> = views.iter().map(|view| view.image).collect();
+        let estimate = pool.install(|| Extent::new(size, &images, None).of_cameras(&settings));
+        let work = || drop(calibrated::render(&views, &target, size, &settings).unwrap());
+        let name = format!("plane, {size:?} from {} of {of_views:?}, {channels}, {degree:?}", views.len());
+        close(&name, size, estimate, peak(&pool, work));
+    }
+}
+
+#[test]
+fn planes_of_rigs_take_what_is_estimated() {
+    let pool = pool();
+    for size in [(600, 500), (4, 80_000)] {
+        let (size, settings) = (scaled(size), RenderSettings { method: Method::Plane, ..Default::default() });
+        let (image, map) = (picture(size, 3), map(size, 0.3, Measure::Disparity));
+        let views = [0.0, 1.0].map(|camera| RectifiedView { image: &image, map: &map, camera });
+        let estimate = pool.install(|| Extent::new(size, &[&image, &image], None).of_rig(&settings));
+        let measured = peak(&pool, || drop(rectified::render(&views, 0.4, &settings).unwrap()));
+        close(&format!("plane of a rig, {size:?}"), size, estimate, measured);
+    }
+}
+
+#[test]
+fn views_from_tracks_take_what_is_estimated() {
+    let pool = pool();
+    for (size, views) in [((500, 400), 2), ((300, 240), 4), ((60, 50), 2)] {
+        let (size, of_views) = (scaled(size), scaled((400, 320)));
+        let cameras: Vec<Camera> = (0..=views)
+            .map(|k| Camera::metric(rig_camera(0.7 * k as f64, of_views), false).unwrap())
+            .collect();
+        let shots: Vec<Image> =
+            cameras.iter().map(|c| SyntheticScene::default().view(c, of_views).0).collect();
+        let point = |i: usize| {
+            let part = |k: usize| ((i * k + 7) % 211) as f64 / 211.0;
+            Vector3::new(3.0 * part(37) - 1.5, 2.0 * part(53) - 1.0, 4.0 + 3.0 * part(89))
+        };
+        let seen = |i: usize, camera: &Camera| {
+            let (x, y, _) = camera.project(&point(i));
+            let inside = x > 0.0 && y > 0.0 && x < of_views.0 as f64 - 1.0 && y < of_views.1 as f64 - 1.0;
+            inside.then(|| nalgebra::Vector2::new(x, y))
+        };
+        let tracks: Vec<Vec<_>> =
+            (0..120).map(|i| cameras[..views].iter().map(|c| seen(i, c)).collect()).collect();
+        let images: Vec<&Image> = shots[..views].iter().collect();
+        let (settings, special) = (RenderSettings::default(), UncalibratedSettings::default());
+        let estimate = pool.install(|| Extent::new(size, &images, None).of_tracks(Degree::Linear));
+        let target = Target::Between(0.5);
+        let work = || {
+            let done = uncalibrated::render(&images, &tracks, &target, size, &settings, &special);
+            drop(done.unwrap());
+        };
+        close(&format!("tracks, {size:?} from {views}"), size, estimate, peak(&pool, work));
+    }
+}
+
+#[test]
+fn predictions_take_what_is_estimated() {
+    let pool = pool();
+    for (size, channels) in [((400, 300), 3), ((300, 400), 1), ((20_000, 6), 3)] {
+        let (size, settings) = (scaled(size), RenderSettings::default());
+        let (image, map) = (picture(size, channels), map(size, 0.3, Measure::Disparity));
+        let views = [0.0, 1.0].map(|camera| RectifiedView { image: &image, map: &map, camera });
+        let estimate =
+            pool.install(|| Extent::new(size, &[&image, &image], None).of_rig_prediction(&settings));
+        let work = || {
+            let predictor = Predictor::new(&views, &settings).unwrap();
+            let now = predictor.at(&0.5, (), None).unwrap();
+            drop(Advice::on(&predictor, &0.5, (), &now).unwrap());
+        };
+        close(&format!("prediction of a rig, {size:?}"), size, estimate, peak(&pool, work));
+        let (map, target) = (map_of(size), looking(0.01, size));
+        let view = |x: f64| CalibratedView { image: &image, map: &map, camera: looking(x, size) };
+        let views = [view(0.0), view(0.02)];
+        let estimate =
+            pool.install(|| Extent::new(size, &[&image, &image], None).of_camera_prediction(&settings));
+        let work = || {
+            let predictor = Predictor::new(&views, &settings).unwrap();
+            let now = predictor.at(&target, size, None).unwrap();
+            drop(Advice::on(&predictor, &target, size, &now).unwrap());
+        };
+        close(&format!("prediction of cameras, {size:?}"), size, estimate, peak(&pool, work));
+    }
+}
+
+fn map_of(size: Size) -> DepthMap {
+    map(size, 5.0, Measure::Depth)
+}
+
+/// No machine has 10^16 bytes; the message has what is wanted and what is there.
+#[test]
+fn what_no_memory_holds_is_refused() {
+    let size = (24, 16);
+    let (image, map) = (picture(size, 1), map(size, 5.0, Measure::Depth));
+    let view = CalibratedView { image: &image, map: &map, camera: looking(0.0, size) };
+    let refused = calibrated::render(
+        &[view],
+        &looking(0.01, size),
+        (1 << 16, (1 << 16) - 1),
+        &RenderSettings::default(),
+    );
+    assert!(matches!(refused, Err(RenderError::Memory { .. })), "{refused:?}");
+    let message = refused.unwrap_err().to_string();
+    assert!(
+        message.contains("65536 x 65535") && message.contains("of memory, and this process may use"),
+        "{message}"
+    );
+}
