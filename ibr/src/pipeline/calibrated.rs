@@ -1,6 +1,6 @@
 //! A view from any number of calibrated cameras with depth.
 
-use super::memory::Extent;
+use super::memory::{Extent, bands_of};
 use super::{
     Agreement, Method, RenderError, RenderSettings, Rendering, Report, ViewWeights, Watch, check_counts,
     check_size,
@@ -15,11 +15,6 @@ use std::ops::Range;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Samples held in memory at a time; larger scenes are rendered in bands of rows.
-const SAMPLES_AT_A_TIME: usize = 1 << 16;
-/// Fewest rows of a band, however many samples they have: neighbouring bands share some rows, whose samples
-/// are made twice.
-const FEWEST_ROWS: usize = 40;
 /// Share of the first two stages in the work, about.
 const GATHERING: f64 = 0.7;
 
@@ -66,11 +61,6 @@ pub(crate) fn extent(
     settings: &RenderSettings,
 ) -> Extent {
     Extent::new(size, &views.iter().map(|view| view.image).collect::<Vec<_>>(), settings.nearest)
-}
-
-/// Bands of rows for views of so many pixels in all.
-pub(super) fn bands_of(pixels: usize, height: usize) -> usize {
-    pixels.div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS)).max(1)
 }
 
 fn check(

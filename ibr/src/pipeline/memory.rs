@@ -3,13 +3,18 @@
 //! The largest arrays are counted: those of the equations and of the pixels, and the samples that are held at a
 //! time. Whether multigrid takes over is not known before; the estimate lies between.
 
-use super::calibrated::bands_of;
 use super::{Method, RenderError, RenderSettings};
 use crate::interpolate::Degree;
 use crate::interpolate::plane::PlaneProblem;
 use crate::sample::Sample;
 use hybank::memory::check_memory;
 use hybank::sampling::Fit2;
+
+/// Samples held in memory at a time; larger scenes are rendered in bands of rows.
+const SAMPLES_AT_A_TIME: usize = 1 << 16;
+/// Fewest rows of a band, however many samples they have: neighbouring bands share some rows, whose samples
+/// are made twice.
+const FEWEST_ROWS: usize = 40;
 
 /// What a rendering of any kind takes: threads, points that are compared, and whatever is small.
 const BASE: f64 = 5e5;
@@ -155,6 +160,11 @@ impl Extent {
         let Self { size, views, .. } = *self;
         check_memory(bytes).map_err(|shortage| RenderError::Memory { size, views, shortage })
     }
+}
+
+/// Bands of rows for views of so many pixels in all.
+pub(super) fn bands_of(pixels: usize, height: usize) -> usize {
+    pixels.div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS)).max(1)
 }
 
 fn order(degree: Degree) -> usize {
