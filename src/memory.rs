@@ -2,9 +2,20 @@
 
 use std::fmt;
 use std::fs;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Estimates of memory are low by this factor at most, with what the allocator adds.
 const ESTIMATES_LOW_BY: f64 = 1.2;
+
+/// Bytes of small pieces of work that are compared with what is free at one time: what the system says of its
+/// memory takes longer to read than a small image.
+const TOGETHER: usize = 1 << 20;
+
+/// Work of fewer bytes is small.
+const SMALL: usize = TOGETHER / 8;
+
+/// What was found free for the small pieces of work of this process.
+static SMALL_PIECES: Grant = Grant(AtomicUsize::new(0));
 
 /// Work that takes more memory than this process may use.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,11 +37,16 @@ impl fmt::Display for MemoryShortage {
 }
 
 /// Refuses work that takes more bytes than this process may use; the system would end the process. Where
-/// addresses are limited it is tried whether the system hands out so much in one piece.
+/// addresses are limited it is tried whether the system hands out so much in one piece. Small pieces
+/// of work are checked a megabyte at a time.
 ///
 /// # Errors
 /// [`MemoryShortage`] with both numbers.
 pub fn check_memory(needed: f64) -> Result<(), MemoryShortage> {
+    SMALL_PIECES.check(needed, check_now)
+}
+
+fn check_now(needed: f64) -> Result<(), MemoryShortage> {
     let (wanted, free) = (ESTIMATES_LOW_BY * needed, available_memory().unwrap_or(f64::INFINITY));
     // Without a limit of addresses the system hands out what it has not.
     let is_told = physical().is_some() && address_space().is_none();
@@ -39,6 +55,31 @@ pub fn check_memory(needed: f64) -> Result<(), MemoryShortage> {
         return Ok(());
     }
     Err(MemoryShortage { needed, available: free.min(wanted) / ESTIMATES_LOW_BY })
+}
+
+/// Bytes that were found free and are not used up.
+struct Grant(AtomicUsize);
+
+impl Grant {
+    /// Checks work by `ask`; small pieces by what is left of the last grant, or by a new one.
+    fn check(
+        &self,
+        needed: f64,
+        ask: impl Fn(f64) -> Result<(), MemoryShortage>,
+    ) -> Result<(), MemoryShortage> {
+        if needed >= SMALL as f64 {
+            return ask(needed);
+        }
+        let rest = |granted: usize| granted.checked_sub(needed.ceil() as usize);
+        if self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, rest).is_ok() {
+            return Ok(());
+        }
+        match ask(needed + TOGETHER as f64) {
+            Ok(()) => self.0.store(TOGETHER, Ordering::Relaxed),
+            Err(_) => ask(needed)?,
+        }
+        Ok(())
+    }
 }
 
 /// Bytes of memory that are free on the machine, or fewer where the process is limited (`ulimit -v`, a
@@ -106,5 +147,27 @@ mod tests {
             message.starts_with("about 10000000000.0 GB of memory, and this process may use"),
             "{message}"
         );
+    }
+
+    /// Small pieces ask seldom, for no less than they take; large ones and those that find little left ask
+    /// each for themselves.
+    #[test]
+    fn small_pieces_are_checked_together() {
+        let (grant, asked) = (Grant(AtomicUsize::new(0)), std::cell::RefCell::new(Vec::new()));
+        let ask_within = |free: f64| {
+            let asked = &asked;
+            move |needed: f64| {
+                asked.borrow_mut().push(needed);
+                if needed <= free { Ok(()) } else { Err(MemoryShortage { needed, available: free }) }
+            }
+        };
+        (0..1000).for_each(|_| assert_eq!(grant.check(1e4, ask_within(1e9)), Ok(())));
+        let (times, total) = (asked.borrow().len(), asked.borrow().iter().sum::<f64>());
+        assert!(times <= 11 && total >= 1e7, "{times} {total}");
+        assert_eq!(grant.check(5e5, ask_within(1e9)), Ok(()));
+        assert_eq!((asked.borrow().len(), asked.borrow().last()), (times + 1, Some(&5e5)));
+        let shortage = (0..1000).find_map(|_| grant.check(1e4, ask_within(9e3)).err());
+        assert_eq!(shortage, Some(MemoryShortage { needed: 1e4, available: 9e3 }));
+        assert_eq!(grant.check(8e3, ask_within(9e3)), Ok(()));
     }
 }
