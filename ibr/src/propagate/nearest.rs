@@ -105,10 +105,11 @@ mod tests {
     /// By definition, for cameras in a plane, on a sphere, along a line, several at one place.
     #[test]
     fn equal_to_the_definition() {
+        type Placing = fn(f64, f64, f64) -> [f64; 3];
         let image = Image::filled(1, 1, 1, 0.0);
         let map = DepthMap::new((1, 1), vec![1.0], 1.0, Measure::Depth).unwrap();
         let part = |i: usize, k: usize| ((i * k + 7) % 101) as f64 / 101.0;
-        let places: [fn(f64, f64, f64) -> [f64; 3]; 4] = [
+        let places: [Placing; 4] = [
             |a, b, _| [2.0, a, b],
             |a, b, c| [a - 0.5, b - 0.5, c - 0.5].map(|v| v / ((a - 0.5).hypot(b - 0.5).hypot(c - 0.5))),
             |a, _, _| [a, 3.0 * a, -a],

@@ -198,11 +198,12 @@ fn narrow_images_are_flat_ones_turned() {
         };
         let (narrow, seen) = fitted(&samples, (width, length), &region);
         let (flat, seen_flat) = fitted(&exchanged, (length, width), &flat_region);
+        assert_eq!(seen.len(), width * length);
         assert_eq!((narrow.depth.size(), narrow.convergence), ((width, length), flat.convergence));
-        for p in 0..width * length {
+        for (p, is_seen) in seen.into_iter().enumerate() {
             let q = turned(p);
             assert_eq!((narrow.values[p], narrow.mask[p]), (flat.values[q], flat.mask[q]), "{p}");
-            assert_eq!((narrow.counts[p], seen[p]), (flat.counts[q], seen_flat[q]), "{p}");
+            assert_eq!((narrow.counts[p], is_seen), (flat.counts[q], seen_flat[q]), "{p}");
             let depths = [narrow.depth.data()[p], flat.depth.data()[q]].map(f32::to_bits);
             assert_eq!(depths[0], depths[1], "{p}");
         }
