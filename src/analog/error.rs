@@ -75,8 +75,9 @@ pub enum AnalogError {
     NoTransmission,
     /// The gain is so large or small that its square leaves the range of double precision.
     #[error(
-        "the gain is {value:e} once time is measured in fast periods; the supported range is {MIN_GAIN:e} to {MAX_GAIN:e}: \
-         check num, gain or c, and the units of poles and period"
+        "the gain is {} once time is measured in fast periods; the supported range is {MIN_GAIN:e} to {MAX_GAIN:e}: \
+         check num, gain or c, and the units of poles and period",
+        gain(*.value)
     )]
     GainOutOfRange {
         /// The normalised gain.
@@ -85,6 +86,11 @@ pub enum AnalogError {
     /// An eigenvalue computation failed.
     #[error("the poles could not be computed: {0}")]
     Numerical(#[from] LinalgError),
+}
+
+/// A gain that may be beyond all numbers.
+fn gain(value: f64) -> String {
+    if value.is_finite() { format!("{value:e}") } else { "beyond the largest number".to_owned() }
 }
 
 /// A pole and its modulus. A first coefficient near the smallest double puts a pole beyond the largest.
