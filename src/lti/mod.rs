@@ -1,7 +1,7 @@
 //! Discrete-time state-space systems: connections, responses, Gramians, peak gains, Riccati equations.
 //!
 //! This module does not depend on filter banks: a system has inputs, outputs and states. Continuous-time
-//! helpers ([`exponential`]) serve exact discretisation.
+//! helpers (`exponential`) serve exact discretisation.
 
 pub(crate) mod exponential;
 mod fir_with_tail;

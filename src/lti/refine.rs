@@ -12,7 +12,7 @@ const LEAST_STEP: f64 = 1e-3;
 /// A peak gain and where it is attained.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
-    /// The largest gain, with the relative accuracy [`PEAK_ACCURACY`](super::peak::PEAK_ACCURACY). It is
+    /// The largest gain, with the relative accuracy `PEAK_ACCURACY`. It is
     /// attained at `frequency`, so it is never too large.
     pub gain: f64,
     /// Radians per step, in [0, pi].

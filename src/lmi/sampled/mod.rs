@@ -22,7 +22,7 @@
 //! plus Hankel in the lags for each pair of taps, so it is summed at the cost of one product per pair of
 //! rows. The data are shifted and scaled by the least-squares solution first, which makes `t` of order one
 //! whatever the size of gamma. The dual iterate is then turned into a lower bound that is proved from the
-//! original data alone ([`lower_bound`]).
+//! original data alone (`lower_bound`).
 //!
 //! Sources: Vandenberghe and Boyd, "Semidefinite programming", SIAM Review 38 (1996); Helmberg,
 //! Rendl, Vanderbei, Wolkowicz, SIAM J. Optim. 6 (1996), Kojima, Shindoh, Hara, SIAM J. Optim. 7

@@ -24,7 +24,7 @@ pub struct Solution {
     pub gamma: f64,
     /// Lower bound on gamma for all taps of the same lags, rounding errors subtracted.
     pub lower: LowerBound,
-    /// The matrices `Y_l` (M x q) that prove it through [`super::lower_bound`].
+    /// The matrices `Y_l` (M x q) that prove it through `lower_bound`.
     pub dual: Vec<CMat>,
     /// Number of steps.
     pub iterations: usize,
