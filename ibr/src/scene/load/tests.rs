@@ -160,7 +160,7 @@ fn what_is_wrong_is_named() {
         let message = read(text, &LoadOptions::default()).unwrap_err();
         assert!(words.iter().all(|w| message.contains(w)), "{message}");
     };
-    fails(&RIG.replace("disparity_scale", "disparity_scal"), &["scene.toml", "disparity_scal", "line"]);
+    fails(&RIG.replace("disparity_scale", "disparity_scal"), &["scene.toml:7:5", "disparity_scal"]);
     fails(&RIG.replacen("disparity = \"d.pgm\"", "", 1), &["\"left\"", "`disparity`"]);
     fails(&RIG.replacen("a.pgm", "missing.pgm", 1), &["missing.pgm"]);
     fails(&RIG.replacen("\"a.pgm\"", "\"small.pgm\"", 1), &["d.pgm", "4 x 2", "2 x 1"]);
