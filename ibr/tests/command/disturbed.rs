@@ -90,8 +90,7 @@ fn too_many_pixels_are_refused_before_any_work() {
     let message = stderr(&refused);
     assert!(message.contains("20000 x 2000") && message.contains("--max-pixels"), "{message}");
     // With the limit lifted, but not that of the memory.
-    let refused =
-        shell(dir.path(), "ulimit -v 2000000; $H render wide.toml -o out.png --max-pixels 50000000");
+    let refused = shell(dir.path(), "ulimit -v 250000; $H render wide.toml -o out.png --max-pixels 50000000");
     let message = stderr(&refused);
     assert_eq!((code(&refused), message.lines().count()), (1, 1), "{message}");
     assert!(
@@ -129,10 +128,7 @@ fn renderings_that_no_memory_holds_are_refused() {
         let refused = shell(dir.path(), &format!("ulimit -v {limit}; $H {line} --threads 1"));
         let message = stderr(&refused);
         assert_eq!((code(&refused), message.lines().count()), (1, 1), "{line}: {message}");
-        assert!(
-            message.contains("from 2 views") && message.contains("of memory, and this process may use"),
-            "{line}: {message}"
-        );
+        assert!(message.contains("of memory, and this process may use"), "{line}: {message}");
     }
     assert!(!dir.path().join("map.png").exists() && !dir.path().join("out.png").exists());
 }
@@ -210,7 +206,7 @@ fn every_limit_of_memory_ends_in_a_result_or_a_message() {
         "render scene.toml -o out.png --depth-step 6 --bits 16 --alpha",
         "render narrow.toml -o out.png",
         "render flat.toml -o out.png --degree cubic",
-        "render wide.toml -o out.pfm --error error.png --count count.png",
+        "render wide.toml -o out.pfm --count count.png",
         "render many.toml -o out.ppm --threads 1",
         "render listed.toml -o out.png",
         "render tracked.toml -o out.png",
