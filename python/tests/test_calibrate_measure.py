@@ -49,7 +49,7 @@ def test_wrong_calibrations_are_refused():
     for keywords, words in [
         ({"tones": [1e6], "blind": True}, "one of tones, waveform and blind"),
         ({"tones": [-1.0]}, "positive"),
-        ({"fit": ["delays"]}, "choose delay"),
+        ({"fit": ["delays"]}, "can be fitted"),
         ({"reference": 0}, "count from 1"),
         ({"clip": -1.0}, "positive level"),
         ({"tones": [1e6]}, "."),
