@@ -319,5 +319,5 @@ fn worst_cases_take_one_error_per_converter() {
     let plain = desk.report(&["analyze", "bank.json"]);
     let moved = desk.report(&["analyze", "bank.json", "--delay-error", "0,4e-7"]);
     assert!(moved["gamma"].as_f64().unwrap() > plain["gamma"].as_f64().unwrap(), "{plain} {moved}");
-    desk.refused(1, &["analyze", "bank.json", "--delay-error", "0,0,0,1ns,1ns"], &["2"]);
+    desk.refused(1, &["analyze", "bank.json", "--delay-error", "0,0,0,1e-9,1e-9"], &["2"]);
 }

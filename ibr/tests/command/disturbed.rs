@@ -256,5 +256,5 @@ fn every_limit_of_memory_ends_in_a_result_or_a_message() {
         }
     }
     println!("{done} results, {refused} refusals, {small} ends by a small allocation under limits of memory");
-    assert!(done > 0 && refused > 0 && small < (done + refused) / 4, "{done}, {refused}, {small}");
+    assert!(done > 0 && refused > 0 && 3 * small <= done + refused, "{done}, {refused}, {small}");
 }
