@@ -1,6 +1,7 @@
 //! The files of an archive (tar), as SigMF packs recordings.
 
 use super::IoError;
+use crate::messages::Quoted;
 use std::io::{self, Read, Seek, SeekFrom};
 use tar::{Archive, Entry};
 
@@ -45,7 +46,12 @@ pub fn tar_files(archive: &mut (impl Read + Seek), file: &str) -> Result<Vec<Tar
                 continue;
             }
             Err(error) if error.raw_os_error().is_some() => return Err(system(error)),
-            Err(error) => format!("{error}; copy the archive again, or pack the recording with tar"),
+            Err(error) => {
+                format!(
+                    "{}; copy the archive again, or pack the recording with tar",
+                    Quoted(error.to_string())
+                )
+            }
         };
         return Err(IoError::malformed(file, "a SigMF archive (tar)")(format!("byte {offset}: {problem}")));
     }
