@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Estimates of memory are low by this factor at most, with what the allocator adds.
 const ESTIMATES_LOW_BY: f64 = 1.2;
 
-/// Bytes of small pieces of work that are compared with what is free at one time: what the system says of its
-/// memory takes longer to read than a small image.
+/// Bytes of small pieces of work that are compared with what is free at one time: what the system says of
+/// its memory takes longer to read than a small image.
 const TOGETHER: usize = 1 << 20;
 
 /// Work of fewer bytes is small.

@@ -1,8 +1,9 @@
-//! What messages hold that this program did not write: foreign text, lines of files, and numbers of any size.
+//! What messages hold that this program did not write: foreign text, lines of files, and numbers of any
+//! size.
 //!
 //! Names of files, keys, headers and cells may hold control characters, which a terminal obeys, and may be
-//! megabytes long. [`Quoted`] is foreign text in a message. Whoever prints a message passes all of it through
-//! [`shown`], so a text that nobody quoted does no harm either.
+//! megabytes long. [`Quoted`] is foreign text in a message. Whoever prints a message passes all of it
+//! through [`shown`], so a text that nobody quoted does no harm either.
 //!
 //! ```
 //! use hybank::messages::{Number, Quoted, shown};

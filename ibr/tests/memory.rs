@@ -26,8 +26,8 @@ fn pool() -> rayon::ThreadPool {
     rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build().unwrap()
 }
 
-/// Views as large as their photographs are estimated within a quarter. Very flat views are estimated up to 0.74
-/// times of what they take, and views much smaller than their photographs up to 3.6 times.
+/// Views as large as their photographs are estimated within a quarter. Very flat views are estimated up to
+/// 0.74 times of what they take, and views much smaller than their photographs up to 3.6 times.
 fn close(name: &str, size: Size, estimate: f64, measured: f64) {
     let (pixels, ratio) = ((size.0 * size.1) as f64, estimate / measured);
     println!("{name}: {:.1} MB, {:.1} bytes per pixel, ratio {ratio:.2}", measured / 1e6, measured / pixels);

@@ -2,8 +2,8 @@
 
 use crate::answer::{Answer, Refusal, text};
 use hybank::bank::Bank;
-use hybank::figures::Figures;
 use hybank::design::{Design, GammaScale, Options, Stage, analyze_mean};
+use hybank::figures::Figures;
 use hybank::overview::{self, Facts, counted};
 use hybank::spec::Spec;
 use hybank::verify::Verified;

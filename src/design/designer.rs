@@ -32,8 +32,8 @@ pub struct Design {
     pub taps_chosen: bool,
     /// Frequency of the worst case.
     pub peak_frequency: RadiansPerSlowPeriod,
-    /// What the search for the least gamma, or for the least mean square beside it, left open; `None` also for
-    /// methods that do not minimise gamma and for a gamma of zero up to rounding.
+    /// What the search for the least gamma, or for the least mean square beside it, left open; `None` also
+    /// for methods that do not minimise gamma and for a gamma of zero up to rounding.
     pub unfinished: Option<Unfinished>,
     /// Number of Riccati equations solved, or of interior-point iterations.
     pub iterations: usize,

@@ -254,8 +254,8 @@ impl DesignSpec {
         Ok(design)
     }
 
-    /// Whether the design couples all samples of a frame. The taps of the mean-square optimum are independent
-    /// for each output sample.
+    /// Whether the design couples all samples of a frame. The taps of the mean-square optimum are
+    /// independent for each output sample.
     pub(super) fn is_coupled(&self) -> bool {
         !(self.method == Method::H2 && self.is_fir())
     }

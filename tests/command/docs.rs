@@ -104,8 +104,8 @@ impl Folder {
         assert!(bank.is_ok(), "{}: {bank:?}", self.place(snippet));
     }
 
-    /// Runs the lines that call `hybank`, the C compiler and what it made; `cargo` lines are the business of a
-    /// fresh clone.
+    /// Runs the lines that call `hybank`, the C compiler and what it made; `cargo` lines are the business
+    /// of a fresh clone.
     fn run(&self, snippet: &Snippet) {
         let programs = ["hybank ", "cc ", "./"];
         let runs = |line: &&str| programs.iter().any(|program| line.starts_with(program));

@@ -38,8 +38,8 @@ pub fn encode(image: &Image, path: &Path, levels: Levels) -> Result<Vec<u8>, Ima
     }
 }
 
-/// Bytes per pixel while a picture is packed: the picture, what the encoder makes of it in pieces that double,
-/// and the file.
+/// Bytes per pixel while a picture is packed: the picture, what the encoder makes of it in pieces that
+/// double, and the file.
 fn packing(channels: usize, levels: Levels) -> f64 {
     let bytes = if levels == Levels::Sixteen { 2 } else { 1 };
     (6 * bytes * channels.max(3)) as f64

@@ -1,7 +1,7 @@
 //! The memory that a rendering takes beside its views, before it begins.
 //!
-//! The largest arrays are counted: those of the equations and of the pixels, and the samples that are held at a
-//! time. Whether multigrid takes over is not known before; the estimate lies between.
+//! The largest arrays are counted: those of the equations and of the pixels, and the samples that are held
+//! at a time. Whether multigrid takes over is not known before; the estimate lies between.
 
 use super::{Method, RenderError, RenderSettings};
 use crate::interpolate::Degree;
@@ -29,8 +29,8 @@ const ROW_SAMPLE: f64 = 67.0;
 /// Bytes of a place in a band beside its sample: positions, depths, weights, cells.
 const PLACE: f64 = 45.0;
 
-/// Bytes per pixel of a prediction: of the evidence of a row fit, of the regressors with slopes, distances and
-/// jitter, of the search for local limits, and of the errors that are its result.
+/// Bytes per pixel of a prediction: of the evidence of a row fit, of the regressors with slopes, distances
+/// and jitter, of the search for local limits, and of the errors that are its result.
 const ROW_EVIDENCE: f64 = 60.0;
 const REGRESSORS: f64 = 76.0;
 const LIMITS: f64 = 52.0;

@@ -227,8 +227,8 @@ pub(crate) fn room_to_parse(text: &str) -> f64 {
     PARSED * text.len() as f64
 }
 
-/// What `read` makes of each view, or the first error in the order of the views, so that every run reports the
-/// same error. Views are read at the same time if there is memory for that, judged by the first one.
+/// What `read` makes of each view, or the first error in the order of the views, so that every run reports
+/// the same error. Views are read at the same time if there is memory for that, judged by the first one.
 fn each<V: Sync, T: Send>(
     views: &[V],
     read: impl Fn(&V) -> Loaded<T> + Sync,

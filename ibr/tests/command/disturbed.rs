@@ -195,7 +195,8 @@ fn sized_scenes(dir: &Path) {
     write("large.toml", &format!("{}{}[virtual]\nposition = 0.5\n", rig(0), rig(1)));
 }
 
-/// Whether the program ended because not even an object of a fixed size could be had, which no input decides.
+/// Whether the program ended because not even an object of a fixed size could be had, which no input
+/// decides.
 #[cfg(target_os = "linux")]
 fn is_small_allocation(message: &str) -> bool {
     let bytes = message.split("memory allocation of ").nth(1).and_then(|rest| rest.split(' ').next());

@@ -67,8 +67,8 @@ impl<'a, const ORDER: usize, const C: usize> Fit2Rows<'a, ORDER, C> {
         }
     }
 
-    /// The ORDER rows of coefficients from `row` on, counted from the first of these. An image of one row has
-    /// one less, and 0 is added to its last one instead.
+    /// The ORDER rows of coefficients from `row` on, counted from the first of these. An image of one row
+    /// has one less, and 0 is added to its last one instead.
     #[inline(always)]
     fn rows_from(&self, row: usize) -> [usize; ORDER] {
         let last = self.size.1.max(1) + ORDER - 3;
