@@ -3,7 +3,7 @@
 //! `cargo run -p arrows` fails on a circle of files, on an arrow that ARCHITECTURE.md does not allow, and on
 //! a public interface that differs from its list in `api/`. Imports are `use` lines and paths in the code,
 //! followed to the file that holds what they name. Tests may import anything. `cargo run -p arrows accept`
-//! writes the lists anew, for review.
+//! writes the lists again, for review.
 
 mod api;
 mod checks;
