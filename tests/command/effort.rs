@@ -1,12 +1,12 @@
 //! Designs that cannot be: a latency out of reach, too long, too large, numbers too large; and long ones
 //! that are interrupted.
 
-use crate::support::{THESIS, names, text};
+#[cfg(target_os = "linux")]
+use crate::support::until_caught;
+use crate::support::{THESIS, names, send, text};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
-#[cfg(target_os = "linux")]
-use std::time::Duration;
 
 fn design(folder: &Path, spec: &str, args: &[&str]) -> Command {
     fs::write(folder.join("spec.toml"), spec).unwrap();
@@ -109,24 +109,11 @@ fn an_interrupt_ends_a_design_at_once_and_leaves_no_file() {
         let mut command =
             design(folder.path(), &spec(2, 2, "taps = 900"), &["--latency", "400", "--no-limit"]);
         let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-        let pid = child.id().to_string();
-        while !listens(&pid) {
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        assert!(Command::new("kill").args(["-s", signal, &pid]).status().unwrap().success());
+        until_caught(child.id(), signal);
+        send(child.id(), signal);
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(1), "{output:?}");
         assert_eq!(text(&output.stderr), "hybank: interrupted; no unfinished file is left\n");
         assert_eq!(names(folder.path()), ["spec.toml"]);
     }
-}
-
-/// Whether the process has handlers for SIGINT and SIGTERM.
-#[cfg(target_os = "linux")]
-fn listens(pid: &str) -> bool {
-    let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
-    let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap();
-    let (interrupt, terminate) = (1 << (2 - 1), 1 << (15 - 1));
-    let both = interrupt | terminate;
-    u64::from_str_radix(caught.trim(), 16).unwrap() & both == both
 }

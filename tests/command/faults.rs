@@ -105,7 +105,7 @@ fn a_signal_ends_a_run_whose_output_nobody_takes() {
     // Until the pipe is full.
     until_a_write_waits(child.id(), None);
     let begin = Instant::now();
-    assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());
+    crate::support::send(child.id(), 15);
     while child.try_wait().unwrap().is_none() {
         assert!(begin.elapsed() < Duration::from_secs(60), "the signal did not end the run");
         std::thread::sleep(Duration::from_millis(20));
@@ -164,7 +164,7 @@ fn a_signal_ends_a_run_whose_messages_nobody_takes() {
     until_a_write_waits(child.id(), None);
     assert!(child.try_wait().unwrap().is_none(), "the message was taken");
     let begin = Instant::now();
-    assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());
+    crate::support::send(child.id(), 15);
     while child.try_wait().unwrap().is_none() {
         assert!(begin.elapsed() < Duration::from_secs(60), "the signal did not end the run");
         std::thread::sleep(Duration::from_millis(20));

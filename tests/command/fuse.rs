@@ -7,7 +7,7 @@ mod turns;
 use crate::support::{Desk, TAPS, bytes, fused, interleaved, names, text, wav};
 use serde_json::json;
 use std::fs;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 /// N = M = 2, m0 = 3.
 fn write_bank(desk: &Desk, name: &str, fast_period: f64, taps: [Vec<f64>; 2]) {
@@ -138,7 +138,7 @@ fn an_interrupt_leaves_nothing_behind() {
     while names(&desk.path("")) == before {
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    crate::support::send(child.id(), 2);
     let output = child.wait_with_output().unwrap();
     drop(stdin);
     let message = text(&output.stderr);

@@ -1,6 +1,8 @@
 //! The command stream, as a user runs it.
 
-use crate::support::{Desk, bytes, floats, frames, fused, text};
+#[cfg(target_os = "linux")]
+use crate::support::until_caught;
+use crate::support::{Desk, bytes, floats, frames, fused, send, text};
 use std::fs;
 use std::io::{Read, Write};
 use std::path::PathBuf;
@@ -194,7 +196,7 @@ fn a_signal_ends_after_whole_frames_and_reports() {
     crate::support::ending_signals().for_each(ends_after_whole_frames);
 }
 
-fn ends_after_whole_frames(signal: &str) {
+fn ends_after_whole_frames(signal: u32) {
     let bench = Bench::new();
     let mut child = bench.spawn(&["-o", "out.raw", "--json"]);
     let mut stdin = child.stdin.take().unwrap();
@@ -205,8 +207,7 @@ fn ends_after_whole_frames(signal: &str) {
     while bench.unfinished_bytes() < Some(800) {
         std::thread::sleep(Duration::from_millis(1));
     }
-    let id = child.id().to_string();
-    assert!(Command::new("kill").args(["-s", signal, &id]).status().unwrap().success());
+    send(child.id(), signal);
     let output = child.wait_with_output().unwrap();
     drop(stdin);
     assert!(output.status.success(), "{output:?}");
@@ -224,24 +225,11 @@ fn an_interrupt_before_the_first_sample_is_reported() {
     assert!(Command::new("mkfifo").arg(bench.path("in")).status().unwrap().success());
     let child = bench.spawn(&["--format", "wav", "--input", "in", "-o", "out.wav"]);
     until_caught(child.id(), 15);
-    assert!(Command::new("kill").arg(child.id().to_string()).status().unwrap().success());
+    send(child.id(), 15);
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     assert!(text(&output.stderr).contains("interrupted after 0 frames"), "{output:?}");
     assert!(!bench.path("out.wav").exists() && bench.unfinished_bytes().is_none());
-}
-
-/// Waits until the process handles this signal.
-#[cfg(target_os = "linux")]
-fn until_caught(process: u32, signal: u32) {
-    let caught = || {
-        let status = fs::read_to_string(format!("/proc/{process}/status")).unwrap();
-        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap().trim();
-        u64::from_str_radix(caught, 16).unwrap() >> (signal - 1) & 1 == 1
-    };
-    while !caught() {
-        std::thread::sleep(Duration::from_millis(1));
-    }
 }
 
 /// As after `nohup`: the stream goes on when its terminal is gone.
@@ -254,7 +242,7 @@ fn an_ignored_hangup_stays_ignored() {
     command.current_dir(bench.path("")).args(["-c", &run]).stdin(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
     until_caught(child.id(), 15);
-    assert!(Command::new("kill").args(["-HUP", &child.id().to_string()]).status().unwrap().success());
+    send(child.id(), 1);
     let input = frames(100);
     child.stdin.take().unwrap().write_all(&bytes(&input)).unwrap();
     let output = child.wait_with_output().unwrap();

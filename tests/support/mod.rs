@@ -37,14 +37,33 @@ pub(crate) const TAPS: [&[f32]; 2] = [&[1.0, 2.0, 3.0, 4.0], &[10.0, 20.0, 30.0,
 
 /// Signals that end a run in order, without those that this process ignores, as under `nohup`: the runs that
 /// it starts ignore them too.
-pub(crate) fn ending_signals() -> impl Iterator<Item = &'static str> {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let ignored = ignored.map_or(0, |mask| u64::from_str_radix(mask.trim(), 16).unwrap());
-    let signals =
-        [("INT", 2), ("TERM", 15), ("HUP", 1), ("XCPU", 24), ("ALRM", 14), ("USR1", 10), ("USR2", 12)];
-    let caught = move |&(name, number): &(&str, u32)| name != "HUP" || ignored >> (number - 1) & 1 == 0;
-    signals.into_iter().filter(caught).map(|(name, _)| name)
+pub(crate) fn ending_signals() -> impl Iterator<Item = u32> {
+    let ignored = signals_of("self", "SigIgn:").unwrap_or(0);
+    let [int, term, hup, xcpu, alrm, usr1, usr2] = [2, 15, 1, 24, 14, 10, 12];
+    let ended_by = [int, term, hup, xcpu, alrm, usr1, usr2];
+    ended_by.into_iter().filter(move |&signal| signal != hup || ignored >> (signal - 1) & 1 == 0)
+}
+
+/// Waits until the process handles `signal`.
+#[cfg(target_os = "linux")]
+pub(crate) fn until_caught(process: u32, signal: u32) {
+    while signals_of(&process.to_string(), "SigCgt:").unwrap() >> (signal - 1) & 1 == 0 {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+}
+
+/// Sends `signal` to the process.
+pub(crate) fn send(process: u32, signal: u32) {
+    let signal = signal.to_string();
+    let kill = std::process::Command::new("kill").args(["-s", &signal, &process.to_string()]).status();
+    assert!(kill.unwrap().success());
+}
+
+/// The mask of signals that `/proc` shows for the process under this key.
+fn signals_of(process: &str, key: &str) -> Option<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let mask = status.lines().find_map(|line| line.strip_prefix(key))?;
+    u64::from_str_radix(mask.trim(), 16).ok()
 }
 
 /// What a program printed.
