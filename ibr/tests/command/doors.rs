@@ -56,7 +56,7 @@ fn lists_and_films_hold_the_views() {
         "frames = 2\nsize = [4, 4]\noffset = 1.0\n[[virtual]]\nposition = 0.0\noffset = 2.0",
         &["number 3 has another `offset`"],
     );
-    broken("position = 0.25", "positon = 0.25", &["did you mean `position`?", "line"]);
+    broken("position = 0.25", "positon = 0.25", &["did you mean `position`?", "broken.toml:"]);
     broken("frames = 2", "frames = 9999", &["more than 9999 virtual views"]);
     for (arguments, words) in [
         (&["--truth", "middle.png"][..], "several virtual views"),
