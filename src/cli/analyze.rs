@@ -2,6 +2,7 @@
 
 use super::bank_file::{bad_flag, load};
 use super::design_report::{against, figure_text};
+use super::design_studies::number;
 use super::print::{Failure, InFile, is_dash, show};
 use super::worst_case::{self, Questions, Sweep};
 use super::written::check_outputs;
@@ -155,22 +156,24 @@ impl Report {
         let Analysis { gamma, peak_hertz, noncausal, mean } = self.analysis;
         let proof = self.certified.map_or_else(String::new, |proof| {
             format!(
-                "certified    {:.9}   proven upper bound (P of order {}; at least {:.9} is proven as well)\n",
-                proof.gamma, proof.states, proof.attained
+                "certified    {}   proven upper bound (P of order {}; at least {} is proven as well)\n",
+                number(proof.gamma),
+                proof.states,
+                number(proof.attained)
             )
         });
         let noncausal = noncausal.map_or_else(
             || "unknown       delays of like channels lie closer together than doubles resolve".to_owned(),
-            |bound| format!("{bound:.9}   no bank at all is better"),
+            |bound| format!("{}   no bank at all is better", number(bound)),
         );
         let MeanAnalysis { rms_error, noise_gain, output_noise } = mean;
         format!(
             "{}\n{}\
-             gamma        {gamma:.9}   worst-case gain from the analog input to the error (h = 1)\n\
+             gamma        {}   worst-case gain from the analog input to the error (h = 1)\n\
              scale        {}, {}\n{proof}\
              worst at     {} modulo the slow rate\n\
              noncausal    {noncausal}\n\
-             rms error    {rms_error:.9}   for white noise of unit density at the analog input\n\
+             rms error    {}   for white noise of unit density at the analog input\n\
              SNR          {} for a signal with the spectrum of the target and of [signal]\n\
              noise gain   {:<11}   for independent noise on the slow samples\n\
              output noise {}\n{}",
@@ -178,9 +181,11 @@ impl Report {
             self.figures
                 .as_ref()
                 .map_or_else(String::new, |figures| figure_text(figures, self.is_normalised)),
+            number(gamma),
             against(gamma, self.scale.zero_output, "zero output"),
             against(gamma, self.scale.interleaving, "plain interleaving"),
             frequency(peak_hertz, self.is_normalised),
+            number(rms_error),
             decibels(self.scale.rms_reference, rms_error),
             six_digits(noise_gain),
             if output_noise == 0.0 {

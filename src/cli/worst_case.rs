@@ -1,5 +1,6 @@
 //! The worst case over a box of errors, as text, as JSON, as CSV and as a picture.
 
+use super::design_studies::number;
 use super::plot::PictureFormat;
 use super::print::Failure;
 use super::written::write_bytes;
@@ -104,7 +105,8 @@ impl Report {
             let most = jitter.iter().map(|x| x.0).fold(0.0, f64::max);
             let what = if added.is_finite() {
                 format!(
-                    "+{added:.9}   at most, by instants that are off by up to {}, differently at each sample",
+                    "+{}   at most, by instants that are off by up to {}, differently at each sample",
+                    number(*added),
                     time(most)
                 )
             } else {
@@ -138,8 +140,9 @@ impl Worst {
         let _ = writeln!(text, "box          {}", of_box(errors));
         let _ = writeln!(
             text,
-            "worst case   {:.9} to {:.9}   both ends proven, {width:.2} % apart",
-            case.lower, case.upper
+            "worst case   {} to {}   both ends proven, {width:.2} % apart",
+            number(case.lower),
+            number(case.upper)
         );
         let _ = writeln!(text, "attained     {} at {:.6}", of_point(case, errors), self.peak_hertz);
         if floor.value() > 0.0 {
@@ -148,7 +151,7 @@ impl Worst {
             } else {
                 "no bank is better at the worst errors"
             };
-            let _ = writeln!(text, "floor        {:.9}   {reason}", floor.value());
+            let _ = writeln!(text, "floor        {}   {reason}", number(floor.value()));
         }
         if let Some(Affordable { loss, factor, errors }) = &self.affordable {
             let share = 100.0 * loss;

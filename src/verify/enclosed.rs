@@ -8,19 +8,20 @@ use super::front_ends::FrontEnds;
 use super::slow_period::SlowPeriod;
 use super::timeline::{SamplingInstant, delay_periods, timeline};
 use super::{
-    BoundedBanks, MAX_STATES, Strictness, Verified, VerifyError, fir_length, lower, positive, spectrum,
-    statements, upper,
+    BoundedBanks, MAX_STATES, Strictness, Verified, VerifyError, fir_length, lower, positive, statements,
+    upper,
 };
 use crate::arithmetic::{BigFloat, DoubleDouble};
 use crate::bank::{
     Bank, CausalWitness, Certificate, DualWitness, Gamma, LowerProof, Proof, SynthesisFilters,
 };
-use crate::linalg::Mat;
+use crate::linalg::{CMat, Mat};
 use crate::units::Timeline;
 use std::sync::OnceLock;
 
-/// Maximum number of states of an error system whose certificate is checked in 512 bits: some seconds of
-/// computing.
+/// Radius of the square of a gain, relative to it, above which it is computed in 512 bits.
+const UNRESOLVED: f64 = 1e-9;
+/// Maximum number of states of an error system that is computed in 512 bits: some seconds for a certificate.
 const MAX_CORRECTED_STATES: usize = 128;
 
 /// The error system of a bank, enclosed.
@@ -155,9 +156,14 @@ impl<'a> EnclosedErrorSystem<'a> {
         })
     }
 
-    /// A proven lower bound of ||K||, from the gain at a frequency.
+    /// A proven lower bound of ||K||, from the gain at a frequency; in 512 bits where 106 do not resolve it.
     pub fn attains(&self, witness: &DualWitness) -> Option<f64> {
-        lower::gain(&self.period, &self.bank.filters, self.bank.ratio, witness)
+        let (filters, ratio) = (&self.bank.filters, self.bank.ratio);
+        let square = lower::square_of_gain(&self.period, filters, ratio, witness);
+        if square.radius() <= UNRESOLVED * square.nearest() || self.states() > MAX_CORRECTED_STATES {
+            return lower::root(square);
+        }
+        lower::root(lower::square_of_gain(self.long_period(), filters, ratio, witness))
     }
 
     /// A proven lower bound for any bank on these front ends, causal or not.
@@ -225,11 +231,15 @@ impl<'a> EnclosedErrorSystem<'a> {
         })
     }
 
-    /// Gram matrix of the M reference and N measured samples at a point of the unit circle, in double
-    /// precision.
-    pub fn gram_at(&self, half: [f64; 2]) -> crate::linalg::CMat {
-        let gram = spectrum::gram(&self.period, &spectrum::ComplexMatrix::unit(half));
-        gram.re.zip_map(&gram.im, |re, im| crate::linalg::Complex::new(re.nearest(), im.nearest()))
+    /// K K* at a point of the unit circle, rounded to double precision after every cancellation; in 512 bits
+    /// where 106 do not resolve it.
+    pub fn error_gram(&self, half: [f64; 2]) -> CMat {
+        let (filters, ratio) = (&self.bank.filters, self.bank.ratio);
+        let short = lower::error_gram(&self.period, filters, ratio, half);
+        if short.is_resolved(UNRESOLVED) || self.states() > MAX_CORRECTED_STATES {
+            return short.nearest();
+        }
+        lower::error_gram(self.long_period(), filters, ratio, half).nearest()
     }
 
     /// Computes the bounds that the witnesses of `proof` prove, and compares the stated `gamma` with them.

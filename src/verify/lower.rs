@@ -15,41 +15,60 @@
 //!
 //! [`super::fir_length`] binds the taps of all banks of one length.
 
-use super::ball::{Ball, Matrix};
+use super::ball::{self, Ball, Matrix};
 use super::positive;
 use super::slow_period::SlowPeriod;
 use super::spectrum::{self, ComplexMatrix};
-use crate::arithmetic::DoubleDouble;
+use crate::arithmetic::{DoubleDouble, Number};
 use crate::bank::{DualWitness, SynthesisFilters};
 
-/// A lower bound of the norm of this bank, from its gain at a frequency: `||K|| >= ||a* K(z)|| / ||a||`.
-pub(super) fn gain(
-    period: &SlowPeriod,
+/// The square of a lower bound of this bank's norm, from its gain at a frequency: `||K|| >= ||a* K(z)|| /
+/// ||a||`.
+pub(super) fn square_of_gain<F: Number>(
+    period: &SlowPeriod<F>,
     filters: &SynthesisFilters,
     ratio: usize,
     witness: &DualWitness,
-) -> Option<f64> {
+) -> Ball<F> {
     let z = ComplexMatrix::unit(witness.half);
     let reference = ComplexMatrix::column(&witness.reference);
-    let through = spectrum::filter_response(filters, ratio, &z).adjoint().product(&reference);
-    let all = reference.above(&ComplexMatrix::zeros(through.re.nrows(), 1).minus(&through));
-    root_of_quotient(energy(&spectrum::gram(period, &z), &all), reference.square())
+    energy(&spectrum::gram(period, &z), &error_samples(filters, ratio, &z, &reference)) / reference.square()
+}
+
+/// [a; -F* a], the combination of all samples that makes a* e.
+fn error_samples<F: Number>(
+    filters: &SynthesisFilters,
+    ratio: usize,
+    z: &ComplexMatrix<F>,
+    a: &ComplexMatrix<F>,
+) -> ComplexMatrix<F> {
+    let through = spectrum::filter_response(filters, ratio, z).adjoint().product(a);
+    a.above(&ComplexMatrix::zeros(through.re.nrows(), through.re.ncols()).minus(&through))
+}
+
+/// K K* = [I, -F] Gamma [I, -F]* of this bank.
+pub(super) fn error_gram<F: Number>(
+    period: &SlowPeriod<F>,
+    filters: &SynthesisFilters,
+    ratio: usize,
+    half: [f64; 2],
+) -> ComplexMatrix<F> {
+    let z = ComplexMatrix::unit(half);
+    let all = error_samples(filters, ratio, &z, &ComplexMatrix::real(ball::identity(ratio)));
+    all.adjoint().product(&spectrum::gram_times(period, &z, &all))
 }
 
 /// b* Gamma b.
-fn energy(gram: &ComplexMatrix, b: &ComplexMatrix) -> Ball {
+fn energy<F: Number>(gram: &ComplexMatrix<F>, b: &ComplexMatrix<F>) -> Ball<F> {
     b.inner(&gram.product(b))
 }
 
-/// A lower bound of sqrt(a / b); `None` if it is unknown.
-fn root_of_quotient(a: Ball, b: Ball) -> Option<f64> {
+/// A lower bound of the root of `square`; `None` if it is unknown.
+pub(super) fn root<F: Number>(square: Ball<F>) -> Option<f64> {
     // A witness of weight zero proves nothing, and NaN is not a bound; `max` would hide it.
-    let quotient = (a / b).lower();
-    if !quotient.is_finite() || b.lower() <= 0.0 {
-        return None;
-    }
-    let value = Ball::<DoubleDouble>::from(quotient.max(0.0)).sqrt().lower();
-    value.is_finite().then(|| value.max(0.0))
+    let square = square.lower();
+    let value = Ball::<DoubleDouble>::from(square.max(0.0)).sqrt().lower();
+    (square.is_finite() && value.is_finite()).then(|| value.max(0.0))
 }
 
 /// A bound for any bank, causal or not, of any length: sqrt(a* S a / a* a) at the witness's frequency.
@@ -78,7 +97,7 @@ pub(super) fn unexplained(
     // The optimal b_h has less energy than the b_h found, by r* Gamma_hh^-1 r with the residual r.
     let residual = gram.product(&b).rows(ratio, n).with_rows_scaled(&units[..n]).square();
     let missed = residual / Ball::from(least);
-    root_of_quotient(energy(&gram, &b) - missed, reference.square())
+    root((energy(&gram, &b) - missed) / reference.square())
 }
 
 /// A proven lower bound of the least eigenvalue, within a factor of ten.

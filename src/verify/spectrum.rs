@@ -7,7 +7,7 @@ use super::error_system::BlockForm;
 use super::slow_period::SlowPeriod;
 use crate::arithmetic::{ComplexBall, DoubleDouble, Number};
 use crate::bank::SynthesisFilters;
-use crate::linalg::{self, Mat};
+use crate::linalg::{self, CMat, Complex, Mat};
 
 /// A complex matrix.
 #[derive(Debug, Clone)]
@@ -21,7 +21,7 @@ impl<F: Number> ComplexMatrix<F> {
         Self { re: ball::zeros(rows, columns), im: ball::zeros(rows, columns) }
     }
 
-    fn real(re: Matrix<F>) -> Self {
+    pub(super) fn real(re: Matrix<F>) -> Self {
         Self { im: ball::zeros(re.nrows(), re.ncols()), re }
     }
 
@@ -129,6 +129,18 @@ impl<F: Number> ComplexMatrix<F> {
     /// sum |x|^2 over all entries.
     pub(super) fn square(&self) -> Ball<F> {
         self.re.iter().chain(&self.im).fold(Ball::ZERO, |sum, &x| sum + x * x)
+    }
+
+    /// Whether the radii stay below the share `most` of the largest entry.
+    pub(super) fn is_resolved(&self, most: f64) -> bool {
+        let all = || self.re.iter().chain(&self.im);
+        let largest = all().map(|x| x.nearest().abs()).fold(0.0, f64::max);
+        all().all(|x| x.radius() <= most * largest)
+    }
+
+    /// The nearest doubles to the midpoints.
+    pub(super) fn nearest(&self) -> CMat {
+        self.re.zip_map(&self.im, |re, im| Complex::new(re.nearest(), im.nearest()))
     }
 
     /// Re <self, other> = Re tr(self* other).
@@ -269,7 +281,11 @@ pub(super) fn gram_times<F: Number>(
 }
 
 /// F(z), M x N, of the bank's filters.
-pub(super) fn filter_response(filters: &SynthesisFilters, ratio: usize, z: &ComplexMatrix) -> ComplexMatrix {
+pub(super) fn filter_response<F: Number>(
+    filters: &SynthesisFilters,
+    ratio: usize,
+    z: &ComplexMatrix<F>,
+) -> ComplexMatrix<F> {
     match filters {
         SynthesisFilters::Fir(taps) => {
             let lags = taps[0].len().div_ceil(ratio);

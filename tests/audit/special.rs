@@ -1,4 +1,4 @@
-//! Narrow filters in all forms, order reductions, integer taps and forged files.
+//! Narrow filters in all forms, nearly equal instants, order reductions, integer taps and forged files.
 
 use super::judge::{Filters, Judge, on_circle};
 use super::optimum::optimum;
@@ -14,6 +14,7 @@ use std::f64::consts::PI;
 const SEED: u64 = 0xA0D1_5000;
 /// Cases of the short form.
 const NARROW: usize = 2;
+const NEAR: usize = 1;
 const REDUCTIONS: usize = 1;
 const INTEGERS: usize = 2;
 const FORGED: usize = 1;
@@ -47,14 +48,37 @@ fn narrow(seed: u64) -> Tally {
     let spec = json!({ "fast_period": 1.0, "ratio": ratio, "latency": dice.count(1, 3),
         "target": { "filter": forms[target] }, "channel": list,
         "design": { "method": "fir", "taps": ratio * dice.count(1, 4) } });
-    let name = format!("narrow {seed}, Q {:.0}: {spec}", 1.0 / width);
+    verdict(&format!("narrow {seed}, Q {:.0}: {spec}", 1.0 / width), &spec)
+}
+
+/// Two like channels whose samples are 1.2e-10 fast periods apart: taps of 1e9, of which little is left.
+fn near(seed: u64) -> Tally {
+    let mut dice = Random(SEED + 0x1000 + seed);
+    let share = 0.03 * 15f64.powf(dice.part());
+    let filter = super::plants::family(&mut dice, share);
+    let (ratio, first) = (dice.count(1, 3), 0.2 + dice.part());
+    let list: Vec<Value> = [first, first + 1.2e-10, 2.0 * dice.part()][..dice.count(2, 3)]
+        .iter()
+        .map(|delay| json!({ "delay": delay, "filter": filter }))
+        .collect();
+    let design = match dice.below(3) {
+        0 => json!({ "method": "iir" }),
+        _ => json!({ "method": "fir", "taps": ratio * dice.count(1, 6) }),
+    };
+    let spec = json!({ "fast_period": 1.0, "ratio": ratio, "latency": dice.count(0, 8),
+        "target": { "filter": filter }, "channel": list, "design": design });
+    verdict(&format!("near {seed}: {spec}"), &spec)
+}
+
+/// What the judge finds of a spec's bank.
+fn verdict(name: &str, spec: &Value) -> Tally {
     let desk = Desk::empty();
-    let (bank, report) = match designed(&desk, &spec) {
+    let (bank, report) = match designed(&desk, spec) {
         Outcome::Bank { bank, report } => (bank, report),
-        Outcome::Refused(reason) => return refused(&name, &reason),
+        Outcome::Refused(reason) => return refused(name, &reason),
     };
     let proven = verified(&desk);
-    let mut tally = judged(&name, &bank, proven.as_ref());
+    let mut tally = judged(name, &bank, proven.as_ref());
     if proven.is_none() {
         tally.unproven.push(format!("{name}: {}", report["unproven"]));
     }
@@ -224,6 +248,11 @@ fn forgeries(seed: u64) -> Tally {
 #[test]
 fn no_statement_about_a_narrow_filter_is_false() {
     campaign(NARROW, "narrow band-passes", narrow);
+}
+
+#[test]
+fn no_statement_about_nearly_equal_instants_is_false() {
+    campaign(NEAR, "instants 1.2e-10 apart", near);
 }
 
 #[test]

@@ -95,3 +95,20 @@ fn an_unknown_noncausal_bound_is_called_unknown() {
     let json = desk.json(&["analyze", "bank.json", "--delay-error", "0,0.6000000000001", "--json"]);
     assert_eq!(json["noncausal"], Value::Null);
 }
+
+/// A gamma of 4e-10 is told in digits, not as 0.000000000.
+#[test]
+fn tiny_numbers_have_digits() {
+    let spec = THESIS.replace("num = [0.25], den = [1.0, 1.0, 0.25]", TINY);
+    assert_ne!(spec, THESIS);
+    let desk = Desk::with_spec(&spec);
+    desk.good(&["design", "spec.toml", "-o", "bank.json"]);
+    let told = desk.good(&["analyze", "bank.json", "--delay-box", "1e-9samples"]);
+    for line in ["gamma", "noncausal", "rms error", "worst case", "floor"] {
+        let found = told.lines().find(|text| text.starts_with(line)).unwrap();
+        assert!(found.contains("e-10 "), "{found}");
+    }
+}
+
+/// A filter of eight poles far below the fast rate.
+const TINY: &str = "family = \"chebyshev1\", order = 8, cutoff = 0.05, ripple_db = 0.5";

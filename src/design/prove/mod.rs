@@ -11,7 +11,7 @@ use super::plant::LiftedPlant;
 use super::{DesignError, analysis};
 use crate::bank::{Bank, DualWitness, Gamma, LowerProof, Proof};
 use crate::linalg::{self, CMat, Complex};
-use crate::lti::peak::{Peak, hinf_norm, refine};
+use crate::lti::peak::{hinf_norm_with_response, resonances, stable_poles};
 use crate::lti::{FrequencyResponse, StateSpace};
 use crate::verify::{EnclosedErrorSystem, Midpoint, Strictness, Verified};
 use lower::lower_proof;
@@ -24,11 +24,9 @@ const SHORTFALL: f64 = 0.5e-6;
 /// Relative distance of a stated lower bound below the proven one: another machine may round an approximate
 /// inverse differently.
 const STATED_BELOW: f64 = 1e-12;
-/// Distances from a peak in doubles at which the enclosed gain is looked at, in radians: from the rounding
-/// of a frequency to the width of a wide resonance.
-const DISTANCES: [f64; 6] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
-/// Relative change of a gain at which the refinement of an enclosed peak ends.
-const FLAT_GAIN: f64 = 1e-11;
+/// Relative width of a proven interval above which the norm is looked for in the arithmetic of `verify`:
+/// twice the least excess of a certificate.
+const NARROW: f64 = 2e-8;
 
 /// A gamma that is proven, not only computed.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -109,7 +107,7 @@ pub(crate) fn attach_proof(
     dual: &DualSolution,
     stop: &Stop,
 ) -> Result<Verified, DesignError> {
-    let (proof, verified) = match prove(bank, &Gamma::default(), dual, stop) {
+    let (mut proof, mut verified) = match prove(bank, &Gamma::default(), dual, stop) {
         Ok(found) => found,
         Err(reason) => {
             if matches!(reason, DesignError::NotCertified { .. } | DesignError::Verify(_)) {
@@ -118,8 +116,12 @@ pub(crate) fn attach_proof(
             return Err(reason);
         }
     };
+    let norm = match bank.gamma.norm {
+        Some(norm) if !is_resolved(norm, &verified) => Some(enclose_peak(bank, &mut proof, &mut verified)?),
+        other => other,
+    };
     bank.gamma = Gamma {
-        norm: bank.gamma.norm.map(|norm| resolved_norm(bank, norm, &verified)).transpose()?,
+        norm: norm.map(|norm| norm.max(verified.attained).min(verified.upper)),
         upper: Some(verified.upper),
         lower: Some(stated(verified.lower)),
         noncausal: Some(stated(verified.noncausal)),
@@ -129,12 +131,23 @@ pub(crate) fn attach_proof(
     Ok(verified)
 }
 
-/// The norm that was computed in double precision, within the proven interval. Where it is not the enclosed
-/// gain at its peak, the largest enclosed gain near there takes its place.
-fn resolved_norm(bank: &Bank, norm: f64, verified: &Verified) -> Result<f64, DesignError> {
-    let is_resolved = (norm - verified.attained).abs() <= Gamma::NORM_ACCURACY * norm;
-    let peak = if is_resolved { None } else { enclosed_peak(&EnclosedErrorSystem::new(bank)?)? };
-    Ok(peak.map_or(norm, |peak| peak.gain).max(verified.attained).min(verified.upper))
+/// Whether a norm that was computed in double precision is the gain that was proven at its peak, and no
+/// larger gain can lie elsewhere.
+fn is_resolved(norm: f64, verified: &Verified) -> bool {
+    let is_the_gain = (norm - verified.attained).abs() <= Gamma::NORM_ACCURACY * norm;
+    is_the_gain && verified.upper <= verified.attained * (1.0 + NARROW)
+}
+
+/// The largest gain in the arithmetic of `verify`. Where it exceeds the one that `proof` attains, it becomes
+/// that of the proof.
+fn enclose_peak(bank: &Bank, proof: &mut Proof, verified: &mut Verified) -> Result<f64, DesignError> {
+    let found = enclosed_peak(&EnclosedErrorSystem::new(bank)?, proof)?;
+    if let (Some((gain, peak)), Some(certificate)) = (found, &mut proof.upper)
+        && gain > verified.attained
+    {
+        (verified.attained, certificate.peak) = (gain, peak);
+    }
+    Ok(verified.attained)
 }
 
 /// The gammas of a bank for which no certificate was found. In double precision a gamma that is a small
@@ -142,8 +155,7 @@ fn resolved_norm(bank: &Bank, norm: f64, verified: &Verified) -> Result<f64, Des
 /// arithmetic of `verify`, and the lower ends are those that it proves.
 fn without_certificate(bank: &Bank, dual: &DualSolution, stop: &Stop) -> Result<Gamma, DesignError> {
     let error = EnclosedErrorSystem::new(bank)?;
-    let Some(peak) = enclosed_peak(&error)? else { return Ok(bank.gamma) };
-    let norm = peak.gain;
+    let Some((norm, _)) = enclosed_peak(&error, &Proof::default())? else { return Ok(bank.gamma) };
     let proof = lower_ends(&error, bank, dual, norm, stop)?;
     let noncausal = proof.noncausal.as_ref().and_then(|witness| error.noncausal_bound(witness));
     let lower = match &proof.lower {
@@ -157,21 +169,50 @@ fn without_certificate(bank: &Bank, dual: &DualSolution, stop: &Stop) -> Result<
     Ok(Gamma { norm: Some(norm), upper, lower, noncausal, ..bank.gamma })
 }
 
-/// The largest gain that `verify` proves beside the peak of the system in doubles; `None` if there is none.
-fn enclosed_peak(error: &EnclosedErrorSystem<'_>) -> Result<Option<Peak>, DesignError> {
+/// The largest gain that `verify` proves, with its witness. Double precision and the witnesses of `proof`
+/// suggest frequencies; every gain is enclosed. `None` if 106 bits resolve none.
+fn enclosed_peak(
+    error: &EnclosedErrorSystem<'_>,
+    proof: &Proof,
+) -> Result<Option<(f64, DualWitness)>, DesignError> {
     let Some(Midpoint { a, b, c, d }) = error.midpoint() else { return Ok(None) };
     let system = StateSpace::new(a, b, c, d)?;
-    let at = |frequency: f64| {
-        let response = system.response_at(Complex::from_polar(1.0, frequency));
-        let gain = error.attains(&witness(frequency, &leading_direction(&response)?));
-        Ok::<_, DesignError>(Peak { gain: gain.unwrap_or(0.0), frequency })
+    let mut frequencies = resonances(&stable_poles(&system)?);
+    let below = match &proof.lower {
+        Some(LowerProof::Fir(witnesses)) => &witnesses[..],
+        _ => &[],
     };
-    let centre = hinf_norm(&system)?.frequency;
-    let sides = DISTANCES.map(|distance| -distance).into_iter().rev().chain([0.0]).chain(DISTANCES);
-    let near = sides.map(|distance| at(centre + distance)).collect::<Result<Vec<_>, _>>()?;
-    let best = near.windows(3).max_by(|x, y| x[1].gain.total_cmp(&y[1].gain));
-    let Some(&[low, middle, high]) = best else { return Ok(None) };
-    Ok(Some(refine(at, [low, middle, high], FLAT_GAIN)?).filter(|peak| peak.gain > 0.0))
+    let peak = proof.upper.as_ref().map(|certificate| &certificate.peak);
+    frequencies.extend(below.iter().chain(&proof.noncausal).chain(peak).map(frequency));
+    frequencies.sort_by(f64::total_cmp);
+    // The level sets of small gains are rounding errors, so the grid has to show all peaks.
+    let split = |ends: &[f64]| {
+        let part = 0.25 * (ends[1] - ends[0]);
+        [0, 1, 2, 3].map(|k| ends[0] + part * f64::from(k))
+    };
+    let dense = frequencies.windows(2).flat_map(split).chain(frequencies.last().copied()).collect();
+    // Directions times gains. Where the arithmetic resolves nothing, the gain counts as zero.
+    let root = |frequency: f64| match linalg::svd(&error.error_gram(half(frequency))) {
+        Ok(svd) => {
+            let gain = |k: usize| Complex::from(svd.s[k].sqrt());
+            CMat::from_fn(svd.u.nrows(), svd.s.len(), |i, k| svd.u[(i, k)] * gain(k))
+        }
+        Err(_) => CMat::zeros(system.outputs(), 1),
+    };
+    let at = hinf_norm_with_response(&system, &root, dense)?.frequency;
+    let peak = witness(at, &leading_direction(&root(at))?);
+    Ok(error.attains(&peak).filter(|gain| *gain > 0.0).map(|gain| (gain, peak)))
+}
+
+/// The frequency of a witness in [0, pi].
+fn frequency(witness: &DualWitness) -> f64 {
+    let [c, s] = witness.half;
+    2.0 * s.abs().atan2(c.abs())
+}
+
+fn half(frequency: f64) -> [f64; 2] {
+    let (s, c) = (0.5 * frequency).sin_cos();
+    [c, s]
 }
 
 /// A stated lower end of a proven one.
@@ -198,8 +239,7 @@ fn leading_direction(response: &CMat) -> Result<CMat, DesignError> {
 }
 
 fn witness(frequency: f64, reference: &CMat) -> DualWitness {
-    let (s, c) = (0.5 * frequency).sin_cos();
-    DualWitness { half: [c, s], reference: pairs(reference), measured: Vec::new() }
+    DualWitness { half: half(frequency), reference: pairs(reference), measured: Vec::new() }
 }
 
 fn pairs(column: &CMat) -> Vec<[f64; 2]> {

@@ -4,10 +4,10 @@
 //! Double precision finds it for most banks. After steep filters, whose samples are nearly dependent, the
 //! error is a small difference of large numbers; the equation is then solved in 512 bits.
 
-use super::{leading_direction, witness};
+use super::{enclosed_peak, leading_direction, witness};
 use crate::arithmetic::dense::{cholesky, product, riccati_limit, select, solve, symmetric};
 use crate::arithmetic::{BigFloat, Number};
-use crate::bank::{Bank, Certificate, DualWitness};
+use crate::bank::{Bank, Certificate, DualWitness, Proof};
 use crate::design::DesignError;
 use crate::design::limits::{MAX_LONG_STATES, Stop};
 use crate::linalg::{self, Complex, Mat, power_of_two};
@@ -46,6 +46,9 @@ pub(in crate::design) const MAX_SEARCHED_STATES: usize = 512;
 const STATE_NOISE: f64 = 0.1;
 /// Relative excess of a stated norm over the one computed here that counts as rounding.
 const SAME_NORM: f64 = 1e-6;
+/// Relative distance of the enclosed gain at the peak from the norm above which double precision does not
+/// resolve the norm.
+const RESOLVED: f64 = 1e-7;
 
 /// The certificate with the least gamma, of those tried until `stop` is due, that passes.
 pub(super) fn certificate(
@@ -62,14 +65,21 @@ pub(super) fn certificate(
     let middle = units.of_one(&raw);
     let system = StateSpace::new(middle.a.clone(), middle.b.clone(), middle.c.clone(), middle.d.clone())?;
     let peak = hinf_norm(&system)?;
+    let response = system.response_at(Complex::from_polar(1.0, peak.frequency));
+    let mut peak_witness = witness(peak.frequency, &leading_direction(&response)?);
     // The norm in the file may differ from the one computed here in the last digits; if the difference is
     // larger, the stated number is not the norm.
     let stated = bank.gamma.norm.map(|stated| stated / units.reference);
     let credible = stated.filter(|&stated| stated <= peak.gain * (1.0 + SAME_NORM));
-    let norm = credible.unwrap_or(0.0).max(peak.gain);
-    let response = system.response_at(Complex::from_polar(1.0, peak.frequency));
-    let peak_witness = witness(peak.frequency, &leading_direction(&response)?);
+    let mut norm = credible.unwrap_or(0.0).max(peak.gain);
     let floor = FLOOR * error.scale() / units.reference;
+    let shown = error.attains(&peak_witness).unwrap_or(0.0) / units.reference;
+    if norm > floor
+        && (shown - norm).abs() > RESOLVED * norm
+        && let Some((gain, enclosed)) = enclosed_peak(error, &Proof::default())?
+    {
+        (norm, peak_witness) = (gain / units.reference, enclosed);
+    }
     let search = Search { error, units: &units, middle: &middle, peak: peak_witness };
     let level = |excess: &f64| Level { norm, excess: excess * norm.max(floor) };
     let mut failure = None;
