@@ -23,6 +23,8 @@ use std::sync::OnceLock;
 const UNRESOLVED: f64 = 1e-9;
 /// Maximum number of states of an error system that is computed in 512 bits: some seconds for a certificate.
 const MAX_CORRECTED_STATES: usize = 128;
+/// The same where gains are computed at hundreds of frequencies: some seconds for all.
+const MAX_LONG_GRAM_STATES: usize = 48;
 
 /// The error system of a bank, enclosed.
 #[derive(Debug, Clone)]
@@ -231,12 +233,12 @@ impl<'a> EnclosedErrorSystem<'a> {
         })
     }
 
-    /// K K* at a point of the unit circle, rounded to double precision after every cancellation; in 512 bits
-    /// where 106 do not resolve it.
+    /// K K* at a point of the unit circle, rounded to double precision after every cancellation; of small
+    /// systems in 512 bits where 106 do not resolve it.
     pub fn error_gram(&self, half: [f64; 2]) -> CMat {
         let (filters, ratio) = (&self.bank.filters, self.bank.ratio);
         let short = lower::error_gram(&self.period, filters, ratio, half);
-        if short.is_resolved(UNRESOLVED) || self.states() > MAX_CORRECTED_STATES {
+        if short.is_resolved(UNRESOLVED) || self.states() > MAX_LONG_GRAM_STATES {
             return short.nearest();
         }
         lower::error_gram(self.long_period(), filters, ratio, half).nearest()

@@ -4,14 +4,14 @@
 mod lower;
 mod upper;
 
-use super::limits::Stop;
+use super::limits::{MAX_LONG_STATES, Stop};
 use super::merging::Repeats;
 use super::methods::DualSolution;
 use super::plant::LiftedPlant;
 use super::{DesignError, analysis};
 use crate::bank::{Bank, DualWitness, Gamma, LowerProof, Proof};
 use crate::linalg::{self, CMat, Complex};
-use crate::lti::peak::{hinf_norm_with_response, resonances, stable_poles};
+use crate::lti::peak::{hinf_norm, hinf_norm_with_response, resonances, stable_poles};
 use crate::lti::{FrequencyResponse, StateSpace};
 use crate::verify::{EnclosedErrorSystem, Midpoint, Strictness, Verified};
 use lower::lower_proof;
@@ -24,6 +24,8 @@ const SHORTFALL: f64 = 0.5e-6;
 /// Relative distance of a stated lower bound below the proven one: another machine may round an approximate
 /// inverse differently.
 const STATED_BELOW: f64 = 1e-12;
+/// Norms below this, relative to the scale of the reference samples, are zero up to rounding.
+const FLOOR: f64 = 1e-10;
 /// Relative width of a proven interval above which the norm is looked for in the arithmetic of `verify`:
 /// twice the least excess of a certificate.
 const NARROW: f64 = 2e-8;
@@ -117,7 +119,9 @@ pub(crate) fn attach_proof(
         }
     };
     let norm = match bank.gamma.norm {
-        Some(norm) if !is_resolved(norm, &verified) => Some(enclose_peak(bank, &mut proof, &mut verified)?),
+        Some(norm) if !is_resolved(norm, &verified) => {
+            Some(enclosed_norm(bank, norm, &mut proof, &mut verified)?)
+        }
         other => other,
     };
     bank.gamma = Gamma {
@@ -138,13 +142,20 @@ fn is_resolved(norm: f64, verified: &Verified) -> bool {
     is_the_gain && verified.upper <= verified.attained * (1.0 + NARROW)
 }
 
-/// The largest gain in the arithmetic of `verify`. Where it exceeds the one that `proof` attains, it becomes
-/// that of the proof.
-fn enclose_peak(bank: &Bank, proof: &mut Proof, verified: &mut Verified) -> Result<f64, DesignError> {
-    let found = enclosed_peak(&EnclosedErrorSystem::new(bank)?, proof)?;
-    if let (Some((gain, peak)), Some(certificate)) = (found, &mut proof.upper)
-        && gain > verified.attained
-    {
+/// The largest gain in the arithmetic of `verify` in place of `norm`. Where it exceeds the one that `proof`
+/// attains, it becomes that of the proof.
+fn enclosed_norm(
+    bank: &Bank,
+    norm: f64,
+    proof: &mut Proof,
+    verified: &mut Verified,
+) -> Result<f64, DesignError> {
+    let error = EnclosedErrorSystem::new(bank)?;
+    // Of a norm that is zero up to rounding nothing is gained by more digits.
+    let is_zero = verified.upper <= FLOOR * error.scale();
+    let found = if is_zero { None } else { enclosed_peak(&error, proof)? };
+    let Some((gain, peak)) = found else { return Ok(norm) };
+    if let Some(certificate) = proof.upper.as_mut().filter(|_| gain > verified.attained) {
         (verified.attained, certificate.peak) = (gain, peak);
     }
     Ok(verified.attained)
@@ -170,7 +181,7 @@ fn without_certificate(bank: &Bank, dual: &DualSolution, stop: &Stop) -> Result<
 }
 
 /// The largest gain that `verify` proves, with its witness. Double precision and the witnesses of `proof`
-/// suggest frequencies; every gain is enclosed. `None` if 106 bits resolve none.
+/// suggest frequencies; of systems that are not large every gain is enclosed. `None` if there is none.
 fn enclosed_peak(
     error: &EnclosedErrorSystem<'_>,
     proof: &Proof,
@@ -199,7 +210,12 @@ fn enclosed_peak(
         }
         Err(_) => CMat::zeros(system.outputs(), 1),
     };
-    let at = hinf_norm_with_response(&system, &root, dense)?.frequency;
+    let found = if error.states() <= MAX_LONG_STATES {
+        hinf_norm_with_response(&system, &root, dense)?
+    } else {
+        hinf_norm(&system)?
+    };
+    let at = found.frequency;
     let peak = witness(at, &leading_direction(&root(at))?);
     Ok(error.attains(&peak).filter(|gain| *gain > 0.0).map(|gain| (gain, peak)))
 }

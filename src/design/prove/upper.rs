@@ -4,7 +4,7 @@
 //! Double precision finds it for most banks. After steep filters, whose samples are nearly dependent, the
 //! error is a small difference of large numbers; the equation is then solved in 512 bits.
 
-use super::{enclosed_peak, leading_direction, witness};
+use super::{FLOOR, enclosed_peak, leading_direction, witness};
 use crate::arithmetic::dense::{cholesky, product, riccati_limit, select, solve, symmetric};
 use crate::arithmetic::{BigFloat, Number};
 use crate::bank::{Bank, Certificate, DualWitness, Proof};
@@ -29,8 +29,6 @@ const LONG_EXCESSES: [f64; 3] = [1e-7, 1e-5, 1e-3];
 const FLOOR_EXCESSES: [f64; 3] = [1.0, 1e2, 1e4];
 /// Weights on all states, relative to the excess.
 const STATE_WEIGHTS: [f64; 2] = [1e-1, 1e-4];
-/// Norms below this, relative to the scale of the reference samples, are zero up to rounding.
-const FLOOR: f64 = 1e-10;
 /// Significant digits of the certificate's numbers in the file.
 const DIGITS: [usize; 4] = [9, 12, 15, 17];
 /// Significant digits of the corrections.
