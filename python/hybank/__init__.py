@@ -1,12 +1,13 @@
 """Hybrid multirate filter banks: several slow converters with fractional delays as one fast one.
 
-``design`` makes a ``Bank``; ``Bank.fuse`` runs it on an array, ``Bank.stream`` block by block. ``hybank.dask`` does both
-on many machines, ``hybank.ibr`` renders views.
+``design`` makes a ``Bank``; ``Bank.fuse`` runs it on an array or on files, ``Bank.stream`` block by block.
+``hybank.dask`` does both on many machines, ``hybank.ibr`` renders views.
 """
 
 import importlib
 
 from hybank import _pickles  # noqa: F401
+from hybank._functions import analyze, calibrate, import_taps, measure, simulate, verify
 from hybank._hybank import (
     Analysis,
     Bank,
@@ -22,13 +23,10 @@ from hybank._hybank import (
     Stream,
     Verified,
     __version__,
-    analyze,
-    calibrate,
     load,
-    measure,
-    simulate,
-    verify,
 )
+from hybank._inputs import Captures, read
+from hybank._results import Comparison, Record
 from hybank._spec import (
     Channel,
     Signal,
@@ -50,12 +48,15 @@ __all__ = [
     "Bank",
     "Calibration",
     "Capture",
+    "Captures",
     "Channel",
+    "Comparison",
     "Figures",
     "FuseReport",
     "Gamma",
     "HybankError",
     "Measurement",
+    "Record",
     "Recording",
     "Signal",
     "SpecError",
@@ -71,9 +72,11 @@ __all__ = [
     "chebyshev2",
     "design",
     "elliptic",
+    "import_taps",
     "load",
     "measure",
     "rc",
+    "read",
     "simulate",
     "ss",
     "tf",
@@ -81,9 +84,15 @@ __all__ = [
     "zpk",
 ]
 
+# The parts that need more than NumPy, or that few programs need, are imported when they are used.
+_PARTS = ("dask", "gnuradio", "ibr")
+
 
 def __getattr__(name):
-    """The parts that need more than NumPy, or that few programs need, are imported when they are used."""
-    if name in ("dask", "gnuradio", "ibr"):
+    if name in _PARTS:
         return importlib.import_module(f"hybank.{name}")
     raise AttributeError(f"module 'hybank' has no attribute {name!r}")
+
+
+def __dir__():
+    return sorted([*__all__, *_PARTS])

@@ -1,6 +1,6 @@
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, KeysView, Mapping, Sequence
 from os import PathLike
-from types import TracebackType
+from types import SimpleNamespace, TracebackType
 from typing import Any, Literal, TypeAlias, final, overload
 
 import numpy as np
@@ -11,12 +11,15 @@ __all__ = [
     "Bank",
     "Calibration",
     "Capture",
+    "Captures",
     "Channel",
+    "Comparison",
     "Figures",
     "FuseReport",
     "Gamma",
     "HybankError",
     "Measurement",
+    "Record",
     "Recording",
     "Signal",
     "SpecError",
@@ -32,9 +35,11 @@ __all__ = [
     "chebyshev2",
     "design",
     "elliptic",
+    "import_taps",
     "load",
     "measure",
     "rc",
+    "read",
     "simulate",
     "ss",
     "tf",
@@ -49,10 +54,33 @@ _Spec: TypeAlias = _Path | Mapping[str, Any]
 _Filter: TypeAlias = dict[str, Any]
 _Quantity: TypeAlias = float | str | np.number[Any]
 _Cutoff: TypeAlias = _Quantity | Sequence[_Quantity] | NDArray[Any]
+_Values: TypeAlias = _Quantity | Sequence[_Quantity] | NDArray[Any]
+_Files: TypeAlias = _Path | Sequence[_Path]
+_Readings: TypeAlias = str | PathLike[str] | Sequence[Mapping[str, Any] | Record]
 _Algorithm: TypeAlias = Literal["auto", "direct", "overlap-save"]
 _Matrix: TypeAlias = NDArray[np.float64]
 
 class HybankError(ValueError): ...
+
+class Record(SimpleNamespace):
+    def __init__(self, **fields: Any) -> None: ...
+    # The names are those of a report.
+    def __getattr__(self, name: str) -> Any: ...
+    def __getitem__(self, name: str) -> Any: ...
+    def __iter__(self) -> Iterator[str]: ...
+    def __len__(self) -> int: ...
+    def keys(self) -> KeysView[str]: ...
+
+class Comparison(Record):
+    def plot(self, ax: Any = None) -> Any: ...
+
+class Captures:
+    channels: Any
+    rate: float | None
+    output_rate: float | None
+    def __init__(self, channels: Any, rate: float | None, output_rate: float | None = None) -> None: ...
+    def __len__(self) -> int: ...
+    def mono(self) -> NDArray[Any]: ...
 
 class SpecError(HybankError):
     path: str
@@ -125,6 +153,8 @@ class FuseReport:
     def gaps(self) -> list[tuple[int, int, int]] | None: ...
     @property
     def mask(self) -> NDArray[np.bool_] | None: ...
+    @property
+    def track(self) -> list[Record] | None: ...
 
 @final
 class Verified:
@@ -159,6 +189,18 @@ class Analysis:
     def noise_gain(self) -> float: ...
     @property
     def output_noise(self) -> float: ...
+    @property
+    def scale(self) -> Record: ...
+    @property
+    def certified(self) -> Record | None: ...
+    @property
+    def worst_case(self) -> Record | None: ...
+    @property
+    def sensitivity(self) -> Record | None: ...
+    @property
+    def jitter(self) -> Record | None: ...
+    @property
+    def sweep(self) -> Record | None: ...
 
 @final
 class Capture:
@@ -166,6 +208,8 @@ class Capture:
     def channels(self) -> Any: ...
     @property
     def target(self) -> NDArray[Any]: ...
+    @property
+    def clipped(self) -> list[int]: ...
 
 @final
 class Recording:
@@ -244,7 +288,11 @@ class Measurement:
     @property
     def left_out(self) -> int: ...
     @property
+    def figures(self) -> list[tuple[str, str, str, str]]: ...
+    @property
     def spectrum(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def plot(self, ax: Any = None) -> Any: ...
+    def _repr_html_(self) -> str: ...
 
 @final
 class Bank:
@@ -256,7 +304,7 @@ class Bank:
         self,
         path: _Path,
         *,
-        format: Literal["c99", "csv", "npz", "mat", "coe", "mem"],
+        format: Literal["c", "c99", "csv", "npz", "mat", "coe", "mem", "sos"],
         name: str = "bank",
         input_bits: int | None = None,
         overwrite: bool = True,
@@ -271,6 +319,10 @@ class Bank:
     def latency(self) -> int: ...
     @property
     def fast_period(self) -> float: ...
+    @property
+    def fast_rate(self) -> float: ...
+    @property
+    def noise_gain(self) -> float: ...
     @property
     def method(self) -> Literal["fir", "iir", "h2", "sinc", "separation"]: ...
     @property
@@ -291,11 +343,15 @@ class Bank:
     def ss(self) -> tuple[_Matrix, _Matrix, _Matrix, _Matrix]: ...
     def figures(self) -> Figures: ...
     def error_response(self, n: int = 512) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
-    def plot(self, ax: Any = None) -> Any: ...
+    def frequency_response(self, n: int = 512) -> tuple[NDArray[np.float64], NDArray[np.complex128]]: ...
+    def front_end_gains(self, n: int = 512) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def pictures(self) -> dict[str, dict[str, Any]]: ...
+    def plot(self, ax: Any = None, picture: str = "error") -> Any: ...
+    def report(self, path: _Path, captures: Any = None, *, axis: int = -1, overwrite: bool = True) -> None: ...
     @overload
     def fuse(
         self,
-        x: ArrayLike,
+        x: ArrayLike | _Files | Captures,
         *,
         axis: int = -1,
         dtype: DTypeLike | None = None,
@@ -303,12 +359,17 @@ class Bank:
         gaps: Literal["hold", "zero"] | None = None,
         algorithm: _Algorithm = "auto",
         keep_latency: bool = False,
+        interleaved: int | None = None,
+        track: _Readings | None = None,
+        track_frames: int = 2048,
+        track_wander: float = 1.0,
+        rate: float | None = None,
         full_output: Literal[False] = False,
     ) -> NDArray[Any]: ...
     @overload
     def fuse(
         self,
-        x: ArrayLike,
+        x: ArrayLike | _Files | Captures,
         *,
         axis: int = -1,
         dtype: DTypeLike | None = None,
@@ -316,6 +377,11 @@ class Bank:
         gaps: Literal["hold", "zero"] | None = None,
         algorithm: _Algorithm = "auto",
         keep_latency: bool = False,
+        interleaved: int | None = None,
+        track: _Readings | None = None,
+        track_frames: int = 2048,
+        track_wander: float = 1.0,
+        rate: float | None = None,
         full_output: Literal[True],
     ) -> tuple[NDArray[Any], FuseReport]: ...
     def stream(
@@ -325,6 +391,11 @@ class Bank:
         dtype: DTypeLike | None = None,
         algorithm: _Algorithm = "auto",
         state: bytes | None = None,
+        gaps: Literal["hold", "zero"] | None = None,
+        track: _Readings | None = None,
+        track_frames: int = 2048,
+        track_wander: float = 1.0,
+        rate: float | None = None,
     ) -> Stream: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __copy__(self) -> Bank: ...
@@ -356,6 +427,12 @@ class Stream:
     def clipped(self) -> int: ...
     @property
     def state_resets(self) -> int: ...
+    @property
+    def gaps(self) -> list[tuple[int, int, int]] | None: ...
+    @property
+    def mask(self) -> NDArray[np.bool_] | None: ...
+    @property
+    def track(self) -> list[Record] | None: ...
     @property
     def state(self) -> bytes: ...
     def agrees(self, state: bytes) -> bool: ...
@@ -393,6 +470,7 @@ def design(
     source: _Spec,
     /,
     *,
+    replace: Mapping[str, Any] | None = None,
     proof: bool = True,
     limits: bool = True,
     progress: Callable[[str, float], object] | None = None,
@@ -402,44 +480,123 @@ def design(
     source: None = None,
     /,
     *,
+    name: str | None = None,
+    fast_rate: _Quantity | None = None,
+    fast_period: _Quantity | None = None,
+    ratio: int | np.integer[Any] | None = None,
+    latency: int | np.integer[Any] | None = None,
+    target: Mapping[str, Any] | None = None,
+    channels: Iterable[Mapping[str, Any]] | None = None,
+    channel: Iterable[Mapping[str, Any]] | None = None,
+    signal: _Cutoff | Mapping[str, Any] | None = None,
+    uncertainty: Mapping[str, Any] | None = None,
+    full_scale: float | str | None = None,
+    fit: str | Sequence[str] | None = None,
+    design: Mapping[str, Any] | None = None,
+    method: Literal["fir", "iir", "h2", "sinc", "separation"] | None = None,
+    taps: int | np.integer[Any] | None = None,
+    target_snr_db: float | np.number[Any] | None = None,
+    gamma_margin: float | np.number[Any] | None = None,
+    solver: Literal["sampled", "kyp"] | None = None,
+    bits: int | Sequence[int] | np.integer[Any] | NDArray[Any] | None = None,
+    fraction_bits: int | np.integer[Any] | None = None,
+    order: int | np.integer[Any] | None = None,
+    reduction_loss_db: float | np.number[Any] | None = None,
+    noise: float | np.number[Any] | None = None,
+    tracking: Literal["affine"] | None = None,
     proof: bool = True,
     limits: bool = True,
     progress: Callable[[str, float], object] | None = None,
-    **keywords: Any,
 ) -> Bank: ...
+def import_taps(spec: Bank | _Spec, taps: ArrayLike, *, latency: int | None = None, proof: bool = True) -> Bank: ...
 def load(path: _Path) -> Bank: ...
+def read(
+    files: _Files,
+    *,
+    bank: Bank | None = None,
+    format: str = "wav",
+    channels: int | None = None,
+    channel: int | None = None,
+    full_scale: float | str | None = None,
+    sample_bits: int | None = None,
+    interleaved: int | None = None,
+    lost: _Path | None = None,
+    max_lost: int | None = None,
+    longest: bool = False,
+) -> Captures: ...
 def verify(bank: Bank | _Path, *, search: bool = False) -> Verified: ...
-def analyze(bank: Bank | _Path, *, delay_error: Sequence[float] | NDArray[Any] | None = None) -> Analysis: ...
+def analyze(
+    bank: Bank | _Path,
+    *,
+    delay_error: _Values | None = None,
+    certify: bool = False,
+    delay_box: _Values | None = None,
+    gain_box: _Values | None = None,
+    cutoff_box: _Values | None = None,
+    jitter: _Values | None = None,
+    reference: int | Literal["none"] | None = None,
+    accuracy: float | str | None = None,
+    sensitivity: bool = False,
+    sweep: bool = False,
+) -> Analysis: ...
 def calibrate(
-    x: ArrayLike,
+    x: ArrayLike | _Files | Captures,
     spec: Bank | _Spec,
     *,
-    tones: Sequence[float] | NDArray[Any] | None = None,
+    tones: _Values | None = None,
     waveform: Sequence[float] | NDArray[Any] | None = None,
     rate: float | None = None,
     blind: bool = False,
     fit: Sequence[str] = ("delay", "gain", "offset"),
     reference: int | None = None,
     clip: float | None = None,
+    interleaved: int | None = None,
     axis: int = -1,
 ) -> Calibration: ...
+@overload
 def measure(
-    y: ArrayLike,
-    rate: float,
+    y: ArrayLike | _Path | Captures,
+    rate: float | None = None,
     *,
-    tones: Sequence[float] | NDArray[Any] | None = None,
-    converters: int = 1,
+    ref: None = None,
+    tones: _Values | None = None,
+    interleaved: int = 1,
     harmonics: int = 10,
     full_scale: float = 1.0,
     window: Literal["none", "hann", "bh4", "bh7"] = "bh7",
+    skip: int = 0,
 ) -> Measurement: ...
+@overload
+def measure(
+    y: ArrayLike | _Path | Captures,
+    rate: float | None = None,
+    *,
+    ref: ArrayLike | _Path | Captures,
+    tones: None = None,
+    interleaved: int = 1,
+    harmonics: int = 10,
+    full_scale: float = 1.0,
+    window: Literal["none", "hann", "bh4", "bh7"] = "bh7",
+    skip: int = 0,
+) -> Comparison: ...
 def simulate(
     source: Bank | _Spec,
-    signal: str | Sequence[complex] | NDArray[Any],
+    signal: str | PathLike[str] | Sequence[complex] | NDArray[Any],
     *,
+    imaginary: str | Sequence[float] | NDArray[Any] | None = None,
+    channel: int | None = None,
     samples: int | None = None,
     gain: float = 1.0,
     rate: float | None = None,
+    noise: float = 0.0,
+    bits: int | None = None,
+    jitter: float | str | None = None,
+    drift: float | Sequence[float] | NDArray[Any] | None = None,
+    delay_error: _Values | None = None,
+    gain_error: _Values | None = None,
+    cutoff_error: _Values | None = None,
+    offset: float | Sequence[float] | NDArray[Any] | None = None,
+    seed: int = 0,
 ) -> Capture: ...
 def butterworth(order: int, cutoff: _Cutoff) -> _Filter: ...
 def chebyshev1(order: int, cutoff: _Cutoff, ripple_db: float) -> _Filter: ...

@@ -1,43 +1,101 @@
-"""A bank as a figure and as a table."""
+"""Banks and measurements as figures and as tables."""
 
 import html as _html
 
 
-def plot(bank, ax=None):
-    """Draw the error by frequency with its bounds; returns the axes."""
-    if ax is None:
-        try:
-            import matplotlib.pyplot as plt
-        except ImportError as error:
-            raise ImportError(
-                "Bank.plot needs matplotlib: pip install matplotlib; Bank.error_response gives the numbers"
-            ) from error
-        _, ax = plt.subplots()
+def _axes(ax, instead):
+    if ax is not None:
+        return ax
+    try:
+        import matplotlib.pyplot as plt
+    except ImportError as error:
+        raise ImportError(f"plot needs matplotlib: pip install matplotlib; {instead} gives the numbers") from error
+    return plt.subplots()[1]
+
+
+def plot(bank, ax=None, picture="error"):
+    """Draw a picture of a bank; returns the axes. The error has its bounds in the legend, where they cannot collide."""
+    ax = _axes(ax, "Bank.error_response" if picture == "error" else "Bank.pictures")
+    if picture != "error":
+        return _picture(bank, ax, picture)
     frequency, gain = bank.error_response(512)
     ax.plot(frequency, gain, label="error")
-    for name in ("upper", "lower", "noncausal"):
+    names = {"upper": "upper bound of gamma", "lower": "lower bound, this method and size", "noncausal": "lower bound, any bank"}
+    for (name, label), style in zip(names.items(), ("-.", "--", ":")):
         level = getattr(bank.gamma, name)
         if level is not None:
-            ax.axhline(level, linestyle=":", linewidth=1, color="gray")
-            ax.annotate(name, (0, level), fontsize="small", va="bottom")
+            ax.axhline(level, linestyle=style, linewidth=1, color="gray", label=f"{label}: {level:.4g}")
     ax.set_xlabel("frequency modulo the slow rate, Hz")
     ax.set_ylabel("largest gain from input to error")
     ax.set_ylim(bottom=0)
+    ax.legend(fontsize="small")
     return ax
+
+
+def _picture(bank, ax, name):
+    pictures = bank.pictures()
+    if name not in pictures:
+        from hybank._hybank import HybankError
+
+        raise HybankError(f"picture: {ascii(name)[:200]} is unknown; choose {', '.join(pictures)}")
+    picture = pictures[name]
+    for label, x, y in picture["curves"]:
+        ax.plot(x, y, label=label)
+    ax.set_xscale("log" if picture["is_logarithmic"] else "linear")
+    ax.set_title(picture["title"])
+    ax.set_xlabel(picture["x_label"])
+    ax.set_ylabel(picture["y_label"])
+    ax.legend(fontsize="small")
+    return ax
+
+
+def spectrum(found, ax=None):
+    """Draw the spectrum of a measurement with its largest spurs, or that of the error of a comparison."""
+    ax = _axes(ax, "spectrum")
+    frequency, level = found.spectrum
+    ax.plot(frequency, level, linewidth=0.8, label="spectrum")
+    # A colour per cause: a text beside each spur would cover others.
+    shown = {}
+    for hertz, below, cause in getattr(found, "spurs", [])[:12]:
+        shown.setdefault(cause, []).append((hertz, below))
+    top = 20 * _log10(max((tone[1] for tone in getattr(found, "tones", [])), default=1.0))
+    for cause, spurs in shown.items():
+        ax.plot([one[0] for one in spurs], [one[1] + top for one in spurs], "o", fillstyle="none", label=cause)
+    ax.set_xlabel("frequency, Hz")
+    ax.set_ylabel("level, dB of full scale")
+    ax.legend(fontsize="small")
+    return ax
+
+
+def _log10(value):
+    import math
+
+    return math.log10(value) if value > 0 else -10.0
+
+
+def _table(caption, rows):
+    line = lambda cells: "".join(f"<td>{_html.escape(str(cell))}</td>" for cell in cells)  # noqa: E731
+    body = "".join(f"<tr><th>{_html.escape(name)}</th>{line(cells)}</tr>" for name, *cells in rows)
+    return f"<table><caption>{_html.escape(caption)}</caption>{body}</table>"
 
 
 def html(bank):
     """The facts of a bank as a table for notebooks."""
     gamma = bank.gamma
     number = lambda value: "unknown" if value is None else f"{value:.6g}"  # noqa: E731
-    rows = {
-        "method": bank.method,
-        "channels, ratio": f"{bank.channels}, {bank.ratio}",
-        "delays": ", ".join(f"{delay:.6g} s" for delay in bank.delays),
-        "latency": f"{bank.latency} fast samples",
-        "gamma": f"{number(gamma.upper)} ({'proven' if bank.proven else 'computed'})",
-        "no bank of this size below": number(gamma.lower),
-        "no bank at all below": number(gamma.noncausal),
-    }
-    cells = "".join(f"<tr><th>{_html.escape(k)}</th><td>{_html.escape(str(v))}</td></tr>" for k, v in rows.items())
-    return f"<table><caption>hybank bank</caption>{cells}</table>"
+    return _table("hybank bank", [
+        ("method", bank.method),
+        ("channels, ratio", f"{bank.channels}, {bank.ratio}"),
+        ("delays", ", ".join(f"{delay:.6g} s" for delay in bank.delays)),
+        ("latency", f"{bank.latency} fast samples"),
+        ("gamma", f"{number(gamma.upper)} ({'proven' if bank.proven else 'computed'})"),
+        ("no bank of this size below", number(gamma.lower)),
+        ("no bank at all below", number(gamma.noncausal)),
+    ])
+
+
+def measured(found):
+    """The figures of a measurement as a table for notebooks."""
+    tones = [("tone", f"{hertz:.6g}", "Hz", f"amplitude {amplitude:.6g}") for hertz, amplitude, _ in found.tones]
+    spurs = [("spur", f"{level:.2f}", "dBc", f"{hertz:.6g} Hz: {cause}") for hertz, level, cause in found.spurs[:8]]
+    return _table("hybank measurement", [*tones, *found.figures, *spurs])

@@ -97,6 +97,10 @@ impl<'py> Held<'py> {
         )))
     }
 
+    pub(crate) fn py(&self) -> Python<'py> {
+        self.bytes.py()
+    }
+
     /// T.
     pub(crate) fn frames(&self) -> usize {
         self.layout.frames
@@ -119,21 +123,24 @@ impl<'py> Held<'py> {
             let samples = Interleaved::new(numbers(all()?)?, channels);
             return Ok(Samples::Interleaved64(samples.map_err(refused)?));
         }
-        let frames = |bytes, channels| {
-            let layout = SampleLayout::packed(number.format());
-            match complex {
-                false => PcmFrames { layout, channels, bytes },
-                true => PcmFrames { layout, channels: 2 * channels, bytes }.part(part),
-            }
-        };
+        let recordings = self.recordings()?.into_iter();
+        Ok(Samples::Pcm(recordings.map(|frames| if complex { frames.part(part) } else { frames }).collect()))
+    }
+
+    /// The samples as a recorder has them; the parts of complex ones take turns.
+    pub(crate) fn recordings(&self) -> PyResult<Vec<PcmFrames<'_>>> {
+        let Self { layout: Layout { channels, order, .. }, format: Format { number, complex }, .. } = *self;
+        let layout = SampleLayout::packed(number.format());
+        let parts = 1 + usize::from(complex);
+        let frames = |bytes, channels| PcmFrames { layout, channels: parts * channels, bytes };
         if order == Order::Frames {
-            return Ok(Samples::Pcm(vec![frames(all()?, channels)]));
+            return Ok(vec![frames(self.bytes.as_slice().map_err(refused)?, channels)]);
         }
         let row = |i| {
             let bytes = self.bytes.as_array().index_axis_move(Axis(0), i).to_slice();
             bytes.map(|bytes| frames(bytes, 1)).ok_or_else(|| refused("a channel has gaps"))
         };
-        Ok(Samples::Pcm((0..channels).map(row).collect::<PyResult<_>>()?))
+        (0..channels).map(row).collect()
     }
 
     /// Frame after frame as doubles: the samples, or the real (0) or imaginary (1) parts of complex ones.

@@ -2,16 +2,21 @@
 
 use crate::arrays::framed;
 use crate::background;
-use crate::errors::{choose, file_error, refused};
-use crate::fuse::{self, Request};
+use crate::errors::{choose, file_error, no_others, refused};
+use crate::fuse::{self, Request, parse_algorithm, parse_gaps};
+use crate::inputs;
+use crate::pictures;
 use crate::results::{Figures, Gamma};
+use crate::running::{Extras, Follow};
 use crate::sources;
 use crate::stream::Stream;
 use hybank::bank::{self, StateSpace, SynthesisFilters};
 use hybank::design;
+use hybank::design::responses::{fir_response, front_end_gains, impulse_responses};
 use hybank::files::AtomicFile;
 use hybank::interchange::{Format as Exported, export};
-use numpy::{Element, PyArray1, PyArray2, PyArrayMethods};
+use hybank::units::Hertz;
+use numpy::{Complex64, Element, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::io::Write;
@@ -25,6 +30,21 @@ const MOST_DENSE_STATES: usize = 4096;
 const MOST_FREQUENCIES: usize = 10_000_000;
 
 /// Reads a bank file.
+///
+/// Parameters
+/// ----------
+/// path : str or os.PathLike
+///     The bank file, as `hybank design` and `Bank.save` write it.
+///
+/// Returns
+/// -------
+/// Bank
+///
+/// Examples
+/// --------
+/// >>> bank = hb.load("thesis-fir.json")
+/// >>> bank.ratio, bank.latency
+/// (2, 10)
 #[pyfunction]
 pub(crate) fn load(path: PathBuf) -> PyResult<Bank> {
     let text = sources::read(&path)?;
@@ -57,35 +77,92 @@ type Matrices<'py> = (
 #[pymethods]
 impl Bank {
     /// The bank of a file's text.
+    ///
+    /// Parameters
+    /// ----------
+    /// text : str
+    ///     The text of a bank file.
+    ///
+    /// Returns
+    /// -------
+    /// Bank
+    ///
+    /// Examples
+    /// --------
+    /// >>> hb.Bank.from_json(bank.to_json()) == bank
+    /// True
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
         sources::parse_bank(text, "bank").map(Self::from)
     }
 
     /// The text of the bank file. All numbers read back to the same bits.
+    ///
+    /// Returns
+    /// -------
+    /// str
+    ///
+    /// Examples
+    /// --------
+    /// >>> bank.to_json()[:25]
+    /// '{"format":"hybank-bank","'
     fn to_json(&self) -> PyResult<String> {
         self.bank.to_json().map_err(refused)
     }
 
     /// Writes the bank file, which appears when it is whole.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     The file.
+    /// overwrite : bool
+    ///     Whether to replace an existing file.
+    ///
+    /// Examples
+    /// --------
+    /// >>> bank.save("copy.json")
     #[pyo3(signature = (path, *, overwrite = true))]
     fn save(&self, path: PathBuf, overwrite: bool) -> PyResult<()> {
         write_file(&path, self.to_json()?.as_bytes(), overwrite)
     }
 
-    /// Writes the bank for another tool: `c99`, `csv`, `npz`, `mat`, `coe` or `mem`. `name` is the prefix of
-    /// C identifiers, and `input_bits` are those of the samples from which integer code subtracts offsets.
-    #[pyo3(signature = (path, *, format, name = "bank", input_bits = None, overwrite = true))]
+    /// Writes the bank for another tool.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     The file.
+    /// format : {"c", "csv", "npz", "mat", "coe", "mem", "sos"}
+    ///     A C99 header ("c99" too), tables and arrays of coefficients, words of FPGA memory, or second-order
+    ///     sections of a recursive bank.
+    /// name : str
+    ///     Prefix of C identifiers.
+    /// input_bits : int, optional
+    ///     Bits of the samples from which integer code subtracts offsets.
+    /// overwrite : bool
+    ///     Whether to replace an existing file.
+    ///
+    /// Examples
+    /// --------
+    /// >>> bank.export("taps.csv", format="csv")
+    #[pyo3(
+        signature = (path, *, format, name = "bank", input_bits = None, overwrite = true, **unknown),
+        text_signature = "($self, path, *, format, name='bank', input_bits=None, overwrite=True)"
+    )]
+    #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
     fn export(
-        &self,
+        slf: &Bound<'_, Self>,
         path: PathBuf,
         format: &str,
         name: &str,
         input_bits: Option<u32>,
         overwrite: bool,
+        unknown: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<()> {
-        let bytes =
-            export(&self.bank, choose("format", format, &FORMATS)?, name, input_bits).map_err(refused)?;
+        no_others(slf.as_any(), "export", unknown)?;
+        let format = choose("format", format, &FORMATS)?;
+        let bytes = export(&slf.get().bank, format, name, input_bits).map_err(refused)?;
         write_file(&path, &bytes, overwrite)
     }
 
@@ -111,6 +188,18 @@ impl Bank {
     #[getter]
     fn latency(&self) -> usize {
         self.bank.latency
+    }
+
+    /// The fast rate in hertz.
+    #[getter]
+    fn fast_rate(&self) -> f64 {
+        1.0 / self.bank.fast_period.0
+    }
+
+    /// Rms of the output noise for independent noise of unit rms on all slow samples.
+    #[getter]
+    fn noise_gain(&self) -> PyResult<f64> {
+        design::noise_gain(&self.bank).map_err(refused)
     }
 
     /// The fast period in seconds.
@@ -184,13 +273,27 @@ impl Bank {
         ))
     }
 
-    /// The largest gain of the error system at `n` frequencies from 0 to half the slow rate: (hertz, gain).
+    /// The largest gain of the error system by frequency. Its maximum over all frequencies is gamma.
+    ///
+    /// Parameters
+    /// ----------
+    /// n : int
+    ///     Equidistant frequencies from 0 to half the slow rate.
+    ///
+    /// Returns
+    /// -------
+    /// f : ndarray, shape (n,)
+    ///     Hertz, modulo the slow rate.
+    /// gain : ndarray, shape (n,)
+    ///
+    /// Examples
+    /// --------
+    /// >>> f, gain = bank.error_response(64)
+    /// >>> bool(gain.max() <= bank.gamma.upper)
+    /// True
     #[pyo3(signature = (n = 512))]
     fn error_response<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Array<'py>, Array<'py>)> {
-        let count = usize::try_from(n)
-            .ok()
-            .filter(|&count| count <= MOST_FREQUENCIES)
-            .ok_or_else(|| refused(format!("n: {n} frequencies; give 0 to {MOST_FREQUENCIES}")))?;
+        let count = frequency_count(n)?;
         let bank = Arc::clone(&self.bank);
         let points = background::run(py, None, move |_| design::error_response(&bank, count))?;
         let points = points.map_err(refused)?;
@@ -199,30 +302,222 @@ impl Bank {
         Ok((PyArray1::from_vec(py, hertz), PyArray1::from_vec(py, gain)))
     }
 
-    /// Signal-to-noise ratio, largest image and error of gain, and what the simple ways would give.
+    /// The frequency responses of the synthesis filters at the fast rate.
+    ///
+    /// Parameters
+    /// ----------
+    /// n : int
+    ///     Equidistant frequencies from 0 to half the fast rate.
+    ///
+    /// Returns
+    /// -------
+    /// f : ndarray, shape (n,)
+    ///     Hertz.
+    /// response : ndarray, shape (N, n)
+    ///     Complex; a row for each sample of a frame, as `taps` has. That of a recursive filter is summed
+    ///     until 1e-12 of its energy is left.
+    ///
+    /// Examples
+    /// --------
+    /// >>> f, response = bank.frequency_response(64)
+    /// >>> response.shape, bool(abs(response[0, 0] - bank.taps[0].sum()) < 1e-12)
+    /// ((2, 64), True)
+    #[pyo3(signature = (n = 512))]
+    fn frequency_response<'py>(
+        &self,
+        py: Python<'py>,
+        n: i64,
+    ) -> PyResult<(Array<'py>, Bound<'py, PyArray2<Complex64>>)> {
+        let (frequencies, bank) = (self.frequencies(n)?, Arc::clone(&self.bank));
+        let of = frequencies.clone();
+        let rows = background::run(py, None, move |_| {
+            let angular = |f: &Hertz| f.angular().per_fast_period(bank.fast_period);
+            let row = |taps: &Vec<f64>| of.iter().map(|f| fir_response(taps, angular(f)).0).collect();
+            impulse_responses(&bank).map(|taps| taps.iter().map(row).collect::<Vec<Vec<Complex64>>>())
+        })?;
+        let rows = PyArray2::from_vec2(py, &rows.map_err(refused)?)?;
+        Ok((PyArray1::from_iter(py, frequencies.iter().map(|f| f.0)), rows))
+    }
+
+    /// The gains of the target and of the converters' front ends.
+    ///
+    /// Parameters
+    /// ----------
+    /// n : int
+    ///     Equidistant frequencies from 0 to half the fast rate.
+    ///
+    /// Returns
+    /// -------
+    /// f : ndarray, shape (n,)
+    ///     Hertz.
+    /// gain : ndarray, shape (1 + N, n)
+    ///     The target, then a row for each converter.
+    ///
+    /// Examples
+    /// --------
+    /// >>> f, gain = bank.front_end_gains(8)
+    /// >>> gain.shape
+    /// (3, 8)
+    #[pyo3(signature = (n = 512))]
+    fn front_end_gains<'py>(
+        &self,
+        py: Python<'py>,
+        n: i64,
+    ) -> PyResult<(Array<'py>, Bound<'py, PyArray2<f64>>)> {
+        let frequencies = self.frequencies(n)?;
+        let gains = front_end_gains(&self.bank, &frequencies).map_err(refused)?;
+        let count = 1 + self.bank.channel_count();
+        let rows: Vec<Vec<f64>> = (0..count).map(|i| gains.iter().map(|gains| gains[i]).collect()).collect();
+        Ok((PyArray1::from_iter(py, frequencies.iter().map(|f| f.0)), PyArray2::from_vec2(py, &rows)?))
+    }
+
+    /// The bank in the user's terms: signal-to-noise ratio, largest image and error of gain, and what the
+    /// simple ways would give.
+    ///
+    /// Returns
+    /// -------
+    /// Figures
+    ///
+    /// Examples
+    /// --------
+    /// >>> bank.figures().snr > 20
+    /// True
     fn figures(&self, py: Python<'_>) -> PyResult<Figures> {
         let bank = Arc::clone(&self.bank);
         let figures = background::run(py, None, move |_| hybank::figures::Figures::new(&bank))?;
         figures.map(Figures::from).map_err(refused)
     }
 
-    /// Draws the error by frequency with matplotlib.
-    #[pyo3(signature = (ax = None))]
-    fn plot<'py>(slf: &Bound<'py, Self>, ax: Option<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
-        slf.py().import("hybank._show")?.call_method1("plot", (slf, ax))
+    /// The curves of the pictures that `hybank plot` draws.
+    ///
+    /// Returns
+    /// -------
+    /// dict
+    ///     By the name of the picture: "tones", "front-ends", "analysis", "filters", "phase", "group-delay",
+    ///     "impulse-responses", "error" and "delay-error". Each is a dictionary with `title`, `caption`,
+    ///     `x_label`, `y_label`, `is_logarithmic` and `curves`, a list of (label, x, y).
+    ///
+    /// Examples
+    /// --------
+    /// >>> label, x, y = bank.pictures()["impulse-responses"]["curves"][0]
+    /// >>> label, len(y)
+    /// ('channel 1', 22)
+    fn pictures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        pictures::pictures(py, &self.bank)
+    }
+
+    /// Draws a picture of the bank with matplotlib.
+    ///
+    /// Parameters
+    /// ----------
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Where to draw; a new figure if left out.
+    /// picture : str
+    ///     A name of `pictures`; "error" is the largest gain to the error by frequency, with its bounds.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    ///
+    /// Examples
+    /// --------
+    /// >>> ax = bank.plot(picture="filters")  # doctest: +SKIP
+    #[pyo3(signature = (ax = None, picture = "error"))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        ax: Option<Bound<'py, PyAny>>,
+        picture: &str,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("hybank._show")?.call_method1("plot", (slf, ax, picture))
+    }
+
+    /// Writes a page (HTML) about the bank, as `hybank report` does: its error with the proven bounds, its
+    /// filters, its cost, and of captures the spectra before and after.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     The page, one file that loads nothing.
+    /// captures : array_like or list of files, optional
+    ///     What `fuse` takes; the first 2^20 frames are used.
+    /// axis : int
+    ///     The axis of time of an array.
+    /// overwrite : bool
+    ///     Whether to replace an existing file.
+    ///
+    /// Examples
+    /// --------
+    /// >>> bank.report("report.html")
+    #[pyo3(signature = (path, captures = None, *, axis = -1, overwrite = true))]
+    fn report(
+        slf: &Bound<'_, Self>,
+        path: PathBuf,
+        captures: Option<&Bound<'_, PyAny>>,
+        axis: isize,
+        overwrite: bool,
+    ) -> PyResult<()> {
+        let page = pictures::page(slf, captures, axis, &path)?;
+        write_file(&path, page.as_bytes(), overwrite)
     }
 
     /// Fuses a whole signal; the output lines up with the time axis of the input.
+    ///
+    /// Parameters
+    /// ----------
+    /// x : array_like, shape (N, T), or list of files
+    ///     A row for each channel; (T, N) with `axis=0`. A list of arrays for converters with rates of their
+    ///     own. Files (WAV, FLAC, SigMF, tables, arrays) or what `hybank.read` returns. DataArrays of xarray
+    ///     keep dimensions and coordinates, dask arrays stay lazy, DataFrames of pandas keep their index.
+    /// axis : int
+    ///     The axis of time.
+    /// dtype : dtype, optional
+    ///     Number type of the output; floats with the digits of the input if left out.
+    /// threads : int
+    ///     Threads that filter, 0 for one per processor. The bits do not depend on it.
+    /// gaps : {"hold", "zero"}, optional
+    ///     Replacement of missing samples, which are NaN: the last good one, or 0.
+    /// algorithm : {"auto", "direct", "overlap-save"}
+    ///     Algorithm of FIR filters.
+    /// keep_latency : bool
+    ///     The causal output, as a stream gives it.
+    /// interleaved : int, optional
+    ///     x is one recording of one channel in which so many converters take turns, the one with the largest
+    ///     delay first.
+    /// track : str or list, optional
+    ///     Follow the delays: "pilot=3.1kHz", "blind", the name of a file that ends in .jsonl, or a list of
+    ///     readings with `frame`, `delay` and `half_width`. The bank needs `tracking="affine"`.
+    /// track_frames : int
+    ///     Frames of one measurement.
+    /// track_wander : float
+    ///     By how many ppm the rate of a clock may wander in a second.
+    /// rate : float, optional
+    ///     Rate of the output in hertz, for `track` with a bank in normalised time.
+    /// full_output : bool
+    ///     Also return the report.
+    ///
+    /// Returns
+    /// -------
+    /// y : ndarray, shape (M T,)
+    /// report : FuseReport
+    ///     With `full_output=True`.
+    ///
+    /// Examples
+    /// --------
+    /// >>> capture = hb.simulate(bank, "tones:0.3", samples=400)
+    /// >>> y = bank.fuse(capture.channels)
+    /// >>> y.shape, float(abs(y - capture.target)[50:-50].max()) < 0.05
+    /// ((400,), True)
     #[pyo3(
         signature = (
             x, *, axis = -1, dtype = None, threads = 1, gaps = None, algorithm = "auto", keep_latency = false,
-            full_output = false
+            interleaved = None, track = None, track_frames = 2048, track_wander = 1.0, rate = None,
+            full_output = false, **unknown
         ),
-        text_signature = "($self, x, *, axis=-1, dtype=None, threads=1, gaps=None, algorithm='auto', keep_latency=False, full_output=False)"
+        text_signature = "($self, x, *, axis=-1, dtype=None, threads=1, gaps=None, algorithm='auto', keep_latency=False, interleaved=None, track=None, track_frames=2048, track_wander=1.0, rate=None, full_output=False)"
     )]
     #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
     fn fuse<'py>(
-        &self,
+        slf: &Bound<'py, Self>,
         x: &Bound<'py, PyAny>,
         axis: isize,
         dtype: Option<Bound<'py, PyAny>>,
@@ -230,29 +525,97 @@ impl Bank {
         gaps: Option<&str>,
         algorithm: &str,
         keep_latency: bool,
+        interleaved: Option<usize>,
+        track: Option<Bound<'py, PyAny>>,
+        track_frames: usize,
+        track_wander: f64,
+        rate: Option<f64>,
         full_output: bool,
+        unknown: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (frames, shape) = framed(x, &self.bank.layout(), axis, false)?;
-        let request = Request::new(threads, gaps, algorithm, keep_latency)?;
-        let (y, report) = fuse::fuse(&self.bank, &frames, shape, dtype.as_ref(), &request)?;
-        if full_output { Ok((y, report).into_pyobject(x.py())?.into_any()) } else { Ok(y) }
+        let py = x.py();
+        no_others(slf.as_any(), "fuse", unknown)?;
+        if interleaved.is_some() || inputs::is_foreign(x)? {
+            let keywords = PyDict::new(py);
+            keywords.set_item("axis", axis)?;
+            keywords.set_item("dtype", dtype)?;
+            keywords.set_item("threads", threads)?;
+            keywords.set_item("gaps", gaps)?;
+            keywords.set_item("algorithm", algorithm)?;
+            keywords.set_item("keep_latency", keep_latency)?;
+            keywords.set_item("track", track)?;
+            keywords.set_item("track_frames", track_frames)?;
+            keywords.set_item("track_wander", track_wander)?;
+            keywords.set_item("rate", rate)?;
+            keywords.set_item("full_output", full_output)?;
+            return py.import("hybank._inputs")?.call_method("fuse", (slf, x, interleaved), Some(&keywords));
+        }
+        let bank = &slf.get().bank;
+        let (frames, shape) = framed(x, &bank.layout(), axis, false)?;
+        let follow = Follow::new(bank, track.as_ref(), track_frames, track_wander, rate)?;
+        let request = Request {
+            workers: fuse::workers(threads)?,
+            extras: Extras { gaps: parse_gaps(gaps)?, follow },
+            algorithm: parse_algorithm(algorithm)?,
+            keep_latency,
+        };
+        let (y, report) = fuse::fuse(bank, &frames, shape, dtype.as_ref(), &request)?;
+        if full_output { Ok((y, report).into_pyobject(py)?.into_any()) } else { Ok(y) }
     }
 
     /// A causal stream through the bank.
     ///
-    /// `state`, that of another stream of the same bank, dtype and algorithm, makes it go on from there.
+    /// Parameters
+    /// ----------
+    /// axis : int
+    ///     The axis of time of the blocks.
+    /// dtype : dtype, optional
+    ///     Number type of the outputs, float32 if left out.
+    /// algorithm : {"auto", "direct", "overlap-save"}
+    ///     Algorithm of FIR filters.
+    /// state : bytes, optional
+    ///     The state of another stream of the same bank, dtype and algorithm, from which this one goes on.
+    /// gaps : {"hold", "zero"}, optional
+    ///     Replacement of missing samples, as in `fuse`; `Stream.gaps` and `Stream.mask` say where.
+    /// track, track_frames, track_wander, rate
+    ///     As in `fuse`. The outputs of a call may belong to frames of earlier ones.
+    ///
+    /// Returns
+    /// -------
+    /// Stream
+    ///
+    /// Examples
+    /// --------
+    /// >>> with bank.stream(gaps="hold") as s:
+    /// ...     y = s.process([[0.0, float("nan")], [0.0, 0.1]])
+    /// >>> y.shape, s.gaps
+    /// ((4,), [(1, 1, 1)])
     #[pyo3(
-        signature = (*, axis = -1, dtype = None, algorithm = "auto", state = None),
-        text_signature = "($self, *, axis=-1, dtype=None, algorithm='auto', state=None)"
+        signature = (
+            *, axis = -1, dtype = None, algorithm = "auto", state = None, gaps = None, track = None,
+            track_frames = 2048, track_wander = 1.0, rate = None, **unknown
+        ),
+        text_signature = "($self, *, axis=-1, dtype=None, algorithm='auto', state=None, gaps=None, track=None, track_frames=2048, track_wander=1.0, rate=None)"
     )]
+    #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
     fn stream(
-        &self,
+        slf: &Bound<'_, Self>,
         axis: isize,
         dtype: Option<Bound<'_, PyAny>>,
         algorithm: &str,
         state: Option<&[u8]>,
+        gaps: Option<&str>,
+        track: Option<&Bound<'_, PyAny>>,
+        track_frames: usize,
+        track_wander: f64,
+        rate: Option<f64>,
+        unknown: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Stream> {
-        Stream::new(&self.bank, axis, dtype.as_ref(), algorithm)?.resumed(state)
+        no_others(slf.as_any(), "stream", unknown)?;
+        let bank = &slf.get().bank;
+        let follow = Follow::new(bank, track, track_frames, track_wander, rate)?;
+        let extras = Extras { gaps: parse_gaps(gaps)?, follow };
+        Stream::new(bank, axis, dtype.as_ref(), algorithm, extras)?.resumed(state)
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
@@ -289,6 +652,13 @@ impl Bank {
 }
 
 impl Bank {
+    /// Equidistant frequencies from 0 to half the fast rate.
+    fn frequencies(&self, n: i64) -> PyResult<Vec<Hertz>> {
+        let count = frequency_count(n)?;
+        let step = 0.5 / self.bank.fast_period.0 / count.saturating_sub(1).max(1) as f64;
+        Ok((0..count).map(|k| Hertz(step * k as f64)).collect())
+    }
+
     /// The bank as a state space, if it is not too large for dense matrices.
     fn block(&self) -> PyResult<StateSpace> {
         let SynthesisFilters::Fir(taps) = &self.bank.filters else {
@@ -307,6 +677,11 @@ impl Bank {
     }
 }
 
+fn frequency_count(n: i64) -> PyResult<usize> {
+    let count = usize::try_from(n).ok().filter(|&count| count <= MOST_FREQUENCIES);
+    count.ok_or_else(|| refused(format!("n: {n} frequencies; give 0 to {MOST_FREQUENCIES}")))
+}
+
 /// Writes a file, which appears when it is whole.
 fn write_file(path: &Path, bytes: &[u8], overwrite: bool) -> PyResult<()> {
     let mut file = AtomicFile::create(path, overwrite).map_err(file_error)?;
@@ -315,13 +690,15 @@ fn write_file(path: &Path, bytes: &[u8], overwrite: bool) -> PyResult<()> {
 }
 
 /// The formats by name.
-const FORMATS: [(&str, Exported); 6] = [
+const FORMATS: [(&str, Exported); 8] = [
+    ("c", Exported::C99),
     ("c99", Exported::C99),
     ("csv", Exported::Csv),
     ("npz", Exported::Npz),
     ("mat", Exported::Mat),
     ("coe", Exported::Coe),
     ("mem", Exported::Mem),
+    ("sos", Exported::Sos),
 ];
 
 /// Rows of `columns` numbers as a read-only array; a matrix without rows keeps its columns.

@@ -3,6 +3,7 @@
 use crate::arrays::{Held, framed};
 use crate::background;
 use crate::errors::refused;
+use crate::quantities::frequencies;
 use crate::sources;
 use hybank::calibrate::{
     self as calibration, CalibrationSignal, ChannelEstimate, Fit, Fitting, Record, Settings, applied,
@@ -54,17 +55,11 @@ impl Calibration {
 
 /// Delays, gains and offsets of the channels from captures.
 #[pyfunction]
-#[pyo3(signature = (
-    x, spec, *, tones = None, waveform = None, rate = None, blind = false,
-    fit = vec!["delay".to_owned(), "gain".to_owned(), "offset".to_owned()], reference = None, clip = None, axis = -1
-))]
-#[pyo3(text_signature = "(x, spec, *, tones=None, waveform=None, rate=None, blind=False, \
-    fit=('delay', 'gain', 'offset'), reference=None, clip=None, axis=-1)")]
 #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
 pub(crate) fn calibrate(
     x: &Bound<'_, PyAny>,
     spec: &Bound<'_, PyAny>,
-    tones: Option<Vec<f64>>,
+    tones: Option<&Bound<'_, PyAny>>,
     waveform: Option<Vec<f64>>,
     rate: Option<f64>,
     blind: bool,
@@ -78,6 +73,7 @@ pub(crate) fn calibrate(
     let layout = spec.layout();
     let (frames, shape) = framed(x, &layout, axis, false)?;
     let held = Held::new(&frames, shape)?;
+    let tones = tones.map(|_| frequencies("tones", tones)).transpose()?;
     let signal = Signal::new(&spec, tones, waveform, rate, blind)?;
     signal.check(held.format.complex)?;
     let mut records = records(&held, layout.count(), clip)?;

@@ -1,29 +1,29 @@
-//! `hybank.design`.
+//! `hybank.design` and `hybank.import_taps`.
 
 use crate::background;
 use crate::bank::Bank;
-use crate::errors::{refused, spec_problem};
-use crate::sources;
-use hybank::design::{Design, DesignError, Limits, Options, ProofSearch, warnings};
-use hybank::messages::shown;
-use pyo3::exceptions::PyUserWarning;
+use crate::errors::{refused, spec_error, spec_problem, warn};
+use crate::{sources, values};
+use hybank::design::{Design, DesignError, Limits, Options, ProofSearch, judge_taps, warnings};
+use hybank::spec::DesignOverrides;
 use pyo3::prelude::*;
-use std::ffi::CString;
-use std::fmt::Display;
 
-/// Designs the bank of a spec.
+/// Designs the bank of a spec, with `latency` and the keys of `[design]` in `keys` in place of its own.
 #[pyfunction]
-#[pyo3(signature = (source, *, proof, limits, progress))]
 pub(crate) fn design(
     source: &Bound<'_, PyAny>,
+    keys: &Bound<'_, PyAny>,
+    latency: Option<usize>,
     proof: bool,
     limits: bool,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Bank> {
     let py = source.py();
-    let spec = sources::spec(source)?;
+    let keys = DesignOverrides::from_data(values::table(keys)?, "design");
+    let mut spec = sources::spec_with(source, keys.map_err(|error| spec_error(py, &error))?)?;
+    spec.latency = latency.or(spec.latency);
     for doubt in warnings(&spec).unwrap_or_default() {
-        warn(py, &doubt)?;
+        warn(py, &doubt, 2)?;
     }
     let proof = if proof { ProofSearch::Run } else { ProofSearch::Skip };
     let limits = if limits { Limits::Enforced } else { Limits::Off };
@@ -31,20 +31,38 @@ pub(crate) fn design(
         let observer = |stage, seconds| reporter.begins(stage, seconds);
         hybank::design::design(&spec, &Options { proof, limits, observer: &observer, stop: reporter.stop() })
     })?;
-    let Design { bank, proof: proven, .. } = designed.map_err(|error| match &error {
+    finished(py, designed, proof)
+}
+
+/// The bank of taps from elsewhere, a row per sample of a frame.
+#[pyfunction]
+pub(crate) fn import_taps(
+    source: &Bound<'_, PyAny>,
+    taps: Vec<Vec<f64>>,
+    latency: Option<usize>,
+    proof: bool,
+) -> PyResult<Bank> {
+    let py = source.py();
+    let mut spec = sources::spec(source)?;
+    spec.latency = latency.or(spec.latency);
+    if spec.latency.is_none() {
+        return Err(refused(
+            "latency: the spec gives none, which taps from elsewhere have; give the delay of their output in fast samples",
+        ));
+    }
+    let proof = if proof { ProofSearch::Run } else { ProofSearch::Skip };
+    finished(py, background::run(py, None, move |_| judge_taps(&spec, taps, proof))?, proof)
+}
+
+fn finished(py: Python<'_>, found: Result<Design, DesignError>, proof: ProofSearch) -> PyResult<Bank> {
+    let Design { bank, proof: proven, .. } = found.map_err(|error| match &error {
         DesignError::Spec(problem) => spec_problem(py, problem),
         _ => refused(error),
     })?;
     if let Err(reason) = proven
         && proof == ProofSearch::Run
     {
-        warn(py, &format!("gamma is computed, not proven: {reason}"))?;
+        warn(py, &format!("gamma is computed, not proven: {reason}"), 2)?;
     }
     Ok(Bank::from(bank))
-}
-
-/// A warning at the line of the caller: the one that calls `hybank.design`.
-fn warn(py: Python<'_>, message: &impl Display) -> PyResult<()> {
-    let text = CString::new(shown(&message.to_string()))?;
-    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 2)
 }

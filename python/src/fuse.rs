@@ -1,54 +1,48 @@
 //! Fuses arrays.
 
 use crate::arrays::{Held, Shape};
-use crate::errors::refused;
+use crate::errors::{choose, refused};
 use crate::formats::Format;
 use crate::outputs::NewArray;
 use crate::results::FuseReport;
+use crate::running::{Extras, Running};
 use crate::signals::Signals;
 use hybank::bank::Bank;
-use hybank::pipeline::{self, DroppedLatency, GapPolicy, Outcome, Settings};
-use hybank::runtime::{Algorithm, Options, Plan, ThreadPool};
+use hybank::pipeline::{self, DroppedLatency, GapPolicy, Outcome, PipelineError, Settings};
+use hybank::runtime::{Algorithm, Options, PcmFrames, Plan, ThreadPool};
 use numpy::PyArray1;
 use pyo3::prelude::*;
+use std::ops::Range;
 
 /// Most threads: more than any processor has, and as many as start at once.
 const MOST_THREADS: i64 = 1024;
 
+/// Frames that are filtered between two looks for signals while delays are followed.
+const PIECE: usize = 1 << 16;
+
 /// How an array is to be fused.
 pub(crate) struct Request {
-    workers: Option<ThreadPool>,
-    gaps: Option<GapPolicy>,
-    algorithm: Algorithm,
-    keep_latency: bool,
+    pub(crate) workers: Option<ThreadPool>,
+    pub(crate) extras: Extras,
+    pub(crate) algorithm: Algorithm,
+    pub(crate) keep_latency: bool,
 }
 
 impl Request {
-    pub(crate) fn new(
-        threads: i64,
-        gaps: Option<&str>,
-        algorithm: &str,
-        keep_latency: bool,
-    ) -> PyResult<Self> {
-        let gaps = match gaps {
-            None => None,
-            Some("hold") => Some(GapPolicy::Hold),
-            Some("zero") => Some(GapPolicy::Zero),
-            Some(other) => {
-                return Err(refused(format!("gaps: \"{other}\" is unknown; choose \"hold\" or \"zero\"")));
-            }
-        };
-        Ok(Self { workers: workers(threads)?, gaps, algorithm: parse_algorithm(algorithm)?, keep_latency })
-    }
-
     fn settings(&self) -> Settings<'_> {
         let dropped = if self.keep_latency { DroppedLatency::Added } else { DroppedLatency::All };
-        Settings { dropped, gaps: self.gaps, workers: self.workers.as_ref(), ..Settings::default() }
+        Settings { dropped, workers: self.workers.as_ref(), ..self.extras.settings() }
     }
 }
 
+/// The policy of a name.
+pub(crate) fn parse_gaps(gaps: Option<&str>) -> PyResult<Option<GapPolicy>> {
+    let known = [("hold", GapPolicy::Hold), ("zero", GapPolicy::Zero)];
+    gaps.map(|name| choose("gaps", name, &known)).transpose()
+}
+
 /// The threads beside the caller's; `None` for a single one.
-fn workers(threads: i64) -> PyResult<Option<ThreadPool>> {
+pub(crate) fn workers(threads: i64) -> PyResult<Option<ThreadPool>> {
     match usize::try_from(threads) {
         Ok(1) => Ok(None),
         Ok(count) if threads <= MOST_THREADS => Ok(Some(ThreadPool::new(count)?)),
@@ -86,6 +80,9 @@ pub(crate) fn fuse<'py>(
     let held = Held::new(x, shape)?;
     let format = Format::of_output(held.format, dtype)?;
     let settings = request.settings();
+    if request.extras.follow.is_some() {
+        return followed(bank, &held, format, request);
+    }
     let plan = plan(bank, format, request.algorithm, settings)?;
     let mut array = NewArray::new(py, held.frames() * bank.ratio, format)?;
     let (parts, mut room) = (held.parts()?, array.room()?);
@@ -95,21 +92,67 @@ pub(crate) fn fuse<'py>(
     let outcome = outcome.map_err(|error| signals.into_error().unwrap_or_else(|| refused(error)))?;
     let clipped = room.clipped();
     let y = array.finish()?;
-    Ok((y, report(py, outcome, settings.dropped.samples(&plan), clipped)))
+    let outcome = Outcome { clipped, ..outcome };
+    Ok((y, report(py, outcome, settings.dropped.samples(&plan))))
 }
 
-fn report(py: Python<'_>, outcome: Outcome, latency_dropped: usize, clipped: u64) -> FuseReport {
+/// As [`fuse`], with filters that follow the delays.
+fn followed<'py>(
+    bank: &Bank,
+    held: &Held<'py>,
+    format: Format,
+    request: &Request,
+) -> PyResult<(Bound<'py, PyAny>, FuseReport)> {
+    let py = held.py();
+    let dropped = request.settings().dropped;
+    let mut running = Running::new(bank, format, request.algorithm, &request.extras, dropped)?;
+    let (tracks, latency_dropped) = (running.tracks(), dropped.samples(running.plan()));
+    let (recordings, frames, signals) = (held.recordings()?, held.frames(), Signals::new());
+    let done = py.detach(|| {
+        for first in (0..frames).step_by(PIECE) {
+            if signals.raised() {
+                return Err(PipelineError::Stopped);
+            }
+            let end = frames.min(first + PIECE);
+            let piece: Vec<_> = recordings.iter().map(|all| piece(all, first..end)).collect();
+            running.push(&piece, end - first)?;
+        }
+        running.flush((frames * bank.ratio) as u64)?;
+        let outputs = running.take();
+        Ok((outputs, running.finish()?))
+    });
+    let done = done.map_err(|error| signals.into_error().unwrap_or_else(|| refused(error)));
+    let (outputs, outcome) = done?;
+    tracks.warn(py)?;
+    let y = PyArray1::from_vec(py, outputs.samples).call_method1("view", (format.name(),))?;
+    let mask = outcome.gaps.is_some().then_some(outputs.mask);
+    let report = report(py, Outcome { mask, ..outcome }, latency_dropped);
+    Ok((y, FuseReport { track: Some(tracks.log(py)?), ..report }))
+}
+
+fn piece<'a>(all: &PcmFrames<'a>, frames: Range<usize>) -> PcmFrames<'a> {
+    let size = all.frame_bytes();
+    PcmFrames { bytes: &all.bytes[frames.start * size..frames.end * size], ..*all }
+}
+
+fn report(py: Python<'_>, outcome: Outcome, latency_dropped: usize) -> FuseReport {
     let Outcome { plan, gaps, mask, .. } = outcome;
     FuseReport {
         algorithm: plan.algorithm.to_owned(),
         numbers: plan.numbers.to_owned(),
         isa: plan.isa,
         latency_dropped,
-        clipped,
+        clipped: outcome.clipped,
         replaced: outcome.replaced,
         state_resets: outcome.state_resets,
         missing: gaps.as_ref().map(|gaps| gaps.missing),
         gaps: gaps.map(|gaps| gaps.list.iter().map(|gap| (gap.channel, gap.first, gap.length)).collect()),
-        mask: mask.map(|mask| PyArray1::from_iter(py, mask.iter().map(|&mark| mark != 0)).unbind()),
+        mask: mask.map(|mask| marks(py, &mask)),
+        track: None,
     }
+}
+
+/// True where a byte is not 0.
+pub(crate) fn marks(py: Python<'_>, mask: &[u8]) -> Py<PyArray1<bool>> {
+    PyArray1::from_iter(py, mask.iter().map(|&mark| mark != 0)).unbind()
 }

@@ -3,7 +3,10 @@
 use crate::arrays::{Held, Shape};
 use crate::background;
 use crate::errors::{choose, refused};
+use crate::quantities::frequencies;
+use crate::records::record;
 use hybank::measure::{self as quality, Imbalance, Settings, Window};
+use hybank::overview::{Figure, column};
 use hybank::units::{Decibels, Hertz};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -40,6 +43,8 @@ pub(crate) struct Measurement {
     /// Samples at the rails, and samples that are not finite.
     clipped: usize,
     left_out: usize,
+    /// The figures as a report shows them: name, value, unit, meaning.
+    figures: Vec<(String, String, String, String)>,
     /// The spectrum: hertz, and dB relative to full scale.
     spectrum: (Py<PyArray1<f64>>, Py<PyArray1<f64>>),
 }
@@ -52,42 +57,132 @@ impl Measurement {
             self.sinad, self.enob, self.snr, self.thd, self.sfdr
         )
     }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("hybank._show")?.call_method1("measured", (slf,))
+    }
+
+    /// Draws the spectrum with its spurs by matplotlib.
+    ///
+    /// Parameters
+    /// ----------
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Where to draw; a new figure if left out.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np
+    /// >>> m = hb.measure(np.cos(0.3 * np.arange(4096)), 48e3)
+    /// >>> ax = m.plot()  # doctest: +SKIP
+    #[pyo3(signature = (ax = None))]
+    fn plot<'py>(slf: &Bound<'py, Self>, ax: Option<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("hybank._show")?.call_method1("spectrum", (slf, ax))
+    }
+}
+
+/// How a record is measured.
+struct Request {
+    rate: Hertz,
+    window: Window,
+    /// Samples at either end that are not measured.
+    skip: usize,
+}
+
+impl Request {
+    fn new(rate: f64, window: &str, skip: usize) -> PyResult<Self> {
+        if !(rate > 0.0 && rate.is_finite()) {
+            return Err(refused(format!("rate: {rate} is no sample rate; give samples per second")));
+        }
+        Ok(Self { rate: Hertz(rate), window: choose("window", window, &WINDOWS)?, skip })
+    }
+
+    /// One part of a record, without its ends.
+    fn samples(&self, held: &Held<'_>, part: usize) -> PyResult<Vec<f64>> {
+        let (skip, count) = (self.skip, held.frames());
+        if 2 * skip >= count && skip > 0 {
+            let most = count.div_ceil(2);
+            return Err(refused(format!(
+                "skip: {skip} leaves nothing of {count} samples; skip fewer than {most}"
+            )));
+        }
+        let mut samples = held.doubles(part)?;
+        samples.truncate(count - skip);
+        samples.drain(..skip);
+        Ok(samples)
+    }
 }
 
 /// The quality of a record of one or several tones.
 #[pyfunction]
-#[pyo3(signature = (
-    y, rate, *, tones = None, converters = 1, harmonics = 10, full_scale = 1.0, window = "bh7"
-))]
+#[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
 pub(crate) fn measure(
     y: &Bound<'_, PyAny>,
     rate: f64,
-    tones: Option<Vec<f64>>,
-    converters: usize,
+    tones: Option<&Bound<'_, PyAny>>,
+    interleaved: usize,
     harmonics: usize,
     full_scale: f64,
     window: &str,
+    skip: usize,
 ) -> PyResult<Measurement> {
-    if !(rate > 0.0 && rate.is_finite()) {
-        return Err(refused(format!("rate: {rate} is no sample rate; give samples per second")));
-    }
+    let request = Request::new(rate, window, skip)?;
     let settings = Settings {
-        tones: tones.unwrap_or_default().into_iter().map(Hertz).collect(),
-        converters,
+        tones: frequencies("tones", tones)?.into_iter().map(Hertz).collect(),
+        converters: interleaved,
         harmonics,
         full_scale,
         rails: (-full_scale, full_scale),
-        window: choose("window", window, &WINDOWS)?,
+        window: request.window,
     };
     let held = Held::new(y, Shape { axis: -1, channels: 1 })?;
     let settings = Settings { rails: held.rails().unwrap_or(settings.rails), ..settings };
-    let (real, rate) = (held.doubles(0)?, Hertz(rate));
-    let imaginary = if held.format.complex { Some(held.doubles(1)?) } else { None };
+    let (real, rate) = (request.samples(&held, 0)?, request.rate);
+    let imaginary = if held.format.complex { Some(request.samples(&held, 1)?) } else { None };
     let found = background::run(y.py(), None, move |_| match imaginary {
         Some(imaginary) => quality::measure_complex(&real, &imaginary, rate, &settings),
         None => quality::measure(&real, rate, &settings),
     })?;
     result(y.py(), found.map_err(refused)?)
+}
+
+/// A record against a reference, and the spectrum of their difference: hertz and amplitudes.
+#[pyfunction]
+#[pyo3(signature = (y, reference, rate, window, skip))]
+pub(crate) fn compare(
+    y: &Bound<'_, PyAny>,
+    reference: &Bound<'_, PyAny>,
+    rate: f64,
+    window: &str,
+    skip: usize,
+) -> PyResult<(Py<PyAny>, Spectrum)> {
+    let (py, request) = (y.py(), Request::new(rate, window, skip)?);
+    let part = |x: &Bound<'_, PyAny>| -> PyResult<Vec<f64>> {
+        let held = Held::new(x, Shape { axis: -1, channels: 1 })?;
+        if held.format.complex {
+            return Err(refused(
+                "ref: complex samples, and only real ones are compared; give the real or the imaginary parts of both",
+            ));
+        }
+        request.samples(&held, 0)
+    };
+    let (own, other) = (part(y)?, part(reference)?);
+    let Request { rate, window, .. } = request;
+    let found = background::run(py, None, move |_| quality::compare(&own, &other, rate, window))?;
+    let found = found.map_err(refused)?;
+    Ok((record(py, &found)?, spectrum(py, &found.error_spectrum, 1.0)))
+}
+
+/// Hertz, and levels in dB.
+type Spectrum = (Py<PyArray1<f64>>, Py<PyArray1<f64>>);
+
+fn spectrum(py: Python<'_>, of: &quality::Spectrum, full_scale: f64) -> Spectrum {
+    let hertz = (0..of.amplitudes.len()).map(|bin| of.frequency(bin).0);
+    let levels = of.amplitudes.iter().map(|amplitude| Decibels::of_amplitude(amplitude / full_scale).0);
+    (PyArray1::from_iter(py, hertz).unbind(), PyArray1::from_iter(py, levels).unbind())
 }
 
 /// The windows by name.
@@ -100,10 +195,7 @@ fn result(py: Python<'_>, found: quality::Measurement) -> PyResult<Measurement> 
         let causes: Vec<String> = spur.causes.iter().map(ToString::to_string).collect();
         (spur.frequency.0, spur.level.0, causes.join("; "))
     };
-    let spectrum = &found.spectrum;
-    let hertz = (0..spectrum.amplitudes.len()).map(|bin| spectrum.frequency(bin).0);
-    let level = |amplitude: &f64| Decibels::of_amplitude(amplitude / found.full_scale).0;
-    let levels = spectrum.amplitudes.iter().map(level);
+    let figure = |of: Figure| (of.name.to_owned(), of.value, of.unit.to_owned(), of.meaning);
     Ok(Measurement {
         sinad: found.sinad.0,
         enob: found.enob,
@@ -123,7 +215,8 @@ fn result(py: Python<'_>, found: quality::Measurement) -> PyResult<Measurement> 
         imbalances: found.quadrature.as_ref().map(|parts| parts.imbalances.iter().map(imbalance).collect()),
         clipped: found.clipped,
         left_out: found.left_out,
-        spectrum: (PyArray1::from_iter(py, hertz).unbind(), PyArray1::from_iter(py, levels).unbind()),
+        figures: column(&found).into_iter().map(figure).collect(),
+        spectrum: spectrum(py, &found.spectrum, found.full_scale),
     })
 }
 

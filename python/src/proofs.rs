@@ -3,10 +3,13 @@
 use crate::background;
 use crate::bank::Bank;
 use crate::errors::{refused, refused_in};
+use crate::quantities::{shares, times};
+use crate::records::{any, record};
 use crate::results::{Analysis, Verified};
 use crate::sources;
 use hybank::bank::{self, check_digest};
-use hybank::design;
+use hybank::design::uncertainty::{BoxWidths, ErrorStudy, Questions, ReferenceChannel, RefusedBox, Sweep};
+use hybank::design::{self, DesignError};
 use hybank::units::Seconds;
 use hybank::verify as checker;
 use pyo3::prelude::*;
@@ -14,7 +17,6 @@ use std::sync::Arc;
 
 /// Proves the gammas of a bank, from a path or a bank in memory.
 #[pyfunction]
-#[pyo3(signature = (bank, *, search = false))]
 pub(crate) fn verify(bank: &Bound<'_, PyAny>, search: bool) -> PyResult<Verified> {
     let given = Given::new(bank)?;
     let certificate_in_bank = given.bank.proof.as_ref().is_some_and(|proof| proof.upper.is_some());
@@ -32,18 +34,105 @@ fn proven(bank: &bank::Bank, search: bool) -> Result<checker::Verified, String> 
     }
 }
 
-/// The error of a bank, with the delays of its spec or with others.
+/// The error of a bank, with the delays of its spec or with others, and over boxes of errors.
 #[pyfunction]
-#[pyo3(signature = (bank, *, delay_error = None))]
-pub(crate) fn analyze(bank: &Bound<'_, PyAny>, delay_error: Option<Vec<f64>>) -> PyResult<Analysis> {
+#[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
+pub(crate) fn analyze(
+    bank: &Bound<'_, PyAny>,
+    delay_error: Option<&Bound<'_, PyAny>>,
+    certify: bool,
+    delay_box: Option<&Bound<'_, PyAny>>,
+    gain_box: Option<&Bound<'_, PyAny>>,
+    cutoff_box: Option<&Bound<'_, PyAny>>,
+    jitter: Option<&Bound<'_, PyAny>>,
+    reference: Option<&Bound<'_, PyAny>>,
+    accuracy: Option<&Bound<'_, PyAny>>,
+    sensitivity: bool,
+    sweep: bool,
+) -> PyResult<Analysis> {
+    let py = bank.py();
     let given = Given::new(bank)?;
-    let errors: Vec<Seconds> = delay_error.unwrap_or_default().into_iter().map(Seconds).collect();
-    if errors.iter().any(|error| !error.0.is_finite()) {
-        return Err(refused("delay_error: errors of delays are finite numbers, in seconds"));
+    let widths = BoxWidths {
+        delay_box: times("delay_box", delay_box)?,
+        gain_box: shares("gain_box", gain_box)?,
+        cutoff_box: shares("cutoff_box", cutoff_box)?,
+        jitter: times("jitter", jitter)?,
+        reference: reference.map(reference_channel).transpose()?,
+    };
+    let bad = |refused_box: RefusedBox| refused(format!("{}: {refused_box}", refused_box.field));
+    let own = times("delay_error", delay_error)?;
+    let own: Vec<Seconds> = own.iter().map(|error| error.in_seconds(given.bank.fast_period)).collect();
+    let questions = Questions {
+        errors: widths.error_box(&given.bank).map_err(bad)?,
+        jitter: widths.jitter_of(&given.bank).map_err(bad)?,
+        sensitivity,
+        loss: shares("accuracy", accuracy)?.first().copied(),
+    };
+    let is_asked = certify || sensitivity || questions.errors.is_some() || questions.jitter.is_some();
+    if is_asked && !own.is_empty() {
+        return Err(refused(
+            "delay_error: proofs and boxes are those of the bank's own delays; leave it out",
+        ));
+    }
+    if (sweep || questions.loss.is_some()) && questions.errors.is_none() {
+        return Err(refused(
+            "accuracy and sweep need a box of errors; give delay_box, gain_box or cutoff_box",
+        ));
+    }
+    if questions.loss.is_some_and(|loss| loss.is_nan() || loss <= 0.0 || loss > 100.0) {
+        return Err(refused("accuracy: the loss is a share of gamma above 0, such as 0.01 or \"1%\""));
     }
     let bank_in = Arc::clone(&given.bank);
-    let analysis = background::run(bank.py(), None, move |_| design::analyze(&bank_in, &errors))?;
-    analysis.map(Analysis::from).map_err(|error| refused_in(&given.name, error))
+    let found = background::run(py, None, move |_| Studied::new(&bank_in, &own, certify, questions, sweep))?;
+    let found = found.map_err(|error| refused_in(&given.name, error))?;
+    Ok(Analysis {
+        scale: Some(record(py, &found.scale)?),
+        certified: any(py, found.certified.as_ref())?,
+        worst_case: any(py, found.study.worst_case.as_ref())?,
+        sensitivity: any(py, found.study.sensitivity.as_ref())?,
+        jitter: any(py, found.study.jitter.as_ref())?,
+        sweep: any(py, found.sweep.as_ref())?,
+        ..Analysis::from(found.analysis)
+    })
+}
+
+/// A channel from 1, or "none".
+fn reference_channel(given: &Bound<'_, PyAny>) -> PyResult<ReferenceChannel> {
+    match given.extract::<usize>() {
+        Ok(channel) => Ok(ReferenceChannel::Channel(channel)),
+        Err(_) if given.extract::<String>().is_ok_and(|text| text == "none") => Ok(ReferenceChannel::None),
+        Err(_) => Err(refused("reference: give a channel, counted from 1, or \"none\"")),
+    }
+}
+
+/// All that is known of the errors of a bank.
+struct Studied {
+    analysis: design::Analysis,
+    scale: design::GammaScale,
+    certified: Option<design::Certified>,
+    study: ErrorStudy,
+    sweep: Option<Sweep>,
+}
+
+impl Studied {
+    fn new(
+        bank: &bank::Bank,
+        delay_errors: &[Seconds],
+        certify: bool,
+        questions: Questions,
+        sweep: bool,
+    ) -> Result<Self, DesignError> {
+        let study = ErrorStudy::new(bank, questions)?;
+        let swept = study.worst_case.as_ref().filter(|_| sweep);
+        let sweep = swept.map(|worst| Sweep::new(bank, &worst.errors, &worst.case.point)).transpose()?;
+        Ok(Self {
+            analysis: design::analyze(bank, delay_errors)?,
+            scale: design::GammaScale::new(bank)?,
+            certified: certify.then(|| design::certify(bank)).transpose()?,
+            study,
+            sweep,
+        })
+    }
 }
 
 /// A bank, from a path or from memory.

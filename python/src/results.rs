@@ -117,6 +117,8 @@ pub(crate) struct FuseReport {
     pub(crate) gaps: Option<Vec<(usize, u64, u64)>>,
     /// True where a missing sample affects the output; None unless gaps were filled.
     pub(crate) mask: Option<Py<PyArray1<bool>>>,
+    /// What was known of the delays, a record per measurement; None unless they were followed.
+    pub(crate) track: Option<Py<PyAny>>,
 }
 
 #[pymethods]
@@ -190,13 +192,38 @@ pub(crate) struct Analysis {
     noise_gain: f64,
     /// Rms of the output noise for the noise of the converters in the spec.
     output_noise: f64,
+    /// gamma of zero output and of plain interleaving, and the rms of the reference.
+    pub(crate) scale: Option<Py<PyAny>>,
+    /// A proven upper bound of gamma; None unless asked for, as all below.
+    pub(crate) certified: Option<Py<PyAny>>,
+    /// The worst case over the box of errors, proven from both sides.
+    pub(crate) worst_case: Option<Py<PyAny>>,
+    /// The derivatives of gamma with respect to the delays.
+    pub(crate) sensitivity: Option<Py<PyAny>>,
+    /// What jitter adds to gamma at most.
+    pub(crate) jitter: Option<Py<PyAny>>,
+    /// gamma along the delays of the box.
+    pub(crate) sweep: Option<Py<PyAny>>,
 }
 
 impl From<design::Analysis> for Analysis {
     fn from(analysis: design::Analysis) -> Self {
         let design::Analysis { gamma, peak_hertz, noncausal, mean } = analysis;
         let design::MeanAnalysis { rms_error, noise_gain, output_noise } = mean;
-        Self { gamma, peak_hertz: peak_hertz.0, noncausal, rms_error, noise_gain, output_noise }
+        Self {
+            gamma,
+            peak_hertz: peak_hertz.0,
+            noncausal,
+            rms_error,
+            noise_gain,
+            output_noise,
+            scale: None,
+            certified: None,
+            worst_case: None,
+            sensitivity: None,
+            jitter: None,
+            sweep: None,
+        }
     }
 }
 
@@ -223,4 +250,6 @@ pub(crate) struct Capture {
     pub(crate) channels: Py<PyAny>,
     /// Samples of the ideal fast converter, M T of them, in line with the output of `Bank.fuse`.
     pub(crate) target: Py<PyAny>,
+    /// Samples of each converter that were clipped at full scale.
+    pub(crate) clipped: Vec<usize>,
 }

@@ -5,7 +5,7 @@ use crate::errors::{file_error, refused, refused_in, spec_error};
 use crate::values;
 use hybank::bank;
 use hybank::files::{self, Bound as SizeBound};
-use hybank::spec::Spec;
+use hybank::spec::{DesignOverrides, Spec};
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -16,6 +16,11 @@ const TEXT_FILE: SizeBound =
 /// The spec that `source` is, names or carries: a path, a TOML text of several lines, a mapping, or a bank.
 /// A bank stands for its spec with the latency of the bank.
 pub(crate) fn spec(source: &Bound<'_, PyAny>) -> PyResult<Spec> {
+    spec_with(source, DesignOverrides::default())
+}
+
+/// The same with other keys of `[design]`, which the spec of a bank does not have.
+pub(crate) fn spec_with(source: &Bound<'_, PyAny>, keys: DesignOverrides) -> PyResult<Spec> {
     let py = source.py();
     if let Ok(bank) = source.cast::<Bank>() {
         return spec_of_bank(&bank.get().bank, "the bank");
@@ -23,16 +28,17 @@ pub(crate) fn spec(source: &Bound<'_, PyAny>) -> PyResult<Spec> {
     if let Ok(text) = source.extract::<String>()
         && text.contains('\n')
     {
-        return Spec::from_toml(&text, "spec").map_err(|error| spec_error(py, &error));
+        return Spec::from_toml_with(&text, "spec", keys).map_err(|error| spec_error(py, &error));
     }
     let Some(path) = path(source) else {
-        return Spec::from_data(values::table(source)?, "spec").map_err(|error| spec_error(py, &error));
+        let spec = Spec::from_data_with(values::table(source)?, "spec", keys);
+        return spec.map_err(|error| spec_error(py, &error));
     };
     let (text, name) = (read(&path)?, path.display().to_string());
     if path.extension().is_some_and(|extension| extension == "json") {
         return spec_of_bank(&parse_bank(&text, &name)?, &name);
     }
-    Spec::from_toml(&text, &name).map_err(|error| spec_error(py, &error))
+    Spec::from_toml_with(&text, &name, keys).map_err(|error| spec_error(py, &error))
 }
 
 fn spec_of_bank(bank: &bank::Bank, name: &str) -> PyResult<Spec> {

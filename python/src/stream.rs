@@ -4,12 +4,14 @@ use crate::arrays::{Held, Shape, framed};
 use crate::bank::Bank as PyBank;
 use crate::errors::refused;
 use crate::formats::{Format, Number};
-use crate::fuse::{parse_algorithm, plan};
+use crate::fuse::{marks, parse_algorithm, plan};
 use crate::outputs::NewArray;
+use crate::running::{Extras, Outputs, Running, Tracks};
 use crate::samples::{Room, Samples};
 use hybank::bank::Bank;
-use hybank::pipeline::Settings;
-use hybank::runtime::{self, Output, Plan, ProcessError, STATE_COUNTS, StateError};
+use hybank::pipeline::{DroppedLatency, PipelineError};
+use hybank::runtime::{self, Algorithm, Output, PcmFrames, Plan, ProcessError, STATE_COUNTS, StateError};
+use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
 use std::fmt;
@@ -26,6 +28,7 @@ pub(crate) struct Stream {
     plan: Plan,
     shape: Shape,
     format: Format,
+    extras: Extras,
     state: Mutex<State>,
 }
 
@@ -33,12 +36,17 @@ pub(crate) struct Stream {
 type Reduced<'py> =
     (Bound<'py, PyAny>, (Bound<'py, PyBank>, isize, &'static str, String, Bound<'py, PyBytes>, bool));
 
-#[derive(Clone)]
 struct State {
-    /// One for real samples, two for the parts of complex ones.
-    streams: Vec<runtime::Stream>,
-    clipped: u64,
+    runs: Runs,
     closed: bool,
+}
+
+/// How frames are filtered.
+enum Runs {
+    /// By one stream for real samples, by two for the parts of complex ones.
+    Streams { streams: Vec<runtime::Stream>, clipped: u64 },
+    /// With gaps that are filled, or filters that follow the delays.
+    Running { running: Box<Running>, mask: Vec<u8> },
 }
 
 impl Stream {
@@ -47,23 +55,24 @@ impl Stream {
         axis: isize,
         dtype: Option<&Bound<'_, PyAny>>,
         algorithm: &str,
+        extras: Extras,
     ) -> PyResult<Self> {
         let default = Format { number: Number::F32, complex: false };
         let format = dtype.map_or(Ok(default), Format::of_dtype)?;
         let shape = Shape { axis, channels: bank.frame_samples() };
         shape.check()?;
         let algorithm_asked = parse_algorithm(algorithm)?.without_added_latency();
-        let plan = plan(bank, format, algorithm_asked, Settings::default())?;
-        let streams = vec![runtime::Stream::new(&plan); 1 + usize::from(format.complex)];
-        let state = Mutex::new(State { streams, clipped: 0, closed: false });
-        Ok(Self { bank: Arc::clone(bank), asked: algorithm.to_owned(), plan, shape, format, state })
+        let plan = plan(bank, format, algorithm_asked, extras.settings())?;
+        let runs = Runs::new(bank, &plan, format, algorithm_asked, &extras)?;
+        let state = Mutex::new(State { runs, closed: false });
+        Ok(Self { bank: Arc::clone(bank), asked: algorithm.to_owned(), plan, shape, format, extras, state })
     }
 
     /// The same stream at the place of a state, if one is given.
     pub(crate) fn resumed(self, state: Option<&[u8]>) -> PyResult<Self> {
         if let Some(bytes) = state {
             let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-            state.resume(bytes).map_err(refused)?;
+            state.runs.resume(bytes)?;
         }
         Ok(self)
     }
@@ -73,18 +82,47 @@ impl Stream {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn read<T: Send>(&self, py: Python<'_>, of: impl FnOnce(&State) -> T + Send) -> T {
-        py.detach(|| of(&self.lock()))
+    fn read<T: Send>(&self, py: Python<'_>, of: impl FnOnce(&Runs) -> T + Send) -> T {
+        py.detach(|| of(&self.lock().runs))
+    }
+
+    /// The outputs that a run has collected.
+    fn collected<'py>(&self, py: Python<'py>, outputs: Outputs) -> PyResult<Bound<'py, PyAny>> {
+        if let Some(tracks) = self.read(py, Runs::tracks) {
+            tracks.warn(py)?;
+        }
+        PyArray1::from_vec(py, outputs.samples).call_method1("view", (self.format.name(),))
     }
 }
 
 #[pymethods]
 impl Stream {
-    /// Filters a block of frames; M output samples for each of them.
+    /// Filters a block of frames.
+    ///
+    /// Parameters
+    /// ----------
+    /// x : array_like
+    ///     Frames along the stream's axis of time.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray
+    ///     M output samples for each frame; where delays are followed, those of the frames that are ready.
+    ///
+    /// Examples
+    /// --------
+    /// >>> s = bank.stream()
+    /// >>> s.process(np.zeros((2, 3), "f4")).shape, s.position
+    /// ((6,), 3)
     fn process<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let (frames, shape) = framed(x, &self.bank.layout(), self.shape.axis, true)?;
         let held = Held::new(&frames, shape)?;
         self.check_parts(held.format)?;
+        if self.extras.is_any() {
+            let (recordings, frames) = (held.recordings()?, held.frames());
+            let outputs = x.py().detach(|| self.lock().push(&recordings, frames)).map_err(refused)?;
+            return self.collected(x.py(), outputs);
+        }
         let mut array = NewArray::new(x.py(), held.frames() * self.plan.ratio(), self.format)?;
         let (parts, mut room) = (held.parts()?, array.room()?);
         x.py().detach(|| self.lock().process(&parts, &mut room)).map_err(refused)?;
@@ -92,7 +130,20 @@ impl Stream {
     }
 
     /// The last samples, by zeros for input: as many frames of them as the latency has.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray
+    ///
+    /// Examples
+    /// --------
+    /// >>> len(bank.stream().flush()) >= bank.latency
+    /// True
     fn flush<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        if self.extras.is_any() {
+            let outputs = py.detach(|| self.lock().drain()).map_err(refused)?;
+            return self.collected(py, outputs);
+        }
         let mut array = NewArray::new(py, self.plan.flush_frames() * self.plan.ratio(), self.format)?;
         let mut room = array.room()?;
         py.detach(|| self.lock().flush(&mut room)).map_err(refused)?;
@@ -100,8 +151,19 @@ impl Stream {
     }
 
     /// Back to the beginning.
-    fn reset(&self, py: Python<'_>) {
-        py.detach(|| self.lock().reset());
+    ///
+    /// Examples
+    /// --------
+    /// >>> s = bank.stream()
+    /// >>> y = s.process(np.ones((2, 3), "f4"))
+    /// >>> s.reset()
+    /// >>> bool((s.process(np.ones((2, 3), "f4")) == y).all())
+    /// True
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        let algorithm = parse_algorithm(&self.asked)?.without_added_latency();
+        let runs = Runs::new(&self.bank, &self.plan, self.format, algorithm, &self.extras)?;
+        py.detach(|| self.lock().runs = runs);
+        Ok(())
     }
 
     /// N, the samples of a frame.
@@ -144,58 +206,111 @@ impl Stream {
     /// Frames since the beginning.
     #[getter]
     fn position(&self, py: Python<'_>) -> u64 {
-        self.read(py, |state| state.streams[0].position())
+        self.read(py, |runs| match runs {
+            Runs::Streams { streams, .. } => streams[0].position(),
+            Runs::Running { running, .. } => running.frames,
+        })
     }
 
     /// Numbers of the input that were NaN or infinite and became 0.
     #[getter]
     fn replaced(&self, py: Python<'_>) -> u64 {
-        self.read(py, |state| state.streams.iter().map(runtime::Stream::replaced).sum())
+        self.read(py, |runs| match runs {
+            Runs::Streams { streams, .. } => streams.iter().map(runtime::Stream::replaced).sum(),
+            Runs::Running { running, .. } => running.replaced(),
+        })
     }
 
     /// Output samples that saturated.
     #[getter]
     fn clipped(&self, py: Python<'_>) -> u64 {
-        self.read(py, |state| state.clipped)
+        self.read(py, |runs| match runs {
+            Runs::Streams { clipped, .. } => *clipped,
+            Runs::Running { running, .. } => running.clipped(),
+        })
     }
 
     /// Times that the state of a recursion was not finite and became 0.
     #[getter]
     fn state_resets(&self, py: Python<'_>) -> u64 {
-        self.read(py, |state| state.streams.iter().map(runtime::Stream::state_resets).sum())
+        self.read(py, |runs| match runs {
+            Runs::Streams { streams, .. } => streams.iter().map(runtime::Stream::state_resets).sum(),
+            Runs::Running { running, .. } => running.state_resets(),
+        })
+    }
+
+    /// The gaps so far as (channel from 1, first sample, length); the last ones may go on. None unless gaps
+    /// are filled.
+    #[getter]
+    fn gaps(&self, py: Python<'_>) -> Option<Vec<(usize, u64, u64)>> {
+        self.extras.gaps?;
+        self.read(py, |runs| match runs {
+            Runs::Streams { .. } => None,
+            Runs::Running { running, .. } => {
+                Some(running.gaps().iter().map(|gap| (gap.channel, gap.first, gap.length)).collect())
+            }
+        })
+    }
+
+    /// True where a missing sample affects the outputs of the last call. None unless gaps are filled.
+    #[getter]
+    fn mask(&self, py: Python<'_>) -> Option<Py<PyArray1<bool>>> {
+        self.extras.gaps?;
+        let mask = self.read(py, |runs| match runs {
+            Runs::Streams { .. } => Vec::new(),
+            Runs::Running { mask, .. } => mask.clone(),
+        });
+        Some(marks(py, &mask))
+    }
+
+    /// What is known of the delays, a record per measurement. None unless they are followed.
+    #[getter]
+    fn track(&self, py: Python<'_>) -> PyResult<Option<Py<PyAny>>> {
+        if self.extras.follow.is_none() {
+            return Ok(None);
+        }
+        self.read(py, Runs::tracks).map(|tracks| tracks.log(py)).transpose()
     }
 
     /// The state as bytes: `bank.stream(state=..)` goes on from there with the same bits, in any process. A
     /// stream can be pickled too, with its bank.
     #[getter]
-    fn state<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
-        PyBytes::new(py, &self.read(py, State::bytes))
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &self.read(py, Runs::bytes)?))
     }
 
     /// True if from here on this stream and one that goes on from `state` give the same bits to the same
     /// input. Counts and positions may differ.
+    ///
+    /// Parameters
+    /// ----------
+    /// state : bytes
+    ///     `Stream.state` of a stream of the same bank, dtype and algorithm.
+    ///
+    /// Returns
+    /// -------
+    /// bool
+    ///
+    /// Examples
+    /// --------
+    /// >>> s = bank.stream()
+    /// >>> s.agrees(s.state)
+    /// True
     fn agrees(&self, py: Python<'_>, state: &[u8]) -> bool {
         self.read(py, |own| own.agrees(state))
     }
 
     /// A second stream at the same place.
-    fn __copy__(&self, py: Python<'_>) -> Self {
-        let state = Mutex::new(self.read(py, State::clone));
-        let Self { bank, asked, plan, shape, format, .. } = self;
-        Self {
-            bank: Arc::clone(bank),
-            asked: asked.clone(),
-            plan: plan.clone(),
-            shape: *shape,
-            format: *format,
-            state,
-        }
+    fn __copy__(&self, py: Python<'_>) -> PyResult<Self> {
+        let (state, closed) = self.saved(py)?;
+        let dtype = self.format.name().into_pyobject(py)?;
+        Self::restored(&self.bank, self.shape.axis, &dtype, &self.asked, &state, closed)
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
         let py = slf.py();
         let Self { bank, asked, shape, format, .. } = slf.get();
-        let (state, closed) = slf.get().read(py, |state| (state.bytes(), state.closed));
+        let (state, closed) = slf.get().saved(py)?;
         let bank = PyBank { bank: Arc::clone(bank) }.into_pyobject(py)?;
         let arguments = (bank, shape.axis, format.name(), asked.clone(), PyBytes::new(py, &state), closed);
         Ok((slf.get_type().getattr("_of")?, arguments))
@@ -211,9 +326,7 @@ impl Stream {
         state: &[u8],
         closed: bool,
     ) -> PyResult<Self> {
-        let stream = Self::new(&bank.bank, axis, Some(dtype), algorithm)?.resumed(Some(state))?;
-        stream.state.lock().unwrap_or_else(PoisonError::into_inner).closed = closed;
-        Ok(stream)
+        Self::restored(&bank.bank, axis, dtype, algorithm, state, closed)
     }
 
     fn __enter__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
@@ -238,6 +351,28 @@ impl Stream {
 }
 
 impl Stream {
+    /// The state, and whether the stream is closed.
+    fn saved(&self, py: Python<'_>) -> PyResult<(Vec<u8>, bool)> {
+        py.detach(|| {
+            let state = self.lock();
+            Ok((state.runs.bytes()?, state.closed))
+        })
+    }
+
+    fn restored(
+        bank: &Arc<Bank>,
+        axis: isize,
+        dtype: &Bound<'_, PyAny>,
+        algorithm: &str,
+        state: &[u8],
+        closed: bool,
+    ) -> PyResult<Self> {
+        let stream =
+            Self::new(bank, axis, Some(dtype), algorithm, Extras::default())?.resumed(Some(state))?;
+        stream.state.lock().unwrap_or_else(PoisonError::into_inner).closed = closed;
+        Ok(stream)
+    }
+
     fn check_parts(&self, given: Format) -> PyResult<()> {
         match (given.complex, self.format.complex) {
             (true, false) => Err(refused(
@@ -254,61 +389,52 @@ impl Stream {
 impl State {
     fn process(&mut self, parts: &[Samples<'_>], room: &mut Room<'_>) -> Result<(), StreamError> {
         self.check_open()?;
-        for (i, (stream, part)) in self.streams.iter_mut().zip(parts).enumerate() {
+        let Runs::Streams { streams, clipped } = &mut self.runs else { return Ok(()) };
+        for (i, (stream, part)) in streams.iter_mut().zip(parts).enumerate() {
             if parts.len() > 1 {
                 room.select(i);
             }
             stream.run(part, room)?;
         }
-        self.clipped += room.clipped();
+        *clipped += room.clipped();
         Ok(())
     }
 
     fn flush(&mut self, room: &mut Room<'_>) -> Result<(), StreamError> {
         self.check_open()?;
-        let is_complex = self.streams.len() > 1;
-        for (part, stream) in self.streams.iter_mut().enumerate() {
+        let Runs::Streams { streams, clipped } = &mut self.runs else { return Ok(()) };
+        let is_complex = streams.len() > 1;
+        for (part, stream) in streams.iter_mut().enumerate() {
             if is_complex {
                 room.select(part);
             }
             stream.flush(room)?;
         }
-        self.clipped += room.clipped();
+        *clipped += room.clipped();
         Ok(())
     }
 
-    fn reset(&mut self) {
-        self.streams.iter_mut().for_each(runtime::Stream::reset);
-        self.clipped = 0;
+    /// Of a stream that fills gaps or follows delays.
+    fn push(&mut self, recordings: &[PcmFrames<'_>], frames: usize) -> Result<Outputs, StreamError> {
+        self.run(|running| running.push(recordings, frames))
     }
 
-    /// The count of saturated samples, then the state of each part, all of one length.
-    fn bytes(&self) -> Vec<u8> {
-        let mut bytes = self.clipped.to_le_bytes().to_vec();
-        self.streams.iter().for_each(|stream| stream.save(&mut bytes));
-        bytes
+    fn drain(&mut self) -> Result<Outputs, StreamError> {
+        self.run(Running::drain)
     }
 
-    fn parts<'a>(&self, bytes: &'a [u8]) -> Option<(u64, Vec<&'a [u8]>)> {
-        let (clipped, states) = bytes.split_first_chunk()?;
-        let parts = self.streams.len();
-        let is_whole = !states.is_empty() && states.len() % parts == 0;
-        is_whole.then(|| (u64::from_le_bytes(*clipped), states.chunks_exact(states.len() / parts).collect()))
-    }
-
-    fn resume(&mut self, bytes: &[u8]) -> Result<(), StateError> {
-        let (clipped, states) = self.parts(bytes).ok_or(StateError::NotAState)?;
-        let mut streams = self.streams.clone();
-        streams.iter_mut().zip(states).try_for_each(|(stream, state)| stream.resume(state))?;
-        (self.streams, self.clipped) = (streams, clipped);
-        Ok(())
-    }
-
-    fn agrees(&self, bytes: &[u8]) -> bool {
-        let same = |(stream, state): (&runtime::Stream, &[u8])| {
-            stream.state().get(STATE_COUNTS..) == state.get(STATE_COUNTS..)
+    fn run(
+        &mut self,
+        step: impl FnOnce(&mut Running) -> Result<(), PipelineError>,
+    ) -> Result<Outputs, StreamError> {
+        self.check_open()?;
+        let Runs::Running { running, mask } = &mut self.runs else {
+            return Ok(Outputs { samples: Vec::new(), mask: Vec::new() });
         };
-        self.parts(bytes).is_some_and(|(_, states)| self.streams.iter().zip(states).all(same))
+        step(running)?;
+        let mut outputs = running.take();
+        *mask = std::mem::take(&mut outputs.mask);
+        Ok(outputs)
     }
 
     fn check_open(&self) -> Result<(), StreamError> {
@@ -316,15 +442,83 @@ impl State {
     }
 }
 
+impl Runs {
+    fn new(
+        bank: &Bank,
+        plan: &Plan,
+        format: Format,
+        algorithm: Algorithm,
+        extras: &Extras,
+    ) -> PyResult<Self> {
+        if !extras.is_any() {
+            let streams = vec![runtime::Stream::new(plan); 1 + usize::from(format.complex)];
+            return Ok(Self::Streams { streams, clipped: 0 });
+        }
+        let running = Running::new(bank, format, algorithm, extras, DroppedLatency::Nothing)?;
+        Ok(Self::Running { running: Box::new(running), mask: Vec::new() })
+    }
+
+    fn tracks(&self) -> Option<Tracks> {
+        if let Self::Running { running, .. } = self { Some(running.tracks()) } else { None }
+    }
+
+    /// The count of saturated samples, then the state of each part, all of one length.
+    fn bytes(&self) -> PyResult<Vec<u8>> {
+        let Self::Streams { streams, clipped } = self else { return Err(stateless()) };
+        let mut bytes = clipped.to_le_bytes().to_vec();
+        streams.iter().for_each(|stream| stream.save(&mut bytes));
+        Ok(bytes)
+    }
+
+    fn resume(&mut self, bytes: &[u8]) -> PyResult<()> {
+        let Self::Streams { streams, clipped } = self else { return Err(stateless()) };
+        let parts = parts(streams.len(), bytes).ok_or(StateError::NotAState);
+        let (count, states) = parts.map_err(refused)?;
+        let mut resumed = streams.clone();
+        let mut pairs = resumed.iter_mut().zip(states);
+        pairs.try_for_each(|(stream, state)| stream.resume(state)).map_err(refused)?;
+        (*streams, *clipped) = (resumed, count);
+        Ok(())
+    }
+
+    fn agrees(&self, bytes: &[u8]) -> bool {
+        let Self::Streams { streams, .. } = self else { return false };
+        let same = |(stream, state): (&runtime::Stream, &[u8])| {
+            stream.state().get(STATE_COUNTS..) == state.get(STATE_COUNTS..)
+        };
+        parts(streams.len(), bytes).is_some_and(|(_, states)| streams.iter().zip(states).all(same))
+    }
+}
+
+/// The count and the states in the bytes of a state of so many parts.
+fn parts(count: usize, bytes: &[u8]) -> Option<(u64, Vec<&[u8]>)> {
+    let (clipped, states) = bytes.split_first_chunk()?;
+    let is_whole = !states.is_empty() && states.len() % count == 0;
+    is_whole.then(|| (u64::from_le_bytes(*clipped), states.chunks_exact(states.len() / count).collect()))
+}
+
+fn stateless() -> PyErr {
+    refused(
+        "a stream that fills gaps or follows delays cannot be copied, pickled or resumed; begin another one",
+    )
+}
+
 /// Why a stream takes no samples.
 enum StreamError {
     Closed,
     Process(ProcessError),
+    Run(PipelineError),
 }
 
 impl From<ProcessError> for StreamError {
     fn from(error: ProcessError) -> Self {
         Self::Process(error)
+    }
+}
+
+impl From<PipelineError> for StreamError {
+    fn from(error: PipelineError) -> Self {
+        Self::Run(error)
     }
 }
 
@@ -335,6 +529,7 @@ impl fmt::Display for StreamError {
                 f.write_str("the stream was closed at the end of its with block; make another one")
             }
             Self::Process(error) => error.fmt(f),
+            Self::Run(error) => error.fmt(f),
         }
     }
 }

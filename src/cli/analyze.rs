@@ -1,19 +1,19 @@
 //! `hybank analyze`: the error of a bank, with its own delays or with others.
 
-use super::bank_file::{bad_flag, load};
+use super::bank_file::load;
 use super::design_report::{against, figure_text};
 use super::design_studies::number;
 use super::print::{Failure, InFile, is_dash, show};
-use super::worst_case::{self, Questions, Sweep};
+use super::worst_case::{self, write_sweep};
 use super::written::check_outputs;
-use crate::bank::Bank;
+use crate::design::uncertainty::{
+    BoxRule, BoxWidths, ErrorStudy, Questions, ReferenceChannel, RefusedBox, Sweep,
+};
 use crate::design::{self, Analysis, Certified, GammaScale, MeanAnalysis};
 use crate::figures::Figures;
 use crate::overview::{decibels, frequency, six_digits, understood};
 use crate::quantity::{self, Time};
-use crate::spec::check_delay_half_width;
 use crate::units::Seconds;
-use crate::verify::uncertainty::ErrorBox;
 use std::path::PathBuf;
 
 /// Computes the gamma of a bank, with the delays of its spec or with others
@@ -82,15 +82,16 @@ fn finite(text: &str) -> Result<Seconds, String> {
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check()?;
     let bank = load(&args.bank)?;
-    let errors = args.errors.is_given().then_some(args.errors.error_box(&bank)?);
-    let jitter = of_channels("--jitter", &in_seconds(&args.errors.jitter, &bank), bank.channel_count())?;
-    let jitter = (!args.errors.jitter.is_empty()).then_some(jitter);
+    let widths = args.errors.widths();
+    let errors = widths.error_box(&bank).map_err(|refused| bad_box(&refused))?;
+    let jitter = widths.jitter_of(&bank).map_err(|refused| bad_box(&refused))?;
     let questions = Questions { errors, jitter, sensitivity: args.sensitivity, loss: args.accuracy };
     let analysis = design::analyze(&bank, &args.delay_error).in_file(&args.bank)?;
     let certified = args.certify.then(|| design::certify(&bank)).transpose().in_file(&args.bank)?;
-    let errors = worst_case::Report::new(&bank, questions).in_file(&args.bank)?;
-    if let Some((path, (errors, case))) = args.sweep.as_ref().zip(errors.case()) {
-        Sweep::new(&bank, errors, &case.point).in_file(&args.bank)?.write(path, args.force)?;
+    let errors = ErrorStudy::new(&bank, questions).in_file(&args.bank)?;
+    if let Some((path, worst)) = args.sweep.as_ref().zip(errors.worst_case.as_ref()) {
+        let sweep = Sweep::new(&bank, &worst.errors, &worst.case.point).in_file(&args.bank)?;
+        write_sweep(&sweep, path, args.force)?;
         // The table alone, so that a program can read it.
         if is_dash(path) {
             return Ok(());
@@ -148,7 +149,7 @@ struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     figures: Option<Figures>,
     #[serde(flatten)]
-    errors: worst_case::Report,
+    errors: ErrorStudy,
 }
 
 impl Report {
@@ -193,7 +194,7 @@ impl Report {
             } else {
                 format!("{output_noise:.6e}  of full scale, for the converters' noise in the spec")
             },
-            self.errors.text()
+            worst_case::text(&self.errors)
         )
     }
 }
@@ -203,55 +204,42 @@ impl Report {
 struct Flags {
     /// Prove the worst case over delays that are off by up to this much (10ps, 0.01samples, or seconds): one
     /// value for all channels but the reference, or one per channel
-    #[arg(long, value_delimiter = ',', value_parser = time)]
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::time)]
     delay_box: Vec<Time>,
     /// Also gains that are off by up to this share (1%, 500ppm, 0.01); values as for --delay-box
-    #[arg(long, value_delimiter = ',', value_parser = share)]
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
     gain_box: Vec<f64>,
     /// Also cut-offs that are off by up to this share; values as for --delay-box
-    #[arg(long, value_delimiter = ',', value_parser = share)]
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
     cutoff_box: Vec<f64>,
     /// Also bound what instants that jitter by up to this much may add: one value, or one per channel
-    #[arg(long, value_delimiter = ',', value_parser = time)]
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::time)]
     jitter: Vec<Time>,
     /// The channel to which delays, gains and cut-offs are relative, from 1, or none if every channel has an
     /// error of its own [default: 1 where one value is given for all channels]
     #[arg(long, value_name = "CHANNEL|none", value_parser = reference)]
-    reference: Option<Reference>,
+    reference: Option<ReferenceChannel>,
 }
 
-/// The reference channel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Reference {
-    None,
-    /// From 1.
-    Channel(usize),
-}
-
-fn reference(text: &str) -> Result<Reference, String> {
+fn reference(text: &str) -> Result<ReferenceChannel, String> {
     match text.trim() {
-        "none" => Ok(Reference::None),
+        "none" => Ok(ReferenceChannel::None),
         text => match text.parse::<usize>() {
-            Ok(channel) if channel > 0 => Ok(Reference::Channel(channel)),
+            Ok(channel) if channel > 0 => Ok(ReferenceChannel::Channel(channel)),
             _ => Err("the reference is a channel, counted from 1, or none".to_owned()),
         },
     }
 }
 
-fn time(text: &str) -> Result<Time, String> {
-    let time = quantity::time(text).map_err(|error| error.to_string())?;
-    if time.in_seconds(Seconds(1.0)).0 >= 0.0 { Ok(time) } else { Err(NEGATIVE.to_owned()) }
-}
-
-fn share(text: &str) -> Result<f64, String> {
-    match quantity::relative(text).map_err(|error| error.to_string())? {
-        share if (0.0..0.5).contains(&share) => Ok(share),
-        share if share < 0.0 => Err(NEGATIVE.to_owned()),
-        _ => Err("shares of 50% and more are not supported".to_owned()),
+/// A refusal, with the option that it is about.
+fn bad_box(refused: &RefusedBox) -> Failure {
+    let message = format!("--{}: {refused}", refused.field.replace('_', "-"));
+    match refused.rule {
+        BoxRule::Number(_) => Failure::Input(message),
+        BoxRule::NoChannel { channel, .. } => Failure::Usage(format!("--reference {channel}: {refused}")),
+        _ => Failure::Usage(message),
     }
 }
-
-const NEGATIVE: &str = "the box reaches as far in both directions; give the positive half-width";
 
 impl Flags {
     /// Whether a box is asked for.
@@ -259,73 +247,14 @@ impl Flags {
         !(self.delay_box.is_empty() && self.gain_box.is_empty() && self.cutoff_box.is_empty())
     }
 
-    /// The box for the channels of `bank`.
-    ///
-    /// # Errors
-    /// [`Failure::Usage`] for lists of another length and for a reference that is not there.
-    fn error_box(&self, bank: &Bank) -> Result<ErrorBox, Failure> {
-        let channels = bank.channel_count();
-        if let Some(Reference::Channel(channel)) = self.reference
-            && channel > channels
-        {
-            let message = format!(
-                "--reference {channel}: the bank has {channels} channels; give 1 to {channels}, or none"
-            );
-            return Err(Failure::Usage(message));
+    /// What is asked for.
+    fn widths(&self) -> BoxWidths {
+        BoxWidths {
+            delay_box: self.delay_box.clone(),
+            gain_box: self.gain_box.clone(),
+            cutoff_box: self.cutoff_box.clone(),
+            jitter: self.jitter.clone(),
+            reference: self.reference,
         }
-        Ok(ErrorBox {
-            delays: self.relative("--delay-box", &self.half_widths(bank)?, channels)?,
-            gains: self.relative("--gain-box", &self.gain_box, channels)?,
-            cutoffs: self.relative("--cutoff-box", &self.cutoff_box, channels)?,
-        })
-    }
-
-    /// Half-widths of the delays, by the rule for specs.
-    fn half_widths(&self, bank: &Bank) -> Result<Vec<Seconds>, Failure> {
-        let delays = in_seconds(&self.delay_box, bank);
-        let check = |delay: &Seconds| check_delay_half_width(delay.in_fast_periods(bank.fast_period), *delay);
-        delays.iter().try_for_each(check).map_err(|problem| bad_flag("delay_box", &problem))?;
-        Ok(delays)
-    }
-
-    /// Values of all channels, 0 for the reference.
-    fn relative<T: Copy + Default>(
-        &self,
-        flag: &str,
-        given: &[T],
-        channels: usize,
-    ) -> Result<Vec<T>, Failure> {
-        let exact = match self.reference {
-            Some(Reference::None) => None,
-            Some(Reference::Channel(channel)) => Some(channel - 1),
-            // A list says itself which channel is exact, and one channel alone is not relative to another.
-            None => (given.len() == 1 && channels > 1).then_some(0),
-        };
-        let mut all = of_channels(flag, given, channels)?;
-        if let Some(exact) = exact {
-            all[exact] = T::default();
-        }
-        Ok(all)
-    }
-}
-
-fn in_seconds(times: &[Time], bank: &Bank) -> Vec<Seconds> {
-    times.iter().map(|time| time.in_seconds(bank.fast_period)).collect()
-}
-
-/// One value per channel, of one for all or of a list; zeros where none is given.
-pub(super) fn of_channels<T: Copy + Default>(
-    flag: &str,
-    given: &[T],
-    channels: usize,
-) -> Result<Vec<T>, Failure> {
-    match given {
-        [] => Ok(vec![T::default(); channels]),
-        [all] => Ok(vec![*all; channels]),
-        _ if given.len() == channels => Ok(given.to_vec()),
-        _ => Err(Failure::Usage(format!(
-            "{flag}: {} values are given for {channels} channels; give one for each, or one for all",
-            given.len()
-        ))),
     }
 }

@@ -1,6 +1,6 @@
 //! `fuse --bit-true`: integer taps on the integers of the captures, as hardware has them.
 
-use super::before_after::BeforeAfter;
+use super::before_after;
 use super::output::{Bits, begin_samples};
 use super::print::{Failure, name, print, warn};
 use super::run::{Job, each_block, interrupted, print_report};
@@ -9,6 +9,7 @@ use crate::files::commit_all;
 use crate::interchange::{BitTrue, WordSizes};
 use crate::io::{Container, MultiReader, OutputHeader, PcmFormat, PcmFrames, SampleWriter};
 use crate::messages::Quoted;
+use crate::overview::BeforeAfter;
 use crate::pipeline::DroppedLatency;
 use crate::runtime::{Input, Isa};
 
@@ -95,7 +96,7 @@ impl BitTrueArgs {
         report.measure = measured()?;
         match &report.measure {
             _ if job.args.json => print_report(&report, job.output),
-            Some(figures) => print(&figures.text()),
+            Some(figures) => print(&before_after::text(figures)),
             None => Ok(()),
         }
     }

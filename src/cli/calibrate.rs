@@ -3,10 +3,10 @@
 use super::bank_file::{bad_flag, parse_spec, read_kind};
 use super::calibrate_report::Report;
 use super::capture_args::{CaptureArgs, InterleavedArgs};
-use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, Whole, rails_of, start};
+use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, rails_of, start, unread};
 use super::file_kind::FileKind;
 use super::interrupt::interrupts;
-use super::match_bank::{channels_of_raw, check_stdin, samples_per_frame};
+use super::match_bank::check_stdin;
 use super::measure::{ToneArg, tone, tones};
 use super::print::{Failure, is_dash, say_understood, warn};
 use super::remedy::explained;
@@ -15,8 +15,9 @@ use crate::calibrate::{
     Acquisition, CalibrateError, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning,
     applied, calibrate_pooled,
 };
-use crate::io::{MultiReader, ReadOptions};
+use crate::io::{MultiReader, ReadOptions, Whole};
 use crate::messages::{Number, Quoted};
+use crate::pipeline::matching::{channels_of_raw, samples_per_frame};
 use crate::spec::{DesignOverrides, Spec};
 use crate::units::{FastPeriods, Hertz};
 use std::path::{Path, PathBuf};
@@ -265,7 +266,7 @@ impl Args {
         });
         let rails: Vec<_> = rails.collect();
         let name = reader.headers().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
-        let Whole { channels, is_cut } = Whole::read_parts(&mut reader, most)?;
+        let Whole { channels, is_cut } = Whole::read_parts(&mut reader, most).map_err(unread)?;
         warnings.extend(reader.warnings().iter().map(ToString::to_string));
         if is_cut {
             warnings.push(format!("{}: only the first {most} frames are used", Quoted(&name)));

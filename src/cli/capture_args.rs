@@ -5,6 +5,7 @@ use super::print::Failure;
 use crate::bank::{Bank, FrameLayout};
 use crate::io::{Coding, MultiReader, ReadOptions, TimeInterleaving};
 use crate::messages::Quoted;
+use crate::pipeline::matching::{self, NotInTurn};
 use crate::quantity::{self, FullScale};
 use crate::units::FastPeriods;
 use std::path::Path;
@@ -178,32 +179,10 @@ impl InterleavedArgs {
         path: &Path,
     ) -> Result<Option<TimeInterleaving>, Failure> {
         let Some(converters) = self.interleaved else { return Ok(None) };
-        if !layout.is_plain() {
-            return Err(Failure::Usage(format!(
-                "--interleaved: the converters of {} have rates of their own, so they do not sample in turn; give one \
-                 recording per converter",
-                Quoted(path)
-            )));
-        }
-        let (channels, ratio) = (delays.len(), layout.ratio());
-        if channels != usize::from(converters) {
-            return Err(Failure::Usage(format!(
-                "--interleaved {converters}: {} has {channels} channels, and each of them is one converter; \
-                 give --interleaved {channels}",
-                Quoted(path)
-            )));
-        }
-        let delays: Vec<f64> = delays.iter().map(|delay| delay.0).collect();
-        let extreme = |of: fn(f64, f64) -> f64| delays.iter().copied().reduce(of).unwrap_or(0.0);
-        let apart = extreme(f64::max) - extreme(f64::min);
-        if apart >= ratio as f64 {
-            return Err(Failure::Input(format!(
-                "{}: the delays lie {apart} fast periods apart, so converters with a slow period of {} do not \
-                 sample in turn; give one recording per channel",
-                Quoted(path),
-                ratio
-            )));
-        }
-        Ok(Some(TimeInterleaving::by_delay(&delays)))
+        let found = matching::turns(converters.into(), delays, layout);
+        found.map(Some).map_err(|problem| match problem {
+            NotInTurn::Apart { .. } => Failure::of(path, problem),
+            _ => Failure::Usage(format!("--interleaved {converters}: {}: {problem}", Quoted(path))),
+        })
     }
 }

@@ -3,8 +3,8 @@
 use super::capture_args::check_scale;
 use super::file_kind::unreadable;
 use super::print::{Failure, is_dash, name, warn};
-use crate::io::{Arrival, MultiReader, PcmFrames, ReadOptions};
-use crate::memory::available_memory;
+use crate::io::{MultiReader, ReadOptions, Whole, WholeError};
+use crate::measure::{Spectrum, Window};
 use crate::messages::Quoted;
 use crate::units::Hertz;
 use crossbeam_channel::Receiver;
@@ -12,9 +12,6 @@ use std::path::{Path, PathBuf};
 
 /// Samples that a measurement reads at most: the spectra of more take several gigabytes.
 pub(super) const MOST_MEASURED: usize = 1 << 26;
-
-/// Bytes of work memory for each sample of a recording: the sample, its spectrum and a copy of both.
-const WORK_BYTES: f64 = 64.0;
 
 /// One channel of a recording.
 #[derive(Debug, Clone)]
@@ -61,7 +58,7 @@ impl CaptureFile {
     fn read_with(
         path: &Path,
         reading: Reading,
-        whole: fn(&mut MultiReader, usize) -> Result<Whole, Failure>,
+        whole: fn(&mut MultiReader, usize) -> Result<Whole, WholeError>,
     ) -> Result<Self, Failure> {
         let mut reader = start(&[path.to_owned()], reading.options, crossbeam_channel::never())?;
         check_scale(reading.options.full_scale, &reader)?;
@@ -79,7 +76,7 @@ impl CaptureFile {
             Failure::of(path, message)
         })?;
         let rails = header.and_then(|header| header.rails);
-        let Whole { channels, is_cut } = whole(&mut reader, reading.most)?;
+        let Whole { channels, is_cut } = whole(&mut reader, reading.most).map_err(unread)?;
         reader.warnings().iter().for_each(|warning| warn(&warning.to_string()));
         let mut parts = channels.into_iter();
         let (samples, imaginary) = (parts.next().unwrap_or_default(), parts.next());
@@ -90,6 +87,12 @@ impl CaptureFile {
             warn(&format!("{}: only the first {} samples are used", Quoted(name(path)), samples.len()));
         }
         Ok(Self { samples, imaginary, rate, rails })
+    }
+
+    /// The spectrum; what is not finite counts as 0.
+    pub(super) fn spectrum(&self, window: Window) -> Spectrum {
+        let finite: Vec<f64> = self.samples.iter().map(|x| if x.is_finite() { *x } else { 0.0 }).collect();
+        Spectrum::new(&finite, self.rate, window)
     }
 
     /// Refuses samples that are not finite.
@@ -150,85 +153,17 @@ pub(super) fn start(
     MultiReader::start(inputs, options, stop).map_err(unreadable)?.ok_or_else(interrupted)
 }
 
-/// All channels of a reader; of complex samples each part is a channel.
-#[derive(Debug)]
-pub(super) struct Whole {
-    /// Lost samples are NaN.
-    pub(super) channels: Vec<Vec<f64>>,
-    /// There are more samples, which were not read.
-    pub(super) is_cut: bool,
-}
-
-impl Whole {
-    /// At most `most` samples of each channel; real ones only.
-    pub(super) fn read(reader: &mut MultiReader, most: usize) -> Result<Self, Failure> {
-        if let Some((input, _)) = reader.headers().find(|(_, header)| header.is_complex) {
-            return Err(Failure::Input(format!(
-                "{}: complex samples, which `fuse`, `stream`, `measure` and `calibrate` take; extract the real or the imaginary part",
-                Quoted(input)
-            )));
-        }
-        Self::read_parts(reader, most)
-    }
-
-    /// At most `most` samples of each channel.
-    pub(super) fn read_parts(reader: &mut MultiReader, most: usize) -> Result<Self, Failure> {
-        let parts = if reader.is_complex() { 2 } else { 1 };
-        let mut channels = vec![Vec::new(); parts * reader.channels()];
-        let promised = reader.promised_frames().and_then(|frames| usize::try_from(frames).ok());
-        let mut checked = promised.unwrap_or_default().min(most);
-        check_memory(checked, channels.len())?;
-        loop {
-            match reader.wait().map_err(Failure::input)? {
-                Arrival::Frames(count) => {
-                    let known = channels.first().map_or(0, Vec::len);
-                    let room = most - known;
-                    if known + count > checked {
-                        checked = (checked + checked / 4).max(known + count).min(most);
-                        check_memory(checked, channels.len())?;
-                    }
-                    append(&reader.frames(), count.min(room), &mut channels);
-                    reader.consume(count);
-                    if room < count {
-                        return Ok(Self { channels, is_cut: true });
-                    }
-                }
-                Arrival::End => return Ok(Self { channels, is_cut: false }),
-                Arrival::Stopped => return Err(interrupted()),
-            }
-        }
-    }
-}
-
-/// Refuses recordings whose work memory the system does not have; it would end the process without a
-/// message.
-fn check_memory(frames: usize, channels: usize) -> Result<(), Failure> {
-    let bytes = WORK_BYTES * frames as f64 * channels as f64;
-    match available_memory() {
-        Some(memory) if bytes > memory => Err(Failure::Input(format!(
-            "{frames} frames of {channels} channels take about {:.1} GB of memory, and this process may use {:.1} GB; \
-             use a shorter part of the recording",
-            bytes / 1e9,
-            memory / 1e9
-        ))),
-        _ => Ok(()),
+/// Why samples could not be read.
+pub(super) fn unread(error: WholeError) -> Failure {
+    match error {
+        WholeError::Io(error) => Failure::input(error),
+        WholeError::Stopped => interrupted(),
+        error => Failure::input(error),
     }
 }
 
 fn interrupted() -> Failure {
     Failure::input("interrupted; nothing was written")
-}
-
-/// The first `count` frames of all parts.
-fn append(parts: &[PcmFrames<'_>], count: usize, channels: &mut [Vec<f64>]) {
-    let mut next = channels.iter_mut();
-    for part in parts {
-        let (format, container) = (part.layout.format, part.layout.container);
-        for (c, samples) in next.by_ref().take(part.channels).enumerate() {
-            let frames = part.bytes.chunks_exact(part.frame_bytes()).take(count);
-            samples.extend(frames.map(|frame| format.decode(&frame[c * container..])));
-        }
-    }
 }
 
 /// Refuses what cannot be read twice.

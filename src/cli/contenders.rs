@@ -1,11 +1,10 @@
 //! The methods that the demo compares, one of them the cubic spline through all slow samples in the order of
 //! their instants.
 
-use super::fused::fused;
 use super::print::Failure;
 use crate::bank::Bank;
 use crate::design::{self, Problem};
-use crate::pipeline::{DroppedLatency, Settings};
+use crate::pipeline::{DroppedLatency, Settings, fused};
 use crate::simulate::{Captured, interleaved};
 use crate::spec::{Method, Spec};
 use crate::units::{Decibels, FastPeriods};
@@ -90,7 +89,9 @@ pub(super) fn contend(spec: &Spec, problem: &Problem, parts: &Parts) -> Result<V
         let bank = designed(spec, method, knows_the_band)?;
         // The target is as late as the bank.
         let causal = Settings { dropped: DroppedLatency::Added, ..Settings::default() };
-        let contender = Contender::judge(name, file, parts, |channels| fused(&bank, channels, causal))?;
+        let contender = Contender::judge(name, file, parts, |channels| {
+            fused(&bank, channels, causal).map_err(Failure::running)
+        })?;
         contenders.push(Contender { gamma: bank.gamma.norm, ..contender });
     }
     let (delays, ratio, latency) = (problem.delays(), problem.ratio, problem.latency);

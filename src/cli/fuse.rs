@@ -1,7 +1,7 @@
 //! `hybank fuse`: fuses slow recordings into one fast recording.
 
 use super::bank_file;
-use super::before_after::{BeforeAfter, BeforeAfterArgs};
+use super::before_after::{self, BeforeAfterArgs};
 use super::bit_true::BitTrueArgs;
 use super::capture_args::CaptureArgs;
 use super::observer::RunObserver;
@@ -12,7 +12,7 @@ use super::run::{Finished, Job, RunArgs, RunReport, print_report};
 use crate::bank::Bank;
 use crate::io::{Container, MultiReader};
 use crate::messages::Quoted;
-use crate::overview::counted;
+use crate::overview::{BeforeAfter, counted};
 use crate::pipeline::DroppedLatency;
 use crate::quantity::readable;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -99,7 +99,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 impl Report<'_> {
     /// The figures of --measure; what was written, and whether the captures agree with the bank.
     fn text(&self, output: &Path) -> String {
-        let figures = self.measure.as_ref().map_or_else(String::new, BeforeAfter::text);
+        let figures = self.measure.as_ref().map_or_else(String::new, before_after::text);
         let (samples, clipped) = (counted(self.run.samples, "sample"), self.run.clipped);
         let rate = self.rate as f64;
         let length = readable(self.run.samples as f64 / rate, "s");
@@ -171,7 +171,7 @@ impl Args {
     fn start_reader(&self, job: &Job<'_>, observer: Option<&RunObserver>) -> Result<MultiReader, Failure> {
         let captures = self.reading.options(
             self.inputs.len(),
-            super::match_bank::channels_of_raw(&job.bank.layout(), self.inputs.len()),
+            crate::pipeline::matching::channels_of_raw(&job.bank.layout(), self.inputs.len()),
         );
         job.start_reader(&self.inputs, captures, observer)
     }

@@ -6,11 +6,11 @@ use super::match_bank::check_stdin;
 use super::measure_report::{ReferenceReport, Report, warnings};
 use super::plot::PictureFormat;
 use super::print::{Failure, InFile, is_dash, name, show, warn};
-use super::spur_chart::chart;
 use super::written::{check_outputs, write_bytes};
 use crate::io::is_same_rate;
 use crate::measure::{MeasureError, Measurement, Settings, Window, compare, measure, measure_complex};
 use crate::messages::Quoted;
+use crate::overview::{Drawn, spur_chart};
 use crate::quantity;
 use crate::units::Hertz;
 use std::path::{Path, PathBuf};
@@ -122,7 +122,9 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let warnings = measurement.as_ref().map(warnings).unwrap_or_default();
     let report = Report { file: name(&args.file), measurement, reference, warnings };
     if let Some(path) = &args.plot {
-        let (chart, marks) = chart(&report, &settings, &capture);
+        let comparison = report.reference.as_ref().map(|of| (of.file.as_str(), &of.comparison));
+        let drawn = Drawn { label: &report.file, measurement: report.measurement.as_ref(), comparison };
+        let (chart, marks) = spur_chart(drawn, &settings, || capture.spectrum(settings.window));
         let format = PictureFormat::of(path).unwrap_or(PictureFormat::Svg);
         write_bytes(path, &format.file(&chart, &marks).in_file(&args.file)?, args.force)?;
     }

@@ -2,6 +2,7 @@
 
 use crate::measure::{Comparison, Imbalance, Measurement, Quadrature, Spur};
 use crate::messages::Quoted;
+use crate::overview::{Figure, causes, column};
 use crate::quantity::readable;
 use std::fmt::Write as _;
 
@@ -25,14 +26,6 @@ pub(super) struct ReferenceReport {
     pub(super) file: String,
     #[serde(flatten)]
     pub(super) comparison: Comparison,
-}
-
-/// A figure: its name, its value, its unit and what it means.
-pub(super) struct Figure {
-    pub(super) name: &'static str,
-    pub(super) value: String,
-    pub(super) unit: &'static str,
-    pub(super) meaning: String,
 }
 
 /// What the user should know beside the figures.
@@ -64,50 +57,6 @@ pub(super) fn warnings(measured: &Measurement) -> Vec<String> {
         ));
     }
     warnings
-}
-
-/// The figures of a measurement in the order of the report.
-pub(super) fn column(measured: &Measurement) -> Vec<Figure> {
-    let figure = |name, value: f64, digits: usize, unit, meaning: &str| Figure {
-        name,
-        value: format!("{value:.digits$}"),
-        unit,
-        meaning: meaning.to_owned(),
-    };
-    let db = |name, value: f64, meaning| figure(name, value, 2, "dB", meaning);
-    let mut figures = vec![
-        db("SINAD", measured.sinad.0, "tone over all else, from the residual of the sine fit"),
-        figure("ENOB", measured.enob, 3, "bits", "from SINAD: (SINAD - 1.76) / 6.02"),
-        figure(
-            "ENOB, full scale",
-            measured.enob_full_scale,
-            3,
-            "bits",
-            "of a tone of full scale in the same noise",
-        ),
-        db("SNR", measured.snr.0, "tone over noise: no harmonics, no spurs"),
-        db("THD", measured.thd.0, "harmonics over tone"),
-    ];
-    if let Some(interleaving) = measured.interleaving {
-        figures.push(db("interleaving", interleaving.0, "interleaving spurs over tone"));
-    }
-    if let Some(spur) = measured.worst_interleaving() {
-        let noise = if spur.above_noise { "" } else { ", below the noise" };
-        let meaning = format!("at {:.3}: {}{noise}", spur.frequency, causes(spur));
-        figures.push(figure("worst of these", spur.level.0, 2, "dBc", &meaning));
-    }
-    figures.push(figure("SFDR", measured.sfdr.0, 2, "dBc", "tone over the largest spur"));
-    if let Some(sfdr) = measured.sfdr_without_interleaving {
-        figures.push(figure("SFDR, converters", sfdr.0, 2, "dBc", "without interleaving spurs"));
-    }
-    figures.push(figure(
-        "noise density",
-        measured.noise_density.0,
-        2,
-        "dBFS/Hz",
-        "relative to a sine of full scale",
-    ));
-    figures
 }
 
 impl Report {
@@ -178,11 +127,6 @@ fn write_spurs(text: &mut String, measured: &Measurement) {
     if above.len() > MOST_SPURS {
         let _ = writeln!(text, "  and {} smaller ones (--json lists all)", above.len() - MOST_SPURS);
     }
-}
-
-/// All that is expected at a spur's frequency.
-pub(super) fn causes(spur: &Spur) -> String {
-    spur.causes.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
 }
 
 /// Six digits after the point; a zero has no sign.

@@ -17,6 +17,7 @@ use crate::io::{
     Arrival, BLOCK_BYTES, Container, MultiReader, OutputHeader, OutputNotes, PcmFormat, PcmFrames, Placement,
     ReadOptions, is_sigmf,
 };
+use crate::pipeline::matching;
 use crate::pipeline::{DroppedLatency, FileOutputs, GapSummary, Outcome, Pipeline, Settings, Warning};
 use crate::runtime::{Algorithm, Input, Options, Plan, PlanSummary, ThreadPool};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -169,7 +170,7 @@ impl Job<'_> {
         let files = ReadOptions {
             block_bytes,
             interleaving: turns.as_ref(),
-            samples_per_frame: match_bank::samples_per_frame(&layout, inputs.len()),
+            samples_per_frame: matching::samples_per_frame(&layout, inputs.len()),
             stalls: stalls.as_ref(),
             full_scale: self.scale.given().or(stated),
             ..captures
@@ -199,8 +200,7 @@ impl Job<'_> {
 
     /// The rate of the output in hertz, if the inputs fit the bank.
     pub(super) fn output_rate(&self, reader: &MultiReader) -> Result<f64, Failure> {
-        match_bank::check_channels(self.bank, self.bank_path, reader)?;
-        match_bank::output_rate(self.bank, reader)
+        match_bank::output_rate(self.bank, self.bank_path, reader)
     }
 
     /// Fuses all frames and writes the outputs; `each` is told how many frames a step had.

@@ -2,7 +2,7 @@
 
 use super::bank_file::load_spec_or_bank;
 use super::print::{Failure, InFile, show, warn};
-use super::virtual_converters::{CommonReport, ConverterArgs, ConverterReport, Converters};
+use super::virtual_converters::{CommonReport, ConverterArgs, ConverterReport, bad_error};
 use super::virtual_signal::{Signal, SignalArgs};
 use super::written::{Mono, begin_recording, check_outputs, write_together};
 use crate::design::Problem;
@@ -10,7 +10,7 @@ use crate::io::{Container, PcmFormat, SampleWriter, is_same_rate};
 use crate::messages::Quoted;
 use crate::overview::{counted, understood};
 use crate::quantity::readable;
-use crate::simulate::{Converter, target};
+use crate::simulate::Converter;
 use crate::spec::{ChannelSpec, Spec};
 use crate::units::Hertz;
 use std::path::PathBuf;
@@ -99,20 +99,23 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let spec = load_spec_or_bank(&args.spec)?.for_outputs(&[])?;
     // The converters do not know what the spec says of the signal. Without latency the target lies on the
     // time axis of the output of `fuse`.
-    let truth = args.converters.true_spec(&spec)?;
+    let errors = args.converters.errors();
+    let truth = errors.true_spec(&spec).map_err(|refused| bad_error(&refused))?;
     let problem = Problem::new(&Spec { signal: None, ..truth }, spec.wait()).in_file(&args.spec)?;
     let signal = Signal::read(&args.signal, &spec)?;
     let kind = args.kind(signal.is_complex())?;
     let (rates, mut warnings) = Rates::of(&spec, kind).in_file(&args.spec)?;
     warnings.extend(signal.warning(&spec));
-    let Converters { common, each } = args.converters.converters(&spec, signal.parts())?;
-    let frames = signal.frames(&problem, args.samples, args.converters.is_jittered())?;
+    let converters = errors.converters(&spec, signal.analog.parts());
+    let converters = converters.map_err(|refused| bad_error(&refused))?;
+    let frames = signal.frames(&problem, args.samples, errors.is_jittered())?;
     let outputs = args.outputs(kind, signal.is_complex(), &rates);
     args.check_outputs(&outputs)?;
-    let (converters, mut reports): (Vec<_>, Vec<_>) = each.into_iter().unzip();
+    let reports = spec.channels.iter().zip(&converters);
+    let mut reports: Vec<_> = reports.map(|(of, each)| ConverterReport::new(of, &each.errors)).collect();
     let run = Run { args, problem: &problem, signal: &signal, frames };
     let captures = converters.iter().zip(&mut reports).enumerate();
-    let captures = captures.map(|(i, (converter, report))| run.capture(i, converter, &mut report.clipped));
+    let captures = captures.map(|(i, (each, report))| run.capture(i, &each.converter, &mut report.clipped));
     let recordings = outputs.iter().zip(captures.chain(std::iter::once_with(|| run.target())));
     run.write(recordings, kind.container())?;
     let files: Vec<String> = outputs.iter().map(|output| output.path.display().to_string()).collect();
@@ -129,7 +132,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         slow_rate: rates.shown(),
         fast_rate: number(rates.fast),
         latency: spec.latency,
-        common,
+        common: args.converters.common(&spec),
         converters: reports,
         warnings,
     };
@@ -160,22 +163,13 @@ impl Run<'_> {
     /// The samples of channel `i`, and how many of their parts `clipped`.
     fn capture(&self, i: usize, converter: &Converter, clipped: &mut usize) -> Parts {
         let Self { problem, signal, frames, .. } = *self;
-        let level = self.args.gain;
-        let real = converter.capture(problem, i, &signal.real, level, frames);
-        let imaginary = signal.imaginary.as_ref();
-        let imaginary =
-            imaginary.map(|signal| converter.capture_imaginary(problem, i, signal, level, frames));
+        let (real, imaginary) = signal.analog.captured(problem, i, converter, self.args.gain, frames);
         *clipped = real.clipped + imaginary.as_ref().map_or(0, |imaginary| imaginary.clipped);
         (real.samples, imaginary.map(|imaginary| imaginary.samples))
     }
 
     fn target(&self) -> Parts {
-        let amplified = |analog| {
-            let mut samples = target(self.problem, analog, self.frames);
-            samples.iter_mut().for_each(|x| *x *= self.args.gain);
-            samples
-        };
-        (amplified(&self.signal.real), self.signal.imaginary.as_ref().map(amplified))
+        self.signal.analog.target(self.problem, self.args.gain, self.frames)
     }
 
     /// All files appear together or not at all.

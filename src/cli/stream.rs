@@ -137,7 +137,7 @@ impl Args {
 
     /// Channels of each raw input.
     fn channels_of_each(&self, inputs: &[PathBuf], bank: &Bank) -> usize {
-        let usual = super::match_bank::channels_of_raw(&bank.layout(), inputs.len());
+        let usual = crate::pipeline::matching::channels_of_raw(&bank.layout(), inputs.len());
         self.channels.map_or(usual, usize::from)
     }
 

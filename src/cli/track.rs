@@ -9,19 +9,12 @@ use crate::bank::Bank;
 use crate::files::AtomicFile;
 use crate::io::IoError;
 use crate::messages::Quoted;
-use crate::pipeline::{Change, PipelineError, Retuner};
-use crate::quantity;
-use crate::runtime::{Algorithm, Options, Stream};
-use crate::track::{self, DelaySource, DriftModel, FollowSettings, Followed, Follower, Logged, Reading};
-use crate::units::Seconds;
+use crate::pipeline::{PipelineError, Retuner};
+use crate::runtime::{Algorithm, Options};
+use crate::track::{DelaySource, Follower, Logged, Reading, TrackError, Tracking};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-/// Least frames of a measurement.
-const LEAST_FRAMES: usize = 256;
-/// The rates of clocks at the beginning, over how far they wander in a second.
-const FIRST_RATE: f64 = 100.0;
 
 /// Options of the commands that can follow delays.
 #[derive(Debug, clap::Args)]
@@ -36,10 +29,10 @@ pub(super) struct TrackArgs {
     #[arg(long, value_name = "FILE", requires = "track")]
     track_log: Option<PathBuf>,
     /// Frames of one measurement. It takes effect two measurements later
-    #[arg(long, value_name = "FRAMES", requires = "track", default_value_t = 2048)]
+    #[arg(long, value_name = "FRAMES", requires = "track", default_value_t = Tracking::default().frames)]
     track_frames: usize,
     /// By how many ppm the rate of a clock may wander in a second
-    #[arg(long, value_name = "PPM", requires = "track", default_value_t = 1.0)]
+    #[arg(long, value_name = "PPM", requires = "track", default_value_t = Tracking::default().wander)]
     track_wander: f64,
 }
 
@@ -52,13 +45,12 @@ impl TrackArgs {
             let message = "--track changes the filters at single frames, and overlap-save filters in blocks; use direct";
             return usage(message.into());
         }
-        if self.track_frames < LEAST_FRAMES {
-            return usage(format!("--track-frames {}: at least {LEAST_FRAMES}", self.track_frames));
-        }
-        let is_ppm = self.track_wander > 0.0 && self.track_wander < 1e6;
-        if !is_ppm {
-            return usage(format!("--track-wander {}: a positive number of ppm", self.track_wander));
-        }
+        let refused = |option: &str, value: &dyn std::fmt::Display, error: TrackError| {
+            Failure::Usage(format!("{option} {value}: {error}"))
+        };
+        let tracking = self.tracking();
+        tracking.check_frames().map_err(|e| refused("--track-frames", &self.track_frames, e))?;
+        tracking.check_wander().map_err(|e| refused("--track-wander", &self.track_wander, e))?;
         self.kind(text)?;
         if self.log().is_some_and(|log| log.as_os_str() == "-") {
             return usage("--track-log -: the log cannot go to standard output; give it a file".into());
@@ -71,24 +63,16 @@ impl TrackArgs {
         self.track_log.as_deref()
     }
 
+    fn tracking(&self) -> Tracking {
+        Tracking { frames: self.track_frames, wander: self.track_wander }
+    }
+
     fn kind(&self, text: &str) -> Result<Kind, Failure> {
-        let usage = |reason: &dyn std::fmt::Display| Failure::Usage(format!("--track {text}: {reason}"));
-        if text == "blind" {
-            return Ok(Kind::Source(DelaySource::AnySignal));
-        }
-        if let Some(pilot) = text.strip_prefix("pilot=") {
-            let pilot = quantity::frequency(pilot.trim()).map_err(|error| usage(&error))?;
-            let is_tone = pilot.0 > 0.0;
-            return if is_tone {
-                Ok(Kind::Source(DelaySource::Pilot(pilot)))
-            } else {
-                Err(usage(&"a pilot has a positive frequency"))
-            };
-        }
         if Path::new(text).extension().is_some_and(|extension| extension == "jsonl") {
             return Ok(Kind::File(PathBuf::from(text)));
         }
-        Err(usage(&"give pilot=F, blind, or a file whose name ends in .jsonl"))
+        let source = Tracking::source(text);
+        source.map(Kind::Source).map_err(|error| Failure::Usage(format!("--track {text}: {error}")))
     }
 
     /// Whether delays are followed.
@@ -113,16 +97,7 @@ impl TrackArgs {
                 DelaySource::Readings(Reading::parse(&text, &name, channels).map_err(Failure::input)?)
             }
         };
-        // A bank in normalised time counts in units that the recordings say.
-        let unit = if bank.fast_period == Seconds(1.0) { 1.0 / rate } else { 1.0 };
-        let wander = 1e-6 * self.track_wander;
-        let settings = FollowSettings {
-            block_frames: self.track_frames,
-            model: DriftModel { delay_walk: 0.0, rate_walk: wander * wander * unit },
-            rate_deviation: FIRST_RATE * wander,
-            rate_change: wander * unit,
-        };
-        let follower = Follower::new(bank, source, settings);
+        let follower = self.tracking().follower(bank, source, rate);
         follower.map(Some).map_err(|error| Failure::Input(format!("{}: {error}", Quoted(path))))
     }
 
@@ -159,23 +134,15 @@ impl Tracked {
     /// Starts the thread, whose filters are those of `bank` with `options`.
     pub(super) fn retuner(
         &self,
-        mut follower: Follower,
+        follower: Follower,
         bank: &Bank,
         options: Options,
     ) -> Result<Retuner, PipelineError> {
-        let (bank, mut followed) = (bank.clone(), bank.clone());
         let (record, events) = (Arc::clone(&self.record), self.events.clone());
-        Retuner::start(follower.block_frames(), &bank.offsets.clone(), move |samples| {
-            let Followed { changes, log, warnings } = follower.follow(samples);
+        follower.retuner(bank, options, move |log, warnings| {
             let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
             warnings.iter().for_each(|text| events.report(Event::Warning { text: text.clone() }));
-            locked(&record).add(&log, warnings)?;
-            let change = |change: track::Change| {
-                followed.filters = bank.filters_at(&change.errors);
-                let (frame, shifts) = (change.frame as u64, change.shifts);
-                Ok(Change { frame, stream: Stream::new(&followed.plan(options)?), shifts })
-            };
-            changes.into_iter().map(change).collect()
+            Ok(locked(&record).add(&log, warnings)?)
         })
     }
 

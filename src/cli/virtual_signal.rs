@@ -4,7 +4,7 @@ use super::capture_file::{CaptureFile, Reading};
 use super::print::Failure;
 use crate::design::Problem;
 use crate::messages::Quoted;
-use crate::simulate::{Analog, ComplexSource, MOST_SAMPLES, Recording, Source, frames};
+use crate::simulate::{self, Analog, ComplexSource, MOST_SAMPLES, Recording, Source};
 use crate::spec::Spec;
 use crate::units::FastPeriods;
 use std::path::Path;
@@ -32,14 +32,11 @@ impl SignalArgs {
 
 /// An analog signal in normalised time.
 pub(super) struct Signal {
-    pub(super) real: Analog,
-    /// The imaginary part, if the signal is complex.
-    pub(super) imaginary: Option<Analog>,
+    pub(super) analog: simulate::Signal,
     /// As it was understood.
     pub(super) text: String,
     /// As it was given.
     pub(super) given: String,
-    ratio: usize,
 }
 
 impl Signal {
@@ -47,21 +44,20 @@ impl Signal {
     pub(super) fn read(args: &SignalArgs, spec: &Spec) -> Result<Self, Failure> {
         let reader = Reader { args, spec };
         reader.check_channel()?;
-        let (real, quadrature, text) = reader.source()?;
-        let ratio = spec.ratio;
+        let (mut analog, text) = reader.source()?;
         let Some(part) = &args.imaginary else {
-            return Ok(Self { real, imaginary: quadrature, text, given: args.source.clone(), ratio });
+            return Ok(Self { analog, text, given: args.source.clone() });
         };
-        if quadrature.is_some() {
+        if analog.imaginary.is_some() {
             return Err(Failure::Usage(format!(
                 "--imaginary: the source {} has an imaginary part of its own; give one of the two",
                 Quoted(&args.source)
             )));
         }
         let (imaginary, its_text) = reader.imaginary(part)?;
+        analog.imaginary = Some(imaginary);
         let text = format!("{text}, and as imaginary part {its_text}");
-        let given = format!("{} --imaginary {part}", args.source);
-        Ok(Self { real, imaginary: Some(imaginary), text, given, ratio })
+        Ok(Self { analog, text, given: format!("{} --imaginary {part}", args.source) })
     }
 
     /// Warns of tones without a unit in a spec whose time is in seconds.
@@ -72,27 +68,18 @@ impl Signal {
     }
 
     pub(super) fn is_complex(&self) -> bool {
-        self.imaginary.is_some()
+        self.analog.imaginary.is_some()
     }
 
-    /// Real and imaginary part.
-    pub(super) fn parts(&self) -> impl Iterator<Item = &Analog> + Clone {
-        std::iter::once(&self.real).chain(&self.imaginary)
-    }
-
-    /// The frames of `samples` fast samples, or of the longer part.
+    /// As [`simulate::Signal::frames`].
     pub(super) fn frames(
         &self,
         problem: &Problem,
         samples: Option<usize>,
         jittered: bool,
     ) -> Result<usize, Failure> {
-        let usual = || self.parts().map(|part| part.usual_samples(self.ratio)).max().unwrap_or(0);
-        let samples = samples.unwrap_or_else(usual);
-        let count = |part| frames(problem, part, samples, jittered);
-        let counts = self.parts().map(count).collect::<Result<Vec<_>, _>>();
-        let counts = counts.map_err(|error| Failure::Input(format!("{}: {error}", Quoted(&self.given))))?;
-        Ok(counts.into_iter().max().unwrap_or(0))
+        let frames = self.analog.frames(problem, samples, jittered);
+        frames.map_err(|error| Failure::Input(format!("{}: {error}", Quoted(&self.given))))
     }
 }
 
@@ -116,17 +103,16 @@ impl Reader<'_> {
         }
     }
 
-    /// Both parts of the source, and its text.
-    fn source(&self) -> Result<(Analog, Option<Analog>, String), Failure> {
+    /// The source, and its text.
+    fn source(&self) -> Result<(simulate::Signal, String), Failure> {
         let text = &self.args.source;
         if is_recording(text) {
-            return Ok((self.recording(text)?, None, Quoted(text).to_string()));
+            let real = self.recording(text)?;
+            return Ok((simulate::Signal { real, imaginary: None }, Quoted(text).to_string()));
         }
         let source: ComplexSource =
             text.parse().map_err(|error| Failure::Usage(format!("--source: {error}")))?;
-        let (real, imaginary) = source.parts();
-        let imaginary = (!source.is_real()).then(|| self.known(&imaginary));
-        Ok((self.known(&real), imaginary, source.to_string()))
+        Ok((simulate::Signal::of_source(&source, self.spec.fast_period), source.to_string()))
     }
 
     fn imaginary(&self, text: &str) -> Result<(Analog, String), Failure> {
@@ -134,11 +120,7 @@ impl Reader<'_> {
             return Ok((self.recording(text)?, Quoted(text).to_string()));
         }
         let source: Source = text.parse().map_err(|error| Failure::Usage(format!("--imaginary: {error}")))?;
-        Ok((self.known(&source), source.to_string()))
-    }
-
-    fn known(&self, source: &Source) -> Analog {
-        Analog::Known(source.normalised(self.spec.fast_period))
+        Ok((Analog::Known(source.normalised(self.spec.fast_period)), source.to_string()))
     }
 
     fn recording(&self, text: &str) -> Result<Analog, Failure> {

@@ -78,6 +78,15 @@ pub fn analyze_mean(bank: &Bank) -> Result<MeanAnalysis, DesignError> {
     mean_of(bank, &LiftedPlant::new(&problem)?)
 }
 
+/// Rms of the output noise for independent noise of unit rms on all slow samples; a bank needs no front ends
+/// for that.
+///
+/// # Errors
+/// [`DesignError::RaggedStateSpace`] and [`DesignError::Lti`] for filters that are none, or unstable ones.
+pub fn noise_gain(bank: &Bank) -> Result<f64, DesignError> {
+    Ok(h2_norm(&filters::lifted(&bank.filters, bank.ratio)?)? / (bank.ratio as f64).sqrt())
+}
+
 fn mean_of(bank: &Bank, plant: &LiftedPlant) -> Result<MeanAnalysis, DesignError> {
     let filters = filters::lifted(&bank.filters, bank.ratio)?;
     let error = plant.error_system(&filters)?;

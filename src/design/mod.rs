@@ -29,7 +29,7 @@ mod unfinished;
 mod warnings;
 
 pub use analysis::{
-    Analysis, GammaScale, MeanAnalysis, NearestSample, analyze, analyze_mean, nearest_samples,
+    Analysis, GammaScale, MeanAnalysis, NearestSample, analyze, analyze_mean, nearest_samples, noise_gain,
 };
 pub use choices::latency;
 pub use designer::{Design, Options, ProofSearch, design, judge_taps};

@@ -35,6 +35,7 @@ pub(crate) mod table;
 mod tar;
 mod timestamps;
 pub mod wav;
+mod whole;
 
 pub use crate::runtime::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
 pub use array::{ArrayHeader, ArrayReader};
@@ -54,3 +55,4 @@ pub use stall::{Stall, StallWatch};
 pub use stream_header::{Coding, StreamHeader, is_same_rate};
 pub use tar::{TarFile, tar_files};
 pub use timestamps::{MAX_LOST, MAX_LOST_AT_ONCE};
+pub use whole::{Whole, WholeError};

@@ -2,15 +2,21 @@
 //! The commands `design`, `plot` and `report` and the page of `playground/` show it.
 
 mod facts;
+mod measured;
+#[cfg(feature = "page")]
+pub mod page;
 mod pictures;
 mod spectra;
+mod spur_chart;
 mod terms;
 mod text;
 mod understood;
 
 pub use facts::{ChannelFact, Facts, uselessness, warnings};
+pub use measured::{BeforeAfter, Figure, Unmeasured, causes, column};
 pub use pictures::{Picture, pictures};
 pub use spectra::spectra;
+pub use spur_chart::{Drawn, before_after, spur_chart};
 pub use terms::{Fact, band, figure_facts, rounded as decibels_of};
 pub use text::{change, counted, decibels, frequency, six_digits};
 pub use understood::understood;

@@ -111,6 +111,11 @@ impl<'a> Fusion<'a> {
         self.replaced + self.streams.iter().map(Stream::replaced).sum::<u64>()
     }
 
+    /// Times that the state of a recursion was not finite and became 0.
+    pub(super) fn state_resets(&self) -> u64 {
+        self.streams.iter().map(Stream::state_resets).sum()
+    }
+
     /// The gaps that have ended.
     pub(super) fn gaps(&self) -> &[Gap] {
         self.gaps.as_ref().map_or(&[], |filler| &filler.summary().list)
@@ -210,7 +215,7 @@ impl<'a> Fusion<'a> {
             samples,
             clipped,
             replaced: self.replaced(),
-            state_resets: self.streams.iter().map(Stream::state_resets).sum(),
+            state_resets: self.state_resets(),
             gaps: self.gaps.map(GapFiller::finish),
             mask: None,
         }

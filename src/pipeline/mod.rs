@@ -13,6 +13,7 @@
 mod error;
 mod fusion;
 mod gaps;
+pub mod matching;
 mod offline;
 mod outcome;
 mod outputs;
@@ -22,7 +23,7 @@ mod streaming;
 pub use error::PipelineError;
 pub use fusion::{DroppedLatency, Settings};
 pub use gaps::{Gap, GapPolicy, GapSummary, LISTED_GAPS};
-pub use offline::fuse;
+pub use offline::{fuse, fused};
 pub use outcome::{Outcome, Warning};
 pub use outputs::FileOutputs;
 pub use retune::{Change, Retuner};

@@ -3,7 +3,9 @@
 use super::fusion::Fusion;
 use super::{Outcome, PipelineError, Settings};
 use crate::bank::{Bank, SynthesisFilters};
-use crate::runtime::{Frames, Input, Plan, ProcessError, SplitOutput, ThreadPool};
+use crate::runtime::{
+    Frames, Input, Options, Plan, Planar, Precision, ProcessError, SplitOutput, ThreadPool,
+};
 
 /// Samples of a step in which gaps are filled.
 const GAP_STEP_SAMPLES: usize = 1 << 17;
@@ -63,6 +65,21 @@ pub fn fuse(
     mask.extend_from_slice(fusion.marks().unwrap_or_default());
     let outcome = fusion.finish(wanted as u64, 0);
     Ok(Outcome { mask: settings.gaps.map(|_| mask), ..outcome })
+}
+
+/// A signal in memory in double precision, fused as by [`fuse`]: M output samples per frame. Channels that are
+/// longer than the shortest one are cut.
+///
+/// # Errors
+/// As [`fuse`], and [`PipelineError::Build`].
+pub fn fused(bank: &Bank, channels: &[Vec<f64>], settings: Settings<'_>) -> Result<Vec<f64>, PipelineError> {
+    let options = Options { precision: Precision::Double, ..Options::default() };
+    let plan = bank.plan(options)?;
+    let frames = channels.iter().map(Vec::len).min().unwrap_or(0);
+    let cut: Vec<&[f64]> = channels.iter().map(|channel| &channel[..frames]).collect();
+    let mut output = vec![0.0; frames * bank.ratio];
+    fuse(bank, &plan, &[Planar::new(&cut)?], &mut output[..], settings, &|| false)?;
+    Ok(output)
 }
 
 fn check(plan: &Plan, parts: &[impl Input], capacity: usize, wanted: usize) -> Result<(), ProcessError> {

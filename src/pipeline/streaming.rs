@@ -88,6 +88,11 @@ impl<'a> Pipeline<'a> {
         self.fusion.replaced()
     }
 
+    /// Times so far that the state of a recursion was not finite and became 0.
+    pub fn state_resets(&self) -> u64 {
+        self.fusion.state_resets()
+    }
+
     /// The gaps that have ended, in the order of their ends, at most [`LISTED_GAPS`](super::LISTED_GAPS).
     pub fn gaps(&self) -> &[Gap] {
         self.fusion.gaps()

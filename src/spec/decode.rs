@@ -356,6 +356,11 @@ fn design(
     }
 }
 
+/// The keys of a `[design]` table that stands alone.
+pub(crate) fn design_keys(table: &Value<'_>) -> Result<DesignOverrides, Fault> {
+    written(&table.fields(&DESIGN_KEYS)?)
+}
+
 /// The keys that are written.
 fn written(table: &Fields<'_>) -> Result<DesignOverrides, Fault> {
     let order = |v: Value<'_>| v.count_in("states", limits::check_order);

@@ -38,7 +38,9 @@ pub use limits::{check_noise, check_offset, within};
 pub use measured::{FilterModel, FilterModels, MeasuredFilter, Measurement};
 pub use passband::Passband;
 pub use signal::{Band, SignalSpec, SignalSpectrum, USUAL_RMS};
-pub use uncertainty::{HALF_WIDTH, PerChannel, UncertaintySpec, check_delay_half_width};
+pub use uncertainty::{
+    ChannelCount, HALF_WIDTH, PerChannel, UncertaintySpec, check_delay_half_width, for_channels,
+};
 pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
@@ -202,12 +204,19 @@ impl Spec {
     /// # Errors
     /// As [`Spec::from_toml`], without a location; the path of keys says where.
     pub fn from_data<'de, D: Deserializer<'de>>(data: D, name: &str) -> Result<Self, SpecError> {
-        let document = document::Node::deserialize(data).map_err(|error| {
-            let problem = SpecProblem::Syntax { message: of_document(&error.to_string()) };
-            SpecError::new(name, "", None, String::new(), problem)
-        })?;
-        decode::spec(&reader::Value::root(&document), DesignOverrides::default())
-            .map_err(|fault| SpecError::of(name, "", Fault { span: None, ..fault }))
+        Self::from_data_with(data, name, DesignOverrides::default())
+    }
+
+    /// As [`Spec::from_data`], with parts of the `[design]` table replaced before it is checked.
+    ///
+    /// # Errors
+    /// As [`Spec::from_data`].
+    pub fn from_data_with<'de, D: Deserializer<'de>>(
+        data: D,
+        name: &str,
+        overrides: DesignOverrides,
+    ) -> Result<Self, SpecError> {
+        read_data(data, name, |document| decode::spec(document, overrides))
     }
 
     /// The spec as a TOML file that reads back equal.
@@ -304,6 +313,30 @@ impl Spec {
     pub fn delays_in_fast_periods(&self) -> Vec<FastPeriods> {
         self.delays().into_iter().map(GridTime::in_fast_periods).collect()
     }
+}
+
+impl DesignOverrides {
+    /// Reads the keys of a `[design]` table from data that have no text.
+    ///
+    /// # Errors
+    /// As [`Spec::from_data`].
+    pub fn from_data<'de, D: Deserializer<'de>>(data: D, name: &str) -> Result<Self, SpecError> {
+        read_data(data, name, decode::design_keys)
+    }
+}
+
+/// Reads data that have no text; the path of keys says where a fault is.
+fn read_data<'de, D: Deserializer<'de>, T>(
+    data: D,
+    name: &str,
+    read: impl FnOnce(&reader::Value<'_>) -> Result<T, Fault>,
+) -> Result<T, SpecError> {
+    let document = document::Node::deserialize(data).map_err(|error| {
+        let problem = SpecProblem::Syntax { message: of_document(&error.to_string()) };
+        SpecError::new(name, "", None, String::new(), problem)
+    })?;
+    read(&reader::Value::root(&document))
+        .map_err(|fault| SpecError::of(name, "", Fault { span: None, ..fault }))
 }
 
 #[cfg(test)]

@@ -76,6 +76,29 @@ impl<T> PerChannel<T> {
     }
 }
 
+/// A list that has neither one value nor one per channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{given} values are given for {channels} channels; give one for each, or one for all")]
+pub struct ChannelCount {
+    /// Values of the list.
+    pub given: usize,
+    /// Channels.
+    pub channels: usize,
+}
+
+/// One value per channel, of one for all or of a list; zeros where none is given.
+///
+/// # Errors
+/// [`ChannelCount`] for a list of another length.
+pub fn for_channels<T: Copy + Default>(given: &[T], channels: usize) -> Result<Vec<T>, ChannelCount> {
+    match given {
+        [] => Ok(vec![T::default(); channels]),
+        [all] => Ok(vec![*all; channels]),
+        _ if given.len() == channels => Ok(given.to_vec()),
+        _ => Err(ChannelCount { given: given.len(), channels }),
+    }
+}
+
 impl UncertaintySpec {
     /// The reference channel from 0: the first one unless the table names another; `None` where every
     /// channel has an error of its own.

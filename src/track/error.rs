@@ -48,6 +48,21 @@ pub enum TrackError {
         /// Half the slow rate.
         half: Hertz,
     },
+    /// A text that names no source of delays.
+    #[error("{reason}")]
+    Source {
+        /// Why, and what names one.
+        reason: String,
+    },
+    /// Too few frames of a measurement.
+    #[error("at least {least}")]
+    Frames {
+        /// Least frames.
+        least: usize,
+    },
+    /// A clock wanders by a positive share.
+    #[error("a positive number of ppm")]
+    Wander,
     /// A line of a file of delays.
     #[error("{}: line {line}: {problem}", Quoted(.file))]
     Reading {

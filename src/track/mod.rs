@@ -36,6 +36,7 @@ mod source;
 mod tests;
 mod timeline;
 mod tracker;
+mod tracking;
 
 pub use coincidence::Coincidence;
 pub use error::{ReadingProblem, TrackError};
@@ -45,3 +46,4 @@ pub use log::{Logged, TrackWarning};
 pub use readings::Reading;
 pub use source::DelaySource;
 pub use tracker::Lock;
+pub use tracking::Tracking;

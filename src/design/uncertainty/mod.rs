@@ -9,12 +9,18 @@ mod derivatives;
 mod floor;
 pub(super) mod search;
 pub(super) mod sides;
+mod study;
+mod sweep;
 #[cfg(test)]
 mod tests;
+mod widths;
 
 pub use derivatives::{DelayDerivatives, delay_derivatives};
 pub use floor::{Floor, floor};
 pub use search::norm_at;
+pub use study::{Affordable, BoxStudy, ErrorStudy, JitterStudy, Questions, Sensitivity};
+pub use sweep::{Sweep, SweepCurve};
+pub use widths::{BoxRule, BoxWidths, ReferenceChannel, RefusedBox};
 
 use super::DesignError;
 use super::analysis::bank_problem;

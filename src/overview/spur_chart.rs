@@ -1,8 +1,6 @@
 //! The spectra of measured recordings with their spurs marked.
 
-use super::capture_file::CaptureFile;
-use super::measure_report::Report;
-use crate::measure::{Cause, Measurement, Settings, Spectrum, Spur};
+use crate::measure::{Cause, Comparison, Measurement, Settings, Spectrum, Spur};
 use crate::plot::{AxisScale, Chart, Marks, Series};
 use crate::quantity::scale_of;
 use crate::units::{Decibels, Hertz};
@@ -14,44 +12,56 @@ const MOST_MARKS: usize = 24;
 /// Decibels below the largest bin at which the picture ends.
 const DEPTH: f64 = 180.0;
 
-/// The chart of a report and its marks.
-pub(super) fn chart(report: &Report, settings: &Settings, capture: &CaptureFile) -> (Chart, Vec<Marks>) {
+/// A recording whose spectrum is drawn.
+#[derive(Debug, Clone, Copy)]
+pub struct Drawn<'a> {
+    /// Its name.
+    pub label: &'a str,
+    /// Its figures, if it was measured; their spectrum is drawn.
+    pub measurement: Option<&'a Measurement>,
+    /// A comparison, and the name of the reference; the spectrum of the error is drawn too.
+    pub comparison: Option<(&'a str, &'a Comparison)>,
+}
+
+/// The chart of a recording and its marks. `spectrum` is that of the recording, if it was not measured.
+pub fn spur_chart(
+    drawn: Drawn<'_>,
+    settings: &Settings,
+    spectrum: impl FnOnce() -> Spectrum,
+) -> (Chart, Vec<Marks>) {
     let own;
-    let spectrum = match &report.measurement {
+    let spectrum = match drawn.measurement {
         Some(measured) => &measured.spectrum,
         None => {
-            let finite: Vec<f64> =
-                capture.samples.iter().map(|x| if x.is_finite() { *x } else { 0.0 }).collect();
-            own = Spectrum::new(&finite, capture.rate, settings.window);
+            own = spectrum();
             &own
         }
     };
     let scale = Scale::of(&[spectrum], settings.full_scale);
-    let mut series = vec![Series { label: report.file.clone(), points: scale.points(spectrum) }];
-    if let Some(reference) = &report.reference {
-        let points = scale.points(&reference.comparison.error_spectrum);
-        series.push(Series { label: format!("error against {}", reference.file), points });
+    let mut series = vec![Series { label: drawn.label.to_owned(), points: scale.points(spectrum) }];
+    if let Some((reference, comparison)) = drawn.comparison {
+        let points = scale.points(&comparison.error_spectrum);
+        series.push(Series { label: format!("error against {reference}"), points });
     }
-    let marks = report.measurement.as_ref();
-    let marks = marks.map(|measured| scale.marks(measured, false, &|_| true)).unwrap_or_default();
-    (scale.chart(title(report), settings, series), marks)
+    let marks = drawn.measurement.map(|measured| scale.marks(measured, false, &|_| true));
+    (scale.chart(title(drawn), settings, series), marks.unwrap_or_default())
 }
 
-fn title(report: &Report) -> String {
-    match (&report.measurement, &report.reference) {
+fn title(drawn: Drawn<'_>) -> String {
+    match (drawn.measurement, drawn.comparison) {
         (Some(m), _) => {
             format!("SINAD {:.2} dB, ENOB {:.2} bits, SFDR {:.2} dBc", m.sinad.0, m.enob, m.sfdr.0)
         }
-        (None, Some(reference)) => {
-            format!("SNR {:.2} dB against {}", reference.comparison.snr.0, reference.file)
+        (None, Some((reference, comparison))) => {
+            format!("SNR {:.2} dB against {reference}", comparison.snr.0)
         }
-        (None, None) => report.file.clone(),
+        (None, None) => drawn.label.to_owned(),
     }
 }
 
 /// Two measurements of one signal over one axis: the spurs of the first one are rings, those of the second
 /// one discs, and each cause has one colour. A spur that both have is named once.
-pub(super) fn before_after(before: &Measurement, after: &Measurement) -> (Chart, Vec<Marks>) {
+pub fn before_after(before: &Measurement, after: &Measurement) -> (Chart, Vec<Marks>) {
     let scale = Scale::of(&[&before.spectrum, &after.spectrum], after.full_scale);
     let series = [("interleaved (rings)", before), ("fused (discs)", after)];
     let series = series

@@ -1,0 +1,354 @@
+"""Captures that are no arrays of NumPy: files, one recording of several converters, xarray, pandas, dask."""
+
+import os
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+
+from hybank import _hybank
+from hybank._hybank import HybankError
+from hybank._keywords import checked
+
+
+@dataclass(eq=False)
+class Captures:
+    """Recordings in memory.
+
+    ``channels`` is an array (N, T) with NaN for lost samples, or a list of arrays of unequal lengths; ``rate`` that of a
+    recording in hertz, or None; ``output_rate`` that of a bank's output, if ``read`` was given a bank.
+    """
+
+    channels: object
+    rate: float | None
+    output_rate: float | None = None
+
+    def __len__(self):
+        return len(self.channels)
+
+    def mono(self):
+        """The only channel."""
+        if len(self.channels) != 1:
+            raise HybankError(f"the recording has {len(self.channels)} channels, and one is needed; give channel=")
+        return self.channels[0]
+
+
+def is_file(x):
+    """Whether this is the name of a file; a signal as a text has a colon or an @ before its first dot."""
+    if isinstance(x, os.PathLike):
+        return True
+    return isinstance(x, str) and os.path.splitext(x)[1].lower() in (".wav", ".wave", ".flac")
+
+
+def _are_files(x):
+    first = x[0] if isinstance(x, (list, tuple)) and len(x) else x
+    return isinstance(first, (str, os.PathLike))
+
+
+@checked
+def read(
+    files, *, bank=None, format="wav", channels=None, channel=None, full_scale=None, sample_bits=None, interleaved=None,
+    lost=None, max_lost=None, longest=False
+):
+    """Read recordings as ``hybank fuse`` reads them.
+
+    Parameters
+    ----------
+    files : str or os.PathLike, or a list of them
+        WAV, FLAC, SigMF, tables (.csv), arrays (.npy, .mat), or raw samples with `format`.
+    bank : Bank, optional
+        Checks that channels and rates are those of the bank.
+    format : str
+        Sample format of raw files as in ffmpeg ("s16le", "cf32", ..), or "csv"; other files state their own.
+    channels : int, optional
+        Interleaved channels of each raw file.
+    channel : int, optional
+        Read only this channel of each file, from 1.
+    full_scale : float or str, optional
+        Full scale of files whose format does not say it: a number, or "8bits", "u8bits".
+    sample_bits : int, optional
+        The same as ``full_scale="<B>bits"``.
+    interleaved : int, optional
+        One recording of one channel in which so many converters take turns; needs `bank`.
+    lost : str or os.PathLike, optional
+        A file of JSON lines that name lost samples.
+    max_lost : int, optional
+        The most frames that an input may leave out.
+    longest : bool
+        Read until the last channel ends; the others are NaN from their ends on.
+
+    Returns
+    -------
+    Captures
+
+    Examples
+    --------
+    >>> capture = hb.simulate(bank, "tones:0.3", samples=400)
+    >>> np.save("ch1.npy", capture.channels[0]); np.save("ch2.npy", capture.channels[1])
+    >>> captures = hb.read(["ch1.npy", "ch2.npy"])
+    >>> captures.channels.shape, bank.fuse(captures).shape
+    ((2, 200), (400,))
+    """
+    if sample_bits is not None:
+        if full_scale is not None:
+            raise HybankError("sample_bits and full_scale are the same; give one of them")
+        full_scale = f"{sample_bits}bits"
+    if interleaved is not None and bank is None:
+        raise HybankError("interleaved: give the bank, whose delays say in which order the converters take turns")
+    options = {
+        "format": format, "channels": channels, "channel": channel,
+        "full_scale": None if full_scale is None else str(full_scale), "interleaved": interleaved,
+        "lost": lost, "max_lost": max_lost, "longest": longest,
+    }
+    names = [files] if isinstance(files, (str, os.PathLike)) else list(files)
+    found = _hybank.read(names, options, bank)
+    parts = found["channels"]
+    is_even = all(len(part) == len(parts[0]) for part in parts)
+    rate, output_rate = (found["rate"], None) if bank is None else (None, found["rate"])
+    return Captures(np.stack(parts) if is_even and parts else parts, rate, output_rate)
+
+
+def fuse(bank, x, interleaved, *, axis, full_output, rate, **keywords):
+    """``Bank.fuse`` of what is no array of NumPy."""
+    if _are_files(x):
+        x, interleaved = read(x, bank=bank, interleaved=interleaved), None
+        # As `hybank fuse` writes it: 32-bit floats.
+        keywords["dtype"] = "f4" if keywords["dtype"] is None else keywords["dtype"]
+        rate = x.output_rate if rate is None else rate
+    if isinstance(x, Captures):
+        rate = x.output_rate if rate is None else rate
+        x, axis = x.channels, -1
+    keywords = {**keywords, "full_output": full_output, "rate": rate}
+    if interleaved is not None:
+        return bank.fuse(in_turn(bank, x, interleaved), axis=-1, **keywords)
+    package = type(x).__module__.split(".")[0]
+    if package == "pandas":
+        return _fuse_frame(bank, x, keywords)
+    if package == "xarray":
+        return _fuse_named(bank, x, axis, keywords)
+    if package == "dask":
+        return _fuse_lazily(bank, x, axis, keywords)
+    return bank.fuse(x, axis=axis, **keywords)
+
+
+def in_turn(source, x, interleaved):
+    """The channels of one recording in which converters take turns; what is no whole frame at its end is left out."""
+    x = np.asarray(x)
+    x = x[0] if x.ndim == 2 and len(x) == 1 else x
+    if x.ndim != 1:
+        raise HybankError(f"interleaved: one recording of one channel is needed, not an array of the shape {x.shape}")
+    order = _hybank.turns(source, interleaved)
+    frames = x[: len(x) // interleaved * interleaved].reshape(-1, interleaved)
+    channels = np.empty((interleaved, len(frames)), x.dtype)
+    channels[order] = frames.T
+    return channels
+
+
+def plain(x, axis, source, interleaved):
+    """Captures as arrays of NumPy, with their axis of time."""
+    if _are_files(x):
+        bank = source if isinstance(source, _hybank.Bank) else None
+        if interleaved is not None and bank is None:
+            x = read(x)
+        else:
+            x, interleaved = read(x, bank=bank, interleaved=interleaved), None
+    if isinstance(x, Captures):
+        x, axis = x.channels, -1
+    if interleaved is not None:
+        return in_turn(source, x, interleaved), -1
+    if type(x).__module__.startswith("pandas"):
+        return x.to_numpy(), 0
+    return x, axis
+
+
+def channels(bank, x, axis):
+    """A list of samples for each channel, in double precision, and the rate of the bank's output."""
+    rate = bank.fast_rate
+    if _are_files(x):
+        x = read(x, bank=bank)
+    if isinstance(x, Captures):
+        rate = x.output_rate if x.output_rate is not None else rate
+        x, axis = x.channels, -1
+    if isinstance(x, (list, tuple)) and max(bank.samples) > 1:
+        rows = [np.asarray(row, float) for row in x]
+        frames = min(len(row) // samples for row, samples in zip(rows, bank.samples))
+        x = np.concatenate([row[: frames * s].reshape(frames, s) for row, s in zip(rows, bank.samples)], axis=1).T
+    x = np.asarray(x)
+    x = x.astype(float) / -np.iinfo(x.dtype).min if x.dtype.kind == "i" else x
+    if x.dtype.kind == "c":
+        raise HybankError("complex samples; give the real or the imaginary parts for a page")
+    rows = x.T if axis in (0, -2) else x
+    if rows.ndim != 2 or len(rows) != sum(bank.samples):
+        raise HybankError(f"captures of the shape {x.shape} are not those of {sum(bank.samples)} channels")
+    return [[float(value) for value in row] for row in rows], rate
+
+
+def record(y, rate):
+    """A record as an array, and its rate in hertz."""
+    if isinstance(y, (str, os.PathLike)):
+        y = read(y)
+    if isinstance(y, Captures):
+        y, rate = y.mono(), y.rate if rate is None else rate
+    if rate is None:
+        step = _step(y)
+        if step is None:
+            raise HybankError("rate: give samples per second")
+        rate = 1 / step
+    return y, rate
+
+
+def _step(y):
+    """The distance of the samples of an xarray or of pandas in seconds, if its coordinate says it."""
+    package = type(y).__module__.split(".")[0]
+    if package == "pandas":
+        times = y.index.to_numpy()
+    elif package == "xarray" and y.ndim == 1 and y.dims[0] in y.coords:
+        times = y.coords[y.dims[0]].to_numpy()
+    else:
+        return None
+    if len(times) < 2:
+        return None
+    step = (times[-1] - times[0]) / (len(times) - 1)
+    return step / np.timedelta64(1, "s") if times.dtype.kind in "mM" else float(step)
+
+
+# Axes with names.
+
+
+def finer(times, ratio):
+    """The times of M samples for each frame: each frame's period is divided evenly."""
+    times = np.asarray(times)
+    if len(times) < 2:
+        raise HybankError("a time axis of fewer than two frames says no rate; give an array of NumPy")
+    if times.dtype.kind not in "mMiuf":
+        raise HybankError(f"a time axis of {times.dtype} cannot be divided; give numbers or times")
+    start = times[0]
+    since = times - start
+    is_time = since.dtype.kind == "m"
+    since = since.astype(np.int64 if is_time else float)
+    periods = np.diff(since, append=2 * since[-1] - since[-2])
+    parts = since[:, None] + periods[:, None] * np.arange(ratio) / ratio
+    parts = np.round(parts).astype(np.int64).astype((times - start).dtype) if is_time else parts
+    return (start + parts).reshape(-1)
+
+
+def _fuse_frame(bank, frame, keywords):
+    """A DataFrame with a column for each channel becomes a Series with its index at the fast rate."""
+    pandas = sys.modules["pandas"]
+    full_output = keywords.pop("full_output")
+    y, report = bank.fuse(frame.to_numpy(), axis=0, full_output=True, **keywords)
+    if isinstance(frame.index, pandas.PeriodIndex):
+        raise HybankError("an index of periods cannot be divided; convert it with to_timestamp()")
+    name = frame.name if isinstance(frame, pandas.Series) else None
+    index = pandas.Index(finer(frame.index.to_numpy(), bank.ratio), name=frame.index.name)
+    if getattr(frame.index, "tz", None) is not None:
+        index = index.tz_localize("UTC").tz_convert(frame.index.tz)
+    series = pandas.Series(y, index=index, name=name)
+    return (series, report) if full_output else series
+
+
+def _fuse_named(bank, x, axis, keywords):
+    """A DataArray loses the dimension of the channels, and has the fast rate along that of time."""
+    xarray = sys.modules["xarray"]
+    if not isinstance(x, xarray.DataArray):
+        raise HybankError("give a DataArray; of a Dataset choose a variable: dataset[name]")
+    time, channel = _dimensions(bank, x, axis)
+    others = [name for name in x.dims if name not in (time, channel)]
+    order = others + ([channel] if channel else []) + [time]
+    data = x.transpose(*order).data
+    full_output = keywords.pop("full_output")
+    if full_output and (others or _is_lazy(data)):
+        raise HybankError("full_output: there is one report per signal; fuse them one by one, as arrays of NumPy")
+    shape = data.shape[: len(others)]
+    report = None
+    if full_output:
+        y, report = bank.fuse(data, full_output=True, **keywords)
+    elif not others:
+        y = _fuse_lazily(bank, data, -1, {**keywords, "full_output": False}) if _is_lazy(data) else bank.fuse(data, **keywords)
+    else:
+        signals = [bank.fuse(data[index], **keywords) for index in np.ndindex(*shape)]
+        stack = sys.modules["dask.array"].stack if _is_lazy(data) else np.stack
+        y = stack(signals).reshape(*shape, -1)
+    coords = {
+        name: coord for name, coord in x.coords.items() if time not in coord.dims and channel not in coord.dims
+    }
+    if time in x.coords:
+        coord = x.coords[time]
+        coords[time] = (time, finer(coord.to_numpy(), bank.ratio), coord.attrs)
+    fused = xarray.DataArray(y, coords=coords, dims=[*others, time], name=x.name, attrs=x.attrs)
+    return (fused, report) if full_output else fused
+
+
+def _dimensions(bank, x, axis):
+    """The names of the dimensions of time and of the channels."""
+    time = "time" if "time" in x.dims and axis == -1 else x.dims[axis]
+    left = [name for name in x.dims if name != time]
+    if "channel" in left:
+        return time, "channel"
+    fitting = [name for name in left if x.sizes[name] == sum(bank.samples)]
+    if len(fitting) == 1 or len(left) == 1:
+        return time, (fitting or left)[0]
+    if not left and sum(bank.samples) == 1:
+        return time, None
+    raise HybankError(
+        f"dimensions {x.dims} with sizes {x.shape}: which holds the {sum(bank.samples)} channels? call it \"channel\""
+    )
+
+
+def _is_lazy(data):
+    return type(data).__module__.split(".")[0] == "dask"
+
+
+# Lazy arrays.
+
+
+def _fuse_lazily(bank, x, axis, keywords):
+    """A dask array of the output, a block for each block along time, with the bits of ``bank.fuse`` over all of it."""
+    import dask
+    import dask.array as da
+
+    from hybank.dask import _plan
+
+    wrong = [name for name in ("gaps", "track", "full_output") if keywords[name]]
+    if wrong:
+        raise HybankError(f"{wrong[0]}: a lazy array is fused block by block; compute it first, or leave {wrong[0]} out")
+    x = x.T if axis in (0, -2) and x.ndim == 2 else x
+    x = x[None, :] if x.ndim == 1 else x
+    if np.isnan(x.shape[1]):
+        raise HybankError("a dask array of unknown length; compute_chunk_sizes() finds it")
+    plan = _plan(bank, x.dtype, keywords["dtype"], keywords["algorithm"])
+    skip = 0 if keywords["keep_latency"] else plan.latency
+    if keywords["keep_latency"]:
+        skip = plan.latency - bank.latency
+    frames, parts, state = x.shape[1], [], None
+    ends = np.cumsum(x.chunks[1])
+    for first, last in zip(ends - x.chunks[1], ends):
+        job = dask.delayed(_block, pure=True, nout=2)
+        ahead = min(int(last) + -(-skip // bank.ratio), frames)
+        begin = 0
+        if plan.memory is not None:
+            begin = max(int(first) - plan.memory, 0) // plan.alignment * plan.alignment
+        elif state is not None:
+            begin = int(first)
+        span = (begin, int(first), int(last), ahead, ahead == frames)
+        y, state = job(bank, x[:, begin:ahead], span, skip, plan, state)
+        length = int(last - first) * bank.ratio
+        parts.append(da.from_delayed(y, shape=(length,), dtype=np.dtype(plan.output)))
+        state = None if plan.memory is not None else state
+    return da.concatenate(parts) if parts else da.zeros(0, dtype=plan.output)
+
+
+def _block(bank, x, span, skip, plan, state):
+    """The outputs of the frames first to last, and the state of a recursion after them."""
+    begin, first, last, ahead, is_end = span
+    x = np.ascontiguousarray(x)
+    s = bank.stream(dtype=plan.stream, algorithm=plan.asked, state=state)
+    outputs = [s.process(x[:, : last - begin])]
+    after = s.state if plan.memory is None else None
+    outputs.append(s.process(x[:, last - begin : ahead - begin]))
+    if is_end:
+        outputs.append(s.flush())
+    y = np.concatenate(outputs)
+    start = (first - begin) * bank.ratio + skip
+    y = y[start : start + (last - first) * bank.ratio]
+    return (_hybank.encode(y, plan.output)[0] if np.dtype(plan.output).kind in "iu" else y), after

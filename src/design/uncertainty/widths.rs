@@ -1,0 +1,145 @@
+//! A box of errors as it is asked for: half-widths, of one channel for all or of each.
+
+use crate::bank::Bank;
+use crate::quantity::Time;
+use crate::spec::{ChannelCount, SpecProblem, check_delay_half_width, for_channels};
+use crate::units::Seconds;
+use crate::verify::uncertainty::ErrorBox;
+
+/// Shares of this size and more are out of the range of the proof.
+const MOST_SHARE: f64 = 0.5;
+
+/// How far the channels may be off, in both directions. A list has no value, one for all channels but the
+/// reference, or one for each.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct BoxWidths {
+    /// Of the delays.
+    pub delay_box: Vec<Time>,
+    /// Of the gains, relative.
+    pub gain_box: Vec<f64>,
+    /// Of the cut-offs, relative.
+    pub cutoff_box: Vec<f64>,
+    /// Of the instants, differently at each sample; the reference has its own.
+    pub jitter: Vec<Time>,
+    /// The channel to which delays, gains and cut-offs are relative. `None`: the first one where one value is
+    /// given for all channels, and none where each has its own.
+    pub reference: Option<ReferenceChannel>,
+}
+
+/// What errors are relative to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReferenceChannel {
+    /// Every channel has an error of its own.
+    None,
+    /// This channel, from 1, has none.
+    Channel(usize),
+}
+
+/// A box that is refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{rule}")]
+pub struct RefusedBox {
+    /// The field of [`BoxWidths`].
+    pub field: &'static str,
+    /// Why.
+    pub rule: BoxRule,
+}
+
+/// A rule for boxes of errors.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BoxRule {
+    /// A number out of its range.
+    #[error(transparent)]
+    Number(#[from] SpecProblem),
+    /// A list of another length.
+    #[error(transparent)]
+    Count(#[from] ChannelCount),
+    /// A width below 0.
+    #[error("the box reaches as far in both directions; give the positive half-width")]
+    Negative,
+    /// A share that is too large for the proof.
+    #[error("shares of 50% and more are not supported")]
+    Share,
+    /// There is no such channel.
+    #[error("the bank has {channels} channels; give 1 to {channels}, or none")]
+    NoChannel {
+        /// As given, from 1.
+        channel: usize,
+        /// Channels of the bank.
+        channels: usize,
+    },
+}
+
+/// Names the field of a refusal.
+fn of<T>(field: &'static str, result: Result<T, impl Into<BoxRule>>) -> Result<T, RefusedBox> {
+    result.map_err(|rule| RefusedBox { field, rule: rule.into() })
+}
+
+impl BoxWidths {
+    /// The box for the channels of `bank`; `None` if no width is given.
+    ///
+    /// # Errors
+    /// [`RefusedBox`]: widths out of their range, lists of another length, a reference that is not there.
+    pub fn error_box(&self, bank: &Bank) -> Result<Option<ErrorBox>, RefusedBox> {
+        let channels = bank.channel_count();
+        if let Some(ReferenceChannel::Channel(channel)) = self.reference
+            && !(1..=channels).contains(&channel)
+        {
+            return of("reference", Err(BoxRule::NoChannel { channel, channels }));
+        }
+        let delays = of("delay_box", in_seconds(&self.delay_box, bank))?;
+        let check = |delay: &Seconds| check_delay_half_width(delay.in_fast_periods(bank.fast_period), *delay);
+        of("delay_box", delays.iter().try_for_each(check))?;
+        of("gain_box", self.gain_box.iter().try_for_each(check_share))?;
+        of("cutoff_box", self.cutoff_box.iter().try_for_each(check_share))?;
+        let is_given = !(delays.is_empty() && self.gain_box.is_empty() && self.cutoff_box.is_empty());
+        let errors = ErrorBox {
+            delays: of("delay_box", self.relative(&delays, channels))?,
+            gains: of("gain_box", self.relative(&self.gain_box, channels))?,
+            cutoffs: of("cutoff_box", self.relative(&self.cutoff_box, channels))?,
+        };
+        Ok(is_given.then_some(errors))
+    }
+
+    /// The jitter of each channel; `None` if none is given.
+    ///
+    /// # Errors
+    /// [`RefusedBox`] of `jitter`.
+    pub fn jitter_of(&self, bank: &Bank) -> Result<Option<Vec<Seconds>>, RefusedBox> {
+        let jitter = of("jitter", in_seconds(&self.jitter, bank))?;
+        let all = of("jitter", for_channels(&jitter, bank.channel_count()))?;
+        Ok((!jitter.is_empty()).then_some(all))
+    }
+
+    /// Values of all channels, 0 for the reference.
+    fn relative<T: Copy + Default>(&self, given: &[T], channels: usize) -> Result<Vec<T>, ChannelCount> {
+        let exact = match self.reference {
+            Some(ReferenceChannel::None) => None,
+            Some(ReferenceChannel::Channel(channel)) => Some(channel - 1),
+            // A list says itself which channel is exact, and one channel alone is not relative to another.
+            None => (given.len() == 1 && channels > 1).then_some(0),
+        };
+        let mut all = for_channels(given, channels)?;
+        if let Some(exact) = exact {
+            all[exact] = T::default();
+        }
+        Ok(all)
+    }
+}
+
+fn in_seconds(times: &[Time], bank: &Bank) -> Result<Vec<Seconds>, BoxRule> {
+    let seconds = |time: &Time| match time.in_seconds(bank.fast_period) {
+        time if time.0 >= 0.0 => Ok(time),
+        _ => Err(BoxRule::Negative),
+    };
+    times.iter().map(seconds).collect()
+}
+
+fn check_share(share: &f64) -> Result<(), BoxRule> {
+    match *share {
+        share if (0.0..MOST_SHARE).contains(&share) => Ok(()),
+        share if share < 0.0 => Err(BoxRule::Negative),
+        _ => Err(BoxRule::Share),
+    }
+}

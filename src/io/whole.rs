@@ -1,0 +1,121 @@
+//! Recordings in memory.
+
+use super::{Arrival, IoError, MultiReader, PcmFrames};
+use crate::memory::available_memory;
+use crate::messages::Quoted;
+
+/// Bytes of work memory for each sample of a recording: the sample, its spectrum and a copy of both.
+const WORK_BYTES: f64 = 64.0;
+
+/// Recordings that are not read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WholeError {
+    /// An input cannot be read.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// Complex samples where real ones are needed.
+    #[error(
+        "{}: complex samples, which `fuse`, `stream`, `measure` and `calibrate` take; extract the real or the imaginary part",
+        Quoted(.input)
+    )]
+    Complex {
+        /// The input.
+        input: String,
+    },
+    /// The system does not have the work memory; it would end the process without a message.
+    #[error(
+        "{frames} frames of {channels} channels take about {gigabytes:.1} GB of memory, and this process may use \
+         {available:.1} GB; use a shorter part of the recording"
+    )]
+    Memory {
+        /// Frames.
+        frames: usize,
+        /// Channels; of complex samples each part is one.
+        channels: usize,
+        /// Memory of both.
+        gigabytes: f64,
+        /// What the process may use.
+        available: f64,
+    },
+    /// The reading was stopped.
+    #[error("interrupted")]
+    Stopped,
+}
+
+/// All channels of a reader; of complex samples each part is a channel.
+#[derive(Debug)]
+pub struct Whole {
+    /// Lost samples are NaN.
+    pub channels: Vec<Vec<f64>>,
+    /// There are more samples, which were not read.
+    pub is_cut: bool,
+}
+
+impl Whole {
+    /// At most `most` samples of each channel; real ones only.
+    ///
+    /// # Errors
+    /// [`WholeError`].
+    pub fn read(reader: &mut MultiReader, most: usize) -> Result<Self, WholeError> {
+        if let Some((input, _)) = reader.headers().find(|(_, header)| header.is_complex) {
+            return Err(WholeError::Complex { input: input.to_owned() });
+        }
+        Self::read_parts(reader, most)
+    }
+
+    /// At most `most` samples of each channel.
+    ///
+    /// # Errors
+    /// [`WholeError`].
+    pub fn read_parts(reader: &mut MultiReader, most: usize) -> Result<Self, WholeError> {
+        let parts = if reader.is_complex() { 2 } else { 1 };
+        let mut channels = vec![Vec::new(); parts * reader.channels()];
+        let promised = reader.promised_frames().and_then(|frames| usize::try_from(frames).ok());
+        let mut checked = promised.unwrap_or_default().min(most);
+        check_memory(checked, channels.len())?;
+        loop {
+            match reader.wait()? {
+                Arrival::Frames(count) => {
+                    let known = channels.first().map_or(0, Vec::len);
+                    let room = most - known;
+                    if known + count > checked {
+                        checked = (checked + checked / 4).max(known + count).min(most);
+                        check_memory(checked, channels.len())?;
+                    }
+                    append(&reader.frames(), count.min(room), &mut channels);
+                    reader.consume(count);
+                    if room < count {
+                        return Ok(Self { channels, is_cut: true });
+                    }
+                }
+                Arrival::End => return Ok(Self { channels, is_cut: false }),
+                Arrival::Stopped => return Err(WholeError::Stopped),
+            }
+        }
+    }
+}
+
+/// Refuses recordings whose work memory the system does not have; it would end the process without a
+/// message.
+fn check_memory(frames: usize, channels: usize) -> Result<(), WholeError> {
+    let bytes = WORK_BYTES * frames as f64 * channels as f64;
+    match available_memory() {
+        Some(memory) if bytes > memory => {
+            Err(WholeError::Memory { frames, channels, gigabytes: bytes / 1e9, available: memory / 1e9 })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The first `count` frames of all parts.
+fn append(parts: &[PcmFrames<'_>], count: usize, channels: &mut [Vec<f64>]) {
+    let mut next = channels.iter_mut();
+    for part in parts {
+        let (format, container) = (part.layout.format, part.layout.container);
+        for (c, samples) in next.by_ref().take(part.channels).enumerate() {
+            let frames = part.bytes.chunks_exact(part.frame_bytes()).take(count);
+            samples.extend(frames.map(|frame| format.decode(&frame[c * container..])));
+        }
+    }
+}

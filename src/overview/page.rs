@@ -1,0 +1,311 @@
+//! The page of a report: all that is known of a bank.
+
+use super::measured::{BeforeAfter, causes, column};
+use super::spur_chart::before_after;
+use super::{ChannelFact, Fact, Facts, change, pictures, spectra};
+use crate::bank::Bank;
+use crate::design::DesignError;
+use crate::measure::{Cause, Measurement, Spur};
+use crate::pipeline::{PipelineError, Settings, fused};
+use crate::plot::{Chart, Marks, PlotError};
+use crate::quantity::readable;
+use crate::simulate::interleaved;
+use crate::spec::SpecProblem;
+use crate::units::{Decibels, Hertz};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+/// Frames of captures that are used; more would only make the lines denser.
+pub const MOST_FRAMES: usize = 1 << 20;
+/// Signal over all else above which captures are those of a tone.
+const LEAST_TONE: Decibels = Decibels(0.0);
+/// Frames that the spectra need.
+const LEAST_FRAMES: usize = 16;
+
+/// A page that cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PageError {
+    /// The bank has no spec, or does not fit it.
+    #[error(transparent)]
+    Design(#[from] DesignError),
+    /// A picture cannot be drawn.
+    #[error(transparent)]
+    Plot(#[from] PlotError),
+    /// The captures cannot be fused.
+    #[error(transparent)]
+    Fuse(#[from] PipelineError),
+    /// The spec cannot be written.
+    #[error(transparent)]
+    Spec(#[from] SpecProblem),
+    /// Captures without a spectrum.
+    #[error("{frames} frames, and a spectrum needs {LEAST_FRAMES}; give longer captures, or none")]
+    Short {
+        /// Frames of the captures.
+        frames: usize,
+    },
+}
+
+/// What the page shows of captures.
+pub struct CapturesOnPage {
+    spectra: Figure,
+    /// Of the tone that they hold.
+    measured: Option<BeforeAfter>,
+}
+
+impl CapturesOnPage {
+    /// Captures, a list per channel of `bank`, plainly interleaved and fused by the bank; `rate` is that of
+    /// the output. `is_cut`: they are only the first frames.
+    ///
+    /// # Errors
+    /// [`PageError`].
+    pub fn new(
+        bank: &Bank,
+        rate: Hertz,
+        mut channels: Vec<Vec<f64>>,
+        is_cut: bool,
+    ) -> Result<Self, PageError> {
+        let frames = channels.iter().map(Vec::len).min().unwrap_or(0);
+        if frames < LEAST_FRAMES {
+            return Err(PageError::Short { frames });
+        }
+        let part = match is_cut {
+            true => format!("the first {frames} frames of the captures"),
+            false => "the captures".to_owned(),
+        };
+        // What was lost is a zero, as `fuse` has it without --gaps.
+        channels.iter_mut().flatten().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
+        let fused = fused(bank, &channels, Settings::default())?;
+        let measured = BeforeAfter::of(bank, rate, &channels, &fused, Vec::new());
+        let measured = measured.map_err(|reason| reason.to_string()).and_then(|measured| {
+            let is_tone = measured.after.sinad > LEAST_TONE;
+            if is_tone { Ok(measured) } else { Err("they hold more than a tone".to_owned()) }
+        });
+        let what = format!(
+            "The spectra of {part}, interleaved as if they were taken in turn, and fused by the bank."
+        );
+        let (spectra, measured) = match measured {
+            Ok(measured) => {
+                let (chart, marks) = before_after(&measured.before, &measured.after);
+                let caption = format!("{what} Each cause of spurs has one colour.");
+                (Figure::marked(&chart, &marks, &caption), Some(measured))
+            }
+            Err(reason) => {
+                let plain = interleaved(&bank.sample_delays(), bank.ratio, bank.wait(), &channels);
+                let chart = spectra(rate, &[("plain interleaving", &plain[..]), ("fused", &fused)]);
+                let caption = format!(
+                    "{what} Lines that only the first has are images of the signal: errors of the converters' \
+                     instants and filters. No tone was measured ({reason})."
+                );
+                (Figure::new(&chart, &caption), None)
+            }
+        };
+        Ok(Self { spectra: spectra?, measured })
+    }
+
+    fn html(&self) -> Markup {
+        html! {
+            (self.spectra.html())
+            @if let Some(measured) = &self.measured {
+                (figures_before_after(measured))
+                (spurs_before_after(measured))
+            }
+        }
+    }
+}
+
+/// The tone and the figures of both.
+fn figures_before_after(measured: &BeforeAfter) -> Markup {
+    let BeforeAfter { before, after } = measured;
+    let level = |measured: &Measurement| {
+        measured.tones.first().map_or_else(String::new, |tone| format!("{:.2} dBFS", tone.level.0))
+    };
+    let tone = after.tones.first().map(|tone| readable(tone.frequency.value.0, "Hz")).unwrap_or_default();
+    html! {
+        table {
+            tr { th { "" } th { "interleaved" } th { "fused" } th { "" } }
+            tr {
+                th { "tone" }
+                td class="value" { (level(before)) }
+                td class="value" { (level(after)) }
+                td { "at " (tone) }
+            }
+            @for (own, fused) in column(before).iter().zip(column(after)) {
+                tr {
+                    th { (fused.name) }
+                    td class="value" { (own.value) " " (own.unit) }
+                    td class="value" { (fused.value) " " (fused.unit) }
+                    td { (fused.meaning) }
+                }
+            }
+            tr {
+                th { "offset" }
+                td class="value" { (format!("{:.2e}", before.offset.value)) }
+                td class="value" { (format!("{:.2e}", after.offset.value)) }
+                td { "the mean, of full scale" }
+            }
+        }
+    }
+}
+
+/// Most lines of the table of spurs.
+const MOST_SPURS: usize = 24;
+
+/// The spurs of both, the largest of the captures first.
+fn spurs_before_after(measured: &BeforeAfter) -> Markup {
+    let BeforeAfter { before, after } = measured;
+    let level = |spur: &Spur| {
+        let noise = if spur.above_noise { "" } else { " (noise)" };
+        format!("{:.2} dBc{noise}", spur.level.0)
+    };
+    let same = |spur: &Spur| after.spurs.iter().find(|other| other.causes == spur.causes);
+    let rows = before.spurs.iter().filter(|spur| spur.causes != [Cause::Unknown]).take(MOST_SPURS);
+    html! {
+        table {
+            tr { th { "spur" } th { "frequency" } th { "interleaved" } th { "fused" } }
+            @for spur in rows {
+                tr {
+                    th { (causes(spur)) }
+                    td class="value" { (readable(spur.frequency.0, "Hz")) }
+                    td class="value" { (level(spur)) }
+                    td class="value" { (same(spur).map(level).unwrap_or_default()) }
+                }
+            }
+        }
+    }
+}
+
+const STYLE: &str = "
+:root { color-scheme: light; }
+body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 0 auto; padding: 1rem; }
+h1 { font-size: 1.5rem; margin: 0.5rem 0 0; } h2 { font-size: 1.15rem; margin: 2rem 0 0.5rem; }
+.understood { color: #555; margin-top: 0.25rem; }
+table { border-collapse: collapse; width: 100%; }
+th, td { text-align: left; vertical-align: top; padding: 0.3rem 1rem 0.3rem 0; border-bottom: 1px solid #ddd; }
+td.value { font-variant-numeric: tabular-nums; white-space: nowrap; }
+figure { margin: 1.5rem 0; } figure div { overflow-x: auto; }
+figure svg { display: block; width: 100%; min-width: 42rem; height: auto; }
+figcaption { color: #555; }
+pre { background: #f5f5f5; padding: 0.8rem; overflow-x: auto; font-size: 0.85rem; }
+@media (max-width: 40rem) { .facts td, .facts th { display: block; border: 0; padding-right: 0; }
+  .facts tr { display: block; border-bottom: 1px solid #ddd; padding: 0.4rem 0; } td.value { white-space: normal; } }
+";
+
+/// A chart in the page.
+struct Figure {
+    svg: String,
+    caption: String,
+}
+
+impl Figure {
+    fn new(chart: &Chart, caption: &str) -> Result<Self, PlotError> {
+        Self::marked(chart, &[], caption)
+    }
+
+    fn marked(chart: &Chart, marks: &[Marks], caption: &str) -> Result<Self, PlotError> {
+        Ok(Self { svg: chart.to_svg_with(marks)?, caption: caption.to_owned() })
+    }
+
+    fn html(&self) -> Markup {
+        html! {
+            figure {
+                div { (PreEscaped(&self.svg)) }
+                figcaption { (self.caption) }
+            }
+        }
+    }
+}
+
+/// All that the page shows.
+pub struct Page {
+    facts: Facts,
+    figures: Vec<Figure>,
+    captures: Option<CapturesOnPage>,
+    /// TOML.
+    spec: String,
+}
+
+impl Page {
+    /// The page of a bank with a spec, and of captures that it fuses.
+    ///
+    /// # Errors
+    /// [`PageError`]: a bank without a spec, or one that does not fit it.
+    pub fn new(bank: &Bank, captures: Option<CapturesOnPage>) -> Result<Self, PageError> {
+        let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
+        let mut figures = Vec::new();
+        for picture in pictures(bank)? {
+            figures.push(Figure::new(&picture.chart, picture.caption)?);
+        }
+        Ok(Self { facts: Facts::new(bank, spec)?, figures, captures, spec: spec.to_toml()? })
+    }
+
+    /// A document that loads nothing; `commands` lead to what it shows.
+    pub fn html(&self, commands: &[String]) -> String {
+        let Facts { title, understood, error, cost, channels } = &self.facts;
+        let page = html! {
+            (DOCTYPE)
+            html lang="en" {
+                head {
+                    meta charset="utf-8";
+                    meta name="viewport" content="width=device-width, initial-scale=1";
+                    link rel="icon" href="data:,";
+                    title { (title) " - hybank" }
+                    style { (PreEscaped(STYLE)) }
+                }
+                body {
+                    h1 { (title) }
+                    p class="understood" { (understood) }
+                    h2 { "Error" }
+                    (facts(error))
+                    h2 { "Cost" }
+                    (facts(cost))
+                    h2 { "Channels" }
+                    (channel_table(channels))
+                    @if let Some(captures) = &self.captures {
+                        h2 { "Captures" }
+                        (captures.html())
+                    }
+                    h2 { "Pictures" }
+                    @for figure in &self.figures { (figure.html()) }
+                    h2 { "Spec" }
+                    pre { (self.spec) }
+                    h2 { "Commands" }
+                    pre { (commands.join("\n")) }
+                    p class="understood" { "hybank " (env!("CARGO_PKG_VERSION")) }
+                }
+            }
+        };
+        page.into_string() + "\n"
+    }
+}
+
+fn facts(facts: &[Fact]) -> Markup {
+    html! {
+        table class="facts" {
+            @for fact in facts {
+                tr { th { (fact.name) } td class="value" { (fact.value) } td { (fact.meaning) } }
+            }
+        }
+    }
+}
+
+fn channel_table(channels: &[ChannelFact]) -> Markup {
+    html! {
+        table {
+            tr { th { "channel" } th { "delay" } th { "gain" } th { "offset" } th { "gamma, if the delay is 0.001 samples longer" } }
+            @for (channel, number) in channels.iter().zip(1..) {
+                tr {
+                    td { (number) }
+                    td class="value" { (channel.delay) }
+                    td class="value" { (channel.gain) }
+                    td class="value" { (channel.offset) }
+                    td class="value" {
+                        @match channel.sensitivity {
+                            Some(share) => { (change(share)) }
+                            None => "no derivative",
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! Checks that recordings fit a bank.
+
+use crate::bank::{Bank, FrameLayout};
+use crate::io::{MultiReader, StreamHeader, TimeInterleaving, is_same_rate};
+use crate::messages::{Number, Quoted};
+use crate::units::FastPeriods;
+
+/// Recordings that do not fit a bank.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum InputMismatch {
+    /// Another number of channels.
+    #[error(
+        "{} has {wanted} channels, but the input has {given} ({files}); give one mono recording per channel or one of \
+         {wanted} channels",
+        Quoted(.bank)
+    )]
+    Channels {
+        /// The name of the bank.
+        bank: String,
+        /// Its channels.
+        wanted: usize,
+        /// Channels of the inputs.
+        given: usize,
+        /// Those of each input.
+        files: String,
+    },
+    /// Another number of samples per frame.
+    #[error(
+        "{} has {converters} converters with rates of their own and {wanted} samples per frame, but the input has {given} \
+         ({files}); give one mono recording per converter, or one of whole frames with {wanted} channels",
+        Quoted(.bank)
+    )]
+    Samples {
+        /// The name of the bank.
+        bank: String,
+        /// Its converters.
+        converters: usize,
+        /// Samples of a frame.
+        wanted: usize,
+        /// Channels of the inputs.
+        given: usize,
+        /// Those of each input.
+        files: String,
+    },
+    /// Two inputs with different rates.
+    #[error(
+        "{}: the sample rate is {} Hz, but {} has {} Hz; all channels need the same rate",
+        Quoted(.input), Number(*.rate), Quoted(.other), Number(*.other_rate)
+    )]
+    Rates {
+        /// One input.
+        input: String,
+        /// Its rate in hertz.
+        rate: f64,
+        /// The first input.
+        other: String,
+        /// Its rate in hertz.
+        other_rate: f64,
+    },
+    /// A rate that is not the bank's.
+    #[error(
+        "{}: the sample rate is {} Hz, but the bank is designed for slow channels of {} Hz; record at that rate or design \
+         a bank for this one",
+        Quoted(.input), Number(*.rate), Number(*.wanted)
+    )]
+    Rate {
+        /// The input.
+        input: String,
+        /// Its rate in hertz.
+        rate: f64,
+        /// That of the bank in hertz.
+        wanted: f64,
+    },
+    /// A rate that is not that of the converter.
+    #[error(
+        "{}: the sample rate is {} Hz, but the bank takes {} Hz there, {samples} samples per frame; give the recordings \
+         in the order of the converters, record at that rate, or design a bank for this one",
+        Quoted(.input), Number(*.rate), Number(*.wanted)
+    )]
+    OwnRate {
+        /// The input.
+        input: String,
+        /// Its rate in hertz.
+        rate: f64,
+        /// That of the converter in hertz.
+        wanted: f64,
+        /// Samples of the converter per frame.
+        samples: usize,
+    },
+}
+
+/// Converters that do not take turns.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NotInTurn {
+    /// They have rates of their own.
+    #[error(
+        "the converters have rates of their own, so they do not sample in turn; give one recording per converter"
+    )]
+    OwnRates,
+    /// Another number of converters.
+    #[error("there are {channels} channels, and each of them is one converter; give {channels}")]
+    Count {
+        /// Channels of the bank or the spec.
+        channels: usize,
+    },
+    /// They sample too far apart.
+    #[error(
+        "the delays lie {apart} fast periods apart, so converters with a slow period of {ratio} do not sample in turn; \
+         give one recording per channel"
+    )]
+    Apart {
+        /// Distance of the delays in fast periods.
+        apart: f64,
+        /// Fast periods of the slow period.
+        ratio: usize,
+    },
+}
+
+/// The order in which `converters` converters with these delays take turns in one recording.
+///
+/// # Errors
+/// [`NotInTurn`].
+pub fn turns(
+    converters: usize,
+    delays: &[FastPeriods],
+    layout: &FrameLayout,
+) -> Result<TimeInterleaving, NotInTurn> {
+    let (channels, ratio) = (delays.len(), layout.ratio());
+    if !layout.is_plain() {
+        return Err(NotInTurn::OwnRates);
+    }
+    if channels != converters {
+        return Err(NotInTurn::Count { channels });
+    }
+    let delays: Vec<f64> = delays.iter().map(|delay| delay.0).collect();
+    let extreme = |of: fn(f64, f64) -> f64| delays.iter().copied().reduce(of).unwrap_or(0.0);
+    let apart = extreme(f64::max) - extreme(f64::min);
+    if apart >= ratio as f64 {
+        return Err(NotInTurn::Apart { apart, ratio });
+    }
+    Ok(TimeInterleaving::by_delay(&delays))
+}
+
+/// Samples per frame of each of so many inputs, for the reader: those of the converters, where each has an
+/// input and a rate of its own.
+pub fn samples_per_frame(layout: &FrameLayout, inputs: usize) -> &[usize] {
+    if !layout.is_plain() && inputs == layout.samples().len() { layout.samples() } else { &[] }
+}
+
+/// Channels of each raw input: one of each converter, or all samples of a frame in a single input.
+pub fn channels_of_raw(layout: &FrameLayout, inputs: usize) -> usize {
+    if inputs == 1 && samples_per_frame(layout, inputs).is_empty() { layout.count() } else { 1 }
+}
+
+/// The inputs together have the N channels of the bank called `name`.
+///
+/// # Errors
+/// [`InputMismatch::Channels`] or [`InputMismatch::Samples`].
+pub fn check_channels(bank: &Bank, name: &str, reader: &MultiReader) -> Result<(), InputMismatch> {
+    let (given, wanted) = (reader.channels(), bank.frame_samples());
+    if given == wanted {
+        return Ok(());
+    }
+    let files: Vec<_> =
+        reader.headers().map(|(name, header)| format!("{}: {}", Quoted(name), header.channels)).collect();
+    let (bank_name, files) = (name.to_owned(), files.join(", "));
+    if bank.layout().is_plain() {
+        return Err(InputMismatch::Channels { bank: bank_name, wanted, given, files });
+    }
+    let converters = bank.channel_count();
+    Err(InputMismatch::Samples { bank: bank_name, converters, wanted, given, files })
+}
+
+/// The rate of the output in hertz: the bank's own, or that of the inputs for a bank in normalised time.
+///
+/// # Errors
+/// [`InputMismatch`]: rates that differ, or are not the bank's 1 / (M h).
+pub fn output_rate(bank: &Bank, reader: &MultiReader) -> Result<f64, InputMismatch> {
+    match input_rate(bank, reader.headers(), &reader.samples_per_frame())? {
+        Some(rate) if bank.is_normalised() => Ok(rate * bank.ratio as f64),
+        _ => Ok(1.0 / bank.fast_period.0),
+    }
+}
+
+/// The common rate of the frames of the inputs, where they state a rate: 1 / (M h), or any for a bank in
+/// normalised time. Input i has `samples[i]` samples per frame.
+fn input_rate<'a>(
+    bank: &Bank,
+    inputs: impl Iterator<Item = (&'a str, &'a StreamHeader)>,
+    samples: &[usize],
+) -> Result<Option<f64>, InputMismatch> {
+    let inputs = inputs
+        .zip(samples)
+        .filter_map(|((name, header), &samples)| Some((name, header, header.rate?, samples)));
+    if samples.iter().any(|&samples| samples > 1) {
+        return rate_of_frames(bank, inputs);
+    }
+    let mut inputs = inputs.map(|(name, header, rate, _)| (name, header, rate));
+    let Some((first, header, rate)) = inputs.next() else {
+        return Ok(None);
+    };
+    let differs = |other: f64, error: f64| !is_same_rate(other, rate, error.max(header.rate_error));
+    if let Some((name, _, other_rate)) = inputs.find(|(_, other, rate)| differs(*rate, other.rate_error)) {
+        let (input, other) = (name.to_owned(), first.to_owned());
+        return Err(InputMismatch::Rates { input, rate: other_rate, other, other_rate: rate });
+    }
+    let wanted = 1.0 / bank.slow_period().0;
+    if !bank.is_normalised() && header.other_rate(wanted).is_some() {
+        return Err(InputMismatch::Rate { input: first.to_owned(), rate, wanted });
+    }
+    Ok(Some(rate))
+}
+
+/// As [`input_rate`], for converters with rates of their own; each input comes with its samples per frame.
+fn rate_of_frames<'a>(
+    bank: &Bank,
+    inputs: impl Iterator<Item = (&'a str, &'a StreamHeader, f64, usize)>,
+) -> Result<Option<f64>, InputMismatch> {
+    let mut frames = (!bank.is_normalised()).then(|| 1.0 / bank.slow_period().0);
+    for (name, header, rate, samples) in inputs {
+        let wanted = *frames.get_or_insert(rate / samples as f64) * samples as f64;
+        if header.other_rate(wanted).is_some() {
+            return Err(InputMismatch::OwnRate { input: name.to_owned(), rate, wanted, samples });
+        }
+    }
+    Ok(frames)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bank::SynthesisFilters;
+    use crate::io::{PcmFormat, SampleLayout};
+    use crate::units::Seconds;
+
+    #[test]
+    fn a_rate_four_percent_off_is_another_rate() {
+        let taps = SynthesisFilters::Fir(vec![vec![1.0]; 2]);
+        let bank = Bank { fast_period: Seconds(0.05), ..Bank::bare(taps, 2) };
+        let header = |rate| StreamHeader {
+            rate: Some(rate),
+            ..StreamHeader::real(SampleLayout::packed(PcmFormat::F32Le), 1)
+        };
+        let rate = |a: f64, b: f64| {
+            input_rate(&bank, [("a", &header(a)), ("b", &header(b))].into_iter(), &[1, 1]).ok()
+        };
+        assert_eq!(rate(10.0, 10.0), Some(Some(10.0)));
+        for (a, b) in [(10.4, 10.4), (10.0, 10.4), (10.4, 10.0)] {
+            assert_eq!(rate(a, b), None, "{a} {b}");
+        }
+    }
+}

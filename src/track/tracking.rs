@@ -1,0 +1,110 @@
+//! Taps that follow the delays while a pipeline runs.
+
+use super::{DelaySource, DriftModel, FollowSettings, Followed, Follower, Logged, TrackError, TrackWarning};
+use crate::bank::Bank;
+use crate::pipeline::{Change, PipelineError, Retuner};
+use crate::quantity;
+use crate::runtime::{Options, Stream};
+
+/// Least frames of a measurement.
+const LEAST_FRAMES: usize = 256;
+/// The rates of clocks at the beginning, over how far they wander in a second.
+const FIRST_RATE: f64 = 100.0;
+
+/// How delays are followed, as a user asks for it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tracking {
+    /// Frames of one measurement.
+    pub frames: usize,
+    /// By how many parts per million the rate of a clock may wander in a second.
+    pub wander: f64,
+}
+
+impl Default for Tracking {
+    fn default() -> Self {
+        Self { frames: 2048, wander: 1.0 }
+    }
+}
+
+impl Tracking {
+    /// A tone of the frequency F, `pilot=F`, or any signal, `blind`.
+    ///
+    /// # Errors
+    /// [`TrackError::Source`] for another text.
+    pub fn source(text: &str) -> Result<DelaySource, TrackError> {
+        let refused = |reason: String| TrackError::Source { reason };
+        if text == "blind" {
+            return Ok(DelaySource::AnySignal);
+        }
+        let Some(pilot) = text.strip_prefix("pilot=") else {
+            let reason = "give pilot=F, blind, or a file whose name ends in .jsonl";
+            return Err(refused(reason.to_owned()));
+        };
+        let pilot = quantity::frequency(pilot.trim()).map_err(|error| refused(error.to_string()))?;
+        if pilot.0 > 0.0 {
+            return Ok(DelaySource::Pilot(pilot));
+        }
+        Err(refused("a pilot has a positive frequency".to_owned()))
+    }
+
+    /// Refuses too few frames of a measurement.
+    ///
+    /// # Errors
+    /// [`TrackError::Frames`].
+    pub fn check_frames(&self) -> Result<(), TrackError> {
+        if self.frames < LEAST_FRAMES { Err(TrackError::Frames { least: LEAST_FRAMES }) } else { Ok(()) }
+    }
+
+    /// Refuses clocks that do not wander, or that are none.
+    ///
+    /// # Errors
+    /// [`TrackError::Wander`].
+    pub fn check_wander(&self) -> Result<(), TrackError> {
+        if self.wander > 0.0 && self.wander < 1e6 { Ok(()) } else { Err(TrackError::Wander) }
+    }
+
+    /// What follows the delays of the channels of `bank` by `source`; `rate` hertz is that of the output.
+    ///
+    /// # Errors
+    /// [`TrackError`].
+    pub fn follower(&self, bank: &Bank, source: DelaySource, rate: f64) -> Result<Follower, TrackError> {
+        self.check_frames()?;
+        self.check_wander()?;
+        // A bank in normalised time counts in units that the recordings say.
+        let unit = if bank.is_normalised() { 1.0 / rate } else { 1.0 };
+        let wander = 1e-6 * self.wander;
+        let settings = FollowSettings {
+            block_frames: self.frames,
+            model: DriftModel { delay_walk: 0.0, rate_walk: wander * wander * unit },
+            rate_deviation: FIRST_RATE * wander,
+            rate_change: wander * unit,
+        };
+        Follower::new(bank, source, settings)
+    }
+}
+
+impl Follower {
+    /// Starts the thread that follows the delays; the filters are those of `bank` with `options`. After each
+    /// measurement `record` is told what is known, and what a user should know at once.
+    ///
+    /// # Errors
+    /// As [`Retuner::start`].
+    pub fn retuner(
+        mut self,
+        bank: &Bank,
+        options: Options,
+        mut record: impl FnMut(Logged, Vec<TrackWarning>) -> Result<(), PipelineError> + Send + 'static,
+    ) -> Result<Retuner, PipelineError> {
+        let (bank, mut followed) = (bank.clone(), bank.clone());
+        Retuner::start(self.block_frames(), &bank.offsets.clone(), move |samples| {
+            let Followed { changes, log, warnings } = self.follow(samples);
+            record(log, warnings)?;
+            let change = |change: super::Change| {
+                followed.filters = bank.filters_at(&change.errors);
+                let (frame, shifts) = (change.frame as u64, change.shifts);
+                Ok(Change { frame, stream: Stream::new(&followed.plan(options)?), shifts })
+            };
+            changes.into_iter().map(change).collect()
+        })
+    }
+}
