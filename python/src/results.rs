@@ -181,17 +181,17 @@ impl Verified {
 #[derive(FromPyObject)]
 pub(crate) struct Analysis {
     /// The worst-case gain, in normalised time.
-    gamma: f64,
+    pub(crate) gamma: f64,
     /// Frequency of the worst case, modulo the slow rate.
-    peak_hertz: f64,
+    pub(crate) peak_hertz: f64,
     /// No bank has a smaller gamma with these front ends and delays; None where that is not known.
-    noncausal: Option<f64>,
+    pub(crate) noncausal: Option<f64>,
     /// Rms of the error for white noise of unit density at the analog input.
-    rms_error: f64,
+    pub(crate) rms_error: f64,
     /// Rms of the output noise for independent noise of unit rms on all slow samples.
-    noise_gain: f64,
+    pub(crate) noise_gain: f64,
     /// Rms of the output noise for the noise of the converters in the spec.
-    output_noise: f64,
+    pub(crate) output_noise: f64,
     /// gamma of zero output and of plain interleaving, and the rms of the reference.
     pub(crate) scale: Option<Py<PyAny>>,
     /// A proven upper bound of gamma; None unless asked for, as all below.
