@@ -45,12 +45,39 @@ class Report:
 def fuse(bank, source, sink, *, client=None, axis=-1, dtype=None, algorithm="auto", span=None, progress=None):
     """Fuse an archive into a new one; the output has the bits of ``bank.fuse`` over all of it.
 
-    ``source`` is the path of a zarr array or of an ``.npy`` file, ``("file.h5", "dataset")``, or a list of WAV or SigMF
-    files with a channel or more each. ``axis`` is the axis of time of arrays. ``sink`` is the path of an ``.npy`` file
-    or of a zarr array, which is made anew; a source or another kind of file is refused. ``client`` is a
-    ``dask.distributed.Client``; without one this process does one span after another. ``span`` is the least number of
-    frames of a task; unless given, each thread has eight tasks, of 2^23 to 2^24 frames. ``progress(done, spans)`` is
-    called after every span.
+    Parameters
+    ----------
+    bank : Bank
+        The bank.
+    source : str or pair or list
+        The path of a zarr array or of an ``.npy`` file, ``("file.h5", "dataset")``, or a list of WAV or SigMF files with
+        a channel or more each.
+    sink : str
+        The path of an ``.npy`` file or of a zarr array, which is made anew; a source or another kind of file is refused.
+    client : dask.distributed.Client, optional
+        Shares the work; without one this process does one span after another.
+    axis : int
+        The axis of time of arrays.
+    dtype : dtype, optional
+        Number type of the output.
+    algorithm : str
+        As in ``Bank.fuse``.
+    span : int, optional
+        The least number of frames of a task; unless given, each thread has eight tasks, of 2^23 to 2^24 frames.
+    progress : callable, optional
+        ``progress(done, spans)`` is called after every span.
+
+    Returns
+    -------
+    Report
+
+    Examples
+    --------
+    >>> x = np.sin(0.1 * np.arange(2000.0)) * np.ones((2, 1))
+    >>> np.save("in.npy", x)
+    >>> report = hb.dask.fuse(bank, "in.npy", "out.npy")
+    >>> bool((np.load("out.npy") == bank.fuse(x)).all())
+    True
     """
     source, sink = _located(source), _location(sink)
     _check_sink(sink, source)
@@ -74,11 +101,32 @@ def fuse(bank, source, sink, *, client=None, axis=-1, dtype=None, algorithm="aut
 
 
 def sweep(specs, *, map=map, client=None, progress=None, **keywords):  # noqa: A002
-    """Design every spec; a list of banks, with the exception in place of a bank that could not be designed.
+    """Design every spec.
 
-    ``map`` is the ``map`` of any executor, for example of ``concurrent.futures.ProcessPoolExecutor``; ``client`` a
-    ``dask.distributed.Client`` in its place. ``progress(done, specs)`` is called after every design. Keywords go to
-    ``hybank.design``.
+    Parameters
+    ----------
+    specs : list
+        Paths or mappings.
+    map : callable
+        The ``map`` of any executor, for example of ``concurrent.futures.ProcessPoolExecutor``.
+    client : dask.distributed.Client, optional
+        In its place.
+    progress : callable, optional
+        ``progress(done, specs)`` is called after every design.
+    **keywords
+        Go to ``hybank.design``.
+
+    Returns
+    -------
+    list of Bank
+        With the exception in place of a bank that could not be designed.
+
+    Examples
+    --------
+    >>> spec = {"fast_rate": 48e3, "ratio": 2, "target": {"filter": hb.butterworth(4, 9e3)}, "design": {"taps": 4},
+    ...         "channel": [hb.Channel(25e-6), hb.Channel(12.5e-6)], "latency": 2}
+    >>> hb.dask.sweep([spec], proof=False)[0].taps.shape
+    (2, 4)
     """
     if isinstance(specs, (str, os.PathLike, Mapping)):
         raise TypeError("specs: give a list of specs; for a single one, call hybank.design")
@@ -163,7 +211,22 @@ def _threads(client):
 
 
 def warm_up(bank):
-    """Frames after which two states of a recursion hardly differ: W = 2 ln eps / ln rho, rho its largest pole."""
+    """Frames after which two states of a recursion hardly differ: W = 2 ln eps / ln rho, rho its largest pole.
+
+    Parameters
+    ----------
+    bank : Bank
+        A recursive bank.
+
+    Returns
+    -------
+    int
+
+    Examples
+    --------
+    >>> hb.dask.warm_up(bank) > 0
+    True
+    """
     poles = np.linalg.eigvals(bank.ss[0])
     rho = max(abs(poles), default=0.0)
     if rho < 1e-3:

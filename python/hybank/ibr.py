@@ -33,20 +33,49 @@ def render(
     fill=True,
     reverse_order=False,
 ):
-    """Render the view of a virtual camera.
+    """Render the view of a virtual camera from views with depth.
 
-    ``images`` are arrays (H, W) or (H, W, 3) with intensities 0 to 255. There are three kinds of views:
+    A rectified rig has `disparity`, `positions` and `at`; other cameras have `depth`, `cameras` and `camera`; views
+    without cameras have `tracks`, and `points` or `at`.
 
-    - A rectified rig has a ``disparity`` map (H, W) per image, in pixels for a baseline of one, ``positions`` along the
-      baseline, and renders the view ``at`` a position.
-    - Calibrated cameras have a ``depth`` map per image and ``cameras`` (3, 4), and render the view of ``camera``.
-    - Views without cameras have ``tracks`` (P, V, 2): x and y of P points in V images, NaN where a point is not seen.
-      The virtual camera is given by ``points`` (P, 2), the same points in it, or lies ``at`` 0 to 1 between the first
-      two views. A ``UserWarning`` says that the order of depth is undecided; ``reverse_order=True`` takes the other one.
+    Parameters
+    ----------
+    images : list of array_like, (H, W) or (H, W, 3)
+        Intensities 0 to 255.
+    disparity : list of array_like (H, W), optional
+        Pixels for a baseline of one; NaN and 0 are unknown.
+    positions : list of float, optional
+        Places along the baseline.
+    at : float, optional
+        The place that is rendered; of tracks 0 to 1 between the first two views.
+    depth : list of array_like (H, W), optional
+        NaN and 0 are unknown.
+    cameras, camera : array_like (3, 4), optional
+        The cameras of the images, and the virtual one.
+    tracks : array_like (P, V, 2), optional
+        x and y of P points in V images, NaN where a point is not seen.
+    points : array_like (P, 2), optional
+        The same points in the virtual camera.
+    size : pair of int, optional
+        (H, W) of the view; that of the first image if left out. A rectified rig has that of its images.
+    method : {"auto", "rows", "plane"}
+        For rectified rigs; "auto" takes rows.
+    fill : bool
+        Fill pixels whose depth is unknown.
+    reverse_order : bool
+        Take the other order of depth, where a ``UserWarning`` says that it is undecided.
 
-    ``size`` (H, W) is that of the first image unless given; a rectified rig has that of its images. NaN and 0 are
-    unknown depth; ``fill=False`` leaves such pixels out. ``method`` is ``"rows"`` or ``"plane"`` for rectified rigs;
-    ``"auto"`` takes rows for them.
+    Returns
+    -------
+    View
+
+    Examples
+    --------
+    >>> column = np.arange(40.0) * np.ones((24, 1))
+    >>> views = [128 + 60 * np.sin(0.2 * (column + shift)) for shift in (0, 4)]
+    >>> view = hb.ibr.render(views, disparity=[np.full((24, 40), 4.0)] * 2, positions=[0, 1], at=0.5)
+    >>> view.image.shape
+    (24, 40)
     """
     images = [_image(image) for image in images]
     rectified = disparity is not None and positions is not None and at is not None

@@ -29,22 +29,7 @@ const MOST_DENSE_STATES: usize = 4096;
 /// Most frequencies of a response, which take a minute.
 const MOST_FREQUENCIES: usize = 10_000_000;
 
-/// Reads a bank file.
-///
-/// Parameters
-/// ----------
-/// path : str or os.PathLike
-///     The bank file, as `hybank design` and `Bank.save` write it.
-///
-/// Returns
-/// -------
-/// Bank
-///
-/// Examples
-/// --------
-/// >>> bank = hb.load("thesis-fir.json")
-/// >>> bank.ratio, bank.latency
-/// (2, 10)
+#[doc = include_str!("docs/load.rst")]
 #[pyfunction]
 pub(crate) fn load(path: PathBuf) -> PyResult<Bank> {
     let text = sources::read(&path)?;
@@ -76,76 +61,24 @@ type Matrices<'py> = (
 
 #[pymethods]
 impl Bank {
-    /// The bank of a file's text.
-    ///
-    /// Parameters
-    /// ----------
-    /// text : str
-    ///     The text of a bank file.
-    ///
-    /// Returns
-    /// -------
-    /// Bank
-    ///
-    /// Examples
-    /// --------
-    /// >>> hb.Bank.from_json(bank.to_json()) == bank
-    /// True
+    #[doc = include_str!("docs/Bank.from_json.rst")]
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
         sources::parse_bank(text, "bank").map(Self::from)
     }
 
-    /// The text of the bank file. All numbers read back to the same bits.
-    ///
-    /// Returns
-    /// -------
-    /// str
-    ///
-    /// Examples
-    /// --------
-    /// >>> bank.to_json()[:25]
-    /// '{"format":"hybank-bank","'
+    #[doc = include_str!("docs/Bank.to_json.rst")]
     fn to_json(&self) -> PyResult<String> {
         self.bank.to_json().map_err(refused)
     }
 
-    /// Writes the bank file, which appears when it is whole.
-    ///
-    /// Parameters
-    /// ----------
-    /// path : str or os.PathLike
-    ///     The file.
-    /// overwrite : bool
-    ///     Whether to replace an existing file.
-    ///
-    /// Examples
-    /// --------
-    /// >>> bank.save("copy.json")
+    #[doc = include_str!("docs/Bank.save.rst")]
     #[pyo3(signature = (path, *, overwrite = true))]
     fn save(&self, path: PathBuf, overwrite: bool) -> PyResult<()> {
         write_file(&path, self.to_json()?.as_bytes(), overwrite)
     }
 
-    /// Writes the bank for another tool.
-    ///
-    /// Parameters
-    /// ----------
-    /// path : str or os.PathLike
-    ///     The file.
-    /// format : {"c", "csv", "npz", "mat", "coe", "mem", "sos"}
-    ///     A C99 header ("c99" too), tables and arrays of coefficients, words of FPGA memory, or second-order
-    ///     sections of a recursive bank.
-    /// name : str
-    ///     Prefix of C identifiers.
-    /// input_bits : int, optional
-    ///     Bits of the samples from which integer code subtracts offsets.
-    /// overwrite : bool
-    ///     Whether to replace an existing file.
-    ///
-    /// Examples
-    /// --------
-    /// >>> bank.export("taps.csv", format="csv")
+    #[doc = include_str!("docs/Bank.export.rst")]
     #[pyo3(
         signature = (path, *, format, name = "bank", input_bits = None, overwrite = true, **unknown),
         text_signature = "($self, path, *, format, name='bank', input_bits=None, overwrite=True)"
@@ -273,24 +206,7 @@ impl Bank {
         ))
     }
 
-    /// The largest gain of the error system by frequency. Its maximum over all frequencies is gamma.
-    ///
-    /// Parameters
-    /// ----------
-    /// n : int
-    ///     Equidistant frequencies from 0 to half the slow rate.
-    ///
-    /// Returns
-    /// -------
-    /// f : ndarray, shape (n,)
-    ///     Hertz, modulo the slow rate.
-    /// gain : ndarray, shape (n,)
-    ///
-    /// Examples
-    /// --------
-    /// >>> f, gain = bank.error_response(64)
-    /// >>> bool(gain.max() <= bank.gamma.upper)
-    /// True
+    #[doc = include_str!("docs/Bank.error_response.rst")]
     #[pyo3(signature = (n = 512))]
     fn error_response<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Array<'py>, Array<'py>)> {
         let count = frequency_count(n)?;
@@ -302,26 +218,7 @@ impl Bank {
         Ok((PyArray1::from_vec(py, hertz), PyArray1::from_vec(py, gain)))
     }
 
-    /// The frequency responses of the synthesis filters at the fast rate.
-    ///
-    /// Parameters
-    /// ----------
-    /// n : int
-    ///     Equidistant frequencies from 0 to half the fast rate.
-    ///
-    /// Returns
-    /// -------
-    /// f : ndarray, shape (n,)
-    ///     Hertz.
-    /// response : ndarray, shape (N, n)
-    ///     Complex; a row for each sample of a frame, as `taps` has. That of a recursive filter is summed
-    ///     until 1e-12 of its energy is left.
-    ///
-    /// Examples
-    /// --------
-    /// >>> f, response = bank.frequency_response(64)
-    /// >>> response.shape, bool(abs(response[0, 0] - bank.taps[0].sum()) < 1e-12)
-    /// ((2, 64), True)
+    #[doc = include_str!("docs/Bank.frequency_response.rst")]
     #[pyo3(signature = (n = 512))]
     fn frequency_response<'py>(
         &self,
@@ -339,25 +236,7 @@ impl Bank {
         Ok((PyArray1::from_iter(py, frequencies.iter().map(|f| f.0)), rows))
     }
 
-    /// The gains of the target and of the converters' front ends.
-    ///
-    /// Parameters
-    /// ----------
-    /// n : int
-    ///     Equidistant frequencies from 0 to half the fast rate.
-    ///
-    /// Returns
-    /// -------
-    /// f : ndarray, shape (n,)
-    ///     Hertz.
-    /// gain : ndarray, shape (1 + N, n)
-    ///     The target, then a row for each converter.
-    ///
-    /// Examples
-    /// --------
-    /// >>> f, gain = bank.front_end_gains(8)
-    /// >>> gain.shape
-    /// (3, 8)
+    #[doc = include_str!("docs/Bank.front_end_gains.rst")]
     #[pyo3(signature = (n = 512))]
     fn front_end_gains<'py>(
         &self,
@@ -371,57 +250,19 @@ impl Bank {
         Ok((PyArray1::from_iter(py, frequencies.iter().map(|f| f.0)), PyArray2::from_vec2(py, &rows)?))
     }
 
-    /// The bank in the user's terms: signal-to-noise ratio, largest image and error of gain, and what the
-    /// simple ways would give.
-    ///
-    /// Returns
-    /// -------
-    /// Figures
-    ///
-    /// Examples
-    /// --------
-    /// >>> bank.figures().snr > 20
-    /// True
+    #[doc = include_str!("docs/Bank.figures.rst")]
     fn figures(&self, py: Python<'_>) -> PyResult<Figures> {
         let bank = Arc::clone(&self.bank);
         let figures = background::run(py, None, move |_| hybank::figures::Figures::new(&bank))?;
         figures.map(Figures::from).map_err(refused)
     }
 
-    /// The curves of the pictures that `hybank plot` draws.
-    ///
-    /// Returns
-    /// -------
-    /// dict
-    ///     By the name of the picture: "tones", "front-ends", "analysis", "filters", "phase", "group-delay",
-    ///     "impulse-responses", "error" and "delay-error". Each is a dictionary with `title`, `caption`,
-    ///     `x_label`, `y_label`, `is_logarithmic` and `curves`, a list of (label, x, y).
-    ///
-    /// Examples
-    /// --------
-    /// >>> label, x, y = bank.pictures()["impulse-responses"]["curves"][0]
-    /// >>> label, len(y)
-    /// ('channel 1', 22)
+    #[doc = include_str!("docs/Bank.pictures.rst")]
     fn pictures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         pictures::pictures(py, &self.bank)
     }
 
-    /// Draws a picture of the bank with matplotlib.
-    ///
-    /// Parameters
-    /// ----------
-    /// ax : matplotlib.axes.Axes, optional
-    ///     Where to draw; a new figure if left out.
-    /// picture : str
-    ///     A name of `pictures`; "error" is the largest gain to the error by frequency, with its bounds.
-    ///
-    /// Returns
-    /// -------
-    /// matplotlib.axes.Axes
-    ///
-    /// Examples
-    /// --------
-    /// >>> ax = bank.plot(picture="filters")  # doctest: +SKIP
+    #[doc = include_str!("docs/Bank.plot.rst")]
     #[pyo3(signature = (ax = None, picture = "error"))]
     fn plot<'py>(
         slf: &Bound<'py, Self>,
@@ -431,23 +272,7 @@ impl Bank {
         slf.py().import("hybank._show")?.call_method1("plot", (slf, ax, picture))
     }
 
-    /// Writes a page (HTML) about the bank, as `hybank report` does: its error with the proven bounds, its
-    /// filters, its cost, and of captures the spectra before and after.
-    ///
-    /// Parameters
-    /// ----------
-    /// path : str or os.PathLike
-    ///     The page, one file that loads nothing.
-    /// captures : array_like or list of files, optional
-    ///     What `fuse` takes; the first 2^20 frames are used.
-    /// axis : int
-    ///     The axis of time of an array.
-    /// overwrite : bool
-    ///     Whether to replace an existing file.
-    ///
-    /// Examples
-    /// --------
-    /// >>> bank.report("report.html")
+    #[doc = include_str!("docs/Bank.report.rst")]
     #[pyo3(signature = (path, captures = None, *, axis = -1, overwrite = true))]
     fn report(
         slf: &Bound<'_, Self>,
@@ -460,53 +285,7 @@ impl Bank {
         write_file(&path, page.as_bytes(), overwrite)
     }
 
-    /// Fuses a whole signal; the output lines up with the time axis of the input.
-    ///
-    /// Parameters
-    /// ----------
-    /// x : array_like, shape (N, T), or list of files
-    ///     A row for each channel; (T, N) with `axis=0`. A list of arrays for converters with rates of their
-    ///     own. Files (WAV, FLAC, SigMF, tables, arrays) or what `hybank.read` returns. DataArrays of xarray
-    ///     keep dimensions and coordinates, dask arrays stay lazy, DataFrames of pandas keep their index.
-    /// axis : int
-    ///     The axis of time.
-    /// dtype : dtype, optional
-    ///     Number type of the output; floats with the digits of the input if left out.
-    /// threads : int
-    ///     Threads that filter, 0 for one per processor. The bits do not depend on it.
-    /// gaps : {"hold", "zero"}, optional
-    ///     Replacement of missing samples, which are NaN: the last good one, or 0.
-    /// algorithm : {"auto", "direct", "overlap-save"}
-    ///     Algorithm of FIR filters.
-    /// keep_latency : bool
-    ///     The causal output, as a stream gives it.
-    /// interleaved : int, optional
-    ///     x is one recording of one channel in which so many converters take turns, the one with the largest
-    ///     delay first.
-    /// track : str or list, optional
-    ///     Follow the delays: "pilot=3.1kHz", "blind", the name of a file that ends in .jsonl, or a list of
-    ///     readings with `frame`, `delay` and `half_width`. The bank needs `tracking="affine"`.
-    /// track_frames : int
-    ///     Frames of one measurement.
-    /// track_wander : float
-    ///     By how many ppm the rate of a clock may wander in a second.
-    /// rate : float, optional
-    ///     Rate of the output in hertz, for `track` with a bank in normalised time.
-    /// full_output : bool
-    ///     Also return the report.
-    ///
-    /// Returns
-    /// -------
-    /// y : ndarray, shape (M T,)
-    /// report : FuseReport
-    ///     With `full_output=True`.
-    ///
-    /// Examples
-    /// --------
-    /// >>> capture = hb.simulate(bank, "tones:0.3", samples=400)
-    /// >>> y = bank.fuse(capture.channels)
-    /// >>> y.shape, float(abs(y - capture.target)[50:-50].max()) < 0.05
-    /// ((400,), True)
+    #[doc = include_str!("docs/Bank.fuse.rst")]
     #[pyo3(
         signature = (
             x, *, axis = -1, dtype = None, threads = 1, gaps = None, algorithm = "auto", keep_latency = false,
@@ -563,33 +342,7 @@ impl Bank {
         if full_output { Ok((y, report).into_pyobject(py)?.into_any()) } else { Ok(y) }
     }
 
-    /// A causal stream through the bank.
-    ///
-    /// Parameters
-    /// ----------
-    /// axis : int
-    ///     The axis of time of the blocks.
-    /// dtype : dtype, optional
-    ///     Number type of the outputs, float32 if left out.
-    /// algorithm : {"auto", "direct", "overlap-save"}
-    ///     Algorithm of FIR filters.
-    /// state : bytes, optional
-    ///     The state of another stream of the same bank, dtype and algorithm, from which this one goes on.
-    /// gaps : {"hold", "zero"}, optional
-    ///     Replacement of missing samples, as in `fuse`; `Stream.gaps` and `Stream.mask` say where.
-    /// track, track_frames, track_wander, rate
-    ///     As in `fuse`. The outputs of a call may belong to frames of earlier ones.
-    ///
-    /// Returns
-    /// -------
-    /// Stream
-    ///
-    /// Examples
-    /// --------
-    /// >>> with bank.stream(gaps="hold") as s:
-    /// ...     y = s.process([[0.0, float("nan")], [0.0, 0.1]])
-    /// >>> y.shape, s.gaps
-    /// ((4,), [(1, 1, 1)])
+    #[doc = include_str!("docs/Bank.stream.rst")]
     #[pyo3(
         signature = (
             *, axis = -1, dtype = None, algorithm = "auto", state = None, gaps = None, track = None,

@@ -5,6 +5,8 @@
 //! released, and turn errors into exceptions.
 
 #![deny(unsafe_code)]
+// The prompts of Python in the documentation are no quotations.
+#![allow(clippy::doc_lazy_continuation)]
 
 mod arrays;
 mod background;
@@ -27,6 +29,7 @@ mod recordings;
 mod records;
 mod results;
 mod running;
+mod runs;
 mod samples;
 mod signals;
 mod simulate;

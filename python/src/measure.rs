@@ -62,22 +62,7 @@ impl Measurement {
         slf.py().import("hybank._show")?.call_method1("measured", (slf,))
     }
 
-    /// Draws the spectrum with its spurs by matplotlib.
-    ///
-    /// Parameters
-    /// ----------
-    /// ax : matplotlib.axes.Axes, optional
-    ///     Where to draw; a new figure if left out.
-    ///
-    /// Returns
-    /// -------
-    /// matplotlib.axes.Axes
-    ///
-    /// Examples
-    /// --------
-    /// >>> import numpy as np
-    /// >>> m = hb.measure(np.cos(0.3 * np.arange(4096)), 48e3)
-    /// >>> ax = m.plot()  # doctest: +SKIP
+    #[doc = include_str!("docs/Measurement.plot.rst")]
     #[pyo3(signature = (ax = None))]
     fn plot<'py>(slf: &Bound<'py, Self>, ax: Option<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("hybank._show")?.call_method1("spectrum", (slf, ax))

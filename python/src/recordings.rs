@@ -56,22 +56,7 @@ impl Recording {
         }
     }
 
-    /// Frames from any place.
-    ///
-    /// Parameters
-    /// ----------
-    /// first : int
-    ///     The first frame, from 0.
-    /// count : int
-    ///     How many; there are fewer at the end.
-    ///
-    /// Returns
-    /// -------
-    /// ndarray, shape (count, channels)
-    ///
-    /// Examples
-    /// --------
-    /// >>> hb.Recording("adc.sigmf-meta").read(1000, 500)  # doctest: +SKIP
+    #[doc = include_str!("docs/Recording.read.rst")]
     fn read<'py>(&self, py: Python<'py>, first: u64, count: usize) -> PyResult<Bound<'py, PyAny>> {
         let first = first.min(self.frames);
         let count = self.frames.saturating_sub(first).min(count as u64) as usize;

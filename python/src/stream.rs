@@ -6,15 +6,13 @@ use crate::errors::refused;
 use crate::formats::{Format, Number};
 use crate::fuse::{marks, parse_algorithm, plan};
 use crate::outputs::NewArray;
-use crate::running::{Extras, Outputs, Running, Tracks};
-use crate::samples::{Room, Samples};
+use crate::running::{Extras, Outputs};
+use crate::runs::{Runs, State};
 use hybank::bank::Bank;
-use hybank::pipeline::{DroppedLatency, PipelineError};
-use hybank::runtime::{self, Algorithm, Output, PcmFrames, Plan, ProcessError, STATE_COUNTS, StateError};
+use hybank::runtime::{self, Plan};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
-use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A stream through a bank: blocks of frames in, M samples per frame out, late by the latency.
@@ -35,19 +33,6 @@ pub(crate) struct Stream {
 /// How a pickle makes a stream: a function and its arguments.
 type Reduced<'py> =
     (Bound<'py, PyAny>, (Bound<'py, PyBank>, isize, &'static str, String, Bound<'py, PyBytes>, bool));
-
-struct State {
-    runs: Runs,
-    closed: bool,
-}
-
-/// How frames are filtered.
-enum Runs {
-    /// By one stream for real samples, by two for the parts of complex ones.
-    Streams { streams: Vec<runtime::Stream>, clipped: u64 },
-    /// With gaps that are filled, or filters that follow the delays.
-    Running { running: Box<Running>, mask: Vec<u8> },
-}
 
 impl Stream {
     pub(crate) fn new(
@@ -97,23 +82,7 @@ impl Stream {
 
 #[pymethods]
 impl Stream {
-    /// Filters a block of frames.
-    ///
-    /// Parameters
-    /// ----------
-    /// x : array_like
-    ///     Frames along the stream's axis of time.
-    ///
-    /// Returns
-    /// -------
-    /// ndarray
-    ///     M output samples for each frame; where delays are followed, those of the frames that are ready.
-    ///
-    /// Examples
-    /// --------
-    /// >>> s = bank.stream()
-    /// >>> s.process(np.zeros((2, 3), "f4")).shape, s.position
-    /// ((6,), 3)
+    #[doc = include_str!("docs/Stream.process.rst")]
     fn process<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let (frames, shape) = framed(x, &self.bank.layout(), self.shape.axis, true)?;
         let held = Held::new(&frames, shape)?;
@@ -129,16 +98,7 @@ impl Stream {
         array.finish()
     }
 
-    /// The last samples, by zeros for input: as many frames of them as the latency has.
-    ///
-    /// Returns
-    /// -------
-    /// ndarray
-    ///
-    /// Examples
-    /// --------
-    /// >>> len(bank.stream().flush()) >= bank.latency
-    /// True
+    #[doc = include_str!("docs/Stream.flush.rst")]
     fn flush<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         if self.extras.is_any() {
             let outputs = py.detach(|| self.lock().drain()).map_err(refused)?;
@@ -150,15 +110,7 @@ impl Stream {
         array.finish()
     }
 
-    /// Back to the beginning.
-    ///
-    /// Examples
-    /// --------
-    /// >>> s = bank.stream()
-    /// >>> y = s.process(np.ones((2, 3), "f4"))
-    /// >>> s.reset()
-    /// >>> bool((s.process(np.ones((2, 3), "f4")) == y).all())
-    /// True
+    #[doc = include_str!("docs/Stream.reset.rst")]
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
         let algorithm = parse_algorithm(&self.asked)?.without_added_latency();
         let runs = Runs::new(&self.bank, &self.plan, self.format, algorithm, &self.extras)?;
@@ -279,23 +231,7 @@ impl Stream {
         Ok(PyBytes::new(py, &self.read(py, Runs::bytes)?))
     }
 
-    /// True if from here on this stream and one that goes on from `state` give the same bits to the same
-    /// input. Counts and positions may differ.
-    ///
-    /// Parameters
-    /// ----------
-    /// state : bytes
-    ///     `Stream.state` of a stream of the same bank, dtype and algorithm.
-    ///
-    /// Returns
-    /// -------
-    /// bool
-    ///
-    /// Examples
-    /// --------
-    /// >>> s = bank.stream()
-    /// >>> s.agrees(s.state)
-    /// True
+    #[doc = include_str!("docs/Stream.agrees.rst")]
     fn agrees(&self, py: Python<'_>, state: &[u8]) -> bool {
         self.read(py, |own| own.agrees(state))
     }
@@ -382,154 +318,6 @@ impl Stream {
                 "the samples are real, the stream is complex; make it with bank.stream(dtype=\"f4\") or \"f8\"",
             )),
             _ => Ok(()),
-        }
-    }
-}
-
-impl State {
-    fn process(&mut self, parts: &[Samples<'_>], room: &mut Room<'_>) -> Result<(), StreamError> {
-        self.check_open()?;
-        let Runs::Streams { streams, clipped } = &mut self.runs else { return Ok(()) };
-        for (i, (stream, part)) in streams.iter_mut().zip(parts).enumerate() {
-            if parts.len() > 1 {
-                room.select(i);
-            }
-            stream.run(part, room)?;
-        }
-        *clipped += room.clipped();
-        Ok(())
-    }
-
-    fn flush(&mut self, room: &mut Room<'_>) -> Result<(), StreamError> {
-        self.check_open()?;
-        let Runs::Streams { streams, clipped } = &mut self.runs else { return Ok(()) };
-        let is_complex = streams.len() > 1;
-        for (part, stream) in streams.iter_mut().enumerate() {
-            if is_complex {
-                room.select(part);
-            }
-            stream.flush(room)?;
-        }
-        *clipped += room.clipped();
-        Ok(())
-    }
-
-    /// Of a stream that fills gaps or follows delays.
-    fn push(&mut self, recordings: &[PcmFrames<'_>], frames: usize) -> Result<Outputs, StreamError> {
-        self.run(|running| running.push(recordings, frames))
-    }
-
-    fn drain(&mut self) -> Result<Outputs, StreamError> {
-        self.run(Running::drain)
-    }
-
-    fn run(
-        &mut self,
-        step: impl FnOnce(&mut Running) -> Result<(), PipelineError>,
-    ) -> Result<Outputs, StreamError> {
-        self.check_open()?;
-        let Runs::Running { running, mask } = &mut self.runs else {
-            return Ok(Outputs { samples: Vec::new(), mask: Vec::new() });
-        };
-        step(running)?;
-        let mut outputs = running.take();
-        *mask = std::mem::take(&mut outputs.mask);
-        Ok(outputs)
-    }
-
-    fn check_open(&self) -> Result<(), StreamError> {
-        if self.closed { Err(StreamError::Closed) } else { Ok(()) }
-    }
-}
-
-impl Runs {
-    fn new(
-        bank: &Bank,
-        plan: &Plan,
-        format: Format,
-        algorithm: Algorithm,
-        extras: &Extras,
-    ) -> PyResult<Self> {
-        if !extras.is_any() {
-            let streams = vec![runtime::Stream::new(plan); 1 + usize::from(format.complex)];
-            return Ok(Self::Streams { streams, clipped: 0 });
-        }
-        let running = Running::new(bank, format, algorithm, extras, DroppedLatency::Nothing)?;
-        Ok(Self::Running { running: Box::new(running), mask: Vec::new() })
-    }
-
-    fn tracks(&self) -> Option<Tracks> {
-        if let Self::Running { running, .. } = self { Some(running.tracks()) } else { None }
-    }
-
-    /// The count of saturated samples, then the state of each part, all of one length.
-    fn bytes(&self) -> PyResult<Vec<u8>> {
-        let Self::Streams { streams, clipped } = self else { return Err(stateless()) };
-        let mut bytes = clipped.to_le_bytes().to_vec();
-        streams.iter().for_each(|stream| stream.save(&mut bytes));
-        Ok(bytes)
-    }
-
-    fn resume(&mut self, bytes: &[u8]) -> PyResult<()> {
-        let Self::Streams { streams, clipped } = self else { return Err(stateless()) };
-        let parts = parts(streams.len(), bytes).ok_or(StateError::NotAState);
-        let (count, states) = parts.map_err(refused)?;
-        let mut resumed = streams.clone();
-        let mut pairs = resumed.iter_mut().zip(states);
-        pairs.try_for_each(|(stream, state)| stream.resume(state)).map_err(refused)?;
-        (*streams, *clipped) = (resumed, count);
-        Ok(())
-    }
-
-    fn agrees(&self, bytes: &[u8]) -> bool {
-        let Self::Streams { streams, .. } = self else { return false };
-        let same = |(stream, state): (&runtime::Stream, &[u8])| {
-            stream.state().get(STATE_COUNTS..) == state.get(STATE_COUNTS..)
-        };
-        parts(streams.len(), bytes).is_some_and(|(_, states)| streams.iter().zip(states).all(same))
-    }
-}
-
-/// The count and the states in the bytes of a state of so many parts.
-fn parts(count: usize, bytes: &[u8]) -> Option<(u64, Vec<&[u8]>)> {
-    let (clipped, states) = bytes.split_first_chunk()?;
-    let is_whole = !states.is_empty() && states.len() % count == 0;
-    is_whole.then(|| (u64::from_le_bytes(*clipped), states.chunks_exact(states.len() / count).collect()))
-}
-
-fn stateless() -> PyErr {
-    refused(
-        "a stream that fills gaps or follows delays cannot be copied, pickled or resumed; begin another one",
-    )
-}
-
-/// Why a stream takes no samples.
-enum StreamError {
-    Closed,
-    Process(ProcessError),
-    Run(PipelineError),
-}
-
-impl From<ProcessError> for StreamError {
-    fn from(error: ProcessError) -> Self {
-        Self::Process(error)
-    }
-}
-
-impl From<PipelineError> for StreamError {
-    fn from(error: PipelineError) -> Self {
-        Self::Run(error)
-    }
-}
-
-impl fmt::Display for StreamError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Closed => {
-                f.write_str("the stream was closed at the end of its with block; make another one")
-            }
-            Self::Process(error) => error.fmt(f),
-            Self::Run(error) => error.fmt(f),
         }
     }
 }

@@ -12,6 +12,7 @@ from conftest import ROOT
 import hybank as hb
 
 FUNCTIONS = [getattr(hb, name) for name in hb.__all__ if inspect.isroutine(getattr(hb, name))]
+FUNCTIONS += [hb.dask.fuse, hb.dask.sweep, hb.dask.warm_up, hb.ibr.render]
 METHODS = [
     getattr(kind, name)
     for kind in (hb.Bank, hb.Stream, hb.Measurement, hb.Comparison, hb.Recording)
@@ -37,7 +38,7 @@ def test_the_documentation_is_whole_and_its_examples_run(thing, tmp_path, monkey
     if parameters:
         section = text[text.index("Parameters\n----------") :]
         for name in parameters:
-            assert re.search(rf"^\*?(.*, )?{name}(, .*)? :|^(.*, )?{name}(, .*)?$", section, re.M), name
+            assert re.search(rf"^\**(.*, )?{name}(, .*)?( :|$)", section, re.M), name
     assert "Examples\n--------" in text
     monkeypatch.chdir(tmp_path)
     shutil.copy(filters / "thesis-fir.json", tmp_path)
