@@ -42,8 +42,8 @@ def design(
         Latency in fast samples; chosen if left out.
     target : dict
         Filter of the ideal fast converter: `butterworth`, `tf`, `zpk`, ..
-    channels : list of Channel
-        The converters. `channel` is the same.
+    channels, channel : list of Channel
+        The converters; two names of one key.
     signal : float or str or pair or dict or Signal, optional
         The band of the signal, or the filter of its spectrum.
     uncertainty : dict, optional
