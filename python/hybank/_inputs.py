@@ -240,9 +240,11 @@ def _fuse_frame(bank, frame, keywords):
     if isinstance(frame.index, pandas.PeriodIndex):
         raise HybankError("an index of periods cannot be divided; convert it with to_timestamp()")
     name = frame.name if isinstance(frame, pandas.Series) else None
-    index = pandas.Index(finer(frame.index.to_numpy(), bank.ratio), name=frame.index.name)
-    if getattr(frame.index, "tz", None) is not None:
-        index = index.tz_localize("UTC").tz_convert(frame.index.tz)
+    zone = getattr(frame.index, "tz", None)
+    times = frame.index if zone is None else frame.index.tz_convert("UTC").tz_localize(None)
+    index = pandas.Index(finer(times.to_numpy(), bank.ratio), name=frame.index.name)
+    if zone is not None:
+        index = index.tz_localize("UTC").tz_convert(zone)
     series = pandas.Series(y, index=index, name=name)
     return (series, report) if full_output else series
 

@@ -7,6 +7,10 @@ from types import SimpleNamespace
 class Record(SimpleNamespace):
     """Named values, with the names that ``--json`` of the command line has."""
 
+    def __getattr__(self, name):
+        """Only for names that are not there."""
+        raise AttributeError(f"{type(self).__name__} has no {name!r}, but {', '.join(vars(self))}")
+
     def __getitem__(self, name):
         return vars(self)[name]
 

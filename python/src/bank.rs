@@ -273,7 +273,10 @@ impl Bank {
     }
 
     #[doc = include_str!("docs/Bank.report.rst")]
-    #[pyo3(signature = (path, captures = None, *, axis = -1, overwrite = true))]
+    #[pyo3(
+        signature = (path, captures = None, *, axis = -1, overwrite = true),
+        text_signature = "($self, path, captures=None, *, axis=-1, overwrite=True)"
+    )]
     fn report(
         slf: &Bound<'_, Self>,
         path: PathBuf,

@@ -14,6 +14,7 @@ def rows():
     """(commands, options, text) of each row."""
     page = (ROOT / "docs" / "python.md").read_text()
     table = page[page.index("## The command line in Python") :]
+    table = table[: table.index("\n## ", 1)]
     lines = [line.strip("| \n").split(" | ") for line in table.splitlines() if line.startswith("| ")][2:]
     quoted = lambda text: re.findall(r"`([^`]+)`", text)  # noqa: E731
     return [(quoted(commands), quoted(options), text) for commands, options, text in lines]

@@ -22,7 +22,7 @@ ratio = 2
 latency = 12
 target = { filter = { family = "butterworth", order = 4, cutoff = 18000.0 } }
 channel = [{ delay_samples = 0.0 }, { delay_samples = 1.0 }]
-design = { method = "fir", taps = 12, tracking = "affine" }
+design = { method = "fir", taps = 24, tracking = "affine" }
 [uncertainty]
 delay_samples = 0.15
 """
@@ -84,7 +84,7 @@ def test_wrong_errors_name_their_keyword():
         ({"gain_error": "200%"}, "^gain_error: .*relative"),
         ({"drift": [1, 2, 3]}, "^drift: 3 values are given for 2 channels"),
         ({"delay_error": "1 m"}, "^delay_error: .*10ps"),
-        ({"cutoff_error": np.nan}, "^cutoff_error: nan is not a finite number"),
+        ({"cutoff_error": np.nan}, "^cutoff_error: NaN is not a finite number"),
         ({"imaginary": "ctones:1kHz"}, "^imaginary: "),
         ({"channel": 2}, "^channel: the signal is no recording"),
     ]:
@@ -140,7 +140,7 @@ def test_wrong_boxes_name_their_keyword(bank):
 
 def test_a_record_is_compared_as_the_command_line_does(folder, binary, random):
     n = np.arange(3000)
-    want = 0.5 * np.cos(0.2 * n) + 0.1 * random.standard_normal(len(n))
+    want = 0.3 * np.cos(0.2 * n) + 0.05 * random.standard_normal(len(n))
     have = 1.25 * np.roll(want, 3) + 0.01 + 1e-3 * random.standard_normal(len(n))
     for name, x in (("have", have), ("want", want)):
         np.save(folder / f"{name}.npy", x)
@@ -220,7 +220,6 @@ def test_a_stream_fills_gaps_as_fuse_does(bank, random):
         assert s.gaps == report.gaps == [(1, 50, 3), (2, 200, 1)] and s.position == 400
     plain = bank.stream()
     assert plain.gaps is plain.mask is plain.track is None
-    s.reset
     with pytest.raises(hb.HybankError, match="cannot be copied"):
         bank.stream(gaps="hold").state  # noqa: B018
     again = bank.stream(gaps="zero")
@@ -242,7 +241,7 @@ def tracked(folder):
 def test_delays_are_followed_as_by_the_command_line(folder, binary, tracked):
     soundfile = pytest.importorskip("soundfile")
     capture = hb.simulate(
-        tracked, "tones:3.1kHz,9.7kHz", samples=40000, drift=[0, 1.5], delay_error=["0", "0.3us"], noise=1e-4
+        tracked, "tones:3.1kHz,9.7kHz", samples=60000, drift=[0, 1.5], delay_error=["0", "0.3us"], noise=1e-4
     )
     for i, row in enumerate(capture.channels):
         soundfile.write(folder / f"t{i}.wav", row, 48000, subtype="FLOAT")
@@ -253,7 +252,7 @@ def test_delays_are_followed_as_by_the_command_line(folder, binary, tracked):
     np.testing.assert_array_equal(y, floats(folder / "y.wav"))
     log = [json.loads(line) for line in (folder / "log.jsonl").read_text().splitlines()]
     assert json.loads(json.dumps(report.track, default=dict)) == log and len(log) > 10
-    error = lambda y: np.std((y - capture.target)[-8000:-200])  # noqa: E731
+    error = lambda y: np.std((y - capture.target)[-20000:-200])  # noqa: E731
     assert error(y) < 0.1 * error(tracked.fuse(x))
     # The same through a stream, however it is cut, and with what was known before.
     with tracked.stream(track="pilot=3.1kHz", track_frames=1024) as s:
