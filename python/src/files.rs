@@ -28,8 +28,8 @@ pub(crate) struct Options {
     longest: bool,
 }
 
-/// The channels of recordings, a list of arrays, with what the files say: the rate in hertz that the frames of
-/// the input have, or with a bank the rate of its output; lowest and highest value of each channel.
+/// The channels of recordings, a list of arrays, with what the files say: the rate of the recordings in
+/// hertz, or with a bank that of its output; lowest and highest value of each file.
 #[pyfunction]
 pub(crate) fn read<'py>(
     py: Python<'py>,

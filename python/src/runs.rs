@@ -1,4 +1,5 @@
-//! How a stream filters its frames: by streams of the runtime, or by a run that fills gaps or follows delays.
+//! How a stream filters its frames: by streams of the runtime, or by a run that fills gaps or follows
+//! delays.
 
 use crate::errors::refused;
 use crate::formats::Format;

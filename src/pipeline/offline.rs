@@ -67,8 +67,8 @@ pub fn fuse(
     Ok(Outcome { mask: settings.gaps.map(|_| mask), ..outcome })
 }
 
-/// A signal in memory in double precision, fused as by [`fuse`]: M output samples per frame. Channels that are
-/// longer than the shortest one are cut.
+/// A signal in memory in double precision, fused as by [`fuse`]: M output samples per frame. Channels that
+/// are longer than the shortest one are cut.
 ///
 /// # Errors
 /// As [`fuse`], and [`PipelineError::Build`].

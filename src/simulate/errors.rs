@@ -136,7 +136,8 @@ impl ConverterErrors {
     /// The converters of `spec` with these errors, for the parts of a signal.
     ///
     /// # Errors
-    /// [`RefusedError`]: a number out of its range, or a list that has neither one value nor one per channel.
+    /// [`RefusedError`]: a number out of its range, or a list that has neither one value nor one per
+    /// channel.
     pub fn converters<'a>(
         &self,
         spec: &Spec,

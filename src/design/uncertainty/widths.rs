@@ -21,8 +21,8 @@ pub struct BoxWidths {
     pub cutoff_box: Vec<f64>,
     /// Of the instants, differently at each sample; the reference has its own.
     pub jitter: Vec<Time>,
-    /// The channel to which delays, gains and cut-offs are relative. `None`: the first one where one value is
-    /// given for all channels, and none where each has its own.
+    /// The channel to which delays, gains and cut-offs are relative. `None`: the first one where one value
+    /// is given for all channels, and none where each has its own.
     pub reference: Option<ReferenceChannel>,
 }
 
