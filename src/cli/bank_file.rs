@@ -5,8 +5,8 @@ use super::print::{Failure, InFile, is_dash, name, say_line};
 use crate::analog::fit::{MeasuredResponse, vector_fit};
 use crate::bank::Bank;
 use crate::design::filters;
-use crate::files::{self, Bound};
-use crate::memory::available_memory;
+use crate::files::{self, Bound, FileError, StandardStream};
+use crate::memory::check_memory;
 use crate::messages::Quoted;
 use crate::quantity::readable;
 use crate::runtime::{Options, Plan};
@@ -20,14 +20,9 @@ use std::path::{Path, PathBuf};
 const TEXT_FILE: Bound =
     Bound { bytes: 256 << 20, kind: "a spec or bank file", remedy: "give the file that was meant" };
 
-/// Bytes of memory that a number of a bank takes while it is read.
-const VALUE_BYTES: f64 = 200.0;
-
 /// Reads a bank file; `-` is standard input.
 pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
     let text = read_kind(path, FileKind::Bank)?;
-    let values = text.bytes().filter(|&byte| byte == b',').count() as f64;
-    check_memory(path, "to read it", VALUE_BYTES * values, "give the file that was meant")?;
     let bank = Bank::from_json(&text, &name(path)).map_err(Failure::input)?;
     filters::check_stable(&bank).in_file(path)?;
     Ok(bank)
@@ -36,22 +31,11 @@ pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
 /// Compiles the bank of the file `path`, if the process may use as much memory as that takes.
 pub(super) fn plan(bank: &Bank, options: Options, path: &Path) -> Result<Plan, Failure> {
     let bytes = bank.plan_bytes(options).in_file(path)?;
-    check_memory(path, "to filter with it", bytes, "use shorter filters, or --algorithm direct")?;
+    check_memory(bytes).map_err(|shortage| {
+        let remedy = "use shorter filters, or --algorithm direct";
+        Failure::of(path, format!("to filter with it takes {shortage}; {remedy}"))
+    })?;
     bank.plan(options).in_file(path)
-}
-
-/// Refuses work on the file `path` for which there is no memory; the system would end the process.
-fn check_memory(path: &Path, work: &str, bytes: f64, remedy: &str) -> Result<(), Failure> {
-    match available_memory() {
-        Some(memory) if bytes > memory => {
-            let (bytes, memory) = (bytes / 1e9, memory / 1e9);
-            let problem = format!(
-                "{work} takes about {bytes:.1} GB of memory, and this process may use {memory:.1} GB; {remedy}"
-            );
-            Err(Failure::of(path, problem))
-        }
-        _ => Ok(()),
-    }
 }
 
 /// A spec, and the measurements that it names.
@@ -137,6 +121,8 @@ pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
 
 fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
     let bytes = if is_dash(path) {
+        let check = StandardStream::Input.check();
+        check.map_err(FileError::system(&name(path), "read it")).map_err(Failure::input)?;
         files::bytes_of(std::io::stdin().lock(), &name(path), TEXT_FILE)
     } else {
         files::read_bytes(path, TEXT_FILE)

@@ -7,6 +7,7 @@ use super::written::{check_outputs, write_text};
 use crate::design::{self, ProofSearch};
 use crate::files::{Bound, read_bytes};
 use crate::interchange::{TapsError, taps_of_csv, taps_of_npy};
+use crate::memory::check_memory;
 use crate::messages::Quoted;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -66,6 +67,10 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     show(&report, args.json, |report| report.text(args.verbose))
 }
 
+/// Bytes of memory for a byte of a file of taps: two of a table may be a tap, which the bank file writes as
+/// text.
+const TAP_BYTES: f64 = 30.0;
+
 /// Reads taps from the bytes of a file.
 type Parse = fn(&[u8]) -> Result<Vec<Vec<f64>>, TapsError>;
 
@@ -81,5 +86,7 @@ fn read(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
         }
     };
     let bytes = read_bytes(path, TAPS_FILE).map_err(Failure::input)?;
+    let shortage = check_memory(TAP_BYTES * bytes.len() as f64);
+    shortage.map_err(|shortage| Failure::of(path, format!("to read its taps takes {shortage}")))?;
     parse(&bytes).in_file(path)
 }

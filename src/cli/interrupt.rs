@@ -11,7 +11,7 @@ mod watch {
     use crate::files::signals::{end, watch};
     use crate::io::is_output_stalled;
     use crossbeam_channel::{Receiver, Sender, bounded, never};
-    use signal_hook::consts::SIGHUP;
+    use signal_hook::consts::{SIGHUP, SIGXCPU};
     use signal_hook::iterator::Signals;
     use std::time::Duration;
 
@@ -39,8 +39,9 @@ mod watch {
         // The receiver lives as long as the run.
         let _ = stop.send(());
         loop {
-            // A lost terminal may be reported twice, by the system and by the shell.
-            if let Some(second) = signals.pending().find(|&signal| signal != SIGHUP) {
+            // A lost terminal may be reported twice, by the system and by the shell; the limit of processor
+            // time is reported every second.
+            if let Some(second) = signals.pending().find(|signal| ![SIGHUP, SIGXCPU].contains(signal)) {
                 end(second);
             }
             // The run is blocked by a reader of its output and does not notice the request.

@@ -45,6 +45,8 @@ mod virtual_signal;
 mod worst_case;
 mod written;
 
+use crate::files::StandardStream;
+use crate::memory::check_memory;
 use crate::messages::usage;
 use clap::builder::StyledStr;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -108,7 +110,7 @@ pub fn run() -> ExitCode {
     #[cfg(unix)]
     crate::files::fail_at_file_size_limit();
     match parsed() {
-        Ok(cli) => match dispatch(cli.command) {
+        Ok(cli) => match check_base().and_then(|()| dispatch(cli.command)) {
             Ok(()) => ExitCode::SUCCESS,
             Err(failure) => failure.report(),
         },
@@ -139,18 +141,29 @@ fn as_shown(argument: OsString) -> [String; 2] {
     [StyledStr::from(typed.clone()).to_string(), typed]
 }
 
+/// Bytes that a command takes whatever its input: threads, blocks of samples, pictures.
+const BASE_BYTES: f64 = 24e6;
+
+/// Refuses to begin where the process may not even use that.
+fn check_base() -> Result<(), Failure> {
+    check_memory(BASE_BYTES)
+        .map_err(|shortage| Failure::Input(format!("a run takes {shortage}; raise the limit of its memory")))
+}
+
 /// Shows help, version, or what is wrong with the usage.
 fn show(message: &clap::Error) -> ExitCode {
+    let open = if message.use_stderr() { Ok(()) } else { StandardStream::Output.check() };
     let text = message.to_string();
     let quoted = usage(&text, std::env::args_os().flat_map(as_shown));
     // Only clap knows the colours.
-    let printed = if quoted == text {
-        message.print()
-    } else {
-        print::say(&quoted);
-        Ok(())
+    let print = || match quoted == text {
+        true => message.print(),
+        false => {
+            print::say(&quoted);
+            Ok(())
+        }
     };
-    match printed {
+    match open.and_then(|()| print()) {
         Err(error) if !message.use_stderr() => print::print_failure(&error).report(),
         _ => ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2)),
     }

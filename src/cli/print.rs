@@ -2,7 +2,7 @@
 //! a failure.
 
 use super::remedy::explained;
-use crate::files::leftovers;
+use crate::files::{StandardStream, leftovers};
 use crate::messages::{Quoted, printable, shown};
 use crate::overview::understood;
 use crate::pipeline::PipelineError;
@@ -87,7 +87,8 @@ pub(super) fn print(text: &str) -> Result<(), Failure> {
 /// As [`print`], for any bytes.
 pub(super) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut stdout = crate::io::stdout();
-    stdout.write_all(bytes).and_then(|()| stdout.flush()).map_err(|error| print_failure(&error))
+    let written = StandardStream::Output.check().and_then(|()| stdout.write_all(bytes));
+    written.and_then(|()| stdout.flush()).map_err(|error| print_failure(&error))
 }
 
 /// One JSON object on standard output.

@@ -1,12 +1,12 @@
 //! The commands that hand out texts: `init`, `help`, `schema`, `completions` and `man`.
 
 use super::print::print;
-use super::written::{begin_file, write_text, write_together};
+use super::written::{begin_file, check_outputs, write_text, write_together};
 use super::{Cli, Failure};
 use crate::messages::Quoted;
 use clap::CommandFactory;
 use clap_complete::Shell;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Writes a commented spec to begin with
 ///
@@ -174,16 +174,18 @@ pub(super) fn man(args: &ManArgs) -> Result<(), Failure> {
     // Gives the commands their full names.
     program.build();
     let commands = program.get_subcommands().cloned();
-    let pages = std::iter::once(program.clone()).chain(commands).map(page);
-    write_together(&args.folder, pages, |(name, text): (String, Vec<u8>)| {
-        Ok(vec![begin_file(&args.folder.join(name), &text, args.force)?])
+    let pages = std::iter::once(program.clone()).chain(commands).map(|command| page(command, &args.folder));
+    let pages = pages.collect::<Result<Vec<_>, _>>()?;
+    check_outputs(&pages.iter().map(|(path, _)| path.as_path()).collect::<Vec<_>>(), &[])?;
+    write_together(&args.folder, pages.into_iter().map(Ok), |(path, text)| {
+        Ok(vec![begin_file(&path, &text, args.force)?])
     })
 }
 
-/// The name of the file and its text.
-fn page(command: clap::Command) -> Result<(String, Vec<u8>), Failure> {
+/// A page in this folder: its file and its text.
+fn page(command: clap::Command, folder: &Path) -> Result<(PathBuf, Vec<u8>), Failure> {
     let mut text = Vec::new();
     let man = clap_mangen::Man::new(command.version(env!("CARGO_PKG_VERSION")));
     man.render(&mut text).map_err(Failure::input)?;
-    Ok((man.get_filename(), text))
+    Ok((folder.join(man.get_filename()), text))
 }

@@ -1,7 +1,8 @@
 //! A file that appears only when it is complete.
 
+use super::identity::Begun;
 use super::{FileError, hidden, rename};
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -11,7 +12,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 const MOST_LINKS: usize = 40;
 
 /// Unfinished files of this process.
-static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+static UNFINISHED: Mutex<BTreeMap<PathBuf, Begun>> = Mutex::new(BTreeMap::new());
 
 /// The outputs of this process that have their names, as they were asked for. Whoever gives names holds the
 /// lock meanwhile, so an end by [`remove_unfinished`] comes before or after all names of a set.
@@ -23,10 +24,7 @@ static NAMED: Mutex<Vec<String>> = Mutex::new(Vec::new());
 pub fn remove_unfinished() -> Vec<String> {
     let named = names_given();
     let files = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
-    for path in files.iter() {
-        // An error cannot be reported from here.
-        let _ = fs::remove_file(path);
-    }
+    files.iter().for_each(|(path, begun)| begun.remove(path));
     std::mem::forget(files);
     let committed = named.clone();
     std::mem::forget(named);
@@ -45,6 +43,7 @@ fn names_given() -> MutexGuard<'static, Vec<String>> {
 pub struct AtomicFile {
     file: Option<File>,
     beside: PathBuf,
+    begun: Begun,
     target: PathBuf,
     name: String,
     replace: bool,
@@ -65,7 +64,7 @@ enum Placed {
 
 impl AtomicFile {
     /// Starts a file that will be called `target`, with `replace` in the place of one that exists and with
-    /// its permission bits. A link is followed to the file that it leads to.
+    /// its owner and permission bits. A link is followed to the file that it leads to.
     ///
     /// # Errors
     /// [`FileError::Exists`] if there is one already and `replace` is not set, [`FileError::NotAFile`] for a
@@ -78,17 +77,18 @@ impl AtomicFile {
             return Err(FileError::Exists { file: name });
         }
         let begin = || {
-            let (beside, file) = unfinished(|files| {
-                let created = create_beside(&target, known.is_some())?;
-                files.insert(created.0.clone());
-                io::Result::Ok(created)
+            let (beside, file, begun) = unfinished(|files| {
+                let (beside, file) = create_beside(&target, known.is_some())?;
+                let begun = Begun::of(&file);
+                files.insert(beside.clone(), begun);
+                io::Result::Ok((beside, file, begun))
             })?;
-            let begun =
-                Self { file: Some(file), beside, target, name: name.clone(), replace, is_unique: false };
-            if let (Some(file), Some(known)) = (&begun.file, known) {
-                file.set_permissions(known.permissions())?;
+            let (file, name) = (Some(file), name.clone());
+            let created = Self { file, beside, begun, target, name, replace, is_unique: false };
+            if let (Some(file), Some(known)) = (&created.file, known) {
+                rename::keep_access(file, &known)?;
             }
-            Ok(begun)
+            Ok(created)
         };
         begin().map_err(FileError::system(&name, "create it"))
     }
@@ -131,6 +131,10 @@ impl AtomicFile {
     /// Gives the file, sealed before, its name: in a way that can be undone if the system allows, unless it
     /// is the last of its set.
     fn place(&mut self, is_last: bool) -> Result<Placed, FileError> {
+        if !self.begun.is_at(&self.beside) {
+            let (file, hidden) = (self.name.clone(), self.beside.display().to_string());
+            return Err(FileError::Replaced { file, hidden });
+        }
         let placed = match rename::rename_new(&self.beside, &self.target) {
             Err(error) if self.replace && is_last && error.kind() == io::ErrorKind::AlreadyExists => {
                 fs::rename(&self.beside, &self.target).map(|()| Placed::Replaced)
@@ -142,26 +146,46 @@ impl AtomicFile {
     }
 
     /// Gives the file the name of another file, which gets the hidden one if the system allows.
-    fn exchange(&self) -> io::Result<Placed> {
-        if rename::exchange(&self.beside, &self.target).is_err() {
-            return fs::rename(&self.beside, &self.target).map(|()| Placed::Replaced);
+    fn exchange(&mut self) -> io::Result<Placed> {
+        match rename::exchange(&self.beside, &self.target) {
+            Err(error) if error.kind() == io::ErrorKind::Unsupported => {
+                return fs::rename(&self.beside, &self.target).map(|()| Placed::Replaced);
+            }
+            exchanged => exchanged?,
         }
         // The system exchanges a file with a folder too, and no output replaces a folder.
         if self.beside.symlink_metadata().is_ok_and(|found| found.is_dir()) {
             rename::exchange(&self.beside, &self.target)?;
             return Err(io::ErrorKind::IsADirectory.into());
         }
+        self.begun = Begun::at(&self.beside);
         Ok(Placed::Exchanged)
     }
 
-    /// Takes the name back; what was replaced gets its own again, unless it is gone.
-    fn undo(mut self, placed: Placed) {
-        // The failure that led here is reported; a second one adds nothing.
-        match placed {
-            Placed::New => drop(fs::rename(&self.target, &self.beside)),
-            Placed::Exchanged => drop(rename::exchange(&self.beside, &self.target)),
-            Placed::Replaced => self.forget(),
+    /// Takes the name back; what was replaced gets its own again. Gives the name if that is impossible.
+    fn undo(mut self, placed: Placed) -> Option<String> {
+        let undone = match placed {
+            Placed::New => fs::rename(&self.target, &self.beside).or_else(|error| match self.is_unique {
+                true => Err(error),
+                false => fs::remove_file(&self.target),
+            }),
+            Placed::Exchanged => rename::exchange(&self.beside, &self.target),
+            Placed::Replaced => Err(io::ErrorKind::Unsupported.into()),
+        };
+        match (undone, placed) {
+            (Ok(()), Placed::Exchanged) => self.begun = Begun::at(&self.beside),
+            (Ok(()), _) => {}
+            (Err(_), Placed::Exchanged) => {
+                // The file that was replaced has the hidden name, and keeps it.
+                self.is_unique = true;
+                return Some(format!("{} (what it replaced is in {})", self.name, self.beside.display()));
+            }
+            (Err(_), _) => {
+                self.forget();
+                return Some(self.name.clone());
+            }
         }
+        None
     }
 
     /// Makes the new name final.
@@ -196,8 +220,7 @@ impl Drop for AtomicFile {
     fn drop(&mut self) {
         if !self.beside.as_os_str().is_empty() {
             if !self.is_unique {
-                // A second error is not reported: the first one is already being returned.
-                let _ = fs::remove_file(&self.beside);
+                self.begun.remove(&self.beside);
             }
             self.forget();
         }
@@ -235,8 +258,9 @@ pub fn commit_all(mut files: Vec<AtomicFile>) -> Result<(), FileError> {
         match file.place(k == last) {
             Ok(how) => placed.push((file, how)),
             Err(error) => {
-                placed.into_iter().rev().for_each(|(file, how)| file.undo(how));
-                return Err(error);
+                let stay: Vec<_> =
+                    placed.into_iter().rev().filter_map(|(file, how)| file.undo(how)).collect();
+                return Err(error.beside(stay));
             }
         }
     }
@@ -245,7 +269,7 @@ pub fn commit_all(mut files: Vec<AtomicFile>) -> Result<(), FileError> {
     Ok(())
 }
 
-fn unfinished<R>(change: impl FnOnce(&mut BTreeSet<PathBuf>) -> R) -> R {
+fn unfinished<R>(change: impl FnOnce(&mut BTreeMap<PathBuf, Begun>) -> R) -> R {
     change(&mut UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner))
 }
 

@@ -1,6 +1,7 @@
 //! Reads whole files up to a maximum size. A device, for example, never ends.
 
 use super::FileError;
+use crate::memory::check_memory;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -14,6 +15,20 @@ pub struct Bound {
     pub kind: &'static str,
     /// What to do about a longer one.
     pub remedy: &'static str,
+}
+
+/// Bytes of memory that a number or a key of a text takes while it is read, and an object with its members.
+const PART_BYTES: f64 = 200.0;
+const OBJECT_BYTES: f64 = 800.0;
+
+/// Bytes of memory that parsing a text takes at most: JSON, TOML or lines.
+fn parsing_bytes(text: &[u8]) -> f64 {
+    let of = |byte: &u8| match byte {
+        b',' | b'\n' | b'=' => PART_BYTES,
+        b'{' | b'[' => OBJECT_BYTES,
+        _ => 1.0,
+    };
+    text.iter().map(of).sum()
 }
 
 /// The bytes of a file.
@@ -52,8 +67,10 @@ pub fn bytes_of(stream: impl Read, name: &str, bound: Bound) -> Result<Vec<u8>, 
 /// The text that `bytes`, read from what is called `name`, hold.
 ///
 /// # Errors
-/// [`FileError::NotText`].
+/// [`FileError::NotText`], and [`FileError::Memory`] if the process may not use what parsing it takes.
 pub fn text_in(bytes: Vec<u8>, name: &str) -> Result<String, FileError> {
+    check_memory(parsing_bytes(&bytes))
+        .map_err(|shortage| FileError::Memory { file: name.to_owned(), shortage })?;
     String::from_utf8(bytes).map_err(|error| FileError::NotText {
         file: name.to_owned(),
         offset: error.utf8_error().valid_up_to(),

@@ -1,5 +1,6 @@
 //! Errors of reading and writing whole files.
 
+use crate::memory::MemoryShortage;
 use crate::messages::Quoted;
 use std::io;
 
@@ -39,6 +40,26 @@ pub enum FileError {
         /// What it is.
         what: &'static str,
     },
+    /// The unfinished output is not the file that was begun under its hidden name.
+    #[error(
+        "{}: another program replaced its unfinished file {}; make sure that none does, and run it again",
+        Quoted(.file),
+        Quoted(.hidden)
+    )]
+    Replaced {
+        /// Name of the output.
+        file: String,
+        /// Hidden name of the unfinished file.
+        hidden: String,
+    },
+    /// A set of outputs of which some could not be taken back.
+    #[error("{error}; already in place and not taken back: {}", .stay.join(" and "))]
+    InPart {
+        /// Why the set is not complete.
+        error: Box<FileError>,
+        /// The outputs that stay, each whole.
+        stay: Vec<String>,
+    },
     /// An output is also an input.
     #[error("{}: it is also the input {}; give the output another name", Quoted(.output), Quoted(.input))]
     InputIsOutput {
@@ -67,6 +88,14 @@ pub enum FileError {
         /// What to do.
         remedy: &'static str,
     },
+    /// The process may not use as much memory as reading takes.
+    #[error("{}: to read it takes {shortage}; give the file that was meant", Quoted(.file))]
+    Memory {
+        /// Name of the file.
+        file: String,
+        /// What it takes and what there is.
+        shortage: MemoryShortage,
+    },
     /// A text that is not UTF-8.
     #[error("{}: byte {offset} is not UTF-8, so this is no text file; give the file that was meant", Quoted(.file))]
     NotText {
@@ -82,5 +111,10 @@ impl FileError {
     pub fn system(file: &str, action: &'static str) -> impl FnOnce(io::Error) -> Self {
         let file = file.to_owned();
         move |source| Self::System { file, action, source }
+    }
+
+    /// The same error of a set of which these outputs `stay`.
+    pub(super) fn beside(self, stay: Vec<String>) -> Self {
+        if stay.is_empty() { self } else { Self::InPart { error: Box::new(self), stay } }
     }
 }

@@ -8,14 +8,15 @@
 //! asked for.
 //!
 //! Several files can not get their names in one step. [`commit_all`] brings all of them to the disk first,
-//! gives the names one after the other, and takes them back if one of them is refused. Three limits remain.
+//! gives the names one after the other, and takes them back if one of them is refused; an output that cannot
+//! be taken back is named. Three limits remain.
 //! For some microseconds only a part of the set is visible. A power failure or `kill -9` in that time
 //! leaves that part. If the system cannot exchange two names (systems other than Linux, some network file
 //! systems), a replaced file is not restored.
 //!
-//! A replaced file keeps its permission bits; other names of it (hard links) keep the old content, and
-//! extended attributes are not carried over. A symbolic link is followed: the file that it leads to is
-//! replaced, the link stays.
+//! A replaced file keeps its permission bits, and its owner if root replaces it; other names of it (hard
+//! links) keep the old content, and extended attributes are not carried over. A symbolic link is followed:
+//! the file that it leads to is replaced, the link stays.
 //!
 //! A run that is killed (`kill -9`) leaves its unfinished files. [`leftovers`] finds them for the next run,
 //! which names them. `remove_unfinished_on_signals` (feature `signals`) removes them where a signal can be
@@ -30,6 +31,7 @@ mod rename;
 #[cfg(all(unix, feature = "signals"))]
 #[doc(hidden)]
 pub mod signals;
+mod streams;
 
 pub use atomic::{AtomicFile, commit_all, remove_unfinished};
 #[cfg(feature = "runtime")]
@@ -40,3 +42,4 @@ pub use hidden::{Leftover, leftovers};
 pub use identity::{is_same_file, refuse_overlaps};
 #[cfg(all(unix, feature = "signals"))]
 pub use signals::{fail_at_file_size_limit, remove_unfinished_on_signals};
+pub use streams::{StandardStream, note_closed_streams};

@@ -1,6 +1,6 @@
-//! System calls that rename files.
+//! System calls that rename files, and give them the access of the files that they replace.
 
-use std::fs::{self, File};
+use std::fs::{self, File, Metadata};
 use std::io;
 use std::path::Path;
 
@@ -56,6 +56,31 @@ fn rename_with(from: &Path, to: &Path, flags: rustix::fs::RenameFlags) -> io::Re
         Err(Errno::INVAL | Errno::NOSYS | Errno::OPNOTSUPP) => Err(io::ErrorKind::Unsupported.into()),
         other => Ok(other?),
     }
+}
+
+/// Gives `file` the owner and the permission bits of the file that it is to replace. Only root gives files
+/// away: others keep the group at most, and then no bits by which a program runs as its owner.
+///
+/// # Errors
+/// The system's refusal of the permissions.
+#[cfg(unix)]
+pub(super) fn keep_access(file: &File, replaced: &Metadata) -> io::Result<()> {
+    use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
+    let known = file.metadata()?;
+    let (owner, group) = (replaced.uid(), replaced.gid());
+    let is_kept =
+        (known.uid(), known.gid()) == (owner, group) || fchown(file, Some(owner), Some(group)).is_ok();
+    if !is_kept {
+        let _ = fchown(file, None, Some(group));
+    }
+    let mut permissions = replaced.permissions();
+    permissions.set_mode(permissions.mode() & if is_kept { 0o7777 } else { 0o1777 });
+    file.set_permissions(permissions)
+}
+
+#[cfg(not(unix))]
+pub(super) fn keep_access(file: &File, replaced: &Metadata) -> io::Result<()> {
+    file.set_permissions(replaced.permissions())
 }
 
 /// Brings all bytes to the disk and closes the file; some file systems report a failed write only now.

@@ -1,17 +1,20 @@
 //! Signals that end a process, and what is removed before they do.
 
 use super::remove_unfinished;
-use signal_hook::consts::{SIGALRM, SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGUSR2, SIGXCPU, SIGXFSZ};
+use signal_hook::consts::{
+    SIGALRM, SIGHUP, SIGINT, SIGPROF, SIGQUIT, SIGTERM, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU, SIGXFSZ,
+};
 use signal_hook::iterator::Signals;
 use std::io::IsTerminal;
 use std::sync::mpsc::sync_channel;
 use std::sync::{Arc, Once};
 
 /// What terminals, shells, timers, limits of the processor time and users send to end a process.
-const ENDING: [i32; 7] = [SIGINT, SIGTERM, SIGHUP, SIGXCPU, SIGALRM, SIGUSR1, SIGUSR2];
+const ENDING: [i32; 10] =
+    [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU, SIGALRM, SIGVTALRM, SIGPROF, SIGUSR1, SIGUSR2];
 
 /// From this call on, the signals that end a process (interrupt, termination, a lost terminal, the limit of
-/// processor time, alarms, user signals) remove its unfinished files before they end it with code
+/// processor time, timers, user signals) remove its unfinished files before they end it with code
 /// 128 + signal. Where no thread can be started, signals keep their default effect: the process ends, and
 /// its unfinished files stay.
 pub fn remove_unfinished_on_signals() {

@@ -92,7 +92,10 @@ impl InputFrames {
     /// One read into `bytes`, which become a block. Gives the bytes of the whole frames that came; there may
     /// be none.
     pub(super) fn read_some(&mut self, bytes: &mut Vec<u8>) -> Result<usize, IoError> {
-        bytes.resize(self.source.block.max(self.frames.frame), 0);
+        let wanted = self.source.block.max(self.frames.frame);
+        let memory = bytes.try_reserve(wanted.saturating_sub(bytes.len()));
+        memory.map_err(|_| IoError::reading(&self.name)(io::ErrorKind::OutOfMemory.into()))?;
+        bytes.resize(wanted, 0);
         let filled = self.frames.read_some(bytes).map_err(IoError::reading(&self.name))?;
         let frames = &mut bytes[..filled];
         self.scaling.iter_mut().for_each(|scaling| scaling.take(frames));

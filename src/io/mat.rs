@@ -214,7 +214,11 @@ impl Variable {
         if bytes > MOST_BYTES {
             return Err(format!("its samples take {bytes} bytes, more than {MOST_BYTES}; save a part of it"));
         }
-        let mut samples = Vec::with_capacity(bytes as usize);
+        let mut samples = Vec::new();
+        let memory = samples.try_reserve_exact(bytes as usize);
+        memory.map_err(|_| {
+            format!("its samples take {bytes} bytes of memory, more than there is; save a part of it")
+        })?;
         for k in 0..count as usize {
             for numbers in &parts {
                 put(format, numbers.get(k, order).unwrap_or(f64::NAN), &mut samples);

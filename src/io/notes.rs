@@ -8,6 +8,7 @@ use super::capture::InputNotes;
 use super::sigmf::{SigmfAnnotation, SigmfCapture};
 use super::wav::WavChunk;
 use serde_json::{Map, Value, json};
+use std::collections::HashSet;
 
 /// Members of `global` that hold for the input's own files only.
 const OF_THE_FILE: [&str; 4] =
@@ -60,7 +61,7 @@ impl OutputNotes {
     /// `global`, the captures and the chunks are those of the first input that has any; annotations are
     /// those of all, each once.
     pub(super) fn of(inputs: &[&InputNotes], origin: u64, placement: Placement) -> Self {
-        let mut notes = Self::default();
+        let (mut notes, mut known) = (Self::default(), HashSet::new());
         for input in inputs {
             let per_frame = input.per_frame.max(1) as u64;
             let (origin, placement) =
@@ -79,7 +80,7 @@ impl OutputNotes {
                 notes.captures = axis.captures(&meta.captures);
             }
             for annotation in meta.annotations.iter().filter_map(|annotation| axis.annotation(annotation)) {
-                if !notes.annotations.contains(&annotation) {
+                if known.insert(json!(annotation).to_string()) {
                     notes.annotations.push(annotation);
                 }
             }

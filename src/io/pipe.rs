@@ -1,7 +1,7 @@
 //! Standard input and output as files, and pipes with buffers large enough for two processes.
 
 use super::IoError;
-use crate::files::is_same_file;
+use crate::files::{StandardStream, is_same_file};
 use crate::messages::Quoted;
 use std::fs::File;
 use std::io::{self, Write};
@@ -19,6 +19,7 @@ const PIPE_BYTES: usize = 1 << 20;
 #[cfg(unix)]
 pub(super) fn stdin_file() -> io::Result<File> {
     use std::os::fd::AsFd;
+    StandardStream::Input.check()?;
     let file = File::from(io::stdin().as_fd().try_clone_to_owned()?);
     widen_pipe(&file);
     Ok(file)
@@ -26,6 +27,7 @@ pub(super) fn stdin_file() -> io::Result<File> {
 
 #[cfg(not(unix))]
 pub(super) fn stdin_file() -> io::Result<io::Stdin> {
+    StandardStream::Input.check()?;
     Ok(io::stdin())
 }
 
@@ -33,6 +35,7 @@ pub(super) fn stdin_file() -> io::Result<io::Stdin> {
 #[cfg(unix)]
 fn stdout_file() -> io::Result<File> {
     use std::os::fd::AsFd;
+    StandardStream::Output.check()?;
     let file = File::from(io::stdout().as_fd().try_clone_to_owned()?);
     widen_pipe(&file);
     Ok(file)
@@ -40,6 +43,7 @@ fn stdout_file() -> io::Result<File> {
 
 #[cfg(not(unix))]
 fn stdout_file() -> io::Result<io::Stdout> {
+    StandardStream::Output.check()?;
     Ok(io::stdout())
 }
 

@@ -25,21 +25,20 @@ impl SigmfReader<Take<File>> {
         let (meta_path, _) = file_pair(path, None);
         let meta = SigmfMeta::read(&meta_path)?;
         let (_, data_path) = file_pair(path, Some(&meta));
-        let file = open_file(&data_path)?;
-        let found = file.metadata().ok();
-        let bytes = found.as_ref().filter(|data| data.is_file()).map(Metadata::len);
-        // Without core:dataset the samples may come from a pipe.
+        // To open a pipe without a writer would take for ever. Without core:dataset the samples may come from one.
         let problem = match &meta.global.dataset {
-            Some(name) if bytes.is_none() => Some(format!("core:dataset leads to \"{}\"", Quoted(name))),
-            None if found.as_ref().is_some_and(|data| data.is_dir()) => {
-                Some(format!("its samples would be in {}", Quoted(&data_path)))
+            Some(name) if data_path.exists() && !data_path.is_file() => {
+                Some(format!("core:dataset leads to \"{}\"", Quoted(name)))
             }
+            None if data_path.is_dir() => Some(format!("its samples would be in {}", Quoted(&data_path))),
             _ => None,
         };
         if let Some(problem) = problem {
             let problem = format!("{problem}, which is no file; give one with samples");
             return Err(malformed(&meta_path.display().to_string(), problem));
         }
+        let file = open_file(&data_path)?;
+        let bytes = file.metadata().ok().filter(|data| data.is_file()).map(|data| data.len());
         // A file may grow while it is read.
         Self::new(meta, &meta_path.display().to_string(), file.take(u64::MAX), bytes)
     }

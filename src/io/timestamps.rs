@@ -82,7 +82,8 @@ impl Timestamps {
 
     /// When a frame of the input was taken, counted from `origin`.
     pub(super) fn time_of(&self, frame: u64, origin: u64) -> u64 {
-        let last = self.0.iter().take_while(|timestamp| timestamp.frame <= frame).last();
+        let before = self.0.partition_point(|timestamp| timestamp.frame <= frame);
+        let last = before.checked_sub(1).map(|last| self.0[last]);
         let index = match (last, self.beginning()) {
             (Some(last), _) => last.index.saturating_add(frame - last.frame),
             (None, Some(beginning)) => beginning.saturating_add(frame),

@@ -1,7 +1,7 @@
 //! Recordings in memory.
 
 use super::{Arrival, IoError, MultiReader, PcmFrames};
-use crate::memory::available_memory;
+use crate::memory::{MemoryShortage, check_memory};
 use crate::messages::Quoted;
 
 /// Bytes of work memory for each sample of a recording: the sample, its spectrum and a copy of both.
@@ -23,20 +23,15 @@ pub enum WholeError {
         /// The input.
         input: String,
     },
-    /// The system does not have the work memory; it would end the process without a message.
-    #[error(
-        "{frames} frames of {channels} channels take about {gigabytes:.1} GB of memory, and this process may use \
-         {available:.1} GB; use a shorter part of the recording"
-    )]
+    /// The system does not have the work memory.
+    #[error("{frames} frames of {channels} channels take {shortage}; use a shorter part of the recording")]
     Memory {
         /// Frames.
         frames: usize,
         /// Channels; of complex samples each part is one.
         channels: usize,
-        /// Memory of both.
-        gigabytes: f64,
-        /// What the process may use.
-        available: f64,
+        /// Memory that they take, and what the process may use.
+        shortage: MemoryShortage,
     },
     /// The reading was stopped.
     #[error("interrupted")]
@@ -73,7 +68,7 @@ impl Whole {
         let mut channels = vec![Vec::new(); parts * reader.channels()];
         let promised = reader.promised_frames().and_then(|frames| usize::try_from(frames).ok());
         let mut checked = promised.unwrap_or_default().min(most);
-        check_memory(checked, channels.len())?;
+        check_work(checked, channels.len())?;
         loop {
             match reader.wait()? {
                 Arrival::Frames(count) => {
@@ -81,7 +76,7 @@ impl Whole {
                     let room = most - known;
                     if known + count > checked {
                         checked = (checked + checked / 4).max(known + count).min(most);
-                        check_memory(checked, channels.len())?;
+                        check_work(checked, channels.len())?;
                     }
                     append(&reader.frames(), count.min(room), &mut channels);
                     reader.consume(count);
@@ -96,16 +91,10 @@ impl Whole {
     }
 }
 
-/// Refuses recordings whose work memory the system does not have; it would end the process without a
-/// message.
-fn check_memory(frames: usize, channels: usize) -> Result<(), WholeError> {
+/// Refuses recordings whose work memory the system does not have.
+fn check_work(frames: usize, channels: usize) -> Result<(), WholeError> {
     let bytes = WORK_BYTES * frames as f64 * channels as f64;
-    match available_memory() {
-        Some(memory) if bytes > memory => {
-            Err(WholeError::Memory { frames, channels, gigabytes: bytes / 1e9, available: memory / 1e9 })
-        }
-        _ => Ok(()),
-    }
+    check_memory(bytes).map_err(|shortage| WholeError::Memory { frames, channels, shortage })
 }
 
 /// The first `count` frames of all parts.

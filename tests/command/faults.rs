@@ -61,6 +61,52 @@ fn a_full_standard_output_is_an_error_of_one_line() {
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
 }
 
+/// Before `main` the standard library puts /dev/null in the place of a closed stream.
+#[test]
+fn a_closed_standard_stream_is_an_error_of_one_line() {
+    let desk = Desk::new();
+    desk.write("spec.toml", crate::support::THESIS);
+    desk.report(&["design", "spec.toml", "-o", "thesis.json"]);
+    desk.write("in", bytes(&frames(50)));
+    let channel = |k| crate::support::channel(&frames(50), k);
+    crate::support::wav::write_pair(&desk, &channel(0), &channel(1));
+    for args in [
+        "--help",
+        "--version",
+        "help spec",
+        "init",
+        "schema spec",
+        "completions bash",
+        "verify thesis.json",
+        "analyze thesis.json --json",
+        "stream bank.json --input in",
+        "fuse bank.json a.wav b.wav -o -",
+        "design spec.toml -o -",
+    ] {
+        let output = shell(&desk, &format!("$H {args} >&-"));
+        let message = text(&output.stderr);
+        assert_eq!((output.status.code(), message.lines().count()), (Some(1), 1), "{args}: {message}");
+        assert!(message.starts_with("hybank: standard output: cannot write it"), "{args}: {message}");
+        assert!(message.contains("closed"), "{args}: {message}");
+        // Nobody closed this one.
+        assert_eq!(shell(&desk, &format!("$H {args} >/dev/null")).status.code(), Some(0), "{args}");
+        assert_eq!(shell(&desk, &format!("$H {args} 1<>/dev/null")).status.code(), Some(0), "{args}");
+    }
+    for args in ["stream bank.json", "fuse bank.json - -o out.wav", "verify -", "design - -o out.json"] {
+        let output = shell(&desk, &format!("$H {args} <&-"));
+        let message = text(&output.stderr);
+        assert_eq!((output.status.code(), message.lines().count()), (Some(1), 1), "{args}: {message}");
+        assert!(
+            message.contains("standard input: cannot") && message.contains("closed"),
+            "{args}: {message}"
+        );
+    }
+    // What goes to a file is there before the report that cannot be printed.
+    let output = shell(&desk, "$H fuse bank.json a.wav b.wav -o out.wav >&-");
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    assert_eq!(crate::support::wav::samples(&desk, "out.wav").len(), 100);
+}
+
 #[test]
 fn without_threads_the_work_is_done_or_refused_in_one_line() {
     let desk = Desk::new();
@@ -132,6 +178,10 @@ fn inputs_without_end_are_refused_with_their_bound() {
     // A link beside the metadata leads as far.
     std::os::unix::fs::symlink("/dev/zero", desk.path("link")).unwrap();
     desk.write("zero.sigmf-meta", r#"{"global": {"core:datatype": "ri8", "core:dataset": "link"}}"#);
+    desk.refused(1, &args, &["zero.sigmf-meta", "core:dataset leads to \"link\"", "no file"]);
+    // A pipe that nobody writes to does not even open.
+    std::fs::remove_file(desk.path("link")).unwrap();
+    assert!(Command::new("mkfifo").arg(desk.path("link")).status().unwrap().success());
     desk.refused(1, &args, &["zero.sigmf-meta", "core:dataset leads to \"link\"", "no file"]);
 }
 

@@ -98,7 +98,7 @@ fn host() -> String {
 fn what_a_killed_run_left_is_named() {
     let desk = desk();
     desk.write("spec.toml", crate::support::THESIS);
-    fs::create_dir(desk.path("captures")).unwrap();
+    ["captures", "pages"].iter().for_each(|folder| fs::create_dir(desk.path(folder)).unwrap());
     let stream = ["stream", "bank.json", "--input", "a.wav", "--format", "wav"];
     for (args, output) in [
         (&["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav"][..], "out.wav"),
@@ -106,6 +106,7 @@ fn what_a_killed_run_left_is_named() {
         (&[&stream[..], &["--input", "b.wav", "-o", "out.sigmf-meta"]].concat(), "out.sigmf-data"),
         (&["design", "spec.toml", "-o", "new.json"], "new.json"),
         (&["simulate", "spec.toml", "--source", "step@3", "-o", "captures"], "captures/target.wav"),
+        (&["man", "pages"], "pages/hybank-design.1"),
     ] {
         // Above the largest number that Linux gives to a process; this run is alive.
         let hidden = |process: u32| {

@@ -2,7 +2,7 @@
 
 use crate::support::jobs::Job;
 use crate::support::random::Random;
-use crate::support::{Desk, THESIS, wav};
+use crate::support::{Desk, THESIS, names, wav};
 
 const HYBANK: &str = env!("CARGO_BIN_EXE_hybank");
 
@@ -33,4 +33,24 @@ pub(crate) fn jobs(desk: &Desk) -> Vec<Job> {
     .iter()
     .map(|(line, outputs)| Job::new(HYBANK, &folder, &line.split(' ').collect::<Vec<_>>(), outputs))
     .collect()
+}
+
+/// A run that records: a signal completes its output.
+pub(crate) fn recorder(desk: &Desk) -> Job {
+    let line = "stream bank.json --input a.wav --input b.wav -o out.raw --force";
+    let args: Vec<&str> = line.split(' ').collect();
+    let mut job = Job::new(HYBANK, &desk.path(""), &args, &["out.raw"]);
+    job.is_live = true;
+    job
+}
+
+/// A run with a set of many files.
+pub(crate) fn manual(desk: &Desk) -> Job {
+    let folder = desk.path("");
+    let run = std::process::Command::new(HYBANK).current_dir(&folder).args(["man", "pages"]).status();
+    assert!(run.unwrap().success());
+    let pages = names(&folder.join("pages")).into_iter().map(|name| format!("pages/{name}"));
+    let pages: Vec<String> = pages.collect();
+    let outputs: Vec<&str> = pages.iter().map(String::as_str).collect();
+    Job::new(HYBANK, &folder, &["man", "pages", "--force"], &outputs)
 }

@@ -6,6 +6,15 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+/// The hangup of a terminal.
+pub(crate) const HUP: u32 = 1;
+
+/// Signals that end a run in order: those of terminals, of shells, of timers, of limits and of users.
+pub(crate) const ENDING: [u32; 10] = {
+    let [int, quit, term, xcpu, alrm, vtalrm, prof, usr1, usr2] = [2, 3, 15, 24, 14, 26, 27, 10, 12];
+    [int, term, HUP, xcpu, alrm, usr1, usr2, quit, vtalrm, prof]
+};
+
 /// What lies under the names of a run's outputs; `None` for a file that is not there.
 pub(crate) type State = Vec<Option<Vec<u8>>>;
 
@@ -17,6 +26,8 @@ pub(crate) struct Job {
     outputs: Vec<PathBuf>,
     /// The outputs of an undisturbed run.
     pub(crate) whole: State,
+    /// A signal completes the output of what came before it.
+    pub(crate) is_live: bool,
 }
 
 impl Job {
@@ -28,6 +39,7 @@ impl Job {
             args: args.iter().map(|&arg| arg.to_owned()).collect(),
             outputs: outputs.iter().map(|name| folder.join(name)).collect(),
             whole: Vec::new(),
+            is_live: false,
         };
         job.prepare(false);
         let output = job.command().output().unwrap();
@@ -78,6 +90,12 @@ impl Job {
             _ if new == state.len() => Some(true),
             _ => None,
         }
+    }
+
+    /// Checks that the only output has so many bytes, the first of the whole one.
+    pub(crate) fn judge_live(&self, bytes: usize, what: &str) {
+        let (state, whole) = (self.state(), self.whole[0].as_ref().unwrap());
+        assert_eq!(state[0].as_deref(), whole.get(..bytes), "{what}");
     }
 
     /// Unfinished files beside the outputs.

@@ -39,9 +39,7 @@ pub(crate) const TAPS: [&[f32]; 2] = [&[1.0, 2.0, 3.0, 4.0], &[10.0, 20.0, 30.0,
 /// it starts ignore them too.
 pub(crate) fn ending_signals() -> impl Iterator<Item = u32> {
     let ignored = signals_of("self", "SigIgn:").unwrap_or(0);
-    let [int, term, hup, xcpu, alrm, usr1, usr2] = [2, 15, 1, 24, 14, 10, 12];
-    let ended_by = [int, term, hup, xcpu, alrm, usr1, usr2];
-    ended_by.into_iter().filter(move |&signal| signal != hup || ignored >> (signal - 1) & 1 == 0)
+    jobs::ENDING.into_iter().filter(move |&signal| signal != jobs::HUP || ignored >> (signal - 1) & 1 == 0)
 }
 
 /// Waits until the process handles `signal`.

@@ -17,6 +17,7 @@ use arguments::{Arguments, Command};
 use clap::Parser;
 use clap::builder::StyledStr;
 use failure::Failure;
+use hybank::files::StandardStream;
 use hybank::memory::check_memory;
 use hybank::messages::usage;
 use std::ffi::OsString;
@@ -56,16 +57,18 @@ fn as_shown(argument: OsString) -> [String; 2] {
 
 /// Shows help, version or what is wrong with the usage.
 fn show(message: &clap::Error) -> ExitCode {
+    let open = if message.use_stderr() { Ok(()) } else { StandardStream::Output.check() };
     let text = message.to_string();
     let quoted = usage(&text, std::env::args_os().flat_map(as_shown));
     // Only clap knows the colours.
-    let printed = if quoted == text {
-        message.print()
-    } else {
-        failure::say(&quoted);
-        Ok(())
+    let print = || match quoted == text {
+        true => message.print(),
+        false => {
+            failure::say(&quoted);
+            Ok(())
+        }
     };
-    match printed {
+    match open.and_then(|()| print()) {
         Err(error) if !message.use_stderr() => Failure::printing(&error).report(),
         _ => ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2)),
     }

@@ -2,7 +2,7 @@
 
 use super::failure::{self, Failure};
 use crate::image::{self, Image, Levels};
-use hybank::files::{AtomicFile, commit_all};
+use hybank::files::{AtomicFile, StandardStream, commit_all};
 use hybank::messages::{Quoted, printable};
 use serde::Serialize;
 use std::io::Write;
@@ -88,7 +88,8 @@ pub(super) fn numbered(path: &Path, frame: usize) -> PathBuf {
 
 pub(super) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
-    out.write_all(bytes).and_then(|()| out.flush()).map_err(|e| Failure::printing(&e))
+    let written = StandardStream::Output.check().and_then(|()| out.write_all(bytes));
+    written.and_then(|()| out.flush()).map_err(|e| Failure::printing(&e))
 }
 
 /// Prints a report to standard output, as one JSON object or as text. Text goes to standard error where

@@ -103,7 +103,6 @@ fn check(arguments: &RenderArguments) -> Result<(), Failure> {
     outputs.check()?;
     let files: Vec<&Path> = outputs.files().collect();
     output::refuse_overlaps(&files, &arguments.scene.inputs())?;
-    output::name_leftovers(&files);
     files.iter().try_for_each(|path| output::refuse_existing(path, arguments.scene.force))
 }
 
@@ -133,7 +132,7 @@ fn read(arguments: &RenderArguments, watch: Watch<'_>) -> Result<Scene, Failure>
     let all = path::outputs(arguments, frames);
     let film = Some(arguments.output.as_path()).filter(|path| path::is_film(path, frames));
     let film = film.filter(|path| !output::is_standard(path));
-    source.refuse_overlaps(&all.iter().flat_map(Outputs::files).chain(film).collect::<Vec<_>>())?;
+    source.check_outputs(&all.iter().flat_map(Outputs::files).chain(film).collect::<Vec<_>>())?;
     arguments.scene.load(&source, arguments.densify, !arguments.drop_unknown, watch)
 }
 

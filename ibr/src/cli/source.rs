@@ -9,6 +9,7 @@ use crate::image::{Image, read_image_within};
 use crate::partial::Densify;
 use crate::pipeline::{RenderSettings, Watch};
 use crate::scene::{self, LoadOptions, Scene, SceneSpec};
+use hybank::files::StandardStream;
 use std::path::{Path, PathBuf};
 
 /// A scene file, read but not loaded.
@@ -74,17 +75,22 @@ impl SceneArguments {
 }
 
 impl Source {
-    /// Refuses outputs that are one file, or an input of the scene.
-    pub(super) fn refuse_overlaps(&self, outputs: &[&Path]) -> Result<(), Failure> {
+    /// Refuses outputs that are one file, or an input of the scene, and names what killed runs left beside
+    /// them.
+    pub(super) fn check_outputs(&self, outputs: &[&Path]) -> Result<(), Failure> {
         let files = self.spec.files(self.path.parent().unwrap_or(Path::new("")));
-        output::refuse_overlaps(outputs, &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())
+        output::refuse_overlaps(outputs, &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
+        output::name_leftovers(outputs);
+        Ok(())
     }
 }
 
 /// The name and the text of a scene file, `-` for standard input.
 fn text(path: &Path) -> Result<(PathBuf, String), Failure> {
     if output::is_standard(path) {
-        let text = files::text(std::io::stdin().lock(), "standard input").map_err(Failure::input)?;
+        let name = "standard input";
+        StandardStream::Input.check().map_err(|error| Failure::Input(format!("{name}: {error}")))?;
+        let text = files::text(std::io::stdin().lock(), name).map_err(Failure::input)?;
         let name = PathBuf::from("<stdin>");
         files::refuse_without_memory(&name, scene::room_to_parse(&text)).map_err(Failure::input)?;
         return Ok((name, text));

@@ -38,6 +38,61 @@ fn what_a_killed_run_left_is_named() {
     assert!(message.contains("4194305, which no longer runs") && stale.exists(), "{message}");
 }
 
+/// As of single outputs, of the numbered files of several virtual views.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_a_killed_run_left_of_numbered_views_is_named() {
+    let dir = rig();
+    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
+    let more = scene.replace("[virtual]", "[[virtual]]") + "[[virtual]]\nposition = 0.25\n";
+    std::fs::write(dir.path().join("two.toml"), more).unwrap();
+    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap();
+    let letter = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+    let host: String = host.trim().chars().take(16).map(letter).collect();
+    for (command, option, file) in [("render", "-o", "out"), ("bound", "--map", "map")] {
+        // Above the largest number that Linux gives to a process.
+        let name = format!(".{file}-0002.png.{host}-4194305-0.part");
+        std::fs::write(dir.path().join(&name), "half").unwrap();
+        let done = run(dir.path(), &[command, "two.toml", option, &format!("{file}.png")]);
+        let message = stderr(&done);
+        assert!(code(&done) == 0 && message.matches(&name).count() == 1, "{message}");
+    }
+}
+
+/// All outputs of a rendering, or none.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_refused_name_of_the_third_output_leaves_none() {
+    let dir = rig();
+    let strace = |options: &[&str]| Command::new("strace").current_dir(dir.path()).args(options).output();
+    if !strace(&["-o", "/dev/null", "true"]).is_ok_and(|output| output.status.success()) {
+        return trials::skipped(&"refused names of outputs: strace is not there or may not trace");
+    }
+    for old in [false, true] {
+        let names = ["out.png", "mask.png", "error.png"];
+        for name in names {
+            let _ = std::fs::remove_file(dir.path().join(name));
+            if old {
+                std::fs::write(dir.path().join(name), "old").unwrap();
+            }
+        }
+        let call = if old { "renameat2:error=EIO:when=5+" } else { "renameat2:error=EIO:when=3+" };
+        let inject = format!("inject={call}");
+        let options = ["-f", "-qq", "-o", "/dev/null", "-e", "trace=renameat2", "-e", &inject, PROGRAM];
+        let render = ["render", "scene.toml", "-o", names[0], "--mask", names[1], "--error", names[2]];
+        let truth = ["--truth", "middle.png", "--force"];
+        let output = strace(&[&options[..], &render, &truth].concat()).unwrap();
+        let message = stderr(&output);
+        assert_eq!((output.status.code(), message.lines().count()), (Some(1), 1), "{message}");
+        let is_as_before =
+            |name: &&str| std::fs::read(dir.path().join(name)).ok() == old.then(|| b"old".to_vec());
+        let changed = names.iter().filter(|name| !is_as_before(name));
+        for name in changed {
+            assert!(message.contains("not taken back: ") && message.contains(name), "{name}: {message}");
+        }
+    }
+}
+
 #[test]
 fn no_file_of_the_scene_is_replaced_even_by_force() {
     let dir = rig();

@@ -92,6 +92,54 @@ fn a_replaced_file_keeps_its_permissions_and_is_never_more_open() {
     }
 }
 
+/// Only root can give files away.
+#[cfg(unix)]
+#[test]
+fn a_replaced_file_keeps_its_owner_if_root_replaces_it() {
+    use std::os::unix::fs::{MetadataExt, PermissionsExt, chown};
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("out.wav");
+    fs::write(&target, "old").unwrap();
+    if chown(&target, Some(12_345), Some(23_456)).is_err() {
+        return trials::skipped(&"the owner of replaced files: not root");
+    }
+    fs::set_permissions(&target, fs::Permissions::from_mode(0o4640)).unwrap();
+    let file = AtomicFile::create(&target, true).unwrap();
+    let access = |path: &Path| {
+        let known = path.metadata().unwrap();
+        (known.uid(), known.gid(), known.mode() & 0o7777)
+    };
+    assert_eq!(access(&file.beside), (12_345, 23_456, 0o4640));
+    file.commit().unwrap();
+    assert_eq!(access(&target), (12_345, 23_456, 0o4640));
+}
+
+/// Another program removes the unfinished file and puts a link, or a file, in its place.
+#[cfg(unix)]
+#[test]
+fn an_unfinished_file_that_another_program_replaced_gets_no_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let (target, precious) = (folder.path().join("out.wav"), folder.path().join("precious"));
+    fs::write(&precious, "another's").unwrap();
+    for replace in [false, true] {
+        if replace {
+            fs::write(&target, "old").unwrap();
+        }
+        let mut file = AtomicFile::create(&target, replace).unwrap();
+        file.write_all(b"new").unwrap();
+        let hidden = file.beside.clone();
+        fs::remove_file(&hidden).unwrap();
+        std::os::unix::fs::symlink(&precious, &hidden).unwrap();
+        let error = file.commit().unwrap_err().to_string();
+        assert!(error.contains("another program replaced") && error.contains(".part"), "{error}");
+        assert_eq!(fs::read(&target).ok(), replace.then(|| b"old".to_vec()));
+        // What another program put there is not removed.
+        assert!(hidden.symlink_metadata().unwrap().is_symlink());
+        fs::remove_file(hidden).unwrap();
+    }
+    assert_eq!(fs::read(&precious).unwrap(), b"another's");
+}
+
 #[cfg(unix)]
 #[test]
 fn links_are_followed_or_refused_but_never_replaced() {
@@ -158,10 +206,10 @@ fn unfinished_files_can_be_removed_from_elsewhere() {
     // Not remove_unfinished itself: other tests of this process are writing.
     let folder = tempfile::tempdir().unwrap();
     let file = AtomicFile::create(&folder.path().join("out.wav"), false).unwrap();
-    assert!(unfinished(|files| files.contains(&file.beside)));
+    assert!(unfinished(|files| files.contains_key(&file.beside)));
     let beside = file.beside.clone();
     file.commit().unwrap();
-    assert!(unfinished(|files| !files.contains(&beside)));
+    assert!(unfinished(|files| !files.contains_key(&beside)));
 }
 
 fn file(folder: &Path, name: &str, replace: bool) -> AtomicFile {

@@ -63,7 +63,6 @@ fn check(arguments: &BoundArguments) -> Result<Option<Limits>, Failure> {
     let outputs = Outputs::of(arguments, None);
     outputs.check()?;
     output::refuse_overlaps(&outputs.files(), &arguments.scene.inputs())?;
-    output::name_leftovers(&outputs.files());
     outputs.refuse_existing(arguments.scene.force)?;
     let limit = |name: &str, value: f64| match value.is_finite() && value >= 0.0 {
         true => Ok(value),
@@ -84,7 +83,7 @@ fn read(arguments: &BoundArguments, watch: Watch<'_>) -> Result<(Scene, Option<I
     let frames = scene.kind.frames();
     let numbers = (0..frames.min(scene::MOST_FRAMES)).map(|frame| (frames > 1).then_some(frame));
     let all: Vec<Outputs> = numbers.map(|frame| Outputs::of(arguments, frame)).collect();
-    source.refuse_overlaps(&all.iter().flat_map(Outputs::files).collect::<Vec<_>>())?;
+    source.check_outputs(&all.iter().flat_map(Outputs::files).collect::<Vec<_>>())?;
     all.iter().try_for_each(|outputs| outputs.refuse_existing(arguments.scene.force))?;
     Ok((scene, arguments.scene.truth()?))
 }
