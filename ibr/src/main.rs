@@ -1,12 +1,18 @@
 //! The `hybank-ibr` binary.
 
+#![deny(unsafe_code)]
+
 use std::process::ExitCode;
 
-ctor::declarative::ctor! {
-    // It reads the state of two descriptors, which needs nothing that `main` prepares.
-    #[ctor(unsafe)]
-    fn before_main() {
-        hybank::files::note_closed_streams();
+/// The state of two descriptors, read while closed ones can still be told from /dev/null. The macro writes
+/// unsafe code; what runs needs nothing that `main` prepares.
+#[allow(unsafe_code)]
+mod before_main {
+    ctor::declarative::ctor! {
+        #[ctor(unsafe)]
+        fn note_closed_streams() {
+            hybank::files::note_closed_streams();
+        }
     }
 }
 

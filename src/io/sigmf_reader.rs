@@ -7,7 +7,7 @@ use super::timestamps::Timestamps;
 use super::{IoError, StreamHeader};
 use crate::files::{bytes_of, text_in};
 use crate::messages::Quoted;
-use std::fs::{File, Metadata};
+use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Take};
 use std::path::Path;
 
