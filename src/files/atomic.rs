@@ -2,6 +2,7 @@
 
 use super::identity::Begun;
 use super::{FileError, hidden, rename};
+use crate::messages::Quoted;
 use std::collections::BTreeMap;
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
@@ -178,11 +179,15 @@ impl AtomicFile {
             (Err(_), Placed::Exchanged) => {
                 // The file that was replaced has the hidden name, and keeps it.
                 self.is_unique = true;
-                return Some(format!("{} (what it replaced is in {})", self.name, self.beside.display()));
+                return Some(format!(
+                    "{} (what it replaced is in {})",
+                    Quoted(&self.name),
+                    Quoted(&self.beside)
+                ));
             }
             (Err(_), _) => {
                 self.forget();
-                return Some(self.name.clone());
+                return Some(Quoted(&self.name).to_string());
             }
         }
         None

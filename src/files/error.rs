@@ -57,7 +57,7 @@ pub enum FileError {
     InPart {
         /// Why the set is not complete.
         error: Box<FileError>,
-        /// The outputs that stay, each whole.
+        /// The outputs that stay, each whole, as text that may be printed.
         stay: Vec<String>,
     },
     /// An output is also an input.
