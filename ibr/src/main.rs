@@ -1,18 +1,14 @@
 //! The `hybank-ibr` binary.
 
-#![deny(unsafe_code)]
-
 use std::process::ExitCode;
 
-/// The state of two descriptors, read while closed ones can still be told from /dev/null. The macro writes
-/// unsafe code; what runs needs nothing that `main` prepares.
-#[allow(unsafe_code)]
-mod before_main {
-    ctor::declarative::ctor! {
-        #[ctor(unsafe)]
-        fn note_closed_streams() {
-            hybank::files::note_closed_streams();
-        }
+// Before `main`, since the standard library opens /dev/null in the place of a closed stream first, and what a
+// parent opened there by itself (Python's `subprocess.DEVNULL`, daemons) has the same flags, position and
+// inode: nothing tells the two apart later. The macro allows itself the unsafe code that this takes.
+ctor::declarative::ctor! {
+    #[ctor(unsafe)]
+    fn note_closed_streams() {
+        hybank::files::note_closed_streams();
     }
 }
 
