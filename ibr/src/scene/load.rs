@@ -154,11 +154,10 @@ impl Loader<'_> {
     }
 
     /// Refuses keys of another kind of scene instead of ignoring them.
-    fn no_other_kind(&self, view: &ViewSpec, kind: &str, others: &[(&str, bool)]) -> Loaded<()> {
+    fn no_other_kind(&self, named: &str, kind: &str, others: &[(&str, bool)]) -> Loaded<()> {
         match others.iter().find(|(_, given)| *given) {
             Some((key, _)) => Err(self.incomplete(format!(
-                "{} has `{key}`, which has no meaning in a {kind} scene; remove it, or give all views the keys of one kind",
-                view.named()
+                "{named} has `{key}`, which has no meaning in a {kind} scene; remove it, or give all views the keys of one kind"
             ))),
             None => Ok(()),
         }

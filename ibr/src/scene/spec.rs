@@ -122,6 +122,26 @@ impl SceneSpec {
 }
 
 impl TargetSpec {
+    /// Keys of which a virtual view has one at most.
+    pub(super) const EITHER: [[&'static str; 2]; 3] =
+        [["camera", "camera_of"], ["to_camera", "to_camera_of"], ["from_tracks", "between"]];
+
+    /// Keys that one kind of scene has: the key, the kind, and whether it is given.
+    pub(super) fn keys(&self) -> [(&'static str, &'static str, bool); 10] {
+        [
+            ("position", "rectified", self.position.is_some()),
+            ("to_position", "rectified", self.to_position.is_some()),
+            ("camera", "calibrated", self.camera.is_some()),
+            ("camera_of", "calibrated", self.colmap_image.is_some()),
+            ("to_camera", "calibrated", self.to_camera.is_some()),
+            ("to_camera_of", "calibrated", self.to_colmap_image.is_some()),
+            ("from_tracks", "matches-only", self.from_tracks.is_some()),
+            ("between", "matches-only", self.between.is_some()),
+            ("to_between", "matches-only", self.to_between.is_some()),
+            ("matches", "matches-only", self.matches.is_some()),
+        ]
+    }
+
     /// Whether the end of a path is given.
     pub(super) fn has_end(&self) -> bool {
         let cameras = self.to_camera.is_some() || self.to_colmap_image.is_some();

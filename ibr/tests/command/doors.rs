@@ -53,7 +53,7 @@ fn lists_and_films_hold_the_views() {
     broken("position = 0.25", "position = 0.25\nframes = 3", &["number 1 has `frames` but no end"]);
     broken(
         "frames = 2",
-        "frames = 2\nsize = [4, 4]\noffset = 1.0\n[[virtual]]\nposition = 0.0\noffset = 2.0",
+        "frames = 2\noffset = 1.0\n[[virtual]]\nposition = 0.0\noffset = 2.0",
         &["number 3 has another `offset`"],
     );
     broken("position = 0.25", "positon = 0.25", &["did you mean `position`?", "broken.toml:"]);

@@ -42,6 +42,7 @@ fn foreign_text_in_files_is_quoted_and_bounded() {
             ("\"left.png\"", quoted.clone()),
             ("\"left.pfm\"", quoted.clone()),
             ("\"left\"", format!("{quoted}\nstep = 0")),
+            ("position = 0.5", format!("position = 0.5\ncamera_of = {quoted}")),
             ("position = 1.0", format!("position = 1e300\nname = {quoted}")),
         ] {
             assert!(scene.contains(from), "{from}");

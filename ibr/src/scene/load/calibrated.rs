@@ -45,6 +45,7 @@ impl Loader<'_> {
         goals: &[Goal],
     ) -> Loaded<Inputs> {
         self.a_camera_each()?;
+        self.keys_of(goals, "calibrated")?;
         let sources = each(views, |view| self.source(view), |source| pixels(&source.0.image), self.watch)?;
         let first = First { size: sources[0].0.image.size(), resized: sources[0].2 };
         let (cameras, size) = match left_out {
@@ -64,7 +65,7 @@ impl Loader<'_> {
             ("disparity_scale", view.disparity_scale.is_some()),
             ("disparity_offset", view.disparity_offset.is_some()),
         ];
-        self.no_other_kind(view, "calibrated", &others)?;
+        self.no_other_kind(&view.named(), "calibrated", &others)?;
         let map = self.need(view.depth.as_deref(), view, "depth", "calibrated")?;
         let (image, depth, filled) =
             self.image_with_map(view, map, view.depth_scale.unwrap_or(1.0), Measure::Depth)?;

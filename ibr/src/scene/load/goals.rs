@@ -41,6 +41,22 @@ impl Loader<'_> {
         Ok(goals)
     }
 
+    /// Refuses keys of another kind of scene than this, and two keys for one thing, instead of ignoring one.
+    pub(super) fn keys_of(&self, goals: &[Goal], kind: &str) -> Loaded<()> {
+        goals.iter().try_for_each(|Goal { target, name }| {
+            let keys = target.keys();
+            let others = keys.map(|(key, of, given)| (key, given && of != kind));
+            self.no_other_kind(name, kind, &others)?;
+            let given = |wanted: &str| keys.iter().any(|(key, _, given)| *given && *key == wanted);
+            match TargetSpec::EITHER.iter().find(|pair| pair.iter().all(|key| given(key))) {
+                Some([one, other]) => Err(self.incomplete(format!(
+                    "{name} has both `{one}` and `{other}`; remove the one that is not meant"
+                ))),
+                None => Ok(()),
+            }
+        })
+    }
+
     /// The virtual views of all tables: `start` gives the view of a table, `on_the_way` that at a share of
     /// its path.
     pub(super) fn along<T>(

@@ -13,6 +13,7 @@ impl Loader<'_> {
         left_out: Option<&ViewSpec>,
         goals: &[Goal],
     ) -> Loaded<Inputs> {
+        self.keys_of(goals, "rectified")?;
         let positions = match left_out {
             Some(view) => vec![self.virtual_position(view.position, "[virtual]")?],
             None => self.positions(goals)?,
@@ -24,7 +25,7 @@ impl Loader<'_> {
                 ("depth_scale", view.depth_scale.is_some()),
                 ("colmap", view.colmap.is_some()),
             ];
-            self.no_other_kind(view, "rectified", &others)?;
+            self.no_other_kind(&view.named(), "rectified", &others)?;
             let position = self.need(view.position, view, "position", "rectified")?;
             let position = self.finite(position, &view.named())?;
             let map = self.need(view.disparity.as_deref(), view, "disparity", "rectified")?;
@@ -37,10 +38,23 @@ impl Loader<'_> {
         for (view, (source, _)) in views.iter().zip(&sources) {
             source.image.same_size(&view.named(), first, &views[0].named())?;
         }
+        self.no_other_size(goals, first)?;
         let calibration = self.calibration(first)?;
         let filled = sources.iter().map(|s| s.1).sum();
         let views = sources.into_iter().map(|s| s.0).collect();
         Ok(Inputs { kind: Kind::Rectified { views, positions }, filled, calibration, notes: Vec::new() })
+    }
+
+    /// A rectified virtual view is as large as the views.
+    fn no_other_size(&self, goals: &[Goal], views: (usize, usize)) -> Loaded<()> {
+        let (width, height) = self.size(goals, views)?;
+        if (width, height) == views {
+            return Ok(());
+        }
+        Err(self.incomplete(format!(
+            "the virtual view has `size` = [{width}, {height}], but that of a rectified scene has the size of its views, {} x {} pixels; remove `size`",
+            views.0, views.1
+        )))
     }
 
     fn virtual_position(&self, position: Option<f64>, goal: &str) -> Loaded<f64> {

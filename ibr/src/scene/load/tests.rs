@@ -63,7 +63,7 @@ fn paths_have_both_ends() {
         ("to_position = 1.0", "how many views"),
         ("to_position = 1.0\nframes = 1", "2 to 9999"),
         ("to_position = nan\nframes = 3", "finite"),
-        ("to_colmap_image = \"a\"\nframes = 3", "`to_position`"),
+        ("to_colmap_image = \"a\"\nframes = 3", "`to_camera_of`, which has no meaning in a rectified scene"),
     ] {
         let message = read(&(RIG.to_string() + keys), &defaults).unwrap_err();
         assert!(message.contains(words), "{message}");
@@ -174,6 +174,17 @@ fn what_is_wrong_is_named() {
     fails(&RIG.replace("position = 1.0", "position = 1.0\ndepth = \"d.pgm\""), &["\"right\"", "`depth`"]);
     fails(&RIG.replace("position = 1.0", "position = nan"), &["\"right\"", "position = NaN"]);
     fails(&RIG.replace("position = 0.5", "position = inf"), &["virtual view", "position = inf"]);
+    fails(
+        &RIG.replace("position = 0.5", "position = 0.5\ncamera_of = \"a\""),
+        &["[virtual] has `camera_of`"],
+    );
+    fails(&RIG.replace("position = 0.5", "position = 0.5\nbetween = 0.5"), &["`between`", "rectified"]);
+    fails(&RIG.replace("position = 0.5", "position = 0.5\nsize = [4, 3]"), &["[4, 3]", "4 x 2"]);
+    let rows = "[[5.0, 0.0, 1.5, 0.0], [0.0, 5.0, 0.5, 0.0], [0.0, 0.0, 1.0, 0.0]]";
+    let view = format!("[[view]]\nimage = \"a.pgm\"\ncamera = {rows}\ndepth = \"d.pgm\"\n");
+    let general = format!("{view}[virtual]\ncamera = {rows}\n");
+    fails(&format!("{general}position = 0.5\n"), &["[virtual] has `position`", "calibrated"]);
+    fails(&format!("{general}camera_of = \"a\"\n"), &["both `camera` and `camera_of`"]);
     let options = LoadOptions { view: Some("middle".into()), ..LoadOptions::default() };
     assert!(read(RIG, &options).unwrap_err().contains("the views are left, right"));
 }

@@ -16,6 +16,7 @@ impl Loader<'_> {
         goals: &[Goal],
     ) -> Loaded<Inputs> {
         let file = self.matches_file(views, goals)?;
+        self.keys_of(goals, "matches-only")?;
         let tracks = Tracks::read(&self.file(file))?;
         let virtual_columns = match left_out {
             Some(view) => vec![self.column_in_order(view)?],
@@ -74,7 +75,7 @@ impl Loader<'_> {
                 ("depth", view.depth.is_some()),
                 ("step", view.step.is_some()),
             ];
-            self.no_other_kind(view, "matches-only", &others)?;
+            self.no_other_kind(&view.named(), "matches-only", &others)?;
         }
         match views.len() {
             0 | 1 => {
