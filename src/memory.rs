@@ -4,8 +4,11 @@ use std::fmt;
 use std::fs;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Estimates of memory are low by this factor at most, with what the allocator adds.
-const ESTIMATES_LOW_BY: f64 = 1.2;
+/// Estimates of memory are true within a quarter, so they are low by this factor at most.
+const ESTIMATES_LOW_BY: f64 = 4.0 / 3.0;
+
+/// Bytes that stay free for what is not counted: an allocation of a few bytes that fails ends the process.
+const RESERVE: f64 = 4e6;
 
 /// Bytes of small pieces of work that are compared with what is free at one time: what the system says of
 /// its memory takes longer to read than a small image.
@@ -47,14 +50,14 @@ pub fn check_memory(needed: f64) -> Result<(), MemoryShortage> {
 }
 
 fn check_now(needed: f64) -> Result<(), MemoryShortage> {
-    let (wanted, free) = (ESTIMATES_LOW_BY * needed, available_memory().unwrap_or(f64::INFINITY));
+    let (wanted, free) = (ESTIMATES_LOW_BY * needed + RESERVE, available_memory().unwrap_or(f64::INFINITY));
     // Without a limit of addresses the system hands out what it has not.
     let is_told = physical().is_some() && address_space().is_none();
     let is_given = || is_told || Vec::<u8>::new().try_reserve_exact(wanted as usize).is_ok();
     if wanted <= free && is_given() {
         return Ok(());
     }
-    Err(MemoryShortage { needed, available: free.min(wanted) / ESTIMATES_LOW_BY })
+    Err(MemoryShortage { needed, available: (free.min(wanted) - RESERVE).max(0.0) / ESTIMATES_LOW_BY })
 }
 
 /// Bytes that were found free and are not used up.

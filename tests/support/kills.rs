@@ -107,7 +107,10 @@ fn killed(mut command: Command, delay: Duration, signal: u32) -> (ExitStatus, bo
     let during = child.try_wait().unwrap().is_none();
     if during {
         let signal = signal.to_string();
-        let _ = Command::new("kill").args(["-s", &signal, &child.id().to_string()]).stderr(Stdio::null()).status();
+        let _ = Command::new("kill")
+            .args(["-s", &signal, &child.id().to_string()])
+            .stderr(Stdio::null())
+            .status();
     }
     let output = child.wait_with_output().unwrap();
     (output.status, during, String::from_utf8_lossy(&output.stderr).into_owned())

@@ -166,7 +166,12 @@ pub trait Predicted: Viewpoint {
     ) -> Result<Examined, RenderError>;
 
     /// The sizes of a prediction of a view, and the bytes that it takes.
-    fn memory(views: &[View<'_, Self>], size: Self::Size, settings: &RenderSettings) -> (Extent, f64);
+    fn memory(
+        &self,
+        views: &[View<'_, Self>],
+        size: Self::Size,
+        settings: &RenderSettings,
+    ) -> Result<(Extent, f64), RenderError>;
 
     /// Mean distance between neighbouring views; of views at one point that from this camera, or one.
     fn spacing(&self, views: &[View<'_, Self>]) -> f64;

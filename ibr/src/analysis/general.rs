@@ -66,12 +66,13 @@ impl Predicted for Camera {
     }
 
     fn memory(
+        &self,
         views: &[CalibratedView<'_>],
         size: (usize, usize),
         settings: &RenderSettings,
-    ) -> (Extent, f64) {
-        let extent = pipeline::extent(views, size, settings);
-        (extent, extent.of_camera_prediction(settings))
+    ) -> Result<(Extent, f64), RenderError> {
+        let extent = pipeline::extent(views, self, size, settings)?;
+        Ok((extent, extent.of_camera_prediction(settings)))
     }
 
     /// Mean distance between a view and the one nearest to it.

@@ -28,7 +28,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     /// Those of [`crate::pipeline`].
     pub fn new(views: &[View<'a, P>], settings: &RenderSettings) -> Result<Self, RenderError> {
         if let Some(first) = views.first() {
-            let (extent, bytes) = P::memory(views, P::size_of(first.image), settings);
+            let (extent, bytes) = first.camera.memory(views, P::size_of(first.image), settings)?;
             extent.check(bytes)?;
         }
         let agreement = Agreement::of(views);
@@ -70,7 +70,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     /// # Errors
     /// Those of [`crate::pipeline`].
     pub fn at(&self, camera: &P, size: P::Size, limits: Option<&Limits>) -> Result<ViewError, RenderError> {
-        let (extent, bytes) = P::memory(&self.views(), size, &self.settings);
+        let (extent, bytes) = camera.memory(&self.views(), size, &self.settings)?;
         extent.check(bytes)?;
         let study = Study { bounds: true, limits, ..self.study(camera) };
         Ok(judge(camera.examine(&self.views(), size, &study)?, self.calibration))

@@ -41,9 +41,14 @@ impl Predicted for f64 {
         Ok(Examined { rendering: found.rendering, regressors, sure_bound: found.sure, local_limit })
     }
 
-    fn memory(views: &[RectifiedView<'_>], (): (), settings: &RenderSettings) -> (Extent, f64) {
+    fn memory(
+        &self,
+        views: &[RectifiedView<'_>],
+        (): (),
+        settings: &RenderSettings,
+    ) -> Result<(Extent, f64), RenderError> {
         let extent = pipeline::extent(views, settings);
-        (extent, extent.of_rig_prediction(settings))
+        Ok((extent, extent.of_rig_prediction(settings)))
     }
 
     fn spacing(&self, views: &[RectifiedView<'_>]) -> f64 {

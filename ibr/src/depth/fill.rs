@@ -43,10 +43,15 @@ fn fill_row(row: &mut [f32], measure: Measure) {
 
 /// Copies rows of nothing from the nearest row of something (the upper of two); `filled` marks those.
 pub(crate) fn fill_empty_rows(filled: &[bool], values: &mut [f32]) {
+    if filled.iter().all(|filled| *filled) {
+        return;
+    }
     let full: Vec<usize> = (0..filled.len()).filter(|y| filled[*y]).collect();
     let stride = values.len() / filled.len().max(1);
     for y in (0..filled.len()).filter(|y| !filled[*y]) {
-        if let Some(&nearest) = full.iter().min_by_key(|other| other.abs_diff(y)) {
+        let after = full.partition_point(|other| *other < y);
+        let beside = full[after.saturating_sub(1)..].iter().take(2);
+        if let Some(&nearest) = beside.min_by_key(|other| other.abs_diff(y)) {
             values.copy_within(nearest * stride..(nearest + 1) * stride, y * stride);
         }
     }

@@ -119,8 +119,6 @@ impl<const C: usize> RowScratch<C> {
         self.chunks.extend(self.keys.chunks(CHUNK).map(Depths::of));
         self.hidden.clear();
         self.hidden.resize(n, false);
-        self.survivors.clear();
-        self.survivors.reserve(n);
         let (mut chunk, count) = (0, self.chunks.len());
         while chunk < count {
             let start = chunk;
@@ -236,6 +234,9 @@ pub fn remove_in_row<const C: usize>(
     scratch.keys.clear();
     scratch.keys.extend(samples.iter().enumerate().map(key));
     scratch.sort();
+    // The two lists are exchanged from row to row, and the longer one has the place that the next row asks for.
+    scratch.survivors.clear();
+    scratch.survivors.reserve_exact(samples.capacity());
     scratch.collect(samples, test);
     std::mem::swap(&mut scratch.survivors, samples);
     before - samples.len()

@@ -42,8 +42,7 @@ pub fn render_watched(
     settings: &RenderSettings,
     watch: Watch<'_>,
 ) -> Result<Rendering, RenderError> {
-    check(views, size, settings)?;
-    let extent = extent(views, size, settings);
+    let extent = extent(views, camera, size, settings)?;
     extent.check(extent.of_cameras(settings))?;
     let colour = views.iter().any(|v| v.image.channels() == 3);
     match (settings.interpolation.plane.degree, colour) {
@@ -54,13 +53,33 @@ pub fn render_watched(
     }
 }
 
-/// The sizes of a view of `size` between others.
-pub(crate) fn extent(
+/// The sizes of the view of `camera` with `size` pixels between others.
+///
+/// # Errors
+/// [`RenderError`] about inputs that cannot be rendered.
+pub fn extent(
     views: &[CalibratedView<'_>],
+    camera: &Camera,
     size: (usize, usize),
     settings: &RenderSettings,
-) -> Extent {
-    Extent::new(size, &views.iter().map(|view| view.image).collect::<Vec<_>>(), settings.nearest)
+) -> Result<Extent, RenderError> {
+    check(views, size, settings)?;
+    let images: Vec<_> = views.iter().map(|view| view.image).collect();
+    let all = Extent::new(size, &images, settings.nearest);
+    let chosen = view_weights(views, camera, settings).views();
+    let footprint = Footprint::of(views, &chosen, camera, &frame(size, settings));
+    Ok(Extent { samples: footprint.most_samples().min(all.pixels), ..all })
+}
+
+fn view_weights(views: &[CalibratedView<'_>], camera: &Camera, settings: &RenderSettings) -> ViewWeights {
+    match settings.nearest {
+        Some(_) => ViewWeights::by_angle(views, camera).nearest(settings.nearest),
+        None => ViewWeights::of(views, camera),
+    }
+}
+
+fn frame((width, height): (usize, usize), settings: &RenderSettings) -> Frame {
+    Frame::whole(width, height, 0.5, settings.offset)
 }
 
 fn check(
@@ -85,18 +104,14 @@ fn render_with<const ORDER: usize, const C: usize>(
     settings: &RenderSettings,
     watch: Watch<'_>,
 ) -> Result<Rendering, RenderError> {
-    let view_weights = match settings.nearest {
-        Some(_) => ViewWeights::by_angle(views, camera).nearest(settings.nearest),
-        None => ViewWeights::of(views, camera),
-    };
+    let view_weights = view_weights(views, camera, settings);
     let agreement = Agreement::of(views);
     let view_weights = view_weights.with_noise(&agreement);
     let settings = &settings.suited_to(&agreement, &view_weights);
     let chosen = view_weights.views();
     let pixels: usize = chosen.iter().map(|v| views[*v].image.width() * views[*v].image.height()).sum();
     let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &settings.interpolation)?;
-    let whole = Frame::whole(width, height, 0.5, settings.offset);
-    let footprint = Footprint::of(views, &chosen, camera, &whole);
+    let footprint = Footprint::of(views, &chosen, camera, &frame((width, height), settings));
     let view_weights =
         if settings.keep_exposure { view_weights } else { view_weights.with_gains(&agreement.gains) };
     let count = bands_of(footprint.most_samples(), height);

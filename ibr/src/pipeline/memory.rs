@@ -29,6 +29,9 @@ const ROW_SAMPLE: f64 = 67.0;
 /// Bytes of a place in a band beside its sample: positions, depths, weights, cells.
 const PLACE: f64 = 45.0;
 
+/// The same of a sample whose place is known already: its position, depth and radius once more, and flags.
+const POINT: f64 = 35.0;
+
 /// Bytes per pixel of a prediction: of the evidence of a row fit, of the regressors with slopes, distances
 /// and jitter, of the search for local limits, and of the errors that are its result.
 const ROW_EVIDENCE: f64 = 60.0;
@@ -45,6 +48,8 @@ pub struct Extent {
     pub views: usize,
     /// Pixels of all of them.
     pub pixels: usize,
+    /// Of these, as many as fall in the virtual view at most.
+    pub samples: usize,
     /// Pixels of the largest.
     pub largest: usize,
     /// 1 for grey, 3 for RGB.
@@ -59,7 +64,8 @@ impl Extent {
         pixels.truncate(nearest.unwrap_or(usize::MAX));
         let channels = images.iter().map(|image| image.channels()).max().unwrap_or(1);
         let largest = pixels.first().copied().unwrap_or(0);
-        Self { size, views: pixels.len(), pixels: pixels.iter().sum(), largest, channels }
+        let (views, pixels) = (pixels.len(), pixels.iter().sum());
+        Self { size, views, pixels, samples: pixels, largest, channels }
     }
 
     fn virtual_pixels(&self) -> f64 {
@@ -98,20 +104,20 @@ impl Extent {
 
     /// Bytes of a view of general cameras.
     pub fn of_cameras(&self, settings: &RenderSettings) -> f64 {
-        let bands = bands_of(self.pixels, self.size.1);
+        let bands = bands_of(self.samples, self.size.1);
         let at_a_time = rayon::current_num_threads().min(bands.div_ceil(2)) as f64 / bands as f64;
-        let samples = self.pixels as f64 * at_a_time.min(1.0) * (self.sample() + PLACE);
+        let samples = self.samples as f64 * at_a_time.min(1.0) * (self.sample() + PLACE);
         BASE + self
             .agreement()
-            .max(self.plane(settings.interpolation.plane.degree, samples + self.pixels as f64))
+            .max(self.plane(settings.interpolation.plane.degree, samples + self.samples as f64))
     }
 
     /// Bytes of a view of views without cameras, all of whose samples are held at a time.
     pub fn of_tracks(&self, degree: Degree) -> f64 {
-        let (pixels, sample) = (self.pixels as f64, self.sample());
-        let decided = 64.0 * self.largest as f64 + 4.0 * pixels;
-        let tested = (sample + PLACE) * pixels;
-        let fitted = self.virtual_pixels() + self.plane(degree, sample * pixels);
+        let (samples, sample) = (self.samples as f64, self.sample());
+        let decided = 64.0 * self.largest as f64 + 4.0 * self.pixels as f64;
+        let tested = (sample + POINT) * samples;
+        let fitted = self.virtual_pixels() + self.plane(degree, sample * samples);
         BASE + decided.max(tested).max(fitted)
     }
 
@@ -125,8 +131,11 @@ impl Extent {
 
     /// Bytes of the prediction of a view of general cameras, with what is known of views before it.
     pub fn of_camera_prediction(&self, settings: &RenderSettings) -> f64 {
-        let found = (REGRESSORS + LIMITS) * self.virtual_pixels();
-        self.predicted() + self.rendering() + self.of_cameras(settings).max(found)
+        let pixels = self.virtual_pixels();
+        let equalised = 4.0 * self.channels as f64 * self.pixels as f64;
+        let limited = equalised + (REGRESSORS + LIMITS) * pixels;
+        let imagined = self.predicted() + self.of_cameras(settings).max(REGRESSORS * pixels);
+        self.rendering() + limited.max(imagined)
     }
 
     /// Photographs with one exposure and maps with errors, a view that is predicted, and another one that is
@@ -148,7 +157,9 @@ impl Extent {
         let pixels = self.virtual_pixels();
         // Depths, their distances, and counts; then the mask instead of the distances.
         let gathered = memory.equations + 10.0 * pixels + gathering;
-        let solved = (memory.solving + memory.with_multigrid) / 2.0 + 7.0 * pixels;
+        let (alone, with_multigrid) = (memory.solving + 7.0 * pixels, memory.with_multigrid + 7.0 * pixels);
+        // As far above the one as below the other.
+        let solved = 2.0 / (1.0 / alone + 1.0 / with_multigrid);
         gathered.max(solved)
     }
 

@@ -152,6 +152,12 @@ fn too_many_pixels_are_refused_before_any_work() {
         message.contains("wide.pgm") && message.contains("of memory, and this process may use"),
         "{message}"
     );
+    // What reading takes, 30 bytes per pixel, is within this limit: the run goes on to what is wrong.
+    let refused =
+        shell(dir.path(), "ulimit -v 2000000; $H render wide.toml -o out.png --max-pixels 50000000");
+    let message = stderr(&refused);
+    assert_eq!((code(&refused), message.lines().count()), (1, 1), "{message}");
+    assert!(message.contains("20000 x 2000") && !message.contains("memory"), "{message}");
 }
 
 /// Images that are read, and then too little memory for the work on them.
@@ -183,7 +189,10 @@ fn renderings_that_no_memory_holds_are_refused() {
         let refused = shell(dir.path(), &format!("ulimit -v {limit}; $H {line} --threads 1"));
         let message = stderr(&refused);
         assert_eq!((code(&refused), message.lines().count()), (1, 1), "{line}: {message}");
-        assert!(message.contains("of memory, and this process may use"), "{line}: {message}");
+        assert!(
+            message.contains("from 2 views") && message.contains("of memory, and this process may use"),
+            "{line}: {message}"
+        );
     }
     assert!(!dir.path().join("map.png").exists() && !dir.path().join("out.png").exists());
 }
@@ -282,7 +291,7 @@ fn every_limit_of_memory_ends_in_a_result_or_a_message() {
         "demo -o demo.png",
     ];
     let (mut done, mut refused, mut small) = (0, 0, 0);
-    let steps = rounds(1);
+    let steps = rounds(2);
     let mut dice = Random(4096);
     for line in runs {
         for step in 0..steps {
@@ -312,5 +321,5 @@ fn every_limit_of_memory_ends_in_a_result_or_a_message() {
         }
     }
     println!("{done} results, {refused} refusals, {small} ends by a small allocation under limits of memory");
-    assert!(done > 0 && refused > 0 && 3 * small <= done + refused, "{done}, {refused}, {small}");
+    assert!(done > 0 && refused > 0 && 10 * small <= done + refused, "{done}, {refused}, {small}");
 }

@@ -138,7 +138,8 @@ impl<const C: usize> Work<C> {
         mut steps: usize,
         watch: Watch<'_>,
     ) -> usize {
-        self.direction.clone_from(multigrid.apply(a, &self.residual, &mut self.image));
+        // The direction so far counts no more; it is overwritten in its place.
+        add_multiple(multigrid.apply(a, &self.residual, &mut self.image), [0.0; C], &mut self.direction);
         let mut product = dot(&self.residual, &self.direction);
         while steps < most && progress.any_open() {
             let curvature = a.multiply(&self.direction, &mut self.image);

@@ -208,7 +208,7 @@ fn narrow_images_are_flat_ones_turned() {
             assert_eq!(depths[0], depths[1], "{p}");
         }
         let values = narrow.values.iter().zip(&region).filter(|(_, inside)| **inside);
-        assert!(values.into_iter().all(|(v, _)| *v > 0.0), "{:?}", narrow.values);
+        assert!(values.into_iter().all(|(v, _)| *v > 40.0), "{ORDER} {width} {:?}", narrow.values);
     }
     for width in [1, 2, 5] {
         check::<2>(PlaneSettings::LINEAR, width);

@@ -110,7 +110,9 @@ fn advantages(
     let sign = chirality::order_sign(&scene.cameras[to], Handedness::Kept);
     let mut samples: Vec<Sample<3>> = Vec::with_capacity(chi.len());
     let frame = Frame::whole(width, height, 0.0, 0.0);
-    propagate_chi(images[from], &chi, 0, &source.relative_to(&target), sign, &frame, &mut samples);
+    propagate_chi(images[from], &chi, 0, &source.relative_to(&target), sign, &frame, |sample| {
+        samples.push(sample)
+    });
     let apart = (SURFACES_APART * chi_range(&scene.features(to))) as f32;
     drop(chi);
     // The nearest and the farthest sample on each pixel, by number.

@@ -139,7 +139,8 @@ pub fn render_watched(
         return Err(RenderError::Tracks { images: images.len(), columns });
     }
     settings.check()?;
-    let extent = Extent::new(size, images, None);
+    // How many samples fall in the view is known when the scene is reconstructed.
+    let extent = Extent { samples: 0, ..Extent::new(size, images, None) };
     extent.check(extent.of_tracks(uncalibrated.plane.degree))?;
     let numbers = match target {
         Target::Tracks(_) if images.len() > 2 => base_pair::order(tracks, columns, uncalibrated),

@@ -9,6 +9,7 @@ use crate::image::Image;
 use crate::interpolate;
 use crate::interpolate::plane::{PlaneProblem, PlaneSettings};
 use crate::occlusion::{self, DepthTest};
+use crate::pipeline::memory::Extent;
 use crate::pipeline::{Agreement, RenderError, RenderSettings, Rendering, Report, ViewWeights, Watch};
 use crate::propagate::Frame;
 use crate::sample::{Dropped, Sample};
@@ -42,7 +43,7 @@ pub(super) fn render<const ORDER: usize, const C: usize>(
 ) -> Result<UncalibratedRendering, RenderError> {
     let Goal { size, settings, plane, watch } = *goal;
     let frame = Frame::whole(size.0, size.1, 0.5, settings.offset);
-    let (mut samples, dropped) = propagated::<C>(images, surfaces, scene, &frame)?;
+    let (mut samples, dropped) = propagated::<C>(images, surfaces, scene, &frame, goal)?;
     view_weights.apply(&mut samples, |view| images[view]);
     let mut report = Report { dropped, propagated: samples.len(), ..Report::default() };
     let hull = hull_features(scene, images.len());
@@ -64,27 +65,36 @@ pub(super) fn render<const ORDER: usize, const C: usize>(
     Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone() })
 }
 
-/// The samples of all views in the virtual one, and what was dropped.
+/// The samples of all views in the virtual one, and what was dropped. They are counted first: their list takes
+/// most of the memory, and no more than those that fall in the view.
 fn propagated<const C: usize>(
     images: &[&Image],
     surfaces: &[Surface],
     scene: &Reconstruction,
     frame: &Frame,
+    goal: &Goal<'_>,
 ) -> Result<(Vec<Sample<C>>, Dropped), RenderError> {
     let target = scene.camera(images.len())?;
     let sign = chirality::order_sign(&scene.cameras[images.len()], scene.hand);
-    let pixels = images.iter().map(|i| i.width() * i.height()).sum();
-    let (mut samples, mut dropped) = (Vec::with_capacity(pixels), Dropped::default());
-    for (i, (image, surface)) in images.iter().zip(surfaces).enumerate() {
-        let map = scene.camera(i)?.relative_to(&target);
-        let first = samples.len();
-        dropped +=
-            propagate_chi(image, &surface.chi(image.size()), i as u16, &map, sign, frame, &mut samples);
-        let doubtful = surface.doubtful(image.size());
-        samples[first..].iter_mut().for_each(|s: &mut Sample<C>| s.doubtful = doubtful[s.pixel as usize]);
+    let of_view = |i: usize, with: &mut dyn FnMut(Sample<C>)| -> Result<Dropped, RenderError> {
+        let (map, chi) = (scene.camera(i)?.relative_to(&target), surfaces[i].chi(images[i].size()));
+        Ok(propagate_chi(images[i], &chi, i as u16, &map, sign, frame, with))
+    };
+    let (mut count, mut dropped) = (0, Dropped::default());
+    for i in 0..images.len() {
+        dropped += of_view(i, &mut |_| count += 1)?;
     }
-    if samples.is_empty() {
-        return Err(RenderError::NoOverlap { pixels, dropped });
+    let extent = Extent { samples: count, ..Extent::new(goal.size, images, None) };
+    if count == 0 {
+        return Err(RenderError::NoOverlap { pixels: extent.pixels, dropped });
+    }
+    extent.check(extent.of_tracks(goal.plane.degree))?;
+    let mut samples = Vec::with_capacity(count);
+    for (i, surface) in surfaces.iter().enumerate() {
+        let first = samples.len();
+        of_view(i, &mut |sample| samples.push(sample))?;
+        let doubtful = surface.doubtful(images[i].size());
+        samples[first..].iter_mut().for_each(|s: &mut Sample<C>| s.doubtful = doubtful[s.pixel as usize]);
     }
     Ok((samples, dropped))
 }
@@ -155,7 +165,7 @@ pub(super) fn propagate_chi<const C: usize>(
     map: &Relative,
     sign: f64,
     frame: &Frame,
-    samples: &mut Vec<Sample<C>>,
+    mut with: impl FnMut(Sample<C>),
 ) -> Dropped {
     let mut dropped = Dropped::default();
     for (pixel, chi) in chi.iter().enumerate() {
@@ -172,7 +182,7 @@ pub(super) fn propagate_chi<const C: usize>(
             let depth = (sign * chi / p.z) as f32;
             let value = image.pixel::<C>(pixel);
             let blank = Sample::BLANK;
-            samples.push(Sample { x: u, y: v, depth, value, pixel: pixel as u32, view, ..blank });
+            with(Sample { x: u, y: v, depth, value, pixel: pixel as u32, view, ..blank });
         } else {
             dropped.outside += 1;
         }
