@@ -234,7 +234,7 @@ pub fn remove_in_row<const C: usize>(
     scratch.keys.clear();
     scratch.keys.extend(samples.iter().enumerate().map(key));
     scratch.sort();
-    // The two lists are exchanged from row to row, and the longer one has the place that the next row asks for.
+    // The two lists are exchanged from row to row; both have the place that the next row asks for.
     scratch.survivors.clear();
     scratch.survivors.reserve_exact(samples.capacity());
     scratch.collect(samples, test);

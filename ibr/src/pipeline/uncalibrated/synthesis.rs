@@ -65,8 +65,8 @@ pub(super) fn render<const ORDER: usize, const C: usize>(
     Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone() })
 }
 
-/// The samples of all views in the virtual one, and what was dropped. They are counted first: their list takes
-/// most of the memory, and no more than those that fall in the view.
+/// The samples of all views in the virtual one, and what was dropped. They are counted first, so that their
+/// list, which takes most of the memory, holds no more than those that fall in the view.
 fn propagated<const C: usize>(
     images: &[&Image],
     surfaces: &[Surface],
