@@ -182,7 +182,7 @@ fn planes_of_rigs_take_what_is_estimated() {
 fn views_from_tracks_take_what_is_estimated() {
     let pool = pool();
     let mut estimates = Estimates::default();
-    for (size, views) in [((500, 400), 2), ((300, 240), 4), ((60, 50), 2)] {
+    for (size, views) in [((500, 400), 2), ((300, 240), 4), ((180, 150), 2)] {
         let (size, of_views) = (scaled(size), scaled((400, 320)));
         let cameras: Vec<Camera> = (0..=views)
             .map(|k| Camera::metric(rig_camera(0.7 * k as f64, of_views), false).unwrap())

@@ -27,7 +27,7 @@ use std::process::ExitCode;
 const MOST_THREADS: usize = 1024;
 
 /// Bytes of memory that every command takes beside what it counts.
-const LEAST_MEMORY: f64 = 16e6;
+const LEAST_MEMORY: f64 = 24e6;
 
 /// Reads the arguments, runs the command and maps its outcome to an exit code: 0 success, 1 input error, 2
 /// usage error.

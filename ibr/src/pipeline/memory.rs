@@ -134,7 +134,10 @@ impl Extent {
         let pixels = self.virtual_pixels();
         let equalised = 4.0 * self.channels as f64 * self.pixels as f64;
         let limited = equalised + (REGRESSORS + LIMITS) * pixels;
-        let imagined = self.predicted() + self.of_cameras(settings).max(REGRESSORS * pixels);
+        let another = self.size.0 * self.size.1;
+        let (all, samples) = (self.pixels + another, self.samples + another);
+        let with_another = Self { views: self.views + 1, pixels: all, samples, ..*self };
+        let imagined = self.predicted() + with_another.of_cameras(settings).max(REGRESSORS * pixels);
         self.rendering() + limited.max(imagined)
     }
 

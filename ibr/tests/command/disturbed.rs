@@ -183,7 +183,7 @@ fn renderings_that_no_memory_holds_are_refused() {
     std::fs::write(dir.path().join("tracked.toml"), scene).unwrap();
     for (line, limit) in [
         ("bound large.toml --map map.png", 500_000),
-        ("render large.toml -o out.png --method plane", 250_000),
+        ("render large.toml -o out.png --method plane", 350_000),
         ("render tracked.toml -o out.png", 500_000),
     ] {
         let refused = shell(dir.path(), &format!("ulimit -v {limit}; $H {line} --threads 1"));
