@@ -7,6 +7,7 @@ use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
 use crate::lmi::LmiError;
 use crate::lti::{LtiError, StateSpaceError};
+use crate::messages::Number;
 use crate::sampling::SamplingError;
 use crate::spec::SpecProblem;
 use crate::units::FastPeriods;
@@ -154,8 +155,9 @@ pub enum DesignError {
     },
     /// Latency and delays are so far apart that the lifted system is too large.
     #[error(
-        "latency {latency} and delays up to {longest_delay} need delay chains of {states} states, at most \
-         {limit} are supported: check the unit of the delays (seconds), and bring latency and delays closer together"
+        "latency {latency} and delays up to {longest_delay} need delay chains of {} states, at most \
+         {limit} are supported: check the unit of the delays (seconds), and bring latency and delays closer together",
+        Number(*.states)
     )]
     TooLate {
         /// m0, fast samples.

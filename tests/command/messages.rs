@@ -123,6 +123,10 @@ fn a_box_that_is_too_wide_is_named() {
         &["--delay-box", "1 s", "1024 fast periods"],
     );
     assert!(said.contains("unit") && !said.contains("latency"), "{said}");
+    // The states of its delay chains once had 300 digits.
+    let args = ["analyze", "bank.json", "--delay-error", "1e300,0"];
+    let said = desk.refused(1, &args, &["delay chains of", "check the unit of the delays"]);
+    assert!(said.len() < 300, "{said}");
 }
 
 /// Only the parser's words, without the line.
