@@ -235,7 +235,7 @@ impl<'a> EnclosedErrorSystem<'a> {
 
     /// K K* at a point of the unit circle, rounded to double precision after every cancellation; of small
     /// systems in 512 bits where 106 do not resolve it.
-    pub fn error_gram(&self, half: [f64; 2]) -> CMat {
+    pub(crate) fn error_gram(&self, half: [f64; 2]) -> CMat {
         let (filters, ratio) = (&self.bank.filters, self.bank.ratio);
         let short = lower::error_gram(&self.period, filters, ratio, half);
         if short.is_resolved(UNRESOLVED) || self.states() > MAX_LONG_GRAM_STATES {
