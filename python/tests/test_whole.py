@@ -260,7 +260,8 @@ def test_delays_are_followed_as_by_the_command_line(folder, binary, tracked):
         parts.append(s.flush())
     whole = np.concatenate(parts)
     np.testing.assert_array_equal(whole[tracked.latency :][: len(y)], y)
-    assert len(s.track) == len(log)
+    # The last measurement may still be under way.
+    assert len(s.track) in (len(log) - 1, len(log)) and dict(s.track[3])["frame"] == log[3]["frame"]
     for readings in (folder / "log.jsonl", report.track, log):
         again = tracked.fuse(x, track=readings)
         assert error(again) < 0.1 * error(tracked.fuse(x))
