@@ -23,7 +23,7 @@ pub(crate) fn design(
     let mut spec = sources::spec_with(source, keys.map_err(|error| spec_error(py, &error))?)?;
     spec.latency = latency.or(spec.latency);
     for doubt in warnings(&spec).unwrap_or_default() {
-        warn(py, &doubt, 2)?;
+        warn(py, &doubt, 3)?;
     }
     let proof = if proof { ProofSearch::Run } else { ProofSearch::Skip };
     let limits = if limits { Limits::Enforced } else { Limits::Off };
@@ -62,7 +62,7 @@ fn finished(py: Python<'_>, found: Result<Design, DesignError>, proof: ProofSear
     if let Err(reason) = proven
         && proof == ProofSearch::Run
     {
-        warn(py, &format!("gamma is computed, not proven: {reason}"), 2)?;
+        warn(py, &format!("gamma is computed, not proven: {reason}"), 3)?;
     }
     Ok(Bank::from(bank))
 }

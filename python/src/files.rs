@@ -78,7 +78,7 @@ pub(crate) fn read<'py>(
         Ok((whole, reader.is_complex(), rate, rails, reader.warnings()))
     });
     let (whole, is_complex, rate, rails, warnings) = read.map_err(refused)?;
-    warnings.iter().try_for_each(|warning| warn(py, warning, 2))?;
+    warnings.iter().try_for_each(|warning| warn(py, warning, 3))?;
     let found = PyDict::new(py);
     found.set_item("channels", arrays(py, whole.channels, is_complex))?;
     found.set_item("rate", rate)?;

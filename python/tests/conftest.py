@@ -36,7 +36,8 @@ def binary():
     found = next((path for path in candidates if path.exists()), None)
     if found is None:
         pytest.skip("no hybank binary: cargo build, or name one with HYBANK")
-    return found
+    # Tests run it in other folders.
+    return found.resolve()
 
 
 @pytest.fixture

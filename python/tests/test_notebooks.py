@@ -5,9 +5,12 @@ HYBANK_NOTEBOOKS=write pytest python/tests/test_notebooks.py    writes these out
 
 import os
 import re
+from pathlib import Path
 
 import pytest
 from conftest import ROOT
+
+import hybank as hb
 
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 NUMBER = r"[-+]?\d+\.\d+(?:e[-+]?\d+)?"
@@ -31,10 +34,12 @@ def shown(cells):
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebook_has_its_outputs(path, tmp_path):
+def test_a_notebook_has_its_outputs(path, tmp_path, monkeypatch):
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
     pytest.importorskip("ipykernel")
     pytest.importorskip("matplotlib")
+    # The kernel works in another folder.
+    monkeypatch.setenv("PYTHONPATH", str(Path(hb.__file__).parents[1]))
     notebook = nbformat.read(path, as_version=4)
     stored = shown(notebook.cells)
     client = nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}})
