@@ -447,8 +447,8 @@ fn write_file(path: &Path, bytes: &[u8], overwrite: bool) -> PyResult<()> {
 
 /// The formats by name.
 const FORMATS: [(&str, Exported); 8] = [
-    ("c", Exported::C99),
     ("c99", Exported::C99),
+    ("c", Exported::C99),
     ("csv", Exported::Csv),
     ("npz", Exported::Npz),
     ("mat", Exported::Mat),
