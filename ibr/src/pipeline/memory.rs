@@ -115,10 +115,12 @@ impl Extent {
     /// Bytes of a view of views without cameras, all of whose samples are held at a time.
     pub fn of_tracks(&self, degree: Degree) -> f64 {
         let (samples, sample) = (self.samples as f64, self.sample());
-        let decided = 64.0 * self.largest as f64 + 4.0 * self.pixels as f64;
+        // The brightness of all views; then the samples of one with their chi, or with the ends on each pixel.
+        let surfaced = 4.0 * self.pixels as f64;
+        let decided = 56.0 * self.largest as f64;
         let tested = (sample + POINT) * samples;
         let fitted = self.virtual_pixels() + self.plane(degree, sample * samples);
-        BASE + decided.max(tested).max(fitted)
+        BASE + surfaced.max(decided).max(tested).max(fitted)
     }
 
     /// Bytes of the prediction of a view of a rectified rig, with what is known of views before it.
