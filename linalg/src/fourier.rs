@@ -57,6 +57,16 @@ pub fn cross_correlation(x: &[f64], y: &[f64]) -> Vec<f64> {
     real_sequence(&product, size)
 }
 
+/// X_k R_k* over the square root of its modulus: the spectrum of a correlation of which neither the
+/// strongest frequencies alone nor the noise between them decides.
+pub fn half_whitened(x: &[Complex<f64>], r: &[Complex<f64>]) -> Vec<Complex<f64>> {
+    let cross = |(x, r): (&Complex<f64>, &Complex<f64>)| {
+        let product = x * r.conj();
+        if product.norm() > 0.0 { product / product.norm().sqrt() } else { Complex::ZERO }
+    };
+    x.iter().zip(r).map(cross).collect()
+}
+
 /// z_n = L sum_k x_k y_{n - k}, indices modulo the length L of both.
 ///
 /// # Panics

@@ -9,6 +9,7 @@ import importlib
 from hybank import _pickles  # noqa: F401
 from hybank._functions import analyze, calibrate, import_taps, measure, simulate, verify
 from hybank._hybank import (
+    Alignment,
     Analysis,
     Bank,
     Calibration,
@@ -23,6 +24,7 @@ from hybank._hybank import (
     Stream,
     Verified,
     __version__,
+    align,
     load,
 )
 from hybank._inputs import Captures, read
@@ -44,6 +46,7 @@ from hybank._spec import (
 )
 
 __all__ = [
+    "Alignment",
     "Analysis",
     "Bank",
     "Calibration",
@@ -63,6 +66,7 @@ __all__ = [
     "Stream",
     "Verified",
     "__version__",
+    "align",
     "analyze",
     "bessel",
     "butterworth",

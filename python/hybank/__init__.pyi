@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 __all__ = [
+    "Alignment",
     "Analysis",
     "Bank",
     "Calibration",
@@ -26,6 +27,7 @@ __all__ = [
     "Stream",
     "Verified",
     "__version__",
+    "align",
     "analyze",
     "bessel",
     "butterworth",
@@ -224,6 +226,33 @@ class Recording:
     @property
     def dtype(self) -> Literal["f4", "f8", "c8", "c16"]: ...
     def read(self, first: int, count: int) -> NDArray[Any]: ...
+
+@final
+class Alignment:
+    @property
+    def spec(self) -> str: ...
+    @property
+    def skip(self) -> list[int]: ...
+    @property
+    def frames(self) -> int: ...
+    @property
+    def delay(self) -> NDArray[np.float64]: ...
+    @property
+    def drift_ppm(self) -> NDArray[np.float64]: ...
+    @property
+    def gain(self) -> NDArray[np.float64]: ...
+    @property
+    def offset(self) -> NDArray[np.float64]: ...
+    @property
+    def track(self) -> str: ...
+    @property
+    def alone_db(self) -> float: ...
+    @property
+    def together_db(self) -> float: ...
+    @property
+    def one_suffices(self) -> bool: ...
+    @property
+    def remarks(self) -> list[str]: ...
 
 @final
 class Calibration:
@@ -540,6 +569,13 @@ def analyze(
     sensitivity: bool = False,
     sweep: bool = False,
 ) -> Analysis: ...
+def align(
+    x: Sequence[ArrayLike] | NDArray[Any],
+    spec: Bank | _Spec,
+    *,
+    reference: int | None = None,
+    within: float | None = None,
+) -> Alignment: ...
 def calibrate(
     x: ArrayLike | _Files | Captures,
     spec: Bank | _Spec,

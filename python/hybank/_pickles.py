@@ -7,8 +7,8 @@ from types import SimpleNamespace
 from hybank import _hybank
 
 _RESULTS = (
-    "Analysis", "Calibration", "Capture", "Figures", "FuseReport", "Gamma", "Geometry", "Measurement", "Verified",
-    "View",
+    "Alignment", "Analysis", "Calibration", "Capture", "Figures", "FuseReport", "Gamma", "Geometry", "Measurement",
+    "Verified", "View",
 )
 
 

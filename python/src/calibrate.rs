@@ -146,7 +146,7 @@ impl Signal {
 }
 
 /// One record per channel. Integers clip at the ends of their range, floats where `clip` says.
-fn records(held: &Held<'_>, channels: usize, clip: Option<f64>) -> PyResult<Vec<Record>> {
+pub(crate) fn records(held: &Held<'_>, channels: usize, clip: Option<f64>) -> PyResult<Vec<Record>> {
     if clip.is_some_and(|level| level.is_nan() || level <= 0.0) {
         return Err(refused("clip: give a positive level"));
     }
@@ -171,7 +171,7 @@ fn fitted(names: &[String]) -> PyResult<Fit> {
 }
 
 /// From 0.
-fn reference_of(spec: &Spec, given: Option<usize>) -> PyResult<usize> {
+pub(crate) fn reference_of(spec: &Spec, given: Option<usize>) -> PyResult<usize> {
     match given {
         Some(0) => Err(refused("reference: channels count from 1")),
         Some(channel) => Ok(channel - 1),

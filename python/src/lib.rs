@@ -8,6 +8,7 @@
 // The prompts of Python in the documentation are no quotations.
 #![allow(clippy::doc_lazy_continuation)]
 
+mod align;
 mod arrays;
 mod background;
 mod bank;
@@ -56,6 +57,7 @@ fn _hybank(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<results::Analysis>()?;
     module.add_class::<results::Capture>()?;
     module.add_class::<recordings::Recording>()?;
+    module.add_class::<align::Alignment>()?;
     module.add_class::<calibrate::Calibration>()?;
     module.add_class::<measure::Measurement>()?;
     module.add_class::<ibr::View>()?;
@@ -66,6 +68,7 @@ fn _hybank(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(proofs::verify, module)?)?;
     module.add_function(wrap_pyfunction!(proofs::analyze, module)?)?;
     module.add_function(wrap_pyfunction!(simulate::simulate, module)?)?;
+    module.add_function(wrap_pyfunction!(align::align, module)?)?;
     module.add_function(wrap_pyfunction!(calibrate::calibrate, module)?)?;
     module.add_function(wrap_pyfunction!(measure::measure, module)?)?;
     module.add_function(wrap_pyfunction!(measure::compare, module)?)?;

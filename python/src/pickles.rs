@@ -1,7 +1,7 @@
 //! Pickles and copies of results: the name of the class and its attributes.
 
 use crate::errors::refused;
-use crate::{calibrate, ibr, measure, results};
+use crate::{align, calibrate, ibr, measure, results};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 
@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 #[pyfunction]
 pub(crate) fn restored<'py>(name: &str, attributes: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     match name {
+        "Alignment" => result::<align::Alignment>(attributes),
         "Analysis" => result::<results::Analysis>(attributes),
         "Calibration" => result::<calibrate::Calibration>(attributes),
         "Capture" => result::<results::Capture>(attributes),

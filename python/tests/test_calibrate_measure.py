@@ -160,3 +160,39 @@ def test_tracking_is_a_key_of_a_design():
     plain = hb.design(spec)
     assert plain.gamma.tracked is None
     assert tracked.gamma.norm <= tracked.gamma.tracked < 1.05 * tracked.gamma.norm
+
+
+def test_recordings_are_aligned_by_any_signal():
+    spec = {
+        "fast_rate": 48e3, "ratio": 2, "target": {"filter": hb.butterworth(4, 9e3)},
+        "channel": [hb.Channel(delay=25e-6), hb.Channel(delay=12.5e-6)], "design": {"method": "fir", "taps": 8},
+    }  # fmt: skip
+    heard = hb.simulate(spec, "chirp:50Hz..8kHz@2s").channels
+    heard = [heard[0][500:], -0.5 * heard[1][:40_000] + 0.1]
+    found = hb.align(heard, spec)
+    assert found.skip == [0, 500] and found.frames == 39_500
+    assert abs(found.delay[1] - 12.5e-6) < 1e-8 and abs(found.drift_ppm[1]) < 0.1
+    assert abs(found.gain[1] + 0.5) < 1e-3 and abs(found.offset[1] - 0.1) < 1e-2
+    assert 0 < len(found.track.splitlines()) <= 1024 and not found.remarks
+    assert not found.one_suffices and found.together_db > found.alone_db and "Alignment" in repr(found)
+    assert hb.design(found.spec, proof=False).gains[1] == found.gain[1]
+    integers = [np.round(32767 * x).astype("i2") for x in heard]
+    assert hb.align(integers, spec).skip == [0, 500]
+
+
+def test_recordings_that_do_not_fit_are_refused():
+    spec = plant([60e-9, 30e-9])
+    random = np.random.default_rng(9)
+    a, b = random.standard_normal((2, 5000))
+    for x, keywords, words in [
+        ([a, b], {}, "nothing in common"),
+        ([a, np.zeros(5000)], {}, "channel 2 is silent"),
+        ([a, a[:100]], {}, "100 samples in common"),
+        ([a], {}, "2 channels"),
+        ([a, b], {"reference": 3}, "channel 3"),
+        ([a, b], {"within": -1.0}, "within"),
+        ([a, 1j * b], {}, "complex"),
+        ([np.sin(0.3 * np.arange(20_000)), np.sin(0.3 * np.arange(20_000) + 1)], {}, "several lags"),
+    ]:
+        with pytest.raises(hb.HybankError, match=words):
+            hb.align(x, spec, **keywords)

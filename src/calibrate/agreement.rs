@@ -128,7 +128,7 @@ pub fn agreement(spec: &Spec, records: &[Record]) -> Agreement {
         return contradicted(without_signal);
     }
     let Ok(model) = Model::new(spec) else { return nothing(Verdict::Undecided) };
-    let beginning: Vec<Record> = records.iter().map(|record| record.beginning(ENOUGH_FRAMES)).collect();
+    let beginning: Vec<Record> = records.iter().map(|record| record.part(0..ENOUGH_FRAMES)).collect();
     let by_delays = by_delays(spec, &model, &beginning).unwrap_or_default();
     if by_delays.iter().any(|found| matches!(found, Contradiction::WrongOrder { .. })) {
         return contradicted(by_delays);

@@ -15,7 +15,7 @@ pub(super) const WORST_CONDITION: f64 = 1e10;
 const CHANCE: f64 = 3.09;
 
 /// What a calibration found.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Calibration {
     /// The reference channel, from 0.
     pub reference: usize,

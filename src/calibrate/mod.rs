@@ -39,6 +39,7 @@ mod contradiction;
 mod error;
 mod estimates;
 mod fit;
+mod lags;
 mod model;
 mod order;
 mod record;
@@ -54,7 +55,9 @@ pub use contradiction::Contradiction;
 pub use error::CalibrateError;
 pub use estimates::{Calibration, ChannelEstimate, Tone, applied};
 pub use fit::Fit;
+pub(crate) use lags::{Correlation, LagLine, NoLag, line, stretch};
 pub(crate) use model::Model;
+pub(crate) use record::longest_run;
 pub use record::{Acquisition, Record};
 pub use warning::Warning;
 
@@ -158,7 +161,7 @@ pub fn calibrate_pooled(
 }
 
 /// All records are real, or all are complex and hold tones.
-fn check_parts(records: &[Record], signal: CalibrationSignal<'_>) -> Result<(), CalibrateError> {
+pub(crate) fn check_parts(records: &[Record], signal: CalibrationSignal<'_>) -> Result<(), CalibrateError> {
     let complex = records.iter().filter(|record| record.imaginary.is_some()).count();
     match signal {
         CalibrationSignal::Tones(_) if complex == records.len() => Ok(()),
@@ -171,7 +174,8 @@ fn check_parts(records: &[Record], signal: CalibrationSignal<'_>) -> Result<(), 
     }
 }
 
-fn check(spec: &Spec, records: &[Record], settings: Settings) -> Result<(), CalibrateError> {
+/// Refuses records and settings that do not belong to a spec.
+pub(crate) fn check(spec: &Spec, records: &[Record], settings: Settings) -> Result<(), CalibrateError> {
     let channels = spec.channels.len();
     if records.len() != channels {
         return Err(CalibrateError::ChannelCount { channels, records: records.len() });

@@ -1,6 +1,7 @@
 //! The captured samples of one channel.
 
 use crate::sine_fit::Channel;
+use std::ops::Range;
 
 /// Least share of equal samples in two records of the same recording.
 const SAME: f64 = 0.999;
@@ -106,12 +107,13 @@ impl Record {
         (0..samples).map(of).collect()
     }
 
-    /// The first samples, at most `count`.
-    pub(super) fn beginning(&self, count: usize) -> Self {
-        let count = count.min(self.samples.len());
-        let imaginary = self.imaginary.as_ref().map(|part| part[..count.min(part.len())].to_vec());
-        let keep = self.keep[..count].to_vec();
-        Self { samples: self.samples[..count].to_vec(), imaginary, keep, clipped: self.clipped }
+    /// Some of the samples, as far as there are so many.
+    pub(crate) fn part(&self, samples: Range<usize>) -> Self {
+        let end = samples.end.min(self.samples.len());
+        let part = samples.start.min(end)..end;
+        let imaginary = self.imaginary.as_ref().map(|all| all[part.clone()].to_vec());
+        let keep = self.keep[part.clone()].to_vec();
+        Self { samples: self.samples[part].to_vec(), imaginary, keep, clipped: self.clipped }
     }
 
     /// Samples that are not clipped and finite.
@@ -130,7 +132,7 @@ impl Record {
 }
 
 /// The first and the longest run of frames that every record has, as first frame and length.
-pub(super) fn longest_run(records: &[Record]) -> (usize, usize) {
+pub(crate) fn longest_run(records: &[Record]) -> (usize, usize) {
     let length = records.iter().map(|record| record.samples.len()).min().unwrap_or(0);
     let (mut best, mut begin) = ((0, 0), 0);
     for k in 0..=length {

@@ -243,17 +243,13 @@ impl Search<'_> {
             padded.resize(size, 0.0);
             fourier::real_spectrum(&padded)
         });
-        // Half whitened: neither the strongest frequencies alone nor the noise between them decides.
-        let cross = |b: usize| {
-            let product = x[b] * r[b].conj();
-            if product.norm() > 0.0 { product / product.norm().sqrt() } else { Complex::ZERO }
-        };
+        let cross = fourier::half_whitened(&x, &r);
         let apart = self.model.delays[i] - self.model.delays[0];
         let zones = self.model.ratio.min(FARTHEST_ZONE) as i32;
         let mut peaks: Vec<(f64, i64)> = Vec::new();
         for zone in -zones..=zones {
             let nu = |b: usize| self.model.alias(b as f64 * (TAU / size as f64), zone);
-            let phased = |b: usize| cross(b) * Complex::from_polar(1.0, nu(b) * apart);
+            let phased = |b: usize| cross[b] * Complex::from_polar(1.0, nu(b) * apart);
             let spectrum: Vec<Complex<f64>> = (0..x.len()).map(phased).collect();
             peaks.extend(highest(&fourier::real_sequence(&spectrum, size), self.frames / OVERLAP));
         }

@@ -15,7 +15,7 @@ use crate::calibrate::{
     Acquisition, CalibrateError, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning,
     applied, calibrate_pooled,
 };
-use crate::io::{MultiReader, ReadOptions, Whole};
+use crate::io::{MultiReader, ReadOptions, WORK_BYTES, Whole};
 use crate::messages::{Number, Quoted};
 use crate::pipeline::matching::{channels_of_raw, samples_per_frame};
 use crate::spec::{DesignOverrides, Spec};
@@ -258,29 +258,8 @@ impl Args {
         self.reading.scale.check(&reader)?;
         check_channels(spec, &reader)?;
         check_rate(spec, &reader)?;
-        let parts = if reader.is_complex() { 2 } else { 1 };
-        let most = most / (parts * reader.channels()).max(1);
-        let headers = reader.headers().zip(reader.samples_per_frame());
-        let rails = headers.flat_map(|((_, header), samples)| {
-            std::iter::repeat_n(header.rails, parts * header.channels * samples)
-        });
-        let rails: Vec<_> = rails.collect();
         let name = reader.headers().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
-        let Whole { channels, is_cut } = Whole::read_parts(&mut reader, most).map_err(unread)?;
-        warnings.extend(reader.warnings().iter().map(ToString::to_string));
-        if is_cut {
-            warnings.push(format!("{}: only the first {most} frames are used", Quoted(&name)));
-        }
-        let all = channels.into_iter().zip(rails).map(|(samples, rails)| record(samples, rails, self.clip));
-        let mut all = all.collect::<Vec<_>>().into_iter();
-        let mut records = Vec::new();
-        while let Some(real) = all.next() {
-            let imaginary = if parts == 2 { all.next() } else { None };
-            records.push(match imaginary {
-                Some(imaginary) => Record::complex(real, imaginary),
-                None => real,
-            });
-        }
+        let mut records = records(&mut reader, most, WORK_BYTES, self.clip, warnings)?;
         if !layout.is_plain() {
             records =
                 layout.ranges().into_iter().map(|samples| Record::in_a_row(&records[samples])).collect();
@@ -294,12 +273,7 @@ impl Args {
             .map_err(|problem| bad_flag("fit", &problem))?;
         let given = if self.fit.is_empty() { &spec.fit } else { &self.fit };
         let fit = if given.is_empty() { Fit::default() } else { given.iter().copied().collect() };
-        let known = spec.uncertainty.as_ref().and_then(|table| table.reference_channel());
-        let reference = match self.reference {
-            Some(0) => return Err(Failure::Usage("--reference 0: channels count from 1".into())),
-            Some(channel) => channel - 1,
-            None => known.unwrap_or(0),
-        };
+        let reference = reference(self.reference, spec)?;
         Ok(Settings { fit, reference })
     }
 
@@ -344,7 +318,7 @@ fn check_channels(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
 }
 
 /// The captures have the slow rate of the spec, as far as they state it; any for a spec in normalised time.
-fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
+pub(super) fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
     let frames = (spec.fast_period * spec.ratio as f64).rate().0;
     let wrong = reader.headers().zip(reader.samples_per_frame()).find_map(|((name, header), samples)| {
         let wanted = frames * samples as f64;
@@ -359,6 +333,52 @@ fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
         ))),
         _ => Ok(()),
     }
+}
+
+/// The reference channel, from 0: the `given` one, from 1, or that of the spec, or the first.
+pub(super) fn reference(given: Option<usize>, spec: &Spec) -> Result<usize, Failure> {
+    let known = spec.uncertainty.as_ref().and_then(|table| table.reference_channel());
+    match given {
+        Some(0) => Err(Failure::Usage("--reference 0: channels count from 1".into())),
+        Some(channel) => Ok(channel - 1),
+        None => Ok(known.unwrap_or(0)),
+    }
+}
+
+/// All channels of a reader, each within its rails or `clip`, for work that takes so many bytes for each
+/// sample; what was tolerated joins the `warnings`.
+pub(super) fn records(
+    reader: &mut MultiReader,
+    most: usize,
+    bytes_per_sample: f64,
+    clip: Option<f64>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Record>, Failure> {
+    let parts = if reader.is_complex() { 2 } else { 1 };
+    let most = most / (parts * reader.channels()).max(1);
+    let headers = reader.headers().zip(reader.samples_per_frame());
+    let rails = headers.flat_map(|((_, header), samples)| {
+        std::iter::repeat_n(header.rails, parts * header.channels * samples)
+    });
+    let rails: Vec<_> = rails.collect();
+    let name = reader.headers().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
+    let Whole { channels, is_cut } =
+        Whole::read_parts_with(reader, most, bytes_per_sample).map_err(unread)?;
+    warnings.extend(reader.warnings().iter().map(ToString::to_string));
+    if is_cut {
+        warnings.push(format!("{}: only the first {most} frames are used", Quoted(&name)));
+    }
+    let all = channels.into_iter().zip(rails).map(|(samples, rails)| record(samples, rails, clip));
+    let mut all = all.collect::<Vec<_>>().into_iter();
+    let mut records = Vec::new();
+    while let Some(real) = all.next() {
+        let imaginary = if parts == 2 { all.next() } else { None };
+        records.push(match imaginary {
+            Some(imaginary) => Record::complex(real, imaginary),
+            None => real,
+        });
+    }
+    Ok(records)
 }
 
 /// Samples beyond the rails, or of this size if a level is given, are clipped.

@@ -16,7 +16,7 @@ const CONTRADICTION: f64 = 3.0;
 
 /// A value and the half-width of its 95 % interval.
 #[derive(Debug, Clone, Copy, serde::Serialize)]
-struct Interval {
+pub(super) struct Interval {
     value: f64,
     half_width: f64,
 }
@@ -91,11 +91,11 @@ pub(super) struct Report {
     pub(super) warnings: Vec<String>,
 }
 
-fn interval(estimate: Estimate<f64>) -> Interval {
+pub(super) fn interval(estimate: Estimate<f64>) -> Interval {
     Interval { value: estimate.value, half_width: HALF_WIDTH * estimate.sigma }
 }
 
-fn periods(estimate: Estimate<FastPeriods>) -> Interval {
+pub(super) fn periods(estimate: Estimate<FastPeriods>) -> Interval {
     interval(Estimate { value: estimate.value.0, sigma: estimate.sigma.0 })
 }
 
@@ -220,7 +220,7 @@ impl Report {
 }
 
 /// Value and half-width, with as many digits as the half-width justifies.
-fn shown(interval: Interval) -> String {
+pub(super) fn shown(interval: Interval) -> String {
     let Interval { value, half_width } = interval;
     if half_width.is_nan() || half_width <= 0.0 {
         return format!("{value}");

@@ -3,6 +3,8 @@
 // Printing macros panic where their output cannot be written.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
+mod align;
+mod align_report;
 mod analyze;
 mod bank_file;
 mod before_after;
@@ -94,6 +96,7 @@ enum Command {
     Export(export::Args),
     Simulate(simulate::Args),
     Calibrate(calibrate::Args),
+    Align(align::Args),
     Fuse(fuse::Args),
     Measure(measure::Args),
     Stream(stream::Args),
@@ -181,6 +184,7 @@ fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Export(args) => export::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
+        Command::Align(args) => align::run(&args),
         Command::Fuse(args) => fuse::run(&args),
         Command::Measure(args) => measure::run(&args),
         Command::Stream(args) => stream::run(&args),

@@ -7,7 +7,7 @@ use crate::files::FileError;
 use crate::interchange::ExportError;
 use crate::io::IoError;
 use crate::pipeline::PipelineError;
-use crate::track::TrackError;
+use crate::track::{AlignError, TrackError};
 use crate::verify::VerifyError;
 use std::any::Any;
 use std::fmt::Display;
@@ -43,6 +43,11 @@ fn option(error: &dyn Any) -> Option<&'static str> {
             ExportError::NoIntegers { .. } => Some("`hybank design --method fir --bits B` designs them"),
             ExportError::Offset { .. } => Some("--input-bits B does"),
             ExportError::NoWords => Some("leave out --input-bits"),
+            _ => None,
+        })
+        .or_else(|| match error.downcast_ref()? {
+            AlignError::Ambiguous { .. } => Some("--within says so"),
+            AlignError::Spec(error) => of_calibration(error),
             _ => None,
         })
         .or_else(|| match error.downcast_ref()? {

@@ -37,6 +37,8 @@ enum Example {
     Audio2x,
     /// Fewer slow sensor samples than output samples
     SensorArray,
+    /// Two inertial sensors with rates of their own, 100 Hz and 60 Hz, into 300 Hz
+    Inertial,
     /// More converters than needed: three for a ratio of two
     Oversampled,
     /// The example of the thesis, in normalised time
@@ -49,6 +51,7 @@ impl Example {
             Self::TiAdc => include_str!("../../filters/interleaved-4x250M.toml"),
             Self::Audio2x => include_str!("../../filters/speech-2x.toml"),
             Self::SensorArray => include_str!("../../filters/vibration-3x.toml"),
+            Self::Inertial => include_str!("../../examples/inertial/spec.toml"),
             Self::Oversampled => include_str!("../../filters/oversampled-3for2.toml"),
             Self::Thesis => include_str!("../../filters/thesis-fir.toml"),
         }

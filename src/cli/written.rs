@@ -91,7 +91,7 @@ pub(super) struct Mono<'a> {
     pub(super) imaginary: Option<&'a [f64]>,
     /// Hertz.
     pub(super) rate: f64,
-    /// 32-bit floats, or integers of 16 or 24 bits.
+    /// Floats or integers.
     pub(super) format: PcmFormat,
     /// SigMF recordings are so by their name.
     pub(super) container: Container,
@@ -116,6 +116,7 @@ impl<'a> Mono<'a> {
             && self.imaginary.is_none()
             && !is_sigmf(path)
             && !is_pipe(path)
+            && bytes <= 4
             && sample_rate > 0
             && is_small(bytes * u64::from(sample_rate))
             && is_small(bytes * self.samples.len() as u64);

@@ -21,6 +21,7 @@
 //! converters of 16 bits: without any noise one channel alone would be exact wherever the signal fits into
 //! it.
 
+mod alone;
 mod band;
 mod integral;
 mod powers;
@@ -33,6 +34,7 @@ mod spline;
 mod tests;
 mod tones;
 
+pub use alone::Alone;
 pub use band::{BandSource, FigureBand, Setup};
 pub use simple::{SimpleFigure, SimpleWay};
 pub use snr::Snr;
@@ -106,7 +108,7 @@ impl Figures {
         let band = FigureBand::new(spec, &plain);
         let tones = ToneResponse::new(plain.clone(), FilterResponse::new(bank)?);
         let Worst { image, gain_error, vanishes } = tones.worst(band.cycles(spec));
-        let setting = Setting::new(bank, spec, &band)?;
+        let setting = Setting::of(bank, spec, &band)?;
         let ways = simple::ways(setting.problem());
         let ratios = setting.ratios(&ways);
         let own = setting.ratio_of_bank(FilterResponse::new(bank)?);
@@ -147,7 +149,7 @@ impl Figures {
 pub fn snr(bank: &Bank) -> Result<Snr, DesignError> {
     let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
     let band = FigureBand::new(spec, &without_signal(spec, bank.latency)?);
-    Ok(Setting::new(bank, spec, &band)?.ratio_of_bank(FilterResponse::new(bank)?).snr)
+    Ok(Setting::of(bank, spec, &band)?.ratio_of_bank(FilterResponse::new(bank)?).snr)
 }
 
 /// A band for the signal of a spec that has none: what the target passes, with a tenth of the resolved band

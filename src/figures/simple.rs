@@ -58,7 +58,7 @@ pub(super) fn ways(problem: &Problem) -> Vec<Reconstruction> {
 
 /// The first channel of each kind: a delay does not change what a channel gives alone. None where there is
 /// one channel only: that is the bank.
-fn kinds(problem: &Problem) -> Vec<(usize, Range<usize>)> {
+pub(super) fn kinds(problem: &Problem) -> Vec<(usize, Range<usize>)> {
     let mut kinds: Vec<(usize, Range<usize>)> = Vec::new();
     let kind = |samples: &Range<usize>| {
         let (channel, noise) = (problem.channels[samples.start], problem.noise[samples.start]);

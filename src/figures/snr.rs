@@ -63,17 +63,31 @@ impl Setting {
     ///
     /// # Errors
     /// As [`Problem::new`].
-    pub(super) fn new(bank: &Bank, spec: &Spec, band: &FigureBand) -> Result<Self, DesignError> {
-        let plain = without_signal(spec, bank.latency)?;
+    pub(super) fn of(bank: &Bank, spec: &Spec, band: &FigureBand) -> Result<Self, DesignError> {
+        let follows = |i: usize| bank.tap_slopes.as_ref().is_some_and(|slopes| slopes.follows(i));
+        Self::new(spec, bank.latency, &follows, band)
+    }
+
+    /// Of any filters for a spec with this latency, which follow the delays of some channels.
+    ///
+    /// # Errors
+    /// As [`Problem::new`].
+    pub(super) fn new(
+        spec: &Spec,
+        latency: usize,
+        follows: &dyn Fn(usize) -> bool,
+        band: &FigureBand,
+    ) -> Result<Self, DesignError> {
+        let plain = without_signal(spec, latency)?;
         let stated: Vec<f64> = spec.channels.iter().map(|channel| channel.sample_noise().powi(2)).collect();
         let stated = spec.layout().each(&stated);
-        let jitter = Problem::jitter_shares(spec, bank.latency)?;
+        let jitter = Problem::jitter_shares(spec, latency)?;
         let signal = match spec.signal.as_ref().map(|signal| &signal.spectrum) {
             Some(SignalSpectrum::Band(_)) => {
                 let [low, high] = band.cycles(spec).map(|f| TAU * f.0);
                 Signal::in_band(plain, low..=high)
             }
-            Some(SignalSpectrum::Filter(_)) => Signal::everywhere(Problem::new(spec, bank.latency)?),
+            Some(SignalSpectrum::Filter(_)) => Signal::everywhere(Problem::new(spec, latency)?),
             None => Signal::everywhere(plain),
         };
         let target = target_power(&signal);
@@ -92,7 +106,6 @@ impl Setting {
         let deviations = deviations.unwrap_or_else(|| vec![Seconds(0.0); channels]);
         let spread: Vec<FastPeriods> =
             deviations.into_iter().map(|time| time.in_fast_periods(spec.fast_period)).collect();
-        let follows = |i: usize| bank.tap_slopes.as_ref().is_some_and(|slopes| slopes.follows(i));
         let known =
             |(i, deviation): (usize, &FastPeriods)| if follows(i) { FastPeriods(0.0) } else { *deviation };
         let not_followed = spread.iter().enumerate().map(known).collect();

@@ -55,4 +55,4 @@ pub use stall::{Stall, StallWatch};
 pub use stream_header::{Coding, StreamHeader, is_same_rate};
 pub use tar::{TarFile, tar_files};
 pub use timestamps::{MAX_LOST, MAX_LOST_AT_ONCE};
-pub use whole::{Whole, WholeError};
+pub use whole::{WORK_BYTES, Whole, WholeError};

@@ -5,7 +5,7 @@ use crate::memory::{MemoryShortage, check_memory};
 use crate::messages::Quoted;
 
 /// Bytes of work memory for each sample of a recording: the sample, its spectrum and a copy of both.
-const WORK_BYTES: f64 = 64.0;
+pub const WORK_BYTES: f64 = 64.0;
 
 /// Recordings that are not read.
 #[derive(Debug, thiserror::Error)]
@@ -64,11 +64,23 @@ impl Whole {
     /// # Errors
     /// [`WholeError`].
     pub fn read_parts(reader: &mut MultiReader, most: usize) -> Result<Self, WholeError> {
+        Self::read_parts_with(reader, most, WORK_BYTES)
+    }
+
+    /// The same for work that takes so many bytes of memory for each sample.
+    ///
+    /// # Errors
+    /// [`WholeError`].
+    pub fn read_parts_with(
+        reader: &mut MultiReader,
+        most: usize,
+        bytes_per_sample: f64,
+    ) -> Result<Self, WholeError> {
         let parts = if reader.is_complex() { 2 } else { 1 };
         let mut channels = vec![Vec::new(); parts * reader.channels()];
         let promised = reader.promised_frames().and_then(|frames| usize::try_from(frames).ok());
         let mut checked = promised.unwrap_or_default().min(most);
-        check_work(checked, channels.len())?;
+        check_work(bytes_per_sample, checked, channels.len())?;
         loop {
             match reader.wait()? {
                 Arrival::Frames(count) => {
@@ -76,7 +88,7 @@ impl Whole {
                     let room = most - known;
                     if known + count > checked {
                         checked = (checked + checked / 4).max(known + count).min(most);
-                        check_work(checked, channels.len())?;
+                        check_work(bytes_per_sample, checked, channels.len())?;
                     }
                     append(&reader.frames(), count.min(room), &mut channels);
                     reader.consume(count);
@@ -92,8 +104,8 @@ impl Whole {
 }
 
 /// Refuses recordings whose work memory the system does not have.
-fn check_work(frames: usize, channels: usize) -> Result<(), WholeError> {
-    let bytes = WORK_BYTES * frames as f64 * channels as f64;
+fn check_work(bytes_per_sample: f64, frames: usize, channels: usize) -> Result<(), WholeError> {
+    let bytes = bytes_per_sample * frames as f64 * channels as f64;
     check_memory(bytes).map_err(|shortage| WholeError::Memory { frames, channels, shortage })
 }
 

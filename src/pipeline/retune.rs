@@ -3,7 +3,8 @@
 //! The stream is cut into blocks of a fixed number of frames, counted from its first frame. What is found in
 //! block b changes the filters within block b + 2: block b + 1 is the time in which another thread may look
 //! for it. So the frames at which filters change, and the filters, depend on the stream alone and not on how
-//! it was cut into calls or how fast the other thread is.
+//! it was cut into calls or how fast the other thread is. What is known beforehand also changes the
+//! filters of the first two blocks.
 //!
 //! A change takes over the history of the stream. The outputs after it are those that the new filters would
 //! have given from the beginning, so that a change of the taps by dF changes an output by dF times the
@@ -58,6 +59,8 @@ pub struct Retuner {
     is_waiting: bool,
     /// Changes to come in the present block.
     changes: VecDeque<Change>,
+    /// Those of the block after the first one, if they are known beforehand.
+    second: Vec<Change>,
     /// The stream that goes on from the next frame, for channels that were shifted before it. Its history
     /// waits for that frame, since it may need samples as far ahead.
     shifted: Option<Stream>,
@@ -111,8 +114,15 @@ impl Retuner {
             found,
             is_waiting: false,
             changes: VecDeque::new(),
+            second: Vec::new(),
             shifted: None,
         })
+    }
+
+    /// The same with changes in the first two blocks, which are known beforehand.
+    #[must_use]
+    pub fn beginning_with(self, [first, second]: [Vec<Change>; 2]) -> Self {
+        Self { changes: first.into(), second, ..self }
     }
 
     /// Takes samples of the inputs.
@@ -162,27 +172,31 @@ impl Retuner {
         Ok(Some(stream))
     }
 
-    /// Moves past `count` frames, and returns the stream that goes on from here with
-    /// the history of the running one, if the filters change.
-    pub(super) fn passed(&mut self, count: usize) -> Result<Option<Stream>, PipelineError> {
+    /// Moves past `count` frames.
+    pub(super) fn passed(&mut self, count: usize) -> Result<(), PipelineError> {
         self.position += count as i64;
         self.forget();
-        let is_end = self.position == self.first + self.block as i64;
-        if is_end {
+        if self.position == self.first + self.block as i64 {
             self.changes = self.receive()?.into();
             let block = self.block_samples();
             self.first = self.position;
             self.blocks.send(block).map_err(|_| PipelineError::RetunerDied)?;
             self.is_waiting = true;
-        }
-        let inside = (self.position - self.first) as u64;
-        let is_due = self.changes.front().is_some_and(|change| change.frame == inside);
-        let due = is_due.then(|| self.changes.pop_front()).flatten();
-        let next = due.and_then(|change| self.begin(change));
-        if is_end {
             self.shifts = self.channels.iter().map(|channel| channel.shift).collect();
         }
-        Ok(next)
+        Ok(())
+    }
+
+    /// The stream that goes on from the next frame with the history of the running one, if the filters
+    /// change there.
+    pub(super) fn due(&mut self) -> Option<Stream> {
+        let inside = (self.position - self.first) as u64;
+        let is_due = self.changes.front().is_some_and(|change| change.frame == inside);
+        let due = is_due.then(|| self.changes.pop_front()).flatten()?;
+        if inside == 0 {
+            self.shifts.clone_from(&due.shifts);
+        }
+        self.begin(due)
     }
 
     /// Waits for what the last block leads to.
@@ -218,7 +232,7 @@ impl Retuner {
     /// Waits for the changes of the block that the other thread has, if it has one.
     fn receive(&mut self) -> Result<Vec<Change>, PipelineError> {
         if !std::mem::take(&mut self.is_waiting) {
-            return Ok(Vec::new());
+            return Ok(std::mem::take(&mut self.second));
         }
         let mut changes = self.found.recv().map_err(|_| PipelineError::RetunerDied)??;
         changes.retain(|change| change.frame < self.block as u64);

@@ -168,6 +168,9 @@ impl<'a> Pipeline<'a> {
     fn run_retuned(&mut self, write: Write<'_>) -> Result<(), PipelineError> {
         let Some(mut retuner) = self.retuner.take() else { return Ok(()) };
         loop {
+            if let Some(stream) = retuner.due() {
+                self.fusion.continue_by(stream)?;
+            }
             let count = retuner.ready(self.step);
             if count == 0 {
                 break;
@@ -176,9 +179,7 @@ impl<'a> Pipeline<'a> {
                 self.fusion.replace(stream);
             }
             self.step(&[retuner.next(count)], write)?;
-            if let Some(stream) = retuner.passed(count)? {
-                self.fusion.continue_by(stream)?;
-            }
+            retuner.passed(count)?;
         }
         self.retuner = Some(retuner);
         Ok(())

@@ -13,6 +13,13 @@ pub struct DriftModel {
     pub rate_walk: f64,
 }
 
+impl DriftModel {
+    /// Of clocks whose rates wander by so much in a second, seconds per second.
+    pub fn wandering(rate: f64) -> Self {
+        Self { delay_walk: 0.0, rate_walk: rate * rate }
+    }
+}
+
 /// A delay, its rate of change, and what is known of them: the entries of the symmetric covariance matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DelayState {

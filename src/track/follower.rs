@@ -163,6 +163,17 @@ impl Follower {
         self.settings.block_frames
     }
 
+    /// What is known beforehand of the first two blocks; nothing where delays are measured in the samples.
+    pub fn beginning(&mut self) -> [Vec<Change>; 2] {
+        if !matches!(self.source, DelaySource::Readings(_)) {
+            return [Vec::new(), Vec::new()];
+        }
+        let changes = [0, self.settings.block_frames as u64].map(|first| self.changes(first));
+        let shifts = changes.iter().filter_map(|block| Some(block.first()?.shifts.clone()));
+        self.shifts = shifts.collect();
+        changes
+    }
+
     /// Takes the samples of the next block, a list per channel of the bank; NaN where one is missing. Each
     /// channel has the shift of the change at the first frame of the block; without such a change, no shift.
     pub fn follow(&mut self, samples: &[Vec<f64>]) -> Followed {

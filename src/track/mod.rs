@@ -8,6 +8,7 @@
 //! [`Follower`] measures the delays of a bank's channels block by block, by a pilot tone or by
 //! any signal, and says how taps that are affine in the delays are to change. Delays measured before
 //! are known on both sides of every instant: a smoothing spline of [`crate::sampling`] goes through them.
+//! [`align`] measures them so for whole recordings, which may have begun at any time.
 //!
 //! ```
 //! use hybank::track::{DelayFilter, DelayMeasurement, DriftModel, DelayState};
@@ -24,6 +25,7 @@
 //! assert!((filter.state().rate - 2e-6).abs() < 1e-9);
 //! ```
 
+mod align;
 mod coincidence;
 mod error;
 mod filter;
@@ -38,6 +40,7 @@ mod timeline;
 mod tracker;
 mod tracking;
 
+pub use align::{AlignError, AlignSettings, AlignWarning, AlignedChannel, Alignment, align};
 pub use coincidence::Coincidence;
 pub use error::{ReadingProblem, TrackError};
 pub use filter::{DelayFilter, DelayMeasurement, DelayState, DriftModel, Innovation};

@@ -4,7 +4,7 @@ use super::{ReadingProblem, TrackError};
 use crate::messages::of_document;
 use crate::spec::HALF_WIDTH;
 use crate::units::Seconds;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// The delays at one frame.
@@ -18,14 +18,14 @@ pub struct Reading {
 
 /// A line: absolute delays in seconds with half-widths of 95 % intervals, one for all channels or one each.
 /// The other keys of a log are not read.
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 struct Line {
     frame: u64,
     delay: Vec<Option<f64>>,
     half_width: HalfWidths,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(untagged, expecting = "half_width is one number for all channels, or a list")]
 enum HalfWidths {
     Same(f64),
@@ -78,6 +78,14 @@ impl Reading {
         };
         let delays = (0..channels).map(of).collect::<Result<_, _>>()?;
         Ok(Self { frame: line.frame, delays })
+    }
+
+    /// The line that [`Reading::parse`] reads.
+    pub fn line(&self) -> String {
+        let delay = self.delays.iter().map(|known| known.map(|(delay, _)| delay.0)).collect();
+        let half_width = self.delays.iter().map(|known| known.map(|(_, sigma)| sigma.0 * HALF_WIDTH));
+        let line = Line { frame: self.frame, delay, half_width: HalfWidths::Each(half_width.collect()) };
+        serde_json::to_string(&line).unwrap_or_default()
     }
 
     /// Those of some frames.

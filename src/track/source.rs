@@ -18,10 +18,10 @@ const OTHERS_RANGE: Decibels = Decibels(60.0);
 const APART: f64 = 3.0;
 /// Rms of a block, relative to full scale, below which it holds nothing to measure by: less than half a step
 /// of 24 bits and of any converter.
-const LEAST_LEVEL: f64 = 1e-8;
+pub(super) const LEAST_LEVEL: f64 = 1e-8;
 /// A measurement with a larger standard deviation says nothing, in fast periods: its interval is as wide as
 /// the distance of two channels.
-const LARGEST_DEVIATION: f64 = 0.25;
+pub(super) const LARGEST_DEVIATION: f64 = 0.25;
 /// Least distance of a pilot from a multiple of half the slow rate, cycles per block.
 const LEAST_CYCLES: f64 = 2.0;
 

@@ -75,7 +75,7 @@ impl Tracking {
         let wander = 1e-6 * self.wander;
         let settings = FollowSettings {
             block_frames: self.frames,
-            model: DriftModel { delay_walk: 0.0, rate_walk: wander * wander * unit },
+            model: DriftModel::wandering(wander * unit.sqrt()),
             rate_deviation: FIRST_RATE * wander,
             rate_change: wander * unit,
         };
@@ -96,15 +96,22 @@ impl Follower {
         mut record: impl FnMut(Logged, Vec<TrackWarning>) -> Result<(), PipelineError> + Send + 'static,
     ) -> Result<Retuner, PipelineError> {
         let (bank, mut followed) = (bank.clone(), bank.clone());
-        Retuner::start(self.block_frames(), &bank.offsets.clone(), move |samples| {
-            let Followed { changes, log, warnings } = self.follow(samples);
-            record(log, warnings)?;
+        let offsets = bank.offsets.clone();
+        let mut changed = move |changes: Vec<super::Change>| -> Result<Vec<Change>, PipelineError> {
             let change = |change: super::Change| {
                 followed.filters = bank.filters_at(&change.errors);
                 let (frame, shifts) = (change.frame as u64, change.shifts);
                 Ok(Change { frame, stream: Stream::new(&followed.plan(options)?), shifts })
             };
             changes.into_iter().map(change).collect()
-        })
+        };
+        let [first, second] = self.beginning();
+        let beginning = [changed(first)?, changed(second)?];
+        let retuner = Retuner::start(self.block_frames(), &offsets, move |samples| {
+            let Followed { changes, log, warnings } = self.follow(samples);
+            record(log, warnings)?;
+            changed(changes)
+        })?;
+        Ok(retuner.beginning_with(beginning))
     }
 }

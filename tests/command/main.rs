@@ -6,6 +6,7 @@ mod support;
 mod abuse;
 mod agreement;
 mod algorithms;
+mod align;
 mod analyze;
 #[cfg(target_os = "linux")]
 mod band;

@@ -24,7 +24,7 @@ method = \"fir\"
 taps = 24
 ";
 
-const COMMANDS: [&str; 18] = [
+const COMMANDS: [&str; 19] = [
     "init",
     "design",
     "analyze",
@@ -35,6 +35,7 @@ const COMMANDS: [&str; 18] = [
     "export",
     "simulate",
     "calibrate",
+    "align",
     "fuse",
     "measure",
     "stream",

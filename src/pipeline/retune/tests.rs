@@ -268,7 +268,8 @@ fn a_frame_holds_the_sample_that_lies_a_shift_further() {
     retuner.shifts = vec![0, 3];
     assert_eq!(retuner.ready(9), 3);
     assert_eq!(loaded(&retuner.next(2)), [[0.0, 102.0], [1.0, 103.0]]);
-    assert!(retuner.passed(2).unwrap().is_none());
+    retuner.passed(2).unwrap();
+    assert!(retuner.due().is_none());
     shift(&mut retuner, [0, -1]);
     assert_eq!(loaded(&retuner.next(1)), [[2.0, 101.0]]);
     assert_eq!(loaded(&retuner.frames(-1, 3, true)), [[-1.0, -2.0], [0.0, -2.0], [1.0, 100.0]]);

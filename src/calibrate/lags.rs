@@ -1,0 +1,392 @@
+//! The lag between two recordings of one event, whatever the signal is and however far apart they began.
+//!
+//! *Probes*, the loudest stretches of one recording, are correlated with all of the other one, block by
+//! block. A clock that runs fast moves the lag along the recording, so each probe has a lag of its own. Those
+//! on one line are the lag and its drift.
+
+use super::record::Record;
+use crate::linalg::{Complex, fourier};
+use crate::sine_fit::Channel;
+use std::f64::consts::TAU;
+
+/// Samples of the longest probe: at 100 ppm the lag moves by three samples within it, and the peak of the
+/// correlation is as much lower.
+const LONGEST: usize = 1 << 15;
+/// A probe is this share of a recording, so that a quarter of it holds one, but no shorter than this.
+const SHARE: usize = 12;
+const SHORTEST: usize = 512;
+/// Most probes of a recording.
+const MOST_PROBES: usize = 8;
+/// Length of a transform in probes: longer ones take less work per sample and more memory.
+const PROBES_PER_BLOCK: usize = 4;
+/// Peaks that are kept of each probe.
+const PEAKS: usize = 4;
+/// Lags this near to each other, in samples, are one: a narrow band or a drift within the probe blurs them.
+const NEIGHBOURS: f64 = 16.0;
+/// Largest difference of two clocks. Crystals differ by up to 200 ppm.
+const MOST_DRIFT: f64 = 5e-4;
+/// Log-odds against chance from which on lags count as found.
+const LEAST_ODDS: f64 = 30.0;
+/// Other lags with this share of the log-odds of the best ones explain the recordings as well: voices that
+/// say different things correlate far beyond chance, but at many lags.
+const ALIKE: f64 = 0.5;
+/// Up to so many samples from the best lag it takes this share: a voice agrees with itself a pitch period later,
+/// but less well, and a tone nearly as well.
+const PITCH: f64 = 1024.0;
+const ALIKE_WITHIN_PITCH: f64 = 0.9;
+/// Share of the largest possible correlation from which on recordings have something in common: different
+/// voices have 0.2, tones and loops 0.4.
+const IN_COMMON: f64 = 0.3;
+
+/// A stretch of a recording that is looked for in another one.
+struct Probe {
+    /// Number of its first sample.
+    first: usize,
+    /// Its deviations from their mean; 0 where samples are left out.
+    samples: Vec<f64>,
+}
+
+/// The loudest stretch of each part of a recording that is not silent. Parts are so long that each holds one
+/// that begins at a multiple of half its length.
+fn probes(record: &Record) -> Vec<Probe> {
+    let count = record.samples.len();
+    let length = 1 << (count / SHARE).clamp(SHORTEST.min(count / 2).max(1), LONGEST).ilog2();
+    let parts = (2 * count / (3 * length)).clamp(1, MOST_PROBES);
+    let part = count / parts;
+    let loudest = |number: usize| {
+        let firsts =
+            (number * part..=((number + 1) * part).saturating_sub(length)).step_by(length.div_ceil(2));
+        let probes = firsts.map(|first| Probe { first, samples: stretch(record, first as i64, length) });
+        probes.max_by(|a, b| a.energy().total_cmp(&b.energy())).filter(|probe| probe.energy() > 0.0)
+    };
+    (0..parts).filter_map(loudest).collect()
+}
+
+impl Probe {
+    fn energy(&self) -> f64 {
+        self.samples.iter().map(|x| x * x).sum()
+    }
+}
+
+/// The deviations of `length` samples from sample `first` on from their mean; 0 where samples are left out
+/// or there are none.
+pub(crate) fn stretch(record: &Record, first: i64, length: usize) -> Vec<f64> {
+    let inside = |sample: i64| sample.clamp(0, record.samples.len() as i64) as usize;
+    let (from, to) = (inside(first), inside(first + length as i64));
+    let channel = Channel { keep: Some(&record.keep[from..to]), ..Channel::new(&record.samples[from..to]) };
+    let mut stretch = vec![0.0; length.min((from as i64 - first) as usize)];
+    stretch.extend(channel.deviations());
+    stretch.resize(length, 0.0);
+    stretch
+}
+
+/// The correlations of a stretch of `size` samples with a shorter one: at index l that of its samples from l
+/// on, with the sign of the correlation, as shares of the largest one that is possible.
+pub(crate) struct Correlation {
+    /// Of the shorter one, under the window of Hann: the leakage of strong lines would be whitened with them.
+    spectrum: Vec<Complex<f64>>,
+    size: usize,
+}
+
+impl Correlation {
+    pub(crate) fn with(shorter: &[f64], size: usize) -> Self {
+        let step = TAU / shorter.len().max(1) as f64;
+        let hann = |(k, x): (usize, &f64)| x * (0.5 - 0.5 * (step * (k as f64 + 0.5)).cos());
+        let mut padded: Vec<f64> = shorter.iter().enumerate().map(hann).collect();
+        padded.resize(size, 0.0);
+        Self { spectrum: fourier::real_spectrum(&padded), size }
+    }
+
+    /// With the stretch of this spectrum.
+    pub(crate) fn of(&self, spectrum: &[Complex<f64>]) -> Vec<f64> {
+        let cross = fourier::half_whitened(spectrum, &self.spectrum);
+        let most = 2.0 * cross.iter().map(|bin| bin.norm()).sum::<f64>();
+        let mut sums = fourier::real_sequence(&cross, self.size);
+        sums.iter_mut().for_each(|x| *x = if most > 0.0 { *x / most } else { 0.0 });
+        sums
+    }
+}
+
+/// The largest correlations of a probe.
+#[derive(Default)]
+struct Peaks {
+    largest: Vec<Peak>,
+    squares: f64,
+    count: usize,
+}
+
+#[derive(Clone, Copy)]
+struct Peak {
+    lag: i64,
+    /// Share of the largest correlation that is possible.
+    height: f64,
+}
+
+/// A lag that a probe may have.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Lag {
+    /// Sample of the reference at which it is.
+    at: f64,
+    /// Samples by which the other recording comes later.
+    lag: f64,
+    /// Correlation over that of chance.
+    sigmas: f64,
+    /// Correlation over the largest possible one.
+    height: f64,
+    /// Number of the probe, and of lags that were looked at.
+    probe: usize,
+    looked_at: usize,
+}
+
+/// The likely lags of the probes of one recording in another one, `record`, `within` so many samples.
+fn lags(probes: &[Probe], record: &Record, within: f64) -> Vec<Lag> {
+    let Some(length) = probes.first().map(|probe| probe.samples.len()) else { return Vec::new() };
+    let size = PROBES_PER_BLOCK * length;
+    let with = |probe: &Probe| (Correlation::with(&probe.samples, size), Peaks::default());
+    let mut all: Vec<(Correlation, Peaks)> = probes.iter().map(with).collect();
+    // A probe may reach beyond both ends of the recording.
+    for first in (-(length as i64)..record.samples.len() as i64).step_by(size - length) {
+        let spectrum = fourier::real_spectrum(&stretch(record, first, size));
+        for (probe, (correlation, peaks)) in probes.iter().zip(&mut all) {
+            let heights = correlation.of(&spectrum);
+            peaks.take(&heights, first - probe.first as i64, size - length, within);
+        }
+    }
+    let of = |(number, (probe, (_, peaks))): (usize, (&Probe, &(_, Peaks)))| {
+        peaks.lags(number, probe.first as f64 + 0.5 * length as f64)
+    };
+    probes.iter().zip(&all).enumerate().flat_map(of).collect()
+}
+
+impl Peaks {
+    /// Takes the first `count` correlations of a block, whose first one has the lag `offset`.
+    fn take(&mut self, heights: &[f64], offset: i64, count: usize, within: f64) {
+        let at = |l: usize| heights[l % heights.len()].abs();
+        for l in 0..count {
+            let (lag, height) = (offset + l as i64, at(l));
+            if (lag as f64).abs() > within {
+                continue;
+            }
+            self.squares += height * height;
+            self.count += usize::from(height > 0.0);
+            if height >= at(l + heights.len() - 1) && height >= at(l + 1) {
+                self.offer(Peak { lag, height });
+            }
+        }
+    }
+
+    fn offer(&mut self, peak: Peak) {
+        let is_near = |other: &Peak| ((other.lag - peak.lag) as f64).abs() <= NEIGHBOURS;
+        if self.largest.iter().any(|other| is_near(other) && other.height >= peak.height) {
+            return;
+        }
+        self.largest.retain(|other| !is_near(other));
+        self.largest.push(peak);
+        self.largest.sort_by(|a, b| b.height.total_cmp(&a.height));
+        self.largest.truncate(PEAKS);
+    }
+
+    /// Those of probe `number` at a sample.
+    fn lags(&self, number: usize, at: f64) -> Vec<Lag> {
+        let chance = (self.squares / self.count.max(1) as f64).sqrt();
+        let lag = |&Peak { lag, height }: &Peak| Lag {
+            at,
+            lag: lag as f64,
+            sigmas: height / chance,
+            height,
+            probe: number,
+            looked_at: self.count,
+        };
+        self.largest.iter().filter(|peak| peak.height > 0.0).map(lag).collect()
+    }
+}
+
+impl Lag {
+    /// The same seen from the other recording: its samples are `at`, and the reference comes later.
+    fn reversed(self) -> Self {
+        Self { at: self.at + self.lag, lag: -self.lag, ..self }
+    }
+}
+
+/// How a lag changes along the reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LagLine {
+    /// Sample of the reference at which the lag is `lag`.
+    at: f64,
+    lag: f64,
+    /// Samples per sample.
+    pub(crate) rate: f64,
+    /// Standard error of the rate, or what it may be at most where one probe alone was found.
+    rate_error: f64,
+}
+
+impl LagLine {
+    /// The lag at a sample of the reference.
+    pub(crate) fn lag_at(&self, sample: f64) -> f64 {
+        self.lag + self.rate * (sample - self.at)
+    }
+
+    fn holds(&self, lag: &Lag) -> bool {
+        (lag.lag - self.lag_at(lag.at)).abs() <= NEIGHBOURS
+    }
+
+    /// Samples by which the lag may differ from the line between two samples of the reference.
+    pub(crate) fn error(&self, first: f64, end: f64) -> f64 {
+        NEIGHBOURS + self.rate_error * (self.at - first).abs().max((end - self.at).abs())
+    }
+}
+
+/// Why there is no lag.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum NoLag {
+    /// No lag stands out.
+    NothingInCommon,
+    /// These explain the recordings alike.
+    Ambiguous(Vec<f64>),
+}
+
+/// How much later `other` comes than `reference`, `within` so many samples. Probes of the shorter recording
+/// are looked for in the longer one: they are all there if it is a part.
+pub(crate) fn line(reference: &Record, other: &Record, within: f64) -> Result<LagLine, NoLag> {
+    if reference.samples.len() <= other.samples.len() {
+        return likeliest(&lags(&probes(reference), other, within));
+    }
+    let lags = lags(&probes(other), reference, within);
+    likeliest(&lags.into_iter().map(Lag::reversed).collect::<Vec<_>>())
+}
+
+/// The line on which most of the likely lags lie.
+fn likeliest(lags: &[Lag]) -> Result<LagLine, NoLag> {
+    let Some(&(best, line)) = lines(lags).first() else { return Err(NoLag::NothingInCommon) };
+    let others: Vec<Lag> = lags.iter().filter(|lag| !line.holds(lag)).copied().collect();
+    let mut alike = vec![line.lag];
+    for (odds, other) in lines(&others) {
+        let lag = other.lag_at(line.at);
+        let is_new = alike.iter().all(|known| (known - lag).abs() > 2.0 * NEIGHBOURS);
+        let is_within_pitch = (lag - line.lag).abs() <= PITCH;
+        let share = if is_within_pitch { ALIKE_WITHIN_PITCH } else { ALIKE };
+        if is_new && (odds >= share * best || best < LEAST_ODDS) {
+            alike.push(lag);
+        }
+    }
+    if best >= LEAST_ODDS && alike.len() == 1 {
+        return Ok(fitted(&on(&line, lags)));
+    }
+    // A signal that repeats correlates with itself at many lags, none of which stands out.
+    let highest = lags.iter().map(|lag| lag.height).fold(0.0, f64::max);
+    alike.truncate(PEAKS);
+    Err(if highest < IN_COMMON { NoLag::NothingInCommon } else { NoLag::Ambiguous(alike) })
+}
+
+/// The lines through one lag or two, the likeliest first, with their log-odds.
+fn lines(lags: &[Lag]) -> Vec<(f64, LagLine)> {
+    let through = |a: &Lag, rate: f64| LagLine { at: a.at, lag: a.lag, rate, rate_error: MOST_DRIFT };
+    let pairs = lags.iter().flat_map(|a| lags.iter().map(move |b| (a, b)));
+    let sloped = pairs.filter(|(a, b)| b.at > a.at).filter_map(|(a, b)| {
+        let rate = (b.lag - a.lag) / (b.at - a.at);
+        (rate.abs() <= MOST_DRIFT).then(|| through(a, rate))
+    });
+    let level = lags.iter().map(|a| through(a, 0.0));
+    let mut lines: Vec<(f64, LagLine)> =
+        level.chain(sloped).map(|line| (odds(&on(&line, lags)), line)).collect();
+    lines.sort_by(|a, b| b.0.total_cmp(&a.0));
+    lines
+}
+
+/// The most likely lag of each probe that lies on a line.
+fn on(line: &LagLine, lags: &[Lag]) -> Vec<Lag> {
+    let mut near: Vec<Lag> = Vec::new();
+    for lag in lags.iter().filter(|lag| line.holds(lag)) {
+        match near.iter_mut().find(|other| other.probe == lag.probe) {
+            Some(other) if other.sigmas < lag.sigmas => *other = *lag,
+            Some(_) => {}
+            None => near.push(*lag),
+        }
+    }
+    near
+}
+
+/// The logarithm of the odds that lags on one line are none of chance: of Gaussian correlations the first
+/// one might have been anywhere, the second within the drifts that clocks have, the others near the line.
+fn odds(lags: &[Lag]) -> f64 {
+    let choices = |(number, lag): (usize, &Lag)| match number {
+        0 => lag.looked_at as f64,
+        1 => (2.0 * MOST_DRIFT * (lag.at - lags[0].at).abs() + 2.0 * NEIGHBOURS).min(lag.looked_at as f64),
+        _ => 2.0 * NEIGHBOURS,
+    };
+    let odds = |(number, lag): (usize, &Lag)| {
+        0.5 * lag.sigmas * lag.sigmas - choices((number, lag)).max(1.0).ln() - (PEAKS as f64).ln()
+    };
+    lags.iter().enumerate().map(odds).sum()
+}
+
+/// The straight line of least squares.
+fn fitted(lags: &[Lag]) -> LagLine {
+    let count = lags.len().max(1) as f64;
+    let mean = |of: fn(&Lag) -> f64| lags.iter().map(of).sum::<f64>() / count;
+    let (at, lag) = (mean(|lag| lag.at), mean(|lag| lag.lag));
+    let squares: f64 = lags.iter().map(|one| (one.at - at).powi(2)).sum();
+    if squares == 0.0 {
+        return LagLine { at, lag, rate: 0.0, rate_error: MOST_DRIFT };
+    }
+    let rate = lags.iter().map(|one| (one.at - at) * (one.lag - lag)).sum::<f64>() / squares;
+    LagLine { at, lag, rate, rate_error: (NEIGHBOURS / squares.sqrt()).min(MOST_DRIFT) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::testbench::gaussian;
+    use crate::random::Random;
+
+    /// The line of two whole recordings.
+    fn found(reference: &[f64], other: &[f64]) -> Result<LagLine, NoLag> {
+        let [reference, other] = [reference, other].map(|samples| Record::new(samples.to_vec()));
+        line(&reference, &other, f64::INFINITY)
+    }
+
+    fn noise(count: usize, dice: &mut Random) -> Vec<f64> {
+        (0..count).map(|_| gaussian(dice)).collect()
+    }
+
+    #[test]
+    fn lags_are_found_at_any_distance_and_length() {
+        let mut dice = Random(71);
+        let event = noise(400_000, &mut dice);
+        let heard = |first: usize, count: usize, gain: f64, dice: &mut Random| -> Vec<f64> {
+            event[first..first + count].iter().map(|x| gain * (x + 0.3 * gaussian(dice)) + 0.2).collect()
+        };
+        for (a, b) in
+            [((0, 1024), (100, 1100)), ((0, 300_000), (250_000, 150_000)), ((90_000, 9_000), (0, 200_000))]
+        {
+            let one = heard(a.0, a.1, 1.0, &mut dice);
+            let two = heard(b.0, b.1, -0.1, &mut dice);
+            let line = found(&one, &two).unwrap();
+            let lag = line.lag_at(a.1 as f64 / 2.0);
+            assert!((lag - (a.0 as f64 - b.0 as f64)).abs() < 1.5, "{a:?} {b:?} {line:?}");
+        }
+    }
+
+    #[test]
+    fn recordings_without_anything_in_common_have_no_lag() {
+        let mut dice = Random(72);
+        for count in [1024, 5000, 200_000] {
+            let [a, b] = [(); 2].map(|()| noise(count, &mut dice));
+            assert_eq!(found(&a, &b), Err(NoLag::NothingInCommon), "{count}");
+        }
+    }
+
+    #[test]
+    fn what_repeats_has_many_lags() {
+        let tone = |count: usize, early: f64| -> Vec<f64> {
+            (0..count).map(|k| (0.7 * (k as f64 + early)).sin()).collect()
+        };
+        let alike = found(&tone(200_000, 0.0), &tone(200_000, 70.3)).unwrap_err();
+        assert!(matches!(&alike, NoLag::Ambiguous(lags) if lags.len() > 1), "{alike:?}");
+        let mut dice = Random(73);
+        let once = noise(9_000, &mut dice);
+        let again: Vec<f64> = once.iter().cycle().take(150_000).copied().collect();
+        let alike = found(&again, &again[4_000..]).unwrap_err();
+        assert!(matches!(&alike, NoLag::Ambiguous(lags) if lags.len() > 1), "{alike:?}");
+    }
+}

@@ -1,0 +1,114 @@
+//! Why recordings cannot be aligned, and what a reader of an alignment must know.
+
+use crate::calibrate::{CalibrateError, NoLag, Warning};
+use crate::units::FastPeriods;
+
+/// Why recordings cannot be aligned.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AlignError {
+    /// The spec and its reference do not fit the recordings, or a front end cannot be realised.
+    #[error(transparent)]
+    Spec(#[from] CalibrateError),
+    /// Channels with rates of their own.
+    #[error(
+        "recordings are aligned sample by sample, so all channels need one rate; give no rates of their own"
+    )]
+    Rates,
+    /// A recording holds no signal.
+    #[error(
+        "the recording of channel {channel} is silent: all its samples are alike; check its cable and its level"
+    )]
+    Silent {
+        /// From 1.
+        channel: usize,
+    },
+    /// No lag stands out.
+    #[error(
+        "the recordings of channels {reference} and {channel} have nothing in common: at no lag do they correlate more \
+         than chance explains; check that both heard the same event, for at least a quarter of the shorter one, and \
+         that neither is drowned in noise"
+    )]
+    NothingInCommon {
+        /// From 1.
+        reference: usize,
+        /// From 1.
+        channel: usize,
+    },
+    /// Several lags explain the recordings alike.
+    #[error(
+        "the recordings of channels {reference} and {channel} agree at several lags, as those of a tone or of a loop do: \
+         channel {channel} may have begun {} samples earlier; say how far apart they began at most, or record a sound \
+         that does not repeat",
+        numbers(lags)
+    )]
+    Ambiguous {
+        /// From 1.
+        reference: usize,
+        /// From 1.
+        channel: usize,
+        /// Samples by which the channel may have begun before the reference.
+        lags: Vec<i64>,
+    },
+    /// The recordings were made at the same time for too short a while.
+    #[error("all recordings together have {frames} samples in common; at least {needed} are needed")]
+    Overlap {
+        /// Samples of each that the others have too.
+        frames: usize,
+        /// Samples needed.
+        needed: usize,
+    },
+    /// The lags were found, but not the delays.
+    #[error(
+        "the recordings agree, but in too few pieces to measure how their clocks differ ({measured} of {pieces}){}",
+        because(reason)
+    )]
+    NotMeasured {
+        /// Pieces that gave delays.
+        measured: usize,
+        /// Pieces that were tried.
+        pieces: usize,
+        /// What is wrong with the others, if anything is.
+        reason: Option<CalibrateError>,
+    },
+}
+
+/// What a reader of an alignment must know.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AlignWarning {
+    /// A delay moves, and the taps stay.
+    #[error(
+        "the delay of channel {channel} moves by {:.3} fast periods while the recordings last, and the taps of this spec \
+         stay; give [design] tracking = \"affine\", so that taps can follow the table of delays",
+        moved.0
+    )]
+    TapsStay {
+        /// From 1.
+        channel: usize,
+        /// Largest minus smallest delay.
+        moved: FastPeriods,
+    },
+    /// What the values mean.
+    #[error(transparent)]
+    Values(#[from] Warning),
+}
+
+impl AlignError {
+    /// Of two channels, from 1, whose lag is not found.
+    pub(super) fn no_lag(why: NoLag, reference: usize, channel: usize) -> Self {
+        match why {
+            NoLag::NothingInCommon => Self::NothingInCommon { reference, channel },
+            NoLag::Ambiguous(lags) => {
+                let lags = lags.into_iter().map(|lag| lag.round() as i64).collect();
+                Self::Ambiguous { reference, channel, lags }
+            }
+        }
+    }
+}
+
+fn numbers(lags: &[i64]) -> String {
+    lags.iter().map(i64::to_string).collect::<Vec<_>>().join(" or ")
+}
+
+fn because(reason: &Option<CalibrateError>) -> String {
+    reason.as_ref().map_or_else(String::new, |reason| format!(": {reason}"))
+}

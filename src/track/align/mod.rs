@@ -1,0 +1,200 @@
+//! Recordings of one event by recorders that were started by hand and have clocks of their own.
+//!
+//! Probes of one recording are looked for in the other, which gives the lag and roughly its drift. Then the
+//! stretches of all recordings at one instant are compared, piece by piece: delays with their intervals,
+//! gains and offsets. A smoothing spline goes through the delays, as through any readings that are known
+//! beforehand.
+
+mod course;
+mod error;
+mod pieces;
+#[cfg(test)]
+mod tests;
+
+pub use error::{AlignError, AlignWarning};
+
+use super::source::LEAST_LEVEL;
+use super::{DriftModel, Reading};
+use crate::calibrate::{
+    CalibrationSignal, ChannelEstimate, Fit, LagLine, Record, Settings, Warning, check, check_parts, line,
+};
+use crate::sine_fit::Estimate;
+use crate::spec::Spec;
+use crate::units::Seconds;
+use course::{Course, mean};
+use pieces::{PieceEstimate, Pieces};
+
+/// Least samples that all recordings have in common.
+const LEAST_SAMPLES: usize = 1024;
+/// Samples of a piece. Within one a clock drifts by a tenth of a sample, and the shortest pieces still
+/// measure.
+const LONGEST_PIECE: usize = 4096;
+const SHORTEST_PIECE: usize = 256;
+const DRIFT_OF_PIECE: f64 = 0.1;
+/// Pieces that are as long as the drift should not make them shorter: below, too few frequencies are told
+/// apart.
+const SHORT_PIECE: usize = 1024;
+/// Number of pieces.
+const LEAST_PIECES: usize = 4;
+const MOST_PIECES: usize = 1024;
+
+/// How recordings are aligned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AlignSettings {
+    /// The channel, from 0, whose clock is the time and whose delay, gain and offset are those of the spec.
+    pub reference: usize,
+    /// How far apart the recordings began at most, if that is known.
+    pub within: Option<Seconds>,
+    /// How delays change.
+    pub model: DriftModel,
+}
+
+/// How recordings lie in time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alignment {
+    /// The reference channel, from 0.
+    pub reference: usize,
+    /// One per channel.
+    pub channels: Vec<AlignedChannel>,
+    /// Frames that all recordings have from their first common one on.
+    pub frames: usize,
+    /// Pieces that were compared.
+    pub pieces: usize,
+    /// Pieces that gave delays.
+    pub measured: usize,
+    /// The delays over these frames, as measured; those that contradict the others are left out.
+    pub readings: Vec<Reading>,
+    /// The spec with the delays, gains and offsets, and with an uncertainty that holds the course of each
+    /// delay: or, if that is longer than a slow period, all delays of one.
+    pub spec: Spec,
+    /// What a reader of the values must know.
+    pub warnings: Vec<AlignWarning>,
+}
+
+/// How the recording of one channel lies in time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AlignedChannel {
+    /// Samples before the first frame: what to cut off.
+    pub skip: usize,
+    /// The delay at the first frame; it grows with the drift.
+    pub delay: Estimate<Seconds>,
+    /// By how much the clock is fast, relative to that of the reference: its mean.
+    pub drift: Estimate<f64>,
+    /// g_i, below 0 for the opposite polarity.
+    pub gain: Estimate<f64>,
+    /// o_i.
+    pub offset: Estimate<f64>,
+}
+
+/// Aligns the recordings of the channels of `spec`, in their order.
+///
+/// # Errors
+/// [`AlignError`].
+pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result<Alignment, AlignError> {
+    let AlignSettings { reference, within, .. } = settings;
+    let fit = Settings { fit: Fit::default(), reference };
+    check(spec, records, fit)?;
+    check_parts(records, CalibrationSignal::Any)?;
+    if !spec.layout().is_plain() {
+        return Err(AlignError::Rates);
+    }
+    if let Some(i) = records.iter().position(|record| record.rms() < LEAST_LEVEL) {
+        return Err(AlignError::Silent { channel: i + 1 });
+    }
+    let frames = records.iter().map(|record| record.samples.len()).min().unwrap_or(0);
+    enough(frames)?;
+    let within = within.map_or(f64::INFINITY, |time| time / (spec.fast_period * spec.ratio as f64));
+    let line = |i: usize| {
+        let found = (i != reference).then(|| line(&records[reference], &records[i], within));
+        found.transpose().map_err(|why| AlignError::no_lag(why, reference + 1, i + 1))
+    };
+    let lines = (0..records.len()).map(line).collect::<Result<Vec<_>, _>>()?;
+    let stretches = Stretches::new(records, reference, &lines)?;
+    let pieces = stretches.firsts().len();
+    let few = |measured, reason| AlignError::NotMeasured { measured, pieces, reason };
+    let estimates = Pieces::new(spec, records, fit, &stretches).measure(&lines);
+    let estimates = estimates.map_err(|reason| few(0, reason))?;
+    let course = Course::new(spec, settings, &estimates, &stretches).ok_or(few(estimates.len(), None))?;
+    Ok(alignment(spec, records, &course, &estimates, pieces))
+}
+
+/// Refuses recordings that have too few samples in common.
+fn enough(frames: usize) -> Result<(), AlignError> {
+    if frames < LEAST_SAMPLES { Err(AlignError::Overlap { frames, needed: LEAST_SAMPLES }) } else { Ok(()) }
+}
+
+/// What all recordings have, and how it is cut into pieces. Samples are those of the reference.
+struct Stretches {
+    first: f64,
+    end: f64,
+    /// Samples of a piece.
+    length: usize,
+    /// Further ones of the other recordings on each side.
+    margin: usize,
+}
+
+impl Stretches {
+    fn new(records: &[Record], reference: usize, lines: &[Option<LagLine>]) -> Result<Self, AlignError> {
+        let (mut first, mut end) = (0.0_f64, records[reference].samples.len() as f64);
+        for (line, record) in lines.iter().zip(records) {
+            let Some(line) = line else { continue };
+            let samples = record.samples.len() as f64;
+            first = first.max(-line.lag_at(-line.lag_at(0.0)));
+            end = end.min(samples - line.lag_at(samples - line.lag_at(samples)));
+        }
+        let frames = (end - first).max(0.0) as usize;
+        enough(frames)?;
+        let lines = || lines.iter().flatten();
+        let fastest = lines().map(|line| line.rate.abs()).fold(0.0, f64::max);
+        let by_drift = ((DRIFT_OF_PIECE / fastest) as usize).clamp(SHORT_PIECE, LONGEST_PIECE);
+        let length = 1 << by_drift.min(frames / LEAST_PIECES).max(SHORTEST_PIECE).ilog2();
+        let error = lines().map(|line| line.error(first, end)).fold(0.0, f64::max);
+        Ok(Self { first, end, length, margin: error.ceil() as usize })
+    }
+
+    /// The first samples of all pieces.
+    fn firsts(&self) -> Vec<usize> {
+        let room = self.end - self.first - self.length as f64;
+        let count = ((room / self.length as f64) as usize + 1).clamp(LEAST_PIECES, MOST_PIECES);
+        let first = |number: usize| self.first.ceil() + (room * number as f64 / count as f64).floor();
+        (0..count).map(|number| first(number) as usize).collect()
+    }
+}
+
+fn alignment(
+    spec: &Spec,
+    records: &[Record],
+    course: &Course<'_>,
+    estimates: &[PieceEstimate],
+    pieces: usize,
+) -> Alignment {
+    let (skips, reference) = (course.skips(), course.reference());
+    let left = records.iter().zip(&skips).map(|(record, skip)| record.samples.len().saturating_sub(*skip));
+    let frames = left.min().unwrap_or(0);
+    let channel = |i: usize| {
+        let nominal = &spec.channels[i];
+        let value = |of: fn(&ChannelEstimate) -> Option<Estimate<f64>>, nominal: f64| {
+            let all = estimates.iter().filter_map(|estimate| of(&estimate.channels[i]));
+            let found = (i != reference).then(|| mean(all)).flatten();
+            found.unwrap_or(Estimate { value: nominal, sigma: 0.0 })
+        };
+        AlignedChannel {
+            skip: skips[i],
+            delay: course.delay(i, &skips),
+            drift: course.drift(i),
+            gain: value(|found| found.gain, nominal.gain),
+            offset: value(|found| found.offset, nominal.offset),
+        }
+    };
+    let mut channels: Vec<AlignedChannel> = (0..records.len()).map(channel).collect();
+    let mut warnings = Vec::new();
+    let counts: Vec<usize> = records.iter().map(|record| record.clipped).collect();
+    if counts.iter().any(|&count| count > 0) {
+        warnings.push(AlignWarning::Values(Warning::Clipped { counts }));
+    }
+    let measured = estimates.len();
+    let (spec, raised) = course.spec(&channels, &mut warnings);
+    channels.iter_mut().for_each(|channel| channel.delay.value += spec.fast_period * raised as f64);
+    let readings = course.readings(&skips, raised);
+    Alignment { reference, channels, frames, pieces, measured, readings, spec, warnings }
+}

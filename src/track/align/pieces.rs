@@ -1,0 +1,165 @@
+//! Delays, gains and offsets piece by piece, of recordings whose lags are known to some samples.
+//!
+//! A piece is so short that no clock drifts by much within it. The cross-correlation gives its lag to a part
+//! of a sample, and a blind calibration the rest. Each is measured on its own, so nothing is lost where some
+//! are silent.
+
+use super::super::source::LARGEST_DEVIATION;
+use super::Stretches;
+use crate::calibrate::{
+    CalibrateError, CalibrationSignal, ChannelEstimate, Correlation, LagLine, Record, Settings, calibrate,
+    longest_run, stretch,
+};
+use crate::linalg::fourier;
+use crate::spec::Spec;
+
+/// Pieces on each side whose lags say where that of a piece is to be.
+const BESIDE: usize = 7;
+/// Samples by which the lag of a piece may differ from what the pieces beside it say.
+const NEAR: f64 = 1.5;
+/// The delay of a piece is at most so many slow periods from its lag.
+const FARTHEST: f64 = 1.0;
+
+/// The recordings of all channels and where they are compared.
+pub(super) struct Pieces<'a> {
+    records: &'a [Record],
+    settings: Settings,
+    stretches: &'a Stretches,
+    /// The expected gains are those of the recordings.
+    spec: Spec,
+}
+
+/// What a piece says of all channels.
+pub(super) struct PieceEstimate {
+    /// Sample of the reference at its middle.
+    pub(super) centre: f64,
+    /// One per channel; D_i of samples that count from that of the reference.
+    pub(super) channels: Vec<ChannelEstimate>,
+}
+
+/// What the correlation in one piece says of the lag of a recording.
+#[derive(Debug, Clone, Copy)]
+struct LocalLag {
+    /// Samples beyond the line.
+    beyond: f64,
+    /// Share of the largest possible correlation, with its sign.
+    height: f64,
+}
+
+impl<'a> Pieces<'a> {
+    pub(super) fn new(
+        spec: &Spec,
+        records: &'a [Record],
+        settings: Settings,
+        stretches: &'a Stretches,
+    ) -> Self {
+        Self { records, settings, stretches, spec: spec.clone() }
+    }
+
+    /// What each piece says, where it says anything, of recordings on these lines; else why the last one
+    /// does not.
+    pub(super) fn measure(
+        mut self,
+        lines: &[Option<LagLine>],
+    ) -> Result<Vec<PieceEstimate>, Option<CalibrateError>> {
+        let firsts = self.stretches.firsts();
+        let mut lags: Vec<Vec<f64>> = vec![vec![0.0; lines.len()]; firsts.len()];
+        for (i, line) in lines.iter().enumerate() {
+            let Some(line) = line else { continue };
+            let local: Vec<LocalLag> = firsts.iter().map(|first| self.local_lag(*first, i, line)).collect();
+            self.expect_gain(i, local.iter().map(|lag| lag.height).sum());
+            for (number, first) in firsts.iter().enumerate() {
+                lags[number][i] = line.lag_at(self.centre(*first)) + likely(&local, number);
+            }
+        }
+        let (mut found, mut reason) = (Vec::new(), None);
+        for (first, lags) in firsts.iter().zip(&lags) {
+            match self.estimate(*first, lags) {
+                Ok(estimate) => found.extend(estimate),
+                Err(error) => reason = Some(error),
+            }
+        }
+        if found.is_empty() { Err(reason) } else { Ok(found) }
+    }
+
+    fn centre(&self, first: usize) -> f64 {
+        first as f64 + 0.5 * (self.stretches.length as f64 - 1.0)
+    }
+
+    /// The lag of recording i as it correlates with the reference.
+    fn local_lag(&self, first: usize, i: usize, line: &LagLine) -> LocalLag {
+        let &Stretches { length, margin, .. } = self.stretches;
+        let size = (length + 2 * margin).next_power_of_two();
+        let expected = line.lag_at(self.centre(first));
+        let begin = first as i64 + expected.round() as i64 - margin as i64;
+        let mut other = stretch(&self.records[i], begin, length + 2 * margin);
+        other.resize(size, 0.0);
+        let own = stretch(&self.records[self.settings.reference], first as i64, length);
+        let sums = Correlation::with(&own, size).of(&fourier::real_spectrum(&other));
+        let shifts = 1..2 * margin;
+        let best = shifts.max_by(|a, b| sums[*a].abs().total_cmp(&sums[*b].abs())).unwrap_or(margin);
+        // The vertex of the parabola through three values.
+        let [before, at, after] = [best - 1, best, best + 1].map(|n| sums[n]);
+        let part = 0.5 * (before - after) / (before - 2.0 * at + after);
+        let part = if part.abs() <= 0.5 { part } else { 0.0 };
+        let lag = (begin + best as i64 - first as i64) as f64 + part;
+        LocalLag { beyond: lag - expected, height: at }
+    }
+
+    /// Expects that recording i has its level, and the polarity with which it `correlates`.
+    fn expect_gain(&mut self, i: usize, correlates: f64) {
+        let (own, reference) = (&self.records[i], &self.records[self.settings.reference]);
+        let gain = self.spec.channels[self.settings.reference].gain * own.rms() / reference.rms();
+        self.spec.channels[i].gain = gain * 1f64.copysign(correlates);
+    }
+
+    /// What a piece says if the recordings have these lags there; `None` where it does not say enough.
+    fn estimate(&self, first: usize, lags: &[f64]) -> Result<Option<PieceEstimate>, CalibrateError> {
+        let (mut spec, length) = (self.spec.clone(), self.stretches.length);
+        let (h, slow) = (spec.fast_period, spec.fast_period * spec.ratio as f64);
+        let own = spec.channels[self.settings.reference].delay;
+        let (mut shifts, mut parts) = (Vec::new(), Vec::new());
+        for ((record, lag), channel) in self.records.iter().zip(lags).zip(&mut spec.channels) {
+            let last = record.samples.len().saturating_sub(length) as i64;
+            let begin = (first as i64 + lag.round() as i64).clamp(0, last);
+            let shift = (begin - first as i64) as f64;
+            channel.delay = own + slow * (lag - shift);
+            shifts.push(shift);
+            parts.push(record.part(begin as usize..begin as usize + length));
+        }
+        let (begin, frames) = longest_run(&parts);
+        let parts: Vec<Record> = parts.iter().map(|part| part.part(begin..begin + frames)).collect();
+        let found = calibrate(&spec, &parts, CalibrationSignal::Any, self.settings)?;
+        let centre = (first + begin) as f64 + 0.5 * (frames as f64 - 1.0);
+        let mut channels = found.channels;
+        for (i, channel) in channels.iter_mut().enumerate() {
+            let Some(delay) = channel.delay.as_mut() else { continue };
+            let moved = (delay.value - spec.channels[i].delay.in_fast_periods(h)).0.abs();
+            let is_known = delay.sigma.0 <= LARGEST_DEVIATION && moved <= FARTHEST * spec.ratio as f64;
+            if !is_known {
+                return Ok(None);
+            }
+            delay.value += (slow * shifts[i]).in_fast_periods(h);
+        }
+        Ok(Some(PieceEstimate { centre, channels }))
+    }
+}
+
+/// By how much the lag of a piece is beyond the line. A lag far from the median of those beside it is that of
+/// chance, and the median is taken.
+fn likely(local: &[LocalLag], number: usize) -> f64 {
+    let beside = &local[number.saturating_sub(BESIDE)..(number + BESIDE + 1).min(local.len())];
+    let (usual, own) = (weighted_median(beside.to_vec()), local[number].beyond);
+    if (own - usual).abs() <= NEAR { own } else { usual }
+}
+
+/// The median, with the squares of the correlations as weights.
+fn weighted_median(mut lags: Vec<LocalLag>) -> f64 {
+    lags.sort_by(|a, b| a.beyond.total_cmp(&b.beyond));
+    let mut left = 0.5 * lags.iter().map(|lag| lag.height.powi(2)).sum::<f64>();
+    let middle = lags.iter().find(|lag| {
+        left -= lag.height.powi(2);
+        left <= 0.0
+    });
+    middle.map_or(0.0, |middle| middle.beyond)
+}

@@ -1,0 +1,195 @@
+//! Simulated recordings of clocks that drift, against what was simulated.
+
+use super::*;
+use crate::calibrate::CalibrateError;
+use crate::design::Problem;
+use crate::random::Random;
+use crate::simulate::{Analog, Converter, Recording};
+use crate::units::FastPeriods;
+
+/// Recorders of 8 kHz that pass 3 kHz, for a target of 1.5 kHz at the same rate.
+fn spec(recorders: usize) -> Spec {
+    let channels: String = (0..recorders).map(|_| "[[channel]]\ndelay_samples = 1\n".to_owned()).collect();
+    let text = format!(
+        "fast_rate = 8000.0\nratio = 1\nlatency = 16\n\
+         target = {{ filter = {{ family = \"butterworth\", order = 4, cutoff = 1500.0 }} }}\n{channels}\
+         [design]\nmethod = \"fir\"\ntaps = 32\ntracking = \"affine\"\n[uncertainty]\ndelay_samples = 0.55\n"
+    );
+    Spec::from_toml(&text, "spec.toml").unwrap()
+}
+
+fn settings() -> AlignSettings {
+    AlignSettings { reference: 0, within: None, model: DriftModel::wandering(1e-6) }
+}
+
+/// One recorder.
+#[derive(Debug, Clone, Copy)]
+struct Recorder {
+    /// Samples by which it began late.
+    late: usize,
+    /// Further delay, fast periods.
+    delay: f64,
+    ppm: f64,
+    gain: f64,
+    offset: f64,
+}
+
+const PLAIN: Recorder = Recorder { late: 0, delay: 0.0, ppm: 0.0, gain: 1.0, offset: 0.0 };
+
+/// Noise with pauses, up to 2 kHz.
+fn event(samples: usize, dice: &mut Random) -> Recording {
+    let (mut y, mut z) = (0.0, 0.0);
+    let loud = |k: usize| if (k / 6000) % 4 == 3 { 0.0 } else { 0.2 };
+    let wave: Vec<f64> = (0..samples)
+        .map(|k| {
+            y = 0.7 * y + 0.3 * loud(k) * dice.sample();
+            z = 0.7 * z + 0.3 * y;
+            z
+        })
+        .collect();
+    Recording::new(&wave, FastPeriods(1.0))
+}
+
+/// What the recorders deliver of an event, as long as each of `frames` says.
+fn recorded(event: &Recording, recorders: &[Recorder], frames: &[usize], noise: f64) -> Vec<Vec<f64>> {
+    let spec = Spec { uncertainty: None, ..spec(recorders.len()) };
+    let problem = Problem::new(&spec, 16).unwrap();
+    let signal = Analog::Recorded(event.clone());
+    let of = |(i, (recorder, frames)): (usize, (&Recorder, &usize))| {
+        let converter = Converter {
+            delay_error: FastPeriods(recorder.delay),
+            gain_error: recorder.gain - 1.0,
+            offset: recorder.offset,
+            drift: 1e-6 * recorder.ppm,
+            noise,
+            seed: 7,
+            ..Converter::ideal()
+        };
+        let all = converter.capture(&problem, i, &signal, 1.0, recorder.late + frames);
+        all.samples[recorder.late..].to_vec()
+    };
+    recorders.iter().zip(frames).enumerate().map(of).collect()
+}
+
+/// Converters that clip at 1.
+fn records(recordings: &[Vec<f64>]) -> Vec<Record> {
+    recordings.iter().map(|samples| Record::within(samples.clone(), -1.0, 1.0)).collect()
+}
+
+fn aligned(recordings: &[Vec<f64>]) -> Result<Alignment, AlignError> {
+    align(&spec(recordings.len()), &records(recordings), settings())
+}
+
+/// Each value of channel `i` against that of the recorders.
+fn assert_is(found: &Alignment, recorders: &[Recorder], i: usize) {
+    let (own, reference, channel) = (recorders[i], recorders[0], found.channels[i]);
+    let first = |i: usize| (found.channels[i].skip + recorders[i].late) as f64;
+    // Sample k of a recorder is taken at k / (1 + drift) - delay.
+    let taken = |i: usize, k: f64| k / (1.0 + 1e-6 * recorders[i].ppm) - recorders[i].delay;
+    let delay = taken(0, first(0)) - taken(i, first(i));
+    let in_samples = |time: Seconds| time.in_fast_periods(Seconds(1.0 / 8000.0)).0;
+    let (value, half) = (in_samples(channel.delay.value), in_samples(channel.delay.sigma));
+    assert!(delay.abs() < 1.1, "{delay} {channel:?}");
+    let miss = (value - 1.0 - delay).abs();
+    assert!(miss < 5.0 * half + 2e-4 && miss < 0.02, "{value} {delay} {half:e} {own:?}");
+    let drift = 1e6 * channel.drift.value - (own.ppm - reference.ppm);
+    assert!(drift.abs() < 5e6 * channel.drift.sigma + 0.02, "{drift} {:?} {own:?}", channel.drift);
+    let gain = own.gain / reference.gain;
+    let miss = (channel.gain.value / gain - 1.0).abs();
+    assert!(miss < 0.01, "{:?} {gain}", channel.gain);
+    let offset = own.offset - reference.offset * gain;
+    assert!(
+        (channel.offset.value - offset).abs() < 2e-3 * gain.abs().max(1.0),
+        "{:?} {offset}",
+        channel.offset
+    );
+}
+
+#[test]
+fn starts_drifts_polarities_gains_and_offsets_are_found() {
+    let mut dice = Random(81);
+    let event = event(160_000, &mut dice);
+    for (late, delay, ppm, gain, offset, frames) in [
+        (0, 0.0, 0.0, 1.0, 0.0, [60_000, 60_000]),
+        (3, 0.31, 1.0, -1.0, 0.0, [60_000, 40_000]),
+        (80_000, -0.2, -10.0, 0.1, 0.3, [150_000, 30_000]),
+        (40_000, 0.4, 100.0, -10.0, -0.2, [120_000, 110_000]),
+        (17_000, 0.1, -100.0, 3.0, 0.01, [40_000, 120_000]),
+        (500, 0.1, 20.0, 1.0, 0.0, [3_000, 2_200]),
+    ] {
+        let two = [PLAIN, Recorder { late, delay, ppm, gain, offset }];
+        let recordings = recorded(&event, &two, &frames, 1e-4);
+        let found = aligned(&recordings).unwrap_or_else(|error| panic!("{two:?}: {error}"));
+        assert_is(&found, &two, 1);
+        // The other way round the roles change.
+        let other = [Recorder { offset: 0.0, ..two[1] }, PLAIN];
+        let recordings = recorded(&event, &other, &[frames[1], frames[0]], 1e-4);
+        let found = aligned(&recordings).unwrap_or_else(|error| panic!("{other:?}: {error}"));
+        assert_is(&found, &other, 1);
+    }
+}
+
+#[test]
+fn three_recorders_are_aligned_together() {
+    let event = event(100_000, &mut Random(82));
+    let three = [
+        Recorder { late: 5_000, ppm: 10.0, ..PLAIN },
+        Recorder { late: 20_000, delay: 0.3, ppm: -30.0, gain: -2.0, ..PLAIN },
+        Recorder { delay: -0.4, ppm: 25.0, ..PLAIN },
+    ];
+    let found = aligned(&recorded(&event, &three, &[60_000, 60_000, 70_000], 1e-3)).unwrap();
+    (1..3).for_each(|i| assert_is(&found, &three, i));
+    // A delay stays in its box: a long one in that of all delays of a period, a short one in its own.
+    let [_, fast, _] = &found.spec.uncertainty.clone().unwrap().delays(3)[..] else { panic!() };
+    assert_eq!(fast.in_fast_periods(Seconds(1.0 / 8000.0)), FastPeriods(0.55));
+    assert_eq!(found.warnings, []);
+    assert!(found.frames > 39_000 && found.frames < 60_001, "{}", found.frames);
+}
+
+#[test]
+fn lost_and_clipped_samples_are_left_out() {
+    let event = event(100_000, &mut Random(83));
+    let two = [PLAIN, Recorder { late: 900, delay: 0.2, ppm: 15.0, ..PLAIN }];
+    let mut recordings = recorded(&event, &two, &[60_000, 60_000], 1e-4);
+    recordings[0][20_000..24_000].fill(f64::NAN);
+    recordings[1].iter_mut().step_by(7001).for_each(|x| *x = 1.0);
+    let found = aligned(&recordings).unwrap();
+    assert_is(&found, &two, 1);
+    assert_eq!(found.warnings, [AlignWarning::Values(Warning::Clipped { counts: vec![0, 9] })]);
+}
+
+#[test]
+fn what_cannot_be_aligned_is_refused_with_its_reason() {
+    let mut dice = Random(84);
+    let noise = |dice: &mut Random, count: usize| -> Vec<f64> { (0..count).map(|_| dice.sample()).collect() };
+    let [a, b] = [(); 2].map(|()| noise(&mut dice, 20_000));
+    let refused = |a: &[f64], b: &[f64]| aligned(&[a.to_vec(), b.to_vec()]).unwrap_err();
+    assert_eq!(refused(&a, &b), AlignError::NothingInCommon { reference: 1, channel: 2 });
+    assert_eq!(refused(&a, &[0.25; 5000]), AlignError::Silent { channel: 2 });
+    assert_eq!(refused(&[f64::NAN; 5000], &b), AlignError::Silent { channel: 1 });
+    let short = AlignError::Overlap { frames: 100, needed: 1024 };
+    assert_eq!(refused(&a, &b[..100]), short);
+    let tone = |early: f64| -> Vec<f64> { (0..20_000).map(|k| (0.3 * (k as f64 + early)).sin()).collect() };
+    let ambiguous = refused(&tone(0.0), &tone(123.4));
+    assert!(matches!(&ambiguous, AlignError::Ambiguous { lags, .. } if lags.len() > 1), "{ambiguous:?}");
+    let one = align(&spec(2), &records(&[a]), settings()).unwrap_err();
+    assert_eq!(one, AlignError::Spec(CalibrateError::ChannelCount { channels: 2, records: 1 }));
+}
+
+#[test]
+fn taps_that_stay_are_named() {
+    let event = event(120_000, &mut Random(85));
+    let two = [PLAIN, Recorder { ppm: 60.0, ..PLAIN }];
+    let recordings = recorded(&event, &two, &[60_000, 60_000], 1e-4);
+    let mut both = spec(2);
+    both.design.tracking = None;
+    let found = align(&both, &records(&recordings), settings()).unwrap();
+    assert!(
+        matches!(
+            found.warnings[..],
+            [AlignWarning::TapsStay { channel: 2, moved }] if (moved.0 - 3.6).abs() < 0.1
+        ),
+        "{:?}",
+        found.warnings
+    );
+}
