@@ -62,9 +62,6 @@ pub mod plot;
 #[cfg(all(feature = "design", feature = "plot"))]
 pub mod overview;
 
-#[cfg(feature = "cli")]
-pub mod cli;
-
 #[cfg(test)]
 #[path = "../tests/support/random.rs"]
 mod random;

@@ -4,10 +4,10 @@
 #   hybank_VERSION_ARCHITECTURE.deb    both programs, manual pages, completions, licences
 #   hybank-VERSION-TARGET.tar.gz       the same files; both programs without any shared library where the musl target is
 #
-# tools/package.sh [--profile NAME]    the profile of the programs, release unless given
+# tools/package.sh [--profile NAME]    the profile of the programs, dist unless given
 set -euo pipefail
 cd "$(dirname "$0")/.."
-profile=release
+profile=dist
 if [ "${1:-}" = --profile ]; then profile=$2; fi
 case $profile in dev) folder=debug ;; *) folder=$profile ;; esac
 
@@ -27,7 +27,7 @@ else
     echo "package: the target $static is not installed (rustup target add $static); the programs use the C library" >&2
 fi
 
-cargo build --quiet --profile "$profile" "${chosen[@]}" --target-dir "$build" -p hybank -p hybank-ibr
+cargo build --quiet --profile "$profile" "${chosen[@]}" --target-dir "$build" -p hybank-cli -p hybank-ibr
 
 out=target/package
 tree=$out/tree

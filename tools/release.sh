@@ -13,7 +13,7 @@ build=${CARGO_TARGET_DIR:-$PWD/target}
 folder=${2:-$build/release-candidate}
 version=$(sed -n '/^\[workspace.package\]/,/^\[/s/^version = "\(.*\)"/\1/p' Cargo.toml)
 # In the order of dependence.
-crates=(hybank-linalg hybank-runtime hybank hybank-ibr)
+crates=(hybank-linalg hybank-runtime hybank hybank-ibr hybank-cli)
 
 rm -rf "$folder"
 mkdir -p "$folder"
@@ -21,7 +21,7 @@ git ls-files -z --cached --others --exclude-standard | xargs -0 cp --parents --n
 cd "$folder"
 
 sed -i "s|^# .repository. is set.*|repository = \"$address\"|" Cargo.toml
-sed -i 's|^license\.workspace = true|&\nrepository.workspace = true|' {.,linalg,runtime,ibr}/Cargo.toml
+sed -i 's|^license\.workspace = true|&\nrepository.workspace = true|' {.,linalg,runtime,ibr,cli}/Cargo.toml
 sed -i "s|^\[project.optional-dependencies\]|[project.urls]\nRepository = \"$address\"\nChangelog = \"$address/blob/v$version/CHANGELOG.md\"\n\n&|" pyproject.toml
 # The pages of the registries, each with the folder from which its links lead.
 for page in README.md linalg/README.md runtime/README.md ibr/README.md docs/python.md; do

@@ -21,7 +21,7 @@ trap 'rm -rf "$work"' EXIT
 "$work/tools/bin/pip" --quiet --disable-pip-version-check install 'maturin>=1.9,<2' auditwheel
 rm -rf "$folder/dist"
 (cd "$folder" && "$work/tools/bin/maturin" sdist --quiet --out dist)
-(cd "$folder" && "$work/tools/bin/maturin" build --quiet --release --out dist)
+(cd "$folder" && "$work/tools/bin/maturin" build --quiet --profile dist --out dist)
 "$work/tools/bin/auditwheel" show "$folder"/dist/*.whl
 for package in "$folder"/dist/*.tar.gz "$folder"/dist/*.whl; do
     "$python" -m zipfile -l "$package" >"$work/list" 2>/dev/null || tar -tzf "$package" >"$work/list"

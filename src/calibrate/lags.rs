@@ -1,8 +1,8 @@
 //! The lag between two recordings of one event, whatever the signal is and however far apart they began.
 //!
 //! *Probes*, the loudest stretches of one recording, are correlated with all of the other one, block by
-//! block. A clock that runs fast moves the lag along the recording, so each probe has a lag of its own. Those
-//! on one line are the lag and its drift.
+//! block. A clock that runs fast moves the lag along the recording, so each probe has a lag of its own.
+//! Those on one line are the lag and its drift.
 
 use super::record::Record;
 use crate::linalg::{Complex, fourier};
@@ -30,8 +30,8 @@ const LEAST_ODDS: f64 = 30.0;
 /// Other lags with this share of the log-odds of the best ones explain the recordings as well: voices that
 /// say different things correlate far beyond chance, but at many lags.
 const ALIKE: f64 = 0.5;
-/// Up to so many samples from the best lag it takes this share: a voice agrees with itself a pitch period later,
-/// but less well, and a tone nearly as well.
+/// Up to so many samples from the best lag it takes this share: a voice agrees with itself a pitch period
+/// later, but less well, and a tone nearly as well.
 const PITCH: f64 = 1024.0;
 const ALIKE_WITHIN_PITCH: f64 = 0.9;
 /// Share of the largest possible correlation from which on recordings have something in common: different
@@ -83,7 +83,8 @@ pub(crate) fn stretch(record: &Record, first: i64, length: usize) -> Vec<f64> {
 /// The correlations of a stretch of `size` samples with a shorter one: at index l that of its samples from l
 /// on, with the sign of the correlation, as shares of the largest one that is possible.
 pub(crate) struct Correlation {
-    /// Of the shorter one, under the window of Hann: the leakage of strong lines would be whitened with them.
+    /// Of the shorter one, under the window of Hann: the leakage of strong lines would be whitened with
+    /// them.
     spectrum: Vec<Complex<f64>>,
     size: usize,
 }

@@ -71,7 +71,8 @@ impl Unfinished {
         (width > NOTICEABLE * accuracy).then_some(Self { objective: Objective::Gamma, width, reason })
     }
 
-    /// What is left of it for a bank of the norm `gamma` where it is proven that no bank has less than `lower`.
+    /// What is left of it for a bank of the norm `gamma` where it is proven that no bank has less than
+    /// `lower`.
     pub(super) fn unless_proven(self, lower: f64, gamma: f64) -> Option<Self> {
         let proven = gamma / lower - 1.0;
         match self.objective {

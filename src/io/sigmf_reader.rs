@@ -25,8 +25,8 @@ impl SigmfReader<Take<File>> {
         let (meta_path, _) = file_pair(path, None);
         let meta = SigmfMeta::read(&meta_path)?;
         let (_, data_path) = file_pair(path, Some(&meta));
-        // To open a pipe without a writer would take for ever. Without core:dataset the samples may come from
-        // one.
+        // To open a pipe without a writer would take for ever. Without core:dataset the samples may come
+        // from one.
         let problem = match &meta.global.dataset {
             Some(name) if data_path.exists() && !data_path.is_file() => {
                 Some(format!("core:dataset leads to \"{}\"", Quoted(name)))

@@ -3,7 +3,7 @@
 //! `tools/adc_tools.py` wrote the records and `figures.json` with adctoolbox 0.9.1 and python-adc-eval
 //! 0.4.0; docs/measure.md says where the definitions differ.
 
-use crate::support::{number, wav};
+use crate::support::{number, wav_file};
 use hybank::measure::{Measurement, Settings, Window, measure};
 use hybank::units::Hertz;
 use serde_json::Value;
@@ -18,7 +18,7 @@ fn figures() -> Value {
 }
 
 fn measured(name: &str, converters: usize) -> Measurement {
-    let (spec, samples) = wav::read(&folder().join(format!("{name}.wav")));
+    let (spec, samples) = wav_file::read(&folder().join(format!("{name}.wav")));
     let samples: Vec<f64> = samples.into_iter().map(f64::from).collect();
     let settings = Settings { converters, window: Window::None, ..Settings::default() };
     measure(&samples, Hertz(f64::from(spec.sample_rate)), &settings).unwrap()

@@ -7,6 +7,7 @@ mod adc_tools;
 mod bands;
 mod causal_optima;
 mod equivalence;
+mod examples;
 mod extremes;
 mod filters;
 mod fir_bounds;

@@ -115,7 +115,8 @@ impl Extent {
     /// Bytes of a view of views without cameras, all of whose samples are held at a time.
     pub fn of_tracks(&self, degree: Degree) -> f64 {
         let (samples, sample) = (self.samples as f64, self.sample());
-        // The brightness of all views; then the samples of one with their chi, or with the ends on each pixel.
+        // The brightness of all views; then the samples of one with their chi, or with the ends on each
+        // pixel.
         let surfaced = 4.0 * self.pixels as f64;
         let decided = 56.0 * self.largest as f64;
         let tested = (sample + POINT) * samples;

@@ -163,8 +163,8 @@ impl<'a> Course<'a> {
         (spec, raised)
     }
 
-    /// Middle and deviation of the normal law whose 95 % interval is the course of a delay. All delays of one
-    /// slow period where the course is longer.
+    /// Middle and deviation of the normal law whose 95 % interval is the course of a delay. All delays of
+    /// one slow period where the course is longer.
     fn range(&self, i: usize, skips: &[usize]) -> Estimate<FastPeriods> {
         let (h, slow) = (self.spec.fast_period, self.slow_period());
         let Extent { mut middle, mut half } = self.extent(i);

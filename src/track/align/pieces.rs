@@ -145,8 +145,8 @@ impl<'a> Pieces<'a> {
     }
 }
 
-/// By how much the lag of a piece is beyond the line. A lag far from the median of those beside it is that of
-/// chance, and the median is taken.
+/// By how much the lag of a piece is beyond the line. A lag far from the median of those beside it is that
+/// of chance, and the median is taken.
 fn likely(local: &[LocalLag], number: usize) -> f64 {
     let beside = &local[number.saturating_sub(BESIDE)..(number + BESIDE + 1).min(local.len())];
     let (usual, own) = (weighted_median(beside.to_vec()), local[number].beyond);

@@ -8,11 +8,12 @@ use std::path::{Path, PathBuf};
 
 /// The crates that ARCHITECTURE.md names, each with its folder. `hybank` is divided into rooms, the modules
 /// at its top; the other crates are rooms themselves.
-const CRATES: [(&str, &str); 4] = [
+const CRATES: [(&str, &str); 5] = [
     ("hybank", "src"),
     ("hybank_linalg", "linalg/src"),
     ("hybank_runtime", "runtime/src"),
     ("hybank_ibr", "ibr/src"),
+    ("hybank_cli", "cli/src"),
 ];
 
 /// The arrows allowed from each room, read from the first block of code below "Who may import whom": one or

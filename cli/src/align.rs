@@ -1,0 +1,233 @@
+//! `hybank align`: when recordings began, how their clocks drift, their polarities and gains.
+
+use super::align_report::Report;
+use super::bank_file::{parse_spec, read_kind};
+use super::calibrate::{check_rate, records, reference};
+use super::capture_args::CaptureArgs;
+use super::capture_file::start;
+use super::file_kind::FileKind;
+use super::interrupt::interrupts;
+use super::match_bank::check_stdin;
+use super::print::{Failure, is_dash, say_understood, warn};
+use super::written::{Mono, begin_file, begin_recording, check_outputs, write_text, write_together};
+use hybank::calibrate::Record;
+use hybank::figures::Alone;
+use hybank::io::{Container, PcmFormat, ReadOptions, StreamHeader, is_same_rate};
+use hybank::messages::{Number, Quoted};
+use hybank::quantity::{self, Time};
+use hybank::spec::{DesignOverrides, Spec};
+use hybank::track::{AlignError, AlignSettings, Alignment, DriftModel, align};
+use hybank::units::Seconds;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Bytes of memory for each sample: the sample, whether it is kept, and room to grow.
+const BYTES_PER_SAMPLE: f64 = 20.0;
+/// By how much the rate of a clock wanders in a second, as `fuse --track` takes it.
+const WANDER: f64 = 1e-6;
+/// Hertz of recordings that state no rate, for a spec in normalised time.
+const NORMALISED_RATE: f64 = 48_000.0;
+
+/// Aligns recordings by recorders that were started by hand and have clocks of their own
+///
+/// Finds by any signal (speech, music, noise) by how many samples each recording began before the others,
+/// how its clock drifts, its polarity, gain and offset, and writes the spec with these values. --trim writes
+/// the recordings from their first common sample on, and the delays that move for `hybank fuse --track`.
+///
+/// All is relative to a reference channel, whose clock is the time. The report says whether one recorder
+/// alone would do as well as all together.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  hybank align spec.toml left.wav right.wav -o aligned.toml --trim aligned
+  hybank design aligned.toml -o bank.json
+  hybank fuse bank.json aligned/ch1.wav aligned/ch2.wav -o fused.wav --track aligned/drift.jsonl
+  hybank align spec.toml a.wav b.wav -o aligned.toml --within 50ms --json
+
+Recordings of a tone or a loop agree at many lags; --within says how far apart they began at most.")]
+pub(super) struct Args {
+    /// The spec (TOML) with the nominal values; `-` is standard input
+    spec: PathBuf,
+    /// One mono recording per channel (WAV, SigMF, .csv, .npy, .mat, or raw with --format), in the order of
+    /// the spec; of any length, and begun at any time
+    #[arg(required = true)]
+    captures: Vec<PathBuf>,
+    /// The spec with the values found; `-` is standard output
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Write the recordings from their first common sample on into this folder: ch1.wav, ch2.wav, .., and
+    /// drift.jsonl, their delays over time as `hybank fuse --track` reads them
+    #[arg(long, value_name = "DIR")]
+    trim: Option<PathBuf>,
+    /// How far apart the recordings began at most, as 50ms or 2s
+    #[arg(long, value_name = "TIME", value_parser = quantity::time)]
+    within: Option<Time>,
+    /// The channel whose clock is the time, from 1 [default: that of the spec's uncertainty table, or 1]
+    #[arg(long, value_name = "I")]
+    reference: Option<usize>,
+    #[command(flatten)]
+    reading: CaptureArgs,
+    /// Replace existing outputs
+    #[arg(long)]
+    force: bool,
+    /// Print a report as one JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+/// The recordings of all channels.
+struct Recordings {
+    records: Vec<Record>,
+    /// Their formats.
+    formats: Vec<PcmFormat>,
+    /// Hertz, of all.
+    rate: f64,
+}
+
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    args.check_usage()?;
+    let text = read_kind(&args.spec, FileKind::Spec)?;
+    let file = parse_spec(&text, &args.spec, DesignOverrides::default())?;
+    let spec = file.for_outputs(&[&args.output])?;
+    let others = args.written(spec.channels.len());
+    args.check_outputs(&others)?;
+    say_understood(Some(&spec));
+    let mut warnings = Vec::new();
+    let read = args.read(&spec, &mut warnings);
+    let found = read.and_then(|recordings| {
+        let settings = args.settings(&spec, recordings.rate)?;
+        Ok((align(&spec, &recordings.records, settings)?, recordings))
+    });
+    // What the recordings have may explain why they do not fit; a report has these warnings.
+    let (found, recordings) = found.inspect_err(|_| warnings.iter().for_each(|text| warn(text)))?;
+    let alone = Alone::new(&found.spec).map_err(Failure::input)?;
+    let written = file.with_values(&text, &found.spec, &args.output).map_err(|problem| {
+        Failure::Input(format!("the values found make no spec: {problem}; nothing was written"))
+    })?;
+    args.write(&written, &found, &recordings, &others)?;
+    Report::new(&spec, &found, alone, warnings).print(&args.output, &others, args.json)
+}
+
+impl Args {
+    /// Refuses impossible combinations of options, before any file is read.
+    fn check_usage(&self) -> Result<(), Failure> {
+        self.reading.check(false)?;
+        check_stdin(self.captures.iter().chain([&self.spec]).map(PathBuf::as_path))?;
+        if self.json && is_dash(&self.output) {
+            let message = "--json and `-o -` both want standard output; write the spec to a file";
+            return Err(Failure::Usage(message.into()));
+        }
+        Ok(())
+    }
+
+    /// Refuses outputs that are inputs; `others` are those beside the spec.
+    fn check_outputs(&self, others: &[PathBuf]) -> Result<(), Failure> {
+        let inputs: Vec<&Path> = self.captures.iter().chain([&self.spec]).map(PathBuf::as_path).collect();
+        let outputs: Vec<&Path> = others.iter().chain([&self.output]).map(PathBuf::as_path).collect();
+        check_outputs(&outputs, &inputs)
+    }
+
+    /// The outputs beside the spec: the recordings of so many channels, and the delays.
+    fn written(&self, channels: usize) -> Vec<PathBuf> {
+        let names = (1..=channels).map(|i| format!("ch{i}.wav")).chain(["drift.jsonl".to_owned()]);
+        let names: Vec<String> = names.collect();
+        self.trim.iter().flat_map(|folder| names.iter().map(|name| folder.join(name))).collect()
+    }
+
+    /// The recordings, which have one rate; what was tolerated joins the `warnings`.
+    fn read(&self, spec: &Spec, warnings: &mut Vec<String>) -> Result<Recordings, Failure> {
+        let options = self.reading.options(self.captures.len(), spec.channels.len());
+        let options = ReadOptions { full_scale: options.full_scale.or(spec.full_scale), ..options };
+        let (mut all, mut formats, mut common) = (Vec::new(), Vec::new(), None);
+        for path in &self.captures {
+            let mut reader = start(std::slice::from_ref(path), options, interrupts())?;
+            self.reading.scale.check(&reader)?;
+            check_rate(spec, &reader)?;
+            let Some((_, header)) = reader.headers().next() else { continue };
+            let (rate, error) = (rate_of(header, spec), header.rate_error);
+            let first: f64 = *common.get_or_insert(rate);
+            if !is_same_rate(rate, first, error) {
+                return Err(Failure::Input(format!(
+                    "{}: the sample rate is {} Hz, but {} has {} Hz; all recordings need the same rate",
+                    Quoted(path),
+                    Number(rate),
+                    Quoted(&self.captures[0]),
+                    Number(first)
+                )));
+            }
+            let format = header.layout.format;
+            let records = records(&mut reader, usize::MAX, BYTES_PER_SAMPLE, None, warnings)?;
+            formats.resize(formats.len() + records.len(), format);
+            all.extend(records);
+        }
+        Ok(Recordings { records: all, formats, rate: common.unwrap_or(NORMALISED_RATE) })
+    }
+
+    fn settings(&self, spec: &Spec, rate: f64) -> Result<AlignSettings, Failure> {
+        // A spec in normalised time counts in units that the recordings say.
+        let unit = if spec.is_normalised() { 1.0 / (rate * spec.ratio as f64) } else { 1.0 };
+        let within = self.within.map(|time| time.in_seconds(spec.fast_period) * (1.0 / unit));
+        if within.is_some_and(|time| time < Seconds(0.0)) {
+            return Err(Failure::Usage("--within: a time is not negative".into()));
+        }
+        Ok(AlignSettings {
+            reference: reference(self.reference, spec)?,
+            within,
+            model: DriftModel::wandering(WANDER * unit.sqrt()),
+        })
+    }
+
+    /// Writes all outputs, which appear together; `others` are those beside the spec.
+    fn write(
+        &self,
+        spec: &str,
+        found: &Alignment,
+        recordings: &Recordings,
+        others: &[PathBuf],
+    ) -> Result<(), Failure> {
+        let (Some(folder), Some((drift, trimmed))) = (&self.trim, others.split_last()) else {
+            return write_text(&self.output, spec, self.force);
+        };
+        let table: String = found.readings.iter().map(|reading| reading.line() + "\n").collect();
+        let is_file = !is_dash(&self.output);
+        let texts = [(drift, table.as_str())].into_iter().chain(is_file.then_some((&self.output, spec)));
+        let begin_text = |(path, text): (&PathBuf, &str)| begin_file(path, text.as_bytes(), self.force);
+        let begin = |channel: Option<usize>| {
+            let Some(i) = channel else { return texts.clone().map(begin_text).collect() };
+            let skip = found.channels[i].skip;
+            begin_recording(&trimmed[i], recordings.mono(i, skip..skip + found.frames), self.force)
+        };
+        write_together(folder, (0..trimmed.len()).map(Some).chain([None]).map(Ok), begin)?;
+        if is_file { Ok(()) } else { write_text(&self.output, spec, self.force) }
+    }
+}
+
+/// Hertz: as stated, or that of the spec.
+fn rate_of(header: &StreamHeader, spec: &Spec) -> f64 {
+    let slow = (spec.fast_period * spec.ratio as f64).rate().0;
+    header.rate.unwrap_or(if spec.is_normalised() { NORMALISED_RATE } else { slow })
+}
+
+impl Recordings {
+    /// A WAV file of some samples of channel `i` in their own format; lost ones are NaN, which integers have
+    /// not.
+    fn mono(&self, i: usize, samples: Range<usize>) -> Mono<'_> {
+        let samples = &self.records[i].samples[samples];
+        let has_lost = samples.iter().any(|x| x.is_nan());
+        let format = match (self.formats[i].is_float(), self.formats[i].bytes()) {
+            (true, 4) => PcmFormat::F32Le,
+            (false, 1) if !has_lost => PcmFormat::U8,
+            (false, 2) if !has_lost => PcmFormat::S16Le,
+            (false, 3) if !has_lost => PcmFormat::S24Le,
+            (false, 4) if !has_lost => PcmFormat::S32Le,
+            _ => PcmFormat::F64Le,
+        };
+        Mono { samples, imaginary: None, rate: self.rate, format, container: Container::Wav }
+    }
+}
+
+impl From<AlignError> for Failure {
+    fn from(error: AlignError) -> Self {
+        Self::input(error)
+    }
+}

@@ -1,0 +1,410 @@
+//! `hybank calibrate`: delays, gains, offsets and cut-offs of the channels from captures.
+
+use super::bank_file::{bad_flag, parse_spec, read_kind};
+use super::calibrate_report::Report;
+use super::capture_args::{CaptureArgs, InterleavedArgs};
+use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, rails_of, start, unread};
+use super::file_kind::FileKind;
+use super::interrupt::interrupts;
+use super::match_bank::check_stdin;
+use super::measure::{ToneArg, tone, tones};
+use super::print::{Failure, is_dash, say_understood, warn};
+use super::remedy::explained;
+use super::written::{check_outputs, write_text};
+use hybank::calibrate::{
+    Acquisition, CalibrateError, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning,
+    applied, calibrate_pooled,
+};
+use hybank::io::{MultiReader, ReadOptions, WORK_BYTES, Whole};
+use hybank::messages::{Number, Quoted};
+use hybank::pipeline::matching::{channels_of_raw, samples_per_frame};
+use hybank::spec::{DesignOverrides, Spec};
+use hybank::units::{FastPeriods, Hertz};
+use std::path::{Path, PathBuf};
+
+/// Most samples of all channels together: 512 MiB as doubles.
+const MOST_SAMPLES: usize = 1 << 26;
+/// Values of a larger misfit are not written unless asked for: intervals that are widened by more than this
+/// no longer describe errors of the values.
+const MOST_MISFIT: f64 = 10.0;
+
+/// Measures delay, gain and offset of each channel from captures, with 95 % intervals
+///
+/// Fits what the captures say of the channels, relative to a reference channel, and writes the spec with
+/// these values and an [uncertainty] table with the half-widths of their intervals. Everything else of the
+/// spec is kept.
+///
+/// The captures hold sine tones (--tone, the default), a waveform that is known (--training), or any signal
+/// that leaves fewer aliases occupied than there are channels (--blind). Complex captures hold tones.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  hybank calibrate spec.toml tone1.wav tone2.wav -o measured.toml --tone 1.2kHz
+  hybank calibrate spec.toml tones1.wav tones2.wav -o measured.toml --tone 1kHz,5kHz,9kHz \\
+      --fit delay,gain,offset,cutoff
+  hybank calibrate spec.toml adc.wav --interleaved 4 -o measured.toml --check other.wav
+  hybank calibrate spec.toml z?.csv --interleaved 4 --full-scale 8bits -o measured.toml
+  hybank calibrate spec.toml ch1.wav ch2.wav -o measured.toml --training chirp.wav
+  hybank calibrate spec.toml ch1.wav ch2.wav -o measured.toml --blind
+
+A tone may lie in any Nyquist zone of the slow rate. `auto` finds tones in the zone of the fast rate
+that holds the signal's band, or that the target passes, and takes their zones of the slow rate from
+the delays of the spec.")]
+pub(super) struct Args {
+    /// The spec (TOML) with the nominal values; `-` is standard input
+    spec: PathBuf,
+    /// One mono recording per channel (WAV, SigMF, .csv, .npy, .mat, or raw with --format), in the order of
+    /// the spec, or one of N channels. Several such sets, one after the other, are pooled: each has tones of
+    /// its own
+    #[arg(required = true)]
+    captures: Vec<PathBuf>,
+    /// The calibrated spec; `-` is standard output
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Frequencies of tones (Hz, kHz, MHz, GHz; hertz if left out) to about 100 ppm, or auto; of complex
+    /// samples also negative
+    #[arg(long, value_name = "F,..|auto", value_delimiter = ',', value_parser = tone,
+          conflicts_with_all = ["training", "blind"], allow_hyphen_values = true)]
+    tone: Vec<ToneArg>,
+    /// A mono recording of the waveform that was played
+    #[arg(long, value_name = "WAV", conflicts_with = "blind")]
+    training: Option<PathBuf>,
+    /// Use whatever signal the captures hold
+    #[arg(long)]
+    blind: bool,
+    /// The channel to which the others are relative, from 1 [default: that of the spec's uncertainty table,
+    /// or 1]
+    #[arg(long, value_name = "I")]
+    reference: Option<usize>,
+    /// What to fit: delay, gain, offset, cutoff, or cutoff:2 for the cut-offs of the second stages of the
+    /// filters' cascades; the rest keeps the values of the spec [default: `fit` of the spec, or
+    /// delay,gain,offset]
+    #[arg(long, value_name = "VALUE,..", value_delimiter = ',')]
+    fit: Vec<Fitting>,
+    /// Captures of the same converters to check the calibrated spec with, of the same kind of signal
+    #[arg(long, value_name = "HOLDOUT", num_args = 1..)]
+    check: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: CaptureArgs,
+    #[command(flatten)]
+    turns: InterleavedArgs,
+    /// Samples of this size and more are clipped and left out [default: the ends of integer formats, 1 for
+    /// floats none of which is beyond]
+    #[arg(long, value_name = "LEVEL")]
+    clip: Option<f64>,
+    /// Replace an existing output, and write values that the captures contradict
+    #[arg(long)]
+    force: bool,
+    /// Print a report as one JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is known of the signal that the captures hold.
+enum Signal {
+    Tones(Vec<Hertz>),
+    Waveform { samples: Vec<f64>, spacing: FastPeriods },
+    Any,
+}
+
+impl Signal {
+    fn borrowed(&self) -> CalibrationSignal<'_> {
+        match self {
+            Self::Tones(list) => CalibrationSignal::Tones(list),
+            Self::Waveform { samples, spacing } => CalibrationSignal::Waveform { samples, spacing: *spacing },
+            Self::Any => CalibrationSignal::Any,
+        }
+    }
+}
+
+/// The captures of one acquisition.
+struct Captures {
+    name: String,
+    /// One per channel.
+    records: Vec<Record>,
+}
+
+/// A failed calibration; what is wrong with the tones of one acquisition is said of its files.
+fn of_captures(captures: &[Captures], error: CalibrateError) -> Failure {
+    match (captures, &error) {
+        ([one], CalibrateError::Tones(_)) => Failure::Input(format!("{}: {error}", Quoted(&one.name))),
+        _ => Failure::input(error),
+    }
+}
+
+/// As the library takes them.
+fn borrowed(all: &[Captures]) -> Vec<Acquisition<'_>> {
+    all.iter().map(|one| Acquisition { name: &one.name, records: &one.records }).collect()
+}
+
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    args.check_usage()?;
+    let text = read_kind(&args.spec, FileKind::Spec)?;
+    let file = parse_spec(&text, &args.spec, DesignOverrides::default())?;
+    let spec = file.for_outputs(&[&args.output])?;
+    say_understood(Some(&spec));
+    let mut warnings = Vec::new();
+    let done = args.calibrated(&spec, &mut warnings);
+    // What the captures have may explain why they do not fit; a report has these warnings.
+    let (calibrated, report) = done.inspect_err(|_| warnings.iter().for_each(|warning| warn(warning)))?;
+    let written = file.with_values(&text, &calibrated, &args.output).map_err(|problem| {
+        Failure::Input(format!("the values found make no spec: {problem}; nothing was written"))
+    })?;
+    write_text(&args.output, &written, args.force)?;
+    report.print(&args.output, args.json)
+}
+
+impl Args {
+    /// The calibrated spec and the report. `warnings` are those of the captures.
+    fn calibrated(&self, spec: &Spec, warnings: &mut Vec<String>) -> Result<(Spec, Report), Failure> {
+        let (settings, signal) = (self.settings(spec)?, self.signal(spec)?);
+        let captures = self.read(&self.captures, spec, warnings)?;
+        let found = calibrate_pooled(spec, &borrowed(&captures), signal.borrowed(), settings);
+        let found = found.map_err(|error| of_captures(&captures, error))?;
+        self.check_misfit(&found, warnings)?;
+        let (calibrated, more) = applied(spec, &found);
+        let mut report = Report::new(spec, &found);
+        report.add(&more);
+        if !self.check.is_empty() {
+            let captures = self.read(&self.check, spec, warnings)?;
+            let held_out = match signal.borrowed() {
+                // Held-out tones have other frequencies.
+                CalibrationSignal::Tones(_) => CalibrationSignal::Tones(&[]),
+                signal => signal,
+            };
+            let checked = calibrate_pooled(&calibrated, &borrowed(&captures), held_out, settings)
+                .map_err(|error| Failure::Input(format!("the held-out captures: {error}")))?;
+            report.check(&calibrated, &found, &checked);
+        }
+        report.warnings.splice(0..0, warnings.iter().cloned());
+        Ok((calibrated, report))
+    }
+
+    /// Refuses values that the captures contradict. What explains that joins the `warnings`.
+    fn check_misfit(&self, found: &Calibration, warnings: &mut Vec<String>) -> Result<(), Failure> {
+        let Some(misfit) = found.misfit.filter(|&misfit| misfit > MOST_MISFIT && !self.force) else {
+            return Ok(());
+        };
+        let reasons =
+            |warning: &&Warning| matches!(warning, Warning::Outlying { .. } | Warning::CutoffExplains { .. });
+        warnings.extend(found.warnings.iter().filter(reasons).map(explained));
+        Err(Failure::Input(format!(
+            "the captures contradict the spec: they differ from its model {misfit:.0} times as much as their noise \
+             explains, so the values mean nothing and were not written; check the frequencies and their zones, the \
+             front ends and the order of the captures, or write them all the same with --force"
+        )))
+    }
+
+    /// Refuses impossible combinations of options, before any file is read.
+    fn check_usage(&self) -> Result<(), Failure> {
+        self.reading.check(self.turns.is_given())?;
+        if self.json && is_dash(&self.output) {
+            let message = "--json and `-o -` both want standard output; write the spec to a file";
+            return Err(Failure::Usage(message.into()));
+        }
+        let inputs = self.captures.iter().chain(&self.check).chain(&self.training).chain([&self.spec]);
+        let inputs: Vec<&Path> = inputs.map(PathBuf::as_path).collect();
+        check_stdin(inputs.iter().copied())?;
+        if let Some(level) = self.clip.filter(|level| level.is_nan() || *level <= 0.0) {
+            return Err(Failure::Usage(format!("--clip {level} is not a positive level")));
+        }
+        check_outputs(&[&self.output], &inputs)
+    }
+
+    /// The acquisitions in these files, each with one record per channel of `spec`; what was tolerated joins
+    /// the `warnings`.
+    fn read(
+        &self,
+        paths: &[PathBuf],
+        spec: &Spec,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<Captures>, Failure> {
+        let files = self.files_of_one(paths, spec)?;
+        let most = MOST_SAMPLES / paths.len().div_ceil(files);
+        paths.chunks(files).map(|files| self.read_one(files, spec, most, warnings)).collect()
+    }
+
+    /// How many files are one acquisition: as many as have the channels of the spec.
+    fn files_of_one(&self, paths: &[PathBuf], spec: &Spec) -> Result<usize, Failure> {
+        let [first, _, ..] = paths else { return Ok(1) };
+        if self.turns.is_given() {
+            return Ok(1);
+        }
+        // What is no file cannot be read twice.
+        if !first.is_file() {
+            return Ok(paths.len());
+        }
+        let reader = start(std::slice::from_ref(first), self.reading.options(2, 1), interrupts())?;
+        let files = spec.channels.len() / reader.channels().max(1);
+        Ok(if files > 0 && paths.len().is_multiple_of(files) { files } else { paths.len() })
+    }
+
+    /// The captures of one acquisition, at most `most` samples of all channels.
+    fn read_one(
+        &self,
+        paths: &[PathBuf],
+        spec: &Spec,
+        most: usize,
+        warnings: &mut Vec<String>,
+    ) -> Result<Captures, Failure> {
+        let layout = spec.layout();
+        let turns = self.turns.by_delay(&spec.delays_in_fast_periods(), &layout, &self.spec)?;
+        let captures = self.reading.options(paths.len(), channels_of_raw(&layout, paths.len()));
+        let samples_per_frame = samples_per_frame(&layout, paths.len());
+        let full_scale = captures.full_scale.or(spec.full_scale);
+        let captures =
+            ReadOptions { interleaving: turns.as_ref(), samples_per_frame, full_scale, ..captures };
+        let mut reader = start(paths, captures, interrupts())?;
+        self.reading.scale.check(&reader)?;
+        check_channels(spec, &reader)?;
+        check_rate(spec, &reader)?;
+        let name = reader.headers().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
+        let mut records = records(&mut reader, most, WORK_BYTES, self.clip, warnings)?;
+        if !layout.is_plain() {
+            records =
+                layout.ranges().into_iter().map(|samples| Record::in_a_row(&records[samples])).collect();
+        }
+        Ok(Captures { name, records })
+    }
+
+    fn settings(&self, spec: &Spec) -> Result<Settings, Failure> {
+        Spec { fit: self.fit.clone(), ..spec.clone() }
+            .check()
+            .map_err(|problem| bad_flag("fit", &problem))?;
+        let given = if self.fit.is_empty() { &spec.fit } else { &self.fit };
+        let fit = if given.is_empty() { Fit::default() } else { given.iter().copied().collect() };
+        let reference = reference(self.reference, spec)?;
+        Ok(Settings { fit, reference })
+    }
+
+    fn signal(&self, spec: &Spec) -> Result<Signal, Failure> {
+        if self.blind {
+            return Ok(Signal::Any);
+        }
+        if let Some(path) = &self.training {
+            let reading = Reading::channel(None, MOST_MEASURED);
+            let CaptureFile { samples, rate, .. } = CaptureFile::read(path, reading)?.finite(path)?;
+            // In normalised time the recording's own rate is the fast rate.
+            let spacing = if spec.is_normalised() {
+                FastPeriods(1.0)
+            } else {
+                rate.period().in_fast_periods(spec.fast_period)
+            };
+            return Ok(Signal::Waveform { samples, spacing });
+        }
+        tones(&self.tone).map(Signal::Tones)
+    }
+}
+
+fn check_channels(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
+    let (wanted, given) = (spec.layout().count(), reader.channels());
+    if given == wanted {
+        return Ok(());
+    }
+    let names: Vec<&str> = reader.headers().map(|(name, _)| name).collect();
+    if !spec.layout().is_plain() {
+        return Err(Failure::Input(format!(
+            "the spec has {} converters with rates of their own and {wanted} samples per frame, but the captures have \
+             {given} ({}); give one mono recording per converter",
+            spec.channels.len(),
+            Quoted(names.join(", "))
+        )));
+    }
+    Err(Failure::Input(format!(
+        "the spec has {wanted} channels, but the captures have {given} ({}); give one mono recording per channel, \
+         one of {wanted} channels, or one in which the converters take turns and --interleaved {wanted}",
+        Quoted(names.join(", "))
+    )))
+}
+
+/// The captures have the slow rate of the spec, as far as they state it; any for a spec in normalised time.
+pub(super) fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
+    let frames = (spec.fast_period * spec.ratio as f64).rate().0;
+    let wrong = reader.headers().zip(reader.samples_per_frame()).find_map(|((name, header), samples)| {
+        let wanted = frames * samples as f64;
+        Some((name, header.other_rate(wanted)?, wanted))
+    });
+    match wrong {
+        Some((name, rate, wanted)) if !spec.is_normalised() => Err(Failure::Input(format!(
+            "{}: the sample rate is {} Hz, but the spec says {} Hz; record at that rate or correct the spec",
+            Quoted(name),
+            Number(rate),
+            Number(wanted)
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// The reference channel, from 0: the `given` one, from 1, or that of the spec, or the first.
+pub(super) fn reference(given: Option<usize>, spec: &Spec) -> Result<usize, Failure> {
+    let known = spec.uncertainty.as_ref().and_then(|table| table.reference_channel());
+    match given {
+        Some(0) => Err(Failure::Usage("--reference 0: channels count from 1".into())),
+        Some(channel) => Ok(channel - 1),
+        None => Ok(known.unwrap_or(0)),
+    }
+}
+
+/// All channels of a reader, each within its rails or `clip`, for work that takes so many bytes for each
+/// sample; what was tolerated joins the `warnings`.
+pub(super) fn records(
+    reader: &mut MultiReader,
+    most: usize,
+    bytes_per_sample: f64,
+    clip: Option<f64>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Record>, Failure> {
+    let parts = if reader.is_complex() { 2 } else { 1 };
+    let most = most / (parts * reader.channels()).max(1);
+    let headers = reader.headers().zip(reader.samples_per_frame());
+    let rails = headers.flat_map(|((_, header), samples)| {
+        std::iter::repeat_n(header.rails, parts * header.channels * samples)
+    });
+    let rails: Vec<_> = rails.collect();
+    let name = reader.headers().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
+    let Whole { channels, is_cut } =
+        Whole::read_parts_with(reader, most, bytes_per_sample).map_err(unread)?;
+    warnings.extend(reader.warnings().iter().map(ToString::to_string));
+    if is_cut {
+        warnings.push(format!("{}: only the first {most} frames are used", Quoted(&name)));
+    }
+    let all = channels.into_iter().zip(rails).map(|(samples, rails)| record(samples, rails, clip));
+    let mut all = all.collect::<Vec<_>>().into_iter();
+    let mut records = Vec::new();
+    while let Some(real) = all.next() {
+        let imaginary = if parts == 2 { all.next() } else { None };
+        records.push(match imaginary {
+            Some(imaginary) => Record::complex(real, imaginary),
+            None => real,
+        });
+    }
+    Ok(records)
+}
+
+/// Samples beyond the rails, or of this size if a level is given, are clipped.
+fn record(samples: Vec<f64>, of_format: Option<(f64, f64)>, clip: Option<f64>) -> Record {
+    let rails = clip.map(|level| (-level, level));
+    match rails.or_else(|| rails_of(samples.iter().copied(), of_format)) {
+        Some((lowest, highest)) => Record::within(samples, lowest, highest),
+        None => Record::new(samples),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integers_clip_at_the_ends_of_their_range_and_floats_at_one() {
+        let clipped = |samples: &[f64], rails, clip| record(samples.to_vec(), rails, clip).clipped;
+        let s16 = Some((-1.0, 32767.0 / 32768.0));
+        assert_eq!(clipped(&[-1.0, 0.0, 32767.0 / 32768.0, 0.99], s16, None), 2);
+        // A converter of 12 bits in words of 16.
+        assert_eq!(clipped(&[-1.0, 0.0, 2047.0 / 2048.0, 0.5], s16, None), 2);
+        assert_eq!(clipped(&[-1.0, 0.0, 1.0, 0.99], None, None), 2);
+        assert_eq!(clipped(&[-1.0, 0.0, 2047.0 / 2048.0, 0.5], None, None), 2);
+        assert_eq!(clipped(&[-1.0, 0.0, 0.9375, 0.9], None, None), 1);
+        assert_eq!(clipped(&[-1.0, 0.0, 1.5, 0.99], None, None), 0);
+        assert_eq!(clipped(&[-1.0, 0.0, 1.5, 0.99], None, Some(0.99)), 3);
+    }
+}

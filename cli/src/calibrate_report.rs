@@ -1,0 +1,230 @@
+//! What `calibrate` prints.
+
+use super::print::{Failure, is_dash, show, warn};
+use super::remedy::explained;
+use hybank::calibrate::{Calibration, ChannelEstimate, Warning};
+use hybank::messages::Quoted;
+use hybank::sine_fit::Estimate;
+use hybank::spec::{HALF_WIDTH, Spec};
+use hybank::units::FastPeriods;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// A held-out value contradicts the calibration if it is this many half-widths away: six standard
+/// deviations.
+const CONTRADICTION: f64 = 3.0;
+
+/// A value and the half-width of its 95 % interval.
+#[derive(Debug, Clone, Copy, serde::Serialize)]
+pub(super) struct Interval {
+    value: f64,
+    half_width: f64,
+}
+
+#[derive(Debug, serde::Serialize)]
+struct ChannelReport {
+    /// From 1.
+    channel: usize,
+    /// Fast periods; absent where the value of the spec stands.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    delay_samples: Option<Interval>,
+    /// Seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    delay: Option<Interval>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gain: Option<Interval>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    offset: Option<Interval>,
+    /// Factor of the cut-off frequency.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cutoff: Option<Interval>,
+    /// Clipped samples, which were left out.
+    clipped: usize,
+}
+
+#[derive(Debug, serde::Serialize)]
+struct ToneReport {
+    /// Hertz.
+    frequency: Interval,
+    /// Nyquist zone of the slow rate, from 1.
+    zone: usize,
+    amplitude: f64,
+}
+
+/// How far held-out captures are from the calibrated spec.
+#[derive(Debug, serde::Serialize)]
+struct CheckReport {
+    channels: Vec<CheckedChannel>,
+    /// The largest deviation over the half-width of its interval.
+    worst: f64,
+    agrees: bool,
+}
+
+#[derive(Debug, serde::Serialize)]
+struct CheckedChannel {
+    channel: usize,
+    /// Fast periods.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    delay_samples: Option<Interval>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gain: Option<Interval>,
+}
+
+/// The report of a calibration.
+#[derive(Debug, serde::Serialize)]
+pub(super) struct Report {
+    /// The reference channel, from 1.
+    reference: usize,
+    frames: usize,
+    channels: Vec<ChannelReport>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    tones: Vec<ToneReport>,
+    /// Delays are known modulo this many fast periods.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    modulus_samples: Option<f64>,
+    /// 1 where the model fits to the noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    misfit: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    check: Option<CheckReport>,
+    notes: Vec<String>,
+    pub(super) warnings: Vec<String>,
+}
+
+pub(super) fn interval(estimate: Estimate<f64>) -> Interval {
+    Interval { value: estimate.value, half_width: HALF_WIDTH * estimate.sigma }
+}
+
+pub(super) fn periods(estimate: Estimate<FastPeriods>) -> Interval {
+    interval(Estimate { value: estimate.value.0, sigma: estimate.sigma.0 })
+}
+
+impl Report {
+    pub(super) fn new(spec: &Spec, found: &Calibration) -> Self {
+        let h = spec.fast_period;
+        let channel = |(i, (estimate, clipped)): (usize, (&ChannelEstimate, &usize))| {
+            let in_seconds = |estimate: Estimate<FastPeriods>| Interval {
+                value: estimate.value.in_seconds(h).0,
+                half_width: HALF_WIDTH * estimate.sigma.in_seconds(h).0,
+            };
+            ChannelReport {
+                channel: i + 1,
+                delay_samples: estimate.delay.map(periods),
+                delay: estimate.delay.map(in_seconds),
+                gain: estimate.gain.map(interval),
+                offset: estimate.offset.map(interval),
+                cutoff: estimate.cutoff.map(interval),
+                clipped: *clipped,
+            }
+        };
+        let tones = found.tones.iter().map(|tone| ToneReport {
+            frequency: interval(Estimate { value: tone.frequency.value.0, sigma: tone.frequency.sigma.0 }),
+            zone: tone.zone,
+            amplitude: tone.amplitude.value,
+        });
+        let mut report = Self {
+            reference: found.reference + 1,
+            frames: found.frames,
+            channels: found.channels.iter().zip(&found.clipped).enumerate().map(channel).collect(),
+            tones: tones.collect(),
+            modulus_samples: found.modulus.map(|modulus| modulus.0),
+            misfit: found.misfit,
+            check: None,
+            notes: Vec::new(),
+            warnings: Vec::new(),
+        };
+        report.add(&found.warnings);
+        report
+    }
+
+    /// Sorts warnings and notes.
+    pub(super) fn add(&mut self, warnings: &[Warning]) {
+        for warning in warnings {
+            let list = if warning.is_note() { &mut self.notes } else { &mut self.warnings };
+            list.push(explained(warning));
+        }
+    }
+
+    /// Compares what held-out captures say with the calibrated spec. `checked` started from its values.
+    pub(super) fn check(&mut self, calibrated: &Spec, found: &Calibration, checked: &Calibration) {
+        let delays = calibrated.delays_in_fast_periods();
+        let deviation = |value: f64, expected: f64, own: f64, before: f64| Interval {
+            value: value - expected,
+            half_width: HALF_WIDTH * own.hypot(before),
+        };
+        let channel = |(i, now): (usize, &ChannelEstimate)| {
+            let before = &found.channels[i];
+            let delay = now
+                .delay
+                .zip(before.delay)
+                .map(|(now, before)| deviation(now.value.0, delays[i].0, now.sigma.0, before.sigma.0));
+            let gain = now.gain.zip(before.gain).map(|(now, before)| {
+                deviation(now.value, calibrated.channels[i].gain, now.sigma, before.sigma)
+            });
+            CheckedChannel { channel: i + 1, delay_samples: delay, gain }
+        };
+        let channels: Vec<CheckedChannel> = checked.channels.iter().enumerate().map(channel).collect();
+        let all = channels.iter().flat_map(|c| [c.delay_samples, c.gain]).flatten();
+        let worst = all.map(|interval| interval.value.abs() / interval.half_width).fold(0.0, f64::max);
+        let agrees = worst <= CONTRADICTION;
+        if !agrees {
+            self.warnings.push(format!(
+                "the held-out captures contradict the calibration: a value is {worst:.1} half-widths of its interval away; the \
+                 converters have changed, or the front ends are not those of the spec"
+            ));
+        }
+        self.check = Some(CheckReport { channels, worst, agrees });
+    }
+
+    pub(super) fn print(&self, output: &Path, json: bool) -> Result<(), Failure> {
+        self.warnings.iter().for_each(|warning| warn(warning));
+        // Standard output carries the spec.
+        if is_dash(output) { Ok(()) } else { show(self, json, |report| report.text(output)) }
+    }
+
+    fn text(&self, output: &Path) -> String {
+        let mut text = format!("{} frames, relative to channel {}:\n", self.frames, self.reference);
+        for tone in &self.tones {
+            let _ = writeln!(text, "  tone       {} Hz, zone {}", shown(tone.frequency), tone.zone);
+        }
+        let _ = writeln!(text, "  channel    delay (fast periods)      gain                      offset");
+        for channel in &self.channels {
+            let cells = [channel.delay_samples, channel.gain, channel.offset]
+                .map(|cell| cell.map_or("-".into(), shown));
+            let _ = write!(text, "  {:<10} {:<25} {:<25} {}", channel.channel, cells[0], cells[1], cells[2]);
+            if let Some(cutoff) = channel.cutoff {
+                let _ = write!(text, "  cut-off x {}", shown(cutoff));
+            }
+            text.push('\n');
+        }
+        if let Some(modulus) = self.modulus_samples {
+            let _ = writeln!(text, "delays are known modulo {modulus:.4} fast periods");
+        }
+        if let Some(misfit) = self.misfit {
+            let _ = writeln!(text, "misfit     {misfit:.2} (1: the noise explains all differences)");
+        }
+        if let Some(check) = &self.check {
+            let verdict = if check.agrees { "agree" } else { "do not agree" };
+            let _ = writeln!(
+                text,
+                "held out   the captures {verdict}: at most {:.2} half-widths away",
+                check.worst
+            );
+        }
+        self.notes.iter().for_each(|note| {
+            let _ = writeln!(text, "note: {note}");
+        });
+        let _ = writeln!(text, "{}", Quoted(output));
+        text
+    }
+}
+
+/// Value and half-width, with as many digits as the half-width justifies.
+pub(super) fn shown(interval: Interval) -> String {
+    let Interval { value, half_width } = interval;
+    if half_width.is_nan() || half_width <= 0.0 {
+        return format!("{value}");
+    }
+    let digits = (1.0 - half_width.log10().floor()).clamp(0.0, 17.0) as usize;
+    format!("{value:.digits$} ± {half_width:.1e}")
+}

@@ -1,0 +1,188 @@
+//! How captures are read whose header does not say it, and converters that take turns in one recording.
+
+use super::output::WAV;
+use super::print::Failure;
+use hybank::bank::{Bank, FrameLayout};
+use hybank::io::{Coding, MultiReader, ReadOptions, TimeInterleaving};
+use hybank::messages::Quoted;
+use hybank::pipeline::matching::{self, NotInTurn};
+use hybank::quantity::{self, FullScale};
+use hybank::units::FastPeriods;
+use std::path::Path;
+
+/// Options of the commands that read captures.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct CaptureArgs {
+    /// Sample format of captures: wav, csv, or a raw format as in ffmpeg (s16le, f32le, ..; with c before it
+    /// for complex samples: cf32, cs16). SigMF recordings, .csv, .npy, .mat (x.mat:name for one variable of
+    /// several) and .flac state their own; a text of numbers is a table, whatever its name
+    #[arg(long, value_name = "FORMAT", default_value = "wav", value_parser = coding)]
+    format: Coding,
+    /// Interleaved channels of each raw capture [default: 1 each, or all in a single capture]
+    #[arg(long, value_name = "C", value_parser = clap::value_parser!(u16).range(1..))]
+    channels: Option<u16>,
+    #[command(flatten)]
+    pub(super) scale: ScaleArgs,
+    /// Use only this channel of each capture, from 1
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
+    channel: Option<u16>,
+}
+
+/// Reads the name of a coding.
+pub(super) fn coding(name: &str) -> Result<Coding, String> {
+    name.parse()
+        .map_err(|error| format!("{error}, wav, csv, or one of these with c before it for complex samples"))
+}
+
+impl CaptureArgs {
+    /// Refuses impossible combinations; `takes_turns` with --interleaved.
+    pub(super) fn check(self, takes_turns: bool) -> Result<(), Failure> {
+        if self.channel.is_some() && takes_turns {
+            let message =
+                "--channel and --interleaved: converters that take turns share one channel; extract it first";
+            return Err(Failure::Usage(message.into()));
+        }
+        check_channels(self.channels, self.format)
+    }
+
+    /// What was given, as it is typed.
+    pub(super) fn typed(self) -> String {
+        let format = (self.format != Coding::Wav).then(|| format!(" --format {}", self.format));
+        let channels = self.channels.map(|channels| format!(" --channels {channels}"));
+        let scale = self.scale.given().map(|scale| format!(" --full-scale {scale}"));
+        let channel = self.channel.map(|channel| format!(" --channel {channel}"));
+        [format, channels, scale, channel].into_iter().flatten().collect()
+    }
+
+    /// For a recording that the one called `file` is compared with: what the options say of the format holds
+    /// for both, unless its name says that it is WAV.
+    pub(super) fn of_reference(self, file: &Path, reference: &Path) -> ReadOptions<'static> {
+        let ending = |path: &Path| path.extension().unwrap_or_default().to_ascii_lowercase();
+        let own = self.options(1, 1);
+        match (ending(file), ending(reference)) {
+            (own_ending, ending) if own_ending == ending => own,
+            (_, ending) if WAV.iter().any(|known| ending == *known) => ReadOptions::files(),
+            _ => ReadOptions { full_scale: None, ..own },
+        }
+    }
+
+    /// For `inputs` captures of `wanted` channels in all.
+    pub(super) fn options(self, inputs: usize, wanted: usize) -> ReadOptions<'static> {
+        let single = if inputs == 1 && self.channel.is_none() { wanted } else { 1 };
+        let channels = self.channels.map_or(single, usize::from);
+        let only = self.channel.map(|channel| usize::from(channel) - 1);
+        let full_scale = self.scale.given();
+        ReadOptions { coding: self.format, channels, only, full_scale, ..ReadOptions::files() }
+    }
+}
+
+/// Refuses a number of channels for captures that state theirs.
+pub(super) fn check_channels(channels: Option<u16>, format: Coding) -> Result<(), Failure> {
+    match (channels, format) {
+        (Some(_), Coding::Wav | Coding::Csv) => Err(Failure::Usage(
+            "--channels: captures with headers state their channels; give the --format of raw captures"
+                .into(),
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// The full scale of captures.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct ScaleArgs {
+    /// Full scale of captures whose format does not say it, such as tables and floats that are not WAV: a
+    /// number (128, 2.5), or the codes of a converter: 8bits from -128 to 127, u8bits from 0 to 255
+    /// [default: that of the spec, or 1]
+    #[arg(long, value_name = "X", value_parser = quantity::full_scale)]
+    full_scale: Option<FullScale>,
+    /// Bits of a converter whose codes such captures are: --full-scale 8bits is the same as 8
+    #[arg(long, value_name = "B", value_parser = codes, conflicts_with = "full_scale")]
+    sample_bits: Option<FullScale>,
+}
+
+/// Signed codes of so many bits.
+fn codes(bits: &str) -> Result<FullScale, String> {
+    let scale = quantity::full_scale(&format!("{}bits", bits.trim())).ok();
+    scale
+        .filter(|scale| matches!(scale, FullScale::Signed(_)))
+        .ok_or_else(|| "give the bits of a converter, 1 to 53; for codes from 0 --full-scale u8bits".into())
+}
+
+impl ScaleArgs {
+    /// The full scale, if it is given.
+    pub(super) fn given(self) -> Option<FullScale> {
+        self.full_scale.or(self.sample_bits)
+    }
+
+    /// Refuses a full scale for captures none of which lacks one.
+    pub(super) fn check(self, reader: &MultiReader) -> Result<(), Failure> {
+        check_scale(self.given(), reader)
+    }
+}
+
+/// Refuses a full scale on the command line for captures none of which lacks one.
+pub(super) fn check_scale(given: Option<FullScale>, reader: &MultiReader) -> Result<(), Failure> {
+    match (given, reader.headers().next()) {
+        (Some(scale), Some((input, _))) if reader.headers().all(|(_, header)| header.is_scaled) => {
+            Err(Failure::Usage(format!(
+                "--full-scale {scale}: {} states its full scale by its format; leave the option out",
+                Quoted(input)
+            )))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The option of the commands that read captures of a bank.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct InterleavedArgs {
+    /// The input is one recording of one channel in which M converters take turns: its sample k, counted
+    /// from 0, comes from converter k mod M. Converters count in the order in which they sample, so
+    /// converter 0 is the channel with the largest delay
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    interleaved: Option<u16>,
+}
+
+impl InterleavedArgs {
+    /// True if converters take turns.
+    pub(super) fn is_given(self) -> bool {
+        self.interleaved.is_some()
+    }
+
+    /// What was given, as it is typed.
+    pub(super) fn typed(self) -> String {
+        self.interleaved.map_or_else(String::new, |converters| format!(" --interleaved {converters}"))
+    }
+
+    /// Refuses more than one input, before any file is read.
+    pub(super) fn check(self, inputs: usize) -> Result<(), Failure> {
+        match self.interleaved {
+            Some(converters) if inputs != 1 => Err(Failure::Usage(format!(
+                "--interleaved {converters} reads all converters from one recording, but {inputs} inputs are given; \
+                 give one, or leave out --interleaved"
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// The channels of `bank` in the order in which they sample, if they take turns.
+    pub(super) fn turns(self, bank: &Bank, path: &Path) -> Result<Option<TimeInterleaving>, Failure> {
+        self.by_delay(&bank.delays_in_fast_periods(), &bank.layout(), path)
+    }
+
+    /// Channels of the given delays in the order in which they sample, if they take turns. `path` is the
+    /// file that says so.
+    pub(super) fn by_delay(
+        self,
+        delays: &[FastPeriods],
+        layout: &FrameLayout,
+        path: &Path,
+    ) -> Result<Option<TimeInterleaving>, Failure> {
+        let Some(converters) = self.interleaved else { return Ok(None) };
+        let found = matching::turns(converters.into(), delays, layout);
+        found.map(Some).map_err(|problem| match problem {
+            NotInTurn::Apart { .. } => Failure::of(path, problem),
+            _ => Failure::Usage(format!("--interleaved {converters}: {}: {problem}", Quoted(path))),
+        })
+    }
+}

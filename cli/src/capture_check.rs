@@ -1,0 +1,121 @@
+//! Checks the first frames of a run for captures that contradict the spec of the bank, beside the filters.
+
+use super::event::{Event, Events};
+use hybank::bank::Bank;
+use hybank::calibrate::{Agreement, ENOUGH_FRAMES, Record, agreement, frames_for_agreement};
+use hybank::io::PcmFrames;
+use hybank::runtime::{Frames, Input, Isa};
+use hybank::spec::Spec;
+use std::thread::{Builder, JoinHandle};
+
+/// What the check found.
+#[derive(Debug, Default)]
+pub(super) struct Checked {
+    /// In what the captures contradict the spec.
+    pub(super) warnings: Vec<String>,
+    /// Whether they agree with it, for the end of a run.
+    pub(super) verdict: String,
+}
+
+/// Keeps the first frames and judges them on a thread of its own.
+pub(super) struct CaptureCheck {
+    state: State,
+    /// Frames that are judged.
+    frames: usize,
+    /// Where a warning goes as soon as it is known.
+    events: Option<Events>,
+}
+
+enum State {
+    /// Nothing to compare with, for this reason, or done.
+    Idle(&'static str),
+    Collecting {
+        spec: Box<Spec>,
+        samples: Vec<Vec<f64>>,
+    },
+    Judging(JoinHandle<Checked>),
+}
+
+/// Where no thread can be started, or it died.
+const UNJUDGED: &str = "the captures were not compared with the spec";
+
+impl CaptureCheck {
+    /// For the spec that `bank` carries, if it does, and if the samples are `comparable`. With `events`
+    /// warnings are reported as soon as they are known, after fewer frames, else at the end of the run.
+    pub(super) fn new(bank: &Bank, comparable: bool, events: Option<Events>) -> Self {
+        let channels = bank.channel_count();
+        let state = match bank.spec.clone() {
+            _ if !comparable => State::Idle(
+                "captures are not compared with the spec where they are complex or their delays are followed",
+            ),
+            _ if !bank.layout().is_plain() => {
+                State::Idle("captures of converters with rates of their own are not compared with the spec")
+            }
+            None => State::Idle("the bank carries no spec with which the captures could be compared"),
+            Some(spec) => State::Collecting { spec: Box::new(spec), samples: vec![Vec::new(); channels] },
+        };
+        let frames = frames_for_agreement(channels);
+        let frames = if events.is_some() { frames.min(ENOUGH_FRAMES) } else { frames };
+        Self { state, frames, events }
+    }
+
+    /// Takes the frames of a block until there are enough; nothing after that.
+    pub(super) fn observe(&mut self, recordings: &[PcmFrames<'_>]) {
+        let State::Collecting { samples, .. } = &mut self.state else { return };
+        let known = samples.first().map_or(0, Vec::len);
+        let block = Frames::new(recordings, 0..self.frames - known);
+        let mut numbers = vec![0.0; block.frames() * block.channels()];
+        block.load(Isa::detect(), 0, &mut numbers);
+        for (i, samples) in samples.iter_mut().enumerate() {
+            samples.extend(numbers.iter().skip(i).step_by(block.channels()));
+        }
+        if known + block.frames() >= self.frames {
+            self.judge();
+        }
+    }
+
+    fn judge(&mut self) {
+        let (spec, samples) = match std::mem::replace(&mut self.state, State::Idle(UNJUDGED)) {
+            State::Collecting { spec, samples } => (spec, samples),
+            other => {
+                self.state = other;
+                return;
+            }
+        };
+        let events = self.events.clone();
+        let judge = move || {
+            let found = judged(&spec, samples);
+            if let Some(events) = events {
+                found.warnings.iter().for_each(|text| events.report(Event::Warning { text: text.clone() }));
+            }
+            found
+        };
+        // Without a thread nothing is judged: the run matters more.
+        if let Ok(thread) = Builder::new().spawn(judge) {
+            self.state = State::Judging(thread);
+        }
+    }
+
+    /// What was found, in short runs too.
+    pub(super) fn finish(mut self) -> Checked {
+        self.judge();
+        let idle = |reason: &str| Checked { verdict: reason.to_owned(), ..Checked::default() };
+        match self.state {
+            State::Judging(thread) => thread.join().unwrap_or_else(|_| idle(UNJUDGED)),
+            State::Idle(reason) => idle(reason),
+            State::Collecting { .. } => idle(UNJUDGED),
+        }
+    }
+}
+
+fn judged(spec: &Spec, samples: Vec<Vec<f64>>) -> Checked {
+    let records: Vec<Record> = samples.into_iter().map(Record::new).collect();
+    let Agreement { contradictions, verdict } = agreement(spec, &records);
+    let warnings: Vec<String> = contradictions.iter().map(ToString::to_string).collect();
+    let verdict = match warnings.len() {
+        0 => verdict.to_string(),
+        1 => "the captures do not agree with the spec of the bank, see the warning".to_owned(),
+        count => format!("the captures do not agree with the spec of the bank, see the {count} warnings"),
+    };
+    Checked { warnings, verdict }
+}

@@ -1,0 +1,178 @@
+//! Recordings in memory, with what must be known about their format.
+
+use super::capture_args::check_scale;
+use super::file_kind::unreadable;
+use super::print::{Failure, is_dash, name, warn};
+use crossbeam_channel::Receiver;
+use hybank::io::{MultiReader, ReadOptions, Whole, WholeError};
+use hybank::measure::{Spectrum, Window};
+use hybank::messages::Quoted;
+use hybank::units::Hertz;
+use std::path::{Path, PathBuf};
+
+/// Samples that a measurement reads at most: the spectra of more take several gigabytes.
+pub(super) const MOST_MEASURED: usize = 1 << 26;
+
+/// One channel of a recording.
+#[derive(Debug, Clone)]
+pub(super) struct CaptureFile {
+    pub(super) samples: Vec<f64>,
+    /// The imaginary parts of complex samples, as many; only of [`CaptureFile::read_any`].
+    pub(super) imaginary: Option<Vec<f64>>,
+    pub(super) rate: Hertz,
+    /// Lowest and highest value of integers and codes; `None` for floats.
+    pub(super) rails: Option<(f64, f64)>,
+}
+
+/// How a recording is read.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reading {
+    /// Format and channel; a mono recording needs no channel.
+    pub(super) options: ReadOptions<'static>,
+    /// The rate, if the file states none.
+    pub(super) rate: Option<Hertz>,
+    /// Samples that are read at most.
+    pub(super) most: usize,
+}
+
+impl Reading {
+    /// Channel `channel` (from 1) of a file with a header and a full scale of its own.
+    pub(super) fn channel(channel: Option<usize>, most: usize) -> Self {
+        let only = channel.map(|channel| channel.saturating_sub(1));
+        let options = ReadOptions { only, ..ReadOptions::files() };
+        Self { options, rate: None, most }
+    }
+}
+
+impl CaptureFile {
+    /// Reads a recording of real samples; `-` is standard input.
+    pub(super) fn read(path: &Path, reading: Reading) -> Result<Self, Failure> {
+        Self::read_with(path, reading, Whole::read)
+    }
+
+    /// Reads a recording of real or complex samples; `-` is standard input.
+    pub(super) fn read_any(path: &Path, reading: Reading) -> Result<Self, Failure> {
+        Self::read_with(path, reading, Whole::read_parts)
+    }
+
+    fn read_with(
+        path: &Path,
+        reading: Reading,
+        whole: fn(&mut MultiReader, usize) -> Result<Whole, WholeError>,
+    ) -> Result<Self, Failure> {
+        let mut reader = start(&[path.to_owned()], reading.options, crossbeam_channel::never())?;
+        check_scale(reading.options.full_scale, &reader)?;
+        let channels = reader.channels();
+        if channels != 1 {
+            let file = Quoted(name(path));
+            return Err(Failure::Input(format!(
+                "{file} has {channels} channels, and one is needed; give its number, --channel 1 to {channels}"
+            )));
+        }
+        let header = reader.headers().next().map(|(_, header)| *header);
+        let stated = header.and_then(|header| header.rate).filter(|rate| *rate > 0.0).map(Hertz);
+        let rate = stated.or(reading.rate).ok_or_else(|| {
+            let message = "it states no sample rate; record or convert it with its rate, or give --rate where there is one";
+            Failure::of(path, message)
+        })?;
+        let rails = header.and_then(|header| header.rails);
+        let Whole { channels, is_cut } = whole(&mut reader, reading.most).map_err(unread)?;
+        reader.warnings().iter().for_each(|warning| warn(&warning.to_string()));
+        let mut parts = channels.into_iter();
+        let (samples, imaginary) = (parts.next().unwrap_or_default(), parts.next());
+        if samples.is_empty() {
+            return Err(Failure::of(path, "no samples (the length is zero)"));
+        }
+        if is_cut {
+            warn(&format!("{}: only the first {} samples are used", Quoted(name(path)), samples.len()));
+        }
+        Ok(Self { samples, imaginary, rate, rails })
+    }
+
+    /// The spectrum; what is not finite counts as 0.
+    pub(super) fn spectrum(&self, window: Window) -> Spectrum {
+        let finite: Vec<f64> = self.samples.iter().map(|x| if x.is_finite() { *x } else { 0.0 }).collect();
+        Spectrum::new(&finite, self.rate, window)
+    }
+
+    /// Refuses samples that are not finite.
+    pub(super) fn finite(self, path: &Path) -> Result<Self, Failure> {
+        match self.samples.iter().position(|x| !x.is_finite()) {
+            Some(n) => {
+                let value = self.samples[n];
+                let problem =
+                    format!("sample {n} is {value}; a source must be finite, repair the recording first");
+                Err(Failure::of(path, problem))
+            }
+            None => Ok(self),
+        }
+    }
+
+    /// Leaves out `skip` samples at either end.
+    pub(super) fn trimmed(mut self, path: &Path, skip: usize) -> Result<Self, Failure> {
+        let count = self.samples.len();
+        if 2 * skip >= count {
+            return Err(Failure::Usage(format!(
+                "--skip {skip} leaves nothing of {} with {count} samples; skip fewer than {}",
+                Quoted(name(path)),
+                count.div_ceil(2)
+            )));
+        }
+        for part in [Some(&mut self.samples), self.imaginary.as_mut()].into_iter().flatten() {
+            part.truncate(count - skip);
+            part.drain(..skip);
+        }
+        Ok(self)
+    }
+}
+
+/// The lowest and the highest value of samples, at which they clip: those of their format. If no sample is
+/// beyond full scale, and all are multiples of the distance q from the largest one to 1, a power of two,
+/// they are the steps of a converter and the rails are -1 and 1 - q. `None` for floats some of which are
+/// beyond.
+pub(super) fn rails_of(
+    samples: impl Iterator<Item = f64> + Clone,
+    of_format: Option<(f64, f64)>,
+) -> Option<(f64, f64)> {
+    if samples.clone().any(|x| x.abs() > 1.0) {
+        return of_format;
+    }
+    let top = samples.clone().fold(f64::NEG_INFINITY, f64::max);
+    let step = 1.0 - top;
+    let is_code = |x: f64| x.is_nan() || (x / step).fract() == 0.0;
+    let is_quantised = step > 0.0 && step.log2().fract() == 0.0 && samples.clone().all(is_code);
+    if is_quantised { Some((-1.0, top)) } else { of_format.or(Some((-1.0, 1.0))) }
+}
+
+/// A reader of the headers of all inputs.
+pub(super) fn start(
+    inputs: &[PathBuf],
+    options: ReadOptions<'_>,
+    stop: Receiver<()>,
+) -> Result<MultiReader, Failure> {
+    MultiReader::start(inputs, options, stop).map_err(unreadable)?.ok_or_else(interrupted)
+}
+
+/// Why samples could not be read.
+pub(super) fn unread(error: WholeError) -> Failure {
+    match error {
+        WholeError::Io(error) => Failure::input(error),
+        WholeError::Stopped => interrupted(),
+        error => Failure::input(error),
+    }
+}
+
+fn interrupted() -> Failure {
+    Failure::input("interrupted; nothing was written")
+}
+
+/// Refuses what cannot be read twice.
+pub(super) fn check_files_on_disk(paths: &[PathBuf], option: &str) -> Result<(), Failure> {
+    match paths.iter().find(|path| is_dash(path) || path.metadata().is_ok_and(|found| !found.is_file())) {
+        None => Ok(()),
+        Some(path) => Err(Failure::Usage(format!(
+            "{option} reads inputs and output once more, which {} cannot give; use files",
+            Quoted(name(path))
+        ))),
+    }
+}

@@ -1,0 +1,177 @@
+//! `hybank design`: from a spec file to a bank file.
+
+use super::bank_file::{bad_flag, load_spec};
+use super::design_report::{Judged, Report};
+use super::design_studies::BandHint;
+use super::interrupt::{end_at_interrupt, end_with};
+use super::print::{Failure, InFile, check_strict, is_dash, say, say_understood, show, warn};
+use super::progress::Progress;
+use super::written::{check_outputs, write_text};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use hybank::design::{self, DesignError, Limits, Options};
+use hybank::messages::Quoted;
+use hybank::spec::{DesignOverrides, Method, Reduction, Solver, Spec, Tracking, WordLengths};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// A design is ended between two steps of its searches; so much later it is given up.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Designs the synthesis filters for a spec
+///
+/// The bank file holds the filters, the spec with all defaults filled in, and gamma, the worst-case gain
+/// from the analog input to the error. Four values of gamma are stated, in normalised time: the computed
+/// norm of this bank, an upper bound of its true norm, a lower bound for all banks of that method and size
+/// (lower), and a lower bound for all banks of any latency (noncausal). If a proof of these values was
+/// found, the file holds it too, for `hybank verify`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  hybank design spec.toml -o bank.json
+  hybank design spec.toml -o iir.json --method iir
+  hybank design spec.toml -o bank.json --method h2 --snr 90
+  hybank design spec.toml -o fixed.json --taps 64 --bits 14
+  hybank design spec.toml -o small.json --method iir --order 6
+  hybank design spec.toml -o small.json --method iir --reduction-loss-db 0.5
+  hybank design spec.toml -o - --taps 64 | hybank analyze -")]
+pub(super) struct Args {
+    /// The spec (TOML); `-` is standard input
+    spec: PathBuf,
+    /// The bank file (JSON); `-` is standard output
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Design method, in place of that of the spec
+    #[arg(long, value_parser = named(Method::ALL.map(|method| (method.name(), method))))]
+    method: Option<Method>,
+    /// Taps per channel, in place of those of the spec
+    #[arg(long)]
+    taps: Option<usize>,
+    /// The fewest taps whose SNR is at least this many decibels, signal against error and noise (methods fir
+    /// and h2)
+    #[arg(long, value_name = "DB", conflicts_with = "taps")]
+    snr: Option<f64>,
+    /// Latency in fast samples, in place of that of the spec
+    #[arg(long)]
+    latency: Option<usize>,
+    /// Share by which gamma may exceed its minimum, for a smaller mean-square error and output noise
+    #[arg(long)]
+    gamma_margin: Option<f64>,
+    /// Solver of FIR designs: sampled (on a grid of frequencies, fast) or kyp (bounded-real LMI, a second
+    /// opinion)
+    #[arg(long, value_parser = named(Solver::ALL.map(|solver| (solver.name(), solver))))]
+    solver: Option<Solver>,
+    /// Integer taps of this many bits, sign included; or a list with the bits of each tap (4,6,8,6,4)
+    #[arg(long)]
+    bits: Option<WordLengths>,
+    /// A tap is its integer times 2^-FRACTION_BITS; chosen for the least gamma if left out
+    #[arg(long, allow_negative_numbers = true)]
+    fraction_bits: Option<i32>,
+    /// Taps that follow the delays while the bank runs, optimal over the delays of the spec's [uncertainty]
+    /// (method fir)
+    #[arg(long, value_parser = named(Tracking::ALL.map(|tracking| (tracking.name(), tracking))))]
+    tracking: Option<Tracking>,
+    /// Use at most this many states (methods iir and h2)
+    #[arg(long)]
+    order: Option<usize>,
+    /// Use the fewest states whose error is at most this many decibels above that of the full bank (methods
+    /// iir and h2)
+    #[arg(long, value_name = "DB", conflicts_with = "order")]
+    reduction_loss_db: Option<f64>,
+    /// Design even if the estimate exceeds ten minutes or the memory of the machine
+    #[arg(long)]
+    no_limit: bool,
+    /// Make every warning about the spec and the bank an error
+    #[arg(long)]
+    strict: bool,
+    /// Replace an existing bank file, and write a bank that is of no use: its gamma above 0.9 of that of
+    /// zero output, or less than 10 dB of the signal's SNR
+    #[arg(long)]
+    force: bool,
+    /// Print all figures: gamma with its scale and its bounds, the mean errors, word lengths, order,
+    /// robustness and the proof
+    #[arg(long, short, conflicts_with = "json")]
+    verbose: bool,
+    /// Print a report as one JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+/// By name, so that completions know the names.
+fn named<T: Copy + Send + Sync + 'static, const K: usize>(
+    known: [(&'static str, T); K],
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(known.map(|(name, _)| name)).try_map(move |given| {
+        known.iter().find(|(name, _)| *name == given).map(|&(_, value)| value).ok_or("unknown name")
+    })
+}
+
+fn overrides(args: &Args) -> DesignOverrides {
+    DesignOverrides {
+        method: args.method,
+        taps: args.taps,
+        target_snr_db: args.snr,
+        gamma_margin: args.gamma_margin,
+        solver: args.solver,
+        bits: args.bits.clone(),
+        fraction_bits: args.fraction_bits,
+        tracking: args.tracking,
+        reduction: args.order.map(Reduction::Order).or(args.reduction_loss_db.map(Reduction::Loss)),
+    }
+}
+
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    if args.json && is_dash(&args.output) {
+        let message = "--json and `-o -` both want standard output; write the bank to a file";
+        return Err(Failure::Usage(message.into()));
+    }
+    check_outputs(&[&args.output], &[&args.spec])?;
+    let mut spec = load_spec(&args.spec, overrides(args))?.for_outputs(&[&args.output])?;
+    spec.latency = args.latency.or(spec.latency);
+    // Everything else was checked on reading.
+    spec.check().map_err(|problem| bad_flag("latency", &problem))?;
+    say_understood(Some(&spec));
+    warn_or_refuse(&spec_warnings(&spec, &args.spec), args.strict)?;
+    let begin = Instant::now();
+    end_at_interrupt();
+    let progress = Progress::default();
+    let limits = if args.no_limit { Limits::Off } else { Limits::Enforced };
+    let options =
+        Options { limits, observer: &|stage, seconds| progress.note(stage, seconds), ..Options::default() };
+    let give_up = || give_up(&args.spec, &spec);
+    let limit = limits.time().map(|limit| limit + PATIENCE);
+    let found = progress.during(limit, give_up, || design::design(&spec, &options)).in_file(&args.spec)?;
+    let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
+    let mut judged = Judged::new(&found.bank).in_file(&args.spec)?;
+    if !args.force {
+        judged.check_useful(&found.bank).in_file(&args.spec)?;
+    }
+    warn_or_refuse(&judged.warnings(&found.bank), args.strict)?;
+    write_text(&args.output, &found.bank.to_json().map_err(Failure::input)?, args.force)?;
+    judged.hint = BandHint::new(&found, seconds).in_file(&args.spec)?;
+    let report = Report::new(args.output.display().to_string(), &found, judged, seconds);
+    if is_dash(&args.output) {
+        say(&report.text(args.verbose));
+        return Ok(());
+    }
+    show(&report, args.json, |report| report.text(args.verbose))
+}
+
+/// Ends a design that its time limit cannot end, because one step of it takes too long.
+fn give_up(path: &Path, spec: &Spec) {
+    let error = DesignError::StoppedWithoutBank { remedy: design::remedy(spec) };
+    let Failure::Input(message) = Failure::of(path, error) else { return };
+    end_with(&message);
+}
+
+/// What in the spec is probably not meant. A spec that is wrong is refused by the design.
+fn spec_warnings(spec: &Spec, path: &Path) -> Vec<String> {
+    let found = design::warnings(spec).unwrap_or_default();
+    found.iter().map(|problem| format!("{}: {problem}", Quoted(path))).collect()
+}
+
+/// Prints the warnings; with `strict` the first one is an error.
+fn warn_or_refuse(warnings: &[String], strict: bool) -> Result<(), Failure> {
+    check_strict(warnings, strict)?;
+    warnings.iter().for_each(|warning| warn(warning));
+    Ok(())
+}

@@ -1,0 +1,144 @@
+//! Missing samples on the command line: their replacement, the report, the mask file.
+
+use super::print::Failure;
+use super::print::say_line;
+use super::written::begin_beside;
+use hybank::files::AtomicFile;
+use hybank::io::{LiveLost, LostSamples, MAX_LOST, ReadOptions, Until, is_pipe};
+use hybank::pipeline::{GapPolicy, GapSummary};
+use std::path::{Path, PathBuf};
+
+/// Maximum number of gaps that are listed on standard error.
+const REPORTED: usize = 10;
+
+/// Options of the commands that can fill gaps.
+#[derive(Debug, clap::Args)]
+pub(super) struct GapArgs {
+    /// Fill and report missing samples: hold repeats the last good sample, zero takes 0, and mask takes 0
+    /// and needs --mask. Missing samples are signalled by NaN, by jumps of SigMF `core:global_index`, or by
+    /// --lost
+    #[arg(long, value_enum, value_name = "POLICY")]
+    gaps: Option<Policy>,
+    /// Write one byte per output sample: 1 if a missing sample affects it, 0 if not
+    #[arg(long, value_name = "FILE")]
+    mask: Option<PathBuf>,
+    /// File of JSON lines that name lost samples. {"channel": 1, "sample_start": 5, "global_index": 8}:
+    /// sample 5 of the input was number 8 at the converter. {"channel": 2, "first": 40, "length": 3}:
+    /// samples 40 to 42 are invalid. From a FIFO `stream` takes lines as they come, each before its samples,
+    /// and waits for none
+    #[arg(long, value_name = "FILE")]
+    lost: Option<PathBuf>,
+    /// The most frames (one sample of each channel of an input) that an input may leave out in all; more are
+    /// an error, because a number is probably wrong [default: 67108864]
+    #[arg(long, value_name = "FRAMES")]
+    max_lost: Option<u64>,
+    /// Continue until the last channel ends; the missing ends of the other channels are filled as gaps
+    #[arg(long)]
+    longest: bool,
+}
+
+/// The replacement of a missing sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Policy {
+    /// The last good sample of the channel
+    Hold,
+    /// Zero
+    Zero,
+    /// Zero, and the affected outputs are marked in the mask file
+    Mask,
+}
+
+impl GapArgs {
+    /// Refuses impossible combinations of options, before any file is read.
+    pub(super) fn check(&self) -> Result<(), Failure> {
+        if let (None, Some(option)) = (self.gaps, self.only_with_gaps()) {
+            return Err(Failure::Usage(format!(
+                "{option} is about missing samples, which nothing replaces without --gaps; give --gaps hold, zero or \
+                 mask, or leave {option} out"
+            )));
+        }
+        if self.gaps == Some(Policy::Mask) && self.mask.is_none() {
+            return Err(Failure::Usage("--gaps mask needs --mask FILE for the marks".into()));
+        }
+        if self.mask().is_some_and(|path| path.as_os_str() == "-") {
+            let message = "--mask -: the mask cannot go to standard output; give it a file";
+            return Err(Failure::Usage(message.into()));
+        }
+        Ok(())
+    }
+
+    /// An option that is given and means nothing without --gaps.
+    fn only_with_gaps(&self) -> Option<&'static str> {
+        let given = [
+            ("--mask", self.mask.is_some()),
+            ("--lost", self.lost.is_some()),
+            ("--max-lost", self.max_lost.is_some()),
+            ("--longest", self.longest),
+        ];
+        given.into_iter().find_map(|(option, is_given)| is_given.then_some(option))
+    }
+
+    /// Reads the file of lost samples, if one is given; in a `live` run it begins to read a FIFO and waits
+    /// for nothing.
+    pub(super) fn lost_samples(&self, live: bool) -> Result<Lost, Failure> {
+        match self.lost() {
+            None => Ok(Lost { read: None, live: None }),
+            Some(path) if live && is_pipe(path) => {
+                Ok(Lost { read: None, live: Some(LiveLost::begin(path).map_err(Failure::input)?) })
+            }
+            Some(path) => {
+                Ok(Lost { read: Some(LostSamples::read(path).map_err(Failure::input)?), live: None })
+            }
+        }
+    }
+
+    /// The file of lost samples.
+    pub(super) fn lost(&self) -> Option<&Path> {
+        self.lost.as_deref()
+    }
+
+    /// The mask file.
+    pub(super) fn mask(&self) -> Option<&Path> {
+        self.mask.as_deref()
+    }
+
+    /// The options of reading that concern gaps; the others are those of `options`.
+    pub(super) fn read_options<'a>(&self, lost: &'a Lost, options: ReadOptions<'a>) -> ReadOptions<'a> {
+        let until = if self.longest { Until::Longest } else { Until::Shortest };
+        let (lost, live_lost) = (lost.read.as_ref(), lost.live.as_ref());
+        ReadOptions { lost, live_lost, until, max_lost: self.max_lost.unwrap_or(MAX_LOST), ..options }
+    }
+
+    /// The replacement of a missing sample, if gaps are to be filled.
+    pub(super) fn policy(&self) -> Option<GapPolicy> {
+        self.gaps.map(|policy| match policy {
+            Policy::Hold => GapPolicy::Hold,
+            Policy::Zero | Policy::Mask => GapPolicy::Zero,
+        })
+    }
+
+    /// Begins the mask file.
+    pub(super) fn begin_mask(&self, force: bool) -> Result<Option<AtomicFile>, Failure> {
+        self.mask().map(|path| begin_beside(path, force)).transpose()
+    }
+}
+
+/// What `--lost` says: now, or during the run.
+#[derive(Debug)]
+pub(super) struct Lost {
+    read: Option<LostSamples>,
+    live: Option<LiveLost>,
+}
+
+/// Reports the gaps on standard error; only how many, if they were said during the run.
+pub(super) fn say_gaps(gaps: &GapSummary, are_said: bool) {
+    if are_said {
+        return say_line(&format!("gap: {} in all, {} samples missing", gaps.count, gaps.missing));
+    }
+    for gap in gaps.list.iter().take(REPORTED) {
+        say_line(&format!("gap: channel {}, sample {}, {} missing", gap.channel, gap.first, gap.length));
+    }
+    if gaps.count > REPORTED as u64 {
+        say_line(&format!("gap: {} in all; --json lists them", gaps.count));
+    }
+}

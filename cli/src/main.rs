@@ -1,0 +1,206 @@
+//! The program `hybank`: one file per command; the only place that prints.
+// Printing macros panic where their output cannot be written.
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
+mod align;
+mod align_report;
+mod analyze;
+mod bank_file;
+mod before_after;
+mod bit_true;
+mod calibrate;
+mod calibrate_report;
+mod capture_args;
+mod capture_check;
+mod capture_file;
+mod contenders;
+mod demo;
+mod design;
+mod design_report;
+mod design_studies;
+mod event;
+mod export;
+mod file_kind;
+mod fuse;
+mod gaps;
+mod import;
+mod interrupt;
+mod match_bank;
+mod measure;
+mod measure_report;
+mod observer;
+mod output;
+mod plot;
+mod print;
+mod progress;
+mod remedy;
+mod report;
+mod run;
+mod simulate;
+mod stream;
+mod texts;
+mod track;
+mod verify;
+mod virtual_converters;
+mod virtual_signal;
+mod worst_case;
+mod written;
+
+use clap::builder::StyledStr;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use hybank::files::StandardStream;
+use hybank::memory::check_memory;
+use hybank::messages::usage;
+use print::Failure;
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+// Before `main`: the standard library then opens /dev/null in the place of a closed stream, and what a
+// parent opened there by itself (Python's `subprocess.DEVNULL`, daemons) has the same flags, position and
+// inode, so nothing tells the two apart later. The macro allows itself the unsafe code that this takes.
+ctor::declarative::ctor! {
+    #[ctor(unsafe)]
+    fn note_closed_streams() {
+        hybank::files::note_closed_streams();
+    }
+}
+
+/// Lets several slow, imperfectly timed converters do the work of one fast converter
+///
+/// hybank designs the digital filters that fuse slow captures into one fast signal with the least worst-case
+/// error. It proves how good these filters are, and it runs them.
+#[derive(Debug, Parser)]
+#[command(
+    name = "hybank",
+    version,
+    disable_help_subcommand = true,
+    after_help = "\
+Examples:
+  hybank demo
+  hybank init -o spec.toml
+  hybank help spec
+  hybank design spec.toml -o bank.json
+  hybank verify bank.json
+  hybank simulate bank.json --source chirp:50Hz..8kHz@1s -o captures
+  hybank fuse bank.json captures/ch1.wav captures/ch2.wav -o fused.wav
+  hybank measure fused.wav --ref captures/target.wav
+
+Exit codes: 0 done; 1 the input or the design failed; 2 wrong usage."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Init(texts::InitArgs),
+    Design(design::Args),
+    Analyze(analyze::Args),
+    Verify(verify::Args),
+    Plot(plot::Args),
+    Report(report::Args),
+    Import(import::Args),
+    Export(export::Args),
+    Simulate(simulate::Args),
+    Calibrate(calibrate::Args),
+    Align(align::Args),
+    Fuse(fuse::Args),
+    Measure(measure::Args),
+    Stream(stream::Args),
+    Demo(demo::Args),
+    Completions(texts::CompletionsArgs),
+    Man(texts::ManArgs),
+    Schema(texts::SchemaArgs),
+    Help(texts::HelpArgs),
+}
+
+/// Runs the command that was typed; the exit code is 0 (done), 1 (the input or the design failed) or
+/// 2 (wrong usage).
+fn main() -> ExitCode {
+    #[cfg(unix)]
+    hybank::files::fail_at_file_size_limit();
+    match parsed() {
+        Ok(cli) => match check_base().and_then(|()| dispatch(cli.command)) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(failure) => failure.report(),
+        },
+        Err(message) => show(&message),
+    }
+}
+
+/// The arguments that were typed.
+fn parsed() -> Result<Cli, clap::Error> {
+    let matches = Cli::command().mut_subcommands(taking_negative_values).try_get_matches()?;
+    Cli::from_arg_matches(&matches)
+}
+
+/// What follows an option is its value, a negative one too, so the message about it says what is wrong with
+/// it. After an option that takes a path it is the next option.
+fn taking_negative_values(command: clap::Command) -> clap::Command {
+    let path = clap::value_parser!(PathBuf).type_id();
+    command.mut_args(|arg| {
+        let has_value = !arg.is_positional() && arg.get_action().takes_values();
+        let is_path = arg.get_value_parser().type_id() == path;
+        if has_value && !is_path { arg.allow_hyphen_values(true) } else { arg }
+    })
+}
+
+/// An argument as it was typed, and as clap shows it: without the sequences that colour a terminal.
+fn as_shown(argument: OsString) -> [String; 2] {
+    let typed = argument.to_string_lossy().into_owned();
+    [StyledStr::from(typed.clone()).to_string(), typed]
+}
+
+/// Bytes that a command takes whatever its input: threads, blocks of samples, pictures.
+const BASE_BYTES: f64 = 24e6;
+
+/// Refuses to begin where the process may not even use that.
+fn check_base() -> Result<(), Failure> {
+    check_memory(BASE_BYTES)
+        .map_err(|shortage| Failure::Input(format!("a run takes {shortage}; raise the limit of its memory")))
+}
+
+/// Shows help, version, or what is wrong with the usage.
+fn show(message: &clap::Error) -> ExitCode {
+    let open = if message.use_stderr() { Ok(()) } else { StandardStream::Output.check() };
+    let text = message.to_string();
+    let quoted = usage(&text, std::env::args_os().flat_map(as_shown));
+    // Only clap knows the colours.
+    let print = || match quoted == text {
+        true => message.print(),
+        false => {
+            print::say(&quoted);
+            Ok(())
+        }
+    };
+    match open.and_then(|()| print()) {
+        Err(error) if !message.use_stderr() => print::print_failure(&error).report(),
+        _ => ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2)),
+    }
+}
+
+fn dispatch(command: Command) -> Result<(), Failure> {
+    match command {
+        Command::Init(args) => texts::init(&args),
+        Command::Design(args) => design::run(&args),
+        Command::Analyze(args) => analyze::run(&args),
+        Command::Verify(args) => verify::run(&args),
+        Command::Plot(args) => plot::run(&args),
+        Command::Report(args) => report::run(&args),
+        Command::Import(args) => import::run(&args),
+        Command::Export(args) => export::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
+        Command::Align(args) => align::run(&args),
+        Command::Fuse(args) => fuse::run(&args),
+        Command::Measure(args) => measure::run(&args),
+        Command::Stream(args) => stream::run(&args),
+        Command::Demo(args) => demo::run(&args),
+        Command::Completions(args) => texts::completions(&args),
+        Command::Man(args) => texts::man(&args),
+        Command::Schema(args) => texts::schema(&args),
+        Command::Help(args) => texts::help(&args),
+    }
+}

@@ -1,0 +1,194 @@
+//! `hybank measure`: the quality of a recording.
+
+use super::capture_args::CaptureArgs;
+use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, rails_of};
+use super::match_bank::check_stdin;
+use super::measure_report::{ReferenceReport, Report, warnings};
+use super::plot::PictureFormat;
+use super::print::{Failure, InFile, is_dash, name, show, warn};
+use super::written::{check_outputs, write_bytes};
+use hybank::io::is_same_rate;
+use hybank::measure::{MeasureError, Measurement, Settings, Window, compare, measure, measure_complex};
+use hybank::messages::Quoted;
+use hybank::overview::{Drawn, spur_chart};
+use hybank::quantity;
+use hybank::units::Hertz;
+use std::path::{Path, PathBuf};
+
+/// Measures a recording of a tone: SINAD, ENOB, SNR, THD, SFDR, noise density and spurs with their causes
+///
+/// The figures come from a least-squares fit of the tone (IEEE 1057 and 1241), so the tone need not lie on a
+/// bin of the spectrum. Tones of complex samples have a sign, and their image is a spur (I/Q imbalance).
+/// With --ref the recording is compared with another one of the same signal: lag, gain, SNR and error.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  hybank measure capture.wav
+  hybank measure capture.wav --interleaved 4 --tone 9.7MHz --plot spectrum.svg
+  hybank measure fused.wav --skip 200 --json | jq .sinad_db
+  hybank measure fused.wav --ref captures/target.wav")]
+pub(super) struct Args {
+    /// The recording (WAV, SigMF, .csv, .npy, .mat, or raw with --format); `-` is standard input
+    file: PathBuf,
+    /// Tones of the recording (9kHz, 1.2GHz, or hertz), in any Nyquist zone, to within 0.1 % of the sample
+    /// rate, of complex samples also negative; auto: the largest tone [default: auto, or none with --ref]
+    #[arg(long, value_name = "F,..", value_delimiter = ',', value_parser = tone, allow_hyphen_values = true)]
+    tone: Vec<ToneArg>,
+    /// Number of converters that take turns in the recording: tells which spurs are interleaving spurs
+    #[arg(long, value_name = "M", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    interleaved: u16,
+    /// Window of the spectrum (SFDR, noise density, plot); SINAD, THD and the spurs need none
+    #[arg(long, value_enum, default_value_t)]
+    window: Window,
+    /// Highest order of the harmonics in THD
+    #[arg(long, value_name = "H", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    harmonics: u16,
+    /// A recording of the same signal to compare with, of the same rate; --format and the other options of
+    /// the recording hold for it too, unless its name says its format
+    #[arg(long = "ref", value_name = "TARGET")]
+    reference: Option<PathBuf>,
+    #[command(flatten)]
+    reading: CaptureArgs,
+    /// Sample rate of a recording that states none (48kHz, 1GS/s, or hertz)
+    #[arg(long, value_name = "F", value_parser = rate)]
+    rate: Option<Hertz>,
+    /// Samples at either end that are not measured, such as those before a filter has settled
+    #[arg(long, value_name = "SAMPLES", default_value_t = 0)]
+    skip: usize,
+    /// Write the spectrum with its spurs: PNG if the name ends in .png, else SVG
+    #[arg(long, value_name = "OUT.svg|.png")]
+    plot: Option<PathBuf>,
+    /// Replace an existing plot
+    #[arg(long)]
+    force: bool,
+    /// Print the figures as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// A tone on the command line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum ToneArg {
+    /// The largest one.
+    Auto,
+    /// The one near a frequency.
+    Near(Hertz),
+}
+
+fn rate(text: &str) -> Result<Hertz, String> {
+    match quantity::rate(text) {
+        Ok(rate) if rate.0 > 0.0 => Ok(rate),
+        Ok(rate) => Err(format!("the rate is {rate}; give one above 0")),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// Reads `auto` or a frequency other than 0.
+pub(super) fn tone(text: &str) -> Result<ToneArg, String> {
+    if text.trim() == "auto" {
+        return Ok(ToneArg::Auto);
+    }
+    match quantity::frequency(text) {
+        Ok(frequency) if frequency.0 != 0.0 => Ok(ToneArg::Near(frequency)),
+        Ok(frequency) => Err(format!("the tone is at {frequency}; give a frequency other than 0, or auto")),
+        Err(error) => Err(format!("{error}; or auto")),
+    }
+}
+
+/// The tones for [`Settings::tones`]: none for the largest one.
+pub(super) fn tones(given: &[ToneArg]) -> Result<Vec<Hertz>, Failure> {
+    let near = given.iter().filter_map(|tone| match tone {
+        ToneArg::Auto => None,
+        ToneArg::Near(frequency) => Some(*frequency),
+    });
+    let tones: Vec<Hertz> = near.collect();
+    if !tones.is_empty() && tones.len() < given.len() || given.len() > tones.len() + 1 {
+        return Err(Failure::Usage("--tone is `auto` or a list of frequencies, not both".into()));
+    }
+    Ok(tones)
+}
+
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    args.check()?;
+    let capture = CaptureFile::read_any(&args.file, args.reading())?.trimmed(&args.file, args.skip)?;
+    if capture.imaginary.is_some() && args.reference.is_some() {
+        let problem = "complex samples, and --ref compares real ones; extract a part of both recordings";
+        return Err(Failure::of(&args.file, problem));
+    }
+    let settings = args.settings(&capture)?;
+    let is_measured = args.reference.is_none() || !args.tone.is_empty();
+    let measurement = is_measured.then(|| measured(&capture, &settings)).transpose().in_file(&args.file)?;
+    let reference = args.reference.as_ref().map(|path| args.compared(&capture, path)).transpose()?;
+    let warnings = measurement.as_ref().map(warnings).unwrap_or_default();
+    let report = Report { file: name(&args.file), measurement, reference, warnings };
+    if let Some(path) = &args.plot {
+        let comparison = report.reference.as_ref().map(|of| (of.file.as_str(), &of.comparison));
+        let drawn = Drawn { label: &report.file, measurement: report.measurement.as_ref(), comparison };
+        let (chart, marks) = spur_chart(drawn, &settings, || capture.spectrum(settings.window));
+        let format = PictureFormat::of(path).unwrap_or(PictureFormat::Svg);
+        write_bytes(path, &format.file(&chart, &marks).in_file(&args.file)?, args.force)?;
+    }
+    report.warnings.iter().for_each(|warning| warn(&format!("{}: {warning}", Quoted(&report.file))));
+    show(&report, args.json, Report::text)
+}
+
+fn measured(capture: &CaptureFile, settings: &Settings) -> Result<Measurement, MeasureError> {
+    match &capture.imaginary {
+        None => measure(&capture.samples, capture.rate, settings),
+        Some(imaginary) => measure_complex(&capture.samples, imaginary, capture.rate, settings),
+    }
+}
+
+impl Args {
+    /// Refuses impossible combinations of options, before any file is read.
+    fn check(&self) -> Result<(), Failure> {
+        self.reading.check(false)?;
+        let inputs: Vec<&Path> =
+            [Some(&self.file), self.reference.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+        if let Some(plot) = &self.plot {
+            if is_dash(plot) {
+                let message = "the figures go to standard output; write the plot to a file";
+                return Err(Failure::Usage(format!("--plot -: {message}")));
+            }
+            check_outputs(&[plot], &inputs)?;
+        }
+        check_stdin(inputs.into_iter())
+    }
+
+    fn reading(&self) -> Reading {
+        let options = self.reading.options(1, 1);
+        Reading { options, rate: self.rate, most: MOST_MEASURED }
+    }
+
+    fn settings(&self, capture: &CaptureFile) -> Result<Settings, Failure> {
+        let all = capture.samples.iter().chain(capture.imaginary.iter().flatten()).copied();
+        Ok(Settings {
+            tones: tones(&self.tone)?,
+            converters: self.interleaved.into(),
+            harmonics: self.harmonics.into(),
+            rails: rails_of(all, capture.rails).unwrap_or((f64::NEG_INFINITY, f64::INFINITY)),
+            window: self.window,
+            ..Settings::default()
+        })
+    }
+
+    fn compared(&self, capture: &CaptureFile, path: &Path) -> Result<ReferenceReport, Failure> {
+        let options = self.reading.of_reference(&self.file, path);
+        let reading = Reading { options, ..self.reading() };
+        let reference = CaptureFile::read(path, reading)?.trimmed(path, self.skip)?;
+        let file = Quoted(name(&self.file));
+        let (own, other) = (capture.rate, reference.rate);
+        if !is_same_rate(other.0, own.0, 0.0) {
+            return Err(Failure::of(
+                path,
+                format!(
+                    "the sample rate is {other}, but {file} has {own}; a comparison needs one rate, resample one of them"
+                ),
+            ));
+        }
+        let comparison = compare(&capture.samples, &reference.samples, own, self.window);
+        let comparison = comparison
+            .map_err(|error| Failure::Input(format!("{file} against {}: {error}", Quoted(name(path)))))?;
+        Ok(ReferenceReport { file: name(path), comparison })
+    }
+}

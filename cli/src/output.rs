@@ -1,0 +1,125 @@
+//! The format of output samples, and the files that a run writes.
+
+use super::print::{Failure, is_dash};
+use super::print::{name_leftovers, warn};
+use hybank::files::refuse_overlaps;
+use hybank::io::{
+    Container, IoError, OutputHeader, PcmFormat, SampleWriter, is_pipe, is_sigmf, mat_variable, sigmf_files,
+};
+use hybank::messages::Quoted;
+use hybank::runtime::Precision;
+use std::path::Path;
+
+/// Sample formats of a WAV output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Bits {
+    /// 16-bit integers
+    #[value(name = "16")]
+    I16,
+    /// 24-bit integers
+    #[value(name = "24")]
+    I24,
+    /// 32-bit integers
+    #[value(name = "32")]
+    I32,
+    /// 32-bit floats
+    #[value(name = "32f")]
+    F32,
+    /// 64-bit floats
+    #[value(name = "64f")]
+    F64,
+}
+
+impl Bits {
+    /// The sample format of this width.
+    pub(super) fn format(self) -> PcmFormat {
+        match self {
+            Self::I16 => PcmFormat::S16Le,
+            Self::I24 => PcmFormat::S24Le,
+            Self::I32 => PcmFormat::S32Le,
+            Self::F32 => PcmFormat::F32Le,
+            Self::F64 => PcmFormat::F64Le,
+        }
+    }
+}
+
+/// Formats with more digits than f32 need sums in f64.
+pub(super) fn precision(format: PcmFormat) -> Precision {
+    use PcmFormat::{F64Be, F64Le, S32Be, S32Le};
+    if matches!(format, F64Be | F64Le | S32Be | S32Le) { Precision::Double } else { Precision::Single }
+}
+
+/// Begins an output of samples, and says what its header cannot.
+pub(super) fn begin_samples(path: &Path, header: OutputHeader, force: bool) -> Result<SampleWriter, IoError> {
+    let writer = SampleWriter::create(path, header, force)?;
+    writer.warning().into_iter().for_each(warn);
+    Ok(writer)
+}
+
+/// Encoded formats, which are not written.
+const ENCODED: [&str; 9] = ["flac", "mp3", "ogg", "oga", "opus", "m4a", "aac", "aif", "aiff"];
+/// Endings of WAV files.
+pub(super) const WAV: [&str; 4] = ["wav", "wave", "bwf", "rf64"];
+/// Formats with a structure, which are not written either.
+const STRUCTURED: [&str; 10] = ["npy", "npz", "mat", "csv", "txt", "json", "toml", "h5", "hdf5", "zip"];
+
+/// Whether the name of a file says that it is WAV; pipes have any name.
+pub(super) fn is_wav(output: &Path) -> bool {
+    let extension = output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    WAV.contains(&extension.to_ascii_lowercase().as_str()) && !is_pipe(output)
+}
+
+/// Refuses a name that promises another format than the one written; pipes have any name.
+fn check_extension(output: &Path, container: Container) -> Result<(), Failure> {
+    let extension = output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    let extension = extension.to_ascii_lowercase();
+    let remedy = match (extension.as_str(), container) {
+        _ if is_pipe(output) => return Ok(()),
+        ("sigmf-meta", _) => return Ok(()),
+        ("sigmf" | "sigmf-data", _) => {
+            format!("name it {}", Quoted(output.with_extension("sigmf-meta")))
+        }
+        (encoded, _) if ENCODED.contains(&encoded) => {
+            format!("write it to a pipe: hybank fuse .. -o - | sox -t wav - {}", Quoted(output))
+        }
+        (other, Container::Wav) if other.is_empty() || WAV.contains(&other) || is_pipe(output) => {
+            return Ok(());
+        }
+        (_, Container::Wav) => {
+            let raw = "hybank stream BANK.json --input CH1.wav .. --output-format f32le";
+            format!("name it {}, or write raw samples: {raw}", Quoted(output.with_extension("wav")))
+        }
+        (wav, Container::Raw) if WAV.contains(&wav) => "give --output-format wav".to_owned(),
+        (other, Container::Raw) if STRUCTURED.contains(&other) => {
+            format!("name it {}", Quoted(output.with_extension("raw")))
+        }
+        _ => return Ok(()),
+    };
+    let written = if container == Container::Wav { "WAV" } else { "raw samples" };
+    let (name, extension) = (Quoted(output), Quoted(&extension));
+    Err(Failure::Usage(format!("{name}: the output is {written}, not {extension}; {remedy}")))
+}
+
+/// Checks that no output of a run is also an input or another output, and that the name of the samples says
+/// what they are in.
+pub(super) fn check_files(
+    output: &Path,
+    container: Container,
+    others: &[&Path],
+    inputs: &[&Path],
+) -> Result<(), Failure> {
+    let mut outputs = SampleWriter::files(output);
+    outputs.extend(others.iter().copied().filter(|path| !is_dash(path)).map(Path::to_owned));
+    let outputs: Vec<_> = outputs.iter().map(|path| path.as_path()).collect();
+    // A SigMF recording has two files, and only one of them is named.
+    let pairs: Vec<_> =
+        inputs.iter().filter(|path| is_sigmf(path)).flat_map(|path| sigmf_files(path)).collect();
+    // Of x.mat:name the file is x.mat.
+    let arrays: Vec<_> = inputs.iter().filter_map(|path| mat_variable(path)).map(|(file, _)| file).collect();
+    let more = pairs.iter().chain(&arrays).map(|path| path.as_path());
+    let inputs: Vec<_> = inputs.iter().copied().chain(more).collect();
+    refuse_overlaps(&outputs, &inputs).map_err(Failure::input)?;
+    check_extension(output, container)?;
+    name_leftovers(&outputs);
+    Ok(())
+}

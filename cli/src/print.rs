@@ -1,0 +1,170 @@
+//! All that the commands say: results on standard output, messages on standard error, and the one message of
+//! a failure.
+
+use super::remedy::explained;
+use hybank::files::{StandardStream, leftovers};
+use hybank::messages::{Quoted, printable, shown};
+use hybank::overview::understood;
+use hybank::pipeline::PipelineError;
+use hybank::spec::Spec;
+use std::fmt::Display;
+use std::io::{ErrorKind, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// A failure with the one message that the user sees.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Failure {
+    /// The input or the design failed: exit code 1.
+    Input(String),
+    /// Wrong usage: exit code 2.
+    Usage(String),
+    /// The reader of the output closed the pipe: end without a message.
+    ClosedPipe,
+}
+
+impl Failure {
+    /// A failure of the input with `message`.
+    pub(crate) fn input(message: impl Display + 'static) -> Self {
+        Self::Input(explained(&message))
+    }
+
+    /// A failure of the file at `path`.
+    pub(super) fn of(path: &Path, problem: impl Display + 'static) -> Self {
+        Self::Input(format!("{}: {}", Quoted(name(path)), explained(&problem)))
+    }
+
+    /// A failure of a run. A closed output pipe is not reported as an error.
+    pub(super) fn running(error: impl Into<PipelineError>) -> Self {
+        match error.into() {
+            error if error.is_closed_pipe() => Self::ClosedPipe,
+            error => Self::input(error),
+        }
+    }
+
+    /// Names what a failed run has left of what cannot be recorded again.
+    pub(super) fn with_remains(self, files: &[PathBuf]) -> Self {
+        let is_something = |file: &&PathBuf| file.metadata().is_ok_and(|found| found.len() > 0);
+        let names: Vec<String> =
+            files.iter().filter(is_something).map(|file| file.display().to_string()).collect();
+        match self {
+            Self::Input(message) if !names.is_empty() => {
+                Self::Input(format!("{message}; what was recorded is in {}", names.join(" and ")))
+            }
+            other => other,
+        }
+    }
+
+    /// Prints the message and gives the exit code.
+    pub(crate) fn report(&self) -> ExitCode {
+        let (message, code) = match self {
+            Self::Input(message) => (message, 1),
+            Self::Usage(message) => (message, 2),
+            Self::ClosedPipe => return ExitCode::SUCCESS,
+        };
+        say_line(message);
+        ExitCode::from(code)
+    }
+}
+
+/// Results whose errors are about a file.
+pub(super) trait InFile<T> {
+    /// Names the file before the error.
+    fn in_file(self, path: &Path) -> Result<T, Failure>;
+}
+
+impl<T, E: Display + 'static> InFile<T> for Result<T, E> {
+    fn in_file(self, path: &Path) -> Result<T, Failure> {
+        self.map_err(|error| Failure::of(path, error))
+    }
+}
+
+/// Results on standard output; a closed pipe ends the run without a message.
+pub(super) fn print(text: &str) -> Result<(), Failure> {
+    print_bytes(text.as_bytes())
+}
+
+/// As [`print`], for any bytes.
+pub(super) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
+    let mut stdout = hybank::io::stdout();
+    let written = StandardStream::Output.check().and_then(|()| stdout.write_all(bytes));
+    written.and_then(|()| stdout.flush()).map_err(|error| print_failure(&error))
+}
+
+/// One JSON object on standard output.
+pub(super) fn print_json(report: &impl serde::Serialize) -> Result<(), Failure> {
+    print(&(serde_json::to_string(report).map_err(Failure::input)? + "\n"))
+}
+
+/// A report: as one JSON object, or as text.
+pub(super) fn show<R: serde::Serialize>(
+    report: &R,
+    json: bool,
+    text: impl FnOnce(&R) -> String,
+) -> Result<(), Failure> {
+    if json { print_json(report) } else { print(&printable(&text(report))) }
+}
+
+/// Why standard output could not be written.
+pub(super) fn print_failure(error: &std::io::Error) -> Failure {
+    match error.kind() {
+        ErrorKind::BrokenPipe => Failure::ClosedPipe,
+        _ => Failure::Input(format!("standard output: cannot write it: {error}")),
+    }
+}
+
+/// Prints text to standard error. Errors are ignored, so that no result is lost.
+pub(super) fn say(text: &str) {
+    put(&printable(text));
+}
+
+/// A line on standard error with the program's name before it.
+pub(super) fn say_line(line: &str) {
+    put(&format!("hybank: {}\n", shown(line)));
+}
+
+/// One JSON object on standard error.
+pub(super) fn say_json(report: &impl serde::Serialize) -> Result<(), Failure> {
+    put(&(serde_json::to_string(report).map_err(Failure::input)? + "\n"));
+    Ok(())
+}
+
+/// Every word on standard error comes this way, and nothing foreign is left in it.
+fn put(text: &str) {
+    let _ = hybank::io::stderr().write_all(text.as_bytes());
+}
+
+/// A warning on standard error.
+pub(super) fn warn(warning: &str) {
+    say_line(&format!("warning: {warning}"));
+}
+
+/// With `strict` the first warning is an error.
+pub(super) fn check_strict(warnings: &[String], strict: bool) -> Result<(), Failure> {
+    match warnings.first() {
+        Some(first) if strict => Err(Failure::Input(format!("{first} (an error because of --strict)"))),
+        _ => Ok(()),
+    }
+}
+
+/// What was understood from a spec, where a person reads it.
+pub(super) fn say_understood(spec: Option<&Spec>) {
+    if std::io::stderr().is_terminal() {
+        spec.iter().for_each(|spec| say(&format!("{}\n", understood(spec))));
+    }
+}
+
+/// Names the unfinished files that killed runs left beside `outputs`.
+pub(super) fn name_leftovers(outputs: &[&Path]) {
+    leftovers(outputs).iter().for_each(|left| warn(&left.to_string()));
+}
+
+/// Whether a path stands for standard input or output.
+pub(super) fn is_dash(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// The name of a file in messages.
+pub(super) fn name(path: &Path) -> String {
+    if is_dash(path) { "standard input".to_owned() } else { path.display().to_string() }
+}

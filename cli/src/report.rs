@@ -1,0 +1,108 @@
+//! `hybank report`: all that is known of a bank, on one page.
+
+use super::bank_file::load;
+use super::capture_args::{CaptureArgs, InterleavedArgs};
+use super::capture_file::{start, unread};
+use super::match_bank::output_rate;
+use super::print::{Failure, name, warn};
+use super::written::{check_outputs, write_text};
+use hybank::bank::Bank;
+use hybank::design::DesignError;
+use hybank::io::{ReadOptions, Whole};
+use hybank::overview::page::{CapturesOnPage, MOST_FRAMES, Page, PageError};
+use hybank::units::Hertz;
+use std::path::{Path, PathBuf};
+
+/// Writes a page (HTML) about a bank: what it is for, its error with the proven bounds, its filters, its
+/// cost
+///
+/// The page is one file that loads nothing. With captures it also shows their spectra, plainly interleaved
+/// and fused by the bank, and of a tone the figures and the spurs before and after.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  hybank report bank.json -o report.html
+  hybank report bank.json ch1.wav ch2.wav -o report.html
+  hybank report quad.json codes.csv --interleaved 4 --sample-bits 8 -o report.html")]
+pub(super) struct Args {
+    /// The bank (JSON)
+    bank: PathBuf,
+    /// Captures to fuse, as `hybank fuse` takes them: one mono file per channel, or one of N channels
+    inputs: Vec<PathBuf>,
+    /// The page; `-` is standard output
+    #[arg(short, long)]
+    output: PathBuf,
+    #[command(flatten)]
+    reading: CaptureArgs,
+    #[command(flatten)]
+    turns: InterleavedArgs,
+    /// Replace an existing file
+    #[arg(long)]
+    force: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    args.reading.check(args.turns.is_given())?;
+    args.turns.check(args.inputs.len())?;
+    let inputs: Vec<&Path> = args.inputs.iter().chain([&args.bank]).map(PathBuf::as_path).collect();
+    check_outputs(&[&args.output], &inputs)?;
+    let bank = load(&args.bank)?;
+    if bank.spec.is_none() {
+        return Err(Failure::of(&args.bank, DesignError::NoSpec));
+    }
+    let captures = if args.inputs.is_empty() { None } else { Some(args.captures(&bank)?) };
+    let page = Page::new(&bank, captures).map_err(|error| of_page(&args.bank, error))?;
+    write_text(&args.output, &page.html(&args.commands()), args.force)
+}
+
+/// A failure of the bank in the file `path`.
+fn of_page(path: &Path, error: PageError) -> Failure {
+    match error {
+        PageError::Design(error) => Failure::of(path, error),
+        PageError::Fuse(error) => Failure::running(error),
+        error => Failure::of(path, error),
+    }
+}
+
+impl Args {
+    /// The command lines that lead to what the page shows.
+    fn commands(&self) -> Vec<String> {
+        let bank = self.bank.display();
+        let inputs: String = self.inputs.iter().map(|path| format!(" {}", path.display())).collect();
+        let inputs = inputs + &self.reading.typed() + &self.turns.typed();
+        let mut commands = vec![
+            "hybank design spec.toml -o bank.json  # the spec above, saved as spec.toml".to_owned(),
+            format!("hybank verify {bank}"),
+            format!("hybank analyze {bank} --sensitivity"),
+            format!("hybank plot {bank} -o pictures"),
+        ];
+        if !self.inputs.is_empty() {
+            commands.push(format!("hybank fuse {bank}{inputs} -o fused.wav"));
+        }
+        commands.push(format!("hybank report {bank}{inputs} -o {}", self.output.display()));
+        commands
+    }
+
+    /// The captures, fused by `bank`.
+    fn captures(&self, bank: &Bank) -> Result<CapturesOnPage, Failure> {
+        let full_scale = bank.spec.as_ref().and_then(|spec| spec.full_scale);
+        let turns = self.turns.turns(bank, &self.bank)?;
+        let captures = self.reading.options(self.inputs.len(), bank.channel_count());
+        let full_scale = captures.full_scale.or(full_scale);
+        let captures = ReadOptions { full_scale, interleaving: turns.as_ref(), ..captures };
+        let mut reader = start(&self.inputs, captures, crossbeam_channel::never())?;
+        self.reading.scale.check(&reader)?;
+        let rate = Hertz(output_rate(bank, &self.bank, &reader)?);
+        let Whole { channels, is_cut } = Whole::read(&mut reader, MOST_FRAMES).map_err(unread)?;
+        reader.warnings().iter().for_each(|warning| warn(&warning.to_string()));
+        let names = self.inputs.iter().map(|input| name(input)).collect::<Vec<_>>().join(", ");
+        let frames = channels.iter().map(Vec::len).min().unwrap_or(0);
+        if is_cut {
+            warn(&format!("{names}: only the first {frames} frames are on the page"));
+        }
+        CapturesOnPage::new(bank, rate, channels, is_cut).map_err(|error| match error {
+            PageError::Short { .. } => Failure::Input(format!("{names}: {error}")),
+            error => of_page(&self.bank, error),
+        })
+    }
+}

@@ -1,0 +1,440 @@
+//! How `fuse` and `stream` run a bank: their common options, the run from its plan to its files, the report.
+
+use super::bank_file;
+use super::capture_args::{InterleavedArgs, ScaleArgs};
+use super::file_kind::unreadable;
+use super::gaps::{GapArgs, say_gaps};
+use super::interrupt::interrupts;
+use super::match_bank;
+use super::observer::{ObserverArgs, RunObserver};
+use super::output::{begin_samples, check_files, precision};
+use super::print::print_json;
+use super::print::{Failure, is_dash};
+use super::print::{say_json, warn};
+use super::track::{TrackArgs, TrackRecord, Tracked};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use hybank::bank::Bank;
+use hybank::io::{
+    Arrival, BLOCK_BYTES, Container, MultiReader, OutputHeader, OutputNotes, PcmFormat, PcmFrames, Placement,
+    ReadOptions, is_sigmf,
+};
+use hybank::pipeline::matching;
+use hybank::pipeline::{DroppedLatency, FileOutputs, GapSummary, Outcome, Pipeline, Settings, Warning};
+use hybank::runtime::{Algorithm, Input, Options, Plan, PlanSummary, ThreadPool};
+use std::path::{Path, PathBuf};
+
+/// Options of the commands that fuse.
+#[derive(Debug, clap::Args)]
+pub(super) struct RunArgs {
+    /// Algorithm of FIR filters; auto is the fastest for the bank, and direct with --gaps, with --track, and
+    /// in `stream`, because overlap-save adds latency (--json says how much)
+    #[arg(long, value_parser = algorithms(), default_value_t = Algorithm::Auto)]
+    algorithm: Algorithm,
+    #[command(flatten)]
+    pub(super) turns: InterleavedArgs,
+    #[command(flatten)]
+    pub(super) gaps: GapArgs,
+    #[command(flatten)]
+    track: TrackArgs,
+    #[command(flatten)]
+    threads: ThreadArgs,
+    #[command(flatten)]
+    pub(super) observer: ObserverArgs,
+    /// Make every tolerated fault (unequal lengths, truncation, an incomplete last frame, NaN, clipping) an
+    /// error
+    #[arg(long)]
+    pub(super) strict: bool,
+    /// Replace an existing output
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Print a report as one JSON object on standard output, or on standard error if the samples are there
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+/// Reads `--algorithm`.
+fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
+    let names = Algorithm::ALL.map(|algorithm| {
+        PossibleValue::new(algorithm.name()).help(match algorithm {
+            Algorithm::Auto => "The fastest algorithm that suits the command",
+            Algorithm::Direct => "Computes every product; adds no latency",
+            Algorithm::OverlapSave { .. } => {
+                "Fourier transforms of blocks; faster for long filters, adds latency"
+            }
+            _ => "",
+        })
+    });
+    PossibleValuesParser::new(names).try_map(|name| name.parse())
+}
+
+/// Threads of the filters.
+#[derive(Debug, Clone, Copy, clap::Args)]
+struct ThreadArgs {
+    /// Threads that filter (FIR banks only), 0 for one per processor. The result has the same bits with any
+    /// number. More than one thread helps with many taps or channels; otherwise reading and writing take
+    /// longer than filtering
+    #[arg(long, value_name = "T", default_value_t = 1, value_parser = clap::value_parser!(u16).range(0..=1024))]
+    threads: u16,
+}
+
+impl ThreadArgs {
+    /// `None` if the calling thread does all.
+    fn workers(self) -> Result<Option<ThreadPool>, Failure> {
+        if self.threads == 1 {
+            return Ok(None);
+        }
+        let refused = |error| Failure::Input(format!("--threads {}: {error}; ask for fewer", self.threads));
+        ThreadPool::new(self.threads.into()).map(Some).map_err(refused)
+    }
+
+    /// Bytes of each input that are read at a time, for `bytes` with one thread: enough for all threads.
+    fn bytes(self, bytes: usize) -> usize {
+        if self.threads == 1 { bytes } else { 8 * bytes }
+    }
+}
+
+impl RunArgs {
+    /// Refuses impossible combinations of options, before any file is read. The command `prints` on standard
+    /// output besides.
+    pub(super) fn check(
+        &self,
+        bank: &Path,
+        inputs: &[PathBuf],
+        output: &Path,
+        container: Container,
+        prints: bool,
+    ) -> Result<(), Failure> {
+        match_bank::check_stdin(inputs.iter().map(PathBuf::as_path).chain([bank]))?;
+        self.gaps.check()?;
+        self.turns.check(inputs.len())?;
+        self.observer.check(output, self.json || prints)?;
+        self.track.check(self.algorithm)?;
+        let inputs = inputs.iter().map(PathBuf::as_path).chain([bank]);
+        let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).chain(self.track.input()).collect();
+        let others = self.gaps.mask().into_iter().chain(self.observer.report()).chain(self.track.log());
+        check_files(output, container, &others.collect::<Vec<&Path>>(), &inputs)
+    }
+}
+
+/// A run: a bank, and what becomes of the outputs.
+pub(super) struct Job<'a> {
+    pub(super) args: &'a RunArgs,
+    pub(super) bank: &'a Bank,
+    pub(super) bank_path: &'a Path,
+    pub(super) output: &'a Path,
+    pub(super) container: Container,
+    pub(super) format: PcmFormat,
+    pub(super) scale: ScaleArgs,
+    pub(super) dropped: DroppedLatency,
+    /// Samples are fused as they arrive: no algorithm may add latency, an interrupt ends the run in order,
+    /// and warnings come at once.
+    pub(super) is_live: bool,
+    /// The last samples are brought out by frames without a signal.
+    pub(super) flush: bool,
+    /// The option that keeps clipped samples.
+    pub(super) lossless: &'a str,
+}
+
+/// A run whose outputs are written.
+pub(super) struct Finished {
+    pub(super) report: RunReport,
+    /// Input frames read.
+    pub(super) frames: u64,
+    pub(super) is_interrupted: bool,
+    /// Output samples dropped at the beginning.
+    pub(super) dropped: usize,
+    /// Largest magnitude of the output, of full scale.
+    pub(super) peak: f64,
+    /// Whether the captures agree with the spec of the bank.
+    pub(super) captures: String,
+}
+
+impl Job<'_> {
+    /// Begins to read as `captures` says.
+    ///
+    /// # Errors
+    /// [`Failure`], also for an interrupt that came first: no output has been begun.
+    pub(super) fn start_reader(
+        &self,
+        inputs: &[PathBuf],
+        captures: ReadOptions<'_>,
+        observer: Option<&RunObserver>,
+    ) -> Result<MultiReader, Failure> {
+        let args = self.args;
+        let lost = args.gaps.lost_samples(self.is_live)?;
+        let turns = args.turns.turns(self.bank, self.bank_path)?;
+        let stalls = observer.map(RunObserver::stall_watch);
+        let block_bytes = args.threads.bytes(BLOCK_BYTES);
+        let stated = self.bank.spec.as_ref().and_then(|spec| spec.full_scale);
+        let layout = self.bank.layout();
+        let files = ReadOptions {
+            block_bytes,
+            interleaving: turns.as_ref(),
+            samples_per_frame: matching::samples_per_frame(&layout, inputs.len()),
+            stalls: stalls.as_ref(),
+            full_scale: self.scale.given().or(stated),
+            ..captures
+        };
+        let started = MultiReader::start(inputs, args.gaps.read_options(&lost, files), interrupts());
+        let reader = started.map_err(unreadable)?.ok_or_else(|| interrupted(0))?;
+        self.scale.check(&reader)?;
+        Ok(reader)
+    }
+
+    fn settings(&self) -> Settings<'static> {
+        let Self { args, dropped, .. } = *self;
+        Settings { dropped, gaps: args.gaps.policy(), is_retuned: args.track.is_wanted(), workers: None }
+    }
+
+    fn options(&self) -> Options {
+        let asked = self.args.algorithm;
+        let algorithm = if self.is_live { asked.without_added_latency() } else { asked };
+        let options = Options { precision: precision(self.format), algorithm, ..Options::default() };
+        self.settings().options(options)
+    }
+
+    /// The plan of the run.
+    pub(super) fn plan(&self) -> Result<Plan, Failure> {
+        bank_file::plan(self.bank, self.options(), self.bank_path)
+    }
+
+    /// The rate of the output in hertz, if the inputs fit the bank.
+    pub(super) fn output_rate(&self, reader: &MultiReader) -> Result<f64, Failure> {
+        match_bank::output_rate(self.bank, self.bank_path, reader)
+    }
+
+    /// Fuses all frames and writes the outputs; `each` is told how many frames a step had.
+    pub(super) fn run(
+        &self,
+        plan: &Plan,
+        reader: &mut MultiReader,
+        observer: &mut RunObserver,
+        each: &dyn Fn(u64),
+    ) -> Result<Finished, Failure> {
+        let (rate, is_complex) = (self.output_rate(reader)?, reader.is_complex());
+        let workers = self.args.threads.workers()?;
+        let settings = Settings { workers: workers.as_ref(), ..self.settings() };
+        let pipeline = Pipeline::new(self.bank, plan, settings, self.format, is_complex);
+        let mut pipeline = pipeline.map_err(Failure::running)?;
+        let tracked = self.args.track.begin(self.args.force, observer.events())?;
+        if let Some(follower) = self.args.track.follower(self.bank, self.bank_path, rate)? {
+            let retuner = tracked.retuner(follower, self.bank, self.options()).map_err(Failure::running)?;
+            pipeline = pipeline.retuned_by(retuner).map_err(Failure::running)?;
+        }
+        let mut outputs = self.outputs(rate, is_complex)?;
+        // What is recorded live cannot be recorded again.
+        let kept = if self.is_live { outputs.keep() } else { Vec::new() };
+        observer.check_captures(self.bank, !is_complex && !self.args.track.is_wanted(), self.is_live);
+        let finished = self.record(pipeline, reader, outputs, tracked, observer, each);
+        finished.map_err(|failure| failure.with_remains(&kept))
+    }
+
+    /// From the first frame to the names of the outputs.
+    fn record(
+        &self,
+        mut pipeline: Pipeline<'_>,
+        reader: &mut MultiReader,
+        mut outputs: FileOutputs,
+        tracked: Tracked,
+        observer: &mut RunObserver,
+        each: &dyn Fn(u64),
+    ) -> Result<Finished, Failure> {
+        let is_interrupted = self.all_frames(reader, &mut pipeline, &mut outputs, observer, each)?;
+        let latency = pipeline.plan().latency();
+        let dropped = self.dropped.samples(pipeline.plan());
+        let outcome = self.drain(pipeline, reader.consumed(), &mut outputs)?;
+        let TrackRecord { log, warnings, .. } = tracked.take();
+        let checked = observer.checked();
+        let report = RunReport::new(outcome, self.tolerated(reader), self.lossless);
+        // A frame may hold several samples of a converter.
+        let report = RunReport { channels: self.bank.channel_count(), ..report };
+        let report = report.with(checked.warnings, self.is_live, warnings);
+        let shift = (latency - dropped) as u64;
+        let (ratio, samples) = (self.bank.ratio as u64, report.samples);
+        let placement = Placement { ratio, per_frame: 1, shift, samples };
+        outputs.annotate(self.notes(reader, &report, placement)?);
+        let peak = outputs.peak();
+        self.complete(outputs.with_log(log), &report, observer)?;
+        let frames = reader.consumed();
+        Ok(Finished { report, frames, is_interrupted, dropped, peak, captures: checked.verdict })
+    }
+
+    /// The outputs at their beginning, of `rate` hertz.
+    fn outputs(&self, rate: f64, is_complex: bool) -> Result<FileOutputs, Failure> {
+        let Self { args, container, format, .. } = *self;
+        let mask = args.gaps.begin_mask(args.force)?;
+        let header = OutputHeader { container, format, is_complex, rate };
+        let samples = begin_samples(self.output, header, args.force).map_err(Failure::running)?;
+        Ok(FileOutputs::new(samples, mask, format))
+    }
+
+    /// Processes all frames; true if an interrupt ended them.
+    fn all_frames(
+        &self,
+        reader: &mut MultiReader,
+        pipeline: &mut Pipeline<'_>,
+        outputs: &mut FileOutputs,
+        observer: &mut RunObserver,
+        each: &dyn Fn(u64),
+    ) -> Result<bool, Failure> {
+        let is_stopped = each_block(reader, |recordings| {
+            pipeline.push(recordings, &mut |block| outputs.write(block)).map_err(Failure::running)?;
+            observer.step(recordings, pipeline);
+            each(recordings.frames() as u64);
+            Ok(())
+        })?;
+        match is_stopped {
+            true if !self.is_live => Err(interrupted(reader.consumed())),
+            _ => Ok(is_stopped),
+        }
+    }
+
+    /// Brings out the last samples, if they are wanted, of a run of so many frames.
+    fn drain(
+        &self,
+        mut pipeline: Pipeline<'_>,
+        frames: u64,
+        outputs: &mut FileOutputs,
+    ) -> Result<Outcome, Failure> {
+        let samples = match self.is_live {
+            true => pipeline.samples() + (pipeline.plan().flush_frames() * self.bank.ratio) as u64,
+            false => frames * self.bank.ratio as u64,
+        };
+        if self.flush {
+            pipeline.flush(samples, &mut |block| outputs.write(block)).map_err(Failure::running)?;
+        }
+        pipeline.finish().map_err(Failure::running)
+    }
+
+    fn tolerated(&self, reader: &MultiReader) -> Vec<Warning> {
+        let names = || reader.headers().map(|(name, _)| name.to_owned()).collect();
+        let is_empty = !self.is_live && reader.consumed() == 0;
+        let empty = is_empty.then(|| Warning::Empty(names()));
+        reader.warnings().into_iter().map(Warning::Input).chain(empty).collect()
+    }
+
+    /// What of the inputs accompanies the output: metadata, gaps as annotations, the bank.
+    fn notes(
+        &self,
+        reader: &MultiReader,
+        report: &RunReport,
+        placement: Placement,
+    ) -> Result<OutputNotes, Failure> {
+        let mut notes = reader.notes(placement);
+        // Only this kind of output holds the rest.
+        if is_sigmf(self.output) {
+            notes.record_bank(&self.bank.digest().map_err(Failure::input)?);
+            for gap in report.gaps.iter().flat_map(|gaps| &gaps.list) {
+                let comment = format!("channel {}: {} samples missing", gap.channel, gap.length);
+                let per_frame = self.bank.samples.get(gap.channel - 1).map_or(1, |&samples| samples as u64);
+                let placement = Placement { per_frame, ..placement };
+                notes.annotate(placement, gap.first, gap.length, "gap", &comment);
+            }
+        }
+        Ok(notes)
+    }
+
+    /// Checks the run, renames the outputs to their final names, and then prints the warnings, so that a
+    /// warning that cannot be written loses no output.
+    fn complete(
+        &self,
+        outputs: FileOutputs,
+        report: &RunReport,
+        observer: &mut RunObserver,
+    ) -> Result<(), Failure> {
+        let judged = report.judge(self.args.strict);
+        if judged.is_ok() {
+            outputs.finish().map_err(Failure::running)?;
+        }
+        let are_said = observer.quiet();
+        report.gaps.iter().for_each(|gaps| say_gaps(gaps, are_said));
+        judged?;
+        report.warnings[..report.warnings.len() - report.reported].iter().for_each(|warning| warn(warning));
+        Ok(())
+    }
+}
+
+/// Hands over all frames, block by block; true if an interrupt ended them.
+pub(super) fn each_block(
+    reader: &mut MultiReader,
+    mut take: impl FnMut(&[PcmFrames<'_>]) -> Result<(), Failure>,
+) -> Result<bool, Failure> {
+    loop {
+        match reader.wait().map_err(Failure::running)? {
+            Arrival::Frames(count) => {
+                take(&reader.frames())?;
+                reader.consume(count);
+            }
+            Arrival::End => return Ok(false),
+            Arrival::Stopped => return Ok(true),
+        }
+    }
+}
+
+/// How an interrupt ends a run whose outputs are whole or absent.
+pub(super) fn interrupted(frames: u64) -> Failure {
+    Failure::Input(format!("interrupted after {frames} frames; nothing was kept, run it again"))
+}
+
+/// What every command that fuses reports.
+#[derive(Debug, serde::Serialize)]
+pub(super) struct RunReport {
+    /// How the bank ran.
+    plan: PlanSummary,
+    channels: usize,
+    ratio: usize,
+    /// Output samples written.
+    pub(super) samples: u64,
+    /// Output samples that saturated.
+    pub(super) clipped: u64,
+    /// Input samples that were NaN or infinite and became 0.
+    replaced: u64,
+    /// Times that a recursion's state was not finite and was set to zero.
+    state_resets: u64,
+    /// Missing samples, if --gaps asked for them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gaps: Option<GapSummary>,
+    warnings: Vec<String>,
+    /// How many of the last warnings were reported during the run.
+    #[serde(skip)]
+    reported: usize,
+}
+
+impl RunReport {
+    /// Of an outcome and what was tolerated before; `lossless` is the option that would have kept clipped
+    /// samples.
+    fn new(outcome: Outcome, tolerated: Vec<Warning>, lossless: &str) -> Self {
+        let text = |warning| match warning {
+            Warning::Clipped(_) => format!("{warning}; {lossless} keeps them"),
+            _ => warning.to_string(),
+        };
+        let warnings = tolerated.into_iter().chain(outcome.warnings()).map(text).collect();
+        let Outcome { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps, .. } = outcome;
+        Self { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps, warnings, reported: 0 }
+    }
+
+    /// With those of the captures, and with those that were reported during the run.
+    fn with(mut self, captures: Vec<String>, are_reported: bool, reported: Vec<String>) -> Self {
+        self.reported = reported.len() + if are_reported { captures.len() } else { 0 };
+        self.warnings.extend(captures);
+        self.warnings.extend(reported);
+        self
+    }
+
+    /// With `strict` the first warning is an error.
+    fn judge(&self, strict: bool) -> Result<(), Failure> {
+        match self.warnings.first() {
+            Some(first) if strict => Err(Failure::Input(format!("{first} (an error because of --strict)"))),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The report as one JSON object: on standard output, or on standard error where samples go to standard
+/// output.
+pub(super) fn print_report(report: &impl serde::Serialize, samples: &Path) -> Result<(), Failure> {
+    if !is_dash(samples) {
+        return print_json(report);
+    }
+    say_json(report)
+}

@@ -1,0 +1,182 @@
+//! `hybank stream`: fuses slow samples as they arrive.
+
+use super::capture_args::{ScaleArgs, check_channels, coding};
+use super::observer::RunObserver;
+use super::output::is_wav;
+use super::print::{say_line, say_understood};
+use super::run::{Finished, Job, RunArgs, RunReport, print_report};
+use super::{Failure, bank_file};
+use hybank::bank::Bank;
+use hybank::io::{Coding, Container, PcmFormat, ReadOptions, is_self_describing};
+use hybank::pipeline::DroppedLatency;
+use std::path::PathBuf;
+
+/// Fuses slow samples as they arrive
+///
+/// Reads interleaved frames (one sample of each channel, in the order of the bank) from standard input, or
+/// the channels of each --input. Writes the M output samples of a frame as soon as its inputs have arrived.
+/// The output is causal: it is delayed by the latency of the bank, and nothing is dropped.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Sample formats, as in ffmpeg:
+  s8 u8 s16le s16be s24le s24be s32le s32be f32le f32be f64le f64be, wav, and csv for inputs; cf32, cs16, cu8, .. are complex
+
+Examples:
+  capture | hybank stream bank.json --format s16le > fast.raw
+  hybank stream bank.json --input ch1.fifo --input ch2.fifo --format f32le | analyse
+  hybank stream quad.json --input left.raw --input right.raw --channels 2 --format s16le -o fast.wav
+  hybank stream bank.json --input ch1.sigmf-meta --input ch2.sigmf-meta -o fast.sigmf-meta
+  capture | hybank stream bank.json --format s16le --interleaved 4 > fast.raw
+  receive | hybank stream bank.json --format cs16 --output-format cf32 > fast.iq
+  sox both.flac -t wav - | hybank stream bank.json --format wav | play -t wav -
+
+An interrupt (Ctrl-C) ends the stream after whole frames; a second one ends it at once.")]
+pub(super) struct Args {
+    /// The bank (JSON), as `hybank design` writes it
+    bank: PathBuf,
+    /// Sample format of the input; with c before it for complex samples
+    #[arg(long, value_name = "FORMAT", default_value = "f32le", value_parser = coding)]
+    format: Coding,
+    /// Sample format of the output [default: wav for the name x.wav, else that of the input; f32le for
+    /// tables]
+    #[arg(long, value_name = "FORMAT", value_parser = output_coding)]
+    output_format: Option<Coding>,
+    #[command(flatten)]
+    scale: ScaleArgs,
+    /// Interleaved channels of each raw input [default: 1 each, or all in a single input]
+    #[arg(long, value_name = "C", value_parser = clap::value_parser!(u16).range(1..))]
+    channels: Option<u16>,
+    /// A FIFO or file. Give the option once per channel, or once for an input that holds all channels. A
+    /// SigMF recording (a name that ends in sigmf-meta) states its own format and channels
+    #[arg(long, value_name = "FILE")]
+    input: Vec<PathBuf>,
+    /// The output file, which appears when it is complete (a SigMF recording if its name ends in
+    /// sigmf-meta), or a FIFO; `-` is standard output
+    #[arg(short, long, default_value = "-")]
+    output: PathBuf,
+    /// Output the last samples at the end, as many as the latency, with zeros for input
+    #[arg(long)]
+    flush: bool,
+    #[command(flatten)]
+    run: RunArgs,
+}
+
+/// The coding of the output; tables are only read.
+fn output_coding(name: &str) -> Result<Coding, String> {
+    match coding(name)? {
+        Coding::Csv => Err("csv is a format of inputs; write wav or a raw format such as f64le".into()),
+        coding => Ok(coding),
+    }
+}
+
+/// The report of a run.
+#[derive(Debug, serde::Serialize)]
+struct Report<'a> {
+    #[serde(flatten)]
+    run: &'a RunReport,
+    /// Input frames read.
+    frames: u64,
+    /// True if a signal ended the stream.
+    interrupted: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] with the one message for the user.
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    let inputs = args.inputs();
+    check_channels(args.channels, args.format)?;
+    args.run.check(&args.bank, &inputs, &args.output, args.container(), false)?;
+    let bank = bank_file::load(&args.bank)?;
+    say_understood(bank.spec.as_ref());
+    args.check_inputs(&inputs, bank.channel_count())?;
+    let mut observer = args.run.observer.begin(args.run.force)?;
+    let job = args.job(&bank);
+    args.stream(&job, &inputs, &mut observer).inspect_err(|failure| observer.fail(failure))
+}
+
+impl Args {
+    fn job<'a>(&'a self, bank: &'a Bank) -> Job<'a> {
+        Job {
+            args: &self.run,
+            bank,
+            bank_path: &self.bank,
+            output: &self.output,
+            container: self.container(),
+            // A WAV stream has 32-bit floats.
+            format: self.output_coding().format().unwrap_or(PcmFormat::F32Le),
+            scale: self.scale,
+            dropped: DroppedLatency::Nothing,
+            is_live: true,
+            flush: self.flush,
+            lossless: "--output-format f32le",
+        }
+    }
+
+    fn stream(&self, job: &Job<'_>, inputs: &[PathBuf], observer: &mut RunObserver) -> Result<(), Failure> {
+        let plan = job.plan()?;
+        let channels = self.channels_of_each(inputs, job.bank);
+        let raw = ReadOptions { coding: self.format, channels, ..ReadOptions::files() };
+        let mut reader = job.start_reader(inputs, raw, Some(observer))?;
+        self.check_output(reader.is_complex())?;
+        let finished = job.run(&plan, &mut reader, observer, &|_| {})?;
+        let Finished { report: run, frames, is_interrupted, .. } = &finished;
+        let report = Report { run, frames: *frames, interrupted: *is_interrupted };
+        observer.end(&report)?;
+        let printed = if self.run.json { print_report(&report, &self.output) } else { Ok(()) };
+        if *is_interrupted && printed.is_ok() {
+            say_line(&format!("interrupted after {frames} frames, {} samples written", run.samples));
+        }
+        printed
+    }
+
+    fn inputs(&self) -> Vec<PathBuf> {
+        if self.input.is_empty() { vec!["-".into()] } else { self.input.clone() }
+    }
+
+    /// Channels of each raw input.
+    fn channels_of_each(&self, inputs: &[PathBuf], bank: &Bank) -> usize {
+        let usual = hybank::pipeline::matching::channels_of_raw(&bank.layout(), inputs.len());
+        self.channels.map_or(usual, usize::from)
+    }
+
+    /// Raw inputs are one interleaved or one per channel, or have --channels each; other formats state
+    /// theirs.
+    fn check_inputs(&self, inputs: &[PathBuf], channels: usize) -> Result<(), Failure> {
+        let raw = self.format.format().is_some() && !inputs.iter().any(|path| is_self_describing(path));
+        if raw && self.channels.is_none() && inputs.len() != 1 && inputs.len() != channels {
+            return Err(Failure::Usage(format!(
+                "--input is given {} times; the bank has {channels} channels, so give it {channels} times, once, \
+                 or not at all, or say with --channels how many each input holds",
+                inputs.len()
+            )));
+        }
+        Ok(())
+    }
+
+    fn container(&self) -> Container {
+        if self.output_coding() == Coding::Wav { Container::Wav } else { Container::Raw }
+    }
+
+    fn output_coding(&self) -> Coding {
+        let of_input = match self.format {
+            _ if is_wav(&self.output) => Coding::Wav,
+            Coding::Csv => Coding::Raw(PcmFormat::F32Le),
+            format => format,
+        };
+        self.output_format.unwrap_or(of_input)
+    }
+
+    /// Real samples cannot be written as complex ones.
+    fn check_output(&self, is_complex: bool) -> Result<(), Failure> {
+        match self.output_format {
+            Some(format) if format.is_complex() && !is_complex => {
+                let message =
+                    "--output-format is complex, but the input is real; leave out the c before its name";
+                Err(Failure::Usage(message.into()))
+            }
+            _ => Ok(()),
+        }
+    }
+}

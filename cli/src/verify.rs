@@ -1,0 +1,173 @@
+//! `hybank verify`: proves a bank's gammas from its file alone.
+
+use super::bank_file::read_kind;
+use super::file_kind::FileKind;
+use super::print::{Failure, InFile, name, show};
+use hybank::bank::{Bank, FixedPoint, SynthesisFilters, check_digest};
+use hybank::design;
+use hybank::messages::Quoted;
+use hybank::overview::counted;
+use hybank::verify::uncertainty::check_stated;
+use hybank::verify::{BoundedBanks, Verified, verify};
+use std::path::PathBuf;
+
+/// Proves the gammas in a bank file, from the file alone
+///
+/// Rebuilds the error system from the spec and the coefficients in the file. It shares no code with the
+/// designer and bounds every rounding error. It proves an upper and a lower bound of gamma with the
+/// certificate and the witnesses in the file. Each gamma that the file states must be proven. A file with an
+/// altered coefficient, gamma or matrix is refused: its digest does not match, or the proof fails. A bank
+/// without a proof is refused at once; --search looks for one.
+///
+/// The front ends are the filters as the spec writes them: their roots and state equations are enclosed.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  hybank verify bank.json
+  hybank design spec.toml -o - | hybank verify -
+  hybank verify bank.json --json | jq '[.lower, .upper]'
+  hybank verify elsewhere.json --search
+
+Exit codes: 0 proven; 1 refused, with the reason; 2 wrong usage.")]
+pub(super) struct Args {
+    /// The bank (JSON); `-` is standard input
+    bank: PathBuf,
+    /// Look for a proof if the file has none; a gamma that this proof neither reaches nor refutes is
+    /// accepted
+    #[arg(long)]
+    search: bool,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, serde::Serialize)]
+struct Report {
+    bank: String,
+    #[serde(flatten)]
+    verified: Verified,
+    /// The file has a digest, and it matches.
+    digest: bool,
+    /// The certificate came with the file; otherwise it was found now.
+    certificate_in_file: bool,
+    #[serde(skip)]
+    taps: usize,
+    /// Word lengths of integer taps.
+    #[serde(skip)]
+    words: String,
+    /// No errors within the spec's uncertainty make gamma larger.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    worst_case: Option<f64>,
+    /// No delays within the spec's uncertainty make gamma larger while the taps follow them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tracked: Option<f64>,
+    /// The file has tap slopes and states nothing that could be proven of them.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    unproven_slopes: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    let file = name(&args.bank);
+    let text = read_kind(&args.bank, FileKind::Bank)?;
+    let bank = Bank::from_json(&text, &file).map_err(Failure::input)?;
+    let digest = check_digest(&text, &file).map_err(Failure::input)?;
+    let certificate_in_file = bank.proof.as_ref().is_some_and(|proof| proof.upper.is_some());
+    let verified = if args.search && !certificate_in_file {
+        let verified = design::prove(&bank).in_file(&args.bank)?.1;
+        check_stated(&bank).in_file(&args.bank)?;
+        verified
+    } else {
+        verify(&bank).in_file(&args.bank)?
+    };
+    let report = Report {
+        taps: taps(&bank),
+        words: words(&bank),
+        worst_case: bank.gamma.worst_case,
+        tracked: bank.gamma.tracked,
+        unproven_slopes: bank.tap_slopes.is_some() && bank.gamma.tracked.is_none(),
+        bank: file,
+        verified,
+        digest,
+        certificate_in_file,
+    };
+    show(&report, args.json, Report::text)
+}
+
+/// Taps per channel; zero for recursive filters.
+fn taps(bank: &Bank) -> usize {
+    match &bank.filters {
+        SynthesisFilters::Fir(taps) => taps[0].len(),
+        SynthesisFilters::StateSpace(_) => 0,
+    }
+}
+
+/// The word lengths as text; reading has checked them.
+fn words(bank: &Bank) -> String {
+    let line = |words: &FixedPoint| {
+        format!("taps       integers of {} times 2^{}\n", words.bits, -words.fraction_bits)
+    };
+    bank.fixed_point.as_ref().map(line).unwrap_or_default()
+}
+
+impl Report {
+    /// The class of banks for which the lower bound holds.
+    fn scope(&self) -> String {
+        match self.verified.lower_banks {
+            BoundedBanks::Any => "no bank at all is better".to_owned(),
+            BoundedBanks::Causal => "no causal bank of this latency is better".to_owned(),
+            BoundedBanks::FirOfThisLength => {
+                format!("no FIR bank of {} per channel is better", counted(self.taps, "tap"))
+            }
+        }
+    }
+
+    fn tracked_line(&self) -> String {
+        match self.tracked {
+            Some(bound) => {
+                format!("tracked    {}   no delays within it do while the taps follow them\n", number(bound))
+            }
+            None if self.unproven_slopes => {
+                "tracked    not proven: the file states no gamma.tracked, so its tap_slopes may be anything\n"
+                    .to_owned()
+            }
+            None => String::new(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let Verified { lower, upper, attained, noncausal, states, .. } = self.verified;
+        let origin = if self.certificate_in_file { "from the file" } else { "found now, the file has none" };
+        let digest =
+            if self.digest { "matches" } else { "the file has none: only what breaks the proof shows" };
+        let width = if upper > 0.0 { (upper - lower) / upper } else { 0.0 };
+        format!(
+            "{}: proven, gamma in [{}, {}] (h = 1), relative width {width:.1e}\n\
+             upper      {}   bounded-real lemma, P of order {states} {origin}\n\
+             attained   {}   this bank's own gain at one frequency\n\
+             lower      {}   {}\n\
+             noncausal  {}   no bank at all is better\n\
+             {}{}{}digest     {digest}\n",
+            Quoted(&self.bank),
+            number(lower),
+            number(upper),
+            number(upper),
+            number(attained),
+            number(lower),
+            self.scope(),
+            number(noncausal),
+            self.worst_case.map_or_else(String::new, |bound| {
+                format!(
+                    "worst case {}   no errors within the spec's uncertainty make gamma larger\n",
+                    number(bound)
+                )
+            }),
+            self.tracked_line(),
+            self.words,
+        )
+    }
+}
+
+/// All digits, because rounding would change a bound.
+fn number(value: f64) -> String {
+    if value >= 1e-4 || value == 0.0 { format!("{value}") } else { format!("{value:e}") }
+}

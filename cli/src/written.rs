@@ -1,0 +1,183 @@
+//! Writes files that appear when they are whole: texts, pictures, recordings, and folders of them.
+
+use super::interrupt::remove_unfinished;
+use super::print::{Failure, is_dash, name_leftovers, print_bytes};
+use hybank::files::{AtomicFile, FileError, commit_all, refuse_overlaps};
+use hybank::io::{Container, OutputHeader, PcmFormat, SampleWriter, is_pipe, is_sigmf};
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+/// Refuses outputs that are also inputs or other outputs, and names what killed runs left beside them.
+pub(super) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), Failure> {
+    let outputs: Vec<&Path> = outputs.iter().copied().filter(|path| !is_dash(path)).collect();
+    refuse_overlaps(&outputs, inputs).map_err(Failure::input)?;
+    name_leftovers(&outputs);
+    Ok(())
+}
+
+/// Writes a text file that appears when it is whole; `-` is standard output.
+pub(super) fn write_text(path: &Path, text: &str, force: bool) -> Result<(), Failure> {
+    write_bytes(path, text.as_bytes(), force)
+}
+
+/// As [`write_text`], for any bytes.
+pub(super) fn write_bytes(path: &Path, bytes: &[u8], force: bool) -> Result<(), Failure> {
+    if is_dash(path) {
+        return print_bytes(bytes);
+    }
+    begin_file(path, bytes, force)?.commit().map_err(Failure::input)
+}
+
+/// A file that is whole but has no name yet.
+pub(super) fn begin_file(path: &Path, bytes: &[u8], force: bool) -> Result<AtomicFile, Failure> {
+    remove_unfinished();
+    let mut file = AtomicFile::create(path, force).map_err(Failure::input)?;
+    file.write_all(bytes).map_err(|error| Failure::of(path, format!("cannot write it: {error}")))?;
+    Ok(file)
+}
+
+/// Begins a file beside the output, which cannot go to standard output.
+pub(super) fn begin_beside(path: &Path, force: bool) -> Result<AtomicFile, Failure> {
+    AtomicFile::create(path, force).map_err(|error| match error {
+        FileError::Special { .. } => Failure::Input(error.to_string()),
+        other => Failure::input(other),
+    })
+}
+
+/// Writes the files of each item to `folder` as soon as the item is known; all files appear together. A
+/// folder that was made for them is removed if they do not.
+pub(super) fn write_together<T>(
+    folder: &Path,
+    items: impl Iterator<Item = Result<T, Failure>>,
+    begin: impl Fn(T) -> Result<Vec<AtomicFile>, Failure>,
+) -> Result<(), Failure> {
+    let is_new = !folder.exists();
+    let begin = |item: Result<T, Failure>| {
+        let item = item?;
+        create_folder(folder)?;
+        begin(item)
+    };
+    let begun = items.map(begin).collect::<Result<Vec<_>, _>>();
+    let written =
+        begun.and_then(|files| commit_all(files.into_iter().flatten().collect()).map_err(Failure::input));
+    if written.is_err() && is_new {
+        // It is empty, or another program has put files there.
+        let _ = std::fs::remove_dir(folder);
+    }
+    written
+}
+
+/// Makes a folder, if it is not there.
+pub(super) fn create_folder(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder).map_err(|error| {
+        let is_file = folder.ancestors().any(|part| part.exists() && !part.is_dir());
+        Failure::of(
+            folder,
+            match is_file {
+                true => {
+                    "a file has this name, or that of a folder above; give the name of a folder".to_owned()
+                }
+                false => format!("cannot create the folder: {error}"),
+            },
+        )
+    })
+}
+
+/// A recording of one channel to be written.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mono<'a> {
+    pub(super) samples: &'a [f64],
+    /// The imaginary parts of complex samples, as many.
+    pub(super) imaginary: Option<&'a [f64]>,
+    /// Hertz.
+    pub(super) rate: f64,
+    /// Floats or integers.
+    pub(super) format: PcmFormat,
+    /// SigMF recordings are so by their name.
+    pub(super) container: Container,
+}
+
+/// Samples that are encoded at a time.
+const CHUNK: usize = 1 << 16;
+
+impl<'a> Mono<'a> {
+    /// Real samples in a WAV file of floats.
+    pub(super) fn wav(samples: &'a [f64], rate: f64) -> Self {
+        Self { samples, imaginary: None, rate, format: PcmFormat::F32Le, container: Container::Wav }
+    }
+
+    /// The header of an ordinary WAV file, if the recording at `path` is to be one: sizes and bytes per
+    /// second are numbers of 32 bits there.
+    fn ordinary_wav(&self, path: &Path) -> Option<hound::WavSpec> {
+        let bytes = self.format.bytes() as u64;
+        let is_small = |bytes: u64| bytes < u64::from(u32::MAX - 1024);
+        let sample_rate = self.rate.round() as u32;
+        let is_ordinary = self.container == Container::Wav
+            && self.imaginary.is_none()
+            && !is_sigmf(path)
+            && !is_pipe(path)
+            && bytes <= 4
+            && sample_rate > 0
+            && is_small(bytes * u64::from(sample_rate))
+            && is_small(bytes * self.samples.len() as u64);
+        let is_float = self.format.is_float();
+        let sample_format = if is_float { hound::SampleFormat::Float } else { hound::SampleFormat::Int };
+        let bits_per_sample = 8 * bytes as u16;
+        is_ordinary.then_some(hound::WavSpec { channels: 1, sample_rate, bits_per_sample, sample_format })
+    }
+
+    /// Any other recording.
+    fn write(&self, path: &Path, force: bool) -> Result<Vec<AtomicFile>, Failure> {
+        let Self { container, format, rate, imaginary, .. } = *self;
+        let header = OutputHeader { container, format, is_complex: imaginary.is_some(), rate };
+        let mut writer = SampleWriter::create(path, header, force).map_err(Failure::input)?;
+        for from in (0..self.samples.len()).step_by(CHUNK) {
+            let to = (from + CHUNK).min(self.samples.len());
+            let parts = |k: usize| [Some(self.samples[k]), imaginary.map(|imaginary| imaginary[k])];
+            let numbers: Vec<f64> = (from..to).flat_map(parts).flatten().collect();
+            let mut bytes = vec![0; numbers.len() * format.bytes()];
+            for (slot, x) in bytes.chunks_exact_mut(format.bytes()).zip(numbers) {
+                format.encode(x, slot);
+            }
+            writer.write(&bytes).map_err(Failure::input)?;
+        }
+        writer.finish().map_err(Failure::input)
+    }
+}
+
+/// Writes recordings, which appear together when they are whole.
+pub(super) fn write_recordings(files: &[(&Path, Mono<'_>)], force: bool) -> Result<(), Failure> {
+    let begin = |(path, mono): &(&Path, Mono<'_>)| begin_recording(path, *mono, force);
+    let files = files.iter().map(begin).collect::<Result<Vec<_>, _>>()?;
+    commit_all(files.into_iter().flatten().collect()).map_err(Failure::input)
+}
+
+/// The files of a recording, which are whole but have no names yet: two of a SigMF recording.
+pub(super) fn begin_recording(path: &Path, mono: Mono<'_>, force: bool) -> Result<Vec<AtomicFile>, Failure> {
+    remove_unfinished();
+    let mut files = match mono.ordinary_wav(path) {
+        Some(spec) => {
+            let mut file = AtomicFile::create(path, force).map_err(Failure::input)?;
+            write_wav(&mut file, mono.samples, spec)
+                .map_err(|error| Failure::of(path, format!("cannot write it: {error}")))?;
+            vec![file]
+        }
+        None => mono.write(path, force)?,
+    };
+    // One open file at a time, however many there are.
+    files.iter_mut().try_for_each(AtomicFile::seal).map_err(Failure::input)?;
+    Ok(files)
+}
+
+fn write_wav(file: &mut AtomicFile, samples: &[f64], spec: hound::WavSpec) -> hound::Result<()> {
+    let mut writer = hound::WavWriter::new(BufWriter::new(file), spec)?;
+    let full_scale = 2f64.powi(i32::from(spec.bits_per_sample) - 1);
+    match spec.sample_format {
+        hound::SampleFormat::Float => samples.iter().try_for_each(|&x| writer.write_sample(x as f32))?,
+        // Steps of a converter that are whole steps of the file.
+        hound::SampleFormat::Int => {
+            samples.iter().try_for_each(|&x| writer.write_sample((x * full_scale) as i32))?;
+        }
+    }
+    writer.finalize()
+}

@@ -1,0 +1,261 @@
+//! `align`: recorders that were started by hand, with clocks of their own, become one recording that is
+//! never worse than that of one of them.
+//!
+//! `HYBANK_SLOW=1` takes the whole grid of signals, clocks and starts, and prints its table.
+
+use crate::support::random::Random;
+use crate::support::{Desk, number, wav};
+use hybank::bank::Bank;
+use hybank::design::{Options, design};
+use serde_json::Value;
+use std::f64::consts::TAU;
+
+/// Two recorders of 48 kHz, ratio 1, with taps for all delays of one period.
+const BANK: &str = include_str!("banks/two_recordings.json");
+const RATE: f64 = 48_000.0;
+
+/// What both recorders hear, at 48 kHz.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Event {
+    Noise,
+    Music,
+    Speech,
+}
+
+/// The second recorder relative to the first one, which has a clock that is right.
+#[derive(Debug, Clone, Copy)]
+struct Case {
+    event: Event,
+    seconds: f64,
+    ppm: f64,
+    /// Seconds by which the second one began later; below 0 for earlier.
+    late: f64,
+}
+
+impl Event {
+    /// `None` where its recordings are not there.
+    fn samples(self, count: usize, dice: &mut Random) -> Option<Vec<f32>> {
+        match self {
+            Self::Noise => Some(noise(count, dice)),
+            Self::Music => Some(music(count, dice)),
+            Self::Speech => speech(count, dice),
+        }
+    }
+}
+
+/// Noise up to about 5 kHz whose level changes.
+fn noise(count: usize, dice: &mut Random) -> Vec<f32> {
+    let (mut y, mut z) = (0.0, 0.0);
+    let sample = |k: usize| {
+        y = 0.5 * y + 0.5 * dice.sample();
+        z = 0.5 * z + 0.5 * y;
+        (0.5 * z * (1.2 + (TAU * 1.3 * k as f64 / RATE).sin())) as f32
+    };
+    (0..count).map(sample).collect()
+}
+
+/// Plucked notes of a scale, at random times.
+fn music(count: usize, dice: &mut Random) -> Vec<f32> {
+    let mut samples = vec![0.0; count];
+    for _ in 0..count / 6000 {
+        let begin = (dice.part() * count as f64) as usize;
+        let pitch = 110.0 * 2f64.powf((24.0 * dice.part()).floor() / 12.0);
+        for (k, slot) in samples[begin..].iter_mut().take(40_000).enumerate() {
+            let t = k as f64 / RATE;
+            let wave = |n: i32| (TAU * pitch * f64::from(n) * t).sin() * (-2.0 * f64::from(n) * t).exp();
+            *slot += 0.1 * (1..8).map(|n| wave(n) / f64::from(n)).sum::<f64>();
+        }
+    }
+    samples.into_iter().map(|x| x as f32).collect()
+}
+
+/// Words with pauses: recordings of speech, forwards and backwards, slower and faster.
+fn speech(count: usize, dice: &mut Random) -> Option<Vec<f32>> {
+    let words = ["audio/Front_Center.wav", "audio/Rear_Left.wav"];
+    let words: Vec<Vec<f64>> =
+        words.iter().map(|name| Some(word(&trials::data(name)?))).collect::<Option<_>>()?;
+    let mut samples = Vec::with_capacity(count);
+    while samples.len() < count {
+        let (word, speed) = (&words[usize::from(dice.part() < 0.5)], 0.8 + 0.5 * dice.part());
+        let is_backwards = dice.part() < 0.5;
+        let length = ((word.len() - 2) as f64 / speed) as usize;
+        samples.extend((0..length).map(|k| {
+            let at = speed * if is_backwards { length - 1 - k } else { k } as f64;
+            let (whole, part) = (at as usize, at.fract());
+            (word[whole] * (1.0 - part) + word[whole + 1] * part) as f32
+        }));
+        samples.extend(vec![0.0; (0.3 * RATE * dice.part()) as usize]);
+    }
+    samples.truncate(count);
+    Some(samples)
+}
+
+fn word(path: &std::path::Path) -> Vec<f64> {
+    let mut reader = hound::WavReader::open(path).unwrap();
+    reader.samples::<i16>().map(|x| f64::from(x.unwrap()) / 32768.0).collect()
+}
+
+/// The bank of one recorder alone, for the same target.
+fn alone() -> String {
+    let mut spec = Bank::from_json(BANK, "bank.json").unwrap().spec.unwrap();
+    spec.channels.truncate(1);
+    (spec.uncertainty, spec.design.tracking) = (None, None);
+    design(&spec, &Options::without_proof()).unwrap().bank.to_json().unwrap()
+}
+
+/// A desk with the banks, the spec, and what both recorders deliver of an event: `a.wav` and `b.wav`.
+fn desk(case: Case, noise: &str, samples: &[f32], alone: &str) -> Desk {
+    let desk = Desk::empty();
+    desk.write("bank.json", BANK);
+    desk.write("alone.json", alone);
+    let spec = Bank::from_json(BANK, "bank.json").unwrap().spec.unwrap();
+    desk.write("spec.toml", spec.to_toml().unwrap());
+    wav::write(&desk, "event.wav", 1, 48_000, samples);
+    let (drift, count) = (format!("0,{}", case.ppm), samples.len().to_string());
+    let heard = ["simulate", "bank.json", "--source", "event.wav", "--samples", &count, "-o", "cap"];
+    desk.good(&[&heard[..], &["--drift", &drift, "--noise", noise, "--delay-error", "0,7.3us"]].concat());
+    let [a, b] = ["cap/ch1.wav", "cap/ch2.wav"].map(|name| wav::samples(&desk, name));
+    let late = (case.late.abs() * RATE) as usize;
+    let (first, second) = if case.late > 0.0 { (0, late) } else { (late, 0) };
+    wav::write(&desk, "a.wav", 1, 48_000, &a[first..]);
+    wav::write(&desk, "b.wav", 1, 48_000, &b[second..]);
+    desk
+}
+
+const ALIGN: [&str; 8] = ["align", "spec.toml", "a.wav", "b.wav", "-o", "aligned.toml", "--trim", "cut"];
+
+/// Signal-to-noise ratio of a recording that begins with sample `first` of the target, in decibels.
+fn snr(desk: &Desk, name: &str, first: usize) -> f64 {
+    let (have, want) = (wav::samples(desk, name), wav::samples(desk, "cap/target.wav"));
+    // Filters see nothing before the beginning, and the frames that a fast clock is ahead are not there.
+    let range = 200..have.len().min(want.len() - first) - 200;
+    let of = |x: &dyn Fn(usize) -> f64| range.clone().map(|k| x(k).powi(2)).sum::<f64>();
+    let want = |k: usize| f64::from(want[k + first]);
+    10.0 * (of(&want) / of(&|k| f64::from(have[k]) - want(k))).log10()
+}
+
+/// Ratios in decibels, and the report.
+struct Fused {
+    alone: f64,
+    together: f64,
+    report: Value,
+}
+
+/// Aligns and fuses the recordings of a case; `None` without its recordings.
+fn fused(case: Case, alone: &str, dice: &mut Random) -> Option<Fused> {
+    let samples = case.event.samples((case.seconds * RATE) as usize, dice)?;
+    let desk = desk(case, "1e-3", &samples, alone);
+    let report = desk.json(&[&ALIGN[..], &["--json"]].concat());
+    let skip = number(&report, "/channels/0/skip") as usize;
+    let late = if case.late > 0.0 { 0 } else { (-case.late * RATE) as usize };
+    let more = ["-o", "y.wav", "--track", "cut/drift.jsonl", "--track-frames", "512"];
+    desk.good(&[&["fuse", "bank.json", "cut/ch1.wav", "cut/ch2.wav"][..], &more].concat());
+    desk.good(&["fuse", "alone.json", "cut/ch1.wav", "-o", "one.wav"]);
+    let first = skip + late;
+    let of = |name: &str| snr(&desk, name, first);
+    Some(Fused { alone: of("one.wav"), together: of("y.wav"), report })
+}
+
+#[test]
+fn fused_recordings_are_never_worse_than_one_alone() {
+    let is_sweep = trials::is_slow("the grid of signals, clocks and starts of two recorders");
+    let case = |event, seconds, ppm, late| Case { event, seconds, ppm, late };
+    let mut cases = vec![
+        case(Event::Noise, 6.0, 20.0, 0.31),
+        case(Event::Music, 14.0, -100.0, 10.0),
+        case(Event::Speech, 8.0, 1.0, -2.0),
+    ];
+    if is_sweep {
+        let events = [Event::Noise, Event::Music, Event::Speech];
+        let all = |late: f64| {
+            [1.0, 3.0, 10.0, 30.0, 100.0, -100.0]
+                .into_iter()
+                .flat_map(move |ppm| events.map(|event| case(event, late.abs() + 12.0, ppm, late)))
+        };
+        cases = [0.0, 0.1, -1.0, 10.0].into_iter().flat_map(all).collect();
+    }
+    let (alone, mut dice) = (alone(), Random(91));
+    for case in cases {
+        let Some(Fused { alone, together, report }) = fused(case, &alone, &mut dice) else { continue };
+        let Case { event, ppm, late, .. } = case;
+        let [drift, half] =
+            ["value", "half_width"].map(|of| number(&report, &format!("/channels/1/drift_ppm/{of}")));
+        println!("| {event:?} | {ppm} | {late} | {drift:.3} +- {half:.3} | {alone:.2} | {together:.2} |");
+        // What noise has near half the rate is read as a part of the delay, and averages out over many
+        // samples.
+        assert!((drift - ppm).abs() < 0.2, "{case:?} {report}");
+        assert!(together >= alone, "{case:?}: {together:.2} dB, alone {alone:.2} dB, {report}");
+    }
+}
+
+#[test]
+fn a_spec_of_the_recordings_gives_their_bank() {
+    let mut dice = Random(92);
+    let case = Case { event: Event::Noise, seconds: 4.0, ppm: 0.0, late: 0.5 };
+    let samples = case.event.samples(192_000, &mut dice).unwrap();
+    let desk = desk(case, "1e-3", &samples, &alone());
+    // Opposite polarity, another gain, an offset: as integers of 16 bits.
+    let spec = hound::WavSpec {
+        channels: 1,
+        sample_rate: 48_000,
+        bits_per_sample: 16,
+        sample_format: hound::SampleFormat::Int,
+    };
+    let mut writer = hound::WavWriter::create(desk.path("c.wav"), spec).unwrap();
+    for x in wav::samples(&desk, "b.wav") {
+        writer.write_sample((32768.0 * (0.05 - 0.4 * x)) as i16).unwrap();
+    }
+    writer.finalize().unwrap();
+    let args = ["align", "spec.toml", "a.wav", "c.wav", "-o", "aligned.toml", "--trim", "cut"];
+    let text = desk.good(&args);
+    assert!(text.contains("relative to channel 1") && text.contains("fusing them is worth it"), "{text}");
+    let aligned =
+        hybank::spec::Spec::from_toml(&crate::support::text(&desk.read("aligned.toml")), "aligned.toml");
+    let channel = aligned.unwrap().channels[1].clone();
+    assert!((channel.gain / -0.4 - 1.0).abs() < 0.01 && (channel.offset - 0.05).abs() < 0.01, "{channel:?}");
+    // The trimmed recordings have the samples and the format of the inputs.
+    let mut cut = hound::WavReader::open(desk.path("cut/ch2.wav")).unwrap();
+    let mut whole = hound::WavReader::open(desk.path("c.wav")).unwrap();
+    assert_eq!(cut.spec(), spec);
+    let [cut, whole] =
+        [&mut cut, &mut whole].map(|r| r.samples::<i16>().map(Result::unwrap).collect::<Vec<_>>());
+    assert_eq!(cut[..], whole[..cut.len()]);
+    let first = wav::samples(&desk, "a.wav").len() - wav::samples(&desk, "cut/ch1.wav").len();
+    assert!((first as i64 - 24_000).abs() <= 1, "{first}");
+    // Nothing is replaced without --force, and with it everything is.
+    desk.refused(1, &args, &["cut/ch1.wav", "--force"]);
+    desk.good(&[&args[..], &["--force"]].concat());
+}
+
+#[test]
+fn recordings_that_do_not_fit_are_refused_with_the_reason() {
+    let mut dice = Random(93);
+    let desk = Desk::empty();
+    let spec = Bank::from_json(BANK, "bank.json").unwrap().spec.unwrap();
+    desk.write("spec.toml", spec.to_toml().unwrap());
+    let random =
+        |dice: &mut Random| -> Vec<f32> { (0..30_000).map(|_| 0.3 * dice.sample() as f32).collect() };
+    let (a, b) = (random(&mut dice), random(&mut dice));
+    wav::write(&desk, "a.wav", 1, 48_000, &a);
+    wav::write(&desk, "b.wav", 1, 48_000, &b);
+    wav::write(&desk, "cd.wav", 1, 44_100, &a);
+    wav::write(&desk, "short.wav", 1, 48_000, &a[..500]);
+    wav::write(&desk, "silent.wav", 1, 48_000, &[0.125; 30_000]);
+    let tone =
+        |early: f64| -> Vec<f32> { (0..30_000).map(|k| (0.3 * (k as f64 + early)).sin() as f32).collect() };
+    wav::write(&desk, "tone.wav", 1, 48_000, &tone(0.0));
+    wav::write(&desk, "late.wav", 1, 48_000, &tone(700.3));
+    let align = |code: i32, inputs: [&str; 2], more: &[&str], parts: &[&str]| {
+        let args = [&["align", "spec.toml", inputs[0], inputs[1], "-o", "aligned.toml"][..], more].concat();
+        desk.refused(code, &args, parts)
+    };
+    let all = ["--trim", "cut"];
+    align(1, ["a.wav", "b.wav"], &all, &["channels 1 and 2 have nothing in common"]);
+    align(1, ["a.wav", "cd.wav"], &all, &["cd.wav", "44100 Hz", "48000 Hz"]);
+    align(1, ["a.wav", "short.wav"], &all, &["have 500 samples in common", "1024"]);
+    align(1, ["silent.wav", "b.wav"], &all, &["channel 1 is silent"]);
+    align(1, ["tone.wav", "late.wav"], &all, &["agree at several lags", "--within"]);
+    align(1, ["a.wav", "none.wav"], &all, &["none.wav"]);
+    align(2, ["a.wav", "b.wav"], &["--reference", "0"], &["--reference 0"]);
+    align(1, ["a.wav", "b.wav"], &["--reference", "3"], &["channel 3 cannot be the reference"]);
+}

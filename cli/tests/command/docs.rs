@@ -1,0 +1,158 @@
+//! The snippets of README.md and docs/ work as they stand: specs and banks can be read, and command lines
+//! run in the order of the text.
+
+use crate::support::Desk;
+use hybank::bank::Bank;
+use hybank::spec::Spec;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// A fenced block of a Markdown text.
+struct Snippet {
+    /// The word after the fence.
+    language: String,
+    text: String,
+    /// Line of the opening fence, from 1.
+    line: usize,
+}
+
+fn snippets(markdown: &str) -> Vec<Snippet> {
+    let mut found: Vec<Snippet> = Vec::new();
+    let mut inside = false;
+    for (index, line) in markdown.lines().enumerate() {
+        match line.strip_prefix("```") {
+            Some(_) if inside => inside = false,
+            Some(language) => {
+                inside = true;
+                found.push(Snippet { language: language.to_owned(), text: String::new(), line: index + 1 });
+            }
+            None if inside => {
+                let text = &mut found.last_mut().expect("a block was opened").text;
+                text.push_str(line);
+                text.push('\n');
+            }
+            None => {}
+        }
+    }
+    assert!(!inside, "a fence is not closed");
+    found
+}
+
+/// README.md and every page of docs/.
+fn pages() -> Vec<PathBuf> {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+    let mut pages = vec![root.join("README.md")];
+    for folder in ["docs", "docs/tutorials"] {
+        let folder = fs::read_dir(root.join(folder)).expect("a folder of pages");
+        pages.extend(folder.map(|entry| entry.expect("an entry").path()));
+    }
+    pages.retain(|page| page.extension().is_some_and(|extension| extension == "md"));
+    pages.sort();
+    pages
+}
+
+/// A folder in which the snippets of one page run, with the spec of the README in it.
+struct Folder {
+    page: PathBuf,
+    desk: Desk,
+}
+
+impl Folder {
+    fn new(page: &Path) -> Self {
+        let readme = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("README.md");
+        let readme = fs::read_to_string(readme).expect("README.md");
+        let spec = snippets(&readme).into_iter().find(|snippet| snippet.language == "toml");
+        let desk = Desk::with_spec(&spec.expect("a spec in README.md").text);
+        Self { page: page.to_owned(), desk }
+    }
+
+    fn check(&self, snippet: &Snippet) {
+        match snippet.language.as_str() {
+            "toml" => self.check_spec(snippet),
+            "json" => self.check_bank(snippet),
+            "sh" => self.run(snippet),
+            // Python has tests of its own; Rust is a documentation test; lines of lost samples run with the
+            // stream that reads them.
+            "rust" | "text" | "jsonl" | "python" => {}
+            "c" => self.desk.write(self.name(snippet, "// "), &snippet.text),
+            // Directives of the site.
+            directive if directive.starts_with('{') => {}
+            other => panic!("{}: no check for a snippet of {other:?}", self.place(snippet)),
+        }
+    }
+
+    fn place(&self, snippet: &Snippet) -> String {
+        format!("{}:{}", self.page.display(), snippet.line)
+    }
+
+    /// A file is named in its first line, after the mark of a comment.
+    fn name<'a>(&self, snippet: &'a Snippet, comment: &str) -> &'a str {
+        let name = snippet.text.lines().next().and_then(|line| line.strip_prefix(comment));
+        name.unwrap_or_else(|| panic!("{}: the first line names no file", self.place(snippet)))
+    }
+
+    fn check_spec(&self, snippet: &Snippet) {
+        let name = self.name(snippet, "# ");
+        let spec = Spec::from_toml(&snippet.text, name);
+        assert!(spec.is_ok(), "{}: {spec:?}", self.place(snippet));
+        self.desk.write(name, &snippet.text);
+    }
+
+    fn check_bank(&self, snippet: &Snippet) {
+        let bank = Bank::from_json(&snippet.text, "bank.json");
+        assert!(bank.is_ok(), "{}: {bank:?}", self.place(snippet));
+    }
+
+    /// Runs the lines that call `hybank`, the C compiler and what it made; `cargo` lines are the business
+    /// of a fresh clone.
+    fn run(&self, snippet: &Snippet) {
+        let programs = ["hybank ", "cc ", "./"];
+        let runs = |line: &&str| programs.iter().any(|program| line.starts_with(program));
+        for line in snippet.text.replace("\\\n", "").lines().filter(runs) {
+            let binary = Path::new(env!("CARGO_BIN_EXE_hybank")).parent().expect("the folder of the binary");
+            let path = std::env::join_paths([binary, Path::new("/usr/bin"), Path::new("/bin")]);
+            let output = Command::new("sh")
+                .args(["-e", "-c", line])
+                .env("PATH", path.expect("a search path"))
+                .current_dir(self.desk.path(""))
+                .output()
+                .expect("a shell");
+            let stderr = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "{}: {line}\n{stderr}", self.place(snippet));
+        }
+    }
+}
+
+#[test]
+fn snippets_of_readme_and_docs_work() {
+    for page in pages() {
+        let folder = Folder::new(&page);
+        let text = fs::read_to_string(&page).expect("a page");
+        snippets(&text).iter().for_each(|snippet| folder.check(snippet));
+    }
+}
+
+#[test]
+fn links_between_the_pages_lead_somewhere() {
+    for page in pages() {
+        let text = fs::read_to_string(&page).expect("a page");
+        let targets = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+        for target in targets.filter(|target| !target.contains("://")) {
+            let file = target.split('#').next().unwrap_or_default();
+            let path = page.parent().expect("a folder").join(file);
+            assert!(path.exists(), "{}: the link to {target} leads nowhere", page.display());
+        }
+    }
+}
+
+#[test]
+fn lines_of_the_pages_end_before_column_110() {
+    for page in pages() {
+        let text = fs::read_to_string(&page).expect("a page");
+        let outside_tables = text.lines().enumerate().filter(|(_, line)| !line.starts_with('|'));
+        for (index, line) in outside_tables {
+            assert!(line.chars().count() < 110, "{}:{}: {line}", page.display(), index + 1);
+        }
+    }
+}

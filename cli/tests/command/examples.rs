@@ -1,0 +1,60 @@
+//! The scripts of `examples/` run as a user starts them.
+
+use crate::support::text;
+use std::path::Path;
+use std::process::Command;
+
+/// Runs the script of a folder of examples in a folder of its own; gives what it printed.
+#[cfg(unix)]
+fn run_script(example: &str, folder: &Path) -> String {
+    let script =
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("examples").join(example).join("run.sh");
+    let binary = Path::new(env!("CARGO_BIN_EXE_hybank")).parent().unwrap();
+    let path = std::env::join_paths([binary, Path::new("/usr/bin"), Path::new("/bin")]).unwrap();
+    let output = Command::new("sh").arg(script).arg(folder).env("PATH", path).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    text(&output.stdout)
+}
+
+/// The loop of capture, calibration, bank and fused recording, as a user starts it.
+#[test]
+#[cfg(unix)]
+fn the_calibration_loop_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let shown = run_script("calibrate", folder.path());
+    assert!(shown.contains("held out   the captures agree"), "{shown}");
+    for name in ["measured.toml", "measured.json", "measured.wav"] {
+        assert!(folder.path().join(name).is_file(), "{name}");
+    }
+    // Measured again: interleaving spurs of the bank for the drawing, and of the bank for the converters.
+    let spurs: Vec<f64> =
+        shown.lines().filter_map(|line| line.strip_prefix("interleaving")).map(decibels).collect();
+    assert!(spurs.len() == 2 && spurs[0] > -45.0 && spurs[1] < -75.0, "{spurs:?}");
+}
+
+/// The first number of a line of figures.
+#[cfg(unix)]
+fn decibels(line: &str) -> f64 {
+    line.split_whitespace().next().unwrap().parse().unwrap()
+}
+
+/// Two sensors of 100 Hz and 60 Hz become one of 300 Hz.
+#[test]
+#[cfg(unix)]
+fn two_inertial_sensors_become_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let shown = run_script("inertial", folder.path());
+    let snr = shown.lines().find_map(|line| line.strip_prefix("SNR")).map(decibels);
+    assert!(snr.is_some_and(|snr| snr > 50.0), "{shown}");
+}
+
+/// Two recordings with clocks of their own become one; the last line is that of the log.
+#[test]
+#[cfg(unix)]
+fn two_recorders_become_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let shown = run_script("recorders", folder.path());
+    let last: serde_json::Value = serde_json::from_str(shown.lines().last().unwrap()).unwrap();
+    assert_eq!(last["lock"][1], "locked", "{shown}");
+    assert!((last["rate_ppm"][1].as_f64().unwrap() - 1.5).abs() < 0.3, "{last}");
+}
