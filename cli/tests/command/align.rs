@@ -239,7 +239,7 @@ fn recordings_that_do_not_fit_are_refused_with_the_reason() {
     wav::write(&desk, "a.wav", 1, 48_000, &a);
     wav::write(&desk, "b.wav", 1, 48_000, &b);
     wav::write(&desk, "cd.wav", 1, 44_100, &a);
-    wav::write(&desk, "short.wav", 1, 48_000, &a[..500]);
+    wav::write(&desk, "short.wav", 1, 48_000, &b[..500]);
     wav::write(&desk, "silent.wav", 1, 48_000, &[0.125; 30_000]);
     let tone =
         |early: f64| -> Vec<f32> { (0..30_000).map(|k| (0.3 * (k as f64 + early)).sin() as f32).collect() };
