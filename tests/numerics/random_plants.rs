@@ -100,7 +100,8 @@ fn end_of(seed: u64) -> End {
     let (norm, lower) = (gamma.norm.unwrap(), gamma.lower.unwrap());
     assert!(norm.is_finite() && gamma.noncausal.unwrap() <= norm && lower <= norm, "plant {seed}: {gamma:?}");
     let again = analyze(&found.bank, &[]).unwrap().gamma;
-    assert!((again - norm).abs() <= 1e-8 * norm + 1e-12, "plant {seed}: {again} {norm}");
+    // Norms below 1e-10 of the reference samples are zero up to rounding.
+    assert!((again - norm).abs() <= 1e-8 * norm + 1e-10, "plant {seed}: {again} {norm}");
     match &found.proof {
         Ok(proven) => {
             let slack = 1e-6 * norm + 1e-9;

@@ -174,7 +174,8 @@ fn without_certificate(bank: &Bank, dual: &DualSolution, stop: &Stop) -> Result<
         Some(LowerProof::Causal(witness)) => Some(witness.gamma),
         None => noncausal,
     };
-    let [lower, noncausal] = [lower, noncausal].map(|proven| proven.map(stated));
+    // Without a witness nothing but zero is known to be below.
+    let [lower, noncausal] = [lower, noncausal].map(|proven| Some(proven.map_or(0.0, stated)));
     let computed = Gamma::computed(norm, 0.0, 0.0, 0.0).upper;
     let upper = [computed, bank.gamma.upper, lower, noncausal].into_iter().flatten().reduce(f64::max);
     Ok(Gamma { norm: Some(norm), upper, lower, noncausal, ..bank.gamma })
