@@ -6,7 +6,9 @@
 
 use super::record::Record;
 use crate::linalg::{Complex, fourier};
+use crate::simulate::{Instants, Recording};
 use crate::sine_fit::Channel;
+use crate::units::FastPeriods;
 use std::f64::consts::TAU;
 
 /// Samples of the longest probe: at 100 ppm the lag moves by three samples within it, and the peak of the
@@ -37,6 +39,9 @@ const ALIKE_WITHIN_PITCH: f64 = 0.9;
 /// Share of the largest possible correlation from which on recordings have something in common: different
 /// voices have 0.2, tones and loops 0.4.
 const IN_COMMON: f64 = 0.3;
+
+/// Samples on each side of those between which a recording is interpolated.
+const BEYOND: usize = 32;
 
 /// A stretch of a recording that is looked for in another one.
 struct Probe {
@@ -78,6 +83,20 @@ pub(crate) fn stretch(record: &Record, first: i64, length: usize) -> Vec<f64> {
     stretch.extend(channel.deviations());
     stretch.resize(length, 0.0);
     stretch
+}
+
+/// `length` samples from sample `first` on, as a clock takes them that runs as that of the reference does
+/// and agrees with it in their middle, where the lag grows by `rate`.
+pub(crate) fn steadied(record: &Record, first: usize, length: usize, rate: f64) -> Record {
+    let mut part = record.part(first..first + length);
+    let around = stretch(record, first as i64 - BEYOND as i64, length + 2 * BEYOND);
+    let begin = BEYOND as f64 - 0.5 * rate * (length as f64 - 1.0);
+    let instants = Instants { first: FastPeriods(begin), step: FastPeriods(1.0 + rate), count: length };
+    let steady = Recording::new(&around, FastPeriods(1.0)).sample_through(|_| Complex::ONE, instants);
+    for ((sample, steady), own) in part.samples.iter_mut().zip(steady).zip(&around[BEYOND..]) {
+        *sample += steady - own;
+    }
+    part
 }
 
 /// The correlations of a stretch of `size` samples with a shorter one: at index l that of its samples from l

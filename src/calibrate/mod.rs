@@ -55,7 +55,7 @@ pub use contradiction::Contradiction;
 pub use error::CalibrateError;
 pub use estimates::{Calibration, ChannelEstimate, Tone, applied};
 pub use fit::Fit;
-pub(crate) use lags::{Correlation, LagLine, NoLag, line, stretch};
+pub(crate) use lags::{Correlation, LagLine, NoLag, line, steadied, stretch};
 pub(crate) use model::Model;
 pub(crate) use record::longest_run;
 pub use record::{Acquisition, Record};

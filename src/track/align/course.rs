@@ -18,6 +18,8 @@ const INSTANTS: u32 = 128;
 /// Half the box of a delay that passes through more than a slow period, in slow periods: taps for all delays
 /// of one, with room for the shifts of frames.
 const WHOLE_PERIOD: f64 = 0.55;
+/// Median of the absolute values of a normal law, in its deviations.
+const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 /// Fixed taps bear a delay that moves by this, in fast periods.
 const NEGLIGIBLE: f64 = 0.02;
 
@@ -58,7 +60,8 @@ impl<'a> Course<'a> {
             frame: estimate.centre.round() as u64,
             delays: estimate.channels.iter().map(known).collect(),
         };
-        let readings: Vec<Reading> = estimates.iter().map(reading).collect();
+        let mut readings: Vec<Reading> = estimates.iter().map(reading).collect();
+        (0..spec.channels.len()).for_each(|i| widen(&mut readings, i));
         let slow = h * spec.ratio as f64;
         let timeline = |i: usize| match i == settings.reference {
             true => Some(None),
@@ -193,6 +196,27 @@ impl<'a> Course<'a> {
         };
         self.readings.iter().filter_map(moved).collect()
     }
+}
+
+/// Widens the intervals of channel i to what the readings scatter: by the median of how far each is from the
+/// line through those beside it.
+fn widen(readings: &mut [Reading], i: usize) {
+    let of = |reading: &Reading| Some((reading.frame as f64, reading.delays[i]?));
+    let all: Vec<(f64, (Seconds, Seconds))> = readings.iter().filter_map(of).collect();
+    let misfit = |three: &[(f64, (Seconds, Seconds))]| {
+        let [(x, before), (y, own), (z, after)] = [three[0], three[1], three[2]];
+        let share = (y - x) / (z - x);
+        let miss = own.0.0 - (1.0 - share) * before.0.0 - share * after.0.0;
+        miss.abs() / own.1.0.hypot((1.0 - share) * before.1.0).hypot(share * after.1.0)
+    };
+    let mut misfits: Vec<f64> = all.windows(3).map(misfit).collect();
+    misfits.sort_by(f64::total_cmp);
+    let median = misfits.get(misfits.len() / 2).copied().unwrap_or(0.0);
+    let factor = (median / MEDIAN_OF_NORMAL).max(1.0);
+    readings
+        .iter_mut()
+        .filter_map(|reading| reading.delays[i].as_mut())
+        .for_each(|delay| delay.1 = delay.1 * factor);
 }
 
 /// The weighted mean of estimates; its deviation is that of their scatter where it is larger.

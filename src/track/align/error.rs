@@ -49,6 +49,18 @@ pub enum AlignError {
         /// Samples by which the channel may have begun before the reference.
         lags: Vec<i64>,
     },
+    /// At each instant the signal is narrow: a sweep, a tone that glides.
+    #[error(
+        "the recordings of channels {reference} and {channel} agree at several lags in most pieces: at each instant the \
+         signal has a narrow band, as a slow sweep has, and its frequency moves as a delay would; record a broad sound \
+         (noise, speech, claps), or follow the delay by a tone that sounds all the time"
+    )]
+    Narrow {
+        /// From 1.
+        reference: usize,
+        /// From 1.
+        channel: usize,
+    },
     /// The recordings were made at the same time for too short a while.
     #[error("all recordings together have {frames} samples in common; at least {needed} are needed")]
     Overlap {

@@ -111,10 +111,9 @@ pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result
     let lines = (0..records.len()).map(line).collect::<Result<Vec<_>, _>>()?;
     let stretches = Stretches::new(records, reference, &lines)?;
     let pieces = stretches.firsts().len();
-    let few = |measured, reason| AlignError::NotMeasured { measured, pieces, reason };
-    let estimates = Pieces::new(spec, records, fit, &stretches).measure(&lines);
-    let estimates = estimates.map_err(|reason| few(0, reason))?;
-    let course = Course::new(spec, settings, &estimates, &stretches).ok_or(few(estimates.len(), None))?;
+    let estimates = Pieces::new(spec, records, fit, &stretches).measure(&lines)?;
+    let few = AlignError::NotMeasured { measured: estimates.len(), pieces, reason: None };
+    let course = Course::new(spec, settings, &estimates, &stretches).ok_or(few)?;
     Ok(alignment(spec, records, &course, &estimates, pieces))
 }
 

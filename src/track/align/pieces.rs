@@ -1,14 +1,14 @@
 //! Delays, gains and offsets piece by piece, of recordings whose lags are known to some samples.
 //!
-//! A piece is so short that no clock drifts by much within it. The cross-correlation gives its lag to a part
+//! A piece is so short that no clock drifts by much within it, and what it drifts is taken out. The cross-correlation gives its lag to a part
 //! of a sample, and a blind calibration the rest. Each is measured on its own, so nothing is lost where some
 //! are silent.
 
 use super::super::source::LARGEST_DEVIATION;
-use super::Stretches;
+use super::{AlignError, Stretches};
 use crate::calibrate::{
     CalibrateError, CalibrationSignal, ChannelEstimate, Correlation, LagLine, Record, Settings, calibrate,
-    longest_run, stretch,
+    longest_run, steadied, stretch,
 };
 use crate::linalg::fourier;
 use crate::spec::Spec;
@@ -20,6 +20,11 @@ const NEAR: f64 = 1.5;
 /// The delay of a piece is at most so many slow periods from its lag.
 const FARTHEST: f64 = 1.0;
 
+/// Another lag whose correlation has this share of the highest one says as much as that.
+const ALIKE: f64 = 0.9;
+/// Samples from the highest correlation within which all others belong to its peak.
+const PEAK: usize = 2;
+
 /// The recordings of all channels and where they are compared.
 pub(super) struct Pieces<'a> {
     records: &'a [Record],
@@ -27,6 +32,8 @@ pub(super) struct Pieces<'a> {
     stretches: &'a Stretches,
     /// The expected gains are those of the recordings.
     spec: Spec,
+    /// By how much the lag of each grows per sample.
+    rates: Vec<f64>,
 }
 
 /// What a piece says of all channels.
@@ -44,6 +51,8 @@ struct LocalLag {
     beyond: f64,
     /// Share of the largest possible correlation, with its sign.
     height: f64,
+    /// No other lag says as much.
+    is_alone: bool,
 }
 
 impl<'a> Pieces<'a> {
@@ -53,23 +62,28 @@ impl<'a> Pieces<'a> {
         settings: Settings,
         stretches: &'a Stretches,
     ) -> Self {
-        Self { records, settings, stretches, spec: spec.clone() }
+        Self { records, settings, stretches, spec: spec.clone(), rates: vec![0.0; records.len()] }
     }
 
     /// What each piece says, where it says anything, of recordings on these lines; else why the last one
     /// does not.
-    pub(super) fn measure(
-        mut self,
-        lines: &[Option<LagLine>],
-    ) -> Result<Vec<PieceEstimate>, Option<CalibrateError>> {
+    pub(super) fn measure(mut self, lines: &[Option<LagLine>]) -> Result<Vec<PieceEstimate>, AlignError> {
         let firsts = self.stretches.firsts();
         let mut lags: Vec<Vec<f64>> = vec![vec![0.0; lines.len()]; firsts.len()];
         for (i, line) in lines.iter().enumerate() {
             let Some(line) = line else { continue };
             let local: Vec<LocalLag> = firsts.iter().map(|first| self.local_lag(*first, i, line)).collect();
             self.expect_gain(i, local.iter().map(|lag| lag.height).sum());
-            for (number, first) in firsts.iter().enumerate() {
-                lags[number][i] = line.lag_at(self.centre(*first)) + likely(&local, number);
+            let weight = |is_alone: bool| -> f64 {
+                local.iter().filter(|lag| lag.is_alone == is_alone).map(|lag| lag.height.powi(2)).sum()
+            };
+            if weight(false) > weight(true) {
+                return Err(AlignError::Narrow { reference: self.settings.reference + 1, channel: i + 1 });
+            }
+            let beyond: Vec<f64> = (0..local.len()).map(|number| likely(&local, number)).collect();
+            self.rates[i] = line.rate + slope(&firsts, &beyond);
+            for ((first, beyond), lags) in firsts.iter().zip(&beyond).zip(&mut lags) {
+                lags[i] = line.lag_at(self.centre(*first)) + beyond;
             }
         }
         let (mut found, mut reason) = (Vec::new(), None);
@@ -79,7 +93,12 @@ impl<'a> Pieces<'a> {
                 Err(error) => reason = Some(error),
             }
         }
-        if found.is_empty() { Err(reason) } else { Ok(found) }
+        let pieces = firsts.len();
+        if found.is_empty() {
+            Err(AlignError::NotMeasured { measured: 0, pieces, reason })
+        } else {
+            Ok(found)
+        }
     }
 
     fn centre(&self, first: usize) -> f64 {
@@ -97,13 +116,16 @@ impl<'a> Pieces<'a> {
         let own = stretch(&self.records[self.settings.reference], first as i64, length);
         let sums = Correlation::with(&own, size).of(&fourier::real_spectrum(&other));
         let shifts = 1..2 * margin;
-        let best = shifts.max_by(|a, b| sums[*a].abs().total_cmp(&sums[*b].abs())).unwrap_or(margin);
+        let best = shifts.clone().max_by(|a, b| sums[*a].abs().total_cmp(&sums[*b].abs())).unwrap_or(margin);
         // The vertex of the parabola through three values.
         let [before, at, after] = [best - 1, best, best + 1].map(|n| sums[n]);
         let part = 0.5 * (before - after) / (before - 2.0 * at + after);
         let part = if part.abs() <= 0.5 { part } else { 0.0 };
         let lag = (begin + best as i64 - first as i64) as f64 + part;
-        LocalLag { beyond: lag - expected, height: at }
+        let height = |n: usize| sums[n].abs();
+        let is_peak = |n: usize| height(n) >= height(n - 1).max(height(n + 1));
+        let is_rival = |n: usize| n.abs_diff(best) > PEAK && is_peak(n) && height(n) >= ALIKE * height(best);
+        LocalLag { beyond: lag - expected, height: at, is_alone: !shifts.clone().any(is_rival) }
     }
 
     /// Expects that recording i has its level, and the polarity with which it `correlates`.
@@ -119,13 +141,15 @@ impl<'a> Pieces<'a> {
         let (h, slow) = (spec.fast_period, spec.fast_period * spec.ratio as f64);
         let own = spec.channels[self.settings.reference].delay;
         let (mut shifts, mut parts) = (Vec::new(), Vec::new());
-        for ((record, lag), channel) in self.records.iter().zip(lags).zip(&mut spec.channels) {
+        for (((record, lag), rate), channel) in
+            self.records.iter().zip(lags).zip(&self.rates).zip(&mut spec.channels)
+        {
             let last = record.samples.len().saturating_sub(length) as i64;
             let begin = (first as i64 + lag.round() as i64).clamp(0, last);
             let shift = (begin - first as i64) as f64;
             channel.delay = own + slow * (lag - shift);
             shifts.push(shift);
-            parts.push(record.part(begin as usize..begin as usize + length));
+            parts.push(steadied(record, begin as usize, length, *rate));
         }
         let (begin, frames) = longest_run(&parts);
         let parts: Vec<Record> = parts.iter().map(|part| part.part(begin..begin + frames)).collect();
@@ -151,6 +175,14 @@ fn likely(local: &[LocalLag], number: usize) -> f64 {
     let beside = &local[number.saturating_sub(BESIDE)..(number + BESIDE + 1).min(local.len())];
     let (usual, own) = (weighted_median(beside.to_vec()), local[number].beyond);
     if (own - usual).abs() <= NEAR { own } else { usual }
+}
+
+/// By how much the lags of pieces that begin at these samples grow per sample: by least squares.
+fn slope(firsts: &[usize], lags: &[f64]) -> f64 {
+    let middle = firsts.iter().sum::<usize>() as f64 / firsts.len() as f64;
+    let from = |first: &usize| *first as f64 - middle;
+    let squares: f64 = firsts.iter().map(|first| from(first).powi(2)).sum();
+    firsts.iter().zip(lags).map(|(first, lag)| from(first) * lag).sum::<f64>() / squares
 }
 
 /// The median, with the squares of the correlations as weights.
