@@ -1,8 +1,8 @@
 //! Delays, gains and offsets piece by piece, of recordings whose lags are known to some samples.
 //!
-//! A piece is so short that no clock drifts by much within it, and what it drifts is taken out. The cross-correlation gives its lag to a part
-//! of a sample, and a blind calibration the rest. Each is measured on its own, so nothing is lost where some
-//! are silent.
+//! A piece is so short that no clock drifts by much within it, and what it drifts is taken out. The
+//! cross-correlation gives its lag to a part of a sample, and a blind calibration the rest. Each is measured
+//! on its own, so nothing is lost where some are silent.
 
 use super::super::source::LARGEST_DEVIATION;
 use super::{AlignError, Stretches};
