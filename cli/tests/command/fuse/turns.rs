@@ -126,7 +126,7 @@ fn what_cannot_take_turns_is_refused() {
     wav::write(&desk, "wide.wav", 3, 16_000, &capture(4));
     let fuse =
         |args: &[&'static str]| [&["fuse", "three.json", "-o", "y.wav", "--interleaved"], args].concat();
-    desk.refused(2, &fuse(&["2", "capture.wav"]), &["has 3 channels", "give --interleaved 3"]);
+    desk.refused(2, &fuse(&["2", "capture.wav"]), &["there are 3 channels", "give 3"]);
     desk.refused(
         2,
         &fuse(&["3", "capture.wav", "wide.wav"]),
