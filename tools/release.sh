@@ -42,7 +42,8 @@ rm -rf "$packed"
 mkdir "$packed"
 members=()
 for crate in "${crates[@]}"; do
-    tar -xzf "$build/package/$crate-$version.crate" -C "$packed"
+    # Files of a package have one date for ever, by which cargo would take an earlier build for this one.
+    tar --touch -xzf "$build/package/$crate-$version.crate" -C "$packed"
     for file in LICENSE-MIT LICENSE-APACHE README.md; do
         [ -s "$packed/$crate-$version/$file" ] || { echo "release: $crate has no $file" >&2; exit 1; }
     done

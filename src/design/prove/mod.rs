@@ -16,6 +16,7 @@ use crate::lti::{FrequencyResponse, StateSpace};
 use crate::verify::{EnclosedErrorSystem, Midpoint, Strictness, Verified};
 use lower::lower_proof;
 pub(super) use lower::max_witnesses;
+use std::f64::consts::PI;
 pub(super) use upper::MAX_SEARCHED_STATES;
 use upper::certificate;
 
@@ -26,6 +27,9 @@ const SHORTFALL: f64 = 0.5e-6;
 const STATED_BELOW: f64 = 1e-12;
 /// Norms below this, relative to the scale of the reference samples, are zero up to rounding.
 const FLOOR: f64 = 1e-10;
+/// Distances from the peak in doubles at which the enclosed gain is looked at, in radians: from the rounding
+/// of a frequency to the width of a wide resonance.
+const BESIDE: [f64; 6] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
 /// Relative width of a proven interval above which the norm is looked for in the arithmetic of `verify`:
 /// twice the least excess of a certificate.
 const NARROW: f64 = 2e-8;
@@ -196,6 +200,12 @@ fn enclosed_peak(
     };
     let peak = proof.upper.as_ref().map(|certificate| &certificate.peak);
     frequencies.extend(below.iter().chain(&proof.noncausal).chain(peak).map(frequency));
+    // The peak in doubles is a narrow one, or none at all.
+    let computed = hinf_norm(&system)?;
+    let beside =
+        BESIDE.iter().flat_map(|distance| [computed.frequency - distance, computed.frequency + distance]);
+    frequencies.extend(beside.filter(|frequency| (0.0..=PI).contains(frequency)));
+    frequencies.push(computed.frequency);
     frequencies.sort_by(f64::total_cmp);
     // The level sets of small gains are rounding errors, so the grid has to show all peaks.
     let split = |ends: &[f64]| {
@@ -211,14 +221,17 @@ fn enclosed_peak(
         }
         Err(_) => CMat::zeros(system.outputs(), 1),
     };
-    let found = if error.states() <= MAX_LONG_STATES {
-        hinf_norm_with_response(&system, &root, dense)?
-    } else {
-        hinf_norm(&system)?
+    let at = |frequency: f64| {
+        let peak = witness(frequency, &leading_direction(&root(frequency))?);
+        Ok::<_, DesignError>(error.attains(&peak).filter(|gain| *gain > 0.0).map(|gain| (gain, peak)))
     };
-    let at = found.frequency;
-    let peak = witness(at, &leading_direction(&root(at))?);
-    Ok(error.attains(&peak).filter(|gain| *gain > 0.0).map(|gain| (gain, peak)))
+    // What is not resolved at the peak in doubles says nothing against it.
+    let Some(there) = at(computed.frequency)? else { return Ok(None) };
+    if error.states() > MAX_LONG_STATES {
+        return Ok(Some(there));
+    }
+    let found = hinf_norm_with_response(&system, &root, dense)?.frequency;
+    Ok(at(found)?.filter(|(gain, _)| *gain > there.0).or(Some(there)))
 }
 
 /// The frequency of a witness in [0, pi].
