@@ -51,7 +51,7 @@ impl Example {
             Self::TiAdc => include_str!("../filters/interleaved-4x250M.toml"),
             Self::Audio2x => include_str!("../filters/speech-2x.toml"),
             Self::SensorArray => include_str!("../filters/vibration-3x.toml"),
-            Self::Inertial => include_str!("../../examples/inertial/spec.toml"),
+            Self::Inertial => include_str!("../examples/inertial/spec.toml"),
             Self::Oversampled => include_str!("../filters/oversampled-3for2.toml"),
             Self::Thesis => include_str!("../filters/thesis-fir.toml"),
         }
