@@ -44,6 +44,31 @@ impl Alignment {
 }
 
 /// When recordings began, how their clocks drift, their polarities, gains and offsets.
+///
+/// Parameters
+/// ----------
+/// x : sequence of array_like
+///     One recording per channel, of any length, of a broad sound (noise, speech, music).
+/// spec : Bank, Spec, dict, str or path
+///     The nominal values.
+/// reference : int, optional
+///     The channel whose clock is the time, from 1.
+/// within : float, optional
+///     How far apart the recordings began at most, in seconds.
+///
+/// Returns
+/// -------
+/// Alignment
+///     The spec with these values, and the samples to leave out.
+///
+/// Examples
+/// --------
+/// >>> sound = "tones:" + ",".join(f"{100 * 1.07**k:.1f}Hz" for k in range(65))
+/// >>> spec = {"fast_rate": 48e3, "ratio": 2, "target": {"filter": hb.butterworth(4, 9e3)},
+/// ...         "channel": [hb.Channel(delay=25e-6), hb.Channel(delay=12.5e-6)]}
+/// >>> heard = hb.simulate(spec, sound, samples=48_000).channels
+/// >>> hb.align([heard[0][500:], heard[1]], spec).skip
+/// [0, 500]
 #[pyfunction]
 #[pyo3(signature = (x, spec, *, reference = None, within = None))]
 pub(crate) fn align(
