@@ -168,7 +168,7 @@ def test_recordings_are_aligned_by_any_signal():
         "channel": [hb.Channel(delay=25e-6), hb.Channel(delay=12.5e-6)], "design": {"method": "fir", "taps": 8},
     }  # fmt: skip
     sound = "tones:" + ",".join(f"{100 * 1.07**k:.1f}Hz" for k in range(65))
-    heard = hb.simulate(spec, sound, samples=96_000).channels
+    heard = hb.simulate(spec, sound, samples=96_000).channels / 100
     heard = [heard[0][500:], -0.5 * heard[1][:40_000] + 0.1]
     found = hb.align(heard, spec)
     assert found.skip == [0, 500] and found.frames == 39_500
