@@ -3,17 +3,20 @@
 
 use super::plant::LiftedPlant;
 use super::problem::Problem;
+use super::prove::resolved_norm;
 use super::{DesignError, filters};
 use crate::bank::Bank;
 use crate::linalg::Mat;
 use crate::lti::StateSpace;
 use crate::lti::gramian::h2_norm;
 use crate::units::{FastPeriods, Hertz, RadiansPerSlowPeriod, Seconds};
+use std::borrow::Cow;
 
 /// The error of a bank with given front ends and delays.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Analysis {
-    /// The norm ||K|| of the error system, in normalised time (h = 1).
+    /// The norm ||K|| of the error system, in normalised time (h = 1): in double precision, or in the
+    /// arithmetic of [`crate::verify`] where double precision does not resolve it.
     pub gamma: f64,
     /// Frequency of the worst case in hertz, from 0 to 1/(2 M h). All higher frequencies alias to one of
     /// these in the slow samples.
@@ -58,7 +61,7 @@ pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, Design
     let shifted = problem.with_delay_errors(&errors);
     shifted.check_size()?;
     let plant = LiftedPlant::new(&shifted)?;
-    let peak = plant.bank_norm(&bank.filters)?;
+    let peak = resolved_norm(&moved_by(bank, delay_errors), plant.bank_norm(&bank.filters)?)?;
     let noncausal = if shifted.resolves_delays() { Some(plant.noncausal_bound()?.gain) } else { None };
     Ok(Analysis {
         gamma: peak.gain,
@@ -66,6 +69,19 @@ pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, Design
         noncausal: noncausal.map(|bound| bound.min(peak.gain)),
         mean: mean_of(bank, &plant)?,
     })
+}
+
+/// The bank with `delay_errors[i]` added to its delays.
+fn moved_by<'a>(bank: &'a Bank, delay_errors: &[Seconds]) -> Cow<'a, Bank> {
+    if delay_errors.iter().all(|error| error.0 == 0.0) {
+        return Cow::Borrowed(bank);
+    }
+    let mut moved = Bank { proof: None, ..bank.clone() };
+    let channels = moved.spec.iter_mut().flat_map(|spec| &mut spec.channels);
+    let delays = channels.map(|channel| &mut channel.delay);
+    let pairs = delays.zip(delay_errors).chain(moved.delays.iter_mut().zip(delay_errors));
+    pairs.for_each(|(delay, error)| delay.0 += error.0);
+    Cow::Owned(moved)
 }
 
 /// Only the averages of [`analyze`], with the bank's own front ends and delays. For a large bank this takes

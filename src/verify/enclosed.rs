@@ -1,7 +1,7 @@
 //! An enclosure of the error system of a bank. It is built once and serves to check any number of
 //! witnesses.
 
-use super::ball::{self, Matrix};
+use super::ball::{self, Ball, Matrix};
 use super::causal::{CausalPlant, Precision, Recursion};
 use super::error_system::{self, BlockForm, ErrorSystem};
 use super::front_ends::FrontEnds;
@@ -11,7 +11,7 @@ use super::{
     BoundedBanks, MAX_STATES, Strictness, Verified, VerifyError, fir_length, lower, positive, statements,
     upper,
 };
-use crate::arithmetic::{BigFloat, DoubleDouble};
+use crate::arithmetic::{BigFloat, DoubleDouble, Number};
 use crate::bank::{
     Bank, CausalWitness, Certificate, DualWitness, Gamma, LowerProof, Proof, SynthesisFilters,
 };
@@ -145,7 +145,7 @@ impl<'a> EnclosedErrorSystem<'a> {
     }
 
     /// Whether `certificate` proves its gamma. Only one with a correction is tried in 512 bits.
-    pub fn keeps(&self, certificate: &Certificate) -> bool {
+    pub fn certifies(&self, certificate: &Certificate) -> bool {
         let long = !certificate.correction.is_empty() && self.states() <= MAX_CORRECTED_STATES;
         upper::proves(&self.equations, certificate)
             || long && upper::proves(self.long_equations(), certificate)
@@ -160,12 +160,24 @@ impl<'a> EnclosedErrorSystem<'a> {
 
     /// A proven lower bound of ||K||, from the gain at a frequency; in 512 bits where 106 do not resolve it.
     pub fn attains(&self, witness: &DualWitness) -> Option<f64> {
+        self.gain_at(witness).0
+    }
+
+    /// The gain at a frequency, rounded down; `None` where neither arithmetic resolves it.
+    pub(crate) fn resolved_gain(&self, witness: &DualWitness) -> Option<f64> {
+        let (gain, is_resolved) = self.gain_at(witness);
+        gain.filter(|_| is_resolved)
+    }
+
+    /// A lower bound of the gain at a frequency, and whether it is the gain up to rounding.
+    fn gain_at(&self, witness: &DualWitness) -> (Option<f64>, bool) {
         let (filters, ratio) = (&self.bank.filters, self.bank.ratio);
-        let square = lower::square_of_gain(&self.period, filters, ratio, witness);
-        if square.radius() <= UNRESOLVED * square.nearest() || self.states() > MAX_CORRECTED_STATES {
-            return lower::root(square);
+        let short = lower::square_of_gain(&self.period, filters, ratio, witness);
+        if is_resolved(&short) || self.states() > MAX_CORRECTED_STATES {
+            return (lower::root(short), is_resolved(&short));
         }
-        lower::root(lower::square_of_gain(self.long_period(), filters, ratio, witness))
+        let long = lower::square_of_gain(self.long_period(), filters, ratio, witness);
+        (lower::root(long), is_resolved(&long))
     }
 
     /// A proven lower bound for any bank on these front ends, causal or not.
@@ -271,7 +283,7 @@ impl<'a> EnclosedErrorSystem<'a> {
         }
         let attained =
             self.attains(&certificate.peak).ok_or(VerifyError::Void { place: "proof.upper.peak" })?;
-        if !self.keeps(certificate) {
+        if !self.certifies(certificate) {
             return Err(VerifyError::NotProven { gamma: upper });
         }
         let noncausal = match &proof.noncausal {
@@ -302,4 +314,9 @@ impl<'a> EnclosedErrorSystem<'a> {
             }
         }
     }
+}
+
+/// Whether the square of a gain is known to [`UNRESOLVED`].
+fn is_resolved<F: Number>(square: &Ball<F>) -> bool {
+    square.radius() <= UNRESOLVED * square.nearest()
 }

@@ -230,9 +230,9 @@ fn a_norm_that_is_stated_too_low_or_too_high_is_refused() {
         // A certificate proves its gamma and no lower one.
         let certificate = bank.proof.as_ref().unwrap().upper.clone().unwrap();
         let error = EnclosedErrorSystem::new(&bank).unwrap();
-        assert!(error.keeps(&certificate));
+        assert!(error.certifies(&certificate));
         for below in [1e-6, 1e-12] {
-            assert!(!error.keeps(&Certificate { gamma: norm * (1.0 - below), ..certificate.clone() }));
+            assert!(!error.certifies(&Certificate { gamma: norm * (1.0 - below), ..certificate.clone() }));
         }
     }
 }
@@ -245,7 +245,7 @@ fn no_certificate_passes_below_the_norm() {
     let error = EnclosedErrorSystem::new(&bank).unwrap();
     let certificate = bank.proof.as_ref().unwrap().upper.as_ref().unwrap();
     let keeps =
-        |factor: Vec<Vec<f64>>, gamma| error.keeps(&Certificate { factor, gamma, ..certificate.clone() });
+        |factor: Vec<Vec<f64>>, gamma| error.certifies(&Certificate { factor, gamma, ..certificate.clone() });
     let factor = &certificate.factor;
     for scale in [0.5, 0.999999, 1.0, 1.000001, 1.5, 1e3] {
         let scaled: Vec<Vec<f64>> =
@@ -269,9 +269,9 @@ fn a_corrected_certificate_passes_and_proves_no_less_than_the_norm() {
     let certificate = design.bank.proof.as_ref().unwrap().upper.clone().unwrap();
     assert_eq!(certificate.correction.len(), certificate.factor.len());
     let error = EnclosedErrorSystem::new(&design.bank).unwrap();
-    assert!(error.keeps(&certificate));
-    assert!(!error.keeps(&Certificate { gamma: proven.attained, ..certificate.clone() }));
-    assert!(!error.keeps(&Certificate { correction: Vec::new(), ..certificate }));
+    assert!(error.certifies(&certificate));
+    assert!(!error.certifies(&Certificate { gamma: proven.attained, ..certificate.clone() }));
+    assert!(!error.certifies(&Certificate { correction: Vec::new(), ..certificate }));
 }
 
 #[test]

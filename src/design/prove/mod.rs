@@ -1,22 +1,23 @@
 //! Searches for certificates and witnesses that prove a bank's gammas. They prove nothing by themselves:
 //! [`crate::verify`] checks them.
 
+mod enclosed_norm;
 mod lower;
 mod upper;
 
-use super::limits::{MAX_LONG_STATES, Stop};
+use super::limits::Stop;
 use super::merging::Repeats;
 use super::methods::DualSolution;
 use super::plant::LiftedPlant;
 use super::{DesignError, analysis};
 use crate::bank::{Bank, DualWitness, Gamma, LowerProof, Proof};
-use crate::linalg::{self, CMat, Complex};
-use crate::lti::peak::{hinf_norm, hinf_norm_with_response, resonances, stable_poles};
-use crate::lti::{FrequencyResponse, StateSpace};
-use crate::verify::{EnclosedErrorSystem, Midpoint, Strictness, Verified};
+use crate::linalg::{self, CMat};
+use crate::lti::FrequencyResponse;
+use crate::verify::{EnclosedErrorSystem, Strictness, Verified};
+pub(super) use enclosed_norm::resolved_norm;
+use enclosed_norm::{EnclosedGains, is_zero};
 use lower::lower_proof;
 pub(super) use lower::max_witnesses;
-use std::f64::consts::PI;
 pub(super) use upper::MAX_SEARCHED_STATES;
 use upper::certificate;
 
@@ -25,11 +26,6 @@ const SHORTFALL: f64 = 0.5e-6;
 /// Relative distance of a stated lower bound below the proven one: another machine may round an approximate
 /// inverse differently.
 const STATED_BELOW: f64 = 1e-12;
-/// Norms below this, relative to the scale of the reference samples, are zero up to rounding.
-const FLOOR: f64 = 1e-10;
-/// Distances from the peak in doubles at which the enclosed gain is looked at, in radians: from the rounding
-/// of a frequency to the width of a wide resonance.
-const BESIDE: [f64; 6] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
 /// Relative width of a proven interval above which the norm is looked for in the arithmetic of `verify`:
 /// twice the least excess of a certificate.
 const NARROW: f64 = 2e-8;
@@ -155,9 +151,7 @@ fn enclosed_norm(
     verified: &mut Verified,
 ) -> Result<f64, DesignError> {
     let error = EnclosedErrorSystem::new(bank)?;
-    // Of a norm that is zero up to rounding nothing is gained by more digits.
-    let is_zero = verified.upper <= FLOOR * error.scale();
-    let found = if is_zero { None } else { enclosed_peak(&error, proof)? };
+    let found = if is_zero(verified.upper, &error) { None } else { EnclosedGains(&error).peak(proof)? };
     let Some((gain, peak)) = found else { return Ok(norm) };
     if let Some(certificate) = proof.upper.as_mut().filter(|_| gain > verified.attained) {
         (verified.attained, certificate.peak) = (gain, peak);
@@ -170,7 +164,7 @@ fn enclosed_norm(
 /// arithmetic of `verify`, and the lower ends are those that it proves.
 fn without_certificate(bank: &Bank, dual: &DualSolution, stop: &Stop) -> Result<Gamma, DesignError> {
     let error = EnclosedErrorSystem::new(bank)?;
-    let Some((norm, _)) = enclosed_peak(&error, &Proof::default())? else { return Ok(bank.gamma) };
+    let Some((norm, _)) = EnclosedGains(&error).peak(&Proof::default())? else { return Ok(bank.gamma) };
     let proof = lower_ends(&error, bank, dual, norm, stop)?;
     let noncausal = proof.noncausal.as_ref().and_then(|witness| error.noncausal_bound(witness));
     let lower = match &proof.lower {
@@ -183,55 +177,6 @@ fn without_certificate(bank: &Bank, dual: &DualSolution, stop: &Stop) -> Result<
     let computed = Gamma::computed(norm, 0.0, 0.0, 0.0).upper;
     let upper = [computed, bank.gamma.upper, lower, noncausal].into_iter().flatten().reduce(f64::max);
     Ok(Gamma { norm: Some(norm), upper, lower, noncausal, ..bank.gamma })
-}
-
-/// The largest gain that `verify` proves, with its witness. Double precision and the witnesses of `proof`
-/// suggest frequencies; of systems that are not large every gain is enclosed. `None` if there is none.
-fn enclosed_peak(
-    error: &EnclosedErrorSystem<'_>,
-    proof: &Proof,
-) -> Result<Option<(f64, DualWitness)>, DesignError> {
-    let Some(Midpoint { a, b, c, d }) = error.midpoint() else { return Ok(None) };
-    let system = StateSpace::new(a, b, c, d)?;
-    let mut frequencies = resonances(&stable_poles(&system)?);
-    let below = match &proof.lower {
-        Some(LowerProof::Fir(witnesses)) => &witnesses[..],
-        _ => &[],
-    };
-    let peak = proof.upper.as_ref().map(|certificate| &certificate.peak);
-    frequencies.extend(below.iter().chain(&proof.noncausal).chain(peak).map(frequency));
-    // The peak in doubles is a narrow one, or none at all.
-    let computed = hinf_norm(&system)?;
-    let beside =
-        BESIDE.iter().flat_map(|distance| [computed.frequency - distance, computed.frequency + distance]);
-    frequencies.extend(beside.filter(|frequency| (0.0..=PI).contains(frequency)));
-    frequencies.push(computed.frequency);
-    frequencies.sort_by(f64::total_cmp);
-    // The level sets of small gains are rounding errors, so the grid has to show all peaks.
-    let split = |ends: &[f64]| {
-        let part = 0.25 * (ends[1] - ends[0]);
-        [0, 1, 2, 3].map(|k| ends[0] + part * f64::from(k))
-    };
-    let dense = frequencies.windows(2).flat_map(split).chain(frequencies.last().copied()).collect();
-    // Directions times gains. Where the arithmetic resolves nothing, the gain counts as zero.
-    let root = |frequency: f64| match linalg::svd(&error.error_gram(half(frequency))) {
-        Ok(svd) => {
-            let gain = |k: usize| Complex::from(svd.s[k].sqrt());
-            CMat::from_fn(svd.u.nrows(), svd.s.len(), |i, k| svd.u[(i, k)] * gain(k))
-        }
-        Err(_) => CMat::zeros(system.outputs(), 1),
-    };
-    let at = |frequency: f64| {
-        let peak = witness(frequency, &leading_direction(&root(frequency))?);
-        Ok::<_, DesignError>(error.attains(&peak).filter(|gain| *gain > 0.0).map(|gain| (gain, peak)))
-    };
-    // What is not resolved at the peak in doubles says nothing against it.
-    let Some(there) = at(computed.frequency)? else { return Ok(None) };
-    if error.states() > MAX_LONG_STATES {
-        return Ok(Some(there));
-    }
-    let found = hinf_norm_with_response(&system, &root, dense)?.frequency;
-    Ok(at(found)?.filter(|(gain, _)| *gain > there.0).or(Some(there)))
 }
 
 /// The frequency of a witness in [0, pi].

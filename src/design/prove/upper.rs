@@ -4,7 +4,8 @@
 //! Double precision finds it for most banks. After steep filters, whose samples are nearly dependent, the
 //! error is a small difference of large numbers; the equation is then solved in 512 bits.
 
-use super::{FLOOR, enclosed_peak, leading_direction, witness};
+use super::enclosed_norm::{EnclosedGains, FLOOR};
+use super::{leading_direction, witness};
 use crate::arithmetic::dense::{cholesky, product, riccati_limit, select, solve, symmetric};
 use crate::arithmetic::{BigFloat, Number};
 use crate::bank::{Bank, Certificate, DualWitness, Proof};
@@ -74,7 +75,7 @@ pub(super) fn certificate(
     let shown = error.attains(&peak_witness).unwrap_or(0.0) / units.reference;
     if norm > floor
         && (shown - norm).abs() > RESOLVED * norm
-        && let Some((gain, enclosed)) = enclosed_peak(error, &Proof::default())?
+        && let Some((gain, enclosed)) = EnclosedGains(error).peak(&Proof::default())?
     {
         (norm, peak_witness) = (gain / units.reference, enclosed);
     }
@@ -138,7 +139,7 @@ impl Search<'_> {
         let gamma = level.gamma() * self.units.reference;
         let [factor, correction] = [factor, correction].map(|rows| self.units.factor(rows));
         let found = Certificate { gamma, peak: self.peak.clone(), factor, correction };
-        self.error.keeps(&found).then_some(found)
+        self.error.certifies(&found).then_some(found)
     }
 
     fn in_doubles(&self, level: Level) -> Result<Option<Certificate>, DesignError> {
