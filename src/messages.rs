@@ -3,7 +3,7 @@
 //!
 //! Names of files, keys, headers and cells may hold control characters, which a terminal obeys, and may be
 //! megabytes long. [`Quoted`] is foreign text in a message. Whoever prints a message passes all of it
-//! through [`shown`], so a text that nobody quoted does no harm either.
+//! through [`shown`], so a text that was not quoted does no harm either.
 //!
 //! ```
 //! use hybank::messages::{Number, Quoted, shown};

@@ -91,7 +91,7 @@ impl Report {
             let _ = writeln!(text, "  {channel:<10} {skip:<11} {delay:<25} {drift:<25} {gain:<25} {offset}");
         }
         let Alone { channel, snr_db, together_db } = self.alone;
-        let verdict = if self.one_suffices { "one recorder suffices" } else { "fusing them is worth it" };
+        let verdict = if self.one_suffices { "one recorder suffices" } else { "fuse them" };
         let _ = writeln!(
             text,
             "alone      channel {channel} gives {:.1} dB at best, all together {:.1} dB: {verdict}",

@@ -33,7 +33,7 @@ pub(crate) struct Alignment {
     together_db: f64,
     one_suffices: bool,
     /// What a reader of the values must know.
-    remarks: Vec<String>,
+    warnings: Vec<String>,
 }
 
 #[pymethods]
@@ -66,8 +66,8 @@ impl Alignment {
 /// >>> sound = "tones:" + ",".join(f"{100 * 1.07**k:.1f}Hz" for k in range(65))
 /// >>> spec = {"fast_rate": 48e3, "ratio": 2, "target": {"filter": hb.butterworth(4, 9e3)},
 /// ...         "channel": [hb.Channel(delay=25e-6), hb.Channel(delay=12.5e-6)]}
-/// >>> heard = hb.simulate(spec, sound, samples=48_000).channels
-/// >>> hb.align([heard[0][500:], heard[1]], spec).skip
+/// >>> recorded = hb.simulate(spec, sound, samples=48_000).channels
+/// >>> hb.align([recorded[0][500:], recorded[1]], spec).skip
 /// [0, 500]
 #[pyfunction]
 #[pyo3(signature = (x, spec, *, reference = None, within = None))]
@@ -115,6 +115,6 @@ fn result(py: Python<'_>, found: &track::Alignment, alone: Alone) -> PyResult<Al
         alone_db: alone.snr_db.0,
         together_db: alone.together_db.0,
         one_suffices: alone.suffices(),
-        remarks: found.warnings.iter().map(ToString::to_string).collect(),
+        warnings: found.warnings.iter().map(ToString::to_string).collect(),
     })
 }

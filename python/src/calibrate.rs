@@ -42,7 +42,7 @@ pub(crate) struct Calibration {
     /// 1 where the model fits to the noise; None if there are no degrees of freedom left.
     misfit: Option<f64>,
     /// What a reader of the values must know.
-    remarks: Vec<String>,
+    warnings: Vec<String>,
 }
 
 #[pymethods]
@@ -212,6 +212,6 @@ fn result(py: Python<'_>, spec: &Spec, found: &calibration::Calibration) -> PyRe
         frames: found.frames,
         clipped: found.clipped.clone(),
         misfit: found.misfit,
-        remarks: found.warnings.iter().chain(&more).map(ToString::to_string).collect(),
+        warnings: found.warnings.iter().chain(&more).map(ToString::to_string).collect(),
     })
 }

@@ -174,7 +174,7 @@ def test_recordings_are_aligned_by_any_signal():
     assert found.skip == [0, 500] and found.frames == 39_500
     assert abs(found.delay[1] - 12.5e-6) < 1e-8 and abs(found.drift_ppm[1]) < 0.1
     assert abs(found.gain[1] + 0.5) < 1e-3 and abs(found.offset[1] - 0.1) < 1e-2
-    assert 0 < len(found.track.splitlines()) <= 1024 and not found.remarks
+    assert 0 < len(found.track.splitlines()) <= 1024 and not found.warnings
     assert not found.one_suffices and found.together_db > found.alone_db and "Alignment" in repr(found)
     assert hb.design(found.spec, proof=False).gains[1] == found.gain[1]
     integers = [np.round(32767 * x).astype("i2") for x in heard]
@@ -187,7 +187,7 @@ def test_recordings_that_do_not_fit_are_refused():
     a, b = random.standard_normal((2, 5000))
     for x, keywords, words in [
         ([a, b], {}, "nothing in common"),
-        ([a, np.zeros(5000)], {}, "channel 2 is silent"),
+        ([a, np.zeros(5000)], {}, "channel 2 holds no signal"),
         ([a, b[:100]], {}, "100 samples in common"),
         ([a], {}, "2 channels"),
         ([a, b], {"reference": 3}, "channel 3"),

@@ -51,7 +51,7 @@ struct Probe {
     samples: Vec<f64>,
 }
 
-/// The loudest stretch of each part of a recording that is not silent. Parts are so long that each holds one
+/// The loudest stretch of each part of a recording that is not zero. Parts are so long that each holds one
 /// that begins at a multiple of half its length.
 fn probes(record: &Record) -> Vec<Probe> {
     let count = record.samples.len();

@@ -49,7 +49,7 @@ pub struct MeanAnalysis {
 /// one error per channel, [`DesignError::TooLate`] for delays that need too many delay-chain states,
 /// [`DesignError::Lti`] for unstable filters.
 pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, DesignError> {
-    let problem = bank_problem(bank)?;
+    let problem = Problem::of_bank(bank)?;
     let count = bank.channel_count();
     if !delay_errors.is_empty() && delay_errors.len() != count {
         return Err(DesignError::DelayErrorCount { given: delay_errors.len(), channels: count });
@@ -90,7 +90,7 @@ fn moved_by<'a>(bank: &'a Bank, delay_errors: &[Seconds]) -> Cow<'a, Bank> {
 /// # Errors
 /// As [`analyze`].
 pub fn analyze_mean(bank: &Bank) -> Result<MeanAnalysis, DesignError> {
-    let problem = bank_problem(bank)?;
+    let problem = Problem::of_bank(bank)?;
     mean_of(bank, &LiftedPlant::new(&problem)?)
 }
 
@@ -115,12 +115,6 @@ fn mean_of(bank: &Bank, plant: &LiftedPlant) -> Result<MeanAnalysis, DesignError
     })
 }
 
-/// The problem that a bank solves.
-pub fn bank_problem(bank: &Bank) -> Result<Problem, DesignError> {
-    let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
-    Problem::new(spec, bank.latency)
-}
-
 /// gamma of the simplest banks, h = 1, and the size of the reference.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct GammaScale {
@@ -140,7 +134,7 @@ impl GammaScale {
     /// [`DesignError::NoSpec`] for a bank without front ends, [`DesignError::TooLate`] for delays that need
     /// too many delay-chain states.
     pub fn new(bank: &Bank) -> Result<Self, DesignError> {
-        let problem = bank_problem(bank)?;
+        let problem = Problem::of_bank(bank)?;
         let plant = LiftedPlant::new(&problem)?;
         let zero = StateSpace::gain(Mat::zeros(problem.ratio, problem.channels.len()));
         let reference = plant.reference()?;

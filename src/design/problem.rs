@@ -2,6 +2,7 @@
 
 use super::DesignError;
 use crate::analog::{StableFilter, StrictlyProper};
+use crate::bank::Bank;
 use crate::linalg::Complex;
 use crate::spec::Spec;
 use crate::units::{FastPeriods, GridTime, RadiansPerFastPeriod, Seconds, Timeline};
@@ -146,6 +147,15 @@ impl Problem {
             channel.delay = channel.delay.moved_by(errors[channel.converter]);
         }
         moved
+    }
+
+    /// The problem that a bank solves.
+    ///
+    /// # Errors
+    /// [`DesignError::NoSpec`] for a bank without front ends; as [`new`](Self::new).
+    pub fn of_bank(bank: &Bank) -> Result<Self, DesignError> {
+        let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
+        Self::new(spec, bank.latency)
     }
 
     /// The largest delay.

@@ -1,7 +1,6 @@
 //! Impulse responses and frequency responses of synthesis filters and front ends, for those who look at
 //! them.
 
-use super::analysis::bank_problem;
 use super::problem::{Channel, Problem};
 use super::{DesignError, LiftedPlant, filters};
 use crate::bank::{Bank, SynthesisFilters};
@@ -69,7 +68,7 @@ pub fn fir_response(taps: &[f64], w: RadiansPerFastPeriod) -> (Complex<f64>, f64
 /// # Errors
 /// [`DesignError::NoSpec`] for a bank without front ends.
 pub fn front_end_gains(bank: &Bank, frequencies: &[Hertz]) -> Result<Vec<Vec<f64>>, DesignError> {
-    let problem = bank_problem(bank)?;
+    let problem = Problem::of_bank(bank)?;
     let first: Vec<usize> = problem.converters().into_iter().map(|channels| channels.start).collect();
     let gains = |frequency: &Hertz| {
         let w = frequency.angular().per_fast_period(bank.fast_period);
@@ -90,7 +89,7 @@ pub fn front_end_gains(bank: &Bank, frequencies: &[Hertz]) -> Result<Vec<Vec<f64
 /// # Errors
 /// As [`front_end_gains`].
 pub fn analysis_gains(bank: &Bank, frequencies: &[Hertz]) -> Result<Vec<Vec<f64>>, DesignError> {
-    let problem = bank_problem(bank)?;
+    let problem = Problem::of_bank(bank)?;
     // Delays change the phase only, and noise is none of the front ends'.
     let delay = GridTime::fast_sample(0.0, problem.fast_period);
     let undelayed = |channel: &Channel| Channel { delay, ..*channel };
@@ -115,7 +114,7 @@ pub fn analysis_gains(bank: &Bank, frequencies: &[Hertz]) -> Result<Vec<Vec<f64>
 /// [`DesignError::NoSpec`] for a bank without front ends, [`DesignError::TooLate`] for delays that need too
 /// many delay-chain states.
 pub fn error_response(bank: &Bank, points: usize) -> Result<Vec<(Hertz, f64)>, DesignError> {
-    let problem = bank_problem(bank)?;
+    let problem = Problem::of_bank(bank)?;
     problem.check_size()?;
     let plant = LiftedPlant::new(&problem)?;
     let filters = filters::FilterResponse::new(bank)?;
@@ -209,7 +208,7 @@ mod tests {
             [include_str!("../../filters/thesis-fir.json"), include_str!("../../filters/thesis-iir.json")]
         {
             let bank = Bank::from_json(text, "bank.json").unwrap();
-            let plant = LiftedPlant::new(&bank_problem(&bank).unwrap()).unwrap();
+            let plant = LiftedPlant::new(&Problem::of_bank(&bank).unwrap()).unwrap();
             let error = plant.error_system(&filters::lifted(&bank.filters, bank.ratio).unwrap()).unwrap();
             let points = error_response(&bank, 9).unwrap();
             assert_eq!(points.len(), 9);

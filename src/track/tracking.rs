@@ -85,7 +85,7 @@ impl Tracking {
 
 impl Follower {
     /// Starts the thread that follows the delays; the filters are those of `bank` with `options`. After each
-    /// measurement `record` is told what is known, and what a user should know at once.
+    /// measurement `record` gets the delays with their half-widths, and the warnings.
     ///
     /// # Errors
     /// As [`Retuner::start`].

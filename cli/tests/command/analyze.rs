@@ -96,7 +96,7 @@ fn an_unknown_noncausal_bound_is_called_unknown() {
     assert_eq!(json["noncausal"], Value::Null);
 }
 
-/// A gamma of 4e-10 is told in digits, not as 0.000000000.
+/// A gamma of 4e-10 is printed with its digits, not as 0.000000000.
 #[test]
 fn tiny_numbers_have_digits() {
     let spec = THESIS.replace("num = [0.25], den = [1.0, 1.0, 0.25]", TINY);

@@ -179,7 +179,7 @@ fn inputs_without_end_are_refused_with_their_bound() {
     std::os::unix::fs::symlink("/dev/zero", desk.path("link")).unwrap();
     desk.write("zero.sigmf-meta", r#"{"global": {"core:datatype": "ri8", "core:dataset": "link"}}"#);
     desk.refused(1, &args, &["zero.sigmf-meta", "core:dataset leads to \"link\"", "no file"]);
-    // A pipe that nobody writes to does not even open.
+    // A pipe without a writer does not even open.
     std::fs::remove_file(desk.path("link")).unwrap();
     assert!(Command::new("mkfifo").arg(desk.path("link")).status().unwrap().success());
     desk.refused(1, &args, &["zero.sigmf-meta", "core:dataset leads to \"link\"", "no file"]);

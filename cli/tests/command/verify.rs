@@ -12,6 +12,7 @@ use hybank::spec::Spec;
 use hybank::verify::{BoundedBanks, verify};
 use serde_json::Value;
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// The thesis example with so little latency that gamma lies above the noncausal bound.
@@ -63,8 +64,8 @@ fn numbers(text: &str) -> Vec<(usize, usize)> {
     (1..bytes.len()).filter(|&i| starts(i)).map(|i| (i, end(i))).collect()
 }
 
-fn replaced(text: &str, (start, end): (usize, usize), by: &str) -> String {
-    format!("{}{by}{}", &text[..start], &text[end..])
+fn replaced(text: &str, place: Range<usize>, by: &str) -> String {
+    format!("{}{by}{}", &text[..place.start], &text[place.end..])
 }
 
 fn mutated(text: &str, dice: &mut Random) -> String {
@@ -76,33 +77,37 @@ fn mutated(text: &str, dice: &mut Random) -> String {
         0..=2 => {
             let digits: Vec<usize> = (at.0..at.1).filter(|&i| text.as_bytes()[i].is_ascii_digit()).collect();
             let place = dice.of(&digits);
-            replaced(text, (place, place + 1), &dice.below(10).to_string())
+            replaced(text, place..place + 1, &dice.below(10).to_string())
         }
         // Another number, or none.
         3 => {
             let value: f64 = old.parse().unwrap();
             let near =
                 [value * (1.0 + 1e-15), value * (1.0 - 1e-9), -value, value + 1e-12, 2.0 * value, 0.0, 1.0];
-            replaced(text, at, &format!("{:?}", dice.of(&near)))
+            replaced(text, at.0..at.1, &format!("{:?}", dice.of(&near)))
         }
-        4 => replaced(text, at, dice.of(&["null", "true", "\"x\"", "[]", "1e999", "-1"])),
+        4 => replaced(text, at.0..at.1, dice.of(&["null", "true", "\"x\"", "[]", "1e999", "-1"])),
         // Two numbers exchanged.
         5 => {
             let other = dice.of(&numbers);
             let (first, second) = if at < other { (at, other) } else { (other, at) };
-            let later = replaced(text, second, &text[first.0..first.1]);
-            if first == second { later } else { replaced(&later, first, &text[second.0..second.1]) }
+            let later = replaced(text, second.0..second.1, &text[first.0..first.1]);
+            if first == second {
+                later
+            } else {
+                replaced(&later, first.0..first.1, &text[second.0..second.1])
+            }
         }
         // A list loses or doubles an entry.
         6 => match dice.below(2) {
-            0 => replaced(text, at, &format!("{old}, {old}")),
-            _ => replaced(text, (at.0, (at.1 + 2).min(text.len())), ""),
+            0 => replaced(text, at.0..at.1, &format!("{old}, {old}")),
+            _ => replaced(text, at.0..(at.1 + 2).min(text.len()), ""),
         },
         // Any character.
         _ => {
             let place = dice.below(text.len() - 1);
             let put = ["", "0", "9", "-", ".", "a", "\"", "]", "}", ","];
-            replaced(text, (place, place + 1), dice.of(&put))
+            replaced(text, place..place + 1, dice.of(&put))
         }
     }
 }

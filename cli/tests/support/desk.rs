@@ -77,7 +77,7 @@ impl Desk {
         output
     }
 
-    /// Runs and wants success without a word on standard error, but for the progress of a long run on a busy
+    /// Runs and wants success with nothing on standard error except the progress of a long run on a busy
     /// machine; gives standard output.
     pub(crate) fn good(&self, args: &[&str]) -> String {
         let output = self.run(args, &[]);

@@ -67,7 +67,8 @@ pub fn extent(
     let images: Vec<_> = views.iter().map(|view| view.image).collect();
     let all = Extent::new(size, &images, settings.nearest);
     let chosen = view_weights(views, camera, settings).views();
-    let footprint = Footprint::of(views, &chosen, camera, &frame(size, settings));
+    let footprint =
+        Footprint::of(views, &chosen, camera, &Frame::whole(size.0, size.1, 0.5, settings.offset));
     Ok(Extent { samples: footprint.most_samples().min(all.pixels), ..all })
 }
 
@@ -76,10 +77,6 @@ fn view_weights(views: &[CalibratedView<'_>], camera: &Camera, settings: &Render
         Some(_) => ViewWeights::by_angle(views, camera).nearest(settings.nearest),
         None => ViewWeights::of(views, camera),
     }
-}
-
-fn frame((width, height): (usize, usize), settings: &RenderSettings) -> Frame {
-    Frame::whole(width, height, 0.5, settings.offset)
 }
 
 fn check(
@@ -111,7 +108,7 @@ fn render_with<const ORDER: usize, const C: usize>(
     let chosen = view_weights.views();
     let pixels: usize = chosen.iter().map(|v| views[*v].image.width() * views[*v].image.height()).sum();
     let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &settings.interpolation)?;
-    let footprint = Footprint::of(views, &chosen, camera, &frame((width, height), settings));
+    let footprint = Footprint::of(views, &chosen, camera, &Frame::whole(width, height, 0.5, settings.offset));
     let view_weights =
         if settings.keep_exposure { view_weights } else { view_weights.with_gains(&agreement.gains) };
     let count = bands_of(footprint.most_samples(), height);

@@ -46,7 +46,7 @@ fn noise_gains_are_sums_of_squared_taps() {
 #[test]
 fn the_error_is_that_of_its_frequency_response() {
     let bank = bank();
-    let plant = LiftedPlant::new(&bank_problem(&bank).unwrap()).unwrap();
+    let plant = LiftedPlant::new(&Problem::of_bank(&bank).unwrap()).unwrap();
     let error = plant.error_system(&filters::lifted(&bank.filters, 2).unwrap()).unwrap();
     let count = 4096;
     let response = |k: usize| error.response_at(Complex::from_polar(1.0, 2.0 * PI * k as f64 / count as f64));
@@ -119,7 +119,7 @@ fn the_gamma_of_zero_output_is_that_of_the_aliases_of_the_reference() {
 #[test]
 fn the_taps_pick_the_nearest_samples() {
     let bank = recursive_bank("{ delay = 1.4 }, { delay = 0.2 }", 3);
-    let taps = interleaving(&bank_problem(&bank).unwrap());
+    let taps = interleaving(&Problem::of_bank(&bank).unwrap());
     // Instants -3 and -2: the samples at -3.4 and -2.2.
     assert_eq!(taps, [vec![0.0, 0.0, 1.0, 0.0], vec![0.0, 0.0, 0.0, 1.0]]);
 }

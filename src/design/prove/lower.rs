@@ -10,11 +10,12 @@
 use super::witness;
 use crate::arithmetic::{BigFloat, Number, dense};
 use crate::bank::{Bank, CausalWitness, DualWitness, LowerProof, SynthesisFilters};
+use crate::design::DesignError;
 use crate::design::limits::Stop;
 use crate::design::merging::Repeats;
 use crate::design::methods::{DualPoint, DualSolution};
 use crate::design::plant::LiftedPlant;
-use crate::design::{DesignError, analysis};
+use crate::design::problem::Problem;
 use crate::linalg::{self, CMat, Complex, Mat, power_of_two};
 use crate::lti::FrequencyResponse;
 use crate::spec::Method;
@@ -93,7 +94,7 @@ pub(super) fn lower_proof(
 /// solution. Identical channels count once.
 fn binding_witnesses(bank: &Bank, dual: &[DualPoint]) -> Result<Vec<DualWitness>, DesignError> {
     let SynthesisFilters::Fir(taps) = &bank.filters else { return Ok(Vec::new()) };
-    let merged = analysis::bank_problem(bank)?.merge_channels(Repeats::AtOneInstant);
+    let merged = Problem::of_bank(bank)?.merge_channels(Repeats::AtOneInstant);
     let units = merged.problem.measurement_units()?;
     let merged = merged.of_unit_size()?;
     let plant = LiftedPlant::new(&merged.problem)?;

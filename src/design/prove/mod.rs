@@ -5,11 +5,12 @@ mod enclosed_norm;
 mod lower;
 mod upper;
 
+use super::DesignError;
 use super::limits::Stop;
 use super::merging::Repeats;
 use super::methods::DualSolution;
 use super::plant::LiftedPlant;
-use super::{DesignError, analysis};
+use super::problem::Problem;
 use crate::bank::{Bank, DualWitness, Gamma, LowerProof, Proof};
 use crate::linalg::{self, CMat};
 use crate::lti::FrequencyResponse;
@@ -198,7 +199,7 @@ fn stated(proven: f64) -> f64 {
 /// The frequency and direction in which the largest part of the reference samples cannot be estimated from
 /// the samples.
 fn noncausal_witness(bank: &Bank) -> Result<DualWitness, DesignError> {
-    let merged = analysis::bank_problem(bank)?.merge_channels(Repeats::AtWholePeriods).of_unit_size()?;
+    let merged = Problem::of_bank(bank)?.merge_channels(Repeats::AtWholePeriods).of_unit_size()?;
     let plant = LiftedPlant::new(&merged.problem)?;
     let (n, m) = (plant.channels(), plant.ratio());
     let frequency = plant.noncausal_bound()?.frequency;

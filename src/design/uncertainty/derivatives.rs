@@ -10,9 +10,9 @@
 //!
 //! [H; H'; W] share their input, so they are lifted together.
 
-use super::super::analysis::bank_problem;
 use super::super::lifting::lift_with_slopes;
 use super::super::plant::LiftedPlant;
+use super::super::problem::Problem;
 use super::super::{DesignError, filters};
 use crate::bank::Bank;
 use crate::linalg::{self, Complex};
@@ -46,7 +46,7 @@ pub struct DelayDerivatives {
 /// # Errors
 /// As [`super::super::analyze`].
 pub fn delay_derivatives(bank: &Bank) -> Result<DelayDerivatives, DesignError> {
-    let problem = bank_problem(bank)?;
+    let problem = Problem::of_bank(bank)?;
     let plant = LiftedPlant::new(&problem)?;
     let peak = plant.bank_norm(&bank.filters)?;
     let (system, delays) = lift_with_slopes(&problem)?;

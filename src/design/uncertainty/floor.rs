@@ -13,7 +13,6 @@
 //! so the search for the maximum and the cut of the sum lose nothing but size. They are computed in double
 //! precision, not proven.
 
-use super::super::analysis::bank_problem;
 use super::super::plant::LiftedPlant;
 use super::super::{DesignError, problem::Problem};
 use super::search::moved;
@@ -50,7 +49,7 @@ impl Floor {
 /// # Errors
 /// As [`super::super::analyze`].
 pub fn floor(bank: &Bank, errors: &ErrorBox, worst: &ErrorPoint) -> Result<Floor, DesignError> {
-    let problem = bank_problem(bank)?;
+    let problem = Problem::of_bank(bank)?;
     let half =
         errors.delays.iter().map(|d| d.in_fast_periods(bank.fast_period).0).fold(f64::INFINITY, f64::min);
     let common_shift = common_shift(&problem, FastPeriods(half));

@@ -23,8 +23,8 @@ pub use sweep::{Sweep, SweepCurve};
 pub use widths::{BoxRule, BoxWidths, ReferenceChannel, RefusedBox};
 
 use super::DesignError;
-use super::analysis::bank_problem;
 use super::plant::LiftedPlant;
+use super::problem::Problem;
 use crate::bank::Bank;
 use crate::verify::uncertainty::{ErrorBox, Taps, WorstCase, certifies, worst_case as proven_worst_case};
 
@@ -56,7 +56,7 @@ pub fn worst_case(
 /// As [`worst_case`].
 pub fn affordable(bank: &Bank, errors: &ErrorBox, loss: f64) -> Result<f64, DesignError> {
     errors.check(bank.channel_count())?;
-    let plant = LiftedPlant::new(&bank_problem(bank)?)?;
+    let plant = LiftedPlant::new(&Problem::of_bank(bank)?)?;
     let allowed = plant.bank_norm(&bank.filters)?.gain * (1.0 + loss);
     let is_certified = |factor: f64| -> Result<bool, DesignError> {
         let scaled = errors.scaled(factor);

@@ -16,7 +16,7 @@ pub enum AlignError {
     Rates,
     /// A recording holds no signal.
     #[error(
-        "the recording of channel {channel} is silent: all its samples are alike; check its cable and its level"
+        "the recording of channel {channel} holds no signal: all its samples are equal; check its cable and its level"
     )]
     Silent {
         /// From 1.
@@ -25,7 +25,7 @@ pub enum AlignError {
     /// No lag stands out.
     #[error(
         "the recordings of channels {reference} and {channel} have nothing in common: at no lag do they correlate more \
-         than chance explains; check that both heard the same event, for at least a quarter of the shorter one, and \
+         than chance explains; check that both recorded the same event, for at least a quarter of the shorter one, and \
          that neither is drowned in noise"
     )]
     NothingInCommon {

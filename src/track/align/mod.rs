@@ -31,8 +31,7 @@ const LEAST_SAMPLES: usize = 1024;
 const LONGEST_PIECE: usize = 4096;
 const SHORTEST_PIECE: usize = 256;
 const DRIFT_OF_PIECE: f64 = 0.1;
-/// Pieces that are as long as the drift should not make them shorter: below, too few frequencies are told
-/// apart.
+/// The length below which drift does not shorten a piece further: shorter ones resolve too few frequencies.
 const SHORT_PIECE: usize = 1024;
 /// Number of pieces.
 const LEAST_PIECES: usize = 4;

@@ -2,7 +2,7 @@
 //!
 //! A piece is so short that no clock drifts by much within it, and what it drifts is taken out. The
 //! cross-correlation gives its lag to a part of a sample, and a blind calibration the rest. Each is measured
-//! on its own, so nothing is lost where some are silent.
+//! on its own, so no piece is lost where some are zero.
 
 use super::super::source::LARGEST_DEVIATION;
 use super::{AlignError, Stretches};

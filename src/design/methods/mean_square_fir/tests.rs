@@ -5,8 +5,8 @@
 //! error per fast sample, signal and noise together, for white noise of unit density at the analog input.
 
 use crate::bank::SynthesisFilters;
-use crate::design::analysis::bank_problem;
 use crate::design::filters::lifted;
+use crate::design::problem::Problem;
 use crate::design::{Design, LiftedPlant, Options, analyze_mean, design};
 use crate::linalg::Complex;
 use crate::lti::gramian::h2_norm;
@@ -252,7 +252,7 @@ fn no_other_taps_are_better() {
 
 /// The mean square of error and noise of a bank whose delays are off by so much, by its error system.
 fn square_at(design: &Design, errors: [f64; 2]) -> f64 {
-    let problem = bank_problem(&design.bank).unwrap().with_delay_errors(&errors.map(FastPeriods));
+    let problem = Problem::of_bank(&design.bank).unwrap().with_delay_errors(&errors.map(FastPeriods));
     let plant = LiftedPlant::new(&problem).unwrap().with_noise().unwrap();
     let filters = lifted(&design.bank.filters, 2).unwrap();
     h2_norm(&plant.error_system(&filters).unwrap()).unwrap().powi(2) / 2.0
