@@ -171,6 +171,20 @@ pub fn usage(text: &str, arguments: impl Iterator<Item = String>) -> String {
     printable(&text)
 }
 
+/// What clap says of the usage of this program, with the arguments in it quoted. `None` where that changes
+/// nothing: then clap can print it, with its colours.
+#[cfg(feature = "clap")]
+pub fn quoted_usage(message: &clap::Error) -> Option<String> {
+    // As it was typed, and as clap shows it: without the sequences that colour a terminal.
+    let forms = |argument: std::ffi::OsString| {
+        let typed = argument.to_string_lossy().into_owned();
+        [clap::builder::StyledStr::from(typed.clone()).to_string(), typed]
+    };
+    let text = message.to_string();
+    let quoted = usage(&text, std::env::args_os().flat_map(forms));
+    (quoted != text).then_some(quoted)
+}
+
 /// What the standard library says of numbers that it cannot read.
 const WORDS_OF_STD: [(&str, &str); 6] = [
     ("invalid digit found in string", "it must be a whole number, zero or more"),

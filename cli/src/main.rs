@@ -46,13 +46,11 @@ mod virtual_signal;
 mod worst_case;
 mod written;
 
-use clap::builder::StyledStr;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use hybank::files::StandardStream;
 use hybank::memory::check_memory;
-use hybank::messages::usage;
+use hybank::messages::quoted_usage;
 use print::Failure;
-use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -147,12 +145,6 @@ fn taking_negative_values(command: clap::Command) -> clap::Command {
     })
 }
 
-/// An argument as it was typed, and as clap shows it: without the sequences that colour a terminal.
-fn as_shown(argument: OsString) -> [String; 2] {
-    let typed = argument.to_string_lossy().into_owned();
-    [StyledStr::from(typed.clone()).to_string(), typed]
-}
-
 /// Bytes that a command takes whatever its input: threads, blocks of samples, pictures.
 const BASE_BYTES: f64 = 24e6;
 
@@ -165,13 +157,10 @@ fn check_base() -> Result<(), Failure> {
 /// Shows help, version, or what is wrong with the usage.
 fn show(message: &clap::Error) -> ExitCode {
     let open = if message.use_stderr() { Ok(()) } else { StandardStream::Output.check() };
-    let text = message.to_string();
-    let quoted = usage(&text, std::env::args_os().flat_map(as_shown));
-    // Only clap knows the colours.
-    let print = || match quoted == text {
-        true => message.print(),
-        false => {
-            print::say(&quoted);
+    let print = || match quoted_usage(message) {
+        None => message.print(),
+        Some(text) => {
+            print::say(&text);
             Ok(())
         }
     };

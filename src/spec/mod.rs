@@ -11,6 +11,7 @@ mod error;
 mod filter;
 mod filter_problem;
 mod filter_reader;
+mod filter_rules;
 mod fitting;
 mod frames;
 mod limits;

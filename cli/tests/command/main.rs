@@ -12,6 +12,7 @@ mod analyze;
 mod band;
 mod bit_true;
 mod calibrate;
+mod converter_errors;
 mod cuts;
 mod design;
 mod docs;

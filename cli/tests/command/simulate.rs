@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 /// Sample rate and samples.
-fn recording(path: &Path) -> (u32, Vec<f64>) {
+pub(crate) fn recording(path: &Path) -> (u32, Vec<f64>) {
     let (spec, samples) = wav::read(path);
     (spec.sample_rate, samples.into_iter().map(f64::from).collect())
 }
@@ -175,175 +175,6 @@ fn converters_without_a_signal_give_silence() {
     assert!(recording(&desk.path("live.wav")).1.iter().all(|&y| y == 0.0));
 }
 
-/// Runs `simulate` on [`THESIS`] with a tone of 0.7 rad/s; returns the report and the captures.
-fn imperfect_captures(desk: &Desk, folder: &str, more: &[&str]) -> (Value, [Vec<f64>; 3]) {
-    let args =
-        ["simulate", "spec.toml", "--source", "tones:0.7", "-o", folder, "--samples", "40000", "--json"];
-    let report = desk.json(&[&args[..], more].concat());
-    let captures =
-        ["ch1.wav", "ch2.wav", "target.wav"].map(|name| recording(&desk.path(folder).join(name)).1);
-    (report, captures)
-}
-
-#[test]
-fn errors_of_the_converters_are_echoed_and_have_their_closed_form() {
-    let desk = Desk::with_spec(THESIS);
-    let errors = [
-        "--delay-error",
-        "10ms,-0.02samples",
-        "--gain-error",
-        "0.5%,-0.01",
-        "--offset",
-        "0.125",
-        "--drift",
-        "20,-30",
-        "--gain",
-        "0.5",
-    ];
-    let (report, captures) = imperfect_captures(&desk, "cap", &errors);
-    // Response of 0.25 / (s + 0.5)^2 to cos(0.7 t).
-    let response = |t: f64| 0.25 / (0.49 + 0.25) * (0.7 * t - 2.0 * (0.7f64 / 0.5).atan()).cos();
-    let truth = [(1.21, 1.005, 20.0), (0.58, 0.99, -30.0)];
-    for (i, (delay, gain, ppm)) in truth.into_iter().enumerate() {
-        for (key, want) in
-            [("delay", delay), ("gain", gain), ("offset", 0.125), ("drift", ppm), ("clipped", 0.0)]
-        {
-            let found = number(&report, &format!("/converters/{i}/{key}"));
-            assert!((found - want).abs() < 1e-12, "{key}: {found}");
-        }
-        for (k, x) in captures[i].iter().enumerate() {
-            let t = 2.0 * k as f64 / (1.0 + ppm * 1e-6) - delay;
-            let want = 0.5 * gain * response(t) + 0.125;
-            assert!((x - want).abs() < 1e-7, "channel {i}, sample {k}: {x} {want}");
-        }
-    }
-    assert_eq!(
-        (&report["bits"], number(&report, "/noise"), number(&report, "/jitter")),
-        (&Value::Null, 0.0, 0.0)
-    );
-    assert_eq!(number(&report, "/converters/1/delay_error"), -0.02);
-    assert_eq!(number(&report, "/converters/0/gain_error"), 0.005);
-    // The reference is that of an ideal converter.
-    for (n, x) in captures[2].iter().enumerate() {
-        assert!((x - 0.5 * response(n as f64)).abs() < 1e-7, "target {n}");
-    }
-}
-
-#[test]
-fn noise_jitter_and_bits_have_their_powers_and_their_seed() {
-    let desk = Desk::with_spec(THESIS);
-    let (_, ideal) = imperfect_captures(&desk, "ideal", &[]);
-    let error = |folder: &str, more: &[&str]| {
-        let (report, captures) = imperfect_captures(&desk, folder, more);
-        let difference =
-            |i: usize| -> Vec<f64> { captures[i].iter().zip(&ideal[i]).map(|(a, b)| a - b).collect() };
-        assert!(difference(2).iter().all(|&x| x == 0.0));
-        let rms = |x: Vec<f64>| (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
-        (report, [rms(difference(0)), rms(difference(1))])
-    };
-    // 20,000 samples: the standard deviation of an rms is 0.5 %. The tone has the amplitude 0.25 / 0.74.
-    let amplitude = 0.25 / 0.74;
-    let slope = amplitude * 0.7 / 2f64.sqrt();
-    for (folder, more, want) in [
-        ("noise", ["--noise", "2e-3", "--seed", "7"], 2e-3),
-        ("jitter", ["--jitter", "0.001samples", "--seed", "7"], slope * 1e-3),
-        ("bits", ["--bits", "10", "--seed", "7"], 0.5f64.powi(9) / 12f64.sqrt()),
-    ] {
-        let (report, found) = error(folder, &more);
-        for rms in found {
-            assert!((rms / want - 1.0).abs() < 0.025, "{folder}: {rms:e} instead of {want:e}");
-        }
-        assert_eq!(report["seed"], 7);
-    }
-    let (report, _) = error("all", &["--noise", "2e-3", "--jitter", "1e-3", "--bits", "10", "--seed", "8"]);
-    assert_eq!(
-        (number(&report, "/noise"), number(&report, "/jitter"), &report["bits"]),
-        (2e-3, 1e-3, &Value::from(10))
-    );
-    let again = |folder: &str, seed: &str| {
-        imperfect_captures(&desk, folder, &["--noise", "2e-3", "--seed", seed]).1[1].clone()
-    };
-    assert_eq!(again("again", "7"), recording(&desk.path("noise/ch2.wav")).1);
-    assert_ne!(again("other", "9"), recording(&desk.path("noise/ch2.wav")).1);
-}
-
-/// Cut-offs off by their errors are those of a spec that says so; with `fit` of one stage, of that stage.
-#[test]
-fn errors_of_cut_offs_are_those_of_other_front_ends() {
-    let desk = Desk::empty();
-    let cascade = |first: &str, second: &str| {
-        let stage = |cutoff: &str| format!("{{ family = \"rc\", cutoff = \"{cutoff}\" }}");
-        format!("filter = {{ cascade = [{}, {}] }}\n", stage(first), stage(second))
-    };
-    let spec = |head: &str, second: String| {
-        format!(
-            "fast_rate = \"48 kHz\"\nratio = 2\n{head}[target]\n{}[[channel]]\ndelay = \"3 us\"\n\
-             [[channel]]\ndelay = 0\n{second}",
-            cascade("8 kHz", "20 kHz")
-        )
-    };
-    let fit = "fit = [\"delay\", \"cutoff:2\"]\n";
-    desk.write("nominal.toml", spec("", String::new()));
-    desk.write("both.toml", spec("", cascade("8.08 kHz", "20.2 kHz")));
-    desk.write("fit.toml", spec(fit, String::new()));
-    desk.write("second.toml", spec("", cascade("8 kHz", "20.2 kHz")));
-    desk.write("single.toml", spec(fit, "filter = { family = \"rc\", cutoff = 8000 }\n".to_owned()));
-    let captured = |spec: &str, more: &[&str]| {
-        let args = ["simulate", spec, "--source", "tones:7.1kHz", "--samples", "400", "-o", "cap"];
-        desk.report(&[&args[..], more].concat());
-        ["ch1.wav", "ch2.wav", "target.wav"].map(|name| recording(&desk.path("cap").join(name)).1)
-    };
-    let error = ["--cutoff-error", "0,1%"];
-    let nominal = captured("nominal.toml", &[]);
-    for (given, truth) in [("nominal.toml", "both.toml"), ("fit.toml", "second.toml")] {
-        let (found, want) = (captured(given, &error), captured(truth, &[]));
-        let differs = |a: &[f64], b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - b).abs() > 1e-7);
-        assert!(!differs(&found[1], &want[1]) && differs(&found[1], &nominal[1]), "{given}");
-        assert!(found[0] == nominal[0] && found[2] == nominal[2], "{given}");
-    }
-    let args = ["simulate", "single.toml", "--source", "tones:7kHz", "-o", "new"];
-    desk.refused(1, &[&args[..], &error].concat(), &["--cutoff-error", "cutoff:2", "no such stage"]);
-    desk.refused(
-        1,
-        &[&args[..], &["--cutoff-error", "0.6"]].concat(),
-        &["--cutoff-error: 0.6", "-0.5 to 0.5"],
-    );
-}
-
-/// The codes of converters, in words of 16 and 24 bits; the target stays a float.
-#[test]
-fn converters_of_some_bits_write_integers() {
-    let desk = Desk::with_spec(THESIS);
-    for (bits, word) in [("8", 16), ("16", 16), ("17", 24), ("24", 24)] {
-        let args = ["simulate", "spec.toml", "--source", "tones:0.7", "--samples", "300", "-o", "cap"];
-        let floats = [&args[..], &["--to", "sigmf", "--force", "--bits", bits]].concat();
-        desk.good(&floats);
-        let raw = desk.read("cap/ch2.sigmf-data");
-        let raw: Vec<f32> = raw.chunks_exact(4).map(|x| f32::from_le_bytes(x.try_into().unwrap())).collect();
-        desk.good(&[&args[..], &["--force", "--bits", bits]].concat());
-        let (spec, samples) = wav::read(&desk.path("cap/ch2.wav"));
-        assert_eq!((spec.bits_per_sample, spec.sample_format), (word, hound::SampleFormat::Int), "{bits}");
-        assert_eq!(samples, raw, "{bits}");
-        let (target, _) = wav::read(&desk.path("cap/target.wav"));
-        assert_eq!(target.sample_format, hound::SampleFormat::Float);
-    }
-}
-
-#[test]
-fn clipped_samples_are_counted_and_reported() {
-    let desk = Desk::with_spec(THESIS);
-    let args = ["simulate", "spec.toml", "--source", "step@0", "-o", "cap", "--gain", "2", "--bits", "8"];
-    let output = desk.run(&[&args[..], &["--json", "--force"]].concat(), &[]);
-    assert!(output.status.success());
-    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
-    // The step response reaches one half after 3.4 and never leaves it.
-    let most = number(&report, "/converters/0/clipped");
-    assert!(most > 95.0 && most < 100.0, "{report}");
-    let message = String::from_utf8(output.stderr).unwrap();
-    assert!(message.contains("cap/ch1.wav") && message.contains("clipped at full scale"), "{message}");
-    assert!(recording(&desk.path("cap/ch1.wav")).1.iter().all(|&x| x <= 127.0 / 128.0));
-}
-
 #[test]
 fn one_channel_of_a_recording_is_a_source() {
     let desk = Desk::with_spec(THESIS);
@@ -369,38 +200,9 @@ fn one_channel_of_a_recording_is_a_source() {
     }
 }
 
-#[test]
-fn errors_out_of_range_are_refused_by_name() {
-    let desk = Desk::with_spec(THESIS);
-    for (code, more, parts) in [
-        (1, ["--noise", "2"], ["--noise: 2 of full scale", "from 0 to 1"]),
-        (1, ["--noise", "nan"], ["--noise: NaN", "from 0 to 1"]),
-        (2, ["--bits", "1"], ["--bits", "2 to 24 bits"]),
-        (2, ["--bits", "32"], ["--bits", "2 to 24 bits"]),
-        (1, ["--jitter", "0.2"], ["--jitter: 2e-1 s are 2e-1 fast periods", "check the unit"]),
-        (1, ["--jitter", "-1ms"], ["--jitter: -1e-3 s", "check the unit"]),
-        (2, ["--jitter", "1kHz"], ["--jitter", "a time such as 10ps"]),
-        (1, ["--drift", "1e6"], ["--drift: 1000000 ppm", "at most 100000 ppm"]),
-        (1, ["--delay-error", "1e9,0"], ["--delay-error: 1000000000 s", "check its unit"]),
-        (1, ["--gain-error", "0,500%"], ["--gain-error: 5", "0.01 is one per cent"]),
-        (1, ["--offset", "5"], ["--offset: 5 of full scale", "5 / 2048"]),
-        (2, ["--offset", "0,0,0"], ["--offset: 3 values", "2 channels"]),
-        (2, ["--seed", "x"], ["--seed", "x"]),
-    ] {
-        let args = [&["simulate", "spec.toml", "--source", "step@1", "-o", "cap"], &more[..]].concat();
-        desk.refused(code, &args, &parts);
-    }
-    // A recording at a hundred times the fast rate.
-    let bank = THESIS.replace("fast_period = 1.0", "fast_rate = 100.0");
-    desk.write("slow.toml", bank);
-    wav::write(&desk, "fine.wav", 1, 10_000, &[0.5; 1000]);
-    let args = ["simulate", "slow.toml", "--source", "fine.wav", "-o", "cap", "--jitter", "1ms"];
-    desk.refused(1, &args, &["--jitter: samples may be", "resample the recording"]);
-}
-
 /// Two captures of a speech recording with the wanted signal, made elsewhere in the frequency domain.
 /// Complex numbers of little-endian 32-bit floats.
-fn complex(bytes: &[u8]) -> Vec<[f64; 2]> {
+pub(crate) fn complex(bytes: &[u8]) -> Vec<[f64; 2]> {
     let number = |bytes: &[u8]| f64::from(f32::from_le_bytes(bytes.try_into().unwrap()));
     bytes.chunks_exact(8).map(|sample| [number(&sample[..4]), number(&sample[4..])]).collect()
 }
@@ -439,25 +241,6 @@ fn complex_captures_have_their_closed_form_and_fuse_to_the_complex_target() {
     desk.report(&[&simulate[..7], &["cap", "--to", "raw"]].concat());
     assert_eq!(desk.read("cap/ch2.cf32"), desk.read("cap/ch2.sigmf-data"));
     desk.refused(2, &[&simulate[..], &["--to", "wav"]].concat(), &["WAV files hold no complex samples"]);
-}
-
-/// I and Q have one clock, hence one jitter, and noise of their own.
-#[test]
-fn an_imaginary_part_has_the_errors_of_its_converters() {
-    let desk = Desk::with_spec(THESIS);
-    let run = |more: &[&str]| {
-        let args =
-            ["simulate", "spec.toml", "--source", "tones:0.3", "--imaginary", "tones:0.3", "-o", "cap"];
-        desk.report(&[&args[..], &["--samples", "4000", "--to", "raw"], more].concat());
-        complex(&desk.read("cap/ch1.cf32"))
-    };
-    assert!(run(&["--jitter", "0.05samples", "--offset", "0.1"]).iter().all(|[re, im]| re == im));
-    let noisy = run(&["--noise", "0.01"]);
-    let apart: f64 = noisy.iter().map(|[re, im]| (re - im).powi(2)).sum::<f64>() / noisy.len() as f64;
-    // 2 sigma^2 with a standard deviation of sqrt(2 / 2000) = 3 %.
-    assert!((apart / 2e-4 - 1.0).abs() < 0.15, "{apart:e}");
-    let both = ["simulate", "spec.toml", "--source", "ctones:1", "--imaginary", "tones:2", "-o", "no"];
-    desk.refused(2, &both, &["--imaginary", "imaginary part of its own"]);
 }
 
 /// WAV cannot state such rates.

@@ -15,12 +15,10 @@ mod summary;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
-use clap::builder::StyledStr;
 use failure::Failure;
 use hybank::files::StandardStream;
 use hybank::memory::check_memory;
-use hybank::messages::usage;
-use std::ffi::OsString;
+use hybank::messages::quoted_usage;
 use std::process::ExitCode;
 
 /// More threads than cores would only use memory for stacks.
@@ -49,22 +47,13 @@ pub fn run() -> ExitCode {
     }
 }
 
-/// An argument as it was typed, and as clap shows it: without the sequences that colour a terminal.
-fn as_shown(argument: OsString) -> [String; 2] {
-    let typed = argument.to_string_lossy().into_owned();
-    [StyledStr::from(typed.clone()).to_string(), typed]
-}
-
 /// Shows help, version or what is wrong with the usage.
 fn show(message: &clap::Error) -> ExitCode {
     let open = if message.use_stderr() { Ok(()) } else { StandardStream::Output.check() };
-    let text = message.to_string();
-    let quoted = usage(&text, std::env::args_os().flat_map(as_shown));
-    // Only clap knows the colours.
-    let print = || match quoted == text {
-        true => message.print(),
-        false => {
-            failure::say(&quoted);
+    let print = || match quoted_usage(message) {
+        None => message.print(),
+        Some(text) => {
+            failure::say(&text);
             Ok(())
         }
     };
