@@ -7,7 +7,7 @@ use super::print::{Failure, is_dash};
 use super::written::write_bytes;
 use hybank::bank::Bank;
 use hybank::files::{FileError, refuse_overlaps};
-use hybank::io::{MultiReader, Whole, is_pipe};
+use hybank::io::{MultiReader, OfflineSamples, is_pipe};
 use hybank::messages::Quoted;
 use hybank::overview::{BeforeAfter, Unmeasured, before_after, column};
 use std::fmt::Write as _;
@@ -72,7 +72,7 @@ impl BeforeAfterArgs {
         force: bool,
     ) -> Result<BeforeAfter, Failure> {
         let fused = CaptureFile::read(output, Reading::channel(None, MOST_MEASURED))?;
-        let channels = Whole::read(&mut reader, MOST_MEASURED).map_err(unread)?.channels;
+        let channels = OfflineSamples::read(&mut reader, MOST_MEASURED).map_err(unread)?.channels;
         let found = BeforeAfter::of(bank, fused.rate, &channels, &fused.samples, tones(&self.tone)?);
         let found = found.map_err(|Unmeasured { which, error }| {
             let output = Quoted(output);

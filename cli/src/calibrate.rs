@@ -15,7 +15,7 @@ use hybank::calibrate::{
     Acquisition, CalibrateError, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning,
     applied, calibrate_pooled,
 };
-use hybank::io::{MultiReader, ReadOptions, WORK_BYTES, Whole};
+use hybank::io::{MultiReader, OfflineSamples, ReadOptions, WORK_BYTES};
 use hybank::messages::{Number, Quoted};
 use hybank::pipeline::matching::{channels_of_raw, samples_per_frame};
 use hybank::spec::{DesignOverrides, Spec};
@@ -362,8 +362,8 @@ pub(super) fn records(
     });
     let rails: Vec<_> = rails.collect();
     let name = reader.headers().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
-    let Whole { channels, is_cut } =
-        Whole::read_parts_with(reader, most, bytes_per_sample).map_err(unread)?;
+    let OfflineSamples { channels, is_cut } =
+        OfflineSamples::read_parts_with(reader, most, bytes_per_sample).map_err(unread)?;
     warnings.extend(reader.warnings().iter().map(ToString::to_string));
     if is_cut {
         warnings.push(format!("{}: only the first {most} frames are used", Quoted(&name)));

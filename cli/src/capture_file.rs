@@ -4,7 +4,7 @@ use super::capture_args::check_scale;
 use super::file_kind::unreadable;
 use super::print::{Failure, is_dash, name, warn};
 use crossbeam_channel::Receiver;
-use hybank::io::{MultiReader, ReadOptions, Whole, WholeError};
+use hybank::io::{MultiReader, OfflineError, OfflineSamples, ReadOptions};
 use hybank::measure::{Spectrum, Window};
 use hybank::messages::Quoted;
 use hybank::units::Hertz;
@@ -47,18 +47,18 @@ impl Reading {
 impl CaptureFile {
     /// Reads a recording of real samples; `-` is standard input.
     pub(super) fn read(path: &Path, reading: Reading) -> Result<Self, Failure> {
-        Self::read_with(path, reading, Whole::read)
+        Self::read_with(path, reading, OfflineSamples::read)
     }
 
     /// Reads a recording of real or complex samples; `-` is standard input.
     pub(super) fn read_any(path: &Path, reading: Reading) -> Result<Self, Failure> {
-        Self::read_with(path, reading, Whole::read_parts)
+        Self::read_with(path, reading, OfflineSamples::read_parts)
     }
 
     fn read_with(
         path: &Path,
         reading: Reading,
-        whole: fn(&mut MultiReader, usize) -> Result<Whole, WholeError>,
+        whole: fn(&mut MultiReader, usize) -> Result<OfflineSamples, OfflineError>,
     ) -> Result<Self, Failure> {
         let mut reader = start(&[path.to_owned()], reading.options, crossbeam_channel::never())?;
         check_scale(reading.options.full_scale, &reader)?;
@@ -76,7 +76,7 @@ impl CaptureFile {
             Failure::of(path, message)
         })?;
         let rails = header.and_then(|header| header.rails);
-        let Whole { channels, is_cut } = whole(&mut reader, reading.most).map_err(unread)?;
+        let OfflineSamples { channels, is_cut } = whole(&mut reader, reading.most).map_err(unread)?;
         reader.warnings().iter().for_each(|warning| warn(&warning.to_string()));
         let mut parts = channels.into_iter();
         let (samples, imaginary) = (parts.next().unwrap_or_default(), parts.next());
@@ -154,10 +154,10 @@ pub(super) fn start(
 }
 
 /// Why samples could not be read.
-pub(super) fn unread(error: WholeError) -> Failure {
+pub(super) fn unread(error: OfflineError) -> Failure {
     match error {
-        WholeError::Io(error) => Failure::input(error),
-        WholeError::Stopped => interrupted(),
+        OfflineError::Io(error) => Failure::input(error),
+        OfflineError::Stopped => interrupted(),
         error => Failure::input(error),
     }
 }

@@ -8,7 +8,7 @@ use super::print::{Failure, name, warn};
 use super::written::{check_outputs, write_text};
 use hybank::bank::Bank;
 use hybank::design::DesignError;
-use hybank::io::{ReadOptions, Whole};
+use hybank::io::{OfflineSamples, ReadOptions};
 use hybank::overview::page::{CapturesOnPage, MOST_FRAMES, Page, PageError};
 use hybank::units::Hertz;
 use std::path::{Path, PathBuf};
@@ -93,7 +93,8 @@ impl Args {
         let mut reader = start(&self.inputs, captures, crossbeam_channel::never())?;
         self.reading.scale.check(&reader)?;
         let rate = Hertz(output_rate(bank, &self.bank, &reader)?);
-        let Whole { channels, is_cut } = Whole::read(&mut reader, MOST_FRAMES).map_err(unread)?;
+        let OfflineSamples { channels, is_cut } =
+            OfflineSamples::read(&mut reader, MOST_FRAMES).map_err(unread)?;
         reader.warnings().iter().for_each(|warning| warn(&warning.to_string()));
         let names = self.inputs.iter().map(|input| name(input)).collect::<Vec<_>>().join(", ");
         let frames = channels.iter().map(Vec::len).min().unwrap_or(0);

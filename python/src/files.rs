@@ -3,7 +3,7 @@
 use crate::bank::Bank;
 use crate::errors::{refused, warn};
 use crate::sources;
-use hybank::io::{Coding, LostSamples, MAX_LOST, MultiReader, ReadOptions, Until, Whole};
+use hybank::io::{Coding, LostSamples, MAX_LOST, MultiReader, OfflineSamples, ReadOptions, Until};
 use hybank::pipeline::matching;
 use hybank::quantity::{self, FullScale};
 use numpy::{Complex64, PyArray1};
@@ -74,7 +74,7 @@ pub(crate) fn read<'py>(
             }
         };
         let rails: Vec<_> = reader.headers().map(|(_, header)| header.rails).collect();
-        let whole = Whole::read_parts(&mut reader, MOST).map_err(|error| error.to_string())?;
+        let whole = OfflineSamples::read_parts(&mut reader, MOST).map_err(|error| error.to_string())?;
         Ok((whole, reader.is_complex(), rate, rails, reader.warnings()))
     });
     let (whole, is_complex, rate, rails, warnings) = read.map_err(refused)?;

@@ -10,7 +10,7 @@ pub const WORK_BYTES: f64 = 64.0;
 /// Recordings that are not read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum WholeError {
+pub enum OfflineError {
     /// An input cannot be read.
     #[error(transparent)]
     Io(#[from] IoError),
@@ -40,21 +40,21 @@ pub enum WholeError {
 
 /// All channels of a reader; of complex samples each part is a channel.
 #[derive(Debug)]
-pub struct Whole {
+pub struct OfflineSamples {
     /// Lost samples are NaN.
     pub channels: Vec<Vec<f64>>,
     /// There are more samples, which were not read.
     pub is_cut: bool,
 }
 
-impl Whole {
+impl OfflineSamples {
     /// At most `most` samples of each channel; real ones only.
     ///
     /// # Errors
-    /// [`WholeError`].
-    pub fn read(reader: &mut MultiReader, most: usize) -> Result<Self, WholeError> {
+    /// [`OfflineError`].
+    pub fn read(reader: &mut MultiReader, most: usize) -> Result<Self, OfflineError> {
         if let Some((input, _)) = reader.headers().find(|(_, header)| header.is_complex) {
-            return Err(WholeError::Complex { input: input.to_owned() });
+            return Err(OfflineError::Complex { input: input.to_owned() });
         }
         Self::read_parts(reader, most)
     }
@@ -62,20 +62,20 @@ impl Whole {
     /// At most `most` samples of each channel.
     ///
     /// # Errors
-    /// [`WholeError`].
-    pub fn read_parts(reader: &mut MultiReader, most: usize) -> Result<Self, WholeError> {
+    /// [`OfflineError`].
+    pub fn read_parts(reader: &mut MultiReader, most: usize) -> Result<Self, OfflineError> {
         Self::read_parts_with(reader, most, WORK_BYTES)
     }
 
     /// The same for work that takes so many bytes of memory for each sample.
     ///
     /// # Errors
-    /// [`WholeError`].
+    /// [`OfflineError`].
     pub fn read_parts_with(
         reader: &mut MultiReader,
         most: usize,
         bytes_per_sample: f64,
-    ) -> Result<Self, WholeError> {
+    ) -> Result<Self, OfflineError> {
         let parts = if reader.is_complex() { 2 } else { 1 };
         let mut channels = vec![Vec::new(); parts * reader.channels()];
         let promised = reader.promised_frames().and_then(|frames| usize::try_from(frames).ok());
@@ -97,16 +97,16 @@ impl Whole {
                     }
                 }
                 Arrival::End => return Ok(Self { channels, is_cut: false }),
-                Arrival::Stopped => return Err(WholeError::Stopped),
+                Arrival::Stopped => return Err(OfflineError::Stopped),
             }
         }
     }
 }
 
 /// Refuses recordings whose work memory the system does not have.
-fn check_work(bytes_per_sample: f64, frames: usize, channels: usize) -> Result<(), WholeError> {
+fn check_work(bytes_per_sample: f64, frames: usize, channels: usize) -> Result<(), OfflineError> {
     let bytes = bytes_per_sample * frames as f64 * channels as f64;
-    check_memory(bytes).map_err(|shortage| WholeError::Memory { frames, channels, shortage })
+    check_memory(bytes).map_err(|shortage| OfflineError::Memory { frames, channels, shortage })
 }
 
 /// The first `count` frames of all parts.
