@@ -1,4 +1,4 @@
-//! The norm of a bank in the arithmetic of `verify`, for banks whose error double precision does not resolve.
+//! The norm of a bank in the arithmetic of `verify`, where double precision does not resolve the error.
 
 use super::{frequency, half, leading_direction, witness};
 use crate::bank::{Bank, DualWitness, Gamma, LowerProof, Proof};
