@@ -12,6 +12,6 @@ hybank init --example inertial -o spec.toml --force
 hybank design spec.toml -o bank.json
 
 # Vibrations at 7, 31 and 57 Hz. Each sensor writes a recording at its own rate.
-hybank simulate bank.json --source tones:7Hz,31Hz,57Hz --gain 0.25 --noise 1e-4 --samples 18000 -o heard
-hybank fuse bank.json heard/ch1.wav heard/ch2.wav -o fused.wav
-hybank measure fused.wav --ref heard/target.wav
+hybank simulate bank.json --source tones:7Hz,31Hz,57Hz --gain 0.25 --noise 1e-4 --samples 18000 -o captures
+hybank fuse bank.json captures/ch1.wav captures/ch2.wav -o fused.wav
+hybank measure fused.wav --ref captures/target.wav

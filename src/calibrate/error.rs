@@ -75,7 +75,7 @@ pub enum CalibrateError {
     OwnRates,
     /// Not one record per channel.
     #[error(
-        "the spec has {channels} channels, but there are {records} captures; give one per channel, in the order of the spec"
+        "captures: {records}, but channels in the spec: {channels}; give one capture per channel, in the order of the spec"
     )]
     ChannelCount {
         /// Channels of the spec.

@@ -45,7 +45,8 @@ fn two_inertial_sensors_become_one() {
     let folder = tempfile::tempdir().unwrap();
     let shown = run_script("inertial", folder.path());
     let snr = shown.lines().find_map(|line| line.strip_prefix("SNR")).map(decibels);
-    assert!(snr.is_some_and(|snr| snr > 50.0), "{shown}");
+    // 61.3 dB; `design` promises 59.8 for white noise, and a cubic spline 19.1.
+    assert!(snr.is_some_and(|snr| snr > 60.0), "{shown}");
 }
 
 /// Two recordings with clocks of their own become one; the last line is that of the log.
