@@ -1,6 +1,6 @@
 #!/bin/sh
-# Two recordings of one event by two recorders become one: their clocks drift apart by 1.5 ppm, and it is not known
-# when the second one began to the microsecond.
+# Two recordings of one event become one. The recorders were started by hand, 50 ms apart, and their clocks drift
+# apart by 1.5 ppm.
 #
 #   sh examples/recorders/run.sh [FOLDER]      everything goes into FOLDER, by default a new one
 set -eu
@@ -9,17 +9,20 @@ work=${1:-$(mktemp -d)}
 mkdir -p "$work"
 cd "$work"
 
+# What the recorders write: a short sweep, three claps and a tone. Only `simulate` knows starts and clocks.
+hybank simulate "$here/spec.toml" -o captures --samples 153600 --gain 0.08 --noise 1e-4 \
+    --source chirp:200Hz..15kHz@0.2s+step@0.31+step@0.46+step@0.58+tones:440Hz \
+    --delay-error 0,-50.4ms --drift 0,1.5
+
+# Starts, drift and gains from the recordings; the spec and the recordings that begin together.
+hybank align "$here/spec.toml" captures/ch1.wav captures/ch2.wav -o aligned.toml --trim aligned
+
 # The bank, its taps affine in the delay of the second recorder.
-hybank design "$here/spec.toml" -o bank.json
+hybank design aligned.toml -o bank.json
 hybank verify bank.json
 
-# What the recorders write. Only `simulate` knows how their clocks differ.
-hybank simulate bank.json --source tones:440Hz,3.1kHz,9.7kHz --samples 76800 -o captures \
-    --drift 0,1.5 --delay-error 0,-0.5us --noise 1e-4
-
-# With taps that stay, and with taps that follow the delay as the recordings show it.
-hybank fuse bank.json captures/ch1.wav captures/ch2.wav -o fixed.wav
-hybank fuse bank.json captures/ch1.wav captures/ch2.wav -o fused.wav --track blind --track-log delays.jsonl
+# With taps that stay, and with taps that follow the delay as `align` found it.
+hybank fuse bank.json aligned/ch1.wav aligned/ch2.wav -o fixed.wav
+hybank fuse bank.json aligned/ch1.wav aligned/ch2.wav -o fused.wav --track aligned/drift.jsonl
 hybank measure fixed.wav --ref captures/target.wav
 hybank measure fused.wav --ref captures/target.wav
-tail -n 1 delays.jsonl

@@ -190,10 +190,10 @@ impl Follower {
             Err(reason) => (vec![None; self.spec.channels.len()], Some(reason.to_string())),
         };
         let log = self.logged(centre, measured, reason);
+        self.warn_of_delays(centre);
         self.shifts.pop_front();
         let changes = self.changes(first + 2 * frames);
         self.shifts.extend(changes.first().map(|change| change.shifts.clone()));
-        self.warn_of_delays(centre, &changes);
         Followed { changes, log, warnings: std::mem::take(&mut self.warnings) }
     }
 
@@ -317,17 +317,23 @@ impl Follower {
         log
     }
 
+    /// The shift of a channel whose delay is known, after `shifts`, and the error of the delay that is left.
+    fn shifted_error(&self, tracker: &DelayTracker, delay: Seconds, shifts: &[i64]) -> (i64, Seconds) {
+        let (j, period) = (tracker.channel, self.frame_time());
+        let error = delay - self.spec.channels[j].delay;
+        let shift = shift_for(error, tracker.half, period, shifts[j]);
+        (shift, error - period * shift as f64)
+    }
+
     /// The shifts and delays of all channels at a frame of the stream.
     fn change(&mut self, frame: usize, at: f64) -> Change {
         let mut errors = vec![FastPeriods(0.0); self.spec.channels.len()];
-        let (h, period) = (self.spec.fast_period, self.frame_time());
         let mut shifts = self.last_shifts.clone();
         for (tracker, state) in self.expected(at) {
-            let (j, half) = (tracker.channel, tracker.half);
-            let error = state.delay - self.spec.channels[j].delay;
-            shifts[j] = shift_for(error, half, period, shifts[j]);
-            let rest = error - period * shifts[j] as f64;
-            errors[j] = Seconds(rest.0.clamp(-half.0, half.0)).in_fast_periods(h);
+            let (j, half) = (tracker.channel, tracker.half.0);
+            let (shift, error) = self.shifted_error(tracker, state.delay, &shifts);
+            errors[j] = Seconds(error.0.clamp(-half, half)).in_fast_periods(self.spec.fast_period);
+            shifts[j] = shift;
         }
         self.last_shifts.clone_from(&shifts);
         Change { frame, errors, shifts }
@@ -358,12 +364,12 @@ impl Follower {
         }
     }
 
-    fn warn_of_delays(&mut self, centre: f64, changes: &[Change]) {
-        let h = self.spec.fast_period;
+    /// Of this block, not of those whose changes are decided: the recording may end before them.
+    fn warn_of_delays(&mut self, centre: f64) {
         let (frame, enough) = (centre as u64, self.enough());
         let is_outside = |tracker: &&DelayTracker| {
-            let most = tracker.half.in_fast_periods(h).0;
-            changes.iter().any(|change| change.errors[tracker.channel].0.abs() >= most)
+            let (_, error) = self.shifted_error(tracker, tracker.state().delay, self.block_shifts());
+            error.0.abs() >= tracker.half.0
         };
         let warning = |tracker: &DelayTracker| {
             let (channel, half) = (tracker.channel + 1, tracker.half);
