@@ -131,7 +131,7 @@ pub enum Warning {
     },
     /// All delays, and the latency, were raised so that none is negative.
     #[error(
-        "a delay would be negative, so {periods} fast periods were added to all delays and to the latency"
+        "fast periods added to all delays and to the latency, because a delay would be negative: {periods}"
     )]
     Shifted {
         /// Whole fast periods.
