@@ -148,6 +148,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     // What the captures have may explain why they do not fit; a report has these warnings.
     let (calibrated, report) = done.inspect_err(|_| warnings.iter().for_each(|warning| warn(warning)))?;
     let written = file.with_values(&text, &calibrated, &args.output).map_err(|problem| {
+        report.warnings.iter().for_each(|warning| warn(warning));
         Failure::Input(format!("the values found make no spec: {problem}; nothing was written"))
     })?;
     write_text(&args.output, &written, args.force)?;

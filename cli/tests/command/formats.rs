@@ -316,6 +316,21 @@ fn full_scale_of_tables_is_stated_or_warned_of() {
     }
 }
 
+/// Codes around 128 have an offset that no spec can hold; what they look like is said all the same.
+#[test]
+fn values_that_make_no_spec_come_with_the_full_scale_that_explains_them() {
+    let desk = Desk::with_spec(
+        "fast_rate = \"1 MHz\"\nratio = 2\nchannel = [{ delay_samples = 1 }, { delay_samples = 0 }]\n\
+         target = { filter = { family = \"butterworth\", order = 2, cutoff = \"400 kHz\" } }\n",
+    );
+    desk.write("unsigned.dat", codes(128));
+    let run =
+        desk.run(&["calibrate", "spec.toml", "unsigned.dat", "--interleaved", "2", "-o", "m.toml"], &[]);
+    let message = text(&run.stderr);
+    assert!(message.contains("full scale of u8bits") && message.contains("out of range"), "{message}");
+    assert!(!run.status.success() && !desk.path("m.toml").exists());
+}
+
 #[test]
 fn a_spec_states_the_full_scale_of_its_captures() {
     let desk = Desk::with_spec(THESIS);
