@@ -49,8 +49,8 @@ fn two_inertial_sensors_become_one() {
     assert!(snr.is_some_and(|snr| snr > 60.0), "{shown}");
 }
 
-/// Two recordings that began apart, with clocks of their own, become one: better than one of them alone at best
-/// (15.8 dB), and than taps that stay.
+/// Two recordings that began apart, with clocks of their own, become one: better than one of them alone at
+/// best (15.8 dB), and than taps that stay.
 #[test]
 #[cfg(unix)]
 fn two_recorders_become_one() {
