@@ -189,7 +189,7 @@ def test_recordings_that_do_not_fit_are_refused():
         ([a, b], {}, "nothing in common"),
         ([a, np.zeros(5000)], {}, "channel 2 holds no signal"),
         ([a, b[:100]], {}, "100 samples in common"),
-        ([a], {}, "2 channels"),
+        ([a], {}, "channels in the spec: 2"),
         ([a, b], {"reference": 3}, "channel 3"),
         ([a, b], {"within": -1.0}, "within"),
         ([a, 1j * b], {}, "complex"),
