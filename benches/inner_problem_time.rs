@@ -8,7 +8,7 @@ use hybank::lmi::{Settings, kyp};
 use nalgebra::DMatrix;
 
 mod stopwatch;
-#[path = "../src/lmi/testbank.rs"]
+#[path = "../tests/support/testbank.rs"]
 mod testbank;
 
 use testbank::TestBank;

@@ -67,5 +67,6 @@ pub mod overview;
 mod random;
 
 #[cfg(test)]
+#[path = "../tests/support/trials.rs"]
 #[allow(dead_code, unreachable_pub)]
 mod trials;

@@ -12,6 +12,7 @@ pub(crate) mod dense;
 mod double_double;
 pub(crate) mod elementary;
 #[cfg(test)]
+#[path = "tests/exact.rs"]
 mod exact;
 mod number;
 mod real;

@@ -21,6 +21,7 @@ mod iteration;
 pub mod kyp;
 pub mod sampled;
 #[cfg(test)]
+#[path = "../../tests/support/testbank.rs"]
 mod testbank;
 
 pub use error::LmiError;

@@ -40,8 +40,6 @@ mod grid;
 mod judge;
 mod memory;
 mod multipliers;
-#[cfg(test)]
-mod ordinary;
 mod quick;
 mod remainder;
 mod scheduled;

@@ -1,3 +1,5 @@
+mod ordinary;
+
 use super::*;
 use crate::bank::SynthesisFilters;
 use crate::linalg::{self, CMat, Complex};

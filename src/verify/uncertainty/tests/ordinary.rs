@@ -1,7 +1,7 @@
 //! Boxes around ordinary filters: none is refused, the ends are as close as asked, and no point of the box
 //! is above them by a sum over aliases, which shares nothing with the proof.
 
-use super::*;
+use super::super::*;
 use crate::analog::StrictlyProper;
 use crate::bank::{StateSpace, SynthesisFilters};
 use crate::design::{Options, design};
