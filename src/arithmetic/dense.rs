@@ -1,7 +1,8 @@
-//! Dense matrices of numbers of extended precision, for which no library offers decompositions, and limits
-//! by doubling: each step squares the number of steps that it covers.
+//! Dense matrices of numbers of extended precision and of balls, for which no library offers decompositions,
+//! and limits by doubling: each step squares the number of steps that it covers.
 
 use super::Number;
+use super::real::Entry;
 use nalgebra::DMatrix as Matrix;
 
 /// Maximum number of doublings: 2^40 steps.
@@ -10,43 +11,42 @@ const DOUBLINGS: usize = 40;
 /// results are rounded in the end, and above that of 106 bits.
 const LIMIT_ACCURACY: f64 = 1e-25;
 
-/// a b. Zeros on the left are skipped, because delay lines are sparse.
-pub(crate) fn product<F: Number>(a: &Matrix<F>, b: &Matrix<F>) -> Matrix<F> {
-    let mut product = zeros(a.nrows(), b.ncols());
-    for (j, column) in b.column_iter().enumerate() {
-        for (&y, factors) in column.iter().zip(a.column_iter()) {
-            for (sum, &x) in product.column_mut(j).iter_mut().zip(factors.iter()) {
-                if x != F::ZERO {
-                    *sum += x * y;
-                }
-            }
+/// a b. Entries of `a` that are exactly zero are skipped, because delay lines are sparse.
+pub(crate) fn product<T: Entry>(a: &Matrix<T>, b: &Matrix<T>) -> Matrix<T> {
+    assert_eq!(a.ncols(), b.nrows(), "the matrices of a product fit each other");
+    let mut result = zeros(a.nrows(), b.ncols());
+    for i in 0..a.nrows() {
+        let row: Vec<(usize, T)> =
+            (0..a.ncols()).map(|k| (k, a[(i, k)])).filter(|(_, x)| *x != T::default()).collect();
+        for j in 0..b.ncols() {
+            result[(i, j)] = row.iter().fold(T::default(), |sum, &(k, x)| sum + x * b[(k, j)]);
         }
     }
-    product
+    result
 }
 
 /// All entries zero.
-pub(crate) fn zeros<F: Number>(rows: usize, columns: usize) -> Matrix<F> {
-    Matrix::from_element(rows, columns, F::ZERO)
+pub(crate) fn zeros<T: Entry>(rows: usize, columns: usize) -> Matrix<T> {
+    Matrix::from_element(rows, columns, T::default())
 }
 
 /// Ones on the diagonal.
-pub(crate) fn identity<F: Number>(order: usize) -> Matrix<F> {
-    Matrix::from_fn(order, order, |i, j| F::from(f64::from(u8::from(i == j))))
+pub(crate) fn identity<T: Entry>(order: usize) -> Matrix<T> {
+    Matrix::from_fn(order, order, |i, j| T::from(f64::from(u8::from(i == j))))
 }
 
 /// The rows and columns with these indices.
-pub(crate) fn select<F: Number>(m: &Matrix<F>, rows: &[usize], columns: &[usize]) -> Matrix<F> {
+pub(crate) fn select<T: Entry>(m: &Matrix<T>, rows: &[usize], columns: &[usize]) -> Matrix<T> {
     Matrix::from_fn(rows.len(), columns.len(), |i, j| m[(rows[i], columns[j])])
 }
 
-/// The same with the lower triangle copied into the upper one.
-pub(crate) fn symmetric<F: Number>(m: &Matrix<F>) -> Matrix<F> {
+/// The same with the lower triangle copied into the upper one. Both must enclose the same numbers.
+pub(crate) fn symmetric<T: Entry>(m: &Matrix<T>) -> Matrix<T> {
     Matrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i.max(j), i.min(j))])
 }
 
-/// m s m' for a symmetric s.
-pub(crate) fn congruence<F: Number>(m: &Matrix<F>, s: &Matrix<F>) -> Matrix<F> {
+/// m s m' for a symmetric s, with the sparse factor on the left of both products.
+pub(crate) fn congruence<T: Entry>(m: &Matrix<T>, s: &Matrix<T>) -> Matrix<T> {
     symmetric(&product(m, &product(m, s).transpose()))
 }
 
@@ -82,10 +82,7 @@ fn subtract_row<F: Number>(m: &mut Matrix<F>, i: usize, factor: F, k: usize, fro
 }
 
 /// U^-1 rhs for an upper triangular U.
-pub(crate) fn back_substituted<F: Number>(
-    mut rhs: Matrix<F>,
-    upper: impl Fn(usize, usize) -> F,
-) -> Matrix<F> {
+fn back_substituted<F: Number>(mut rhs: Matrix<F>, upper: impl Fn(usize, usize) -> F) -> Matrix<F> {
     for k in (0..rhs.nrows()).rev() {
         for j in 0..rhs.ncols() {
             let known = (k + 1..rhs.nrows()).fold(rhs[(k, j)], |sum, i| sum - upper(k, i) * rhs[(i, j)]);
@@ -107,23 +104,31 @@ pub(crate) fn solve_lower<F: Number>(lower: &Matrix<F>, rhs: &Matrix<F>) -> Matr
     x
 }
 
-/// The lower triangular L with L L' = m; `None` if m is not positive definite.
+/// The lower triangular L with L L' = m, of which the lower triangle is read; `None` at the first pivot that
+/// is not positive.
 pub(crate) fn cholesky<F: Number>(m: &Matrix<F>) -> Option<Matrix<F>> {
     let n = m.nrows();
-    let mut l = zeros(n, n);
+    // L', so that the rows of L are contiguous.
+    let mut upper = zeros(n, n);
     for i in 0..n {
         for j in 0..=i {
-            let rest = (0..j).fold(m[(i, j)], |sum, k| sum - l[(i, k)] * l[(j, k)]);
+            let (row, above) = (&upper.as_slice()[i * n..], &upper.as_slice()[j * n..]);
+            let rest = row[..j].iter().zip(&above[..j]).fold(m[(i, j)], |sum, (&x, &y)| sum - x * y);
             if i > j {
-                l[(i, j)] = rest / l[(j, j)];
+                upper[(j, i)] = rest / above[j];
             } else if rest.nearest() > 0.0 && rest.nearest().is_finite() {
-                l[(i, i)] = rest.sqrt();
+                upper[(i, i)] = rest.sqrt();
             } else {
                 return None;
             }
         }
     }
-    Some(l)
+    Some(upper.transpose())
+}
+
+/// (L L')^-1 rhs.
+pub(crate) fn solve_factored<F: Number>(lower: &Matrix<F>, rhs: &Matrix<F>) -> Matrix<F> {
+    back_substituted(solve_lower(lower, rhs), |k, i| lower[(i, k)])
 }
 
 /// The pivots of the elimination without pivoting, in their order. By Sylvester's law a symmetric matrix has

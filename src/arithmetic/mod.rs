@@ -28,14 +28,14 @@ use std::ops::{AddAssign, SubAssign};
 
 /// The assignments by which matrices of these numbers are added.
 macro_rules! assignments {
-    ($($number:ty),*) => {$(
-        impl AddAssign for $number {
+    ($([$($f:ident)?] $number:ty),*) => {$(
+        impl<$($f: Number)?> AddAssign for $number {
             fn add_assign(&mut self, other: Self) {
                 *self = *self + other;
             }
         }
 
-        impl SubAssign for $number {
+        impl<$($f: Number)?> SubAssign for $number {
             fn sub_assign(&mut self, other: Self) {
                 *self = *self - other;
             }
@@ -43,4 +43,4 @@ macro_rules! assignments {
     )*};
 }
 
-assignments!(DoubleDouble, BigFloat);
+assignments!([] DoubleDouble, [] BigFloat, [F] Ball<F>);

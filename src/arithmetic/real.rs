@@ -14,6 +14,11 @@ impl<T> Field for T where
 {
 }
 
+/// What the entries of a matrix are: numbers, or balls.
+pub(crate) trait Entry: Field + nalgebra::Scalar + Default + From<f64> {}
+
+impl<T: Field + nalgebra::Scalar + Default + From<f64>> Entry for T {}
+
 /// A real number, exact to rounding (`f64`) or enclosed ([`Ball`]). A formula that is generic over it is
 /// written once for the design and for the proof.
 pub(crate) trait Real: Field + From<f64> + PartialEq + std::fmt::Debug + 'static {

@@ -124,7 +124,7 @@ impl<F: Number> CausalPlant<F> {
         let square = Ball::from(gamma) * Ball::from(gamma);
         let mut p: Matrix<F> = ball::zeros(n, n);
         for period in 0..periods {
-            let mut gram = ball::add(&ball::congruence(&self.system, &p), &self.input_gram);
+            let mut gram = ball::congruence(&self.system, &p) + &self.input_gram;
             (measured..rows).for_each(|i| gram[(i, i)] = gram[(i, i)] - square);
             for (row, _) in (n..).zip(&self.first).filter(|&(_, &first)| first <= period) {
                 if gram[(row, row)].lower().is_nan() || gram[(row, row)].lower() <= 0.0 {

@@ -39,7 +39,7 @@ impl<F: Number> Covariance<F> {
                 let state = state.map(|x| x.widened(rest));
                 return Some(Self { state, transition: period.transition.clone() });
             }
-            state = ball::add(&state, &ball::congruence(&power, &state));
+            state += ball::congruence(&power, &state);
             power = ball::product(&power, &power);
         }
         None
@@ -51,10 +51,7 @@ impl<F: Number> Covariance<F> {
         let (row_a, row_b) = (period.outputs.rows(a, 1).into_owned(), period.outputs.rows(b, 1).into_owned());
         let before = ball::product_transposed(&self.state, &row_b);
         let mut values = vec![ball::product(&row_a, &before)[(0, 0)] + period.gram[(n + a, n + b)]];
-        let mut common = ball::add(
-            &ball::product(&self.transition, &before),
-            &period.gram.view((0, n + b), (n, 1)).into_owned(),
-        );
+        let mut common = ball::product(&self.transition, &before) + period.gram.view((0, n + b), (n, 1));
         for _ in 1..=lags {
             values.push(ball::product(&row_a, &common)[(0, 0)]);
             common = ball::product(&self.transition, &common);

@@ -159,7 +159,7 @@ impl<F: Number> Rows<F> {
         for (to, from) in [(&mut self.state, &other.state), (&mut self.input, &other.input)] {
             let part = ball::product(by, &from.rows(range.start, range.len()).into_owned());
             let mut rows = to.rows_mut(start, by.nrows());
-            let difference = ball::subtract(&rows.clone_owned(), &part);
+            let difference = &rows - part;
             rows.copy_from(&difference);
         }
     }
@@ -197,7 +197,7 @@ impl<F: Number> ErrorSystem<F> {
         whole.subtract(own.start, &filters.b.map(|x| -x), &delivered, measured.clone());
         // e = reference - c eta - d measured.
         whole.state.view_mut((order, own.start), (outputs, own.len())).copy_from(&filters.c.map(|x| -x));
-        whole.subtract(order, &ball::identity(outputs).map(|x| -x), &delivered, reference);
+        whole.subtract(order, &ball::identity(outputs).map(|x: Ball<F>| -x), &delivered, reference);
         whole.subtract(order, &filters.d, &delivered, measured);
         Self { system: whole.state, inputs: whole.input, gram: period.gram.clone(), outputs }
     }

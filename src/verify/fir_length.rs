@@ -113,7 +113,7 @@ impl<F: Number> BindingSums<F> {
         // a_p conj((Gamma b)_i) z^j is the conjugate of what r sums; its real part is the same.
         let mut turned = a.product(&image.select(&self.measured, &[0]).adjoint());
         for lag in &mut self.residual {
-            *lag = ball::add(lag, &turned.re);
+            *lag += &turned.re;
             turned = turned.times(&z);
         }
     }

@@ -19,7 +19,7 @@ use super::ball::{self, Ball, Matrix};
 use super::positive;
 use super::slow_period::SlowPeriod;
 use super::spectrum::{self, ComplexMatrix};
-use crate::arithmetic::{DoubleDouble, Number};
+use crate::arithmetic::{DoubleDouble, Number, dense};
 use crate::bank::{DualWitness, SynthesisFilters};
 
 /// The square of a lower bound of this bank's norm, from its gain at a frequency: `||K|| >= ||a* K(z)|| /
@@ -87,11 +87,10 @@ pub(super) fn unexplained(
     let cross = gram.select(&measured, &(0..ratio).collect::<Vec<_>>()).product(&reference);
     let units = positive::scales(&known);
     let least = least_eigenvalue(&positive::scaled(&known, &units))?;
-    let factor = positive::cholesky(&known.map(Ball::mid))?;
-    let right: Vec<_> = cross.re.iter().chain(&cross.im).map(|x| (-*x).mid()).collect();
-    let solution = factor.solve(&right);
+    let factor = dense::cholesky(&known.map(Ball::mid))?;
+    let solution = dense::solve_factored(&factor, &cross.stacked().map(|x| (-x).mid()));
     let n = measured.len();
-    let part = |start: usize| Matrix::from_fn(n, 1, |i, _| Ball::exactly(solution[start + i]));
+    let part = |start: usize| solution.rows(start, n).map(Ball::exactly);
     let b = reference.above(&ComplexMatrix { re: part(0), im: part(n) });
     let gram = gram.select(&all, &all);
     // The optimal b_h has less energy than the b_h found, by r* Gamma_hh^-1 r with the residual r.

@@ -7,34 +7,9 @@
 //! the midpoint less (radii + g tr + margin) I is factored.
 
 use super::ball::{self, Ball, Matrix};
-use crate::arithmetic::{DoubleDouble, Number};
+use crate::arithmetic::Number;
+use crate::arithmetic::dense::{cholesky, solve_factored};
 use nalgebra::DMatrix;
-
-/// Lower triangular.
-#[derive(Debug, Clone)]
-pub(super) struct Factor<F = DoubleDouble> {
-    rows: Vec<Vec<F>>,
-}
-
-/// L L' = m in rounded arithmetic; `None` at the first pivot that is not positive.
-pub(super) fn cholesky<F: Number>(m: &DMatrix<F>) -> Option<Factor<F>> {
-    let mut rows: Vec<Vec<F>> = Vec::with_capacity(m.nrows());
-    for i in 0..m.nrows() {
-        let mut row: Vec<F> = Vec::with_capacity(i + 1);
-        for j in 0..i {
-            let above = &rows[j];
-            let sum = (0..j).fold(m[(i, j)], |sum, k| sum - row[k] * above[k]);
-            row.push(sum / above[j]);
-        }
-        let pivot = row.iter().fold(m[(i, i)], |sum, &x| sum - x * x);
-        if !(pivot.nearest() > 0.0 && pivot.nearest().is_finite()) {
-            return None;
-        }
-        row.push(pivot.sqrt());
-        rows.push(row);
-    }
-    Some(Factor { rows })
-}
 
 /// R with R R' = m up to a shift of 1e-28 of its size, which makes a semidefinite m definite. The result is
 /// rounded and must not be used in a proof.
@@ -46,25 +21,7 @@ pub(super) fn root(m: &Matrix) -> Option<Matrix> {
         if i == j { (scaled + Ball::from(1e-28)).mid() } else { scaled.mid() }
     });
     let factor = cholesky(&shifted)?;
-    Some(Matrix::from_fn(n, n, |i, j| {
-        factor.rows[i].get(j).map_or(Ball::ZERO, |&x| Ball::exactly(x) / Ball::from(scales[i]))
-    }))
-}
-
-impl<F: Number> Factor<F> {
-    /// (L L')^-1 v, rounded.
-    pub(super) fn solve(&self, v: &[F]) -> Vec<F> {
-        let mut x: Vec<F> = Vec::with_capacity(v.len());
-        for (row, &value) in self.rows.iter().zip(v) {
-            let sum = x.iter().zip(row).fold(value, |sum, (&x, &l)| sum - l * x);
-            x.push(sum / row[row.len() - 1]);
-        }
-        for i in (0..x.len()).rev() {
-            let sum = (i + 1..x.len()).fold(x[i], |sum, k| sum - self.rows[k][i] * x[k]);
-            x[i] = sum / self.rows[i][i];
-        }
-        x
-    }
+    Some(Matrix::from_fn(n, n, |i, j| Ball::exactly(factor[(i, j)]) / Ball::from(scales[i])))
 }
 
 /// Powers of two that bring the diagonal of a matrix to the size of one: the scaling is exact, and the
@@ -115,7 +72,7 @@ fn factoring<F: Number>(m: &Matrix<F>, least: f64) -> f64 {
 #[derive(Debug, Clone)]
 pub(super) struct Definite<F> {
     matrix: Matrix<F>,
-    factor: Factor<F>,
+    factor: DMatrix<F>,
     /// No eigenvalue is less.
     least: f64,
 }
@@ -137,10 +94,8 @@ impl<F: Number> Definite<F> {
     /// At least r' M^-1 r, for all in the enclosures: with any v and rho = r - M v it is
     /// v' r + v' rho + rho' M^-1 rho.
     pub(super) fn inverse_form(&self, r: &Matrix<F>) -> Ball<F> {
-        let right: Vec<F> = r.iter().map(|x| x.mid()).collect();
-        let v = self.factor.solve(&right);
-        let v = Matrix::from_fn(v.len(), 1, |i, _| Ball::exactly(v[i]));
-        let rho = ball::subtract(r, &ball::product(&self.matrix, &v));
+        let v = solve_factored(&self.factor, &r.map(Ball::mid)).map(Ball::exactly);
+        let rho = r - ball::product(&self.matrix, &v);
         let inner =
             |x: &Matrix<F>, y: &Matrix<F>| x.iter().zip(y).fold(Ball::ZERO, |sum, (&x, &y)| sum + x * y);
         inner(&v, r) + inner(&v, &rho) + inner(&rho, &rho) / Ball::from(self.least)
@@ -150,6 +105,7 @@ impl<F: Number> Definite<F> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arithmetic::DoubleDouble;
     use crate::linalg::hermitian_eigenvalues;
 
     /// Q diag(values) Q' with a Householder reflection: eigenvalues known beforehand.
@@ -200,16 +156,14 @@ mod tests {
     #[test]
     fn solutions_solve() {
         let m = with_eigenvalues(&[1.0, 3.0, 1e-9, 2.0]);
-        let v: Vec<DoubleDouble> = [1.0, -2.0, 0.5, 3.0].map(DoubleDouble::from).to_vec();
-        let x = cholesky(&m.map(Ball::mid)).unwrap().solve(&v);
-        let column = Matrix::from_fn(4, 1, |i, _| Ball::exactly(x[i]));
-        let back = ball::product(&m, &column);
-        assert!((0..4).all(|i| (back[i].mid() - v[i]).nearest().abs() < 1e-18));
-        // Two right sides at once: the inverse acts linearly, so x(v) + x(w) = x(v + w).
-        let w: Vec<DoubleDouble> = [0.25, 1.0, -3.0, 7.0].map(DoubleDouble::from).to_vec();
         let factor = cholesky(&m.map(Ball::mid)).unwrap();
-        let sum: Vec<DoubleDouble> = v.iter().zip(&w).map(|(&v, &w)| v + w).collect();
-        let (x, y, z) = (factor.solve(&v), factor.solve(&w), factor.solve(&sum));
+        let solved = |v: &DMatrix<DoubleDouble>| solve_factored(&factor, v);
+        let [v, w] = [[1.0, -2.0, 0.5, 3.0], [0.25, 1.0, -3.0, 7.0]]
+            .map(|v| DMatrix::from_iterator(4, 1, v.map(DoubleDouble::from)));
+        let back = ball::product(&m, &solved(&v).map(Ball::exactly));
+        assert!((0..4).all(|i| (back[i].mid() - v[i]).nearest().abs() < 1e-18));
+        // The inverse acts linearly, so x(v) + x(w) = x(v + w).
+        let (x, y, z) = (solved(&v), solved(&w), solved(&(&v + &w)));
         assert!((0..4).all(|i| (x[i] + y[i] - z[i]).nearest().abs() < 1e-18 * (1.0 + z[i].nearest().abs())));
     }
 }

@@ -42,8 +42,8 @@ impl<F: Number> ComplexMatrix<F> {
     pub(super) fn product(&self, other: &Self) -> Self {
         let of = ball::product;
         Self {
-            re: ball::subtract(&of(&self.re, &other.re), &of(&self.im, &other.im)),
-            im: ball::add(&of(&self.re, &other.im), &of(&self.im, &other.re)),
+            re: of(&self.re, &other.re) - of(&self.im, &other.im),
+            im: of(&self.re, &other.im) + of(&self.im, &other.re),
         }
     }
 
@@ -57,11 +57,11 @@ impl<F: Number> ComplexMatrix<F> {
     }
 
     pub(super) fn plus(&self, other: &Self) -> Self {
-        Self { re: ball::add(&self.re, &other.re), im: ball::add(&self.im, &other.im) }
+        Self { re: &self.re + &other.re, im: &self.im + &other.im }
     }
 
     pub(super) fn minus(&self, other: &Self) -> Self {
-        Self { re: ball::subtract(&self.re, &other.re), im: ball::subtract(&self.im, &other.im) }
+        Self { re: &self.re - &other.re, im: &self.im - &other.im }
     }
 
     pub(super) fn adjoint(&self) -> Self {
@@ -117,7 +117,7 @@ impl<F: Number> ComplexMatrix<F> {
     }
 
     /// Real parts over imaginary parts.
-    fn stacked(&self) -> Matrix<F> {
+    pub(super) fn stacked(&self) -> Matrix<F> {
         let n = self.re.nrows();
         Matrix::from_fn(
             2 * n,
@@ -181,20 +181,20 @@ fn resolved<F: Number>(a: &Matrix<F>, z: &ComplexMatrix<F>, right: &ComplexMatri
         return right.clone();
     }
     let shifted = ComplexMatrix {
-        re: ball::subtract(&ball::scaled(&ball::identity(n), z.re[(0, 0)]), a),
+        re: ball::scaled(&ball::identity(n), z.re[(0, 0)]) - a,
         im: ball::scaled(&ball::identity(n), z.im[(0, 0)]),
     }
     .realified();
     let right = right.stacked();
     let inverse = linalg::inverse(&ball::nearest(&shifted));
-    let residual = |x: &Matrix<F>| ball::subtract(&right, &ball::product(&shifted, x));
+    let residual = |x: &Matrix<F>| &right - ball::product(&shifted, x);
     let size = |m: &Matrix<F>| m.iter().map(|x| x.magnitude()).fold(0.0, ball::nan_max);
     let mut x = ball::zeros(2 * n, right.ncols());
     let mut rest = right.clone();
     let mut largest = size(&rest);
     for _ in 0..refinements::<F>() {
         let step = ball::exact(&(&inverse * ball::nearest(&rest)));
-        let next = ball::add(&x, &step).map(|x| Ball::exactly(x.mid()));
+        let next = (&x + step).map(|x| Ball::exactly(x.mid()));
         let next_rest = residual(&next);
         let before = std::mem::replace(&mut largest, size(&next_rest));
         (x, rest) = (next, next_rest);

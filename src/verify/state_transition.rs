@@ -27,7 +27,7 @@ pub(super) fn state_transition<F: Number>(a: &Matrix<F>, b: &Matrix<F>, t: Ball<
     let mut whole = taylor(a, b, t * Ball::from(0.5f64.powi(halvings)), norm);
     for _ in 0..halvings {
         let StateTransition { transition, gramian } = &whole;
-        let grown = ball::add(gramian, &ball::congruence(transition, gramian));
+        let grown = gramian + ball::congruence(transition, gramian);
         whole = StateTransition { gramian: grown, transition: ball::product(transition, transition) };
     }
     whole
@@ -48,10 +48,10 @@ fn taylor<F: Number>(a: &Matrix<F>, b: &Matrix<F>, t: Ball<F>, norm: f64) -> Sta
     for k in 1..terms {
         let over = |k: usize| Ball::from(1.0) / Ball::from(k as f64);
         power = ball::scaled(&ball::product(&at, &power), over(k));
-        transition = ball::add(&transition, &power);
+        transition += &power;
         let half = ball::product(&at, &derivative);
-        derivative = ball::scaled(&ball::add(&half, &half.transpose()), over(k + 1));
-        gramian = ball::add(&gramian, &derivative);
+        derivative = ball::scaled(&(&half + half.transpose()), over(k + 1));
+        gramian += &derivative;
     }
     // The terms left out fall at least as fast as 1, 1/2, 1/4, ...
     let (size, factorial) = (norm * t.magnitude() * 1.001, factorial(terms));
@@ -150,7 +150,7 @@ mod tests {
             let rest = state_transition(&ball::exact(&a), &ball::exact(&b), Ball::from(2.0) - Ball::from(t));
             let first = enclosed(&a, &b, t);
             let joined = ball::product(&rest.transition, &first.transition);
-            let gramian = ball::add(&rest.gramian, &ball::congruence(&rest.transition, &first.gramian));
+            let gramian = &rest.gramian + ball::congruence(&rest.transition, &first.gramian);
             let difference =
                 |x: &Matrix, y: &Matrix| x.zip_map(y, |x, y| (x - y).nearest().abs() - (x - y).radius());
             for gap in

@@ -44,5 +44,5 @@ fn inequality<F: Number>(error: &ErrorSystem<F>, certificate: &Certificate) -> M
     let square = Ball::from(certificate.gamma) * Ball::from(certificate.gamma);
     (n..n + m).for_each(|i| left[(i, i)] = square);
     let moved = ball::congruence(&error.system, &p);
-    ball::subtract(&left, &ball::add(&moved, &error.input_gram()))
+    left - (moved + error.input_gram())
 }

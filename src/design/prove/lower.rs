@@ -305,7 +305,7 @@ impl<'a> Normal<'a> {
     fn solve(&self, covariance: &Matrix<BigFloat>, cross: &Matrix<BigFloat>) -> Option<Vec<BigFloat>> {
         let factor = dense::cholesky(&self.matrix(covariance))?;
         let right = Matrix::from_vec(factor.nrows(), 1, self.right(cross));
-        let taps = dense::back_substituted(dense::solve_lower(&factor, &right), |k, i| factor[(i, k)]);
+        let taps = dense::solve_factored(&factor, &right);
         Some(taps.iter().copied().collect())
     }
 

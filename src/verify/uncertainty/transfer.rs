@@ -53,7 +53,7 @@ impl Transfer {
             let trace = (0..n).fold(Ball::ZERO, |sum, i| sum + next[(i, i)]);
             let coefficient = -(trace / Ball::from(k as f64));
             den[n - k] = coefficient;
-            power = ball::add(&next, &ball::scaled(&ball::identity(n), coefficient));
+            power = next + ball::scaled(&ball::identity(n), coefficient);
         }
         if !d.is_zero() {
             let direct = *d * gain;
