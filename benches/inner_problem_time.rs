@@ -3,9 +3,8 @@
 //! Run with `cargo bench --bench inner_problem_time`. Data: sampled hybrid filter banks, the same on every
 //! run.
 
+use hybank::lmi::Settings;
 use hybank::lmi::sampled::{self, Point, Problem};
-use hybank::lmi::{Settings, kyp};
-use nalgebra::DMatrix;
 
 mod stopwatch;
 #[path = "../tests/support/testbank.rs"]
@@ -24,7 +23,6 @@ fn main() {
     if std::env::args().any(|arg| arg == "--bench") {
         sampled_worst_case();
         mean_square_under_cap();
-        kyp_thesis();
     }
 }
 
@@ -44,7 +42,7 @@ fn sampled_worst_case() {
     ] {
         let problem = problem(&bank, taps, points);
         stopwatch::time(&format!("sampled worst case, {name}"), || {
-            sampled::minimise(&problem, &Settings::SAMPLED)
+            sampled::minimise(&problem, &Settings::DEFAULT)
         });
     }
 }
@@ -56,45 +54,11 @@ fn mean_square_under_cap() {
         ("N = M = 8, 32 taps, 129 points", testbank::eight_channels(12), 32, 129),
     ] {
         let problem = problem(&bank, taps, points);
-        let settings = Settings::SAMPLED;
+        let settings = Settings::DEFAULT;
         let best = sampled::minimise(&problem, &settings).expect("settings are the defaults");
         let square = sampled::MeanSquareObjective::noiseless(vec![1.0; points], problem.channels());
         stopwatch::time(&format!("mean square under cap, {name}"), || {
             sampled::mean_square_under_cap(&problem, &square, 1.001 * best.gamma, &best.taps, &settings)
         });
     }
-}
-
-/// The thesis's own form: bounded real lemma with P, 35 states and 44 taps.
-fn kyp_thesis() {
-    let problem = kyp_problem(&testbank::thesis(), 11);
-    stopwatch::time("KYP, thesis, 22 taps", || kyp::minimise(&problem, &Settings::KYP));
-}
-
-/// Taps on a register of `lags` slow samples of all channels.
-fn kyp_problem(bank: &TestBank, lags: usize) -> kyp::Problem {
-    let [plant, drive, cw, dw, ch, dh] = bank.blocked();
-    let (n, q, channels, m) = (plant.nrows(), drive.ncols(), ch.nrows(), cw.nrows());
-    let order = n + channels * (lags - 1);
-    let mut a = DMatrix::zeros(order, order);
-    a.view_mut((0, 0), (n, n)).copy_from(&plant);
-    a.view_mut((n, 0), (channels, n)).copy_from(&ch);
-    (channels..order - n).for_each(|i| a[(n + i, n + i - channels)] = 1.0);
-    let mut b = DMatrix::zeros(order, q);
-    b.view_mut((0, 0), (n, q)).copy_from(&drive);
-    b.view_mut((n, 0), (channels, q)).copy_from(&dh);
-    let mut terms = Vec::new();
-    for (j, p, i) in (0..lags).flat_map(|j| (0..m).flat_map(move |p| (0..channels).map(move |i| (j, p, i)))) {
-        let (mut ck, mut dk) = (DMatrix::zeros(m, order), DMatrix::zeros(m, q));
-        if j == 0 {
-            ck.view_mut((p, 0), (1, n)).copy_from(&-ch.row(i));
-            dk.row_mut(p).copy_from(&-dh.row(i));
-        } else {
-            ck[(p, n + channels * (j - 1) + i)] = -1.0;
-        }
-        terms.push((ck, dk));
-    }
-    let mut c = DMatrix::zeros(m, order);
-    c.view_mut((0, 0), (m, n)).copy_from(&cw);
-    kyp::Problem::new(a, b, c, dw, terms).expect("a stable bank makes a problem")
 }

@@ -10,7 +10,7 @@ use super::written::{check_outputs, write_text};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use hybank::design::{self, DesignError, Limits, Options};
 use hybank::messages::Quoted;
-use hybank::spec::{DesignOverrides, Method, Reduction, Solver, Spec, Tracking, WordLengths};
+use hybank::spec::{DesignOverrides, Method, Reduction, Spec, Tracking, WordLengths};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -56,10 +56,6 @@ pub(super) struct Args {
     /// Share by which gamma may exceed its minimum, for a smaller mean-square error and output noise
     #[arg(long)]
     gamma_margin: Option<f64>,
-    /// Solver of FIR designs: sampled (on a grid of frequencies, fast) or kyp (bounded-real LMI, a second
-    /// opinion)
-    #[arg(long, value_parser = named(Solver::ALL.map(|solver| (solver.name(), solver))))]
-    solver: Option<Solver>,
     /// Integer taps of this many bits, sign included; or a list with the bits of each tap (4,6,8,6,4)
     #[arg(long)]
     bits: Option<WordLengths>,
@@ -111,7 +107,6 @@ fn overrides(args: &Args) -> DesignOverrides {
         taps: args.taps,
         target_snr_db: args.snr,
         gamma_margin: args.gamma_margin,
-        solver: args.solver,
         bits: args.bits.clone(),
         fraction_bits: args.fraction_bits,
         tracking: args.tracking,

@@ -17,10 +17,7 @@ pub use eigen::{
     singular_values, spectral_radius, svd, symmetric_eigen,
 };
 pub use scalar::{Scalar, Svd};
-pub use solve::{
-    PositiveFactor, cholesky, inverse, lq, lq_factor, solve, solve_lower, solve_lower_transposed,
-    solve_positive, transposed_product,
-};
+pub use solve::{PositiveFactor, cholesky, inverse, lq, lq_factor, solve, solve_lower, solve_positive};
 
 use faer::MatRef;
 pub use nalgebra::Complex;

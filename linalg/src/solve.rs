@@ -30,27 +30,9 @@ pub fn inverse(m: &Mat) -> Mat {
 
 /// Solves `l x = rhs` with a lower triangular `l`.
 pub fn solve_lower(l: &Mat, rhs: &Mat) -> Mat {
-    in_place(rhs, |x| view(l).solve_lower_triangular_in_place(x))
-}
-
-/// Solves `l' x = rhs` with a lower triangular `l`.
-pub fn solve_lower_transposed(l: &Mat, rhs: &Mat) -> Mat {
-    in_place(rhs, |x| view(l).transpose().solve_upper_triangular_in_place(x))
-}
-
-fn in_place(rhs: &Mat, solve: impl FnOnce(faer::MatMut<'_, f64>)) -> Mat {
     let mut x = view(rhs).to_owned();
-    solve(x.as_mut());
+    view(l).solve_lower_triangular_in_place(x.as_mut());
     owned(x.as_ref())
-}
-
-/// `a[:, columns]' b` without copying the transpose.
-///
-/// # Panics
-/// If the columns are not columns of `a` or the numbers of rows differ.
-pub fn transposed_product(a: &Mat, columns: std::ops::Range<usize>, b: &Mat) -> Mat {
-    let part = view(a).subcols(columns.start, columns.len());
-    owned((part.transpose() * view(b)).as_ref())
 }
 
 /// Lower Cholesky factor of a symmetric matrix; only the lower triangle is read.
@@ -83,15 +65,5 @@ impl PositiveFactor {
     /// `m^{-1} rhs`.
     pub fn solve(&self, rhs: &Mat) -> Mat {
         owned(self.llt.solve(view(rhs)).as_ref())
-    }
-
-    /// `L^{-1} rhs` with the lower factor L, `m = L L'`.
-    pub fn solve_half(&self, rhs: &Mat) -> Mat {
-        in_place(rhs, |x| self.llt.L().solve_lower_triangular_in_place(x))
-    }
-
-    /// `L'^{-1} rhs`, the other half.
-    pub fn solve_half_transposed(&self, rhs: &Mat) -> Mat {
-        in_place(rhs, |x| self.llt.L().transpose().solve_upper_triangular_in_place(x))
     }
 }

@@ -527,7 +527,6 @@ def design(
     taps: int | np.integer[Any] | None = None,
     target_snr_db: float | np.number[Any] | None = None,
     gamma_margin: float | np.number[Any] | None = None,
-    solver: Literal["sampled", "kyp"] | None = None,
     bits: int | Sequence[int] | np.integer[Any] | NDArray[Any] | None = None,
     fraction_bits: int | np.integer[Any] | None = None,
     order: int | np.integer[Any] | None = None,

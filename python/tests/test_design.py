@@ -34,7 +34,7 @@ def test_text_path_mapping_and_keywords_give_the_same_bank(bank, tmp_path):
         "latency": 4,
         "target": {"filter": {"family": "butterworth", "order": np.uint8(4), "cutoff": Fraction(9000)}},
         "channel": ({"delay": np.array(25e-6), "noise": None}, {"delay": 12.5e-6}),
-        "design": {"method": "fir", "taps": 16, "solver": None},
+        "design": {"method": "fir", "taps": 16, "bits": None},
     }
     keywords = hb.design(
         fast_rate=48e3,

@@ -328,7 +328,6 @@ pub(super) fn settings(spec: &Spec) -> Result<Settings, DesignError> {
         robust: RobustProblem::of(spec),
         deviations: Deviations::of(spec),
         gamma_margin: spec.design.gamma_margin,
-        solver: spec.design.solver,
         at_slow_rate: separate.then(at_slow_rate).transpose()?,
         ..Settings::default()
     })

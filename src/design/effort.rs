@@ -9,12 +9,11 @@ use super::DesignError;
 use super::error_grid::{FINE, coarse_intervals};
 use super::limits::{Effort, Limits, MAX_LONG_STATES};
 use super::merging::Repeats;
-use super::methods::fir_kyp::MAX_STATES;
 use super::methods::{Deviations, scenarios::RobustProblem};
 use super::problem::{Problem, common_delay};
 use super::prove::{MAX_SEARCHED_STATES, max_witnesses};
 use crate::memory::available_memory;
-use crate::spec::{Method, Reduction, Solver, Spec};
+use crate::spec::{Method, Reduction, Spec};
 
 /// Operations at that rate for an interior-point block, relative to the square of its order: a cube, but the
 /// rate of complex decompositions grows with the order.
@@ -173,12 +172,6 @@ impl Sizes {
     /// The method itself.
     fn method(&self, spec: &Spec) -> Effort {
         match spec.design.method {
-            // The bounded-real LMI. The method itself refuses more states, at once.
-            Method::Fir if spec.design.solver == Some(Solver::Kyp) => {
-                let states = self.error_states();
-                let unknowns = if states > MAX_STATES as f64 { 0.0 } else { 0.5 * states * states };
-                Effort::of(24.0 * unknowns.powi(3), 3.0 * REAL * unknowns * unknowns)
-            }
             Method::Fir => self.exchange(RobustProblem::of(spec), spec.design.tracking.is_some()),
             Method::H2 if spec.is_fir() && Deviations::of(spec).is_some() => self.averaged(),
             Method::H2 if spec.is_fir() => self.smoother(2.0, self.lags(), self.ratio),

@@ -41,17 +41,6 @@ pub enum DesignError {
     /// A linear matrix inequality was not well formed, or could not be set up.
     #[error(transparent)]
     Lmi(#[from] LmiError),
-    /// Too many states for the bounded-real LMI.
-    #[error(
-        "solver = \"kyp\" solves the bounded-real LMI for up to {limit} states of the error system, this one has {states}: use \
-         fewer taps or solver = \"sampled\""
-    )]
-    KypTooLarge {
-        /// States of the plant and of the delay lines of its measurements.
-        states: usize,
-        /// Most states.
-        limit: usize,
-    },
     /// No certificate was found, not even for a gamma up to 10 % above the computed norm.
     #[error(
         "the computed gamma could not be proven: no certificate passes up to 10 % above it, {}{}; the front ends may be too \

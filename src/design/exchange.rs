@@ -64,7 +64,7 @@ impl Tolerances {
     /// Every problem as closely as the last one, for few rounds: five are rarely needed.
     fn steady(accuracy: f64) -> Self {
         let loosest = POINTS_ACCURACY * accuracy;
-        Self { accuracy, loosest, mean_square: Settings::SAMPLED.tol_gap_rel, active: 0.0, rounds: 16 }
+        Self { accuracy, loosest, mean_square: Settings::DEFAULT.tol_gap_rel, active: 0.0, rounds: 16 }
     }
 
     /// For many rounds. Each problem is solved only as closely as the peaks between its points require: an
@@ -335,7 +335,7 @@ impl<E: AffineError> Exchange<E> {
 
     /// Solves the problem on the points.
     fn round(&mut self, tolerances: Tolerances, tolerance: f64) -> Result<Round<E::Scenario>, DesignError> {
-        let settings = Settings { tol_gap_rel: tolerance, ..Settings::SAMPLED };
+        let settings = Settings { tol_gap_rel: tolerance, ..Settings::DEFAULT };
         let solution = sampled::minimise(&self.problem, &settings)?;
         self.count_round(solution.iterations);
         self.raise_lower_bound(solution.lower, solution.dual);
@@ -379,7 +379,7 @@ impl<E: AffineError> Exchange<E> {
     ) -> Result<Candidate<E::Scenario>, DesignError> {
         let cap = start.peaks.estimate * (1.0 + self.gamma_margin);
         let cap_at_points = start.peaks.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);
-        let settings = Settings { tol_gap_rel: tolerances.mean_square, ..Settings::SAMPLED };
+        let settings = Settings { tol_gap_rel: tolerances.mean_square, ..Settings::DEFAULT };
         let mut left = None;
         for _ in 0..tolerances.rounds {
             if self.stop.is_due() {

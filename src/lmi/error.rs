@@ -1,7 +1,6 @@
 //! Why data do not form a problem.
 
 use crate::linalg::LinalgError;
-use crate::lti::LtiError;
 
 /// Why data do not form a problem, or why it could not be solved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -77,23 +76,6 @@ pub enum LmiError {
         /// Worst-case norm of the taps given.
         gamma: f64,
     },
-    /// The bounded real lemma needs a stable A.
-    #[error("A has spectral radius {radius}; the bounded real lemma needs all poles inside the unit circle")]
-    Unstable {
-        /// Largest modulus of the eigenvalues of A.
-        radius: f64,
-    },
-    /// A setting is out of its range.
-    #[error("setting {name} = {value} must lie strictly between 0 and 1")]
-    Setting {
-        /// Name of the setting.
-        name: &'static str,
-        /// Value given.
-        value: f64,
-    },
-    /// A Gramian could not be computed.
-    #[error(transparent)]
-    Lti(#[from] LtiError),
     /// A decomposition failed.
     #[error(transparent)]
     Linalg(#[from] LinalgError),

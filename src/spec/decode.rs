@@ -1,6 +1,6 @@
 //! Turns a document into a [`Spec`]: resolves units, fills in omitted filters, checks all rules.
 
-use super::design::{DesignOverrides, Method, Reduction, Solver, Tracking};
+use super::design::{DesignOverrides, Method, Reduction, Tracking};
 use super::error::KeyProblem;
 use super::filter_reader::{FILTER_FORMS, filter};
 use super::measured::{FilterModel, FilterModels, MeasuredFilter, Measurement, no_models};
@@ -30,12 +30,11 @@ const TOP_KEYS: [&str; 12] = [
 const TARGET_KEYS: [&str; 1] = ["filter"];
 const CHANNEL_KEYS: [&str; 9] =
     ["delay", "delay_samples", "rate", "filter", "noise", "bits", "jitter", "gain", "offset"];
-const DESIGN_KEYS: [&str; 11] = [
+const DESIGN_KEYS: [&str; 10] = [
     "method",
     "taps",
     "target_snr_db",
     "gamma_margin",
-    "solver",
     "bits",
     "fraction_bits",
     "tracking",
@@ -122,7 +121,7 @@ fn whole(document: &Value<'_>, overrides: DesignOverrides, models: &FilterModels
     frames::check_size(&layout, design.is_coupled(), h)
         .map_err(|problem| top.fault_at(Some("channel"), problem))?;
     design.check_beside(uncertainty.as_ref(), channels.len()).map_err(|KeyProblem { key, problem }| {
-        if matches!(key, "tracking" | "solver") && overrides.gives(key) {
+        if overrides.gives(key) {
             Fault::overriding(key, problem)
         } else {
             blamed.fault_at(Some(key), problem)
@@ -371,7 +370,6 @@ fn written(table: &Fields<'_>) -> Result<DesignOverrides, Fault> {
             .read("target_snr_db", |v| v.number_in(limits::check_target_snr))?
             .map(|db| db + 0.0),
         gamma_margin: table.read("gamma_margin", |v| v.number_in(limits::check_gamma_margin))?,
-        solver: table.read("solver", |v| v.name("solver", &Solver::ALL.map(|s| (s.name(), s))))?,
         bits: table.read("bits", |v| word_lengths(&v))?,
         fraction_bits: table.read("fraction_bits", |v| fraction_bits(&v))?,
         tracking: table.read("tracking", |v| v.name("tracking", &Tracking::ALL.map(|t| (t.name(), t))))?,

@@ -23,18 +23,6 @@ pub enum Method {
     Separation,
 }
 
-/// The optimisation method of FIR designs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-#[non_exhaustive]
-pub enum Solver {
-    /// The exchange algorithm: frequencies are added until gamma meets its lower bound. The secondary
-    /// objective chooses among the optimal taps.
-    Sampled,
-    /// The bounded-real LMI of thesis 5.4 with a Lyapunov matrix; slower, without a secondary objective.
-    Kyp,
-}
-
 /// How the taps of an FIR bank follow delays that change while it runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -60,9 +48,6 @@ pub struct DesignTable<M> {
     /// Relative excess over the optimal gamma that the designer may spend on a smaller mean-square error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gamma_margin: Option<f64>,
-    /// The optimisation method of FIR designs; `None` is [`Solver::Sampled`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub solver: Option<Solver>,
     /// Bits of the taps, for integer taps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bits: Option<WordLengths>,
@@ -104,13 +89,12 @@ struct Key {
 }
 
 /// The keys that not every method reads.
-const KEYS: [Key; 9] = {
+const KEYS: [Key; 8] = {
     use Method::{Fir, H2, Iir, Separation, Sinc};
     [
         Key { name: "taps", methods: &[Fir, H2, Sinc, Separation], advised: "fir or h2" },
         Key { name: "target_snr_db", methods: &[Fir, H2], advised: "fir or h2" },
         Key { name: "gamma_margin", methods: &[Fir, Iir], advised: "fir or iir" },
-        Key { name: "solver", methods: &[Fir], advised: "fir" },
         Key { name: "bits", methods: &[Fir], advised: "fir" },
         Key { name: "fraction_bits", methods: &[Fir], advised: "fir" },
         Key { name: "tracking", methods: &[Fir], advised: "fir" },
@@ -146,19 +130,6 @@ impl Method {
     }
 }
 
-impl Solver {
-    /// Every solver, the default first.
-    pub const ALL: [Self; 2] = [Self::Sampled, Self::Kyp];
-
-    /// The name in spec files and on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Sampled => "sampled",
-            Self::Kyp => "kyp",
-        }
-    }
-}
-
 impl Tracking {
     /// Every way.
     pub const ALL: [Self; 1] = [Self::Affine];
@@ -189,7 +160,6 @@ impl<M> DesignTable<M> {
             taps: self.taps,
             target_snr_db: self.target_snr_db,
             gamma_margin: self.gamma_margin,
-            solver: self.solver,
             bits: self.bits,
             fraction_bits: self.fraction_bits,
             tracking: self.tracking,
@@ -203,7 +173,6 @@ impl<M> DesignTable<M> {
             ("taps", self.taps.is_some()),
             ("target_snr_db", self.target_snr_db.is_some()),
             ("gamma_margin", self.gamma_margin.is_some()),
-            ("solver", self.solver.is_some()),
             ("bits", self.bits.is_some()),
             ("fraction_bits", self.fraction_bits.is_some()),
             ("tracking", self.tracking.is_some()),
@@ -301,16 +270,9 @@ impl DesignSpec {
 
     /// A key that excludes another one, whatever their values are.
     fn clash(&self) -> Option<(&'static str, SpecProblem)> {
-        let is_kyp = self.solver == Some(Solver::Kyp);
-        let kyp = |key| {
-            let (method, remedy) = ("fir with solver = \"kyp\"", "fir with solver = \"sampled\"");
-            Some((key, SpecProblem::NeedlessKey { key, method, remedy }))
-        };
         let conflict =
             |first, second, remedy| Some((second, SpecProblem::Conflict { first, second, remedy }));
         match self.reduction {
-            _ if is_kyp && self.gamma_margin.is_some() => kyp("gamma_margin"),
-            _ if is_kyp && self.tracking.is_some() => kyp("tracking"),
             _ if self.bits.is_some() && self.tracking.is_some() => conflict(
                 "bits",
                 "tracking",
@@ -334,11 +296,6 @@ impl DesignSpec {
         channels: usize,
     ) -> Result<(), KeyProblem> {
         let conflict = |first, remedy| Err(SpecProblem::Conflict { first, second: "[uncertainty]", remedy });
-        if self.solver == Some(Solver::Kyp) && uncertainty.is_some_and(|table| table.is_a_box(channels)) {
-            let remedy =
-                "a bank for uncertain channels is designed by solver = \"sampled\"; leave out one of the two";
-            return blame("solver", conflict("solver = \"kyp\"", remedy));
-        }
         if let (Some(reduction), Method::H2) = (self.reduction, self.method)
             && uncertainty.is_some_and(|table| table.has_delays_or_gains(channels))
         {
@@ -373,7 +330,6 @@ impl DesignOverrides {
                 .target_snr_db
                 .or(file.target_snr_db.filter(|_| keeps("target_snr_db") && self.taps.is_none())),
             gamma_margin: self.gamma_margin.or(file.gamma_margin.filter(|_| keeps("gamma_margin"))),
-            solver: self.solver.or(file.solver.filter(|_| keeps("solver"))),
             bits: self.bits.or(file.bits.filter(|_| keeps("bits"))),
             fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| keeps("fraction_bits"))),
             tracking: self.tracking.or(file.tracking.filter(|_| keeps("tracking"))),

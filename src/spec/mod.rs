@@ -24,7 +24,7 @@ mod word_lengths;
 mod write;
 
 pub use crate::messages::Location;
-pub use design::{DesignOverrides, DesignSpec, DesignTable, Method, Reduction, Solver, Tracking};
+pub use design::{DesignOverrides, DesignSpec, DesignTable, Method, Reduction, Tracking};
 pub use edit::with_measurements_renamed;
 pub(crate) use error::{Fault, shown_path};
 pub use error::{SpecError, SpecProblem};

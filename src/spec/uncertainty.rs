@@ -136,11 +136,6 @@ impl UncertaintySpec {
         self.has_delays(channels) || self.gains(channels).iter().any(|gain| *gain > 0.0)
     }
 
-    /// Whether a delay, a gain or a cut-off is uncertain.
-    pub(super) fn is_a_box(&self, channels: usize) -> bool {
-        self.has_delays_or_gains(channels) || self.cutoffs(channels).iter().any(|share| *share > 0.0)
-    }
-
     /// Standard deviations of all `channels` delays: a half-width of a 95 % interval of the normal law is
     /// 1.96 of them.
     pub fn delay_deviations(&self, channels: usize) -> Vec<Seconds> {

@@ -22,7 +22,6 @@ mod random_plants;
 mod rates;
 mod reduction;
 mod repeated_channels;
-mod second_opinion;
 mod sections;
 mod soundness;
 mod steep_front_ends;

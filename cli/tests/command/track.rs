@@ -191,7 +191,6 @@ fn a_spec_that_leaves_nothing_to_follow_is_refused() {
     refused("\"affine\"", "\"afine\"", &["bad.toml:7", "did you mean \"affine\"?"]);
     refused("\"fir\", taps = 24", "\"iir\"", &["tracking has no meaning for the method iir"]);
     refused("taps = 24", "taps = 24, bits = 12", &["bits and tracking"]);
-    refused("taps = 24", "taps = 24, solver = \"kyp\"", &["tracking has no meaning", "kyp"]);
     desk.write(
         "plain.toml",
         SPEC.replace(", tracking = \"affine\"", "").replace("delay_samples = 0.15", "gain = 0.01"),

@@ -14,7 +14,6 @@ mod averaged_fir;
 mod comparison;
 mod filtering;
 pub(crate) mod fir;
-pub(crate) mod fir_kyp;
 mod gamma_iteration;
 pub(crate) mod h2;
 pub(crate) mod iir;
@@ -32,7 +31,7 @@ use super::problem::Problem;
 use super::unfinished::Unfinished;
 use crate::lti::StateSpace;
 use crate::lti::peak::Peak;
-use crate::spec::{Method, Solver, Spec, Tracking};
+use crate::spec::{Method, Spec, Tracking};
 use crate::units::FastPeriods;
 
 /// Settings of a method, in addition to the plant.
@@ -43,8 +42,6 @@ pub(crate) struct Settings {
     /// Relative excess over the least gamma that may be spent on a smaller mean square; `None` is the
     /// method's default.
     pub(crate) gamma_margin: Option<f64>,
-    /// Solver of `fir`; `None` is the sampled worst-case solver.
-    pub(crate) solver: Option<Solver>,
     /// The errors that `fir` has to expect; `None` if there are none.
     pub(crate) robust: Option<scenarios::RobustProblem>,
     /// For mean-square designs, how well each converter is known; `None` if all are exact.
@@ -160,7 +157,6 @@ pub(crate) fn synthesise(
         };
     }
     match method {
-        Method::Fir if settings.solver == Some(Solver::Kyp) => fir_kyp::synthesise(plant, settings),
         Method::Fir => fir::synthesise(plant, settings),
         Method::Iir => iir::synthesise(plant, settings),
         Method::H2 if settings.taps > 0 => match &settings.deviations {

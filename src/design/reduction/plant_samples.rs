@@ -70,7 +70,7 @@ impl<'a> PlantSamples<'a> {
     /// The problem's solution at the sampled frequencies, to a relative accuracy. Its only tap holds the
     /// output matrices.
     pub(super) fn worst_case(&self, dynamics: &Dynamics, accuracy: f64) -> Result<Solution, DesignError> {
-        let settings = Settings { tol_gap_rel: accuracy, ..Settings::SAMPLED };
+        let settings = Settings { tol_gap_rel: accuracy, ..Settings::DEFAULT };
         Ok(sampled::minimise(&self.problem(dynamics)?, &settings)?)
     }
 

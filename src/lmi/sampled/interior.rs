@@ -10,9 +10,8 @@ use super::prepare::Reduced;
 use super::quadratic::Quadratic;
 use crate::linalg::Mat;
 use crate::linalg::blocks::Blocks;
-use crate::lmi::Settings;
 use crate::lmi::factor::RegularisedCholesky;
-use crate::lmi::iteration::{StepLengths, centering};
+use crate::lmi::iteration::{self, StepLengths, centering};
 use std::cell::OnceCell;
 
 /// The objective.
@@ -176,7 +175,7 @@ impl<'a> Engine<'a> {
     }
 
     /// One step; `None` if rounding errors prevent it. The iterate changes only if all goes well.
-    pub(super) fn step(&mut self, settings: &Settings) -> Option<()> {
+    pub(super) fn step(&mut self) -> Option<()> {
         if !self.cone.invert() {
             return None;
         }
@@ -198,7 +197,7 @@ impl<'a> Engine<'a> {
         let rhs: Vec<f64> = (0..cost.len()).map(|a| sigma * mu * center[a] - second[a] - cost[a]).collect();
         let full = self.direction(&newton, &rhs);
         self.cone.dual_step(&full.slack, sigma * mu, Some(&corrector), &mut dz);
-        let fraction = settings.fraction(predicted);
+        let fraction = iteration::fraction(predicted);
         let StepLengths { primal, dual } = self.max_steps(&full, &dz, 1.0 / fraction);
         let length = StepLengths { primal: fraction * primal, dual: fraction * dual };
 

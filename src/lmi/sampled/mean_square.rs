@@ -10,7 +10,7 @@ use super::prepare::Reduced;
 use super::problem::{MeanSquareObjective, Point, Problem, Taps};
 use super::quadratic::Quadratic;
 use crate::lmi::factor::RegularisedCholesky;
-use crate::lmi::iteration::{self, Iterate};
+use crate::lmi::iteration::{self, Iterate, RANK};
 use crate::lmi::{LmiError, Outcome, Settings};
 
 /// Taps of least mean square under a cap.
@@ -65,9 +65,8 @@ pub fn mean_square_under_cap(
     start: &Taps,
     settings: &Settings,
 ) -> Result<MeanSquare, LmiError> {
-    settings.check()?;
     problem.check_taps(start)?;
-    let free = least_squares(problem, square, settings.tol_rank)?;
+    let free = least_squares(problem, square, RANK)?;
     let free_square = problem.mean_square(&free, square);
     let mut best = Best::new(problem, square, cap, start)?;
     best.offer(free)?;
@@ -179,7 +178,7 @@ impl Iterate for Run<'_> {
         Ok(self.gap())
     }
 
-    fn step(&mut self, settings: &Settings) -> Option<()> {
-        self.engine.step(settings)
+    fn step(&mut self) -> Option<()> {
+        self.engine.step()
     }
 }

@@ -6,7 +6,7 @@ use super::interior::{Engine, Objective, norm};
 use super::prepare::Reduced;
 use super::problem::{Problem, Taps};
 use crate::linalg::{self, CMat};
-use crate::lmi::iteration::{self, Iterate};
+use crate::lmi::iteration::{self, GAP_OF_ZERO, Iterate, RANK};
 use crate::lmi::{LmiError, Outcome, Settings};
 
 /// The start lies this factor above the worst point of the least-squares taps (in t), far enough inside for
@@ -36,17 +36,15 @@ pub struct Solution {
 /// points and a lower bound, whatever the outcome.
 ///
 /// # Errors
-/// [`LmiError::Setting`] for a setting out of its range, [`LmiError::Linalg`] if a decomposition
-/// does not converge.
+/// [`LmiError::Linalg`] if a decomposition does not converge.
 pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, LmiError> {
-    settings.check()?;
     let mut reduced = Reduced::new(problem)?;
     if reduced.layout.unknowns() == 0 {
         return fixed(problem);
     }
     let basis = Basis::new(&reduced, vec![1.0; reduced.count()])?;
-    let x = basis.least_squares(&reduced, &reduced.w, settings.tol_rank);
-    let best = Best::new(problem, reduced.taps(&x), settings)?;
+    let x = basis.least_squares(&reduced, &reduced.w, RANK);
+    let best = Best::new(problem, reduced.taps(&x))?;
     if best.relative_gap() <= settings.tol_gap_rel {
         return Ok(best.finish(Outcome::Solved, 0));
     }
@@ -84,9 +82,9 @@ struct Best {
 }
 
 impl Best {
-    fn new(problem: &Problem, taps: Taps, settings: &Settings) -> Result<Self, LmiError> {
+    fn new(problem: &Problem, taps: Taps) -> Result<Self, LmiError> {
         let (gamma, _) = problem.worst(&taps)?;
-        let floor = settings.tol_gap_abs * problem.worst(&problem.zero_taps())?.0;
+        let floor = GAP_OF_ZERO * problem.worst(&problem.zero_taps())?.0;
         let (lower, dual) = (LowerBound::zero(), bound::zero_dual(problem));
         Ok(Self { floor, taps, gamma, lower, dual })
     }
@@ -139,7 +137,7 @@ impl Iterate for Run<'_> {
         Ok(best.relative_gap())
     }
 
-    fn step(&mut self, settings: &Settings) -> Option<()> {
-        self.engine.step(settings)
+    fn step(&mut self) -> Option<()> {
+        self.engine.step()
     }
 }

@@ -59,7 +59,6 @@ prop_compose! {
         method in prop::sample::select(Method::ALL.to_vec()),
         taps in 1usize..100,
         gamma_margin in prop::option::of(0.0..0.1f64),
-        solver in prop::option::of(prop::sample::select(Solver::ALL.to_vec())),
         bits in prop::option::of((2..33u32).prop_map(WordLengths::Same)),
         fraction_bits in prop::option::of(-256..257i32),
         reduction in prop::option::of(prop_oneof![
@@ -84,8 +83,7 @@ prop_compose! {
             ..UncertaintySpec::default()
         });
         let moves = uncertainty.as_ref().is_some_and(|table| table.delays(channels.len()).iter().any(|d| d.0 > 0.0));
-        let solver = solver.filter(|solver| *solver != Solver::Kyp || !uncertainty.as_ref().is_some_and(|table| table.is_a_box(channels.len())));
-        let follows = method.reads("tracking") && solver != Some(Solver::Kyp) && bits.is_none() && moves;
+        let follows = method.reads("tracking") && bits.is_none() && moves;
         let is_sized = method.has_taps() || (method == Method::H2 && reduction.is_none());
         let by_snr = method.reads("target_snr_db") && ratio % 3 == 0;
         Spec {
@@ -99,8 +97,7 @@ prop_compose! {
                 method,
                 taps: (is_sized && !by_snr).then_some(taps),
                 target_snr_db: (is_sized && by_snr).then_some(taps as f64 / 1000.0),
-                gamma_margin: gamma_margin.filter(|_| method.reads("gamma_margin") && solver != Some(Solver::Kyp)),
-                solver: solver.filter(|_| method.reads("solver")),
+                gamma_margin: gamma_margin.filter(|_| method.reads("gamma_margin")),
                 bits: bits.clone().filter(|_| method.reads("bits")),
                 fraction_bits: fraction_bits.filter(|_| method.reads("bits") && bits.is_some()),
                 tracking: follows.then_some(Tracking::Affine),

@@ -40,9 +40,9 @@ fn exactly_reproducible_targets_give_zero() {
 #[test]
 fn an_exhausted_iteration_limit_keeps_valid_bounds() {
     let problem = random_problem(31, (2, 2, 4), 30, &[5, 5]);
-    let full = minimise(&problem, &Settings::SAMPLED).unwrap();
+    let full = minimise(&problem, &Settings::DEFAULT).unwrap();
     for max_iterations in 0..6 {
-        let s = minimise(&problem, &Settings { max_iterations, ..Settings::SAMPLED }).unwrap();
+        let s = minimise(&problem, &Settings { max_iterations, ..Settings::DEFAULT }).unwrap();
         check(&problem, &s);
         assert_eq!(s.outcome, Outcome::IterationLimit);
         assert_eq!(s.iterations, max_iterations);
@@ -70,16 +70,14 @@ fn what_is_no_problem_is_refused() {
         Problem::new(good.points().to_vec(), vec![1]),
         Err(LmiError::Count { given: 1, wanted: 2, .. })
     ));
-    let settings = Settings { step_fraction: 1.0, ..Settings::SAMPLED };
-    assert!(matches!(minimise(&good, &settings), Err(LmiError::Setting { name: "step_fraction", .. })));
-    let s = minimise(&good, &Settings::SAMPLED).unwrap();
+    let s = minimise(&good, &Settings::DEFAULT).unwrap();
     let channels = good.channels();
     let with = |weights: &[f64], noise: &[f64]| MeanSquareObjective {
         weights: weights.to_vec(),
         noise: noise.to_vec(),
     };
     let capped = |square: &MeanSquareObjective, cap, taps| {
-        mean_square_under_cap(&good, square, cap, taps, &Settings::SAMPLED)
+        mean_square_under_cap(&good, square, cap, taps, &Settings::DEFAULT)
     };
     let ones = MeanSquareObjective::noiseless(vec![1.0; 3], channels);
     let refused = |weights: &[f64], noise: &[f64]| capped(&with(weights, noise), 1.0, &s.taps).unwrap_err();
