@@ -6,9 +6,8 @@ use crate::design::plant::LiftedPlant;
 use crate::design::problem::Problem;
 use crate::design::uncertainty::box_plant::BoxPlant;
 use crate::design::uncertainty::search::BoxSearch;
-use crate::design::uncertainty::sides::{Side, point_at, sides};
 use crate::spec::{Method, Spec};
-use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
+use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Side};
 
 /// Relative width of the interval of the worst norm over the scenarios.
 pub(super) const ACCURACY: f64 = 1e-4;
@@ -82,7 +81,7 @@ pub(super) struct MovedPlant {
 /// Points of the box: a lattice over all sides, or its ends where there are many, or its most different
 /// corners where there are very many.
 pub(super) fn scenarios(errors: &ErrorBox) -> Vec<ErrorPoint> {
-    let sides = sides(errors);
+    let sides = errors.sides();
     // The error is affine in the gains: only their ends matter.
     let steps = |side: &Side, most: usize| if matches!(side, Side::Gain(_)) { 2 } else { most };
     let count = |most: usize| sides.iter().fold(1usize, |all, side| all.saturating_mul(steps(side, most)));
@@ -105,7 +104,7 @@ fn lattice_point(errors: &ErrorBox, sides: &[Side], per_side: &[usize], index: u
             2.0 * step as f64 / (count - 1) as f64 - 1.0
         })
         .collect();
-    point_at(errors, sides, &shares)
+    errors.point_at(sides, &shares)
 }
 
 /// Rows of a Hadamard matrix and their opposites: corners that differ from each other in half of the sides.
@@ -115,7 +114,7 @@ fn corners(errors: &ErrorBox, sides: &[Side]) -> Vec<ErrorPoint> {
         .map(|corner| {
             let (row, opposite) = (corner / 2, if corner % 2 == 0 { 1.0 } else { -1.0 });
             let shares: Vec<f64> = (0..sides.len()).map(|side| opposite * sign(row, side)).collect();
-            point_at(errors, sides, &shares)
+            errors.point_at(sides, &shares)
         })
         .collect()
 }

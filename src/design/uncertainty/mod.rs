@@ -8,7 +8,6 @@ pub(super) mod box_plant;
 mod derivatives;
 mod floor;
 pub(super) mod search;
-pub(super) mod sides;
 mod study;
 mod sweep;
 #[cfg(test)]

@@ -284,21 +284,19 @@ impl AtFrequency<'_> {
 
     /// K K*, M x M, of the rows `mixes`.
     pub(super) fn square(&self, mixes: &[Mix]) -> ComplexMatrix {
-        let outputs = self.filters.re.nrows();
-        let terms: Vec<(usize, usize, f64)> = mixes
-            .iter()
-            .enumerate()
-            .flat_map(|(i, mix)| mix.iter().map(move |&(row, weight)| (i, row, -weight)))
-            .collect();
-        let rows: Vec<usize> = (0..outputs).chain(terms.iter().map(|&(_, row, _)| row)).collect();
-        let part = |filters: &Matrix, unit: f64| {
-            Matrix::from_fn(outputs, rows.len(), |p, c| match c.checked_sub(outputs) {
-                None if p == c && unit != 0.0 => Ball::from(unit),
-                None => Ball::ZERO,
-                Some(t) => filters[(p, terms[t].0)] * Ball::from(terms[t].2),
-            })
+        let term = |i: usize, &(row, weight): &(usize, f64)| {
+            (scaled(&column(&self.filters, i), Ball::from(-weight)), row)
         };
-        let map = ComplexMatrix { re: part(&self.filters.re, 1.0), im: part(&self.filters.im, 0.0) };
-        map.product(&self.gram.select(&rows, &rows)).product(&map.adjoint())
+        let terms = mixes.iter().enumerate().flat_map(|(i, mix)| mix.iter().map(move |part| term(i, part)));
+        self.square_of(&terms.collect::<Vec<_>>())
     }
+}
+
+pub(super) fn column(filters: &ComplexMatrix, i: usize) -> ComplexMatrix {
+    let rows: Vec<usize> = (0..filters.re.nrows()).collect();
+    filters.select(&rows, &[i])
+}
+
+pub(super) fn scaled(m: &ComplexMatrix, by: Ball) -> ComplexMatrix {
+    ComplexMatrix { re: ball::scaled(&m.re, by), im: ball::scaled(&m.im, by) }
 }

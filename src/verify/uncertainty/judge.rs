@@ -14,7 +14,7 @@ use super::memory::Memory;
 use super::remainder::Remainders;
 use super::scheduled::{self, Scheduled, moved};
 use super::transfer::Transfer;
-use super::{ErrorBox, ErrorPoint, Taps};
+use super::{ErrorBox, ErrorPoint, Side, Taps};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::units::{RadiansPerSlowPeriod, Seconds};
 use std::f64::consts::PI;
@@ -283,13 +283,14 @@ impl<'a> Judge<'a> {
         let Some((halvings, _)) = self.grids.last() else { return false };
         let limit = |halvings: &[Halvings]| remainders.rough_limit(halvings, threshold);
         let so_far = limit(halvings);
-        let rated = self.sides().into_iter().map(|side| (limit(&side.halved(halvings)) - so_far, side));
+        let rated =
+            self.errors.sides().into_iter().map(|side| (limit(&halved(side, halvings)) - so_far, side));
         let mut rated: Vec<(f64, Side)> = rated.collect();
         rated.sort_by(|a, b| b.0.total_cmp(&a.0));
         let most = rated.first().map_or(0.0, |(gain, _)| *gain);
         let mut finer = halvings.clone();
         for (gain, side) in rated {
-            let next = side.halved(&finer);
+            let next = halved(side, &finer);
             if gain > 0.0 && gain >= SHARE_OF_WORST * most && self.rows(&next) <= MAX_ROWS {
                 finer = next;
             }
@@ -303,14 +304,6 @@ impl<'a> Judge<'a> {
             GRID_OPERATIONS * grid.period.samples() as f64 * (grid.period.order() as f64).powi(3);
         self.grids.push((finer, grid));
         true
-    }
-
-    /// The sides of the box that can be halved.
-    fn sides(&self) -> Vec<Side> {
-        let converters = 0..self.errors.delays.len();
-        let delays = converters.clone().filter(|&i| self.errors.delays[i].0 > 0.0).map(Side::Delay);
-        let cutoffs = converters.filter(|&i| self.errors.cutoffs[i] > 0.0).map(Side::Cutoff);
-        delays.chain(cutoffs).collect()
     }
 
     /// Rows of the Gram matrix of a grid.
@@ -362,23 +355,15 @@ fn channels(
     (0..grid.channels.len()).map(channel).collect()
 }
 
-/// A side of the box that a grid divides.
-#[derive(Debug, Clone, Copy)]
-enum Side {
-    Delay(usize),
-    Cutoff(usize),
-}
-
-impl Side {
-    /// With this side halved once more.
-    fn halved(self, halvings: &[Halvings]) -> Vec<Halvings> {
-        let mut finer = halvings.to_vec();
-        match self {
-            Self::Delay(i) => finer[i].delay += 1,
-            Self::Cutoff(i) => finer[i].cutoff += 1,
-        }
-        finer
+/// With one side halved once more. The gains have vertices only.
+fn halved(side: Side, halvings: &[Halvings]) -> Vec<Halvings> {
+    let mut finer = halvings.to_vec();
+    match side {
+        Side::Delay(i) => finer[i].delay += 1,
+        Side::Cutoff(i) => finer[i].cutoff += 1,
+        Side::Gain(_) => {}
     }
+    finer
 }
 
 /// The halvings of a grid: where the taps depend on the delays, a part has its ends and its middle.

@@ -79,6 +79,14 @@ pub struct ErrorPoint {
     pub cutoffs: Vec<f64>,
 }
 
+/// One uncertain number of a channel, a side of the box.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Side {
+    Delay(usize),
+    Gain(usize),
+    Cutoff(usize),
+}
+
 /// Whether the taps are fixed or scheduled by the delays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Taps {
@@ -137,6 +145,28 @@ impl ErrorBox {
     /// Whether there are no errors.
     pub fn is_point(&self) -> bool {
         self.delays.iter().all(|x| x.0 == 0.0) && self.gains.iter().chain(&self.cutoffs).all(|x| *x == 0.0)
+    }
+
+    /// The sides that have a length: delays, then gains, then cut-offs.
+    pub(crate) fn sides(&self) -> Vec<Side> {
+        let channels = 0..self.delays.len();
+        let delays = channels.clone().filter(|&i| self.delays[i].0 > 0.0).map(Side::Delay);
+        let gains = channels.clone().filter(|&i| self.gains[i] > 0.0).map(Side::Gain);
+        let cutoffs = channels.filter(|&i| self.cutoffs[i] > 0.0).map(Side::Cutoff);
+        delays.chain(gains).chain(cutoffs).collect()
+    }
+
+    /// The point with these shares, from -1 to 1, of the half-widths of `sides`.
+    pub(crate) fn point_at(&self, sides: &[Side], shares: &[f64]) -> ErrorPoint {
+        let mut point = ErrorPoint::none(self.delays.len());
+        for (side, &share) in sides.iter().zip(shares) {
+            match *side {
+                Side::Delay(i) => point.delays[i] = self.delays[i] * share,
+                Side::Gain(i) => point.gains[i] = self.gains[i] * share,
+                Side::Cutoff(i) => point.cutoffs[i] = self.cutoffs[i] * share,
+            }
+        }
+        point
     }
 
     /// The box with all sides multiplied by `factor`.

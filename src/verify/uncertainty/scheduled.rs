@@ -21,9 +21,11 @@
 //! A bound by the norms of the second part, sum_i d_i^2 |F_i q_i + S_ii b_i|, would be larger: what the taps
 //! make up for at the vertices they miss at the centre, and in K_v both have opposite signs.
 
-use super::super::ball::{self, Ball};
+use super::super::ball::Ball;
 use super::super::spectrum::ComplexMatrix;
-use super::at_frequency::{AtFrequency, Attained, Limits, MAX_BOXES, Part, Verdict, Vertex, Work};
+use super::at_frequency::{
+    AtFrequency, Attained, Limits, MAX_BOXES, Part, Verdict, Vertex, Work, column, scaled,
+};
 use super::channel::column_norm;
 use super::gain::{lower_gain, upper_gain};
 use super::grid::ChannelGrid;
@@ -283,13 +285,4 @@ pub(super) fn moved(
 ) -> ComplexMatrix {
     let scheduled = slopes.iter().zip(deltas).filter_map(|(slope, delta)| Some((slope.as_ref()?, *delta)));
     scheduled.fold(filters.clone(), |sum, (slope, delta)| sum.plus(&scaled(slope, delta)))
-}
-
-fn column(filters: &ComplexMatrix, i: usize) -> ComplexMatrix {
-    let rows: Vec<usize> = (0..filters.re.nrows()).collect();
-    filters.select(&rows, &[i])
-}
-
-fn scaled(m: &ComplexMatrix, by: Ball) -> ComplexMatrix {
-    ComplexMatrix { re: ball::scaled(&m.re, by), im: ball::scaled(&m.im, by) }
 }
