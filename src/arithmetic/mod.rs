@@ -15,14 +15,13 @@ pub(crate) mod elementary;
 #[path = "tests/exact.rs"]
 mod exact;
 mod number;
-mod real;
 
 pub(crate) use ball::{Ball, OUTWARD};
 pub(crate) use big_float::BigFloat;
 pub(crate) use cartesian::{Cartesian, ComplexBall};
 pub(crate) use double_double::DoubleDouble;
 pub(crate) use number::Number;
-pub(crate) use real::Real;
+pub(crate) use number::Real;
 
 use std::ops::{AddAssign, SubAssign};
 

@@ -13,7 +13,7 @@ use super::filters;
 use super::least_errors::{LeastErrors, candidates, check_reach, is_almost, manageable, shortest};
 use super::limits::{Limits, Stop};
 use super::merging::Repeats;
-use super::methods::scenarios::RobustProblem;
+use super::methods::robust_fir::RobustProblem;
 use super::methods::{self, Deviations, Filters, Settings};
 use super::plant::LiftedPlant;
 use super::problem::{Problem, common_delay};

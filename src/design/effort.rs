@@ -9,7 +9,7 @@ use super::DesignError;
 use super::error_grid::{FINE, coarse_intervals};
 use super::limits::{Effort, Limits, MAX_LONG_STATES};
 use super::merging::Repeats;
-use super::methods::{Deviations, scenarios::RobustProblem};
+use super::methods::{Deviations, robust_fir::RobustProblem};
 use super::problem::{Problem, common_delay};
 use super::prove::{MAX_SEARCHED_STATES, max_witnesses};
 use crate::memory::available_memory;

@@ -35,21 +35,19 @@
 mod ball;
 mod causal;
 mod covariance;
-mod enclosed;
+pub(crate) mod enclosed;
 mod error;
 mod error_system;
 mod fir_length;
 mod front_ends;
 mod lower;
 mod positive;
-pub(crate) mod precise;
 mod slow_period;
 mod spectrum;
 mod state_transition;
 mod statements;
 #[cfg(test)]
 mod tests;
-mod timeline;
 pub mod uncertainty;
 mod upper;
 

@@ -11,9 +11,8 @@ mod bessel;
 mod chebyshev;
 mod elliptic;
 mod passband;
-mod selectivity;
 
-pub(super) use selectivity::Selectivity;
+pub(super) use elliptic::Selectivity;
 
 use super::roots::{Factors, RootSet};
 use super::{AnalogError, MIN_DAMPING_RATIO};

@@ -1,8 +1,8 @@
 //! A response on a list of frequencies.
 
 use super::MeasurementError;
-use super::text::{MOST_POINTS, Point};
-use super::{table, touchstone};
+use super::text::{MOST_POINTS, Point, read_table};
+use super::touchstone;
 use crate::linalg::Complex;
 use crate::units::{Hertz, Seconds};
 use std::f64::consts::TAU;
@@ -33,7 +33,7 @@ impl MeasuredResponse {
     /// # Errors
     /// [`MeasurementError`] with the line of the first thing that is wrong.
     pub fn from_csv(text: &str) -> Result<Self, MeasurementError> {
-        table::read(text).and_then(Self::new)
+        read_table(text).and_then(Self::new)
     }
 
     /// Of lines with their numbers.

@@ -7,7 +7,6 @@
 mod error;
 mod measured;
 mod poles;
-mod table;
 mod text;
 mod touchstone;
 mod vector_fit;

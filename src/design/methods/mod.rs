@@ -20,7 +20,6 @@ pub(crate) mod iir;
 mod mean_square_fir;
 mod precise_filtering;
 pub(crate) mod robust_fir;
-pub(crate) mod scenarios;
 pub(crate) mod scheduled_fir;
 
 use super::DesignError;
@@ -43,7 +42,7 @@ pub(crate) struct Settings {
     /// method's default.
     pub(crate) gamma_margin: Option<f64>,
     /// The errors that `fir` has to expect; `None` if there are none.
-    pub(crate) robust: Option<scenarios::RobustProblem>,
+    pub(crate) robust: Option<robust_fir::RobustProblem>,
     /// For mean-square designs, how well each converter is known; `None` if all are exact.
     pub(crate) deviations: Option<Vec<Deviations>>,
     /// Ends the search with the best filters so far.

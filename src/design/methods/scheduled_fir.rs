@@ -20,7 +20,7 @@
 //! interleaving has no error at all at its own delays.
 
 use super::robust_fir::worst_of;
-use super::scenarios::{ACCURACY, MARGIN, MISSED_ERROR_LIMIT, MovedPlant, RobustNorms, RobustProblem};
+use super::robust_fir::{ACCURACY, MARGIN, MISSED_ERROR_LIMIT, MovedPlant, RobustNorms, RobustProblem};
 use super::{Filters, Settings, Synthesis, fir, tap_lags};
 use crate::bank::TapSlopes;
 use crate::design::DesignError;

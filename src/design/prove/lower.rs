@@ -19,7 +19,7 @@ use crate::design::problem::Problem;
 use crate::linalg::{self, CMat, Complex, Mat, power_of_two};
 use crate::lti::FrequencyResponse;
 use crate::spec::Method;
-use crate::verify::precise::ComplexParts;
+use crate::verify::enclosed::ComplexParts;
 use crate::verify::{EnclosedErrorSystem, Precision, Recursion};
 use nalgebra::DMatrix as Matrix;
 

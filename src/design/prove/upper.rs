@@ -15,7 +15,7 @@ use crate::linalg::{self, Complex, Mat, power_of_two};
 use crate::lti::gramian::{controllability_root, observability_root};
 use crate::lti::peak::hinf_norm;
 use crate::lti::{GramianCoordinates, LtiError, StateSpace, bounded_real_riccati};
-use crate::verify::precise::PreciseErrorSystem;
+use crate::verify::enclosed::PreciseErrorSystem;
 use crate::verify::{EnclosedErrorSystem, Midpoint};
 use nalgebra::DMatrix as Matrix;
 

@@ -14,7 +14,7 @@
 //! ```
 //!
 //! because the largest singular value bounds every weighted mean of the error. G_u is the response of a
-//! tap of value one. All phases are coupled, in contrast to `forms`.
+//! tap of value one. All phases are coupled, in contrast to the forms of `problem`.
 
 use super::lattice::{Span, closest};
 use super::problem::TapError;

@@ -4,7 +4,7 @@
 //! Rounding each tap by itself wastes gamma, because noise in the taps matters only where the channels carry
 //! signal. The search has two stages:
 //! 1. The closest point of a lattice in the quadratic form of the mean-square error that a change of taps
-//!    adds (`forms`, `lattice`). The weights of the form grow at the frequencies where the last integers
+//!    adds (`problem`, `lattice`). The weights of the form grow at the frequencies where the last integers
 //!    were worst (Lawson's method of minimax approximation).
 //! 2. A descent on gamma itself, from the best of these points (`descent`).
 //!
@@ -17,7 +17,6 @@
 
 mod descent;
 mod enumeration;
-mod forms;
 mod lattice;
 mod problem;
 mod quantiser;

@@ -1,8 +1,8 @@
 //! Integers at one scale: closest lattice points with weights on the worst frequencies, then a descent.
 
 use super::descent::Descent;
-use super::forms::Tap;
 use super::lattice::{Span, closest};
+use super::problem::Tap;
 use super::problem::{Candidate, TapError};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;

@@ -7,14 +7,13 @@
 //! tried.
 //!
 //! For given dynamics, the output matrices C and D are optimised again, which is a convex problem
-//! (`output_matrices`). The poles are then refined with the output matrices eliminated (`pole_refinement`,
+//! (`dynamics`). The poles are then refined with the output matrices eliminated (`pole_refinement`,
 //! variable projection). This last step is a local search: the gamma reported is that of the bank found, not
 //! the least of all banks of its order.
 
 mod descent;
 mod dynamics;
 mod order_search;
-mod output_matrices;
 mod plant_samples;
 mod pole_refinement;
 

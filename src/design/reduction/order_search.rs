@@ -2,7 +2,7 @@
 //! one are refined.
 
 use super::dynamics::Dynamics;
-use super::output_matrices::{mean_square, state_covariance_root};
+use super::dynamics::{mean_square, state_covariance_root};
 use super::plant_samples::PlantSamples;
 use super::pole_refinement::{Refined, refined};
 use super::{Aim, Figures, OrderErrorPoint, OrderReduction, ReductionProblem};

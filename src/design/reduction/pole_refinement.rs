@@ -12,7 +12,7 @@
 use super::Aim;
 use super::descent::{Evaluated, descend};
 use super::dynamics::Dynamics;
-use super::output_matrices::{mean_square, normalised};
+use super::dynamics::{mean_square, normalised};
 use super::plant_samples::{PlantSamples, delay};
 use crate::design::DesignError;
 use crate::linalg::{self, CMat, Complex, Mat};

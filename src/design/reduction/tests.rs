@@ -1,5 +1,5 @@
 use super::dynamics::Dynamics;
-use super::output_matrices::{mean_square, state_covariance_root};
+use super::dynamics::{mean_square, state_covariance_root};
 use super::plant_samples::PlantSamples;
 use super::*;
 use crate::design::Problem;

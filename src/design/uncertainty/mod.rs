@@ -9,7 +9,6 @@ mod derivatives;
 mod floor;
 pub(super) mod search;
 mod study;
-mod sweep;
 #[cfg(test)]
 mod tests;
 mod widths;
@@ -18,7 +17,7 @@ pub use derivatives::{DelayDerivatives, delay_derivatives};
 pub use floor::{Floor, floor};
 pub use search::norm_at;
 pub use study::{Affordable, BoxStudy, ErrorStudy, JitterStudy, Questions, Sensitivity};
-pub use sweep::{Sweep, SweepCurve};
+pub use study::{Sweep, SweepCurve};
 pub use widths::{BoxRule, BoxWidths, ReferenceChannel, RefusedBox};
 
 use super::DesignError;

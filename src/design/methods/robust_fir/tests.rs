@@ -1,6 +1,6 @@
 //! Robust optima against a semidefinite program, and the worst case that the file states.
 
-use crate::design::methods::scenarios::{MAX_SCENARIOS, scenarios};
+use crate::design::methods::robust_fir::{MAX_SCENARIOS, scenarios};
 use crate::design::uncertainty::norm_at;
 use crate::design::{Options, design};
 use crate::random::Random;
