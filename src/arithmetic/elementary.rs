@@ -41,7 +41,7 @@ fn inverse_tangent(n: f64, sign: f64) -> Long {
     let step = Ball::from(sign) / Ball::from(n * n);
     let (mut power, mut sum, mut odd) = (Ball::from(1.0) / Ball::from(n), Ball::ZERO, 1.0);
     while power.magnitude() > NEGLIGIBLE {
-        sum = sum + power / Ball::from(odd);
+        sum += power / Ball::from(odd);
         power = power * step;
         odd += 2.0;
     }

@@ -125,7 +125,7 @@ impl<F: Number> CausalPlant<F> {
         let mut p: Matrix<F> = ball::zeros(n, n);
         for period in 0..periods {
             let mut gram = ball::congruence(&self.system, &p) + &self.input_gram;
-            (measured..rows).for_each(|i| gram[(i, i)] = gram[(i, i)] - square);
+            (measured..rows).for_each(|i| gram[(i, i)] -= square);
             for (row, _) in (n..).zip(&self.first).filter(|&(_, &first)| first <= period) {
                 if gram[(row, row)].lower().is_nan() || gram[(row, row)].lower() <= 0.0 {
                     return Recursion::Undecided;
@@ -163,7 +163,7 @@ fn eliminate<F: Number>(gram: &mut Matrix<F>, n: usize, row: usize) {
     let remains = |i: &usize| *i < n || *i > row;
     for i in (0..gram.nrows()).filter(remains) {
         for j in (0..=i).filter(remains) {
-            gram[(i, j)] = gram[(i, j)] - column[i] * quotients[j];
+            gram[(i, j)] -= column[i] * quotients[j];
             gram[(j, i)] = gram[(i, j)];
         }
     }

@@ -108,8 +108,8 @@ impl<F: Number> BindingSums<F> {
         let a = ComplexMatrix::column(&witness.reference);
         let b = a.above(&ComplexMatrix::column(&witness.measured));
         let image = spectrum::gram_times(period, &z, &b);
-        self.value = self.value + a.inner(&image.rows(0, self.ratio));
-        self.size = self.size + (a.square() * b.inner(&image)).sqrt();
+        self.value += a.inner(&image.rows(0, self.ratio));
+        self.size += (a.square() * b.inner(&image)).sqrt();
         // a_p conj((Gamma b)_i) z^j is the conjugate of what r sums; its real part is the same.
         let mut turned = a.product(&image.select(&self.measured, &[0]).adjoint());
         for lag in &mut self.residual {

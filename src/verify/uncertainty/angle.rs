@@ -39,9 +39,9 @@ fn series(x: f64) -> (Ball, Ball) {
     let (mut sin, mut cos) = (Ball::ZERO, Ball::ZERO);
     for k in 0..TERMS {
         let sign = Ball::from(if k % 2 == 0 { 1.0 } else { -1.0 });
-        cos = cos + sign * term;
+        cos += sign * term;
         term = term * x / Ball::from((2 * k + 1) as f64);
-        sin = sin + sign * term;
+        sin += sign * term;
         term = term * x / Ball::from((2 * k + 2) as f64);
     }
     let rest = term.magnitude();

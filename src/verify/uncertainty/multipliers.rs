@@ -86,14 +86,14 @@ impl Problem {
         for (i, vertices) in channels.iter().enumerate() {
             for (row, weight) in walsh(at, i, vertices, 0) {
                 for p in 0..outputs {
-                    map.re[(p, row)] = map.re[(p, row)] - at.filters.re[(p, i)] * weight;
-                    map.im[(p, row)] = map.im[(p, row)] - at.filters.im[(p, i)] * weight;
+                    map.re[(p, row)] -= at.filters.re[(p, i)] * weight;
+                    map.im[(p, row)] -= at.filters.im[(p, i)] * weight;
                 }
             }
             for signs in 1..vertices.len() {
                 let term = outputs + owners.len();
                 for (row, weight) in walsh(at, i, vertices, signs) {
-                    map.re[(term, row)] = map.re[(term, row)] + weight;
+                    map.re[(term, row)] += weight;
                 }
                 owners.push(i);
             }
@@ -115,11 +115,11 @@ impl Problem {
             Matrix::from_fn(gram.nrows(), gram.ncols(), |i, j| {
                 let mut entry = -gram[(i, j)];
                 if i < outputs && j < outputs {
-                    entry = entry - weighed[(i, j)];
+                    entry -= weighed[(i, j)];
                 }
                 if i == j {
                     let diagonal = if i < outputs { square } else { multipliers[i - outputs] };
-                    entry = entry + Ball::from(unit * diagonal);
+                    entry += Ball::from(unit * diagonal);
                 }
                 entry
             })

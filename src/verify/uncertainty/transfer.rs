@@ -58,7 +58,7 @@ impl Transfer {
         if !d.is_zero() {
             let direct = *d * gain;
             num.push(Ball::ZERO);
-            num.iter_mut().zip(&den).for_each(|(num, &den)| *num = *num + den * direct);
+            num.iter_mut().zip(&den).for_each(|(num, &den)| *num += den * direct);
         }
         let short = |list: &[Ball<BigFloat>]| list.iter().map(|x| x.shortened()).collect();
         let short = Quotient { num: short(&num), den: short(&den) };
