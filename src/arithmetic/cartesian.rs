@@ -1,6 +1,6 @@
 //! Complex numbers of any of the real ones.
 
-use super::number::Field;
+use super::real::Field;
 use super::{Ball, BigFloat, Number};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -2,7 +2,7 @@
 //! and limits by doubling: each step squares the number of steps that it covers.
 
 use super::Number;
-use super::number::Entry;
+use super::real::Entry;
 use nalgebra::DMatrix as Matrix;
 
 /// Maximum number of doublings: 2^40 steps.

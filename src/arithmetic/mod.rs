@@ -15,13 +15,14 @@ pub(crate) mod elementary;
 #[path = "tests/exact.rs"]
 mod exact;
 mod number;
+mod real;
 
 pub(crate) use ball::{Ball, OUTWARD};
 pub(crate) use big_float::BigFloat;
 pub(crate) use cartesian::{Cartesian, ComplexBall};
 pub(crate) use double_double::DoubleDouble;
 pub(crate) use number::Number;
-pub(crate) use number::Real;
+pub(crate) use real::Real;
 
 use std::ops::{AddAssign, SubAssign};
 

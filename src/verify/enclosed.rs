@@ -6,8 +6,9 @@ use super::causal::{CausalPlant, Precision, Recursion};
 use super::covariance::{Covariance, TapSamples};
 use super::error_system::{self, BlockForm, ErrorSystem};
 use super::front_ends::FrontEnds;
-use super::slow_period::{SamplingInstant, SlowPeriod, delay_periods, timeline};
+use super::slow_period::SlowPeriod;
 use super::spectrum::{self, ComplexMatrix};
+use super::timeline::{SamplingInstant, delay_periods, timeline};
 use super::{
     BoundedBanks, MAX_STATES, Strictness, Verified, VerifyError, fir_length, lower, positive, statements,
     upper,

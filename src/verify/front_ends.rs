@@ -2,7 +2,7 @@
 //! enclosed.
 
 use super::ball::{self, Ball, Matrix};
-use super::slow_period::SamplingInstant;
+use super::timeline::SamplingInstant;
 use super::{MAX_ANALOG_STATES, MAX_WORK, VerifyError};
 use crate::analog::{Realisation, SignalFilter, StrictlyProper, enclosed, proportion, signal};
 use crate::arithmetic::{BigFloat, Number};

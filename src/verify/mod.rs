@@ -48,6 +48,7 @@ mod state_transition;
 mod statements;
 #[cfg(test)]
 mod tests;
+mod timeline;
 pub mod uncertainty;
 mod upper;
 

@@ -5,9 +5,9 @@
 //! `c - A*(Z) = 0` starts out violated.
 
 use super::blocks::{Cone, SlackStep};
-use super::mean_square::Quadratic;
 use super::newton::{self, ChannelProjection};
 use super::prepare::Reduced;
+use super::quadratic::Quadratic;
 use crate::linalg::Mat;
 use crate::linalg::blocks::Blocks;
 use crate::lmi::factor::RegularisedCholesky;

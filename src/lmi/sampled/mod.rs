@@ -38,6 +38,7 @@ mod mean_square;
 mod newton;
 mod prepare;
 mod problem;
+mod quadratic;
 #[cfg(test)]
 mod tests;
 mod worst_case;

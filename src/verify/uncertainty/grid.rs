@@ -5,7 +5,7 @@
 use super::super::VerifyError;
 use super::super::front_ends::FrontEnds;
 use super::super::slow_period::SlowPeriod;
-use super::super::slow_period::{SamplingInstant, timeline};
+use super::super::timeline::{SamplingInstant, timeline};
 use super::{ErrorBox, ErrorPoint};
 use crate::bank::Bank;
 use crate::units::Seconds;

@@ -35,6 +35,7 @@ mod angle;
 mod at_frequency;
 mod channel;
 mod cover;
+mod gain;
 mod grid;
 mod judge;
 mod memory;

@@ -274,7 +274,7 @@ fn largest_eigenvector(m: &CMat) -> Option<(f64, Vec<Complex<f64>>)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::at_frequency::lower_gain;
+    use super::super::gain::lower_gain;
     use super::super::grid::ChannelGrid;
     use super::*;
     use crate::random::Random;

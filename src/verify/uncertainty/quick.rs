@@ -248,7 +248,7 @@ fn is_dominated(m: &Complex, n: usize, bound: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::super::ball::Matrix;
-    use super::super::at_frequency::{lower_gain, upper_gain};
+    use super::super::gain::{lower_gain, upper_gain};
     use super::*;
     use crate::random::Random;
 

@@ -32,7 +32,7 @@ use super::super::spectrum::ComplexMatrix;
 use super::Taps;
 use super::aliases::{Aliases, FarAliases, Weight};
 use super::angle::outward;
-use super::at_frequency::upper_gain;
+use super::gain::upper_gain;
 use super::grid::Halvings;
 use std::rc::Rc;
 

@@ -26,8 +26,8 @@ use super::super::spectrum::ComplexMatrix;
 use super::at_frequency::{
     AtFrequency, Attained, Limits, MAX_BOXES, Part, Verdict, Vertex, Work, column, scaled,
 };
-use super::at_frequency::{lower_gain, upper_gain};
 use super::channel::column_norm;
+use super::gain::{lower_gain, upper_gain};
 use super::grid::ChannelGrid;
 use super::quick::{self, Columns, Compared, Quick, Terms};
 use super::remainder::Remainders;

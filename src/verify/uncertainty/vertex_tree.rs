@@ -9,7 +9,7 @@
 
 use super::angle::outward;
 use super::at_frequency::{AtFrequency, Attained, Limits, MAX_BOXES, Mix, Part, Verdict, Vertex, Work};
-use super::at_frequency::{lower_gain, upper_gain};
+use super::gain::{lower_gain, upper_gain};
 use super::multipliers::{self, Vertices};
 use super::quick::{Compared, Quick, Terms};
 use super::remainder::Remainders;
