@@ -63,9 +63,7 @@ pub use pcm::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
 pub use plan::{Options, Plan, PlanSummary};
 pub use sample::{Sample, Shape};
 pub use simd::Isa;
-#[doc(hidden)]
 pub use simd::multiply_add_chains;
-#[doc(hidden)]
 pub use state::STATE_COUNTS;
 pub use stream::Stream;
 #[cfg(feature = "rayon")]

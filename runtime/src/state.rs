@@ -8,6 +8,7 @@ use crate::error::StateError;
 
 /// Bytes at the beginning of a state that later outputs do not depend on: the format, and what the stream
 /// has counted. Streams whose states agree in all bytes after these give the same bits from there on.
+#[doc(hidden)]
 pub const STATE_COUNTS: usize = 8 * COUNTS;
 
 /// The format: a name and a version.

@@ -29,7 +29,6 @@ mod hidden;
 mod identity;
 mod rename;
 #[cfg(all(unix, feature = "signals"))]
-#[doc(hidden)]
 pub mod signals;
 mod streams;
 

@@ -1,4 +1,5 @@
 //! Signals that end a process, and what is removed before they do.
+#![doc(hidden)]
 
 use super::remove_unfinished;
 use signal_hook::consts::{

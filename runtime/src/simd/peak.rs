@@ -9,6 +9,7 @@ const CHAINS: usize = 12;
 
 /// Runs `iterations` times 12 independent f32 multiply-adds on whole vectors of `isa`; returns how many
 /// scalar multiply-adds that were, and their sum, so that nothing is optimised away.
+#[doc(hidden)]
 pub fn multiply_add_chains(isa: Isa, iterations: u64) -> (u64, f32) {
     // SAFETY: the kernel asks nothing of its job.
     unsafe { compiled::<Chains>(isa)(iterations) }

@@ -54,7 +54,8 @@ fn read(root: &Path) -> Result<(Imports, Vec<&'static str>), String> {
 pub(crate) fn faults(root: &Path) -> Result<Vec<String>, String> {
     let rules = std::fs::read_to_string(root.join("ARCHITECTURE.md")).map_err(|error| error.to_string())?;
     let (imports, names) = read(root)?;
-    let promised = names.iter().map(|name| differences(root, &imports, name)).collect::<Vec<_>>().concat();
+    let promised = names.iter().filter_map(|name| difference(root, &imports, name).transpose());
+    let promised = promised.collect::<Result<Vec<_>, _>>()?;
     let checks = Checks { root, rules: allowed(&rules)?, arrows: imports.arrows(), files: imports.files };
     Ok([checks.unnamed(), checks.forbidden(), checks.circles(), promised].concat())
 }
@@ -64,37 +65,31 @@ fn list(root: &Path, name: &str) -> PathBuf {
     root.join("tools/arrows/api").join(name).with_extension("txt")
 }
 
+/// What users of a crate can name now.
+fn promised(imports: &Imports, name: &str) -> Result<String, String> {
+    api::listing(imports.files.iter().filter(|file| file.module[0] == name))
+}
+
 /// Writes the lists as the crates are now.
 pub(crate) fn accept(root: &Path) -> Result<Vec<String>, String> {
     let (imports, names) = read(root)?;
     for name in names {
-        let lines = api::listing(&imports, name).join("\n") + "\n";
         let path = list(root, name);
-        std::fs::write(&path, lines).map_err(|error| format!("{}: {error}", path.display()))?;
+        std::fs::write(&path, promised(&imports, name)?)
+            .map_err(|error| format!("{}: {error}", path.display()))?;
     }
     Ok(Vec::new())
 }
 
-/// Where the public interface of a crate is not the one of its list.
-fn differences(root: &Path, imports: &Imports, name: &str) -> Vec<String> {
-    let path = list(root, name);
-    if path.parent().is_none_or(|folder| !folder.is_dir()) {
-        return Vec::new();
-    }
-    let listed = std::fs::read_to_string(path).unwrap_or_default();
-    let listed: BTreeSet<&str> = listed.lines().collect();
-    let found = api::listing(imports, name);
-    let found: BTreeSet<&str> = found.iter().map(String::as_str).collect();
-    let gone = listed.difference(&found).map(|line| format!("- {line}"));
-    let added = found.difference(&listed).map(|line| format!("+ {line}"));
-    let lines: Vec<String> = gone.chain(added).collect();
-    if lines.is_empty() {
-        return lines;
-    }
-    let remedy = format!(
-        "{name}: its public interface is not the listed one; if that is meant, `cargo run -p arrows accept`"
-    );
-    [vec![remedy], lines].concat()
+/// The first line where the public interface of a crate is not the one of its list.
+fn difference(root: &Path, imports: &Imports, name: &str) -> Result<Option<String>, String> {
+    let Ok(listed) = std::fs::read_to_string(list(root, name)) else { return Ok(None) };
+    let found = promised(imports, name)?;
+    let line = listed.lines().zip(found.lines()).take_while(|(listed, found)| listed == found).count();
+    let [was, is] = [&listed, &found].map(|text| text.lines().nth(line).unwrap_or("nothing more").trim());
+    let remedy = "if that is meant, `cargo run -p arrows accept`";
+    let fault = format!("{name}: its public interface is not the listed one; {remedy}\n- {was}\n+ {is}");
+    Ok((listed != found).then_some(fault))
 }
 
 struct Checks<'a> {
@@ -219,54 +214,58 @@ mod tests {
 
     #[test]
     fn what_users_can_name_is_compared_with_its_list() {
-        let files = [
-            (
-                "src/a.rs",
-                "pub mod c { pub use super::d::*; pub struct S { pub x: u8, y: u8 } }\nmod d; pub use d::E as F;",
-            ),
-            (
-                "src/a/d.rs",
-                "/// E\n#[derive(Debug)] #[non_exhaustive] pub enum E { A, B { n: u8 } }\n\
-                impl E { pub fn f(\n&self,\nn: u8,\n) -> u8 { n } fn g() {} }\nimpl Clone for E {}",
-            ),
-            (
-                "src/b.rs",
-                "pub(crate) fn no() {} #[doc(hidden)] pub fn hidden() {} #[cfg(test)] pub fn test() {}\n\
-                pub trait T { const C: u8; fn f(&self) -> u8 { 1 } }\nm! { /// Of a macro.\n M, \"s\" }",
-            ),
-            ("tools/arrows/api/hybank.txt", "pub fn hybank::b::gone()\npub enum hybank::a::F\n"),
-        ];
-        let found = faults(&files);
-        let own = |path: &str| {
-            [
-                format!("+ #[non_exhaustive] hybank::a::{path}"),
-                format!("+ impl Clone for hybank::a::{path}"),
-                format!("+ impl Debug for hybank::a::{path}"),
-                format!("+ pub enum hybank::a::{path}"),
-                format!("+ pub fn hybank::a::{path}::f(&self, n: u8) -> u8"),
-                format!("+ pub hybank::a::{path}::A"),
-                format!("+ pub hybank::a::{path}::B {{ n: u8 }}"),
-            ]
+        let a =
+            "pub mod c { pub use super::d::*; pub struct S { pub x: u8, y: u8 } }\nmod d; pub use d::E as F;";
+        let d = "/// E\n#[must_use] #[derive(Debug)] #[non_exhaustive] pub enum E { A, B { n: u8 } } struct P;\n\
+            impl E { pub fn f(\n&self,\nmut n: u8,\n) -> u8 { n } fn g() {} }\nimpl Clone for E {} impl Clone for P {}";
+        let b = "pub(crate) fn no() {} #[doc(hidden)] pub fn hidden() {} #[cfg(test)] pub fn test() {}\n\
+            pub trait T { const C: u8; fn f(&self) -> u8 { 1 } }\nm! { /// Of a macro.\n M, \"s\" }";
+        let want = "\
+// hybank
+pub mod a;
+pub mod b;
+
+// hybank::a
+pub mod c {
+    pub use super::d::*;
+    pub struct S {
+        pub x: u8,
+        _private: (),
+    }
+}
+pub use d::E as F;
+
+// hybank::a::d
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum E {
+    A,
+    B { n: u8 },
+}
+impl E {
+    pub fn f(&self, n: u8) -> u8 {}
+}
+impl Clone for E {}
+
+// hybank::b
+pub trait T {
+    const C: u8;
+    fn f(&self) -> u8 {}
+}
+m! { M , \"s\" }
+";
+        let found = |listed: &str| {
+            let files = ["src/a.rs", "src/a/d.rs", "src/b.rs", "tools/arrows/api/hybank.txt"];
+            faults(&[(files[0], a), (files[1], d), (files[2], b), (files[3], listed)])
         };
-        let mut want = [own("F"), own("c::E")].concat();
-        want.retain(|line| line != "+ pub enum hybank::a::F");
-        want.extend(
-            [
-                "- pub fn hybank::b::gone()",
-                "+ m! hybank::b::M M,\"s\"",
-                "+ pub hybank::b::T::C: u8",
-                "+ pub fn hybank::b::T::f(&self) -> u8 { .. }",
-                "+ pub hybank::a::c::S::x: u8",
-                "+ pub struct hybank::a::c::S { .. }",
-                "+ pub trait hybank::b::T",
-            ]
-            .map(str::to_owned),
-        );
-        let mut lines = found[1..].to_vec();
-        want.sort();
-        lines.sort();
-        assert!(found[0].contains("cargo run -p arrows accept"), "{found:?}");
-        assert_eq!(lines, want);
+        assert_eq!(found(want), [""; 0]);
+        for (was, line) in [("pub x: u8,", "pub z: u8,"), ("m! { M", "pub fn gone() {}\nm! { M")] {
+            let found = found(&want.replace(was, line));
+            let [fault] = &*found else { panic!("{found:?}") };
+            assert!(fault.contains("cargo run -p arrows accept"), "{fault}");
+            let line = line.lines().next().unwrap();
+            assert!(fault.contains(&format!("\n- {line}\n+ {}", &was[..6])), "{fault}");
+        }
     }
 
     #[test]

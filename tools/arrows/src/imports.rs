@@ -1,15 +1,21 @@
 //! The files of crates, and which file imports which.
 
+use quote::ToTokens;
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
+use syn::parse::{Parse, ParseStream};
 use syn::punctuated::Punctuated;
 use syn::visit::{self, Visit};
-use syn::{Attribute, Expr, Item, Meta, Token, UseTree};
+use syn::visit_mut::{self, VisitMut};
+use syn::{Attribute, Expr, Meta, Token, UseTree, Visibility};
 
+#[derive(Clone)]
 pub(crate) struct File {
     pub(crate) path: PathBuf,
     /// Names from the crate's on: `hybank`, `design`, `fir`.
     pub(crate) module: Vec<String>,
+    /// Without what stands under `#[cfg(test)]`.
+    pub(crate) syntax: syn::File,
 }
 
 /// A path as written in a module of a file. `use path::*` imports the module itself.
@@ -26,7 +32,6 @@ struct Module {
     /// The names that `use` brought in, with the path of each.
     used: HashMap<String, Vec<String>>,
     globs: Vec<Vec<String>>,
-    items: Vec<Item>,
 }
 
 #[derive(Default)]
@@ -41,15 +46,17 @@ impl Imports {
     pub(crate) fn read(&mut self, path: &Path, module: Vec<String>) -> Result<(), String> {
         let wrong = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
         let source = std::fs::read_to_string(path).map_err(|error| wrong(&error))?;
-        let syntax = syn::parse_file(&source).map_err(|error| wrong(&error))?;
+        let mut syntax = syn::parse_file(&source).map_err(|error| wrong(&error))?;
+        WithoutTests.visit_file_mut(&mut syntax);
         let file = self.files.len();
-        self.files.push(File { path: path.to_owned(), module: module.clone() });
         let mut reader = Reader { file, module: module.clone(), children: Vec::new(), imports: self };
-        reader.here().items.clone_from(&syntax.items);
+        reader.here();
         reader.visit_file(&syntax);
+        let children = reader.children;
+        self.files.push(File { path: path.to_owned(), module: module.clone(), syntax });
         let is_root = ["mod.rs", "lib.rs", "main.rs"].iter().any(|root| path.ends_with(root));
         let folder = if is_root { path.with_file_name("") } else { path.with_extension("") };
-        for child in reader.children {
+        for child in children {
             let below = folder.join(child[module.len()..].iter().collect::<PathBuf>());
             let flat = below.with_extension("rs");
             self.read(&if flat.is_file() { flat } else { below.join("mod.rs") }, child)?;
@@ -66,26 +73,6 @@ impl Imports {
             (import.file != to && (item.is_some() || import.is_glob)).then_some((import.file, to))
         };
         self.imports.iter().filter_map(arrow).collect()
-    }
-
-    /// The items of a module.
-    pub(crate) fn items(&self, module: &[String]) -> &[Item] {
-        self.modules.get(module).map_or(&[], |module| &module.items)
-    }
-
-    /// The items of all modules of a crate, each with its module.
-    pub(crate) fn all_items(&self, krate: &str) -> impl Iterator<Item = (&[String], &Item)> {
-        let modules = self.modules.iter().filter(move |(name, _)| name[0] == krate);
-        modules.flat_map(|(name, module)| module.items.iter().map(|item| (&**name, item)))
-    }
-
-    /// The module to which a path leads that stands in a module, and what the path names inside it.
-    pub(crate) fn leads_to(
-        &self,
-        module: &[String],
-        path: &[String],
-    ) -> Option<(Vec<String>, Option<String>)> {
-        self.resolve(module, path, 0)
     }
 
     /// The module to which a path leads that stands in a module, and what the path names inside it; `None`
@@ -137,7 +124,7 @@ impl Imports {
     }
 }
 
-/// Walks the syntax of one file, without what stands under `#[cfg(test)]`.
+/// Walks the syntax of one file.
 struct Reader<'a> {
     file: usize,
     module: Vec<String>,
@@ -178,25 +165,10 @@ impl Reader<'_> {
 }
 
 impl<'ast> Visit<'ast> for Reader<'_> {
-    fn visit_item(&mut self, item: &'ast Item) {
-        let attributes = match item {
-            Item::Const(item) => &item.attrs,
-            Item::Fn(item) => &item.attrs,
-            Item::Impl(item) => &item.attrs,
-            Item::Mod(item) => &item.attrs,
-            Item::Struct(item) => &item.attrs,
-            Item::Use(item) => &item.attrs,
-            _ => return visit::visit_item(self, item),
-        };
-        if !attributes.iter().any(is_test) {
-            visit::visit_item(self, item);
-        }
-    }
-
     fn visit_item_mod(&mut self, item: &'ast syn::ItemMod) {
         self.module.push(item.ident.to_string());
-        if let Some((_, items)) = &item.content {
-            self.here().items.clone_from(items);
+        if item.content.is_some() {
+            self.here();
             visit::visit_item_mod(self, item);
         } else {
             self.children.push(self.module.clone());
@@ -206,12 +178,6 @@ impl<'ast> Visit<'ast> for Reader<'_> {
 
     fn visit_item_use(&mut self, item: &'ast syn::ItemUse) {
         self.use_tree(&[], &item.tree);
-    }
-
-    fn visit_impl_item_fn(&mut self, item: &'ast syn::ImplItemFn) {
-        if !item.attrs.iter().any(is_test) {
-            visit::visit_impl_item_fn(self, item);
-        }
     }
 
     fn visit_path(&mut self, path: &'ast syn::Path) {
@@ -229,9 +195,50 @@ impl<'ast> Visit<'ast> for Reader<'_> {
     }
 }
 
-/// `#[cfg(test)]` or `#[cfg(all(test, ..))]`, but not `any` or `not`.
-pub(crate) fn is_test(attribute: &Attribute) -> bool {
-    let Meta::List(list) = &attribute.meta else { return false };
-    let text = list.tokens.to_string();
-    list.path.is_ident("cfg") && text.contains("test") && !text.contains("any") && !text.contains("not")
+struct WithoutTests;
+
+impl VisitMut for WithoutTests {
+    fn visit_file_mut(&mut self, file: &mut syn::File) {
+        file.items.retain(|item| !is_test(item));
+        visit_mut::visit_file_mut(self, file);
+    }
+
+    fn visit_item_mod_mut(&mut self, item: &mut syn::ItemMod) {
+        if let Some((_, items)) = &mut item.content {
+            items.retain(|item| !is_test(item));
+        }
+        visit_mut::visit_item_mod_mut(self, item);
+    }
+
+    fn visit_item_impl_mut(&mut self, item: &mut syn::ItemImpl) {
+        item.items.retain(|item| !is_test(item));
+    }
+}
+
+/// Whether it stands under `#[cfg(test)]` or `#[cfg(all(test, ..))]`, but not `any` or `not`.
+fn is_test(item: &impl ToTokens) -> bool {
+    let is_test = |attribute: &Attribute| {
+        let Meta::List(list) = &attribute.meta else { return false };
+        let text = list.tokens.to_string();
+        list.path.is_ident("cfg") && text.contains("test") && !text.contains("any") && !text.contains("not")
+    };
+    head(item).attributes.iter().any(is_test)
+}
+
+/// What an item or a field begins with.
+pub(crate) struct Head {
+    pub(crate) attributes: Vec<Attribute>,
+    pub(crate) visibility: Visibility,
+}
+
+impl Parse for Head {
+    fn parse(input: ParseStream) -> syn::Result<Head> {
+        let head = Head { attributes: Attribute::parse_outer(input)?, visibility: input.parse()? };
+        input.parse::<proc_macro2::TokenStream>().map(|_| head)
+    }
+}
+
+pub(crate) fn head(syntax: &impl ToTokens) -> Head {
+    let nothing = |_| Head { attributes: Vec::new(), visibility: Visibility::Inherited };
+    syn::parse2(syntax.to_token_stream()).unwrap_or_else(nothing)
 }
