@@ -16,7 +16,7 @@ const BANK_FILE: Bound =
     Bound { bytes: 256 << 20, kind: "a bank file", remedy: "give the file that was meant" };
 
 /// 16-bit samples in the byte order of this machine.
-const INT16: PcmFormat = if cfg!(target_endian = "big") { PcmFormat::S16Be } else { PcmFormat::S16Le };
+const INT16: PcmFormat = PcmFormat::S16Le.native();
 
 /// A stream through the bank of a file.
 fn open(path: &str, algorithm: &str, double_sums: bool) -> Result<Stream, String> {

@@ -7,7 +7,6 @@ use hybank::io::{
     Container, IoError, OutputHeader, PcmFormat, SampleWriter, is_pipe, is_sigmf, mat_variable, sigmf_files,
 };
 use hybank::messages::Quoted;
-use hybank::runtime::Precision;
 use std::path::Path;
 
 /// Sample formats of a WAV output.
@@ -41,12 +40,6 @@ impl Bits {
             Self::F64 => PcmFormat::F64Le,
         }
     }
-}
-
-/// Formats with more digits than f32 need sums in f64.
-pub(super) fn precision(format: PcmFormat) -> Precision {
-    use PcmFormat::{F64Be, F64Le, S32Be, S32Le};
-    if matches!(format, F64Be | F64Le | S32Be | S32Le) { Precision::Double } else { Precision::Single }
 }
 
 /// Begins an output of samples, and says what its header cannot.

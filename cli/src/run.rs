@@ -7,7 +7,7 @@ use super::gaps::{GapArgs, say_gaps};
 use super::interrupt::interrupts;
 use super::match_bank;
 use super::observer::{ObserverArgs, RunObserver};
-use super::output::{begin_samples, check_files, precision};
+use super::output::{begin_samples, check_files};
 use super::print::print_json;
 use super::print::{Failure, is_dash};
 use super::print::{say_json, warn};
@@ -20,7 +20,7 @@ use hybank::io::{
 };
 use hybank::pipeline::matching;
 use hybank::pipeline::{DroppedLatency, FileOutputs, GapSummary, Outcome, Pipeline, Settings, Warning};
-use hybank::runtime::{Algorithm, Input, Options, Plan, PlanSummary, ThreadPool};
+use hybank::runtime::{Algorithm, Input, Options, Plan, PlanSummary, Precision, ThreadPool};
 use std::path::{Path, PathBuf};
 
 /// Options of the commands that fuse.
@@ -189,7 +189,7 @@ impl Job<'_> {
     fn options(&self) -> Options {
         let asked = self.args.algorithm;
         let algorithm = if self.is_live { asked.without_added_latency() } else { asked };
-        let options = Options { precision: precision(self.format), algorithm, ..Options::default() };
+        let options = Options { precision: Precision::of(self.format), algorithm, ..Options::default() };
         self.settings().options(options)
     }
 

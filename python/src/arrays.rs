@@ -1,12 +1,10 @@
 //! Arrays as inputs of a bank, without a copy.
 
 use crate::errors::refused;
-use crate::formats::{Format, Number};
-use crate::samples::Samples;
-use bytemuck::AnyBitPattern;
+use crate::formats::Format;
 use hybank::bank::FrameLayout;
 use hybank::memory::available_memory;
-use hybank::runtime::{Input, Interleaved, Isa, PcmFrames, SampleLayout};
+use hybank::runtime::{Input, Isa, PcmFrames, SampleLayout};
 use numpy::ndarray::Axis;
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyMemoryError;
@@ -107,30 +105,23 @@ impl<'py> Held<'py> {
     }
 
     /// The samples, or the real and the imaginary parts of complex ones.
-    pub(crate) fn parts(&self) -> PyResult<Vec<Samples<'_>>> {
+    pub(crate) fn parts(&self) -> PyResult<Vec<Vec<PcmFrames<'_>>>> {
         (0..1 + usize::from(self.format.complex)).map(|part| self.part(part)).collect()
     }
 
     /// The samples, or one part of complex ones.
-    fn part(&self, part: usize) -> PyResult<Samples<'_>> {
-        let Self { layout: Layout { channels, order, .. }, format: Format { number, complex }, .. } = *self;
-        let all = || self.bytes.as_slice().map_err(refused);
-        if order == Order::Frames && !complex && number == Number::F32 {
-            let samples = Interleaved::new(numbers(all()?)?, channels);
-            return Ok(Samples::Interleaved32(samples.map_err(refused)?));
-        }
-        if order == Order::Frames && !complex && number == Number::F64 {
-            let samples = Interleaved::new(numbers(all()?)?, channels);
-            return Ok(Samples::Interleaved64(samples.map_err(refused)?));
-        }
-        let recordings = self.recordings()?.into_iter();
-        Ok(Samples::Pcm(recordings.map(|frames| if complex { frames.part(part) } else { frames }).collect()))
+    fn part(&self, part: usize) -> PyResult<Vec<PcmFrames<'_>>> {
+        let recordings = self.recordings()?;
+        Ok(match self.format.complex {
+            true => recordings.iter().map(|frames| frames.part(part)).collect(),
+            false => recordings,
+        })
     }
 
     /// The samples as a recorder has them; the parts of complex ones take turns.
     pub(crate) fn recordings(&self) -> PyResult<Vec<PcmFrames<'_>>> {
         let Self { layout: Layout { channels, order, .. }, format: Format { number, complex }, .. } = *self;
-        let layout = SampleLayout::packed(number.format());
+        let layout = SampleLayout::packed(number);
         let parts = 1 + usize::from(complex);
         let frames = |bytes, channels| PcmFrames { layout, channels: parts * channels, bytes };
         if order == Order::Frames {
@@ -155,13 +146,13 @@ impl<'py> Held<'py> {
             return Err(PyMemoryError::new_err(text));
         }
         let mut frames = vec![0.0; count];
-        self.part(part)?.load(Isa::detect(), 0, &mut frames);
+        self.part(part)?[..].load(Isa::detect(), 0, &mut frames);
         Ok(frames)
     }
 
     /// Lowest and highest value of a sample of integers; `None` for floats.
     pub(crate) fn rails(&self) -> Option<(f64, f64)> {
-        let format = self.format.number.format();
+        let format = self.format.number;
         (!format.is_float()).then(|| (-1.0, 1.0 - 2f64.powi(1 - 8 * format.bytes() as i32)))
     }
 }
@@ -281,10 +272,4 @@ fn plain<'py>(x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         true => array.call_method1("astype", ("f8",)),
         false => Ok(array),
     }
-}
-
-/// Bytes as the numbers that they are.
-fn numbers<S: AnyBitPattern>(bytes: &[u8]) -> PyResult<&[S]> {
-    // An array without numbers may lie anywhere.
-    if bytes.is_empty() { Ok(&[]) } else { bytemuck::try_cast_slice(bytes).map_err(refused) }
 }

@@ -9,7 +9,7 @@ use crate::running::{Extras, Running};
 use crate::signals::Signals;
 use hybank::bank::Bank;
 use hybank::pipeline::{self, DroppedLatency, GapPolicy, Outcome, PipelineError, Settings};
-use hybank::runtime::{Algorithm, Options, PcmFrames, Plan, ThreadPool};
+use hybank::runtime::{Algorithm, Frames, Options, PcmFrames, Plan, Precision, ThreadPool};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use std::ops::Range;
@@ -64,7 +64,7 @@ pub(crate) fn plan(
     algorithm: Algorithm,
     settings: Settings<'_>,
 ) -> PyResult<Plan> {
-    let options = Options { precision: format.number.precision(), algorithm, ..Options::default() };
+    let options = Options { precision: Precision::of(format.number), algorithm, ..Options::default() };
     bank.plan(settings.options(options)).map_err(refused)
 }
 
@@ -86,11 +86,12 @@ pub(crate) fn fuse<'py>(
     let plan = plan(bank, format, request.algorithm, settings)?;
     let mut array = NewArray::new(py, held.frames() * bank.ratio, format)?;
     let (parts, mut room) = (held.parts()?, array.room()?);
+    let parts: Vec<_> = parts.iter().map(|part| Frames::new(&part[..], 0..held.frames())).collect();
     let signals = Signals::new();
     let stop = || signals.raised();
     let outcome = py.detach(|| pipeline::fuse(bank, &plan, &parts, &mut room, settings, &stop));
     let outcome = outcome.map_err(|error| signals.into_error().unwrap_or_else(|| refused(error)))?;
-    let clipped = room.clipped();
+    let clipped = room.clipped;
     let y = array.finish()?;
     let outcome = Outcome { clipped, ..outcome };
     Ok((y, report(py, outcome, settings.dropped.samples(&plan))))
@@ -106,7 +107,7 @@ fn followed<'py>(
     let py = held.py();
     let dropped = request.settings().dropped;
     let mut running = Running::new(bank, format, request.algorithm, &request.extras, dropped)?;
-    let (tracks, latency_dropped) = (running.tracks(), dropped.samples(running.plan()));
+    let (tracks, latency_dropped) = (running.tracks(), dropped.samples(running.pipeline.plan()));
     let (recordings, frames, signals) = (held.recordings()?, held.frames(), Signals::new());
     let done = py.detach(|| {
         for first in (0..frames).step_by(PIECE) {
@@ -118,8 +119,7 @@ fn followed<'py>(
             running.push(&piece, end - first)?;
         }
         running.flush((frames * bank.ratio) as u64)?;
-        let outputs = running.take();
-        Ok((outputs, running.finish()?))
+        Ok((running.outputs, running.pipeline.finish()?))
     });
     let done = done.map_err(|error| signals.into_error().unwrap_or_else(|| refused(error)));
     let (outputs, outcome) = done?;

@@ -31,7 +31,6 @@ mod records;
 mod results;
 mod running;
 mod runs;
-mod samples;
 mod signals;
 mod simulate;
 mod sources;

@@ -2,9 +2,8 @@
 
 use crate::arrays::{Held, Shape};
 use crate::errors::refused;
-use crate::formats::{Format, Number};
-use crate::samples::{Room, Samples};
-use hybank::runtime::{Input, Isa, Output, PcmOutput, Sample};
+use crate::formats::Format;
+use hybank::runtime::{Input, Isa, Output, PcmFrames, PcmOutput, Sample};
 use numpy::{PyArray1, PyArrayMethods, PyReadwriteArray1};
 use pyo3::prelude::*;
 
@@ -26,18 +25,8 @@ impl<'py> NewArray<'py> {
     }
 
     /// Room for the samples; for the parts of complex ones once one of them is selected.
-    pub(crate) fn room(&mut self) -> PyResult<Room<'_>> {
-        let bytes = self.bytes.as_slice_mut().map_err(refused)?;
-        let is_aligned = bytes.as_ptr().cast::<f64>().is_aligned();
-        Ok(match self.format {
-            Format { number: Number::F32, complex: false } if is_aligned => {
-                Room::F32(bytemuck::cast_slice_mut(bytes))
-            }
-            Format { number: Number::F64, complex: false } if is_aligned => {
-                Room::F64(bytemuck::cast_slice_mut(bytes))
-            }
-            Format { number, .. } => Room::Pcm(PcmOutput::packed(number.format(), bytes)),
-        })
+    pub(crate) fn room(&mut self) -> PyResult<PcmOutput<'_>> {
+        Ok(PcmOutput::packed(self.format.number, self.bytes.as_slice_mut().map_err(refused)?))
     }
 
     /// The array.
@@ -55,19 +44,19 @@ pub(crate) fn encode<'py>(
     let held = Held::new(y, Shape { axis: -1, channels: 1 })?;
     let mut array = NewArray::new(y.py(), held.frames(), Format::of_dtype(dtype)?)?;
     let (parts, mut room) = (held.parts()?, array.room()?);
-    let (frames, is_single) = (held.frames(), held.format.number == Number::F32);
+    let (frames, is_single) = (held.frames(), held.format == Format::F32);
     let clipped = y.py().detach(|| {
         if is_single {
             convert::<f32>(&parts[0], frames, &mut room);
         } else {
             convert::<f64>(&parts[0], frames, &mut room);
         }
-        room.clipped()
+        room.clipped
     });
     Ok((array.finish()?, clipped))
 }
 
-fn convert<T: Sample>(samples: &Samples<'_>, frames: usize, room: &mut Room<'_>) {
+fn convert<T: Sample>(samples: &[PcmFrames<'_>], frames: usize, room: &mut PcmOutput<'_>) {
     let mut numbers = vec![T::default(); frames];
     samples.load(Isa::detect(), 0, &mut numbers);
     room.store(Isa::detect(), 0, &numbers);

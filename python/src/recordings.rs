@@ -1,9 +1,10 @@
 //! `hybank.Recording`: frames of a WAV or SigMF file from any place, for workers that read spans of it.
 
 use crate::errors::refused;
+use crate::formats::Format;
 use hybank::io::wav::WavReader;
 use hybank::io::{SigmfMeta, StreamHeader, is_sigmf, sigmf_files};
-use hybank::runtime::{Input, Isa, PcmFormat, PcmFrames};
+use hybank::runtime::{Input, Isa, PcmFrames, Precision, Sample};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use std::fs::File;
@@ -48,12 +49,7 @@ impl Recording {
     /// The type of the arrays that `read` returns: floats that hold all digits of the samples.
     #[getter]
     fn dtype(&self) -> &'static str {
-        match (self.is_double(), self.header.is_complex) {
-            (false, false) => "f4",
-            (true, false) => "f8",
-            (false, true) => "c8",
-            (true, true) => "c16",
-        }
+        Format::floats(self.header.layout.format, self.header.is_complex).name()
     }
 
     #[doc = include_str!("docs/Recording.read.rst")]
@@ -61,7 +57,10 @@ impl Recording {
         let first = first.min(self.frames);
         let count = self.frames.saturating_sub(first).min(count as u64) as usize;
         let bytes = py.detach(|| self.bytes(first, count))?;
-        if self.is_double() { self.array::<f64>(py, &bytes) } else { self.array::<f32>(py, &bytes) }
+        match Precision::of(self.header.layout.format) {
+            Precision::Single => self.array::<f32>(py, &bytes),
+            Precision::Double => self.array::<f64>(py, &bytes),
+        }
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, (PathBuf,)) {
@@ -104,11 +103,6 @@ impl Recording {
         Ok(Self { path: path.to_owned(), data, offset: 0, header, frames })
     }
 
-    fn is_double(&self) -> bool {
-        use PcmFormat::{F64Be, F64Le, S32Be, S32Le};
-        matches!(self.header.layout.format, F64Be | F64Le | S32Be | S32Le)
-    }
-
     fn bytes(&self, first: u64, count: usize) -> PyResult<Vec<u8>> {
         let frame = self.header.frame_bytes();
         let mut bytes = vec![0; count * frame];
@@ -118,7 +112,7 @@ impl Recording {
         Ok(bytes)
     }
 
-    fn array<'py, T: hybank::runtime::Sample + numpy::Element>(
+    fn array<'py, T: Sample + numpy::Element>(
         &self,
         py: Python<'py>,
         bytes: &[u8],

@@ -6,8 +6,9 @@ use crate::fuse::plan;
 use crate::records::record;
 use crate::sources;
 use hybank::bank::Bank;
-use hybank::pipeline::{DroppedLatency, Gap, GapPolicy, Outcome, Pipeline, PipelineError, Settings};
-use hybank::runtime::{Algorithm, Options, PcmFrames, Plan};
+use hybank::io::IoError;
+use hybank::pipeline::{Block, DroppedLatency, Gap, GapPolicy, Pipeline, PipelineError, Settings};
+use hybank::runtime::{Algorithm, Options, PcmFrames, Plan, Precision};
 use hybank::track::{DelaySource, Logged, Reading, Tracking};
 use pyo3::prelude::*;
 use std::path::Path;
@@ -87,18 +88,26 @@ struct Tracked {
 
 /// A run. Its outputs are collected until they are taken.
 pub(crate) struct Running {
-    pipeline: Pipeline<'static>,
+    pub(crate) pipeline: Pipeline<'static>,
     tracked: Arc<Mutex<Tracked>>,
     /// Input frames.
     pub(crate) frames: u64,
-    samples: Vec<u8>,
-    mask: Vec<u8>,
+    pub(crate) outputs: Outputs,
 }
 
 /// Outputs with their marks.
+#[derive(Default)]
 pub(crate) struct Outputs {
     pub(crate) samples: Vec<u8>,
     pub(crate) mask: Vec<u8>,
+}
+
+impl Outputs {
+    fn add(&mut self, block: Block<'_>) -> Result<(), IoError> {
+        self.samples.extend_from_slice(block.samples);
+        self.mask.extend_from_slice(block.mask.unwrap_or_default());
+        Ok(())
+    }
 }
 
 impl Running {
@@ -112,11 +121,12 @@ impl Running {
     ) -> PyResult<Self> {
         let settings = Settings { dropped, ..extras.settings() };
         let plan: Plan = plan(bank, format, algorithm, settings)?;
-        let number = format.number.format();
-        let mut pipeline = Pipeline::new(bank, &plan, settings, number, format.complex).map_err(refused)?;
+        let pipeline = Pipeline::new(bank, &plan, settings, format.number, format.complex);
+        let mut pipeline = pipeline.map_err(refused)?;
         let tracked = Arc::new(Mutex::new(Tracked::default()));
         if let Some(Follow { source, tracking, rate }) = &extras.follow {
-            let options = Options { precision: format.number.precision(), algorithm, ..Options::default() };
+            let options =
+                Options { precision: Precision::of(format.number), algorithm, ..Options::default() };
             let follower = tracking.follower(bank, source.clone(), *rate).map_err(refused)?;
             let record = Arc::clone(&tracked);
             let retuner = follower.retuner(bank, settings.options(options), move |log, warnings| {
@@ -127,53 +137,23 @@ impl Running {
             });
             pipeline = retuner.and_then(|retuner| pipeline.retuned_by(retuner)).map_err(refused)?;
         }
-        Ok(Self { pipeline, tracked, frames: 0, samples: Vec::new(), mask: Vec::new() })
-    }
-
-    pub(crate) fn plan(&self) -> &Plan {
-        self.pipeline.plan()
+        Ok(Self { pipeline, tracked, frames: 0, outputs: Outputs::default() })
     }
 
     pub(crate) fn push(&mut self, recordings: &[PcmFrames<'_>], frames: usize) -> Result<(), PipelineError> {
-        let Self { pipeline, samples, mask, .. } = self;
         self.frames += frames as u64;
-        pipeline.push(recordings, &mut |block| {
-            samples.extend_from_slice(block.samples);
-            mask.extend_from_slice(block.mask.unwrap_or_default());
-            Ok(())
-        })
+        self.pipeline.push(recordings, &mut |block| self.outputs.add(block))
     }
 
     /// Frames without a signal, until so many samples were written since the beginning.
     pub(crate) fn flush(&mut self, until: u64) -> Result<(), PipelineError> {
-        let Self { pipeline, samples, mask, .. } = self;
-        pipeline.flush(until, &mut |block| {
-            samples.extend_from_slice(block.samples);
-            mask.extend_from_slice(block.mask.unwrap_or_default());
-            Ok(())
-        })
+        self.pipeline.flush(until, &mut |block| self.outputs.add(block))
     }
 
     /// The last samples of a stream: as many frames of them as the latency has.
     pub(crate) fn drain(&mut self) -> Result<(), PipelineError> {
-        let plan = self.plan();
+        let plan = self.pipeline.plan();
         self.flush(self.pipeline.samples() + (plan.flush_frames() * plan.ratio()) as u64)
-    }
-
-    pub(crate) fn take(&mut self) -> Outputs {
-        Outputs { samples: std::mem::take(&mut self.samples), mask: std::mem::take(&mut self.mask) }
-    }
-
-    pub(crate) fn clipped(&self) -> u64 {
-        self.pipeline.clipped()
-    }
-
-    pub(crate) fn replaced(&self) -> u64 {
-        self.pipeline.replaced()
-    }
-
-    pub(crate) fn state_resets(&self) -> u64 {
-        self.pipeline.state_resets()
     }
 
     /// All gaps so far: those that have ended, then those that go on.
@@ -184,10 +164,6 @@ impl Running {
     /// What is known of the delays, also after the run.
     pub(crate) fn tracks(&self) -> Tracks {
         Tracks(Arc::clone(&self.tracked))
-    }
-
-    pub(crate) fn finish(self) -> Result<Outcome, PipelineError> {
-        self.pipeline.finish()
     }
 }
 

@@ -4,12 +4,10 @@
 use crate::errors::refused;
 use crate::formats::Format;
 use crate::running::{Extras, Outputs, Running, Tracks};
-use crate::samples::{Room, Samples};
 use hybank::bank::Bank;
 use hybank::pipeline::{DroppedLatency, PipelineError};
-use hybank::runtime::{self, Algorithm, Output, PcmFrames, Plan, ProcessError, STATE_COUNTS, StateError};
+use hybank::runtime::{self, Algorithm, Output, PcmFrames, PcmOutput, Plan, STATE_COUNTS, StateError};
 use pyo3::prelude::*;
-use std::fmt;
 
 /// The runs of a stream, which the end of its `with` block closes.
 pub(crate) struct State {
@@ -22,24 +20,24 @@ pub(crate) enum Runs {
     /// By one stream for real samples, by two for the parts of complex ones.
     Streams { streams: Vec<runtime::Stream>, clipped: u64 },
     /// With gaps that are filled, or filters that follow the delays.
-    Running { running: Box<Running>, mask: Vec<u8> },
+    Running(Box<Running>),
 }
 
 impl State {
-    pub(crate) fn process(&mut self, parts: &[Samples<'_>], room: &mut Room<'_>) -> Result<(), StreamError> {
+    pub(crate) fn process(&mut self, parts: &[Vec<PcmFrames<'_>>], room: &mut PcmOutput<'_>) -> PyResult<()> {
         self.check_open()?;
         let Runs::Streams { streams, clipped } = &mut self.runs else { return Ok(()) };
         for (i, (stream, part)) in streams.iter_mut().zip(parts).enumerate() {
             if parts.len() > 1 {
                 room.select(i);
             }
-            stream.run(part, room)?;
+            stream.run(&part[..], room).map_err(refused)?;
         }
-        *clipped += room.clipped();
+        *clipped += room.clipped;
         Ok(())
     }
 
-    pub(crate) fn flush(&mut self, room: &mut Room<'_>) -> Result<(), StreamError> {
+    pub(crate) fn flush(&mut self, room: &mut PcmOutput<'_>) -> PyResult<()> {
         self.check_open()?;
         let Runs::Streams { streams, clipped } = &mut self.runs else { return Ok(()) };
         let is_complex = streams.len() > 1;
@@ -47,41 +45,29 @@ impl State {
             if is_complex {
                 room.select(part);
             }
-            stream.flush(room)?;
+            stream.flush(room).map_err(refused)?;
         }
-        *clipped += room.clipped();
+        *clipped += room.clipped;
         Ok(())
     }
 
-    /// Of a stream that fills gaps or follows delays.
-    pub(crate) fn push(
-        &mut self,
-        recordings: &[PcmFrames<'_>],
-        frames: usize,
-    ) -> Result<Outputs, StreamError> {
-        self.run(|running| running.push(recordings, frames))
-    }
-
-    pub(crate) fn drain(&mut self) -> Result<Outputs, StreamError> {
-        self.run(Running::drain)
-    }
-
-    fn run(
+    /// A step of a stream that fills gaps or follows delays: its output samples.
+    pub(crate) fn step(
         &mut self,
         step: impl FnOnce(&mut Running) -> Result<(), PipelineError>,
-    ) -> Result<Outputs, StreamError> {
+    ) -> PyResult<Vec<u8>> {
         self.check_open()?;
-        let Runs::Running { running, mask } = &mut self.runs else {
-            return Ok(Outputs { samples: Vec::new(), mask: Vec::new() });
-        };
-        step(running)?;
-        let mut outputs = running.take();
-        *mask = std::mem::take(&mut outputs.mask);
-        Ok(outputs)
+        let Runs::Running(running) = &mut self.runs else { return Ok(Vec::new()) };
+        running.outputs = Outputs::default();
+        step(running).map_err(refused)?;
+        Ok(std::mem::take(&mut running.outputs.samples))
     }
 
-    fn check_open(&self) -> Result<(), StreamError> {
-        if self.closed { Err(StreamError::Closed) } else { Ok(()) }
+    fn check_open(&self) -> PyResult<()> {
+        if self.closed {
+            return Err(refused("the stream was closed at the end of its with block; make another one"));
+        }
+        Ok(())
     }
 }
 
@@ -98,11 +84,11 @@ impl Runs {
             return Ok(Self::Streams { streams, clipped: 0 });
         }
         let running = Running::new(bank, format, algorithm, extras, DroppedLatency::Nothing)?;
-        Ok(Self::Running { running: Box::new(running), mask: Vec::new() })
+        Ok(Self::Running(Box::new(running)))
     }
 
     pub(crate) fn tracks(&self) -> Option<Tracks> {
-        if let Self::Running { running, .. } = self { Some(running.tracks()) } else { None }
+        if let Self::Running(running) = self { Some(running.tracks()) } else { None }
     }
 
     /// The count of saturated samples, then the state of each part, all of one length.
@@ -144,35 +130,4 @@ fn stateless() -> PyErr {
     refused(
         "a stream that fills gaps or follows delays cannot be copied, pickled or resumed; begin another one",
     )
-}
-
-/// Why a stream takes no samples.
-pub(crate) enum StreamError {
-    Closed,
-    Process(ProcessError),
-    Run(PipelineError),
-}
-
-impl From<ProcessError> for StreamError {
-    fn from(error: ProcessError) -> Self {
-        Self::Process(error)
-    }
-}
-
-impl From<PipelineError> for StreamError {
-    fn from(error: PipelineError) -> Self {
-        Self::Run(error)
-    }
-}
-
-impl fmt::Display for StreamError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Closed => {
-                f.write_str("the stream was closed at the end of its with block; make another one")
-            }
-            Self::Process(error) => error.fmt(f),
-            Self::Run(error) => error.fmt(f),
-        }
-    }
 }

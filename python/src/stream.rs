@@ -3,10 +3,10 @@
 use crate::arrays::{Held, Shape, framed};
 use crate::bank::Bank as PyBank;
 use crate::errors::refused;
-use crate::formats::{Format, Number};
+use crate::formats::Format;
 use crate::fuse::{marks, parse_algorithm, plan};
 use crate::outputs::NewArray;
-use crate::running::{Extras, Outputs};
+use crate::running::{Extras, Running};
 use crate::runs::{Runs, State};
 use hybank::bank::Bank;
 use hybank::runtime::{self, Plan};
@@ -42,8 +42,7 @@ impl Stream {
         algorithm: &str,
         extras: Extras,
     ) -> PyResult<Self> {
-        let default = Format { number: Number::F32, complex: false };
-        let format = dtype.map_or(Ok(default), Format::of_dtype)?;
+        let format = dtype.map_or(Ok(Format::F32), Format::of_dtype)?;
         let shape = Shape { axis, channels: bank.frame_samples() };
         shape.check()?;
         let algorithm_asked = parse_algorithm(algorithm)?.without_added_latency();
@@ -71,12 +70,12 @@ impl Stream {
         py.detach(|| of(&self.lock().runs))
     }
 
-    /// The outputs that a run has collected.
-    fn collected<'py>(&self, py: Python<'py>, outputs: Outputs) -> PyResult<Bound<'py, PyAny>> {
+    /// The outputs of a step.
+    fn collected<'py>(&self, py: Python<'py>, samples: Vec<u8>) -> PyResult<Bound<'py, PyAny>> {
         if let Some(tracks) = self.read(py, Runs::tracks) {
             tracks.warn(py)?;
         }
-        PyArray1::from_vec(py, outputs.samples).call_method1("view", (self.format.name(),))
+        PyArray1::from_vec(py, samples).call_method1("view", (self.format.name(),))
     }
 }
 
@@ -89,24 +88,25 @@ impl Stream {
         self.check_parts(held.format)?;
         if self.extras.is_any() {
             let (recordings, frames) = (held.recordings()?, held.frames());
-            let outputs = x.py().detach(|| self.lock().push(&recordings, frames)).map_err(refused)?;
-            return self.collected(x.py(), outputs);
+            let push = |running: &mut Running| running.push(&recordings, frames);
+            let samples = x.py().detach(|| self.lock().step(push))?;
+            return self.collected(x.py(), samples);
         }
         let mut array = NewArray::new(x.py(), held.frames() * self.plan.ratio(), self.format)?;
         let (parts, mut room) = (held.parts()?, array.room()?);
-        x.py().detach(|| self.lock().process(&parts, &mut room)).map_err(refused)?;
+        x.py().detach(|| self.lock().process(&parts, &mut room))?;
         array.finish()
     }
 
     #[doc = include_str!("docs/Stream.flush.rst")]
     fn flush<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         if self.extras.is_any() {
-            let outputs = py.detach(|| self.lock().drain()).map_err(refused)?;
-            return self.collected(py, outputs);
+            let samples = py.detach(|| self.lock().step(Running::drain))?;
+            return self.collected(py, samples);
         }
         let mut array = NewArray::new(py, self.plan.flush_frames() * self.plan.ratio(), self.format)?;
         let mut room = array.room()?;
-        py.detach(|| self.lock().flush(&mut room)).map_err(refused)?;
+        py.detach(|| self.lock().flush(&mut room))?;
         array.finish()
     }
 
@@ -160,7 +160,7 @@ impl Stream {
     fn position(&self, py: Python<'_>) -> u64 {
         self.read(py, |runs| match runs {
             Runs::Streams { streams, .. } => streams[0].position(),
-            Runs::Running { running, .. } => running.frames,
+            Runs::Running(running) => running.frames,
         })
     }
 
@@ -169,7 +169,7 @@ impl Stream {
     fn replaced(&self, py: Python<'_>) -> u64 {
         self.read(py, |runs| match runs {
             Runs::Streams { streams, .. } => streams.iter().map(runtime::Stream::replaced).sum(),
-            Runs::Running { running, .. } => running.replaced(),
+            Runs::Running(running) => running.pipeline.replaced(),
         })
     }
 
@@ -178,7 +178,7 @@ impl Stream {
     fn clipped(&self, py: Python<'_>) -> u64 {
         self.read(py, |runs| match runs {
             Runs::Streams { clipped, .. } => *clipped,
-            Runs::Running { running, .. } => running.clipped(),
+            Runs::Running(running) => running.pipeline.clipped(),
         })
     }
 
@@ -187,7 +187,7 @@ impl Stream {
     fn state_resets(&self, py: Python<'_>) -> u64 {
         self.read(py, |runs| match runs {
             Runs::Streams { streams, .. } => streams.iter().map(runtime::Stream::state_resets).sum(),
-            Runs::Running { running, .. } => running.state_resets(),
+            Runs::Running(running) => running.pipeline.state_resets(),
         })
     }
 
@@ -198,7 +198,7 @@ impl Stream {
         self.extras.gaps?;
         self.read(py, |runs| match runs {
             Runs::Streams { .. } => None,
-            Runs::Running { running, .. } => {
+            Runs::Running(running) => {
                 Some(running.gaps().iter().map(|gap| (gap.channel, gap.first, gap.length)).collect())
             }
         })
@@ -210,7 +210,7 @@ impl Stream {
         self.extras.gaps?;
         let mask = self.read(py, |runs| match runs {
             Runs::Streams { .. } => Vec::new(),
-            Runs::Running { mask, .. } => mask.clone(),
+            Runs::Running(running) => running.outputs.mask.clone(),
         });
         Some(marks(py, &mask))
     }

@@ -18,65 +18,39 @@ pub trait Sample: Element + PartialOrd {
     fn from_f64(value: f64) -> Self;
     /// Exact.
     fn to_f64(self) -> f64;
-    /// The samples, with their type as a value.
-    fn typed(samples: &[Self]) -> Samples<'_>;
-    /// The samples, with their type as a value.
-    fn typed_mut(samples: &mut [Self]) -> SamplesMut<'_>;
-    /// The samples themselves, if they are of this type.
-    fn same<S: Sample>(samples: &[S]) -> Option<&[Self]>;
-    /// The samples themselves, if they are of this type.
-    fn same_mut<S: Sample>(samples: &mut [S]) -> Option<&mut [Self]>;
 }
 
-/// Samples in memory.
-#[derive(Debug)]
-pub enum Samples<'a> {
-    /// In f32.
-    F32(&'a [f32]),
-    /// In f64.
-    F64(&'a [f64]),
+impl Sample for f32 {
+    #[inline(always)]
+    fn from_f64(value: f64) -> Self {
+        value as f32
+    }
+
+    #[inline(always)]
+    fn to_f64(self) -> f64 {
+        f64::from(self)
+    }
 }
 
-/// Room for samples in memory.
-#[derive(Debug)]
-pub enum SamplesMut<'a> {
-    /// In f32.
-    F32(&'a mut [f32]),
-    /// In f64.
-    F64(&'a mut [f64]),
+impl Sample for f64 {
+    #[inline(always)]
+    fn from_f64(value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn to_f64(self) -> f64 {
+        self
+    }
 }
 
-macro_rules! sample {
-    ($number:ty, $variant:ident) => {
-        impl Sample for $number {
-            #[inline(always)]
-            fn from_f64(value: f64) -> Self {
-                value as $number
-            }
-
-            #[inline(always)]
-            fn to_f64(self) -> f64 {
-                f64::from(self)
-            }
-
-            fn typed(samples: &[Self]) -> Samples<'_> {
-                Samples::$variant(samples)
-            }
-
-            fn typed_mut(samples: &mut [Self]) -> SamplesMut<'_> {
-                SamplesMut::$variant(samples)
-            }
-
-            fn same<S: Sample>(samples: &[S]) -> Option<&[Self]> {
-                if let Samples::$variant(samples) = S::typed(samples) { Some(samples) } else { None }
-            }
-
-            fn same_mut<S: Sample>(samples: &mut [S]) -> Option<&mut [Self]> {
-                if let SamplesMut::$variant(samples) = S::typed_mut(samples) { Some(samples) } else { None }
-            }
-        }
-    };
+/// The samples themselves, if they are of type `T`.
+pub(crate) fn same<S: Sample, T: Sample>(samples: &[S]) -> Option<&[T]> {
+    // Of the two types no other has the size of this one.
+    (size_of::<S>() == size_of::<T>()).then(|| bytemuck::cast_slice(samples))
 }
 
-sample!(f32, F32);
-sample!(f64, F64);
+/// The samples themselves, if they are of type `T`.
+pub(crate) fn same_mut<S: Sample, T: Sample>(samples: &mut [S]) -> Option<&mut [T]> {
+    (size_of::<S>() == size_of::<T>()).then(|| bytemuck::cast_slice_mut(samples))
+}

@@ -1,6 +1,7 @@
 //! Samples in memory, frame after frame.
 
 use super::{Input, Output, SplitOutput, convert};
+use crate::sample::{same, same_mut};
 use crate::{Isa, ProcessError, Sample};
 use std::ops::Range;
 
@@ -35,7 +36,7 @@ impl<S: Sample> Input for Interleaved<'_, S> {
     }
 
     fn in_memory<T: Sample>(&self) -> Option<&[T]> {
-        T::same(self.samples)
+        same(self.samples)
     }
 
     fn is_finite(&self, frames: Range<usize>) -> bool {
@@ -54,7 +55,7 @@ impl<S: Sample> Output for [S] {
     }
 
     fn slots<T: Sample>(&mut self, samples: Range<usize>) -> Option<&mut [T]> {
-        T::same_mut(&mut self[samples])
+        same_mut(&mut self[samples])
     }
 
     fn store<T: Sample>(&mut self, _: Isa, first: usize, samples: &[T]) {

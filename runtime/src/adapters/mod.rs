@@ -18,6 +18,7 @@ pub(crate) use offsets::{Offsets, WithoutOffsets};
 pub use pcm::PcmOutput;
 pub use planar::Planar;
 
+use crate::sample::same;
 use crate::{Isa, Sample};
 use std::ops::Range;
 
@@ -108,7 +109,7 @@ const SCRATCH: usize = 1024;
 
 /// The same numbers in another type.
 fn convert<S: Sample, T: Sample>(from: &[S], to: &mut [T]) {
-    if let Some(same) = T::same(from) {
+    if let Some(same) = same(from) {
         to.copy_from_slice(same);
         return;
     }

@@ -1,9 +1,8 @@
 //! The offsets of the converters, subtracted from the samples on their way to the kernels.
 
 use super::Input;
-use crate::sample::SamplesMut;
+use crate::sample::same;
 use crate::{BuildError, Isa, Sample};
-use std::ops::Sub;
 
 /// Samples after which the pattern of offsets repeats, at least: long enough for whole vectors.
 const PATTERN: usize = 256;
@@ -38,16 +37,10 @@ impl Offsets {
 
     /// Subtracts the offsets from whole frames.
     fn subtract_from<T: Sample>(&self, samples: &mut [T]) {
-        match T::typed_mut(samples) {
-            SamplesMut::F32(samples) => subtract(samples, &self.single),
-            SamplesMut::F64(samples) => subtract(samples, &self.double),
+        let pattern: &[T] = same(&self.single).or_else(|| same(&self.double)).unwrap_or_default();
+        for part in samples.chunks_mut(pattern.len()) {
+            part.iter_mut().zip(pattern).for_each(|(sample, &offset)| *sample = *sample - offset);
         }
-    }
-}
-
-fn subtract<T: Copy + Sub<Output = T>>(samples: &mut [T], pattern: &[T]) {
-    for part in samples.chunks_mut(pattern.len()) {
-        part.iter_mut().zip(pattern).for_each(|(sample, &offset)| *sample = *sample - offset);
     }
 }
 

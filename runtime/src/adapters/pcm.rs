@@ -2,7 +2,7 @@
 
 use super::{Input, MOST_ROWS, Output, SCRATCH, SplitOutput, convert, interleave_rows};
 use crate::pcm::for_pcm_format;
-use crate::sample::{Samples, SamplesMut};
+use crate::sample::{same, same_mut};
 use crate::simd::{decode, encode};
 use crate::{Isa, PcmFormat, PcmFrames, Sample, SampleLayout};
 use std::ops::Range;
@@ -41,6 +41,12 @@ impl<'a> PcmOutput<'a> {
     }
 }
 
+/// Whether samples of a layout lie in memory as numbers of type `T` do.
+fn is_native<T: Sample>(layout: SampleLayout) -> bool {
+    let format = if size_of::<T>() == 4 { PcmFormat::F32Le } else { PcmFormat::F64Le };
+    layout == SampleLayout::packed(format.native())
+}
+
 /// Several recordings side by side: their channels follow each other.
 impl Input for [PcmFrames<'_>] {
     fn channels(&self) -> usize {
@@ -49,6 +55,12 @@ impl Input for [PcmFrames<'_>] {
 
     fn frames(&self) -> usize {
         self.iter().map(PcmFrames::frames).min().unwrap_or(0)
+    }
+
+    fn in_memory<T: Sample>(&self) -> Option<&[T]> {
+        let [alone] = self else { return None };
+        let whole = &alone.bytes[..alone.bytes.len() / alone.frame_bytes() * alone.frame_bytes()];
+        if is_native::<T>(alone.layout) { bytemuck::try_cast_slice(whole).ok() } else { None }
     }
 
     fn is_finite(&self, frames: Range<usize>) -> bool {
@@ -61,8 +73,8 @@ impl Input for [PcmFrames<'_>] {
         }
         let n = self.channels();
         let mono = self.iter().all(|recording| recording.channels == 1);
-        match T::typed_mut(samples) {
-            SamplesMut::F32(samples) if mono && n <= MOST_ROWS => {
+        match same_mut::<T, f32>(samples) {
+            Some(samples) if mono && n <= MOST_ROWS => {
                 interleave_rows(isa, n, samples, |i, start, row| {
                     load_recording(isa, &self[i], first + start, row);
                 });
@@ -74,8 +86,8 @@ impl Input for [PcmFrames<'_>] {
 
 /// All channels from one recording.
 fn load_recording<T: Sample>(isa: Isa, recording: &PcmFrames<'_>, first: usize, samples: &mut [T]) {
-    let done = match T::typed_mut(samples) {
-        SamplesMut::F32(samples) if recording.layout.is_packed() => {
+    let done = match same_mut::<T, f32>(samples) {
+        Some(samples) if recording.layout.is_packed() => {
             decode(isa, recording.layout.format, &recording.bytes[first * recording.frame_bytes()..], samples)
         }
         _ => 0,
@@ -120,15 +132,20 @@ impl Output for PcmOutput<'_> {
         self.part = Some(part);
     }
 
+    fn slots<T: Sample>(&mut self, samples: Range<usize>) -> Option<&mut [T]> {
+        let (layout, before) = self.selected();
+        let bytes = &mut self.bytes[before..];
+        let numbers = is_native::<T>(layout).then(|| bytemuck::try_cast_slice_mut(bytes).ok());
+        numbers.flatten().map(|numbers| &mut numbers[samples])
+    }
+
     fn store<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]) {
         let (layout, before) = self.selected();
         let SampleLayout { format, container } = layout;
         let out = &mut self.bytes[before + first * container..];
-        self.clipped += match T::typed(samples) {
-            Samples::F32(samples) if layout.is_packed() => encode(isa, format, samples, out),
-            Samples::F64(samples) if layout.is_packed() && format.bytes() < 4 => {
-                encode_by_scratch(isa, format, samples, out)
-            }
+        self.clipped += match same(samples) {
+            Some(samples) if layout.is_packed() => encode(isa, format, samples, out),
+            None if layout.is_packed() && format.bytes() < 4 => encode_by_scratch(isa, format, samples, out),
             // Formats that hold more digits than f32, and samples apart.
             _ => encode_each(layout, samples, out),
         };

@@ -1,7 +1,7 @@
 //! Samples in memory, channel after channel.
 
 use super::{Input, MOST_ROWS, convert, interleave_rows};
-use crate::sample::SamplesMut;
+use crate::sample::{same, same_mut};
 use crate::{Isa, ProcessError, Sample};
 use std::ops::Range;
 
@@ -40,7 +40,7 @@ impl<S: Sample> Input for Planar<'_, S> {
     /// One channel is interleaved as it lies.
     fn in_memory<T: Sample>(&self) -> Option<&[T]> {
         match self.channels {
-            [alone] => T::same(alone),
+            [alone] => same(alone),
             _ => None,
         }
     }
@@ -53,12 +53,10 @@ impl<S: Sample> Input for Planar<'_, S> {
 
     fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
         let n = self.channels.len();
-        match T::typed_mut(samples) {
-            SamplesMut::F32(samples) if n <= MOST_ROWS => {
-                interleave_rows(isa, n, samples, |i, start, row| {
-                    convert(&self.channels[i][first + start..][..row.len()], row);
-                })
-            }
+        match same_mut::<T, f32>(samples) {
+            Some(samples) if n <= MOST_ROWS => interleave_rows(isa, n, samples, |i, start, row| {
+                convert(&self.channels[i][first + start..][..row.len()], row);
+            }),
             _ => {
                 for (k, frame) in (first..).zip(samples.chunks_exact_mut(n)) {
                     for (slot, channel) in frame.iter_mut().zip(self.channels) {

@@ -8,8 +8,8 @@
 
 use super::filter::phase_taps;
 use super::overlap_save::Shape;
-use crate::BuildError;
 use crate::simd::{SHORTEST_TRANSFORM, group_lanes};
+use crate::{BuildError, PcmFormat};
 use std::fmt;
 use std::str::FromStr;
 
@@ -64,6 +64,12 @@ pub enum Precision {
 }
 
 impl Precision {
+    /// For samples of a format: those with more digits than f32 need sums in f64.
+    pub fn of(format: PcmFormat) -> Self {
+        use PcmFormat::{F64Be, F64Le, S32Be, S32Le};
+        if matches!(format, F64Be | F64Le | S32Be | S32Le) { Self::Double } else { Self::Single }
+    }
+
     /// Bytes of a number.
     pub(crate) fn bytes(self) -> f64 {
         match self {

@@ -137,6 +137,15 @@ impl PcmFormat {
         }
     }
 
+    /// The same numbers in the byte order of this machine.
+    pub const fn native(self) -> Self {
+        match self {
+            Self::S8 | Self::U8 => self,
+            // In pairs, the little-endian one first.
+            _ => Self::ALL[self as usize / 2 * 2 + cfg!(target_endian = "big") as usize],
+        }
+    }
+
     const fn is_big_endian(self) -> bool {
         matches!(self, Self::S16Be | Self::S24Be | Self::S32Be | Self::F32Be | Self::F64Be)
     }

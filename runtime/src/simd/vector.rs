@@ -15,7 +15,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 /// A sample type: f32 or f64.
 pub(crate) trait Number:
-    Copy
+    bytemuck::Pod
     + Default
     + Debug
     + PartialEq
