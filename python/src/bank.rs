@@ -4,7 +4,6 @@ use crate::arrays::framed;
 use crate::background;
 use crate::errors::{choose, file_error, no_others, refused};
 use crate::fuse::{self, Request, parse_algorithm, parse_gaps};
-use crate::inputs;
 use crate::pictures;
 use crate::results::{Figures, Gamma};
 use crate::running::{Extras, Follow};
@@ -317,7 +316,7 @@ impl Bank {
     ) -> PyResult<Bound<'py, PyAny>> {
         let py = x.py();
         no_others(slf.as_any(), "fuse", unknown)?;
-        if interleaved.is_some() || inputs::is_foreign(x)? {
+        if interleaved.is_some() || sources::is_foreign(x)? {
             let keywords = PyDict::new(py);
             keywords.set_item("axis", axis)?;
             keywords.set_item("dtype", dtype)?;
@@ -417,12 +416,13 @@ impl Bank {
 
     /// The bank as a state space, if it is not too large for dense matrices.
     fn block(&self) -> PyResult<StateSpace> {
-        let SynthesisFilters::Fir(taps) = &self.bank.filters else {
-            let filters = design::filters::lifted(&self.bank.filters, self.bank.ratio).map_err(refused)?;
-            return Ok(design::filters::to_block(&filters));
+        let lags = |f: &Vec<f64>| f.len().div_ceil(self.bank.ratio).saturating_sub(1);
+        let states = match &self.bank.filters {
+            SynthesisFilters::Fir(taps) => {
+                taps.iter().map(lags).max().unwrap_or(0).saturating_mul(taps.len())
+            }
+            _ => 0,
         };
-        let lags = taps.iter().map(|f| f.len().div_ceil(self.bank.ratio)).max().unwrap_or(1);
-        let states = lags.saturating_sub(1).saturating_mul(taps.len());
         if states > MOST_DENSE_STATES {
             return Err(refused(format!(
                 "ss would have {states} states, and dense matrices of at most {MOST_DENSE_STATES} are made; use taps"

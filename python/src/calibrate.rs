@@ -3,8 +3,8 @@
 use crate::arrays::{Held, framed};
 use crate::background;
 use crate::errors::refused;
-use crate::quantities::frequencies;
 use crate::sources;
+use crate::values::frequencies;
 use hybank::calibrate::{
     self as calibration, CalibrationSignal, ChannelEstimate, Fit, Fitting, Record, Settings, applied,
 };

@@ -1,12 +1,12 @@
 //! Fuses arrays.
 
 use crate::arrays::{Held, Shape};
+use crate::background::Signals;
 use crate::errors::{choose, refused};
 use crate::formats::Format;
 use crate::outputs::NewArray;
 use crate::results::FuseReport;
 use crate::running::{Extras, Running};
-use crate::signals::Signals;
 use hybank::bank::Bank;
 use hybank::pipeline::{self, DroppedLatency, GapPolicy, Outcome, PipelineError, Settings};
 use hybank::runtime::{Algorithm, Frames, Options, PcmFrames, Plan, Precision, ThreadPool};

@@ -3,8 +3,8 @@
 use crate::arrays::{Held, Shape};
 use crate::background;
 use crate::errors::{choose, refused};
-use crate::quantities::frequencies;
-use crate::records::record;
+use crate::results::record;
+use crate::values::frequencies;
 use hybank::measure::{self as quality, Imbalance, Settings, Window};
 use hybank::overview::{Figure, column};
 use hybank::units::{Decibels, Hertz};

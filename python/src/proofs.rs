@@ -3,10 +3,9 @@
 use crate::background;
 use crate::bank::Bank;
 use crate::errors::{refused, refused_in};
-use crate::quantities::{shares, times};
-use crate::records::{any, record};
-use crate::results::{Analysis, Verified};
+use crate::results::{Analysis, Verified, any, record};
 use crate::sources;
+use crate::values::{shares, times};
 use hybank::bank::{self, check_digest};
 use hybank::design::uncertainty::{BoxWidths, ErrorStudy, Questions, ReferenceChannel, RefusedBox, Sweep};
 use hybank::design::{self, DesignError};

@@ -3,7 +3,7 @@
 use crate::errors::{HybankError, refused, warn};
 use crate::formats::Format;
 use crate::fuse::plan;
-use crate::records::record;
+use crate::results::record;
 use crate::sources;
 use hybank::bank::Bank;
 use hybank::io::IoError;

@@ -3,9 +3,9 @@
 use crate::arrays::{Held, Shape};
 use crate::background;
 use crate::errors::refused;
-use crate::quantities::{numbers, shares, times};
 use crate::results::Capture;
 use crate::sources;
+use crate::values::{numbers, shares, times};
 use hybank::design::Problem;
 use hybank::simulate::{
     Analog, ComplexSource, ConverterErrors, Delivered, Recording, RefusedError, Signal, Source,
