@@ -1,23 +1,24 @@
 //! `hybank align`: when recordings began, how their clocks drift, their polarities and gains.
 
-use super::align_report::Report;
 use super::bank_file::{parse_spec, read_kind};
 use super::calibrate::{check_rate, records, reference};
-use super::capture_args::CaptureArgs;
+use super::calibrate_report::{Interval, interval, periods, shown};
+use super::capture_args::{CaptureArgs, check_stdin};
 use super::capture_file::start;
 use super::file_kind::FileKind;
 use super::interrupt::interrupts;
-use super::match_bank::check_stdin;
-use super::print::{Failure, is_dash, say_understood, warn};
+use super::print::{Failure, check_json, is_dash, say_understood, show, warn};
 use super::written::{Mono, begin_file, begin_recording, check_outputs, write_text, write_together};
 use hybank::calibrate::Record;
 use hybank::figures::Alone;
 use hybank::io::{Container, PcmFormat, ReadOptions, StreamHeader, is_same_rate};
 use hybank::messages::{Number, Quoted};
 use hybank::quantity::{self, Time};
+use hybank::sine_fit::Estimate;
 use hybank::spec::{DesignOverrides, Spec};
-use hybank::track::{AlignError, AlignSettings, Alignment, DriftModel, align};
+use hybank::track::{AlignError, AlignSettings, AlignedChannel, Alignment, DriftModel, align};
 use hybank::units::Seconds;
+use std::fmt::Write as _;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -113,11 +114,7 @@ impl Args {
     fn check_usage(&self) -> Result<(), Failure> {
         self.reading.check(false)?;
         check_stdin(self.captures.iter().chain([&self.spec]).map(PathBuf::as_path))?;
-        if self.json && is_dash(&self.output) {
-            let message = "--json and `-o -` both want standard output; write the spec to a file";
-            return Err(Failure::Usage(message.into()));
-        }
-        Ok(())
+        check_json(self.json, &self.output, "spec")
     }
 
     /// Refuses outputs that are inputs; `others` are those beside the spec.
@@ -229,5 +226,100 @@ impl Recordings {
 impl From<AlignError> for Failure {
     fn from(error: AlignError) -> Self {
         Self::input(error)
+    }
+}
+
+/// The report of an alignment.
+#[derive(Debug, serde::Serialize)]
+struct Report {
+    /// The reference channel, from 1.
+    reference: usize,
+    /// Frames that all recordings have.
+    frames: usize,
+    /// Pieces that were compared, and those of them that gave delays.
+    pieces: usize,
+    measured: usize,
+    channels: Vec<ChannelReport>,
+    /// What one recorder gives, and all of them together.
+    alone: Alone,
+    one_suffices: bool,
+    warnings: Vec<String>,
+}
+
+#[derive(Debug, serde::Serialize)]
+struct ChannelReport {
+    /// From 1.
+    channel: usize,
+    /// Samples to cut off at the beginning.
+    skip: usize,
+    /// Fast periods, at the first frame.
+    delay_samples: Interval,
+    drift_ppm: Interval,
+    gain: Interval,
+    offset: Interval,
+}
+
+impl ChannelReport {
+    fn new(spec: &Spec, channel: usize, found: &AlignedChannel) -> Self {
+        let h = spec.fast_period;
+        let Estimate { value, sigma } = found.delay;
+        let delay = Estimate { value: value.in_fast_periods(h), sigma: sigma.in_fast_periods(h) };
+        let drift = Estimate { value: 1e6 * found.drift.value, sigma: 1e6 * found.drift.sigma };
+        Self {
+            channel,
+            skip: found.skip,
+            delay_samples: periods(delay),
+            drift_ppm: interval(drift),
+            gain: interval(found.gain),
+            offset: interval(found.offset),
+        }
+    }
+}
+
+impl Report {
+    fn new(spec: &Spec, found: &Alignment, alone: Alone, mut warnings: Vec<String>) -> Self {
+        let channels = found.channels.iter().enumerate();
+        warnings.extend(found.warnings.iter().map(ToString::to_string));
+        Self {
+            reference: found.reference + 1,
+            frames: found.frames,
+            pieces: found.pieces,
+            measured: found.measured,
+            channels: channels.map(|(i, one)| ChannelReport::new(spec, i + 1, one)).collect(),
+            alone,
+            one_suffices: alone.suffices(),
+            warnings,
+        }
+    }
+
+    fn print(&self, output: &Path, others: &[PathBuf], json: bool) -> Result<(), Failure> {
+        self.warnings.iter().for_each(|warning| warn(warning));
+        // Standard output carries the spec.
+        if is_dash(output) { Ok(()) } else { show(self, json, |report| report.text(output, others)) }
+    }
+
+    fn text(&self, output: &Path, others: &[PathBuf]) -> String {
+        let Self { frames, reference, pieces, measured, .. } = self;
+        let mut text = format!(
+            "{frames} frames in common, {measured} of {pieces} pieces measured, relative to channel {reference}:\n  \
+             channel    cut off     delay (fast periods)      drift (ppm)               gain                      offset\n"
+        );
+        for channel in &self.channels {
+            let ChannelReport { channel, skip, delay_samples, drift_ppm, gain, offset, .. } = channel;
+            let [delay, drift, gain, offset] =
+                [delay_samples, drift_ppm, gain, offset].map(|cell| shown(*cell));
+            let _ = writeln!(text, "  {channel:<10} {skip:<11} {delay:<25} {drift:<25} {gain:<25} {offset}");
+        }
+        let Alone { channel, snr_db, together_db } = self.alone;
+        let verdict = if self.one_suffices { "one recorder suffices" } else { "fuse them" };
+        let _ = writeln!(
+            text,
+            "alone      channel {channel} gives {:.1} dB at best, all together {:.1} dB: {verdict}",
+            snr_db.0, together_db.0
+        );
+        for path in others.iter().map(PathBuf::as_path).chain([output]) {
+            let _ = writeln!(text, "{}", path.display());
+        }
+        text
     }
 }

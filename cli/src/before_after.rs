@@ -2,9 +2,8 @@
 
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, check_files_on_disk, unread};
 use super::measure::{ToneArg, tone, tones};
-use super::plot::PictureFormat;
+use super::plot::write_picture;
 use super::print::{Failure, is_dash};
-use super::written::write_bytes;
 use hybank::bank::Bank;
 use hybank::files::{FileError, refuse_overlaps};
 use hybank::io::{MultiReader, OfflineSamples, is_pipe};
@@ -80,8 +79,7 @@ impl BeforeAfterArgs {
         })?;
         if let Some(path) = &self.plot {
             let (chart, marks) = before_after(&found.before, &found.after);
-            let format = PictureFormat::of(path).unwrap_or(PictureFormat::Svg);
-            write_bytes(path, &format.file(&chart, &marks).map_err(Failure::input)?, force)?;
+            write_picture(path, &chart, &marks, force)?;
         }
         Ok(found)
     }

@@ -2,7 +2,7 @@
 
 use super::before_after;
 use super::output::{Bits, begin_samples};
-use super::print::{Failure, name, print, warn};
+use super::print::{Failure, check_strict, name, print, warn};
 use super::run::{Job, each_block, interrupted, print_report};
 use hybank::bank::Bank;
 use hybank::files::commit_all;
@@ -88,9 +88,7 @@ impl BitTrueArgs {
         };
         let warnings: Vec<String> =
             reader.warnings().iter().map(ToString::to_string).chain(report.warnings()).collect();
-        if let (Some(first), true) = (warnings.first(), job.args.strict) {
-            return Err(Failure::Input(format!("{first} (an error because of --strict)")));
-        }
+        check_strict(&warnings, job.args.strict)?;
         commit_all(run.output.finish().map_err(Failure::running)?).map_err(Failure::input)?;
         warnings.iter().for_each(|warning| warn(warning));
         report.measure = measured()?;

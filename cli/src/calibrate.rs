@@ -2,14 +2,12 @@
 
 use super::bank_file::{bad_flag, parse_spec, read_kind};
 use super::calibrate_report::Report;
-use super::capture_args::{CaptureArgs, InterleavedArgs};
+use super::capture_args::{CaptureArgs, InterleavedArgs, check_stdin};
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, rails_of, start, unread};
 use super::file_kind::FileKind;
 use super::interrupt::interrupts;
-use super::match_bank::check_stdin;
 use super::measure::{ToneArg, tone, tones};
-use super::print::{Failure, is_dash, say_understood, warn};
-use super::remedy::explained;
+use super::print::{Failure, check_json, explained, say_understood, warn};
 use super::written::{check_outputs, write_text};
 use hybank::calibrate::{
     Acquisition, CalibrateError, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning,
@@ -199,10 +197,7 @@ impl Args {
     /// Refuses impossible combinations of options, before any file is read.
     fn check_usage(&self) -> Result<(), Failure> {
         self.reading.check(self.turns.is_given())?;
-        if self.json && is_dash(&self.output) {
-            let message = "--json and `-o -` both want standard output; write the spec to a file";
-            return Err(Failure::Usage(message.into()));
-        }
+        check_json(self.json, &self.output, "spec")?;
         let inputs = self.captures.iter().chain(&self.check).chain(&self.training).chain([&self.spec]);
         let inputs: Vec<&Path> = inputs.map(PathBuf::as_path).collect();
         check_stdin(inputs.iter().copied())?;

@@ -1,7 +1,6 @@
 //! What `calibrate` prints.
 
-use super::print::{Failure, is_dash, show, warn};
-use super::remedy::explained;
+use super::print::{Failure, explained, is_dash, show, warn};
 use hybank::calibrate::{Calibration, ChannelEstimate, Warning};
 use hybank::messages::Quoted;
 use hybank::sine_fit::Estimate;

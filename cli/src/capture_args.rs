@@ -1,7 +1,8 @@
-//! How captures are read whose header does not say it, and converters that take turns in one recording.
+//! How captures are read whose header does not say it, converters that take turns in one recording, and whether
+//! captures fit the bank.
 
 use super::output::WAV;
-use super::print::Failure;
+use super::print::{Failure, is_dash};
 use hybank::bank::{Bank, FrameLayout};
 use hybank::io::{Coding, MultiReader, ReadOptions, TimeInterleaving};
 use hybank::messages::Quoted;
@@ -185,4 +186,18 @@ impl InterleavedArgs {
             _ => Failure::Usage(format!("--interleaved {converters}: {}: {problem}", Quoted(path))),
         })
     }
+}
+
+/// `-` may be given once.
+pub(super) fn check_stdin<'a>(inputs: impl Iterator<Item = &'a Path>) -> Result<(), Failure> {
+    if inputs.filter(|path| is_dash(path)).count() > 1 {
+        return Err(Failure::Usage("`-` is given twice; standard input can be only one of them".into()));
+    }
+    Ok(())
+}
+
+/// The inputs together have the channels of the bank in the file `path`; the rate of the output in hertz.
+pub(super) fn output_rate(bank: &Bank, path: &Path, reader: &MultiReader) -> Result<f64, Failure> {
+    matching::check_channels(bank, &path.display().to_string(), reader).map_err(Failure::input)?;
+    matching::output_rate(bank, reader).map_err(Failure::input)
 }

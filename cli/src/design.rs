@@ -4,7 +4,7 @@ use super::bank_file::{bad_flag, load_spec};
 use super::design_report::{Judged, Report};
 use super::design_studies::BandHint;
 use super::interrupt::{end_at_interrupt, end_with};
-use super::print::{Failure, InFile, check_strict, is_dash, say, say_understood, show, warn};
+use super::print::{Failure, InFile, check_json, check_strict, is_dash, say, say_understood, show, warn};
 use super::progress::Progress;
 use super::written::{check_outputs, write_text};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -115,10 +115,7 @@ fn overrides(args: &Args) -> DesignOverrides {
 }
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
-    if args.json && is_dash(&args.output) {
-        let message = "--json and `-o -` both want standard output; write the bank to a file";
-        return Err(Failure::Usage(message.into()));
-    }
+    check_json(args.json, &args.output, "bank")?;
     check_outputs(&[&args.output], &[&args.spec])?;
     let mut spec = load_spec(&args.spec, overrides(args))?.for_outputs(&[&args.output])?;
     spec.latency = args.latency.or(spec.latency);

@@ -6,8 +6,7 @@ use super::bit_true::BitTrueArgs;
 use super::capture_args::CaptureArgs;
 use super::observer::RunObserver;
 use super::output::Bits;
-use super::print::say_understood;
-use super::print::{Failure, is_dash};
+use super::print::{Failure, is_dash, print, say_understood};
 use super::run::{Finished, Job, RunArgs, RunReport, print_report};
 use hybank::bank::Bank;
 use hybank::io::{Container, MultiReader};
@@ -100,9 +99,9 @@ impl Report<'_> {
     /// The figures of --measure; what was written, and whether the captures agree with the bank.
     fn text(&self, output: &Path) -> String {
         let figures = self.measure.as_ref().map_or_else(String::new, before_after::text);
-        let (samples, clipped) = (counted(self.run.samples, "sample"), self.run.clipped);
+        let (samples, clipped) = (counted(self.run.outcome.samples, "sample"), self.run.outcome.clipped);
         let rate = self.rate as f64;
-        let length = readable(self.run.samples as f64 / rate, "s");
+        let length = readable(self.run.outcome.samples as f64 / rate, "s");
         let level =
             if self.peak > 0.0 { format!(" ({:.1} dBFS)", 20.0 * self.peak.log10()) } else { String::new() };
         let clipped = if clipped == 0 { "none".to_owned() } else { clipped.to_string() };
@@ -165,7 +164,7 @@ impl Args {
         if taken.into_iter().flatten().any(is_dash) {
             return Ok(());
         }
-        super::print::print(&report.text(&self.output))
+        print(&report.text(&self.output))
     }
 
     fn start_reader(&self, job: &Job<'_>, observer: Option<&RunObserver>) -> Result<MultiReader, Failure> {

@@ -3,7 +3,6 @@
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 mod align;
-mod align_report;
 mod analyze;
 mod bank_file;
 mod before_after;
@@ -25,15 +24,12 @@ mod fuse;
 mod gaps;
 mod import;
 mod interrupt;
-mod match_bank;
 mod measure;
-mod measure_report;
 mod observer;
 mod output;
 mod plot;
 mod print;
 mod progress;
-mod remedy;
 mod report;
 mod run;
 mod simulate;

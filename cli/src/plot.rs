@@ -2,7 +2,7 @@
 
 use super::bank_file::load;
 use super::print::{Failure, InFile, print};
-use super::written::{begin_file, check_outputs, write_together};
+use super::written::{begin_file, check_outputs, write_bytes, write_together};
 use hybank::bank::Bank;
 use hybank::design::{DesignError, Options, design};
 use hybank::overview::{Picture, pictures};
@@ -91,6 +91,12 @@ impl PictureFormat {
             Self::Png => chart.to_png_with(marks),
         }
     }
+}
+
+/// Writes a picture: PNG if the name ends in .png, else SVG.
+pub(super) fn write_picture(path: &Path, chart: &Chart, marks: &[Marks], force: bool) -> Result<(), Failure> {
+    let format = PictureFormat::of(path).unwrap_or(PictureFormat::Svg);
+    write_bytes(path, &format.file(chart, marks).in_file(path)?, force)
 }
 
 /// Points of a curve.

@@ -1,12 +1,19 @@
 //! All that the commands say: results on standard output, messages on standard error, and the one message of
-//! a failure.
+//! a failure, with the options of this program that remedy an error of the library. The library itself names keys
+//! of the spec and fields, because its errors are also read in Python, in C and in a browser.
 
-use super::remedy::explained;
-use hybank::files::{StandardStream, leftovers};
+use hybank::calibrate::{CalibrateError, Warning};
+use hybank::design::DesignError;
+use hybank::files::{FileError, StandardStream, leftovers};
+use hybank::interchange::ExportError;
+use hybank::io::IoError;
 use hybank::messages::{Quoted, printable, shown};
 use hybank::overview::understood;
 use hybank::pipeline::PipelineError;
 use hybank::spec::Spec;
+use hybank::track::{AlignError, TrackError};
+use hybank::verify::VerifyError;
+use std::any::Any;
 use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -96,6 +103,15 @@ pub(super) fn print_json(report: &impl serde::Serialize) -> Result<(), Failure> 
     print(&(serde_json::to_string(report).map_err(Failure::input)? + "\n"))
 }
 
+/// Refuses a report and an output of `what` that both go to standard output.
+pub(super) fn check_json(json: bool, output: &Path, what: &str) -> Result<(), Failure> {
+    if json && is_dash(output) {
+        let message = format!("--json and `-o -` both want standard output; write the {what} to a file");
+        return Err(Failure::Usage(message));
+    }
+    Ok(())
+}
+
 /// A report: as one JSON object, or as text.
 pub(super) fn show<R: serde::Serialize>(
     report: &R,
@@ -167,4 +183,78 @@ pub(super) fn is_dash(path: &Path) -> bool {
 /// The name of a file in messages.
 pub(super) fn name(path: &Path) -> String {
     if is_dash(path) { "standard input".to_owned() } else { path.display().to_string() }
+}
+
+/// The text of an error or a warning, followed by the option that remedies it.
+pub(super) fn explained(error: &(impl Display + 'static)) -> String {
+    option(error).map_or_else(|| error.to_string(), |option| format!("{error}; {option}"))
+}
+
+fn option(error: &dyn Any) -> Option<&'static str> {
+    let of_file = |error: &FileError| match error {
+        FileError::Exists { .. } => Some("--force replaces it"),
+        FileError::Special { .. } => Some("or write to `-` and redirect"),
+        _ => None,
+    };
+    None.or_else(|| of_file(error.downcast_ref()?))
+        .or_else(|| match error.downcast_ref()? {
+            IoError::File(error) => of_file(error),
+            _ => None,
+        })
+        .or_else(|| match error.downcast_ref()? {
+            PipelineError::File(error) | PipelineError::Io(IoError::File(error)) => of_file(error),
+            _ => None,
+        })
+        .or_else(|| of_design(error.downcast_ref()?))
+        .or_else(|| of_proof(error.downcast_ref()?))
+        .or_else(|| of_calibration(error.downcast_ref()?))
+        .or_else(|| match error.downcast_ref()? {
+            Warning::CutoffExplains { .. } => Some("--fit takes that list"),
+            _ => None,
+        })
+        .or_else(|| match error.downcast_ref()? {
+            ExportError::NoIntegers { .. } => Some("`hybank design --method fir --bits B` designs them"),
+            ExportError::Offset { .. } => Some("--input-bits B does"),
+            ExportError::NoWords => Some("leave out --input-bits"),
+            _ => None,
+        })
+        .or_else(|| match error.downcast_ref()? {
+            AlignError::Ambiguous { .. } => Some("--within says so"),
+            AlignError::Spec(error) => of_calibration(error),
+            _ => None,
+        })
+        .or_else(|| match error.downcast_ref()? {
+            TrackError::NoTapSlopes => Some("`hybank design --tracking affine` designs such taps"),
+            _ => None,
+        })
+}
+
+fn of_design(error: &DesignError) -> Option<&'static str> {
+    match error {
+        DesignError::TooLong { .. } | DesignError::TooLarge { .. } => Some("--no-limit runs it all the same"),
+        DesignError::StoppedWithoutBank { .. } => Some("--no-limit runs it to its end"),
+        DesignError::Verify(error) => of_proof(error),
+        _ => None,
+    }
+}
+
+fn of_proof(error: &VerifyError) -> Option<&'static str> {
+    match error {
+        VerifyError::NoCertificate => {
+            Some("`hybank design` writes one, and `hybank verify --search` searches for one")
+        }
+        VerifyError::WideBox => Some("the box is that of --delay-box, --gain-box and --cutoff-box"),
+        _ => None,
+    }
+}
+
+fn of_calibration(error: &CalibrateError) -> Option<&'static str> {
+    match error {
+        CalibrateError::ComplexSamples { .. } => Some("--tone names them, or finds them with `auto`"),
+        CalibrateError::AmbiguousZone { .. } => Some("--tone takes it"),
+        CalibrateError::NotIdentifiable | CalibrateError::CutoffLooksLikeDelay { .. } => {
+            Some("--fit takes what is fitted")
+        }
+        _ => None,
+    }
 }

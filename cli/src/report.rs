@@ -1,9 +1,8 @@
 //! `hybank report`: all that is known of a bank, on one page.
 
 use super::bank_file::load;
-use super::capture_args::{CaptureArgs, InterleavedArgs};
+use super::capture_args::{CaptureArgs, InterleavedArgs, output_rate};
 use super::capture_file::{start, unread};
-use super::match_bank::output_rate;
 use super::print::{Failure, name, warn};
 use super::written::{check_outputs, write_text};
 use hybank::bank::Bank;

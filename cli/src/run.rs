@@ -1,16 +1,13 @@
 //! How `fuse` and `stream` run a bank: their common options, the run from its plan to its files, the report.
 
 use super::bank_file;
-use super::capture_args::{InterleavedArgs, ScaleArgs};
+use super::capture_args::{InterleavedArgs, ScaleArgs, check_stdin, output_rate};
 use super::file_kind::unreadable;
 use super::gaps::{GapArgs, say_gaps};
 use super::interrupt::interrupts;
-use super::match_bank;
 use super::observer::{ObserverArgs, RunObserver};
 use super::output::{begin_samples, check_files};
-use super::print::print_json;
-use super::print::{Failure, is_dash};
-use super::print::{say_json, warn};
+use super::print::{Failure, check_strict, is_dash, print_json, say_json, warn};
 use super::track::{TrackArgs, TrackRecord, Tracked};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hybank::bank::Bank;
@@ -19,8 +16,8 @@ use hybank::io::{
     ReadOptions, is_sigmf,
 };
 use hybank::pipeline::matching;
-use hybank::pipeline::{DroppedLatency, FileOutputs, GapSummary, Outcome, Pipeline, Settings, Warning};
-use hybank::runtime::{Algorithm, Input, Options, Plan, PlanSummary, Precision, ThreadPool};
+use hybank::pipeline::{DroppedLatency, FileOutputs, Outcome, Pipeline, Settings, Warning};
+use hybank::runtime::{Algorithm, Input, Options, Plan, Precision, ThreadPool};
 use std::path::{Path, PathBuf};
 
 /// Options of the commands that fuse.
@@ -36,8 +33,11 @@ pub(super) struct RunArgs {
     pub(super) gaps: GapArgs,
     #[command(flatten)]
     track: TrackArgs,
-    #[command(flatten)]
-    threads: ThreadArgs,
+    /// Threads that filter (FIR banks only), 0 for one per processor. The result has the same bits with any
+    /// number. More than one thread helps with many taps or channels; otherwise reading and writing take
+    /// longer than filtering
+    #[arg(long, value_name = "T", default_value_t = 1, value_parser = clap::value_parser!(u16).range(0..=1024))]
+    threads: u16,
     #[command(flatten)]
     pub(super) observer: ObserverArgs,
     /// Make every tolerated fault (unequal lengths, truncation, an incomplete last frame, NaN, clipping) an
@@ -67,19 +67,9 @@ fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
     PossibleValuesParser::new(names).try_map(|name| name.parse())
 }
 
-/// Threads of the filters.
-#[derive(Debug, Clone, Copy, clap::Args)]
-struct ThreadArgs {
-    /// Threads that filter (FIR banks only), 0 for one per processor. The result has the same bits with any
-    /// number. More than one thread helps with many taps or channels; otherwise reading and writing take
-    /// longer than filtering
-    #[arg(long, value_name = "T", default_value_t = 1, value_parser = clap::value_parser!(u16).range(0..=1024))]
-    threads: u16,
-}
-
-impl ThreadArgs {
-    /// `None` if the calling thread does all.
-    fn workers(self) -> Result<Option<ThreadPool>, Failure> {
+impl RunArgs {
+    /// Threads beside the calling one, if it does not do all.
+    fn workers(&self) -> Result<Option<ThreadPool>, Failure> {
         if self.threads == 1 {
             return Ok(None);
         }
@@ -87,13 +77,6 @@ impl ThreadArgs {
         ThreadPool::new(self.threads.into()).map(Some).map_err(refused)
     }
 
-    /// Bytes of each input that are read at a time, for `bytes` with one thread: enough for all threads.
-    fn bytes(self, bytes: usize) -> usize {
-        if self.threads == 1 { bytes } else { 8 * bytes }
-    }
-}
-
-impl RunArgs {
     /// Refuses impossible combinations of options, before any file is read. The command `prints` on standard
     /// output besides.
     pub(super) fn check(
@@ -104,7 +87,7 @@ impl RunArgs {
         container: Container,
         prints: bool,
     ) -> Result<(), Failure> {
-        match_bank::check_stdin(inputs.iter().map(PathBuf::as_path).chain([bank]))?;
+        check_stdin(inputs.iter().map(PathBuf::as_path).chain([bank]))?;
         self.gaps.check()?;
         self.turns.check(inputs.len())?;
         self.observer.check(output, self.json || prints)?;
@@ -164,7 +147,8 @@ impl Job<'_> {
         let lost = args.gaps.lost_samples(self.is_live)?;
         let turns = args.turns.turns(self.bank, self.bank_path)?;
         let stalls = observer.map(RunObserver::stall_watch);
-        let block_bytes = args.threads.bytes(BLOCK_BYTES);
+        // Enough for all threads.
+        let block_bytes = if args.threads == 1 { BLOCK_BYTES } else { 8 * BLOCK_BYTES };
         let stated = self.bank.spec.as_ref().and_then(|spec| spec.full_scale);
         let layout = self.bank.layout();
         let files = ReadOptions {
@@ -200,7 +184,7 @@ impl Job<'_> {
 
     /// The rate of the output in hertz, if the inputs fit the bank.
     pub(super) fn output_rate(&self, reader: &MultiReader) -> Result<f64, Failure> {
-        match_bank::output_rate(self.bank, self.bank_path, reader)
+        output_rate(self.bank, self.bank_path, reader)
     }
 
     /// Fuses all frames and writes the outputs; `each` is told how many frames a step had.
@@ -212,7 +196,7 @@ impl Job<'_> {
         each: &dyn Fn(u64),
     ) -> Result<Finished, Failure> {
         let (rate, is_complex) = (self.output_rate(reader)?, reader.is_complex());
-        let workers = self.args.threads.workers()?;
+        let workers = self.args.workers()?;
         let settings = Settings { workers: workers.as_ref(), ..self.settings() };
         let pipeline = Pipeline::new(self.bank, plan, settings, self.format, is_complex);
         let mut pipeline = pipeline.map_err(Failure::running)?;
@@ -245,12 +229,12 @@ impl Job<'_> {
         let outcome = self.drain(pipeline, reader.consumed(), &mut outputs)?;
         let TrackRecord { log, warnings, .. } = tracked.take();
         let checked = observer.checked();
-        let report = RunReport::new(outcome, self.tolerated(reader), self.lossless);
         // A frame may hold several samples of a converter.
-        let report = RunReport { channels: self.bank.channel_count(), ..report };
+        let outcome = Outcome { channels: self.bank.channel_count(), ..outcome };
+        let report = RunReport::new(outcome, self.tolerated(reader), self.lossless);
         let report = report.with(checked.warnings, self.is_live, warnings);
         let shift = (latency - dropped) as u64;
-        let (ratio, samples) = (self.bank.ratio as u64, report.samples);
+        let (ratio, samples) = (self.bank.ratio as u64, report.outcome.samples);
         let placement = Placement { ratio, per_frame: 1, shift, samples };
         outputs.annotate(self.notes(reader, &report, placement)?);
         let peak = outputs.peak();
@@ -324,7 +308,7 @@ impl Job<'_> {
         // Only this kind of output holds the rest.
         if is_sigmf(self.output) {
             notes.record_bank(&self.bank.digest().map_err(Failure::input)?);
-            for gap in report.gaps.iter().flat_map(|gaps| &gaps.list) {
+            for gap in report.outcome.gaps.iter().flat_map(|gaps| &gaps.list) {
                 let comment = format!("channel {}: {} samples missing", gap.channel, gap.length);
                 let per_frame = self.bank.samples.get(gap.channel - 1).map_or(1, |&samples| samples as u64);
                 let placement = Placement { per_frame, ..placement };
@@ -342,12 +326,12 @@ impl Job<'_> {
         report: &RunReport,
         observer: &mut RunObserver,
     ) -> Result<(), Failure> {
-        let judged = report.judge(self.args.strict);
+        let judged = check_strict(&report.warnings, self.args.strict);
         if judged.is_ok() {
             outputs.finish().map_err(Failure::running)?;
         }
         let are_said = observer.quiet();
-        report.gaps.iter().for_each(|gaps| say_gaps(gaps, are_said));
+        report.outcome.gaps.iter().for_each(|gaps| say_gaps(gaps, are_said));
         judged?;
         report.warnings[..report.warnings.len() - report.reported].iter().for_each(|warning| warn(warning));
         Ok(())
@@ -379,21 +363,8 @@ pub(super) fn interrupted(frames: u64) -> Failure {
 /// What every command that fuses reports.
 #[derive(Debug, serde::Serialize)]
 pub(super) struct RunReport {
-    /// How the bank ran.
-    plan: PlanSummary,
-    channels: usize,
-    ratio: usize,
-    /// Output samples written.
-    pub(super) samples: u64,
-    /// Output samples that saturated.
-    pub(super) clipped: u64,
-    /// Input samples that were NaN or infinite and became 0.
-    replaced: u64,
-    /// Times that a recursion's state was not finite and was set to zero.
-    state_resets: u64,
-    /// Missing samples, if --gaps asked for them.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    gaps: Option<GapSummary>,
+    #[serde(flatten)]
+    pub(super) outcome: Outcome,
     warnings: Vec<String>,
     /// How many of the last warnings were reported during the run.
     #[serde(skip)]
@@ -409,8 +380,7 @@ impl RunReport {
             _ => warning.to_string(),
         };
         let warnings = tolerated.into_iter().chain(outcome.warnings()).map(text).collect();
-        let Outcome { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps, .. } = outcome;
-        Self { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps, warnings, reported: 0 }
+        Self { outcome, warnings, reported: 0 }
     }
 
     /// With those of the captures, and with those that were reported during the run.
@@ -419,14 +389,6 @@ impl RunReport {
         self.warnings.extend(captures);
         self.warnings.extend(reported);
         self
-    }
-
-    /// With `strict` the first warning is an error.
-    fn judge(&self, strict: bool) -> Result<(), Failure> {
-        match self.warnings.first() {
-            Some(first) if strict => Err(Failure::Input(format!("{first} (an error because of --strict)"))),
-            _ => Ok(()),
-        }
     }
 }
 

@@ -126,7 +126,7 @@ impl Args {
         observer.end(&report)?;
         let printed = if self.run.json { print_report(&report, &self.output) } else { Ok(()) };
         if *is_interrupted && printed.is_ok() {
-            say_line(&format!("interrupted after {frames} frames, {} samples written", run.samples));
+            say_line(&format!("interrupted after {frames} frames, {} samples written", run.outcome.samples));
         }
         printed
     }

@@ -6,7 +6,7 @@ use crate::runtime::PlanSummary;
 use std::fmt;
 
 /// Counts and settings of a finished run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Outcome {
     /// The plan with which the bank ran.
     pub plan: PlanSummary,
@@ -23,9 +23,11 @@ pub struct Outcome {
     /// Times that a recursion's state was not finite and was set to zero.
     pub state_resets: u64,
     /// Missing samples, if they were to be filled.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub gaps: Option<GapSummary>,
     /// One byte per output sample, 1 if a missing input affects it, if gaps were to be filled by
     /// [`fuse`](super::fuse). A [`Pipeline`](super::Pipeline) hands the mask over with its samples.
+    #[serde(skip)]
     pub mask: Option<Vec<u8>>,
 }
 
