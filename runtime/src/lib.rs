@@ -57,7 +57,7 @@ mod thread_pool;
 
 pub use adapters::{Frames, Input, Interleaved, Output, PcmOutput, Planar, SplitOutput, Zeros};
 pub use algorithms::choice::{Algorithm, ParseAlgorithmError, Precision};
-pub use algorithms::recursive::StateSpace;
+pub use algorithms::recursive::{DelayLines, DelayedInput, StateSpace};
 pub use error::{BuildError, ProcessError, StateError, SwapError};
 pub use pcm::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
 pub use plan::{Options, Plan, PlanSummary};

@@ -2,6 +2,8 @@
 
 use super::ExportError;
 use crate::bank::{Bank, StateSpace, SynthesisFilters};
+use crate::runtime::{DelayLines, DelayedInput};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 /// The part `z^-delay (b0 + b1 z^-1 + b2 z^-2) / (1 + a1 z^-1 + a2 z^-2)` of a filter entry, z^-1 being one
@@ -27,11 +29,6 @@ impl Section {
     }
 }
 
-/// The states that a section takes in the bank: x+ = f x + (what drives it).
-struct Block {
-    states: Vec<usize>,
-}
-
 /// The sections of a bank: the delays of its FIR head with their taps, two at a time, and its poles.
 ///
 /// With the states of a section s, x+ = A x + sum over d of `B_d u[k - d]`, its part of the output is
@@ -45,153 +42,81 @@ pub fn sections(bank: &Bank) -> Result<Vec<Section>, ExportError> {
     let SynthesisFilters::StateSpace(block) = &bank.filters else {
         return Err(ExportError::NoSections("this bank has no poles; csv and npz hold its taps"));
     };
-    let structure = Structure::of(block)?;
+    let lines = DelayLines::new(block);
+    let poles = pole_blocks(&lines).ok_or(ExportError::NoSections(
+        "some of its poles nearly coincide, so that no sections side by side have its accuracy; npz and mat hold its \
+         matrices, and a design with order has fewer poles",
+    ))?;
     let mut all = Vec::new();
     for channel in 0..bank.frame_samples() {
         for phase in 0..bank.ratio {
-            all.extend(structure.entry(block, channel, phase));
+            all.extend(entry(&lines, &poles, channel, phase));
         }
     }
     Ok(all)
 }
 
-/// Which state is a delayed input, and which belong to poles.
-struct Structure {
-    /// Of each state.
-    delayed: Vec<Option<DelayedInput>>,
-    poles: Vec<Block>,
+/// The sections from a channel to a phase.
+fn entry(lines: &DelayLines, poles: &[Poles], channel: usize, phase: usize) -> Vec<Section> {
+    let section = |delay, b, a| Section { channel, phase, delay, b, a };
+    let of_channel = |terms: &BTreeMap<DelayedInput, Vec<f64>>| -> Vec<(usize, Vec<f64>)> {
+        let own = terms.iter().filter(|((i, _), _)| *i == channel);
+        own.map(|((_, delay), factors)| (*delay, factors.clone())).collect()
+    };
+    let (taps, drives) = (of_channel(&lines.taps), of_channel(&lines.b));
+    let tap = |at: usize| taps.iter().find(|(delay, _)| *delay == at).map_or(0.0, |(_, taps)| taps[phase]);
+    let last = taps.last().map_or(0, |(delay, _)| *delay);
+    let head = (0..=last).step_by(2).map(|delay| section(delay, [tap(delay), tap(delay + 1), 0.0], [0.0; 2]));
+    let parts = poles.iter().flat_map(|poles| {
+        let part = |(delay, drive): &(usize, Vec<f64>)| {
+            section(*delay, poles.numerator(lines, phase, drive), poles.denominator(lines))
+        };
+        drives.iter().map(part).collect::<Vec<_>>()
+    });
+    head.chain(parts).filter(|section| section.b.iter().any(|b| *b != 0.0)).collect()
 }
 
-/// The input of a channel `delay` >= 1 slow periods ago.
-#[derive(Clone, Copy)]
-struct DelayedInput {
-    channel: usize,
-    delay: usize,
-}
-
-impl Structure {
-    fn of(block: &StateSpace) -> Result<Self, ExportError> {
-        let delayed: Vec<_> = (0..block.a.len()).map(|state| delayed_input(block, state)).collect();
-        let poles = pole_blocks(block, &delayed).ok_or(ExportError::NoSections(
-            "some of its poles nearly coincide, so that no sections side by side have its accuracy; npz and mat \
-             hold its matrices, and a design with order has fewer poles",
-        ))?;
-        Ok(Self { delayed, poles })
-    }
-
-    fn entry(&self, block: &StateSpace, channel: usize, phase: usize) -> Vec<Section> {
-        let section = |delay, b, a| Section { channel, phase, delay, b, a };
-        let head = self.head(block, channel, phase);
-        let pairs = head
-            .chunks(2)
-            .enumerate()
-            .map(|(k, taps)| section(2 * k, [taps[0], taps.get(1).copied().unwrap_or(0.0), 0.0], [0.0; 2]));
-        let poles = self.poles.iter().flat_map(|poles| {
-            let a = poles.denominator(block);
-            let part = move |(delay, drive): (usize, Vec<f64>)| {
-                section(delay, poles.numerator(block, phase, &drive), a)
-            };
-            poles.drives(block, &self.delayed, channel).into_iter().map(part).collect::<Vec<_>>()
-        });
-        pairs.chain(poles).filter(|section| section.b.iter().any(|b| *b != 0.0)).collect()
-    }
-
-    /// The taps of the delayed inputs, without delay first.
-    fn head(&self, block: &StateSpace, channel: usize, phase: usize) -> Vec<f64> {
-        let mut taps = vec![block.d[phase][channel]];
-        for (state, place) in self.delayed.iter().enumerate() {
-            if let Some(DelayedInput { delay, .. }) = place.filter(|input| input.channel == channel) {
-                taps.resize(taps.len().max(delay + 1), 0.0);
-                taps[delay] += block.c[phase][state];
-            }
-        }
-        taps
-    }
-}
-
-/// The input that a state holds, if all it does is to repeat it: each state on the way has one coefficient,
-/// which is 1.
-fn delayed_input(block: &StateSpace, state: usize) -> Option<DelayedInput> {
-    let n = block.a.len();
-    let mut at = state;
-    for delay in 1..=n {
-        let mut row = block.a[at].iter().chain(&block.b[at]).enumerate().filter(|(_, x)| **x != 0.0);
-        let (column, value) = row.next()?;
-        if *value != 1.0 || row.next().is_some() {
-            return None;
-        }
-        match column.checked_sub(n) {
-            Some(channel) => return Some(DelayedInput { channel, delay }),
-            None => at = column,
-        }
-    }
-    None
+/// The states of a pole or of two that drive one another: x+ = f x + (what drives it).
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct Poles {
+    state: usize,
+    other: Option<usize>,
 }
 
 /// The states of poles, one or two each; `None` if more of them drive one another.
-fn pole_blocks(block: &StateSpace, delayed: &[Option<DelayedInput>]) -> Option<Vec<Block>> {
-    let own: Vec<usize> = (0..delayed.len()).filter(|&state| delayed[state].is_none()).collect();
-    let drives = |i: usize, j: usize| i != j && (block.a[i][j] != 0.0 || block.a[j][i] != 0.0);
-    let mut blocks = Vec::new();
-    for &state in &own {
-        let partners: Vec<usize> = own.iter().copied().filter(|&other| drives(state, other)).collect();
-        match partners[..] {
-            [] => blocks.push(Block { states: vec![state] }),
-            [other] if own.iter().filter(|&&third| drives(other, third)).count() == 1 => {
-                if state < other {
-                    blocks.push(Block { states: vec![state, other] });
-                }
-            }
-            _ => return None,
+fn pole_blocks(lines: &DelayLines) -> Option<Vec<Poles>> {
+    let of = |(state, other): (usize, Option<usize>)| match other {
+        Some(j) if lines.a[state][j] == 0.0 && lines.a[j][state] == 0.0 => {
+            vec![Poles { state, other: None }, Poles { state: j, other: None }]
         }
-    }
+        _ => vec![Poles { state, other }],
+    };
+    let mut blocks: Vec<Poles> = lines.sections()?.into_iter().flat_map(of).collect();
+    blocks.sort();
     Some(blocks)
 }
 
-impl Block {
-    fn a(&self, block: &StateSpace, row: usize, column: usize) -> f64 {
-        block.a[self.states[row]][self.states[column]]
-    }
-
+impl Poles {
     /// -tr A and det A; of one state -A and 0.
-    fn denominator(&self, block: &StateSpace) -> [f64; 2] {
-        let a = |i, j| self.a(block, i, j);
-        match self.states.len() {
-            1 => [-a(0, 0), 0.0],
-            _ => [-(a(0, 0) + a(1, 1)), a(0, 0) * a(1, 1) - a(0, 1) * a(1, 0)],
+    fn denominator(&self, lines: &DelayLines) -> [f64; 2] {
+        let (a, i) = (&lines.a, self.state);
+        match self.other {
+            None => [-a[i][i], 0.0],
+            Some(j) => [-(a[i][i] + a[j][j]), a[i][i] * a[j][j] - a[i][j] * a[j][i]],
         }
     }
 
     /// 0, c B and c (A - tr A) B; of one state 0, c B and 0.
-    fn numerator(&self, block: &StateSpace, phase: usize, drive: &[f64]) -> [f64; 3] {
-        let c = |i: usize| block.c[phase][self.states[i]];
-        let a = |i, j| self.a(block, i, j);
-        match drive {
-            [single] => [0.0, c(0) * single, 0.0],
-            _ => {
+    fn numerator(&self, lines: &DelayLines, phase: usize, drive: &[f64]) -> [f64; 3] {
+        let (a, c, i) = (&lines.a, |state: usize| lines.c[state][phase], self.state);
+        match self.other {
+            None => [0.0, c(i) * drive[i], 0.0],
+            Some(j) => {
                 let swapped =
-                    [a(0, 1) * drive[1] - a(1, 1) * drive[0], a(1, 0) * drive[0] - a(0, 0) * drive[1]];
-                [0.0, c(0) * drive[0] + c(1) * drive[1], c(0) * swapped[0] + c(1) * swapped[1]]
+                    [a[i][j] * drive[j] - a[j][j] * drive[i], a[j][i] * drive[i] - a[i][i] * drive[j]];
+                [0.0, c(i) * drive[i] + c(j) * drive[j], c(i) * swapped[0] + c(j) * swapped[1]]
             }
         }
-    }
-
-    /// The coefficients B_d of a channel's input d periods ago, with d.
-    fn drives(
-        &self,
-        block: &StateSpace,
-        delayed: &[Option<DelayedInput>],
-        channel: usize,
-    ) -> Vec<(usize, Vec<f64>)> {
-        let direct = self.states.iter().map(|&state| block.b[state][channel]).collect();
-        let mut drives = vec![(0, direct)];
-        for (of, place) in delayed.iter().enumerate() {
-            if let Some(DelayedInput { delay, .. }) = place.filter(|input| input.channel == channel) {
-                drives.push((delay, self.states.iter().map(|&state| block.a[state][of]).collect()));
-            }
-        }
-        drives.retain(|(_, drive): &(usize, Vec<f64>)| drive.iter().any(|x| *x != 0.0));
-        drives
     }
 }
 

@@ -4,25 +4,25 @@ use super::StateSpace;
 use std::collections::BTreeMap;
 
 /// An input some frames ago: (channel, frames).
-pub(super) type DelayedInput = (usize, usize);
+pub type DelayedInput = (usize, usize);
 
 /// A state-space filter with its delay lines taken out:
 /// y = sum taps u + sum c x, x+ = sum a x + sum b u, where u are inputs of this frame and of earlier ones.
 #[derive(Debug)]
-pub(crate) struct DelayLines {
+pub struct DelayLines {
     /// For each past input that the output takes, its M factors.
-    pub(crate) taps: BTreeMap<DelayedInput, Vec<f64>>,
+    pub taps: BTreeMap<DelayedInput, Vec<f64>>,
     /// For each past input that the states take, a factor for each state.
-    pub(crate) b: BTreeMap<DelayedInput, Vec<f64>>,
+    pub b: BTreeMap<DelayedInput, Vec<f64>>,
     /// Row by row.
-    pub(crate) a: Vec<Vec<f64>>,
+    pub a: Vec<Vec<f64>>,
     /// One list of M factors for each state.
-    pub(crate) c: Vec<Vec<f64>>,
+    pub c: Vec<Vec<f64>>,
 }
 
 impl DelayLines {
     /// The matrices have fitting shapes.
-    pub(crate) fn new(filter: &StateSpace) -> Self {
+    pub fn new(filter: &StateSpace) -> Self {
         let delayed = delayed_inputs(filter);
         let core: Vec<usize> = (0..delayed.len()).filter(|&s| delayed[s].is_none()).collect();
         let read = |s: usize| filter.c.iter().map(move |row| row[s]);
@@ -52,7 +52,7 @@ impl DelayLines {
 
     /// The states by twos such that each depends on the other one of its two at most; one may be alone.
     /// `None` if the states depend on one another in another way.
-    pub(crate) fn sections(&self) -> Option<Vec<(usize, Option<usize>)>> {
+    pub fn sections(&self) -> Option<Vec<(usize, Option<usize>)>> {
         let n = self.a.len();
         let coupled = |i: usize, j: usize| i != j && (self.a[i][j] != 0.0 || self.a[j][i] != 0.0);
         let mut sections = Vec::new();

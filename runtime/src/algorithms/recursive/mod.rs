@@ -14,7 +14,7 @@ mod layout;
 #[cfg(test)]
 mod tests;
 
-use self::delay_lines::DelayLines;
+pub use self::delay_lines::{DelayLines, DelayedInput};
 use self::layout::Layout;
 use super::filter::{Facts, Filter, replace_not_finite};
 use crate::adapters::{Input, Output};
