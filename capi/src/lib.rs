@@ -4,23 +4,19 @@
 mod abi;
 
 use hybank::bank::Bank;
-use hybank::files::{Bound, read_text};
+use hybank::files::{SPEC_OR_BANK, read_text};
 use hybank::messages::shown;
 use hybank::runtime::{Algorithm, Options, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, Stream};
 use std::cell::RefCell;
 use std::ffi::CString;
 use std::path::Path;
 
-/// The largest bank with its proof is smaller.
-const BANK_FILE: Bound =
-    Bound { bytes: 256 << 20, kind: "a bank file", remedy: "give the file that was meant" };
-
 /// 16-bit samples in the byte order of this machine.
 const INT16: PcmFormat = PcmFormat::S16Le.native();
 
 /// A stream through the bank of a file.
 fn open(path: &str, algorithm: &str, double_sums: bool) -> Result<Stream, String> {
-    let text = read_text(Path::new(path), BANK_FILE).map_err(|error| error.to_string())?;
+    let text = read_text(Path::new(path), SPEC_OR_BANK).map_err(|error| error.to_string())?;
     let bank = Bank::from_json(&text, path).map_err(|error| error.to_string())?;
     let precision = if double_sums { Precision::Double } else { Precision::Single };
     let algorithm = algorithm.parse::<Algorithm>().map_err(|error| format!("algorithm: {error}"))?;

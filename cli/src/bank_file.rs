@@ -5,7 +5,7 @@ use super::print::{Failure, InFile, is_dash, name, say_line};
 use hybank::analog::fit::{MeasuredResponse, vector_fit};
 use hybank::bank::Bank;
 use hybank::design::filters;
-use hybank::files::{self, Bound, FileError, StandardStream};
+use hybank::files::{self, Bound, FileError, SPEC_OR_BANK, StandardStream};
 use hybank::memory::check_memory;
 use hybank::messages::Quoted;
 use hybank::quantity::readable;
@@ -15,10 +15,6 @@ use hybank::spec::{
 };
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
-
-/// Maximum size of a spec or bank file; the largest bank with its proof is smaller.
-const TEXT_FILE: Bound =
-    Bound { bytes: 256 << 20, kind: "a spec or bank file", remedy: "give the file that was meant" };
 
 /// Reads a bank file; `-` is standard input.
 pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
@@ -123,9 +119,9 @@ fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
     let bytes = if is_dash(path) {
         let check = StandardStream::Input.check();
         check.map_err(FileError::system(&name(path), "read it")).map_err(Failure::input)?;
-        files::bytes_of(std::io::stdin().lock(), &name(path), TEXT_FILE)
+        files::bytes_of(std::io::stdin().lock(), &name(path), SPEC_OR_BANK)
     } else {
-        files::read_bytes(path, TEXT_FILE)
+        files::read_bytes(path, SPEC_OR_BANK)
     };
     bytes.map_err(Failure::input)
 }

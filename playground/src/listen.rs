@@ -6,9 +6,8 @@ use hybank::bank::{Bank, FrameSample};
 use hybank::design::Problem;
 use hybank::io::wav::WavReader;
 use hybank::overview;
-use hybank::pipeline::{Settings, fuse};
+use hybank::pipeline::{Settings, fused};
 use hybank::quantity::readable;
-use hybank::runtime::{Options, Planar, Precision};
 use hybank::simulate::{Analog, Captured, Recording, Source, Tone, capture, frames, interleaved};
 use hybank::spec::{SignalSpec, Spec};
 use hybank::units::{FastPeriods, Hertz, Seconds};
@@ -75,7 +74,7 @@ fn playback(bank: &Bank, spec: &Spec, signal: &Signal) -> Result<Answer, Refusal
     }
     let channels = samples_of_frames(bank, &channels);
     let before = interleaved(&bank.sample_delays(), bank.ratio, bank.wait(), &channels);
-    let after = fused(bank, &channels)?;
+    let after = fused(bank, &channels, Settings::default()).map_err(Refusal::new)?;
     let snr_of = |output: &[f64]| snr(&target, output, SETTLING + bank.latency);
     let chart =
         overview::spectra(spec.fast_period.rate(), &[("plain interleaving", &before), ("fused", &after)]);
@@ -96,16 +95,6 @@ fn samples_of_frames(bank: &Bank, converters: &[Vec<f64>]) -> Vec<Vec<f64>> {
         converters[converter].iter().skip(number).step_by(bank.samples[converter]).copied().collect()
     };
     bank.layout().iter().map(of).collect()
-}
-
-fn fused(bank: &Bank, channels: &[Vec<f64>]) -> Result<Vec<f64>, Refusal> {
-    let plan =
-        bank.plan(Options { precision: Precision::Double, ..Options::default() }).map_err(Refusal::new)?;
-    let lists: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
-    let input = Planar::new(&lists).map_err(Refusal::new)?;
-    let mut output = vec![0.0; bank.ratio * channels.first().map_or(0, Vec::len)];
-    fuse(bank, &plan, &[input], &mut output[..], Settings::default(), &|| false).map_err(Refusal::new)?;
-    Ok(output)
 }
 
 /// 10 log10 of the power of the target over that of the error, without `skipped` samples at either end.

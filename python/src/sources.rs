@@ -4,15 +4,11 @@ use crate::bank::Bank;
 use crate::errors::{file_error, refused, refused_in, spec_error};
 use crate::values;
 use hybank::bank;
-use hybank::files::{self, Bound as SizeBound};
+use hybank::files;
 use hybank::spec::{DesignOverrides, Spec};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyString, PyTuple};
 use std::path::{Path, PathBuf};
-
-/// The largest bank with its proof is smaller.
-const TEXT_FILE: SizeBound =
-    SizeBound { bytes: 256 << 20, kind: "a spec or bank file", remedy: "give the file that was meant" };
 
 /// The spec that `source` is, names or carries: a path, a TOML text of several lines, a mapping, or a bank.
 /// A bank stands for its spec with the latency of the bank.
@@ -56,7 +52,7 @@ pub(crate) fn path(source: &Bound<'_, PyAny>) -> Option<PathBuf> {
 
 /// The text of a spec or bank file.
 pub(crate) fn read(path: &Path) -> PyResult<String> {
-    files::read_text(path, TEXT_FILE).map_err(file_error)
+    files::read_text(path, files::SPEC_OR_BANK).map_err(file_error)
 }
 
 /// A bank that can run.

@@ -17,6 +17,10 @@ pub struct Bound {
     pub remedy: &'static str,
 }
 
+/// Specs and banks; the largest bank with its proof is smaller.
+pub const SPEC_OR_BANK: Bound =
+    Bound { bytes: 256 << 20, kind: "a spec or bank file", remedy: "give the file that was meant" };
+
 /// Bytes of memory that a number or a key of a text takes while it is read, and an object with its members.
 const PART_BYTES: f64 = 200.0;
 const OBJECT_BYTES: f64 = 800.0;
