@@ -1,7 +1,7 @@
 //! `fuse --bit-true`: integer taps on the integers of the captures, as hardware has them.
 
 use super::before_after;
-use super::output::{Bits, begin_samples};
+use super::output::begin_samples;
 use super::print::{Failure, check_strict, name, print, warn};
 use super::run::{Job, each_block, interrupted, print_report};
 use hybank::bank::Bank;
@@ -121,14 +121,14 @@ fn integer_format(reader: &MultiReader) -> Result<PcmFormat, Failure> {
     let Some((first, format, is_complex)) = formats.next() else {
         return Err(Failure::input("--bit-true: there is no input"));
     };
-    let bits = match format {
+    let written = match format {
         _ if is_complex => None,
-        PcmFormat::S16Le | PcmFormat::S16Be => Some(Bits::I16),
-        PcmFormat::S24Le | PcmFormat::S24Be => Some(Bits::I24),
-        PcmFormat::S32Le | PcmFormat::S32Be => Some(Bits::I32),
+        PcmFormat::S16Le | PcmFormat::S16Be => Some(PcmFormat::S16Le),
+        PcmFormat::S24Le | PcmFormat::S24Be => Some(PcmFormat::S24Le),
+        PcmFormat::S32Le | PcmFormat::S32Be => Some(PcmFormat::S32Le),
         _ => None,
     };
-    let Some(bits) = bits else {
+    let Some(written) = written else {
         return Err(Failure::Input(format!(
             "{}: --bit-true takes real integers of 16, 24 or 32 bits, and these are {}; convert the capture",
             Quoted(first),
@@ -143,7 +143,7 @@ fn integer_format(reader: &MultiReader) -> Result<PcmFormat, Failure> {
             Quoted(first),
             format.name()
         ))),
-        None => Ok(bits.format()),
+        None => Ok(written),
     }
 }
 

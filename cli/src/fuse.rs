@@ -5,11 +5,11 @@ use super::before_after::{self, BeforeAfterArgs};
 use super::bit_true::BitTrueArgs;
 use super::capture_args::CaptureArgs;
 use super::observer::RunObserver;
-use super::output::Bits;
+use super::output::bits;
 use super::print::{Failure, is_dash, print, say_understood};
 use super::run::{Finished, Job, RunArgs, RunReport, print_report};
 use hybank::bank::Bank;
-use hybank::io::{Container, MultiReader};
+use hybank::io::{Container, MultiReader, PcmFormat};
 use hybank::messages::Quoted;
 use hybank::overview::{BeforeAfter, counted};
 use hybank::pipeline::DroppedLatency;
@@ -45,8 +45,8 @@ pub(super) struct Args {
     #[arg(short, long)]
     output: PathBuf,
     /// Sample format of the output: integers of 16, 24 or 32 bits, floats of 32 or 64 bits
-    #[arg(long, value_enum, default_value_t = Bits::F32)]
-    bits: Bits,
+    #[arg(long, value_parser = bits(), default_value = "32f")]
+    bits: PcmFormat,
     /// Keep the bank's latency: the causal output, as `stream` gives it
     #[arg(long)]
     keep_latency: bool,
@@ -131,7 +131,7 @@ impl Args {
             bank_path: &self.bank,
             output: &self.output,
             container: Container::Wav,
-            format: self.bits.format(),
+            format: self.bits,
             scale: self.reading.scale,
             dropped: if self.keep_latency { DroppedLatency::Added } else { DroppedLatency::All },
             is_live: false,

@@ -2,6 +2,7 @@
 
 use super::print::{Failure, is_dash};
 use super::print::{name_leftovers, warn};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hybank::files::refuse_overlaps;
 use hybank::io::{
     Container, IoError, OutputHeader, PcmFormat, SampleWriter, is_pipe, is_sigmf, mat_variable, sigmf_files,
@@ -9,37 +10,21 @@ use hybank::io::{
 use hybank::messages::Quoted;
 use std::path::Path;
 
-/// Sample formats of a WAV output.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(super) enum Bits {
-    /// 16-bit integers
-    #[value(name = "16")]
-    I16,
-    /// 24-bit integers
-    #[value(name = "24")]
-    I24,
-    /// 32-bit integers
-    #[value(name = "32")]
-    I32,
-    /// 32-bit floats
-    #[value(name = "32f")]
-    F32,
-    /// 64-bit floats
-    #[value(name = "64f")]
-    F64,
-}
+/// Sample formats of a WAV output, by their names on the command line.
+const WIDTHS: [(&str, PcmFormat, &str); 5] = [
+    ("16", PcmFormat::S16Le, "16-bit integers"),
+    ("24", PcmFormat::S24Le, "24-bit integers"),
+    ("32", PcmFormat::S32Le, "32-bit integers"),
+    ("32f", PcmFormat::F32Le, "32-bit floats"),
+    ("64f", PcmFormat::F64Le, "64-bit floats"),
+];
 
-impl Bits {
-    /// The sample format of this width.
-    pub(super) fn format(self) -> PcmFormat {
-        match self {
-            Self::I16 => PcmFormat::S16Le,
-            Self::I24 => PcmFormat::S24Le,
-            Self::I32 => PcmFormat::S32Le,
-            Self::F32 => PcmFormat::F32Le,
-            Self::F64 => PcmFormat::F64Le,
-        }
-    }
+/// Reads `--bits`.
+pub(super) fn bits() -> impl TypedValueParser<Value = PcmFormat> {
+    let names = WIDTHS.map(|(name, _, help)| PossibleValue::new(name).help(help));
+    PossibleValuesParser::new(names).try_map(|given| {
+        WIDTHS.iter().find(|(name, ..)| *name == given).map(|(_, format, _)| *format).ok_or("unknown name")
+    })
 }
 
 /// Begins an output of samples, and says what its header cannot.
