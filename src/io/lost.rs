@@ -216,8 +216,10 @@ impl LostSamples {
         let here = |line: &LostLine| {
             let Entry::Invalid(frames) = &line.entry else { return None };
             let inside = line.channel.is_none_or(|channel| channels.contains(&channel)) && !frames.is_empty();
-            let channel = line.channel.map(|channel| channel - channels.start);
-            inside.then(|| Dropout { channel, frames: frames.clone() })
+            inside.then(|| Dropout {
+                channel: line.channel.map(|channel| channel - channels.start),
+                frames: frames.clone(),
+            })
         };
         let mut dropouts: Vec<_> = self.lines.iter().filter_map(here).collect();
         dropouts.sort_by_key(|dropout| (dropout.frames.start, dropout.channel));
@@ -308,6 +310,7 @@ mod tests {
         {"sample_start": 5, "global_index": 18}
 
         {"channel": 3, "first": 40, "length": 3}
+        {"channel": 1, "first": 30, "length": 2}
         {"first": 20, "length": 1}
         {"channel": 2, "first": 7, "length": 0}
     "#;
@@ -323,7 +326,7 @@ mod tests {
         let timestamp = |frame, index| Timestamp { frame, index };
         assert_eq!(inputs[0].timestamps, Timestamps::new(vec![timestamp(0, 10), timestamp(5, 18)]).unwrap());
         assert_eq!(inputs[1].timestamps, Timestamps::new(vec![timestamp(5, 18)]).unwrap());
-        assert_eq!(inputs[0].dropouts, [dropout(None, 20..21)]);
+        assert_eq!(inputs[0].dropouts, [dropout(None, 20..21), dropout(Some(0), 30..32)]);
         assert_eq!(inputs[1].dropouts, [dropout(None, 20..21), dropout(Some(1), 40..43)]);
     }
 
