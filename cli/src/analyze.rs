@@ -6,13 +6,11 @@ use super::design_studies::number;
 use super::print::{Failure, InFile, is_dash, show};
 use super::worst_case::{self, write_sweep};
 use super::written::check_outputs;
-use hybank::design::uncertainty::{
-    BoxRule, BoxWidths, ErrorStudy, Questions, ReferenceChannel, RefusedBox, Sweep,
-};
+use hybank::design::uncertainty::{BoxRule, BoxWidths, ErrorStudy, Questions, RefusedBox, Sweep};
 use hybank::design::{self, Analysis, Certified, GammaScale, MeanAnalysis};
 use hybank::figures::Figures;
 use hybank::overview::{decibels, frequency, six_digits, understood};
-use hybank::quantity::{self, Time};
+use hybank::quantity;
 use hybank::units::Seconds;
 use std::path::PathBuf;
 
@@ -46,7 +44,7 @@ pub(super) struct Args {
     #[arg(long)]
     certify: bool,
     #[command(flatten)]
-    errors: Flags,
+    errors: BoxWidths,
     /// Also find the largest part of the box that costs at most this share of gamma (1%)
     #[arg(long, value_name = "LOSS", value_parser = loss)]
     accuracy: Option<f64>,
@@ -82,9 +80,8 @@ fn finite(text: &str) -> Result<Seconds, String> {
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check()?;
     let bank = load(&args.bank)?;
-    let widths = args.errors.widths();
-    let errors = widths.error_box(&bank).map_err(|refused| bad_box(&refused))?;
-    let jitter = widths.jitter_of(&bank).map_err(|refused| bad_box(&refused))?;
+    let errors = args.errors.error_box(&bank).map_err(|refused| bad_box(&refused))?;
+    let jitter = args.errors.jitter_of(&bank).map_err(|refused| bad_box(&refused))?;
     let questions = Questions { errors, jitter, sensitivity: args.sensitivity, loss: args.accuracy };
     let analysis = design::analyze(&bank, &args.delay_error).in_file(&args.bank)?;
     let certified = args.certify.then(|| design::certify(&bank)).transpose().in_file(&args.bank)?;
@@ -118,12 +115,12 @@ impl Args {
         if self.certify && !self.delay_error.is_empty() {
             return usage("--certify proves the bank with its own delays; leave out --delay-error");
         }
-        let asked = self.errors.is_given() || !self.errors.jitter.is_empty() || self.sensitivity;
+        let asked = self.errors.has_box() || !self.errors.jitter.is_empty() || self.sensitivity;
         if asked && !self.delay_error.is_empty() {
             return usage("a box of errors lies around the delays of the bank; leave out --delay-error");
         }
         for (flag, given) in [("--accuracy", self.accuracy.is_some()), ("--sweep", self.sweep.is_some())] {
-            if given && !self.errors.is_given() {
+            if given && !self.errors.has_box() {
                 return usage(&format!("{flag} needs a box of errors; give --delay-box"));
             }
         }
@@ -199,38 +196,6 @@ impl Report {
     }
 }
 
-// Not a doc comment: clap would show it as the text of the whole command.
-#[derive(Debug, clap::Args)]
-struct Flags {
-    /// Prove the worst case over delays that are off by up to this much (10ps, 0.01samples, or seconds): one
-    /// value for all channels but the reference, or one per channel
-    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::time)]
-    delay_box: Vec<Time>,
-    /// Also gains that are off by up to this share (1%, 500ppm, 0.01); values as for --delay-box
-    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
-    gain_box: Vec<f64>,
-    /// Also cut-offs that are off by up to this share; values as for --delay-box
-    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
-    cutoff_box: Vec<f64>,
-    /// Also bound what instants that jitter by up to this much may add: one value, or one per channel
-    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::time)]
-    jitter: Vec<Time>,
-    /// The channel to which delays, gains and cut-offs are relative, from 1, or none if every channel has an
-    /// error of its own [default: 1 where one value is given for all channels]
-    #[arg(long, value_name = "CHANNEL|none", value_parser = reference)]
-    reference: Option<ReferenceChannel>,
-}
-
-fn reference(text: &str) -> Result<ReferenceChannel, String> {
-    match text.trim() {
-        "none" => Ok(ReferenceChannel::None),
-        text => match text.parse::<usize>() {
-            Ok(channel) if channel > 0 => Ok(ReferenceChannel::Channel(channel)),
-            _ => Err("the reference is a channel, counted from 1, or none".to_owned()),
-        },
-    }
-}
-
 /// A refusal, with the option that it is about.
 fn bad_box(refused: &RefusedBox) -> Failure {
     let message = format!("--{}: {refused}", refused.field.replace('_', "-"));
@@ -238,23 +203,5 @@ fn bad_box(refused: &RefusedBox) -> Failure {
         BoxRule::Number(_) => Failure::Input(message),
         BoxRule::NoChannel { channel, .. } => Failure::Usage(format!("--reference {channel}: {refused}")),
         _ => Failure::Usage(message),
-    }
-}
-
-impl Flags {
-    /// Whether a box is asked for.
-    fn is_given(&self) -> bool {
-        !(self.delay_box.is_empty() && self.gain_box.is_empty() && self.cutoff_box.is_empty())
-    }
-
-    /// What is asked for.
-    fn widths(&self) -> BoxWidths {
-        BoxWidths {
-            delay_box: self.delay_box.clone(),
-            gain_box: self.gain_box.clone(),
-            cutoff_box: self.cutoff_box.clone(),
-            jitter: self.jitter.clone(),
-            reference: self.reference,
-        }
     }
 }

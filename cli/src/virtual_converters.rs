@@ -2,45 +2,10 @@
 
 use super::print::Failure;
 use hybank::io::PcmFormat;
-use hybank::quantity::{self, Time, readable};
+use hybank::quantity::readable;
 use hybank::simulate::{ConverterErrors, ErrorRule, ErrorsOfConverter, RefusedError};
 use hybank::spec::{ChannelSpec, Spec};
 use hybank::units::Seconds;
-
-/// How the converters differ from what the spec says.
-#[derive(Debug, clap::Args)]
-#[command(next_help_heading = "Errors of the converters")]
-pub(super) struct ConverterArgs {
-    /// White noise on every sample, rms relative to full scale
-    #[arg(long, value_name = "RMS", default_value_t = 0.0, allow_hyphen_values = true)]
-    noise: f64,
-    /// Round to so many bits, 2 to 24, with full scale 1; samples beyond it are clipped and counted
-    #[arg(long, value_name = "B")]
-    bits: Option<u32>,
-    /// Aperture jitter: each sample is taken this much off its instant, rms, as 2ps or 0.01samples [default:
-    /// 0]
-    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = quantity::time)]
-    jitter: Option<Time>,
-    /// By how many parts per million the clocks are too fast, one value for all or one per channel
-    #[arg(long, value_name = "PPM,..", value_delimiter = ',', allow_hyphen_values = true)]
-    drift: Vec<f64>,
-    /// True delays minus those of the spec, as 10ps or 0.01samples, one value for all or one per channel
-    #[arg(long, value_name = "TIME,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::time)]
-    delay_error: Vec<Time>,
-    /// Relative errors of the gains, as 1% or 0.01, one value for all or one per channel
-    #[arg(long, value_name = "SHARE,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
-    gain_error: Vec<f64>,
-    /// Relative errors of the cut-offs of the front ends, as 1% or 0.01, one value for all or one per
-    /// channel; of the stage that `fit` of the spec names, if it names one
-    #[arg(long, value_name = "SHARE,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
-    cutoff_error: Vec<f64>,
-    /// Offsets relative to full scale, added to those of the spec, one value for all or one per channel
-    #[arg(long, value_name = "O,..", value_delimiter = ',', allow_hyphen_values = true)]
-    offset: Vec<f64>,
-    /// Seed of noise and jitter; the same seed gives the same samples
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
-}
 
 /// What all converters have in common.
 #[derive(Debug, serde::Serialize)]
@@ -73,34 +38,6 @@ pub(super) struct ConverterReport {
     pub(super) clipped: usize,
 }
 
-impl ConverterArgs {
-    /// The errors that are asked for.
-    pub(super) fn errors(&self) -> ConverterErrors {
-        ConverterErrors {
-            noise: self.noise,
-            bits: self.bits,
-            jitter: self.jitter,
-            drift: self.drift.clone(),
-            delay_error: self.delay_error.clone(),
-            gain_error: self.gain_error.clone(),
-            cutoff_error: self.cutoff_error.clone(),
-            offset: self.offset.clone(),
-            seed: self.seed,
-        }
-    }
-
-    /// The format of the converters' codes, if they have any.
-    pub(super) fn integers(&self) -> Option<PcmFormat> {
-        self.bits.map(|bits| if bits <= 16 { PcmFormat::S16Le } else { PcmFormat::S24Le })
-    }
-
-    /// What the converters of a spec have in common.
-    pub(super) fn common(&self, spec: &Spec) -> CommonReport {
-        let jitter = self.jitter.map_or(Seconds(0.0), |jitter| jitter.in_seconds(spec.fast_period));
-        CommonReport { noise: self.noise, bits: self.bits, jitter: jitter.0, seed: self.seed }
-    }
-}
-
 /// A refusal, with the option that it is about.
 pub(super) fn bad_error(refused: &RefusedError) -> Failure {
     let message = format!("--{}: {refused}", refused.field.replace('_', "-"));
@@ -126,7 +63,18 @@ impl ConverterReport {
     }
 }
 
+/// The format of the converters' codes, if they have any.
+pub(super) fn integers(errors: &ConverterErrors) -> Option<PcmFormat> {
+    errors.bits.map(|bits| if bits <= 16 { PcmFormat::S16Le } else { PcmFormat::S24Le })
+}
+
 impl CommonReport {
+    /// Of the converters of a spec.
+    pub(super) fn new(errors: &ConverterErrors, spec: &Spec) -> Self {
+        let jitter = errors.jitter.map_or(Seconds(0.0), |jitter| jitter.in_seconds(spec.fast_period));
+        Self { noise: errors.noise, bits: errors.bits, jitter: jitter.0, seed: errors.seed }
+    }
+
     /// What differs from an ideal converter, in one line.
     pub(super) fn text(&self) -> String {
         let noise = (self.noise > 0.0).then(|| format!("noise {} of full scale rms", self.noise));

@@ -5,6 +5,7 @@ use crate::quantity::Time;
 use crate::spec::{ChannelCount, SpecProblem, check_delay_half_width, for_channels};
 use crate::units::Seconds;
 use crate::verify::uncertainty::ErrorBox;
+use std::str::FromStr;
 
 /// Shares of this size and more are out of the range of the proof.
 const MOST_SHARE: f64 = 0.5;
@@ -12,18 +13,32 @@ const MOST_SHARE: f64 = 0.5;
 /// How far the channels may be off, in both directions. A list has no value, one for all channels but the
 /// reference, or one for each.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct BoxWidths {
-    /// Of the delays.
+    /// Prove the worst case over delays that are off by up to this much (10ps, 0.01samples, or seconds): one
+    /// value for all channels but the reference, or one per channel
+    #[cfg_attr(feature = "clap", arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = crate::quantity::time))]
     pub delay_box: Vec<Time>,
-    /// Of the gains, relative.
+    /// Also gains that are off by up to this share (1%, 500ppm, 0.01); values as for --delay-box
+    #[cfg_attr(feature = "clap", arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = crate::quantity::relative))]
     pub gain_box: Vec<f64>,
-    /// Of the cut-offs, relative.
+    /// Also cut-offs that are off by up to this share; values as for --delay-box
+    #[cfg_attr(feature = "clap", arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = crate::quantity::relative))]
     pub cutoff_box: Vec<f64>,
-    /// Of the instants, differently at each sample; the reference has its own.
+    /// Also bound what instants that jitter by up to this much may add: one value, or one per channel
+    #[cfg_attr(feature = "clap", arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = crate::quantity::time))]
     pub jitter: Vec<Time>,
-    /// The channel to which delays, gains and cut-offs are relative. `None`: the first one where one value
-    /// is given for all channels, and none where each has its own.
+    /// The channel to which delays, gains and cut-offs are relative, from 1, or none if every channel has an
+    /// error of its own [default: 1 where one value is given for all channels]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "CHANNEL|none"))]
     pub reference: Option<ReferenceChannel>,
+}
+
+impl BoxWidths {
+    /// Whether a box is asked for.
+    pub fn has_box(&self) -> bool {
+        !(self.delay_box.is_empty() && self.gain_box.is_empty() && self.cutoff_box.is_empty())
+    }
 }
 
 /// What errors are relative to.
@@ -33,6 +48,21 @@ pub enum ReferenceChannel {
     None,
     /// This channel, from 1, has none.
     Channel(usize),
+}
+
+/// A channel from 1, or `none`.
+impl FromStr for ReferenceChannel {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text.trim() {
+            "none" => Ok(Self::None),
+            text => match text.parse::<usize>() {
+                Ok(channel) if channel > 0 => Ok(Self::Channel(channel)),
+                _ => Err("the reference is a channel, counted from 1, or none"),
+            },
+        }
+    }
 }
 
 /// A box that is refused.
