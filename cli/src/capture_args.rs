@@ -1,5 +1,5 @@
-//! How captures are read whose header does not say it, converters that take turns in one recording, and whether
-//! captures fit the bank.
+//! How captures are read whose header does not say it, converters that take turns in one recording, and
+//! whether captures fit the bank.
 
 use super::output::WAV;
 use super::print::{Failure, is_dash};

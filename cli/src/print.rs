@@ -1,6 +1,6 @@
-//! All that the commands say: results on standard output, messages on standard error, and the one message of
-//! a failure, with the options of this program that remedy an error of the library. The library itself names keys
-//! of the spec and fields, because its errors are also read in Python, in C and in a browser.
+//! All that the commands say: results on standard output, messages on standard error, and the one message
+//! of a failure, with the options of this program that remedy an error of the library. The library itself
+//! names keys of the spec and fields, because its errors are also read in Python, in C and in a browser.
 
 use hybank::calibrate::{CalibrateError, Warning};
 use hybank::design::DesignError;

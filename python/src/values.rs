@@ -1,5 +1,5 @@
-//! Python objects as the tables, lists, numbers and texts of a spec, and as quantities: numbers in SI units or
-//! texts such as `10ps` and `1%`, one or a list.
+//! Python objects as the tables, lists, numbers and texts of a spec, and as quantities: numbers in SI units
+//! or texts such as `10ps` and `1%`, one or a list.
 
 use crate::errors::refused;
 use hybank::messages::{Quoted, shown};

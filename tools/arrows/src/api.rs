@@ -1,8 +1,8 @@
 //! What the users of a crate can name: its source without bodies, comments and what is private.
 //!
-//! Items stand below the module that defines them, and the `pub use` lines that pass them on below theirs. What is
-//! `pub` can be reached: the compiler's `unreachable_pub` sees to that. What stands under `#[doc(hidden)]` is
-//! promised to nobody. Items that a macro makes appear as its call.
+//! Items stand below the module that defines them, and the `pub use` lines that pass them on below theirs.
+//! What is `pub` can be reached: the compiler's `unreachable_pub` sees to that. What stands under
+//! `#[doc(hidden)]` is promised to nobody. Items that a macro makes appear as its call.
 
 use crate::imports::{File, head};
 use quote::ToTokens;
