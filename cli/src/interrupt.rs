@@ -2,6 +2,7 @@
 //! orderly end, and the second one ends the process at once. In a computation the first one ends it at once.
 
 use super::print::say_line;
+#[cfg(not(unix))]
 use crossbeam_channel::Receiver;
 use hybank::files::remove_unfinished as remove_unfinished_files;
 
@@ -19,14 +20,17 @@ mod watch {
     const PATIENCE: Duration = Duration::from_secs(2);
     const STEP: Duration = Duration::from_millis(50);
 
-    /// See [`super::interrupts`].
-    pub(super) fn start() -> Receiver<()> {
+    /// A channel that receives a message at the first interrupt. A second interrupt ends the process. The first
+    /// one also ends it if the reader of standard output or standard error takes no data. Unfinished files
+    /// are removed.
+    pub(crate) fn interrupts() -> Receiver<()> {
         let (stop_sender, stop) = bounded(1);
         if watch(move |signals| until_the_end(signals, &stop_sender)) { stop } else { never() }
     }
 
-    /// See [`super::end_at_interrupt`].
-    pub(super) fn end_at_first() {
+    /// From now on an interrupt ends the process at once, with a message and exit code 1. Unfinished files are
+    /// removed.
+    pub(crate) fn end_at_interrupt() {
         watch(|mut signals| {
             if signals.forever().next().is_some() {
                 end_with("interrupted");
@@ -53,20 +57,8 @@ mod watch {
     }
 }
 
-/// A channel that receives a message at the first interrupt. A second interrupt ends the process. The first
-/// one also ends it if the reader of standard output or standard error takes no data. Unfinished files are
-/// removed.
 #[cfg(unix)]
-pub(super) fn interrupts() -> Receiver<()> {
-    watch::start()
-}
-
-/// From now on an interrupt ends the process at once, with a message and exit code 1. Unfinished files are
-/// removed.
-#[cfg(unix)]
-pub(super) fn end_at_interrupt() {
-    watch::end_at_first();
-}
+pub(super) use watch::{end_at_interrupt, interrupts};
 
 /// Nothing, on a system without signals.
 #[cfg(not(unix))]

@@ -29,7 +29,6 @@ mod observer;
 mod output;
 mod plot;
 mod print;
-mod progress;
 mod report;
 mod run;
 mod simulate;
@@ -39,7 +38,6 @@ mod track;
 mod verify;
 mod virtual_converters;
 mod virtual_signal;
-mod worst_case;
 mod written;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
