@@ -45,6 +45,9 @@ fn samples_are_written_where_they_lie() {
     output.select(1);
     assert!(output.slots::<f64>(0..1).is_none());
     assert_eq!(numbers, [0.0, 0.5, -2.0, 7.0]);
+    let mut empty = PcmOutput::packed(native, &mut []);
+    empty.select(1);
+    assert!(empty.slots::<f64>(0..0).is_none());
     let mut bytes = [0u8; 9];
     assert!(PcmOutput::packed(PcmFormat::S16Le, &mut bytes).slots::<f32>(0..1).is_none());
 }

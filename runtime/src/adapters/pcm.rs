@@ -133,9 +133,9 @@ impl Output for PcmOutput<'_> {
     }
 
     fn slots<T: Sample>(&mut self, samples: Range<usize>) -> Option<&mut [T]> {
-        let (layout, before) = self.selected();
-        let bytes = &mut self.bytes[before..];
-        let numbers = is_native::<T>(layout).then(|| bytemuck::try_cast_slice_mut(bytes).ok());
+        // Parts of complex samples lie apart.
+        let numbers =
+            is_native::<T>(self.selected().0).then(|| bytemuck::try_cast_slice_mut(self.bytes).ok());
         numbers.flatten().map(|numbers| &mut numbers[samples])
     }
 
