@@ -20,16 +20,16 @@ mod watch {
     const PATIENCE: Duration = Duration::from_secs(2);
     const STEP: Duration = Duration::from_millis(50);
 
-    /// A channel that receives a message at the first interrupt. A second interrupt ends the process. The first
-    /// one also ends it if the reader of standard output or standard error takes no data. Unfinished files
-    /// are removed.
+    /// A channel that receives a message at the first interrupt. A second interrupt ends the process. The
+    /// first one also ends it if the reader of standard output or standard error takes no data. Unfinished
+    /// files are removed.
     pub(crate) fn interrupts() -> Receiver<()> {
         let (stop_sender, stop) = bounded(1);
         if watch(move |signals| until_the_end(signals, &stop_sender)) { stop } else { never() }
     }
 
-    /// From now on an interrupt ends the process at once, with a message and exit code 1. Unfinished files are
-    /// removed.
+    /// From now on an interrupt ends the process at once, with a message and exit code 1. Unfinished files
+    /// are removed.
     pub(crate) fn end_at_interrupt() {
         watch(|mut signals| {
             if signals.forever().next().is_some() {

@@ -64,8 +64,8 @@ impl StepLengths {
     }
 }
 
-/// The fraction of the way to the boundary that a step goes: the closer, the longer the steps of the predictor
-/// were (Mehrotra).
+/// The fraction of the way to the boundary that a step goes: the closer, the longer the steps of the
+/// predictor were (Mehrotra).
 pub(super) fn fraction(predicted: StepLengths) -> f64 {
     STEP_FRACTION.min(0.9 + 0.09 * predicted.primal.min(predicted.dual).min(1.0))
 }

@@ -1,5 +1,5 @@
-//! The interior-point method for the least worst-case norm of `W - F H` at sampled frequencies ([`sampled`]),
-//! for up to about 1000 taps and 500 frequencies.
+//! The interior-point method for the least worst-case norm of `W - F H` at sampled frequencies
+//! ([`sampled`]), for up to about 1000 taps and 500 frequencies.
 //!
 //! The optimum on a finite set of frequencies is a lower bound for the whole unit circle; with the peaks of
 //! the norm added as points, the two optima meet. They are those of the linear matrix inequality of thesis

@@ -1,5 +1,5 @@
-//! The taps to quantise, the error of integers in their place, and the mean-square error that a change of the
-//! taps adds, over weighted frequencies.
+//! The taps to quantise, the error of integers in their place, and the mean-square error that a change of
+//! the taps adds, over weighted frequencies.
 //!
 //! A change Delta of the taps adds `Delta H` to the error. The mean square `sum_k w_k |Delta(w_k) H(w_k)|^2`
 //! is a sum of one quadratic form per phase p, in the taps `f_i[p + j M]` of that phase:
