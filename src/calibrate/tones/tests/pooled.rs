@@ -77,7 +77,7 @@ fn faults_name_the_acquisition() {
     assert!(matches!(nowhere, CalibrateError::ToneNowhere { tone: Hertz(71e3), .. }), "{nowhere}");
     all[1].pop();
     let short = pooled(&spec, &all, &LIST).unwrap_err().to_string();
-    assert!(short.starts_with("b: the spec has 4 channels"), "{short}");
+    assert!(short.starts_with("b: captures: 3, but channels in the spec: 4"), "{short}");
     let any = [Acquisition { name: "a", records: &all[0] }; 2];
     let refused = calibrate_pooled(&spec, &any, CalibrationSignal::Any, Settings::default()).unwrap_err();
     assert_eq!(refused, CalibrateError::NotPooled { acquisitions: 2 });
