@@ -1,4 +1,4 @@
-//! How long a view takes: rows and plane, two sizes, two views and eight, mean shift.
+//! How long a view takes: rows and plane, two sizes, two views and eight, coarse depth.
 //!
 //! The views are those of the synthetic scene, so that the inputs repeat exactly. Only renderings are timed:
 //! the photographs and their depths are in memory. An argument chooses the lines that contain it
@@ -11,9 +11,9 @@ mod stopwatch;
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::DepthMap;
 use hybank_ibr::image::Image;
+use hybank_ibr::partial::densify;
 use hybank_ibr::pipeline::{Method, RenderSettings, calibrated, rectified};
 use hybank_ibr::propagate::{CalibratedView, RectifiedView};
-use hybank_ibr::segment::segment;
 use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use stopwatch::time;
 
@@ -75,6 +75,7 @@ fn main() {
         full_depth(size, &[0.0, 1.0]);
         full_depth(size, &[-1.0, -0.7, -0.3, 0.0, 1.0, 1.3, 1.7, 2.0]);
     }
-    let image = &views((450, 375), &[0.0])[0].image;
-    time_chosen("mean shift, 450x375", || segment(image));
+    let view = &views((450, 375), &[0.0])[0];
+    let coarse = view.disparity.decimated(6).expect("known disparities");
+    time_chosen("coarse depth, 450x375", || densify(&coarse, 6, &view.image));
 }

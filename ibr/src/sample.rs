@@ -26,6 +26,8 @@ pub struct Sample<const C: usize> {
     pub view: u16,
     /// Whether the depth is a guess, or the colour may be mixed with that of a nearer surface.
     pub doubtful: bool,
+    /// Whether the depth is a guess: it was filled from its neighbours.
+    pub guessed: bool,
 }
 
 impl<const C: usize> Sample<C> {
@@ -40,6 +42,7 @@ impl<const C: usize> Sample<C> {
         pixel: 0,
         view: 0,
         doubtful: false,
+        guessed: false,
     };
 }
 

@@ -7,7 +7,7 @@ use super::sure::Limits;
 use super::variogram::Variogram;
 use crate::image::Image;
 use crate::pipeline::memory::Extent;
-use crate::pipeline::{RenderError, RenderSettings, Rendering};
+use crate::pipeline::{Exposure, RenderError, RenderSettings, Rendering};
 use crate::propagate::{View, Viewpoint};
 use std::ops::Range;
 
@@ -193,10 +193,11 @@ pub struct Study<'a> {
 }
 
 /// Photographs with one exposure.
-pub(super) fn equalised<'a>(images: impl Iterator<Item = &'a Image>, gains: &[f64]) -> Vec<Image> {
+pub(super) fn equalised<'a>(images: impl Iterator<Item = &'a Image>, gains: &[Exposure]) -> Vec<Image> {
     let scaled = |(i, image): (usize, &Image)| {
-        let (mut image, gain) = (image.clone(), gains.get(i).map_or(1.0, |g| *g as f32));
-        image.data_mut().iter_mut().for_each(|v| *v *= gain);
+        let (mut image, gain) = (image.clone(), gains.get(i).map_or([1.0; 3], |gain| gain.map(|g| g as f32)));
+        let channels = image.channels();
+        image.data_mut().iter_mut().enumerate().for_each(|(k, v)| *v *= gain[k % channels]);
         image
     };
     images.enumerate().map(scaled).collect()

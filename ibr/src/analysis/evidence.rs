@@ -2,6 +2,7 @@
 //! fit that is really used, and how well the samples agree.
 
 use super::sure::{self, Limits};
+use crate::depth::Measure;
 use crate::interpolate::rows::RowWork;
 use crate::interpolate::{Cover, Degree, InterpolationError, Settings};
 use crate::pipeline::rectified::{self, Strip};
@@ -68,7 +69,7 @@ pub fn collect_evidence(
 ) -> Result<PixelEvidence, RenderError> {
     let rendering = rectified::render(views, position, settings)?;
     let view_weights = ViewWeights::of(views, &position).with_noise(&rendering.agreement);
-    let settings = &settings.suited_to(&rendering.agreement, &view_weights);
+    let settings = &settings.suited_to(&rendering.agreement, &view_weights, Measure::Disparity);
     let view_weights = view_weights.with_gains(&rendering.agreement.gains);
     let (camera, (width, height)) = (RigCamera::new(views, position), rendering.image.size());
     let colour = rendering.image.channels() == 3;
@@ -260,7 +261,11 @@ impl<const ORDER: usize, const C: usize> RowEvidence<ORDER, C> {
         let image = job.rows.views[usize::from(s.view)].image;
         let (pixel, width) = (s.pixel as usize, image.width());
         let (column, gain) = (pixel % width, job.rows.view_weights.gain(s.view));
-        let at = |p: usize| image.pixel::<C>(p).map(|v| v * gain);
+        let at = |p: usize| {
+            let mut value = image.pixel::<C>(p);
+            value.iter_mut().zip(gain).for_each(|(v, g)| *v *= g);
+            value
+        };
         let here = at(pixel);
         let left = if column > 0 { at(pixel - 1) } else { here };
         let right = if column + 1 < width { at(pixel + 1) } else { here };

@@ -15,7 +15,6 @@
 
 use crate::camera::Camera;
 use crate::image::Image;
-use crate::interpolate::Cover;
 use crate::pipeline::Rendering;
 use crate::propagate::CalibratedView;
 use rayon::prelude::*;
@@ -68,7 +67,7 @@ pub(super) fn local_limits(
     let shown: Vec<Shown> = (0..width * height).into_par_iter().map(at).collect();
     let nearby = largest_nearby(&shown, (width, height));
     let limit = |p: usize| {
-        if rendering.mask[p] != Cover::Seen || shown[p].moved.is_nan() {
+        if rendering.mask[p].is_hole() || shown[p].moved.is_nan() {
             return UNSEEN;
         }
         let Shown { residual, slope, curvature, .. } = nearby[p];

@@ -80,12 +80,12 @@ pub(super) fn hole_distances(mask: &[Cover], width: usize) -> Vec<usize> {
     for (row, mask) in distances.chunks_mut(width).zip(mask.chunks(width)) {
         let mut away = width;
         for x in 0..width {
-            away = if mask[x] == Cover::Seen { 0 } else { away + 1 };
+            away = if !mask[x].is_hole() { 0 } else { away + 1 };
             row[x] = away;
         }
         away = width;
         for x in (0..width).rev() {
-            away = if mask[x] == Cover::Seen { 0 } else { away + 1 };
+            away = if !mask[x].is_hole() { 0 } else { away + 1 };
             row[x] = row[x].min(away);
         }
     }

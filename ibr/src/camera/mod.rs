@@ -12,6 +12,7 @@ pub mod transforms;
 pub use lens::Lens;
 pub use list::{CameraList, Frame, ListedCamera};
 
+use crate::depth::or_far;
 use nalgebra::{Matrix3, Matrix3x4, Vector2, Vector3};
 
 /// A 3 x 3 part whose determinant is this small against its norm cubed does not map rays to pixels.
@@ -179,7 +180,7 @@ impl Relative {
         let (x, y) = through(self.from.as_ref(), x, y, Lens::ideal);
         let p = self.a * Vector3::new(x, y, 1.0) * d + self.b;
         let (x, y) = through(self.to.as_ref(), p.x / p.z, p.y / p.z, Lens::record);
-        (x, y, p.z)
+        (x, y, or_far(p.z))
     }
 }
 

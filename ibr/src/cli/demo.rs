@@ -9,7 +9,7 @@ use super::summary::Summary;
 use crate::camera::Camera;
 use crate::depth::DepthMap;
 use crate::image::{Image, ImageError, Levels, quality};
-use crate::partial::{Densify, densify};
+use crate::partial::densify;
 use crate::pipeline::{RenderSettings, Rendering, rectified};
 use crate::propagate::RectifiedView;
 use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
@@ -81,7 +81,7 @@ fn view(position: f64, size: (usize, usize)) -> Result<(Image, DepthMap), Failur
 
 fn coarse(map: &DepthMap, image: &Image) -> Result<DepthMap, Failure> {
     let sparse = map.decimated(STEP).map_err(Failure::input)?;
-    densify(&sparse, STEP, image, Densify::default()).map_err(Failure::input)
+    densify(&sparse, STEP, image).map_err(Failure::input)
 }
 
 fn rig<'a>(image: &'a Image, map: &'a DepthMap, camera: f64) -> RectifiedView<'a> {

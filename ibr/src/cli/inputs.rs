@@ -34,7 +34,8 @@ pub(super) fn warn_of_contradictions(agreement: &Agreement, kind: &Kind) {
 /// The line of a report about the inputs; none for views without depth.
 pub(super) fn line(agreement: &Agreement) -> Option<String> {
     let Some(worst) = agreement.worst() else { return unchecked(agreement) };
-    let exposures = agreement.gains.iter().any(|g| *g != 1.0);
+    // What a viewer notices; smaller differences are matched too.
+    let exposures = agreement.gains.iter().flatten().any(|g| g.ln().abs() > 0.02);
     Some(format!(
         "inputs    views agree in depth and colour at {:.0} % of the points{}",
         100.0 * worst.share,
@@ -63,9 +64,10 @@ mod tests {
     #[test]
     fn the_line_says_what_was_checked() {
         let of = |views: usize, pairs: Vec<PairAgreement>| {
-            line(&Agreement { pairs, gains: vec![1.0; views], ..Agreement::default() })
+            line(&Agreement { pairs, gains: vec![[1.0; 3]; views], ..Agreement::default() })
         };
-        let pair = PairAgreement { views: [0, 1], points: 500, share: 0.876, gain: 1.0, difference: 2.0 };
+        let pair =
+            PairAgreement { views: [0, 1], points: 500, share: 0.876, gain: [1.0; 3], difference: 2.0 };
         assert_eq!(of(0, Vec::new()), None);
         assert!(of(1, Vec::new()).is_some_and(|l| l.contains("unchecked: a single view")));
         assert!(of(3, Vec::new()).is_some_and(|l| l.contains("unchecked: the 3 views share too few points")));

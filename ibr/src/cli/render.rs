@@ -133,7 +133,7 @@ fn read(arguments: &RenderArguments, watch: Watch<'_>) -> Result<Scene, Failure>
     let film = Some(arguments.output.as_path()).filter(|path| path::is_film(path, frames));
     let film = film.filter(|path| !output::is_standard(path));
     source.check_outputs(&all.iter().flat_map(Outputs::files).chain(film).collect::<Vec<_>>())?;
-    arguments.scene.load(&source, arguments.densify, !arguments.drop_unknown, watch)
+    arguments.scene.load(&source, !arguments.drop_unknown, watch)
 }
 
 /// The virtual view `frame` of a list or path; 0 if there is one.

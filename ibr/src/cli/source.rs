@@ -6,7 +6,6 @@ use super::inputs;
 use super::output;
 use crate::files;
 use crate::image::{Image, read_image_within};
-use crate::partial::Densify;
 use crate::pipeline::{RenderSettings, Watch};
 use crate::scene::{self, LoadOptions, Scene, SceneSpec};
 use hybank::files::StandardStream;
@@ -53,17 +52,10 @@ impl SceneArguments {
     }
 
     /// Loads the scene, and prints what was decided on the way.
-    pub(super) fn load(
-        &self,
-        source: &Source,
-        densify: Densify,
-        fill: bool,
-        watch: Watch<'_>,
-    ) -> Result<Scene, Failure> {
+    pub(super) fn load(&self, source: &Source, fill: bool, watch: Watch<'_>) -> Result<Scene, Failure> {
         let options = LoadOptions {
             view: self.view.clone(),
             depth_step: self.depth_step,
-            densify,
             fill,
             max_pixels: self.max_pixels,
         };

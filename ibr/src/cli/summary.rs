@@ -125,7 +125,10 @@ impl Summary {
                 "samples   {} propagated, {} occluded, {} used; dropped: {} unknown depth, {} behind, {} outside",
                 s.propagated, s.occluded, s.used, d.unknown, d.behind, d.outside
             ),
-            format!("holes     {} px cracks, {} px disocclusions", self.holes.crack, self.holes.disocclusion),
+            format!(
+                "holes     {} px cracks, {} px disocclusions; {} px shown by samples of guessed depth only",
+                self.holes.crack, self.holes.disocclusion, self.holes.guessed
+            ),
         ];
         if self.filled_depths > 0 {
             lines.push(format!(

@@ -1,25 +1,52 @@
-//! Filling unknown depths before propagation: the farther of the neighbours along the row.
+//! Filling unknown depths before propagation.
 //!
-//! Depth is mostly unknown where the second sensor of a stereo pair had no view, which is background.
+//! Disparity is mostly unknown where the second camera of a rig had no view, which is background: the
+//! farther of the neighbours along the row. A depth map says nothing of a second camera, and programs leave
+//! out what they could not match, in the foreground too. There a hole is filled only within one surface.
 
+use super::relief::JUMP;
 use super::{DepthMap, Measure};
 
-/// Gives every unknown pixel the farther of the nearest known values to its left and right.
+/// Gives unknown pixels of disparity the farther of the nearest known values to their left and right, and
+/// unknown depths the farthest of those around if all lie on one surface, on both sides in the row or the
+/// column.
 ///
-/// A row without any known value takes those of the nearest row that has one (the upper of two).
-/// The map remembers which values are guesses; renderings weigh them less. Returns the number of pixels
+/// A row of disparities without any known value takes those of the nearest row that has one (the upper of
+/// two). The map remembers which values are guesses; renderings weigh them less. Returns the number of pixels
 /// filled.
 pub fn fill_unknown(map: &mut DepthMap) -> usize {
     let unknown = map.unknown();
     if unknown == 0 {
         return 0;
     }
-    map.guessed = map.data.iter().map(|v| v.is_nan()).collect();
-    let (width, measure) = (map.width, map.measure);
-    map.data.chunks_exact_mut(width).for_each(|row| fill_row(row, measure));
-    let filled: Vec<bool> = map.data.chunks_exact(width).map(|row| !row[0].is_nan()).collect();
-    fill_empty_rows(&filled, &mut map.data);
-    unknown
+    let was_unknown: Vec<bool> = map.data.iter().map(|v| v.is_nan()).collect();
+    match map.measure {
+        Measure::Disparity => {
+            let width = map.width;
+            map.data.chunks_exact_mut(width).for_each(|row| fill_row(row, Measure::Disparity));
+            let filled: Vec<bool> = map.data.chunks_exact(width).map(|row| !row[0].is_nan()).collect();
+            fill_empty_rows(&filled, &mut map.data);
+        }
+        Measure::Depth => fill_surfaces(map),
+    }
+    let filled = |(was_unknown, v): (bool, &f32)| was_unknown && !v.is_nan();
+    map.guessed = was_unknown.into_iter().zip(&map.data).map(filled).collect();
+    unknown - map.unknown()
+}
+
+/// Fills the holes that have one surface around them.
+fn fill_surfaces(map: &mut DepthMap) {
+    let mut found = Vec::new();
+    for_holes(&map.data, map.width, |p, around| {
+        let sides = around.map(|q| map.data.get(q as usize).copied());
+        let is_enclosed = sides.chunks_exact(2).any(|pair| pair.iter().all(Option::is_some));
+        let known = || sides.iter().flatten().copied();
+        let (near, far) = (known().fold(f32::MAX, f32::min), known().fold(0.0, f32::max));
+        if is_enclosed && far - near < JUMP * near {
+            found.push((p, far));
+        }
+    });
+    found.iter().for_each(|(p, depth)| map.data[*p] = *depth);
 }
 
 fn fill_row(row: &mut [f32], measure: Measure) {
@@ -57,6 +84,45 @@ pub(crate) fn fill_empty_rows(filled: &[bool], values: &mut [f32]) {
     }
 }
 
+/// In place of the number of a known pixel, where there is none.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// Calls `visit(p, neighbours)` for every unknown pixel with its nearest known pixels to the left,
+/// right, above and below.
+pub(crate) fn for_holes(depth: &[f32], width: usize, mut visit: impl FnMut(usize, [u32; 4])) {
+    let below = nearest_below(depth, width);
+    let mut above = vec![NONE; width];
+    let mut right = vec![NONE; width];
+    for (y, row) in depth.chunks_exact(width).enumerate() {
+        let index = |x: usize| (y * width + x) as u32;
+        let mut last = NONE;
+        for x in (0..width).rev() {
+            right[x] = last;
+            if !row[x].is_nan() {
+                last = index(x);
+            }
+        }
+        let mut left = NONE;
+        for x in 0..width {
+            if row[x].is_nan() {
+                visit(y * width + x, [left, right[x], above[x], below[y * width + x]]);
+            } else {
+                left = index(x);
+                above[x] = left;
+            }
+        }
+    }
+}
+
+fn nearest_below(depth: &[f32], width: usize) -> Vec<u32> {
+    let mut below = vec![NONE; depth.len()];
+    for p in (0..depth.len().saturating_sub(width)).rev() {
+        let next = p + width;
+        below[p] = if depth[next].is_nan() { below[next] } else { next as u32 };
+    }
+    below
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -73,13 +139,20 @@ mod tests {
     fn the_farther_neighbour_wins() {
         let row = [U, 3.0, U, U, 5.0, U];
         assert_eq!(filled(&row, (6, 1), Measure::Disparity), (vec![3.0, 3.0, 3.0, 3.0, 5.0, 5.0], 4));
-        assert_eq!(filled(&row, (6, 1), Measure::Depth), (vec![3.0, 3.0, 5.0, 5.0, 5.0, 5.0], 4));
+    }
+
+    /// Depths are filled within one surface, not between two and not at the border.
+    #[test]
+    fn depths_are_filled_within_a_surface() {
+        let (data, count) = filled(&[U, 3.0, U, U, 3.05, U, 5.0], (7, 1), Measure::Depth);
+        assert_eq!((&data[1..5], count), (&[3.0, 3.05, 3.05, 3.05][..], 2));
+        assert!(data[0].is_nan() && data[5].is_nan());
     }
 
     #[test]
     fn empty_rows_take_the_nearest_full_one() {
         let data = [U, U, 1.0, 2.0, U, U, U, U, 3.0, 4.0];
-        let (got, count) = filled(&data, (2, 5), Measure::Depth);
+        let (got, count) = filled(&data, (2, 5), Measure::Disparity);
         assert_eq!(got, [1.0, 2.0, 1.0, 2.0, 1.0, 2.0, 3.0, 4.0, 3.0, 4.0]);
         assert_eq!(count, 6);
     }

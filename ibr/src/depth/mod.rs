@@ -6,6 +6,7 @@ mod relief;
 use crate::lanes::bounds;
 pub(crate) use fill::fill_empty_rows;
 pub use fill::fill_unknown;
+pub(crate) use fill::{NONE, for_holes};
 pub use relief::Relief;
 pub(crate) use relief::{JUMP, Reliefs, TILE};
 
@@ -19,6 +20,22 @@ pub enum Measure {
 }
 
 impl Measure {
+    /// A value as parallax, disparity or reciprocal depth, which is affine on planes.
+    #[inline]
+    pub(crate) fn parallax(self, value: f32) -> f32 {
+        if self == Self::Disparity { value } else { 1.0 / value }
+    }
+
+    /// The value of a parallax.
+    #[inline]
+    pub(crate) fn of_parallax(self, parallax: f32) -> f32 {
+        if self == Self::Disparity {
+            parallax
+        } else {
+            or_far(f64::from(1.0 / parallax.max(1.0 / FAR))) as f32
+        }
+    }
+
     /// The farther of two values.
     pub fn farther(self, a: f32, b: f32) -> f32 {
         match self {
@@ -70,8 +87,23 @@ pub enum DepthError {
     Step,
 }
 
-/// A map of depths or disparities with NaN for unknown. Known depths are positive and finite; known
-/// disparities are finite, and negative behind the point at which converged cameras look.
+/// The depth of what is infinitely far away, in every map and at every camera. It is finite, so that such
+/// points have a place in other views: with a baseline of 1000 units and a focal length of 10,000 pixels they
+/// miss it by a ten thousandth of a pixel.
+pub const FAR: f32 = 1e11;
+
+/// Depths from here on are [`FAR`]: renderers write 1e10 where they see nothing, and a point that is far
+/// away from one camera has at another one its depth times the cosine of an angle between their axes.
+const FAR_FROM: f32 = 5e9;
+
+/// A depth along the axis of another camera: what is far away is so for all cameras.
+#[inline]
+pub(crate) fn or_far(depth: f64) -> f64 {
+    if depth >= f64::from(FAR_FROM) { f64::from(FAR) } else { depth }
+}
+
+/// A map of depths or disparities with NaN for unknown. Known depths are positive, and [`FAR`] at most;
+/// known disparities are finite, and negative behind the point at which converged cameras look.
 #[derive(Debug, Clone)]
 pub struct DepthMap {
     width: usize,
@@ -85,8 +117,9 @@ pub struct DepthMap {
 }
 
 impl DepthMap {
-    /// A map from stored numbers: value / scale. 0 and subnormal numbers, NaN and infinities are unknown;
-    /// so are negative depths, and negative disparities if all of them are one number, which then is a mark.
+    /// A map from stored numbers: value / scale. 0 and subnormal numbers and NaN are unknown; so are
+    /// negative depths, and negative disparities if all of them are one number, which then is a mark. Depths
+    /// of positive infinity are [`FAR`] away, and infinite disparities are unknown.
     ///
     /// # Errors
     /// [`DepthError::Scale`], [`DepthError::Size`] when the numbers do not fill the map, and
@@ -105,7 +138,12 @@ impl DepthMap {
             return Err(DepthError::Size { map, image, step: 1, expected: image });
         }
         let negatives = measure == Measure::Disparity && has_negatives(&stored);
-        let data: Vec<f32> = stored.into_iter().map(|v| known(v, scale, negatives)).collect();
+        let value = |v: f32| match measure {
+            Measure::Disparity => known(v, scale, negatives),
+            Measure::Depth if v == f32::INFINITY => FAR,
+            Measure::Depth => or_far(f64::from(known(v, scale, negatives))) as f32,
+        };
+        let data: Vec<f32> = stored.into_iter().map(value).collect();
         if data.iter().all(|v| v.is_nan()) {
             return Err(DepthError::AllUnknown { values: data.len() });
         }
@@ -184,10 +222,11 @@ impl DepthMap {
         self.data.iter().filter(|v| v.is_nan()).count()
     }
 
-    /// The median of about a thousand evenly spaced values; none if they are unknown.
+    /// The median of about a thousand evenly spaced values; none if they are unknown or far away.
     pub fn middle(&self) -> Option<f32> {
         let step = self.data.len().div_ceil(1000).max(1);
-        let mut known: Vec<f32> = self.data.iter().copied().step_by(step).filter(|v| !v.is_nan()).collect();
+        let near = self.data.iter().copied().step_by(step).filter(|v| *v < FAR);
+        let mut known: Vec<f32> = near.collect();
         known.sort_by(f32::total_cmp);
         known.get(known.len() / 2).copied()
     }
@@ -207,6 +246,21 @@ impl DepthMap {
         }
         let size = (self.width.div_ceil(step), self.height.div_ceil(step));
         Ok(self.with_values(size, data))
+    }
+
+    /// Whether the known values lie apart, as points of a lidar do: fewer than half of them have neighbours to
+    /// the right and below.
+    pub(crate) fn is_scattered(&self) -> bool {
+        let rows = self.data.chunks_exact(self.width).zip(self.data.chunks_exact(self.width).skip(1));
+        let (mut known, mut joined) = (0, 0);
+        for (row, below) in rows {
+            let pairs = row.windows(2).zip(below).filter(|(pair, _)| !pair[0].is_nan());
+            pairs.for_each(|(pair, below)| {
+                known += 1;
+                joined += usize::from(!pair[1].is_nan() && !below.is_nan());
+            });
+        }
+        2 * joined < known
     }
 
     /// Refuses a map whose size does not fit an image of `size` with one value every `step` pixels.
@@ -236,6 +290,15 @@ impl DepthMap {
         let (mut map, offset) = (self.clone(), self.offset as f32);
         map.data.iter_mut().for_each(|v| *v = change(*v).max(0.1 * *v - 0.9 * offset));
         map
+    }
+
+    /// The same map, in which the guesses of another one and some more values are guesses.
+    pub(crate) fn with_guessed(mut self, before: &Self, also: &[bool]) -> Self {
+        let is_guessed = |p: usize| before.is_guessed(p) || also.get(p).copied().unwrap_or(false);
+        if !(before.guessed.is_empty() && also.is_empty()) {
+            self.guessed = (0..self.data.len()).map(is_guessed).collect();
+        }
+        self
     }
 
     /// A map of the same measure and offset with other values, NaN where unknown.

@@ -1,7 +1,6 @@
 //! Images: intensities 0..255 as f32, one or three interleaved channels, pixel centres at integers.
 
 mod colmap_map;
-pub mod colour;
 mod dynamic;
 mod frame_rate;
 pub mod pfm;

@@ -48,6 +48,8 @@ pub enum Cover {
     /// From samples.
     #[default]
     Seen,
+    /// From samples of which only a guess says how deep they lie.
+    Guessed,
     /// Crack: a hole in a stretched surface, with the same depth on both sides.
     Crack,
     /// Disocclusion: no view saw this region. The depth differs across the hole, or the hole touches the
@@ -55,57 +57,36 @@ pub enum Cover {
     Disocclusion,
 }
 
-/// Rows on each side over which disocclusions are averaged.
-const ROWS: usize = 4;
-
-/// Replaces every disoccluded pixel by the mean over the disoccluded pixels near it in its column. Each row
-/// fills its holes for itself, and without this the fillings form a comb of teeth one row high.
-pub(crate) fn join_rows<const C: usize>(mask: &[Cover], width: usize, values: &mut [f32]) {
-    let pixels = values.as_chunks_mut::<C>().0;
-    let height = mask.len() / width.max(1);
-    // The rows above as they were, the latest ones.
-    let mut above = vec![[0.0; C]; width * ROWS.min(height.saturating_sub(1))];
-    let kept = |y: usize, x: usize| y % ROWS * width + x;
-    for y in 0..height {
-        for x in 0..width {
-            let here = pixels[y * width + x];
-            if mask[y * width + x] == Cover::Disocclusion {
-                let (mut sum, mut count) = ([0.0; C], 0.0);
-                let rows = y.saturating_sub(ROWS)..(y + ROWS + 1).min(height);
-                for row in rows.filter(|row| mask[row * width + x] == Cover::Disocclusion) {
-                    let value = if row < y { above[kept(row, x)] } else { pixels[row * width + x] };
-                    sum.iter_mut().zip(value).for_each(|(s, v)| *s += v);
-                    count += 1.0;
-                }
-                pixels[y * width + x] = sum.map(|s| s / count);
-            }
-            if let Some(above) = above.get_mut(kept(y, x)) {
-                *above = here;
-            }
-        }
+impl Cover {
+    /// Whether no sample shows the pixel.
+    pub fn is_hole(self) -> bool {
+        matches!(self, Self::Crack | Self::Disocclusion)
     }
 }
 
-/// Pixels in holes, by kind.
+/// Pixels that were not seen, by kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 pub struct HoleCount {
     /// Pixels in cracks.
     pub crack: usize,
     /// Pixels in disocclusions.
     pub disocclusion: usize,
+    /// Pixels that only samples of guessed depth show.
+    pub guessed: usize,
 }
 
 impl HoleCount {
-    /// Counts the holes of a mask.
+    /// Counts the pixels of a mask.
     pub fn of(mask: &[Cover]) -> Self {
         // A byte counts a short piece, so that the compiler compares many pixels at a time.
         let piece = |kind: Cover, piece: &[Cover]| piece.iter().map(|c| u8::from(*c == kind)).sum::<u8>();
         let count = |kind: Cover| mask.chunks(128).map(|part| usize::from(piece(kind, part))).sum();
-        Self { crack: count(Cover::Crack), disocclusion: count(Cover::Disocclusion) }
+        let [crack, disocclusion, guessed] = [Cover::Crack, Cover::Disocclusion, Cover::Guessed].map(count);
+        Self { crack, disocclusion, guessed }
     }
 
-    /// All pixels in holes.
+    /// All pixels that were not seen.
     pub fn total(&self) -> usize {
-        self.crack + self.disocclusion
+        self.crack + self.disocclusion + self.guessed
     }
 }

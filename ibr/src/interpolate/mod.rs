@@ -3,11 +3,11 @@
 //! [`rows`] fits one spline per row and needs samples on whole rows, as a rectified rig gives them;
 //! [`plane`] fits the whole image and takes samples anywhere.
 
+mod extend;
 mod holes;
 pub mod plane;
 pub mod rows;
 
-use holes::join_rows;
 pub use holes::{Cover, HoleCount, HoleFill, HoleSettings};
 
 use crate::occlusion::DepthTest;

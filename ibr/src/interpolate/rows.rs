@@ -5,8 +5,10 @@
 //! f(c) = sum_s w_s ((I_s - J(x_s))^2 + lambda V_s J'(x_s)^2) + tau sum_m (c_m - c_{m-1})^2
 //! ```
 
+use super::extend::Level;
+use super::plane::background;
 use super::{Cover, HoleFill, InterpolationError, Settings};
-use crate::depth::fill_empty_rows;
+use crate::depth::{NONE, fill_empty_rows};
 use crate::sample::Sample;
 use hybank::sampling::fit::Response;
 use hybank::sampling::{Fit, FitSample};
@@ -186,19 +188,25 @@ fn mark<const C: usize>(samples: &[Sample<C>], settings: &Settings, mask: &mut [
         let gap = pair[1].x - pair[0].x;
         if gap > settings.holes.gap && one_surface(&pair[0], &pair[1], settings) {
             let near = gap <= 2.0 * reach(&pair[0]).max(reach(&pair[1]));
-            let cover = if near { Cover::Seen } else { Cover::Crack };
+            let seen = if pair[0].guessed || pair[1].guessed { Cover::Guessed } else { Cover::Seen };
+            let cover = if near { seen } else { Cover::Crack };
             pixels(pair[0].x, pair[1].x, mask.len()).for_each(|j| mask[j] = cover);
         }
     }
-    let mut next = 0;
-    for (j, cover) in mask.iter_mut().enumerate() {
-        let x = j as f64;
-        while next < samples.len() && samples[next].x < x {
-            next += 1;
-        }
-        let right = samples.get(next).is_some_and(|s| s.x - x <= reach(s));
-        if right || (next > 0 && x - samples[next - 1].x <= reach(&samples[next - 1])) {
-            *cover = Cover::Seen;
+    for (is_guess, cover) in [(true, Cover::Guessed), (false, Cover::Seen)] {
+        let mut ahead = samples.iter().filter(|s| s.guessed == is_guess).peekable();
+        let mut behind = None;
+        for (j, pixel) in mask.iter_mut().enumerate() {
+            let x = j as f64;
+            while let Some(s) = ahead.next_if(|s| s.x < x) {
+                behind = Some(s);
+            }
+            let reaches = |s: &&Sample<C>| (s.x - x).abs() <= reach(s);
+            if *pixel != Cover::Seen
+                && (behind.as_ref().is_some_and(reaches) || ahead.peek().is_some_and(reaches))
+            {
+                *pixel = cover;
+            }
         }
     }
 }
@@ -213,7 +221,7 @@ pub fn nearest_depths<const C: usize>(samples: &[Sample<C>], settings: &Settings
             next += 1;
         }
         let sides = [next.checked_sub(1), Some(next)].into_iter().flatten().filter_map(|i| samples.get(i));
-        let within = sides.filter(|s| (s.x - x).abs() <= settings.holes.reach(s.spacing));
+        let within = sides.filter(|s| !s.guessed && (s.x - x).abs() <= settings.holes.reach(s.spacing));
         let nearest = within.min_by(|a, b| (a.x - x).abs().total_cmp(&(b.x - x).abs()));
         *depth = nearest.map_or(f32::NAN, |s| s.depth);
     }
@@ -241,7 +249,7 @@ fn pixels(low: f64, high: f64, width: usize) -> std::ops::Range<usize> {
 
 /// Leaves holes black.
 pub(super) fn blacken(mask: &[Cover], values: &mut [f32], channels: usize) {
-    for (pixel, _) in values.chunks_exact_mut(channels).zip(mask).filter(|(_, c)| **c != Cover::Seen) {
+    for (pixel, _) in values.chunks_exact_mut(channels).zip(mask).filter(|(_, c)| c.is_hole()) {
         pixel.fill(0.0);
     }
 }
@@ -289,19 +297,55 @@ fn interpolate_with<const ORDER: usize, const C: usize>(
     if !filled.contains(&true) {
         return Err(InterpolationError::NoSamples { width, height });
     }
-    finish::<C>(&filled, &mask, settings.holes.fill, &mut values);
+    let mut depths = vec![f32::NAN; width * height];
+    rows.iter().zip(depths.chunks_exact_mut(width)).for_each(|(row, out)| nearest_depths(row, settings, out));
+    finish::<C>(&filled, &mask, &depths, settings, &mut values);
     Ok((values, mask))
 }
 
-/// What rows do together when each is fitted: rows without samples are copied from the nearest one that is
-/// `filled`, and the holes of neighbouring rows are joined.
-pub(crate) fn finish<const C: usize>(filled: &[bool], mask: &[Cover], fill: HoleFill, values: &mut [f32]) {
-    if fill != HoleFill::Leave {
-        fill_empty_rows(filled, values);
+/// What rows do together when each is fitted: the surfaces around disocclusions are continued into them.
+/// Without that, rows without samples are copied from the nearest one that is `filled`.
+pub(crate) fn finish<const C: usize>(
+    filled: &[bool],
+    mask: &[Cover],
+    depths: &[f32],
+    settings: &Settings,
+    values: &mut [f32],
+) {
+    match settings.holes.fill {
+        HoleFill::Leave => {}
+        HoleFill::Bridge => fill_empty_rows(filled, values),
+        HoleFill::Background if mask.contains(&Cover::Disocclusion) => {
+            continue_surfaces::<C>(mask, depths, settings, mask.len() / filled.len().max(1), values);
+        }
+        HoleFill::Background => {}
     }
-    if fill == HoleFill::Background {
-        super::join_rows::<C>(mask, mask.len() / filled.len().max(1), values);
-    }
+}
+
+/// Extends the farther surface into each disocclusion. The outermost pixels of a surface, whose colours may
+/// be mixed, are left out.
+fn continue_surfaces<const C: usize>(
+    mask: &[Cover],
+    depths: &[f32],
+    settings: &Settings,
+    width: usize,
+    values: &mut [f32],
+) {
+    let beside = |p: usize| {
+        let (left, right) = (!p.is_multiple_of(width), p % width + 1 < width);
+        (left && depths[p - 1].is_nan()) || (right && depths[p + 1].is_nan())
+    };
+    let sound = |p: usize| if beside(p) { f32::NAN } else { depths[p] };
+    let sound: Vec<f32> = (0..depths.len()).map(sound).collect();
+    let sources = background::sources(&sound, width, &settings.depth_test);
+    drop(sound);
+    let holes = || (0..mask.len()).filter(|p| mask[*p] == Cover::Disocclusion && sources[*p] != NONE);
+    let mut weights = vec![0.0; mask.len()];
+    holes().for_each(|p| weights[sources[p] as usize] = 1.0);
+    let pixels = values.as_chunks_mut::<C>().0;
+    let mut continued = Level { width, values: pixels.to_vec(), weights };
+    continued.extend();
+    holes().for_each(|p| pixels[p] = continued.values[p]);
 }
 
 #[cfg(test)]

@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn exactly_on_the_circle_counts() {
-        let test = DepthTest { epsilon: 5.0, relative: 0.0, absolute: 1.0 };
+        let test = DepthTest { epsilon: 5.0, relative: 0.0, absolute: 1.0, parallax: 0.0 };
         let mut pair = vec![sample(0.0, 0.0, -3.0), sample(3.0, 4.0, -2.0), sample(3.0, 4.1, -2.0)];
         assert_eq!(remove(&mut pair, &test), 1);
         assert_eq!(pair.len(), 2);
@@ -206,7 +206,8 @@ mod tests {
         #[test]
         fn equal_to_the_definition(
             raw in prop::collection::vec((-20.0..20.0_f64, -3.0..9.0_f64, 0.5..9.0_f32, 0.2..12.0_f32), 0..150),
-            coarse: bool, wide: bool, epsilon in 0.1..4.0_f64, relative in 0.0..0.3_f64, lift in -20.0..5.0_f32
+            coarse: bool, wide: bool, epsilon in 0.1..4.0_f64, relative in 0.0..0.3_f64, parallax in 0.0..0.4_f64,
+            lift in -20.0..5.0_f32
         ) {
             let position = |x: f64| if coarse { (x * 2.0).round() / 2.0 } else { x };
             let samples: Vec<Sample<1>> = raw
@@ -216,11 +217,11 @@ mod tests {
                     Sample { spacing: if wide { *spacing } else { 1.0 }, ..sample(position(*x), position(*y), depth) }
                 })
                 .collect();
-            check(&samples, &DepthTest { epsilon: position(epsilon).max(0.5), relative, absolute: 0.1 });
+            check(&samples, &DepthTest { epsilon: position(epsilon).max(0.5), relative, absolute: 0.1, parallax });
             // Signed keys, as chi gives them, with an absolute threshold.
             let signed: Vec<Sample<1>> =
                 samples.iter().map(|s| Sample { depth: s.depth + lift, ..*s }).collect();
-            check(&signed, &DepthTest { epsilon, relative: 0.0, absolute: 0.5 });
+            check(&signed, &DepthTest { epsilon, relative: 0.0, absolute: 0.5, parallax: 0.0 });
         }
 
         /// Samples that only hide others, places without a sample, several calls, and memory used before.
@@ -236,7 +237,7 @@ mod tests {
                     _ => Sample { spacing: *spacing, ..sample(*x, *y, *d) },
                 })
                 .collect();
-            let test = DepthTest { epsilon, relative, absolute: 0.1 };
+            let test = DepthTest { epsilon, relative, absolute: 0.1, parallax: 0.0 };
             let mut points = Points::of(&samples);
             raw.iter().enumerate().for_each(|(i, s)| points.own[i] = s.4 > 1);
             let own = |i: &usize| points.own[*i];

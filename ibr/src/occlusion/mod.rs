@@ -7,8 +7,8 @@
 //! ||x - y||_2 <= epsilon(y)   and   d(x) - d(y) >= sigma(y),   sigma(y) = relative d(y) + absolute
 //! ```
 //!
-//! with epsilon(y) = epsilon max(1, spacing(y)). The spacing is the distance between neighbouring samples of
-//! one view on the surface of y. A fixed radius is right only where they lie about a pixel apart: where the
+//! and, where depths have errors, 1 / d(y) - 1 / d(x) >= parallax. Here epsilon(y) = epsilon max(1,
+//! spacing(y)). The spacing is the distance between neighbouring samples of one view on the surface of y. A fixed radius is right only where they lie about a pixel apart: where the
 //! view magnifies, the balls of a foreground would no longer cover it, and background would show through.
 //!
 //! Every test is against all of P, not against the samples that are left, so the result does not depend on
@@ -42,6 +42,9 @@ pub struct DepthTest {
     pub relative: f64,
     /// Absolute part of the difference that must be reached.
     pub absolute: f64,
+    /// Least difference of the reciprocal depths, that is of disparities; needs positive depths if it is not
+    /// 0.
+    pub parallax: f64,
 }
 
 impl Default for DepthTest {
@@ -49,7 +52,7 @@ impl Default for DepthTest {
     /// apart, so a hidden sample nearly always has a nearer one in its ball; below 1 px neighbouring rows
     /// do not interact.
     fn default() -> Self {
-        Self { epsilon: 0.7, relative: 0.05, absolute: 0.0 }
+        Self { epsilon: 0.7, relative: 0.05, absolute: 0.0, parallax: 0.0 }
     }
 }
 
@@ -62,13 +65,15 @@ impl DepthTest {
         POSITIVE.check("epsilon", self.epsilon)?;
         NOT_NEGATIVE.check("relative depth difference", self.relative)?;
         NOT_NEGATIVE.check("absolute depth difference", self.absolute)?;
+        NOT_NEGATIVE.check("parallax", self.parallax)?;
         POSITIVE.check("sum of relative and absolute depth difference", self.relative + self.absolute)
     }
 
     /// Whether a sample of depth `near` hides one of depth `far` at the same position.
     #[inline]
     pub fn hides(&self, near: f64, far: f64) -> bool {
-        far - near >= self.relative * near + self.absolute
+        // 1 / near - 1 / far >= parallax without a division, monotone in both depths.
+        (far - near >= self.relative * near + self.absolute) & (far * (1.0 - self.parallax * near) >= near)
     }
 
     /// The radius within which a sample of this spacing hides others: epsilon max(1, spacing).
@@ -122,9 +127,13 @@ mod tests {
 
     #[test]
     fn the_threshold_itself_hides() {
-        let test = DepthTest { epsilon: 1.0, relative: 0.5, absolute: 0.0 };
+        let none = DepthTest { epsilon: 1.0, relative: 0.0, absolute: 0.0, parallax: 0.0 };
+        let test = DepthTest { relative: 0.5, ..none };
         assert!(test.hides(2.0, 3.0) && !test.hides(2.0, 2.9999));
-        let test = DepthTest { epsilon: 1.0, relative: 0.0, absolute: 0.5 };
+        let test = DepthTest { absolute: 0.5, ..none };
         assert!(test.hides(-1.0, -0.5) && !test.hides(-1.0, -0.51));
+        // Disparities of 4 and 2, and of 2 and 0.5 pixels.
+        let test = DepthTest { relative: 0.05, parallax: 2.0, ..none };
+        assert!(test.hides(0.25, 0.5) && !test.hides(0.25, 0.49) && !test.hides(0.5, 2.0));
     }
 }

@@ -272,7 +272,7 @@ mod tests {
     #[test]
     fn samples_hide_also_if_they_are_hidden_themselves() {
         // 3 is hidden by 2 although 2 is hidden by 1, which is too far from 3.
-        let test = DepthTest { epsilon: 1.0, relative: 0.1, absolute: 0.0 };
+        let test = DepthTest { epsilon: 1.0, relative: 0.1, absolute: 0.0, parallax: 0.0 };
         let mut row = vec![sample(0.0, 1.0, 1), sample(0.9, 2.0, 2), sample(1.8, 3.0, 3)];
         assert_eq!(remove_in_row(&mut row, &test, &mut RowScratch::default()), 2);
         assert_eq!(row[0].pixel, 1);
@@ -293,7 +293,7 @@ mod tests {
 
     #[test]
     fn far_apart_and_crowded_rows() {
-        let test = DepthTest { epsilon: 0.6, relative: 0.05, absolute: 0.0 };
+        let test = DepthTest { epsilon: 0.6, relative: 0.05, absolute: 0.0, parallax: 0.0 };
         let mut scratch = RowScratch::default();
         let spread: Vec<Sample<1>> = (0..50).map(|i| sample(1e6 * ((i * 31) % 50) as f64, 1.0, i)).collect();
         check(&spread, &test, &mut scratch);
@@ -307,7 +307,7 @@ mod tests {
         #[test]
         fn equal_to_the_definition(
             raw in prop::collection::vec((0.0..40.0_f64, 0.5..9.0_f32, 0.2..12.0_f32), 0..120),
-            coarse: bool, wide: bool, epsilon in 0.1..3.0_f64, relative in 0.0..0.3_f64
+            coarse: bool, wide: bool, epsilon in 0.1..3.0_f64, relative in 0.0..0.3_f64, parallax in 0.0..0.4_f64
         ) {
             let position = |x: f64| if coarse { (x * 4.0).round() / 4.0 } else { x };
             let depth = |d: f32| if coarse { d.round().max(1.0) } else { d };
@@ -320,7 +320,7 @@ mod tests {
                 })
                 .collect();
             let epsilon = position(epsilon).max(0.25);
-            let test = DepthTest { epsilon, relative, absolute: 0.1 };
+            let test = DepthTest { epsilon, relative, absolute: 0.1, parallax };
             let mut scratch = RowScratch::default();
             check(&samples, &test, &mut scratch);
             check(&samples, &test, &mut scratch);

@@ -3,7 +3,7 @@
 
 use super::depth_errors::{self, FEWEST_POINTS, Lookups};
 use crate::depth::{DepthMap, Measure};
-use crate::image::{Image, Texture};
+use crate::image::Texture;
 use crate::propagate::{Nearest, View, Viewpoint};
 use rayon::prelude::*;
 
@@ -16,11 +16,11 @@ const DEPTH_SHARE: f32 = 0.05;
 /// Colours agree up to this many grey levels.
 const GREY_LEVELS: f32 = 20.0;
 
-/// Exposures that differ by less than this are equal: the estimate has an error too.
-const SMALLEST_GAIN: f64 = 0.04;
-
 /// Share of agreeing points below which the inputs are probably wrong.
 const LEAST_SHARE: f64 = 0.5;
+
+/// A number for each of red, green and blue; the same ones for grey.
+pub type Exposure = [f64; 3];
 
 /// How well two views agree.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -33,8 +33,9 @@ pub struct PairAgreement {
     /// or the inputs are wrong: 0.85 to 0.95 for good depth, 0.1 to 0.3 for swapped positions or a missing
     /// scale.
     pub share: f64,
-    /// Brightness of the second view divided by that of the first, at points of the same depth.
-    pub gain: f64,
+    /// Red, green and blue of the second view divided by those of the first, at points of the same depth; the
+    /// ratio of the brightness if one of the views is grey.
+    pub gain: Exposure,
     /// Root mean square difference of the brightness at points of the same depth, with equal exposure, grey
     /// levels.
     pub difference: f64,
@@ -52,8 +53,8 @@ impl PairAgreement {
 pub struct Agreement {
     /// The pairs that share enough points for a verdict.
     pub pairs: Vec<PairAgreement>,
-    /// Factor for each view that gives it the exposure of the first one; 1 where the difference is small.
-    pub gains: Vec<f64>,
+    /// Factors for each view that give it the exposure and the white balance of the first one.
+    pub gains: Vec<Exposure>,
     /// Noise and slopes of each photograph, where it shows them.
     pub textures: Vec<Option<Texture>>,
     /// Standard deviation of the independent errors of each map: pixels of disparity for a baseline of one,
@@ -65,16 +66,16 @@ impl Agreement {
     /// Of views of one kind.
     pub fn of<P: Viewpoint>(views: &[View<'_, P>]) -> Self {
         let textures = views.par_iter().map(|view| Texture::of(view.image)).collect();
-        let mut agreement = Self { gains: vec![1.0; views.len()], textures, ..Self::default() };
+        let mut agreement = Self { gains: vec![[1.0; 3]; views.len()], textures, ..Self::default() };
         let mut errors = vec![Vec::new(); views.len()];
         let nearest = Nearest::new(views);
         for j in 1..views.len() {
             let Some(i) = nearest.before(j) else { continue };
             let found = Comparison::new(&views[i], &views[j]).verdict([i, j]);
             let Some(pair) = found else { continue };
-            // Brightness at points that do not correspond says nothing.
-            let gain = if pair.is_poor() { 1.0 } else { pair.gain };
-            agreement.gains[j] = agreement.gains[i] / gain;
+            // Colours at points that do not correspond say nothing.
+            let gain = if pair.is_poor() { [1.0; 3] } else { pair.gain };
+            agreement.gains[j] = std::array::from_fn(|c| agreement.gains[i][c] / gain[c]);
             agreement.pairs.push(pair);
             let look =
                 |a: &View<'_, P>, b: &View<'_, P>| Lookups::of(a.map, b.map, a.camera.map_to(&b.camera));
@@ -83,7 +84,6 @@ impl Agreement {
                 [i, j].iter().zip(found).for_each(|(view, variance)| errors[*view].push(variance));
             }
         }
-        agreement.gains.iter_mut().filter(|g| g.ln().abs() < SMALLEST_GAIN).for_each(|g| *g = 1.0);
         agreement.depth_errors = deviations(&errors).unwrap_or_default();
         agreement
     }
@@ -91,12 +91,13 @@ impl Agreement {
     /// Variance of the noise of a view, with its exposure; 0 if its photograph does not show it.
     pub(super) fn noise(&self, view: usize) -> f64 {
         let texture = self.textures.get(view).copied().flatten();
-        let gain = self.gains.get(view).copied().unwrap_or(1.0);
+        // That of green, as the noise.
+        let gain = self.gains.get(view).map_or(1.0, |gain| gain[1]);
         texture.map_or(0.0, |texture| (texture.noise * gain).powi(2))
     }
 
     /// Standard deviation of the errors of a map; 0 if it is not known.
-    pub(super) fn depth_error(&self, view: usize) -> f64 {
+    pub(crate) fn depth_error(&self, view: usize) -> f64 {
         self.depth_errors.get(view).copied().unwrap_or(0.0)
     }
 
@@ -126,19 +127,21 @@ fn deviations(variances: &[Vec<f64>]) -> Option<Vec<f64>> {
 /// Points of one view found in another one.
 struct Comparison {
     points: usize,
-    /// Brightness in both views of the points at which the depths agree.
-    matched: Vec<[f32; 2]>,
+    /// Colours in both views of the points at which the depths agree.
+    matched: Vec<[[f32; 3]; 2]>,
+    is_grey: bool,
 }
 
 impl Comparison {
     fn new<P: Viewpoint>(first: &View<'_, P>, second: &View<'_, P>) -> Self {
         let (image, other, other_map) = (first.image, second.image, second.map);
         let to_second = first.camera.map_to(&second.camera);
+        let is_grey = image.channels() != 3 || other.channels() != 3;
         let (width, height) = image.size();
         let step = ((width * height / COMPARED_PIXELS) as f64).sqrt().ceil().max(1.0) as usize;
         let rows: Vec<usize> = (0..height).step_by(step).collect();
         let of_row = |y: &usize| {
-            let mut all = Self { points: 0, matched: Vec::new() };
+            let mut all = Self { points: 0, matched: Vec::new(), is_grey };
             for x in (0..width).step_by(step) {
                 let (u, v, d) = to_second(x as f64, *y as f64, f64::from(first.map.row(*y)[x]));
                 let inside = |v: f64, side: usize| v > -0.5 && v < side as f64 - 0.5;
@@ -154,14 +157,14 @@ impl Comparison {
                 all.points += 1;
                 if same_depth(d as f32, there, other_map) {
                     let q = row * other.width() + column;
-                    all.matched.push([brightness(image, y * width + x), brightness(other, q)]);
+                    all.matched.push([image.pixel(y * width + x), other.pixel(q)]);
                 }
             }
             all
         };
         let parts: Vec<Self> = rows.par_iter().with_min_len(16).map(of_row).collect();
         let points = parts.iter().map(|part| part.points).sum();
-        Self { points, matched: parts.into_iter().flat_map(|part| part.matched).collect() }
+        Self { points, matched: parts.into_iter().flat_map(|part| part.matched).collect(), is_grey }
     }
 
     fn verdict(&self, views: [usize; 2]) -> Option<PairAgreement> {
@@ -169,21 +172,32 @@ impl Comparison {
             return None;
         }
         let gain = self.gain();
-        let alike = |[a, b]: &&[f32; 2]| (b - a * gain as f32).abs() <= GREY_LEVELS;
+        let alike =
+            |[a, b]: &&[[f32; 3]; 2]| (brightness(b, [1.0; 3]) - brightness(a, gain)).abs() <= GREY_LEVELS;
         let share = self.matched.iter().filter(alike).count() as f64 / self.points as f64;
         Some(PairAgreement { views, points: self.points, share, gain, difference: self.difference(gain) })
     }
 
-    fn difference(&self, gain: f64) -> f64 {
-        let square = |[a, b]: &[f32; 2]| (f64::from(*b) / gain - f64::from(*a)).powi(2);
+    fn difference(&self, gain: Exposure) -> f64 {
+        let back = gain.map(|gain| 1.0 / gain);
+        let square =
+            |[a, b]: &[[f32; 3]; 2]| f64::from(brightness(b, back) - brightness(a, [1.0; 3])).powi(2);
         (self.matched.iter().map(square).sum::<f64>() / self.matched.len().max(1) as f64).sqrt()
     }
 
-    /// The median ratio of the brightness of points that are neither dark nor overexposed; 1 of too few.
-    fn gain(&self) -> f64 {
+    fn gain(&self) -> Exposure {
+        match self.is_grey {
+            true => [self.ratio(|colour| brightness(colour, [1.0; 3])); 3],
+            false => std::array::from_fn(|c| self.ratio(|colour| colour[c])),
+        }
+    }
+
+    /// The median ratio of some value at points that are neither dark nor overexposed; 1 of too few.
+    fn ratio(&self, value: impl Fn(&[f32; 3]) -> f32) -> f64 {
         let usable = |v: f32| (16.0..250.0).contains(&v);
-        let both = self.matched.iter().filter(|[a, b]| usable(*a) && usable(*b));
-        let mut ratios: Vec<f64> = both.map(|[a, b]| f64::from(*b) / f64::from(*a)).collect();
+        let values = self.matched.iter().map(|pair| [value(&pair[0]), value(&pair[1])]);
+        let both = values.filter(|[a, b]| usable(*a) && usable(*b));
+        let mut ratios: Vec<f64> = both.map(|[a, b]| f64::from(b) / f64::from(a)).collect();
         if ratios.len() < FEWEST_POINTS { 1.0 } else { depth_errors::median(&mut ratios).unwrap_or(1.0) }
     }
 }
@@ -196,14 +210,16 @@ fn same_depth(a: f32, b: f32, map: &DepthMap) -> bool {
     (a - b).abs() <= tolerance
 }
 
-fn brightness(image: &Image, pixel: usize) -> f32 {
-    image.pixel::<3>(pixel).iter().sum::<f32>() / 3.0
+/// The mean of the three values with these factors.
+fn brightness(colour: &[f32; 3], gain: Exposure) -> f32 {
+    colour.iter().zip(gain).map(|(v, g)| v * g as f32).sum::<f32>() / 3.0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::camera::Camera;
+    use crate::image::Image;
     use crate::propagate::{CalibratedView, RectifiedView};
     use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 
@@ -247,19 +263,22 @@ mod tests {
     }
 
     #[test]
-    fn exposures_are_measured_and_small_differences_left() {
+    fn exposures_and_white_balances_are_measured() {
         let shots = [0.0, 1.0].map(record);
         let disparities = shots.each_ref().map(|s| rig_disparity(&s.1, SIZE.0));
-        let gains = |factor: f32| {
+        let gains = |factors: [f32; 3]| {
             let mut brighter = shots[1].0.clone();
-            brighter.data_mut().iter_mut().for_each(|v| *v *= factor);
+            brighter.data_mut().iter_mut().enumerate().for_each(|(i, v)| *v *= factors[i % 3]);
             let first = RectifiedView { image: &shots[0].0, map: &disparities[0], camera: 0.0 };
             let second = RectifiedView { image: &brighter, map: &disparities[1], camera: 1.0 };
             Agreement::of(&[first, second]).gains
         };
-        let found = gains(0.8);
-        assert!(found[0] == 1.0 && (found[1] - 1.25).abs() < 0.03, "{found:?}");
-        assert_eq!(gains(1.01), [1.0, 1.0]);
+        for factors in [[0.8; 3], [0.965; 3], [0.9, 1.0, 1.1]] {
+            let found = gains(factors);
+            assert_eq!(found[0], [1.0; 3]);
+            let is_right = |(gain, factor): (f64, f32)| (gain * f64::from(factor) - 1.0).abs() < 0.02;
+            assert!(found[1].into_iter().zip(factors).all(is_right), "{factors:?}: {found:?}");
+        }
     }
 
     #[test]
@@ -269,6 +288,6 @@ mod tests {
         let view = |position| RectifiedView { image: &image, map: &disparity, camera: position };
         assert_eq!(Agreement::of(&[view(0.0)]).worst(), None);
         let apart = Agreement::of(&[view(0.0), view(100.0)]);
-        assert!(apart.pairs.is_empty() && apart.gains == [1.0, 1.0]);
+        assert!(apart.pairs.is_empty() && apart.gains == [[1.0; 3]; 2]);
     }
 }

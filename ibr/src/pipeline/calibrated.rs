@@ -6,6 +6,7 @@ use super::{
     check_size,
 };
 use crate::camera::Camera;
+use crate::depth::Measure;
 use crate::interpolate::Degree;
 use crate::interpolate::plane::PlaneProblem;
 use crate::occlusion::{DepthTest, PlaneSearch};
@@ -104,7 +105,7 @@ fn render_with<const ORDER: usize, const C: usize>(
     let view_weights = view_weights(views, camera, settings);
     let agreement = Agreement::of(views);
     let view_weights = view_weights.with_noise(&agreement);
-    let settings = &settings.suited_to(&agreement, &view_weights);
+    let settings = &settings.suited_to(&agreement, &view_weights, Measure::Depth);
     let chosen = view_weights.views();
     let pixels: usize = chosen.iter().map(|v| views[*v].image.width() * views[*v].image.height()).sum();
     let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &settings.interpolation)?;

@@ -1,7 +1,7 @@
 //! Independent errors of the depth maps, from the maps alone: points that one map gives are looked up in
 //! another.
 
-use crate::depth::{DepthMap, Measure};
+use crate::depth::{DepthMap, FAR, Measure};
 
 /// Every so many pixels of a map are looked up.
 const LOOKUP_STEP: usize = 7;
@@ -13,7 +13,7 @@ pub(super) const FEWEST_POINTS: usize = 100;
 const SAME_SURFACE: f64 = 0.05;
 
 /// The median of |x| of a normal variable of deviation one, to its inverse.
-const DEVIATION_PER_MEDIAN: f64 = 1.4826;
+pub(crate) const DEVIATION_PER_MEDIAN: f64 = 1.4826;
 
 /// Differences beyond this many deviations belong to points that another surface hides.
 const HIDDEN_BEYOND: f64 = 3.0;
@@ -40,7 +40,8 @@ impl Lookups {
         let (width, height) = from.size();
         let mut all =
             Self { differences: Vec::with_capacity((width * height).div_ceil(LOOKUP_STEP)), kept: 0.0 };
-        for p in (0..width * height).step_by(LOOKUP_STEP).filter(|p| !from.is_guessed(*p)) {
+        let is_measured = |p: &usize| !from.is_guessed(*p) && from.data()[*p] < FAR;
+        for p in (0..width * height).step_by(LOOKUP_STEP).filter(is_measured) {
             let depth = f64::from(from.data()[p]);
             let (u, v, d) = map((p % width) as f64, (p / width) as f64, depth);
             let Some((there, kept)) = interpolated(to, u, v) else { continue };
@@ -104,7 +105,7 @@ fn interpolated(map: &DepthMap, u: f64, v: f64) -> Option<(f64, f64)> {
 }
 
 /// The middle one of some numbers.
-pub(super) fn median(values: &mut [f64]) -> Option<f64> {
+pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
@@ -137,13 +138,13 @@ pub(crate) struct DisparityGain {
 
 impl DisparityGain {
     /// Of errors of disparity, at this distance along the rows.
-    pub(super) fn along_rows(distance: f64) -> Self {
+    pub(crate) fn along_rows(distance: f64) -> Self {
         Self { xx: distance * distance, ..Self::default() }
     }
 
     /// From the map of pixels and their depths to the other view. The pixels that move farthest, a tenth,
     /// are left out: points close to a camera move without limit.
-    pub(super) fn of(map: &DepthMap, to: impl Fn(f64, f64, f64) -> (f64, f64, f64)) -> Self {
+    pub(crate) fn of(map: &DepthMap, to: impl Fn(f64, f64, f64) -> (f64, f64, f64)) -> Self {
         const STEPS: usize = 16;
         let (width, height) = map.size();
         let columns = (0..width).step_by(width.div_ceil(STEPS).max(1));
@@ -162,7 +163,7 @@ impl DisparityGain {
 
     /// Mean square change of the value for an error of one in the depth, from the products x x, x y and y y
     /// of the slopes of the view.
-    pub(super) fn product(&self, [xx, xy, yy]: [f64; 3]) -> f64 {
+    pub(crate) fn product(&self, [xx, xy, yy]: [f64; 3]) -> f64 {
         self.xx * xx + 2.0 * self.xy * xy + self.yy * yy
     }
 }

@@ -9,8 +9,10 @@ mod smoothing;
 pub mod uncalibrated;
 mod view_weights;
 
-pub use agreement::{Agreement, PairAgreement};
+pub use agreement::{Agreement, Exposure, PairAgreement};
+pub(crate) use depth_errors::{DEVIATION_PER_MEDIAN, DisparityGain, median};
 pub use view_weights::ViewWeights;
+pub(crate) use view_weights::{APERTURE, NEGLIGIBLE};
 
 use crate::depth::DepthMap;
 use crate::image::Image;

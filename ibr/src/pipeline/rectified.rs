@@ -94,7 +94,7 @@ fn render_with<const ORDER: usize, const C: usize>(
     let agreement = Agreement::of(views);
     let mut view_weights = ViewWeights::of(views, &position).nearest(settings.nearest).with_noise(&agreement);
     let chosen = view_weights.views();
-    let settings = &settings.suited_to(&agreement, &view_weights);
+    let settings = &settings.suited_to(&agreement, &view_weights, Measure::Disparity);
     if !settings.keep_exposure {
         view_weights = view_weights.with_gains(&agreement.gains);
     }
@@ -137,7 +137,6 @@ fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rend
             *count = strip.survivors_of_row(job, row);
             rows::count(&strip.samples, samples);
             nearest_depths(&strip.samples, &job.settings.interpolation, keys);
-            job.disparities(keys);
             (job.watch)((ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / height as f64);
             fit.interpolate(&strip.samples, &job.settings.interpolation, values, mask)
                 .map(|_| ())
@@ -147,7 +146,8 @@ fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rend
     let report = total(counts.iter(), HoleCount::of(&mask));
     enough(job, &report)?;
     let filled: Vec<bool> = counts.iter().map(|c| c.used > 0).collect();
-    rows::finish::<C>(&filled, &mask, job.settings.interpolation.holes.fill, &mut values);
+    rows::finish::<C>(&filled, &mask, &keys, &job.settings.interpolation, &mut values);
+    job.disparities(&mut keys);
     let image = Image::from_values((width, height), C, values);
     let depth = DepthMap::from_known((width, height), keys, Measure::Disparity);
     let (views, agreement) = (Vec::new(), Agreement::default());

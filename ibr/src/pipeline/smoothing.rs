@@ -1,6 +1,7 @@
 //! Smoothing that suits the noise of the photographs.
 
 use super::{Agreement, RenderSettings, ViewWeights};
+use crate::depth::Measure;
 
 /// Range of the smoothing: with less the fit is undetermined between samples, and with more the noise is
 /// not that of a photograph.
@@ -8,8 +9,13 @@ const LEAST_SMOOTHING: f64 = 0.01;
 const MOST_SMOOTHING: f64 = 4.0;
 
 impl RenderSettings {
-    /// The settings with the lambda and the stiffness that suit the photographs; as they are with
-    /// `keep_smoothing` or if no photograph shows its noise. The result keeps its smoothing.
+    /// The settings with the depth test that suits the maps, and with the lambda and the stiffness that suit
+    /// the photographs; the smoothing is as it was with `keep_smoothing` or if no photograph shows its noise.
+    /// The result keeps its smoothing.
+    ///
+    /// Depths of one point in two maps with independent errors of the deviation delta differ by sqrt(2)
+    /// delta. So one sample hides another if they differ by three times that, disparities in pixels and
+    /// depths as shares: of the samples of one surface one in 700 is then removed.
     ///
     /// Take the noise of the samples as white with the variance sigma^2 and the texture along a row as a
     /// random walk with the mean square slope s^2. The most probable row minimises
@@ -22,8 +28,14 @@ impl RenderSettings {
     /// sum_k w_k J'(x_k)^2 / (W s^2). So lambda = sigma^2 / (W s^2) in the row fit. The plane fit counts
     /// edges of pixels instead of samples, so its stiffness is sigma^2 / s^2; it is never less than that of
     /// the settings, because samples of general cameras are also displaced.
-    pub fn suited_to(&self, agreement: &Agreement, view_weights: &ViewWeights) -> Self {
+    pub fn suited_to(&self, agreement: &Agreement, view_weights: &ViewWeights, measure: Measure) -> Self {
         let mut settings = Self { keep_smoothing: true, ..*self };
+        let test = &mut settings.interpolation.depth_test;
+        let differs = 3.0 * (2.0 * mean_square(&agreement.depth_errors)).sqrt();
+        match measure {
+            Measure::Disparity => test.parallax = test.parallax.max(differs),
+            Measure::Depth => test.relative = test.relative.max(differs),
+        }
         if self.keep_smoothing {
             return settings;
         }
@@ -43,6 +55,10 @@ impl RenderSettings {
     }
 }
 
+fn mean_square(numbers: &[f64]) -> f64 {
+    numbers.iter().map(|v| v * v).sum::<f64>() / numbers.len().max(1) as f64
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -50,7 +66,7 @@ mod tests {
 
     fn suited(textures: &[Option<Texture>], settings: &RenderSettings) -> RenderSettings {
         let agreement = Agreement { textures: textures.to_vec(), ..Agreement::default() };
-        settings.suited_to(&agreement, &ViewWeights::by_distance(&vec![1.0; textures.len()]))
+        settings.suited_to(&agreement, &ViewWeights::by_distance(&vec![1.0; textures.len()]), Measure::Depth)
     }
 
     #[test]

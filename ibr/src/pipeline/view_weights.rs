@@ -1,7 +1,7 @@
 //! The share of each view in the virtual one, and its exposure.
 
-use super::Agreement;
 use super::depth_errors::{DisparityGain, median};
+use super::{Agreement, Exposure};
 use crate::camera::Camera;
 use crate::depth::Measure;
 use crate::image::Image;
@@ -19,11 +19,11 @@ const LEAST_VARIANCE: f64 = 1.0;
 
 /// Variance of a position within a pixel, in square pixels. Errors of depth that displace samples by less
 /// say little: between samples the fit is no better.
-const APERTURE: f64 = 1.0 / 12.0;
+pub(crate) const APERTURE: f64 = 1.0 / 12.0;
 
 /// Errors of depth that change the weight of no sample by more than this share are left out: the slopes of
 /// all samples take a fifth of the time of a view.
-const NEGLIGIBLE: f64 = 0.02;
+pub(crate) const NEGLIGIBLE: f64 = 0.02;
 
 /// Weights of the views: near ones count more.
 ///
@@ -49,8 +49,8 @@ pub struct ViewWeights {
     disparity_gains: Vec<DisparityGain>,
     /// Errors of the samples of each view; empty if they are not known.
     errors: Vec<SampleErrors>,
-    /// Factors that give the views one exposure; empty if they have it.
-    gains: Vec<f32>,
+    /// Factors that give the views one exposure; empty if they are not wanted.
+    gains: Vec<[f32; 3]>,
 }
 
 impl ViewWeights {
@@ -200,10 +200,9 @@ impl ViewWeights {
         self
     }
 
-    /// The same with factors for the brightness of the views.
-    pub fn with_gains(self, gains: &[f64]) -> Self {
-        let needed = gains.iter().any(|g| *g != 1.0);
-        Self { gains: if needed { gains.iter().map(|g| *g as f32).collect() } else { Vec::new() }, ..self }
+    /// The same with factors for the colours of the views.
+    pub fn with_gains(self, gains: &[Exposure]) -> Self {
+        Self { gains: gains.iter().map(|gain| gain.map(|g| g as f32)).collect(), ..self }
     }
 
     /// The sum of the weights.
@@ -216,12 +215,12 @@ impl ViewWeights {
         self.weights.get(usize::from(view)).copied().unwrap_or(1.0)
     }
 
-    /// The factor for the brightness of a view.
-    pub fn gain(&self, view: u16) -> f32 {
-        self.gains.get(usize::from(view)).copied().unwrap_or(1.0)
+    /// The factors for the colours of a view.
+    pub fn gain(&self, view: u16) -> [f32; 3] {
+        self.gains.get(usize::from(view)).copied().unwrap_or([1.0; 3])
     }
 
-    /// Multiplies the weight and the brightness of every sample by those of its view, and the weight by what
+    /// Multiplies the weight and the colours of every sample by those of its view, and the weight by what
     /// the slope of its photograph makes of the errors of the depths.
     pub fn apply<'a, const C: usize>(&self, samples: &mut [Sample<C>], image: impl Fn(usize) -> &'a Image) {
         let is_exact = self.errors.iter().all(|errors| errors.typical.jitter == 0.0);
@@ -235,7 +234,7 @@ impl ViewWeights {
                 };
                 for (s, share) in part.iter_mut().zip(shares) {
                     s.weight *= weight * share;
-                    s.value.iter_mut().for_each(|v| *v *= gain);
+                    s.value.iter_mut().zip(gain).for_each(|(v, g)| *v *= g);
                 }
             }
         }
@@ -253,11 +252,11 @@ impl ViewWeights {
         own: &SampleErrors,
         image: &Image,
         samples: &[Sample<C>],
-        gain: f32,
+        gain: [f32; 3],
     ) -> [f32; PART] {
         let mut gradients = [Gradient([0.0; 3]); PART];
         for (gradient, s) in gradients.iter_mut().zip(samples) {
-            *gradient = Gradient::of(image, s.pixel as usize, gain, own.noise);
+            *gradient = Gradient::of(image, s.pixel as usize, gain[1], own.noise);
         }
         let (mut sums, mut total) = ([0.0; PART], 0.0);
         for (errors, weight) in self.errors.iter().zip(&self.weights).step_by(self.stride()) {
@@ -298,7 +297,8 @@ impl SampleErrors {
     }
 }
 
-/// Mean over the channels of the products of the slopes of a photograph: x x, x y and y y.
+/// Mean over the channels of the products of the slopes of a photograph, with the factor for green: x x, x y
+/// and y y.
 #[derive(Clone, Copy)]
 struct Gradient([f64; 3]);
 
@@ -343,10 +343,11 @@ mod tests {
     #[test]
     fn a_photograph_with_more_noise_counts_less() {
         let texture = |noise| Some(Texture { noise, slope: 10.0 });
-        let pair = PairAgreement { views: [0, 1], points: 1000, share: 0.9, gain: 1.0, difference: 10.0 };
+        let pair =
+            PairAgreement { views: [0, 1], points: 1000, share: 0.9, gain: [1.0; 3], difference: 10.0 };
         let weights = |noise: [f64; 2], pairs: Vec<PairAgreement>| {
             let textures = noise.map(texture).to_vec();
-            let agreement = Agreement { pairs, gains: vec![1.0, 1.0], textures, ..Agreement::default() };
+            let agreement = Agreement { pairs, gains: vec![[1.0; 3]; 2], textures, ..Agreement::default() };
             ViewWeights::by_distance(&[0.5, 0.5]).with_noise(&agreement).weights
         };
         assert_eq!(weights([5.0, 5.0], vec![pair]), [1.0, 1.0]);
@@ -361,7 +362,8 @@ mod tests {
     /// more; on a flat photograph both are alike.
     #[test]
     fn samples_with_errors_of_depth_count_less_on_slopes() {
-        let pair = PairAgreement { views: [0, 1], points: 1000, share: 0.9, gain: 1.0, difference: 10.0 };
+        let pair =
+            PairAgreement { views: [0, 1], points: 1000, share: 0.9, gain: [1.0; 3], difference: 10.0 };
         let depth_errors = vec![0.0, 2.0];
         let agreement = Agreement { pairs: vec![pair], depth_errors, ..Agreement::default() };
         let disparity_gains = vec![DisparityGain::along_rows(0.5); 2];
@@ -393,9 +395,11 @@ mod tests {
     fn exposures_are_matched() {
         let image = Image::filled(1, 1, 1, 0.0);
         let mut samples = [Sample::<1> { value: [100.0], view: 1, ..Sample::BLANK }];
-        ViewWeights::by_distance(&[1.0, 1.0]).with_gains(&[1.0, 1.0]).apply(&mut samples, |_| &image);
+        ViewWeights::by_distance(&[1.0, 1.0]).with_gains(&[[1.0; 3]; 2]).apply(&mut samples, |_| &image);
         assert_eq!(samples[0].value, [100.0]);
-        ViewWeights::by_distance(&[1.0, 1.0]).with_gains(&[1.0, 1.5]).apply(&mut samples, |_| &image);
+        ViewWeights::by_distance(&[1.0, 1.0])
+            .with_gains(&[[1.0; 3], [1.5; 3]])
+            .apply(&mut samples, |_| &image);
         assert_eq!(samples[0].value, [150.0]);
     }
 

@@ -184,7 +184,8 @@ impl ShiftedTile {
                 dropped.outside += 1;
                 continue;
             }
-            let doubtful = self.reliefs.behind_edge[i] || view.map.is_guessed(pixel);
+            let guessed = view.map.is_guessed(pixel);
+            let doubtful = self.reliefs.behind_edge[i] || guessed;
             samples.push(Sample {
                 x,
                 y: y as f64,
@@ -195,6 +196,7 @@ impl ShiftedTile {
                 pixel: pixel as u32,
                 view: index,
                 doubtful,
+                guessed,
             });
         }
         dropped

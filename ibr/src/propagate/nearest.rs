@@ -58,6 +58,11 @@ impl Nearest {
         if view == 0 { None } else { self.search(self.place_of[view], is_before).map(|(_, first)| first) }
     }
 
+    /// The view that is nearest to another one; the first at its place.
+    pub(crate) fn other(&self, view: usize) -> Option<usize> {
+        self.search(self.place_of[view], |other| other.first != view).map(|(_, first)| first)
+    }
+
     /// Distance from a view to the nearest other one, infinite if there is none.
     pub(crate) fn distance(&self, view: usize) -> f64 {
         let place = self.place_of[view];

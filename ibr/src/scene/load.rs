@@ -13,13 +13,15 @@ pub use complete::complete;
 pub use goals::MOST_FRAMES;
 
 use super::spec::{SceneSpec, ViewSpec};
-use super::{Kind, Scene, SceneError};
+use super::{Kind, Scene, SceneError, SourceView};
 use crate::camera::middlebury::Calibration;
 use crate::depth::{DepthMap, Measure, fill_unknown};
 use crate::files::{InputError, Location};
 use crate::image::{Image, ImageError, MOST_PIXELS, read_image_within, read_map_within};
-use crate::partial::{Densify, densify};
+use crate::partial::densify;
 use crate::pipeline::Watch;
+use crate::propagate::Viewpoint;
+use crate::restore::{coloured, from_scattered, restore};
 use goals::Goal;
 use hybank::memory::check_memory;
 use hybank::messages::{self, Number, Quoted, of_document};
@@ -36,8 +38,6 @@ pub struct LoadOptions {
     pub view: Option<String>,
     /// Use only every K-th value of full maps.
     pub depth_step: usize,
-    /// How coarse maps are made dense.
-    pub densify: Densify,
     /// Whether unknown depths are filled from the farther neighbour in their row.
     pub fill: bool,
     /// The most pixels of the virtual view, and of each image and map.
@@ -46,7 +46,7 @@ pub struct LoadOptions {
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { view: None, depth_step: 1, densify: Densify::default(), fill: true, max_pixels: MOST_PIXELS }
+        Self { view: None, depth_step: 1, fill: true, max_pixels: MOST_PIXELS }
     }
 }
 
@@ -126,15 +126,30 @@ impl Loader<'_> {
         }
         let goals = self.goals()?;
         let own = index.map(|i| &self.spec.view[i]);
-        let Inputs { kind, filled, calibration, mut notes } = if views.iter().any(|v| v.position.is_some()) {
-            self.rectified(&views, own, &goals)?
-        } else if views.iter().any(|v| v.camera.is_some() || self.source_of(v).is_some()) {
-            self.calibrated(&views, left_out.as_ref(), &goals)?
-        } else {
-            self.uncalibrated(&views, own, &goals)?
-        };
+        let Inputs { mut kind, filled, calibration, mut notes } =
+            if views.iter().any(|v| v.position.is_some()) {
+                self.rectified(&views, own, &goals)?
+            } else if views.iter().any(|v| v.camera.is_some() || self.source_of(v).is_some()) {
+                self.calibrated(&views, left_out.as_ref(), &goals)?
+            } else {
+                self.uncalibrated(&views, own, &goals)?
+            };
         notes.extend(self.spec.notes.iter().cloned());
-        Ok(Scene { kind, offset: self.offset(&goals)?, filled, calibration, notes })
+        notes.extend(note_of_dark(&kind.images()));
+        self.room_to_restore(&kind.images())?;
+        let outliers = restored(&mut kind, &mut notes);
+        Ok(Scene { kind, offset: self.offset(&goals)?, filled, outliers, calibration, notes })
+    }
+
+    /// Refuses views whose maps there is no memory to restore.
+    fn room_to_restore(&self, images: &[&Image]) -> Loaded<()> {
+        let sizes = images.iter().map(|image| pixels(image) as f64);
+        let bytes = sizes.clone().map(|size| 5.0 * size).sum::<f64>() + RESTORING * sizes.fold(0.0, f64::max);
+        check_memory(bytes).map_err(|shortage| {
+            self.incomplete(format!(
+                "to restore the depth maps takes {shortage}; shrink the images or use fewer views"
+            ))
+        })
     }
 
     fn incomplete(&self, reason: impl Into<String>) -> SceneError {
@@ -205,19 +220,87 @@ impl Loader<'_> {
         let step = if given == 1 { self.options.depth_step } else { given };
         if step == 1 {
             let mut map = map;
+            if map.is_scattered() {
+                let unknown = map.unknown();
+                return Ok((image.clone(), from_scattered(&map, &image), unknown));
+            }
             let filled = if self.options.fill { fill_unknown(&mut map) } else { 0 };
             return Ok((image, map, filled));
         }
         ImageError::refuse_without_memory(&path, image.size(), LOADING_BYTES)?;
         let coarse = if given == 1 { map.decimated(step).map_err(depth_error)? } else { map };
-        let dense = densify(&coarse, step, &image, self.options.densify).map_err(depth_error)?;
+        let dense = densify(&coarse, step, &image).map_err(depth_error)?;
         Ok((image, dense, coarse.unknown()))
     }
+}
+
+/// Restores the maps and colours of a scene; the share of outliers in each map.
+fn restored(kind: &mut Kind, notes: &mut Vec<String>) -> Vec<f64> {
+    match kind {
+        Kind::Rectified { views, .. } => restore_views(views, notes),
+        Kind::Calibrated { views, .. } => restore_views(views, notes),
+        Kind::Uncalibrated { .. } => Vec::new(),
+    }
+}
+
+/// Largest value of 12 bits in 16 on the scale of 255, rounded up.
+const TWELVE_BITS: f32 = 16.0;
+
+/// That photographs are as dark as data of 12 bits in files of 16.
+fn note_of_dark(images: &[&Image]) -> Option<String> {
+    let is_dark = |image: &Image| image.data().iter().all(|v| *v < TWELVE_BITS);
+    let dark: Vec<String> =
+        (1..).zip(images).filter(|(_, i)| is_dark(i)).map(|(k, _)| k.to_string()).collect();
+    (!dark.is_empty()).then(|| {
+        format!(
+            "no value of view {} is above a sixteenth of white; data of 12 bits in files of 16 must be multiplied by 16",
+            dark.join(", ")
+        )
+    })
+}
+
+/// Share of outliers from which on the user is told.
+const MANY_OUTLIERS: f64 = 0.005;
+
+fn note_of_outliers(shares: &[f64]) -> Option<String> {
+    let most = shares.iter().copied().fold(0.0, f64::max);
+    (most >= MANY_OUTLIERS).then(|| {
+        let percent: Vec<String> = shares.iter().map(|share| format!("{:.1}", 100.0 * share)).collect();
+        format!(
+            "{} % of the depths of the views contradict their neighbours and the other views, and were replaced",
+            percent.join(", ")
+        )
+    })
+}
+
+fn restore_views<P: Viewpoint>(views: &mut [SourceView<P>], notes: &mut Vec<String>) -> Vec<f64> {
+    let restored = restore(&views.iter().map(SourceView::view).collect::<Vec<_>>());
+    let outliers: Vec<f64> = restored.iter().map(|restored| restored.outliers).collect();
+    views.iter_mut().zip(restored).for_each(|(view, restored)| view.map = restored.map);
+    notes.extend(note_of_outliers(&outliers));
+    let coloured = coloured(&views.iter().map(SourceView::view).collect::<Vec<_>>());
+    let grey: Vec<String> =
+        (1..).zip(&coloured).filter(|(_, c)| c.is_some()).map(|(k, _)| k.to_string()).collect();
+    for (view, image) in views.iter_mut().zip(coloured) {
+        if let Some(image) = image {
+            view.image = image;
+        }
+    }
+    if !grey.is_empty() {
+        notes.push(format!(
+            "view {} grey beside coloured ones: what the others show gives the colour, the grey photographs the luminance",
+            if let [one] = &grey[..] { format!("{one} is") } else { format!("{} are", grey.join(", ")) }
+        ));
+    }
+    outliers
 }
 
 /// Bytes per pixel of a view that is there, and of one that is being read and made dense.
 const VIEW_BYTES: f64 = 20.0;
 const LOADING_BYTES: f64 = 110.0;
+
+/// Bytes per pixel of the view whose map is restored: the equations of a spline of one value.
+const RESTORING: f64 = 100.0;
 
 /// Bytes of memory in which the text of a scene file can be parsed.
 #[cfg(feature = "cli")]

@@ -28,6 +28,9 @@ pub struct Scene {
     pub offset: f64,
     /// Unknown depths that were filled from their neighbours.
     pub filled: usize,
+    /// Share of the values of each map that contradicted their neighbours and the other views, and were
+    /// replaced.
+    pub outliers: Vec<f64>,
     /// The calibration file of a rectified rig, which gives its disparities a unit.
     pub calibration: Option<Calibration>,
     /// What was decided on reading; it is reported to the user.
@@ -73,6 +76,15 @@ impl Kind {
             Self::Rectified { views, .. } => views.len(),
             Self::Calibrated { views, .. } => views.len(),
             Self::Uncalibrated { images, .. } => images.len(),
+        }
+    }
+
+    /// The photographs of the views.
+    pub fn images(&self) -> Vec<&Image> {
+        match self {
+            Self::Rectified { views, .. } => views.iter().map(|view| &view.image).collect(),
+            Self::Calibrated { views, .. } => views.iter().map(|view| &view.image).collect(),
+            Self::Uncalibrated { images, .. } => images.iter().collect(),
         }
     }
 

@@ -4,7 +4,7 @@ use super::planner::{
     Candidate, Costs, Placement, RoundingCosts, Search, Wanted, price_of_depth_errors, rounded_map,
 };
 use super::*;
-use hybank_ibr::partial::{Densify, densify};
+use crate::bilinear::bilinear;
 use hybank_ibr::pipeline::rectified;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -90,7 +90,7 @@ fn the_split_of_bits_with_partial_depth() {
         let of_view = |k: usize| {
             let coarse = rig.maps[k].decimated(6).unwrap();
             let coarse = step.map_or(coarse.clone(), |step| rounded_map(&coarse, step));
-            densify(&coarse, 6, &rig.images[k], Densify::Bilinear).unwrap()
+            bilinear(&coarse, 6, rig.images[k].size())
         };
         (0..2).map(of_view).collect::<Vec<_>>()
     };

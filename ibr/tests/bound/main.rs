@@ -2,6 +2,8 @@
 //! where the data are not there, and on scenes with exact references.
 
 mod advice;
+#[path = "../support/bilinear.rs"]
+mod bilinear;
 mod decisions;
 #[path = "../../examples/plan/planner/mod.rs"]
 #[allow(dead_code, unreachable_pub, unused_imports)]

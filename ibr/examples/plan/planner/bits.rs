@@ -19,7 +19,7 @@
 
 use super::random::{seeded, within};
 use hybank_ibr::analysis::with_noise;
-use hybank_ibr::depth::DepthMap;
+use hybank_ibr::depth::{DepthMap, Measure};
 use hybank_ibr::image::Image;
 use hybank_ibr::pipeline::{Agreement, RenderError, RenderSettings, ViewWeights, rectified};
 use hybank_ibr::propagate::RectifiedView;
@@ -44,7 +44,10 @@ pub struct Sensitivity {
 fn settled(views: &[RectifiedView<'_>], position: f64, settings: &RenderSettings) -> RenderSettings {
     let agreement = Agreement::of(views);
     let view_weights = ViewWeights::of(views, &position).with_noise(&agreement);
-    RenderSettings { keep_exposure: true, ..settings.suited_to(&agreement, &view_weights) }
+    RenderSettings {
+        keep_exposure: true,
+        ..settings.suited_to(&agreement, &view_weights, Measure::Disparity)
+    }
 }
 
 /// The sensitivities of a view of a rectified rig: it is rendered from intensities and from disparities with

@@ -4,7 +4,6 @@ use super::SceneArguments;
 use crate::image::{FrameRate, Levels};
 use crate::interpolate::plane::PlaneSettings;
 use crate::interpolate::{Degree, HoleFill};
-use crate::partial::Densify;
 use crate::pipeline::{Method, RenderSettings};
 use clap::Args;
 use std::path::PathBuf;
@@ -51,7 +50,8 @@ pub(in crate::cli) struct RenderArguments {
     /// several views.
     #[arg(short, long, value_name = "FILE")]
     pub(in crate::cli) output: PathBuf,
-    /// Also write a mask: white for seen pixels, grey for cracks, black for disocclusions.
+    /// Also write a mask: white for seen pixels, grey for cracks, dark grey where only samples of guessed
+    /// depth lie, black for disocclusions.
     #[arg(long, value_name = "FILE")]
     pub(in crate::cli) mask: Option<PathBuf>,
     /// Also write the depth of the virtual view (.pfm), NaN in holes: millimetres of a rig with calib.txt,
@@ -85,9 +85,6 @@ pub(in crate::cli) struct RenderArguments {
     /// How holes are filled.
     #[arg(long, value_enum, default_value_t = HoleFill::Background)]
     pub(in crate::cli) fill: HoleFill,
-    /// How coarse depth is made dense.
-    #[arg(long, value_enum, default_value_t = Densify::Segmentwise)]
-    pub(in crate::cli) densify: Densify,
     /// Drop pixels of unknown depth instead of filling it from the farther neighbour.
     #[arg(long)]
     pub(in crate::cli) drop_unknown: bool,
@@ -95,18 +92,10 @@ pub(in crate::cli) struct RenderArguments {
     /// takes three times as long.
     #[arg(long, value_enum)]
     pub(in crate::cli) degree: Option<Degree>,
-    /// Weight of the slope penalty of the row fit, px^2 [default: from the noise of the photographs].
+    /// Weight of the slope penalty of the row fit, px^2 [default: from the noise of the photographs, 0.01 to
+    /// 4].
     #[arg(long, value_name = "L", allow_negative_numbers = true)]
     pub(in crate::cli) lambda: Option<f64>,
-    /// Weight of the differences of neighbouring coefficients of the row fit.
-    #[arg(long, value_name = "T", allow_negative_numbers = true)]
-    pub(in crate::cli) tau: Option<f64>,
-    /// Radius of the depth test, px.
-    #[arg(long, value_name = "PX", allow_negative_numbers = true)]
-    pub(in crate::cli) epsilon: Option<f64>,
-    /// Depth difference from which a sample is hidden, as a share of the nearer depth.
-    #[arg(long, value_name = "R", allow_negative_numbers = true)]
-    pub(in crate::cli) relative_depth: Option<f64>,
     /// Seed of the robust estimators (scenes without cameras).
     #[arg(long, default_value_t = 1)]
     pub(in crate::cli) seed: u64,
@@ -129,15 +118,7 @@ impl RenderArguments {
             Some(Degree::Cubic) => stage.plane = PlaneSettings::CUBIC,
             None => {}
         }
-        let mut typed = |slot: fn(&mut crate::interpolate::Settings) -> &mut f64, value: Option<f64>| {
-            if let Some(value) = value {
-                *slot(stage) = value;
-            }
-        };
-        typed(|s| &mut s.fit.lambda, self.lambda);
-        typed(|s| &mut s.fit.tau, self.tau);
-        typed(|s| &mut s.depth_test.epsilon, self.epsilon);
-        typed(|s| &mut s.depth_test.relative, self.relative_depth);
+        stage.fit.lambda = self.lambda.unwrap_or(stage.fit.lambda);
         settings
     }
 }

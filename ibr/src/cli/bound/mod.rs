@@ -12,7 +12,6 @@ use super::output;
 use super::progress::Progress;
 use crate::analysis::{Limits, ViewError};
 use crate::image::Image;
-use crate::partial::Densify;
 use crate::pipeline::{RenderError, Watch};
 use crate::scene::{self, Kind, Scene};
 use files::Outputs;
@@ -36,7 +35,7 @@ pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
     let mut worst: Option<(usize, f64, ViewError)> = None;
     for frame in 0..frames {
         let predicted = predictor.at(frame).map_err(named)?;
-        let mut summary = Summary::new(&predicted, predictor.agreement());
+        let mut summary = Summary::new(&predicted, predictor.agreement(), &scene.outliers);
         summary.measure(&predicted, truth.as_ref(), arguments.scene.truth.as_deref())?;
         let outputs = Outputs::of(arguments, (frames > 1).then_some(frame));
         let (encoded, white) = outputs.encoded(&predicted, truth.as_ref())?;
@@ -78,7 +77,7 @@ fn check(arguments: &BoundArguments) -> Result<Option<Limits>, Failure> {
 
 fn read(arguments: &BoundArguments, watch: Watch<'_>) -> Result<(Scene, Option<Image>), Failure> {
     let source = arguments.scene.source()?;
-    let scene = arguments.scene.load(&source, Densify::default(), true, watch)?;
+    let scene = arguments.scene.load(&source, true, watch)?;
     refuse_what_has_no_prediction(&scene, arguments)?;
     let frames = scene.kind.frames();
     let numbers = (0..frames.min(scene::MOST_FRAMES)).map(|frame| (frames > 1).then_some(frame));

@@ -18,6 +18,8 @@ pub(super) struct Summary {
     dominant: Cause,
     /// What makes the largest part smaller; to check the inputs, if they contradict each other.
     remedy: &'static str,
+    /// Share of the depths that were outliers.
+    outliers: f64,
     /// Whether the views fit each other; null if there is nothing to compare.
     inputs_agree: Option<bool>,
     /// Views that were left out in turn to calibrate the estimate; 0 if typical weights were used.
@@ -57,8 +59,15 @@ struct Measured {
 const CHECK_FIRST: &str =
     "check the inputs first: the views contradict each other, and the prediction is that of these inputs";
 
+/// What to do first where depths are outliers.
+const MEND_DEPTH_FIRST: &str = "depth without outliers: those were replaced by guesses from their neighbours, which err most at outlines";
+
+/// Share of outliers from which on they are what to mend first.
+const MANY_OUTLIERS: f64 = 0.01;
+
 impl Summary {
-    pub(super) fn new(predicted: &ViewError, agreement: &Agreement) -> Self {
+    pub(super) fn new(predicted: &ViewError, agreement: &Agreement, outliers: &[f64]) -> Self {
+        let outliers = outliers.iter().sum::<f64>() / outliers.len().max(1) as f64;
         let share = |(cause, error)| CauseShare { cause, error };
         let dominant = predicted.dominant();
         let inputs_agree = agreement.worst().map(|pair| !pair.is_poor());
@@ -66,7 +75,12 @@ impl Summary {
             totals: predicted.totals(),
             causes: Cause::ALL.into_iter().zip(predicted.causes).map(share).collect(),
             dominant,
-            remedy: if inputs_agree == Some(false) { CHECK_FIRST } else { dominant.remedy() },
+            remedy: match inputs_agree {
+                Some(false) => CHECK_FIRST,
+                _ if outliers >= MANY_OUTLIERS => MEND_DEPTH_FIRST,
+                _ => dominant.remedy(),
+            },
+            outliers,
             inputs_agree,
             calibrated_on: predicted.calibration.views,
             disparity_noise: predicted.calibration.disparity_noise,
@@ -111,6 +125,9 @@ impl Summary {
         lines.extend(t.sure_bound.map(|b| format!("sure      {b:.2} in the mean, within the limits given")));
         let part = |c: &CauseShare| format!("{:?} {:.2}", c.cause, c.error).to_lowercase();
         lines.push(format!("causes    {}", self.causes.iter().map(part).collect::<Vec<_>>().join(", ")));
+        if self.outliers >= MANY_OUTLIERS {
+            lines.push(format!("outliers  {:.1} % of the depths", 100.0 * self.outliers));
+        }
         lines.push(format!("next      {}", self.remedy));
         lines.extend(self.advice.as_ref().filter(|_| self.inputs_agree != Some(false)).map(advice));
         lines.push(match self.calibrated_on {

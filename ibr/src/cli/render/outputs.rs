@@ -4,6 +4,7 @@ use crate::cli::arguments::RenderArguments;
 use crate::cli::failure::Failure;
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded};
+use crate::depth::{FAR, Measure};
 use crate::image::{Image, ImageError, Levels, encode_levels, encode_with_alpha, pfm};
 use crate::interpolate::Cover;
 use crate::pipeline::Rendering;
@@ -140,7 +141,7 @@ impl Outputs {
             all.push(match part {
                 Part::View => self.view(rendering, path)?,
                 Part::Mask => output::encoded(&mask_image(rendering), path, Levels::Eight)?,
-                Part::Depth => numbers(rendering.depth.data().to_vec(), rendering.depth.size(), path),
+                Part::Depth => numbers(depths(rendering), rendering.depth.size(), path),
                 Part::Count => counts(rendering, path)?,
                 Part::Error => {
                     let Some(truth) = truth else { continue };
@@ -163,7 +164,7 @@ impl Outputs {
     }
 }
 
-/// White seen, grey crack, black disocclusion.
+/// White seen, grey crack, dark grey guessed, black disocclusion.
 fn mask_image(rendering: &Rendering) -> Image {
     let (width, height) = rendering.image.size();
     let mut image = Image::filled(width, height, 1, 0.0);
@@ -171,10 +172,18 @@ fn mask_image(rendering: &Rendering) -> Image {
         *pixel = match cover {
             Cover::Seen => 255.0,
             Cover::Crack => 128.0,
+            Cover::Guessed => 64.0,
             Cover::Disocclusion => 0.0,
         };
     }
     image
+}
+
+/// The depths, infinite where they are far away.
+fn depths(rendering: &Rendering) -> Vec<f32> {
+    let map = &rendering.depth;
+    let is_far = |v: f32| map.measure() == Measure::Depth && v >= FAR;
+    map.data().iter().map(|v| if is_far(*v) { f32::INFINITY } else { *v }).collect()
 }
 
 /// A float map.

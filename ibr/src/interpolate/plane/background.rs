@@ -1,53 +1,15 @@
 //! Classification of holes in the plane, and the surface that is continued into each.
 
+use crate::depth::{NONE, for_holes};
 use crate::interpolate::Cover;
 use crate::occlusion::DepthTest;
-
-/// The known pixel next to `p` in each of the four directions, as an index; `NONE` where there is none.
-pub(super) const NONE: u32 = u32::MAX;
-
-/// Calls `visit(p, neighbours)` for every unknown pixel with its nearest known pixels to the left,
-/// right, above and below.
-fn for_holes(depth: &[f32], width: usize, mut visit: impl FnMut(usize, [u32; 4])) {
-    let below = nearest_below(depth, width);
-    let mut above = vec![NONE; width];
-    let mut right = vec![NONE; width];
-    for (y, row) in depth.chunks_exact(width).enumerate() {
-        let index = |x: usize| (y * width + x) as u32;
-        let mut last = NONE;
-        for x in (0..width).rev() {
-            right[x] = last;
-            if !row[x].is_nan() {
-                last = index(x);
-            }
-        }
-        let mut left = NONE;
-        for x in 0..width {
-            if row[x].is_nan() {
-                visit(y * width + x, [left, right[x], above[x], below[y * width + x]]);
-            } else {
-                left = index(x);
-                above[x] = left;
-            }
-        }
-    }
-}
-
-fn nearest_below(depth: &[f32], width: usize) -> Vec<u32> {
-    let mut below = vec![NONE; depth.len()];
-    for p in (0..depth.len().saturating_sub(width)).rev() {
-        let next = p + width;
-        below[p] = if depth[next].is_nan() { below[next] } else { next as u32 };
-    }
-    below
-}
 
 /// For every unknown pixel the known pixel to continue from, [`NONE`] if there is none.
 ///
 /// If the closest known pixel has no counterpart on the other side, the hole is open to the border of the
 /// image there, and the closest pixel is continued. Otherwise the hole lies between surfaces, and the
 /// closest pixel of the farthest of them is: background that the camera uncovers.
-pub(super) fn sources(depth: &[f32], width: usize, test: &DepthTest) -> Vec<u32> {
+pub(in crate::interpolate) fn sources(depth: &[f32], width: usize, test: &DepthTest) -> Vec<u32> {
     let mut sources = vec![NONE; depth.len()];
     for_holes(depth, width, |p, around| {
         let p32 = p as u32;

@@ -1,6 +1,6 @@
 //! Samples enter the normal equations: into the whole image, or into several parts of it at a time.
 
-use super::{Fit2Sample, PlaneProblem};
+use super::{Fit2Sample, GUESSED, PlaneProblem};
 use crate::interpolate::{HoleSettings, InterpolationError, check_samples};
 use crate::occlusion::LARGEST_SPACING;
 use crate::sample::Sample;
@@ -70,8 +70,9 @@ impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
                 let (dx, dy) = (s.x - column as f64, s.y - row as f64);
                 let squared = dx * dx + dy * dy;
                 let p = row * width + column - self.first;
-                if squared <= half * half && (squared as f32) < self.distance[p] {
-                    (self.distance[p], self.depth[p]) = (squared as f32, s.depth);
+                let distance = squared as f32 + if s.guessed { GUESSED } else { 0.0 };
+                if squared <= half * half && distance < self.distance[p] {
+                    (self.distance[p], self.depth[p]) = (distance, s.depth);
                 }
             }
         }

@@ -14,13 +14,14 @@
 //! smooths like a cubic spline: it removes noise and keeps slopes. [`hybank::sampling::fit2`] holds and
 //! solves the equations.
 
-mod background;
+pub(super) mod background;
 mod gather;
 mod grid;
 mod springs;
 
+use super::extend::Level;
 use super::{Cover, Degree, HoleFill, InterpolationError, Settings, Watch};
-use crate::depth::{DepthMap, Measure};
+use crate::depth::{DepthMap, Measure, NONE};
 use crate::sample::Sample;
 use grid::Grid;
 use hybank::sampling::Fit2;
@@ -96,6 +97,9 @@ pub struct PlaneFit {
 /// beside the pixel.
 const LEAST_SOURCE_WEIGHT: f32 = 0.3;
 
+/// Added to the squared distance of a sample of guessed depth: any other one that reaches a pixel is nearer.
+const GUESSED: f32 = 1e4;
+
 /// Collects visible samples, all at once or band by band, and then fits the image.
 #[derive(Debug, Clone)]
 pub struct PlaneProblem<const ORDER: usize, const C: usize> {
@@ -107,7 +111,7 @@ pub struct PlaneProblem<const ORDER: usize, const C: usize> {
     fit: Fit2<ORDER, C>,
     /// Depth of the sample nearest to each pixel centre, NaN where none lies within half a gap.
     depth: Vec<f32>,
-    /// Squared distance of that sample.
+    /// Squared distance of that sample, and [`GUESSED`] if its depth is a guess.
     distance: Vec<f32>,
     counts: Vec<u16>,
     settings: Settings,
@@ -183,14 +187,16 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         }
         let given = |p: usize| if turned { p % width * height + p / width } else { p };
         let inside = |p: usize| region.is_none_or(|r| r.get(given(p)).copied().unwrap_or(false));
-        self.distance = Vec::new();
         let mut mask = background::classify(&self.depth, width, &self.settings.depth_test);
+        let guessed = mask.iter_mut().zip(std::mem::take(&mut self.distance));
+        let guessed = guessed.filter(|(cover, distance)| **cover == Cover::Seen && *distance >= GUESSED);
+        guessed.for_each(|(cover, _)| *cover = Cover::Guessed);
         let background = self.settings.holes.fill == HoleFill::Background;
         if background && mask.contains(&Cover::Disocclusion) {
             self.fill_background(&mask, &inside);
         }
         let left_out = self.settings.holes.fill == HoleFill::Leave;
-        let fitted = |p: usize| inside(p) && !(left_out && mask[p] != Cover::Seen);
+        let fitted = |p: usize| inside(p) && !(left_out && mask[p].is_hole());
         let (counts, mut depth) = (std::mem::take(&mut self.counts), std::mem::take(&mut self.depth));
         let (mut values, convergence) = self.fitted(&depth, &fitted, watch);
         // The depths that were continued into holes are those of the springs only.
@@ -225,21 +231,21 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         let mut is_source = vec![false; sound.len()];
         drop(sound);
         let holes = (0..mask.len()).filter(|p| mask[*p] == Cover::Disocclusion && inside(*p));
-        let holes = holes.filter(|p| sources[*p] != background::NONE);
+        let holes = holes.filter(|p| sources[*p] != NONE);
         holes.clone().for_each(|p| is_source[sources[p] as usize] = true);
         // The value of a seen pixel before the fit: its share of the right-hand side. The new samples must
         // not count in it.
-        let value = |source: usize| {
-            let (weight, values) = self.fit.local_sums(grid.coefficient(source));
-            (source as u32, values.map(|v| v / weight))
+        let value = |p: usize| {
+            let (weight, values) = self.fit.local_sums(grid.coefficient(p));
+            if is_source[p] { values.map(|v| v / weight) } else { [0.0; C] }
         };
-        let sources_used = (0..mask.len()).filter(|p| is_source[*p]);
-        let continued: Vec<(u32, [f32; C])> = sources_used.map(value).collect();
+        let values = (0..mask.len()).map(value).collect();
+        let weights = is_source.iter().map(|is_source| f32::from(u8::from(*is_source))).collect();
+        let mut continued = Level { width: self.width, values, weights };
+        continued.extend();
         for p in holes {
-            let Ok(at) = continued.binary_search_by_key(&sources[p], |(source, _)| *source) else { continue };
-            let (source, values) = continued[at];
-            self.depth[p] = self.depth[source as usize];
-            self.add_on_pixel(p, values);
+            self.depth[p] = self.depth[sources[p] as usize];
+            self.add_on_pixel(p, continued.values[p]);
         }
     }
 
@@ -262,6 +268,23 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         let hybank::sampling::fit2::Convergence { steps, residual, reached } = ended;
         (values, Convergence { steps, residual, reached })
     }
+}
+
+/// The bilinear spline through values on pixels, NaN where there are none, with the springs of the surfaces
+/// that a `shape` shows. Of the settings those of the springs and of the solver are used.
+pub(crate) fn fit_surface(values: &[f32], shape: &[f32], width: usize, settings: &Settings) -> Vec<f32> {
+    let size = (width, values.len() / width.max(1));
+    let mut fit = Fit2::<2, 1>::new(size.0, size.1);
+    let mut rows = fit.rows();
+    for (p, value) in values.iter().enumerate().filter(|(_, value)| !value.is_nan()) {
+        let (x, y) = ((p % width) as f64, (p / width) as f64);
+        rows.add(&Fit2Sample { x, y, values: [*value], weight: 1.0 });
+    }
+    let grid = Grid { image: size, coefficients: fit.coefficients() };
+    let springs = |direction, y| springs::of_row(shape, grid, &|_| true, settings, direction, y);
+    let PlaneSettings { tolerance, iterations, .. } = settings.plane;
+    let iteration = Iteration { tolerance, steps: iterations };
+    fit.connect(springs, |_| false).solve(&iteration, &|_| ()).0
 }
 
 /// The pixels of an image by columns, from those by rows of `width`.

@@ -3,7 +3,7 @@
 use super::row_map::RowMap;
 use super::{CalibratedView, Frame, Tile};
 use crate::camera::Relative;
-use crate::depth::{Reliefs, TILE};
+use crate::depth::{Reliefs, TILE, or_far};
 use crate::image::Image;
 use crate::occlusion::{Points, RUN};
 use crate::propagate::{spacing, weight};
@@ -16,6 +16,7 @@ pub(crate) struct Projected {
     points: Points,
     weights: Vec<f32>,
     doubtful: Vec<bool>,
+    guessed: Vec<bool>,
     tiles: Vec<ProjectedTile>,
 }
 
@@ -33,6 +34,7 @@ impl Projected {
         self.points.resize(0);
         self.weights.clear();
         self.doubtful.clear();
+        self.guessed.clear();
         self.tiles.clear();
     }
 
@@ -56,10 +58,12 @@ impl Projected {
         let mut places = Places::new(&RowMap::new(map, row), column, &depths, &reliefs, count);
         places.keep(frame, own, count);
         self.append(&places, count);
-        let mut doubtful = reliefs.behind_edge;
-        for (doubtful, guessed) in doubtful.iter_mut().zip(view.map.guessed_from(first_pixel)) {
-            *doubtful |= *guessed;
+        let (mut doubtful, mut guessed) = (reliefs.behind_edge, [false; TILE]);
+        for (i, is_guessed) in view.map.guessed_from(first_pixel).iter().take(count.min(TILE)).enumerate() {
+            guessed[i] = *is_guessed;
+            doubtful[i] |= *is_guessed;
         }
+        self.guessed.extend_from_slice(&guessed[..count]);
         self.append_trust(&places, &reliefs, &doubtful, count);
         let first_place = self.doubtful.len() - count;
         self.tiles.push(ProjectedTile { view: tile.view, first_pixel: first_pixel as u32, first_place });
@@ -125,6 +129,7 @@ impl Projected {
             own: &points.own.as_chunks().0[number],
             weights: &self.weights.as_chunks().0[number],
             doubtful: &self.doubtful.as_chunks().0[number],
+            guessed: &self.guessed.as_chunks().0[number],
         }
     }
 }
@@ -138,6 +143,7 @@ struct Run<'a> {
     own: &'a [bool; RUN],
     weights: &'a [f32; RUN],
     doubtful: &'a [bool; RUN],
+    guessed: &'a [bool; RUN],
 }
 
 impl Run<'_> {
@@ -161,6 +167,7 @@ impl Run<'_> {
             pixel,
             view: tile.view,
             doubtful: self.doubtful[i],
+            guessed: self.guessed[i],
         }
     }
 }
@@ -214,7 +221,7 @@ impl Places {
     /// Marks what lies between the rows `own`, and removes what lies outside the frame.
     fn keep(&mut self, frame: &Frame, own: (f64, f64), count: usize) {
         for i in 0..count.min(TILE) {
-            let (x, y, depth) = (self.x[i] + frame.offset, self.y[i], self.depth[i]);
+            let (x, y, depth) = (self.x[i] + frame.offset, self.y[i], or_far(self.depth[i]));
             let kept = (depth > 0.0) & frame.holds(x, y);
             self.x[i] = if kept { x } else { f64::NAN };
             self.y[i] = if kept { y } else { f64::NAN };

@@ -1,0 +1,64 @@
+//! A scene whose maps are damaged, and its true view.
+
+use super::damage::Damage;
+use hybank_ibr::image::{Image, quality, read_image};
+use hybank_ibr::pipeline::{RenderError, RenderSettings, Rendering, calibrated, rectified};
+use hybank_ibr::scene::{self, Kind, LoadOptions, Scene, SceneSpec, SourceView};
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+/// A scene file, read but not loaded, and the true view.
+pub(crate) struct Case {
+    pub(crate) name: String,
+    spec: SceneSpec,
+    path: PathBuf,
+    truth: Image,
+}
+
+impl Case {
+    /// A scene of the data folder; `None` with a note if it is not there.
+    pub(crate) fn of_data(name: &str, truth: &str) -> Result<Option<Self>, Box<dyn Error>> {
+        let Some(folder) = trials::data(&format!("ibr/{name}")) else { return Ok(None) };
+        Self::read(name, &folder.join("scene.toml"), &folder.join(truth)).map(Some)
+    }
+
+    pub(crate) fn read(name: &str, path: &Path, truth: &Path) -> Result<Self, Box<dyn Error>> {
+        let spec = scene::parse(&std::fs::read_to_string(path)?, path)?;
+        Ok(Self { name: name.into(), spec, path: path.into(), truth: read_image(truth)? })
+    }
+
+    /// The view rendered with damaged maps, which are written into a folder.
+    pub(crate) fn rendered(&self, damage: Damage, folder: &Path) -> Result<Rendered, Box<dyn Error>> {
+        let spec = damage.applied(&self.spec, &self.path, folder)?;
+        let options = LoadOptions { depth_step: damage.step(), ..LoadOptions::default() };
+        let scene = scene::load(&spec, &self.path, &options)?;
+        let rendering = render(&scene)?;
+        let psnr = quality::compare(&rendering.image, &self.truth, None)?.map_or(f64::NAN, |q| q.psnr);
+        let outliers = scene.outliers.iter().sum::<f64>() / scene.outliers.len().max(1) as f64;
+        Ok(Rendered { psnr, coverage: rendering.coverage(), outliers })
+    }
+}
+
+/// Figures of a rendering.
+pub(crate) struct Rendered {
+    pub(crate) psnr: f64,
+    /// Share of the pixels that were seen.
+    pub(crate) coverage: f64,
+    /// Share of the depths that were outliers.
+    pub(crate) outliers: f64,
+}
+
+fn render(scene: &Scene) -> Result<Rendering, RenderError> {
+    let settings = RenderSettings { offset: scene.offset, ..RenderSettings::default() };
+    match &scene.kind {
+        Kind::Rectified { views, positions } => {
+            let views: Vec<_> = views.iter().map(SourceView::view).collect();
+            rectified::render(&views, positions[0], &settings)
+        }
+        Kind::Calibrated { views, cameras, size } => {
+            let views: Vec<_> = views.iter().map(SourceView::view).collect();
+            calibrated::render(&views, &cameras[0], *size, &settings)
+        }
+        Kind::Uncalibrated { .. } => Err(RenderError::NoViews),
+    }
+}

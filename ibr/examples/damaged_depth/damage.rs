@@ -1,0 +1,129 @@
+//! Damages of depth maps, as cameras, matchers and lidar make them.
+
+use hybank_ibr::camera::Camera;
+use hybank_ibr::image::{Image, pfm, read_map};
+use hybank_ibr::propagate::Viewpoint;
+use hybank_ibr::scene::SceneSpec;
+use nalgebra::Matrix3x4;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+/// What is done to the maps of a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Damage {
+    Clean,
+    /// This share of the values is anything between the least and the largest of the map.
+    Outliers(f64),
+    /// White errors of this many pixels in the virtual view for a rig, or to the next view.
+    Noise(f64),
+    /// This share of the values is known, the rest is 0.
+    Scattered(f64),
+    /// Every sixth value in rows and columns is used.
+    Lattice,
+    /// What is infinitely far away has this value.
+    Sky(f32),
+}
+
+impl Damage {
+    pub(crate) const ALL: [Self; 6] = [
+        Self::Clean,
+        Self::Outliers(0.05),
+        Self::Noise(0.5),
+        Self::Noise(1.0),
+        Self::Scattered(0.03),
+        Self::Lattice,
+    ];
+    pub(crate) const OF_SKY: [Self; 4] =
+        [Self::Sky(f32::INFINITY), Self::Sky(1e10), Self::Sky(f32::NAN), Self::Sky(0.0)];
+
+    pub(crate) fn name(self) -> String {
+        match self {
+            Self::Clean => "clean".into(),
+            Self::Outliers(share) => format!("outliers {} %", 100.0 * share),
+            Self::Noise(pixels) => format!("noise {pixels} px"),
+            Self::Scattered(share) => format!("scattered {} %", 100.0 * share),
+            Self::Lattice => "lattice 2.8 %".into(),
+            Self::Sky(value) => format!("sky as {value:e}"),
+        }
+    }
+
+    pub(crate) fn step(self) -> usize {
+        if self == Self::Lattice { 6 } else { 1 }
+    }
+
+    /// The scene with damaged maps, which are written into a folder.
+    pub(crate) fn applied(
+        self,
+        spec: &SceneSpec,
+        path: &Path,
+        folder: &Path,
+    ) -> Result<SceneSpec, Box<dyn Error>> {
+        let mut damaged = spec.clone();
+        let beside = path.parent().unwrap_or(Path::new(""));
+        for (k, view) in damaged.view.iter_mut().enumerate() {
+            let view_path = view.image.clone();
+            view.image = beside.join(view_path);
+            let is_depth = view.depth.is_some();
+            let Some(map) = view.depth.as_mut().or(view.disparity.as_mut()) else { continue };
+            let (width, height, mut values) = read_map(&beside.join(&map))?;
+            let seed = &mut Pcg64::seed_from_u64(100 + k as u64);
+            match is_depth {
+                // Errors in pixels are errors of the reciprocal depth.
+                true => {
+                    let unit = reciprocal_per_pixel(spec, k);
+                    self.change(&mut values, seed, |v, e| (1.0 / (1.0 / v + e * unit)).max(0.1 * v));
+                }
+                false => {
+                    let scale = view.disparity_scale.or(spec.disparity_scale).unwrap_or(1.0);
+                    self.change(&mut values, seed, |v, e| (v + e * scale).max(0.1 * v));
+                }
+            }
+            let file: PathBuf = folder.join(format!("damaged{k}.pfm"));
+            std::fs::write(&file, pfm::encode(&Image::new(width, height, 1, values)?))?;
+            *map = file;
+        }
+        Ok(damaged)
+    }
+
+    /// Changes the values; `moved` adds an error in pixels to a value.
+    fn change(self, values: &mut [f32], random: &mut Pcg64, moved: impl Fn(f64, f64) -> f64) {
+        let known = values.iter().copied().filter(|v| v.is_finite() && *v > 0.0);
+        let (low, high) = known.fold((f32::MAX, f32::MIN), |(low, high), v| (low.min(v), high.max(v)));
+        for value in values {
+            let is_known = value.is_finite() && *value > 0.0;
+            match self {
+                Self::Clean | Self::Lattice => {}
+                Self::Outliers(share) if uniform(random) < share => {
+                    *value = low + (high - low) * uniform(random) as f32;
+                }
+                Self::Noise(pixels) if is_known => {
+                    let normal = (0..12).map(|_| uniform(random)).sum::<f64>() - 6.0;
+                    *value = moved(f64::from(*value), pixels * normal) as f32;
+                }
+                Self::Scattered(share) if uniform(random) >= share => *value = 0.0,
+                Self::Sky(far) if value.is_infinite() => *value = far,
+                _ => {}
+            }
+        }
+    }
+}
+
+fn uniform(random: &mut Pcg64) -> f64 {
+    (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// By how much the reciprocal depth changes if the middle of a view moves by a pixel in the next view.
+fn reciprocal_per_pixel(spec: &SceneSpec, view: usize) -> f64 {
+    let camera = |k: usize| {
+        let rows = spec.view[k % spec.view.len()].camera.unwrap_or_default();
+        Camera::metric(Matrix3x4::from_fn(|i, j| rows[i][j]), false)
+    };
+    let (Ok(from), Ok(to)) = (camera(view), camera(view + 1)) else { return 0.0 };
+    let map = from.map_to(&to);
+    let at = |reciprocal: f64| map(240.0, 180.0, 1.0 / reciprocal);
+    let (reciprocal, step) = (0.15, 1e-4);
+    let (a, b) = (at(reciprocal), at(reciprocal + step));
+    step / (b.0 - a.0).hypot(b.1 - a.1)
+}

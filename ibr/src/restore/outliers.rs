@@ -1,0 +1,191 @@
+//! Values of a map that contradict their neighbours and every other view.
+
+use crate::depth::{DepthMap, JUMP, Measure};
+use crate::image::Image;
+use crate::pipeline::Exposure;
+use crate::propagate::{View, Viewpoint};
+use rayon::prelude::*;
+
+/// Differences of two values with errors are below this many of their standard deviations.
+const DEVIATIONS: f32 = 3.0;
+
+/// Neighbours, of eight, that a value on a surface has at least: those along a line one pixel wide.
+const SUPPORTERS: usize = 2;
+
+/// Other views that vote on a value, at most: evenly chosen ones of more.
+const VOTERS: usize = 8;
+
+/// Two views show one point if its colours differ by at most this many grey levels.
+const GREY_LEVELS: f32 = 20.0;
+
+/// Of unlike colours the median takes the least weight: where no other value is known they decide.
+const LEAST_LIKENESS: f32 = 1e-6;
+
+/// Radius of the neighbourhood whose median replaces an outlier.
+const RADIUS: usize = 2;
+
+/// A map in parallax.
+#[derive(Debug, Clone)]
+pub(super) struct Parallax {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// Row by row, NaN where unknown; next to 0 where far away.
+    pub(super) values: Vec<f32>,
+    /// Added to a value, it is in proportion to the reciprocal depth.
+    pub(super) offset: f32,
+    /// Standard deviation of the errors.
+    pub(super) error: f32,
+}
+
+impl Parallax {
+    /// Of a map whose errors, in its own measure, have this standard deviation. Those of depths are shares of
+    /// the depth; what is taken as the deviation of the reciprocal depth is that in the middle of the scene.
+    pub(super) fn of(map: &DepthMap, error: f64) -> Self {
+        let measure = map.measure();
+        let values = map.data().iter().map(|v| measure.parallax(*v)).collect();
+        let unit = match measure {
+            Measure::Disparity => 1.0,
+            Measure::Depth => map.middle().map_or(0.0, |middle| 1.0 / f64::from(middle)),
+        };
+        let ((width, height), offset) = (map.size(), map.offset() as f32);
+        Self { width, height, values, offset, error: (error * unit) as f32 }
+    }
+
+    /// The map with these values. Where nothing changed it has the bits that it had.
+    pub(super) fn into_map(self, before: &DepthMap, guessed: Vec<bool>) -> DepthMap {
+        let measure = before.measure();
+        let value = |(now, was): (&f32, &f32)| match measure.parallax(*was).to_bits() == now.to_bits() {
+            true => *was,
+            false if now.is_nan() => f32::NAN,
+            false => measure.of_parallax(*now),
+        };
+        let data = self.values.iter().zip(before.data()).map(value).collect();
+        before.with_values(before.size(), data).with_guessed(before, &guessed)
+    }
+
+    /// Whether two values may lie on one surface.
+    #[inline]
+    pub(super) fn agree(&self, a: f32, b: f32) -> bool {
+        let spread = DEVIATIONS * std::f32::consts::SQRT_2 * self.error;
+        (a - b).abs() <= (JUMP * (a.min(b) + self.offset)).max(spread)
+    }
+
+    /// The pixels within a radius of one, itself included.
+    pub(super) fn around(&self, pixel: usize, radius: usize) -> impl Iterator<Item = usize> + use<> {
+        let (x, y, width) = (pixel % self.width, pixel / self.width, self.width);
+        let columns = x.saturating_sub(radius)..(x + radius + 1).min(width);
+        let rows = y.saturating_sub(radius)..(y + radius + 1).min(self.height);
+        rows.flat_map(move |row| columns.clone().map(move |column| row * width + column))
+    }
+
+    /// Whether enough neighbours lie on the surface of a pixel.
+    fn is_supported(&self, pixel: usize) -> bool {
+        let here = self.values[pixel];
+        let neighbours = self.around(pixel, 1).filter(|q| *q != pixel && self.agree(here, self.values[*q]));
+        neighbours.take(SUPPORTERS).count() == SUPPORTERS
+    }
+
+    /// The pixel at a position whose surface has this parallax.
+    pub(super) fn showing(&self, at: [f64; 2], there: f32) -> Option<usize> {
+        self.pixels_at(at).find(|q| self.agree(there, self.values[*q]))
+    }
+
+    /// The known pixels around a position, none outside the image.
+    fn pixels_at(&self, [u, v]: [f64; 2]) -> impl Iterator<Item = usize> {
+        let inside = |at: f64, side: usize| at > -0.5 && at < side as f64 - 0.5;
+        let (columns, rows) = match inside(u, self.width) && inside(v, self.height) {
+            true => {
+                let (x, y) = (u.max(0.0) as usize, v.max(0.0) as usize);
+                (x..(x + 2).min(self.width), y..(y + 2).min(self.height))
+            }
+            false => (0..0, 0..0),
+        };
+        let pixels = rows.flat_map(move |y| columns.clone().map(move |x| y * self.width + x));
+        pixels.filter(|q| !self.values[*q].is_nan())
+    }
+
+    /// Gives pixels the median of those around them that are not rejected, weighed by the likeness of their
+    /// colours; what has none is unknown.
+    pub(super) fn replace(&mut self, image: &Image, rejected: &[bool]) {
+        let place = |p: usize| rejected[p].then(|| (p, self.median(image, p, RADIUS, |q| !rejected[q])));
+        let found: Vec<_> = (0..self.values.len()).into_par_iter().filter_map(place).collect();
+        found.iter().for_each(|(p, value)| self.values[*p] = *value);
+    }
+
+    /// The median of the known values around a pixel that are `allowed`, weighed by the likeness of colours.
+    pub(super) fn median(
+        &self,
+        image: &Image,
+        pixel: usize,
+        radius: usize,
+        allowed: impl Fn(usize) -> bool,
+    ) -> f32 {
+        let near = self.around(pixel, radius).filter(|q| allowed(*q) && !self.values[*q].is_nan());
+        let likeness = |q: usize| {
+            let difference = difference(image.pixel(pixel), image.pixel(q)) / GREY_LEVELS;
+            (-difference * difference).exp().max(LEAST_LIKENESS)
+        };
+        let mut near: Vec<(f32, f32)> = near.map(|q| (self.values[q], likeness(q))).collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut left = near.iter().map(|(_, weight)| weight).sum::<f32>() / 2.0;
+        let middle = near.iter().find(|(_, weight)| {
+            left -= weight;
+            left <= 0.0
+        });
+        middle.map_or(f32::NAN, |(value, _)| *value)
+    }
+}
+
+/// Mean difference of two colours.
+pub(super) fn difference(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>() / 3.0
+}
+
+/// Which values of a view are outliers: few neighbours agree with them, and not more of the other views
+/// confirm them than see through them.
+pub(super) fn rejected<P: Viewpoint>(
+    views: &[View<'_, P>],
+    planes: &[Parallax],
+    gains: &[Exposure],
+    index: usize,
+) -> Vec<bool> {
+    let (view, plane) = (&views[index], &planes[index]);
+    let colour = |view: usize, p: usize| -> [f32; 3] {
+        let colour = views[view].image.pixel::<3>(p);
+        std::array::from_fn(|c| colour[c] * gains[view][c] as f32)
+    };
+    let others = (0..views.len()).filter(|other| *other != index);
+    let others: Vec<usize> = others.step_by((views.len() - 1).div_ceil(VOTERS).max(1)).collect();
+    let maps: Vec<_> = others.iter().map(|other| view.camera.map_to(&views[*other].camera)).collect();
+    let is_outlier = |p: usize| {
+        let value = view.map.data()[p];
+        if value.is_nan() || view.map.is_guessed(p) || plane.is_supported(p) {
+            return false;
+        }
+        let votes = others.iter().zip(&maps).map(|(other, map)| {
+            let (x, y) = ((p % plane.width) as f64, (p / plane.width) as f64);
+            let (u, v, depth) = map(x, y, f64::from(value));
+            let there = view.map.measure().parallax(depth as f32);
+            vote(&planes[*other], [u, v], there, |q| difference(colour(index, p), colour(*other, q)))
+        });
+        votes.sum::<i32>() <= 0
+    };
+    (0..plane.values.len()).into_par_iter().with_min_len(1024).map(is_outlier).collect()
+}
+
+/// 1 if a view confirms a point at a position with a parallax, by a pixel of a surface there that has nearly
+/// its colour; -1 if it sees through the point; 0 if something hides it, or it falls outside.
+fn vote(plane: &Parallax, at: [f64; 2], there: f32, colour: impl Fn(usize) -> f32) -> i32 {
+    let (mut is_inside, mut is_seen_through) = (false, true);
+    for q in plane.pixels_at(at) {
+        is_inside = true;
+        if plane.agree(there, plane.values[q]) {
+            if colour(q) <= GREY_LEVELS {
+                return 1;
+            }
+            is_seen_through = false;
+        }
+        is_seen_through &= plane.values[q] < there;
+    }
+    -i32::from(is_inside && is_seen_through)
+}

@@ -1,0 +1,122 @@
+//! Damaged maps of the synthetic scene against its exact depth.
+
+use super::*;
+use crate::camera::Camera;
+use crate::image::Image;
+use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
+use crate::uncalibrated::random::Dice;
+
+const SIZE: (usize, usize) = (240, 180);
+
+struct Shot {
+    image: Image,
+    depth: DepthMap,
+    disparity: DepthMap,
+    camera: Camera,
+}
+
+fn shots() -> [Shot; 2] {
+    [0.0, 1.0].map(|position| {
+        let camera = Camera::metric(rig_camera(position, SIZE), false).unwrap();
+        let (image, depth) = SyntheticScene::default().view(&camera, SIZE);
+        let disparity = rig_disparity(&depth, SIZE.0);
+        Shot { image, depth, disparity, camera }
+    })
+}
+
+fn changed(map: &DepthMap, seed: u64, change: impl Fn(f32, &mut Dice) -> f32) -> DepthMap {
+    let dice = &mut Dice::new(seed);
+    let values = map.data().iter().map(|v| change(*v, dice)).collect();
+    DepthMap::new(map.size(), values, 1.0, map.measure()).unwrap()
+}
+
+/// The restored disparities of both views.
+fn restored(shots: &[Shot; 2], maps: &[DepthMap; 2]) -> Vec<Restored> {
+    let view = |i: usize| View { image: &shots[i].image, map: &maps[i], camera: i as f64 };
+    restore(&[view(0), view(1)])
+}
+
+/// Root mean square error, without the largest hundredth: outlines.
+fn error(map: &DepthMap, exact: &DepthMap) -> f64 {
+    let mut squares: Vec<f64> =
+        map.data().iter().zip(exact.data()).map(|(a, b)| f64::from(a - b).powi(2)).collect();
+    squares.sort_by(f64::total_cmp);
+    squares.truncate(squares.len() * 99 / 100);
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+#[test]
+fn exact_maps_keep_their_bits() {
+    let shots = shots();
+    let maps = shots.each_ref().map(|shot| shot.disparity.clone());
+    for (restored, map) in restored(&shots, &maps).iter().zip(&maps) {
+        assert!(restored.map == *map && restored.outliers == 0.0, "{}", restored.outliers);
+    }
+}
+
+#[test]
+fn outliers_are_found_and_replaced() {
+    let shots = shots();
+    let wild = |v: f32, dice: &mut Dice| {
+        if dice.within(0.0, 1.0) < 0.05 { dice.within(8.0, 25.0) as f32 } else { v }
+    };
+    let maps = [0, 1].map(|i| changed(&shots[i].disparity, 5 + i as u64, wild));
+    for (restored, shot) in restored(&shots, &maps).iter().zip(&shots) {
+        // Some are as good as right.
+        assert!((0.035..0.055).contains(&restored.outliers), "{}", restored.outliers);
+        let left = error(&restored.map, &shot.disparity);
+        assert!(left < 0.1, "{left}");
+    }
+}
+
+/// The same by reciprocal depths of general cameras.
+#[test]
+fn outliers_of_depths_are_found() {
+    let shots = shots();
+    let wild = |v: f32, dice: &mut Dice| {
+        if dice.within(0.0, 1.0) < 0.05 { dice.within(3.0, 12.0) as f32 } else { v }
+    };
+    let maps = [0, 1].map(|i| changed(&shots[i].depth, 5 + i as u64, wild));
+    let view = |i: usize| View { image: &shots[i].image, map: &maps[i], camera: shots[i].camera };
+    for (restored, shot) in restore(&[view(0), view(1)]).iter().zip(&shots) {
+        let left = error(&restored.map, &shot.depth);
+        assert!((0.03..0.055).contains(&restored.outliers) && left < 0.05, "{} {left}", restored.outliers);
+    }
+}
+
+/// Noise of the same deviation in both maps, which the lookups measure, falls to less than a third.
+#[test]
+fn noise_is_removed() {
+    let shots = shots();
+    for deviation in [0.3, 1.0] {
+        let maps = [0, 1].map(|i| {
+            changed(&shots[i].disparity, 9 + i as u64, |v, dice| v + (deviation * dice.normal()) as f32)
+        });
+        for (restored, shot) in restored(&shots, &maps).iter().zip(&shots) {
+            let left = error(&restored.map, &shot.disparity);
+            println!("{deviation}: measured {:.3}, left {left:.3}", restored.error);
+            assert!((0.8..1.2).contains(&(restored.error / deviation)) && left < deviation / 3.0, "{left}");
+        }
+    }
+}
+
+/// A line one pixel wide is not a set of outliers, nor is a single pixel that the other view confirms.
+#[test]
+fn thin_things_are_kept() {
+    let near = |x: usize, y: usize, shift: usize| (x + shift == 100) || (x + shift, y) == (60, 40);
+    let thin = [0, 10].map(|shift| {
+        let data = (0..SIZE.0 * SIZE.1).map(|p| if near(p % SIZE.0, p / SIZE.0, shift) { 10.0 } else { 2.0 });
+        DepthMap::new(SIZE, data.collect(), 1.0, Measure::Disparity).unwrap()
+    });
+    let image = [0, 10].map(|shift| {
+        let data = (0..SIZE.0 * SIZE.1).map(|p| {
+            let (x, y) = (p % SIZE.0, p / SIZE.0);
+            if near(x, y, shift) { 200.0 } else { 60.0 + 20.0 * ((x + shift / 5) as f32 * 0.7).sin() }
+        });
+        Image::new(SIZE.0, SIZE.1, 1, data.collect()).unwrap()
+    });
+    let view = |i: usize| View { image: &image[i], map: &thin[i], camera: i as f64 };
+    for (restored, map) in restore(&[view(0), view(1)]).iter().zip(&thin) {
+        assert!(restored.map == *map, "{}", restored.outliers);
+    }
+}
