@@ -4,7 +4,8 @@ use crate::depth::{DepthError, DepthMap};
 use crate::image::Image;
 use crate::restore::from_scattered;
 
-/// Makes a map with one value every `step` pixels (the first at pixel (0, 0)) as large as its image.
+/// Makes a map with one value every `step` pixels (the first at pixel (0, 0)) as large as its image. With a
+/// step of one, a map most of whose values are unknown becomes dense, and another one stays as it is.
 ///
 /// Between the samples is a spline with edges where the colours of the image change, in disparity or
 /// reciprocal depth, in which planes are affine.
@@ -14,6 +15,7 @@ use crate::restore::from_scattered;
 pub fn densify(sparse: &DepthMap, step: usize, image: &Image) -> Result<DepthMap, DepthError> {
     sparse.fits(image.size(), step)?;
     Ok(match step {
+        1 if sparse.is_scattered() => from_scattered(sparse, image),
         1 => sparse.clone(),
         _ => from_scattered(&placed(sparse, step, image.size()), image),
     })

@@ -10,6 +10,7 @@ use hybank_ibr::pipeline::memory::Extent;
 use hybank_ibr::pipeline::uncalibrated::{self, Target, UncalibratedSettings};
 use hybank_ibr::pipeline::{Method, RenderError, RenderSettings, calibrated, rectified};
 use hybank_ibr::propagate::{CalibratedView, RectifiedView};
+use hybank_ibr::restore::{self, restore};
 use hybank_ibr::synthetic::{SyntheticScene, rig_camera};
 use nalgebra::{Matrix3x4, Vector3};
 
@@ -249,6 +250,39 @@ fn predictions_take_what_is_estimated() {
             drop(Advice::on(&predictor, &target, size, &now).unwrap());
         };
         estimates.compare(&format!("prediction of cameras, {size:?}"), size, estimate, peak(&pool, work));
+    }
+}
+
+/// Maps without any error, with outliers, and with noise that is smoothed.
+#[test]
+fn restored_maps_take_what_is_estimated() {
+    let pool = pool();
+    let mut estimates = Estimates::default();
+    for (size, views) in [((600, 500), 2), ((500, 700), 4), ((90_000, 4), 2)] {
+        let size = scaled(size);
+        let image = picture(size, 3);
+        let clean = map(size, 4.0, Measure::Disparity);
+        let wild = |i: usize| if i % 61 == 0 { 9.0 + (i % 5) as f32 } else { 4.0 };
+        let wild = DepthMap::new(size, (0..size.0 * size.1).map(wild).collect(), 1.0, Measure::Disparity);
+        let noisy: Vec<DepthMap> =
+            (0..views).map(|k| noisy_map(size, 40.0, Measure::Disparity, 1 + 17 * k)).collect();
+        let same = |map: &DepthMap| vec![map.clone(); views];
+        for (name, maps, is_noisy) in [
+            ("clean", same(&clean), false),
+            ("outliers", same(&wild.unwrap()), false),
+            ("noise", noisy, true),
+        ] {
+            let view = |k: usize| RectifiedView { image: &image, map: &maps[k], camera: k as f64 };
+            let views: Vec<_> = (0..views).map(view).collect();
+            let estimate = restore::memory(&vec![size; views.len()], is_noisy);
+            let measured = peak(&pool, || drop(restore(&views).unwrap()));
+            estimates.compare(
+                &format!("restored, {name}, {size:?} x {}", views.len()),
+                size,
+                estimate,
+                measured,
+            );
+        }
     }
 }
 

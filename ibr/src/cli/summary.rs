@@ -132,7 +132,7 @@ impl Summary {
         ];
         if self.filled_depths > 0 {
             lines.push(format!(
-                "depth     {} unknown values filled from the farther neighbour",
+                "depth     {} unknown values filled from their neighbours",
                 self.filled_depths
             ));
         }

@@ -8,8 +8,8 @@ use super::relief::JUMP;
 use super::{DepthMap, Measure};
 
 /// Gives unknown pixels of disparity the farther of the nearest known values to their left and right, and
-/// unknown depths the farthest of those around if all lie on one surface, on both sides in the row or the
-/// column.
+/// unknown depths the farther of those on both sides, in the row and in the column, if all of these lie on one
+/// surface. A side whose opposite one is beyond the border says nothing: it may be far away.
 ///
 /// A row of disparities without any known value takes those of the nearest row that has one (the upper of
 /// two). The map remembers which values are guesses; renderings weigh them less. Returns the number of pixels
@@ -38,11 +38,10 @@ pub fn fill_unknown(map: &mut DepthMap) -> usize {
 fn fill_surfaces(map: &mut DepthMap) {
     let mut found = Vec::new();
     for_holes(&map.data, map.width, |p, around| {
-        let sides = around.map(|q| map.data.get(q as usize).copied());
-        let is_enclosed = sides.chunks_exact(2).any(|pair| pair.iter().all(Option::is_some));
-        let known = || sides.iter().flatten().copied();
-        let (near, far) = (known().fold(f32::MAX, f32::min), known().fold(0.0, f32::max));
-        if is_enclosed && far - near < JUMP * near {
+        let side = |q: u32| map.data.get(q as usize).copied();
+        let pairs = around.as_chunks().0.iter().filter_map(|[a, b]| Some([side(*a)?, side(*b)?]));
+        let (near, far) = pairs.flatten().fold((f32::MAX, 0.0), |(near, far), v| (v.min(near), v.max(far)));
+        if far > 0.0 && far - near < JUMP * near {
             found.push((p, far));
         }
     });
@@ -147,6 +146,10 @@ mod tests {
         let (data, count) = filled(&[U, 3.0, U, U, 3.05, U, 5.0], (7, 1), Measure::Depth);
         assert_eq!((&data[1..5], count), (&[3.0, 3.05, 3.05, 3.05][..], 2));
         assert!(data[0].is_nan() && data[5].is_nan());
+        // A slanted wall: left of the hole in the second row it is much nearer, and to the right is nothing.
+        let wall = [8.0, 9.0, 9.5, 7.0, U, U, 8.1, 9.1, 9.6];
+        let (data, count) = filled(&wall, (3, 3), Measure::Depth);
+        assert_eq!((&data[3..6], count), (&[7.0, 9.1, 9.6][..], 2));
     }
 
     #[test]

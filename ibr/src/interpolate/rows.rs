@@ -6,9 +6,8 @@
 //! ```
 
 use super::extend::Level;
-use super::plane::background;
 use super::{Cover, HoleFill, InterpolationError, Settings};
-use crate::depth::{NONE, fill_empty_rows};
+use crate::depth::{fill_empty_rows, for_holes};
 use crate::sample::Sample;
 use hybank::sampling::fit::Response;
 use hybank::sampling::{Fit, FitSample};
@@ -303,8 +302,8 @@ fn interpolate_with<const ORDER: usize, const C: usize>(
     Ok((values, mask))
 }
 
-/// What rows do together when each is fitted: the surfaces around disocclusions are continued into them.
-/// Without that, rows without samples are copied from the nearest one that is `filled`.
+/// What rows do together when each is fitted: rows without samples are copied from the nearest one that is
+/// `filled`, and the surfaces around disocclusions are continued into them.
 pub(crate) fn finish<const C: usize>(
     filled: &[bool],
     mask: &[Cover],
@@ -312,36 +311,40 @@ pub(crate) fn finish<const C: usize>(
     settings: &Settings,
     values: &mut [f32],
 ) {
-    match settings.holes.fill {
-        HoleFill::Leave => {}
-        HoleFill::Bridge => fill_empty_rows(filled, values),
-        HoleFill::Background if mask.contains(&Cover::Disocclusion) => {
-            continue_surfaces::<C>(mask, depths, settings, mask.len() / filled.len().max(1), values);
-        }
-        HoleFill::Background => {}
+    let fill = settings.holes.fill;
+    if fill != HoleFill::Leave {
+        fill_empty_rows(filled, values);
+    }
+    if fill == HoleFill::Background && mask.contains(&Cover::Disocclusion) {
+        continue_surfaces::<C>(mask, depths, mask.len() / filled.len().max(1), values);
     }
 }
 
 /// Extends the farther surface into each disocclusion. The outermost pixels of a surface, whose colours may
 /// be mixed, are left out.
-fn continue_surfaces<const C: usize>(
-    mask: &[Cover],
-    depths: &[f32],
-    settings: &Settings,
-    width: usize,
-    values: &mut [f32],
-) {
+fn continue_surfaces<const C: usize>(mask: &[Cover], depths: &[f32], width: usize, values: &mut [f32]) {
     let beside = |p: usize| {
         let (left, right) = (!p.is_multiple_of(width), p % width + 1 < width);
         (left && depths[p - 1].is_nan()) || (right && depths[p + 1].is_nan())
     };
     let sound = |p: usize| if beside(p) { f32::NAN } else { depths[p] };
     let sound: Vec<f32> = (0..depths.len()).map(sound).collect();
-    let sources = background::sources(&sound, width, &settings.depth_test);
-    drop(sound);
-    let holes = || (0..mask.len()).filter(|p| mask[*p] == Cover::Disocclusion && sources[*p] != NONE);
     let mut weights = vec![0.0; mask.len()];
-    holes().for_each(|p| weights[sources[p] as usize] = 1.0);
+    for_holes(&sound, width, |p, [left, right, ..]| {
+        let farther = match [left, right].map(|q| sound.get(q as usize)) {
+            [Some(a), Some(b)] if a > b => left,
+            [Some(_), None] => left,
+            _ => right,
+        };
+        if let Some(weight) = weights.get_mut(farther as usize).filter(|_| mask[p] == Cover::Disocclusion) {
+            *weight = 1.0;
+        }
+    });
+    drop(sound);
+    if weights.iter().all(|w| *w == 0.0) {
+        return;
+    }
+    let holes = || (0..mask.len()).filter(|p| mask[*p] == Cover::Disocclusion);
     let pixels = values.as_chunks_mut::<C>().0;
     let mut continued = Level { width, values: pixels.to_vec(), weights };
     continued.extend();

@@ -19,6 +19,12 @@ const GREY_LEVELS: f32 = 20.0;
 /// Share of agreeing points below which the inputs are probably wrong.
 const LEAST_SHARE: f64 = 0.5;
 
+/// Bands of rows over which a ratio of colours is compared with itself.
+const BANDS: usize = 16;
+
+/// A ratio counts as far as it exceeds so many standard deviations of its error.
+const GAIN_DEVIATIONS: f64 = 3.0;
+
 /// A number for each of red, green and blue; the same ones for grey.
 pub type Exposure = [f64; 3];
 
@@ -67,7 +73,8 @@ impl Agreement {
     pub fn of<P: Viewpoint>(views: &[View<'_, P>]) -> Self {
         let textures = views.par_iter().map(|view| Texture::of(view.image)).collect();
         let mut agreement = Self { gains: vec![[1.0; 3]; views.len()], textures, ..Self::default() };
-        let mut errors = vec![Vec::new(); views.len()];
+        // Those of good pairs, and of poor ones.
+        let mut errors = [vec![Vec::new(); views.len()], vec![Vec::new(); views.len()]];
         let nearest = Nearest::new(views);
         for j in 1..views.len() {
             let Some(i) = nearest.before(j) else { continue };
@@ -81,9 +88,13 @@ impl Agreement {
                 |a: &View<'_, P>, b: &View<'_, P>| Lookups::of(a.map, b.map, a.camera.map_to(&b.camera));
             let lookups = [look(&views[i], &views[j]), look(&views[j], &views[i])];
             if let Some(found) = depth_errors::of_each(lookups) {
+                let errors = &mut errors[usize::from(pair.is_poor())];
                 [i, j].iter().zip(found).for_each(|(view, variance)| errors[*view].push(variance));
             }
         }
+        let [good, poor] = errors;
+        let of_view = |(good, poor): (Vec<f64>, Vec<f64>)| if good.is_empty() { poor } else { good };
+        let errors: Vec<Vec<f64>> = good.into_iter().zip(poor).map(of_view).collect();
         agreement.depth_errors = deviations(&errors).unwrap_or_default();
         agreement
     }
@@ -99,6 +110,16 @@ impl Agreement {
     /// Standard deviation of the errors of a map; 0 if it is not known.
     pub(crate) fn depth_error(&self, view: usize) -> f64 {
         self.depth_errors.get(view).copied().unwrap_or(0.0)
+    }
+
+    /// For each view the first of those with which it agrees, directly or by way of others; itself where it
+    /// agrees with none before it.
+    pub(crate) fn groups(&self) -> Vec<usize> {
+        let mut groups: Vec<usize> = (0..self.gains.len()).collect();
+        for [i, j] in self.pairs.iter().filter(|pair| !pair.is_poor()).map(|pair| pair.views) {
+            groups[j] = groups[i];
+        }
+        groups
     }
 
     /// Variance of what views show differently for other reasons than noise: depth that is not exact, and
@@ -192,14 +213,36 @@ impl Comparison {
         }
     }
 
-    /// The median ratio of some value at points that are neither dark nor overexposed; 1 of too few.
+    /// The median ratio of some value at points that are neither dark nor overexposed; 1 of too few, and
+    /// nearer to 1 the less it exceeds its error.
     fn ratio(&self, value: impl Fn(&[f32; 3]) -> f32) -> f64 {
         let usable = |v: f32| (16.0..250.0).contains(&v);
         let values = self.matched.iter().map(|pair| [value(&pair[0]), value(&pair[1])]);
         let both = values.filter(|[a, b]| usable(*a) && usable(*b));
-        let mut ratios: Vec<f64> = both.map(|[a, b]| f64::from(b) / f64::from(a)).collect();
-        if ratios.len() < FEWEST_POINTS { 1.0 } else { depth_errors::median(&mut ratios).unwrap_or(1.0) }
+        let mut ratios: Vec<f64> = both.map(|[a, b]| f64::from(b / a).ln()).collect();
+        if ratios.len() < FEWEST_POINTS {
+            return 1.0;
+        }
+        let error = error_of_median(&ratios);
+        depth_errors::median(&mut ratios).map_or(1.0, |ratio| shrunk(ratio, error).exp())
     }
+}
+
+/// Standard deviation of the median of some numbers, from the medians of bands of them: neighbours have
+/// errors in common, so their count says little.
+fn error_of_median(numbers: &[f64]) -> f64 {
+    let bands = numbers.chunks(numbers.len().div_ceil(BANDS).max(1));
+    let medians: Vec<f64> = bands.filter_map(|band| depth_errors::median(&mut band.to_vec())).collect();
+    let count = medians.len() as f64;
+    let mean = medians.iter().sum::<f64>() / count;
+    let squares = medians.iter().map(|m| (m - mean).powi(2)).sum::<f64>();
+    (squares / (count * (count - 1.0)).max(1.0)).sqrt()
+}
+
+/// A number that was found with an error, nearer to 0: the estimator of James and Stein.
+fn shrunk(found: f64, error: f64) -> f64 {
+    let part = GAIN_DEVIATIONS * error / found.abs().max(f64::MIN_POSITIVE);
+    found * (1.0 - part * part).max(0.0)
 }
 
 fn same_depth(a: f32, b: f32, map: &DepthMap) -> bool {
@@ -262,6 +305,19 @@ mod tests {
         assert!((a.pairs[0].share - b.pairs[0].share).abs() < 0.03, "{a:?} {b:?}");
     }
 
+    /// Two views agree, and a third one, whose map is that of the first, stands elsewhere.
+    #[test]
+    fn views_that_contradict_do_not_measure_depth() {
+        let shots = [0.0, 1.0].map(record);
+        let disparities = shots.each_ref().map(|s| rig_disparity(&s.1, SIZE.0));
+        let view = |i: usize, camera: f64| RectifiedView { image: &shots[i].0, map: &disparities[i], camera };
+        let alone = Agreement::of(&[view(0, 0.0), view(1, 1.0)]);
+        let three = Agreement::of(&[view(0, 0.0), view(1, 1.0), view(0, 4.0)]);
+        assert_eq!((three.groups(), alone.groups()), (vec![0, 0, 2], vec![0, 0]));
+        assert_eq!(three.depth_errors[..2], alone.depth_errors[..]);
+        assert!(three.depth_errors[2] > 10.0 * alone.depth_errors[1], "{:?}", three.depth_errors);
+    }
+
     #[test]
     fn exposures_and_white_balances_are_measured() {
         let shots = [0.0, 1.0].map(record);
@@ -279,6 +335,26 @@ mod tests {
             let is_right = |(gain, factor): (f64, f32)| (gain * f64::from(factor) - 1.0).abs() < 0.02;
             assert!(found[1].into_iter().zip(factors).all(is_right), "{factors:?}: {found:?}");
         }
+    }
+
+    /// Sixteen bands whose medians are 1 and -1 in turn.
+    #[test]
+    fn ratios_within_their_error_are_one() {
+        let numbers: Vec<f64> = (0..16 * 9).map(|i| if i / 9 % 2 == 0 { 1.0 } else { -1.0 }).collect();
+        assert!((error_of_median(&numbers) - (16.0_f64 / 15.0).sqrt() / 4.0).abs() < 1e-12);
+        assert_eq!((shrunk(0.0, 0.0), shrunk(0.3, 0.1), shrunk(-0.3, 0.0)), (0.0, 0.0, -0.3));
+        assert!((shrunk(-0.6, 0.1) + 0.45).abs() < 1e-12);
+        // Noise of 10 grey levels in photographs of one exposure.
+        let shots = [0.0, 1.0].map(record);
+        let disparities = shots.each_ref().map(|s| rig_disparity(&s.1, SIZE.0));
+        let dice = &mut crate::uncalibrated::random::Dice::new(3);
+        let noisy = shots.each_ref().map(|shot| {
+            let mut image = shot.0.clone();
+            image.data_mut().iter_mut().for_each(|v| *v += 10.0 * dice.normal() as f32);
+            image
+        });
+        let view = |i: usize| RectifiedView { image: &noisy[i], map: &disparities[i], camera: i as f64 };
+        assert_eq!(Agreement::of(&[view(0), view(1)]).gains, [[1.0; 3]; 2]);
     }
 
     #[test]

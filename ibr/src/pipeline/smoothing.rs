@@ -31,7 +31,7 @@ impl RenderSettings {
     pub fn suited_to(&self, agreement: &Agreement, view_weights: &ViewWeights, measure: Measure) -> Self {
         let mut settings = Self { keep_smoothing: true, ..*self };
         let test = &mut settings.interpolation.depth_test;
-        let differs = 3.0 * (2.0 * mean_square(&agreement.depth_errors)).sqrt();
+        let differs = 3.0 * (2.0 * mean_square_error(agreement, view_weights)).sqrt();
         match measure {
             Measure::Disparity => test.parallax = test.parallax.max(differs),
             Measure::Depth => test.relative = test.relative.max(differs),
@@ -55,8 +55,13 @@ impl RenderSettings {
     }
 }
 
-fn mean_square(numbers: &[f64]) -> f64 {
-    numbers.iter().map(|v| v * v).sum::<f64>() / numbers.len().max(1) as f64
+/// Of the depths of the views that count, by their weights.
+fn mean_square_error(agreement: &Agreement, view_weights: &ViewWeights) -> f64 {
+    let weight = |view: usize| f64::from(view_weights.weight(view as u16));
+    let (sum, total) = view_weights.views().into_iter().fold((0.0, 0.0), |(sum, total), view| {
+        (sum + weight(view) * agreement.depth_error(view).powi(2), total + weight(view))
+    });
+    if total > 0.0 { sum / total } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -79,6 +84,16 @@ mod tests {
         assert!((lambda(&[of(5.0), of(5.0)]) - 0.125).abs() < 1e-7);
         assert_eq!(lambda(&[of(0.1)]), LEAST_SMOOTHING);
         assert_eq!(lambda(&[of(100.0)]), MOST_SMOOTHING);
+    }
+
+    /// Disparities of a deviation of 0.1 and 0.3 px; a third view does not count.
+    #[test]
+    fn the_depth_test_allows_for_errors_of_the_views_that_count() {
+        let agreement = Agreement { depth_errors: vec![0.1, 0.3, 9.0], ..Agreement::default() };
+        let weights = ViewWeights::by_distance(&[1.0, 1.0, 5.0]).nearest(Some(2));
+        let suited = RenderSettings::default().suited_to(&agreement, &weights, Measure::Disparity);
+        let found = suited.interpolation.depth_test.parallax;
+        assert!((found - 3.0 * 0.1_f64.sqrt()).abs() < 1e-6, "{found}");
     }
 
     #[test]

@@ -18,8 +18,10 @@ pub use colour::coloured;
 pub(crate) use surface::from_scattered;
 
 use crate::depth::{DepthMap, Measure};
+use crate::interpolate::plane::surface_memory;
 use crate::pipeline::{APERTURE, Agreement, DisparityGain, NEGLIGIBLE};
 use crate::propagate::{Nearest, View, Viewpoint};
+use hybank::memory::{MemoryShortage, check_memory};
 use outliers::Parallax;
 
 /// A map that was restored.
@@ -34,8 +36,31 @@ pub struct Restored {
     pub error: f64,
 }
 
+/// Bytes of all that is not in proportion to the pixels, about: points that are compared.
+const BASE: f64 = 5e5;
+
+/// Bytes per pixel of all views: parallaxes and restored maps.
+const HELD: f64 = 8.0;
+
+/// Bytes per pixel of one view: the parallaxes that change, and marks of outliers.
+const CHANGED: f64 = 5.0;
+
+/// Bytes that maps of these widths and heights take while they are restored, with noise that is smoothed or
+/// without.
+pub fn memory(sizes: &[(usize, usize)], is_noisy: bool) -> f64 {
+    let pixels = |size: &(usize, usize)| size.0 as f64 * size.1 as f64;
+    let largest = sizes.iter().copied().max_by(|a, b| pixels(a).total_cmp(&pixels(b))).unwrap_or((0, 0));
+    let smoothed = if is_noisy { surface_memory(largest) } else { 0.0 };
+    BASE + HELD * sizes.iter().map(pixels).sum::<f64>() + CHANGED * pixels(&largest) + smoothed
+}
+
 /// Restores the maps of views that see one scene.
-pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Vec<Restored> {
+///
+/// # Errors
+/// [`MemoryShortage`]; maps without noise take much less than others.
+pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, MemoryShortage> {
+    let sizes: Vec<(usize, usize)> = views.iter().map(|view| view.map.size()).collect();
+    check_memory(memory(&sizes, false))?;
     let agreement = Agreement::of(views);
     let error = |view: usize| agreement.depth_error(view);
     let planes: Vec<Parallax> =
@@ -43,7 +68,7 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Vec<Restored> {
     let nearest = Nearest::new(views);
     let one = |i: usize| {
         let view = &views[i];
-        let rejected = outliers::rejected(views, &planes, &agreement.gains, i);
+        let rejected = outliers::rejected(views, &planes, &agreement, i);
         let count = rejected.iter().filter(|r| **r).count();
         let mut plane = planes[i].clone();
         let mut guessed = Vec::new();
@@ -52,14 +77,15 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Vec<Restored> {
             guessed = rejected;
         }
         if is_noticeable(views, i, nearest.other(i), error(i)) {
+            check_memory(surface_memory(sizes[i]))?;
             plane.smooth(view.image);
         }
         let known = (plane.values.len() - view.map.unknown()).max(1);
-        Restored {
+        Ok(Restored {
             map: plane.into_map(view.map, guessed),
             outliers: count as f64 / known as f64,
             error: error(i),
-        }
+        })
     };
     (0..views.len()).map(one).collect()
 }

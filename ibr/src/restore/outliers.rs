@@ -2,7 +2,7 @@
 
 use crate::depth::{DepthMap, JUMP, Measure};
 use crate::image::Image;
-use crate::pipeline::Exposure;
+use crate::pipeline::Agreement;
 use crate::propagate::{View, Viewpoint};
 use rayon::prelude::*;
 
@@ -146,16 +146,16 @@ pub(super) fn difference(a: [f32; 3], b: [f32; 3]) -> f32 {
 pub(super) fn rejected<P: Viewpoint>(
     views: &[View<'_, P>],
     planes: &[Parallax],
-    gains: &[Exposure],
+    agreement: &Agreement,
     index: usize,
 ) -> Vec<bool> {
+    let gains = &agreement.gains;
     let (view, plane) = (&views[index], &planes[index]);
     let colour = |view: usize, p: usize| -> [f32; 3] {
         let colour = views[view].image.pixel::<3>(p);
         std::array::from_fn(|c| colour[c] * gains[view][c] as f32)
     };
-    let others = (0..views.len()).filter(|other| *other != index);
-    let others: Vec<usize> = others.step_by((views.len() - 1).div_ceil(VOTERS).max(1)).collect();
+    let others = voters(&agreement.groups(), index);
     let maps: Vec<_> = others.iter().map(|other| view.camera.map_to(&views[*other].camera)).collect();
     let is_outlier = |p: usize| {
         let value = view.map.data()[p];
@@ -171,6 +171,16 @@ pub(super) fn rejected<P: Viewpoint>(
         votes.sum::<i32>() <= 0
     };
     (0..plane.values.len()).into_par_iter().with_min_len(1024).map(is_outlier).collect()
+}
+
+/// The views that vote on values of one: those that agree with it, or all if none does.
+fn voters(groups: &[usize], index: usize) -> Vec<usize> {
+    let others = || (0..groups.len()).filter(|other| *other != index);
+    let mut found: Vec<usize> = others().filter(|other| groups[*other] == groups[index]).collect();
+    if found.is_empty() {
+        found = others().collect();
+    }
+    found.iter().copied().step_by(found.len().div_ceil(VOTERS).max(1)).collect()
 }
 
 /// 1 if a view confirms a point at a position with a parallax, by a pixel of a surface there that has nearly

@@ -33,7 +33,7 @@ fn changed(map: &DepthMap, seed: u64, change: impl Fn(f32, &mut Dice) -> f32) ->
 /// The restored disparities of both views.
 fn restored(shots: &[Shot; 2], maps: &[DepthMap; 2]) -> Vec<Restored> {
     let view = |i: usize| View { image: &shots[i].image, map: &maps[i], camera: i as f64 };
-    restore(&[view(0), view(1)])
+    restore(&[view(0), view(1)]).unwrap()
 }
 
 /// Root mean square error, without the largest hundredth: outlines.
@@ -78,7 +78,7 @@ fn outliers_of_depths_are_found() {
     };
     let maps = [0, 1].map(|i| changed(&shots[i].depth, 5 + i as u64, wild));
     let view = |i: usize| View { image: &shots[i].image, map: &maps[i], camera: shots[i].camera };
-    for (restored, shot) in restore(&[view(0), view(1)]).iter().zip(&shots) {
+    for (restored, shot) in restore(&[view(0), view(1)]).unwrap().iter().zip(&shots) {
         let left = error(&restored.map, &shot.depth);
         assert!((0.03..0.055).contains(&restored.outliers) && left < 0.05, "{} {left}", restored.outliers);
     }
@@ -116,7 +116,7 @@ fn thin_things_are_kept() {
         Image::new(SIZE.0, SIZE.1, 1, data.collect()).unwrap()
     });
     let view = |i: usize| View { image: &image[i], map: &thin[i], camera: i as f64 };
-    for (restored, map) in restore(&[view(0), view(1)]).iter().zip(&thin) {
+    for (restored, map) in restore(&[view(0), view(1)]).unwrap().iter().zip(&thin) {
         assert!(restored.map == *map, "{}", restored.outliers);
     }
 }

@@ -21,9 +21,9 @@ use crate::image::{Image, ImageError, MOST_PIXELS, read_image_within, read_map_w
 use crate::partial::densify;
 use crate::pipeline::Watch;
 use crate::propagate::Viewpoint;
-use crate::restore::{coloured, from_scattered, restore};
+use crate::restore::{coloured, restore};
 use goals::Goal;
-use hybank::memory::check_memory;
+use hybank::memory::{MemoryShortage, check_memory};
 use hybank::messages::{self, Number, Quoted, of_document};
 use left_out::LeftOut;
 use models::Models;
@@ -38,7 +38,7 @@ pub struct LoadOptions {
     pub view: Option<String>,
     /// Use only every K-th value of full maps.
     pub depth_step: usize,
-    /// Whether unknown depths are filled from the farther neighbour in their row.
+    /// Whether unknown depths are filled from their neighbours, by `fill_unknown`.
     pub fill: bool,
     /// The most pixels of the virtual view, and of each image and map.
     pub max_pixels: usize,
@@ -136,18 +136,21 @@ impl Loader<'_> {
             };
         notes.extend(self.spec.notes.iter().cloned());
         notes.extend(note_of_dark(&kind.images()));
-        self.room_to_restore(&kind.images())?;
-        let outliers = restored(&mut kind, &mut notes);
+        let outliers = self.restored(&mut kind, &mut notes)?;
         Ok(Scene { kind, offset: self.offset(&goals)?, filled, outliers, calibration, notes })
     }
 
-    /// Refuses views whose maps there is no memory to restore.
-    fn room_to_restore(&self, images: &[&Image]) -> Loaded<()> {
-        let sizes = images.iter().map(|image| pixels(image) as f64);
-        let bytes = sizes.clone().map(|size| 5.0 * size).sum::<f64>() + RESTORING * sizes.fold(0.0, f64::max);
-        check_memory(bytes).map_err(|shortage| {
+    /// Restores the maps and colours of a scene; the share of outliers in each map.
+    fn restored(&self, kind: &mut Kind, notes: &mut Vec<String>) -> Loaded<Vec<f64>> {
+        let count = kind.images().len();
+        let done = match kind {
+            Kind::Rectified { views, .. } => restore_views(views, notes),
+            Kind::Calibrated { views, .. } => restore_views(views, notes),
+            Kind::Uncalibrated { .. } => Ok(Vec::new()),
+        };
+        done.map_err(|shortage| {
             self.incomplete(format!(
-                "to restore the depth maps takes {shortage}; shrink the images or use fewer views"
+                "to restore depth and colours from {count} views takes {shortage}; shrink the images or use fewer views"
             ))
         })
     }
@@ -218,12 +221,8 @@ impl Loader<'_> {
         let given = view.step.unwrap_or(1);
         map.fits(image.size(), given).map_err(depth_error)?;
         let step = if given == 1 { self.options.depth_step } else { given };
-        if step == 1 {
+        if step == 1 && !map.is_scattered() {
             let mut map = map;
-            if map.is_scattered() {
-                let unknown = map.unknown();
-                return Ok((image.clone(), from_scattered(&map, &image), unknown));
-            }
             let filled = if self.options.fill { fill_unknown(&mut map) } else { 0 };
             return Ok((image, map, filled));
         }
@@ -234,21 +233,14 @@ impl Loader<'_> {
     }
 }
 
-/// Restores the maps and colours of a scene; the share of outliers in each map.
-fn restored(kind: &mut Kind, notes: &mut Vec<String>) -> Vec<f64> {
-    match kind {
-        Kind::Rectified { views, .. } => restore_views(views, notes),
-        Kind::Calibrated { views, .. } => restore_views(views, notes),
-        Kind::Uncalibrated { .. } => Vec::new(),
-    }
-}
-
 /// Largest value of 12 bits in 16 on the scale of 255, rounded up.
 const TWELVE_BITS: f32 = 16.0;
 
-/// That photographs are as dark as data of 12 bits in files of 16.
+/// That photographs are as dark as data of 12 bits in files of 16. Those of files of 8 bits have whole numbers.
 fn note_of_dark(images: &[&Image]) -> Option<String> {
-    let is_dark = |image: &Image| image.data().iter().all(|v| *v < TWELVE_BITS);
+    let is_dark = |image: &Image| {
+        image.data().iter().all(|v| *v < TWELVE_BITS) && image.data().iter().any(|v| v.fract() != 0.0)
+    };
     let dark: Vec<String> =
         (1..).zip(images).filter(|(_, i)| is_dark(i)).map(|(k, _)| k.to_string()).collect();
     (!dark.is_empty()).then(|| {
@@ -273,12 +265,15 @@ fn note_of_outliers(shares: &[f64]) -> Option<String> {
     })
 }
 
-fn restore_views<P: Viewpoint>(views: &mut [SourceView<P>], notes: &mut Vec<String>) -> Vec<f64> {
-    let restored = restore(&views.iter().map(SourceView::view).collect::<Vec<_>>());
+fn restore_views<P: Viewpoint>(
+    views: &mut [SourceView<P>],
+    notes: &mut Vec<String>,
+) -> Result<Vec<f64>, MemoryShortage> {
+    let restored = restore(&views.iter().map(SourceView::view).collect::<Vec<_>>())?;
     let outliers: Vec<f64> = restored.iter().map(|restored| restored.outliers).collect();
     views.iter_mut().zip(restored).for_each(|(view, restored)| view.map = restored.map);
     notes.extend(note_of_outliers(&outliers));
-    let coloured = coloured(&views.iter().map(SourceView::view).collect::<Vec<_>>());
+    let coloured = coloured(&views.iter().map(SourceView::view).collect::<Vec<_>>())?;
     let grey: Vec<String> =
         (1..).zip(&coloured).filter(|(_, c)| c.is_some()).map(|(k, _)| k.to_string()).collect();
     for (view, image) in views.iter_mut().zip(coloured) {
@@ -292,15 +287,12 @@ fn restore_views<P: Viewpoint>(views: &mut [SourceView<P>], notes: &mut Vec<Stri
             if let [one] = &grey[..] { format!("{one} is") } else { format!("{} are", grey.join(", ")) }
         ));
     }
-    outliers
+    Ok(outliers)
 }
 
 /// Bytes per pixel of a view that is there, and of one that is being read and made dense.
 const VIEW_BYTES: f64 = 20.0;
 const LOADING_BYTES: f64 = 110.0;
-
-/// Bytes per pixel of the view whose map is restored: the equations of a spline of one value.
-const RESTORING: f64 = 100.0;
 
 /// Bytes of memory in which the text of a scene file can be parsed.
 #[cfg(feature = "cli")]

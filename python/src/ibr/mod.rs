@@ -24,7 +24,7 @@ pub(crate) struct View {
     image: Py<PyAny>,
     /// Depth at the virtual camera, NaN in holes: (H, W). Without cameras only its order has a meaning.
     depth: Py<PyAny>,
-    /// 0 where a view saw the pixel, 1 in cracks, 2 where no view saw it: (H, W).
+    /// 0 where a view saw the pixel, 1 in cracks, 2 where no view saw it, 3 where only guessed depth shows it: (H, W).
     mask: Py<PyAny>,
     /// Share of the pixels that samples cover.
     coverage: f64,
@@ -114,6 +114,7 @@ impl View {
             Cover::Seen => 0u8,
             Cover::Crack => 1,
             Cover::Disocclusion => 2,
+            Cover::Guessed => 3,
         });
         let region = region.unwrap_or_else(|| vec![true; width * height]);
         let depth = PyArray1::from_slice(py, rendering.depth.data());

@@ -9,7 +9,7 @@ use crate::occlusion::DepthTest;
 /// If the closest known pixel has no counterpart on the other side, the hole is open to the border of the
 /// image there, and the closest pixel is continued. Otherwise the hole lies between surfaces, and the
 /// closest pixel of the farthest of them is: background that the camera uncovers.
-pub(in crate::interpolate) fn sources(depth: &[f32], width: usize, test: &DepthTest) -> Vec<u32> {
+pub(super) fn sources(depth: &[f32], width: usize, test: &DepthTest) -> Vec<u32> {
     let mut sources = vec![NONE; depth.len()];
     for_holes(depth, width, |p, around| {
         let p32 = p as u32;

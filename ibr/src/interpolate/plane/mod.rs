@@ -14,7 +14,7 @@
 //! smooths like a cubic spline: it removes noise and keeps slopes. [`hybank::sampling::fit2`] holds and
 //! solves the equations.
 
-pub(super) mod background;
+mod background;
 mod gather;
 mod grid;
 mod springs;
@@ -285,6 +285,12 @@ pub(crate) fn fit_surface(values: &[f32], shape: &[f32], width: usize, settings:
     let PlaneSettings { tolerance, iterations, .. } = settings.plane;
     let iteration = Iteration { tolerance, steps: iterations };
     fit.connect(springs, |_| false).solve(&iteration, &|_| ()).0
+}
+
+/// Bytes that [`fit_surface`] takes beside its values, with its result and a shape.
+pub(crate) fn surface_memory((width, height): (usize, usize)) -> f64 {
+    let memory = Fit2::<2, 1>::memory(width, height);
+    memory.equations.max(memory.solving) + 8.0 * width as f64 * height as f64
 }
 
 /// The pixels of an image by columns, from those by rows of `width`.

@@ -188,3 +188,10 @@ fn what_is_wrong_is_named() {
     let options = LoadOptions { view: Some("middle".into()), ..LoadOptions::default() };
     assert!(read(RIG, &options).unwrap_err().contains("the views are left, right"));
 }
+
+/// 12 bits in files of 16 are at most 4095 / 257, and dark photographs of 8 bits are no such data.
+#[test]
+fn data_of_twelve_bits_are_noticed() {
+    let noted = |values: [f32; 2]| note_of_dark(&[&Image::new(2, 1, 1, values.to_vec()).unwrap()]).is_some();
+    assert!(noted([15.9, 3.1]) && !noted([15.0, 3.0]) && !noted([16.1, 3.1]));
+}
