@@ -8,12 +8,12 @@ use super::relief::JUMP;
 use super::{DepthMap, Measure};
 
 /// Gives unknown pixels of disparity the farther of the nearest known values to their left and right, and
-/// unknown depths the farther of those on both sides, in the row and in the column, if all of these lie on one
-/// surface. A side whose opposite one is beyond the border says nothing: it may be far away.
+/// unknown depths the farther of those on both sides, in the row and in the column, if all of these lie on
+/// one surface. A side whose opposite one is beyond the border says nothing: it may be far away.
 ///
 /// A row of disparities without any known value takes those of the nearest row that has one (the upper of
-/// two). The map remembers which values are guesses; renderings weigh them less. Returns the number of pixels
-/// filled.
+/// two). The map remembers which values are guesses; renderings weigh them less. Returns the number of
+/// pixels filled.
 pub fn fill_unknown(map: &mut DepthMap) -> usize {
     let unknown = map.unknown();
     if unknown == 0 {

@@ -88,8 +88,8 @@ pub enum DepthError {
 }
 
 /// The depth of what is infinitely far away, in every map and at every camera. It is finite, so that such
-/// points have a place in other views: with a baseline of 1000 units and a focal length of 10,000 pixels they
-/// miss it by a ten thousandth of a pixel.
+/// points have a place in other views: with a baseline of 1000 units and a focal length of 10,000 pixels
+/// they miss it by a ten thousandth of a pixel.
 pub const FAR: f32 = 1e11;
 
 /// Depths from here on are [`FAR`]: renderers write 1e10 where they see nothing, and a point that is far
@@ -248,8 +248,8 @@ impl DepthMap {
         Ok(self.with_values(size, data))
     }
 
-    /// Whether the known values lie apart, as points of a lidar do: fewer than half of them have neighbours to
-    /// the right and below.
+    /// Whether the known values lie apart, as points of a lidar do: fewer than half of them have neighbours
+    /// to the right and below.
     pub(crate) fn is_scattered(&self) -> bool {
         let rows = self.data.chunks_exact(self.width).zip(self.data.chunks_exact(self.width).skip(1));
         let (mut known, mut joined) = (0, 0);

@@ -71,6 +71,12 @@ impl<const C: usize> Level<C> {
     }
 }
 
+/// The mean of the nearest pixel and the smooth extension: of a large hole the first keeps what lies beside
+/// it, and the second has no streaks.
+pub(super) fn mean<const C: usize>(nearest: [f32; C], smooth: [f32; C]) -> [f32; C] {
+    std::array::from_fn(|c| (nearest[c] + smooth[c]) / 2.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,7 +5,7 @@
 //! f(c) = sum_s w_s ((I_s - J(x_s))^2 + lambda V_s J'(x_s)^2) + tau sum_m (c_m - c_{m-1})^2
 //! ```
 
-use super::extend::Level;
+use super::extend::{Level, mean};
 use super::{Cover, HoleFill, InterpolationError, Settings};
 use crate::depth::{fill_empty_rows, for_holes};
 use crate::sample::Sample;
@@ -320,8 +320,8 @@ pub(crate) fn finish<const C: usize>(
     }
 }
 
-/// Extends the farther surface into each disocclusion. The outermost pixels of a surface, whose colours may
-/// be mixed, are left out.
+/// Extends the farther surface into each disocclusion, half by its row and half smoothly. The outermost
+/// pixels of a surface, whose colours may be mixed, are left out.
 fn continue_surfaces<const C: usize>(mask: &[Cover], depths: &[f32], width: usize, values: &mut [f32]) {
     let beside = |p: usize| {
         let (left, right) = (!p.is_multiple_of(width), p % width + 1 < width);
@@ -348,7 +348,7 @@ fn continue_surfaces<const C: usize>(mask: &[Cover], depths: &[f32], width: usiz
     let pixels = values.as_chunks_mut::<C>().0;
     let mut continued = Level { width, values: pixels.to_vec(), weights };
     continued.extend();
-    holes().for_each(|p| pixels[p] = continued.values[p]);
+    holes().for_each(|p| pixels[p] = mean(pixels[p], continued.values[p]));
 }
 
 #[cfg(test)]

@@ -8,8 +8,9 @@
 //! ```
 //!
 //! and, where depths have errors, 1 / d(y) - 1 / d(x) >= parallax. Here epsilon(y) = epsilon max(1,
-//! spacing(y)). The spacing is the distance between neighbouring samples of one view on the surface of y. A fixed radius is right only where they lie about a pixel apart: where the
-//! view magnifies, the balls of a foreground would no longer cover it, and background would show through.
+//! spacing(y)). The spacing is the distance between neighbouring samples of one view on the surface of y. A
+//! fixed radius is right only where they lie about a pixel apart: where the view magnifies, the balls of a
+//! foreground would no longer cover it, and background would show through.
 //!
 //! Every test is against all of P, not against the samples that are left, so the result does not depend on
 //! any order. sigma grows with d(y). Hence if any sample of one radius in the ball hides x, then the nearest

@@ -39,8 +39,8 @@ pub struct PairAgreement {
     /// or the inputs are wrong: 0.85 to 0.95 for good depth, 0.1 to 0.3 for swapped positions or a missing
     /// scale.
     pub share: f64,
-    /// Red, green and blue of the second view divided by those of the first, at points of the same depth; the
-    /// ratio of the brightness if one of the views is grey.
+    /// Red, green and blue of the second view divided by those of the first, at points of the same depth;
+    /// the ratio of the brightness if one of the views is grey.
     pub gain: Exposure,
     /// Root mean square difference of the brightness at points of the same depth, with equal exposure, grey
     /// levels.

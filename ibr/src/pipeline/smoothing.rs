@@ -10,8 +10,8 @@ const MOST_SMOOTHING: f64 = 4.0;
 
 impl RenderSettings {
     /// The settings with the depth test that suits the maps, and with the lambda and the stiffness that suit
-    /// the photographs; the smoothing is as it was with `keep_smoothing` or if no photograph shows its noise.
-    /// The result keeps its smoothing.
+    /// the photographs; the smoothing is as it was with `keep_smoothing` or if no photograph shows its
+    /// noise. The result keeps its smoothing.
     ///
     /// Depths of one point in two maps with independent errors of the deviation delta differ by sqrt(2)
     /// delta. So one sample hides another if they differ by three times that, disparities in pixels and

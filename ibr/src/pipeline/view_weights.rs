@@ -25,8 +25,8 @@ pub(crate) const APERTURE: f64 = 1.0 / 12.0;
 /// all samples take a fifth of the time of a view.
 pub(crate) const NEGLIGIBLE: f64 = 0.02;
 
-/// Colours whose logarithms differ by less drift, as those of one camera do. On "Cones" red and green of im6
-/// are 3 % brighter than those of im2, and those of the photographs between lie between.
+/// Logarithms of brightness and colours that differ by less drift, as those of one camera do. On "Cones" red
+/// and green of im6 are 3 % brighter than those of im2, and those of the photographs between lie between.
 const DRIFT: f64 = 0.04;
 
 /// Weights of the views: near ones count more.
@@ -204,17 +204,20 @@ impl ViewWeights {
         self
     }
 
-    /// The same with factors for the colours of the views, with which all have those of the first. Where a
-    /// colour drifts little from view to view, the virtual view has that of its place: the mean by weights.
+    /// The same with factors for the colours of the views, with which all have those of the first. Where the
+    /// brightness or a colour beside it drifts from view to view, the virtual view has that of its place:
+    /// the mean by weights.
     pub fn with_gains(self, gains: &[Exposure]) -> Self {
         let weight = |view: usize| f64::from(self.weight(view as u16));
         let total: f64 = (0..gains.len()).map(weight).sum();
-        let own: Exposure = std::array::from_fn(|c| {
-            let logarithms = || gains.iter().map(|gain| gain[c].ln());
-            let mean = logarithms().enumerate().map(|(view, ln)| weight(view) * ln).sum::<f64>() / total;
-            let drifts = total > 0.0 && logarithms().all(|ln| ln.abs() < DRIFT);
-            if drifts { (-mean).exp() } else { 1.0 }
-        });
+        let drift = |part: &dyn Fn(&Exposure) -> f64| {
+            let mean = gains.iter().enumerate().map(|(view, gain)| weight(view) * part(gain)).sum::<f64>();
+            if total > 0.0 && gains.iter().all(|gain| part(gain).abs() < DRIFT) { mean / total } else { 0.0 }
+        };
+        let brightness = |gain: &Exposure| gain.map(f64::ln).iter().sum::<f64>() / 3.0;
+        let common = drift(&brightness);
+        let own = |c: usize| (-common - drift(&|gain| gain[c].ln() - brightness(gain))).exp();
+        let own: Exposure = std::array::from_fn(own);
         let factors = |gain: &Exposure| std::array::from_fn(|c| (gain[c] * own[c]) as f32);
         Self { gains: gains.iter().map(factors).collect(), ..self }
     }
@@ -415,14 +418,18 @@ mod tests {
             .with_gains(&[[1.0; 3], [1.5; 3]])
             .apply(&mut samples, |_| &image);
         assert_eq!(samples[0].value, [150.0]);
-        // One colour drifts, and the view is three times as near to the second one; another one does not.
-        let weights = ViewWeights { weights: vec![1.0, 3.0], ..ViewWeights::by_distance(&[1.0, 1.0]) };
-        let weights = weights.with_gains(&[[1.0; 3], [1.03, 1.05, 1.0]]);
-        let is_near = |found: [f32; 3], want: [f64; 3]| {
-            found.into_iter().zip(want).all(|(found, want)| (f64::from(found) - want).abs() < 1e-6)
-        };
-        assert!(is_near(weights.gain(0), [1.03_f64.powf(-0.75), 1.0, 1.0]), "{:?}", weights.gain(0));
-        assert!(is_near(weights.gain(1), [1.03_f64.powf(0.25), 1.05, 1.0]), "{:?}", weights.gain(1));
+        // The brightness drifts, or the colours beside a large difference of the brightness; the view is
+        // three times as near to the second one.
+        for (large, small) in [(1.0, [1.03; 3]), (1.2, [1.02, 1.0, 1.0 / 1.02])] {
+            let weights = ViewWeights { weights: vec![1.0, 3.0], ..ViewWeights::by_distance(&[1.0, 1.0]) };
+            let weights = weights.with_gains(&[[1.0; 3], small.map(|gain| large * gain)]);
+            let is_near = |found: [f32; 3], common: f64, power: f64| {
+                let want = small.map(|gain| common * gain.powf(power));
+                found.into_iter().zip(want).all(|(found, want)| (f64::from(found) - want).abs() < 1e-6)
+            };
+            assert!(is_near(weights.gain(0), 1.0, -0.75), "{:?}", weights.gain(0));
+            assert!(is_near(weights.gain(1), large, 0.25), "{:?}", weights.gain(1));
+        }
     }
 
     #[test]

@@ -38,8 +38,9 @@ pub(super) struct Parallax {
 }
 
 impl Parallax {
-    /// Of a map whose errors, in its own measure, have this standard deviation. Those of depths are shares of
-    /// the depth; what is taken as the deviation of the reciprocal depth is that in the middle of the scene.
+    /// Of a map whose errors, in its own measure, have this standard deviation. Those of depths are shares
+    /// of the depth; what is taken as the deviation of the reciprocal depth is that in the middle of the
+    /// scene.
     pub(super) fn of(map: &DepthMap, error: f64) -> Self {
         let measure = map.measure();
         let values = map.data().iter().map(|v| measure.parallax(*v)).collect();

@@ -8,8 +8,8 @@
 //! sum_p (d_p - z_p)^2 / delta^2 + sum (z_(p-1) - 2 z_p + z_(p+1))^2 / kappa^2
 //! ```
 //!
-//! so the bending is delta^2 / kappa^2. Across the edges of surfaces the springs are weak; where the edges are
-//! is what the last fit shows.
+//! so the bending is delta^2 / kappa^2. Across the edges of surfaces the springs are weak; where the edges
+//! are is what the last fit shows.
 
 use super::outliers::{Parallax, difference};
 use crate::depth::DepthMap;
@@ -34,8 +34,8 @@ const TOLERANCES: [f64; 3] = [0.4, 0.2, 0.15];
 /// The share of its parallax by which a value may differ from its neighbour on the same surface.
 const SLOPE: f64 = 0.01;
 
-/// Radius of the medians at the beginning, and at the end, where they take pixels between two surfaces to one
-/// of them.
+/// Radius of the medians at the beginning, and at the end, where they take pixels between two surfaces to
+/// one of them.
 const RADIUS: usize = 2;
 
 impl Parallax {
@@ -102,8 +102,8 @@ const SCATTERED_SLOPE: f64 = 0.015;
 
 /// Depths for all pixels from those of a few.
 ///
-/// At first each pixel takes the value of the nearest sample, by the length of a path on which differences of
-/// colour count. So its surface ends where the colours change. The fit then makes the surfaces smooth.
+/// At first each pixel takes the value of the nearest sample, by the length of a path on which differences
+/// of colour count. So its surface ends where the colours change. The fit then makes the surfaces smooth.
 pub(crate) fn from_scattered(map: &DepthMap, image: &Image) -> DepthMap {
     let (width, measure) = (image.width(), map.measure());
     let values: Vec<f32> = map.data().iter().map(|v| measure.parallax(*v)).collect();

@@ -236,7 +236,8 @@ impl Loader<'_> {
 /// Largest value of 12 bits in 16 on the scale of 255, rounded up.
 const TWELVE_BITS: f32 = 16.0;
 
-/// That photographs are as dark as data of 12 bits in files of 16. Those of files of 8 bits have whole numbers.
+/// That photographs are as dark as data of 12 bits in files of 16. Those of files of 8 bits have whole
+/// numbers.
 fn note_of_dark(images: &[&Image]) -> Option<String> {
     let is_dark = |image: &Image| {
         image.data().iter().all(|v| *v < TWELVE_BITS) && image.data().iter().any(|v| v.fract() != 0.0)

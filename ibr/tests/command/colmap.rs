@@ -99,8 +99,8 @@ fn binary_models_and_their_depth_maps_are_rendered() {
     replace(dir.path(), "\"model\"", "\"dense/sparse\"");
     assert!(want > 31.0 && (psnr(dir.path(), &truth) - want).abs() < 1e-9, "{want}");
     assert!(std::fs::read(at("o.png")).unwrap() == picture);
-    // Depths that the reconstruction does not know are 0. Of these, 1000 in the upper rows, some columns have
-    // the wall above and a disc below: what is there is not known, and they stay unknown.
+    // Depths that the reconstruction does not know are 0. Of these, 1000 in the upper rows, some columns
+    // have the wall above and a disc below: what is there is not known, and they stay unknown.
     let map = pfm::decode(&std::fs::read(at("0.pfm")).unwrap()).unwrap();
     let hole = 500..1500;
     let known_in = |column: usize, rows: [usize; 2]| {

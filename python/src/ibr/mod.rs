@@ -24,7 +24,8 @@ pub(crate) struct View {
     image: Py<PyAny>,
     /// Depth at the virtual camera, NaN in holes: (H, W). Without cameras only its order has a meaning.
     depth: Py<PyAny>,
-    /// 0 where a view saw the pixel, 1 in cracks, 2 where no view saw it, 3 where only guessed depth shows it: (H, W).
+    /// 0 where a view saw the pixel, 1 in cracks, 2 where no view saw it, 3 where only guessed depth shows
+    /// it: (H, W).
     mask: Py<PyAny>,
     /// Share of the pixels that samples cover.
     coverage: f64,

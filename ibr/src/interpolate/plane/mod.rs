@@ -19,7 +19,7 @@ mod gather;
 mod grid;
 mod springs;
 
-use super::extend::Level;
+use super::extend::{Level, mean};
 use super::{Cover, Degree, HoleFill, InterpolationError, Settings, Watch};
 use crate::depth::{DepthMap, Measure, NONE};
 use crate::sample::Sample;
@@ -245,7 +245,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         continued.extend();
         for p in holes {
             self.depth[p] = self.depth[sources[p] as usize];
-            self.add_on_pixel(p, continued.values[p]);
+            self.add_on_pixel(p, mean(continued.values[sources[p] as usize], continued.values[p]));
         }
     }
 
