@@ -262,7 +262,7 @@ fn restored_maps_take_what_is_estimated() {
         let size = scaled(size);
         let image = picture(size, 3);
         let clean = map(size, 4.0, Measure::Disparity);
-        let wild = |i: usize| if i % 61 == 0 { 9.0 + (i % 5) as f32 } else { 4.0 };
+        let wild = |i: usize| if i.is_multiple_of(61) { 9.0 + (i % 5) as f32 } else { 4.0 };
         let wild = DepthMap::new(size, (0..size.0 * size.1).map(wild).collect(), 1.0, Measure::Disparity);
         let noisy: Vec<DepthMap> =
             (0..views).map(|k| noisy_map(size, 40.0, Measure::Disparity, 1 + 17 * k)).collect();
