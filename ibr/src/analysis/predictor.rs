@@ -7,7 +7,7 @@ use super::sure::Limits;
 use super::variogram::Variogram;
 use crate::depth::DepthMap;
 use crate::image::Image;
-use crate::pipeline::{Agreement, RenderError, RenderSettings, Rendering};
+use crate::pipeline::{Agreement, RenderError, RenderSettings, Rendering, without_drift};
 use crate::propagate::View;
 
 /// Views with the weights that are calibrated on them, for any number of predictions.
@@ -32,8 +32,8 @@ impl<'a, P: Predicted> Predictor<'a, P> {
             extent.check(bytes)?;
         }
         let agreement = Agreement::of(views);
-        let gains = if settings.keep_exposure { &[][..] } else { &agreement.gains };
-        let images = equalised(views.iter().map(|v| v.image), gains);
+        let gains = if settings.keep_exposure { Vec::new() } else { without_drift(&agreement.gains) };
+        let images = equalised(views.iter().map(|v| v.image), &gains);
         let maps: Vec<_> = views.iter().map(|v| (v.map, v.camera)).collect();
         let views = joined(&images, &maps);
         let settings = RenderSettings { keep_exposure: true, ..*settings };

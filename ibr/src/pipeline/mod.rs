@@ -12,7 +12,7 @@ mod view_weights;
 pub use agreement::{Agreement, Exposure, PairAgreement};
 pub(crate) use depth_errors::{DEVIATION_PER_MEDIAN, DisparityGain, median};
 pub use view_weights::ViewWeights;
-pub(crate) use view_weights::{APERTURE, NEGLIGIBLE};
+pub(crate) use view_weights::{APERTURE, NEGLIGIBLE, without_drift};
 
 use crate::depth::DepthMap;
 use crate::image::Image;

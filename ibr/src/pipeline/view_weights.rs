@@ -212,11 +212,10 @@ impl ViewWeights {
         let total: f64 = (0..gains.len()).map(weight).sum();
         let drift = |part: &dyn Fn(&Exposure) -> f64| {
             let mean = gains.iter().enumerate().map(|(view, gain)| weight(view) * part(gain)).sum::<f64>();
-            if total > 0.0 && gains.iter().all(|gain| part(gain).abs() < DRIFT) { mean / total } else { 0.0 }
+            if total > 0.0 && drifts(gains, part) { mean / total } else { 0.0 }
         };
-        let brightness = |gain: &Exposure| gain.map(f64::ln).iter().sum::<f64>() / 3.0;
         let common = drift(&brightness);
-        let own = |c: usize| (-common - drift(&|gain| gain[c].ln() - brightness(gain))).exp();
+        let own = |c: usize| (-common - drift(&|gain| beside_brightness(gain, c))).exp();
         let own: Exposure = std::array::from_fn(own);
         let factors = |gain: &Exposure| std::array::from_fn(|c| (gain[c] * own[c]) as f32);
         Self { gains: gains.iter().map(factors).collect(), ..self }
@@ -349,6 +348,31 @@ impl Gradient {
         }
         sums
     }
+}
+
+/// Logarithm of the common factor of the colours.
+fn brightness(gain: &Exposure) -> f64 {
+    gain.map(f64::ln).iter().sum::<f64>() / 3.0
+}
+
+/// Logarithm of the factor of a colour beside that.
+fn beside_brightness(gain: &Exposure, colour: usize) -> f64 {
+    gain[colour].ln() - brightness(gain)
+}
+
+fn drifts(gains: &[Exposure], part: impl Fn(&Exposure) -> f64) -> bool {
+    gains.iter().all(|gain| part(gain).abs() < DRIFT)
+}
+
+/// Factors that give photographs one exposure, each with its own drift.
+pub(crate) fn without_drift(gains: &[Exposure]) -> Vec<Exposure> {
+    let common = if drifts(gains, brightness) { 0.0 } else { 1.0 };
+    let own: Exposure =
+        std::array::from_fn(|c| if drifts(gains, |gain| beside_brightness(gain, c)) { 0.0 } else { 1.0 });
+    let factors = |gain: &Exposure| {
+        std::array::from_fn(|c| (common * brightness(gain) + own[c] * beside_brightness(gain, c)).exp())
+    };
+    gains.iter().map(factors).collect()
 }
 
 #[cfg(test)]
