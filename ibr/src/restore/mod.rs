@@ -5,10 +5,10 @@
 //! errors of matchers are white.
 //!
 //! 1. *Outliers.* A value is rejected if it contradicts its neighbours and the other views
-//!    ([`outliers`]), and takes the median of its neighbours, weighed by the likeness of their colours.
+//!    (`outliers`), and takes the median of its neighbours, weighed by the likeness of their colours.
 //! 2. *Noise.* With the standard deviation delta of the errors, which
-//!    [`Agreement`](crate::pipeline::Agreement) finds from the lookups of one map in another, and the bends
-//!    kappa of the surfaces, the map is the most probable one of a random walk of slopes ([`surface`]).
+//!    [`Agreement`] finds from the lookups of one map in another, and the bends
+//!    kappa of the surfaces, the map is the most probable one of a random walk of slopes (`surface`).
 
 mod colour;
 mod outliers;
