@@ -17,12 +17,13 @@ pub fn densify(sparse: &DepthMap, step: usize, image: &Image) -> Result<DepthMap
     Ok(match step {
         1 if sparse.is_scattered() => from_scattered(sparse, image),
         1 => sparse.clone(),
-        _ => from_scattered(&placed(sparse, step, image.size()), image),
+        _ => from_scattered(&placed(sparse, step, image), image),
     })
 }
 
-/// The samples at their pixels, all others unknown.
-fn placed(sparse: &DepthMap, step: usize, (width, height): (usize, usize)) -> DepthMap {
+/// The samples at their pixels of the image, all others unknown.
+fn placed(sparse: &DepthMap, step: usize, image: &Image) -> DepthMap {
+    let (width, height) = image.size();
     let mut data = vec![f32::NAN; width * height];
     for (k, value) in sparse.data().iter().enumerate() {
         let (column, row) = (k % sparse.width(), k / sparse.width());

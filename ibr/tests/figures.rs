@@ -196,7 +196,7 @@ fn cones_with_three_percent_of_the_depths() {
             let (coarse, image) = (map.decimated(6).unwrap(), &whole.images[i]);
             whole.maps[i] = match is_spline {
                 true => densify(&coarse, 6, image).unwrap(),
-                false => bilinear(&coarse, 6, image.size()),
+                false => bilinear(&coarse, 6, image),
             };
             println!("densified in {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
         }

@@ -234,11 +234,7 @@ fn every_kind_of_scene_profits_from_the_image_where_depth_is_coarse() {
         let render = |is_spline: bool| {
             let dense = |i: usize| {
                 let (coarse, image) = (ends[i].1.decimated(6).unwrap(), &ends[i].0);
-                if is_spline {
-                    densify(&coarse, 6, image).unwrap()
-                } else {
-                    bilinear(&coarse, 6, image.size())
-                }
+                if is_spline { densify(&coarse, 6, image).unwrap() } else { bilinear(&coarse, 6, image) }
             };
             let maps = [dense(0), dense(1)];
             let view = |i: usize| RectifiedView { image: &ends[i].0, map: &maps[i], camera: i as f64 };

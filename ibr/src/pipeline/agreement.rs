@@ -1,8 +1,9 @@
 //! Whether the inputs fit each other, from the inputs alone: points that one view gives by its depth must
 //! lie at the same depth and have the same colour in another view.
 
+use super::Exposure;
 use super::depth_errors::{self, FEWEST_POINTS, Lookups};
-use crate::depth::{DepthMap, Measure};
+use crate::depth::{DepthMap, JUMP, Measure};
 use crate::image::Texture;
 use crate::propagate::{Nearest, View, Viewpoint};
 use rayon::prelude::*;
@@ -10,11 +11,8 @@ use rayon::prelude::*;
 /// Pixels of each view that are compared, about.
 const COMPARED_PIXELS: usize = 20_000;
 
-/// Depths agree up to this share of the nearer one, disparities also up to one pixel.
-const DEPTH_SHARE: f32 = 0.05;
-
-/// Colours agree up to this many grey levels.
-const GREY_LEVELS: f32 = 20.0;
+/// Two views show one point if its colours differ by at most this many grey levels.
+pub(crate) const GREY_LEVELS: f32 = 20.0;
 
 /// Share of agreeing points below which the inputs are probably wrong.
 const LEAST_SHARE: f64 = 0.5;
@@ -24,9 +22,6 @@ const BANDS: usize = 16;
 
 /// A ratio counts as far as it exceeds so many standard deviations of its error.
 const GAIN_DEVIATIONS: f64 = 3.0;
-
-/// A number for each of red, green and blue; the same ones for grey.
-pub type Exposure = [f64; 3];
 
 /// How well two views agree.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -245,10 +240,12 @@ fn shrunk(found: f64, error: f64) -> f64 {
     found * (1.0 - part * part).max(0.0)
 }
 
+/// Up to the share of the nearer one beyond which two samples lie on different surfaces, and for disparities
+/// up to one pixel.
 fn same_depth(a: f32, b: f32, map: &DepthMap) -> bool {
     let tolerance = match map.measure() {
-        Measure::Disparity => (DEPTH_SHARE * (a.min(b) + map.offset() as f32)).max(1.0),
-        Measure::Depth => DEPTH_SHARE * a.min(b),
+        Measure::Disparity => (JUMP * (a.min(b) + map.offset() as f32)).max(1.0),
+        Measure::Depth => JUMP * a.min(b),
     };
     (a - b).abs() <= tolerance
 }

@@ -3,16 +3,20 @@
 mod agreement;
 pub mod calibrated;
 pub(crate) mod depth_errors;
+mod exposure;
 pub mod memory;
 pub mod rectified;
 mod smoothing;
 pub mod uncalibrated;
 mod view_weights;
 
-pub use agreement::{Agreement, Exposure, PairAgreement};
+pub(crate) use agreement::GREY_LEVELS;
+pub use agreement::{Agreement, PairAgreement};
 pub(crate) use depth_errors::{DEVIATION_PER_MEDIAN, DisparityGain, median};
+pub use exposure::Exposure;
+pub(crate) use exposure::without_drift;
 pub use view_weights::ViewWeights;
-pub(crate) use view_weights::{APERTURE, NEGLIGIBLE, without_drift};
+pub(crate) use view_weights::{APERTURE, NEGLIGIBLE};
 
 use crate::depth::DepthMap;
 use crate::image::Image;
@@ -47,8 +51,8 @@ pub struct RenderSettings {
     pub interpolation: Settings,
     /// Added to every column, in pixels: registration of the virtual image.
     pub offset: f64,
-    /// Use the brightness of every view as it is. Otherwise views that are brighter or darker than the first
-    /// one are given its exposure.
+    /// Use the colours of every view as they are. Otherwise views get the exposure and the white balance of
+    /// the first one, except for drift, which follows the place of the virtual camera.
     pub keep_exposure: bool,
     /// Use lambda and stiffness as they are. Otherwise they follow from the noise and the slopes of the
     /// photographs, where cameras are known.

@@ -1,6 +1,7 @@
 //! The share of each view in the virtual one, and its exposure.
 
 use super::depth_errors::{DisparityGain, median};
+use super::exposure::drifts;
 use super::{Agreement, Exposure};
 use crate::camera::Camera;
 use crate::depth::Measure;
@@ -24,10 +25,6 @@ pub(crate) const APERTURE: f64 = 1.0 / 12.0;
 /// Errors of depth that change the weight of no sample by more than this share are left out: the slopes of
 /// all samples take a fifth of the time of a view.
 pub(crate) const NEGLIGIBLE: f64 = 0.02;
-
-/// Logarithms of brightness and colours that differ by less drift, as those of one camera do. On "Cones" red
-/// and green of im6 are 3 % brighter than those of im2, and those of the photographs between lie between.
-const DRIFT: f64 = 0.04;
 
 /// Weights of the views: near ones count more.
 ///
@@ -210,13 +207,10 @@ impl ViewWeights {
     pub fn with_gains(self, gains: &[Exposure]) -> Self {
         let weight = |view: usize| f64::from(self.weight(view as u16));
         let total: f64 = (0..gains.len()).map(weight).sum();
-        let drift = |part: &dyn Fn(&Exposure) -> f64| {
-            let mean = gains.iter().enumerate().map(|(view, gain)| weight(view) * part(gain)).sum::<f64>();
-            if total > 0.0 && drifts(gains, part) { mean / total } else { 0.0 }
-        };
-        let common = drift(&brightness);
-        let own = |c: usize| (-common - drift(&|gain| beside_brightness(gain, c))).exp();
-        let own: Exposure = std::array::from_fn(own);
+        let drifts = drifts(gains);
+        let mean =
+            |c: usize| drifts.iter().enumerate().map(|(view, drift)| weight(view) * drift[c]).sum::<f64>();
+        let own: Exposure = std::array::from_fn(|c| if total > 0.0 { (-mean(c) / total).exp() } else { 1.0 });
         let factors = |gain: &Exposure| std::array::from_fn(|c| (gain[c] * own[c]) as f32);
         Self { gains: gains.iter().map(factors).collect(), ..self }
     }
@@ -348,31 +342,6 @@ impl Gradient {
         }
         sums
     }
-}
-
-/// Logarithm of the common factor of the colours.
-fn brightness(gain: &Exposure) -> f64 {
-    gain.map(f64::ln).iter().sum::<f64>() / 3.0
-}
-
-/// Logarithm of the factor of a colour beside that.
-fn beside_brightness(gain: &Exposure, colour: usize) -> f64 {
-    gain[colour].ln() - brightness(gain)
-}
-
-fn drifts(gains: &[Exposure], part: impl Fn(&Exposure) -> f64) -> bool {
-    gains.iter().all(|gain| part(gain).abs() < DRIFT)
-}
-
-/// Factors that give photographs one exposure, each with its own drift.
-pub(crate) fn without_drift(gains: &[Exposure]) -> Vec<Exposure> {
-    let common = if drifts(gains, brightness) { 0.0 } else { 1.0 };
-    let own: Exposure =
-        std::array::from_fn(|c| if drifts(gains, |gain| beside_brightness(gain, c)) { 0.0 } else { 1.0 });
-    let factors = |gain: &Exposure| {
-        std::array::from_fn(|c| (common * brightness(gain) + own[c] * beside_brightness(gain, c)).exp())
-    };
-    gains.iter().map(factors).collect()
 }
 
 #[cfg(test)]

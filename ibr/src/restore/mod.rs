@@ -4,8 +4,8 @@
 //! Everything is done in parallax, that is disparity or reciprocal depth, in which planes are affine and the
 //! errors of matchers are white.
 //!
-//! 1. *Outliers.* A value is rejected if it contradicts its neighbours and the other views
-//!    (`outliers`), and takes the median of its neighbours, weighed by the likeness of their colours.
+//! 1. *Outliers.* A value is rejected if it contradicts its neighbours and the other views do not outvote
+//!    them (`outliers`). It takes the median of its neighbours, weighed by the likeness of their colours.
 //! 2. *Noise.* With the standard deviation delta of the errors, which
 //!    [`Agreement`] finds from the lookups of one map in another, and the bends
 //!    kappa of the surfaces, the map is the most probable one of a random walk of slopes (`surface`).
@@ -50,7 +50,7 @@ const CHANGED: f64 = 5.0;
 pub fn memory(sizes: &[(usize, usize)], is_noisy: bool) -> f64 {
     let pixels = |size: &(usize, usize)| size.0 as f64 * size.1 as f64;
     let largest = sizes.iter().copied().max_by(|a, b| pixels(a).total_cmp(&pixels(b))).unwrap_or((0, 0));
-    let smoothed = if is_noisy { surface_memory(largest) } else { 0.0 };
+    let smoothed = if is_noisy { surface_memory(largest.0, largest.1) } else { 0.0 };
     BASE + HELD * sizes.iter().map(pixels).sum::<f64>() + CHANGED * pixels(&largest) + smoothed
 }
 
@@ -77,7 +77,7 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, Mem
             guessed = rejected;
         }
         if is_noticeable(views, i, nearest.other(i), error(i)) {
-            check_memory(surface_memory(sizes[i]))?;
+            check_memory(surface_memory(view.map.width(), view.map.height()))?;
             plane.smooth(view.image);
         }
         let known = (plane.values.len() - view.map.unknown()).max(1);

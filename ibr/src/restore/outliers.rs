@@ -1,8 +1,8 @@
-//! Values of a map that contradict their neighbours and every other view.
+//! Values of a map that contradict their neighbours, where the other views do not outvote these.
 
 use crate::depth::{DepthMap, JUMP, Measure};
 use crate::image::Image;
-use crate::pipeline::Agreement;
+use crate::pipeline::{Agreement, GREY_LEVELS};
 use crate::propagate::{View, Viewpoint};
 use rayon::prelude::*;
 
@@ -15,13 +15,10 @@ const SUPPORTERS: usize = 2;
 /// Other views that vote on a value, at most: evenly chosen ones of more.
 const VOTERS: usize = 8;
 
-/// Two views show one point if its colours differ by at most this many grey levels.
-const GREY_LEVELS: f32 = 20.0;
-
 /// Of unlike colours the median takes the least weight: where no other value is known they decide.
 const LEAST_LIKENESS: f32 = 1e-6;
 
-/// Radius of the neighbourhood whose median replaces an outlier.
+/// Radius of the medians.
 const RADIUS: usize = 2;
 
 /// A map in parallax.
@@ -72,7 +69,7 @@ impl Parallax {
     }
 
     /// The pixels within a radius of one, itself included.
-    pub(super) fn around(&self, pixel: usize, radius: usize) -> impl Iterator<Item = usize> + use<> {
+    fn around(&self, pixel: usize, radius: usize) -> impl Iterator<Item = usize> + use<> {
         let (x, y, width) = (pixel % self.width, pixel / self.width, self.width);
         let columns = x.saturating_sub(radius)..(x + radius + 1).min(width);
         let rows = y.saturating_sub(radius)..(y + radius + 1).min(self.height);
@@ -108,20 +105,14 @@ impl Parallax {
     /// Gives pixels the median of those around them that are not rejected, weighed by the likeness of their
     /// colours; what has none is unknown.
     pub(super) fn replace(&mut self, image: &Image, rejected: &[bool]) {
-        let place = |p: usize| rejected[p].then(|| (p, self.median(image, p, RADIUS, |q| !rejected[q])));
+        let place = |p: usize| rejected[p].then(|| (p, self.median(image, p, |q| !rejected[q])));
         let found: Vec<_> = (0..self.values.len()).into_par_iter().filter_map(place).collect();
         found.iter().for_each(|(p, value)| self.values[*p] = *value);
     }
 
     /// The median of the known values around a pixel that are `allowed`, weighed by the likeness of colours.
-    pub(super) fn median(
-        &self,
-        image: &Image,
-        pixel: usize,
-        radius: usize,
-        allowed: impl Fn(usize) -> bool,
-    ) -> f32 {
-        let near = self.around(pixel, radius).filter(|q| allowed(*q) && !self.values[*q].is_nan());
+    pub(super) fn median(&self, image: &Image, pixel: usize, allowed: impl Fn(usize) -> bool) -> f32 {
+        let near = self.around(pixel, RADIUS).filter(|q| allowed(*q) && !self.values[*q].is_nan());
         let likeness = |q: usize| {
             let difference = difference(image.pixel(pixel), image.pixel(q)) / GREY_LEVELS;
             (-difference * difference).exp().max(LEAST_LIKENESS)

@@ -34,12 +34,12 @@ const TOLERANCES: [f64; 3] = [0.4, 0.2, 0.15];
 /// The share of its parallax by which a value may differ from its neighbour on the same surface.
 const SLOPE: f64 = 0.01;
 
-/// Radius of the medians at the beginning, and at the end, where they take pixels between two surfaces to
-/// one of them.
-const RADIUS: usize = 2;
+/// A little, so that what bending leaves free is determined.
+const STIFFNESS: f64 = 0.02;
 
 impl Parallax {
-    /// Removes the noise.
+    /// Removes the noise. Medians begin, and medians end: they take pixels between two surfaces to one of
+    /// them.
     pub(super) fn smooth(&mut self, image: &Image) {
         let bending = self.bending();
         let mut shape = self.medians(image);
@@ -59,7 +59,7 @@ impl Parallax {
     fn medians(&self, image: &Image) -> Vec<f32> {
         let median = |p: usize| match self.values[p].is_nan() {
             true => f32::NAN,
-            false => self.median(image, p, RADIUS, |_| true),
+            false => self.median(image, p, |_| true),
         };
         (0..self.values.len()).into_par_iter().with_min_len(256).map(median).collect()
     }
@@ -82,9 +82,6 @@ impl Parallax {
         error / kappa
     }
 }
-
-/// A little, so that what bending leaves free is determined.
-const STIFFNESS: f64 = 0.02;
 
 /// Cost of a step between pixels per grey level of the difference of their colours, in pixels.
 const COST: f32 = 1.0;

@@ -252,7 +252,7 @@ fn note_of_dark(images: &[&Image]) -> Option<String> {
     })
 }
 
-/// Share of outliers from which on the user is told.
+/// Share of outliers from which on a report names them.
 const MANY_OUTLIERS: f64 = 0.005;
 
 fn note_of_outliers(shares: &[f64]) -> Option<String> {
@@ -260,7 +260,7 @@ fn note_of_outliers(shares: &[f64]) -> Option<String> {
     (most >= MANY_OUTLIERS).then(|| {
         let percent: Vec<String> = shares.iter().map(|share| format!("{:.1}", 100.0 * share)).collect();
         format!(
-            "{} % of the depths of the views contradict their neighbours and the other views, and were replaced",
+            "{} % of the depths of the views contradict their neighbours, and other views do not outvote these; they were replaced",
             percent.join(", ")
         )
     })

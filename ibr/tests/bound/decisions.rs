@@ -90,7 +90,7 @@ fn the_split_of_bits_with_partial_depth() {
         let of_view = |k: usize| {
             let coarse = rig.maps[k].decimated(6).unwrap();
             let coarse = step.map_or(coarse.clone(), |step| rounded_map(&coarse, step));
-            bilinear(&coarse, 6, rig.images[k].size())
+            bilinear(&coarse, 6, &rig.images[k])
         };
         (0..2).map(of_view).collect::<Vec<_>>()
     };

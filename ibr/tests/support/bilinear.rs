@@ -1,9 +1,11 @@
 //! Coarse disparities made dense by bilinear interpolation: what the spline of the crate is compared with.
 
 use hybank_ibr::depth::{DepthMap, fill_unknown};
+use hybank_ibr::image::Image;
 
-/// A map with one value every `step` pixels, as large as its image.
-pub(crate) fn bilinear(coarse: &DepthMap, step: usize, (width, height): (usize, usize)) -> DepthMap {
+/// A map with one value every `step` pixels, as large as `image`.
+pub(crate) fn bilinear(coarse: &DepthMap, step: usize, image: &Image) -> DepthMap {
+    let (width, height) = image.size();
     let mut coarse = coarse.clone();
     fill_unknown(&mut coarse);
     let (columns, rows) = coarse.size();

@@ -2,7 +2,7 @@
 //!
 //! Items stand below the module that defines them, and the `pub use` lines that pass them on below theirs.
 //! What is `pub` can be reached: the compiler's `unreachable_pub` sees to that. What stands under
-//! `#[doc(hidden)]` is promised to nobody. Items that a macro makes appear as its call.
+//! `#[doc(hidden)]` is no promise. Items that a macro makes appear as its call.
 
 use crate::imports::{File, head};
 use quote::ToTokens;
