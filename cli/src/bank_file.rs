@@ -2,18 +2,13 @@
 
 use super::file_kind::{FileKind, refuse_other};
 use super::print::{Failure, InFile, is_dash, name, say_line};
-use hybank::analog::fit::{MeasuredResponse, vector_fit};
+use hybank::analog::fit::Measurements;
 use hybank::bank::Bank;
 use hybank::design::filters;
-use hybank::files::{self, Bound, FileError, SPEC_OR_BANK, StandardStream};
+use hybank::files::{self, FileError, SPEC_OR_BANK, StandardStream};
 use hybank::memory::check_memory;
-use hybank::messages::Quoted;
-use hybank::quantity::readable;
 use hybank::runtime::{Options, Plan};
-use hybank::spec::{
-    DesignOverrides, FilterModel, MeasuredFilter, Measurement, Spec, SpecProblem, with_measurements_renamed,
-};
-use std::cell::RefCell;
+use hybank::spec::{DesignOverrides, Spec, SpecProblem, with_measurements_renamed};
 use std::path::{Path, PathBuf};
 
 /// Reads a bank file; `-` is standard input.
@@ -37,13 +32,13 @@ pub(super) fn plan(bank: &Bank, options: Options, path: &Path) -> Result<Plan, F
 /// A spec, and the measurements that it names.
 pub(super) struct SpecFile {
     spec: Spec,
-    models: Models,
+    measurements: Measurements,
 }
 
 impl SpecFile {
     /// The spec, unless one of these outputs is a file that it names.
     pub(super) fn for_outputs(&self, outputs: &[&Path]) -> Result<Spec, Failure> {
-        let inputs = self.models.files();
+        let inputs = self.measurements.files();
         let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
         let outputs: Vec<&Path> = outputs.iter().copied().filter(|path| !is_dash(path)).collect();
         files::refuse_overlaps(&outputs, &inputs).map_err(Failure::input)?;
@@ -58,9 +53,9 @@ impl SpecFile {
         changed: &Spec,
         output: &Path,
     ) -> Result<String, SpecProblem> {
-        let written = changed.to_toml_like(text, &|wanted| self.models.model(wanted))?;
+        let written = changed.to_toml_like(text, &|wanted| self.measurements.model(wanted))?;
         let whole = |folder: &Path| Path::new(".").join(folder).canonicalize().ok();
-        let from = whole(&self.models.folder);
+        let from = whole(self.measurements.folder());
         if is_dash(output) || from == whole(&folder(output)) {
             return Ok(written);
         }
@@ -79,16 +74,21 @@ fn folder(path: &Path) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).to_owned()
 }
 
+/// The measurements beside the file `path`; `-` has those of the present folder.
+fn beside(path: &Path) -> Measurements {
+    Measurements::in_folder(if is_dash(path) { PathBuf::new() } else { folder(path) })
+}
+
 /// The spec in the text of the file `path`, with the measurements beside it.
 pub(super) fn parse_spec(text: &str, path: &Path, overrides: DesignOverrides) -> Result<SpecFile, Failure> {
-    let models = Models::beside(path);
-    let read = Spec::from_toml_and_files(text, &name(path), overrides, &|wanted| models.model(wanted));
+    let measurements = beside(path);
+    let read = Spec::from_toml_and_files(text, &name(path), overrides, &|wanted| measurements.model(wanted));
     let spec = read.map_err(|error| match error.overridden() {
         Some(key) => bad_flag(key, error.problem()),
         None => Failure::input(error),
     })?;
-    models.echo.take().iter().for_each(|line| say_line(line));
-    Ok(SpecFile { spec, models })
+    measurements.echo().iter().for_each(|line| say_line(line));
+    Ok(SpecFile { spec, measurements })
 }
 
 /// A value of the command line that was given in place of the spec's `key`.
@@ -107,7 +107,7 @@ pub(super) fn load_spec_or_bank(path: &Path) -> Result<SpecFile, Failure> {
     let spec = bank.spec.ok_or_else(|| {
         Failure::of(path, "this bank carries no spec, so its front ends are unknown; give the spec file")
     })?;
-    Ok(SpecFile { spec: Spec { latency, ..spec }, models: Models::beside(path) })
+    Ok(SpecFile { spec: Spec { latency, ..spec }, measurements: beside(path) })
 }
 
 /// The text of a file; `-` is standard input.
@@ -131,72 +131,4 @@ pub(super) fn read_kind(path: &Path, wanted: FileKind) -> Result<String, Failure
     let bytes = read_file(path)?;
     refuse_other(&name(path), FileKind::of(&bytes), wanted)?;
     files::text_in(bytes, &name(path)).map_err(Failure::input)
-}
-
-/// Largest file of a measurement.
-const MEASUREMENT: Bound =
-    Bound { bytes: 64 << 20, kind: "a measured response", remedy: "give the file that was meant" };
-
-/// The models of one spec, each fitted once.
-struct Models {
-    /// The folder of the spec, to which names of files are relative.
-    folder: PathBuf,
-    made: RefCell<Vec<(MeasuredFilter, FilterModel)>>,
-    /// What was understood of them, a line each.
-    echo: RefCell<Vec<String>>,
-}
-
-impl Models {
-    /// Of no measurement yet, for the spec in the file `path`.
-    fn beside(path: &Path) -> Self {
-        let folder = if is_dash(path) { PathBuf::new() } else { folder(path) };
-        Self { folder, made: RefCell::default(), echo: RefCell::default() }
-    }
-
-    /// The measurements that were read.
-    fn files(&self) -> Vec<PathBuf> {
-        self.made.borrow().iter().map(|(made, _)| self.folder.join(&made.path)).collect()
-    }
-
-    /// The model of a measurement.
-    fn model(&self, wanted: &MeasuredFilter) -> Result<FilterModel, String> {
-        let known =
-            self.made.borrow().iter().find(|(made, _)| made == wanted).map(|(_, model)| model.clone());
-        if let Some(model) = known {
-            return Ok(model);
-        }
-        let path = self.folder.join(&wanted.path);
-        let text = files::read_text(&path, MEASUREMENT).map_err(|error| error.to_string())?;
-        let named = |error: &dyn std::fmt::Display| format!("{}: {error}", Quoted(&path));
-        let measured = response(&path, &text, wanted).map_err(|error| named(&error))?;
-        let fitted = vector_fit(&measured.without_delay(wanted.deembed), wanted.order);
-        let fitted = fitted.map_err(|error| named(&error))?;
-        let points = measured.points();
-        let at = |k: usize| points.get(k).map_or(0.0, |point| point.0.0);
-        self.echo.borrow_mut().push(format!(
-            "{}: {} poles fitted to {} frequencies, {} to {}; error at most {:.2e} dB",
-            Quoted(&path),
-            wanted.order,
-            points.len(),
-            readable(at(0), "Hz"),
-            readable(at(points.len() - 1), "Hz"),
-            fitted.error.0
-        ));
-        let model = FilterModel { filter: fitted.filter, error: fitted.error };
-        self.made.borrow_mut().push((wanted.clone(), model.clone()));
-        Ok(model)
-    }
-}
-
-fn response(path: &Path, text: &str, wanted: &MeasuredFilter) -> Result<MeasuredResponse, String> {
-    let Measurement::Touchstone(parameter) = &wanted.measurement else {
-        return MeasuredResponse::from_csv(text).map_err(|error| error.to_string());
-    };
-    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-    let ports = match extension.to_ascii_lowercase().as_str() {
-        "s1p" => 1,
-        "s2p" => 2,
-        _ => return Err("Touchstone files of one or two ports end in .s1p or .s2p".to_owned()),
-    };
-    MeasuredResponse::from_touchstone(text, ports, parameter.as_deref()).map_err(|error| error.to_string())
 }

@@ -3,6 +3,7 @@
 use crate::bank::Bank;
 use crate::errors::{file_error, refused, refused_in, spec_error};
 use crate::values;
+use hybank::analog::fit::Measurements;
 use hybank::bank;
 use hybank::files;
 use hybank::spec::{DesignOverrides, Spec};
@@ -25,17 +26,27 @@ pub(crate) fn spec_with(source: &Bound<'_, PyAny>, keys: DesignOverrides) -> PyR
     if let Ok(text) = source.extract::<String>()
         && text.contains('\n')
     {
-        return Spec::from_toml_with(&text, "spec", keys).map_err(|error| spec_error(py, &error));
+        return spec_in(py, &text, Path::new("spec"), keys);
     }
     let Some(path) = path(source) else {
-        let spec = Spec::from_data_with(values::table(source)?, "spec", keys);
+        let beside = Measurements::in_folder(PathBuf::new());
+        let table = values::table(source)?;
+        let spec = Spec::from_data_and_files(table, "spec", keys, &|wanted| beside.model(wanted));
         return spec.map_err(|error| spec_error(py, &error));
     };
     let (text, name) = (read(&path)?, path.display().to_string());
     if path.extension().is_some_and(|extension| extension == "json") {
         return spec_of_bank(&parse_bank(&text, &name)?, &name);
     }
-    Spec::from_toml_with(&text, &name, keys).map_err(|error| spec_error(py, &error))
+    spec_in(py, &text, &path, keys)
+}
+
+/// The spec in the text of the file `path`; the measurements that it names are relative to its folder.
+fn spec_in(py: Python<'_>, text: &str, path: &Path, keys: DesignOverrides) -> PyResult<Spec> {
+    let beside = Measurements::in_folder(path.parent().unwrap_or(Path::new("")).to_owned());
+    let name = path.display().to_string();
+    Spec::from_toml_and_files(text, &name, keys, &|wanted| beside.model(wanted))
+        .map_err(|error| spec_error(py, &error))
 }
 
 fn spec_of_bank(bank: &bank::Bank, name: &str) -> PyResult<Spec> {

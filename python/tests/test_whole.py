@@ -351,3 +351,35 @@ def test_keys_of_a_spec_are_replaced(folder):
         hb.design(SPEC, replace={"tabs": 10})
     with pytest.raises(TypeError, match="replace"):
         hb.design(replace={"taps": 10})
+
+
+def test_measured_filters_are_read_from_files(binary, tmp_path, monkeypatch):
+    """By the path of a spec, as a text and as a mapping: the filters that the command line fits."""
+    frequencies = np.linspace(100.0, 40e3, 300)
+    response = 1 / (1 + 1j * frequencies / 9e3) ** 2
+    rows = zip(frequencies, 20 * np.log10(abs(response)), np.degrees(np.unwrap(np.angle(response))))
+    text = "frequency (Hz), gain (dB), phase (deg)\n" + "".join("%.17g,%.17g,%.17g\n" % row for row in rows)
+    lab = tmp_path / "lab"
+    lab.mkdir()
+    (lab / "bode.csv").write_text(text)
+    parts = "".join(f"{f:.17g} 0 0 {h.real:.17g} {h.imag:.17g} 0 0 0 0\n" for f, h in zip(frequencies, response))
+    (lab / "afe.s2p").write_text("# Hz S RI R 50\n" + parts)
+    for filter_ in ({"response": "bode.csv", "order": 2}, {"touchstone": "afe.s2p", "order": 2}):
+        written = ", ".join(f"{key} = {json.dumps(value)}" for key, value in filter_.items())
+        spec = SPEC.replace("delay = 12.5e-6", f"delay = 12.5e-6, filter = {{ {written} }}")
+        (lab / "spec.toml").write_text(spec)
+        run(binary, lab, "design", "spec.toml", "-o", "bank.json", "--force")
+        wanted = hb.load(lab / "bank.json").taps
+        assert np.array_equal(hb.design(lab / "spec.toml", proof=False).taps, wanted)
+        with pytest.raises(hb.SpecError, match=list(filter_.values())[0]):
+            hb.design(spec, proof=False)
+        monkeypatch.chdir(lab)
+        assert np.array_equal(hb.design(spec, proof=False).taps, wanted)
+        channels = [dict(delay=25e-6, gain=1.01, offset=0.001), dict(delay=12.5e-6, filter=filter_)]
+        mapping = {
+            "fast_rate": 48000.0, "ratio": 2, "latency": 6, "channel": channels,
+            "target": {"filter": {"family": "butterworth", "order": 4, "cutoff": 9000.0}},
+            "design": {"method": "fir", "taps": 12},
+        }  # fmt: skip
+        assert np.array_equal(hb.design(mapping, proof=False).taps, wanted)
+        monkeypatch.undo()

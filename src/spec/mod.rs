@@ -205,19 +205,20 @@ impl Spec {
     /// # Errors
     /// As [`Spec::from_toml`], without a location; the path of keys says where.
     pub fn from_data<'de, D: Deserializer<'de>>(data: D, name: &str) -> Result<Self, SpecError> {
-        Self::from_data_with(data, name, DesignOverrides::default())
+        Self::from_data_and_files(data, name, DesignOverrides::default(), &measured::no_models)
     }
 
-    /// As [`Spec::from_data`], with parts of the `[design]` table replaced before it is checked.
+    /// As [`Spec::from_toml_and_files`], of data.
     ///
     /// # Errors
-    /// As [`Spec::from_data`].
-    pub fn from_data_with<'de, D: Deserializer<'de>>(
+    /// As [`Spec::from_data`], and those of `models`.
+    pub fn from_data_and_files<'de, D: Deserializer<'de>>(
         data: D,
         name: &str,
         overrides: DesignOverrides,
+        models: &FilterModels<'_>,
     ) -> Result<Self, SpecError> {
-        read_data(data, name, |document| decode::spec(document, overrides))
+        read_data(data, name, |document| decode::spec_with(document, overrides, models))
     }
 
     /// The spec as a TOML file that reads back equal.
