@@ -83,6 +83,8 @@ fn place_of(message: &str) -> (Option<(&str, &str)>, &str) {
 /// What a message of serde or serde_json says, in plain words and with the line and the column.
 pub fn of_json(message: &str) -> String {
     match place_of(message) {
+        // Columns are counted from 1, so nothing was read.
+        (Some(("1", "0")), _) => "it is empty".into(),
         (Some((line, column)), _) => format!("line {line}, column {column}: {}", of_document(message)),
         (None, _) => of_document(message),
     }
@@ -112,7 +114,7 @@ pub fn of_document(message: &str) -> String {
         "recursion limit exceeded" => "lists and tables are nested too deeply".into(),
         "trailing characters" => "there is more text after the end of the document".into(),
         "key must be a string" => "a key must be a text in double quotes".into(),
-        "expected value" => "a value is missing or not one of JSON".into(),
+        "expected value" | "expected ident" => "a value is missing or not one of JSON".into(),
         _ => match after("EOF while parsing ") {
             Some(part) => {
                 format!("the text ends inside {}", if part == "an object" { "a table" } else { part })
@@ -169,6 +171,23 @@ pub fn usage(text: &str, arguments: impl Iterator<Item = String>) -> String {
         text = text.replace(foreign, plain);
     }
     printable(&text)
+}
+
+/// The arguments of this program. What follows an option is its value, a negative one too, so the message about
+/// it says what is wrong with it. After an option that takes a path it is the next option.
+///
+/// # Errors
+/// What is wrong with the usage, or the help that was asked for.
+#[cfg(feature = "clap")]
+pub fn arguments<A: clap::CommandFactory + clap::FromArgMatches>() -> Result<A, clap::Error> {
+    let path = clap::value_parser!(std::path::PathBuf).type_id();
+    let with_negative = |arg: clap::Arg| {
+        let has_value = !arg.is_positional() && arg.get_action().takes_values();
+        let is_path = arg.get_value_parser().type_id() == path;
+        if has_value && !is_path { arg.allow_hyphen_values(true) } else { arg }
+    };
+    let command = A::command().mut_subcommands(|command| command.mut_args(with_negative));
+    A::from_arg_matches(&command.try_get_matches()?)
 }
 
 /// What clap says of the usage of this program, with the arguments in it quoted. `None` where that changes

@@ -5,7 +5,7 @@ use super::design_report::{against, figure_text};
 use super::design_studies::number;
 use super::plot::PictureFormat;
 use super::print::{Failure, InFile, is_dash, show};
-use super::written::{check_outputs, write_bytes};
+use super::written::{check_output, write_bytes};
 use hybank::design::uncertainty::{
     Affordable, BoxRule, BoxStudy, BoxWidths, ErrorStudy, JitterStudy, Questions, RefusedBox, Sensitivity,
     Sweep, SweepCurve,
@@ -44,7 +44,7 @@ pub(super) struct Args {
     /// The bank (JSON); `-` is standard input
     bank: PathBuf,
     /// True delay minus the delay in the bank, one value per channel, in seconds
-    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    #[arg(long, value_delimiter = ',', value_parser = finite)]
     delay_error: Vec<Seconds>,
     /// Also prove an upper bound of gamma (bounded-real lemma, with every rounding error bounded)
     #[arg(long)]
@@ -131,7 +131,7 @@ impl Args {
             }
         }
         match &self.sweep {
-            Some(sweep) => check_outputs(&[sweep], &[&self.bank]),
+            Some(sweep) => check_output(sweep, &[&self.bank], self.force),
             None => Ok(()),
         }
     }

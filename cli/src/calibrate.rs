@@ -8,7 +8,7 @@ use super::file_kind::FileKind;
 use super::interrupt::interrupts;
 use super::measure::{ToneArg, tone, tones};
 use super::print::{Failure, check_json, explained, say_understood, warn};
-use super::written::{check_outputs, write_text};
+use super::written::{check_output, write_text};
 use hybank::calibrate::{
     Acquisition, CalibrateError, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning,
     applied, calibrate_pooled,
@@ -62,7 +62,7 @@ pub(super) struct Args {
     /// Frequencies of tones (Hz, kHz, MHz, GHz; hertz if left out) to about 100 ppm, or auto; of complex
     /// samples also negative
     #[arg(long, value_name = "F,..|auto", value_delimiter = ',', value_parser = tone,
-          conflicts_with_all = ["training", "blind"], allow_hyphen_values = true)]
+          conflicts_with_all = ["training", "blind"])]
     tone: Vec<ToneArg>,
     /// A mono recording of the waveform that was played
     #[arg(long, value_name = "WAV", conflicts_with = "blind")]
@@ -204,7 +204,7 @@ impl Args {
         if let Some(level) = self.clip.filter(|level| level.is_nan() || *level <= 0.0) {
             return Err(Failure::Usage(format!("--clip {level} is not a positive level")));
         }
-        check_outputs(&[&self.output], &inputs)
+        check_output(&self.output, &inputs, self.force)
     }
 
     /// The acquisitions in these files, each with one record per channel of `spec`; what was tolerated joins

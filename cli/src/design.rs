@@ -7,7 +7,7 @@ use super::interrupt::{end_at_interrupt, end_with};
 use super::print::{
     Failure, InFile, check_json, check_strict, is_dash, say, say_line, say_understood, show, warn,
 };
-use super::written::{check_outputs, write_text};
+use super::written::{check_output, write_text};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use hybank::design::{self, DesignError, Limits, Options, Stage};
@@ -66,7 +66,7 @@ pub(super) struct Args {
     #[arg(long)]
     bits: Option<WordLengths>,
     /// A tap is its integer times 2^-FRACTION_BITS; chosen for the least gamma if left out
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     fraction_bits: Option<i32>,
     /// Taps that follow the delays while the bank runs, optimal over the delays of the spec's [uncertainty]
     /// (method fir)
@@ -122,7 +122,7 @@ fn overrides(args: &Args) -> DesignOverrides {
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     check_json(args.json, &args.output, "bank")?;
-    check_outputs(&[&args.output], &[&args.spec])?;
+    check_output(&args.output, &[&args.spec], args.force)?;
     let mut spec = load_spec(&args.spec, overrides(args))?.for_outputs(&[&args.output])?;
     spec.latency = args.latency.or(spec.latency);
     // Everything else was checked on reading.

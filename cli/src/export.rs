@@ -2,7 +2,7 @@
 
 use super::bank_file::load;
 use super::print::{Failure, InFile};
-use super::written::{check_outputs, write_bytes};
+use super::written::{check_output, write_bytes};
 use clap::ValueEnum;
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::design::analyze;
@@ -66,7 +66,7 @@ impl Args {
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let format = args.format()?;
-    check_outputs(&[&args.output], &[&args.bank])?;
+    check_output(&args.output, &[&args.bank], args.force)?;
     let bank = load(&args.bank)?;
     let mut bytes = export(&bank, format, &args.name, args.input_bits).in_file(&args.bank)?;
     if format == Format::Sos {

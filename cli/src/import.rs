@@ -3,7 +3,7 @@
 use super::bank_file::load_spec_or_bank;
 use super::design_report::{Judged, Report};
 use super::print::{Failure, InFile, show, warn};
-use super::written::{check_outputs, write_text};
+use super::written::{check_output, write_text};
 use hybank::design::{self, ProofSearch};
 use hybank::files::{Bound, read_bytes};
 use hybank::interchange::{TapsError, taps_of_csv, taps_of_npy};
@@ -49,7 +49,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
-    check_outputs(&[&args.output], &[&args.spec, &args.taps])?;
+    check_output(&args.output, &[&args.spec, &args.taps], args.force)?;
     let mut spec = load_spec_or_bank(&args.spec)?.for_outputs(&[&args.output])?;
     spec.latency = args.latency.or(spec.latency);
     if spec.latency.is_none() {

@@ -40,12 +40,11 @@ mod virtual_converters;
 mod virtual_signal;
 mod written;
 
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 use hybank::files::StandardStream;
 use hybank::memory::check_memory;
-use hybank::messages::quoted_usage;
+use hybank::messages::{arguments, quoted_usage};
 use print::Failure;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 // Before `main`: the standard library then opens /dev/null in the place of a closed stream, and what a
@@ -113,30 +112,13 @@ enum Command {
 fn main() -> ExitCode {
     #[cfg(unix)]
     hybank::files::fail_at_file_size_limit();
-    match parsed() {
+    match arguments::<Cli>() {
         Ok(cli) => match check_base().and_then(|()| dispatch(cli.command)) {
             Ok(()) => ExitCode::SUCCESS,
             Err(failure) => failure.report(),
         },
         Err(message) => show(&message),
     }
-}
-
-/// The arguments that were typed.
-fn parsed() -> Result<Cli, clap::Error> {
-    let matches = Cli::command().mut_subcommands(taking_negative_values).try_get_matches()?;
-    Cli::from_arg_matches(&matches)
-}
-
-/// What follows an option is its value, a negative one too, so the message about it says what is wrong with
-/// it. After an option that takes a path it is the next option.
-fn taking_negative_values(command: clap::Command) -> clap::Command {
-    let path = clap::value_parser!(PathBuf).type_id();
-    command.mut_args(|arg| {
-        let has_value = !arg.is_positional() && arg.get_action().takes_values();
-        let is_path = arg.get_value_parser().type_id() == path;
-        if has_value && !is_path { arg.allow_hyphen_values(true) } else { arg }
-    })
 }
 
 /// Bytes that a command takes whatever its input: threads, blocks of samples, pictures.

@@ -4,7 +4,7 @@ use super::capture_args::{CaptureArgs, check_stdin};
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, rails_of};
 use super::plot::write_picture;
 use super::print::{Failure, InFile, is_dash, name, show, warn};
-use super::written::check_outputs;
+use super::written::check_output;
 use hybank::io::is_same_rate;
 use hybank::measure::{
     Comparison, Imbalance, MeasureError, Measurement, Quadrature, Settings, Spur, Window, compare, measure,
@@ -34,7 +34,7 @@ pub(super) struct Args {
     file: PathBuf,
     /// Tones of the recording (9kHz, 1.2GHz, or hertz), in any Nyquist zone, to within 0.1 % of the sample
     /// rate, of complex samples also negative; auto: the largest tone [default: auto, or none with --ref]
-    #[arg(long, value_name = "F,..", value_delimiter = ',', value_parser = tone, allow_hyphen_values = true)]
+    #[arg(long, value_name = "F,..", value_delimiter = ',', value_parser = tone)]
     tone: Vec<ToneArg>,
     /// Number of converters that take turns in the recording: tells which spurs are interleaving spurs
     #[arg(long, value_name = "M", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -151,7 +151,7 @@ impl Args {
                 let message = "the figures go to standard output; write the plot to a file";
                 return Err(Failure::Usage(format!("--plot -: {message}")));
             }
-            check_outputs(&[plot], &inputs)?;
+            check_output(plot, &inputs, self.force)?;
         }
         check_stdin(inputs.into_iter())
     }

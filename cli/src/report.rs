@@ -4,7 +4,7 @@ use super::bank_file::load;
 use super::capture_args::{CaptureArgs, InterleavedArgs, output_rate};
 use super::capture_file::{start, unread};
 use super::print::{Failure, name, warn};
-use super::written::{check_outputs, write_text};
+use super::written::{check_output, write_text};
 use hybank::bank::Bank;
 use hybank::design::DesignError;
 use hybank::io::{OfflineSamples, ReadOptions};
@@ -44,7 +44,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.reading.check(args.turns.is_given())?;
     args.turns.check(args.inputs.len())?;
     let inputs: Vec<&Path> = args.inputs.iter().chain([&args.bank]).map(PathBuf::as_path).collect();
-    check_outputs(&[&args.output], &inputs)?;
+    check_output(&args.output, &inputs, args.force)?;
     let bank = load(&args.bank)?;
     if bank.spec.is_none() {
         return Err(Failure::of(&args.bank, DesignError::NoSpec));

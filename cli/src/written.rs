@@ -2,7 +2,7 @@
 
 use super::interrupt::remove_unfinished;
 use super::print::{Failure, is_dash, name_leftovers, print_bytes};
-use hybank::files::{AtomicFile, FileError, commit_all, refuse_overlaps};
+use hybank::files::{self, AtomicFile, FileError, commit_all, refuse_overlaps};
 use hybank::io::{Container, OutputHeader, PcmFormat, SampleWriter, is_pipe, is_sigmf};
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -13,6 +13,12 @@ pub(super) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), F
     refuse_overlaps(&outputs, inputs).map_err(Failure::input)?;
     name_leftovers(&outputs);
     Ok(())
+}
+
+/// As [`check_outputs`], for one file that may be begun when the work is done.
+pub(super) fn check_output(output: &Path, inputs: &[&Path], force: bool) -> Result<(), Failure> {
+    check_outputs(&[output], inputs)?;
+    if is_dash(output) { Ok(()) } else { files::check_output(output, force).map_err(Failure::input) }
 }
 
 /// Writes a text file that appears when it is whole; `-` is standard output.

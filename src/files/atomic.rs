@@ -1,5 +1,6 @@
 //! A file that appears only when it is complete.
 
+use super::error::CREATE;
 use super::identity::Begun;
 use super::{FileError, hidden, rename};
 use crate::messages::Quoted;
@@ -73,10 +74,7 @@ impl AtomicFile {
     /// the system's refusal.
     pub fn create(target: &Path, replace: bool) -> Result<Self, FileError> {
         let name = target.display().to_string();
-        let (target, known) = destination(target)?;
-        if known.is_some() && !replace {
-            return Err(FileError::Exists { file: name });
-        }
+        let (target, known) = allowed(target, replace)?;
         let begin = || {
             let (beside, file, begun) = unfinished(|files| {
                 let (beside, file) = create_beside(&target, known.is_some())?;
@@ -91,7 +89,7 @@ impl AtomicFile {
             }
             Ok(created)
         };
-        begin().map_err(FileError::system(&name, "create it"))
+        begin().map_err(FileError::system(&name, CREATE))
     }
 
     /// The name that was asked for.
@@ -278,13 +276,36 @@ fn unfinished<R>(change: impl FnOnce(&mut BTreeMap<PathBuf, Begun>) -> R) -> R {
     change(&mut UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
+/// The [`destination`] of a file that may be begun.
+fn allowed(path: &Path, replace: bool) -> Result<(PathBuf, Option<Metadata>), FileError> {
+    let (target, known) = destination(path)?;
+    match known {
+        Some(_) if !replace => Err(FileError::Exists { file: path.display().to_string() }),
+        _ => Ok((target, known)),
+    }
+}
+
+/// Refuses what [`AtomicFile::create`] would refuse, without a file: for a run that takes long before it
+/// writes.
+///
+/// # Errors
+/// As [`AtomicFile::create`].
+pub fn check_output(path: &Path, replace: bool) -> Result<(), FileError> {
+    let (target, _) = allowed(path, replace)?;
+    folder_of(&target).metadata().map(drop).map_err(FileError::system(&path.display().to_string(), CREATE))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
 /// Where a file of this name has to be put, and the plain file that is there.
 fn destination(path: &Path) -> Result<(PathBuf, Option<Metadata>), FileError> {
     let refused = |what| Err(FileError::NotAFile { file: path.display().to_string(), what });
     let found = match path.symlink_metadata() {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok((path.to_owned(), None)),
         // A name that is too long, for example, of which the hidden name knows nothing.
-        found => found.map_err(FileError::system(&path.display().to_string(), "create it"))?,
+        found => found.map_err(FileError::system(&path.display().to_string(), CREATE))?,
     };
     let (target, found) = if found.is_symlink() { follow(path)? } else { (path.to_owned(), found) };
     match found {
@@ -305,8 +326,7 @@ fn follow(link: &Path) -> Result<(PathBuf, Metadata), FileError> {
     let nothing = || refused("a link to nothing; remove the link, or give the name that it should lead to");
     let mut path = link.to_owned();
     for _ in 0..MOST_LINKS {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        let folder = folder.unwrap_or(Path::new(".")).to_owned();
+        let folder = folder_of(&path).to_owned();
         // Links there stand for open files (/dev/stdout), not for names.
         if folder.canonicalize().is_ok_and(|folder| folder.starts_with("/proc")) {
             return Err(special(link, "a link to an open file"));

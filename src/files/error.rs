@@ -9,7 +9,7 @@ use std::io;
 #[non_exhaustive]
 pub enum FileError {
     /// The operating system refused.
-    #[error("{}: cannot {action}: {}", Quoted(.file), .source)]
+    #[error("{}: cannot {action}: {}", Quoted(.file), reason(action, .source))]
     System {
         /// Name of the file.
         file: String,
@@ -105,6 +105,20 @@ pub enum FileError {
         offset: usize,
     },
 }
+
+/// The system's reason; its words for folders do not say that they are about these.
+fn reason(action: &str, source: &io::Error) -> String {
+    match source.kind() {
+        io::ErrorKind::IsADirectory => "it is a folder; give the name of a file".into(),
+        io::ErrorKind::NotFound if action == CREATE => {
+            "its folder is not there or takes no files; make the folder, or give another name".into()
+        }
+        _ => source.to_string(),
+    }
+}
+
+/// The action that begins an output.
+pub(super) const CREATE: &str = "create it";
 
 impl FileError {
     /// Wraps the system's refusal; for use with `map_err`.

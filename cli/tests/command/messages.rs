@@ -151,6 +151,46 @@ fn a_folder_is_no_dataset() {
     desk.refused(1, &["fuse", "bank.json", "x.sigmf-meta", "-o", "out.wav"], &["x.sigmf-data", "no file"]);
 }
 
+/// "Is a directory (os error 21)".
+#[test]
+fn a_folder_is_no_input() {
+    let desk = desk();
+    std::fs::create_dir(desk.path("folder")).unwrap();
+    for args in [
+        &["analyze", "folder"][..],
+        &["design", "folder", "-o", "out.json"],
+        &["measure", "folder"],
+        &["fuse", "bank.json", "folder", "b.wav", "-o", "out.wav"],
+    ] {
+        let said = desk.refused(1, args, &["folder: cannot read", "it is a folder; give the name of a file"]);
+        assert!(!said.contains("os error"), "{said}");
+    }
+}
+
+/// The name of the output was looked at when the work was done, after minutes of it, and the message did not
+/// say whether the file or its folder was missing.
+#[test]
+fn an_output_that_cannot_be_is_refused_before_the_work() {
+    let desk = Desk::new();
+    desk.write("taken", "");
+    // Each is an error of its own, which would come first if the work began.
+    desk.write("spec.toml", "ratio = 2");
+    desk.write("nothing", "");
+    for run in [
+        &["design", "spec.toml", "-o"][..],
+        &["import", "spec.toml", "nothing", "-o"],
+        &["export", "nothing", "--to", "c", "-o"],
+        &["report", "nothing", "-o"],
+        &["calibrate", "spec.toml", "nothing", "--blind", "-o"],
+        &["measure", "nothing", "--plot"],
+        &["analyze", "nothing", "--delay-box", "1ps", "--sweep"],
+    ] {
+        for (output, words) in [("none/out", "its folder is not there"), ("taken", "the file exists")] {
+            desk.refused(1, &[run, &[output]].concat(), &[output, words]);
+        }
+    }
+}
+
 /// The message named no file, and spoke of the largest peak where only those near the tone were looked at.
 #[test]
 fn a_tone_that_is_not_there_is_named_with_the_recordings() {
@@ -194,6 +234,10 @@ fn errors_of_json_are_in_plain_words() {
     ] {
         desk.write("x.sigmf-meta", format!("{{\"global\": {global}}}"));
         desk.refused(1, &recording, &["x.sigmf-meta", "line 1, column", words]);
+    }
+    for (text, words) in [("", "empty.json: it is empty"), ("no", "a value is missing or not one of JSON")] {
+        desk.write("empty.json", text);
+        desk.refused(1, &["analyze", "empty.json"], &[words]);
     }
     desk.write("x.sigmf-meta", "{\"global\": {");
     desk.refused(1, &recording, &["the text ends inside a table"]);

@@ -54,7 +54,7 @@ pub(super) struct SceneArguments {
     #[arg(long, value_name = "FILE")]
     pub(super) truth: Option<PathBuf>,
     /// Offset added to every column of the virtual view, in pixels; overrides that of the scene.
-    #[arg(long, value_name = "PX", allow_hyphen_values = true)]
+    #[arg(long, value_name = "PX")]
     pub(super) offset: Option<f64>,
     /// Use the brightness of every view as it is, instead of giving all the exposure of the first.
     #[arg(long)]
@@ -109,25 +109,13 @@ pub(super) struct BoundArguments {
     pub(super) plot: Option<PathBuf>,
     /// Largest second derivative of the rows of the virtual view within one surface, grey levels per pixel
     /// squared: gives a sure bound (rectified rigs).
-    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    #[arg(long, value_name = "K")]
     pub(super) curvature: Option<f64>,
     /// Largest error of an intensity, for the sure bound: noise, rounding, reflections.
-    #[arg(
-        long,
-        value_name = "E",
-        default_value_t = 0.5,
-        requires = "curvature",
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "E", default_value_t = 0.5, requires = "curvature")]
     pub(super) intensity_error: f64,
     /// Largest error of a disparity for a baseline of one, in pixels, for the sure bound.
-    #[arg(
-        long,
-        value_name = "PX",
-        default_value_t = 0.0,
-        requires = "curvature",
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "PX", default_value_t = 0.0, requires = "curvature")]
     pub(super) disparity_error: f64,
 }
 

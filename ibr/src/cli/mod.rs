@@ -14,7 +14,6 @@ mod source;
 mod summary;
 
 use arguments::{Arguments, Command};
-use clap::Parser;
 use failure::Failure;
 use hybank::files::StandardStream;
 use hybank::memory::check_memory;
@@ -32,7 +31,7 @@ const LEAST_MEMORY: f64 = 24e6;
 pub fn run() -> ExitCode {
     #[cfg(unix)]
     hybank::files::fail_at_file_size_limit();
-    let arguments = match Arguments::try_parse() {
+    let arguments = match hybank::messages::arguments::<Arguments>() {
         Ok(arguments) => arguments,
         Err(message) => return show(&message),
     };

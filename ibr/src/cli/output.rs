@@ -2,7 +2,7 @@
 
 use super::failure::{self, Failure};
 use crate::image::{self, Image, Levels};
-use hybank::files::{AtomicFile, StandardStream, commit_all};
+use hybank::files::{AtomicFile, FileError, StandardStream, check_output, commit_all};
 use hybank::messages::{Quoted, printable};
 use serde::Serialize;
 use std::io::Write;
@@ -18,12 +18,17 @@ pub(super) fn refuse_overlaps(outputs: &[&Path], inputs: &[&Path]) -> Result<(),
     hybank::files::refuse_overlaps(outputs, inputs).map_err(Failure::input)
 }
 
-/// Refuses a file that exists, before any work is done.
+/// Refuses a file that exists, or cannot be begun, before any work is done.
 pub(super) fn refuse_existing(path: &Path, force: bool) -> Result<(), Failure> {
-    if !force && !is_standard(path) && path.exists() {
-        return Err(Failure::Input(format!("{} exists; use --force to overwrite it", Quoted(path))));
+    if is_standard(path) {
+        return Ok(());
     }
-    Ok(())
+    check_output(path, force).map_err(|error| match error {
+        FileError::Exists { .. } => {
+            Failure::Input(format!("{} exists; use --force to overwrite it", Quoted(path)))
+        }
+        other => Failure::input(other),
+    })
 }
 
 /// Names the unfinished files that killed runs left beside `outputs`.

@@ -240,3 +240,30 @@ fn transforms_without_a_virtual_view_say_which_key_is_missing() {
     refused(dir.path(), &target, 1, &["d0.png", "120 x 90", "60 x 90"]);
     assert_eq!(read_image(&dir.path().join("o.png")).unwrap().size(), SIZE);
 }
+
+/// A negative number was taken for an option, with the advice to write `-- -1`.
+#[test]
+fn negative_values_are_refused_by_their_rule() {
+    let dir = rig();
+    for (option, value) in [("--depth-step", "-1"), ("--max-pixels", "-1"), ("--threads", "-2")] {
+        let output = run(dir.path(), &["render", "scene.toml", "-o", "o.png", option, value]);
+        let said = stderr(&output);
+        assert!(code(&output) == 2 && said.contains(option) && said.contains("whole number"), "{said}");
+        assert!(!said.contains("tip:"), "{said}");
+    }
+}
+
+/// The view was computed before its name was looked at.
+#[test]
+fn an_output_that_cannot_be_is_refused_before_the_scene_is_read() {
+    let dir = rig();
+    write(dir.path(), "no.toml", "no scene");
+    for command in [["render", "no.toml", "-o"], ["bound", "no.toml", "--map"]] {
+        refused(
+            dir.path(),
+            &[&command[..], &["none/o.png"]].concat(),
+            1,
+            &["none/o.png", "its folder is not there"],
+        );
+    }
+}

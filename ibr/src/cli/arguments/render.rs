@@ -94,7 +94,7 @@ pub(in crate::cli) struct RenderArguments {
     pub(in crate::cli) degree: Option<Degree>,
     /// Weight of the slope penalty of the row fit, px^2 [default: from the noise of the photographs, 0.01 to
     /// 4].
-    #[arg(long, value_name = "L", allow_negative_numbers = true)]
+    #[arg(long, value_name = "L")]
     pub(in crate::cli) lambda: Option<f64>,
     /// Seed of the robust estimators (scenes without cameras).
     #[arg(long, default_value_t = 1)]
