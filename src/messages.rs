@@ -173,8 +173,8 @@ pub fn usage(text: &str, arguments: impl Iterator<Item = String>) -> String {
     printable(&text)
 }
 
-/// The arguments of this program. What follows an option is its value, a negative one too, so the message about
-/// it says what is wrong with it. After an option that takes a path it is the next option.
+/// The arguments of this program. What follows an option is its value, a negative one too, so the message
+/// about it says what is wrong with it. After an option that takes a path it is the next option.
 ///
 /// # Errors
 /// What is wrong with the usage, or the help that was asked for.

@@ -1,16 +1,20 @@
 //! `hybank export`: a bank for other tools.
 
 use super::bank_file::load;
-use super::print::{Failure, InFile};
-use super::written::{check_output, write_bytes};
+use super::print::{Failure, InFile, check_json, is_dash, print_json};
+use super::written::{begin_file, check_outputs, write_bytes, write_together};
 use clap::ValueEnum;
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::design::analyze;
-use hybank::interchange::{Format, block_of_sections, export, sections};
+use hybank::interchange::{
+    Circuit, ExportError, Format, Multipliers, Verilog, VerilogOptions, WordSizes, block_of_sections, export,
+    sections,
+};
 use hybank::messages::Quoted;
-use std::path::PathBuf;
+use std::num::NonZeroU32;
+use std::path::{Path, PathBuf};
 
-/// Writes a bank for other tools: C99, CSV, NumPy, MATLAB, FPGA memory
+/// Writes a bank for other tools: C99, Verilog, CSV, NumPy, MATLAB, FPGA memory
 ///
 /// The order of FIR taps is the same in every format: channel, then phase of the output, then lag in slow
 /// periods. coe and mem hold integer taps (`hybank design --bits`), and with offsets the constants that
@@ -18,6 +22,9 @@ use std::path::PathBuf;
 /// slow rate: the filter from a channel to a phase of the output is the sum of its sections z^-delay (b0 +
 /// b1 z^-1 + b2 z^-2) / (a0 + a1 z^-1 + a2 z^-2). Its first line is a comment with the gamma of the
 /// sections as they are written.
+///
+/// verilog is a module with the bits of `fuse --bit-true`: words as wide as their values need, or an
+/// --accumulator that wraps. Its header and --json say what it takes.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -25,22 +32,31 @@ Examples:
   hybank export bank.json -o bank.npz
   hybank export fixed.json -o taps.coe
   hybank export fixed.json -o bank.h --input-bits 12
+  hybank export fixed.json -o core.v --input-bits 12 --output-bits 14 --testbench test
+  hybank export fixed.json -o core.v --input-bits 12 --clocks-per-frame 8 --pipeline 2
+  hybank export fixed.json -o core.v --input-bits 12 --multipliers shift-add --json
   hybank export recursive.json --to sos -o sections.csv")]
 pub(super) struct Args {
     /// The bank (JSON); `-` is standard input
     bank: PathBuf,
-    /// The format [default: that of the output's extension: h, csv, npz, mat, coe or mem]
-    #[arg(long, value_enum)]
+    /// The format [default: that of the output's extension: h, v, csv, npz, mat, coe or mem]
+    #[arg(long, visible_alias = "format", value_enum)]
     to: Option<Format>,
     /// The file to write; `-` is standard output
     #[arg(short, long)]
     output: PathBuf,
-    /// Bits of the samples that integer code takes: offsets are relative to their full scale (c, coe, mem)
+    /// Bits of the samples that integer code takes: offsets are relative to their full scale (c, coe, mem,
+    /// verilog; there those of the spec's converters if left out)
     #[arg(long, value_name = "B")]
     input_bits: Option<u32>,
-    /// Prefix of the C identifiers
-    #[arg(long, default_value = "bank")]
-    name: String,
+    #[command(flatten)]
+    verilog: VerilogArgs,
+    /// Prefix of the C identifiers, or the Verilog module [default: bank; of a module the name of its file]
+    #[arg(long)]
+    name: Option<String>,
+    /// Print what was written as one JSON object on standard output
+    #[arg(long)]
+    json: bool,
     /// Replace an existing file
     #[arg(long)]
     force: bool,
@@ -53,26 +69,126 @@ impl Args {
         // A header is the only C that is written, and a table of sections has the ending of any CSV.
         let meant = match extension.as_str() {
             "h" => Some(Format::C99),
+            "v" => Some(Format::Verilog),
             name => Format::from_str(name, false)
                 .ok()
                 .filter(|format| !matches!(format, Format::C99 | Format::Sos)),
         };
         self.to.or(meant).ok_or_else(|| {
-            let message = "the name does not say which format it is to have; give --to c, csv, npz, mat, coe, mem or sos";
+            let message = "the name does not say which format it is to have; give --to c, verilog, csv, npz, mat, coe, mem or sos";
             Failure::Usage(format!("{}: {message}", Quoted(&self.output)))
         })
     }
 }
 
+/// The circuit of a Verilog module.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Verilog")]
+struct VerilogArgs {
+    /// Bits of the outputs, which saturate [default: those of the samples]
+    #[arg(long, value_name = "B")]
+    output_bits: Option<u32>,
+    /// Bits of the accumulator; sums that do not fit wrap around [default: as many as no sum can leave]
+    #[arg(long, value_name = "B")]
+    accumulator: Option<u32>,
+    /// Clocks between two frames: with C of them, each multiplier serves C taps [default: 1]
+    #[arg(long, value_name = "C")]
+    clocks_per_frame: Option<NonZeroU32>,
+    /// Levels of adders between two registers [default: 1]
+    #[arg(long, value_name = "LEVELS")]
+    pipeline: Option<NonZeroU32>,
+    /// How constants multiply [default: inferred]
+    #[arg(long, value_enum)]
+    multipliers: Option<Multipliers>,
+    /// Write a self-checking testbench into this folder too, with its frames and the outputs of the
+    /// bit-true model
+    #[arg(long, value_name = "DIR")]
+    testbench: Option<PathBuf>,
+    /// Random frames of the testbench, after those of the worst signs [default: 1000]
+    #[arg(long, value_name = "FRAMES", requires = "testbench")]
+    random_frames: Option<u32>,
+}
+
+impl VerilogArgs {
+    fn is_given(&self) -> bool {
+        let numbers = [self.output_bits, self.accumulator, self.random_frames].iter().any(Option::is_some);
+        let circuit =
+            self.clocks_per_frame.is_some() || self.pipeline.is_some() || self.multipliers.is_some();
+        numbers || circuit || self.testbench.is_some()
+    }
+
+    fn options(&self, bank: &Bank, input_bits: Option<u32>) -> Result<VerilogOptions, ExportError> {
+        let plain = VerilogOptions::new(bank, input_bits)?;
+        Ok(VerilogOptions {
+            words: WordSizes {
+                output: self.output_bits.unwrap_or(plain.words.output),
+                accumulator: self.accumulator.unwrap_or(plain.words.accumulator),
+                ..plain.words
+            },
+            clocks_per_frame: self.clocks_per_frame.unwrap_or(plain.clocks_per_frame),
+            pipeline: self.pipeline.unwrap_or(plain.pipeline),
+            multipliers: self.multipliers.unwrap_or(plain.multipliers),
+        })
+    }
+}
+
+/// What was written.
+#[derive(Debug, serde::Serialize)]
+struct Report {
+    output: String,
+    /// What a Verilog module takes.
+    #[serde(flatten)]
+    circuit: Option<Circuit>,
+}
+
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let format = args.format()?;
-    check_output(&args.output, &[&args.bank], args.force)?;
-    let bank = load(&args.bank)?;
-    let mut bytes = export(&bank, format, &args.name, args.input_bits).in_file(&args.bank)?;
-    if format == Format::Sos {
-        bytes.splice(0..0, gamma_of_sections(&bank).in_file(&args.bank)?.bytes());
+    if format != Format::Verilog && args.verilog.is_given() {
+        let message = "these options describe a circuit; give --to verilog, or leave out --output-bits, --accumulator, \
+             --clocks-per-frame, --pipeline, --multipliers and --testbench";
+        return Err(Failure::Usage(message.to_owned()));
     }
-    write_bytes(&args.output, &bytes, args.force)
+    check_json(args.json, &args.output, "code")?;
+    check_outputs(&[&args.output], &[&args.bank])?;
+    let bank = load(&args.bank)?;
+    let circuit = match format {
+        Format::Verilog => Some(write_verilog(args, &bank)?),
+        _ => {
+            let name = args.name.as_deref().unwrap_or("bank");
+            let mut bytes = export(&bank, format, name, args.input_bits).in_file(&args.bank)?;
+            if format == Format::Sos {
+                bytes.splice(0..0, gamma_of_sections(&bank).in_file(&args.bank)?.bytes());
+            }
+            write_bytes(&args.output, &bytes, args.force)?;
+            None
+        }
+    };
+    match args.json {
+        true => print_json(&Report { output: args.output.display().to_string(), circuit }),
+        false => Ok(()),
+    }
+}
+
+/// Writes the module, and the testbench with it.
+fn write_verilog(args: &Args, bank: &Bank) -> Result<Circuit, Failure> {
+    let options = args.verilog.options(bank, args.input_bits).in_file(&args.bank)?;
+    // Linters want a module to have the name of its file.
+    let stem = args.output.file_stem().and_then(|stem| stem.to_str());
+    let name = args.name.as_deref().or(stem.filter(|_| !is_dash(&args.output))).unwrap_or("bank");
+    let verilog = Verilog::new(bank, name, &options).in_file(&args.bank)?;
+    let Some(folder) = &args.verilog.testbench else {
+        write_bytes(&args.output, verilog.text.as_bytes(), args.force)?;
+        return Ok(verilog.circuit);
+    };
+    let bench = verilog.testbench(args.verilog.random_frames.unwrap_or(1000));
+    let mut files: Vec<_> = bench.into_iter().map(|(name, text)| (folder.join(name), text)).collect();
+    let circuit = verilog.circuit;
+    files.push((args.output.clone(), verilog.text));
+    let paths: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
+    check_outputs(&paths, &[&args.bank])?;
+    let begin = |(path, text): &(PathBuf, String)| Ok(vec![begin_file(path, text.as_bytes(), args.force)?]);
+    write_together(folder, files.iter().map(Ok), begin)?;
+    Ok(circuit)
 }
 
 /// A line with the gamma of the numbers that were written; empty where the front ends are unknown.

@@ -334,7 +334,7 @@ class Bank:
         self,
         path: _Path,
         *,
-        format: Literal["c", "c99", "csv", "npz", "mat", "coe", "mem", "sos"],
+        format: Literal["c", "c99", "csv", "npz", "mat", "coe", "mem", "sos", "verilog"],
         name: str = "bank",
         input_bits: int | None = None,
         overwrite: bool = True,

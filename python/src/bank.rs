@@ -446,7 +446,7 @@ fn write_file(path: &Path, bytes: &[u8], overwrite: bool) -> PyResult<()> {
 }
 
 /// The formats by name.
-const FORMATS: [(&str, Exported); 8] = [
+const FORMATS: [(&str, Exported); 9] = [
     ("c99", Exported::C99),
     ("c", Exported::C99),
     ("csv", Exported::Csv),
@@ -455,6 +455,7 @@ const FORMATS: [(&str, Exported); 8] = [
     ("coe", Exported::Coe),
     ("mem", Exported::Mem),
     ("sos", Exported::Sos),
+    ("verilog", Exported::Verilog),
 ];
 
 /// Rows of `columns` numbers as a read-only array; a matrix without rows keeps its columns.

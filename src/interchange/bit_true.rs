@@ -2,6 +2,7 @@
 
 use super::ExportError;
 use super::layout::PolyphaseTaps;
+use super::range::Range;
 use crate::bank::{Bank, FixedPoint};
 
 /// Bits of the words. Samples and outputs have the same step, 1.
@@ -13,6 +14,15 @@ pub struct WordSizes {
     pub accumulator: u32,
     /// Of the outputs, 2 to 32: they saturate.
     pub output: u32,
+}
+
+impl WordSizes {
+    /// Refuses sizes out of range.
+    pub(super) fn check(self) -> Result<(), ExportError> {
+        check_word("the samples", self.input, 32)?;
+        check_word("the accumulator", self.accumulator, 64)?;
+        check_word("the outputs", self.output, 32)
+    }
 }
 
 /// A bank of integer taps as it runs in hardware, and as the exported C has it with words of 64 and 32 bits.
@@ -31,9 +41,9 @@ pub struct WordSizes {
 /// first frame are the offsets, rounded to whole steps.
 #[derive(Debug, Clone)]
 pub struct BitTrue {
-    filters: IntegerFilters,
+    pub(super) filters: IntegerFilters,
     fraction_bits: i32,
-    words: WordSizes,
+    pub(super) words: WordSizes,
     /// The samples of the last `lags` frames, a ring.
     history: Vec<i64>,
     newest: usize,
@@ -48,12 +58,9 @@ impl BitTrue {
     /// [`ExportError::Words`] for sizes out of range, [`ExportError::NoIntegers`],
     /// [`ExportError::Accumulator`] for taps whose sums of 32-bit samples may not fit 64 bits.
     pub fn new(bank: &Bank, words: WordSizes) -> Result<Self, ExportError> {
-        let WordSizes { input, accumulator, output } = words;
-        check_word("the samples", input, 32)?;
-        check_word("the accumulator", accumulator, 64)?;
-        check_word("the outputs", output, 32)?;
         let integers = bank.fixed_point.as_ref().ok_or(ExportError::NoIntegers { format: "bit-true" })?;
-        let filters = IntegerFilters::new(bank, integers, Some(input))?;
+        words.check()?;
+        let filters = IntegerFilters::new(bank, integers, Some(words.input))?;
         let history = filters.resting.repeat(filters.taps.lags);
         let fraction_bits = integers.fraction_bits;
         Ok(Self { filters, fraction_bits, words, history, newest: 0, wraps: 0, saturated: 0 })
@@ -178,6 +185,14 @@ impl IntegerFilters {
     /// Whether the samples have offsets.
     pub(super) fn has_offsets(&self) -> bool {
         self.constants.iter().chain(&self.resting).any(|x| *x != 0)
+    }
+
+    /// The least and the largest sum of a phase without its constant, of samples of so many bits.
+    pub(super) fn sums(&self, phase: usize, sample_bits: u32) -> Range {
+        let taps = &self.taps;
+        let entries = (0..taps.channels).flat_map(|i| (0..taps.lags).map(move |j| (i, j)));
+        let products = entries.map(|(i, j)| Range::of_bits(sample_bits).times(taps.get(i, phase, j).into()));
+        products.fold(Range::from(0), Range::plus)
     }
 
     /// Bits of an accumulator that no sum of samples of so many bits can leave.

@@ -11,7 +11,9 @@ const PER_LINE: usize = 4;
 
 /// The header. `name` is the prefix of its identifiers.
 pub(super) fn header(bank: &Bank, name: &str, input_bits: Option<u32>) -> Result<String, ExportError> {
-    check_name(name)?;
+    if !is_identifier(name) {
+        return Err(ExportError::Name { name: name.to_owned(), language: "C" });
+    }
     let body = match (&bank.filters, &bank.fixed_point) {
         (SynthesisFilters::Fir(_), Some(words)) => integer_fir(bank, words, name, input_bits)?,
         (SynthesisFilters::Fir(taps), None) => real_fir(bank, &PolyphaseTaps::new(taps, bank.ratio), name),
@@ -21,36 +23,47 @@ pub(super) fn header(bank: &Bank, name: &str, input_bits: Option<u32>) -> Result
     Ok(format!("{}#ifndef {guard}\n#define {guard}\n\n{body}\n#endif\n", about(bank, name)))
 }
 
-fn check_name(name: &str) -> Result<(), ExportError> {
-    let legal = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    if name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(legal) {
-        return Ok(());
-    }
-    Err(ExportError::Name { name: name.to_owned() })
+/// Whether C and Verilog take this name, unless it is one of their words.
+pub(super) fn is_identifier(name: &str) -> bool {
+    let is_legal = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(is_legal)
+}
+
+/// The name of the spec as a part of a comment.
+pub(super) fn title(bank: &Bank) -> String {
+    let title = bank.spec.as_ref().map(|spec| spec.name.replace("*/", "* /")).unwrap_or_default();
+    title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+/// The gammas of the coefficients as words of a comment.
+pub(super) fn gammas(bank: &Bank) -> String {
+    let bound = |value: Option<f64>| value.map_or_else(|| "unknown".to_owned(), |value| format!("{value:e}"));
+    format!(
+        "gamma of these coefficients in exact arithmetic: {}, upper bound {}, lower bound {}",
+        bound(bank.gamma.norm),
+        bound(bank.gamma.upper),
+        bound(bank.gamma.lower)
+    )
 }
 
 /// What the header is, as a comment.
 fn about(bank: &Bank, name: &str) -> String {
-    let title = bank.spec.as_ref().map(|spec| spec.name.replace("*/", "* /")).unwrap_or_default();
-    let title: String = title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-    let bound = |value: Option<f64>| value.map_or_else(|| "unknown".to_owned(), |value| format!("{value:e}"));
     format!(
-        "/* {title}\n   Written by hybank. C99, no allocation, no library.\n\n   \
+        "/* {}\n   Written by hybank. C99, no allocation, no library.\n\n   \
          {name}_reset clears a state. {name}_process takes the samples of one slow period, {}\n   \
          channels, and writes the {} output samples of that period. Its latency is {} (output samples).\n   \
-         gamma of these coefficients in exact arithmetic: {}, upper bound {}, lower bound {}.\n   \
+         {}.\n   \
          Sums are taken in the order written; -ffp-contract=off gives the same bits with every compiler. */\n",
+        title(bank),
         samples_of(bank),
         bank.ratio,
         bank.latency,
-        bound(bank.gamma.norm),
-        bound(bank.gamma.upper),
-        bound(bank.gamma.lower),
+        gammas(bank),
     )
 }
 
 /// The input of one call in words, which "channels" follows.
-fn samples_of(bank: &Bank) -> String {
+pub(super) fn samples_of(bank: &Bank) -> String {
     match bank.layout().is_plain() {
         true => format!("one of each of the {}", bank.channel_count()),
         false => {

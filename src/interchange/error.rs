@@ -52,12 +52,27 @@ pub enum ExportError {
     /// The bank is no sum of sections.
     #[error("no second-order sections: {0}")]
     NoSections(&'static str),
-    /// A name that C does not allow.
-    #[error("\"{}\" is no C identifier; use letters, digits and underscores, a letter first", Quoted(.name))]
+    /// A name that C or Verilog does not allow.
+    #[error(
+        "\"{}\" is no {language} identifier; use letters, digits and underscores, a letter first, and no word of \
+         the language",
+        Quoted(.name)
+    )]
     Name {
         /// The name.
         name: String,
+        /// C or Verilog.
+        language: &'static str,
     },
+    /// Code of which the words are the ports needs the bits of the samples.
+    #[error("the bits of the samples are the widths of the ports, and no channel of the spec states them")]
+    NoInputBits,
+    /// Shift-and-add has no coefficients that a ROM could hold.
+    #[error(
+        "with several clocks for a frame the multipliers take their coefficients from a ROM, which shift-and-add \
+         has not; take one clock for each frame, or inferred multipliers"
+    )]
+    ShiftAddRom,
     /// The archive could not be put together.
     #[error("the archive cannot be written: {0}")]
     Archive(String),

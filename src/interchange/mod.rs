@@ -1,5 +1,5 @@
-//! Banks for other tools (C99, tables, memory images of FPGAs, NumPy and MATLAB files), and taps of other
-//! tools.
+//! Banks for other tools (C99, Verilog, tables, memory images of FPGAs, NumPy and MATLAB files), and taps
+//! of other tools.
 //!
 //! The order of FIR taps is the same in every format: channel, then phase p of the output, then lag j in
 //! slow periods. Entry (i, p, j) is the tap `f_i[p + j M]`, so
@@ -13,15 +13,18 @@ mod bit_true;
 mod c99;
 mod error;
 mod layout;
+mod range;
 mod read_taps;
 mod sections;
 mod tables;
+mod verilog;
 
 pub use bit_true::{BitTrue, WordSizes};
 pub use error::ExportError;
 pub use layout::{PolyphaseTaps, SparseBlock};
 pub use read_taps::{TapsError, taps_of_csv, taps_of_npy};
 pub use sections::{Section, block_of_sections, sections};
+pub use verilog::{Circuit, Multipliers, Verilog, VerilogOptions};
 
 use crate::bank::Bank;
 
@@ -45,12 +48,14 @@ pub enum Format {
     Mem,
     /// Second-order sections (CSV)
     Sos,
+    /// A module in Verilog-2001
+    Verilog,
 }
 
 impl Format {
     /// Whether integer taps are written as code for integer samples.
     fn is_integer_code(self, bank: &Bank) -> bool {
-        matches!(self, Self::C99 | Self::Coe | Self::Mem) && bank.fixed_point.is_some()
+        matches!(self, Self::C99 | Self::Coe | Self::Mem | Self::Verilog) && bank.fixed_point.is_some()
     }
 }
 
@@ -71,6 +76,10 @@ pub fn export(
     }
     match format {
         Format::C99 => c99::header(bank, name, input_bits).map(String::into_bytes),
+        Format::Verilog => {
+            let options = VerilogOptions::new(bank, input_bits)?;
+            Ok(Verilog::new(bank, name, &options)?.text.into_bytes())
+        }
         Format::Csv => Ok(tables::csv(bank).into_bytes()),
         Format::Npz => arrays::npz(bank),
         Format::Mat => arrays::mat(bank),

@@ -67,3 +67,23 @@ fn two_recorders_become_one() {
     // After the line of `design`: 57.9 dB in what remains once the ends are left out, and 59.7 dB of all.
     assert!(matches!(ratios[..], [_, fixed, fused] if fixed < fused && fused > 59.0), "{shown}");
 }
+
+/// The circuit of the example gives the integers of the model, and its spurs are theirs.
+#[test]
+#[cfg(unix)]
+fn the_circuit_of_the_fpga_example_has_the_bits_of_the_model() {
+    if Command::new("iverilog").arg("-V").output().is_err() {
+        trials::skipped(&"examples/fpga: no iverilog");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let shown = run_script("fpga", folder.path());
+    assert!(shown.matches("PASS").count() == 2 && !shown.contains("FAIL"), "{shown}");
+    let levels: Vec<f64> = shown
+        .lines()
+        .filter_map(|line| line.strip_prefix("SFDR  ")?.split_whitespace().next()?.parse().ok())
+        .collect();
+    assert!(levels.len() == 3 && levels[0] > 95.0 && levels[1] > 80.0, "{shown}");
+    // The file of numbers begins with the same samples.
+    assert!((levels[1] - levels[2]).abs() < 0.01, "{shown}");
+}

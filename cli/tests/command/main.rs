@@ -46,3 +46,4 @@ mod two_clocks;
 mod understanding;
 mod usage;
 mod verify;
+mod verilog;

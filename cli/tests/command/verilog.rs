@@ -1,0 +1,320 @@
+//! Exported Verilog in the hands of Icarus Verilog, Verilator and Yosys, as far as they are there.
+
+use crate::support::random::Random;
+use crate::support::{Desk, THESIS, number, text};
+use hybank::bank::{Bank, FixedPoint, SynthesisFilters};
+use hybank::spec::WordLengths;
+use serde_json::Value;
+use std::process::Command;
+
+/// Runs a tool on the desk: whether it succeeded, with all that it said. `None` if it is not there, which
+/// goes to the list of skipped tests.
+fn tool(desk: &Desk, line: &[&str]) -> Option<(bool, String)> {
+    match Command::new(line[0]).args(&line[1..]).current_dir(desk.path("")).output() {
+        Ok(output) => Some((output.status.success(), text(&output.stdout) + &text(&output.stderr))),
+        Err(_) => {
+            trials::skipped(&format_args!("exported Verilog: no {}", line[0]));
+            None
+        }
+    }
+}
+
+/// What the testbench prints in Icarus Verilog.
+fn simulated(desk: &Desk) -> Option<String> {
+    let (is_good, said) = tool(desk, &["iverilog", "-g2001", "-Wall", "-o", "test", "core.v", "core_tb.v"])?;
+    assert!(is_good && !said.contains("warning"), "{said}");
+    tool(desk, &["vvp", "test"]).map(|(_, said)| said)
+}
+
+fn write_bank(desk: &Desk, integers: Vec<Vec<i64>>, bits: u32, fraction_bits: i32, ratio: usize) {
+    let words = FixedPoint { bits: WordLengths::Same(bits), fraction_bits, integers };
+    let mut bank = Bank::bare(SynthesisFilters::Fir(words.taps()), ratio);
+    bank.offsets.iter_mut().enumerate().for_each(|(i, offset)| *offset = 0.03 * i as f64 - 0.05);
+    bank.fixed_point = Some(words);
+    desk.write("b.json", bank.to_json().unwrap());
+}
+
+/// The report of an export with a testbench beside it.
+fn exported(desk: &Desk, more: &[&str]) -> Value {
+    let plain = ["export", "b.json", "-o", "core.v", "--testbench", ".", "--json", "--force"];
+    desk.json(&[&plain[..], more].concat())
+}
+
+/// A bank of integers, and the options of a circuit.
+struct Shape {
+    integers: Vec<Vec<i64>>,
+    fraction_bits: i32,
+    ratio: usize,
+    flags: &'static str,
+}
+
+impl Shape {
+    /// A desk with the bank, its module and the testbench, and the report of the export.
+    fn exported(&self) -> (Desk, Value) {
+        let desk = Desk::empty();
+        write_bank(&desk, self.integers.clone(), 8, self.fraction_bits, self.ratio);
+        let flags: Vec<&str> = self.flags.split_whitespace().collect();
+        let report = exported(&desk, &[&["--input-bits", "8"], &flags[..]].concat());
+        (desk, report)
+    }
+}
+
+/// With zeros, powers of two, equal taps and phases without taps.
+fn shapes() -> Vec<Shape> {
+    let wild = |n: usize, taps: usize| -> Vec<Vec<i64>> {
+        let tap = |i: usize, k: usize| ((k * 37 + 101 * i) % 255) as i64 - 127;
+        (0..n).map(|i| (0..taps).map(|k| tap(i, k)).collect()).collect()
+    };
+    let small = vec![vec![5, -3, 0, 8, -16, 5], vec![-128, 0, 0, 127, 1, -1]];
+    let shape = |integers: Vec<Vec<i64>>, fraction_bits, ratio, flags| Shape {
+        integers,
+        fraction_bits,
+        ratio,
+        flags,
+    };
+    vec![
+        shape(small.clone(), 6, 2, ""),
+        shape(small.clone(), 0, 2, "--pipeline 3 --output-bits 12"),
+        shape(small.clone(), -3, 3, "--output-bits 17"),
+        shape(small.clone(), 6, 3, "--clocks-per-frame 2"),
+        shape(small.clone(), 6, 2, "--accumulator 12"),
+        shape(small.clone(), 5, 2, "--accumulator 12 --clocks-per-frame 3 --output-bits 5"),
+        shape(small.clone(), 30, 2, ""),
+        shape(small, 6, 2, "--multipliers shift-add --pipeline 2"),
+        shape(wild(3, 7), 7, 2, "--multipliers shift-add"),
+        shape(wild(5, 4), 7, 4, "--clocks-per-frame 8"),
+        shape(wild(1, 9), 4, 1, ""),
+        shape(wild(2, 6), 4, 2, "--clocks-per-frame 100"),
+        shape(vec![vec![0, 0], vec![0, 0]], 4, 2, ""),
+        shape(vec![vec![1, 0], vec![0, 0]], 0, 2, "--clocks-per-frame 2"),
+        shape(vec![vec![1], vec![0]], 0, 2, "--output-bits 5"),
+    ]
+}
+
+#[test]
+fn verilog_has_the_bits_of_the_model() {
+    for shape in shapes() {
+        let flags = shape.flags;
+        let (desk, report) = shape.exported();
+        let Some(said) = simulated(&desk) else { return };
+        assert!(said.contains("PASS") && !said.contains("FAIL"), "{flags} {report}: {said}");
+    }
+}
+
+#[test]
+fn verilog_is_clean_for_linters() {
+    for shape in shapes() {
+        let flags = shape.flags;
+        let (desk, _) = shape.exported();
+        let Some((is_good, said)) = tool(&desk, &["verilator", "--lint-only", "-Wall", "core.v"]) else {
+            return;
+        };
+        assert!(is_good && said.is_empty(), "{flags}: {said}");
+        let of_bench = "verilator --lint-only --timing -Wno-lint --top-module core_tb core.v core_tb.v";
+        let line: Vec<&str> = of_bench.split_whitespace().collect();
+        let Some((is_good, said)) = tool(&desk, &line) else { return };
+        assert!(is_good, "{flags}: {said}");
+    }
+}
+
+/// Cells of Yosys whose kind begins with one of these words: their number and their bits.
+fn cells(statistics: &str, kinds: &[&str]) -> (f64, f64) {
+    let cell = |line: &str| {
+        let (name, count) = line.trim().split_once(' ')?;
+        let (kind, bits) = name.strip_prefix('$')?.rsplit_once('_')?;
+        let is_wanted = kinds.iter().any(|wanted| kind.contains(wanted));
+        let (bits, count): (f64, f64) = (bits.parse().ok()?, count.trim().parse().ok()?);
+        is_wanted.then_some((count, bits * count))
+    };
+    statistics.lines().filter_map(cell).fold((0.0, 0.0), |sum, cell| (sum.0 + cell.0, sum.1 + cell.1))
+}
+
+#[test]
+fn synthesis_has_no_latch_and_the_cells_of_the_report() {
+    for shape in shapes() {
+        let flags = shape.flags;
+        if shape.fraction_bits == 30 || shape.integers.concat().iter().all(|tap| tap.abs() < 2) {
+            continue;
+        }
+        let (desk, report) = shape.exported();
+        let script = "read_verilog core.v; proc; opt_clean; tee -q -o cells.txt stat -width; synth -noabc; check -assert; \
+                      select -assert-none t:$_DLATCH* t:$dlatch t:$_SR*";
+        let Some((is_good, said)) = tool(&desk, &["yosys", "-q", "-p", script]) else { return };
+        assert!(is_good, "{flags}: {said}");
+        let cells = |kinds: &[&str]| cells(&text(&desk.read("cells.txt")), kinds);
+        let close = |found: f64, key: &str| {
+            let stated = number(&report, key);
+            assert!((found - stated).abs() <= 0.2 * stated, "{flags}: {found} {key}, {report}");
+        };
+        close(cells(&["mul"]).0, "/multipliers");
+        close(cells(&["add", "sub", "neg"]).0, "/adders");
+        close(cells(&["dff"]).1, "/registers");
+    }
+}
+
+/// Each wrong circuit is found by the testbench of the right one.
+#[test]
+fn mutations_are_caught() {
+    let desk = Desk::empty();
+    write_bank(&desk, vec![vec![5, -3, 0, 8, -16, 5], vec![-127, 0, 0, 127, 3, -1]], 8, 6, 2);
+    for flags in [&["--input-bits", "8"][..], &["--input-bits", "8", "--clocks-per-frame", "3"]] {
+        exported(&desk, flags);
+        let core = text(&desk.read("core.v"));
+        let (parallel, folded) = (flags.len() == 2, flags.len() > 2);
+        let narrower = |register: &str| {
+            let line = core.lines().find(|line| line.ends_with(&format!(" {register};"))).unwrap();
+            let (begin, rest) = line.split_once('[').unwrap();
+            let (top, end) = rest.split_once(':').unwrap();
+            core.replace(line, &format!("{begin}[{}:{end}", top.parse::<u32>().unwrap() - 1))
+        };
+        let mut wrong = vec![narrower(if parallel { "z0_0" } else { "z0" })];
+        if parallel {
+            wrong.push(core.replacen(" - ", " + ", 1));
+            let (before, after) = core.split_once("x1_times_5 <= ").unwrap();
+            wrong.push(format!("{before}x1_times_5 <= -{after}"));
+            // A word that skips its register, and a frame that is too early.
+            let delayed = core.find("_d <= ").map(|end| core[..end].rsplit(' ').next().unwrap()).unwrap();
+            wrong.push(
+                core.replace(&format!("{delayed}_d[7]"), &format!("{delayed}[7]"))
+                    .replace(&format!("{delayed}_d}}"), &format!("{delayed}}}")),
+            );
+            wrong.push(core.replacen("if (valid[1])", "if (valid[0])", 1));
+        }
+        if folded {
+            wrong.push(core.replacen("8'sd5;", "-8'sd5;", 1));
+            wrong.push(core.replacen(" ? -", " ? ", 1));
+            wrong.push(core.replacen("(first[2]", "(first[1]", 1));
+        }
+        for (number, text) in wrong.iter().enumerate() {
+            desk.write("core.v", text);
+            let Some(said) = simulated(&desk) else { return };
+            assert!(*text == core || said.contains("FAIL"), "{flags:?}, mutation {number}: {said}");
+        }
+        assert!(wrong.iter().filter(|text| **text != core).count() >= 3, "{flags:?}");
+    }
+}
+
+/// Yosys proves a small circuit equal to the definition, for every input, pause and state before the reset:
+/// sums, rounding, saturation and the valid flag.
+#[test]
+fn a_small_circuit_is_proven() {
+    for flags in ["", "--clocks-per-frame 2", "--multipliers shift-add"] {
+        let desk = Desk::empty();
+        let words = FixedPoint {
+            bits: WordLengths::Same(4),
+            fraction_bits: 1,
+            integers: vec![vec![3, -2, 1], vec![-5, 7, 0]],
+        };
+        let mut bank = Bank::bare(SynthesisFilters::Fir(words.taps()), 2);
+        bank.fixed_point = Some(words);
+        desk.write("b.json", bank.to_json().unwrap());
+        let words: Vec<&str> = flags.split_whitespace().collect();
+        let report = exported(&desk, &[&["--input-bits", "3"][..], &words].concat());
+        let latency = number(&report, "/latency_clocks") as usize;
+        let ready = if flags.contains("clocks") { "wire ready; " } else { "wire ready = 1'b1; " };
+        let port = if flags.contains("clocks") { ", .in_ready(ready)" } else { "" };
+        desk.write(
+            "top.v",
+            format!(
+                "module top (input clk, input rst, input in_valid, input signed [2:0] x1, input signed [2:0] x2, output ok);\n\
+                 wire out_valid; wire signed [2:0] y0, y1; {ready}\n\
+                 core core (.clk(clk), .rst(rst), .in_valid(in_valid), .x1(x1), .x2(x2), .out_valid(out_valid), .y0(y0), .y1(y1){port});\n\
+                 wire take = in_valid & ready;\n\
+                 reg signed [2:0] a, a1, b;\n\
+                 reg [{top}:0] valid; reg signed [2:0] w0 [1:{before}], w1 [1:{before}];\n\
+                 wire signed [9:0] s0 = 3 * a + a1 - 5 * b; wire signed [9:0] s1 = 7 * b - 2 * a;\n\
+                 wire signed [9:0] r0 = (s0 + 1) >>> 1; wire signed [9:0] r1 = (s1 + 1) >>> 1;\n\
+                 integer k;\n\
+                 always @(posedge clk) begin\n\
+                 if (rst) begin a <= 0; a1 <= 0; b <= 0; valid <= 0; end\n\
+                 else begin valid <= {{valid, take}}; if (take) begin a <= x1; a1 <= a; b <= x2; end end\n\
+                 w0[1] <= r0 > 3 ? 3 : r0 < -4 ? -4 : r0; w1[1] <= r1 > 3 ? 3 : r1 < -4 ? -4 : r1;\n\
+                 for (k = 2; k <= {before}; k = k + 1) begin w0[k] <= w0[k - 1]; w1[k] <= w1[k - 1]; end\n\
+                 end\n\
+                 assign ok = out_valid == valid[{top}] & (~out_valid | y0 == w0[{before}] & y1 == w1[{before}]);\n\
+                 endmodule\n",
+                top = latency - 1,
+                before = latency - 1,
+            ),
+        );
+        let steps = (latency + 6).to_string();
+        let script = format!(
+            "read_verilog core.v top.v; hierarchy -top top; proc; flatten; memory; opt; \
+             sat -verify -set-at 1 rst 1 -prove ok 1 -seq {steps} -prove-skip 1 top"
+        );
+        let Some((is_good, said)) = tool(&desk, &["yosys", "-q", "-p", &script]) else { return };
+        assert!(is_good, "{flags}: {said}");
+    }
+}
+
+/// N and M of 1 to 8, 2 to 64 taps of 4 to 18 bits, 1, 2, 4 and 8 clocks, a million frames, compiled.
+#[test]
+fn random_banks_have_no_differing_bit_in_a_million_frames() {
+    if !trials::is_slow("a million frames of random banks in Verilator") {
+        return;
+    }
+    for seed in trials::trials(20) {
+        let mut random = Random(seed + 1);
+        let (n, ratio, taps) = (random.count(1, 8), random.count(1, 8), random.count(2, 64));
+        let bits = random.count(4, 18) as u32;
+        let most = 1_i64 << (bits - 1);
+        let tap = |random: &mut Random| random.below(2 * most as usize) as i64 - most;
+        let integers = (0..n).map(|_| (0..taps).map(|_| tap(&mut random)).collect()).collect();
+        let desk = Desk::empty();
+        let fraction_bits = random.count(0, bits as usize + 3) as i32;
+        write_bank(&desk, integers, bits, fraction_bits, ratio);
+        let clocks = ["1", "2", "4", "8"][seed as usize % 4];
+        let multipliers = if clocks == "1" && seed % 8 == 0 { "shift-add" } else { "inferred" };
+        let input = random.count(4, 16).to_string();
+        let pipeline = random.count(1, 3).to_string();
+        let flags = ["--input-bits", &input, "--clocks-per-frame", clocks, "--multipliers", multipliers];
+        let more = ["--pipeline", &pipeline, "--random-frames", "1000000"];
+        let report = exported(&desk, &[&flags[..], &more].concat());
+        let line = [
+            "verilator",
+            "--binary",
+            "--timing",
+            "-Wno-fatal",
+            "-O3",
+            "--top-module",
+            "core_tb",
+            "core.v",
+            "core_tb.v",
+        ];
+        let Some((is_good, said)) = tool(&desk, &line) else { return };
+        assert!(is_good, "{seed}: {said}");
+        let program = desk.path("obj_dir/Vcore_tb");
+        let output = Command::new(program).current_dir(desk.path("")).output().unwrap();
+        let said = text(&output.stdout);
+        println!("{seed}: N {n}, M {ratio}, {taps} taps of {bits} bits, C {clocks}: {report}");
+        assert!(said.contains("PASS") && !said.contains("FAIL"), "{seed} {flags:?} {report}: {said}");
+    }
+}
+
+#[test]
+fn verilog_that_cannot_be_is_refused() {
+    let desk = Desk::with_spec(THESIS);
+    desk.good(&["design", "spec.toml", "-o", "real.json"]);
+    let verilog = |bank: &'static str| ["export", bank, "-o", "core.v"];
+    let more = |bank: &'static str, flags: &[&'static str]| [&verilog(bank)[..], flags].concat();
+    desk.refused(1, &more("real.json", &["--input-bits", "8"]), &["real.json", "integer taps", "--bits"]);
+    desk.good(&["design", "spec.toml", "-o", "b.json", "--bits", "8"]);
+    desk.refused(1, &verilog("b.json"), &["no channel of the spec", "--input-bits B"]);
+    let shift_add = ["--input-bits", "8", "--clocks-per-frame", "2", "--multipliers", "shift-add"];
+    desk.refused(1, &more("b.json", &shift_add), &["ROM", "one clock"]);
+    for name in ["wire", "1a", "a b"] {
+        let flags = ["export", "b.json", "-o", "core.v", "--input-bits", "8", "--name", name];
+        desk.refused(1, &flags, &[name, "Verilog identifier"]);
+    }
+    desk.refused(1, &more("b.json", &["--input-bits", "40"]), &["40 bits for the samples"]);
+    desk.refused(1, &more("b.json", &["--input-bits", "8", "--accumulator", "65"]), &["65 bits"]);
+    desk.refused(2, &more("b.json", &["--input-bits", "8", "--pipeline", "0"]), &["--pipeline"]);
+    desk.refused(2, &["export", "b.json", "-o", "b.csv", "--output-bits", "8"], &["--to verilog"]);
+    desk.refused(2, &["export", "b.json", "-o", "-", "--to", "verilog", "--json"], &["--json"]);
+    assert!(!desk.path("core.v").exists());
+    // Without a name of its own the module has that of the file; the bits are those of the converters.
+    desk.write("wide.toml", THESIS.replace("delay = 1.2", "delay = 1.2\nbits = 10"));
+    desk.good(&["design", "wide.toml", "-o", "wide.json", "--bits", "8"]);
+    let code = desk.good(&["export", "wide.json", "--format", "verilog", "-o", "-"]);
+    assert!(code.contains("module bank (") && code.contains("input wire signed [9:0] x1"), "{code}");
+}

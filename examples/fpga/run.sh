@@ -1,0 +1,44 @@
+#!/bin/sh
+# From captures to hardware: four 12-bit converters are calibrated, a bank with taps of 14 bits is designed for
+# them and exported as Verilog, and the circuit runs on captures in a simulator. Its outputs are those of
+# `fuse --bit-true`, and their SFDR is that of the floating-point bank.
+#
+#   sh examples/fpga/run.sh [FOLDER]      needs Icarus Verilog; everything goes into FOLDER, by default a new one
+set -eu
+here=$(cd "$(dirname "$0")" && pwd)
+work=${1:-$(mktemp -d)}
+mkdir -p "$work"
+cd "$work"
+
+# The true converters. Only `simulate` knows these errors.
+errors="--delay-error 10ps,-8ps,9ps,0 --gain-error 1%,-0.8%,-1%,0 --offset 0.0024,-0.0020,0.0015,-0.0024 --bits 12"
+four() { echo "$1/ch1.wav $1/ch2.wav $1/ch3.wav $1/ch4.wav"; }
+hybank simulate "$here/spec.toml" --source tones:37.1MHz,161.3MHz,211.7MHz --gain 0.32 --samples 65536 \
+    $errors --seed 1 -o training
+hybank simulate "$here/spec.toml" --source tones:183.1MHz --gain 0.9 --samples 65536 $errors --seed 2 -o held-out
+hybank calibrate "$here/spec.toml" $(four training) -o measured.toml --reference 4 --tone 37.1MHz,161.3MHz,211.7MHz
+
+# The bank as numbers of 64 bits and with taps of 14 bits.
+hybank design measured.toml -o float.json
+hybank design measured.toml -o fixed.json --bits 14
+hybank fuse float.json $(four held-out) -o float.wav --bits 64f --keep-latency
+hybank fuse fixed.json $(four held-out) -o integer.wav --bit-true --keep-latency
+
+# The circuit with its testbench. The WAV files hold the 12 bits in words of 16, so that the outputs have 16 too.
+hybank export fixed.json -o core.v --input-bits 16 --testbench . --json
+iverilog -g2001 -o test core.v core_tb.v
+vvp test
+
+# The same testbench with the captures: 16384 frames of words of 16 bits, at the ends of the files.
+words() { tail -c $((16384 * $2)) "$1" | od -An -v -t d2 -w"$2"; }
+for i in 1 2 3 4; do words held-out/ch$i.wav 2 >ch$i.txt; done
+paste -d ' ' ch1.txt ch2.txt ch3.txt ch4.txt >captures.txt
+words integer.wav 8 >wanted.txt
+iverilog -g2001 -P core_tb.INPUT='"captures.txt"' -P core_tb.EXPECTED='"wanted.txt"' \
+    -P core_tb.FRAMES=16384 -P core_tb.OUTPUT='"rtl.csv"' -o captures core.v core_tb.v
+vvp captures
+
+for what in float.wav integer.wav "rtl.csv --rate 1e9 --sample-bits 16"; do
+    echo "${what%%.*}"
+    hybank measure $what --tone 183.1MHz --interleaved 4 --skip 200
+done

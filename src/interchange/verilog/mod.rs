@@ -1,0 +1,204 @@
+//! A bank of integer taps as a module in Verilog-2001, with the bits of [`BitTrue`].
+//!
+//! Words are as wide as their exact ranges, which follow from the taps and the bits of the samples, or as
+//! the accumulator where that is less. Adders of a tree have registers in between.
+
+mod folded;
+mod netlist;
+mod output;
+mod parallel;
+mod shift_add;
+mod testbench;
+
+use super::bit_true::{BitTrue, IntegerFilters, WordSizes};
+use super::c99;
+use super::error::ExportError;
+use crate::bank::Bank;
+use folded::{Schedule, folded};
+use netlist::Netlist;
+use output::Output;
+use parallel::parallel;
+use std::num::NonZeroU32;
+
+/// How constants multiply.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+#[non_exhaustive]
+pub enum Multipliers {
+    /// The operator *, for the multipliers of a device
+    Inferred,
+    /// Shifts and adders: canonical signed digits, common subexpressions of each input
+    ShiftAdd,
+}
+
+/// The circuit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct VerilogOptions {
+    /// Bits of the words.
+    pub words: WordSizes,
+    /// Clocks between two frames. With more than one, each multiplier serves as many taps.
+    pub clocks_per_frame: NonZeroU32,
+    /// Levels of adders between two registers.
+    pub pipeline: NonZeroU32,
+    /// How constants multiply.
+    pub multipliers: Multipliers,
+}
+
+impl VerilogOptions {
+    /// A frame at every clock, a register behind every adder, inferred multipliers, an accumulator that
+    /// never wraps, and outputs of the bits of the samples: of so many, or those of the widest converter.
+    ///
+    /// # Errors
+    /// [`ExportError::NoInputBits`] where the spec states none either.
+    pub fn new(bank: &Bank, input_bits: Option<u32>) -> Result<Self, ExportError> {
+        let channels = bank.spec.iter().flat_map(|spec| &spec.channels);
+        let widest = channels.filter_map(|channel| channel.bits).max();
+        let input = input_bits.or(widest).ok_or(ExportError::NoInputBits)?;
+        let words = WordSizes { input, accumulator: 64, output: input };
+        let one = NonZeroU32::MIN;
+        Ok(Self { words, clocks_per_frame: one, pipeline: one, multipliers: Multipliers::Inferred })
+    }
+}
+
+/// What a circuit takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct Circuit {
+    /// Clocks from a frame to its outputs.
+    pub latency_clocks: usize,
+    /// Clocks between two frames at least.
+    pub clocks_per_frame: usize,
+    /// Operators * of two words, or of a word and a constant that is no power of two.
+    pub multipliers: usize,
+    /// Operators + and -.
+    pub adders: usize,
+    /// Bits of all registers.
+    pub registers: usize,
+    /// Bits of the coefficients, where multipliers serve several taps.
+    pub rom_bits: usize,
+    /// Bits with which no sum can wrap.
+    pub needed_accumulator_bits: u32,
+    /// Bits of the accumulator; fewer than needed wrap.
+    pub accumulator_bits: u32,
+}
+
+/// A bank as a module in Verilog.
+#[derive(Debug)]
+pub struct Verilog {
+    /// Name of the module.
+    name: String,
+    /// Whether the module says when it takes a frame.
+    has_ready: bool,
+    /// The module.
+    pub text: String,
+    /// What it takes.
+    pub circuit: Circuit,
+    model: BitTrue,
+}
+
+impl Verilog {
+    /// The module `name` of a bank.
+    ///
+    /// # Errors
+    /// [`ExportError`] for a name that is no identifier, for sizes that are out of range, and for a bank
+    /// without integer taps.
+    pub fn new(bank: &Bank, name: &str, options: &VerilogOptions) -> Result<Self, ExportError> {
+        check_name(name)?;
+        let words = options.words;
+        let integers = bank.fixed_point.as_ref().ok_or(ExportError::NoIntegers { format: "Verilog" })?;
+        let model = BitTrue::new(bank, words)?;
+        let filters = &model.filters;
+        let needed = filters.needed_bits(words.input);
+        let mut netlist = Netlist::new(options.pipeline.get(), words.accumulator);
+        let output = Output::new(words.output, integers.fraction_bits);
+        let (clocks_per_frame, latency_clocks, rom_bits) = match options.clocks_per_frame.get() as usize {
+            1 => (1, parallel(&mut netlist, filters, options, output), 0),
+            _ if options.multipliers == Multipliers::ShiftAdd => return Err(ExportError::ShiftAddRom),
+            clocks => {
+                let schedule = Schedule::new(filters, clocks);
+                let (latency, rom) = folded(&mut netlist, filters, &schedule, options, output);
+                (schedule.clocks, latency, rom)
+            }
+        };
+        let circuit = Circuit {
+            latency_clocks,
+            clocks_per_frame,
+            multipliers: netlist.multipliers,
+            adders: netlist.adders,
+            registers: netlist.registers,
+            rom_bits,
+            needed_accumulator_bits: needed,
+            accumulator_bits: needed.min(words.accumulator),
+        };
+        let has_ready = options.clocks_per_frame.get() > 1;
+        let text = about(bank, words, &circuit) + &ports(name, filters, words, has_ready) + &netlist.body();
+        Ok(Self { name: name.to_owned(), has_ready, text: text + "endmodule\n", circuit, model })
+    }
+
+    /// A test of the module: names and texts of its files. Its frames are impulses, full-scale steps, those
+    /// that make the largest and the least sum of each phase, and `random` random ones.
+    pub fn testbench(&self, random: u32) -> Vec<(String, String)> {
+        testbench::files(self, random)
+    }
+}
+
+/// Words that no module can have as its name.
+const KEYWORDS: &str = "always and assign automatic begin buf bufif0 bufif1 case casex casez cell cmos config \
+    deassign default defparam design disable edge else end endcase endconfig endfunction endgenerate endmodule \
+    endprimitive endspecify endtable endtask event for force forever fork function generate genvar highz0 \
+    highz1 if ifnone incdir include initial inout input instance integer join large liblist library localparam \
+    macromodule medium module nand negedge nmos nor noshowcancelled not notif0 notif1 or output parameter pmos \
+    posedge primitive pull0 pull1 pulldown pullup pulsestyle_ondetect pulsestyle_onevent rcmos real realtime \
+    reg release repeat rnmos rpmos rtran rtranif0 rtranif1 scalared showcancelled signed small specify \
+    specparam strong0 strong1 supply0 supply1 table task time tran tranif0 tranif1 tri tri0 tri1 triand trior \
+    trireg unsigned use vectored wait wand weak0 weak1 while wire wor xnor xor";
+
+fn check_name(name: &str) -> Result<(), ExportError> {
+    let refused = ExportError::Name { name: name.to_owned(), language: "Verilog" };
+    match c99::is_identifier(name) && !KEYWORDS.split_whitespace().any(|word| word == name) {
+        true => Ok(()),
+        false => Err(refused),
+    }
+}
+
+fn about(bank: &Bank, words: WordSizes, circuit: &Circuit) -> String {
+    let list = |range: std::ops::Range<usize>| range.map(|i| format!("x{i}")).collect::<Vec<_>>().join(", ");
+    let Circuit { latency_clocks, clocks_per_frame, multipliers, adders, registers, rom_bits, .. } = circuit;
+    let needed = circuit.needed_accumulator_bits;
+    let sums = match needed <= words.accumulator {
+        true => {
+            format!("No sum overflows: {needed} bits hold all, and each word is as wide as its values need")
+        }
+        false => format!("Sums wrap around at {} bits; {needed} hold all", words.accumulator),
+    };
+    format!(
+        "/* {}\n   Written by hybank. Verilog-2001, no primitives.\n\n   \
+         A clock with in_valid takes a frame: the samples {} of {} bits, {}. {latency_clocks} clocks\n   \
+         later out_valid is there with the output samples y0 to y{} of {} bits. Frames may come at\n   \
+         {}. rst clears all at a clock. The latency of the filters is {} \
+         (output samples).\n   {}.\n   \
+         {sums}.\n   Each is rounded to the nearest integer, halves upwards, and saturates.\n\n   \
+         multipliers {multipliers}, adders {adders}, bits of registers {registers}, of ROM {rom_bits} */\n",
+        c99::title(bank),
+        list(1..bank.frame_samples() + 1),
+        words.input,
+        c99::samples_of(bank) + " channels",
+        bank.ratio - 1,
+        words.output,
+        match clocks_per_frame {
+            1 => "every clock".to_owned(),
+            clocks => format!("every {clocks}th clock, when in_ready is there"),
+        },
+        bank.latency,
+        c99::gammas(bank),
+    )
+}
+
+fn ports(name: &str, filters: &IntegerFilters, words: WordSizes, has_ready: bool) -> String {
+    let mut ports = vec!["input wire clk".to_owned(), "input wire rst".into(), "input wire in_valid".into()];
+    ports.extend(has_ready.then(|| "output wire in_ready".into()));
+    let word = |kind: &str, bits: u32, name: String| format!("{kind} signed [{}:0] {name}", bits - 1);
+    ports.extend((1..=filters.taps.channels).map(|i| word("input wire", words.input, format!("x{i}"))));
+    ports.push("output wire out_valid".into());
+    ports.extend((0..filters.taps.ratio).map(|p| word("output reg", words.output, format!("y{p}"))));
+    format!("module {name} (\n    {}\n);\n", ports.join(",\n    "))
+}

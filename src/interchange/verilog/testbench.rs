@@ -1,0 +1,105 @@
+//! A self-checking testbench: frames and the outputs that the bit-true model gives for them.
+
+use super::Verilog;
+use crate::interchange::layout::PolyphaseTaps;
+use std::fmt::Write;
+
+/// Names and texts of the files.
+pub(super) fn files(verilog: &Verilog, random: u32) -> Vec<(String, String)> {
+    let mut model = verilog.model.clone();
+    let taps = model.filters.taps.clone();
+    let frames = frames(&taps, verilog.model.words.input, &model.resting(), random);
+    let mut outputs = vec![0; taps.ratio];
+    let (mut input, mut expected) = (String::new(), String::new());
+    for frame in frames.chunks(taps.channels) {
+        model.process(frame, &mut outputs);
+        write_line(&mut input, frame);
+        write_line(&mut expected, &outputs);
+    }
+    let bench = bench(verilog, &taps, frames.len() / taps.channels);
+    vec![
+        (format!("{}_tb.v", verilog.name), bench),
+        ("input.txt".to_owned(), input),
+        ("expected.txt".to_owned(), expected),
+    ]
+}
+
+fn write_line(text: &mut String, words: &[i32]) {
+    for (k, word) in words.iter().enumerate() {
+        let _ = write!(text, "{}{word}", if k == 0 { "" } else { " " });
+    }
+    text.push('\n');
+}
+
+/// Impulses, steps, the worst signs of each phase, and random samples.
+fn frames(taps: &PolyphaseTaps<i64>, bits: u32, resting: &[i32], random: u32) -> Vec<i32> {
+    let (n, lags) = (taps.channels, taps.lags);
+    let (least, most) = ((-1_i64 << (bits - 1)) as i32, ((1_i64 << (bits - 1)) - 1) as i32);
+    let mut frames = resting.repeat(lags);
+    for (i, extreme) in (0..n).flat_map(|i| [(i, most), (i, least)]) {
+        let mut impulse = resting.to_vec();
+        impulse[i] = extreme;
+        frames.extend(&impulse);
+        frames.extend(resting.repeat(lags));
+        frames.extend(impulse.repeat(lags));
+        frames.extend(resting.repeat(lags));
+    }
+    for extreme in [most, least, most] {
+        frames.extend(vec![extreme; n * lags]);
+    }
+    for (p, is_largest) in (0..taps.ratio).flat_map(|p| [(p, true), (p, false)]) {
+        let worst = |i: usize, j: usize| if (taps.get(i, p, j) > 0) == is_largest { most } else { least };
+        frames.extend((0..lags).rev().flat_map(|j| (0..n).map(move |i| worst(i, j))));
+    }
+    let mut state = 1_u64;
+    frames.extend((0..random as usize * n).map(|_| {
+        // Knuth's multiplier; the high bits are the random ones.
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        ((state as i64) >> (64 - bits)) as i32
+    }));
+    frames
+}
+
+fn bench(verilog: &Verilog, taps: &PolyphaseTaps<i64>, frames: usize) -> String {
+    let (words, circuit) = (verilog.model.words, &verilog.circuit);
+    let inputs: Vec<String> = (1..=taps.channels).map(|i| format!("x{i}")).collect();
+    let outputs: Vec<String> = (0..taps.ratio).map(|p| format!("y{p}")).collect();
+    let expected: Vec<String> = outputs.iter().map(|y| format!("expected_{y}")).collect();
+    // Not every simulator cuts a number that it reads to the bits of a word.
+    let read = |names: &[String], after: &str| {
+        let names: Vec<String> = names.iter().map(|name| format!("read_{name}{after}")).collect();
+        names.join(", ")
+    };
+    let cut = |names: &[String], bits: u32| read(names, &format!("[{}:0]", bits - 1));
+    let mut ports: String = inputs.iter().chain(&outputs).map(|port| format!(", .{port}({port})")).collect();
+    let ready = if verilog.has_ready {
+        ports += ", .in_ready(in_ready)";
+        ""
+    } else {
+        "    assign in_ready = 1'b1;\n"
+    };
+    let format_of = |names: &[String]| vec!["%d"; names.len()].join(" ");
+    let parts = [
+        ("NAME", verilog.name.clone()),
+        ("FRAMES", frames.to_string()),
+        ("LATENCY", circuit.latency_clocks.to_string()),
+        ("CLOCKS", circuit.clocks_per_frame.to_string()),
+        ("INPUT_TOP", (words.input - 1).to_string()),
+        ("OUTPUT_TOP", (words.output - 1).to_string()),
+        ("INPUT_FORMAT", format_of(&inputs)),
+        ("OUTPUT_FORMAT", format_of(&outputs)),
+        ("LINES", format_of(&outputs).replace(' ', "\\n")),
+        ("READ", read(&[&inputs[..], &outputs].concat(), "")),
+        ("READ_INPUTS", read(&inputs, "")),
+        ("READ_OUTPUTS", read(&outputs, "")),
+        ("CUT_INPUTS", cut(&inputs, words.input)),
+        ("CUT_OUTPUTS", cut(&outputs, words.output)),
+        ("INPUTS", inputs.join(", ")),
+        ("OUTPUTS", outputs.join(", ")),
+        ("EXPECTED", expected.join(", ")),
+        ("PORTS", ports),
+        ("READY", ready.to_owned()),
+    ];
+    let fill = |text: String, (key, value): &(&str, String)| text.replace(&format!("@{key}@"), value);
+    parts.iter().fold(include_str!("testbench.v").to_owned(), fill)
+}
