@@ -2,7 +2,7 @@
 
 use super::bank_file::load;
 use super::print::{Failure, InFile, check_json, is_dash, print_json};
-use super::written::{begin_file, check_outputs, write_bytes, write_together};
+use super::written::{begin_file, check_output, check_outputs, write_bytes, write_together};
 use clap::ValueEnum;
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::design::analyze;
@@ -149,7 +149,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::Usage(message.to_owned()));
     }
     check_json(args.json, &args.output, "code")?;
-    check_outputs(&[&args.output], &[&args.bank])?;
+    check_output(&args.output, &[&args.bank], args.force)?;
     let bank = load(&args.bank)?;
     let circuit = match format {
         Format::Verilog => Some(write_verilog(args, &bank)?),

@@ -301,7 +301,7 @@ fn every_mistake_names_its_json_place_and_the_remedy() {
         ss.replacen(from, to, 1)
     };
     for (text, path, words) in [
-        (String::new(), "", "the text ends"),
+        (String::new(), "", "it is empty"),
         ("[]".into(), "", "expected a table"),
         (FIR_TEXT[..400].into(), "", "line"),
         (fir_with("\"latency\": 10,", "\"latency\": 10, \"latency\": 10,"), "", "given twice"),

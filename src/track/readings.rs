@@ -124,7 +124,7 @@ mod tests {
             ("{\"frame\": 3, \"delay\": [1, 2], \"half_width\": -1}", "zero or more"),
             ("{\"frame\": 3, \"delay\": [1, 2], \"half_width\": [1]}", "no half_width"),
             ("{\"frame\": -3, \"delay\": [1, 2], \"half_width\": 1}", "-3"),
-            ("frame", "expected"),
+            ("frame", "a value is missing"),
         ] {
             let error = Reading::parse(&format!("\n{text}"), "d.jsonl", 2).unwrap_err().to_string();
             assert!(error.starts_with("d.jsonl: line 2: ") && error.contains(words), "{error}");

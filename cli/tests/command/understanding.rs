@@ -45,11 +45,11 @@ fn units_in_a_spec_are_those_of_bare_numbers() {
         ("true", &["target.filter.cutoff", "a number and its unit"]),
     ] {
         desk.write("odd.toml", AUDIO.replace("9000.0", unit));
-        let args = ["design", "odd.toml", "-o", "odd.json"];
+        let args = ["design", "odd.toml", "-o", "odd.json", "--force"];
         if parts.is_empty() { drop(desk.good(&args)) } else { drop(desk.refused(1, &args, parts)) }
     }
     desk.write("odd.toml", AUDIO.replace("fast_rate = 48000.0", "fast_period = \"1 samples\""));
-    desk.refused(1, &["design", "odd.toml", "-o", "odd.json"], &["fast_period", "\"1 ns\""]);
+    desk.refused(1, &["design", "odd.toml", "-o", "odd.json", "--force"], &["fast_period", "\"1 ns\""]);
 }
 
 /// Each of these once gave exit code 0 and a proud report.
