@@ -20,61 +20,73 @@ pub(crate) struct Ball<F = DoubleDouble> {
 impl<F: Number> Ball<F> {
     pub(crate) const ZERO: Self = Self { mid: F::ZERO, radius: 0.0 };
 
+    #[inline]
     pub(crate) fn mid(self) -> F {
         self.mid
     }
 
     /// The nearest double to the midpoint.
+    #[inline]
     pub(crate) fn nearest(self) -> f64 {
         self.mid.nearest()
     }
 
     /// The radius.
+    #[inline]
     pub(crate) fn radius(self) -> f64 {
         self.radius
     }
 
     /// Exactly the midpoint given.
+    #[inline]
     pub(crate) fn exactly(mid: F) -> Self {
         Self { mid, radius: 0.0 }
     }
 
     /// The same midpoint, `by` further in both directions.
+    #[inline]
     pub(crate) fn widened(self, by: f64) -> Self {
         Self { mid: self.mid, radius: (self.radius + by) * OUTWARD }
     }
 
     /// A bound on the modulus.
+    #[inline]
     pub(crate) fn magnitude(self) -> f64 {
         (self.size() + self.radius) * OUTWARD
     }
 
     /// A bound on the modulus of the midpoint, up to a relative error of 2^-52.
+    #[inline]
     fn size(self) -> f64 {
         if self.mid == F::ZERO { 0.0 } else { self.mid.nearest().abs() + TINY }
     }
 
     /// No value of the ball is less.
+    #[inline]
     pub(crate) fn lower(self) -> f64 {
         // 2^-52 is the error of the nearest double, the rest that of the difference.
         self.mid.nearest() - (self.radius + self.size() * (2.0 * f64::EPSILON)) * OUTWARD
     }
 
     /// No value of the ball is larger.
+    #[inline]
     pub(crate) fn upper(self) -> f64 {
         -(-self).lower()
     }
 
     /// Whether this is exactly zero.
+    #[inline]
     pub(crate) fn is_zero(self) -> bool {
         self == Self::ZERO
     }
 
+    #[inline]
     fn rounded(mid: F, inherited: f64) -> Self {
         Self { mid, radius: (inherited + F::ROUNDING * mid.nearest().abs()) * OUTWARD + TINY }
     }
 
     /// A number of which nothing is known.
+    #[inline]
     pub(crate) fn unknown() -> Self {
         Self { mid: F::from(f64::NAN), radius: f64::NAN }
     }
@@ -112,6 +124,7 @@ impl Ball<BigFloat> {
 }
 
 impl<F: Number> From<f64> for Ball<F> {
+    #[inline]
     fn from(value: f64) -> Self {
         Self { mid: value.into(), radius: 0.0 }
     }
@@ -119,6 +132,7 @@ impl<F: Number> From<f64> for Ball<F> {
 
 impl<F: Number> Neg for Ball<F> {
     type Output = Self;
+    #[inline]
     fn neg(self) -> Self {
         Self { mid: -self.mid, radius: self.radius }
     }
@@ -126,6 +140,7 @@ impl<F: Number> Neg for Ball<F> {
 
 impl<F: Number> Add for Ball<F> {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         match (self.is_zero(), other.is_zero()) {
             (true, _) => other,
@@ -137,6 +152,7 @@ impl<F: Number> Add for Ball<F> {
 
 impl<F: Number> Sub for Ball<F> {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         self + -other
     }
@@ -144,6 +160,7 @@ impl<F: Number> Sub for Ball<F> {
 
 impl<F: Number> Mul for Ball<F> {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
         if self.is_zero() || other.is_zero() {
             return Self::ZERO;
@@ -156,6 +173,7 @@ impl<F: Number> Mul for Ball<F> {
 impl<F: Number> Div for Ball<F> {
     type Output = Self;
     /// NaN if the divisor's ball contains zero or reaches out of the normal doubles.
+    #[inline]
     fn div(self, other: Self) -> Self {
         let least = other.mid.nearest().abs() * (1.0 - f64::EPSILON) - other.radius * OUTWARD;
         if !least.is_normal() || least < 0.0 {

@@ -51,6 +51,7 @@ fn normalised(words: &[u64], exponent: i64, negative: bool) -> BigFloat {
 impl BigFloat {
     const NAN: Self = Self { words: [0; WORDS], exponent: 0, negative: false, nan: true };
 
+    #[inline]
     fn is_zero(&self) -> bool {
         self.words[WORDS - 1] == 0 && !self.nan
     }
@@ -64,16 +65,19 @@ impl BigFloat {
     }
 
     /// e with 2^(e - 1) <= |x| < 2^e; 0 for zero and NaN.
+    #[inline]
     pub(crate) fn exponent(&self) -> i64 {
         self.exponent
     }
 
     /// x 2^power.
+    #[inline]
     pub(crate) fn scaled(self, power: i64) -> Self {
         if self.is_zero() { self } else { Self { exponent: self.exponent + power, ..self }.within_range() }
     }
 
     /// The number, unknown if its exponent is too large.
+    #[inline]
     fn within_range(self) -> Self {
         if self.exponent.abs() <= MAX_EXPONENT { self } else { Self::NAN }
     }
@@ -109,6 +113,7 @@ impl BigFloat {
     }
 
     /// |self| 2^-exponent with the precision of a double.
+    #[inline]
     fn mantissa(&self) -> f64 {
         self.words[WORDS - 1] as f64 * 2f64.powi(-64)
     }
@@ -121,6 +126,7 @@ impl Number for BigFloat {
     /// 0.5^k / k! is below 2^-512 from here on.
     const SERIES_TERMS: usize = 90;
 
+    #[inline]
     fn nearest(self) -> f64 {
         if self.nan {
             return f64::NAN;
@@ -175,6 +181,7 @@ impl From<f64> for BigFloat {
 
 impl Neg for BigFloat {
     type Output = Self;
+    #[inline]
     fn neg(self) -> Self {
         if self.is_zero() { self } else { Self { negative: !self.negative, ..self } }
     }

@@ -15,21 +15,25 @@ pub(crate) struct Cartesian<T> {
 pub(crate) type ComplexBall<F = BigFloat> = Cartesian<Ball<F>>;
 
 impl<T: Field> Cartesian<T> {
+    #[inline]
     pub(crate) fn new(re: T, im: T) -> Self {
         Self { re, im }
     }
 
     /// The conjugate.
+    #[inline]
     pub(crate) fn conj(self) -> Self {
         Self { re: self.re, im: -self.im }
     }
 
     /// The square of the modulus.
+    #[inline]
     pub(crate) fn norm_sqr(self) -> T {
         self.re * self.re + self.im * self.im
     }
 
     /// Times a real number.
+    #[inline]
     pub(crate) fn scaled(self, by: T) -> Self {
         Self { re: self.re * by, im: self.im * by }
     }
@@ -49,6 +53,7 @@ impl<F: Number> ComplexBall<F> {
 }
 
 impl<F: Number> From<Ball<F>> for ComplexBall<F> {
+    #[inline]
     fn from(re: Ball<F>) -> Self {
         Self { re, im: Ball::ZERO }
     }
@@ -56,6 +61,7 @@ impl<F: Number> From<Ball<F>> for ComplexBall<F> {
 
 impl<T: Field> Neg for Cartesian<T> {
     type Output = Self;
+    #[inline]
     fn neg(self) -> Self {
         Self { re: -self.re, im: -self.im }
     }
@@ -63,6 +69,7 @@ impl<T: Field> Neg for Cartesian<T> {
 
 impl<T: Field> Add for Cartesian<T> {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self { re: self.re + other.re, im: self.im + other.im }
     }
@@ -70,6 +77,7 @@ impl<T: Field> Add for Cartesian<T> {
 
 impl<T: Field> Sub for Cartesian<T> {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         Self { re: self.re - other.re, im: self.im - other.im }
     }
@@ -77,6 +85,7 @@ impl<T: Field> Sub for Cartesian<T> {
 
 impl<T: Field> Mul for Cartesian<T> {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
         Self { re: self.re * other.re - self.im * other.im, im: self.re * other.im + self.im * other.re }
     }
@@ -85,6 +94,7 @@ impl<T: Field> Mul for Cartesian<T> {
 impl<T: Field> Div for Cartesian<T> {
     type Output = Self;
     /// NaN if the divisor is, or may be, zero.
+    #[inline]
     fn div(self, other: Self) -> Self {
         let (product, size) = (self * other.conj(), other.norm_sqr());
         Self { re: product.re / size, im: product.im / size }

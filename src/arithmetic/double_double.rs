@@ -26,6 +26,7 @@ pub(crate) struct DoubleDouble {
 }
 
 /// a + b exactly, as a rounded sum and its error (Knuth).
+#[inline]
 fn two_sum(a: f64, b: f64) -> DoubleDouble {
     let high = a + b;
     let part = high - a;
@@ -33,12 +34,14 @@ fn two_sum(a: f64, b: f64) -> DoubleDouble {
 }
 
 /// [`two_sum`] for `|a| >= |b|` (Dekker).
+#[inline]
 fn fast_two_sum(a: f64, b: f64) -> DoubleDouble {
     let high = a + b;
     DoubleDouble { high, low: b - (high - a) }
 }
 
 /// a b exactly, as a rounded product and its error.
+#[inline]
 fn two_product(a: f64, b: f64) -> DoubleDouble {
     let high = a * b;
     DoubleDouble { high, low: a.mul_add(b, -high) }
@@ -46,6 +49,7 @@ fn two_product(a: f64, b: f64) -> DoubleDouble {
 
 impl DoubleDouble {
     /// Times a power of two.
+    #[inline]
     fn times(self, power: f64) -> Self {
         Self { high: self.high * power, low: self.low * power }
     }
@@ -57,6 +61,7 @@ impl Number for DoubleDouble {
     /// 0.5^30 / 30! = 4e-42.
     const SERIES_TERMS: usize = 30;
 
+    #[inline]
     fn nearest(self) -> f64 {
         self.high
     }
@@ -75,6 +80,7 @@ impl Number for DoubleDouble {
 }
 
 impl From<f64> for DoubleDouble {
+    #[inline]
     fn from(value: f64) -> Self {
         Self { high: value, low: 0.0 }
     }
@@ -82,6 +88,7 @@ impl From<f64> for DoubleDouble {
 
 impl Neg for DoubleDouble {
     type Output = Self;
+    #[inline]
     fn neg(self) -> Self {
         Self { high: -self.high, low: -self.low }
     }
@@ -89,6 +96,7 @@ impl Neg for DoubleDouble {
 
 impl Add for DoubleDouble {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         let (s, t) = (two_sum(self.high, other.high), two_sum(self.low, other.low));
         let v = fast_two_sum(s.high, s.low + t.high);
@@ -98,6 +106,7 @@ impl Add for DoubleDouble {
 
 impl Sub for DoubleDouble {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         self + -other
     }
@@ -105,6 +114,7 @@ impl Sub for DoubleDouble {
 
 impl Mul for DoubleDouble {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
         let c = two_product(self.high, other.high);
         let low = self.high.mul_add(other.low, self.low * other.low);
@@ -114,6 +124,7 @@ impl Mul for DoubleDouble {
 
 impl Div for DoubleDouble {
     type Output = Self;
+    #[inline]
     fn div(self, other: Self) -> Self {
         if self.high.abs() < SMALL && self.high != 0.0 {
             return (self.times(LIFT) / other).times(1.0 / LIFT);

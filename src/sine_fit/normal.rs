@@ -47,8 +47,8 @@ pub(super) fn fractional_cycles(cycles: f64, n: f64) -> f64 {
 /// The inner product of two blocks. Eight partial sums let the compiler use vector instructions.
 fn dot(x: &[f64], y: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
-    for (x, y) in x.chunks_exact(8).zip(y.chunks_exact(8)) {
-        sums.iter_mut().zip(x.iter().zip(y)).for_each(|(sum, (x, y))| *sum += x * y);
+    for (x, y) in x.as_chunks::<8>().0.iter().zip(y.as_chunks::<8>().0) {
+        sums = std::array::from_fn(|k| sums[k] + x[k] * y[k]);
     }
     sums.iter().sum()
 }

@@ -89,6 +89,10 @@ fn lower_ends(
     let witness = noncausal_witness(bank)?;
     let noncausal = error.noncausal_bound(&witness);
     let above = noncausal.unwrap_or(0.0);
+    // Nothing of interest lies below a norm that is zero up to rounding.
+    if bank.gamma.norm.is_some_and(|norm| is_zero(norm, error)) {
+        return Ok(Proof { upper: None, lower: None, noncausal: noncausal.map(|_| witness) });
+    }
     // What the noncausal bound does not explain is looked for.
     let wanted = bank.gamma.lower.map(|stated| stated.max(dual.bound) * (1.0 - SHORTFALL));
     let explained = wanted.is_some_and(|wanted| above >= wanted);

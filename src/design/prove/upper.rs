@@ -91,13 +91,14 @@ pub(super) fn certificate(
             None
         })
     };
-    let long = || {
-        let mut excesses = LONG_EXCESSES.iter().take_while(|_| !stop.is_due());
-        excesses.find_map(|excess| search.in_512_bits(level(excess)))
-    };
     let is_zero = norm <= floor;
     let (fine, coarse) =
         if is_zero { (&FLOOR_EXCESSES[..], &[][..]) } else { EXCESSES.split_at(FINE_EXCESSES) };
+    let long = || {
+        let excesses = if is_zero { FLOOR_EXCESSES } else { LONG_EXCESSES };
+        let mut tried = excesses.iter().take_while(|_| !stop.is_due());
+        tried.find_map(|excess| search.in_512_bits(level(excess)))
+    };
     let found = fine.iter().find_map(&mut in_doubles).or_else(long);
     found.or_else(|| coarse.iter().find_map(&mut in_doubles)).ok_or_else(|| match stop.is_due() {
         true => DesignError::Stopped,
