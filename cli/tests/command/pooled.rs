@@ -163,6 +163,15 @@ fn an_intermediate_frequency_is_calibrated_and_fused() {
     );
     let wrong: Vec<&str> = wrong.iter().map(String::as_str).collect();
     desk.refused(1, &wrong, &["the captures contradict the spec", "their zones", "--force"]);
+    let is_slow =
+        trials::is_slow("the intermediate frequency with 64 taps, uncertain delays and three tones");
+    if !is_slow {
+        // Half of the taps, and delays that are taken as exact.
+        let measured = desk.read("m.toml");
+        let certain = measured.split("[uncertainty]").next().unwrap_or_default();
+        desk.write("if.toml", IF.replace("taps = 64", "taps = 32"));
+        desk.write("m.toml", certain.replace("taps = 64", "taps = 32"));
+    }
     for (spec, bank) in [("if.toml", "nominal.json"), ("m.toml", "measured.json")] {
         design(&desk, spec);
         desk.write(bank, desk.read("bank.json"));
@@ -171,7 +180,8 @@ fn an_intermediate_frequency_is_calibrated_and_fused() {
         let fuse = with(&["fuse", bank], files, &["-o", "y.wav", "--measure", "--tone", tone]);
         report(&fuse)["measure"].take()
     };
-    for tone in ["671.3MHz", "702.1MHz", "851.9MHz"] {
+    let tones = ["671.3MHz", "702.1MHz", "851.9MHz"];
+    for tone in if is_slow { &tones[..] } else { &tones[1..2] } {
         let files = capture(&format!("tones:{tone}"), "0.9", "held");
         let nominal = measured("nominal.json", tone, &files);
         let calibrated = measured("measured.json", tone, &files);

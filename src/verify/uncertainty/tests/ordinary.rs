@@ -180,7 +180,7 @@ fn random_case(trial: u64) -> (Bank, ErrorBox) {
 /// `HYBANK_TRIALS=0..100` makes as many, in minutes.
 #[test]
 fn random_boxes_are_proven_as_closely_as_asked() {
-    for trial in crate::trials::trials(6) {
+    for trial in crate::trials::trials(3) {
         let (bank, errors) = random_case(trial);
         println!("{trial}: {errors:?}");
         let begin = std::time::Instant::now();
