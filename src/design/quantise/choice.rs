@@ -44,10 +44,10 @@ pub fn quantise_within(
     quantiser.most_mean_square = quantiser.error.real_mean_square * 10f64.powf(loss_db / 10.0);
     let lengths = Lengths::up_to(most);
     let (found, least) = scan(&quantiser, &lengths, allowance)?;
-    let chosen = match by_digits {
-        true => fewest_digits(&quantiser, &found[least], most)?,
-        false => leave_out(&quantiser, &found[least])?,
-    };
+    let few_taps = leave_out(&quantiser, &found[least])?;
+    let few_taps = Quantised { fixed_point: without_zeros(few_taps.fixed_point), ..few_taps };
+    let signed_digits_of_fewest_bits = few_taps.fixed_point.signed_digits();
+    let chosen = if *by_digits { fewest_digits(&quantiser, &few_taps, most)? } else { few_taps };
     let beside = &found[least.saturating_sub(BESIDE)..(least + BESIDE + 1).min(found.len())];
     let words = beside.iter().map(|found| quantiser.loss(found)).collect();
     let fixed_point = without_zeros(chosen.fixed_point);
@@ -57,7 +57,7 @@ pub fn quantise_within(
         snr_loss_db: 10.0 * decades(chosen.mean_square, quantiser.error.real_mean_square),
         taps_left_out: (0..problem.taps[0].len()).filter(|&n| is_left_out(&fixed_point, n)).count(),
         signed_digits: fixed_point.signed_digits(),
-        signed_digits_of_fewest_bits: found[least].fixed_point.signed_digits(),
+        signed_digits_of_fewest_bits,
     };
     Ok((fixed_point, WordStudy { real_gamma, words, choice: Some(choice) }))
 }

@@ -9,7 +9,6 @@
 use super::phases::{Change, Digits, Phases};
 use super::problem::Candidate;
 use super::quantiser::{Quantised, Quantiser};
-use super::search::Search;
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::spec::{MAX_FRACTION_BITS, WordLengths};
@@ -28,38 +27,34 @@ pub(super) fn fewest_digits(
     start: &Quantised,
     most: &WordLengths,
 ) -> Result<Quantised, DesignError> {
-    let error = &quantiser.error;
-    let mut best = Candidate {
-        fixed_point: start.fixed_point.clone(),
-        gamma: start.gamma,
-        mean_square: start.mean_square,
-    };
+    let Quantised { fixed_point, gamma, mean_square, rounded } = start.clone();
+    let mut best = Candidate { fixed_point, gamma, mean_square };
     for finer in FINER {
-        let scale = start.fixed_point.fraction_bits + finer;
-        let Some(bits) = start.fixed_point.bits.widened(finer) else { break };
-        let is_too_long = (0..error.problem.taps[0].len()).any(|n| bits.bits(n) > most.bits(n));
-        if is_too_long || scale > MAX_FRACTION_BITS || error.problem.stop.is_due() {
-            break;
+        let Some(words) = refined(&start.fixed_point, finer, most) else { break };
+        let mut phases = Phases::new(&quantiser.error, &words, mean_square);
+        phases.near_optimum()?;
+        while save_digits(&mut phases, quantiser.most_mean_square)? {}
+        let found = quantiser.error.candidate(shortened(phases.fixed_point(&words)))?;
+        let key = |found: &Candidate| (found.fixed_point.signed_digits(), found.gamma);
+        if found.mean_square <= quantiser.most_mean_square && key(&found) < key(&best) {
+            best = found;
         }
-        let near = Search::new(error.problem.taps, error, &bits, scale).run()?;
-        let near = near.into_iter().filter(|found| found.mean_square <= quantiser.most_mean_square);
-        for start in near
-            .min_by(|a, b| a.mean_square.total_cmp(&b.mean_square))
-            .into_iter()
-            .chain((finer == 0).then(|| best.clone()))
-        {
-            let mut phases = Phases::new(error, &start);
-            phases.improve(Digits::NoMore);
-            while save_digits(&mut phases, quantiser.most_mean_square) {}
-            let found = error.candidate(shortened(phases.fixed_point(&start.fixed_point)))?;
-            let key = |found: &Candidate| (found.fixed_point.signed_digits(), found.gamma);
-            if found.mean_square <= quantiser.most_mean_square && key(&found) < key(&best) {
-                best = found;
-            }
+        if quantiser.error.problem.stop.is_due() {
+            break;
         }
     }
     let Candidate { fixed_point, gamma, mean_square } = best;
-    Ok(Quantised { fixed_point, gamma, mean_square, rounded: start.rounded })
+    Ok(Quantised { fixed_point, gamma, mean_square, rounded })
+}
+
+/// The same taps with a step finer by so many bits; `None` beyond the most bits.
+fn refined(words: &FixedPoint, finer: i32, most: &WordLengths) -> Option<FixedPoint> {
+    let bits = words.bits.widened(finer)?;
+    let fits = (0..words.integers[0].len()).all(|n| bits.bits(n) <= most.bits(n));
+    let fraction_bits =
+        Some(words.fraction_bits + finer).filter(|bits| fits && *bits <= MAX_FRACTION_BITS)?;
+    let integers = words.integers.iter().map(|list| list.iter().map(|x| x << finer).collect()).collect();
+    Some(FixedPoint { bits, fraction_bits, integers })
 }
 
 /// The same taps with the longest step and the fewest bits that hold them.
@@ -75,7 +70,7 @@ fn shortened(words: FixedPoint) -> FixedPoint {
 
 /// Makes the first of the cheapest changes that save digits and, once the other taps follow, keep to the mean
 /// square; whether there is one.
-fn save_digits(phases: &mut Phases, most: f64) -> bool {
+fn save_digits(phases: &mut Phases, most: f64) -> Result<bool, DesignError> {
     let saving = |p: usize| {
         let changes = phases.all[p].changes(Digits::NoMore).filter(|change| change.saved > 0);
         changes.map(|change| (p, change)).collect::<Vec<_>>()
@@ -84,14 +79,29 @@ fn save_digits(phases: &mut Phases, most: f64) -> bool {
     let per_digit = |change: &Change| change.cost / change.saved as f64;
     all.sort_by(|(_, a), (_, b)| per_digit(a).total_cmp(&per_digit(b)));
     let least = phases.least_gain();
-    for (p, change) in all.into_iter().take(TRIALS) {
-        let mut changed = phases.all[p].clone();
-        changed.make(&change);
-        let mean_square = phases.mean_square + change.cost + changed.improve(least, Digits::NoMore);
-        if mean_square <= most {
-            (phases.all[p], phases.mean_square) = (changed, mean_square);
-            return true;
+    all.truncate(TRIALS);
+    // The others follow by single changes, or by a new search that keeps the changed one.
+    for follows in [Follows::ByChanges, Follows::ByLattice] {
+        for (p, change) in &all {
+            let mut changed = phases.all[*p].clone();
+            changed.make(change);
+            let cost = match follows {
+                Follows::ByChanges => changed.improve(least, Digits::NoMore),
+                Follows::ByLattice => changed.near_optimum_beside(change)?,
+            };
+            let mean_square = phases.mean_square + change.cost + cost;
+            if mean_square <= most && changed.digits() < phases.all[*p].digits() {
+                (phases.all[*p], phases.mean_square) = (changed, mean_square);
+                return Ok(true);
+            }
         }
     }
-    false
+    Ok(false)
+}
+
+/// How the other integers follow a change of one.
+#[derive(Debug, Clone, Copy)]
+enum Follows {
+    ByChanges,
+    ByLattice,
 }

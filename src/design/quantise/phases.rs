@@ -1,11 +1,12 @@
 //! The mean square as a function of the integers: quadratic, and of each phase of the output on its own.
 
-use super::lattice::Span;
-use super::problem::{Candidate, Tap, TapError};
+use super::lattice::{Span, closest};
+use super::problem::{RIDGE, Tap, TapError};
 use crate::bank::{FixedPoint, signed_digits};
+use crate::design::DesignError;
 use crate::design::error_grid::error_at;
 use crate::design::filters::polyphase;
-use crate::linalg::{CMat, Complex, Mat};
+use crate::linalg::{self, CMat, Complex, Mat};
 use crate::spec::MAX_BITS;
 
 /// Changes that lower the mean square, one after the other.
@@ -73,6 +74,51 @@ impl Phase {
             .for_each(|(slope, x)| *slope += by * x);
     }
 
+    /// Integers close to the real taps of least mean square, if these are better; what they cost.
+    fn near_optimum(&mut self) -> Result<f64, DesignError> {
+        let mut form = self.form.clone();
+        (0..self.taps.len()).for_each(|i| form[(i, i)] += RIDGE * form[(i, i)] + f64::MIN_POSITIVE);
+        let factor = linalg::cholesky(&form)?;
+        let slopes = Mat::from_column_slice(self.slopes.len(), 1, &self.slopes);
+        let solve = |lower: Mat| factor.tr_solve_lower_triangular(&lower);
+        let Some(from) = factor.solve_lower_triangular(&slopes).and_then(solve) else { return Ok(0.0) };
+        let centre: Vec<f64> =
+            self.integers.iter().zip(from.iter()).map(|(x, from)| *x as f64 - from).collect();
+        let near = closest(&factor, &centre, &self.spans);
+        let by = Mat::from_iterator(
+            near.len(),
+            1,
+            near.iter().zip(&self.integers).map(|(x, own)| x - *own as f64),
+        );
+        let bent = &self.form * &by;
+        let cost: f64 = by
+            .iter()
+            .zip(&self.slopes)
+            .zip(bent.iter())
+            .map(|((by, slope), bent)| by * (2.0 * slope + bent))
+            .sum();
+        if cost >= 0.0 {
+            return Ok(0.0);
+        }
+        self.integers = near.iter().map(|x| *x as i64).collect();
+        self.slopes.iter_mut().zip(bent.iter()).for_each(|(slope, x)| *slope += x);
+        Ok(cost)
+    }
+
+    /// [`Self::near_optimum`] of all integers but one that was changed.
+    pub(super) fn near_optimum_beside(&mut self, change: &Change) -> Result<f64, DesignError> {
+        let kept = Span { least: change.to as f64, most: change.to as f64 };
+        let span = std::mem::replace(&mut self.spans[change.tap], kept);
+        let cost = self.near_optimum();
+        self.spans[change.tap] = span;
+        cost
+    }
+
+    /// Canonical signed digits of all integers.
+    pub(super) fn digits(&self) -> u32 {
+        self.integers.iter().map(|integer| signed_digits(*integer)).sum()
+    }
+
     /// The change that lowers the mean square most, again and again, until none lowers it by `least`; what
     /// all of them cost.
     pub(super) fn improve(&mut self, least: f64, digits: Digits) -> f64 {
@@ -94,9 +140,9 @@ pub(super) struct Phases {
 }
 
 impl Phases {
-    /// Of integers.
-    pub(super) fn new(error: &TapError<'_>, start: &Candidate) -> Self {
-        let (words, ratio) = (&start.fixed_point, error.ratio);
+    /// Of integers with their mean square.
+    pub(super) fn new(error: &TapError<'_>, words: &FixedPoint, mean_square: f64) -> Self {
+        let ratio = error.ratio;
         let (step, taps) = (words.step(), words.taps());
         let lags = polyphase(&taps, ratio);
         let errors: Vec<CMat> = error.points.iter().map(|point| error_at(point, &lags)).collect();
@@ -120,7 +166,9 @@ impl Phases {
         let phase = |phase: usize| {
             let count = (taps[0].len() - phase).div_ceil(ratio);
             let of_lag = |lag| (0..taps.len()).map(move |channel| Tap { channel, lag });
-            let taps: Vec<Tap> = (0..count).flat_map(of_lag).collect();
+            let mut taps: Vec<Tap> = (0..count).flat_map(of_lag).collect();
+            // Taps with few bits are decided first, so that the others compensate for them.
+            taps.sort_by_key(|tap| std::cmp::Reverse(words.bits.bits(phase + tap.lag * ratio)));
             let own = |a: usize| noise(taps[a].channel);
             let form = Mat::from_fn(taps.len(), taps.len(), |a, b| {
                 step * step * (correlations.between(taps[a], taps[b]) + if a == b { own(a) } else { 0.0 })
@@ -137,7 +185,7 @@ impl Phases {
             }
         };
         let all = (0..ratio.min(taps[0].len())).map(phase).collect();
-        Self { all, mean_square: start.mean_square }
+        Self { all, mean_square }
     }
 
     /// Less than this is no gain.
@@ -145,7 +193,19 @@ impl Phases {
         LEAST_GAIN * self.mean_square
     }
 
-    /// Lowers the mean square.
+    /// Integers close to the real taps of least mean square.
+    ///
+    /// # Errors
+    /// [`DesignError::Linalg`] if a decomposition fails.
+    pub(super) fn near_optimum(&mut self) -> Result<(), DesignError> {
+        for phase in &mut self.all {
+            self.mean_square += phase.near_optimum()?;
+        }
+        self.improve(Digits::Any);
+        Ok(())
+    }
+
+    /// Lowers the mean square by single changes.
     pub(super) fn improve(&mut self, digits: Digits) {
         let least = self.least_gain();
         self.mean_square += self.all.iter_mut().map(|phase| phase.improve(least, digits)).sum::<f64>();

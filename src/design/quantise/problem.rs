@@ -105,7 +105,7 @@ fn output_noise(noise: &[f64], taps: &[Vec<f64>]) -> f64 {
 
 /// Added to the diagonal, because the form is singular for equal channels. Relative to each entry, because
 /// channels may differ by many decades.
-const RIDGE: f64 = 1e-12;
+pub(super) const RIDGE: f64 = 1e-12;
 
 /// A tap of a phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

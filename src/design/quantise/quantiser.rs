@@ -2,7 +2,7 @@
 
 use super::enumeration::Enumeration;
 use super::lattice::Span;
-use super::phases::{Digits, Phases};
+use super::phases::Phases;
 use super::problem::{Candidate, QuantisationProblem, TapError};
 use super::search::Search;
 use super::smaller_taps::{SmallerTaps, smaller_taps};
@@ -98,12 +98,12 @@ impl<'a> Quantiser<'a> {
         Ok(Quantised { fixed_point, gamma, mean_square, rounded })
     }
 
-    /// The candidate of least mean square, with changes that lower it further.
+    /// From the candidate of least mean square, one near the real taps of least mean square.
     fn improved(&self, found: &[Candidate]) -> Result<Option<Candidate>, DesignError> {
         let least = found.iter().min_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
         let improved = |start: &Candidate| {
-            let mut phases = Phases::new(&self.error, start);
-            phases.improve(Digits::Any);
+            let mut phases = Phases::new(&self.error, &start.fixed_point, start.mean_square);
+            phases.near_optimum()?;
             self.error.candidate(phases.fixed_point(&start.fixed_point))
         };
         least.map(improved).transpose()

@@ -100,7 +100,10 @@ fn bits_are_chosen_for_a_loss() {
             None => bits.as_u64().unwrap(),
         };
         // The bank says what was chosen, not the wish.
-        assert_eq!((&bank["spec"]["design"]["bits"], &bank["spec"]["design"]["loss_db"]), (bits, &Value::Null));
+        assert_eq!(
+            (&bank["spec"]["design"]["bits"], &bank["spec"]["design"]["loss_db"]),
+            (bits, &Value::Null)
+        );
         assert!(desk.good(&["verify", "chosen.json"]).contains("integers of"));
         // One bit fewer loses more, chosen or not.
         let fewer = (most - 1).to_string();
