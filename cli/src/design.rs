@@ -37,6 +37,8 @@ Examples:
   hybank design spec.toml -o iir.json --method iir
   hybank design spec.toml -o bank.json --method h2 --snr 90
   hybank design spec.toml -o fixed.json --taps 64 --bits 14
+  hybank design spec.toml -o fixed.json --loss-db 0.1
+  hybank design spec.toml -o digits.json --loss-db 0.1 --digits
   hybank design spec.toml -o small.json --method iir --order 6
   hybank design spec.toml -o small.json --method iir --reduction-loss-db 0.5
   hybank design spec.toml -o - --taps 64 | hybank analyze -")]
@@ -68,6 +70,13 @@ pub(super) struct Args {
     /// A tap is its integer times 2^-FRACTION_BITS; chosen for the least gamma if left out
     #[arg(long)]
     fraction_bits: Option<i32>,
+    /// Integer taps of the fewest bits (of --bits at most), and of the fewest taps of that length, that lose at
+    /// most this many decibels of SNR relative to the real taps
+    #[arg(long, value_name = "DB", conflicts_with = "fraction_bits")]
+    loss_db: Option<f64>,
+    /// With --loss-db: taps of the fewest canonical signed digits, for multiplication by shifts and adders
+    #[arg(long, requires = "loss_db")]
+    digits: bool,
     /// Taps that follow the delays while the bank runs, optimal over the delays of the spec's [uncertainty]
     /// (method fir)
     #[arg(long, value_parser = named(Tracking::ALL.map(|tracking| (tracking.name(), tracking))))]
@@ -115,6 +124,8 @@ fn overrides(args: &Args) -> DesignOverrides {
         gamma_margin: args.gamma_margin,
         bits: args.bits.clone(),
         fraction_bits: args.fraction_bits,
+        loss_db: args.loss_db,
+        digits: args.digits,
         tracking: args.tracking,
         reduction: args.order.map(Reduction::Order).or(args.reduction_loss_db.map(Reduction::Loss)),
     }

@@ -172,7 +172,7 @@ impl<'a> Report<'a> {
         let terms = [self.heading(), figure_text(&self.judged.figures, self.is_normalised)].concat();
         if !verbose {
             let unfinished = if self.is_far_from_finished() { self.unfinished_text() } else { String::new() };
-            return terms + &self.gamma_line() + &unfinished + &self.hint();
+            return terms + &self.gamma_line() + &self.choice() + &unfinished + &self.hint();
         }
         let parts = [
             format!("{}\n", self.understood),
@@ -181,6 +181,7 @@ impl<'a> Report<'a> {
             self.unfinished_text(),
             self.mean_text(),
             self.hint(),
+            self.choice(),
             self.words.as_ref().map(Words::text).unwrap_or_default(),
             self.reduction.map(|reduction| order_text(reduction, self.method)).unwrap_or_default(),
             self.robust
@@ -214,6 +215,11 @@ impl Report<'_> {
     /// Whether the least gamma may be lower by an amount that decides anything: 1 % is 0.09 dB.
     fn is_far_from_finished(&self) -> bool {
         self.unfinished.is_some_and(|left| left.width > 0.01)
+    }
+
+    /// How integer taps were chosen for a loss.
+    fn choice(&self) -> String {
+        self.words.as_ref().map(Words::choice_text).unwrap_or_default()
     }
 
     fn unfinished_text(&self) -> String {

@@ -1,18 +1,19 @@
 //! What a design reports of integer taps, uncertain channels, the order, and a band in the spec.
 
-use hybank::bank::Bank;
+use hybank::bank::{Bank, FixedPoint};
 use hybank::design::quantise::WordStudy;
 use hybank::design::{
     Design, DesignError, Options, OrderErrorPoint, OrderReduction, RobustStudy, TrackingStudy, design,
 };
 use hybank::figures::{snr, target_band};
-use hybank::overview::{band, decibels_of};
-use hybank::spec::{Method, SignalSpec, Spec};
+use hybank::overview::{band, counted, decibels_of};
+use hybank::spec::{Method, SignalSpec, Spec, WordLengths};
 use hybank::units::{Decibels, Hertz};
 
 /// The increase of the error by integer taps.
 #[derive(Debug, serde::Serialize)]
 pub(super) struct Words<'a> {
+    bits: &'a WordLengths,
     fraction_bits: i32,
     /// gamma of these integers over that of the real taps, both computed, in decibels.
     loss_db: f64,
@@ -24,7 +25,34 @@ impl<'a> Words<'a> {
     pub(super) fn of(design: &'a Design) -> Option<Self> {
         let (integers, study) = design.bank.fixed_point.as_ref().zip(design.words.as_ref())?;
         let loss_db = study.loss_db(design.bank.gamma.norm?);
-        Some(Self { fraction_bits: integers.fraction_bits, loss_db, study })
+        let FixedPoint { bits, fraction_bits, .. } = integers;
+        Some(Self { bits, fraction_bits: *fraction_bits, loss_db, study })
+    }
+
+    /// What was chosen for a loss, and why.
+    pub(super) fn choice_text(&self) -> String {
+        let Some(choice) = &self.study.choice else { return String::new() };
+        let fewest = self.study.words.iter().position(|word| word.mean_square_loss_db <= choice.allowed_db);
+        let fewest = fewest.unwrap_or_default();
+        let fewer = fewest.checked_sub(1).map(|fewer| &self.study.words[fewer]);
+        let why = match (choice.by_digits, fewer) {
+            (true, _) => format!(
+                "taps of the fewest bits, {}, have {} digits",
+                self.study.words[fewest].bits, choice.signed_digits_of_fewest_bits
+            ),
+            (false, Some(word)) => format!("{} lose {:.3} dB", word.bits, word.mean_square_loss_db),
+            (false, None) => "no tap has fewer bits".to_owned(),
+        };
+        format!(
+            "words      {} times 2^{}, {} left out, {}\n\
+             \x20          {:.3} dB of the SNR of the real taps lost, {} allowed; {why}\n",
+            self.bits,
+            -self.fraction_bits,
+            counted(choice.taps_left_out, "tap"),
+            counted(choice.signed_digits as usize, "signed digit"),
+            choice.snr_loss_db,
+            choice.allowed_db,
+        )
     }
 
     pub(super) fn text(&self) -> String {

@@ -28,20 +28,20 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  hybank export bank.json --to c -o bank.h
+  hybank export bank.json --format c -o bank.h
   hybank export bank.json -o bank.npz
   hybank export fixed.json -o taps.coe
   hybank export fixed.json -o bank.h --input-bits 12
   hybank export fixed.json -o core.v --input-bits 12 --output-bits 14 --testbench test
   hybank export fixed.json -o core.v --input-bits 12 --clocks-per-frame 8 --pipeline 2
   hybank export fixed.json -o core.v --input-bits 12 --multipliers shift-add --json
-  hybank export recursive.json --to sos -o sections.csv")]
+  hybank export recursive.json --format sos -o sections.csv")]
 pub(super) struct Args {
     /// The bank (JSON); `-` is standard input
     bank: PathBuf,
     /// The format [default: that of the output's extension: h, v, csv, npz, mat, coe or mem]
-    #[arg(long, visible_alias = "format", value_enum)]
-    to: Option<Format>,
+    #[arg(long, value_enum)]
+    format: Option<Format>,
     /// The file to write; `-` is standard output
     #[arg(short, long)]
     output: PathBuf,
@@ -63,7 +63,7 @@ pub(super) struct Args {
 }
 
 impl Args {
-    fn format(&self) -> Result<Format, Failure> {
+    fn chosen_format(&self) -> Result<Format, Failure> {
         let extension = self.output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
         let extension = extension.to_ascii_lowercase();
         // A header is the only C that is written, and a table of sections has the ending of any CSV.
@@ -74,8 +74,8 @@ impl Args {
                 .ok()
                 .filter(|format| !matches!(format, Format::C99 | Format::Sos)),
         };
-        self.to.or(meant).ok_or_else(|| {
-            let message = "the name does not say which format it is to have; give --to c, verilog, csv, npz, mat, coe, mem or sos";
+        self.format.or(meant).ok_or_else(|| {
+            let message = "the name does not say which format it is to have; give --format c, verilog, csv, npz, mat, coe, mem or sos";
             Failure::Usage(format!("{}: {message}", Quoted(&self.output)))
         })
     }
@@ -136,15 +136,18 @@ impl VerilogArgs {
 #[derive(Debug, serde::Serialize)]
 struct Report {
     output: String,
+    /// The folder of a testbench.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    testbench: Option<String>,
     /// What a Verilog module takes.
     #[serde(flatten)]
     circuit: Option<Circuit>,
 }
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
-    let format = args.format()?;
+    let format = args.chosen_format()?;
     if format != Format::Verilog && args.verilog.is_given() {
-        let message = "these options describe a circuit; give --to verilog, or leave out --output-bits, --accumulator, \
+        let message = "these options describe a circuit; give --format verilog, or leave out --output-bits, --accumulator, \
              --clocks-per-frame, --pipeline, --multipliers and --testbench";
         return Err(Failure::Usage(message.to_owned()));
     }
@@ -164,7 +167,10 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         }
     };
     match args.json {
-        true => print_json(&Report { output: args.output.display().to_string(), circuit }),
+        true => {
+            let testbench = args.verilog.testbench.as_ref().map(|folder| folder.display().to_string());
+            print_json(&Report { output: args.output.display().to_string(), testbench, circuit })
+        }
         false => Ok(()),
     }
 }

@@ -1,7 +1,7 @@
 #!/bin/sh
 # From captures to hardware: four 12-bit converters are calibrated, a bank with taps of 14 bits is designed for
-# them and exported as Verilog, and the circuit runs on captures in a simulator. Its outputs are those of
-# `fuse --bit-true`, and their SFDR is that of the floating-point bank.
+# them and exported as Verilog, and the circuit runs on captures in a simulator. Its outputs must equal those of
+# `fuse --bit-true`; the SFDR of both is printed beside that of the floating-point bank.
 #
 #   sh examples/fpga/run.sh [FOLDER]      needs Icarus Verilog; everything goes into FOLDER, by default a new one
 set -eu

@@ -147,7 +147,7 @@ def quad():
             row(unit, f"{tone:.0f} MHz", *map(both, found))
 
 
-# 2. Four converters of 250 MS/s and 12 bits behind filters of 600 MHz, calibrated by five tones.
+# 2. Four converters of 250 MS/s and 12 bits after filters of 600 MHz, calibrated by five tones.
 
 FOUR = """fast_rate = "1 GS/s"
 ratio = 4
@@ -195,7 +195,7 @@ def four():
         row(tone.replace("MHz", " MHz"), *map(shown, found))
 
 
-# 3. An intermediate frequency behind a band-pass of order 4.
+# 3. An intermediate frequency after a band-pass of order 4.
 
 IF = """fast_rate = "1 GS/s"
 ratio = 4
@@ -229,7 +229,7 @@ def intermediate():
     for name in ("if", "measured"):
         hybank("design", f"{name}.toml", "-o", f"{name}.json", "--force")
     known = simple.Errors([(channels("training", 4), [tone * 1e6 for tone in tones])], rate, 3)
-    print("\nSFDR and SINAD of tones behind a band-pass of order 4 from 600 to 900 MHz, without `--tone`.\n")
+    print("\nSFDR and SINAD of tones after a band-pass of order 4 from 600 to 900 MHz, without `--tone`.\n")
     head("tone", "as captured", "spec of the drawing", "calibrated", "numpy: gains and offsets")
     shown = lambda found: f"{found['sfdr_db']:.1f} dBc, {found['sinad_db']:.1f} dB"
     for tone in ("671.3MHz", "702.1MHz", "851.9MHz"):

@@ -529,6 +529,8 @@ def design(
     gamma_margin: float | np.number[Any] | None = None,
     bits: int | Sequence[int] | np.integer[Any] | NDArray[Any] | None = None,
     fraction_bits: int | np.integer[Any] | None = None,
+    loss_db: float | np.number[Any] | None = None,
+    digits: bool | None = None,
     order: int | np.integer[Any] | None = None,
     reduction_loss_db: float | np.number[Any] | None = None,
     noise: float | np.number[Any] | None = None,

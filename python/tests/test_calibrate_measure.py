@@ -143,7 +143,7 @@ def test_a_tone_in_noise_has_the_figures_of_its_formulas():
 def test_exports_are_those_of_the_command_line(binary, filters, tmp_path, format, to):  # noqa: A002
     bank = hb.load(filters / "thesis-fir.json")
     bank.export(tmp_path / "python", format=format)
-    command = [binary, "export", filters / "thesis-fir.json", "--to", to, "-o", tmp_path / "command"]
+    command = [binary, "export", filters / "thesis-fir.json", "--format", to, "-o", tmp_path / "command"]
     subprocess.run(command, check=True, capture_output=True)
     assert (tmp_path / "python").read_bytes() == (tmp_path / "command").read_bytes()
     with pytest.raises(hb.HybankError, match="choose c99"):

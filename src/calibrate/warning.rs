@@ -131,7 +131,8 @@ pub enum Warning {
     },
     /// All delays, and the latency, were raised so that none is negative.
     #[error(
-        "fast periods added to all delays and to the latency, because a delay would be negative: {periods}"
+        "fast periods added to all delays and to the latency, because a delay would be negative: {periods}; the output without \
+         its latency begins with the sample as many fast periods after the first"
     )]
     Shifted {
         /// Whole fast periods.

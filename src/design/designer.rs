@@ -14,7 +14,7 @@ use super::realise::{Realised, realise};
 use super::reduction::OrderReduction;
 use super::unfinished::Unfinished;
 use super::{DesignError, filters, prove, uncertainty};
-use crate::bank::{Bank, Gamma, SynthesisFilters};
+use crate::bank::{Bank, FixedPoint, Gamma, SynthesisFilters};
 use crate::spec::{DesignSpec, Method, Spec, SpecProblem};
 use crate::units::RadiansPerSlowPeriod;
 use crate::verify::uncertainty::{ErrorBox, Taps, certifies};
@@ -186,6 +186,7 @@ fn complete(spec: &Spec, options: &Options<'_>, stop: &Stop) -> Result<(Spec, Pr
 fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis) -> Design {
     let Realised { filters, peak, rounding, reduction, integers } = realised;
     let (fixed_point, words) = integers.unzip();
+    let complete = with_chosen_words(complete, fixed_point.as_ref());
     let bank = Bank {
         fast_period: complete.fast_period,
         ratio: complete.ratio,
@@ -217,6 +218,15 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
         proof_time: Duration::ZERO,
         bank,
     }
+}
+
+/// The spec with the bits that were chosen for a loss.
+fn with_chosen_words(mut spec: Spec, words: Option<&FixedPoint>) -> Spec {
+    if spec.design.loss_db.take().is_some() {
+        spec.design.bits = words.map(|words| words.bits.clone());
+        spec.design.digits = false;
+    }
+    spec
 }
 
 impl Design {

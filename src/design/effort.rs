@@ -53,8 +53,11 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
     if proving {
         effort = effort.then(sizes.proof());
     }
-    if spec.design.bits.is_some() {
-        effort = effort.then(sizes.integers());
+    if spec.design.has_integers() {
+        // For a loss, more word lengths, and taps left out.
+        let integers = sizes.integers();
+        let searches = if spec.design.loss_db.is_some() { 3.0 } else { 1.0 };
+        effort = effort.then(Effort { seconds: searches * integers.seconds, ..integers });
     }
     if spec.design.reduction.is_some() {
         // A norm for each order that is visited, and the refinement of its poles.
@@ -93,7 +96,7 @@ pub(super) fn check(spec: &Spec, proving: bool, limits: Limits) -> Result<Effort
 /// What makes the design of a spec shorter.
 pub fn remedy(spec: &Spec) -> &'static str {
     match spec.design.method {
-        Method::Fir if spec.design.bits.is_some() => {
+        Method::Fir if spec.design.has_integers() => {
             "use fewer taps, leave out bits, take a smaller ratio or fewer channels"
         }
         Method::Fir if spec.design.tracking.is_some() => {

@@ -9,7 +9,7 @@ use crate::lmi::LmiError;
 use crate::lti::{LtiError, StateSpaceError};
 use crate::messages::Number;
 use crate::sampling::SamplingError;
-use crate::spec::SpecProblem;
+use crate::spec::{SpecProblem, WordLengths};
 use crate::units::FastPeriods;
 use crate::verify::VerifyError;
 use std::time::Duration;
@@ -98,6 +98,19 @@ pub enum DesignError {
         fraction_bits: i32,
         /// The finest scale at which no tap is clipped.
         fitting: i32,
+    },
+    /// The most bits that integer taps may have lose more than is allowed.
+    #[error(
+        "integer taps of {bits} lose {best:.3} dB of SNR or more, and loss_db = {allowed} is allowed: allow more bits, or a \
+         larger loss"
+    )]
+    WordsLoseMore {
+        /// The most that were allowed.
+        bits: WordLengths,
+        /// What they lose, in decibels.
+        best: f64,
+        /// The most that may be lost.
+        allowed: f64,
     },
     /// The settings of `separation` lack the channels in units of the slow period.
     #[error(

@@ -182,11 +182,20 @@ impl<'a> ErrorGrid<'a> {
     /// The mean square of the first scenario's error per slow period, for white noise of unit density at the
     /// analog input, by the trapezoidal rule on the equidistant frequencies.
     pub(super) fn mean_square(&self, taps: &[Mat]) -> f64 {
-        let (response, uniform) = (self.response(taps), &self.frequencies.uniform);
+        let (response, weights) = (self.response(taps), self.mean_weights());
+        let square = |k: usize| weights[k] * self.error(0, k, &response).norm_squared();
+        self.frequencies.uniform.iter().map(|&k| square(k)).sum()
+    }
+
+    /// The weight of each point in [`Self::mean_square`].
+    pub(super) fn mean_weights(&self) -> Vec<f64> {
+        let Frequencies { all, uniform, .. } = &self.frequencies;
         let last = uniform.len() - 1;
-        let weight = |k: usize| if k == 0 || k == last { 0.5 } else { 1.0 };
-        let square = |k: usize| weight(k) * self.error(0, uniform[k], &response).norm_squared();
-        (0..=last).map(square).sum::<f64>() / last as f64
+        let mut weights = vec![0.0; all.len()];
+        for (k, &index) in uniform.iter().enumerate() {
+            weights[index] = if k == 0 || k == last { 0.5 } else { 1.0 } / last as f64;
+        }
+        weights
     }
 
     /// The peaks of the errors with `taps` above `level`. The estimate is that of gamma if gamma is above

@@ -7,13 +7,13 @@ use super::merging::{MergedChannels, Repeats};
 use super::methods::{Filters, Synthesis};
 use super::plant::LiftedPlant;
 use super::problem::Problem;
-use super::quantise::{QuantisationProblem, WordStudy, quantise};
+use super::quantise::{Allowance, QuantisationProblem, WordStudy, quantise, quantise_within};
 use super::reduction::{Aim, OrderReduction, ReductionProblem, reduce};
 use super::{DesignError, filters};
 use crate::bank::{FixedPoint, SynthesisFilters};
 use crate::lti::peak::Peak;
 use crate::lti::{FirWithTail, LtiError, StateSpace};
-use crate::spec::{Method, Spec};
+use crate::spec::{MAX_BITS, Method, Spec, WordLengths};
 
 /// A change of coordinates may increase gamma by this fraction.
 const REALISATION_ACCURACY: f64 = 1e-8;
@@ -80,17 +80,24 @@ impl Realisation<'_> {
 
     /// Quantises the taps if the spec asks for integer taps.
     fn with_integers(&self, real: Realised) -> Result<Realised, DesignError> {
-        let (SynthesisFilters::Fir(taps), Some(bits)) = (&real.filters, &self.spec.design.bits) else {
-            return Ok(real);
-        };
+        let design = &self.spec.design;
+        let SynthesisFilters::Fir(taps) = &real.filters else { return Ok(real) };
         let problem = QuantisationProblem {
             plant: self.whole,
             taps,
             noise: &self.whole.problem().noise,
-            gamma_margin: self.spec.design.gamma_margin.unwrap_or(0.0),
+            gamma_margin: design.gamma_margin.unwrap_or(0.0),
             stop: self.stop,
         };
-        let (integers, study) = quantise(problem, real.peak.gain, bits, self.spec.design.fraction_bits)?;
+        let gamma = real.peak.gain;
+        let (integers, study) = match (&design.bits, design.loss_db) {
+            (bits, Some(loss_db)) => {
+                let most = bits.clone().unwrap_or(WordLengths::Same(MAX_BITS));
+                quantise_within(problem, gamma, &Allowance { loss_db, most, by_digits: design.digits })?
+            }
+            (Some(bits), None) => quantise(problem, gamma, bits, design.fraction_bits)?,
+            (None, None) => return Ok(real),
+        };
         let evaluated = evaluate(self.whole, SynthesisFilters::Fir(integers.taps()))?;
         Ok(Realised { integers: Some((integers, study)), ..evaluated })
     }

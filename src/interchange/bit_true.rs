@@ -170,15 +170,14 @@ impl IntegerFilters {
             bank.layout().each(&bank.offsets).iter().map(|offset| offset * full_scale).collect();
         // Sums of 62 bits in doubles: their rounding is far below a step of the outputs.
         let constant = |p: usize| {
-            let of_channel = |i: usize| (0..taps.lags).map(move |j| (i, j));
-            let entries = (0..taps.channels).flat_map(of_channel);
-            entries.map(|(i, j)| taps.get(i, p, j) as f64 * steps[i]).sum::<f64>().round() as i64
+            let sum: f64 = taps.of_phase(p).map(|(i, tap)| tap as f64 * steps[i]).sum();
+            sum.round() as i64
         };
         let constants: Vec<i64> = (0..taps.ratio).map(constant).collect();
         let resting = steps.iter().map(|step| step.round().clamp(-full_scale, (full_scale - 1.0).max(0.0)));
         let filters = Self { resting: resting.map(|x| x as i64).collect(), constants, taps };
         // Rounding adds half of the largest sum at most.
-        let sum = filters.largest_sum(32);
+        let sum = filters.largest_sum();
         if sum >= 1 << 62 { Err(ExportError::Accumulator { sum: (sum >> 31) as u64 }) } else { Ok(filters) }
     }
 
@@ -187,27 +186,24 @@ impl IntegerFilters {
         self.constants.iter().chain(&self.resting).any(|x| *x != 0)
     }
 
-    /// The least and the largest sum of a phase without its constant, of samples of so many bits.
+    /// The least and the largest sum of a phase, of samples of so many bits.
     pub(super) fn sums(&self, phase: usize, sample_bits: u32) -> Range {
-        let taps = &self.taps;
-        let entries = (0..taps.channels).flat_map(|i| (0..taps.lags).map(move |j| (i, j)));
-        let products = entries.map(|(i, j)| Range::of_bits(sample_bits).times(taps.get(i, phase, j).into()));
-        products.fold(Range::from(0), Range::plus)
+        let start = Range::from(-i128::from(self.constants[phase]));
+        let product = |(_, tap): (usize, i64)| Range::of_bits(sample_bits).times(tap.into());
+        self.taps.of_phase(phase).map(product).fold(start, Range::plus)
     }
 
     /// Bits of an accumulator that no sum of samples of so many bits can leave.
     pub(super) fn needed_bits(&self, sample_bits: u32) -> u32 {
-        1 + u128::BITS - self.largest_sum(sample_bits).leading_zeros()
+        (0..self.taps.ratio).map(|p| self.sums(p, sample_bits).bits()).max().unwrap_or(1)
     }
 
-    /// The largest modulus of a sum of samples of so many bits.
-    fn largest_sum(&self, sample_bits: u32) -> u128 {
-        let taps = &self.taps;
+    /// What no sum of 32-bit samples exceeds, constants included.
+    fn largest_sum(&self) -> u128 {
         let of_phase = |p: usize| {
-            let entries = (0..taps.channels).flat_map(|i| (0..taps.lags).map(move |j| (i, j)));
-            let moduli: u128 = entries.map(|(i, j)| u128::from(taps.get(i, p, j).unsigned_abs())).sum();
-            (moduli << (sample_bits - 1)) + u128::from(self.constants[p].unsigned_abs())
+            let moduli: u128 = self.taps.of_phase(p).map(|(_, tap)| u128::from(tap.unsigned_abs())).sum();
+            (moduli << 31) + u128::from(self.constants[p].unsigned_abs())
         };
-        (0..taps.ratio).map(of_phase).max().unwrap_or(0)
+        (0..self.taps.ratio).map(of_phase).max().unwrap_or(0)
     }
 }

@@ -30,6 +30,12 @@ impl<T: Copy + Default + PartialEq> PolyphaseTaps<T> {
         self.values[(channel * self.ratio + phase) * self.lags + lag]
     }
 
+    /// The taps of a phase, each with its channel, in the order of the file.
+    pub fn of_phase(&self, phase: usize) -> impl Iterator<Item = (usize, T)> {
+        let of_channel = move |i: usize| (0..self.lags).map(move |j| (i, self.get(i, phase, j)));
+        (0..self.channels).flat_map(of_channel)
+    }
+
     /// Taps that are not zero: the multiplications of a slow period.
     pub fn nonzero(&self) -> usize {
         self.values.iter().filter(|value| **value != T::default()).count()

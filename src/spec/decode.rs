@@ -30,13 +30,15 @@ const TOP_KEYS: [&str; 12] = [
 const TARGET_KEYS: [&str; 1] = ["filter"];
 const CHANNEL_KEYS: [&str; 9] =
     ["delay", "delay_samples", "rate", "filter", "noise", "bits", "jitter", "gain", "offset"];
-const DESIGN_KEYS: [&str; 10] = [
+const DESIGN_KEYS: [&str; 12] = [
     "method",
     "taps",
     "target_snr_db",
     "gamma_margin",
     "bits",
     "fraction_bits",
+    "loss_db",
+    "digits",
     "tracking",
     "order",
     "reduction_loss_db",
@@ -372,6 +374,8 @@ fn written(table: &Fields<'_>) -> Result<DesignOverrides, Fault> {
         gamma_margin: table.read("gamma_margin", |v| v.number_in(limits::check_gamma_margin))?,
         bits: table.read("bits", |v| word_lengths(&v))?,
         fraction_bits: table.read("fraction_bits", |v| fraction_bits(&v))?,
+        loss_db: table.read("loss_db", |v| v.number_in(limits::check_word_loss))?.map(|db| db + 0.0),
+        digits: table.read("digits", |v| v.boolean())?.unwrap_or(false),
         tracking: table.read("tracking", |v| v.name("tracking", &Tracking::ALL.map(|t| (t.name(), t))))?,
         reduction: match table.either(
             "order",

@@ -48,12 +48,18 @@ pub struct DesignTable<M> {
     /// Relative excess over the optimal gamma that the designer may spend on a smaller mean-square error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gamma_margin: Option<f64>,
-    /// Bits of the taps, for integer taps.
+    /// Bits of the taps, for integer taps; beside `loss_db` the most that may be chosen.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bits: Option<WordLengths>,
     /// Taps are integers times 2^-fraction_bits; `None` lets the designer choose.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fraction_bits: Option<i32>,
+    /// Integer taps of the fewest bits that lose at most so many decibels of SNR, in place of `bits`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loss_db: Option<f64>,
+    /// Whether `loss_db` asks for few signed digits, not for few bits.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub digits: bool,
     /// Taps that follow the delays, for the method `fir`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking: Option<Tracking>,
@@ -89,7 +95,7 @@ struct Key {
 }
 
 /// The keys that not every method reads.
-const KEYS: [Key; 8] = {
+const KEYS: [Key; 10] = {
     use Method::{Fir, H2, Iir, Separation, Sinc};
     [
         Key { name: "taps", methods: &[Fir, H2, Sinc, Separation], advised: "fir or h2" },
@@ -97,6 +103,8 @@ const KEYS: [Key; 8] = {
         Key { name: "gamma_margin", methods: &[Fir, Iir], advised: "fir or iir" },
         Key { name: "bits", methods: &[Fir], advised: "fir" },
         Key { name: "fraction_bits", methods: &[Fir], advised: "fir" },
+        Key { name: "loss_db", methods: &[Fir], advised: "fir" },
+        Key { name: "digits", methods: &[Fir], advised: "fir" },
         Key { name: "tracking", methods: &[Fir], advised: "fir" },
         Key { name: "order", methods: &[Iir, H2], advised: "iir or h2" },
         Key { name: "reduction_loss_db", methods: &[Iir, H2], advised: "iir or h2" },
@@ -162,6 +170,8 @@ impl<M> DesignTable<M> {
             gamma_margin: self.gamma_margin,
             bits: self.bits,
             fraction_bits: self.fraction_bits,
+            loss_db: self.loss_db,
+            digits: self.digits,
             tracking: self.tracking,
             reduction: self.reduction,
         }
@@ -175,6 +185,8 @@ impl<M> DesignTable<M> {
             ("gamma_margin", self.gamma_margin.is_some()),
             ("bits", self.bits.is_some()),
             ("fraction_bits", self.fraction_bits.is_some()),
+            ("loss_db", self.loss_db.is_some()),
+            ("digits", self.digits),
             ("tracking", self.tracking.is_some()),
         ];
         keys.into_iter()
@@ -194,6 +206,11 @@ impl DesignSpec {
     pub fn is_fir(&self) -> bool {
         let asks_for_taps = self.taps.is_some() || self.target_snr_db.is_some();
         self.method.has_taps() || (self.method.reads("taps") && asks_for_taps)
+    }
+
+    /// Whether the taps are integers.
+    pub fn has_integers(&self) -> bool {
+        self.bits.is_some() || self.loss_db.is_some()
     }
 
     /// A method, with taps if it makes FIR filters, and no other keys.
@@ -241,6 +258,11 @@ impl DesignSpec {
         }
         blame("fraction_bits", self.fraction_bits.map_or(Ok(()), check_fraction_bits))?;
         blame("bits", self.bits.as_ref().map_or(Ok(()), |bits| bits.check(self.taps)))?;
+        blame("loss_db", self.loss_db.map_or(Ok(()), limits::check_word_loss))?;
+        if self.digits && self.loss_db.is_none() {
+            let remedy = "digits are the fewest for a loss, for example loss_db = 0.1";
+            return blame("digits", Err(SpecProblem::MissingKey { key: "loss_db", remedy }));
+        }
         if self.fraction_bits.is_some() && self.bits.is_none() {
             let remedy = "fraction_bits sets the binary point of integer taps, whose word length bits gives, for example bits = 16";
             return blame("fraction_bits", Err(SpecProblem::MissingKey { key: "bits", remedy }));
@@ -273,10 +295,15 @@ impl DesignSpec {
         let conflict =
             |first, second, remedy| Some((second, SpecProblem::Conflict { first, second, remedy }));
         match self.reduction {
-            _ if self.bits.is_some() && self.tracking.is_some() => conflict(
-                "bits",
+            _ if self.has_integers() && self.tracking.is_some() => conflict(
+                if self.bits.is_some() { "bits" } else { "loss_db" },
                 "tracking",
                 "taps that follow the delays are no integers; leave out one of the two",
+            ),
+            _ if self.loss_db.is_some() && self.fraction_bits.is_some() => conflict(
+                "loss_db",
+                "fraction_bits",
+                "the loss decides the step of the taps; leave out one of the two",
             ),
             _ if self.taps.is_some() && self.target_snr_db.is_some() => {
                 conflict("taps", "target_snr_db", "the SNR decides how many taps there are, keep one of them")
@@ -332,6 +359,8 @@ impl DesignOverrides {
             gamma_margin: self.gamma_margin.or(file.gamma_margin.filter(|_| keeps("gamma_margin"))),
             bits: self.bits.or(file.bits.filter(|_| keeps("bits"))),
             fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| keeps("fraction_bits"))),
+            loss_db: self.loss_db.or(file.loss_db.filter(|_| keeps("loss_db"))),
+            digits: self.digits || file.digits && keeps("digits"),
             tracking: self.tracking.or(file.tracking.filter(|_| keeps("tracking"))),
             reduction: self.reduction.or(file.reduction.filter(|_| keeps("order"))),
         }

@@ -34,6 +34,9 @@ pub const MAX_TARGET_SNR_DB: f64 = 300.0;
 /// Largest loss by order reduction of a spec; a larger one would leave no state.
 pub const MAX_REDUCTION_LOSS_DB: f64 = 400.0;
 
+/// Largest loss by integer taps; one that loses more is of other taps.
+const MAX_WORD_LOSS_DB: f64 = 20.0;
+
 /// Largest share by which gamma may exceed its optimum; no bank that is worth anything is so far from it.
 const MAX_GAMMA_MARGIN: f64 = 1e6;
 
@@ -201,6 +204,14 @@ pub(crate) fn check_reduction_loss(db: f64) -> Result<(), SpecProblem> {
          0 removes only states without effect"
     );
     within(db, 0.0..=MAX_REDUCTION_LOSS_DB, "dB", rule)
+}
+
+/// Decibels of SNR that integer taps may lose.
+pub(super) fn check_word_loss(db: f64) -> Result<(), SpecProblem> {
+    let rule = format!(
+        "loss_db is how much of the SNR integer taps may lose, above 0 and at most {MAX_WORD_LOSS_DB} dB; 0.1 is usual"
+    );
+    within(db, f64::MIN_POSITIVE..=MAX_WORD_LOSS_DB, "dB", rule)
 }
 
 /// Relative excess over the optimal gamma.

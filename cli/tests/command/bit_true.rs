@@ -40,7 +40,7 @@ fn the_model_has_the_bits_of_the_exported_c() {
     for (bits, fraction_bits) in [(16, 7), (24, 6), (32, 9)] {
         let desk = desk(fraction_bits);
         let input = captures(&desk, bits);
-        desk.good(&["export", "b.json", "--to", "c", "-o", "bank.h"]);
+        desk.good(&["export", "b.json", "--format", "c", "-o", "bank.h"]);
         if !compiled(&desk, "int32_t", 2, 2) {
             return;
         }
@@ -70,7 +70,7 @@ fn offsets_are_subtracted_from_the_sums() {
     for (bits, fraction_bits) in [(16, 7), (24, 6), (32, 9)] {
         let desk = desk_of(&spec, fraction_bits);
         let input = captures(&desk, bits);
-        let to_c = ["export", "b.json", "--to", "c", "-o", "bank.h"];
+        let to_c = ["export", "b.json", "--format", "c", "-o", "bank.h"];
         desk.refused(1, &to_c, &["channel 1 has the offset 0.0123456 of full scale", "--input-bits B"]);
         desk.good(&[&to_c[..], &["--input-bits", &bits.to_string()]].concat());
         let report = desk.report(&[&FUSE[..], &["--keep-latency"]].concat());
@@ -206,7 +206,7 @@ fn what_has_no_integers_is_refused() {
     let floats = ["fuse", "b.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "x.wav", "--bit-true"];
     desk.refused(1, &floats, &["cap/ch1.wav", "f32le", "16, 24 or 32 bits"]);
     desk.refused(2, &[&FUSE[..], &["--bits", "16"]].concat(), &["--bit-true", "--bits"]);
-    let words = ["export", "b.json", "--to", "csv", "-o", "x.csv", "--input-bits", "12"];
+    let words = ["export", "b.json", "--format", "csv", "-o", "x.csv", "--input-bits", "12"];
     desk.refused(1, &words, &["only the integer code", "leave out --input-bits"]);
     desk.refused(2, &["fuse", "b.json", "in.wav", "-o", "x.wav", "--accumulator", "40"], &["--bit-true"]);
 }

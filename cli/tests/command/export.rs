@@ -98,7 +98,7 @@ fn streamed(desk: &Desk, input: &[f64]) -> Vec<f64> {
 fn c_of_real_taps_has_the_bits_of_its_definition() {
     let desk = Desk::with_spec(&THESIS.replace("delay = 1.2", "delay = 1.2\noffset = 0.125"));
     desk.good(&["design", "spec.toml", "-o", "b.json", "--taps", "23"]);
-    desk.good(&["export", "b.json", "--to", "c", "-o", "bank.h"]);
+    desk.good(&["export", "b.json", "--format", "c", "-o", "bank.h"]);
     if !compiled(&desk, "double", 2, 2) {
         return;
     }
@@ -132,7 +132,7 @@ fn c_of_integer_taps_has_no_differing_bit() {
     for fraction_bits in [6, 0, -2] {
         let designed = with_wild_integers(original.clone(), fraction_bits);
         desk.write("b.json", designed.to_json().unwrap());
-        desk.good(&["export", "b.json", "--to", "c", "-o", "bank.h", "--force"]);
+        desk.good(&["export", "b.json", "--format", "c", "-o", "bank.h", "--force"]);
         if !compiled(&desk, "int32_t", 2, 2) {
             return;
         }
@@ -160,7 +160,7 @@ fn c_of_integer_taps_has_no_differing_bit() {
 fn c_of_recursive_banks_has_the_bits_of_its_definition() {
     let desk = Desk::with_spec(THESIS);
     desk.good(&["design", "spec.toml", "-o", "b.json", "--method", "iir"]);
-    desk.good(&["export", "b.json", "--to", "c", "-o", "bank.h", "--name", "bank"]);
+    desk.good(&["export", "b.json", "--format", "c", "-o", "bank.h", "--name", "bank"]);
     if !compiled(&desk, "double", 2, 2) {
         return;
     }
@@ -185,7 +185,7 @@ fn numpy_and_scipy_read_the_arrays() {
     let desk = Desk::with_spec(THESIS);
     desk.good(&["design", "spec.toml", "-o", "b.json", "--method", "iir"]);
     for format in ["npz", "mat"] {
-        desk.good(&["export", "b.json", "--to", format, "-o", &format!("b.{format}")]);
+        desk.good(&["export", "b.json", "--format", format, "-o", &format!("b.{format}")]);
     }
     let script = "\
 import json, numpy as np, scipy.io
@@ -209,22 +209,22 @@ assert z['ratio'].item() == m['ratio'].item() == 2
 fn refusals_name_the_remedy() {
     let desk = Desk::with_spec(THESIS);
     desk.good(&["design", "spec.toml", "-o", "b.json"]);
-    desk.refused(1, &["export", "b.json", "--to", "coe", "-o", "x.coe"], &["b.json", "--bits"]);
+    desk.refused(1, &["export", "b.json", "--format", "coe", "-o", "x.coe"], &["b.json", "--bits"]);
     desk.refused(
         1,
-        &["export", "b.json", "--to", "c", "-o", "x.h", "--name", "1x"],
+        &["export", "b.json", "--format", "c", "-o", "x.h", "--name", "1x"],
         &["\"1x\"", "C identifier"],
     );
-    desk.refused(1, &["export", "spec.toml", "--to", "csv", "-o", "x.csv"], &["this is a spec"]);
-    desk.refused(1, &["export", "b.json", "--to", "csv", "-o", "b.json", "--force"], &["b.json"]);
+    desk.refused(1, &["export", "spec.toml", "--format", "csv", "-o", "x.csv"], &["this is a spec"]);
+    desk.refused(1, &["export", "b.json", "--format", "csv", "-o", "b.json", "--force"], &["b.json"]);
     assert!(
-        desk.good(&["export", "b.json", "--to", "csv", "-o", "-"])
+        desk.good(&["export", "b.json", "--format", "csv", "-o", "-"])
             .starts_with("channel,phase,lag,value\n1,0,0,")
     );
     // The extension says the format; others need the option.
     desk.good(&["export", "b.json", "-o", "t.csv"]);
     assert!(desk.read("t.csv").starts_with(b"channel,phase,lag,value\n1,0,0,"));
-    desk.refused(2, &["export", "b.json", "-o", "t.txt"], &["t.txt", "--to c"]);
+    desk.refused(2, &["export", "b.json", "-o", "t.txt"], &["t.txt", "--format c"]);
 }
 
 /// What was exported comes back with the gamma that it had, proven again.
@@ -232,7 +232,7 @@ fn refusals_name_the_remedy() {
 fn taps_of_other_tools_are_judged() {
     let desk = Desk::with_spec(THESIS);
     let own = desk.json(&["design", "spec.toml", "-o", "b.json", "--json"]);
-    desk.good(&["export", "b.json", "--to", "csv", "-o", "taps.csv"]);
+    desk.good(&["export", "b.json", "--format", "csv", "-o", "taps.csv"]);
     let foreign = desk.json(&["import", "spec.toml", "taps.csv", "-o", "back.json", "--json"]);
     let gamma = |report: &serde_json::Value| number(report, "/gamma/norm");
     assert!((gamma(&own) / gamma(&foreign) - 1.0).abs() < 1e-9, "{foreign}");
@@ -284,7 +284,7 @@ fn sections_are_the_bank_and_carry_its_gamma() {
     ] {
         let desk = Desk::with_spec(&spec.replace("delay = 1.2", "delay = 0.9"));
         desk.good(&[&["design", "spec.toml", "-o", "b.json"], flags].concat());
-        desk.good(&["export", "b.json", "--to", "sos", "-o", "s.csv"]);
+        desk.good(&["export", "b.json", "--format", "sos", "-o", "s.csv"]);
         let table = String::from_utf8(desk.read("s.csv")).unwrap();
         let input = samples(2 * 500);
         let difference = worst_difference(&by_sections(&table, &input, 2, 2), &streamed(&desk, &input));
@@ -300,7 +300,7 @@ fn sections_are_the_bank_and_carry_its_gamma() {
     desk.good(&["design", "spec.toml", "-o", "b.json"]);
     desk.refused(
         1,
-        &["export", "b.json", "--to", "sos", "-o", "s.csv"],
+        &["export", "b.json", "--format", "sos", "-o", "s.csv"],
         &["b.json", "no poles", "csv and npz"],
     );
 }

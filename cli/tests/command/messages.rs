@@ -179,7 +179,7 @@ fn an_output_that_cannot_be_is_refused_before_the_work() {
     for run in [
         &["design", "spec.toml", "-o"][..],
         &["import", "spec.toml", "nothing", "-o"],
-        &["export", "nothing", "--to", "c", "-o"],
+        &["export", "nothing", "--format", "c", "-o"],
         &["report", "nothing", "-o"],
         &["calibrate", "spec.toml", "nothing", "--blind", "-o"],
         &["measure", "nothing", "--plot"],

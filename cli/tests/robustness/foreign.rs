@@ -209,7 +209,7 @@ fn foreign_names_and_arguments_are_quoted_and_bounded() {
             &["design", "spec.toml", "-o", "out.json", &format!("--{text}")],
             &["analyze", "bank.json", "--delay-box", text],
             &["analyze", "bank.json", "--delay-error", &format!("1,{text}")],
-            &["export", "bank.json", "--to", "c", "--name", text, "-o", "out.h"],
+            &["export", "bank.json", "--format", "c", "--name", text, "-o", "out.h"],
             &["help", text],
             &[text],
         ] {

@@ -137,7 +137,7 @@ const OTHERS: [&str; 9] = [
     "analyze designed.json",
     "plot designed.json -o plot.svg --force",
     "report designed.json -o report.html --force",
-    "export designed.json -o bank.c --to c --force",
+    "export designed.json -o bank.c --format c --force",
     "measure a.wav",
     "calibrate spec.toml a.wav b.wav -o calibrated.toml --blind --force",
     "man pages --force",

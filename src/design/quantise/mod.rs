@@ -15,14 +15,18 @@
 //! candidates with about the least gamma, the one with the least mean-square error and converter noise at
 //! the output is chosen.
 
+mod choice;
 mod descent;
+mod digits;
 mod enumeration;
 mod lattice;
+mod phases;
 mod problem;
 mod quantiser;
 mod search;
 mod smaller_taps;
 
+pub use choice::{Allowance, quantise_within};
 pub use problem::QuantisationProblem;
 
 use crate::bank::FixedPoint;
@@ -40,6 +44,9 @@ pub struct WordStudy {
     pub real_gamma: f64,
     /// In ascending order of the bits.
     pub words: Vec<WordLoss>,
+    /// How the bits were chosen, where a loss was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub choice: Option<WordChoice>,
 }
 
 /// The cost of taps of one word length.
@@ -55,6 +62,24 @@ pub struct WordLoss {
     pub mean_square_loss_db: f64,
     /// `loss_db` of the real taps rounded one by one, at the finest scale at which they fit.
     pub rounded_loss_db: f64,
+}
+
+/// Integer taps that were chosen for a loss of SNR: of the whole error, the mean square of the error for the
+/// signal and of the converters' noise at the output, relative to that of the real taps.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct WordChoice {
+    /// The most that may be lost, in decibels.
+    pub allowed_db: f64,
+    /// Whether there are few digits, and not few bits.
+    pub by_digits: bool,
+    /// What these integers lose.
+    pub snr_loss_db: f64,
+    /// Taps that are zero in all channels.
+    pub taps_left_out: usize,
+    /// Canonical signed digits of all taps.
+    pub signed_digits: u32,
+    /// Those of the integers of the fewest bits.
+    pub signed_digits_of_fewest_bits: u32,
 }
 
 impl WordStudy {
@@ -109,7 +134,7 @@ pub fn quantise(
         Some(fraction_bits) if quantiser.does_nothing(&asked)? => {
             Err(DesignError::TinyTaps { fraction_bits, fitting: quantiser.finest_that_fits(bits) })
         }
-        _ => Ok((asked.fixed_point, WordStudy { real_gamma, words })),
+        _ => Ok((asked.fixed_point, WordStudy { real_gamma, words, choice: None })),
     }
 }
 

@@ -81,6 +81,13 @@ impl<'a> TapError<'a> {
         Ok(Candidate { gamma: self.grid.peaks(&lags, 0.0)?.estimate, mean_square, fixed_point })
     }
 
+    /// The mean square that a unit of each channel's tap adds.
+    pub(super) fn powers(&self) -> Vec<f64> {
+        let correlations = self.forms.correlations(&self.grid.mean_weights(), 1);
+        let noise = |i: usize| self.problem.noise.get(i).copied().unwrap_or(0.0);
+        (0..self.problem.taps.len()).map(|i| correlations.power(i) + noise(i)).collect()
+    }
+
     /// Estimate of gamma of integer taps.
     pub(super) fn gamma(&self, fixed_point: &FixedPoint) -> Result<f64, DesignError> {
         Ok(self.grid.peaks(&polyphase(&fixed_point.taps(), self.ratio), 0.0)?.estimate)
@@ -98,7 +105,7 @@ fn output_noise(noise: &[f64], taps: &[Vec<f64>]) -> f64 {
 
 /// Added to the diagonal, because the form is singular for equal channels. Relative to each entry, because
 /// channels may differ by many decades.
-const RIDGE: f64 = 1e-12;
+pub(super) const RIDGE: f64 = 1e-12;
 
 /// A tap of a phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -154,7 +161,12 @@ impl Correlations {
         Ok(linalg::cholesky(&form)?)
     }
 
-    fn between(&self, a: Tap, b: Tap) -> f64 {
+    /// The form of a single tap of channel i.
+    fn power(&self, i: usize) -> f64 {
+        self.by_lag[0][(i, i)]
+    }
+
+    pub(super) fn between(&self, a: Tap, b: Tap) -> f64 {
         // The sum for -d is the transposed one.
         if a.lag >= b.lag {
             self.by_lag[a.lag - b.lag][(a.channel, b.channel)]

@@ -2,13 +2,14 @@
 
 use super::enumeration::Enumeration;
 use super::lattice::Span;
+use super::phases::Phases;
 use super::problem::{Candidate, QuantisationProblem, TapError};
 use super::search::Search;
 use super::smaller_taps::{SmallerTaps, smaller_taps};
 use super::{WordLoss, decades};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
-use crate::spec::{MAX_FRACTION_BITS, WordLengths};
+use crate::spec::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 use std::ops::RangeInclusive;
 use std::sync::OnceLock;
 use std::thread::ScopedJoinHandle;
@@ -49,6 +50,8 @@ impl Quantised {
 /// The search for integers near the taps of one bank.
 pub(super) struct Quantiser<'a> {
     pub(super) error: TapError<'a>,
+    /// The mean square that integers should keep to; infinite where only gamma counts.
+    pub(super) most_mean_square: f64,
     /// Computed when first needed.
     smaller: OnceLock<Result<Vec<SmallerTaps>, DesignError>>,
 }
@@ -59,7 +62,8 @@ impl<'a> Quantiser<'a> {
     /// # Errors
     /// [`DesignError::Lti`] if the plant is not stable, [`DesignError::Linalg`] if a decomposition fails.
     pub(super) fn new(problem: QuantisationProblem<'a>) -> Result<Self, DesignError> {
-        Ok(Self { error: TapError::new(problem)?, smaller: OnceLock::new() })
+        let error = TapError::new(problem)?;
+        Ok(Self { error, most_mean_square: f64::INFINITY, smaller: OnceLock::new() })
     }
 
     /// The best integers of the given bits; `fraction_bits` fixes their scale.
@@ -87,11 +91,34 @@ impl<'a> Quantiser<'a> {
                 Some(scale) => self.search_few_taps(bits, scale..=scale, &mut found)?,
             }
         }
-        let cap = least_gamma(&found) * (1.0 + self.error.problem.gamma_margin.max(GAMMA_TIE));
-        let good = found.into_iter().filter(|found| found.gamma <= cap);
-        let least_mean_square = good.min_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
-        let Candidate { fixed_point, gamma, mean_square } = least_mean_square.unwrap_or(zero_output);
+        if self.most_mean_square.is_finite() {
+            found.extend(self.improved(&found)?);
+        }
+        let Candidate { fixed_point, gamma, mean_square } = self.best(found).unwrap_or(zero_output);
         Ok(Quantised { fixed_point, gamma, mean_square, rounded })
+    }
+
+    /// From the candidate of least mean square, one near the real taps of least mean square.
+    fn improved(&self, found: &[Candidate]) -> Result<Option<Candidate>, DesignError> {
+        let least = found.iter().min_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
+        let improved = |start: &Candidate| {
+            let mut phases = Phases::new(&self.error, &start.fixed_point, start.mean_square);
+            phases.near_optimum()?;
+            self.error.candidate(phases.fixed_point(&start.fixed_point))
+        };
+        least.map(improved).transpose()
+    }
+
+    /// The candidate of least mean square: of those of about the least gamma that keep to the mean square
+    /// that is allowed, or of all where none does.
+    fn best(&self, mut found: Vec<Candidate>) -> Option<Candidate> {
+        let keeps = |found: &Candidate| found.mean_square <= self.most_mean_square;
+        if found.iter().any(keeps) {
+            found.retain(keeps);
+            let cap = least_gamma(&found) * (1.0 + self.error.problem.gamma_margin.max(GAMMA_TIE));
+            found.retain(|found| found.gamma <= cap);
+        }
+        found.into_iter().min_by(|a, b| a.mean_square.total_cmp(&b.mean_square))
     }
 
     /// Adds candidates with steps finer than those that hold the optimal taps: near smaller taps, and from
@@ -175,6 +202,23 @@ impl<'a> Quantiser<'a> {
         let zero_output = self.error.gamma(&FixedPoint { integers: zeros, ..fixed_point.clone() })?;
         Ok(found.gamma >= zero_output * (1.0 - LEAST_EFFECT_OF_INTEGERS)
             && self.error.real_gamma < zero_output * (1.0 - LEAST_EFFECT_OF_REAL_TAPS))
+    }
+
+    /// Whether the mean square is as small as it should be.
+    pub(super) fn keeps(&self, found: &Quantised) -> bool {
+        found.mean_square <= self.most_mean_square
+    }
+
+    /// The bits with which rounding adds, on average, the mean square that is left: step^2 / 12 times the
+    /// power that each tap sees.
+    pub(super) fn bits_by_rounding(&self) -> u32 {
+        let taps = self.error.problem.taps;
+        let seen: f64 =
+            self.error.powers().iter().zip(taps).map(|(power, taps)| power * taps.len() as f64).sum();
+        let left = self.most_mean_square - self.error.real_mean_square;
+        let most = taps.iter().flatten().fold(0.0f64, |most, tap| most.max(tap.abs()));
+        let magnitude = (most / (12.0 * left / seen).sqrt()).log2();
+        magnitude.ceil().clamp(0.0, f64::from(MAX_BITS)) as u32 + 1
     }
 
     pub(super) fn loss(&self, found: &Quantised) -> WordLoss {

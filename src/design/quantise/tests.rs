@@ -275,7 +275,7 @@ fn a_scale_beyond_the_limits_is_not_chosen() {
 
 #[test]
 fn a_loss_over_nothing_is_a_number() {
-    let study = |real_gamma| WordStudy { real_gamma, words: Vec::new() };
+    let study = |real_gamma| WordStudy { real_gamma, words: Vec::new(), choice: None };
     assert_eq!(study(0.0).loss_db(0.0), 0.0);
     assert_eq!(study(0.0).loss_db(1e-17), f64::INFINITY);
     assert!((study(0.5).loss_db(5.0) - 20.0).abs() < 1e-12);

@@ -162,7 +162,7 @@ fn accumulate(
     output: Output,
 ) {
     let start = -i128::from(filters.constants[phase]);
-    let sums = filters.sums(phase, options.words.input).plus(start.into());
+    let sums = filters.sums(phase, options.words.input);
     // Where no sum wraps, the accumulator begins with the half that rounds. Sums on the way may leave its
     // bits and come back.
     let half = if netlist.holds(sums) { output.half() } else { 0 };

@@ -45,7 +45,7 @@ pub struct VerilogOptions {
 }
 
 impl VerilogOptions {
-    /// A frame at every clock, a register behind every adder, inferred multipliers, an accumulator that
+    /// A frame at every clock, a register after every adder, inferred multipliers, an accumulator that
     /// never wraps, and outputs of the bits of the samples: of so many, or those of the widest converter.
     ///
     /// # Errors

@@ -16,7 +16,7 @@ pub(super) struct Word {
 }
 
 impl Word {
-    /// A word right behind a register.
+    /// A word right after a register.
     pub(super) fn at(stage: usize, name: String, range: Range) -> Self {
         Self { name, range, stage, level: 0 }
     }
@@ -57,6 +57,7 @@ impl Term {
 pub(super) fn constant(value: i128, bits: u32) -> String {
     let least = Range::of_bits(bits).least;
     match value {
+        -1 if bits == 1 => "1'sb1".to_owned(),
         // The modulus of the least value does not fit.
         _ if value == least => format!("{{1'b1, {}'d0}}", bits - 1),
         _ if value < 0 => format!("-{bits}'sd{}", -value),

@@ -20,6 +20,11 @@ const INSTANTS: u32 = 128;
 const WHOLE_PERIOD: f64 = 0.55;
 /// Median of the absolute values of a normal law, in its deviations.
 const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
+/// Misfits on each side that say how far a reading scatters: sounds change after some pieces.
+const BESIDE: usize = 6;
+/// A misfit counts as at most so many of the usual ones: a reading may be wrong altogether, and is refused
+/// later.
+const MOST_MISFIT: f64 = 3.0;
 /// Fixed taps bear a delay that moves by this, in fast periods.
 const NEGLIGIBLE: f64 = 0.02;
 
@@ -198,8 +203,14 @@ impl<'a> Course<'a> {
     }
 }
 
-/// Widens the intervals of channel i to what the readings scatter: by the median of how far each is from the
-/// line through those beside it.
+/// Widens the intervals of channel i to what the readings beside each scatter. Intervals of pieces are those
+/// of the Cramer-Rao bound, which pieces of little or narrow sound miss by up to twice, while the others reach
+/// it.
+///
+/// Misfits are second differences in their stated deviations; overlapping ones are correlated by -2/3 and 1/6.
+/// The variance of a reading relative to the stated one has the scaled inverse chi-square law whose prior, of
+/// two degrees of freedom, is the stated variance, and whose data are the misfits: its mean is theirs plus 2
+/// over their degrees of freedom.
 fn widen(readings: &mut [Reading], i: usize) {
     let of = |reading: &Reading| Some((reading.frame as f64, reading.delays[i]?));
     let all: Vec<(f64, (Seconds, Seconds))> = readings.iter().filter_map(of).collect();
@@ -209,14 +220,20 @@ fn widen(readings: &mut [Reading], i: usize) {
         let miss = own.0.0 - (1.0 - share) * before.0.0 - share * after.0.0;
         miss.abs() / own.1.0.hypot((1.0 - share) * before.1.0).hypot(share * after.1.0)
     };
-    let mut misfits: Vec<f64> = all.windows(3).map(misfit).collect();
-    misfits.sort_by(f64::total_cmp);
-    let median = misfits.get(misfits.len() / 2).copied().unwrap_or(0.0);
-    let factor = (median / MEDIAN_OF_NORMAL).max(1.0);
-    readings
-        .iter_mut()
-        .filter_map(|reading| reading.delays[i].as_mut())
-        .for_each(|delay| delay.1 = delay.1 * factor);
+    let misfits: Vec<f64> = all.windows(3).map(misfit).collect();
+    let mut sorted = misfits.clone();
+    sorted.sort_by(f64::total_cmp);
+    let Some(median) = sorted.get(sorted.len() / 2) else { return };
+    let most = MOST_MISFIT * (median / MEDIAN_OF_NORMAL).max(1.0);
+    let factor = |number: usize| {
+        // The misfit of a reading is one before it, because the first reading has none.
+        let beside = number.saturating_sub(BESIDE + 1)..(number + BESIDE).min(misfits.len());
+        let freedom = beside.len() as f64 / (1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0));
+        let squares: f64 = misfits[beside.clone()].iter().map(|misfit| misfit.min(most).powi(2)).sum();
+        (squares / beside.len() as f64 + 2.0 / freedom).max(1.0).sqrt()
+    };
+    let delays = readings.iter_mut().filter_map(|reading| reading.delays[i].as_mut());
+    delays.enumerate().for_each(|(number, delay)| delay.1 = delay.1 * factor(number));
 }
 
 /// The weighted mean of estimates; its deviation is that of their scatter where it is larger.

@@ -1,6 +1,7 @@
 //! Taps of few bits, by `bits`, `fraction_bits` and their flags.
 
 use crate::support::{Desk, THESIS, number};
+use serde_json::Value;
 
 #[test]
 fn integer_taps_are_designed_proven_and_run() {
@@ -67,4 +68,93 @@ fn a_bank_without_any_error_loses_nothing_by_integers() {
         desk.good(&["design", "exact.toml", "-o", "b.json", "--force", "--verbose"])
             .contains("gamma is 0.0000 dB above")
     );
+}
+
+/// README's converters, of 12 bits.
+const TWELVE_BITS: &str = "fast_rate = \"48 kS/s\"\nratio = 2\nlatency = 12\n\
+    target = { filter = { family = \"butterworth\", order = 4, cutoff = \"9 kHz\" } }\n\
+    channel = [{ delay = \"25 us\", bits = 12 }, { delay = \"12.5 us\", bits = 12 }]\n\
+    signal = { band = \"14 kHz\" }\ndesign = { method = \"fir\", taps = 24 }\n";
+
+fn snr(report: &Value) -> f64 {
+    number(report, "/figures/snr/total_db")
+}
+
+#[test]
+fn bits_are_chosen_for_a_loss() {
+    let desk = Desk::with_spec(TWELVE_BITS);
+    let design = |name: &str, flags: &str| {
+        let words: Vec<&str> = flags.split_whitespace().collect();
+        desk.json(&[&["design", "spec.toml", "-o", name, "--json", "--force"][..], &words].concat())
+    };
+    let real = design("real.json", "");
+    for loss in [0.03, 0.1, 0.5] {
+        let report = design("chosen.json", &format!("--loss-db {loss}"));
+        let (bank, stated) = (desk.read_json("chosen.json"), number(&report, "/words/choice/snr_loss_db"));
+        // The figure that users read loses what is stated of the spectrum that the bank is designed for.
+        let lost = snr(&real) - snr(&report);
+        assert!(stated <= loss && lost <= loss + 0.01 && (lost - stated).abs() < 0.02, "{lost} {report}");
+        let bits = &bank["fixed_point"]["bits"];
+        let most = match bits.as_array() {
+            Some(list) => list.iter().map(|bits| bits.as_u64().unwrap()).max().unwrap(),
+            None => bits.as_u64().unwrap(),
+        };
+        // The bank says what was chosen, not the wish.
+        assert_eq!(
+            (&bank["spec"]["design"]["bits"], &bank["spec"]["design"]["loss_db"]),
+            (bits, &Value::Null)
+        );
+        assert!(desk.good(&["verify", "chosen.json"]).contains("integers of"));
+        // One bit fewer loses more, chosen or not.
+        let fewer = (most - 1).to_string();
+        let flags = ["design", "spec.toml", "-o", "no.json", "--bits", &fewer];
+        let wanted = loss.to_string();
+        desk.refused(1, &[&flags[..], &["--loss-db", &wanted]].concat(), &["dB of SNR or more", &wanted]);
+        assert!(snr(&real) - snr(&design("fewer.json", &format!("--bits {fewer}"))) > loss);
+        // The same bank again, by its own bits or within them.
+        let again = design("again.json", &format!("--loss-db {loss} --bits {most}"));
+        assert_eq!(again["words"]["choice"], report["words"]["choice"]);
+    }
+    let text = desk.good(&["design", "spec.toml", "-o", "t.json", "--loss-db", "0.1"]);
+    assert!(text.contains("dB of the SNR of the real taps lost, 0.1 allowed"), "{text}");
+}
+
+#[test]
+fn few_digits_are_chosen_for_a_loss() {
+    let desk = Desk::with_spec(TWELVE_BITS);
+    let real = desk.json(&["design", "spec.toml", "-o", "real.json", "--json"]);
+    let plain = ["design", "spec.toml", "--loss-db", "0.1", "--json", "-o"];
+    let bits = desk.json(&[&plain[..], &["bits.json"]].concat());
+    let digits = desk.json(&[&plain[..], &["digits.json", "--digits"]].concat());
+    let lost = snr(&real) - snr(&digits);
+    assert!(lost <= 0.11, "{lost} {digits}");
+    let count = |report: &Value| number(report, "/words/choice/signed_digits");
+    assert!(count(&digits) < 0.8 * count(&bits), "{digits} {bits}");
+    desk.good(&["verify", "digits.json"]);
+    let core = ["--input-bits", "12", "--multipliers", "shift-add", "--json", "--force", "-o", "core.v"];
+    let exported = |bank: &str| desk.json(&[&["export", bank][..], &core].concat());
+    let (few, many) = (exported("digits.json"), exported("bits.json"));
+    assert_eq!(number(&few, "/multipliers"), 0.0);
+    assert!(number(&few, "/adders") < number(&many, "/adders"), "{few} {many}");
+}
+
+#[test]
+fn wishes_that_make_no_sense_are_refused() {
+    let desk = Desk::with_spec(TWELVE_BITS);
+    for (flags, parts) in [
+        (&["--loss-db", "0"][..], ["--loss-db: 0 dB", "above 0"]),
+        (&["--loss-db", "0.1", "--method", "iir"], ["loss_db", "fir"]),
+        (&["--loss-db", "nan"], ["--loss-db", "dB"]),
+    ] {
+        desk.refused(1, &[&["design", "spec.toml", "-o", "no.json"][..], flags].concat(), &parts);
+    }
+    desk.refused(2, &["design", "spec.toml", "-o", "no.json", "--digits"], &["--loss-db"]);
+    for (keys, part) in [
+        ("digits = true", "loss_db = 0.1"),
+        ("loss_db = 0.1, fraction_bits = 3", "the loss decides"),
+        ("loss_db = 0.1, digits = 1", "true or false"),
+    ] {
+        desk.write("bad.toml", TWELVE_BITS.replace("taps = 24", &format!("taps = 24, {keys}")));
+        desk.refused(1, &["design", "bad.toml", "-o", "no.json"], &["bad.toml:", part]);
+    }
 }

@@ -1,0 +1,153 @@
+//! The fewest bits of integer taps for an allowed loss of SNR, and then the taps that can be left out.
+//!
+//! Integers that fit few bits fit more bits, so the least loss of all integers falls with the bits. The search
+//! finds good integers and not always the best, so it scans neighbouring word lengths, from a first guess
+//! onwards, until one holds the loss and the next shorter one does not.
+
+use super::digits::fewest_digits;
+use super::quantiser::{Quantised, Quantiser};
+use super::{QuantisationProblem, WordChoice, WordStudy, decades};
+use crate::bank::FixedPoint;
+use crate::design::DesignError;
+use crate::spec::WordLengths;
+
+/// Word lengths that are tried at once.
+const BATCH: usize = 5;
+/// Word lengths of the report on each side of the chosen one.
+const BESIDE: usize = 2;
+
+/// What integer taps may lose and take.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Allowance {
+    /// The most that the whole error may grow, in decibels.
+    pub loss_db: f64,
+    /// The most bits.
+    pub most: WordLengths,
+    /// Whether there are to be few signed digits.
+    pub by_digits: bool,
+}
+
+/// Integers near the filters of `problem`, whose norm is `real_gamma`, that lose no more SNR than allowed: of
+/// the fewest bits that were found, and of these as many taps as possible left out; or of the fewest signed
+/// digits. Among these gamma decides.
+///
+/// # Errors
+/// [`DesignError::WordsLoseMore`] if the most bits lose more, else as [`super::quantise`].
+pub fn quantise_within(
+    problem: QuantisationProblem<'_>,
+    real_gamma: f64,
+    allowance: &Allowance,
+) -> Result<(FixedPoint, WordStudy), DesignError> {
+    let Allowance { loss_db, most, by_digits } = allowance;
+    most.check(None)?;
+    let mut quantiser = Quantiser::new(problem)?;
+    quantiser.most_mean_square = quantiser.error.real_mean_square * 10f64.powf(loss_db / 10.0);
+    let lengths = Lengths::up_to(most);
+    let (found, least) = scan(&quantiser, &lengths, allowance)?;
+    let few_taps = leave_out(&quantiser, &found[least])?;
+    let few_taps = Quantised { fixed_point: without_zeros(few_taps.fixed_point), ..few_taps };
+    let signed_digits_of_fewest_bits = few_taps.fixed_point.signed_digits();
+    let chosen = if *by_digits { fewest_digits(&quantiser, &few_taps, most)? } else { few_taps };
+    let beside = &found[least.saturating_sub(BESIDE)..(least + BESIDE + 1).min(found.len())];
+    let words = beside.iter().map(|found| quantiser.loss(found)).collect();
+    let fixed_point = without_zeros(chosen.fixed_point);
+    let choice = WordChoice {
+        allowed_db: *loss_db,
+        by_digits: *by_digits,
+        snr_loss_db: 10.0 * decades(chosen.mean_square, quantiser.error.real_mean_square),
+        taps_left_out: (0..problem.taps[0].len()).filter(|&n| is_left_out(&fixed_point, n)).count(),
+        signed_digits: fixed_point.signed_digits(),
+        signed_digits_of_fewest_bits,
+    };
+    Ok((fixed_point, WordStudy { real_gamma, words, choice: Some(choice) }))
+}
+
+/// Word lengths that differ by a bit, the shortest first.
+struct Lengths(Vec<WordLengths>);
+
+impl Lengths {
+    fn up_to(most: &WordLengths) -> Self {
+        let mut all: Vec<WordLengths> = (0..).map_while(|fewer: i32| most.widened(-fewer)).collect();
+        all.reverse();
+        Self(all)
+    }
+
+    /// The first one whose longest word has so many bits, or the last one.
+    fn of_bits(&self, bits: u32, taps: usize) -> usize {
+        let longest = |words: &WordLengths| (0..taps).map(|n| words.bits(n)).max().unwrap_or(0);
+        self.0.iter().position(|words| longest(words) >= bits).unwrap_or(self.0.len() - 1)
+    }
+}
+
+/// Integers of consecutive word lengths, and the index of the first that keeps to the loss; the one before
+/// it, if there is one, does not.
+fn scan(
+    quantiser: &Quantiser<'_>,
+    lengths: &Lengths,
+    allowance: &Allowance,
+) -> Result<(Vec<Quantised>, usize), DesignError> {
+    let all = &lengths.0;
+    let guess = lengths.of_bits(quantiser.bits_by_rounding(), quantiser.error.problem.taps[0].len());
+    let (mut first, mut end) = (guess.saturating_sub(BATCH / 2), (guess + BATCH / 2 + 1).min(all.len()));
+    let mut found = quantiser.quantise_all(&all[first..end], None)?;
+    while quantiser.keeps(&found[0]) && first > 0 {
+        let before = first.saturating_sub(BATCH);
+        found.splice(0..0, quantiser.quantise_all(&all[before..first], None)?);
+        first = before;
+    }
+    while !found.iter().any(|found| quantiser.keeps(found)) && end < all.len() {
+        let after = (end + BATCH).min(all.len());
+        found.extend(quantiser.quantise_all(&all[end..after], None)?);
+        end = after;
+    }
+    let losses = found.iter().map(|found| quantiser.loss(found).mean_square_loss_db);
+    let best = losses.fold(f64::INFINITY, f64::min);
+    match found.iter().position(|found| quantiser.keeps(found)) {
+        Some(least) => Ok((found, least)),
+        None => {
+            Err(DesignError::WordsLoseMore { bits: allowance.most.clone(), best, allowed: allowance.loss_db })
+        }
+    }
+}
+
+/// The same bits with as many taps left out as the loss allows: those whose integers matter least, and the
+/// others chosen again. Bisection between numbers of taps of which the smaller keeps to the loss.
+fn leave_out(quantiser: &Quantiser<'_>, found: &Quantised) -> Result<Quantised, DesignError> {
+    let FixedPoint { bits, integers, .. } = &found.fixed_point;
+    let powers = quantiser.error.powers();
+    let size = |n: usize| -> f64 {
+        integers.iter().zip(&powers).map(|(list, power)| power * (list[n] as f64).powi(2)).sum()
+    };
+    let mut order: Vec<usize> = (0..integers[0].len()).collect();
+    order.sort_by(|&a, &b| size(a).total_cmp(&size(b)));
+    let without = |count: usize| {
+        let bits = |n: usize| if order[..count].contains(&n) { 0 } else { bits.bits(n) };
+        WordLengths::PerTap((0..order.len()).map(bits).collect())
+    };
+    let mut best = found.clone();
+    let (mut few, mut many) = (order.iter().filter(|&&n| size(n) == 0.0).count(), order.len());
+    while many - few > 1 && !quantiser.error.problem.stop.is_due() {
+        let middle = few + (many - few) / 2;
+        let tried = quantiser.quantise(&without(middle), None)?;
+        if quantiser.keeps(&tried) {
+            (few, best) = (middle, tried);
+        } else {
+            many = middle;
+        }
+    }
+    Ok(best)
+}
+
+fn is_left_out(words: &FixedPoint, n: usize) -> bool {
+    words.integers.iter().all(|list| list[n] == 0)
+}
+
+/// Taps that are zero in all channels get no bits.
+fn without_zeros(words: FixedPoint) -> FixedPoint {
+    let left_out: Vec<bool> = (0..words.integers[0].len()).map(|n| is_left_out(&words, n)).collect();
+    if words.is_zero() || !left_out.contains(&true) {
+        return words;
+    }
+    let bits = left_out.iter().enumerate().map(|(n, is_out)| if *is_out { 0 } else { words.bits.bits(n) });
+    FixedPoint { bits: WordLengths::PerTap(bits.collect()), ..words }
+}
