@@ -2,6 +2,7 @@
 
 mod colmap_map;
 mod dynamic;
+mod float;
 mod frame_rate;
 pub mod pfm;
 pub mod quality;
@@ -29,7 +30,7 @@ pub enum ImageError {
     #[error(transparent)]
     Read(#[from] InputError),
     /// The file is not an image of a known format, or is damaged.
-    #[error("{}: {}; the readable formats are PNG, JPEG, PPM, PGM and PFM", Quoted(path), Quoted(reason))]
+    #[error("{}: {}; the readable formats are PNG, JPEG, TIFF, PPM, PGM, PFM, OpenEXR and NPY", Quoted(path), Quoted(reason))]
     Decode {
         /// The file.
         path: PathBuf,

@@ -1,9 +1,10 @@
 //! Scenes of a rectified rig: positions and disparities.
 
+use super::maps::{Given, Whole};
 use super::{Goal, Inputs, Loaded, Loader, each, pixels};
 use crate::camera::middlebury::{Calibration, read_calibration};
 use crate::depth::Measure;
-use crate::scene::{Kind, SourceView, ViewSpec};
+use crate::scene::{Kind, ViewSpec};
 use hybank::messages::Quoted;
 
 impl Loader<'_> {
@@ -29,19 +30,22 @@ impl Loader<'_> {
             let position = self.need(view.position, view, "position", "rectified")?;
             let position = self.finite(position, &view.named())?;
             let map = self.need(view.disparity.as_deref(), view, "disparity", "rectified")?;
-            let (image, disparity, filled) =
-                self.image_with_map(view, map, view.disparity_scale.unwrap_or(1.0), Measure::Disparity)?;
-            Ok((SourceView { image, map: disparity, camera: position }, filled))
+            let given = Given { map, scale: view.disparity_scale, measure: Measure::Disparity };
+            self.read(view, (self.image(&view.image)?, position), &given, |_, _| {
+                Err(self.incomplete(format!(
+                    "{} has disparity = \"points\", which a rectified rig does not have; give it a map or \"matched\"",
+                    view.named()
+                )))
+            })
         };
-        let sources = each(views, one, |source| pixels(&source.0.image), self.watch)?;
-        let first = sources[0].0.image.size();
-        for (view, (source, _)) in views.iter().zip(&sources) {
+        let sources = each(views, one, |source| pixels(&source.image), self.watch)?;
+        let first = sources[0].image.size();
+        for (view, source) in views.iter().zip(&sources) {
             source.image.same_size(&view.named(), first, &views[0].named())?;
         }
         self.no_other_size(goals, first)?;
         let calibration = self.calibration(first)?;
-        let filled = sources.iter().map(|s| s.1).sum();
-        let views = sources.into_iter().map(|s| s.0).collect();
+        let Whole { views, filled } = self.matched(views, sources, Measure::Disparity)?;
         Ok(Inputs { kind: Kind::Rectified { views, positions }, filled, calibration, notes: Vec::new() })
     }
 
