@@ -94,8 +94,8 @@ Figures, in grey levels:
   expected   root mean square error, a bound of the expected mean error
   limit      not exceeded where slopes, second differences and residuals are at most those of the samples
              nearby; not sure, as photographs break that
-  sure       with --curvature: not exceeded, whatever the scene, within the limits that are given; of
-             rectified rigs
+  sure       with --curvature: not exceeded by surfaces that some view samples, within the limits that are
+             given; of rectified rigs
 The view of a rectified rig is the one that `render --method rows` gives. Of several virtual views each is
 predicted, and files are numbered. Scenes without cameras are refused.";
 

@@ -115,7 +115,9 @@ pub(super) fn npy(file: &Source<'_>) -> Decoded {
         .or_else(|array| floats::<i64>(array, |v| v as f32));
     let numbers = match numbers {
         Ok(numbers) => numbers.map_err(wrong)?,
-        Err(array) => return Err(file.wrong(format!("numbers of the type {} are not read", array.dtype().descr()))),
+        Err(array) => {
+            return Err(file.wrong(format!("numbers of the type {} are not read", array.dtype().descr())));
+        }
     };
     if numbers.is_empty() || numbers.len() != width * height {
         return Err(file.wrong(format!("it has {} values for {width} x {height} pixels", numbers.len())));
@@ -206,7 +208,9 @@ mod tests {
         assert!(message("a.exr").contains("the channels are U, V"), "{}", message("a.exr"));
         write_npy(&at("a.npy"), &[6], npyz::Order::C, &VALUES);
         assert!(message("a.npy").contains("shape [6]"), "{}", message("a.npy"));
-        for (name, start) in [("b.exr", &[0x76, 0x2f, 0x31, 0x01][..]), ("b.npy", b"\x93NUMPY\x01"), ("b.tif", b"II*\0")] {
+        for (name, start) in
+            [("b.exr", &[0x76, 0x2f, 0x31, 0x01][..]), ("b.npy", b"\x93NUMPY\x01"), ("b.tif", b"II*\0")]
+        {
             std::fs::write(at(name), start).unwrap();
             assert!(message(name).contains(name), "{}", message(name));
         }

@@ -76,7 +76,8 @@ impl Text<'_> {
         let models: Vec<PathBuf> = places.filter(|place| is_model(place)).collect();
         if !models.is_empty() {
             // A dense reconstruction has undistorted photographs and depth.
-            let dense = models.iter().find(|model| workspace(model).is_some_and(|w| w.join("stereo").is_dir()));
+            let dense =
+                models.iter().find(|model| workspace(model).is_some_and(|w| w.join("stereo").is_dir()));
             return self.of_model(folder, dense.unwrap_or(&models[0]));
         }
         if folder.join("calib.txt").is_file() {
@@ -111,9 +112,10 @@ impl Text<'_> {
     }
 
     fn of_pair(&self, photographs: [&Path; 2]) -> Described<String> {
-        let mut text = "# A rectified pair: the left photograph, and the right one. Its disparities are found from \
+        let mut text =
+            "# A rectified pair: the left photograph, and the right one. Its disparities are found from \
                         them.\n"
-            .to_string();
+                .to_string();
         for (position, photograph) in photographs.into_iter().enumerate() {
             self.view_of_rig(&mut text, photograph, position, None)?;
         }
@@ -137,7 +139,8 @@ impl Text<'_> {
     /// A pair of Middlebury of 2014 and later.
     fn of_calibrated_pair(&self, folder: &Path) -> Described<String> {
         let calibration = self.path(&folder.join("calib.txt"))?;
-        let mut text = format!("# A pair of the Middlebury benchmark, with its calibration.\ncalib = {calibration}\n");
+        let mut text =
+            format!("# A pair of the Middlebury benchmark, with its calibration.\ncalib = {calibration}\n");
         for position in 0..2 {
             let maps = ["", "GT"].map(|end| folder.join(format!("disp{position}{end}.pfm")));
             let map = maps.iter().find(|map| map.is_file());
@@ -243,7 +246,8 @@ impl Text<'_> {
         there.truncate(MOST_VIEWS);
         let mut text = head;
         if count > there.len() {
-            let _ = writeln!(text, "# The {MOST_VIEWS} of {count} views that are nearest to the virtual camera.");
+            let _ =
+                writeln!(text, "# The {MOST_VIEWS} of {count} views that are nearest to the virtual camera.");
         }
         for placed in &there {
             self.view_of_camera(&mut text, placed)?;
@@ -264,7 +268,8 @@ impl Text<'_> {
         let image = self.path(&placed.image)?;
         let depth = placed.depth.as_ref().map_or(Ok("\"matched\"".into()), |depth| self.path(depth))?;
         let _ = write!(text, "\n[[view]]\nimage = {image}\ndepth = {depth}\n");
-        if placed.depth.as_ref().is_some_and(|depth| depth.extension().is_some_and(|ending| ending == "png")) {
+        if placed.depth.as_ref().is_some_and(|depth| depth.extension().is_some_and(|ending| ending == "png"))
+        {
             text.push_str("depth_scale = 1000.0\n");
         }
         Ok(())

@@ -197,8 +197,16 @@ impl Loader<'_> {
     }
 
     fn need<T>(&self, value: Option<T>, view: &ViewSpec, key: &str, kind: &str) -> Loaded<T> {
-        let reason = || format!("{} has no `{key}`, which every view of a {kind} scene needs", view.named());
-        value.ok_or_else(|| self.incomplete(reason()))
+        value.ok_or_else(|| {
+            let remedy = match key {
+                "depth" | "disparity" => format!("; {key} = \"matched\" finds it from the photographs"),
+                _ => String::new(),
+            };
+            let named = view.named();
+            self.incomplete(format!(
+                "{named} has no `{key}`, which every view of a {kind} scene needs{remedy}"
+            ))
+        })
     }
 }
 

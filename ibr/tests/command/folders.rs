@@ -48,7 +48,8 @@ fn a_set_of_middlebury_has_its_scale() {
     let exact = rig();
     for (name, map) in [("left.pfm", "disp2.png"), ("right.pfm", "disp6.png")] {
         let (width, height, values) = hybank_ibr::image::read_map(&exact.path().join(name)).unwrap();
-        let stored = Image::new(width, height, 1, values.iter().map(|v| (8.0 * v).round()).collect()).unwrap();
+        let stored =
+            Image::new(width, height, 1, values.iter().map(|v| (8.0 * v).round()).collect()).unwrap();
         assert!(stored.data().iter().all(|v| *v < 255.0));
         save(&stored, &dir.path().join("set").join(map)).unwrap();
     }
@@ -149,7 +150,8 @@ fn what_is_no_scene_is_refused() {
     refused(dir.path(), &["render", "set", "-o", "o.png"], 1, &["set", "3 photographs"]);
     std::fs::write(dir.path().join("s.toml"), "").unwrap();
     refused(dir.path(), &init(&["set/a.png", "set/b.png"]), 1, &["s.toml exists", "--force"]);
-    let rig = "[[view]]\nimage = \"set/a.png\"\nposition = 0\ndisparity = \"points\"\n[virtual]\nposition = 0.5\n";
+    let rig =
+        "[[view]]\nimage = \"set/a.png\"\nposition = 0\ndisparity = \"points\"\n[virtual]\nposition = 0.5\n";
     std::fs::write(dir.path().join("s.toml"), rig).unwrap();
     refused(dir.path(), &["render", "s.toml", "-o", "o.png"], 1, &["\"points\"", "rectified"]);
     std::fs::write(dir.path().join("s.toml"), rig.replace("\"points\"", "\"matched\"\nstep = 2")).unwrap();

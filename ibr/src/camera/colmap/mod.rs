@@ -21,7 +21,8 @@ const FILES: &str = "a COLMAP model has cameras.txt and images.txt, or cameras.b
 const LISTED: f64 = 1500.0;
 
 /// Where COLMAP puts models in its folders.
-pub(crate) const PLACES: [&str; 6] = ["sparse/0", "sparse", "0", "dense/0/sparse", "dense/sparse", "colmap/sparse/0"];
+pub(crate) const PLACES: [&str; 6] =
+    ["sparse/0", "sparse", "0", "dense/0/sparse", "dense/sparse", "colmap/sparse/0"];
 
 /// Reads the model in `folder`: the text files if cameras.txt is there, else the binary ones if cameras.bin
 /// is.
@@ -95,7 +96,8 @@ fn join(inners: &BTreeMap<u64, Inner>, poses: Vec<Pose>, path: &Path) -> Result<
         let inner = *inners.get(&camera).ok_or_else(|| {
             (at, format!("image \"{}\" has camera {camera}, which the cameras do not list", Quoted(&name)))
         })?;
-        frames.insert(name.clone(), Frame { image: name.into(), depth: None, number: k + 1, id, pose, inner });
+        frames
+            .insert(name.clone(), Frame { image: name.into(), depth: None, number: k + 1, id, pose, inner });
     }
     Ok(CameraList::new(path.into(), frames.into_values().collect()))
 }

@@ -102,7 +102,9 @@ mod tests {
         assert_eq!(read_points(dir.path()).unwrap(), want);
         std::fs::write(at("points3D.txt"), text).unwrap();
         assert_eq!(read_points(dir.path()).unwrap(), want);
-        for (text, words) in [("1 2 x 3", "points3D.txt:1: the Y \"x\""), ("\n1 2 3 nan", "txt:2: the coordinate NaN")] {
+        for (text, words) in
+            [("1 2 x 3", "points3D.txt:1: the Y \"x\""), ("\n1 2 3 nan", "txt:2: the coordinate NaN")]
+        {
             std::fs::write(at("points3D.txt"), text).unwrap();
             let message = read_points(dir.path()).unwrap_err().to_string();
             assert!(message.contains(words), "{message}");

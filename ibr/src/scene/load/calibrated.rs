@@ -71,7 +71,8 @@ impl Loader<'_> {
         let image = self.image(&view.image)?;
         let (camera, resized) = self.camera_of(view, image.size())?;
         let given = Given { map, scale: view.depth_scale, measure: Measure::Depth };
-        let read = self.read(view, (image, camera), &given, |image, camera| self.of_points(view, image, camera))?;
+        let read =
+            self.read(view, (image, camera), &given, |image, camera| self.of_points(view, image, camera))?;
         Ok((read, resized))
     }
 

@@ -118,7 +118,9 @@ impl Loader<'_> {
                 (Some(map), _) => (map, read.filled),
                 (None, Some(map)) => {
                     let map = match view.disparity_offset {
-                        Some(offset) => map.with_offset(offset).map_err(|e| self.incomplete(e.to_string()))?,
+                        Some(offset) => {
+                            map.with_offset(offset).map_err(|e| self.incomplete(e.to_string()))?
+                        }
                         None => map,
                     };
                     self.dense(view, map, &read.image, Path::new("matched"))?
@@ -144,10 +146,8 @@ impl Loader<'_> {
         let mut data = vec![f32::NAN; width * height];
         for point in points {
             let (x, y, depth) = camera.project(&point);
-            let is_inside = x > -0.5 && y > -0.5 && x < width as f64 - 0.5 && y < height as f64 - 0.5;
-            if is_inside && depth > 0.0 {
-                let nearest = &mut data[(y + 0.5) as usize * width + (x + 0.5) as usize];
-                *nearest = nearest.min(depth as f32);
+            if let Some(p) = image.pixel_at(x, y).filter(|_| depth > 0.0) {
+                data[p] = data[p].min(depth as f32);
             }
         }
         DepthMap::new((width, height), data, 1.0, Measure::Depth).map_err(|_| {

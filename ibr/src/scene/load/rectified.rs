@@ -4,7 +4,7 @@ use super::maps::{Given, Whole};
 use super::{Goal, Inputs, Loaded, Loader, each, pixels};
 use crate::camera::middlebury::{Calibration, read_calibration};
 use crate::depth::Measure;
-use crate::scene::{Kind, ViewSpec};
+use crate::scene::{Kind, SourceView, ViewSpec};
 use hybank::messages::Quoted;
 
 impl Loader<'_> {
@@ -45,8 +45,10 @@ impl Loader<'_> {
         }
         self.no_other_size(goals, first)?;
         let calibration = self.calibration(first)?;
+        let is_matched = views.iter().any(|view| !view.is_stored());
         let Whole { views, filled } = self.matched(views, sources, Measure::Disparity)?;
-        Ok(Inputs { kind: Kind::Rectified { views, positions }, filled, calibration, notes: Vec::new() })
+        let notes = note_of_exchange(&views).filter(|_| is_matched).into_iter().collect();
+        Ok(Inputs { kind: Kind::Rectified { views, positions }, filled, calibration, notes })
     }
 
     /// A rectified virtual view is as large as the views.
@@ -97,4 +99,15 @@ impl Loader<'_> {
             size.1
         )))
     }
+}
+
+/// That photographs seem to be exchanged: nearly all of what was found lies behind infinity.
+fn note_of_exchange(views: &[SourceView<f64>]) -> Option<String> {
+    let is_behind = |view: &SourceView<f64>| {
+        let behind = view.map.data().iter().filter(|v| **v < 0.0).count();
+        behind as f64 > 0.9 * view.map.data().len() as f64
+    };
+    views.iter().all(is_behind).then(|| {
+        "nearly all disparities are negative, as if the photographs were exchanged; exchange their positions".into()
+    })
 }
