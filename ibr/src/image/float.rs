@@ -57,7 +57,8 @@ pub(super) fn exr(file: &Source<'_>) -> Decoded {
     Ok(Image::from_values(size, chosen.len(), data))
 }
 
-/// A TIFF file with numbers that no other image has: floats, or integers of 32 bits. `None` of any other file.
+/// A TIFF file with numbers that no other image has: floats, or integers of 32 bits. `None` of another
+/// file.
 pub(super) fn tiff(file: &Source<'_>) -> Result<Option<Image>, ImageError> {
     if !is_tiff(file.bytes) {
         return Ok(None);

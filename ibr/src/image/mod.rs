@@ -233,19 +233,19 @@ impl Image {
         is_inside.then(|| (y + 0.5) as usize * self.width + (x + 0.5) as usize)
     }
 
-    /// The value of a grey image at a position, linear between pixels; NaN outside.
+    /// A channel at a position, linear between pixels; NaN outside.
     #[inline]
-    pub(crate) fn value_at(&self, [x, y]: [f64; 2]) -> f32 {
+    pub(crate) fn value_at(&self, x: f64, y: f64, channel: usize) -> f32 {
         if !(x >= 0.0 && y >= 0.0 && x <= (self.width - 1) as f64 && y <= (self.height - 1) as f64) {
             return f32::NAN;
         }
         let (column, row) = (x as u32, y as u32);
         let (a, b) = ((x - f64::from(column)) as f32, (y - f64::from(row)) as f32);
-        let here = row as usize * self.width + column as usize;
-        let (right, below) = (usize::from(a > 0.0), if b > 0.0 { self.width } else { 0 });
-        let along = |p: usize| self.data[p] + a * (self.data[p + right] - self.data[p]);
-        let upper = along(here);
-        upper + b * (along(here + below) - upper)
+        let here = (row as usize * self.width + column as usize) * self.channels + channel;
+        let right = if a > 0.0 { self.channels } else { 0 };
+        let below = if b > 0.0 { self.width * self.channels } else { 0 };
+        let along = |i: usize| self.data[i] * (1.0 - a) + self.data[i + right] * a;
+        along(here) * (1.0 - b) + along(here + below) * b
     }
 
     /// The same image with three channels.
@@ -266,7 +266,8 @@ impl Image {
         Self { channels: 1, data: self.data.chunks_exact(3).map(luma).collect(), ..*self }
     }
 
-    /// One pixel, the mean, for each `by` x `by`; at the right and at the bottom the last pixels are repeated.
+    /// One pixel, the mean, for each `by` x `by`; the last column and row are repeated where some are
+    /// missing.
     pub fn reduced(&self, by: usize) -> Self {
         let (width, height) = (self.width.div_ceil(by), self.height.div_ceil(by));
         let mean = |i: usize| {

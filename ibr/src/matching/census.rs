@@ -1,5 +1,5 @@
-//! The costs of hypotheses: how much the surroundings of a pixel differ from those of the point that it would
-//! be in other photographs.
+//! The costs of hypotheses: how much the surroundings of a pixel differ from those of the point that it
+//! would be in other photographs.
 //!
 //! The census of a pixel has a bit for each pixel around it, set if that one is darker (R. Zabih, J.
 //! Woodfill, ECCV 1994), so exposure and white balance do not matter. The cost is the number of bits that
@@ -39,7 +39,11 @@ impl Costs {
     pub(super) fn offer(&mut self, hypothesis: usize, other: &Image, at: impl Fn([f64; 2]) -> [f64; 2]) {
         let mut shown = Vec::with_capacity(self.around.clone().count() * self.width);
         for y in self.around.clone() {
-            shown.extend((0..self.width).map(|x| other.value_at(at([x as f64, y as f64]))));
+            let value = |x: usize| {
+                let [u, v] = at([x as f64, y as f64]);
+                other.value_at(u, v, 0)
+            };
+            shown.extend((0..self.width).map(value));
         }
         let there = census(&shown, self.width).into_iter().zip(&shown[RADIUS * self.width..]);
         let costs = self.values[hypothesis..].iter_mut().step_by(self.hypotheses);

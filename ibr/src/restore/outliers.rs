@@ -164,8 +164,8 @@ pub(super) fn rejected<P: Viewpoint>(
     (0..plane.values.len()).into_par_iter().with_min_len(1024).map(is_outlier).collect()
 }
 
-/// The views that vote on values of each: those that agree with it, or all if none does; evenly chosen ones of
-/// many. `groups` are those of the agreement.
+/// The views that vote on values of each: those that agree with it, or all if none does; evenly chosen ones
+/// of many. `groups` are those of the agreement.
 pub(super) fn voters(groups: &[usize]) -> Vec<Vec<usize>> {
     let all: Vec<usize> = (0..groups.len()).collect();
     let mut members = vec![Vec::new(); groups.len()];

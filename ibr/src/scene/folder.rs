@@ -1,5 +1,5 @@
-//! A scene file for what lies in a folder: a COLMAP workspace, the frames of transforms.json, a rectified pair
-//! of Middlebury, or two photographs.
+//! A scene file for what lies in a folder: a COLMAP workspace, the frames of transforms.json, a rectified
+//! pair of Middlebury, or two photographs.
 
 use super::SceneError;
 use crate::camera::colmap::{PLACES, is_model, read_model};
@@ -29,8 +29,8 @@ const KNOWN: &str = "a folder with a COLMAP model and its images, transforms.jso
 
 type Described<T> = Result<T, SceneError>;
 
-/// The text of a scene file in the folder `beside`, for a folder, a `transforms.json` or the left and the right
-/// photograph of a rectified rig. Its virtual view is half-way between two views.
+/// The text of a scene file in the folder `beside`, for a folder, a `transforms.json` or the left and the
+/// right photograph of a rectified rig. Its virtual view is half-way between two views.
 ///
 /// # Errors
 /// [`SceneError`] of a file, or that there is no scene.

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! points3D.txt  POINT3D_ID X Y Z R G B ERROR, then IMAGE_ID POINT2D_IDX of each image that shows it
-//! points3D.bin  count u64; per point: id u64, x y z f64, r g b u8, error f64, count of images u64, per image:
-//!               id u32, index u32
+//! points3D.bin  count u64; per point: id u64, x y z f64, r g b u8, error f64, count of images u64,
+//!               per image: id u32, index u32
 //! ```
 
 use super::{binary, content, is_model, no_model, number};
