@@ -11,6 +11,7 @@ pub mod image;
 pub mod interpolate;
 mod lanes;
 mod linear;
+pub mod matching;
 pub mod occlusion;
 pub mod partial;
 pub mod pipeline;

@@ -22,18 +22,21 @@ pub(crate) enum Damage {
     Scattered(f64),
     /// Every sixth value in rows and columns is used.
     Lattice,
+    /// There are no maps: the depths are found from the photographs.
+    Matched,
     /// What is infinitely far away has this value.
     Sky(f32),
 }
 
 impl Damage {
-    pub(crate) const ALL: [Self; 6] = [
+    pub(crate) const ALL: [Self; 7] = [
         Self::Clean,
         Self::Outliers(0.05),
         Self::Noise(0.5),
         Self::Noise(1.0),
         Self::Scattered(0.03),
         Self::Lattice,
+        Self::Matched,
     ];
     pub(crate) const OF_SKY: [Self; 4] =
         [Self::Sky(f32::INFINITY), Self::Sky(1e10), Self::Sky(f32::NAN), Self::Sky(0.0)];
@@ -45,6 +48,7 @@ impl Damage {
             Self::Noise(pixels) => format!("noise {pixels} px"),
             Self::Scattered(share) => format!("scattered {} %", 100.0 * share),
             Self::Lattice => "lattice 2.8 %".into(),
+            Self::Matched => "matched".into(),
             Self::Sky(value) => format!("sky as {value:e}"),
         }
     }
@@ -67,6 +71,11 @@ impl Damage {
             view.image = beside.join(view_path);
             let is_depth = view.depth.is_some();
             let Some(map) = view.depth.as_mut().or(view.disparity.as_mut()) else { continue };
+            if self == Self::Matched {
+                *map = "matched".into();
+                (view.depth_scale, view.disparity_scale) = (None, None);
+                continue;
+            }
             let (width, height, mut values) = read_map(&beside.join(&map))?;
             let seed = &mut Pcg64::seed_from_u64(100 + k as u64);
             match is_depth {
@@ -94,7 +103,7 @@ impl Damage {
         for value in values {
             let is_known = value.is_finite() && *value > 0.0;
             match self {
-                Self::Clean | Self::Lattice => {}
+                Self::Clean | Self::Lattice | Self::Matched => {}
                 Self::Outliers(share) if uniform(random) < share => {
                     *value = low + (high - low) * uniform(random) as f32;
                 }

@@ -14,7 +14,6 @@
 //! view.
 
 use crate::camera::Camera;
-use crate::image::Image;
 use crate::pipeline::Rendering;
 use crate::propagate::CalibratedView;
 use rayon::prelude::*;
@@ -114,7 +113,8 @@ impl Lookup<'_> {
         let image = self.view.image;
         let sides = [beside(-1.0, 0.0), beside(1.0, 0.0), beside(0.0, -1.0), beside(0.0, 1.0)];
         for channel in 0..image.channels() {
-            let value = |(u, v): (f64, f64)| bilinear(image, u, v, channel);
+            let value =
+                |(u, v): (f64, f64)| Some(image.value_at(u, v, channel)).filter(|value| !value.is_nan());
             let here = value((u, v))?;
             let [left, right, up, down] =
                 [value(sides[0])?, value(sides[1])?, value(sides[2])?, value(sides[3])?];
@@ -136,20 +136,4 @@ impl Lookup<'_> {
         let same = |seen: f32| (f64::from(seen) / d - 1.0).abs() <= SAME_POINT;
         (inside && d > 0.0 && same(self.view.map.row(v.round() as usize)[u.round() as usize])).then_some(())
     }
-}
-
-/// An image between its pixels; none outside.
-fn bilinear(image: &Image, u: f64, v: f64, channel: usize) -> Option<f32> {
-    let ((width, height), channels) = (image.size(), image.channels());
-    // Also false for numbers that are not finite.
-    if !(u >= 0.0 && v >= 0.0 && u <= width as f64 - 1.0 && v <= height as f64 - 1.0) {
-        return None;
-    }
-    let (x, y) = ((u as usize).min(width.max(2) - 2), (v as usize).min(height.max(2) - 2));
-    let (s, t) = ((u - x as f64) as f32, (v - y as f64) as f32);
-    let at = |x: usize, y: usize| {
-        image.data()[(y.min(height - 1) * width + x.min(width - 1)) * channels + channel]
-    };
-    let row = |y: usize| at(x, y) * (1.0 - s) + at(x + 1, y) * s;
-    Some(row(y) * (1.0 - t) + row(y + 1) * t)
 }

@@ -27,6 +27,8 @@ pub struct Frame {
     pub depth: Option<PathBuf>,
     /// Its number in the list, from 1.
     pub(super) number: usize,
+    /// The number by which a COLMAP model calls it.
+    pub(crate) id: u64,
     /// World to camera, with x to the right, y down and z forwards.
     pub(super) pose: Matrix3x4<f64>,
     pub(super) inner: Inner,
@@ -51,6 +53,13 @@ pub(super) struct Inner {
     pub(super) p1: Option<f64>,
     pub(super) p2: Option<f64>,
     pub(super) is_fisheye: Option<bool>,
+}
+
+impl Frame {
+    /// Whether the list has the size of the image.
+    pub(crate) fn has_size(&self) -> bool {
+        self.inner.w.is_some() && self.inner.h.is_some()
+    }
 }
 
 /// A camera of a list with the size of its image.

@@ -66,7 +66,14 @@ pub fn parse_transforms(text: &str, path: &Path) -> Result<CameraList, InputErro
         let fault = |reason: String| InputError::content(path, at.clone(), reason);
         let inner = spec.inner.or(&file.inner).checked().map_err(fault)?;
         let pose = world_to_camera(&spec.transform_matrix).map_err(fault)?;
-        Ok(Frame { image: image_path(&spec.file_path), depth: spec.depth_file_path, number, pose, inner })
+        Ok(Frame {
+            image: image_path(&spec.file_path),
+            depth: spec.depth_file_path,
+            number,
+            id: number as u64,
+            pose,
+            inner,
+        })
     };
     let frames = file.frames.into_iter().enumerate().map(one).collect::<Result<_, _>>()?;
     Ok(CameraList::new(path.into(), frames))

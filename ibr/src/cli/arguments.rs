@@ -18,6 +18,8 @@ pub(super) struct Arguments {
 
 const EXAMPLES: &str = "Examples:
   hybank-ibr render scene.toml -o middle.png
+  hybank-ibr render folder -o middle.png
+  hybank-ibr init left.png right.png -o scene.toml
   hybank-ibr render scene.toml --view centre -o centre.png --truth centre-photo.png
   hybank-ibr render scene.toml --depth-step 6 -o sparse.png --json
   hybank-ibr render path.toml -o film.y4m
@@ -32,6 +34,9 @@ pub(super) enum Command {
     Render(Box<RenderArguments>),
     /// Predict the error of the virtual view without a photograph of it, and what to spend on next.
     Bound(BoundArguments),
+    /// Write the scene file of a folder: a COLMAP workspace, transforms.json, a pair of Middlebury, or two
+    /// photographs.
+    Init(InitArguments),
     /// Render a synthetic scene with exact depth, compare the result with the exact view, and write a
     /// contact sheet.
     Demo(DemoArguments),
@@ -40,7 +45,7 @@ pub(super) enum Command {
 /// What `render` and `bound` share.
 #[derive(Debug, Args)]
 pub(super) struct SceneArguments {
-    /// Scene file (TOML); `-` is standard input.
+    /// Scene file (TOML), `-` for standard input, or a folder of which `init` makes a scene.
     #[arg(value_name = "SCENE")]
     pub(super) file: PathBuf,
     /// Leave this view out; the virtual view is its place. Its name, or the end of the path of its image;
@@ -89,8 +94,8 @@ Figures, in grey levels:
   expected   root mean square error, a bound of the expected mean error
   limit      not exceeded where slopes, second differences and residuals are at most those of the samples
              nearby; not sure, as photographs break that
-  sure       with --curvature: not exceeded, whatever the scene, within the limits that are given; of
-             rectified rigs
+  sure       with --curvature: not exceeded by surfaces that some view samples, within the limits that are
+             given; of rectified rigs
 The view of a rectified rig is the one that `render --method rows` gives. Of several virtual views each is
 predicted, and files are numbered. Scenes without cameras are refused.";
 
@@ -117,6 +122,33 @@ pub(super) struct BoundArguments {
     /// Largest error of a disparity for a baseline of one, in pixels, for the sure bound.
     #[arg(long, value_name = "PX", default_value_t = 0.0, requires = "curvature")]
     pub(super) disparity_error: f64,
+}
+
+const INIT_EXAMPLES: &str = "Examples:
+  hybank-ibr init workspace -o scene.toml
+      a COLMAP model with its images, and the depth maps in stereo/depth_maps if there are any
+  hybank-ibr init left.png right.png -o scene.toml
+      a rectified pair, whose disparities are found from the photographs
+
+Without depth maps a scene says \"matched\": the depths are found when it is rendered. The virtual view is
+half-way between two views. `render folder` makes the same scene without writing it; if the folder has a
+scene.toml, that is taken.";
+
+#[derive(Debug, Args)]
+#[command(after_help = INIT_EXAMPLES)]
+pub(super) struct InitArguments {
+    /// A folder, a transforms.json, or the left and the right photograph of a rectified rig.
+    #[arg(value_name = "FOLDER", required = true, num_args = 1..=2)]
+    pub(super) inputs: Vec<PathBuf>,
+    /// Scene file to write; `-` is standard output. Its paths are relative to its folder where they can be.
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: PathBuf,
+    /// Overwrite an existing file.
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Number of threads [default: all cores].
+    #[arg(long, value_name = "N")]
+    pub(super) threads: Option<usize>,
 }
 
 #[derive(Debug, Args)]

@@ -6,6 +6,7 @@ mod contact;
 mod demo;
 mod failure;
 mod heat;
+mod init;
 mod inputs;
 mod output;
 mod progress;
@@ -38,6 +39,7 @@ pub fn run() -> ExitCode {
     let outcome = match arguments.command {
         Command::Render(arguments) => in_pool(arguments.scene.threads, || render::run(&arguments)),
         Command::Bound(arguments) => in_pool(arguments.scene.threads, || bound::run(&arguments)),
+        Command::Init(arguments) => in_pool(arguments.threads, || init::run(&arguments)),
         Command::Demo(arguments) => in_pool(arguments.threads, || demo::run(&arguments)),
     };
     match outcome {

@@ -1,7 +1,7 @@
 //! The scene of a command: its file, what was typed with it, and the photograph to compare with.
 
 use super::arguments::SceneArguments;
-use super::failure::Failure;
+use super::failure::{self, Failure};
 use super::inputs;
 use super::output;
 use crate::files;
@@ -9,6 +9,7 @@ use crate::image::{Image, read_image_within};
 use crate::pipeline::{RenderSettings, Watch};
 use crate::scene::{self, LoadOptions, Scene, SceneSpec};
 use hybank::files::StandardStream;
+use hybank::messages::Quoted;
 use std::path::{Path, PathBuf};
 
 /// A scene file, read but not loaded.
@@ -87,8 +88,23 @@ fn text(path: &Path) -> Result<(PathBuf, String), Failure> {
         files::refuse_without_memory(&name, scene::room_to_parse(&text)).map_err(Failure::input)?;
         return Ok((name, text));
     }
+    let folder = if path.is_dir() { Some(path) } else { path.parent().filter(|_| is_list(path)) };
+    if let Some(folder) = folder {
+        let own = folder.join("scene.toml");
+        if !(path.is_dir() && own.is_file()) {
+            let text = scene::describe(&[path.to_owned()], folder).map_err(Failure::input)?;
+            return Ok((folder.join("<scene>"), text));
+        }
+        failure::say_line(&format!("note: the scene of this folder is {}", Quoted(&own)));
+        return text(&own);
+    }
     Ok((
         path.to_owned(),
         files::read_text(path, "check the path", scene::room_to_parse).map_err(Failure::input)?,
     ))
+}
+
+/// Whether a file lists cameras of which a scene is made.
+fn is_list(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending == "json")
 }

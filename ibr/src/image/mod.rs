@@ -2,6 +2,7 @@
 
 mod colmap_map;
 mod dynamic;
+mod float;
 mod frame_rate;
 pub mod pfm;
 pub mod quality;
@@ -29,7 +30,11 @@ pub enum ImageError {
     #[error(transparent)]
     Read(#[from] InputError),
     /// The file is not an image of a known format, or is damaged.
-    #[error("{}: {}; the readable formats are PNG, JPEG, PPM, PGM and PFM", Quoted(path), Quoted(reason))]
+    #[error(
+        "{}: {}; the readable formats are PNG, JPEG, TIFF, PPM, PGM, PFM, OpenEXR and NPY",
+        Quoted(path),
+        Quoted(reason)
+    )]
     Decode {
         /// The file.
         path: PathBuf,
@@ -221,6 +226,28 @@ impl Image {
         std::array::from_fn(|c| self.data[start + c.min(self.channels - 1)])
     }
 
+    /// The number of the pixel at a position.
+    #[inline]
+    pub(crate) fn pixel_at(&self, x: f64, y: f64) -> Option<usize> {
+        let is_inside = x > -0.5 && y > -0.5 && x < self.width as f64 - 0.5 && y < self.height as f64 - 0.5;
+        is_inside.then(|| (y + 0.5) as usize * self.width + (x + 0.5) as usize)
+    }
+
+    /// A channel at a position, linear between pixels; NaN outside.
+    #[inline]
+    pub(crate) fn value_at(&self, x: f64, y: f64, channel: usize) -> f32 {
+        if !(x >= 0.0 && y >= 0.0 && x <= (self.width - 1) as f64 && y <= (self.height - 1) as f64) {
+            return f32::NAN;
+        }
+        let (column, row) = (x as u32, y as u32);
+        let (a, b) = ((x - f64::from(column)) as f32, (y - f64::from(row)) as f32);
+        let here = (row as usize * self.width + column as usize) * self.channels + channel;
+        let right = if a > 0.0 { self.channels } else { 0 };
+        let below = if b > 0.0 { self.width * self.channels } else { 0 };
+        let along = |i: usize| self.data[i] * (1.0 - a) + self.data[i + right] * a;
+        along(here) * (1.0 - b) + along(here + below) * b
+    }
+
     /// The same image with three channels.
     pub fn to_rgb(&self) -> Self {
         if self.channels == 3 {
@@ -237,6 +264,20 @@ impl Image {
         }
         let luma = |p: &[f32]| 0.299 * p[0] + 0.587 * p[1] + 0.114 * p[2];
         Self { channels: 1, data: self.data.chunks_exact(3).map(luma).collect(), ..*self }
+    }
+
+    /// One pixel, the mean, for each `by` x `by`; the last column and row are repeated where some are
+    /// missing.
+    pub fn reduced(&self, by: usize) -> Self {
+        let (width, height) = (self.width.div_ceil(by), self.height.div_ceil(by));
+        let mean = |i: usize| {
+            let (p, c) = (i / self.channels, i % self.channels);
+            let (x, y) = (p % width * by, p / width * by);
+            let row = |k: usize| self.row((y + k / by).min(self.height - 1));
+            let value = |k: usize| row(k)[(x + k % by).min(self.width - 1) * self.channels + c];
+            (0..by * by).map(value).sum::<f32>() / (by * by) as f32
+        };
+        Self { width, height, data: (0..width * height * self.channels).map(mean).collect(), ..*self }
     }
 
     /// Every value rounded half up to a whole number in 0..=255, as it would be in an 8-bit file.

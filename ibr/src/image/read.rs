@@ -1,6 +1,6 @@
 //! Reading images and depth maps from files.
 
-use super::{Image, ImageError, colmap_map, pfm};
+use super::{Image, ImageError, colmap_map, float, pfm};
 use crate::files::{self, CHECK_THE_PATH};
 use image::{DynamicImage, ImageReader};
 use std::io::Cursor;
@@ -82,37 +82,63 @@ enum Loaded {
     Whole(DynamicImage),
 }
 
-fn load(path: &Path, most: usize) -> Result<Loaded, ImageError> {
-    let bytes = files::read(path, CHECK_THE_PATH)?;
-    let decode = |reason: String| ImageError::Decode { path: path.into(), reason };
-    // The numbers of a float map are as many bytes again.
-    files::refuse_without_memory(path, bytes.len() as f64)?;
-    let float = match &bytes[..] {
-        [b'P', b'F' | b'f', ..] => Some(pfm::decode(&bytes)),
-        _ => colmap_map::is_map(&bytes).then(|| colmap_map::decode(&bytes)),
-    };
-    if let Some(map) = float {
-        let map = map.map_err(decode)?;
-        return check_size(path, map.size(), most).map(|()| Loaded::Float(map));
-    }
-    let open = || ImageReader::new(Cursor::new(&bytes)).with_guessed_format();
-    // Before the pixels are unpacked.
-    let (width, height) =
-        open().map_err(|e| decode(e.to_string()))?.into_dimensions().map_err(|e| decode(e.to_string()))?;
-    check_size(path, (width as usize, height as usize), most)?;
-    let mut reader = open().map_err(|e| decode(e.to_string()))?;
-    // The size was checked; the decoders have limits of their own, without a way to allow more.
-    reader.no_limits();
-    Ok(Loaded::Whole(reader.decode().map_err(|e| decode(e.to_string()))?))
+/// A file whose format is not known yet.
+pub(super) struct Source<'a> {
+    path: &'a Path,
+    pub(super) bytes: &'a [u8],
+    /// The most pixels that it may have.
+    most: usize,
 }
 
-/// Refuses too many pixels, and such that the system has no memory for.
-fn check_size(path: &Path, (width, height): (usize, usize), most: usize) -> Result<(), ImageError> {
-    let pixels = width.saturating_mul(height);
-    if pixels > most {
-        return Err(ImageError::TooLarge { path: path.into(), width, height, most });
+impl Source<'_> {
+    /// That the content cannot be used.
+    pub(super) fn wrong(&self, reason: String) -> ImageError {
+        ImageError::Decode { path: self.path.into(), reason }
     }
-    ImageError::refuse_without_memory(path, (width, height), READING)
+
+    /// Refuses too many pixels, and such that the system has no memory for.
+    pub(super) fn check_size(&self, (width, height): (usize, usize)) -> Result<(), ImageError> {
+        let pixels = width.saturating_mul(height);
+        if pixels > self.most {
+            return Err(ImageError::TooLarge { path: self.path.into(), width, height, most: self.most });
+        }
+        ImageError::refuse_without_memory(self.path, (width, height), READING)
+    }
+
+    /// The numbers of a format that only maps have.
+    fn float(&self) -> Result<Option<Image>, ImageError> {
+        let decoded = match self.bytes {
+            [b'P', b'F' | b'f', ..] => pfm::decode(self.bytes),
+            bytes if colmap_map::is_map(bytes) => colmap_map::decode(bytes),
+            bytes if float::is_exr(bytes) => return float::exr(self).map(Some),
+            bytes if float::is_npy(bytes) => return float::npy(self).map(Some),
+            _ => return float::tiff(self),
+        };
+        let map = decoded.map_err(|reason| self.wrong(reason))?;
+        self.check_size(map.size()).map(|()| Some(map))
+    }
+}
+
+fn load(path: &Path, most: usize) -> Result<Loaded, ImageError> {
+    let bytes = files::read(path, CHECK_THE_PATH)?;
+    // The numbers of a float map are as many bytes again.
+    files::refuse_without_memory(path, bytes.len() as f64)?;
+    let source = Source { path, bytes: &bytes, most };
+    if let Some(map) = source.float()? {
+        return Ok(Loaded::Float(map));
+    }
+    let wrong = |e: image::ImageError| source.wrong(e.to_string());
+    let open = || {
+        let reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format();
+        reader.map_err(|e| source.wrong(e.to_string()))
+    };
+    // Before the pixels are unpacked.
+    let (width, height) = open()?.into_dimensions().map_err(wrong)?;
+    source.check_size((width as usize, height as usize))?;
+    let mut reader = open()?;
+    // The size was checked; the decoders have limits of their own, without a way to allow more.
+    reader.no_limits();
+    Ok(Loaded::Whole(reader.decode().map_err(wrong)?))
 }
 
 fn is_deep(picture: &DynamicImage) -> bool {

@@ -160,19 +160,14 @@ impl Comparison {
             let mut all = Self { points: 0, matched: Vec::new(), is_grey };
             for x in (0..width).step_by(step) {
                 let (u, v, d) = to_second(x as f64, *y as f64, f64::from(first.map.row(*y)[x]));
-                let inside = |v: f64, side: usize| v > -0.5 && v < side as f64 - 0.5;
-                // False for NaN, hence for pixels without depth.
-                if !(inside(u, other.width()) && inside(v, other.height())) {
-                    continue;
-                }
-                let (column, row) = ((u + 0.5) as usize, (v + 0.5) as usize);
-                let there = other_map.row(row)[column];
+                // None for NaN, hence for pixels without depth.
+                let Some(q) = other.pixel_at(u, v) else { continue };
+                let there = other_map.data()[q];
                 if there.is_nan() {
                     continue;
                 }
                 all.points += 1;
                 if same_depth(d as f32, there, other_map) {
-                    let q = row * other.width() + column;
                     all.matched.push([image.pixel(y * width + x), other.pixel(q)]);
                 }
             }

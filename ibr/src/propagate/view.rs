@@ -36,6 +36,9 @@ pub trait Viewpoint: Copy + Send + Sync {
 
     /// The map of pixels with the numbers of their map from this camera to another one.
     fn map_to(&self, other: &Self) -> impl Fn(f64, f64, f64) -> (f64, f64, f64) + Sync;
+
+    /// The camera of the photograph with one pixel for `by` x `by`, and with the same numbers of the map.
+    fn reduced(&self, by: usize) -> Self;
 }
 
 impl Viewpoint for f64 {
@@ -51,6 +54,10 @@ impl Viewpoint for f64 {
         let shift = self - other;
         move |x, y, disparity| (x + shift * disparity, y, disparity)
     }
+
+    fn reduced(&self, by: usize) -> Self {
+        self / by as f64
+    }
 }
 
 impl Viewpoint for Camera {
@@ -61,5 +68,10 @@ impl Viewpoint for Camera {
     fn map_to(&self, other: &Self) -> impl Fn(f64, f64, f64) -> (f64, f64, f64) + Sync {
         let map = self.relative_to(other);
         move |x, y, depth| map.map(x, y, depth)
+    }
+
+    fn reduced(&self, by: usize) -> Self {
+        // A camera stays one by factors that are positive and finite.
+        self.resized([1.0 / by as f64; 2]).unwrap_or(*self)
     }
 }

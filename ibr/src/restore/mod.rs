@@ -65,10 +65,10 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, Mem
     let error = |view: usize| agreement.depth_error(view);
     let planes: Vec<Parallax> =
         views.iter().enumerate().map(|(i, v)| Parallax::of(v.map, error(i))).collect();
-    let nearest = Nearest::new(views);
+    let (nearest, voters) = (Nearest::new(views), outliers::voters(&agreement.groups()));
     let one = |i: usize| {
         let view = &views[i];
-        let rejected = outliers::rejected(views, &planes, &agreement, i);
+        let rejected = outliers::rejected(views, &planes, &agreement.gains, &voters[i], i);
         let count = rejected.iter().filter(|r| **r).count();
         let mut plane = planes[i].clone();
         let mut guessed = Vec::new();

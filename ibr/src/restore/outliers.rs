@@ -2,7 +2,7 @@
 
 use crate::depth::{DepthMap, JUMP, Measure};
 use crate::image::Image;
-use crate::pipeline::{Agreement, GREY_LEVELS};
+use crate::pipeline::{Exposure, GREY_LEVELS};
 use crate::propagate::{View, Viewpoint};
 use rayon::prelude::*;
 
@@ -138,23 +138,22 @@ pub(super) fn difference(a: [f32; 3], b: [f32; 3]) -> f32 {
 pub(super) fn rejected<P: Viewpoint>(
     views: &[View<'_, P>],
     planes: &[Parallax],
-    agreement: &Agreement,
+    gains: &[Exposure],
+    voters: &[usize],
     index: usize,
 ) -> Vec<bool> {
-    let gains = &agreement.gains;
     let (view, plane) = (&views[index], &planes[index]);
     let colour = |view: usize, p: usize| -> [f32; 3] {
         let colour = views[view].image.pixel::<3>(p);
         std::array::from_fn(|c| colour[c] * gains[view][c] as f32)
     };
-    let others = voters(&agreement.groups(), index);
-    let maps: Vec<_> = others.iter().map(|other| view.camera.map_to(&views[*other].camera)).collect();
+    let maps: Vec<_> = voters.iter().map(|other| view.camera.map_to(&views[*other].camera)).collect();
     let is_outlier = |p: usize| {
         let value = view.map.data()[p];
         if value.is_nan() || view.map.is_guessed(p) || plane.is_supported(p) {
             return false;
         }
-        let votes = others.iter().zip(&maps).map(|(other, map)| {
+        let votes = voters.iter().zip(&maps).map(|(other, map)| {
             let (x, y) = ((p % plane.width) as f64, (p / plane.width) as f64);
             let (u, v, depth) = map(x, y, f64::from(value));
             let there = view.map.measure().parallax(depth as f32);
@@ -165,14 +164,20 @@ pub(super) fn rejected<P: Viewpoint>(
     (0..plane.values.len()).into_par_iter().with_min_len(1024).map(is_outlier).collect()
 }
 
-/// The views that vote on values of one: those that agree with it, or all if none does.
-fn voters(groups: &[usize], index: usize) -> Vec<usize> {
-    let others = || (0..groups.len()).filter(|other| *other != index);
-    let mut found: Vec<usize> = others().filter(|other| groups[*other] == groups[index]).collect();
-    if found.is_empty() {
-        found = others().collect();
-    }
-    found.iter().copied().step_by(found.len().div_ceil(VOTERS).max(1)).collect()
+/// The views that vote on values of each: those that agree with it, or all if none does; evenly chosen ones
+/// of many. `groups` are those of the agreement.
+pub(super) fn voters(groups: &[usize]) -> Vec<Vec<usize>> {
+    let all: Vec<usize> = (0..groups.len()).collect();
+    let mut members = vec![Vec::new(); groups.len()];
+    groups.iter().enumerate().for_each(|(view, group)| members[*group].push(view));
+    let of = |view: &usize| {
+        let own = &members[groups[*view]];
+        let from = if own.len() > 1 { own } else { &all };
+        let (place, count) = (from.partition_point(|other| other < view), from.len() - 1);
+        let chosen = (0..count).step_by(count.div_ceil(VOTERS).max(1));
+        chosen.map(|k| from[k + usize::from(k >= place)]).collect()
+    };
+    all.iter().map(of).collect()
 }
 
 /// 1 if a view confirms a point at a position with a parallax, by a pixel of a surface there that has nearly

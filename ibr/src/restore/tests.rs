@@ -120,3 +120,21 @@ fn thin_things_are_kept() {
         assert!(restored.map == *map, "{}", restored.outliers);
     }
 }
+
+/// By definition: the others of a group, or all others if a view is alone in its group, at equal distances.
+#[test]
+fn few_of_many_views_vote() {
+    for groups in [vec![0, 0, 2, 0, 4, 4], vec![0; 40], (0..23).collect(), vec![0]] {
+        let found = outliers::voters(&groups);
+        for (index, found) in found.iter().enumerate() {
+            let others = || (0..groups.len()).filter(|other| *other != index);
+            let mut wanted: Vec<usize> = others().filter(|other| groups[*other] == groups[index]).collect();
+            if wanted.is_empty() {
+                wanted = others().collect();
+            }
+            let wanted: Vec<usize> =
+                wanted.iter().copied().step_by(wanted.len().div_ceil(8).max(1)).collect();
+            assert_eq!(*found, wanted, "{groups:?} {index}");
+        }
+    }
+}

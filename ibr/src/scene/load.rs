@@ -5,6 +5,7 @@ mod complete;
 mod goals;
 mod keys;
 mod left_out;
+mod maps;
 mod models;
 mod rectified;
 mod uncalibrated;
@@ -15,10 +16,8 @@ pub use goals::MOST_FRAMES;
 use super::spec::{SceneSpec, ViewSpec};
 use super::{Kind, Scene, SceneError, SourceView};
 use crate::camera::middlebury::Calibration;
-use crate::depth::{DepthMap, Measure, fill_unknown};
 use crate::files::{InputError, Location};
-use crate::image::{Image, ImageError, MOST_PIXELS, read_image_within, read_map_within};
-use crate::partial::densify;
+use crate::image::{Image, MOST_PIXELS, read_image_within};
 use crate::pipeline::Watch;
 use crate::propagate::Viewpoint;
 use crate::restore::{coloured, restore};
@@ -26,6 +25,7 @@ use goals::Goal;
 use hybank::memory::{MemoryShortage, check_memory};
 use hybank::messages::{self, Number, Quoted, of_document};
 use left_out::LeftOut;
+use maps::LOADING_BYTES;
 use models::Models;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -197,39 +197,16 @@ impl Loader<'_> {
     }
 
     fn need<T>(&self, value: Option<T>, view: &ViewSpec, key: &str, kind: &str) -> Loaded<T> {
-        let reason = || format!("{} has no `{key}`, which every view of a {kind} scene needs", view.named());
-        value.ok_or_else(|| self.incomplete(reason()))
-    }
-
-    /// Image and dense map of a view, and the number of unknown values that were filled.
-    fn image_with_map(
-        &self,
-        view: &ViewSpec,
-        map: &Path,
-        scale: f64,
-        measure: Measure,
-    ) -> Loaded<(Image, DepthMap, usize)> {
-        let path = self.file(map);
-        let image = self.image(&view.image)?;
-        let (width, height, stored) = read_map_within(&path, self.options.max_pixels)?;
-        let depth_error = |source| SceneError::Depth { view: view.label(), path: path.clone(), source };
-        let map = DepthMap::new((width, height), stored, scale, measure).map_err(depth_error)?;
-        let map = match view.disparity_offset {
-            Some(offset) => map.with_offset(offset).map_err(depth_error)?,
-            None => map,
-        };
-        let given = view.step.unwrap_or(1);
-        map.fits(image.size(), given).map_err(depth_error)?;
-        let step = if given == 1 { self.options.depth_step } else { given };
-        if step == 1 && !map.is_scattered() {
-            let mut map = map;
-            let filled = if self.options.fill { fill_unknown(&mut map) } else { 0 };
-            return Ok((image, map, filled));
-        }
-        ImageError::refuse_without_memory(&path, image.size(), LOADING_BYTES)?;
-        let coarse = if given == 1 { map.decimated(step).map_err(depth_error)? } else { map };
-        let dense = densify(&coarse, step, &image).map_err(depth_error)?;
-        Ok((image, dense, coarse.unknown()))
+        value.ok_or_else(|| {
+            let remedy = match key {
+                "depth" | "disparity" => format!("; {key} = \"matched\" finds it from the photographs"),
+                _ => String::new(),
+            };
+            let named = view.named();
+            self.incomplete(format!(
+                "{named} has no `{key}`, which every view of a {kind} scene needs{remedy}"
+            ))
+        })
     }
 }
 
@@ -291,9 +268,8 @@ fn restore_views<P: Viewpoint>(
     Ok(outliers)
 }
 
-/// Bytes per pixel of a view that is there, and of one that is being read and made dense.
+/// Bytes per pixel of a view that is there.
 const VIEW_BYTES: f64 = 20.0;
-const LOADING_BYTES: f64 = 110.0;
 
 /// Bytes of memory in which the text of a scene file can be parsed.
 #[cfg(feature = "cli")]

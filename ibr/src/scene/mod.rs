@@ -1,8 +1,10 @@
 //! Scenes: TOML files that list views (images, maps, cameras) and describe the virtual view.
 
+mod folder;
 mod load;
 mod spec;
 
+pub use folder::describe;
 #[cfg(feature = "cli")]
 pub(crate) use load::room_to_parse;
 pub use load::{LoadOptions, MOST_FRAMES, complete, load, load_watched, parse};

@@ -50,7 +50,7 @@ pub struct ViewSpec {
     pub image: PathBuf,
     /// Position along the baseline of a rectified rig, in baselines.
     pub position: Option<f64>,
-    /// Disparity map of a rectified rig.
+    /// Disparity map of a rectified rig, or `matched`: it is found from the photographs.
     pub disparity: Option<PathBuf>,
     /// Stored value / scale = disparity in pixels for a baseline of one.
     pub disparity_scale: Option<f64>,
@@ -59,7 +59,8 @@ pub struct ViewSpec {
     pub disparity_offset: Option<f64>,
     /// 3 x 4 camera matrix, in pixels.
     pub camera: Option<[[f64; 4]; 3]>,
-    /// Depth map of a general rig.
+    /// Depth map of a general rig, or `matched` or `points`: it is found from the photographs, or is that of
+    /// the points of the COLMAP model.
     pub depth: Option<PathBuf>,
     /// Stored value / scale = depth.
     pub depth_scale: Option<f64>,
@@ -105,11 +106,33 @@ pub struct TargetSpec {
     pub matches: Option<PathBuf>,
 }
 
+/// Where a map comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum MapSource<'a> {
+    File(&'a Path),
+    /// The points of the COLMAP model that has the cameras.
+    Points,
+    /// The photographs beside this one.
+    Matched,
+}
+
+impl<'a> MapSource<'a> {
+    /// What `depth` or `disparity` says: one of two words, or a file.
+    pub(super) fn of(map: &'a Path) -> Self {
+        match map.to_str() {
+            Some("points") => Self::Points,
+            Some("matched") => Self::Matched,
+            _ => Self::File(map),
+        }
+    }
+}
+
 impl SceneSpec {
     /// Every file that the scene names; relative paths start in `folder`.
     pub fn files(&self, folder: &Path) -> Vec<PathBuf> {
         let images = self.view.iter().map(|view| &view.image);
         let maps = self.view.iter().flat_map(|view| [&view.disparity, &view.depth]).flatten();
+        let maps = maps.filter(|map| matches!(MapSource::of(map), MapSource::File(_)));
         let lists = [&self.matches, &self.transforms, &self.calib].into_iter();
         let lists = lists.chain(self.targets.iter().map(|target| &target.matches)).flatten();
         let models = self.view.iter().map(|view| &view.colmap).chain([&self.colmap]).flatten();
@@ -150,6 +173,12 @@ impl TargetSpec {
 }
 
 impl ViewSpec {
+    /// Whether the numbers of the map are stored in a file.
+    pub(super) fn is_stored(&self) -> bool {
+        let map = self.depth.as_deref().or(self.disparity.as_deref());
+        map.is_none_or(|map| matches!(MapSource::of(map), MapSource::File(_)))
+    }
+
     /// The name, or the image file's.
     pub fn label(&self) -> String {
         self.name.clone().unwrap_or_else(|| self.image.display().to_string())

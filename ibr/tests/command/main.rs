@@ -12,6 +12,7 @@ mod colmap;
 #[cfg(unix)]
 mod disturbed;
 mod doors;
+mod folders;
 mod foreign;
 mod mistakes;
 mod path;

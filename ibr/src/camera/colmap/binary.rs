@@ -57,25 +57,25 @@ pub(super) fn cameras(bytes: &[u8]) -> Result<BTreeMap<u64, Inner>, Fault> {
 /// The images with their numbers from 1.
 pub(super) fn images(bytes: &[u8]) -> Result<Vec<Pose>, Fault> {
     let found = records(bytes, |rest| {
-        let _: [u8; 4] = take(rest)?;
+        let id = u64::from(u32::from_le_bytes(take(rest)?));
         let mut seven = [0.0; 7];
         for value in &mut seven {
             *value = float(rest)?;
         }
-        let id = u64::from(u32::from_le_bytes(take(rest)?));
+        let camera = u64::from(u32::from_le_bytes(take(rest)?));
         let end = rest.iter().position(|b| *b == 0).ok_or_else(cut_short)?;
         let name = String::from_utf8_lossy(&rest[..end]).into_owned();
         *rest = &rest[end + 1..];
         let points = u64::from_le_bytes(take(rest)?).saturating_mul(POINT);
         let skip = usize::try_from(points).ok().filter(|n| *n <= rest.len()).ok_or_else(cut_short)?;
         *rest = &rest[skip..];
-        Ok((id, pose(seven)?, name))
+        Ok(Pose { at: 0, id, camera, pose: pose(seven)?, name })
     })?;
-    Ok(found.into_iter().enumerate().map(|(i, (id, pose, name))| (i + 1, id, pose, name)).collect())
+    Ok((1..).zip(found).map(|(at, found)| Pose { at, ..found }).collect())
 }
 
 /// As many records as the file states.
-fn records<T>(
+pub(super) fn records<T>(
     mut rest: &[u8],
     mut one: impl FnMut(&mut &[u8]) -> Result<T, String>,
 ) -> Result<Vec<T>, Fault> {
@@ -92,13 +92,13 @@ fn cut_short() -> String {
     "the file ends within this record".into()
 }
 
-fn take<const N: usize>(rest: &mut &[u8]) -> Result<[u8; N], String> {
+pub(super) fn take<const N: usize>(rest: &mut &[u8]) -> Result<[u8; N], String> {
     let (head, tail) = rest.split_first_chunk::<N>().ok_or_else(cut_short)?;
     *rest = tail;
     Ok(*head)
 }
 
-fn float(rest: &mut &[u8]) -> Result<f64, String> {
+pub(super) fn float(rest: &mut &[u8]) -> Result<f64, String> {
     Ok(f64::from_le_bytes(take(rest)?))
 }
 

@@ -3,6 +3,9 @@
 //! COLMAP puts pixel centres at half-integers; [`CameraList::camera`] shifts the principal point.
 
 mod binary;
+mod points;
+
+pub use points::{ScenePoint, read_points};
 
 use super::list::{CameraList, Frame, Inner};
 use crate::files::{self, CHECK_THE_PATH, InputError, Location};
@@ -18,7 +21,8 @@ const FILES: &str = "a COLMAP model has cameras.txt and images.txt, or cameras.b
 const LISTED: f64 = 1500.0;
 
 /// Where COLMAP puts models in its folders.
-const PLACES: [&str; 6] = ["sparse/0", "sparse", "0", "dense/0/sparse", "dense/sparse", "colmap/sparse/0"];
+pub(crate) const PLACES: [&str; 6] =
+    ["sparse/0", "sparse", "0", "dense/0/sparse", "dense/sparse", "colmap/sparse/0"];
 
 /// Reads the model in `folder`: the text files if cameras.txt is there, else the binary ones if cameras.bin
 /// is.
@@ -44,7 +48,7 @@ pub fn read_model(folder: &Path) -> Result<CameraList, InputError> {
 }
 
 /// Whether a folder has the file of cameras, in one of the formats.
-fn is_model(folder: &Path) -> bool {
+pub(crate) fn is_model(folder: &Path) -> bool {
     ["cameras.txt", "cameras.bin"].iter().any(|name| folder.join(name).is_file())
 }
 
@@ -88,11 +92,12 @@ pub fn parse_model(cameras: &str, images: &str, folder: &Path) -> Result<CameraL
 /// listed.
 fn join(inners: &BTreeMap<u64, Inner>, poses: Vec<Pose>, path: &Path) -> Result<CameraList, (usize, String)> {
     let mut frames = BTreeMap::new();
-    for (k, (at, id, pose, name)) in poses.into_iter().enumerate() {
-        let inner = *inners.get(&id).ok_or_else(|| {
-            (at, format!("image \"{}\" has camera {id}, which the cameras do not list", Quoted(&name)))
+    for (k, Pose { at, id, camera, pose, name }) in poses.into_iter().enumerate() {
+        let inner = *inners.get(&camera).ok_or_else(|| {
+            (at, format!("image \"{}\" has camera {camera}, which the cameras do not list", Quoted(&name)))
         })?;
-        frames.insert(name.clone(), Frame { image: name.into(), depth: None, number: k + 1, pose, inner });
+        frames
+            .insert(name.clone(), Frame { image: name.into(), depth: None, number: k + 1, id, pose, inner });
     }
     Ok(CameraList::new(path.into(), frames.into_values().collect()))
 }
@@ -169,8 +174,17 @@ fn inner(model: &str, size: (usize, usize), parameters: &[f64]) -> Result<Inner,
     })
 }
 
-/// Line or record of an image, id of its camera, world-to-camera pose, and name.
-type Pose = (usize, u64, Matrix3x4<f64>, String);
+/// An image of a model.
+struct Pose {
+    /// Its line or record.
+    at: usize,
+    id: u64,
+    /// The id of its camera.
+    camera: u64,
+    /// World to camera.
+    pose: Matrix3x4<f64>,
+    name: String,
+}
 
 /// Two lines per image: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then its points, which are ignored.
 fn parse_images(text: &str) -> Result<Vec<Pose>, (usize, String)> {
@@ -180,26 +194,25 @@ fn parse_images(text: &str) -> Result<Vec<Pose>, (usize, String)> {
         if line.is_empty() {
             continue;
         }
-        let (id, pose, name) = parse_image(line).map_err(|reason| (i, reason))?;
-        poses.push((i, id, pose, name));
+        poses.push(parse_image(i, line).map_err(|reason| (i, reason))?);
         lines.next();
     }
     Ok(poses)
 }
 
-fn parse_image(line: &str) -> Result<(u64, Matrix3x4<f64>, String), String> {
+fn parse_image(at: usize, line: &str) -> Result<Pose, String> {
     let mut words = line.split_whitespace();
-    let _: u64 = number(words.next(), "image id")?;
+    let id = number(words.next(), "image id")?;
     let mut seven = [0.0; 7];
     for (value, name) in seven.iter_mut().zip(["QW", "QX", "QY", "QZ", "TX", "TY", "TZ"]) {
         *value = number(words.next(), name)?;
     }
-    let id = number(words.next(), "camera id")?;
+    let camera = number(words.next(), "camera id")?;
     let name = words.collect::<Vec<_>>().join(" ");
     if name.is_empty() {
         return Err("the name of the image is missing".into());
     }
-    Ok((id, pose(seven)?, name))
+    Ok(Pose { at, id, camera, pose: pose(seven)?, name })
 }
 
 /// \[R | t\] from a quaternion (scalar first) and a translation.

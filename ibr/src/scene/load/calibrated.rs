@@ -1,13 +1,14 @@
 //! Scenes of general cameras: 3 x 4 matrices, COLMAP models or transforms files, and depths.
 
 use super::left_out::LeftOut;
+use super::maps::{Given, Read, Whole};
 use super::models::Source;
 use super::{Goal, Inputs, Loaded, Loader, each, pixels};
 use crate::camera::Camera;
 use crate::camera::ListedCamera;
 use crate::camera::resize::{Size, factors};
 use crate::depth::Measure;
-use crate::scene::{Kind, SceneError, SourceView, ViewSpec};
+use crate::scene::{Kind, SceneError, ViewSpec};
 use hybank::messages::Quoted;
 use nalgebra::Matrix3x4;
 
@@ -47,19 +48,19 @@ impl Loader<'_> {
         self.a_camera_each()?;
         self.keys_of(goals, "calibrated")?;
         let sources = each(views, |view| self.source(view), |source| pixels(&source.0.image), self.watch)?;
-        let first = First { size: sources[0].0.image.size(), resized: sources[0].2 };
+        let first = First { size: sources[0].0.image.size(), resized: sources[0].1 };
         let (cameras, size) = match left_out {
             Some(place) => self.at_place(place, first, goals)?,
             None => self.cameras(goals, first)?,
         };
-        let notes = notes(sources.iter().filter_map(|s| s.2));
-        let filled = sources.iter().map(|s| s.1).sum();
-        let views = sources.into_iter().map(|s| s.0).collect();
+        let notes = notes(sources.iter().filter_map(|s| s.1));
+        let read = sources.into_iter().map(|s| s.0).collect();
+        let Whole { views, filled } = self.matched(views, read, Measure::Depth)?;
         Ok(Inputs { kind: Kind::Calibrated { views, cameras, size }, filled, calibration: None, notes })
     }
 
-    /// A view, the number of its depths that were filled, and how its camera was resized.
-    fn source(&self, view: &ViewSpec) -> Loaded<(SourceView<Camera>, usize, Option<Resized>)> {
+    /// A view, and how its camera was resized.
+    fn source(&self, view: &ViewSpec) -> Loaded<(Read<Camera>, Option<Resized>)> {
         let others = [
             ("disparity", view.disparity.is_some()),
             ("disparity_scale", view.disparity_scale.is_some()),
@@ -67,10 +68,12 @@ impl Loader<'_> {
         ];
         self.no_other_kind(&view.named(), "calibrated", &others)?;
         let map = self.need(view.depth.as_deref(), view, "depth", "calibrated")?;
-        let (image, depth, filled) =
-            self.image_with_map(view, map, view.depth_scale.unwrap_or(1.0), Measure::Depth)?;
+        let image = self.image(&view.image)?;
         let (camera, resized) = self.camera_of(view, image.size())?;
-        Ok((SourceView { image, map: depth, camera }, filled, resized))
+        let given = Given { map, scale: view.depth_scale, measure: Measure::Depth };
+        let read =
+            self.read(view, (image, camera), &given, |image, camera| self.of_points(view, image, camera))?;
+        Ok((read, resized))
     }
 
     /// The camera of the view that is left out, or of an image that the file of cameras lists, and the size

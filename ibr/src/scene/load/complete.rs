@@ -42,7 +42,7 @@ pub fn complete(spec: &SceneSpec, path: &Path) -> Loaded<SceneSpec> {
             }
         }
     }
-    for view in &mut whole.view {
+    for view in whole.view.iter_mut().filter(|view| view.is_stored()) {
         view.disparity_scale = view.disparity_scale.or(spec.disparity_scale);
         view.depth_scale = view.depth_scale.or(spec.depth_scale);
     }

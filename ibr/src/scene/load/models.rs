@@ -1,7 +1,7 @@
 //! Cameras from files of other programs, each file read once.
 
 use super::{Loaded, Loader};
-use crate::camera::colmap::read_model;
+use crate::camera::colmap::{ScenePoint, read_model, read_points};
 use crate::camera::names::{self, NameError};
 use crate::camera::resize::Size;
 use crate::camera::transforms::read_transforms;
@@ -9,6 +9,7 @@ use crate::camera::{CameraList, ListedCamera};
 use crate::files::InputError;
 use crate::scene::ViewSpec;
 use hybank::messages::Quoted;
+use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -23,18 +24,37 @@ pub(super) struct Source {
 #[derive(Default)]
 pub(super) struct Models {
     read: Mutex<BTreeMap<PathBuf, Arc<CameraList>>>,
+    points: Mutex<BTreeMap<PathBuf, Arc<Vec<ScenePoint>>>>,
 }
 
 impl Models {
     fn get(&self, source: &Source) -> Loaded<Arc<CameraList>> {
-        let mut read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(found) = read.get(&source.path) {
-            return Ok(found.clone());
-        }
-        let list = Arc::new((source.read)(&source.path)?);
-        read.insert(source.path.clone(), list.clone());
-        Ok(list)
+        once(&self.read, &source.path, source.read)
     }
+
+    /// The points of the COLMAP model in a folder that one of its images shows.
+    pub(super) fn points(&self, folder: &Path, image: &str) -> Loaded<Vec<Vector3<f64>>> {
+        let list = self.get(&Source { path: folder.into(), read: read_model })?;
+        let id = list.find(image).ok().map(|(frame, _)| frame.id);
+        let points = once(&self.points, folder, read_points)?;
+        let shown = points.iter().filter(|point| id.is_some_and(|id| point.images.contains(&id)));
+        Ok(shown.map(|point| point.position).collect())
+    }
+}
+
+/// What a file holds, read once.
+fn once<T>(
+    known: &Mutex<BTreeMap<PathBuf, Arc<T>>>,
+    path: &Path,
+    read: fn(&Path) -> Result<T, InputError>,
+) -> Loaded<Arc<T>> {
+    let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(found) = known.get(path) {
+        return Ok(found.clone());
+    }
+    let found = Arc::new(read(path)?);
+    known.insert(path.into(), found.clone());
+    Ok(found)
 }
 
 impl Loader<'_> {

@@ -1,5 +1,6 @@
 //! Scenes of a rectified rig: positions and disparities.
 
+use super::maps::{Given, Whole};
 use super::{Goal, Inputs, Loaded, Loader, each, pixels};
 use crate::camera::middlebury::{Calibration, read_calibration};
 use crate::depth::Measure;
@@ -29,20 +30,25 @@ impl Loader<'_> {
             let position = self.need(view.position, view, "position", "rectified")?;
             let position = self.finite(position, &view.named())?;
             let map = self.need(view.disparity.as_deref(), view, "disparity", "rectified")?;
-            let (image, disparity, filled) =
-                self.image_with_map(view, map, view.disparity_scale.unwrap_or(1.0), Measure::Disparity)?;
-            Ok((SourceView { image, map: disparity, camera: position }, filled))
+            let given = Given { map, scale: view.disparity_scale, measure: Measure::Disparity };
+            self.read(view, (self.image(&view.image)?, position), &given, |_, _| {
+                Err(self.incomplete(format!(
+                    "{} has disparity = \"points\", which a rectified rig does not have; give it a map or \"matched\"",
+                    view.named()
+                )))
+            })
         };
-        let sources = each(views, one, |source| pixels(&source.0.image), self.watch)?;
-        let first = sources[0].0.image.size();
-        for (view, (source, _)) in views.iter().zip(&sources) {
+        let sources = each(views, one, |source| pixels(&source.image), self.watch)?;
+        let first = sources[0].image.size();
+        for (view, source) in views.iter().zip(&sources) {
             source.image.same_size(&view.named(), first, &views[0].named())?;
         }
         self.no_other_size(goals, first)?;
         let calibration = self.calibration(first)?;
-        let filled = sources.iter().map(|s| s.1).sum();
-        let views = sources.into_iter().map(|s| s.0).collect();
-        Ok(Inputs { kind: Kind::Rectified { views, positions }, filled, calibration, notes: Vec::new() })
+        let is_matched = views.iter().any(|view| !view.is_stored());
+        let Whole { views, filled } = self.matched(views, sources, Measure::Disparity)?;
+        let notes = note_of_exchange(&views).filter(|_| is_matched).into_iter().collect();
+        Ok(Inputs { kind: Kind::Rectified { views, positions }, filled, calibration, notes })
     }
 
     /// A rectified virtual view is as large as the views.
@@ -93,4 +99,15 @@ impl Loader<'_> {
             size.1
         )))
     }
+}
+
+/// That photographs seem to be exchanged: nearly all of what was found lies behind infinity.
+fn note_of_exchange(views: &[SourceView<f64>]) -> Option<String> {
+    let is_behind = |view: &SourceView<f64>| {
+        let behind = view.map.data().iter().filter(|v| **v < 0.0).count();
+        behind as f64 > 0.9 * view.map.data().len() as f64
+    };
+    views.iter().all(is_behind).then(|| {
+        "nearly all disparities are negative, as if the photographs were exchanged; exchange their positions".into()
+    })
 }

@@ -1,0 +1,210 @@
+//! Depth from photographs: semi-global matching (H. Hirschmüller, "Stereo processing by semiglobal matching
+//! and mutual information", IEEE PAMI 30, 2008) along the rays of pixels.
+//!
+//! The hypotheses of a pixel are parallaxes (disparities of a rig, reciprocal depths) at equal distances,
+//! each of which moves it by about a pixel in other photographs. A hypothesis costs what the surroundings
+//! there differ (`census`), paths from eight directions join pixels to surfaces (`aggregate`), and what no
+//! other photograph confirms is unknown. All is done twice: at a quarter of the size for the range of the
+//! parallaxes, and then in it.
+
+mod aggregate;
+mod census;
+
+use crate::depth::{DepthMap, Measure};
+use crate::image::Image;
+use crate::propagate::Viewpoint;
+use census::Costs;
+use hybank::memory::{MemoryShortage, check_memory};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// A photograph, and its position on the line of a rectified rig or its matrix.
+#[derive(Debug, Clone, Copy)]
+pub struct Photograph<'a, P> {
+    /// The image.
+    pub image: &'a Image,
+    /// The camera.
+    pub camera: P,
+}
+
+/// Why photographs cannot be matched; they are numbered from 0.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MatchError {
+    /// There is no other photograph at another place.
+    #[error("photograph {} has no other one at another place, with which it could be matched", .0 + 1)]
+    Alone(usize),
+    /// Hardly any point was found in two photographs.
+    #[error("photograph {} and those beside it show hardly any common point; are they rectified, and are the cameras right?", .0 + 1)]
+    Unlike(usize),
+    /// There is too little memory.
+    #[error("to match the photographs takes {0}; shrink them")]
+    Memory(MemoryShortage),
+}
+
+/// Other photographs with which each one is matched: the nearest.
+const OTHERS: usize = 2;
+
+/// The part of their sides that the photographs have when the range is looked for.
+const REDUCTION: usize = 4;
+
+/// Largest displacement between two photographs, as a share of the width.
+const WIDEST: f64 = 0.3;
+
+/// Share of the parallaxes at either end that the range leaves out, and pixels that it is longer there.
+const STRAY: f64 = 0.005;
+const MARGIN: f32 = 12.0;
+
+/// Share of the pixels that others must confirm: in unlike photographs a fifth is by chance.
+const LEAST_SHARE: f64 = 0.3;
+
+/// Rows that are matched together, and rows beyond them where paths begin.
+const ROWS: usize = 96;
+const LEAD: usize = 24;
+
+/// Bytes per hypothesis of a pixel: a cost and a sum.
+const BYTES: f64 = 3.0;
+
+/// The work on one photograph.
+struct Sweep<P> {
+    camera: P,
+    measure: Measure,
+    grey: Image,
+    others: Vec<usize>,
+    /// Parallax from one hypothesis to the next.
+    unit: f32,
+    range: Range<i32>,
+}
+
+/// Maps of photographs of one kind, unknown where no other photograph shows the point: disparities in pixels
+/// for a baseline of one, or depths in the unit of the cameras.
+///
+/// # Errors
+/// [`MatchError`].
+pub fn depths<P: Viewpoint>(
+    photographs: &[Photograph<'_, P>],
+    measure: Measure,
+) -> Result<Vec<DepthMap>, MatchError> {
+    let sweeps = |by| {
+        let reduced = |p: &Photograph<'_, P>| (p.camera.reduced(by), p.image.to_grey().reduced(by));
+        let sweep =
+            |(camera, grey)| Sweep { camera, measure, grey, others: Vec::new(), unit: 0.0, range: 0..0 };
+        let mut sweeps: Vec<_> = photographs.iter().map(reduced).map(sweep).collect();
+        (0..sweeps.len()).try_for_each(|k| Sweep::prepare(&mut sweeps, k)).map(|()| sweeps)
+    };
+    let coarse = matched(&sweeps(REDUCTION)?)?;
+    let mut fine = sweeps(1)?;
+    fine.iter_mut().zip(&coarse).for_each(|(sweep, found)| sweep.narrow(found));
+    let map = |(sweep, found): (&Sweep<P>, Vec<f32>)| {
+        let data = found.into_iter().map(|v| measure.of_parallax(v)).collect();
+        DepthMap::from_known(sweep.grey.size(), data, measure)
+    };
+    Ok(fine.iter().zip(matched(&fine)?).map(map).collect())
+}
+
+/// The parallaxes of all photographs, NaN where no other one has the same at the point.
+fn matched<P: Viewpoint>(sweeps: &[Sweep<P>]) -> Result<Vec<Vec<f32>>, MatchError> {
+    let cells = |sweep: &Sweep<P>| (sweep.grey.width() * (ROWS + 2 * LEAD) * sweep.range.len()) as f64;
+    let most = sweeps.iter().map(cells).fold(0.0, f64::max);
+    check_memory(BYTES * most * rayon::current_num_threads() as f64).map_err(MatchError::Memory)?;
+    let found: Vec<Vec<f32>> = sweeps.iter().map(|sweep| sweep.parallaxes(sweeps)).collect();
+    let confirmed = (0..sweeps.len()).map(|k| {
+        let values = sweeps[k].confirmed(sweeps, &found, k);
+        let known = values.iter().filter(|v| !v.is_nan()).count();
+        let is_alike = known as f64 > LEAST_SHARE * values.len() as f64;
+        if is_alike { Ok(values) } else { Err(MatchError::Unlike(k)) }
+    });
+    confirmed.collect()
+}
+
+impl<P: Viewpoint> Sweep<P> {
+    /// Finds the nearest other photographs, and takes the widest range.
+    fn prepare(sweeps: &mut [Self], index: usize) -> Result<(), MatchError> {
+        let sweep = &sweeps[index];
+        let distance = |other: &usize| sweep.camera.distance(&sweeps[*other].camera);
+        let mut others: Vec<usize> = (0..sweeps.len()).filter(|other| distance(other) > 0.0).collect();
+        others.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        others.truncate(OTHERS);
+        let shift = others.iter().map(|k| sweep.shift(&sweeps[*k].camera)).fold(0.0, f64::max);
+        let widest = (WIDEST * sweep.grey.width() as f64) as i32;
+        let low = if sweep.measure == Measure::Disparity { -widest } else { 0 };
+        let sweep = &mut sweeps[index];
+        (sweep.others, sweep.unit, sweep.range) = (others, (1.0 / shift) as f32, low..widest + 1);
+        if shift > 0.0 { Ok(()) } else { Err(MatchError::Alone(index)) }
+    }
+
+    /// Mean displacement in another photograph per parallax, of points that are far away.
+    fn shift(&self, other: &P) -> f64 {
+        let (width, height) = self.grey.size();
+        let map = self.camera.map_to(other);
+        let step = 1e-3 / self.camera.distance(other);
+        let [far, near] = [0.0, step].map(|parallax| f64::from(self.measure.of_parallax(parallax as f32)));
+        let shifts = [0.25, 0.5, 0.75].map(|share| {
+            let (x, y) = (share * width as f64, share * height as f64);
+            let ((a, b, _), (c, d, _)) = (map(x, y, far), map(x, y, near));
+            (c - a).hypot(d - b) / step
+        });
+        shifts.iter().sum::<f64>() / 3.0
+    }
+
+    /// Takes the range of the parallaxes that were found.
+    fn narrow(&mut self, found: &[f32]) {
+        let mut known: Vec<f32> = found.iter().map(|v| v / self.unit).filter(|v| !v.is_nan()).collect();
+        known.sort_by(f32::total_cmp);
+        let stray = (STRAY * known.len() as f64) as usize;
+        let (low, high) = (known[stray] - MARGIN, known[known.len() - 1 - stray] + MARGIN);
+        self.range = self.range.start.max(low.floor() as i32)..high.ceil() as i32 + 1;
+    }
+
+    /// The map of positions and parallaxes to another photograph.
+    fn map_to(&self, other: &Self) -> impl Fn([f64; 2], f32) -> ([f64; 2], f32) + Sync {
+        let (map, measure) = (self.camera.map_to(&other.camera), self.measure);
+        move |[x, y], parallax| {
+            let (u, v, there) = map(x, y, f64::from(measure.of_parallax(parallax)));
+            ([u, v], measure.parallax(there as f32))
+        }
+    }
+
+    /// The parallaxes of all pixels, in bands of rows at the same time.
+    fn parallaxes(&self, sweeps: &[Self]) -> Vec<f32> {
+        let height = self.grey.height();
+        let starts: Vec<usize> = (0..height).step_by(ROWS).collect();
+        let bands = starts.into_par_iter().map(|y| self.band(sweeps, y..(y + ROWS).min(height)));
+        bands.collect::<Vec<_>>().concat()
+    }
+
+    fn band(&self, sweeps: &[Self], band: Range<usize>) -> Vec<f32> {
+        let (width, height) = self.grey.size();
+        let rows = band.start.saturating_sub(LEAD)..(band.end + LEAD).min(height);
+        let mut costs = Costs::new(&self.grey, &rows, self.range.len());
+        for other in self.others.iter().map(|other| &sweeps[*other]) {
+            let map = self.map_to(other);
+            for (hypothesis, k) in self.range.clone().enumerate() {
+                costs.offer(hypothesis, &other.grey, |place| map(place, k as f32 * self.unit).0);
+            }
+        }
+        let greys = &self.grey.data()[rows.start * width..rows.end * width];
+        let sums = aggregate::aggregated(&costs.finished(), greys);
+        let pixels = sums.chunks_exact(self.range.len()).skip((band.start - rows.start) * width);
+        let best = pixels.take(band.len() * width).map(aggregate::best);
+        best.map(|k| (k + self.range.start as f32) * self.unit).collect()
+    }
+
+    /// The parallaxes of this photograph, NaN where no other one has the same, to one step, at the point.
+    fn confirmed(&self, sweeps: &[Self], found: &[Vec<f32>], index: usize) -> Vec<f32> {
+        let width = self.grey.width();
+        let maps: Vec<_> = self.others.iter().map(|other| (*other, self.map_to(&sweeps[*other]))).collect();
+        let is_confirmed = |p: usize, value: f32| {
+            maps.iter().any(|(other, map)| {
+                let ([x, y], there) = map([(p % width) as f64, (p / width) as f64], value);
+                let pixel = sweeps[*other].grey.pixel_at(x, y);
+                pixel.is_some_and(|q| (found[*other][q] - there).abs() <= sweeps[*other].unit)
+            })
+        };
+        let kept = |(p, value): (usize, &f32)| if is_confirmed(p, *value) { *value } else { f32::NAN };
+        found[index].iter().enumerate().map(kept).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

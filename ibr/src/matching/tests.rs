@@ -1,0 +1,61 @@
+use super::*;
+use crate::camera::Camera;
+use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
+
+const SIZE: (usize, usize) = (160, 120);
+
+fn cameras() -> [Camera; 3] {
+    [0.0, 1.0, 2.0].map(|position| Camera::metric(rig_camera(position, SIZE), false).unwrap())
+}
+
+/// Median of the differences of known values, and their share.
+fn errors(found: &DepthMap, truth: &DepthMap, measure: Measure) -> (f32, f64) {
+    let values = found.data().iter().zip(truth.data()).filter(|(f, _)| !f.is_nan());
+    let mut errors: Vec<f32> =
+        values.map(|(f, t)| (measure.parallax(*f) - measure.parallax(*t)).abs()).collect();
+    errors.sort_by(f32::total_cmp);
+    (errors[errors.len() / 2], errors.len() as f64 / found.data().len() as f64)
+}
+
+#[test]
+fn disparities_of_a_pair_are_found() {
+    let shots = cameras().map(|camera| SyntheticScene::default().view(&camera, SIZE));
+    let views = [0, 1].map(|k| Photograph { image: &shots[k].0, camera: k as f64 });
+    let found = depths(&views, Measure::Disparity).unwrap();
+    for (found, shot) in found.iter().zip(&shots) {
+        let (error, share) = errors(found, &rig_disparity(&shot.1, SIZE.0), Measure::Disparity);
+        assert!(error < 0.3 && share > 0.75, "{error} {share}");
+    }
+    let in_one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(in_one_thread.install(|| depths(&views, Measure::Disparity)).unwrap(), found);
+}
+
+#[test]
+fn depths_of_general_cameras_are_found() {
+    let cameras = cameras();
+    let shots = cameras.map(|camera| SyntheticScene::default().view(&camera, SIZE));
+    let view = |k: usize| Photograph { image: &shots[k].0, camera: cameras[k] };
+    let found = depths(&[view(0), view(1), view(2)], Measure::Depth).unwrap();
+    for (found, shot) in found.iter().zip(&shots) {
+        let (error, share) = errors(found, &shot.1, Measure::Depth);
+        let middle = 1.0 / shot.1.middle().unwrap();
+        assert!(error < 0.05 * middle && share > 0.75, "{error} of {middle} {share}");
+    }
+}
+
+#[test]
+fn photographs_that_cannot_be_matched_are_named() {
+    let image = Image::filled(64, 48, 1, 100.0);
+    let view = |camera: f64| Photograph { image: &image, camera };
+    for alone in [&[view(0.0)][..], &[view(1.0), view(1.0)]] {
+        assert_eq!(depths(alone, Measure::Disparity).unwrap_err(), MatchError::Alone(0));
+    }
+    let dice = &mut crate::uncalibrated::random::Dice::new(3);
+    let mut noise = || {
+        let data = (0..64 * 48).map(|_| 100.0 + 50.0 * dice.normal() as f32).collect();
+        Image::new(64, 48, 1, data).unwrap()
+    };
+    let (a, b) = (noise(), noise());
+    let views = [Photograph { image: &a, camera: 0.0 }, Photograph { image: &b, camera: 1.0 }];
+    assert!(matches!(depths(&views, Measure::Disparity), Err(MatchError::Unlike(_))));
+}

@@ -1,0 +1,157 @@
+//! The maps of views: from files, from the points of a model, or from the photographs themselves.
+
+use super::{Loaded, Loader};
+use crate::camera::Camera;
+use crate::depth::{DepthMap, Measure, fill_unknown};
+use crate::image::{Image, ImageError, read_map_within};
+use crate::matching::{Photograph, depths};
+use crate::partial::densify;
+use crate::propagate::Viewpoint;
+use crate::scene::spec::MapSource;
+use crate::scene::{SceneError, SourceView, ViewSpec};
+use std::path::Path;
+
+/// Bytes per pixel of a view that is being read and made dense.
+pub(super) const LOADING_BYTES: f64 = 110.0;
+
+/// A view whose map, if it is to be found from the photographs, waits for the others.
+pub(super) struct Read<P> {
+    pub(super) image: Image,
+    map: Option<DepthMap>,
+    pub(super) camera: P,
+    /// Unknown values that were filled.
+    filled: usize,
+}
+
+/// Views with dense maps, and the number of unknown values that were filled.
+pub(super) struct Whole<P> {
+    pub(super) views: Vec<SourceView<P>>,
+    pub(super) filled: usize,
+}
+
+/// What a view says of its map.
+pub(super) struct Given<'a> {
+    pub(super) map: &'a Path,
+    pub(super) scale: Option<f64>,
+    pub(super) measure: Measure,
+}
+
+impl Loader<'_> {
+    /// A view with its map; `points` gives that of the points of a model.
+    pub(super) fn read<P>(
+        &self,
+        view: &ViewSpec,
+        (image, camera): (Image, P),
+        given: &Given<'_>,
+        points: impl Fn(&Image, &P) -> Loaded<DepthMap>,
+    ) -> Loaded<Read<P>> {
+        let source = MapSource::of(given.map);
+        if !matches!(source, MapSource::File(_)) {
+            let scale = if given.measure == Measure::Depth { "depth_scale" } else { "disparity_scale" };
+            let others = [(scale, given.scale.is_some()), ("step", view.step.is_some())];
+            if let Some((key, _)) = others.iter().find(|(_, given)| *given) {
+                return Err(self.incomplete(format!(
+                    "{} has `{key}`, which is for the numbers of a file, but no file has its map; remove it",
+                    view.named()
+                )));
+            }
+        }
+        let map = match source {
+            MapSource::File(file) => self.stored(view, file, given)?,
+            MapSource::Points => points(&image, &camera)?,
+            MapSource::Matched => return Ok(Read { image, map: None, camera, filled: 0 }),
+        };
+        let (map, filled) = self.dense(view, map, &image, given.map)?;
+        Ok(Read { image, map: Some(map), camera, filled })
+    }
+
+    /// The map of a file.
+    fn stored(&self, view: &ViewSpec, file: &Path, given: &Given<'_>) -> Loaded<DepthMap> {
+        let path = self.file(file);
+        let (width, height, stored) = read_map_within(&path, self.options.max_pixels)?;
+        let depth_error = |source| SceneError::Depth { view: view.label(), path: path.clone(), source };
+        let map = DepthMap::new((width, height), stored, given.scale.unwrap_or(1.0), given.measure);
+        let map = map.map_err(depth_error)?;
+        match view.disparity_offset {
+            Some(offset) => map.with_offset(offset).map_err(depth_error),
+            None => Ok(map),
+        }
+    }
+
+    /// A map with a value for every pixel of its image that is wanted, and the number of those that were
+    /// unknown.
+    fn dense(&self, view: &ViewSpec, map: DepthMap, image: &Image, file: &Path) -> Loaded<(DepthMap, usize)> {
+        let path = self.file(file);
+        let depth_error = |source| SceneError::Depth { view: view.label(), path: path.clone(), source };
+        let given = view.step.unwrap_or(1);
+        map.fits(image.size(), given).map_err(depth_error)?;
+        let step = if given == 1 { self.options.depth_step } else { given };
+        if step == 1 && !map.is_scattered() {
+            let mut map = map;
+            let filled = if self.options.fill { fill_unknown(&mut map) } else { 0 };
+            return Ok((map, filled));
+        }
+        ImageError::refuse_without_memory(&path, image.size(), LOADING_BYTES)?;
+        let coarse = if given == 1 { map.decimated(step).map_err(depth_error)? } else { map };
+        let dense = densify(&coarse, step, image).map_err(depth_error)?;
+        Ok((dense, coarse.unknown()))
+    }
+
+    /// The views with the maps that are found from the photographs.
+    pub(super) fn matched<P: Viewpoint>(
+        &self,
+        views: &[&ViewSpec],
+        read: Vec<Read<P>>,
+        measure: Measure,
+    ) -> Loaded<Whole<P>> {
+        let photographs: Vec<_> =
+            read.iter().map(|read| Photograph { image: &read.image, camera: read.camera }).collect();
+        let found = match read.iter().all(|read| read.map.is_some()) {
+            true => Vec::new(),
+            false => depths(&photographs, measure).map_err(|e| self.incomplete(e.to_string()))?,
+        };
+        let mut found = found.into_iter();
+        let mut whole = Whole { views: Vec::new(), filled: 0 };
+        for (view, read) in views.iter().zip(read) {
+            let matched = found.next();
+            let (map, filled) = match (read.map, matched) {
+                (Some(map), _) => (map, read.filled),
+                (None, Some(map)) => {
+                    let map = match view.disparity_offset {
+                        Some(offset) => {
+                            map.with_offset(offset).map_err(|e| self.incomplete(e.to_string()))?
+                        }
+                        None => map,
+                    };
+                    self.dense(view, map, &read.image, Path::new("matched"))?
+                }
+                (None, None) => return Err(self.incomplete("a view without a map")),
+            };
+            whole.filled += filled;
+            whole.views.push(SourceView { image: read.image, map, camera: read.camera });
+        }
+        Ok(whole)
+    }
+
+    /// The depths of the points of a model that this view shows, unknown elsewhere.
+    pub(super) fn of_points(&self, view: &ViewSpec, image: &Image, camera: &Camera) -> Loaded<DepthMap> {
+        let Some(folder) = view.colmap.as_ref().or(self.spec.colmap.as_ref()) else {
+            return Err(self.incomplete(format!(
+                "{} has depth = \"points\", those of a COLMAP model; name its folder with `colmap`, or give a depth map",
+                view.named()
+            )));
+        };
+        let points = self.models.points(&self.file(folder), &view.image.to_string_lossy())?;
+        let (width, height) = image.size();
+        let mut data = vec![f32::NAN; width * height];
+        for point in points {
+            let (x, y, depth) = camera.project(&point);
+            if let Some(p) = image.pixel_at(x, y).filter(|_| depth > 0.0) {
+                data[p] = data[p].min(depth as f32);
+            }
+        }
+        DepthMap::new((width, height), data, 1.0, Measure::Depth).map_err(|_| {
+            self.incomplete(format!("{} shows no point of the model; give it a depth map", view.named()))
+        })
+    }
+}
