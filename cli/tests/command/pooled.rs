@@ -167,7 +167,7 @@ fn an_intermediate_frequency_is_calibrated_and_fused() {
         trials::is_slow("the intermediate frequency with 64 taps, uncertain delays and three tones");
     if !is_slow {
         // Half of the taps, and delays that are taken as exact.
-        let measured = desk.read("m.toml");
+        let measured = String::from_utf8(desk.read("m.toml")).unwrap();
         let certain = measured.split("[uncertainty]").next().unwrap_or_default();
         desk.write("if.toml", IF.replace("taps = 64", "taps = 32"));
         desk.write("m.toml", certain.replace("taps = 64", "taps = 32"));
