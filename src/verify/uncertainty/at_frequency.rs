@@ -232,14 +232,15 @@ impl AtFrequency<'_> {
         all.flat_map(|(error, speed)| gains.iter().map(move |&gain| Vertex { error, speed, gain })).collect()
     }
 
-    pub(super) fn mix(&self, i: usize, vertex: &Vertex) -> Mix {
-        vec![(self.channels[i].rows[vertex.error][vertex.speed], vertex.gain)]
+    /// The row of a vertex, and its weight.
+    pub(super) fn mix(&self, i: usize, vertex: &Vertex) -> (usize, f64) {
+        (self.channels[i].rows[vertex.error][vertex.speed], vertex.gain)
     }
 
     /// The mean of the rows of a set of vertices.
     pub(super) fn mean(&self, i: usize, set: &[Vertex]) -> Mix {
         let mut mean: Mix = Vec::new();
-        for (row, gain) in set.iter().flat_map(|vertex| self.mix(i, vertex)) {
+        for (row, gain) in set.iter().map(|vertex| self.mix(i, vertex)) {
             let share = gain / set.len() as f64;
             match mean.iter_mut().find(|(known, _)| *known == row) {
                 Some((_, weight)) => *weight += share,
@@ -256,7 +257,8 @@ impl AtFrequency<'_> {
         }
         let distance = |vertex: &Vertex| {
             let mut difference = mean.clone();
-            difference.extend(self.mix(i, vertex).into_iter().map(|(row, gain)| (row, -gain)));
+            let (row, gain) = self.mix(i, vertex);
+            difference.push((row, -gain));
             let square = difference.iter().fold(Ball::ZERO, |sum, &(a, x)| {
                 difference
                     .iter()

@@ -55,8 +55,13 @@ struct Complex {
 }
 
 impl Complex {
-    fn zeros(rows: usize, columns: usize) -> Self {
-        Self { columns, re: vec![0.0; rows * columns], im: vec![0.0; rows * columns] }
+    /// Zeros in place of what was there.
+    fn clear(&mut self, rows: usize, columns: usize) {
+        self.columns = columns;
+        for part in [&mut self.re, &mut self.im] {
+            part.clear();
+            part.resize(rows * columns, 0.0);
+        }
     }
 
     fn of(m: &ComplexMatrix) -> Self {
@@ -96,6 +101,23 @@ impl Terms {
     }
 }
 
+/// What comparisons compute with, kept from one to the next: there are millions of them.
+#[derive(Debug, Default)]
+pub(super) struct Workspace {
+    /// The rows of the Gram matrix that K reads.
+    rows: Vec<usize>,
+    /// A.
+    map: Complex,
+    /// The rows and columns of the Gram matrix that K reads.
+    gram: Complex,
+    /// A row of A G.
+    row: Complex,
+    /// A G A*.
+    square: Complex,
+    /// Of Cholesky.
+    factor: Complex,
+}
+
 /// How a gain compares with a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Compared {
@@ -127,16 +149,15 @@ impl Quick {
     }
 
     /// Compares the gain of K = reference rows + `terms` with `limit`.
-    pub(super) fn compare(&self, terms: &Terms, limit: f64) -> Compared {
+    pub(super) fn compare(&self, terms: &Terms, limit: f64, space: &mut Workspace) -> Compared {
         let square = limit * limit * (1.0 - 8.0 * UNIT);
         if limit.is_nan() || limit <= 0.0 {
             return Compared::NotBelow;
         }
         let outputs = self.filters.outputs;
-        let (map, error) = self.map(terms, outputs);
-        let rows: Vec<usize> = (0..outputs).chain(terms.rows.iter().copied()).collect();
+        let error = self.fill_map(terms, outputs, &mut space.map);
         let is_sharp = square > LEAST && error < SHARP * square;
-        if square > LEAST && is_dominated(&self.congruence(&map, &rows), outputs, square - error) {
+        if square > LEAST && self.is_dominated(terms, square - error, space) {
             Compared::Below
         } else if is_sharp {
             Compared::NotBelow
@@ -145,10 +166,19 @@ impl Quick {
         }
     }
 
+    /// Whether it is proven that A G A* as computed has no eigenvalue above `bound`.
+    fn is_dominated(&self, terms: &Terms, bound: f64, space: &mut Workspace) -> bool {
+        let outputs = self.filters.outputs;
+        space.rows.clear();
+        space.rows.extend((0..outputs).chain(terms.rows.iter().copied()));
+        self.congruence(space);
+        is_dominated(&space.square, outputs, bound, &mut space.factor)
+    }
+
     /// A, and a bound of the error of the eigenvalues of A G A* as [`Quick::congruence`] computes it.
-    fn map(&self, terms: &Terms, outputs: usize) -> (Complex, f64) {
+    fn fill_map(&self, terms: &Terms, outputs: usize, map: &mut Complex) -> f64 {
         let count = outputs + terms.rows.len();
-        let mut map = Complex::zeros(outputs, count);
+        map.clear(outputs, count);
         // |a|^2 and |d|^2 with d_p = sum_c |A_pc - its double| s_c.
         let (mut all, mut inexact) = (0.0, 0.0);
         for p in 0..outputs {
@@ -166,34 +196,35 @@ impl Quick {
         // Each of the two products sums `count` complex terms, of which each is rounded four times.
         let rounding = (16 * count + 64) as f64 * UNIT;
         let error = (self.spread + rounding) * all + 2.0 * (inexact * all).sqrt();
-        (map, error * (1.0 + 1e-10))
+        error * (1.0 + 1e-10)
     }
 
     /// A G A*, in rounded arithmetic.
-    fn congruence(&self, map: &Complex, rows: &[usize]) -> Complex {
+    fn congruence(&self, space: &mut Workspace) {
+        let Workspace { rows, map, gram, row, square, .. } = space;
         let (count, n) = (map.columns, self.gram.columns);
         let outputs = map.re.len() / count;
-        // Rows of the Gram matrix that are read, side by side.
-        let mut gram = Complex::zeros(count, count);
+        gram.clear(count, count);
         for (c, &row) in rows.iter().enumerate() {
             for (d, &column) in rows.iter().enumerate() {
                 gram.re[c * count + d] = self.gram.re[row * n + column];
                 gram.im[c * count + d] = self.gram.im[row * n + column];
             }
         }
-        let mut square = Complex::zeros(outputs, outputs);
-        let (mut re, mut im) = (vec![0.0; count], vec![0.0; count]);
+        square.clear(outputs, outputs);
+        row.clear(1, count);
         for p in 0..outputs {
-            re.copy_from_slice(&gram.re[p * count..][..count]);
-            im.copy_from_slice(&gram.im[p * count..][..count]);
+            row.re.copy_from_slice(&gram.re[p * count..][..count]);
+            row.im.copy_from_slice(&gram.im[p * count..][..count]);
             for c in outputs..count {
                 let (x, y) = (map.re[p * count + c], map.im[p * count + c]);
                 let (row_re, row_im) = (&gram.re[c * count..][..count], &gram.im[c * count..][..count]);
                 for d in 0..count {
-                    re[d] += x * row_re[d] - y * row_im[d];
-                    im[d] += x * row_im[d] + y * row_re[d];
+                    row.re[d] += x * row_re[d] - y * row_im[d];
+                    row.im[d] += x * row_im[d] + y * row_re[d];
                 }
             }
+            let (re, im) = (&row.re[..count], &row.im[..count]);
             for q in 0..=p {
                 let (x, y) = (&map.re[q * count..][..count], &map.im[q * count..][..count]);
                 // Times the conjugate.
@@ -201,7 +232,6 @@ impl Quick {
                 square.im[p * outputs + q] = (0..count).map(|d| im[d] * x[d] - re[d] * y[d]).sum();
             }
         }
-        square
     }
 }
 
@@ -213,7 +243,7 @@ pub(super) fn off(x: Ball) -> f64 {
 /// Whether it is proven that the Hermitian matrix (lower triangle read) has no eigenvalue above `bound`: the
 /// Cholesky factorisation of bound I - m, less the bound of its backward error, runs to its end. (See
 /// [`super::super::positive`]; the complex matrix is that of twice the order which acts on (re, im).)
-fn is_dominated(m: &Complex, n: usize, bound: f64) -> bool {
+fn is_dominated(m: &Complex, n: usize, bound: f64, factor: &mut Complex) -> bool {
     let trace: f64 = (0..n).map(|i| bound.abs() + m.re[i * n + i].abs()).sum();
     // Twice the order, and complex operations that round up to four times.
     let rounding = (16 * n + 64) as f64 * UNIT * trace;
@@ -221,7 +251,7 @@ fn is_dominated(m: &Complex, n: usize, bound: f64) -> bool {
     if shift.is_nan() || shift < LEAST {
         return false;
     }
-    let mut factor = Complex::zeros(n, n);
+    factor.clear(n, n);
     for i in 0..n {
         for j in 0..=i {
             let (mut re, mut im) = (-m.re[i * n + j], -m.im[i * n + j]);
@@ -287,7 +317,7 @@ mod tests {
         for (t, &(i, weight)) in WEIGHTS.iter().enumerate() {
             quick.subtract(&mut terms, i, filters.re.nrows() + t, weight);
         }
-        quick.compare(&terms, limit)
+        quick.compare(&terms, limit, &mut Workspace::default())
     }
 
     /// Against balls: no gain is called below a limit that it exceeds, and nearly all that are below are

@@ -169,7 +169,7 @@ impl Remainders {
     pub(super) fn limit(&self, filters: &ComplexMatrix, halvings: &[Halvings], threshold: f64) -> f64 {
         let bounds = self.bounds(halvings);
         let Division { near, others, .. } = self.best_division(&bounds, threshold);
-        let norms: Vec<f64> = (0..self.rows.len()).map(|i| self.norm(&bounds, i, near)).collect();
+        let norms: Vec<f64> = self.norms(&bounds, near).collect();
         let rest = threshold * threshold * (1.0 - 1e-15) - others;
         signed_root(rest) * (1.0 - 1e-15) - self.joint(filters, &norms)
     }
@@ -208,6 +208,11 @@ impl Remainders {
         if square == 0.0 { 0.0 } else { outward(square.sqrt()) }
     }
 
+    /// The norms of all r_i over the first `near` aliases.
+    fn norms(&self, bounds: &Bounds, near: usize) -> impl Iterator<Item = f64> {
+        (0..self.rows.len()).map(move |i| self.norm(bounds, i, near))
+    }
+
     fn ratio(&self) -> f64 {
         self.rows.first().map_or(1.0, |row| row.response.far.ratio)
     }
@@ -219,8 +224,8 @@ impl Remainders {
             self.columns.iter().zip(values).map(|(column, value)| column * value).sum()
         };
         let value = |near: usize, others: f64| {
-            let norms: Vec<f64> = (0..self.rows.len()).map(|i| self.norm(bounds, i, near)).collect();
-            Division { near, others, value: signed_root(threshold * threshold - others) - weighed(&norms) }
+            let norms = self.columns.iter().zip(self.norms(bounds, near)).map(|(column, norm)| column * norm);
+            Division { near, others, value: signed_root(threshold * threshold - others) - norms.sum::<f64>() }
         };
         let mut best = value(known + 1, 0.0);
         if self.rows.iter().all(UncertainRow::is_certain) {

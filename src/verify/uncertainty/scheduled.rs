@@ -29,7 +29,7 @@ use super::at_frequency::{
 use super::channel::column_norm;
 use super::gain::{lower_gain, upper_gain};
 use super::grid::ChannelGrid;
-use super::quick::{self, Columns, Compared, Quick, Terms};
+use super::quick::{self, Columns, Compared, Quick, Terms, Workspace};
 use super::remainder::Remainders;
 
 /// Points of a grid that a part needs to be halved: each half has its ends and its middle.
@@ -115,7 +115,7 @@ impl<'a> Scheduled<'a> {
         let sets: Vec<Vec<Choice>> = parts.iter().enumerate().map(choices).collect();
         let count = sets.iter().fold(1usize, |all, set| all.saturating_mul(set.len()));
         let mut chosen: Vec<Choice> = Vec::with_capacity(sets.len());
-        let mut terms = Terms::default();
+        let (mut terms, mut space) = (Terms::default(), Workspace::default());
         for index in 0..count {
             if work.is_used_up() {
                 return Some(Attained::unknown());
@@ -128,9 +128,10 @@ impl<'a> Scheduled<'a> {
                 rest /= set.len();
             }
             self.terms(parts, &chosen, &mut terms);
-            match self.doubles.quick.compare(&terms, limit) {
+            let mut compare = |limit: f64| self.doubles.quick.compare(&terms, limit, &mut space);
+            match compare(limit) {
                 Compared::Below => continue,
-                Compared::NotBelow if self.doubles.quick.compare(&terms, reported) == Compared::Below => {
+                Compared::NotBelow if compare(reported) == Compared::Below => {
                     return Some(Attained::unknown());
                 }
                 _ => work.count(),

@@ -11,7 +11,7 @@ use super::angle::outward;
 use super::at_frequency::{AtFrequency, Attained, Limits, MAX_BOXES, Mix, Part, Verdict, Vertex, Work};
 use super::gain::{lower_gain, upper_gain};
 use super::multipliers::{self, Vertices};
-use super::quick::{Compared, Quick, Terms};
+use super::quick::{Compared, Quick, Terms, Workspace};
 use super::remainder::Remainders;
 use std::collections::HashMap;
 
@@ -40,6 +40,7 @@ impl AtFrequency<'_> {
         let quick = Quick::new(&self.gram, &self.filters);
         let mut limits = Limits::new(remainders, &self.filters, threshold, HALVED);
         let mut sets = Sets { at: self, known: HashMap::new() };
+        let (mut terms, mut space) = (Terms::default(), Workspace::default());
         let mut boxes = vec![self.whole()];
         for _ in 0..MAX_BOXES {
             let Some(parts) = boxes.pop() else { return Verdict::Below };
@@ -49,7 +50,8 @@ impl AtFrequency<'_> {
                 reported: if limits.can_halve(&parts) { threshold } else { 0.0 },
             };
             let sets = sets.of(&parts);
-            let mut tree = Tree { at: self, quick: &quick, sets: &sets, gains, work };
+            let (terms, space) = (&mut terms, &mut space);
+            let mut tree = Tree { at: self, quick: &quick, sets: &sets, gains, work, terms, space };
             match tree.search() {
                 Found::Nothing => continue,
                 Found::UsedUp => break,
@@ -129,6 +131,8 @@ struct Tree<'a, 'b> {
     sets: &'a [Set],
     gains: Gains,
     work: &'a mut Work,
+    terms: &'a mut Terms,
+    space: &'a mut Workspace,
 }
 
 impl Tree<'_, '_> {
@@ -158,7 +162,10 @@ impl Tree<'_, '_> {
         }
         let (sets, columns) = (self.sets, self.at.converters[converter].clone());
         for vertex in &sets[converter].vertices {
-            columns.clone().for_each(|column| mixes[column] = self.at.mix(column, vertex));
+            for column in columns.clone() {
+                mixes[column].clear();
+                mixes[column].push(self.at.mix(column, vertex));
+            }
             chosen.push(*vertex);
             let found = self.branch(spread, mixes, chosen);
             chosen.pop();
@@ -173,11 +180,8 @@ impl Tree<'_, '_> {
     /// Whether multipliers prove that all vertices of a branch are within the limit; `None` if there are few
     /// enough to look at them.
     fn are_bounded(&mut self, chosen: &[Vertex]) -> Option<bool> {
-        let sets = self.sets;
-        let chosen_sets = chosen.iter().map(std::slice::from_ref);
-        let others = sets[chosen.len()..].iter().map(|set| set.vertices.as_slice());
-        let converters: Vec<Vertices<'_>> = chosen_sets.chain(others).collect();
-        let count = converters.iter().fold(1usize, |all, vertices| all.saturating_mul(vertices.len()));
+        let others = self.sets[chosen.len()..].iter().map(|set| set.vertices.as_slice());
+        let count = others.clone().fold(1usize, |all, vertices| all.saturating_mul(vertices.len()));
         if count < MANY_VERTICES {
             return None;
         }
@@ -185,6 +189,7 @@ impl Tree<'_, '_> {
             return Some(false);
         }
         // Multipliers bound the rows of a converter as if each had errors of its own.
+        let converters = chosen.iter().map(std::slice::from_ref).chain(others);
         let columns = self.at.converters.iter().zip(converters);
         let channels: Vec<Vertices<'_>> =
             columns.flat_map(|(columns, vertices)| std::iter::repeat_n(vertices, columns.len())).collect();
@@ -198,11 +203,13 @@ impl Tree<'_, '_> {
     fn judge(&mut self, spread: f64, mixes: &[Mix], chosen: &[Vertex]) -> Option<Found> {
         let (limit, is_leaf) = (self.gains.most - spread, chosen.len() == self.sets.len());
         self.work.count_quick();
-        let terms = self.terms(mixes);
-        match self.quick.compare(&terms, limit) {
+        self.set_terms(mixes);
+        match self.quick.compare(self.terms, limit, self.space) {
             Compared::Below => return Some(Found::Nothing),
             Compared::NotBelow if !is_leaf => return None,
-            Compared::NotBelow if self.quick.compare(&terms, self.gains.reported) == Compared::Below => {
+            Compared::NotBelow
+                if self.quick.compare(self.terms, self.gains.reported, self.space) == Compared::Below =>
+            {
                 return Some(Found::Between);
             }
             _ => {}
@@ -217,11 +224,10 @@ impl Tree<'_, '_> {
         is_leaf.then(|| Found::Gain(attained()))
     }
 
-    fn terms(&self, mixes: &[Mix]) -> Terms {
-        let mut terms = Terms::default();
+    fn set_terms(&mut self, mixes: &[Mix]) {
+        self.terms.clear();
         for (i, mix) in mixes.iter().enumerate() {
-            mix.iter().for_each(|&(row, weight)| self.quick.subtract(&mut terms, i, row, weight));
+            mix.iter().for_each(|&(row, weight)| self.quick.subtract(self.terms, i, row, weight));
         }
-        terms
     }
 }
