@@ -1,8 +1,8 @@
 //! The fewest bits of integer taps for an allowed loss of SNR, and then the taps that can be left out.
 //!
-//! Integers that fit few bits fit more bits, so the least loss of all integers falls with the bits. The search
-//! finds good integers and not always the best, so it scans neighbouring word lengths, from a first guess
-//! onwards, until one holds the loss and the next shorter one does not.
+//! Integers that fit few bits fit more bits, so the least loss of all integers falls with the bits. The
+//! search finds good integers and not always the best, so it scans neighbouring word lengths, from a first
+//! guess onwards, until one holds the loss and the next shorter one does not.
 
 use super::digits::{fewest_digits, is_left_out, without_zeros};
 use super::quantiser::{Quantised, Quantiser};
@@ -27,9 +27,9 @@ pub struct Allowance {
     pub by_digits: bool,
 }
 
-/// Integers near the filters of `problem`, whose norm is `real_gamma`, that lose no more SNR than allowed: of
-/// the fewest bits that were found, and of these as many taps as possible left out; or of the fewest signed
-/// digits. Among these gamma decides.
+/// Integers near the filters of `problem`, whose norm is `real_gamma`, that lose no more SNR than allowed:
+/// of the fewest bits that were found, and of these as many taps as possible left out; or of the fewest
+/// signed digits. Among these gamma decides.
 ///
 /// # Errors
 /// [`DesignError::WordsLoseMore`] if the most bits lose more, else as [`super::quantise`].

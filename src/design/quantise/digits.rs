@@ -1,10 +1,11 @@
 //! Integers of few canonical signed digits, for multiplication by shifts and adders.
 //!
-//! The mean square is a quadratic function of the integers of each phase of the output. From good integers of
-//! some scales, the change by a power of two that costs least per digit is made as long as the loss is kept;
-//! after each one the other integers follow, so that the mean square is low again. The fewest digits of all
-//! scales are chosen. H. Samueli, *An improved search algorithm for the design of multiplierless FIR filters with
-//! powers-of-two coefficients*, IEEE Trans. Circuits and Systems 36(7), 1989, for the local search.
+//! The mean square is a quadratic function of the integers of each phase of the output. From good integers
+//! of some scales, the change by a power of two that costs least per digit is made as long as the loss is
+//! kept; after each one the other integers follow, so that the mean square is low again. The fewest digits
+//! of all scales are chosen. H. Samueli, *An improved search algorithm for the design of multiplierless FIR
+//! filters with powers-of-two coefficients*, IEEE Trans. Circuits and Systems 36(7), 1989, for the local
+//! search.
 
 use super::phases::{Change, Digits, Phases};
 use super::problem::Candidate;
@@ -86,8 +87,8 @@ fn shortened(words: FixedPoint) -> FixedPoint {
     FixedPoint { bits: WordLengths::Same(bits), fraction_bits: words.fraction_bits - shift as i32, integers }
 }
 
-/// Makes the first of the cheapest changes that save digits and, once the other taps follow, keep to the mean
-/// square; whether there is one.
+/// Makes the first of the cheapest changes that save digits and, once the other taps follow, keep to the
+/// mean square; whether there is one.
 fn save_digits(phases: &mut Phases, most: f64) -> Result<bool, DesignError> {
     // The others follow by single changes without digits, or by a new search that keeps the changed one.
     for follows in [Follows::ByChanges, Follows::ByLattice] {

@@ -213,14 +213,14 @@ impl<'a> Course<'a> {
     }
 }
 
-/// Widens the intervals of channel i to what the readings beside each scatter. Intervals of pieces are those
-/// of the Cramer-Rao bound, which pieces of little or narrow sound miss by up to twice, while the others reach
-/// it.
+/// Widens the intervals of channel i to what the readings beside each scatter. Intervals of pieces are
+/// those of the Cramer-Rao bound, which pieces of little or narrow sound miss by up to twice, while the
+/// others reach it.
 ///
-/// Misfits are second differences in their stated deviations; overlapping ones are correlated by -2/3 and 1/6.
-/// The variance of a reading relative to the stated one has the scaled inverse chi-square law whose prior, of
-/// two degrees of freedom, is the stated variance, and whose data are the misfits: its mean is theirs plus 2
-/// over their degrees of freedom.
+/// Misfits are second differences in their stated deviations; overlapping ones are correlated by -2/3 and
+/// 1/6. The variance of a reading relative to the stated one has the scaled inverse chi-square law whose
+/// prior, of two degrees of freedom, is the stated variance, and whose data are the misfits: its mean is
+/// theirs plus 2 over their degrees of freedom.
 fn widen(readings: &mut [Reading], i: usize) {
     let of = |reading: &Reading| Some((reading.frame as f64, reading.delays[i]?));
     let all: Vec<(f64, (Seconds, Seconds))> = readings.iter().filter_map(of).collect();
