@@ -70,8 +70,8 @@ pub(super) struct Args {
     /// A tap is its integer times 2^-FRACTION_BITS; chosen for the least gamma if left out
     #[arg(long)]
     fraction_bits: Option<i32>,
-    /// Integer taps of the fewest bits (of --bits at most), and of the fewest taps of that length, that lose at
-    /// most this many decibels of SNR relative to the real taps
+    /// Integer taps of the fewest bits (of --bits at most), and of the fewest taps of that length, that
+    /// lose at most this many decibels of SNR relative to the real taps
     #[arg(long, value_name = "DB", conflicts_with = "fraction_bits")]
     loss_db: Option<f64>,
     /// With --loss-db: taps of the fewest canonical signed digits, for multiplication by shifts and adders

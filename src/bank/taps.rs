@@ -30,7 +30,8 @@ impl FixedPoint {
     }
 
     /// Digits other than 0 of all integers in canonical signed digits: -1, 0 and 1, of which no two
-    /// neighbours are other than 0, as few as any such digits (G. W. Reitwiesner, *Binary Arithmetic*, 1960).
+    /// neighbours are other than 0, as few as any such digits (G. W. Reitwiesner, *Binary Arithmetic*,
+    /// 1960).
     pub fn signed_digits(&self) -> u32 {
         self.integers.iter().flatten().map(|&integer| signed_digits(integer)).sum()
     }

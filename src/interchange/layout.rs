@@ -31,7 +31,7 @@ impl<T: Copy + Default + PartialEq> PolyphaseTaps<T> {
     }
 
     /// The taps of a phase, each with its channel, in the order of the file.
-    pub fn of_phase(&self, phase: usize) -> impl Iterator<Item = (usize, T)> {
+    pub(super) fn of_phase(&self, phase: usize) -> impl Iterator<Item = (usize, T)> {
         let of_channel = move |i: usize| (0..self.lags).map(move |j| (i, self.get(i, phase, j)));
         (0..self.channels).flat_map(of_channel)
     }

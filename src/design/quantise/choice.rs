@@ -1,10 +1,10 @@
 //! The fewest bits of integer taps for an allowed loss of SNR, and then the taps that can be left out.
 //!
-//! Integers that fit few bits fit more bits, so the least loss of all integers falls with the bits. The search
-//! finds good integers and not always the best, so it scans neighbouring word lengths, from a first guess
-//! onwards, until one holds the loss and the next shorter one does not.
+//! Integers that fit few bits fit more bits, so the least loss of all integers falls with the bits. The
+//! search finds good integers and not always the best, so it scans neighbouring word lengths, from a first
+//! guess onwards, until one holds the loss and the next shorter one does not.
 
-use super::digits::fewest_digits;
+use super::digits::{fewest_digits, is_left_out, without_zeros};
 use super::quantiser::{Quantised, Quantiser};
 use super::{QuantisationProblem, WordChoice, WordStudy, decades};
 use crate::bank::FixedPoint;
@@ -27,9 +27,9 @@ pub struct Allowance {
     pub by_digits: bool,
 }
 
-/// Integers near the filters of `problem`, whose norm is `real_gamma`, that lose no more SNR than allowed: of
-/// the fewest bits that were found, and of these as many taps as possible left out; or of the fewest signed
-/// digits. Among these gamma decides.
+/// Integers near the filters of `problem`, whose norm is `real_gamma`, that lose no more SNR than allowed:
+/// of the fewest bits that were found, and of these as many taps as possible left out; or of the fewest
+/// signed digits. Among these gamma decides.
 ///
 /// # Errors
 /// [`DesignError::WordsLoseMore`] if the most bits lose more, else as [`super::quantise`].
@@ -45,9 +45,11 @@ pub fn quantise_within(
     let lengths = Lengths::up_to(most);
     let (found, least) = scan(&quantiser, &lengths, allowance)?;
     let few_taps = leave_out(&quantiser, &found[least])?;
-    let few_taps = Quantised { fixed_point: without_zeros(few_taps.fixed_point), ..few_taps };
     let signed_digits_of_fewest_bits = few_taps.fixed_point.signed_digits();
-    let chosen = if *by_digits { fewest_digits(&quantiser, &few_taps, most)? } else { few_taps };
+    let chosen = match by_digits {
+        true => fewest_digits(&quantiser, &[&found[least], &few_taps], most)?,
+        false => few_taps,
+    };
     let beside = &found[least.saturating_sub(BESIDE)..(least + BESIDE + 1).min(found.len())];
     let words = beside.iter().map(|found| quantiser.loss(found)).collect();
     let fixed_point = without_zeros(chosen.fixed_point);
@@ -136,18 +138,4 @@ fn leave_out(quantiser: &Quantiser<'_>, found: &Quantised) -> Result<Quantised, 
         }
     }
     Ok(best)
-}
-
-fn is_left_out(words: &FixedPoint, n: usize) -> bool {
-    words.integers.iter().all(|list| list[n] == 0)
-}
-
-/// Taps that are zero in all channels get no bits.
-fn without_zeros(words: FixedPoint) -> FixedPoint {
-    let left_out: Vec<bool> = (0..words.integers[0].len()).map(|n| is_left_out(&words, n)).collect();
-    if words.is_zero() || !left_out.contains(&true) {
-        return words;
-    }
-    let bits = left_out.iter().enumerate().map(|(n, is_out)| if *is_out { 0 } else { words.bits.bits(n) });
-    FixedPoint { bits: WordLengths::PerTap(bits.collect()), ..words }
 }

@@ -45,6 +45,15 @@ pub(super) struct Change {
     pub(super) saved: i64,
 }
 
+/// Where the mean square of a phase is least.
+struct Optimum {
+    /// The form, a little above that of the mean square.
+    form: Mat,
+    /// L with `L L'` = form.
+    factor: Mat,
+    centre: Vec<f64>,
+}
+
 impl Phase {
     /// One integer by a power of two, which keeps to its bits.
     pub(super) fn changes(&self, digits: Digits) -> impl Iterator<Item = Change> + '_ {
@@ -65,25 +74,44 @@ impl Phase {
         by * (2.0 * self.slopes[tap] + by * self.form[(tap, tap)])
     }
 
-    pub(super) fn make(&mut self, change: &Change) {
+    /// Makes a change; what it costs without the others.
+    pub(super) fn make(&mut self, change: &Change) -> f64 {
         let by = (change.to - self.integers[change.tap]) as f64;
+        let cost = self.cost(change.tap, by);
         self.integers[change.tap] = change.to;
         self.slopes
             .iter_mut()
             .zip(self.form.column(change.tap).iter())
             .for_each(|(slope, x)| *slope += by * x);
+        cost
     }
 
-    /// Integers close to the real taps of least mean square, if these are better; what they cost.
-    fn near_optimum(&mut self) -> Result<f64, DesignError> {
+    /// The real taps of least mean square.
+    fn optimum(&self) -> Result<Optimum, DesignError> {
         let mut form = self.form.clone();
         (0..self.taps.len()).for_each(|i| form[(i, i)] += RIDGE * form[(i, i)] + f64::MIN_POSITIVE);
         let factor = linalg::cholesky(&form)?;
         let slopes = Mat::from_column_slice(self.slopes.len(), 1, &self.slopes);
-        let solve = |lower: Mat| factor.tr_solve_lower_triangular(&lower);
-        let Some(from) = factor.solve_lower_triangular(&slopes).and_then(solve) else { return Ok(0.0) };
-        let centre: Vec<f64> =
-            self.integers.iter().zip(from.iter()).map(|(x, from)| *x as f64 - from).collect();
+        let from = linalg::solve(&form, &slopes);
+        let centre = self.integers.iter().zip(from.iter()).map(|(x, from)| *x as f64 - from).collect();
+        Ok(Optimum { form, factor, centre })
+    }
+
+    /// Changes that save digits, with what they cost if all other taps follow as real ones.
+    pub(super) fn savings(&self) -> Result<Vec<Change>, DesignError> {
+        let Optimum { form, centre, .. } = self.optimum()?;
+        let inverse = linalg::inverse(&form);
+        let far = |tap: usize, integer: i64| (integer as f64 - centre[tap]).powi(2) / inverse[(tap, tap)];
+        let followed = |change: Change| {
+            let cost = far(change.tap, change.to) - far(change.tap, self.integers[change.tap]);
+            Change { cost, ..change }
+        };
+        Ok(self.changes(Digits::NoMore).filter(|change| change.saved > 0).map(followed).collect())
+    }
+
+    /// Integers close to the real taps of least mean square, if these are better; what they cost.
+    fn near_optimum(&mut self) -> Result<f64, DesignError> {
+        let Optimum { factor, centre, .. } = self.optimum()?;
         let near = closest(&factor, &centre, &self.spans);
         let by = Mat::from_iterator(
             near.len(),
@@ -126,8 +154,7 @@ impl Phase {
         for _ in 0..MOST_CHANGES {
             let best = self.changes(digits).min_by(|a, b| a.cost.total_cmp(&b.cost));
             let Some(best) = best.filter(|change| change.cost < -least) else { break };
-            self.make(&best);
-            cost += best.cost;
+            cost += self.make(&best);
         }
         cost
     }

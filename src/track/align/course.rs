@@ -130,12 +130,22 @@ impl<'a> Course<'a> {
         Estimate { value: state.delay - self.cut(i, skips), sigma: state.deviation() }
     }
 
-    /// By how much the clock is fast.
+    /// By how much the clock is fast: the slope of the line that is closest to the delays. Their first and
+    /// last ones alone would say it with the errors of few pieces.
     pub(super) fn drift(&self, i: usize) -> Estimate<f64> {
-        let [begin, end] = [self.first, self.end].map(|sample| self.at(i, sample));
-        let time = self.slow_period() * (self.end - self.first);
-        let sigma = begin.deviation().0.hypot(end.deviation().0) / time.0;
-        Estimate { value: (end.delay - begin.delay) / time, sigma }
+        let Some(line) = &self.timelines[i] else { return Estimate { value: 0.0, sigma: 0.0 } };
+        let taken = self.readings.iter().filter(|reading| !line.refuses(reading.frame));
+        let slow = self.slow_period();
+        let weighted = |reading: &Reading| {
+            let (delay, sigma) = reading.delays[i]?;
+            Some((reading.frame as f64 * slow.0, delay.0, sigma.0.powi(-2)))
+        };
+        let all: Vec<(f64, f64, f64)> = taken.filter_map(weighted).collect();
+        let weights: f64 = all.iter().map(|(_, _, weight)| weight).sum();
+        let middle = all.iter().map(|(time, _, weight)| weight * time).sum::<f64>() / weights;
+        let squares: f64 = all.iter().map(|(time, _, weight)| weight * (time - middle).powi(2)).sum();
+        let product: f64 = all.iter().map(|(time, delay, weight)| weight * (time - middle) * delay).sum();
+        Estimate { value: product / squares, sigma: squares.powf(-0.5) }
     }
 
     /// The spec, and the fast periods that all delays were raised by.
@@ -203,14 +213,14 @@ impl<'a> Course<'a> {
     }
 }
 
-/// Widens the intervals of channel i to what the readings beside each scatter. Intervals of pieces are those
-/// of the Cramer-Rao bound, which pieces of little or narrow sound miss by up to twice, while the others reach
-/// it.
+/// Widens the intervals of channel i to what the readings beside each scatter. Intervals of pieces are
+/// those of the Cramer-Rao bound, which pieces of little or narrow sound miss by up to twice, while the
+/// others reach it.
 ///
-/// Misfits are second differences in their stated deviations; overlapping ones are correlated by -2/3 and 1/6.
-/// The variance of a reading relative to the stated one has the scaled inverse chi-square law whose prior, of
-/// two degrees of freedom, is the stated variance, and whose data are the misfits: its mean is theirs plus 2
-/// over their degrees of freedom.
+/// Misfits are second differences in their stated deviations; overlapping ones are correlated by -2/3 and
+/// 1/6. The variance of a reading relative to the stated one has the scaled inverse chi-square law whose
+/// prior, of two degrees of freedom, is the stated variance, and whose data are the misfits: its mean is
+/// theirs plus 2 over their degrees of freedom.
 fn widen(readings: &mut [Reading], i: usize) {
     let of = |reading: &Reading| Some((reading.frame as f64, reading.delays[i]?));
     let all: Vec<(f64, (Seconds, Seconds))> = readings.iter().filter_map(of).collect();

@@ -77,7 +77,8 @@ pub struct AlignedChannel {
     pub skip: usize,
     /// The delay at the first frame; it grows with the drift.
     pub delay: Estimate<Seconds>,
-    /// By how much the clock is fast, relative to that of the reference: its mean.
+    /// By how much the clock is fast, relative to that of the reference: the slope of the line that is
+    /// closest to the delays, of which each counts by its interval.
     pub drift: Estimate<f64>,
     /// g_i, below 0 for the opposite polarity.
     pub gain: Estimate<f64>,
