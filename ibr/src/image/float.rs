@@ -30,8 +30,8 @@ fn is_tiff(bytes: &[u8]) -> bool {
 pub(super) fn exr(file: &Source<'_>) -> Decoded {
     let wrong = |e: exr::error::Error| file.wrong(e.to_string());
     let head = MetaData::read_from_buffered(Cursor::new(file.bytes), false).map_err(wrong)?;
-    let sizes = head.headers.iter().map(|header| (header.layer_size.0, header.layer_size.1));
-    sizes.map(|size| file.check_size(size)).collect::<Result<(), _>>()?;
+    let mut sizes = head.headers.iter().map(|header| (header.layer_size.0, header.layer_size.1));
+    sizes.try_for_each(|size| file.check_size(size))?;
     let layers = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
     let layer = layers.all_attributes().from_buffered(Cursor::new(file.bytes)).map_err(wrong)?.layer_data;
     let all = &layer.channel_data.list;

@@ -9,11 +9,11 @@
 use super::census::Costs;
 
 /// P1.
-const SLANT: i16 = 6;
+const SLANT: i16 = 4;
 
 /// P2 where the photograph is flat; it is half of that where neighbours differ by `EDGE` grey levels, and
 /// more than P1 everywhere.
-const JUMP: f32 = 60.0;
+const JUMP: f32 = 40.0;
 const EDGE: f32 = 10.0;
 
 /// More than every path, and so little that prices can be added.

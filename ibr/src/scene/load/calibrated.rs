@@ -8,6 +8,7 @@ use crate::camera::Camera;
 use crate::camera::ListedCamera;
 use crate::camera::resize::{Size, factors};
 use crate::depth::Measure;
+use crate::image::Image;
 use crate::scene::{Kind, SceneError, ViewSpec};
 use hybank::messages::Quoted;
 use nalgebra::Matrix3x4;
@@ -69,11 +70,11 @@ impl Loader<'_> {
         self.no_other_kind(&view.named(), "calibrated", &others)?;
         let map = self.need(view.depth.as_deref(), view, "depth", "calibrated")?;
         let image = self.image(&view.image)?;
-        let (camera, resized) = self.camera_of(view, image.size())?;
         let given = Given { map, scale: view.depth_scale, measure: Measure::Depth };
-        let read =
-            self.read(view, (image, camera), &given, |image, camera| self.of_points(view, image, camera))?;
-        Ok((read, resized))
+        let stored = self.stored(view, &image, &given)?;
+        let (camera, resized) = self.camera_of(view, image.size())?;
+        let points = |image: &Image, camera: &Camera| self.of_points(view, image, camera);
+        Ok((self.read(view, (image, camera), (&given, stored), points)?, resized))
     }
 
     /// The camera of the view that is left out, or of an image that the file of cameras lists, and the size

@@ -37,45 +37,52 @@ pub(super) struct Given<'a> {
 }
 
 impl Loader<'_> {
+    /// The map of a view, if a file has it.
+    pub(super) fn stored(
+        &self,
+        view: &ViewSpec,
+        image: &Image,
+        given: &Given<'_>,
+    ) -> Loaded<Option<DepthMap>> {
+        let MapSource::File(file) = MapSource::of(given.map) else {
+            let scale = if given.measure == Measure::Depth { "depth_scale" } else { "disparity_scale" };
+            let others = [(scale, given.scale.is_some()), ("step", view.step.is_some())];
+            return match others.iter().find(|(_, given)| *given) {
+                None => Ok(None),
+                Some((key, _)) => Err(self.incomplete(format!(
+                    "{} has `{key}`, which is for the numbers of a file, but no file has its map; remove it",
+                    view.named()
+                ))),
+            };
+        };
+        let path = self.file(file);
+        let (width, height, stored) = read_map_within(&path, self.options.max_pixels)?;
+        let depth_error = |source| SceneError::Depth { view: view.label(), path: path.clone(), source };
+        let map = DepthMap::new((width, height), stored, given.scale.unwrap_or(1.0), given.measure);
+        let map = map.and_then(|map| match view.disparity_offset {
+            Some(offset) => map.with_offset(offset),
+            None => Ok(map),
+        });
+        let map = map.map_err(depth_error)?;
+        map.fits(image.size(), view.step.unwrap_or(1)).map_err(depth_error)?;
+        Ok(Some(map))
+    }
+
     /// A view with its map; `points` gives that of the points of a model.
     pub(super) fn read<P>(
         &self,
         view: &ViewSpec,
         (image, camera): (Image, P),
-        given: &Given<'_>,
+        (given, stored): (&Given<'_>, Option<DepthMap>),
         points: impl Fn(&Image, &P) -> Loaded<DepthMap>,
     ) -> Loaded<Read<P>> {
-        let source = MapSource::of(given.map);
-        if !matches!(source, MapSource::File(_)) {
-            let scale = if given.measure == Measure::Depth { "depth_scale" } else { "disparity_scale" };
-            let others = [(scale, given.scale.is_some()), ("step", view.step.is_some())];
-            if let Some((key, _)) = others.iter().find(|(_, given)| *given) {
-                return Err(self.incomplete(format!(
-                    "{} has `{key}`, which is for the numbers of a file, but no file has its map; remove it",
-                    view.named()
-                )));
-            }
-        }
-        let map = match source {
-            MapSource::File(file) => self.stored(view, file, given)?,
-            MapSource::Points => points(&image, &camera)?,
-            MapSource::Matched => return Ok(Read { image, map: None, camera, filled: 0 }),
+        let map = match stored {
+            Some(map) => map,
+            None if MapSource::of(given.map) == MapSource::Points => points(&image, &camera)?,
+            None => return Ok(Read { image, map: None, camera, filled: 0 }),
         };
         let (map, filled) = self.dense(view, map, &image, given.map)?;
         Ok(Read { image, map: Some(map), camera, filled })
-    }
-
-    /// The map of a file.
-    fn stored(&self, view: &ViewSpec, file: &Path, given: &Given<'_>) -> Loaded<DepthMap> {
-        let path = self.file(file);
-        let (width, height, stored) = read_map_within(&path, self.options.max_pixels)?;
-        let depth_error = |source| SceneError::Depth { view: view.label(), path: path.clone(), source };
-        let map = DepthMap::new((width, height), stored, given.scale.unwrap_or(1.0), given.measure);
-        let map = map.map_err(depth_error)?;
-        match view.disparity_offset {
-            Some(offset) => map.with_offset(offset).map_err(depth_error),
-            None => Ok(map),
-        }
     }
 
     /// A map with a value for every pixel of its image that is wanted, and the number of those that were
@@ -84,7 +91,6 @@ impl Loader<'_> {
         let path = self.file(file);
         let depth_error = |source| SceneError::Depth { view: view.label(), path: path.clone(), source };
         let given = view.step.unwrap_or(1);
-        map.fits(image.size(), given).map_err(depth_error)?;
         let step = if given == 1 { self.options.depth_step } else { given };
         if step == 1 && !map.is_scattered() {
             let mut map = map;

@@ -31,7 +31,9 @@ impl Loader<'_> {
             let position = self.finite(position, &view.named())?;
             let map = self.need(view.disparity.as_deref(), view, "disparity", "rectified")?;
             let given = Given { map, scale: view.disparity_scale, measure: Measure::Disparity };
-            self.read(view, (self.image(&view.image)?, position), &given, |_, _| {
+            let image = self.image(&view.image)?;
+            let stored = self.stored(view, &image, &given)?;
+            self.read(view, (image, position), (&given, stored), |_, _| {
                 Err(self.incomplete(format!(
                     "{} has disparity = \"points\", which a rectified rig does not have; give it a map or \"matched\"",
                     view.named()
