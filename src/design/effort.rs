@@ -3,7 +3,7 @@
 //! Every step of a design is dense linear algebra on matrices whose sizes follow from the spec. The estimate
 //! counts the operations of the steps that take longest, by one formula per method, and divides by one rate.
 //! How many rounds a search takes, and whether a proof needs 512 bits, shows only on the way, so the time is
-//! a range. On the processors of docs/figures.md the measured times lie within it, or beyond by half at most.
+//! a range. The times that docs/figures.md has lie within it, or beyond by half at most.
 //! The memory is that of the largest matrices that exist at one time.
 
 use super::DesignError;
