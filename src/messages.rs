@@ -111,7 +111,14 @@ pub fn of_document(message: &str) -> String {
         return format!("expected {}, found {}", expected_type(expected), found_value(found));
     }
     match message {
-        "recursion limit exceeded" => "lists and tables are nested too deeply".into(),
+        deep if deep.contains("recur") => "lists and tables are nested too deeply".into(),
+        "number out of range" => "a number does not fit a double; write one below 1e308".into(),
+        "invalid escape" | "unexpected end of hex escape" | "lone leading surrogate in hex escape" => {
+            "a text has a backslash that begins no character of JSON".into()
+        }
+        control if control.starts_with("control character") => {
+            "a text has a line break or another control character; write \\n or \\u and four digits".into()
+        }
         "trailing characters" => "there is more text after the end of the document".into(),
         "key must be a string" => "a key must be a text in double quotes".into(),
         "expected value" | "expected ident" => "a value is missing or not one of JSON".into(),
@@ -390,6 +397,20 @@ mod tests {
             (
                 "recursion limit exceeded at line 1 column 128",
                 "line 1, column 128: lists and tables are nested too deeply",
+            ),
+            ("cannot recurse further; max recursion depth met", "lists and tables are nested too deeply"),
+            (
+                "number out of range at line 1 column 15",
+                "line 1, column 15: a number does not fit a double; write one below 1e308",
+            ),
+            (
+                "unexpected end of hex escape at line 1 column 14",
+                "line 1, column 14: a text has a backslash that begins no character of JSON",
+            ),
+            (
+                "control character (\\u0000-\\u001F) found while parsing a string at line 1 column 4",
+                "line 1, column 4: a text has a line break or another control character; write \\n or \\u and four \
+                 digits",
             ),
             ("expected `,` or `}` at line 1 column 7", "line 1, column 7: expected `,` or `}`"),
         ] {

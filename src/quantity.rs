@@ -53,6 +53,14 @@ pub enum QuantityError {
         /// The text.
         text: String,
     },
+    /// The number is too small or too large.
+    #[error("\"{}\" is out of range; write {example}", Quoted(.text))]
+    Range {
+        /// The text.
+        text: String,
+        /// What to write.
+        example: &'static str,
+    },
     /// The unit is not known here.
     #[error("\"{}\" has the unit \"{}\", which is not known here; write {example}", Quoted(.text), Quoted(.unit))]
     Unit {
@@ -202,6 +210,7 @@ pub fn full_scale(text: &str) -> Result<FullScale, QuantityError> {
         ("bits" | "bit", None, Some(bits)) => Ok(FullScale::Signed(bits)),
         ("bits" | "bit", Some(_), Some(bits)) => Ok(FullScale::Unsigned(bits)),
         ("", None, _) if FULL_SCALES.contains(&number) => Ok(FullScale::Number(number)),
+        ("", None, _) => Err(QuantityError::Range { text: text.to_owned(), example: FULL_SCALE }),
         _ => Err(written.unknown_unit(FULL_SCALE)),
     }
 }

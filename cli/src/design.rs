@@ -10,7 +10,7 @@ use super::print::{
 use super::written::{check_output, write_text};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
-use hybank::design::{self, DesignError, Limits, Options, Stage};
+use hybank::design::{self, DesignError, Effort, Limits, Options, Stage};
 use hybank::messages::Quoted;
 use hybank::spec::{DesignOverrides, Method, Reduction, Spec, Tracking, WordLengths};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -145,7 +145,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let progress = Progress::default();
     let limits = if args.no_limit { Limits::Off } else { Limits::Enforced };
     let options =
-        Options { limits, observer: &|stage, seconds| progress.note(stage, seconds), ..Options::default() };
+        Options { limits, observer: &|stage, effort| progress.note(stage, effort), ..Options::default() };
     let give_up = || give_up(&args.spec, &spec);
     let limit = limits.time().map(|limit| limit + PATIENCE);
     let found = progress.during(limit, give_up, || design::design(&spec, &options)).in_file(&args.spec)?;
@@ -192,16 +192,16 @@ const REDRAW_INTERVAL: Duration = Duration::from_millis(125);
 /// Time between two lines where stderr is no terminal.
 const LINE: Duration = Duration::from_secs(30);
 
-/// What a design does now, and the seconds that all of it takes by the estimate.
+/// What a design does now, and the estimate of all of it.
 #[derive(Default)]
 struct Progress {
-    now: Mutex<Option<(Stage, f64)>>,
+    now: Mutex<Option<(Stage, Effort)>>,
 }
 
 impl Progress {
     /// The step that begins.
-    fn note(&self, stage: Stage, seconds: f64) {
-        *self.now.lock().unwrap_or_else(PoisonError::into_inner) = Some((stage, seconds));
+    fn note(&self, stage: Stage, effort: Effort) {
+        *self.now.lock().unwrap_or_else(PoisonError::into_inner) = Some((stage, effort));
     }
 
     /// Runs `work` and shows meanwhile what it does; calls `give_up` if it has not ended by the `limit`.
@@ -256,8 +256,8 @@ impl Progress {
     }
 
     fn text(&self, begin: Instant) -> Option<String> {
-        let (stage, seconds) = (*self.now.lock().unwrap_or_else(PoisonError::into_inner))?;
-        Some(line(stage, begin.elapsed(), seconds))
+        let (stage, effort) = (*self.now.lock().unwrap_or_else(PoisonError::into_inner))?;
+        Some(line(stage, begin.elapsed(), effort))
     }
 }
 
@@ -266,12 +266,12 @@ fn wait(done: &Receiver<()>, time: Duration) -> bool {
     done.recv_timeout(time) == Err(RecvTimeoutError::Timeout)
 }
 
-fn line(stage: Stage, elapsed: Duration, seconds: f64) -> String {
-    let elapsed = elapsed.as_secs();
-    if seconds > elapsed as f64 {
-        format!("{stage}: {elapsed} s of about {seconds:.0} s")
+fn line(stage: Stage, elapsed: Duration, effort: Effort) -> String {
+    let seconds = elapsed.as_secs();
+    if effort.longest > elapsed.as_secs_f64() {
+        format!("{stage}: {seconds} s of about {}", effort.time())
     } else {
-        format!("{stage}: {elapsed} s")
+        format!("{stage}: {seconds} s, more than expected")
     }
 }
 
@@ -281,10 +281,14 @@ mod tests {
 
     #[test]
     fn the_line_says_the_step_and_the_time_that_is_expected() {
-        let said = |seconds| line(Stage::Latency { designs: 7 }, Duration::from_secs(31), seconds);
-        assert_eq!(said(120.4), "choosing the latency (7 designs compared): 31 s of about 120 s");
-        // An estimate that has passed says nothing any more.
-        assert_eq!(said(20.0), "choosing the latency (7 designs compared): 31 s");
+        let said = |shortest, longest| {
+            let effort = Effort { shortest, longest, bytes: 1e6 };
+            line(Stage::Latency { designs: 7 }, Duration::from_secs(31), effort)
+        };
+        let step = "choosing the latency (7 designs compared): 31 s";
+        assert_eq!(said(119.0, 120.4), format!("{step} of about 2.0 minutes"));
+        assert_eq!(said(0.08, 120.4), format!("{step} of about 80 ms to 2.0 minutes"));
+        assert_eq!(said(15.0, 20.0), format!("{step}, more than expected"));
     }
 
     #[test]

@@ -51,7 +51,10 @@ impl Failure {
 
     /// Names what a failed run has left of what cannot be recorded again.
     pub(super) fn with_remains(self, files: &[PathBuf]) -> Self {
-        let is_something = |file: &&PathBuf| file.metadata().is_ok_and(|found| found.len() > 0);
+        let is_something = |file: &&PathBuf| {
+            // A link in its place is not what was recorded.
+            file.symlink_metadata().is_ok_and(|found| found.is_file() && found.len() > 0)
+        };
         let names: Vec<String> =
             files.iter().filter(is_something).map(|file| file.display().to_string()).collect();
         match self {

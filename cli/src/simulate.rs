@@ -192,7 +192,10 @@ impl Run<'_> {
         match all.find(|x| x.is_nan() || x.abs() > f64::from(f32::MAX)) {
             None => Ok(parts),
             Some(x) => {
-                let rule = "beyond the range of a 32-bit float; use a smaller --gain";
+                let rule = match x.is_nan() {
+                    true => "as a frequency of the source is far above the rates of the spec; use lower ones",
+                    false => "beyond the range of a 32-bit float; use a smaller --gain",
+                };
                 Err(Failure::Input(format!("{}: a captured sample is {x:e}, {rule}", self.signal.given)))
             }
         }

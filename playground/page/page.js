@@ -213,7 +213,7 @@ function progress() {
   let step = 'designing', expected = 0;
   const show = () => {
     const seconds = (performance.now() - begin) / 1e3;
-    const of = expected > seconds ? ` of about ${expected.toPrecision(2)} s` : '';
+    const of = expected > seconds ? ` of up to ${expected.toPrecision(2)} s` : '';
     if (1e3 * seconds < PATIENCE) return;
     $('stop').hidden = false;
     status(`${step}: ${seconds.toFixed(1)} s${of}`);

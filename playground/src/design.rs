@@ -2,7 +2,7 @@
 
 use crate::answer::{Answer, Refusal, text};
 use hybank::bank::Bank;
-use hybank::design::{Design, GammaScale, Options, Stage, analyze_mean};
+use hybank::design::{Design, Effort, GammaScale, Options, Stage, analyze_mean};
 use hybank::figures::Figures;
 use hybank::overview::{self, Facts, counted};
 use hybank::spec::Spec;
@@ -43,9 +43,9 @@ pub(crate) fn design(input: &[u8]) -> Result<Answer, Refusal> {
     Answer::of(&Designed::new(&spec, design, seconds)?)
 }
 
-/// A line for who waits: the seconds that all of it takes natively, and the step that begins.
-fn tell(stage: Stage, seconds: f64) {
-    let _ = writeln!(io::stderr(), "{seconds} {stage}");
+/// A line for who waits: the seconds that all of it takes natively at most, and the step that begins.
+fn tell(stage: Stage, effort: Effort) {
+    let _ = writeln!(io::stderr(), "{} {stage}", effort.longest);
 }
 
 impl Designed {

@@ -4,7 +4,7 @@ use crate::background;
 use crate::bank::Bank;
 use crate::errors::{refused, spec_error, spec_problem, warn};
 use crate::{sources, values};
-use hybank::design::{Design, DesignError, Limits, Options, ProofSearch, judge_taps, warnings};
+use hybank::design::{Design, DesignError, Effort, Limits, Options, ProofSearch, judge_taps, warnings};
 use hybank::spec::DesignOverrides;
 use pyo3::prelude::*;
 
@@ -28,7 +28,7 @@ pub(crate) fn design(
     let proof = if proof { ProofSearch::Run } else { ProofSearch::Skip };
     let limits = if limits { Limits::Enforced } else { Limits::Off };
     let designed = background::run(py, progress, move |reporter| {
-        let observer = |stage, seconds| reporter.begins(stage, seconds);
+        let observer = |stage, effort: Effort| reporter.begins(stage, effort.longest);
         hybank::design::design(&spec, &Options { proof, limits, observer: &observer, stop: reporter.stop() })
     })?;
     finished(py, designed, proof)

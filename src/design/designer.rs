@@ -2,7 +2,7 @@
 
 use super::choices::{completed, settings, with_taps};
 use super::effort;
-use super::limits::{Limits, Stage, Stop};
+use super::limits::{Effort, Limits, Stage, Stop};
 use super::merging::Repeats;
 use super::methods::robust_fir::RobustStudy;
 use super::methods::scheduled_fir::TrackingStudy;
@@ -70,8 +70,8 @@ pub struct Options<'a> {
     pub proof: ProofSearch,
     /// Whether a design that takes too long or needs too much memory is refused, or ended when it has.
     pub limits: Limits,
-    /// Called with the step that begins and the estimated seconds of the whole design.
-    pub observer: &'a dyn Fn(Stage, f64),
+    /// Called with the step that begins and the estimate of the whole design.
+    pub observer: &'a dyn Fn(Stage, Effort),
     /// Ends the design.
     pub stop: Stop,
 }
@@ -112,8 +112,8 @@ pub fn design(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError>
 
 fn designed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
     let stop = options.stop.within(options.limits);
-    let (complete, problem, seconds) = complete(spec, options, &stop)?;
-    (options.observer)(Stage::Filters, seconds);
+    let (complete, problem, effort) = complete(spec, options, &stop)?;
+    (options.observer)(Stage::Filters, effort);
     let settings = Settings { stop: stop.clone(), ..settings(&complete)? };
     let merged = if settings.robust.is_some() || settings.deviations.is_some() {
         problem.merge_channels(Repeats::Never)
@@ -122,13 +122,13 @@ fn designed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
     };
     let plant = LiftedPlant::new(&merged.problem)?;
     let synthesis = methods::synthesise(spec.design.method, &plant, &settings)?;
-    (options.observer)(Stage::Realisation, seconds);
+    (options.observer)(Stage::Realisation, effort);
     let realised = realise(&complete, &problem, &merged, &plant, &synthesis, &stop)?;
     let judged = judge(spec, complete, realised, &synthesis).without_unresolved_bounds(&problem);
     if stop.is_due() {
         return Ok(Design { proof: Err(DesignError::Stopped), ..judged });
     }
-    (options.observer)(Stage::Proof, seconds);
+    (options.observer)(Stage::Proof, effort);
     Ok(judged.proved(&synthesis.dual, options.proof, &stop))
 }
 
@@ -163,14 +163,14 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
     ))
 }
 
-/// The spec with all defaults filled in, its problem in normalised time, and the estimate of its design in
-/// seconds. The effort is checked before the latency is chosen, and again with that latency.
-fn complete(spec: &Spec, options: &Options<'_>, stop: &Stop) -> Result<(Spec, Problem, f64), DesignError> {
+/// The spec with all defaults filled in, its problem in normalised time, and the estimate of its design.
+/// The effort is checked before the latency is chosen, and again with that latency.
+fn complete(spec: &Spec, options: &Options<'_>, stop: &Stop) -> Result<(Spec, Problem, Effort), DesignError> {
     let checked = |spec: &Spec| effort::check(spec, options.proof == ProofSearch::Run, options.limits);
     let open = with_taps(spec)?;
     let mut effort = checked(&open)?;
     let compared = |designs| {
-        (options.observer)(Stage::Latency { designs }, effort.seconds);
+        (options.observer)(Stage::Latency { designs }, effort);
         if stop.is_due() { Err(DesignError::Stopped) } else { Ok(()) }
     };
     let complete = completed(&open, &compared)?;
@@ -178,7 +178,7 @@ fn complete(spec: &Spec, options: &Options<'_>, stop: &Stop) -> Result<(Spec, Pr
         effort = checked(&complete)?;
     }
     let problem = Problem::new(&complete, complete.latency.unwrap_or_default())?;
-    Ok((complete, problem, effort.seconds))
+    Ok((complete, problem, effort))
 }
 
 /// The bank with its complete spec and with the norm of its final coefficients. No lower bound exceeds that

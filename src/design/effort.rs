@@ -2,12 +2,13 @@
 //!
 //! Every step of a design is dense linear algebra on matrices whose sizes follow from the spec. The estimate
 //! counts the operations of the steps that take longest, by one formula per method, and divides by one rate.
-//! It is right within a factor of about three where a design takes more than a few seconds
-//! (docs/figures.md). The memory is that of the largest matrices that exist at one time.
+//! How many rounds a search takes, and whether a proof needs 512 bits, shows only on the way, so the time is
+//! a range. The times that docs/figures.md has lie within it, or beyond by half at most.
+//! The memory is that of the largest matrices that exist at one time.
 
 use super::DesignError;
 use super::error_grid::{FINE, coarse_intervals};
-use super::limits::{Effort, Limits, MAX_LONG_STATES};
+use super::limits::{Effort, Limits, MAX_LONG_STATES, Range};
 use super::merging::Repeats;
 use super::methods::{Deviations, robust_fir::RobustProblem};
 use super::problem::{Problem, common_delay};
@@ -15,18 +16,30 @@ use super::prove::{MAX_SEARCHED_STATES, max_witnesses};
 use crate::memory::available_memory;
 use crate::spec::{Method, Reduction, Spec};
 
-/// Operations at that rate for an interior-point block, relative to the square of its order: a cube, but the
-/// rate of complex decompositions grows with the order.
-const BLOCK: f64 = 2500.0;
-/// The same relative to the cube of the states, for the norm of a system: the eigenvalues of two matrices of
-/// twice the order.
-const NORM: f64 = 100.0;
-/// For a Riccati equation with its trials.
-const RICCATI: f64 = 900.0;
+/// Operations at that rate for an interior-point block, relative to the square of its order, and for a gain
+/// of such a block: cubes, but the rate of complex decompositions grows with the order.
+const BLOCK: f64 = 8500.0;
+const GAIN: f64 = 1000.0;
+/// For the norm of a system, times the powers of its states: the eigenvalues of two matrices of twice the
+/// order, at a rate that grows with the order.
+const NORM: Powers = Powers { none: 5e7, square: 2e4, cube: 45.0 };
+/// For a Riccati equation with its trials, times the cube of the states.
+const RICCATI: f64 = 1500.0;
 /// For a certificate in double precision, and for one in 512 bits with the bounds that need them.
-const CERTIFICATES: [f64; 2] = [900.0, 1.3e5];
+const CERTIFICATE: Powers = Powers { none: 1.5e8, square: 1.2e5, cube: 900.0 };
+const LONG_CERTIFICATE: f64 = 1.3e5;
+/// Certificates that are tried, and how fast: processors differ by a factor of four in small matrices.
+const CERTIFICATES: Range = Range { least: 0.25, most: 1.5 };
 /// Interior-point iterations of an exchange.
-const ITERATIONS: f64 = 25.0;
+const ITERATIONS: Range = Range { least: 9.0, most: 75.0 };
+/// Sweeps over integer taps, all word lengths together.
+const SWEEPS: Range = Range { least: 5.0, most: 25.0 };
+/// Norms of each scenario of a robust design, and operations of the proof over its box: a limit holds for
+/// them.
+const NORMS_OF_SCENARIOS: Range = Range { least: 1.0, most: 4.0 };
+const BOX_PROOF: Range = Range { least: 3e9, most: 1e11 };
+/// Operations of the refinement of poles, likewise.
+const POLE_REFINEMENT: f64 = 1.5e11;
 /// Histories through which the smoother passes for an open number of taps, whose lengths are doubled and
 /// then halved, and for an open latency.
 const HISTORIES: [f64; 2] = [24.0, 2.0];
@@ -51,21 +64,24 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
     let sizes = Sizes::of(spec)?;
     let mut effort = sizes.method(spec).then(sizes.norms());
     if proving {
-        effort = effort.then(sizes.proof());
+        effort = effort.then(sizes.proof(spec.design.method));
     }
     if spec.design.has_integers() {
         // For a loss, more word lengths, and taps left out.
-        let integers = sizes.integers();
-        let searches = if spec.design.loss_db.is_some() { 3.0 } else { 1.0 };
-        effort = effort.then(Effort { seconds: searches * integers.seconds, ..integers });
+        let most = if spec.design.loss_db.is_some() { 3.0 } else { 1.0 };
+        effort = effort.then(sizes.integers().times(Range { least: 1.0, most }));
+    }
+    if proving && RobustProblem::of(spec).is_some() {
+        effort = effort.then(Effort::of(1.0, 0.0).times(BOX_PROOF));
     }
     if spec.design.reduction.is_some() {
         // A norm for each order that is visited, and the refinement of its poles.
-        effort.seconds += 2.0 * sizes.states.min(40.0) * sizes.norms().seconds;
+        let norms = sizes.norms().times(Range { least: 2.0, most: 2.0 * sizes.states.min(40.0) });
+        effort = effort.then(norms).perhaps(Effort::of(POLE_REFINEMENT, 0.0));
     }
     if matches!(spec.design.reduction, Some(Reduction::Order(_))) && spec.latency.is_none() {
         // The banks of some slow periods of latency are compared.
-        effort.seconds *= PERIODS_COMPARED * sizes.ratio;
+        effort = effort.times(Range { least: 1.0, most: PERIODS_COMPARED * sizes.ratio });
     }
     if spec.is_fir() && spec.design.taps.is_none() {
         effort = effort.then(sizes.smoother(HISTORIES[0], sizes.lags(), OPEN_TARGETS));
@@ -86,7 +102,7 @@ pub(super) fn check(spec: &Spec, proving: bool, limits: Limits) -> Result<Effort
     match (limits.time(), memory) {
         (None, _) => Ok(effort),
         (_, Some(memory)) if effort.bytes > memory => Err(DesignError::TooLarge { effort, memory, remedy }),
-        (Some(limit), _) if effort.seconds > limit.as_secs_f64() => {
+        (Some(limit), _) if effort.shortest > limit.as_secs_f64() => {
             Err(DesignError::TooLong { effort, limit, remedy })
         }
         _ => Ok(effort),
@@ -114,6 +130,20 @@ pub fn remedy(spec: &Spec) -> &'static str {
         Method::Fir | Method::Sinc | Method::Separation => {
             "use fewer taps, a smaller ratio or fewer channels"
         }
+    }
+}
+
+/// Factors of the powers of a number.
+#[derive(Debug, Clone, Copy)]
+struct Powers {
+    none: f64,
+    square: f64,
+    cube: f64,
+}
+
+impl Powers {
+    fn at(self, x: f64) -> f64 {
+        self.none + self.square * x * x + self.cube * x * x * x
     }
 }
 
@@ -198,14 +228,15 @@ impl Sizes {
         let points = self.points();
         let blocks = BLOCK * points * p * p;
         let products = points * (m.min(self.taps) * columns).powi(2) * (64.0 + 4.0 * self.lags());
-        let iteration = blocks + products + unknowns.powi(3) / 5.0;
+        let iteration = blocks + products + unknowns.powi(3) / 12.0;
         // Scenarios take more rounds, on twice the points.
-        let iterations = ITERATIONS * if scenarios > 0.0 { 4.0 + functions } else { 1.0 };
+        let rounds = if scenarios > 0.0 { 4.0 + functions } else { 1.0 };
         let fine = FINE as f64 * points * (1.0 + scenarios);
-        let grid = fine * p * (12.0 * self.analog_states.powi(2) + 0.4 * BLOCK * p);
-        let norms = scenarios * NORM * self.error_states().powi(3);
+        let grid = fine * p * (12.0 * self.analog_states.powi(2) + GAIN * p);
+        let norms = Effort::of(scenarios * NORM.at(self.error_states()), 0.0).times(NORMS_OF_SCENARIOS);
         let kept = COMPLEX * p * p * (fine + 9.0 * points);
-        Effort::of(iterations * iteration + grid + norms, kept + 3.0 * REAL * unknowns * unknowns)
+        let newton = Effort::of(rounds * iteration, kept + 3.0 * REAL * unknowns * unknowns);
+        newton.times(ITERATIONS).then(Effort::of(grid, 0.0)).then(norms)
     }
 
     /// The bank of least mean square over uncertain delays: a covariance for each pair of channels and each
@@ -226,21 +257,23 @@ impl Sizes {
     /// The norm of the bank, of plain interleaving, and those of the search.
     fn norms(&self) -> Effort {
         let states = self.error_states();
-        Effort::of(3.0 * NORM * states.powi(3), 20.0 * REAL * states * states)
+        Effort::of(3.0 * NORM.at(states), 20.0 * REAL * states * states)
     }
 
-    /// The search for a proof. It is counted as if 512 bits were needed where they are tried.
-    fn proof(&self) -> Effort {
+    /// The search for a proof, which may need 512 bits where they are tried, and for FIR banks of least
+    /// gamma all directions.
+    fn proof(&self, method: Method) -> Effort {
         let states = self.error_states();
         if states > MAX_SEARCHED_STATES as f64 {
             return Effort::default();
         }
-        let long = if states > MAX_LONG_STATES as f64 { 0.0 } else { CERTIFICATES[1] };
-        let taps = self.channels * self.taps;
+        let long = if states > MAX_LONG_STATES as f64 { 0.0 } else { LONG_CERTIFICATE * states.powi(3) };
+        let taps = if method == Method::Fir { self.channels * self.taps } else { 0.0 };
         let rows = 2.0 * max_witnesses(taps as usize) as f64 * self.channels;
         let witnesses = 4.0 * rows * taps * rows.min(taps);
         let bytes = REAL * (30.0 * states * states + 5.0 * rows * taps);
-        Effort::of((CERTIFICATES[0] + long) * states.powi(3) + witnesses, bytes)
+        let certificates = Effort::of(CERTIFICATE.at(states), bytes).times(CERTIFICATES);
+        certificates.perhaps(Effort::of(long + witnesses, 0.0))
     }
 
     /// Integer taps of five word lengths: lattice points close to the optimum, then single steps, each
@@ -249,9 +282,9 @@ impl Sizes {
         let (phase, p) = (self.channels * self.lags(), self.outputs());
         let lattice = 60.0 * self.ratio * (0.2 * phase.powi(3) + 520.0 * phase * phase);
         let fine = FINE as f64 * self.points();
-        let step = fine * (32.0 * self.channels * p + 0.4 * BLOCK * self.ratio) * self.ratio;
+        let step = fine * (32.0 * self.channels * p + GAIN * self.ratio) * self.ratio;
         let bytes = COMPLEX * p * p * fine + 3.0 * REAL * phase * phase;
-        Effort::of(lattice + 2.5 * self.channels * self.taps * step, bytes)
+        Effort::of(lattice, bytes).then(Effort::of(self.channels * self.taps * step, 0.0).times(SWEEPS))
     }
 }
 

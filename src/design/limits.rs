@@ -23,6 +23,9 @@ pub(super) const MOST_STATES_AT_106_BITS: usize = 96;
 /// The same for 512 bits.
 pub(super) const MOST_STATES_AT_512_BITS: usize = 40;
 
+/// Ratio of the ends of a time up to which it is said as one.
+const MUCH_THE_SAME: f64 = 1.5;
+
 /// Whether a design is refused when its estimate exceeds a time or the free memory, and ended at that time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Limits {
@@ -104,21 +107,51 @@ impl Stop {
 /// Time and memory that a design needs.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Effort {
-    /// Seconds on one core.
-    pub seconds: f64,
+    /// Least seconds on one core.
+    pub shortest: f64,
+    /// Most seconds on one core.
+    pub longest: f64,
     /// Bytes at the peak.
     pub bytes: f64,
+}
+
+/// A number that is known within bounds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Range {
+    pub(super) least: f64,
+    pub(super) most: f64,
 }
 
 impl Effort {
     /// So many operations at the rate of dense linear algebra.
     pub(super) fn of(operations: f64, bytes: f64) -> Self {
-        Self { seconds: operations / RATE, bytes }
+        Self { shortest: operations / RATE, longest: operations / RATE, bytes }
     }
 
     /// One step after the other; the memory of the first one is free again.
     pub(super) fn then(self, next: Self) -> Self {
-        Self { seconds: self.seconds + next.seconds, bytes: self.bytes.max(next.bytes) }
+        let (shortest, longest) = (self.shortest + next.shortest, self.longest + next.longest);
+        Self { shortest, longest, bytes: self.bytes.max(next.bytes) }
+    }
+
+    /// A step that some designs take afterwards.
+    pub(super) fn perhaps(self, next: Self) -> Self {
+        self.then(Self { shortest: 0.0, ..next })
+    }
+
+    /// The same so many times.
+    pub(super) fn times(self, count: Range) -> Self {
+        Self { shortest: count.least * self.shortest, longest: count.most * self.longest, ..self }
+    }
+
+    /// "80 ms to 12 seconds", to two digits each; one time where the ends are much the same.
+    pub fn time(self) -> String {
+        let [shortest, longest] = [self.shortest, self.longest].map(|seconds| rounded(seconds, &TIMES));
+        if self.longest <= MUCH_THE_SAME * self.shortest {
+            longest
+        } else {
+            format!("{shortest} to {longest}")
+        }
     }
 }
 
@@ -128,7 +161,7 @@ const TIMES: [(f64, &str); 5] =
 impl fmt::Display for Effort {
     /// "35 minutes and 8.7 GB", to two digits.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} and {}", rounded(self.seconds, &TIMES), memory_text(self.bytes))
+        write!(f, "{} and {}", self.time(), memory_text(self.bytes))
     }
 }
 

@@ -42,7 +42,7 @@ pub enum FileError {
     },
     /// The unfinished output is not the file that was begun under its hidden name.
     #[error(
-        "{}: another program replaced its unfinished file {}; make sure that none does, and run it again",
+        "{}: another program moved, removed or replaced its unfinished file {}; make sure that none does, and run it again",
         Quoted(.file),
         Quoted(.hidden)
     )]

@@ -4,6 +4,8 @@
 #[cfg(target_os = "linux")]
 use crate::support::until_caught;
 use crate::support::{THESIS, names, send, text};
+use hybank::design::effort::estimate;
+use hybank::spec::Spec;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -53,6 +55,78 @@ fn a_latency_out_of_reach_is_refused_before_anything_is_computed() {
             &["at latency 500"],
         );
     }
+}
+
+/// A design with its processor time, of design and proof together.
+struct Timed {
+    channels: usize,
+    ratio: usize,
+    latency: usize,
+    design: &'static str,
+    seconds: f64,
+}
+
+const fn timed(channels: usize, ratio: usize, latency: usize, design: &'static str, seconds: f64) -> Timed {
+    Timed { channels, ratio, latency, design, seconds }
+}
+
+/// `hybank design --no-limit` of a release build on one core of an Intel Xeon (family 6, model 207) that is
+/// shared with other work, 2026-11-26; the last ones on an AMD EPYC (Zen 4), 2026-11-22.
+const TIMED: [Timed; 41] = [
+    timed(2, 2, 10, "method = \"iir\"", 0.08),
+    timed(2, 2, 32, "method = \"iir\"", 0.28),
+    timed(2, 2, 100, "method = \"iir\"", 2.5),
+    timed(4, 4, 40, "method = \"iir\"", 0.40),
+    timed(3, 4, 60, "method = \"iir\"", 0.59),
+    timed(2, 2, 20, "method = \"iir\"\norder = 6", 10.1),
+    timed(2, 2, 100, "method = \"h2\"", 1.9),
+    timed(2, 2, 200, "method = \"h2\"", 11.6),
+    timed(2, 2, 32, "method = \"h2\"\ntaps = 64", 0.30),
+    timed(2, 2, 256, "method = \"h2\"\ntaps = 512", 7.8),
+    timed(8, 8, 64, "method = \"h2\"\ntaps = 128", 0.95),
+    timed(2, 2, 10, "taps = 22", 0.11),
+    timed(2, 2, 32, "taps = 64", 0.49),
+    timed(2, 2, 128, "taps = 256", 9.7),
+    timed(4, 4, 32, "taps = 64", 0.35),
+    timed(8, 8, 32, "taps = 64", 0.62),
+    timed(8, 8, 64, "taps = 128", 3.8),
+    timed(8, 8, 128, "taps = 256", 9.8),
+    timed(16, 16, 64, "taps = 128", 3.1),
+    timed(2, 64, 32, "taps = 64", 2.6),
+    timed(3, 8, 20, "taps = 40", 0.33),
+    timed(2, 2, 10, "taps = 22\nbits = 12", 0.46),
+    timed(4, 4, 32, "taps = 64\nbits = 12", 4.1),
+    timed(2, 2, 10, "taps = 22\n[uncertainty]\ndelay_samples = 0.1", 0.68),
+    timed(2, 2, 32, "taps = 64\n[uncertainty]\ndelay_samples = 0.1", 2.7),
+    timed(4, 4, 12, "taps = 24\n[uncertainty]\ndelay_samples = 0.1", 2.5),
+    timed(2, 2, 10, "taps = 22\n[uncertainty]\ndelay_samples = 0.1\ncutoff = 0.01", 5.9),
+    timed(2, 2, 10, "taps = 22\ntracking = \"affine\"\n[uncertainty]\ndelay_samples = 0.1", 1.1),
+    timed(2, 2, 100, "method = \"iir\"", 1.0),
+    timed(2, 2, 200, "method = \"h2\"", 6.8),
+    timed(2, 2, 32, "taps = 64", 0.11),
+    timed(2, 2, 128, "taps = 256", 5.6),
+    timed(8, 8, 32, "taps = 64", 0.14),
+    timed(8, 8, 128, "taps = 256", 10.0),
+    timed(16, 16, 64, "taps = 128", 2.8),
+    timed(2, 64, 32, "taps = 64", 1.8),
+    timed(2, 2, 400, "method = \"h2\"", 16.0),
+    timed(2, 2, 1000, "method = \"h2\"", 421.0),
+    timed(2, 2, 512, "taps = 1024", 59.0),
+    timed(32, 32, 32, "taps = 64", 39.0),
+    timed(3, 256, 4, "taps = 6", 36.0),
+];
+
+/// 12 s were said for what took 0.1 s, and 17 s for 39.
+#[test]
+fn measured_times_lie_within_the_estimate_or_beyond_by_half() {
+    let wrong = TIMED.iter().filter_map(|Timed { channels, ratio, latency, design, seconds }| {
+        let text = format!("latency = {latency}\n{}", spec(*channels, *ratio, design));
+        let effort = estimate(&Spec::from_toml(&text, "spec.toml").unwrap(), true).unwrap();
+        let line = format!("{channels}, {ratio}, latency {latency}, {design:?}: {seconds} s of {effort:?}");
+        println!("{line}");
+        (effort.shortest > 1.5 * seconds || *seconds > 1.5 * effort.longest).then_some(line)
+    });
+    assert_eq!(wrong.collect::<Vec<_>>(), Vec::<String>::new());
 }
 
 /// Each of these once ran for minutes or ate the memory of the machine, in silence.

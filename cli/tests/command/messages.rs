@@ -129,6 +129,19 @@ fn a_box_that_is_too_wide_is_named() {
     assert!(said.len() < 300, "{said}");
 }
 
+/// A sample that was "NaN, beyond the range of a 32-bit float", which no gain mends, and a number "with the
+/// unit \"\"".
+#[test]
+fn numbers_beyond_every_range_are_said_to_be_that() {
+    let desk = desk();
+    desk.write("spec.toml", THESIS);
+    let source = ["simulate", "spec.toml", "--source", "tones:1e300Hz", "--samples", "100", "-o", "captures"];
+    desk.refused(1, &source, &["tones:1e300Hz: a captured sample is NaN, as a frequency", "use lower ones"]);
+    let scale = ["fuse", "bank.json", "1.wav", "2.wav", "-o", "out.wav", "--full-scale", "1e300"];
+    let said = desk.refused(2, &scale, &["\"1e300\" is out of range; write the number that is full scale"]);
+    assert!(!said.contains("the unit"), "{said}");
+}
+
 /// Only the parser's words, without the line.
 #[test]
 fn nesting_is_refused_with_its_line() {

@@ -272,6 +272,29 @@ fn a_recording_whose_name_is_taken_stays_under_its_hidden_name() {
     assert_eq!(fs::read(bench.path("out.raw")).unwrap(), b"another");
 }
 
+/// A link in the place of the unfinished file was said to hold what was recorded.
+#[test]
+fn a_hidden_file_that_another_program_took_is_not_said_to_hold_the_recording() {
+    let bench = Bench::new();
+    let mut child = bench.spawn(&["-o", "out.raw"]);
+    let mut stdin = child.stdin.take().unwrap();
+    stdin.write_all(&bytes(&frames(100))).unwrap();
+    while bench.unfinished_bytes() < Some(800) {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let names = fs::read_dir(bench.path("")).unwrap().map(|file| file.unwrap().path());
+    let hidden = names.into_iter().find(|path| path.to_string_lossy().ends_with(".part")).unwrap();
+    fs::rename(&hidden, bench.path("taken")).unwrap();
+    std::os::unix::fs::symlink(bench.path("bank.json"), &hidden).unwrap();
+    drop(stdin);
+    let output = child.wait_with_output().unwrap();
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("another program moved, removed or replaced its unfinished file"), "{message}");
+    assert!(!message.contains("what was recorded is in"), "{message}");
+    assert!(!bench.path("out.raw").exists());
+}
+
 #[test]
 fn a_name_that_is_too_long_is_refused_before_the_first_sample() {
     let bench = Bench::new();

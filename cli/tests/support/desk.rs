@@ -137,7 +137,8 @@ pub(crate) fn names(folder: &Path) -> Vec<String> {
 /// Whether the line says how long a run has taken, as in `hybank: searching for a proof of gamma: 30 s`.
 fn is_progress(line: &str) -> bool {
     let time = line.strip_prefix("hybank: ").and_then(|said| said.rsplit_once(": "));
-    time.is_some_and(|(_, time)| {
-        time.split(" s of about ").all(|part| part.trim_end_matches(" s").bytes().all(|c| c.is_ascii_digit()))
+    time.and_then(|(_, time)| time.split_once(" s")).is_some_and(|(seconds, rest)| {
+        let known = rest.is_empty() || rest.starts_with(" of about ") || rest == ", more than expected";
+        known && seconds.bytes().all(|c| c.is_ascii_digit())
     })
 }

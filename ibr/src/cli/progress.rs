@@ -4,11 +4,15 @@ use super::failure::say;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread;
 use std::time::{Duration, Instant};
 
 /// Parts of a step that the bar shows.
 const PARTS: u64 = 100;
+
+/// Time between two updates of the bar: its clock runs on in a part of a step that takes long.
+const REDRAW: Duration = Duration::from_millis(250);
 
 /// Time between two lines where standard error is no terminal.
 const LINE: Duration = Duration::from_secs(30);
@@ -17,9 +21,8 @@ const LINE: Duration = Duration::from_secs(30);
 pub(super) struct Progress {
     bar: ProgressBar,
     begun: AtomicU64,
-    begin: Instant,
-    /// The name of the step and the time of the last line; `None` on a terminal.
-    lines: Option<Mutex<(&'static str, Instant)>>,
+    /// Dropped with this value, which ends the display.
+    _display: Sender<()>,
 }
 
 impl Progress {
@@ -32,9 +35,15 @@ impl Progress {
             bar.set_style(style);
         }
         bar.set_length(length);
-        let begin = Instant::now();
-        let lines = (!is_terminal).then(|| Mutex::new(("", begin)));
-        Self { bar, begun: AtomicU64::new(0), begin, lines }
+        let (display, done) = channel();
+        let (shown, begin) = (bar.clone(), Instant::now());
+        let show = move || match is_terminal {
+            true => every(REDRAW, &done, || shown.tick()),
+            false => every(LINE, &done, || say(&line(&shown.message(), share(&shown), begin.elapsed()))),
+        };
+        // A thread that cannot be started is no reason to fail.
+        let _ = thread::Builder::new().name("progress".into()).spawn(show);
+        Self { bar, begun: AtomicU64::new(0), _display: display }
     }
 
     /// Begins the next step.
@@ -42,10 +51,6 @@ impl Progress {
         let begun = self.begun.fetch_add(1, Ordering::Relaxed);
         self.bar.set_position(begun * PARTS);
         self.bar.set_message(name);
-        if let Some(lines) = &self.lines {
-            lines.lock().unwrap_or_else(PoisonError::into_inner).0 = name;
-        }
-        self.line();
     }
 
     /// The share of the current step that is done, 0 to 1.
@@ -56,19 +61,19 @@ impl Progress {
         if here > self.bar.position() {
             self.bar.set_position(here);
         }
-        self.line();
     }
+}
 
-    /// Writes a line if it is time for one and no other thread does.
-    fn line(&self) {
-        let Some(Ok(mut last)) = self.lines.as_ref().map(Mutex::try_lock) else { return };
-        if last.1.elapsed() < LINE {
-            return;
-        }
-        last.1 = Instant::now();
-        let done = self.bar.position() as f64 / self.bar.length().unwrap_or(1).max(1) as f64;
-        say(&line(last.0, done, self.begin.elapsed()));
+/// Calls `show` once in a while until the other end of `done` is dropped.
+fn every(time: Duration, done: &Receiver<()>, show: impl Fn()) {
+    while done.recv_timeout(time) == Err(RecvTimeoutError::Timeout) {
+        show();
     }
+}
+
+/// The share of all steps that is done.
+fn share(bar: &ProgressBar) -> f64 {
+    bar.position() as f64 / bar.length().unwrap_or(1).max(1) as f64
 }
 
 /// What is done, and the time that is left at the pace so far.
@@ -96,5 +101,16 @@ mod tests {
         let said = line("rendering", 0.25, Duration::from_secs(30));
         assert_eq!(said, "hybank-ibr: rendering, 25 % done in 30 s; about 90 s are left\n");
         assert_eq!(line("reading", 0.0, Duration::from_secs(31)), "hybank-ibr: reading, 0 % done in 31 s\n");
+    }
+
+    /// A part of a step that reports nothing is shown all the same, until the end.
+    #[test]
+    fn the_display_goes_on_without_reports() {
+        let ((display, done), (shown, times)) = (channel(), channel());
+        let thread = thread::spawn(move || every(Duration::ZERO, &done, || shown.send(()).unwrap()));
+        (0..3).for_each(|_| times.recv().unwrap());
+        drop(display);
+        times.iter().for_each(drop);
+        thread.join().unwrap();
     }
 }

@@ -223,6 +223,14 @@ fn the_scale_of_all_maps_is_one_line() {
     );
 }
 
+/// "cannot recurse further; max recursion depth met".
+#[test]
+fn nesting_is_refused_in_plain_words() {
+    let dir = transforms();
+    write(dir.path(), "s.toml", &format!("[virtual]\nx = {}{}\n", "[".repeat(200), "]".repeat(200)));
+    refused(dir.path(), &["render", "s.toml", "-o", "x.png"], 1, &["s.toml:2:", "nested too deeply"]);
+}
+
 /// Without `[virtual]` the message names the key to write; a frame without depth is a place too.
 #[test]
 fn transforms_without_a_virtual_view_say_which_key_is_missing() {

@@ -161,8 +161,8 @@ fn a_design_ends_at_every_stage_with_a_bank() {
 fn a_design_that_takes_longer_than_its_limit_is_ended() {
     let limit = Duration::from_secs(3);
     let spec = spec("method = \"fir\", taps = 22", THESIS);
-    let late = |stage, seconds: f64| {
-        assert!(seconds < limit.as_secs_f64(), "the estimate is within the limit: {seconds}");
+    let late = |stage, effort: Effort| {
+        assert!(effort.shortest < limit.as_secs_f64(), "the estimate is within the limit: {effort}");
         if stage == Stage::Filters {
             std::thread::sleep(limit);
         }

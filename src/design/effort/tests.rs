@@ -11,11 +11,14 @@ const PAIR: &str = "channel = [{ delay = 1.2 }, { delay = 0.6 }]";
 
 #[test]
 fn efforts_are_said_in_units_for_people() {
-    let said = |seconds: f64, bytes: f64| Effort { seconds, bytes }.to_string();
+    let said = |seconds: f64, bytes: f64| Effort { shortest: seconds, longest: seconds, bytes }.to_string();
     assert_eq!(said(0.05, 2.4e6), "50 ms and 2.4 MB");
     assert_eq!(said(75.0, 31e6), "75 seconds and 31 MB");
     assert_eq!(said(2100.0, 8.7e9), "35 minutes and 8.7 GB");
     assert_eq!(said(3.6e7, 1e13), "417 days and 10 TB");
+    let range = |shortest: f64, longest: f64| Effort { shortest, longest, bytes: 1e6 }.time();
+    assert_eq!(range(0.08, 12.0), "80 ms to 12 seconds");
+    assert_eq!(range(9.0, 12.0), "12 seconds");
 }
 
 #[test]
@@ -23,7 +26,7 @@ fn more_of_anything_takes_longer() {
     let base = ("ratio = 2", "latency = 10", "taps = 22");
     let of = |(ratio, latency, taps): (&str, &str, &str)| {
         let text = format!("{ratio}\n{latency}\n{PAIR}\ndesign = {{ method = \"fir\", {taps} }}");
-        estimate(&spec(&text), false).unwrap().seconds
+        estimate(&spec(&text), false).unwrap().longest
     };
     let small = of(base);
     assert!(small < 1.0, "{small}");
@@ -39,7 +42,7 @@ fn the_search_for_a_proof_costs_time() {
     let proof = |latency: usize, taps: usize| {
         let text =
             format!("ratio = 2\nlatency = {latency}\n{PAIR}\ndesign = {{ method = \"fir\", taps = {taps} }}");
-        let seconds = |proving| estimate(&spec(&text), proving).unwrap().seconds;
+        let seconds = |proving| estimate(&spec(&text), proving).unwrap().longest;
         seconds(true) - seconds(false)
     };
     assert!(proof(10, 24) > 0.3, "{}", proof(10, 24));
@@ -53,7 +56,7 @@ fn each_scenario_of_uncertain_channels_costs_time() {
         let text = format!(
             "ratio = 2\nlatency = 10\n{PAIR}\ndesign = {{ method = \"fir\", taps = 22 }}\n{uncertainty}"
         );
-        estimate(&spec(&text), false).unwrap().seconds
+        estimate(&spec(&text), false).unwrap().longest
     };
     let (nominal, delays) = (seconds(""), seconds("uncertainty = { delay_samples = 0.1 }"));
     let both = seconds("uncertainty = { delay_samples = 0.1, cutoff = 0.01 }");
