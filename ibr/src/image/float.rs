@@ -1,6 +1,6 @@
 //! Maps of numbers as other programs write them: OpenEXR, TIFF with floats or wide integers, NumPy arrays.
 
-use super::read::Source;
+use super::source::Source;
 use super::{Image, ImageError};
 use exr::meta::MetaData;
 use exr::prelude::{ReadChannels, ReadLayers, read};

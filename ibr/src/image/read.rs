@@ -1,5 +1,6 @@
 //! Reading images and depth maps from files.
 
+use super::source::Source;
 use super::{Image, ImageError, colmap_map, float, pfm};
 use crate::files::{self, CHECK_THE_PATH};
 use image::{DynamicImage, ImageReader};
@@ -8,10 +9,6 @@ use std::path::Path;
 
 /// Default of the most pixels of an image or map: 5792 x 5792, whose rendering takes 2 to 4 gigabytes.
 pub const MOST_PIXELS: usize = 1 << 25;
-
-/// Bytes per pixel while an image is unpacked and converted: four channels of 16 bits, three as they are
-/// needed, and three numbers.
-const READING: f64 = 30.0;
 
 /// Reads a grey or RGB image of at most [`MOST_PIXELS`] pixels; 16-bit values are scaled to 0..255, PFM
 /// values (white = 1) times 255.
@@ -82,41 +79,17 @@ enum Loaded {
     Whole(DynamicImage),
 }
 
-/// A file whose format is not known yet.
-pub(super) struct Source<'a> {
-    path: &'a Path,
-    pub(super) bytes: &'a [u8],
-    /// The most pixels that it may have.
-    most: usize,
-}
-
-impl Source<'_> {
-    /// That the content cannot be used.
-    pub(super) fn wrong(&self, reason: String) -> ImageError {
-        ImageError::Decode { path: self.path.into(), reason }
-    }
-
-    /// Refuses too many pixels, and such that the system has no memory for.
-    pub(super) fn check_size(&self, (width, height): (usize, usize)) -> Result<(), ImageError> {
-        let pixels = width.saturating_mul(height);
-        if pixels > self.most {
-            return Err(ImageError::TooLarge { path: self.path.into(), width, height, most: self.most });
-        }
-        ImageError::refuse_without_memory(self.path, (width, height), READING)
-    }
-
-    /// The numbers of a format that only maps have.
-    fn float(&self) -> Result<Option<Image>, ImageError> {
-        let decoded = match self.bytes {
-            [b'P', b'F' | b'f', ..] => pfm::decode(self.bytes),
-            bytes if colmap_map::is_map(bytes) => colmap_map::decode(bytes),
-            bytes if float::is_exr(bytes) => return float::exr(self).map(Some),
-            bytes if float::is_npy(bytes) => return float::npy(self).map(Some),
-            _ => return float::tiff(self),
-        };
-        let map = decoded.map_err(|reason| self.wrong(reason))?;
-        self.check_size(map.size()).map(|()| Some(map))
-    }
+/// The numbers of a format that only maps have.
+fn float_map(file: &Source<'_>) -> Result<Option<Image>, ImageError> {
+    let decoded = match file.bytes {
+        [b'P', b'F' | b'f', ..] => pfm::decode(file.bytes),
+        bytes if colmap_map::is_map(bytes) => colmap_map::decode(bytes),
+        bytes if float::is_exr(bytes) => return float::exr(file).map(Some),
+        bytes if float::is_npy(bytes) => return float::npy(file).map(Some),
+        _ => return float::tiff(file),
+    };
+    let map = decoded.map_err(|reason| file.wrong(reason))?;
+    file.check_size(map.size()).map(|()| Some(map))
 }
 
 fn load(path: &Path, most: usize) -> Result<Loaded, ImageError> {
@@ -124,7 +97,7 @@ fn load(path: &Path, most: usize) -> Result<Loaded, ImageError> {
     // The numbers of a float map are as many bytes again.
     files::refuse_without_memory(path, bytes.len() as f64)?;
     let source = Source { path, bytes: &bytes, most };
-    if let Some(map) = source.float()? {
+    if let Some(map) = float_map(&source)? {
         return Ok(Loaded::Float(map));
     }
     let wrong = |e: image::ImageError| source.wrong(e.to_string());
