@@ -5,7 +5,7 @@ use super::lines::{Found, Lines, fit_lines};
 use super::record::{Quadrature, Record, UnsettledEnds};
 use super::{Cause, MeasureError, Settings, Spectrum, Window};
 use crate::sine_fit::SineFitError::{AtEdge, NoTone, TonesCoincide};
-use crate::sine_fit::{Direction, Estimate, SineFit, ToneFit, find_tones, fit, locate};
+use crate::sine_fit::{Direction, Estimate, SineFit, ToneFit, find_tones, fit, locate, with_lines};
 use crate::units::{Decibels, Hertz, Radians};
 
 /// A tone that is given may be this far from the true one, in cycles per sample ..
@@ -189,7 +189,8 @@ fn figures(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Meas
 /// larger exponential.
 fn fit_tones(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<SineFit, MeasureError> {
     let channels = record.channels();
-    let found = fit(&channels, rate, &starts(record, rate, settings)?)?;
+    let found = fit(&channels, rate, &starts(record, rate, settings)?)
+        .map_err(|error| with_lines(error, &channels, rate))?;
     let size = |direction| record.amplitude(&found, 0, direction);
     let is_given = !settings.tones.is_empty() || !record.is_complex();
     if is_given || size(Direction::Forward) >= size(Direction::Backward) {

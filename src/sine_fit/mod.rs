@@ -49,6 +49,7 @@ pub use error::SineFitError;
 pub use gauss_newton::{fit, fit_known};
 pub(crate) use result::wrapped;
 pub use result::{ChannelFit, ComplexChannel, Component, Direction, Ratio, SineFit, ToneFit};
+pub(crate) use search::with_lines;
 pub use search::{find_tones, locate};
 
 use crate::units::Seconds;

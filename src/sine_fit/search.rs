@@ -72,12 +72,27 @@ pub fn locate(
     let folded = alias(cycles);
     let found = power.maximum(folded - width..folded + width, power.largest);
     let Some(found) = found else {
-        let lines = find_tones(channels, rate, NAMED_LINES, NAMED_RANGE).unwrap_or_default();
-        return Err(SineFitError::NoTone { near: Some(near), lines });
+        return Err(SineFitError::NoTone { near: Some(near), lines: lines(channels, rate) });
     };
     let zone = cycles.round();
     let sign = if cycles >= zone { 1.0 } else { -1.0 };
     Ok(rate * (zone + sign * found))
+}
+
+/// The error of a fit that began at a peak. Where it did not converge, and the peak is none of the largest
+/// lines, there is no tone, but those lines.
+pub(crate) fn with_lines(error: SineFitError, channels: &[Channel<'_>], rate: Hertz) -> SineFitError {
+    let SineFitError::NoConvergence { frequency, .. } = error else { return error };
+    let lines = lines(channels, rate);
+    let length = channels.iter().map(|channel| channel.samples.len()).min().unwrap_or(0);
+    let folded = |frequency: Hertz| alias(frequency / rate).abs() * length as f64;
+    let is_line = lines.iter().any(|line| (folded(*line) - folded(frequency)).abs() < 1.0);
+    if lines.is_empty() || is_line { error } else { SineFitError::NoTone { near: Some(frequency), lines } }
+}
+
+/// The lines that a message names.
+fn lines(channels: &[Channel<'_>], rate: Hertz) -> Vec<Hertz> {
+    find_tones(channels, rate, NAMED_LINES, NAMED_RANGE).unwrap_or_default()
 }
 
 /// The sum of the Hann-windowed power spectra of all records.

@@ -72,6 +72,10 @@ fn two_recorders_become_one() {
 #[test]
 #[cfg(unix)]
 fn the_circuit_of_the_fpga_example_has_the_bits_of_the_model() {
+    // The tests of the export simulate smaller banks in any case.
+    if !trials::is_slow("examples/fpga") {
+        return;
+    }
     if Command::new("iverilog").arg("-V").output().is_err() {
         trials::skipped(&"examples/fpga: no iverilog");
         return;

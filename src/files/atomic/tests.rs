@@ -131,7 +131,10 @@ fn an_unfinished_file_that_another_program_replaced_gets_no_name() {
         fs::remove_file(&hidden).unwrap();
         std::os::unix::fs::symlink(&precious, &hidden).unwrap();
         let error = file.commit().unwrap_err().to_string();
-        assert!(error.contains("another program replaced") && error.contains(".part"), "{error}");
+        assert!(
+            error.contains("another program moved, removed or replaced") && error.contains(".part"),
+            "{error}"
+        );
         assert_eq!(fs::read(&target).ok(), replace.then(|| b"old".to_vec()));
         // What another program put there is not removed.
         assert!(hidden.symlink_metadata().unwrap().is_symlink());

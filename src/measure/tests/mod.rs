@@ -333,6 +333,18 @@ fn what_cannot_be_measured_is_refused() {
     }
 }
 
+/// Rounding of a periodic tone leaves small lines. One of them is no tone that the fit could find.
+#[test]
+fn a_tone_that_is_not_there_is_answered_by_the_lines() {
+    let rate = Hertz(48e3);
+    let samples = quantised(&tone(48_000, 3.1 / 48.0, 0.5), 12);
+    let refused = measure(&samples, rate, &Settings { tones: vec![Hertz(2.2e3)], ..Settings::default() });
+    let Err(MeasureError::Fit(SineFitError::NoTone { near: Some(near), lines })) = refused else {
+        panic!("{refused:?}");
+    };
+    assert!((near.0 - 2.2e3).abs() < 50.0 && (lines[0].0 - 3.1e3).abs() < 1e-3, "{near} {lines:?}");
+}
+
 /// A sum of tones below 0.45 of the rate, delayed by any number of samples.
 fn waveform(count: usize, delay: f64) -> Vec<f64> {
     let tones = [(0.0123, 0.5), (0.0876, 0.3), (0.2219, 0.2), (0.3571, 0.1), (0.449, 0.05)];
