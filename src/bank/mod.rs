@@ -20,6 +20,7 @@ pub use check::MAX_BANK_LATENCY;
 pub use error::{BankError, BankProblem};
 pub use proof::{CausalWitness, Certificate, DualWitness, LowerProof, Proof};
 pub use read::check_digest;
+#[cfg(feature = "design")]
 pub(crate) use taps::signed_digits;
 pub use taps::{FixedPoint, TapSlopes};
 
