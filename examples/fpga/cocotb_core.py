@@ -70,13 +70,13 @@ def main():
     runner = get_runner("icarus")
     runner.build(
         sources=[core],
-        hdl_toplevel="core",
+        hdl_toplevel=core.stem,
         build_dir=vectors / "cocotb",
         build_args=["-g2001"],
         timescale=("1ns", "1ps"),
     )
     results = runner.test(
-        hdl_toplevel="core",
+        hdl_toplevel=core.stem,
         test_module="cocotb_core",
         test_dir=vectors / "cocotb",
         extra_env={"HYBANK_VECTORS": str(vectors), "PYTHONPATH": str(Path(__file__).parent)},
