@@ -37,8 +37,9 @@ impl<'a> Words<'a> {
         let fewer = fewest.checked_sub(1).map(|fewer| &self.study.words[fewer]);
         let why = match (choice.by_digits, fewer) {
             (true, _) => format!(
-                "taps of the fewest bits, {}, have {} digits",
-                self.study.words[fewest].bits, choice.signed_digits_of_fewest_bits
+                "taps of the fewest bits, {}, have {}",
+                self.study.words[fewest].bits,
+                counted(choice.signed_digits_of_fewest_bits as usize, "signed digit")
             ),
             (false, Some(word)) => format!("{} lose {:.3} dB", word.bits, word.mean_square_loss_db),
             (false, None) => "no tap has fewer bits".to_owned(),

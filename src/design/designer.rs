@@ -256,13 +256,17 @@ impl Design {
 }
 
 impl Design {
-    /// Where the searched bank is the finished one, its proof may show more than the bounds of the search.
+    /// Where the searched bank is the finished one, its proof may show more than the bounds of the search. A
+    /// bank without any error leaves nothing open.
     fn close_search(&mut self) {
         let is_searched = self.words.is_none() && self.reduction.is_none();
         let is_nominal = self.robust.is_none() && self.tracking.is_none();
         if let (true, Ok(proven), Some(norm)) = (is_searched && is_nominal, &self.proof, self.bank.gamma.norm)
         {
             self.unfinished = self.unfinished.and_then(|left| left.unless_proven(proven.lower, norm));
+        }
+        if is_nominal && self.unfinished.is_some() && prove::has_no_error(&self.bank) {
+            self.unfinished = None;
         }
     }
 

@@ -55,6 +55,12 @@ pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {
     Ok(Certified { gamma: upper, attained, states })
 }
 
+/// Whether the norm of a bank is zero up to rounding, so that no search can make it less.
+pub(super) fn has_no_error(bank: &Bank) -> bool {
+    let is_zero = |error: EnclosedErrorSystem<'_>| bank.gamma.norm.is_some_and(|norm| is_zero(norm, &error));
+    EnclosedErrorSystem::new(bank).is_ok_and(is_zero)
+}
+
 /// Searches for witnesses of the bank's gammas. Returns the proof and the bounds that it proves, which
 /// do not refute the `stated` gamma.
 ///

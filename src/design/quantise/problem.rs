@@ -39,9 +39,13 @@ pub(super) struct Candidate {
     pub(super) fixed_point: FixedPoint,
     /// Estimate of gamma on the grid.
     pub(super) gamma: f64,
-    /// Mean square of the error plus the converters' noise at the output, per slow period.
+    /// Mean square of the error plus the converters' noise at the output, per slow period; at least the
+    /// rounding of that of zero taps.
     pub(super) mean_square: f64,
 }
+
+/// Mean squares below this, relative to that of zero taps, are zero up to rounding.
+const FLOOR: f64 = 1e-20;
 
 /// Estimates of the error of integer taps, on a grid of frequencies.
 pub(super) struct TapError<'a> {
@@ -55,6 +59,8 @@ pub(super) struct TapError<'a> {
     pub(super) real_gamma: f64,
     /// Mean square of the real taps, as in [`Candidate`].
     pub(super) real_mean_square: f64,
+    /// The least mean square that counts.
+    least_mean_square: f64,
 }
 
 impl<'a> TapError<'a> {
@@ -69,15 +75,19 @@ impl<'a> TapError<'a> {
         let points = grid.points();
         let forms = Forms::new(&points);
         let real_gamma = grid.peaks(&lags, 0.0)?.estimate;
-        let real_mean_square = grid.mean_square(&lags) + output_noise(problem.noise, problem.taps);
-        Ok(Self { problem, ratio, grid, points, forms, real_gamma, real_mean_square })
+        let zeros = vec![vec![0.0; problem.taps[0].len()]; problem.taps.len()];
+        let least_mean_square = FLOOR * grid.mean_square(&polyphase(&zeros, ratio));
+        let real = grid.mean_square(&lags) + output_noise(problem.noise, problem.taps);
+        let real_mean_square = real.max(least_mean_square);
+        Ok(Self { problem, ratio, grid, points, forms, real_gamma, real_mean_square, least_mean_square })
     }
 
     /// The error of integer taps.
     pub(super) fn candidate(&self, fixed_point: FixedPoint) -> Result<Candidate, DesignError> {
         let taps = fixed_point.taps();
         let lags = polyphase(&taps, self.ratio);
-        let mean_square = self.grid.mean_square(&lags) + output_noise(self.problem.noise, &taps);
+        let found = self.grid.mean_square(&lags) + output_noise(self.problem.noise, &taps);
+        let mean_square = found.max(self.least_mean_square);
         Ok(Candidate { gamma: self.grid.peaks(&lags, 0.0)?.estimate, mean_square, fixed_point })
     }
 

@@ -70,6 +70,26 @@ fn a_bank_without_any_error_loses_nothing_by_integers() {
     );
 }
 
+/// Plain interleaving of delays 0 and 1: the mean squares of real and of integer taps are rounding.
+#[test]
+fn interleaving_without_any_error_loses_nothing_and_leaves_nothing_open() {
+    let text = "fast_period = 1.0\nratio = 2\nlatency = 3\nchannel = [{ delay = 0 }, { delay = 1 }]\n\
+                target = { filter = { family = \"butterworth\", order = 2, cutoff = 0.1 } }\n\
+                design = { method = \"fir\", taps = 8 }\n";
+    let desk = Desk::with_spec(text);
+    for digits in [&[][..], &["--digits"]] {
+        let wish =
+            [&["design", "spec.toml", "-o", "b.json", "--force", "--loss-db", "0.1"][..], digits].concat();
+        let report = desk.json(&[&wish[..], &["--json"]].concat());
+        assert_eq!(number(&report, "/words/choice/snr_loss_db"), 0.0);
+        assert_eq!(report["unfinished"], Value::Null);
+        let said = desk.good(&wish);
+        assert!(
+            said.contains("0.000 dB of the SNR") && said.contains("proven") && !said.contains("unfinished")
+        );
+    }
+}
+
 /// README's converters, of 12 bits.
 const TWELVE_BITS: &str = "fast_rate = \"48 kS/s\"\nratio = 2\nlatency = 12\n\
     target = { filter = { family = \"butterworth\", order = 4, cutoff = \"9 kHz\" } }\n\
