@@ -30,8 +30,8 @@ fn is_tiff(bytes: &[u8]) -> bool {
 pub(super) fn exr(file: &Source<'_>) -> Decoded {
     let wrong = |e: exr::error::Error| file.wrong(e.to_string());
     let head = MetaData::read_from_buffered(Cursor::new(file.bytes), false).map_err(wrong)?;
-    let mut sizes = head.headers.iter().map(|header| (header.layer_size.0, header.layer_size.1));
-    sizes.try_for_each(|size| file.check_size(size))?;
+    let mut sizes = head.headers.iter().map(|header| header.layer_size);
+    sizes.try_for_each(|size| file.check_size(size.0, size.1))?;
     let layers = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
     let layer = layers.all_attributes().from_buffered(Cursor::new(file.bytes)).map_err(wrong)?.layer_data;
     let all = &layer.channel_data.list;
@@ -72,7 +72,7 @@ pub(super) fn tiff(file: &Source<'_>) -> Result<Option<Image>, ImageError> {
         ColorType::RGB(16..) => 3,
         _ => return Ok(None),
     };
-    file.check_size(size)?;
+    file.check_size(size.0, size.1)?;
     // As many bytes as so many pixels take at most.
     let mut limits = Limits::default();
     limits.decoding_buffer_size = size.0 * size.1 * channels * 8;
@@ -104,7 +104,7 @@ pub(super) fn npy(file: &Source<'_>) -> Decoded {
         (_, [height, width]) => (*height as usize, *width as usize),
         _ => return Err(file.wrong(format!("the array has the shape {shape:?}; a map has rows and columns"))),
     };
-    file.check_size((width, height))?;
+    file.check_size(width, height)?;
     let is_by_columns = array.order() == Order::Fortran;
     let numbers = floats::<f32>(array, |v| v)
         .or_else(|array| floats::<f64>(array, |v| v as f32))

@@ -89,7 +89,7 @@ fn float_map(file: &Source<'_>) -> Result<Option<Image>, ImageError> {
         _ => return float::tiff(file),
     };
     let map = decoded.map_err(|reason| file.wrong(reason))?;
-    file.check_size(map.size()).map(|()| Some(map))
+    file.check_size(map.width(), map.height()).map(|()| Some(map))
 }
 
 fn load(path: &Path, most: usize) -> Result<Loaded, ImageError> {
@@ -107,7 +107,7 @@ fn load(path: &Path, most: usize) -> Result<Loaded, ImageError> {
     };
     // Before the pixels are unpacked.
     let (width, height) = open()?.into_dimensions().map_err(wrong)?;
-    source.check_size((width as usize, height as usize))?;
+    source.check_size(width as usize, height as usize)?;
     let mut reader = open()?;
     // The size was checked; the decoders have limits of their own, without a way to allow more.
     reader.no_limits();

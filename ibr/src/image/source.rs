@@ -22,7 +22,7 @@ impl Source<'_> {
     }
 
     /// Refuses too many pixels, and such that the system has no memory for.
-    pub(super) fn check_size(&self, (width, height): (usize, usize)) -> Result<(), ImageError> {
+    pub(super) fn check_size(&self, width: usize, height: usize) -> Result<(), ImageError> {
         let pixels = width.saturating_mul(height);
         if pixels > self.most {
             return Err(ImageError::TooLarge { path: self.path.into(), width, height, most: self.most });

@@ -23,13 +23,19 @@ const NEVER: i16 = i16::MAX / 2;
 pub(super) fn aggregated(costs: &Costs, greys: &[f32]) -> Vec<i16> {
     let mut sums = vec![0; costs.values.len()];
     for (dx, dy) in [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)] {
-        add_paths(costs, greys, (dx, dy), &mut sums);
+        add_paths(costs, greys, &Step { dx, dy }, &mut sums);
     }
     sums
 }
 
-/// Adds the paths that go from the pixel before, by (dx, dy), to each pixel.
-fn add_paths(costs: &Costs, greys: &[f32], (dx, dy): (isize, isize), sums: &mut [i16]) {
+/// The way from one pixel of a path to the next.
+struct Step {
+    dx: isize,
+    dy: isize,
+}
+
+/// Adds the paths of one direction.
+fn add_paths(costs: &Costs, greys: &[f32], &Step { dx, dy }: &Step, sums: &mut [i16]) {
     let (width, count) = (costs.width, costs.hypotheses);
     // The paths to the pixels of a row, each between two that are never taken, and the least of each pixel.
     let stride = count + 2;

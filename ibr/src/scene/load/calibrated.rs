@@ -1,7 +1,7 @@
 //! Scenes of general cameras: 3 x 4 matrices, COLMAP models or transforms files, and depths.
 
 use super::left_out::LeftOut;
-use super::maps::{Given, Read, Whole};
+use super::maps::{Given, Read, Stored, Whole};
 use super::models::Source;
 use super::{Goal, Inputs, Loaded, Loader, each, pixels};
 use crate::camera::Camera;
@@ -71,10 +71,10 @@ impl Loader<'_> {
         let map = self.need(view.depth.as_deref(), view, "depth", "calibrated")?;
         let image = self.image(&view.image)?;
         let given = Given { map, scale: view.depth_scale, measure: Measure::Depth };
-        let stored = self.stored(view, &image, &given)?;
+        let map = self.stored(view, &image, &given)?;
         let (camera, resized) = self.camera_of(view, image.size())?;
         let points = |image: &Image, camera: &Camera| self.of_points(view, image, camera);
-        Ok((self.read(view, (image, camera), (&given, stored), points)?, resized))
+        Ok((self.read(view, &given, Stored { image, camera, map }, points)?, resized))
     }
 
     /// The camera of the view that is left out, or of an image that the file of cameras lists, and the size

@@ -23,6 +23,13 @@ pub(super) struct Read<P> {
     filled: usize,
 }
 
+/// The image of a view with its camera, and its map if a file has it.
+pub(super) struct Stored<P> {
+    pub(super) image: Image,
+    pub(super) camera: P,
+    pub(super) map: Option<DepthMap>,
+}
+
 /// Views with dense maps, and the number of unknown values that were filled.
 pub(super) struct Whole<P> {
     pub(super) views: Vec<SourceView<P>>,
@@ -72,11 +79,12 @@ impl Loader<'_> {
     pub(super) fn read<P>(
         &self,
         view: &ViewSpec,
-        (image, camera): (Image, P),
-        (given, stored): (&Given<'_>, Option<DepthMap>),
+        given: &Given<'_>,
+        stored: Stored<P>,
         points: impl Fn(&Image, &P) -> Loaded<DepthMap>,
     ) -> Loaded<Read<P>> {
-        let map = match stored {
+        let Stored { image, camera, map } = stored;
+        let map = match map {
             Some(map) => map,
             None if MapSource::of(given.map) == MapSource::Points => points(&image, &camera)?,
             None => return Ok(Read { image, map: None, camera, filled: 0 }),

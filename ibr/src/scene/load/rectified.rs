@@ -1,6 +1,6 @@
 //! Scenes of a rectified rig: positions and disparities.
 
-use super::maps::{Given, Whole};
+use super::maps::{Given, Stored, Whole};
 use super::{Goal, Inputs, Loaded, Loader, each, pixels};
 use crate::camera::middlebury::{Calibration, read_calibration};
 use crate::depth::Measure;
@@ -32,8 +32,8 @@ impl Loader<'_> {
             let map = self.need(view.disparity.as_deref(), view, "disparity", "rectified")?;
             let given = Given { map, scale: view.disparity_scale, measure: Measure::Disparity };
             let image = self.image(&view.image)?;
-            let stored = self.stored(view, &image, &given)?;
-            self.read(view, (image, position), (&given, stored), |_, _| {
+            let map = self.stored(view, &image, &given)?;
+            self.read(view, &given, Stored { image, camera: position, map }, |_, _| {
                 Err(self.incomplete(format!(
                     "{} has disparity = \"points\", which a rectified rig does not have; give it a map or \"matched\"",
                     view.named()
@@ -103,13 +103,13 @@ impl Loader<'_> {
     }
 }
 
-/// That photographs seem to be exchanged: nearly all of what was found lies behind infinity.
+/// That photographs seem to be exchanged: nearly all disparities are negative.
 fn note_of_exchange(views: &[SourceView<f64>]) -> Option<String> {
-    let is_behind = |view: &SourceView<f64>| {
-        let behind = view.map.data().iter().filter(|v| **v < 0.0).count();
-        behind as f64 > 0.9 * view.map.data().len() as f64
+    let is_negative = |view: &SourceView<f64>| {
+        let negative = view.map.data().iter().filter(|v| **v < 0.0).count();
+        negative as f64 > 0.9 * view.map.data().len() as f64
     };
-    views.iter().all(is_behind).then(|| {
+    views.iter().all(is_negative).then(|| {
         "nearly all disparities are negative, as if the photographs were exchanged; exchange their positions".into()
     })
 }
