@@ -175,7 +175,8 @@ impl Quick {
         is_dominated(&space.square, outputs, bound, &mut space.factor)
     }
 
-    /// A, and a bound of the error of the eigenvalues of A G A* as [`Quick::congruence`] computes it.
+    /// Sets `map` to A, and bounds the error of the eigenvalues of A G A* as [`Quick::congruence`] computes
+    /// it.
     fn fill_map(&self, terms: &Terms, outputs: usize, map: &mut Complex) -> f64 {
         let count = outputs + terms.rows.len();
         map.clear(outputs, count);
@@ -199,7 +200,7 @@ impl Quick {
         error * (1.0 + 1e-10)
     }
 
-    /// A G A*, in rounded arithmetic.
+    /// Sets `space.square` to A G A*, in rounded arithmetic.
     fn congruence(&self, space: &mut Workspace) {
         let Workspace { rows, map, gram, row, square, .. } = space;
         let (count, n) = (map.columns, self.gram.columns);

@@ -224,6 +224,7 @@ impl Tree<'_, '_> {
         is_leaf.then(|| Found::Gain(attained()))
     }
 
+    /// Sets the terms to -F_i times the rows and weights of each channel's mix.
     fn set_terms(&mut self, mixes: &[Mix]) {
         self.terms.clear();
         for (i, mix) in mixes.iter().enumerate() {
