@@ -1,7 +1,7 @@
 //! `hybank export`: a bank for other tools.
 
 use super::bank_file::load;
-use super::print::{Failure, InFile, check_json, is_dash, print_json};
+use super::print::{Failure, InFile, check_json, is_dash, print_json, warn};
 use super::written::{begin_file, check_output, check_outputs, write_bytes, write_together};
 use clap::ValueEnum;
 use hybank::bank::{Bank, SynthesisFilters};
@@ -182,6 +182,7 @@ fn write_verilog(args: &Args, bank: &Bank) -> Result<Circuit, Failure> {
     let stem = args.output.file_stem().and_then(|stem| stem.to_str());
     let name = args.name.as_deref().or(stem.filter(|_| !is_dash(&args.output))).unwrap_or("bank");
     let verilog = Verilog::new(bank, name, &options).in_file(&args.bank)?;
+    warn_of_words(&verilog.circuit, &options);
     let Some(folder) = &args.verilog.testbench else {
         write_bytes(&args.output, verilog.text.as_bytes(), args.force)?;
         return Ok(verilog.circuit);
@@ -195,6 +196,23 @@ fn write_verilog(args: &Args, bank: &Bank) -> Result<Circuit, Failure> {
     let begin = |(path, text): &(PathBuf, String)| Ok(vec![begin_file(path, text.as_bytes(), args.force)?]);
     write_together(folder, files.iter().map(Ok), begin)?;
     Ok(circuit)
+}
+
+/// Says where the circuit is another one than a user may expect of his options.
+fn warn_of_words(circuit: &Circuit, options: &VerilogOptions) {
+    let Circuit { accumulator_bits, needed_accumulator_bits, clocks_per_frame, .. } = *circuit;
+    if accumulator_bits < needed_accumulator_bits {
+        warn(&format!(
+            "sums wrap around in the accumulator of {accumulator_bits} bits; {needed_accumulator_bits} would hold all"
+        ));
+    }
+    let asked = options.clocks_per_frame.get();
+    if clocks_per_frame < asked as usize {
+        warn(&format!(
+            "no more than {clocks_per_frame} clocks have work in a frame, so in_ready is there after as many, and not \
+             after {asked}"
+        ));
+    }
 }
 
 /// A line with the gamma of the numbers that were written; empty where the front ends are unknown.

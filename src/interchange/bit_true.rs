@@ -66,6 +66,11 @@ impl BitTrue {
         Ok(Self { filters, fraction_bits, words, history, newest: 0, wraps: 0, saturated: 0 })
     }
 
+    /// A tap is its integer times 2^-f.
+    pub(super) fn fraction_bits(&self) -> i32 {
+        self.fraction_bits
+    }
+
     /// Bits of an accumulator that no sum can leave.
     pub fn needed_bits(&self) -> u32 {
         self.filters.needed_bits(self.words.input)

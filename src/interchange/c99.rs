@@ -31,7 +31,8 @@ pub(super) fn is_identifier(name: &str) -> bool {
 
 /// The name of the spec as a part of a comment.
 pub(super) fn title(bank: &Bank) -> String {
-    let title = bank.spec.as_ref().map(|spec| spec.name.replace("*/", "* /")).unwrap_or_default();
+    let named = bank.spec.as_ref().map(|spec| spec.name.replace("*/", "* /")).filter(|name| !name.is_empty());
+    let title = named.unwrap_or_else(|| "A filter bank.".to_owned());
     title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
@@ -50,8 +51,8 @@ pub(super) fn gammas(bank: &Bank) -> String {
 fn about(bank: &Bank, name: &str) -> String {
     format!(
         "/* {}\n   Written by hybank. C99, no allocation, no library.\n\n   \
-         {name}_reset clears a state. {name}_process takes the samples of one slow period, {}\n   \
-         channels, and writes the {} output samples of that period. Its latency is {} (output samples).\n   \
+         {name}_reset clears a state. {name}_process takes the samples of one slow period, {},\n   \
+         and writes the {} output samples of that period. Its latency is {} (output samples).\n   \
          {}.\n   \
          Sums are taken in the order written; -ffp-contract=off gives the same bits with every compiler. */\n",
         title(bank),
@@ -62,14 +63,14 @@ fn about(bank: &Bank, name: &str) -> String {
     )
 }
 
-/// The input of one call in words, which "channels" follows.
+/// The input of one call in words.
 pub(super) fn samples_of(bank: &Bank) -> String {
-    match bank.layout().is_plain() {
-        true => format!("one of each of the {}", bank.channel_count()),
-        false => {
-            let counts: Vec<String> = bank.samples.iter().map(usize::to_string).collect();
-            format!("{} in a row of the {}", counts.join(" and "), bank.channel_count())
-        }
+    let counts: Vec<String> = bank.samples.iter().map(usize::to_string).collect();
+    match (bank.layout().is_plain(), bank.channel_count()) {
+        (true, 1) => "one of the channel".to_owned(),
+        (true, channels) => format!("one of each of the {channels} channels"),
+        (false, 1) => format!("{} in a row of the channel", counts.join("")),
+        (false, channels) => format!("{} in a row of the {channels} channels", counts.join(" and ")),
     }
 }
 

@@ -64,6 +64,12 @@ pub enum ExportError {
         /// C or Verilog.
         language: &'static str,
     },
+    /// A module cannot have the name of a port or of a signal in it.
+    #[error("\"{}\" is the name of a signal in the module; give the module another name", Quoted(.name))]
+    NameOfSignal {
+        /// The name.
+        name: String,
+    },
     /// Code of which the words are the ports needs the bits of the samples.
     #[error("the bits of the samples are the widths of the ports, and no channel of the spec states them")]
     NoInputBits,

@@ -42,8 +42,8 @@ fn write_bank(desk: &Desk, integers: Vec<Vec<i64>>, bits: u32, fraction_bits: i3
 
 /// The report of an export with a testbench beside it.
 fn exported(desk: &Desk, more: &[&str]) -> Value {
-    let plain = ["export", "b.json", "-o", "core.v", "--testbench", ".", "--json", "--force"];
-    desk.json(&[&plain[..], more].concat())
+    let plain = ["export", "b.json", "-o", "core.v", "--testbench", "."];
+    desk.report(&[&plain[..], more].concat())
 }
 
 /// A bank of integers, and the options of a circuit.
@@ -305,6 +305,33 @@ fn random_banks_have_no_differing_bit_in_a_million_frames() {
     }
 }
 
+/// Without a title, with one channel and one phase, and where fewer bits or clocks are there than one may think.
+#[test]
+fn the_header_and_the_warnings_say_what_the_circuit_does() {
+    let desk = Desk::empty();
+    desk.write("b.json", bank_of_integers(vec![vec![3, -1]], 4, 0, 1).to_json().unwrap());
+    let export = ["export", "b.json", "-o", "core.v", "--force", "--input-bits", "8"];
+    let header = |flags: &[&str]| {
+        let output = desk.run(&[&export[..], flags].concat(), &[]);
+        assert!(output.status.success(), "{output:?}");
+        let head = String::from_utf8(desk.read("core.v")).unwrap();
+        (head.split("*/").next().unwrap().to_owned(), text(&output.stderr))
+    };
+    let (plain, said) = header(&[]);
+    let parts =
+        ["the sample x1 of 8 bits, one of the channel", "the output y0 of 8 bits", "a width of 10 holds all"];
+    assert!(parts.iter().all(|part| plain.contains(part)) && said.is_empty(), "{plain} {said}");
+    let (narrow, said) = header(&["--accumulator", "4"]);
+    assert!(narrow.contains("accumulator of 4 bits wraps around; 10 would hold all sums"), "{narrow}");
+    assert!(
+        said.contains("warning: sums wrap around in the accumulator of 4 bits; 10 would hold all"),
+        "{said}"
+    );
+    let (folded, said) = header(&["--clocks-per-frame", "100"]);
+    assert!(folded.contains("every\n   2 clocks, when in_ready is there"), "{folded}");
+    assert!(said.contains("warning: no more than 2 clocks have work in a frame"), "{said}");
+}
+
 #[test]
 fn verilog_that_cannot_be_is_refused() {
     let desk = Desk::with_spec(THESIS);
@@ -319,6 +346,10 @@ fn verilog_that_cannot_be_is_refused() {
     for name in ["wire", "1a", "a b"] {
         let flags = ["export", "b.json", "-o", "core.v", "--input-bits", "8", "--name", name];
         desk.refused(1, &flags, &[name, "Verilog identifier"]);
+    }
+    for name in ["x1", "clk", "sum1"] {
+        let flags = ["export", "b.json", "-o", "core.v", "--input-bits", "8", "--name", name];
+        desk.refused(1, &flags, &[name, "name of a signal"]);
     }
     desk.refused(1, &more("b.json", &["--input-bits", "40"]), &["40 bits for the samples"]);
     desk.refused(1, &more("b.json", &["--input-bits", "8", "--accumulator", "65"]), &["65 bits"]);

@@ -130,7 +130,12 @@ impl Verilog {
             accumulator_bits: needed.min(words.accumulator),
         };
         let has_ready = options.clocks_per_frame.get() > 1;
-        let text = about(bank, words, &circuit) + &ports(name, filters, words, has_ready) + &netlist.body();
+        let module = ports(filters, words, has_ready) + &netlist.body();
+        let is_word = |word: &str| word == name;
+        if module.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').any(is_word) {
+            return Err(ExportError::NameOfSignal { name: name.to_owned() });
+        }
+        let text = about(bank, &model, words, &circuit) + &format!("module {name} (\n") + &module;
         Ok(Self { name: name.to_owned(), has_ready, text: text + "endmodule\n", circuit, model })
     }
 
@@ -160,45 +165,68 @@ fn check_name(name: &str) -> Result<(), ExportError> {
     }
 }
 
-fn about(bank: &Bank, words: WordSizes, circuit: &Circuit) -> String {
-    let list = |range: std::ops::Range<usize>| range.map(|i| format!("x{i}")).collect::<Vec<_>>().join(", ");
+fn about(bank: &Bank, model: &BitTrue, words: WordSizes, circuit: &Circuit) -> String {
     let Circuit { latency_clocks, clocks_per_frame, multipliers, adders, registers, rom_bits, .. } = circuit;
-    let needed = circuit.needed_accumulator_bits;
-    let sums = match needed <= words.accumulator {
-        true => {
-            format!("No sum overflows: {needed} bits hold all, and each word is as wide as its values need")
-        }
-        false => format!("Sums wrap around at {} bits; {needed} hold all", words.accumulator),
-    };
+    let (samples, outputs) =
+        (listed("sample", "x", 1..bank.frame_samples() + 1), listed("output", "y", 0..bank.ratio));
     format!(
         "/* {}\n   Written by hybank. Verilog-2001, no primitives.\n\n   \
-         A clock with in_valid takes a frame: the samples {} of {} bits, {}. {latency_clocks} clocks\n   \
-         later out_valid is there with the output samples y0 to y{} of {} bits. Frames may come at\n   \
-         {}. rst clears all at a clock. The latency of the filters is {} \
-         (output samples).\n   {}.\n   \
-         {sums}.\n   Each is rounded to the nearest integer, halves upwards, and saturates.\n\n   \
-         multipliers {multipliers}, adders {adders}, bits of registers {registers}, of ROM {rom_bits} */\n",
+         A clock with in_valid takes a frame: {samples} of {} bits, {}. {latency_clocks} clocks\n   \
+         later out_valid is there with {outputs} of {} bits. Frames may come at every\n   \
+         {}. rst clears all at a clock. The latency of the filters is {} (output samples).\n   {}.\n   \
+         {}.\n\n   \
+         Before optimisation: multipliers {multipliers}, adders {adders}, bits of registers {registers}, of ROM {rom_bits} */\n",
         c99::title(bank),
-        list(1..bank.frame_samples() + 1),
         words.input,
-        c99::samples_of(bank) + " channels",
-        bank.ratio - 1,
+        c99::samples_of(bank),
         words.output,
         match clocks_per_frame {
-            1 => "every clock".to_owned(),
-            clocks => format!("every {clocks}th clock, when in_ready is there"),
+            1 => "clock".to_owned(),
+            clocks => format!("{clocks} clocks, when in_ready is there"),
         },
         bank.latency,
         c99::gammas(bank),
+        arithmetic(model, words, circuit.needed_accumulator_bits),
     )
 }
 
-fn ports(name: &str, filters: &IntegerFilters, words: WordSizes, has_ready: bool) -> String {
+/// "the samples x1, x2", or "the sample x1".
+fn listed(noun: &str, letter: &str, numbers: std::ops::Range<usize>) -> String {
+    let ending = if numbers.len() == 1 { "" } else { "s" };
+    let names: Vec<String> = numbers.map(|i| format!("{letter}{i}")).collect();
+    format!("the {noun}{ending} {}", names.join(", "))
+}
+
+/// What becomes of the samples, and where bits are lost.
+fn arithmetic(model: &BitTrue, words: WordSizes, needed: u32) -> String {
+    let offsets = if model.filters.has_offsets() {
+        " The offsets of the channels are subtracted as constants."
+    } else {
+        ""
+    };
+    let sums = match needed <= words.accumulator {
+        true => format!(
+            "No sum overflows: a width of {needed} holds all, and each word is as wide as its values need"
+        ),
+        false => format!(
+            "The accumulator of {} bits wraps around; {needed} would hold all sums",
+            words.accumulator
+        ),
+    };
+    format!(
+        "A tap is its integer times 2^{}, and a step of an output is one of a sample.{offsets}\n   \
+         {sums}.\n   Each sum is rounded to the nearest step, halves upwards, and saturates",
+        -model.fraction_bits(),
+    )
+}
+
+/// The list of ports, and the end of the head of the module.
+fn ports(filters: &IntegerFilters, words: WordSizes, has_ready: bool) -> String {
     let mut ports = vec!["input wire clk".to_owned(), "input wire rst".into(), "input wire in_valid".into()];
     ports.extend(has_ready.then(|| "output wire in_ready".into()));
     let word = |kind: &str, bits: u32, name: String| format!("{kind} signed [{}:0] {name}", bits - 1);
     ports.extend((1..=filters.taps.channels).map(|i| word("input wire", words.input, format!("x{i}"))));
     ports.push("output wire out_valid".into());
     ports.extend((0..filters.taps.ratio).map(|p| word("output reg", words.output, format!("y{p}"))));
-    format!("module {name} (\n    {}\n);\n", ports.join(",\n    "))
+    format!("    {}\n);\n", ports.join(",\n    "))
 }
