@@ -47,7 +47,7 @@ pub(super) struct Args {
     output: PathBuf,
     /// Bits of the samples that integer code takes: offsets are relative to their full scale (c, coe, mem,
     /// verilog; there those of the spec's converters if left out)
-    #[arg(long, value_name = "B")]
+    #[arg(long, value_name = "B", value_parser = clap::value_parser!(u32).range(2..=32))]
     input_bits: Option<u32>,
     #[command(flatten)]
     verilog: VerilogArgs,
@@ -86,10 +86,10 @@ impl Args {
 #[command(next_help_heading = "Verilog")]
 struct VerilogArgs {
     /// Bits of the outputs, which saturate [default: those of the samples]
-    #[arg(long, value_name = "B")]
+    #[arg(long, value_name = "B", value_parser = clap::value_parser!(u32).range(2..=32))]
     output_bits: Option<u32>,
     /// Bits of the accumulator; sums that do not fit wrap around [default: as many as no sum can leave]
-    #[arg(long, value_name = "B")]
+    #[arg(long, value_name = "B", value_parser = clap::value_parser!(u32).range(2..=64))]
     accumulator: Option<u32>,
     /// Clocks between two frames: with C of them, each multiplier serves C taps [default: 1]
     #[arg(long, value_name = "C")]

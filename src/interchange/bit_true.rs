@@ -56,11 +56,18 @@ impl BitTrue {
     ///
     /// # Errors
     /// [`ExportError::Words`] for sizes out of range, [`ExportError::NoIntegers`],
-    /// [`ExportError::Accumulator`] for taps whose sums of 32-bit samples may not fit 64 bits.
+    /// [`ExportError::Accumulator`] for taps whose sums may not fit 64 bits, and
+    /// [`ExportError::NothingLeft`] for an accumulator that wraps below the steps of the outputs.
     pub fn new(bank: &Bank, words: WordSizes) -> Result<Self, ExportError> {
         let integers = bank.fixed_point.as_ref().ok_or(ExportError::NoIntegers { format: "bit-true" })?;
         words.check()?;
         let filters = IntegerFilters::new(bank, integers, Some(words.input))?;
+        filters.check_sums(words.input)?;
+        let (needed, accumulator) = (filters.needed_bits(words.input), words.accumulator);
+        if accumulator < needed && i64::from(accumulator) <= i64::from(integers.fraction_bits) {
+            let fraction_bits = integers.fraction_bits;
+            return Err(ExportError::NothingLeft { accumulator, fraction_bits, needed });
+        }
         let history = filters.resting.repeat(filters.taps.lags);
         let fraction_bits = integers.fraction_bits;
         Ok(Self { filters, fraction_bits, words, history, newest: 0, wraps: 0, saturated: 0 })
@@ -81,7 +88,8 @@ impl BitTrue {
         self.filters.resting.iter().map(|x| *x as i32).collect()
     }
 
-    /// Takes N samples, one of each channel, and writes M output samples. Further values are left alone.
+    /// Takes N samples of so many bits, one of each channel, and writes M output samples. Further values are
+    /// left alone.
     pub fn process(&mut self, input: &[i32], output: &mut [i32]) {
         let PolyphaseTaps { channels: n, ratio, lags, .. } = self.filters.taps;
         self.newest = self.newest.checked_sub(1).unwrap_or(lags - 1);
@@ -158,8 +166,7 @@ impl IntegerFilters {
     /// Of a bank with offsets only for samples of so many bits.
     ///
     /// # Errors
-    /// [`ExportError::Offset`] without these bits, [`ExportError::Words`], and [`ExportError::Accumulator`]
-    /// where sums of 32-bit samples may not fit 64 bits.
+    /// [`ExportError::Offset`] without these bits, and [`ExportError::Words`].
     pub(super) fn new(bank: &Bank, words: &FixedPoint, input_bits: Option<u32>) -> Result<Self, ExportError> {
         let nonzero = |(_, offset): &(usize, &f64)| **offset != 0.0;
         let full_scale = match (input_bits, bank.offsets.iter().enumerate().find(nonzero)) {
@@ -180,10 +187,15 @@ impl IntegerFilters {
         };
         let constants: Vec<i64> = (0..taps.ratio).map(constant).collect();
         let resting = steps.iter().map(|step| step.round().clamp(-full_scale, (full_scale - 1.0).max(0.0)));
-        let filters = Self { resting: resting.map(|x| x as i64).collect(), constants, taps };
-        // Rounding adds half of the largest sum at most.
-        let sum = filters.largest_sum();
-        if sum >= 1 << 62 { Err(ExportError::Accumulator { sum: (sum >> 31) as u64 }) } else { Ok(filters) }
+        Ok(Self { resting: resting.map(|x| x as i64).collect(), constants, taps })
+    }
+
+    /// Taps with the same sums modulo 2^bits.
+    pub(super) fn modulo(&self, bits: u32) -> Self {
+        let unused = i64::BITS - bits;
+        let mut filters = self.clone();
+        filters.taps.values.iter_mut().for_each(|tap| *tap = *tap << unused >> unused);
+        filters
     }
 
     /// Whether the samples have offsets.
@@ -203,12 +215,17 @@ impl IntegerFilters {
         (0..self.taps.ratio).map(|p| self.sums(p, sample_bits).bits()).max().unwrap_or(1)
     }
 
-    /// What no sum of 32-bit samples exceeds, constants included.
-    fn largest_sum(&self) -> u128 {
-        let of_phase = |p: usize| {
-            let moduli: u128 = self.taps.of_phase(p).map(|(_, tap)| u128::from(tap.unsigned_abs())).sum();
-            (moduli << 31) + u128::from(self.constants[p].unsigned_abs())
-        };
-        (0..self.taps.ratio).map(of_phase).max().unwrap_or(0)
+    /// Refuses taps whose sums of samples of so many bits may not fit 64 bits.
+    pub(super) fn check_sums(&self, sample_bits: u32) -> Result<(), ExportError> {
+        let moduli =
+            |p: usize| -> u128 { self.taps.of_phase(p).map(|(_, tap)| u128::from(tap.unsigned_abs())).sum() };
+        let of_phase =
+            |p: usize| (moduli(p) << (sample_bits - 1)) + u128::from(self.constants[p].unsigned_abs());
+        let sum = (0..self.taps.ratio).map(of_phase).max().unwrap_or(0);
+        // Rounding adds half of the largest sum at most.
+        match sum < 1 << 62 {
+            true => Ok(()),
+            false => Err(ExportError::Accumulator { sum: (sum >> (sample_bits - 1)) as u64, sample_bits }),
+        }
     }
 }

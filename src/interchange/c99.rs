@@ -118,6 +118,8 @@ fn integer_fir(
     input_bits: Option<u32>,
 ) -> Result<String, ExportError> {
     let filters = IntegerFilters::new(bank, words, input_bits)?;
+    // Whatever it is given, no sum of the code overflows.
+    filters.check_sums(32)?;
     let taps = &filters.taps;
     let of_offsets = |text: String| if filters.has_offsets() { text } else { String::new() };
     let reset = format!(

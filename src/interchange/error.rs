@@ -25,14 +25,29 @@ pub enum ExportError {
         /// The offset relative to full scale.
         offset: f64,
     },
-    /// Sums of 32-bit samples could exceed 64 bits.
+    /// Sums could exceed 64 bits.
     #[error(
-        "the integer taps of one output phase sum to {sum} in size; sums of 32-bit samples may not fit 64 bits, give \
-         fewer bits"
+        "the integer taps of one output phase sum to {sum} in size; sums of {sample_bits}-bit samples may not fit \
+         64 bits, give fewer bits"
     )]
     Accumulator {
         /// Largest sum of the moduli of a phase.
         sum: u64,
+        /// Bits of the samples.
+        sample_bits: u32,
+    },
+    /// The accumulator wraps around below the step of the outputs.
+    #[error(
+        "an accumulator of {accumulator} bits holds nothing above the {fraction_bits} fraction bits of the taps; \
+         {needed} bits hold all sums"
+    )]
+    NothingLeft {
+        /// Bits of the accumulator.
+        accumulator: u32,
+        /// Of the taps.
+        fraction_bits: i32,
+        /// Bits that hold all sums.
+        needed: u32,
     },
     /// A word that the model does not have.
     #[error("{bits} bits for {word}; give 2 to {most}")]

@@ -85,7 +85,9 @@ fn integers<'a>(
     input_bits: Option<u32>,
 ) -> Result<(&'a FixedPoint, IntegerFilters), ExportError> {
     let words = bank.fixed_point.as_ref().ok_or(ExportError::NoIntegers { format })?;
-    Ok((words, IntegerFilters::new(bank, words, input_bits)?))
+    let filters = IntegerFilters::new(bank, words, input_bits)?;
+    filters.check_sums(input_bits.unwrap_or(32))?;
+    Ok((words, filters))
 }
 
 /// Bits of the widest tap.

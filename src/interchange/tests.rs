@@ -81,7 +81,7 @@ fn what_a_format_cannot_hold_is_refused() {
     }
     let large = integers(32, vec![vec![1 << 30], vec![-(1 << 30)]]);
     let refused = export(&large, Format::C99, "b", None);
-    assert!(matches!(refused, Err(ExportError::Accumulator { sum }) if sum == 1 << 31));
+    assert!(matches!(refused, Err(ExportError::Accumulator { sum, sample_bits: 32 }) if sum == 1 << 31));
     // The constants of offsets are part of the sums.
     let mut large = integers(31, vec![vec![1 << 29], vec![1 << 29]]);
     assert!(export(&large, Format::C99, "b", Some(32)).is_ok());

@@ -3,10 +3,11 @@
 //! accumulator adds the clocks.
 
 use super::VerilogOptions;
-use super::netlist::{Netlist, Term, Word, constant};
-use super::output::{Output, wrapped};
+use super::netlist::{Netlist, Term, Word, constant, wrapped};
+use super::output::Output;
 use crate::interchange::bit_true::IntegerFilters;
 use crate::interchange::range::Range;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// The samples of which some tap is not zero, as (channel, lag), for each multiplier those of its clocks.
@@ -28,10 +29,12 @@ impl Schedule {
         Self { samples, clocks }
     }
 
-    /// The taps of a phase for the samples of each multiplier.
-    fn coefficients(&self, filters: &IntegerFilters, phase: usize) -> Vec<Vec<i64>> {
-        let tap = |&(i, j): &(usize, usize)| filters.taps.get(i, phase, j);
-        self.samples.chunks(self.clocks).map(|samples| samples.iter().map(tap).collect()).collect()
+    /// The taps of a phase at each clock of a multiplier. They are zero where it has no sample left.
+    fn taps(&self, filters: &IntegerFilters, phase: usize, multiplier: usize) -> Vec<i64> {
+        let samples = self.samples.iter().skip(multiplier * self.clocks).take(self.clocks);
+        let mut taps: Vec<i64> = samples.map(|&(i, j)| filters.taps.get(i, phase, j)).collect();
+        taps.resize(self.clocks, 0);
+        taps
     }
 
     /// Lags of a channel.
@@ -50,45 +53,73 @@ pub(super) fn folded(
 ) -> (usize, usize) {
     let bits = options.words.input;
     write_history(netlist, filters, schedule, bits);
-    let mut cases = vec![String::new(); schedule.clocks];
+    let mut rom = Rom { cases: vec![String::new(); schedule.clocks], bits: 0, products: BTreeMap::new() };
+    let mut products = vec![Vec::new(); filters.taps.ratio];
     for (m, samples) in schedule.samples.chunks(schedule.clocks).enumerate() {
-        netlist.declare_register(&format!("a{m}"), bits);
-        for (case, (i, j)) in cases.iter_mut().zip(samples) {
-            let _ = write!(case, " a{m} <= x{}_{j};", i + 1);
+        let a = Word::at(1, format!("a{m}"), Range::of_bits(bits));
+        netlist.declare_register(&a.name, bits);
+        for (case, (i, j)) in rom.cases.iter_mut().zip(samples) {
+            let _ = write!(case, " {} <= x{}_{j};", a.name, i + 1);
+        }
+        for (p, products) in products.iter_mut().enumerate() {
+            products.extend(rom.product(netlist, &a, &format!("q{p}_{m}"), &schedule.taps(filters, p, m)));
         }
     }
-    let mut rom = 0;
-    let mut phases = Vec::new();
-    for p in 0..filters.taps.ratio {
-        let mut products = Vec::new();
-        for (m, taps) in schedule.coefficients(filters, p).iter().enumerate() {
-            let Some(range) = range(taps) else { continue };
-            let name = format!("q{p}_{m}");
-            netlist.declare_register(&name, range.bits());
-            rom += range.bits() as usize * schedule.clocks;
-            for (step, case) in cases.iter_mut().enumerate() {
-                let tap = taps.get(step).copied().unwrap_or(0);
-                let _ = write!(case, " {name} <= {};", constant(tap.into(), range.bits()));
-            }
-            let a = Word::at(1, format!("a{m}"), Range::of_bits(bits));
-            products.push(Term::from(netlist.product_of(&a, &Word::at(1, name, range))));
-        }
-        phases.push(netlist.sum(products));
+    let sums: Vec<_> = products.into_iter().map(|products| netlist.sum(products)).collect();
+    let stage = sums.iter().flatten().map(|term| term.word.stage).fold(2, usize::max);
+    write_control(netlist, &rom.cases, stage);
+    for (p, sum) in sums.into_iter().enumerate() {
+        let sum = sum.map(|term| Term { word: netlist.at_stage(term.word, stage), ..term });
+        accumulate(netlist, filters, p, sum, stage, options, output);
     }
-    let stage = phases.iter().flatten().map(|term| term.word.stage).max().unwrap_or(2);
-    write_control(netlist, &cases, stage);
-    for (p, products) in phases.into_iter().enumerate() {
-        let products = products.map(|term| netlist.at_stage(term.word, stage));
-        accumulate(netlist, filters, p, products, options, output);
-    }
-    (schedule.clocks + stage + 2, rom)
+    (schedule.clocks + stage + 2, rom.bits)
 }
 
-/// The coefficients of a multiplier, unless all are zero.
-fn range(taps: &[i64]) -> Option<Range> {
-    let hull = |range: Range, tap: &i64| range.hull(i128::from(*tap).into());
-    let range = taps.iter().fold(Range::from(0), hull);
-    (range != Range::from(0)).then_some(range)
+/// The coefficients of the multipliers, and the products with them.
+struct Rom {
+    /// What registers take at each clock of a frame.
+    cases: Vec<String>,
+    bits: usize,
+    /// Products by the name of the sample and the coefficients. They serve all phases that have them.
+    products: BTreeMap<(String, Vec<i64>), Term>,
+}
+
+impl Rom {
+    /// The products of the sample `a` with its taps at each clock, unless all are zero. What the taps have in
+    /// common, a power of two or all of it, needs no ROM.
+    fn product(&mut self, netlist: &mut Netlist, a: &Word, name: &str, taps: &[i64]) -> Option<Term> {
+        let nonzero = taps.iter().filter(|tap| **tap != 0);
+        let shift = nonzero.map(|tap| tap.trailing_zeros()).min()?;
+        let factors: Vec<i64> = taps.iter().map(|tap| tap >> shift).collect();
+        let key = (a.name.clone(), factors);
+        if let Some(known) = self.products.get(&key) {
+            return Some(known.clone().scaled(shift, false));
+        }
+        let factors = &key.1;
+        let first = factors[0];
+        let term = match first.unsigned_abs() {
+            _ if factors.iter().any(|factor| *factor != first) => {
+                let word = self.word(netlist, name, factors);
+                netlist.product_of(a, &word).into()
+            }
+            1 => Term::from(a.clone()).scaled(0, first < 0),
+            odd => Term::from(netlist.product(a, odd.into(), 0)).scaled(0, first < 0),
+        };
+        self.products.insert(key, term.clone());
+        Some(term.scaled(shift, false))
+    }
+
+    /// A register with the factor of each clock.
+    fn word(&mut self, netlist: &mut Netlist, name: &str, factors: &[i64]) -> Word {
+        let hull = |range: Range, factor: &i64| range.hull(i128::from(*factor).into());
+        let range = factors.iter().fold(Range::from(0), hull);
+        netlist.declare_register(name, range.bits());
+        self.bits += range.bits() as usize * factors.len();
+        for (case, factor) in self.cases.iter_mut().zip(factors) {
+            let _ = write!(case, " {name} <= {};", constant((*factor).into(), range.bits()));
+        }
+        Word::at(1, name.to_owned(), range)
+    }
 }
 
 /// The last samples of each channel. After the reset they are those without a signal.
@@ -157,7 +188,8 @@ fn accumulate(
     netlist: &mut Netlist,
     filters: &IntegerFilters,
     phase: usize,
-    products: Option<Word>,
+    sum: Option<Term>,
+    stage: usize,
     options: &VerilogOptions,
     output: Output,
 ) {
@@ -168,10 +200,12 @@ fn accumulate(
     let half = if netlist.holds(sums) { output.half() } else { 0 };
     let range = if netlist.holds(sums) { sums.plus(half.into()) } else { netlist.held(sums) };
     let (name, bits) = (format!("z{phase}"), range.bits());
-    let stage = products.as_ref().map_or(2, |word| word.stage);
     let begin = wrapped(start + half, bits);
-    let product = products.map(|word| format!(" + {}", netlist.sized(&word, 0, bits))).unwrap_or_default();
-    netlist.adders += usize::from(!product.is_empty());
-    netlist.register(&name, bits, &format!("(first[{}] ? {begin} : {name}){product}", stage - 1));
+    netlist.adders += usize::from(sum.is_some());
+    let sum = sum.map_or_else(String::new, |term| {
+        let sign = if term.is_negative { '-' } else { '+' };
+        format!(" {sign} {}", netlist.sized(&term.word, term.shift, bits))
+    });
+    netlist.register(&name, bits, &format!("(first[{}] ? {begin} : {name}){sum}", stage - 1));
     output.write(netlist, phase, &Word::at(stage + 1, name, range), output.half() - half);
 }

@@ -49,8 +49,9 @@ impl VerilogOptions {
     /// never wraps, and outputs of the bits of the samples: of so many, or those of the widest converter.
     ///
     /// # Errors
-    /// [`ExportError::NoInputBits`] where the spec states none either.
+    /// [`ExportError::NoIntegers`], and [`ExportError::NoInputBits`] where the spec states none either.
     pub fn new(bank: &Bank, input_bits: Option<u32>) -> Result<Self, ExportError> {
+        bank.fixed_point.as_ref().ok_or(ExportError::NoIntegers { format: "Verilog" })?;
         let channels = bank.spec.iter().flat_map(|spec| &spec.channels);
         let widest = channels.filter_map(|channel| channel.bits).max();
         let input = input_bits.or(widest).ok_or(ExportError::NoInputBits)?;
@@ -106,8 +107,8 @@ impl Verilog {
         let words = options.words;
         let integers = bank.fixed_point.as_ref().ok_or(ExportError::NoIntegers { format: "Verilog" })?;
         let model = BitTrue::new(bank, words)?;
-        let filters = &model.filters;
-        let needed = filters.needed_bits(words.input);
+        let needed = model.needed_bits();
+        let filters = &model.filters.modulo(words.accumulator);
         let mut netlist = Netlist::new(options.pipeline.get(), words.accumulator);
         let output = Output::new(words.output, integers.fraction_bits);
         let (clocks_per_frame, latency_clocks, rom_bits) = match options.clocks_per_frame.get() as usize {

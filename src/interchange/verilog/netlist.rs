@@ -53,6 +53,22 @@ impl Term {
     }
 }
 
+/// What a sum of two terms, or its negative, is known by.
+fn key(a: &Term, b: &Term, is_negated: bool) -> String {
+    let mut parts = [a, b].map(|term| {
+        let sign = if term.is_negative == is_negated { '+' } else { '-' };
+        format!("{} {} {sign}", term.word.name, term.shift)
+    });
+    parts.sort();
+    parts.join(" ")
+}
+
+/// The value as a word of so many bits holds it.
+pub(super) fn wrapped(value: i128, bits: u32) -> String {
+    let unused = i128::BITS - bits;
+    constant(value << unused >> unused, bits)
+}
+
 /// A constant of so many bits.
 pub(super) fn constant(value: i128, bits: u32) -> String {
     let least = Range::of_bits(bits).least;
@@ -84,7 +100,8 @@ pub(super) struct Netlist {
     unused: Vec<String>,
     /// The same words a clock later.
     delayed: HashMap<String, Word>,
-    sums: usize,
+    /// Sums of two terms by their text, which serve wherever they are needed.
+    sums: HashMap<String, Word>,
 }
 
 impl Netlist {
@@ -99,13 +116,19 @@ impl Netlist {
             registers: 0,
             unused: Vec::new(),
             delayed: HashMap::new(),
-            sums: 0,
+            sums: HashMap::new(),
         }
     }
 
     /// The range of sums in the accumulator: all of it, if they may wrap.
     pub(super) fn held(&self, range: Range) -> Range {
         if self.holds(range) { range } else { Range::of_bits(self.accumulator) }
+    }
+
+    /// The range of a word that takes the lower bits of the accumulator after a shift.
+    fn held_below(&self, range: Range, shift: u32) -> Range {
+        let bits = self.accumulator.saturating_sub(shift).max(1);
+        if range.bits() <= bits { range } else { Range::of_bits(bits) }
     }
 
     /// Whether no sum of this range wraps.
@@ -133,24 +156,35 @@ impl Netlist {
         let _ = writeln!(self.clocked, "        {name} <= {value};");
     }
 
-    /// The product with a constant, in a register.
-    pub(super) fn product(&mut self, x: &Word, factor: i128) -> Word {
-        let range = x.range.times(factor);
-        let name = format!("{}_times_{factor}", x.name);
-        let factor = constant(factor, Range::from(factor).bits());
-        self.register(&name, range.bits(), &format!("{} * {factor}", x.name));
-        self.multipliers += 1;
-        Word::at(x.stage + 1, name, range)
+    /// The product with a constant, in a register. It will be shifted by `shift` at least, so it has no bit
+    /// that the accumulator then cannot hold.
+    pub(super) fn product(&mut self, x: &Word, factor: i128, shift: u32) -> Word {
+        let range = self.held_below(x.range.times(factor), shift);
+        let bits = range.bits();
+        let factor_bits = Range::from(factor).bits();
+        let value = match bits < factor_bits.max(x.bits()) {
+            true => format!("{} * {}", self.sized(x, 0, bits), wrapped(factor, bits)),
+            false => format!("{} * {}", x.name, constant(factor, factor_bits)),
+        };
+        self.multiply(x, format!("{}_times_{factor}", x.name), range, &value)
     }
 
     /// The product of two words, in a register.
     pub(super) fn product_of(&mut self, a: &Word, b: &Word) -> Word {
-        let ends = b.range;
-        let range = a.range.times(ends.least).hull(a.range.times(ends.most));
-        let name = format!("{}_times_{}", a.name, b.name);
-        self.register(&name, range.bits(), &format!("{} * {}", a.name, b.name));
+        let exact = a.range.times(b.range.least).hull(a.range.times(b.range.most));
+        let range = self.held(exact);
+        let bits = range.bits();
+        let value = match bits < a.bits().max(b.bits()) {
+            true => format!("{} * {}", self.sized(a, 0, bits), self.sized(b, 0, bits)),
+            false => format!("{} * {}", a.name, b.name),
+        };
+        self.multiply(a, format!("{}_times_{}", a.name, b.name), range, &value)
+    }
+
+    fn multiply(&mut self, x: &Word, name: String, range: Range, value: &str) -> Word {
+        self.register(&name, range.bits(), value);
         self.multipliers += 1;
-        Word::at(a.stage + 1, name, range)
+        Word::at(x.stage + 1, name, range)
     }
 
     /// The word at a later stage.
@@ -194,8 +228,14 @@ impl Netlist {
         });
         let level = a.word.level.max(b.word.level) + 1;
         let range = self.held(a.range().plus(b.range()));
-        self.sums += 1;
-        let name = format!("sum{}", self.sums);
+        let (key, negated) = (key(&a, &b, false), key(&a, &b, true));
+        if let Some(word) = self.sums.get(&key) {
+            return Term { word: word.clone(), shift, is_negative };
+        }
+        if let Some(word) = self.sums.get(&negated) {
+            return Term { word: word.clone(), shift, is_negative: !is_negative };
+        }
+        let name = format!("sum{}", self.sums.len() + 1);
         let value = self.total(&[&a, &b], range.bits());
         let word = if level >= self.levels {
             self.register(&name, range.bits(), &value);
@@ -204,6 +244,7 @@ impl Netlist {
             self.declare_wire(&name, range.bits(), &value);
             Word { name, range, stage, level }
         };
+        self.sums.insert(key, word.clone());
         Term { word, shift, is_negative }
     }
 

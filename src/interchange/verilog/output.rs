@@ -1,6 +1,6 @@
 //! From a sum to an output sample: rounded to the nearest integer, halves upwards, and saturated.
 
-use super::netlist::{Netlist, Word, constant};
+use super::netlist::{Netlist, Word, constant, wrapped};
 use crate::interchange::range::Range;
 
 /// How sums become outputs.
@@ -83,10 +83,4 @@ pub(super) fn held_sum(netlist: &mut Netlist, phase: usize, sum: Word, added: i1
     netlist.adders += 1;
     netlist.declare_wire(&name, bits, &value);
     Word { name, range, ..sum }
-}
-
-/// The value as a word of so many bits holds it.
-pub(super) fn wrapped(value: i128, bits: u32) -> String {
-    let unused = i128::BITS - bits;
-    constant(value << unused >> unused, bits)
 }

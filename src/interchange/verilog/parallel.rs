@@ -2,13 +2,13 @@
 //! its channel, the products of one phase and lag are added by a tree, and a chain of accumulators adds the
 //! lags.
 
-use super::netlist::{Netlist, Term, Word};
-use super::output::{Output, held_sum, wrapped};
+use super::netlist::{Netlist, Term, Word, wrapped};
+use super::output::{Output, held_sum};
 use super::shift_add::multiples;
 use super::{Multipliers, VerilogOptions};
 use crate::interchange::bit_true::IntegerFilters;
 use crate::interchange::range::Range;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Writes the filters and gives the latency in clocks.
@@ -68,14 +68,18 @@ fn products(
 ) -> BTreeMap<u64, Term> {
     let taps = &filters.taps;
     let own = &taps.values[channel * taps.ratio * taps.lags..][..taps.ratio * taps.lags];
-    let odd: BTreeSet<u64> = own.iter().filter(|tap| **tap != 0).map(|tap| odd_part(*tap).0).collect();
-    let product = |odd: u64| match odd {
+    // The odd parts, with the least shift of each.
+    let mut parts: BTreeMap<u64, u32> = BTreeMap::new();
+    for (odd, shift) in own.iter().filter(|tap| **tap != 0).map(|tap| odd_part(*tap)) {
+        parts.entry(odd).and_modify(|least| *least = shift.min(*least)).or_insert(shift);
+    }
+    let product = |(odd, shift): (u64, u32)| match odd {
         1 => (1, x.clone().into()),
-        _ => (odd, netlist.product(x, odd.into()).into()),
+        _ => (odd, netlist.product(x, odd.into(), shift).into()),
     };
     match multipliers {
-        Multipliers::Inferred => odd.into_iter().map(product).collect(),
-        Multipliers::ShiftAdd => multiples(netlist, x, &odd),
+        Multipliers::Inferred => parts.into_iter().map(product).collect(),
+        Multipliers::ShiftAdd => multiples(netlist, x, &parts.into_keys().collect()),
     }
 }
 
