@@ -7,7 +7,7 @@
 //! The centres lie symmetric about the real axis, so the root of a real centre is real, and two conjugate
 //! discs hold a conjugate pair.
 
-use crate::arithmetic::{Ball, BigFloat, Cartesian, ComplexBall, Number};
+use crate::arithmetic::{Ball, Cartesian, ComplexBall, Float512, Number};
 use crate::linalg::{self, Complex, Mat};
 
 use super::AnalogError;
@@ -15,7 +15,7 @@ use super::roots::RootSet;
 use super::square_free::{Factor, square_free_factors};
 
 /// Relative error of a coefficient of a square-free factor.
-const COEFFICIENT_ERROR: f64 = 2.0 * BigFloat::ROUNDING;
+const COEFFICIENT_ERROR: f64 = 2.0 * Float512::ROUNDING;
 /// Most steps of [`refined`]. From eigenvalues in doubles three are enough; the further ones are for
 /// clusters, to which the eigenvalues are poor approximations.
 const MAX_STEPS: usize = 100;
@@ -30,7 +30,7 @@ const REAL: f64 = 1e-100;
 /// rounded to doubles.
 const OUTWARD: f64 = 1.0 + 1e-12;
 
-type Long = Cartesian<BigFloat>;
+type Long = Cartesian<Float512>;
 
 /// The roots of the polynomial with these coefficients in descending powers, each as often as it occurs;
 /// `what` names it in errors.
@@ -40,7 +40,7 @@ type Long = Cartesian<BigFloat>;
 pub(super) fn enclosed_roots(
     coefficients: &[f64],
     what: &'static str,
-) -> Result<RootSet<Ball<BigFloat>>, AnalogError> {
+) -> Result<RootSet<Ball<Float512>>, AnalogError> {
     let significant = coefficients.iter().rposition(|&x| x != 0.0).map_or(0, |last| last + 1);
     let mut roots = RootSet::default();
     roots.real.resize(coefficients.len() - significant, Ball::ZERO);
@@ -55,7 +55,7 @@ pub(super) fn enclosed_roots(
 }
 
 /// The simple roots of a polynomial.
-pub(super) fn isolated(p: &[BigFloat]) -> Option<RootSet<Ball<BigFloat>>> {
+pub(super) fn isolated(p: &[Float512]) -> Option<RootSet<Ball<Float512>>> {
     let centres = symmetric(refined(p, approximate_roots(p)?))?;
     let radii: Vec<f64> = (0..centres.len()).map(|i| radius(p, &centres, i)).collect();
     for (i, &z) in centres.iter().enumerate() {
@@ -69,7 +69,7 @@ pub(super) fn isolated(p: &[BigFloat]) -> Option<RootSet<Ball<BigFloat>>> {
     let mut roots = RootSet::default();
     for (z, &radius) in centres.iter().zip(&radii) {
         let part = |x| Ball::exactly(x).widened(radius);
-        match (z.im == BigFloat::ZERO, z.im.nearest() > 0.0) {
+        match (z.im == Float512::ZERO, z.im.nearest() > 0.0) {
             (true, _) => roots.real.push(part(z.re)),
             (_, true) => roots.upper.push((part(z.re), part(z.im))),
             _ => {}
@@ -80,7 +80,7 @@ pub(super) fn isolated(p: &[BigFloat]) -> Option<RootSet<Ball<BigFloat>>> {
 }
 
 /// Eigenvalues of the companion matrix in the unit of their geometric mean, without symmetry.
-fn approximate_roots(p: &[BigFloat]) -> Option<Vec<Long>> {
+fn approximate_roots(p: &[Float512]) -> Option<Vec<Long>> {
     let n = p.len() - 1;
     let unit = (p[n].exponent() - p[0].exponent()) / (n as i64).max(1);
     let scaled = |k: usize| (p[k] / p[0]).scaled(-unit * k as i64).nearest();
@@ -92,13 +92,13 @@ fn approximate_roots(p: &[BigFloat]) -> Option<Vec<Long>> {
     let eigenvalues = linalg::eigenvalues(&companion).ok()?;
     let turned = |(i, z): (usize, Complex<f64>)| {
         let z = z * Complex::from_polar(1.0 + ASYMMETRY * i as f64, ASYMMETRY);
-        Long::new(BigFloat::from(z.re).scaled(unit), BigFloat::from(z.im).scaled(unit))
+        Long::new(Float512::from(z.re).scaled(unit), Float512::from(z.im).scaled(unit))
     };
     Some(eigenvalues.into_iter().enumerate().map(turned).collect())
 }
 
 /// Newton's steps for all roots at once, each deflated by the other roots (Ehrlich and Aberth).
-fn refined(p: &[BigFloat], mut roots: Vec<Long>) -> Vec<Long> {
+fn refined(p: &[Float512], mut roots: Vec<Long>) -> Vec<Long> {
     for _ in 0..MAX_STEPS {
         let mut settled = true;
         for i in 0..roots.len() {
@@ -118,28 +118,28 @@ fn refined(p: &[BigFloat], mut roots: Vec<Long>) -> Vec<Long> {
     roots
 }
 
-fn correction(p: &[BigFloat], roots: &[Long], i: usize) -> Long {
+fn correction(p: &[Float512], roots: &[Long], i: usize) -> Long {
     let z = roots[i];
-    let (mut value, mut slope) = (real(BigFloat::ZERO), real(BigFloat::ZERO));
+    let (mut value, mut slope) = (real(Float512::ZERO), real(Float512::ZERO));
     for &coefficient in p {
         slope = slope * z + value;
         value = value * z + real(coefficient);
     }
     let newton = value / slope;
     let others = roots.iter().enumerate().filter(|&(j, _)| j != i);
-    let repulsion = others.fold(real(BigFloat::ZERO), |sum, (_, &other)| sum + inverse(z - other));
-    newton / (real(BigFloat::from(1.0)) - newton * repulsion)
+    let repulsion = others.fold(real(Float512::ZERO), |sum, (_, &other)| sum + inverse(z - other));
+    newton / (real(Float512::from(1.0)) - newton * repulsion)
 }
 
-fn real(x: BigFloat) -> Long {
-    Long::new(x, BigFloat::ZERO)
+fn real(x: Float512) -> Long {
+    Long::new(x, Float512::ZERO)
 }
 
 fn inverse(z: Long) -> Long {
-    z.conj().scaled(BigFloat::from(1.0) / z.norm_sqr())
+    z.conj().scaled(Float512::from(1.0) / z.norm_sqr())
 }
 
-fn modulus(z: Long) -> BigFloat {
+fn modulus(z: Long) -> Float512 {
     z.norm_sqr().sqrt()
 }
 
@@ -155,20 +155,20 @@ fn symmetric(roots: Vec<Long>) -> Option<Vec<Long>> {
 }
 
 /// Smith's radius of the disc around centre `i`.
-fn radius(p: &[BigFloat], centres: &[Long], i: usize) -> f64 {
+fn radius(p: &[Float512], centres: &[Long], i: usize) -> f64 {
     let z = centres[i];
     let others = centres.iter().enumerate().filter(|&(j, _)| j != i);
     let denominator = others.fold(p[0], |product, (_, &other)| product * modulus(z - other));
-    let size = residual(p, z) * BigFloat::from(centres.len() as f64);
+    let size = residual(p, z) * Float512::from(centres.len() as f64);
     // What is no double is rounded up.
     (size / denominator).nearest().abs() * OUTWARD + f64::MIN_POSITIVE
 }
 
 /// A bound of |p(z)|. It is computed in the unit of |z|, in which no power of z leaves the range of doubles.
-fn residual(p: &[BigFloat], z: Long) -> BigFloat {
+fn residual(p: &[Float512], z: Long) -> Float512 {
     let (n, unit) = (p.len() as i64 - 1, modulus(z).exponent());
     let power = |k: usize| unit * (n - k as i64);
-    let size = (0..p.len()).filter(|&k| p[k] != BigFloat::ZERO).map(|k| p[k].exponent() + power(k)).max();
+    let size = (0..p.len()).filter(|&k| p[k] != Float512::ZERO).map(|k| p[k].exponent() + power(k)).max();
     let size = size.unwrap_or(0);
     let coefficient = |k: usize| {
         let x = p[k].scaled(power(k) - size);
@@ -178,5 +178,5 @@ fn residual(p: &[BigFloat], z: Long) -> BigFloat {
     let point = ComplexBall::new(Ball::exactly(z.re.scaled(-unit)), Ball::exactly(z.im.scaled(-unit)));
     let value =
         (0..p.len()).fold(ComplexBall::from(Ball::ZERO), |sum, k| sum * point + coefficient(k).into());
-    BigFloat::from(value.re.magnitude() + value.im.magnitude()).scaled(size)
+    Float512::from(value.re.magnitude() + value.im.magnitude()).scaled(size)
 }

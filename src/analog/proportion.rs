@@ -1,11 +1,11 @@
 //! Filters that are exactly proportional, as far as their written forms show it.
 
-use crate::arithmetic::{Ball, BigFloat};
+use crate::arithmetic::{Ball, Float512};
 use crate::spec::FilterSpec;
 
 /// g with `a` = g `b`, if both are written in one form that shows it without rounding: with proportional
 /// coefficients, with the same zeros and poles, or equal. Filters that only agree up to rounding have none.
-pub(crate) fn proportion(a: &FilterSpec, b: &FilterSpec) -> Option<Ball<BigFloat>> {
+pub(crate) fn proportion(a: &FilterSpec, b: &FilterSpec) -> Option<Ball<Float512>> {
     use FilterSpec::{Cascade, TransferFunction, ZeroPoleGain};
     match (a, b) {
         _ if a == b => Some(Ball::from(1.0)),
@@ -28,20 +28,20 @@ pub(crate) fn proportion(a: &FilterSpec, b: &FilterSpec) -> Option<Ball<BigFloat
 }
 
 /// g with x = g y, leading zeros apart.
-fn common_factor(x: &[f64], y: &[f64]) -> Option<Ball<BigFloat>> {
+fn common_factor(x: &[f64], y: &[f64]) -> Option<Ball<Float512>> {
     let significant = |list: &[f64]| -> Vec<f64> { list.iter().copied().skip_while(|&x| x == 0.0).collect() };
     let (x, y) = (significant(x), significant(y));
     let (&first, &other) = x.first().zip(y.first())?;
     // Products of two doubles are exact.
-    let product = |a: f64, b: f64| BigFloat::from(a) * BigFloat::from(b);
+    let product = |a: f64, b: f64| Float512::from(a) * Float512::from(b);
     let agree = x.iter().zip(&y).all(|(&a, &b)| product(a, other) == product(b, first));
     (x.len() == y.len() && agree).then(|| quotient(first, other))
 }
 
 /// x / y, exactly where that is a double.
-fn quotient(x: f64, y: f64) -> Ball<BigFloat> {
+fn quotient(x: f64, y: f64) -> Ball<Float512> {
     let rounded = x / y;
-    let is_exact = BigFloat::from(rounded) * BigFloat::from(y) == BigFloat::from(x);
+    let is_exact = Float512::from(rounded) * Float512::from(y) == Float512::from(x);
     if is_exact { Ball::from(rounded) } else { Ball::from(x) / Ball::from(y) }
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::arithmetic::{Ball, BigFloat, Real};
+use crate::arithmetic::{Ball, Float512, Real};
 use crate::linalg::{Complex, eigenvalues, solve, to_complex};
 use crate::spec::{FilterSpec, Passband};
 use crate::units::Seconds;
@@ -39,7 +39,7 @@ pub(super) trait Written: Real {
     fn family(member: &Member, passband: Passband, h: Seconds) -> Result<Factors<Self>, AnalogError>;
 }
 
-impl Written for Ball<BigFloat> {
+impl Written for Ball<Float512> {
     fn quotient(num: &[f64], den: &[f64]) -> Result<Factors<Self>, AnalogError> {
         let [num, den] = [num, den].map(without_leading_zeros);
         let (zeros, poles) = (enclosed_roots(num, "num")?, enclosed_roots(den, "den")?);

@@ -6,7 +6,7 @@
 
 use num_bigint::{BigInt, BigUint, Sign};
 
-use crate::arithmetic::BigFloat;
+use crate::arithmetic::Float512;
 
 /// 2^61 - 1, a prime. A polynomial with a multiple root has one modulo every prime that does not divide its
 /// leading coefficient, and none of 53 bits is a multiple of this one.
@@ -20,7 +20,7 @@ const PIECES: u64 = 12;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Factor {
     /// In descending powers, each rounded to 512 bits; the first and the last one are not zero.
-    pub(super) coefficients: Vec<BigFloat>,
+    pub(super) coefficients: Vec<Float512>,
     pub(super) multiplicity: usize,
 }
 
@@ -28,7 +28,7 @@ pub(super) struct Factor {
 /// last one are not zero. Their product is the polynomial up to a constant.
 pub(super) fn square_free_factors(coefficients: &[f64]) -> Vec<Factor> {
     if has_simple_roots(coefficients) {
-        let coefficients = coefficients.iter().map(|&x| BigFloat::from(x)).collect();
+        let coefficients = coefficients.iter().map(|&x| Float512::from(x)).collect();
         return vec![Factor { coefficients, multiplicity: 1 }];
     }
     // Entry k - 1: the product of all roots that occur k times and more, each once.
@@ -153,7 +153,7 @@ fn quotient(p: &[BigInt], q: &[BigInt]) -> Vec<BigInt> {
 }
 
 /// Rounded to 512 bits, with a relative error of at most twice their rounding.
-fn to_long(x: &BigInt) -> BigFloat {
+fn to_long(x: &BigInt) -> Float512 {
     let piece = |i: u64| {
         let low = x.magnitude() >> (PIECE_BITS * i);
         let high: BigUint = &low >> PIECE_BITS;
@@ -163,7 +163,7 @@ fn to_long(x: &BigInt) -> BigFloat {
     let left_out = count.saturating_sub(PIECES);
     let value = (left_out..count)
         .rev()
-        .fold(BigFloat::from(0.0), |sum, i| sum.scaled(PIECE_BITS as i64) + BigFloat::from(piece(i) as f64));
+        .fold(Float512::from(0.0), |sum, i| sum.scaled(PIECE_BITS as i64) + Float512::from(piece(i) as f64));
     let value = value.scaled((PIECE_BITS * left_out) as i64);
     if x.sign() == Sign::Minus { -value } else { value }
 }
@@ -186,7 +186,7 @@ mod tests {
 
     /// The factors by multiplicity, each divided by its leading coefficient.
     fn factors(p: &[f64]) -> Vec<(usize, Vec<f64>)> {
-        let monic = |c: &[BigFloat]| c.iter().map(|&x| (x / c[0]).nearest()).collect();
+        let monic = |c: &[Float512]| c.iter().map(|&x| (x / c[0]).nearest()).collect();
         square_free_factors(p).iter().map(|f| (f.multiplicity, monic(&f.coefficients))).collect()
     }
 

@@ -2,7 +2,7 @@
 //! adds a bound of its rounding error to the radius. A result encloses the exact result for all values in
 //! the operands; docs/proof.md derives this, down to numbers that no double holds.
 
-use super::{BigFloat, DoubleDouble, Number};
+use super::{DoubleDouble, Float512, Number};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Compensates for the rounding of the radius itself: at most a dozen operations in double precision.
@@ -105,7 +105,7 @@ impl<F: Number> Ball<F> {
     }
 }
 
-impl Ball<BigFloat> {
+impl Ball<Float512> {
     /// The enclosed numbers in the precision of `F`.
     pub(crate) fn shortened<F: Number>(self) -> Ball<F> {
         if self.radius.is_nan() {
@@ -115,7 +115,7 @@ impl Ball<BigFloat> {
         let negligible = F::ROUNDING * self.mid.nearest().abs();
         while rest.nearest().abs() > negligible {
             mid += F::from(rest.nearest());
-            rest = rest - BigFloat::from(rest.nearest());
+            rest = rest - Float512::from(rest.nearest());
             pieces += 1.0;
         }
         // Each sum is rounded, and what is left is negligible.
@@ -192,7 +192,7 @@ impl<F: Number> Div for Ball<F> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{BigFloat, exact::Exact};
+    use super::super::{Float512, exact::Exact};
     use super::*;
     use proptest::prelude::*;
 
@@ -274,7 +274,7 @@ mod tests {
         /// Against exact integers.
         #[test]
         fn no_value_is_lost_however_large_or_small(
-            x in any_ball::<BigFloat>(1020), y in any_ball::<BigFloat>(1020),
+            x in any_ball::<Float512>(1020), y in any_ball::<Float512>(1020),
             u in any_ball::<DoubleDouble>(400), v in any_ball::<DoubleDouble>(400),
         ) {
             if !is_unknown(x) && !is_unknown(y) {
@@ -290,10 +290,10 @@ mod tests {
     /// a huge number.
     #[test]
     fn midpoints_beyond_the_doubles_count() {
-        let tiny = BigFloat::from(1e-200) * BigFloat::from(1e-130);
-        let wide = Ball::<BigFloat>::ZERO.widened(1e100);
+        let tiny = Float512::from(1e-200) * Float512::from(1e-130);
+        let wide = Ball::<Float512>::ZERO.widened(1e100);
         assert!((Ball::exactly(tiny) * wide).radius() >= 1e-230);
-        let quotient = Ball::<BigFloat>::ZERO.widened(1e308) / Ball::exactly(BigFloat::from(1.0) / tiny);
+        let quotient = Ball::<Float512>::ZERO.widened(1e308) / Ball::exactly(Float512::from(1.0) / tiny);
         assert!(quotient.radius().is_nan() || quotient.radius() >= 1e-22);
         assert!(Ball::exactly(-tiny).lower() < 0.0 && Ball::exactly(tiny).magnitude() > 0.0);
     }

@@ -1,25 +1,27 @@
-//! Numbers of 512 bits, for proofs in which 106 bits are not enough.
+//! Numbers of 256 and of 512 bits, where 106 bits are not enough.
 //!
-//! A number is `sign * m * 2^(exponent - 512)` with an integer m of eight 64-bit words whose top bit is
-//! set, so that `2^(exponent - 1) <= |x| < 2^exponent`. Sums and products are computed in integers and drop
-//! what does not fit: their relative error is below 2^-510. Quotients and roots take Newton's iteration and
-//! a last step with the residual; theirs is below 2^-508 (docs/proof.md derives both). An exponent beyond
+//! A number of B bits is `sign * m * 2^(exponent - B)` with an integer m of B / 64 words whose top bit is set,
+//! so that `2^(exponent - 1) <= |x| < 2^exponent`. Sums and products are computed in integers and drop what
+//! does not fit: their relative error is below 2^(2 - B). Quotients and roots take Newton's iteration and a
+//! last step with the residual; theirs is below 2^(4 - B) (docs/proof.md derives both). An exponent beyond
 //! [`MAX_EXPONENT`] makes a number unknown, so that nothing overflows or underflows unseen.
 
 use super::number::Number;
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// 64-bit words of a mantissa.
-const WORDS: usize = 8;
-const BITS: i64 = 64 * WORDS as i64;
+/// Most 64-bit words of a mantissa.
+const MOST_WORDS: usize = 8;
 /// Largest modulus of an exponent: sums of two such exponents stay within 64 bits, and squaring reaches it
 /// only after fifty steps.
 const MAX_EXPONENT: i64 = 1 << 60;
 
-/// A floating-point number with a mantissa of 512 bits; zero has no mantissa, NaN is an unknown number.
+/// 512 bits.
+pub(crate) type Float512 = BigFloat<8>;
+
+/// A floating-point number with a mantissa of so many words; zero has no mantissa, NaN is an unknown number.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct BigFloat {
+pub(crate) struct BigFloat<const WORDS: usize> {
     /// Least significant word first; the top bit is set unless the number is zero.
     words: [u64; WORDS],
     exponent: i64,
@@ -27,29 +29,51 @@ pub(crate) struct BigFloat {
     nan: bool,
 }
 
-impl Default for BigFloat {
+impl<const WORDS: usize> Default for BigFloat<WORDS> {
     fn default() -> Self {
         Self::ZERO
     }
 }
 
-/// The words `words[..]` as a number below `2^exponent`; what lies more than 512 bits below the first
-/// bit set is dropped.
-fn normalised(words: &[u64], exponent: i64, negative: bool) -> BigFloat {
+/// The words `words[..]` as a number below `2^exponent`; what lies more bits below the first bit set than the
+/// number has is dropped.
+fn normalised<const WORDS: usize>(words: &[u64], exponent: i64, negative: bool) -> BigFloat<WORDS> {
     let Some(top) = words.iter().rposition(|&word| word != 0) else { return BigFloat::ZERO };
+    let mut leading = [0; MOST_WORDS + 1];
+    let kept = (top + 1).min(WORDS + 1);
+    leading[WORDS + 1 - kept..=WORDS].copy_from_slice(&words[top + 1 - kept..=top]);
     let shift = words[top].leading_zeros();
-    let mut result = [0; WORDS];
-    for (k, word) in result.iter_mut().rev().enumerate() {
-        let high = top.checked_sub(k).map_or(0, |i| words[i]);
-        let low = top.checked_sub(k + 1).map_or(0, |i| words[i]);
-        *word = if shift == 0 { high } else { high << shift | low >> (64 - shift) };
-    }
     let dropped = 64 * (words.len() - 1 - top) as i64 + i64::from(shift);
-    BigFloat { words: result, exponent: exponent - dropped, negative, nan: false }.within_range()
+    let words = upper(&leading[..=WORDS], shift);
+    BigFloat { words, exponent: exponent - dropped, negative, nan: false }.within_range()
 }
 
-impl BigFloat {
+/// The upper word of two after a shift to the left by less than a word.
+#[inline]
+fn joined(high: u64, low: u64, shift: u32) -> u64 {
+    high << shift | low >> 1 >> (63 - shift)
+}
+
+/// All words but the lowest one, after a shift to the left by less than a word.
+#[inline]
+fn upper<const WORDS: usize>(words: &[u64], shift: u32) -> [u64; WORDS] {
+    std::array::from_fn(|k| joined(words[k + 1], words[k], shift))
+}
+
+/// 2^power, a normal double.
+#[inline]
+fn power_of_two(power: i64) -> f64 {
+    f64::from_bits(((power + 1023) as u64) << 52)
+}
+
+impl<const WORDS: usize> BigFloat<WORDS> {
+    const BITS: i64 = 64 * WORDS as i64;
     const NAN: Self = Self { words: [0; WORDS], exponent: 0, negative: false, nan: true };
+
+    /// With another number of words; what does not fit is dropped.
+    pub(crate) fn rounded<const OTHER: usize>(self) -> BigFloat<OTHER> {
+        BigFloat { nan: self.nan, ..normalised(&self.words, self.exponent, self.negative) }
+    }
 
     #[inline]
     fn is_zero(&self) -> bool {
@@ -84,45 +108,50 @@ impl BigFloat {
 
     /// |self| + |other| for |self| >= |other| > 0, or the difference, with the sign of `self`.
     fn combined(&self, other: &Self, subtract: bool) -> Self {
-        // One word below the mantissa keeps 64 more bits of the smaller number, and one above takes the
-        // carry.
-        let mut sum = [0; WORDS + 2];
-        sum[1..=WORDS].copy_from_slice(&self.words);
         let distance = self.exponent - other.exponent;
-        if distance < BITS + 64 {
-            let (whole, shift) = ((distance / 64) as usize, (distance % 64) as u32);
-            // Bit 0 of `other` lies at word 1 before the shift to the right.
-            let word = |i: usize| i.checked_sub(1).and_then(|i| other.words.get(i)).copied().unwrap_or(0);
-            let part = |i: usize| {
-                let (low, high) = (word(i + whole), word(i + whole + 1));
-                if shift == 0 { low } else { low >> shift | high << (64 - shift) }
-            };
-            let mut carry = false;
-            for (i, entry) in sum.iter_mut().enumerate().take(WORDS + 1) {
-                let part = part(i);
-                let (first, over) =
-                    if subtract { entry.overflowing_sub(part) } else { entry.overflowing_add(part) };
-                let step = u64::from(carry);
-                let (second, again) =
-                    if subtract { first.overflowing_sub(step) } else { first.overflowing_add(step) };
-                (*entry, carry) = (second, over || again);
-            }
-            sum[WORDS + 1] = u64::from(carry && !subtract);
+        if distance >= Self::BITS + 64 {
+            return *self;
         }
-        normalised(&sum, self.exponent + 64, self.negative)
+        // One word below the mantissas keeps 64 more bits of the smaller number.
+        let mut padded = [0; 2 * MOST_WORDS + 3];
+        padded[1..=WORDS].copy_from_slice(&other.words);
+        let (whole, shift) = ((distance / 64) as usize, (distance % 64) as u32);
+        let smaller = &padded[whole..whole + WORDS + 2];
+        let mut sum = [0; MOST_WORDS + 1];
+        let sum = &mut sum[..=WORDS];
+        sum[1..].copy_from_slice(&self.words);
+        let mut carry = false;
+        for (entry, pair) in sum.iter_mut().zip(smaller.windows(2)) {
+            let part = pair[0] >> shift | pair[1] << 1 << (63 - shift);
+            let step = u64::from(carry);
+            let (first, over) =
+                if subtract { entry.overflowing_sub(part) } else { entry.overflowing_add(part) };
+            let (second, again) =
+                if subtract { first.overflowing_sub(step) } else { first.overflowing_add(step) };
+            (*entry, carry) = (second, over | again);
+        }
+        if subtract {
+            return normalised(sum, self.exponent, self.negative);
+        }
+        let (mut words, mut exponent) = (upper(sum, 0), self.exponent);
+        if carry {
+            words = std::array::from_fn(|k| joined(sum.get(k + 2).copied().unwrap_or(1), sum[k + 1], 63));
+            exponent += 1;
+        }
+        Self { words, exponent, negative: self.negative, nan: false }.within_range()
     }
 
     /// |self| 2^-exponent with the precision of a double.
     #[inline]
     fn mantissa(&self) -> f64 {
-        self.words[WORDS - 1] as f64 * 2f64.powi(-64)
+        self.words[WORDS - 1] as f64 * power_of_two(-64)
     }
 }
 
-impl Number for BigFloat {
+impl<const WORDS: usize> Number for BigFloat<WORDS> {
     const ZERO: Self = Self { words: [0; WORDS], exponent: 0, negative: false, nan: false };
-    /// 2^-506, four times what is proven of the least accurate operation.
-    const ROUNDING: f64 = f64::from_bits((1023 - 506) << 52);
+    /// 2^(6 - B), four times what is proven of the least accurate operation.
+    const ROUNDING: f64 = f64::from_bits((1023 + 6 - 64 * WORDS as u64) << 52);
     /// 0.5^k / k! is below 2^-512 from here on.
     const SERIES_TERMS: usize = 90;
 
@@ -132,11 +161,11 @@ impl Number for BigFloat {
             return f64::NAN;
         }
         let size = match self.exponent {
-            -1021..=1023 => self.mantissa() * 2f64.powi(self.exponent as i32),
+            -1021..=1023 => self.mantissa() * power_of_two(self.exponent),
             // 2^1024 is no double, its half is.
-            1024 => (2.0 * self.mantissa()) * 2f64.powi(1023),
+            1024 => (2.0 * self.mantissa()) * power_of_two(1023),
             1025.. => f64::INFINITY,
-            _ => (self.mantissa() * 2f64.powi(-1021)) * 2f64.powi((self.exponent + 1021).max(-1000) as i32),
+            _ => (self.mantissa() * power_of_two(-1021)) * power_of_two((self.exponent + 1021).max(-1000)),
         };
         if self.negative { -size } else { size }
     }
@@ -162,7 +191,7 @@ impl Number for BigFloat {
     }
 }
 
-impl From<f64> for BigFloat {
+impl<const WORDS: usize> From<f64> for BigFloat<WORDS> {
     fn from(value: f64) -> Self {
         if value == 0.0 {
             return Self::ZERO;
@@ -179,7 +208,7 @@ impl From<f64> for BigFloat {
     }
 }
 
-impl Neg for BigFloat {
+impl<const WORDS: usize> Neg for BigFloat<WORDS> {
     type Output = Self;
     #[inline]
     fn neg(self) -> Self {
@@ -187,7 +216,7 @@ impl Neg for BigFloat {
     }
 }
 
-impl Add for BigFloat {
+impl<const WORDS: usize> Add for BigFloat<WORDS> {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         if self.nan || other.nan {
@@ -207,14 +236,14 @@ impl Add for BigFloat {
     }
 }
 
-impl Sub for BigFloat {
+impl<const WORDS: usize> Sub for BigFloat<WORDS> {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
         self + -other
     }
 }
 
-impl Mul for BigFloat {
+impl<const WORDS: usize> Mul for BigFloat<WORDS> {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
         if self.nan || other.nan {
@@ -223,21 +252,39 @@ impl Mul for BigFloat {
         if self.is_zero() || other.is_zero() {
             return Self::ZERO;
         }
-        let mut product = [0u64; 2 * WORDS];
-        for (i, &x) in self.words.iter().enumerate() {
-            let mut carry = 0u128;
-            for (j, &y) in other.words.iter().enumerate() {
-                let sum = u128::from(x) * u128::from(y) + u128::from(product[i + j]) + carry;
-                product[i + j] = sum as u64;
-                carry = sum >> 64;
-            }
-            product[i + WORDS] = carry as u64;
+        let mut product = [0; 2 * MOST_WORDS];
+        let product = &mut product[..2 * WORDS];
+        write_product(&self.words, &other.words, product);
+        // Both mantissas are at least 1/2, so their product is at least 1/4.
+        let shift = product[2 * WORDS - 1].leading_zeros();
+        Self {
+            words: upper(&product[WORDS - 1..], shift),
+            exponent: self.exponent + other.exponent - i64::from(shift),
+            negative: self.negative != other.negative,
+            nan: false,
         }
-        normalised(&product, self.exponent + other.exponent, self.negative != other.negative)
+        .within_range()
     }
 }
 
-impl Div for BigFloat {
+/// x y, exact, into zeros.
+#[inline]
+fn write_product<const WORDS: usize>(x: &[u64; WORDS], y: &[u64; WORDS], product: &mut [u64]) {
+    for (i, &x) in x.iter().enumerate() {
+        let mut carry = 0;
+        for (j, &y) in y.iter().enumerate() {
+            // At most (2^64 - 1)^2 + 2 (2^64 - 1) = 2^128 - 1.
+            let sum = u128::from(x)
+                .wrapping_mul(u128::from(y))
+                .wrapping_add(u128::from(product[i + j]))
+                .wrapping_add(u128::from(carry));
+            (product[i + j], carry) = (sum as u64, (sum >> 64) as u64);
+        }
+        product[i + WORDS] = carry;
+    }
+}
+
+impl<const WORDS: usize> Div for BigFloat<WORDS> {
     type Output = Self;
     fn div(self, other: Self) -> Self {
         if self.nan || other.nan || other.is_zero() {
@@ -259,6 +306,7 @@ impl Div for BigFloat {
 #[cfg(test)]
 mod tests {
     use super::super::exact::Exact;
+    use super::Float512 as BigFloat;
     use super::*;
     use num_bigint::{BigInt, Sign};
     use proptest::prelude::*;
@@ -322,17 +370,17 @@ mod tests {
         }
     }
 
-    impl From<BigFloat> for Exact {
-        fn from(x: BigFloat) -> Self {
+    impl<const WORDS: usize> From<super::BigFloat<WORDS>> for Exact {
+        fn from(x: super::BigFloat<WORDS>) -> Self {
             assert!(!x.nan);
             let bytes: Vec<u8> = x.words.iter().flat_map(|word| word.to_le_bytes()).collect();
             let sign = if x.negative { Sign::Minus } else { Sign::Plus };
-            Self { mantissa: BigInt::from_bytes_le(sign, &bytes), power: x.exponent - BITS }
+            Self { mantissa: BigInt::from_bytes_le(sign, &bytes), power: x.exponent - 64 * WORDS as i64 }
         }
     }
 
     /// Mantissas whose digits are random, all zero but the ends, or all one but a few.
-    fn any_number() -> impl Strategy<Value = BigFloat> {
+    fn any_number<const WORDS: usize>() -> impl Strategy<Value = super::BigFloat<WORDS>> {
         let words = prop_oneof![
             any::<[u64; WORDS]>(),
             (0..WORDS, any::<u64>()).prop_map(|(i, word)| {
@@ -349,7 +397,7 @@ mod tests {
         let exponent = prop_oneof![-3i64..4, -1100i64..1100, -1i64 << 40..1 << 40];
         (words, exponent, any::<bool>()).prop_map(|(mut words, exponent, negative)| {
             words[WORDS - 1] |= 1 << 63;
-            BigFloat { words, exponent, negative, nan: false }
+            super::BigFloat { words, exponent, negative, nan: false }
         })
     }
 
@@ -358,24 +406,47 @@ mod tests {
         of.times(&Exact::power_of_two(power))
     }
 
+    /// Against exact integers; a sum of numbers that lie close together, too.
+    fn errors_are_proven<const WORDS: usize>(
+        x: super::BigFloat<WORDS>,
+        y: super::BigFloat<WORDS>,
+        shift: i64,
+    ) -> Result<(), TestCaseError> {
+        let bits = 64 * WORDS as i64;
+        let y =
+            super::BigFloat { exponent: if shift % 2 == 0 { x.exponent + shift } else { y.exponent }, ..y };
+        let [a, b] = [x, y].map(Exact::from);
+        if (x.exponent - y.exponent).abs() < 3000 {
+            let sum = a.plus(&b);
+            prop_assert!(Exact::from(x + y).minus(&sum).is_within(&proven(2 - bits, &sum)));
+        }
+        let product = a.times(&b);
+        prop_assert!(Exact::from(x * y).minus(&product).is_within(&proven(2 - bits, &product)));
+        prop_assert!(Exact::from(x / y).times(&b).minus(&a).is_within(&proven(4 - bits, &a)));
+        let positive = super::BigFloat { negative: false, ..x };
+        let root = Exact::from(positive.sqrt());
+        prop_assert!(root.times(&root).minus(&a.abs()).is_within(&proven(5 - bits, &a)));
+        Ok(())
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { cases: 2048, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// Against exact integers; a sum of numbers that lie close together, too.
         #[test]
         fn errors_are_those_that_are_proven(x in any_number(), y in any_number(), shift in -600i64..600) {
-            let y = BigFloat { exponent: if shift % 2 == 0 { x.exponent + shift } else { y.exponent }, ..y };
-            let [a, b] = [x, y].map(Exact::from);
-            if (x.exponent - y.exponent).abs() < 3000 {
-                let sum = a.plus(&b);
-                prop_assert!(Exact::from(x + y).minus(&sum).is_within(&proven(-510, &sum)));
-            }
-            let product = a.times(&b);
-            prop_assert!(Exact::from(x * y).minus(&product).is_within(&proven(-510, &product)));
-            prop_assert!(Exact::from(x / y).times(&b).minus(&a).is_within(&proven(-508, &a)));
-            let positive = BigFloat { negative: false, ..x };
-            let root = Exact::from(positive.sqrt());
-            prop_assert!(root.times(&root).minus(&a.abs()).is_within(&proven(-507, &a)));
+            errors_are_proven::<8>(x, y, shift)?;
+        }
+
+        #[test]
+        fn errors_of_256_bits_are_those_that_are_proven(
+            x in any_number(),
+            y in any_number(),
+            shift in -400i64..400,
+            long in any_number::<8>(),
+        ) {
+            errors_are_proven::<4>(x, y, shift)?;
+            let exact = Exact::from(long);
+            prop_assert!(Exact::from(long.rounded::<4>()).minus(&exact).is_within(&proven(-255, &exact)));
         }
     }
 

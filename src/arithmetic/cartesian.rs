@@ -1,7 +1,7 @@
 //! Complex numbers of any of the real ones.
 
 use super::real::Field;
-use super::{Ball, BigFloat, Number};
+use super::{Ball, Float512, Number};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A complex number by its parts.
@@ -12,7 +12,7 @@ pub(crate) struct Cartesian<T> {
 }
 
 /// All complex numbers whose parts lie in two balls.
-pub(crate) type ComplexBall<F = BigFloat> = Cartesian<Ball<F>>;
+pub(crate) type ComplexBall<F = Float512> = Cartesian<Ball<F>>;
 
 impl<T: Field> Cartesian<T> {
     #[inline]

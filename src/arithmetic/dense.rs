@@ -169,7 +169,7 @@ pub(crate) fn riccati_limit<F: Number>(f: &Matrix<F>, g: &Matrix<F>, h: &Matrix<
 
 #[cfg(test)]
 mod tests {
-    use super::super::{BigFloat, DoubleDouble};
+    use super::super::{DoubleDouble, Float512};
     use super::*;
 
     /// 1 / (i + j + 1): the condition number for n = 12 is 2e16, beyond double precision.
@@ -197,17 +197,17 @@ mod tests {
     #[test]
     fn hilbert_matrices_are_inverted() {
         inverses_are_integers::<DoubleDouble>(1e-10);
-        inverses_are_integers::<BigFloat>(1e-130);
+        inverses_are_integers::<Float512>(1e-130);
     }
 
     #[test]
     fn the_factor_of_cholesky_multiplies_back_and_solves() {
-        let m = hilbert::<BigFloat>(15);
+        let m = hilbert::<Float512>(15);
         let l = cholesky(&m).unwrap();
         assert!(distance(&product(&l, &l.transpose()), &m) < 1e-140);
         let x = solve_lower(&l, &m);
         assert!(distance(&x, &l.transpose()) < 1e-100);
-        let indefinite = &m - (identity::<BigFloat>(15) + identity(15));
+        let indefinite = &m - (identity::<Float512>(15) + identity(15));
         assert!(cholesky(&indefinite).is_none());
         assert_eq!(pivots(&indefinite).iter().filter(|pivot| pivot.nearest() < 0.0).count(), 15);
         assert!(pivots(&m).iter().all(|pivot| pivot.nearest() > 0.0));
@@ -228,8 +228,8 @@ mod tests {
         assert!(distance(&congruence(&a, &s), &product(&product(&a, &s), &a.transpose())) < 1e-30);
     }
 
-    fn wave(rows: usize, columns: usize, step: f64) -> Matrix<BigFloat> {
-        Matrix::from_fn(rows, columns, |i, j| BigFloat::from(0.4 * (step * (3 * i + 5 * j + 1) as f64).sin()))
+    fn wave(rows: usize, columns: usize, step: f64) -> Matrix<Float512> {
+        Matrix::from_fn(rows, columns, |i, j| Float512::from(0.4 * (step * (3 * i + 5 * j + 1) as f64).sin()))
     }
 
     #[test]
@@ -239,7 +239,7 @@ mod tests {
         let x = riccati_limit(&a, &zeros(5, 5), &squares).unwrap();
         let residual = congruence(&a, &x) + squares - &x;
         assert!(size(&residual) < 1e-40 * size(&x), "{:e}", size(&residual));
-        let unstable = identity::<BigFloat>(1);
+        let unstable = identity::<Float512>(1);
         assert!(riccati_limit(&unstable, &zeros(1, 1), &unstable).is_none());
     }
 

@@ -1,10 +1,10 @@
 //! Elementary functions of numbers of 512 bits, enclosed: series with a bound for what they leave out, after
 //! an argument reduction in balls.
 
-use super::{Ball, BigFloat, ComplexBall};
+use super::{Ball, ComplexBall, Float512};
 use std::sync::OnceLock;
 
-type Long = Ball<BigFloat>;
+type Long = Ball<Float512>;
 
 /// A term below this, 2^-540, lies below the rounding of every sum of about one.
 const NEGLIGIBLE: f64 = f64::from_bits((1023 - 540) << 52);

@@ -1,6 +1,6 @@
 //! Real numbers of more than 53 bits, with a proven relative error for each operation.
 //!
-//! [`DoubleDouble`] has 106 bits and [`BigFloat`] has 512. Both are a [`Number`], the trait over which
+//! [`DoubleDouble`] has 106 bits and [`Float512`] has 512. Both are a [`Number`], the trait over which
 //! enclosures and the decompositions of [`dense`] are generic: [`Ball`] encloses a real number,
 //! [`ComplexBall`] a complex one. A formula that is generic over [`Real`] is computed in doubles and in
 //! balls.
@@ -18,7 +18,7 @@ mod number;
 mod real;
 
 pub(crate) use ball::{Ball, OUTWARD};
-pub(crate) use big_float::BigFloat;
+pub(crate) use big_float::{BigFloat, Float512};
 pub(crate) use cartesian::{Cartesian, ComplexBall};
 pub(crate) use double_double::DoubleDouble;
 pub(crate) use number::Number;
@@ -28,14 +28,14 @@ use std::ops::{AddAssign, SubAssign};
 
 /// The assignments by which matrices of these numbers are added.
 macro_rules! assignments {
-    ($([$($f:ident)?] $number:ty),*) => {$(
-        impl<$($f: Number)?> AddAssign for $number {
+    ($([$($f:tt)*] $number:ty),*) => {$(
+        impl<$($f)*> AddAssign for $number {
             fn add_assign(&mut self, other: Self) {
                 *self = *self + other;
             }
         }
 
-        impl<$($f: Number)?> SubAssign for $number {
+        impl<$($f)*> SubAssign for $number {
             fn sub_assign(&mut self, other: Self) {
                 *self = *self - other;
             }
@@ -43,4 +43,4 @@ macro_rules! assignments {
     )*};
 }
 
-assignments!([] DoubleDouble, [] BigFloat, [F] Ball<F>);
+assignments!([] DoubleDouble, [const WORDS: usize] BigFloat<WORDS>, [F: Number] Ball<F>);

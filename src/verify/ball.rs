@@ -1,6 +1,6 @@
 //! Matrices of enclosed numbers.
 
-use crate::arithmetic::{BigFloat, DoubleDouble, Number, OUTWARD};
+use crate::arithmetic::{DoubleDouble, Float512, Number, OUTWARD};
 use nalgebra::DMatrix;
 
 pub(super) use crate::arithmetic::Ball;
@@ -15,7 +15,7 @@ pub(super) fn exact<F: Number>(m: &DMatrix<f64>) -> Matrix<F> {
 }
 
 /// The same in the precision of `F`.
-pub(super) fn shortened<F: Number>(m: &Matrix<BigFloat>) -> Matrix<F> {
+pub(super) fn shortened<F: Number>(m: &Matrix<Float512>) -> Matrix<F> {
     m.map(Ball::shortened)
 }
 

@@ -13,7 +13,7 @@ use super::{
     BoundedBanks, MAX_STATES, Strictness, Verified, VerifyError, fir_length, lower, positive, statements,
     upper,
 };
-use crate::arithmetic::{BigFloat, DoubleDouble, Number};
+use crate::arithmetic::{DoubleDouble, Float512, Number};
 use crate::bank::{
     Bank, CausalWitness, Certificate, DualWitness, Gamma, LowerProof, Proof, SynthesisFilters,
 };
@@ -38,10 +38,10 @@ pub struct EnclosedErrorSystem<'a> {
     timeline: Timeline,
     pub(super) period: SlowPeriod,
     equations: ErrorSystem,
-    long_equations: OnceLock<ErrorSystem<BigFloat>>,
-    long_period: OnceLock<SlowPeriod<BigFloat>>,
+    long_equations: OnceLock<ErrorSystem<Float512>>,
+    long_period: OnceLock<SlowPeriod<Float512>>,
     short: OnceLock<Option<CausalPlant<DoubleDouble>>>,
-    long: OnceLock<Option<CausalPlant<BigFloat>>>,
+    long: OnceLock<Option<CausalPlant<Float512>>>,
 }
 
 /// Midpoints of the enclosed error system, for the search for a certificate: xi+ = a xi + b w, e = c xi + d
@@ -155,7 +155,7 @@ impl<'a> EnclosedErrorSystem<'a> {
     }
 
     /// The error system in 512 bits.
-    pub(super) fn long_equations(&self) -> &ErrorSystem<BigFloat> {
+    pub(super) fn long_equations(&self) -> &ErrorSystem<Float512> {
         self.long_equations.get_or_init(|| {
             ErrorSystem::new(self.long_period(), &BlockForm::new(&self.bank.filters, self.bank.ratio))
         })
@@ -205,7 +205,7 @@ impl<'a> EnclosedErrorSystem<'a> {
     }
 
     /// The slow period in 512 bits.
-    pub(super) fn long_period(&self) -> &SlowPeriod<BigFloat> {
+    pub(super) fn long_period(&self) -> &SlowPeriod<Float512> {
         self.long_period.get_or_init(|| SlowPeriod::new(&self.front_ends, &self.timeline, &self.samples))
     }
 
@@ -325,14 +325,14 @@ fn is_resolved<F: Number>(square: &Ball<F>) -> bool {
 }
 
 /// Real and imaginary part.
-pub(crate) type ComplexParts = [DMatrix<BigFloat>; 2];
+pub(crate) type ComplexParts = [DMatrix<Float512>; 2];
 
 /// An error system xi+ = A xi + J u, e = C xi + L u with the Gram matrix S of u.
 pub(crate) struct PreciseErrorSystem {
     /// [A; C], (n + M) x n.
-    pub(crate) system: DMatrix<BigFloat>,
+    pub(crate) system: DMatrix<Float512>,
     /// [J; L] S [J; L]'.
-    pub(crate) input_gram: DMatrix<BigFloat>,
+    pub(crate) input_gram: DMatrix<Float512>,
 }
 
 /// The error system and second moments of its samples in 512 bits, for the search for certificates and for
@@ -361,7 +361,7 @@ impl EnclosedErrorSystem<'_> {
         &self,
         channels: &[usize],
         lags: usize,
-    ) -> Option<[DMatrix<BigFloat>; 2]> {
+    ) -> Option<[DMatrix<Float512>; 2]> {
         let (period, ratio) = (self.long_period(), self.bank.ratio);
         let covariance = Covariance::new(period)?;
         let samples = TapSamples { ratio, channels, lags };
@@ -370,6 +370,6 @@ impl EnclosedErrorSystem<'_> {
     }
 }
 
-fn midpoints(m: &ball::Matrix<BigFloat>) -> DMatrix<BigFloat> {
+fn midpoints(m: &ball::Matrix<Float512>) -> DMatrix<Float512> {
     m.map(Ball::mid)
 }

@@ -5,13 +5,13 @@ use super::ball::{self, Ball, Matrix};
 use super::timeline::SamplingInstant;
 use super::{MAX_ANALOG_STATES, MAX_WORK, VerifyError};
 use crate::analog::{Realisation, SignalFilter, StrictlyProper, enclosed, proportion, signal};
-use crate::arithmetic::{BigFloat, Number};
+use crate::arithmetic::{Float512, Number};
 use crate::bank::Bank;
 use crate::spec::FilterSpec;
 use crate::units::GridTime;
 
 /// State equations of a filter.
-pub(super) type Equations = Realisation<Ball<BigFloat>>;
+pub(super) type Equations = Realisation<Ball<Float512>>;
 
 /// The filter W of the signal and the distinct front ends, which it drives, the states of W first:
 /// dx/dt = a x + b f. Without a signal the front ends stand side by side, driven by the same input.
@@ -104,7 +104,7 @@ impl FrontEnds {
     }
 
     /// Gain of a sample over the output of its filter.
-    pub(super) fn gain(sample: &SamplingInstant) -> Ball<BigFloat> {
+    pub(super) fn gain(sample: &SamplingInstant) -> Ball<Float512> {
         // A factor of one would only widen the enclosure.
         match sample.converter_gain {
             1.0 => sample.gain,
@@ -145,7 +145,7 @@ impl FrontEnds {
             b.rows_mut(0, signal.order()).copy_from(&signal.b);
         }
         for FrontEnd { start, equations, speed, .. } in &self.filters {
-            let fast = |m: &Matrix<BigFloat>| {
+            let fast = |m: &Matrix<Float512>| {
                 if *speed == 1.0 { m.clone() } else { ball::scaled(m, Ball::from(*speed)) }
             };
             let input = fast(&equations.b);

@@ -309,7 +309,7 @@ pub(super) fn filter_response<F: Number>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arithmetic::BigFloat;
+    use crate::arithmetic::Float512;
 
     #[test]
     fn any_two_doubles_name_a_point_of_the_circle() {
@@ -339,8 +339,8 @@ mod tests {
 
     #[test]
     fn residuals_of_512_bits_reach_their_precision() {
-        let a = Matrix::<BigFloat>::from_fn(4, 4, |i, j| Ball::from(0.3 * ((3 * i + 5 * j) as f64).sin()));
-        let z: ComplexMatrix<BigFloat> = ComplexMatrix::unit([0.3, 0.9]);
+        let a = Matrix::<Float512>::from_fn(4, 4, |i, j| Ball::from(0.3 * ((3 * i + 5 * j) as f64).sin()));
+        let z: ComplexMatrix<Float512> = ComplexMatrix::unit([0.3, 0.9]);
         let one = ComplexMatrix::real(ball::identity(4));
         let inverse = resolved(&a, &z, &one);
         let rest = one.times(&z).minus(&ComplexMatrix::real(a)).product(&inverse).minus(&one);

@@ -72,7 +72,7 @@ fn factorial(n: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arithmetic::BigFloat;
+    use crate::arithmetic::Float512;
     use crate::linalg::Mat;
 
     fn enclosed(a: &Mat, b: &Mat, t: f64) -> StateTransition {
@@ -129,7 +129,7 @@ mod tests {
         let a = Mat::from_row_slice(3, 3, &[-1.0, 2.0, 0.0, -2.0, -1.0, 30.0, 0.0, 0.0, -70.0]);
         let b = Mat::from_row_slice(3, 1, &[0.0, 1.0, 1.0]);
         let short = enclosed(&a, &b, 1.7);
-        let long: StateTransition<BigFloat> =
+        let long: StateTransition<Float512> =
             state_transition(&ball::exact(&a), &ball::exact(&b), Ball::from(1.7));
         for (x, y) in short.gramian.iter().zip(&long.gramian) {
             assert!(

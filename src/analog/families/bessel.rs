@@ -9,7 +9,7 @@ use super::Long;
 use crate::analog::AnalogError;
 use crate::analog::polynomial::isolated;
 use crate::analog::roots::{Factors, RootSet};
-use crate::arithmetic::{Ball, BigFloat, Number, elementary};
+use crate::arithmetic::{Ball, Float512, Number, elementary};
 use crate::spec::MAX_ORDER;
 
 /// Bessel with `norm="phase"`: the magnitude falls asymptotically as a Butterworth filter of the same order
@@ -34,13 +34,13 @@ fn scaled_roots(n: usize) -> Option<RootSet<Long>> {
 }
 
 /// theta_n in descending powers. Its integers are exact: the largest for n = 32 have 150 bits.
-fn reverse_bessel(n: usize) -> Vec<BigFloat> {
-    let one = BigFloat::from(1.0);
+fn reverse_bessel(n: usize) -> Vec<Float512> {
+    let one = Float512::from(1.0);
     let (mut previous, mut current) = (vec![one], vec![one, one]);
     for k in 2..=n {
-        let factor = BigFloat::from(2.0 * k as f64 - 1.0);
-        let mut next: Vec<BigFloat> =
-            std::iter::once(BigFloat::ZERO).chain(current.iter().map(|&x| factor * x)).collect();
+        let factor = Float512::from(2.0 * k as f64 - 1.0);
+        let mut next: Vec<Float512> =
+            std::iter::once(Float512::ZERO).chain(current.iter().map(|&x| factor * x)).collect();
         previous.iter().enumerate().for_each(|(i, &x)| next[i] += x);
         (previous, current) = (current, next);
     }

@@ -16,11 +16,11 @@ pub(super) use elliptic::Selectivity;
 
 use super::roots::{Factors, RootSet};
 use super::{AnalogError, MIN_DAMPING_RATIO};
-use crate::arithmetic::{Ball, BigFloat, ComplexBall, elementary};
+use crate::arithmetic::{Ball, ComplexBall, Float512, elementary};
 use crate::spec::{Family, FilterProblem, Passband};
 use crate::units::Seconds;
 
-type Long = Ball<BigFloat>;
+type Long = Ball<Float512>;
 
 /// Radius over midpoint up to which a number counts as resolved: its double is right then, and the
 /// proofs need a few digits more.

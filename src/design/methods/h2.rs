@@ -5,7 +5,7 @@ use super::Synthesis;
 use super::filtering::{Filter, Innovations};
 use super::gamma_iteration::GammaIteration;
 use super::precise_filtering::PreciseFiltering;
-use crate::arithmetic::{BigFloat, DoubleDouble, Number};
+use crate::arithmetic::{DoubleDouble, Float512, Number};
 use crate::design::DesignError;
 use crate::design::limits::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, Stop};
 use crate::design::plant::LiftedPlant;
@@ -39,7 +39,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, stop: &Stop) -> Result<Synthesis, 
     };
     let faint = innovations.iter().any(|form| form.least_feedthrough() < FAINT_FEEDTHROUGH);
     if (faint || precise_filter.is_none()) && !is_due(&candidates) {
-        candidates.extend(precise::<BigFloat>(&noisy, MOST_STATES_AT_512_BITS)?);
+        candidates.extend(precise::<Float512>(&noisy, MOST_STATES_AT_512_BITS)?);
     }
     candidates.extend(precise_filter);
     let rms = candidates.iter().map(|filter| rms_error(&noisy, filter)).collect::<Result<Vec<_>, _>>()?;

@@ -5,7 +5,7 @@ use super::filtering::{Filter, Innovations, RiccatiSolver, Trial};
 use super::gamma_iteration::{Evaluated, GammaIteration};
 use super::precise_filtering::PreciseFiltering;
 use super::{Settings, Synthesis};
-use crate::arithmetic::{BigFloat, DoubleDouble, Number};
+use crate::arithmetic::{DoubleDouble, Float512, Number};
 use crate::design::DesignError;
 use crate::design::limits::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS};
 use crate::design::plant::LiftedPlant;
@@ -40,7 +40,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
     }
     iteration.bisect()?;
     refine::<DoubleDouble>(plant, &mut iteration, MOST_STATES_AT_106_BITS)?;
-    refine::<BigFloat>(plant, &mut iteration, MOST_STATES_AT_512_BITS)?;
+    refine::<Float512>(plant, &mut iteration, MOST_STATES_AT_512_BITS)?;
     let optimum = iteration.best()?;
     let relaxed = relaxed(plant, &mut iteration, &optimum, settings.gamma_margin.unwrap_or(0.0))?;
     let unfinished = iteration.unfinished();

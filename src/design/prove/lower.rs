@@ -8,7 +8,7 @@
 //! frequencies, so in 512 bits the energy of the error for a faint white input is added to the sum.
 
 use super::witness;
-use crate::arithmetic::{BigFloat, Number, dense};
+use crate::arithmetic::{Float512, Number, dense};
 use crate::bank::{Bank, CausalWitness, DualWitness, LowerProof, SynthesisFilters};
 use crate::design::DesignError;
 use crate::design::limits::Stop;
@@ -254,15 +254,15 @@ struct Normal<'a> {
 }
 
 /// (a + ib)(c + id).
-fn times([a, b]: [BigFloat; 2], [c, d]: [BigFloat; 2]) -> [BigFloat; 2] {
+fn times([a, b]: [Float512; 2], [c, d]: [Float512; 2]) -> [Float512; 2] {
     [a * c - b * d, a * d + b * c]
 }
 
-fn conjugate([a, b]: [BigFloat; 2]) -> [BigFloat; 2] {
+fn conjugate([a, b]: [Float512; 2]) -> [Float512; 2] {
     [a, -b]
 }
 
-fn entry(m: &ComplexParts, i: usize, j: usize) -> [BigFloat; 2] {
+fn entry(m: &ComplexParts, i: usize, j: usize) -> [Float512; 2] {
     [m[0][(i, j)], m[1][(i, j)]]
 }
 
@@ -274,7 +274,7 @@ impl<'a> Normal<'a> {
         directions: &'a [DualWitness],
         channels: &[usize],
         ridge: f64,
-    ) -> Option<Vec<Vec<[BigFloat; 2]>>> {
+    ) -> Option<Vec<Vec<[Float512; 2]>>> {
         let (ratio, SynthesisFilters::Fir(taps)) = (bank.ratio, &bank.filters) else { return None };
         let length = taps[0].len();
         if channels.len() * length > MOST_LONG_TAPS {
@@ -290,19 +290,19 @@ impl<'a> Normal<'a> {
         Some((0..directions.len()).map(|t| normal.estimate(t, &taps)).collect())
     }
 
-    fn a(&self, t: usize, p: usize) -> [BigFloat; 2] {
-        self.directions[t].reference[p].map(BigFloat::from)
+    fn a(&self, t: usize, p: usize) -> [Float512; 2] {
+        self.directions[t].reference[p].map(Float512::from)
     }
 
     /// z^0 .. z^-(count - 1).
-    fn powers(&self, t: usize, count: usize) -> Vec<[BigFloat; 2]> {
+    fn powers(&self, t: usize, count: usize) -> Vec<[Float512; 2]> {
         let back = conjugate(entry(&self.moments[t][0], 0, 0));
-        let one = [BigFloat::from(1.0), BigFloat::ZERO];
+        let one = [Float512::from(1.0), Float512::ZERO];
         std::iter::successors(Some(one), |&power| Some(times(power, back))).take(count).collect()
     }
 
     /// The taps, in the order of time and, at one time, of the channels.
-    fn solve(&self, covariance: &Matrix<BigFloat>, cross: &Matrix<BigFloat>) -> Option<Vec<BigFloat>> {
+    fn solve(&self, covariance: &Matrix<Float512>, cross: &Matrix<Float512>) -> Option<Vec<Float512>> {
         let factor = dense::cholesky(&self.matrix(covariance))?;
         let right = Matrix::from_vec(factor.nrows(), 1, self.right(cross));
         let taps = dense::solve_factored(&factor, &right);
@@ -310,14 +310,14 @@ impl<'a> Normal<'a> {
     }
 
     /// sum over directions of Re conj(a_p) a_p' z^-(j - j') Gamma_{i,i'}, and the white input.
-    fn matrix(&self, covariance: &Matrix<BigFloat>) -> Matrix<BigFloat> {
+    fn matrix(&self, covariance: &Matrix<Float512>) -> Matrix<Float512> {
         let (n, m) = (self.channels, self.ratio);
         let lags = covariance.nrows() / n;
         // By lag difference d >= 0, the outputs p, p' and the channels i, i'.
         let index = |d: usize, (p, q): (usize, usize), (i, k): (usize, usize)| {
             ((d * m + p) * m + q) * n * n + i * n + k
         };
-        let mut sums = vec![BigFloat::ZERO; lags * m * m * n * n];
+        let mut sums = vec![Float512::ZERO; lags * m * m * n * n];
         for t in 0..self.directions.len() {
             let powers = self.powers(t, lags);
             for (p, q) in pairs(m) {
@@ -335,24 +335,24 @@ impl<'a> Normal<'a> {
         Matrix::from_fn(self.times.len() * n, self.times.len() * n, |row, column| {
             let (((j, p), i), ((l, q), k)) = (at(row.max(column)), at(row.min(column)));
             let sum = sums[index(j - l, (p, q), (i, k))];
-            if p == q { sum + BigFloat::from(self.ridge) * covariance[(j * n + i, l * n + k)] } else { sum }
+            if p == q { sum + Float512::from(self.ridge) * covariance[(j * n + i, l * n + k)] } else { sum }
         })
     }
 
     /// sum over directions of Re conj(a_p) z^-j (Gamma_hw a)_i, and the white input.
-    fn right(&self, cross: &Matrix<BigFloat>) -> Vec<BigFloat> {
+    fn right(&self, cross: &Matrix<Float512>) -> Vec<Float512> {
         let (n, m) = (self.channels, self.ratio);
         let lags = self.times.last().map_or(0, |(lag, _)| lag + 1);
         let white = |row: usize| {
             let (lag, p) = self.times[row / n];
-            BigFloat::from(self.ridge) * cross[(p, lag * n + row % n)]
+            Float512::from(self.ridge) * cross[(p, lag * n + row % n)]
         };
-        let mut sums: Vec<BigFloat> = (0..self.times.len() * n).map(white).collect();
+        let mut sums: Vec<Float512> = (0..self.times.len() * n).map(white).collect();
         for t in 0..self.directions.len() {
             let powers = self.powers(t, lags);
             for i in 0..n {
                 let from = |p: usize| times(entry(&self.moments[t][1], m + i, p), self.a(t, p));
-                let target = (0..m).map(from).fold([BigFloat::ZERO; 2], |[a, b], [c, d]| [a + c, b + d]);
+                let target = (0..m).map(from).fold([Float512::ZERO; 2], |[a, b], [c, d]| [a + c, b + d]);
                 for (row, &(lag, p)) in self.times.iter().enumerate() {
                     let rotated = times(times(conjugate(self.a(t, p)), powers[lag]), target);
                     sums[row * n + i] += rotated[0];
@@ -363,9 +363,9 @@ impl<'a> Normal<'a> {
     }
 
     /// F* a for direction t: sum over taps of f a_p z^j.
-    fn estimate(&self, t: usize, taps: &[BigFloat]) -> Vec<[BigFloat; 2]> {
+    fn estimate(&self, t: usize, taps: &[Float512]) -> Vec<[Float512; 2]> {
         let powers = self.powers(t, self.times.last().map_or(0, |(lag, _)| lag + 1));
-        let mut sums = vec![[BigFloat::ZERO; 2]; self.channels];
+        let mut sums = vec![[Float512::ZERO; 2]; self.channels];
         for (row, &(lag, p)) in self.times.iter().enumerate() {
             let phasor = times(self.a(t, p), conjugate(powers[lag]));
             for (i, sum) in sums.iter_mut().enumerate() {

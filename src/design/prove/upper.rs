@@ -2,12 +2,13 @@
 //! slightly above the norm.
 //!
 //! Double precision finds it for most banks. After steep filters, whose samples are nearly dependent, the
-//! error is a small difference of large numbers; the equation is then solved in 512 bits.
+//! error is a small difference of large numbers; the equation is then solved in 256 bits, and in 512 where
+//! these do not do either.
 
 use super::enclosed_norm::{EnclosedGains, FLOOR};
 use super::{leading_direction, witness};
 use crate::arithmetic::dense::{cholesky, product, riccati_limit, select, solve, symmetric};
-use crate::arithmetic::{BigFloat, Number};
+use crate::arithmetic::{BigFloat, Float512, Number};
 use crate::bank::{Bank, Certificate, DualWitness, Proof};
 use crate::design::DesignError;
 use crate::design::limits::{MAX_LONG_STATES, Stop};
@@ -22,9 +23,9 @@ use nalgebra::DMatrix as Matrix;
 /// Relative excesses over the computed norm at which the search tries to find a certificate, smallest
 /// first.
 const EXCESSES: [f64; 8] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
-/// The relative excesses that are tried in double precision before 512 bits are used.
+/// The relative excesses that are tried in double precision before more bits are used.
 const FINE_EXCESSES: usize = 3;
-/// The relative excesses that are tried in 512 bits.
+/// The relative excesses that are tried in 256 and in 512 bits.
 const LONG_EXCESSES: [f64; 3] = [1e-7, 1e-5, 1e-3];
 /// The same in units of `FLOOR`, for norms that are zero up to rounding.
 const FLOOR_EXCESSES: [f64; 3] = [1.0, 1e2, 1e4];
@@ -34,7 +35,7 @@ const STATE_WEIGHTS: [f64; 2] = [1e-1, 1e-4];
 const DIGITS: [usize; 4] = [9, 12, 15, 17];
 /// Significant digits of the corrections.
 const CORRECTION_DIGITS: [usize; 2] = [9, 17];
-/// Part of the excess that white noise on the states may take in 512 bits.
+/// Part of the excess that white noise on the states may take there.
 const NOISE: f64 = 1e-3;
 /// Maximum number of states of an error system for which the search tries to find a certificate. It needs
 /// eigenvalues of matrices twice as large.
@@ -96,8 +97,12 @@ pub(super) fn certificate(
         if is_zero { (&FLOOR_EXCESSES[..], &[][..]) } else { EXCESSES.split_at(FINE_EXCESSES) };
     let long = || {
         let excesses = if is_zero { FLOOR_EXCESSES } else { LONG_EXCESSES };
+        let long = search.in_512_bits()?;
         let mut tried = excesses.iter().take_while(|_| !stop.is_due());
-        tried.find_map(|excess| search.in_512_bits(level(excess)))
+        tried.find_map(|excess| {
+            let level = level(excess);
+            search.of_long::<4>(&long, level).or_else(|| search.of_long::<8>(&long, level))
+        })
     };
     let found = fine.iter().find_map(&mut in_doubles).or_else(long);
     found.or_else(|| coarse.iter().find_map(&mut in_doubles)).ok_or_else(|| match stop.is_due() {
@@ -153,14 +158,17 @@ impl Search<'_> {
         Ok(STATE_WEIGHTS.iter().find_map(tried))
     }
 
-    /// In 512 bits, R as two doubles per entry where one does not do. `None` also for many states.
-    fn in_512_bits(&self, level: Level) -> Option<Certificate> {
-        if self.error.states() > MAX_LONG_STATES {
-            return None;
-        }
-        let system = self.error.in_512_bits();
+    /// `None` for many states.
+    fn in_512_bits(&self) -> Option<LongSystem> {
+        let is_small = self.error.states() <= MAX_LONG_STATES;
+        let energy = observability_root(&self.middle.a, &self.middle.c).ok()?.norm_squared();
+        is_small.then(|| LongSystem { error: self.units.of_long(&self.error.in_512_bits()), energy })
+    }
+
+    /// In numbers of so many words, R as two doubles per entry where one does not do.
+    fn of_long<const WORDS: usize>(&self, long: &LongSystem, level: Level) -> Option<Certificate> {
         let noise = NOISE * level.excess;
-        let [factor, correction] = long_root(self.units, &system, self.middle, level.middle(), noise)?;
+        let [factor, correction] = long.root::<WORDS>(level.middle(), noise)?;
         let passes = |correction| self.passes(level, factor.clone(), correction);
         let corrected = || CORRECTION_DIGITS.iter().find_map(|&digits| passes(rounded(&correction, digits)));
         passes(Vec::new()).or_else(corrected)
@@ -207,27 +215,27 @@ impl Riccati {
     }
 }
 
-/// Rows of a lower triangular R with P = R R' at the level `gamma`, in `units`, and of what rounding to
-/// doubles takes from it. `middle` is the same system in doubles. The noise on the states adds about `noise`
-/// to the norm. `None` if there is no such P.
-fn long_root(
-    units: &Units,
-    error: &PreciseErrorSystem,
-    middle: &Midpoint,
-    gamma: f64,
-    noise: f64,
-) -> Option<[Vec<Vec<f64>>; 2]> {
-    // Noise of unit density on all states has this energy in e.
-    let energy = observability_root(&middle.a, &middle.c).ok()?.norm_squared();
-    let equation = LongRiccati::new(&units.of_long(error), 2.0 * gamma * noise / energy);
-    let root = cholesky(&equation.limit(gamma)?)?;
-    let rows = |entry: &dyn Fn(BigFloat) -> f64| -> Vec<Vec<f64>> {
-        (0..root.nrows()).map(|i| (0..=i).map(|j| entry(root[(i, j)])).collect()).collect()
-    };
-    Some([rows(&|x| x.nearest()), rows(&|x| (x - BigFloat::from(x.nearest())).nearest())])
+/// The error system in 512 bits, in units of one.
+struct LongSystem {
+    error: PreciseErrorSystem,
+    /// Of noise of unit density on all states, in e.
+    energy: f64,
 }
 
-/// The bounded-real Riccati equation in 512 bits.
+impl LongSystem {
+    /// Rows of a lower triangular R with P = R R' at the level `gamma`, and of what rounding to doubles takes
+    /// from it. The noise on the states adds about `noise` to the norm. `None` if there is no such P.
+    fn root<const WORDS: usize>(&self, gamma: f64, noise: f64) -> Option<[Vec<Vec<f64>>; 2]> {
+        let equation = LongRiccati::<WORDS>::new(&self.error, 2.0 * gamma * noise / self.energy);
+        let root = cholesky(&equation.limit(gamma)?)?;
+        let rows = |entry: &dyn Fn(BigFloat<WORDS>) -> f64| -> Vec<Vec<f64>> {
+            (0..root.nrows()).map(|i| (0..=i).map(|j| entry(root[(i, j)])).collect()).collect()
+        };
+        Some([rows(&|x| x.nearest()), rows(&|x| (x - BigFloat::from(x.nearest())).nearest())])
+    }
+}
+
+/// The bounded-real Riccati equation in numbers of more bits.
 ///
 /// With xi+ = A xi + J u, e = C xi + L u and the Gram matrix S of u, the least P at the level gamma is the
 /// limit from P = 0 of
@@ -238,36 +246,38 @@ fn long_root(
 ///
 /// N is white noise on the states. It makes the inequality of the certificate strict. The limit is that of
 /// P+ = F P (I + G P)^-1 F' + H with F = A - T' Re^-1 C, G = C' Re^-1 C and H = P+, all at P = 0.
-struct LongRiccati {
-    a: Matrix<BigFloat>,
-    c: Matrix<BigFloat>,
+struct LongRiccati<const WORDS: usize> {
+    a: Matrix<BigFloat<WORDS>>,
+    c: Matrix<BigFloat<WORDS>>,
     /// J S J' + N.
-    input_gram: Matrix<BigFloat>,
+    input_gram: Matrix<BigFloat<WORDS>>,
     /// L S J'.
-    cross: Matrix<BigFloat>,
+    cross: Matrix<BigFloat<WORDS>>,
     /// L S L'.
-    direct: Matrix<BigFloat>,
+    direct: Matrix<BigFloat<WORDS>>,
 }
 
-impl LongRiccati {
+impl<const WORDS: usize> LongRiccati<WORDS> {
     /// With white noise of the variance `noise` on each state.
     fn new(error: &PreciseErrorSystem, noise: f64) -> Self {
         let n = error.system.ncols();
         let (states, outputs): (Vec<usize>, Vec<usize>) =
             ((0..n).collect(), (n..error.system.nrows()).collect());
-        let mut input_gram = select(&error.input_gram, &states, &states);
+        let system = error.system.map(Float512::rounded);
+        let gram = error.input_gram.map(Float512::rounded);
+        let mut input_gram = select(&gram, &states, &states);
         (0..n).for_each(|i| input_gram[(i, i)] += BigFloat::from(noise));
         Self {
-            a: select(&error.system, &states, &states),
-            c: select(&error.system, &outputs, &states),
+            a: select(&system, &states, &states),
+            c: select(&system, &outputs, &states),
             input_gram,
-            cross: select(&error.input_gram, &outputs, &states),
-            direct: select(&error.input_gram, &outputs, &outputs),
+            cross: select(&gram, &outputs, &states),
+            direct: select(&gram, &outputs, &outputs),
         }
     }
 
     /// P at the level `gamma`; `None` if the recursion has no limit.
-    fn limit(&self, gamma: f64) -> Option<Matrix<BigFloat>> {
+    fn limit(&self, gamma: f64) -> Option<Matrix<BigFloat<WORDS>>> {
         let Self { a, c, input_gram, cross, direct } = self;
         let mut re = direct.clone();
         (0..re.nrows()).for_each(|i| re[(i, i)] -= BigFloat::from(gamma) * BigFloat::from(gamma));
@@ -324,7 +334,7 @@ impl Units {
 
     /// The system in 512 bits in these units.
     fn of_long(&self, error: &PreciseErrorSystem) -> PreciseErrorSystem {
-        let unit = |i: usize| BigFloat::from(*self.states.get(i).unwrap_or(&self.reference));
+        let unit = |i: usize| Float512::from(*self.states.get(i).unwrap_or(&self.reference));
         let PreciseErrorSystem { system, input_gram } = error;
         let system =
             Matrix::from_fn(system.nrows(), system.ncols(), |i, j| system[(i, j)] * unit(j) / unit(i));
@@ -342,25 +352,31 @@ mod tests {
 
     /// x+ = a x + u, e = x: with N = 0 the equation is P = a^2 P + 1 + a^2 P^2 / (g^2 - P), or
     /// P^2 - (1 + g^2 (1 - a^2)) P + g^2 = 0 with the norm 1 / (1 - a).
-    fn one_pole(gamma: f64) -> Option<f64> {
+    fn one_pole<const WORDS: usize>(gamma: f64) -> Option<f64> {
         let number = |rows: usize, columns: usize, entries: &[f64]| {
-            Matrix::from_fn(rows, columns, |i, j| BigFloat::from(entries[i * columns + j]))
+            Matrix::from_fn(rows, columns, |i, j| Float512::from(entries[i * columns + j]))
         };
         let error = PreciseErrorSystem {
             system: number(2, 1, &[0.5, 1.0]),
             input_gram: number(2, 2, &[1.0, 0.0, 0.0, 0.0]),
         };
-        Some(LongRiccati::new(&error, 0.0).limit(gamma)?[(0, 0)].nearest())
+        Some(LongRiccati::<WORDS>::new(&error, 0.0).limit(gamma)?[(0, 0)].nearest())
     }
 
     #[test]
     fn one_pole_has_its_quadratic_root() {
+        roots_are_those_of_the_quadratic::<4>();
+        roots_are_those_of_the_quadratic::<8>();
+    }
+
+    fn roots_are_those_of_the_quadratic<const WORDS: usize>() {
         for gamma in [2.0 * (1.0 + 1e-12), 2.1, 10.0_f64] {
             let b = 1.0 + 0.75 * gamma * gamma;
             let exact = 2.0 * gamma * gamma / (b + (b * b - 4.0 * gamma * gamma).sqrt());
-            let p = one_pole(gamma).unwrap();
+            let p = one_pole::<WORDS>(gamma).unwrap();
             assert!((p / exact - 1.0).abs() < 1e-5, "{gamma}: {p} {exact}");
         }
-        assert!(one_pole(1.9).is_none_or(|p| !(0.0..=1.9 * 1.9).contains(&p)), "{:?}", one_pole(1.9));
+        let below = one_pole::<WORDS>(1.9);
+        assert!(below.is_none_or(|p| !(0.0..=1.9 * 1.9).contains(&p)), "{below:?}");
     }
 }

@@ -3,7 +3,7 @@
 
 use super::super::ball::{self, Ball, Matrix};
 use super::super::front_ends::Equations;
-use crate::arithmetic::{BigFloat, ComplexBall, DoubleDouble, Number};
+use crate::arithmetic::{ComplexBall, DoubleDouble, Float512, Number};
 
 /// Relative error of the denominator up to which 106 bits suffice.
 const SHARP: f64 = 1e-6;
@@ -17,7 +17,7 @@ const MAX_HALVINGS: u32 = 24;
 pub(super) struct Transfer {
     short: Quotient<DoubleDouble>,
     /// With more digits, for frequencies near the poles of narrow filters.
-    long: Quotient<BigFloat>,
+    long: Quotient<Float512>,
 }
 
 /// Two polynomials, coefficients in ascending powers.
@@ -41,12 +41,12 @@ impl Transfer {
     /// `gain` (c (s I - a)^-1 b + d), by the recursion of Faddeev and Le Verrier: M_0 = I,
     /// M_k = a M_{k-1} + d_k I, d_k = -tr(a M_{k-1}) / k; then D = s^n + sum_k d_k s^(n-k) and
     /// N = sum_k c M_k b s^(n-1-k) + d D. It loses many digits, so it runs with 512 bits.
-    pub(super) fn new(filter: &Equations, gain: Ball<BigFloat>) -> Self {
+    pub(super) fn new(filter: &Equations, gain: Ball<Float512>) -> Self {
         let Equations { a, b, c, d } = filter;
         let c = ball::scaled(c, gain);
         let n = a.nrows();
         let (mut num, mut den) = (vec![Ball::ZERO; n], vec![Ball::from(1.0); n + 1]);
-        let mut power: Matrix<BigFloat> = ball::identity(n);
+        let mut power: Matrix<Float512> = ball::identity(n);
         for k in 1..=n {
             num[n - k] = ball::product(&c, &ball::product(&power, b))[(0, 0)];
             let next = ball::product(a, &power);
@@ -60,7 +60,7 @@ impl Transfer {
             num.push(Ball::ZERO);
             num.iter_mut().zip(&den).for_each(|(num, &den)| *num += den * direct);
         }
-        let short = |list: &[Ball<BigFloat>]| list.iter().map(|x| x.shortened()).collect();
+        let short = |list: &[Ball<Float512>]| list.iter().map(|x| x.shortened()).collect();
         let short = Quotient { num: short(&num), den: short(&den) };
         Self { short, long: Quotient { num, den } }
     }

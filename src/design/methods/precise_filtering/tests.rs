@@ -2,7 +2,7 @@
 
 use super::super::filtering::Innovations;
 use super::*;
-use crate::arithmetic::{BigFloat, DoubleDouble};
+use crate::arithmetic::{DoubleDouble, Float512};
 use crate::design::problem::Problem;
 use crate::spec::Spec;
 
@@ -31,7 +31,7 @@ fn norm(plant: &LiftedPlant, filter: &StateSpace) -> f64 {
 #[test]
 fn covariances_do_not_change_in_a_step() {
     for plant in plants() {
-        let filtering = PreciseFiltering::<BigFloat>::new(&plant).unwrap();
+        let filtering = PreciseFiltering::<Float512>::new(&plant).unwrap();
         let silence = norm(&plant, &StateSpace::gain(Mat::zeros(plant.ratio(), plant.channels())));
         for gamma in [None, Some(1.2 * silence)] {
             let p = filtering.covariance(gamma).unwrap();
@@ -68,7 +68,7 @@ fn filters_are_those_of_double_precision() {
 #[test]
 fn gammas_below_the_causal_optimum_are_impossible() {
     let plant = plant(0, "{ delay = 0.5 }");
-    let filtering = PreciseFiltering::<BigFloat>::new(&plant).unwrap();
+    let filtering = PreciseFiltering::<Float512>::new(&plant).unwrap();
     let (mut below, mut above) = (plant.noncausal_bound().unwrap().gain, 2.0);
     assert!(matches!(filtering.h_infinity(below * 1.001), Trial::Impossible));
     while above > below * (1.0 + 1e-9) {
