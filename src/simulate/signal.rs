@@ -1,5 +1,6 @@
 //! A real or complex analog signal.
 
+use super::normal::Purpose;
 use super::{Analog, ComplexSource, Converter, Delivered, WorkloadError, frames, target};
 use crate::design::Problem;
 use crate::units::Seconds;
@@ -54,7 +55,8 @@ impl Signal {
         let imaginary = self.imaginary.as_ref();
         (
             converter.capture(problem, i, &self.real, level, frames),
-            imaginary.map(|part| converter.capture_imaginary(problem, i, part, level, frames)),
+            imaginary
+                .map(|part| converter.capture_part(problem, i, part, level, frames, Purpose::ImaginaryNoise)),
         )
     }
 
