@@ -65,10 +65,7 @@ pub(crate) fn simulate<'py>(
         let each = each.map(|(i, each)| signal.captured(&problem, i, &each.converter, gain, frames));
         (each.collect::<Vec<_>>(), signal.target(&problem, gain, frames))
     })?;
-    let clipped: Vec<usize> = captured
-        .iter()
-        .map(|(real, imaginary)| real.clipped + imaginary.as_ref().map_or(0, |imaginary| imaginary.clipped))
-        .collect();
+    let clipped: Vec<usize> = captured.iter().map(|one| one.clipped).collect();
     let target = match &target.1 {
         None => PyArray1::from_vec(py, target.0).into_any(),
         Some(imaginary) => PyArray1::from_vec(py, complex(&target.0, imaginary)).into_any(),
@@ -78,13 +75,11 @@ pub(crate) fn simulate<'py>(
 }
 
 /// The samples of all converters.
-fn channels(py: Python<'_>, captured: Vec<(Delivered, Option<Delivered>)>) -> PyResult<Bound<'_, PyAny>> {
-    if captured.iter().all(|(_, imaginary)| imaginary.is_none()) {
-        return rows(py, captured.into_iter().map(|(real, _)| real.samples).collect());
+fn channels(py: Python<'_>, captured: Vec<Delivered>) -> PyResult<Bound<'_, PyAny>> {
+    if captured.iter().all(|one| one.imaginary.is_none()) {
+        return rows(py, captured.into_iter().map(|one| one.samples).collect());
     }
-    let both = |(real, imaginary): (Delivered, Option<Delivered>)| {
-        complex(&real.samples, &imaginary.map_or_else(Vec::new, |imaginary| imaginary.samples))
-    };
+    let both = |one: Delivered| complex(&one.samples, &one.imaginary.unwrap_or_default());
     rows(py, captured.into_iter().map(both).collect())
 }
 

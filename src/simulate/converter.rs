@@ -40,9 +40,11 @@ pub struct Converter {
 /// What a converter delivered.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Delivered {
-    /// Sample k.
+    /// Sample k, or its real part.
     pub samples: Vec<f64>,
-    /// Samples that saturated.
+    /// The imaginary parts of a complex signal.
+    pub imaginary: Option<Vec<f64>>,
+    /// Samples, or parts of them, that saturated.
     pub clipped: usize,
 }
 
@@ -126,7 +128,7 @@ impl Converter {
                 clipped += usize::from(saturated);
             }
         }
-        Delivered { samples, clipped }
+        Delivered { samples, imaginary: None, clipped }
     }
 }
 
