@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let records: Vec<Record> =
         captured(&built, "tones:3.1kHz,5.3kHz")?.into_iter().map(Record::new).collect();
     let settings = calibrate::Settings { reference: 1, ..calibrate::Settings::default() };
-    let found = calibrate(&drawn, &records, CalibrationSignal::Tones(&TONES), settings)?;
+    let found = calibrate(&drawn, &records, &CalibrationSignal::Tones(TONES.to_vec()), settings)?;
     let (measured, _) = applied(&drawn, &found);
     println!("delay of channel 1: {}", measured.channels[0].delay);
     assert!((measured.channels[0].delay - Seconds(25.3e-6)).0.abs() < 1e-10);

@@ -1,6 +1,5 @@
 //! The memory that this process may use.
 
-use std::fmt;
 use std::fs;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -21,7 +20,8 @@ const SMALL: usize = TOGETHER / 8;
 static SMALL_PIECES: Grant = Grant(AtomicUsize::new(0));
 
 /// Work that takes more memory than this process may use.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("about {} of memory, and this process may use {}", size(*.needed), size(*.available))]
 pub struct MemoryShortage {
     /// Bytes that the work takes.
     pub needed: f64,
@@ -29,14 +29,8 @@ pub struct MemoryShortage {
     pub available: f64,
 }
 
-impl fmt::Display for MemoryShortage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let size = |bytes: f64| match bytes {
-            _ if bytes < 1e9 => format!("{:.0} MB", bytes / 1e6),
-            _ => format!("{:.1} GB", bytes / 1e9),
-        };
-        write!(f, "about {} of memory, and this process may use {}", size(self.needed), size(self.available))
-    }
+fn size(bytes: f64) -> String {
+    if bytes < 1e9 { format!("{:.0} MB", bytes / 1e6) } else { format!("{:.1} GB", bytes / 1e9) }
 }
 
 /// Refuses work that takes more bytes than this process may use; the system would end the process. Where

@@ -254,11 +254,6 @@ impl RadiansPerFastPeriod {
     pub fn per_second(self, fast_period: Seconds) -> RadiansPerSecond {
         RadiansPerSecond(self.0 / fast_period.0)
     }
-
-    /// W = M w'.
-    pub fn per_slow_period(self, ratio: usize) -> RadiansPerSlowPeriod {
-        RadiansPerSlowPeriod(self.0 * ratio as f64)
-    }
 }
 
 impl RadiansPerSlowPeriod {
@@ -324,7 +319,7 @@ mod tests {
         #[test]
         fn both_ways_to_hertz_agree(f in wild(), h in wild(), ratio in 1usize..1024) {
             let h = Seconds(h.abs());
-            let slow = Hertz(f).angular().per_fast_period(h).per_slow_period(ratio);
+            let slow = RadiansPerSlowPeriod(Hertz(f).angular().per_fast_period(h).0 * ratio as f64);
             prop_assert!(close(slow.in_hertz(h * ratio as f64).0, f, 4.0));
         }
 

@@ -16,7 +16,7 @@ use hybank::messages::{Number, Quoted};
 use hybank::quantity::{self, Time};
 use hybank::sine_fit::Estimate;
 use hybank::spec::{DesignOverrides, Spec};
-use hybank::track::{AlignError, AlignSettings, AlignedChannel, Alignment, DriftModel, align};
+use hybank::track::{AlignSettings, AlignedChannel, Alignment, DriftModel, align};
 use hybank::units::Seconds;
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -97,7 +97,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let read = args.read(&spec, &mut warnings);
     let found = read.and_then(|recordings| {
         let settings = args.settings(&spec, recordings.rate)?;
-        Ok((align(&spec, &recordings.records, settings)?, recordings))
+        Ok((align(&spec, &recordings.records, settings).map_err(Failure::input)?, recordings))
     });
     // What the recordings have may explain why they do not fit; a report has these warnings.
     let (found, recordings) = found.inspect_err(|_| warnings.iter().for_each(|text| warn(text)))?;
@@ -220,12 +220,6 @@ impl Recordings {
             _ => PcmFormat::F64Le,
         };
         Mono { samples, imaginary: None, rate: self.rate, format, container: Container::Wav }
-    }
-}
-
-impl From<AlignError> for Failure {
-    fn from(error: AlignError) -> Self {
-        Self::input(error)
     }
 }
 

@@ -13,7 +13,7 @@ use hybank::design::uncertainty::{
 use hybank::design::{self, Analysis, Certified, GammaScale, MeanAnalysis};
 use hybank::figures::Figures;
 use hybank::overview::{decibels, frequency, six_digits, understood};
-use hybank::plot::{AxisScale, Chart, Series};
+use hybank::plot::{Chart, Series};
 use hybank::quantity::{self, readable};
 use hybank::units::Seconds;
 use hybank::verify::uncertainty::{ErrorBox, ErrorPoint, WorstCase};
@@ -335,7 +335,7 @@ fn rounded(x: f64) -> f64 {
 /// Writes the file that `path` names: SVG or PNG if its extension says so, else CSV.
 fn write_sweep(sweep: &Sweep, path: &Path, force: bool) -> Result<(), Failure> {
     let bytes = match PictureFormat::of(path) {
-        Some(format) => format.file(&chart(sweep), &[]).map_err(Failure::input)?,
+        Some(format) => format.file(&chart(sweep)).map_err(Failure::input)?,
         None => csv(sweep).into_bytes(),
     };
     write_bytes(path, &bytes, force)
@@ -366,8 +366,8 @@ fn chart(sweep: &Sweep) -> Chart {
     Chart {
         title: "gamma with delays that are not those of the bank".into(),
         x_label: format!("error, in units of the box ({} s)", widths.join(", ")),
-        x_scale: AxisScale::Linear,
         y_label: "gamma".into(),
         series: sweep.curves.iter().map(series).collect(),
+        ..Chart::default()
     }
 }

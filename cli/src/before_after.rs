@@ -78,8 +78,7 @@ impl BeforeAfterArgs {
             Failure::Input(format!("{output} is written, but --measure cannot measure {which}: {error}"))
         })?;
         if let Some(path) = &self.plot {
-            let (chart, marks) = before_after(&found.before, &found.after);
-            write_picture(path, &chart, &marks, force)?;
+            write_picture(path, &before_after(&found.before, &found.after), force)?;
         }
         Ok(found)
     }

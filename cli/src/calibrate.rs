@@ -17,7 +17,7 @@ use hybank::io::{MultiReader, OfflineSamples, ReadOptions, WORK_BYTES};
 use hybank::messages::{Number, Quoted};
 use hybank::pipeline::matching::{channels_of_raw, samples_per_frame};
 use hybank::spec::{DesignOverrides, Spec};
-use hybank::units::{FastPeriods, Hertz};
+use hybank::units::FastPeriods;
 use std::path::{Path, PathBuf};
 
 /// Most samples of all channels together: 512 MiB as doubles.
@@ -98,23 +98,6 @@ pub(super) struct Args {
     json: bool,
 }
 
-/// What is known of the signal that the captures hold.
-enum Signal {
-    Tones(Vec<Hertz>),
-    Waveform { samples: Vec<f64>, spacing: FastPeriods },
-    Any,
-}
-
-impl Signal {
-    fn borrowed(&self) -> CalibrationSignal<'_> {
-        match self {
-            Self::Tones(list) => CalibrationSignal::Tones(list),
-            Self::Waveform { samples, spacing } => CalibrationSignal::Waveform { samples, spacing: *spacing },
-            Self::Any => CalibrationSignal::Any,
-        }
-    }
-}
-
 /// The captures of one acquisition.
 struct Captures {
     name: String,
@@ -158,7 +141,7 @@ impl Args {
     fn calibrated(&self, spec: &Spec, warnings: &mut Vec<String>) -> Result<(Spec, Report), Failure> {
         let (settings, signal) = (self.settings(spec)?, self.signal(spec)?);
         let captures = self.read(&self.captures, spec, warnings)?;
-        let found = calibrate_pooled(spec, &borrowed(&captures), signal.borrowed(), settings);
+        let found = calibrate_pooled(spec, &borrowed(&captures), &signal, settings);
         let found = found.map_err(|error| of_captures(&captures, error))?;
         self.check_misfit(&found, warnings)?;
         let (calibrated, more) = applied(spec, &found);
@@ -166,12 +149,12 @@ impl Args {
         report.add(&more);
         if !self.check.is_empty() {
             let captures = self.read(&self.check, spec, warnings)?;
-            let held_out = match signal.borrowed() {
+            let held_out = match signal {
                 // Held-out tones have other frequencies.
-                CalibrationSignal::Tones(_) => CalibrationSignal::Tones(&[]),
+                CalibrationSignal::Tones(_) => CalibrationSignal::Tones(Vec::new()),
                 signal => signal,
             };
-            let checked = calibrate_pooled(&calibrated, &borrowed(&captures), held_out, settings)
+            let checked = calibrate_pooled(&calibrated, &borrowed(&captures), &held_out, settings)
                 .map_err(|error| Failure::Input(format!("the held-out captures: {error}")))?;
             report.check(&calibrated, &found, &checked);
         }
@@ -273,9 +256,9 @@ impl Args {
         Ok(Settings { fit, reference })
     }
 
-    fn signal(&self, spec: &Spec) -> Result<Signal, Failure> {
+    fn signal(&self, spec: &Spec) -> Result<CalibrationSignal, Failure> {
         if self.blind {
-            return Ok(Signal::Any);
+            return Ok(CalibrationSignal::Any);
         }
         if let Some(path) = &self.training {
             let reading = Reading::channel(None, MOST_MEASURED);
@@ -286,9 +269,9 @@ impl Args {
             } else {
                 rate.period().in_fast_periods(spec.fast_period)
             };
-            return Ok(Signal::Waveform { samples, spacing });
+            return Ok(CalibrationSignal::Waveform { samples, spacing });
         }
-        tones(&self.tone).map(Signal::Tones)
+        tones(&self.tone).map(CalibrationSignal::Tones)
     }
 }
 

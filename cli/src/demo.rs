@@ -5,7 +5,7 @@ use super::print::{Failure, show};
 use super::written::{Mono, create_folder, write_recordings, write_text};
 use hybank::design::{self, Problem};
 use hybank::messages::Quoted;
-use hybank::plot::{AxisScale, Chart, Marks, PlotError, Series};
+use hybank::plot::{Chart, Marks, PlotError, Series};
 use hybank::simulate::{Analog, Captured, Source, Tone, capture};
 use hybank::spec::Spec;
 use hybank::units::{Decibels, Hertz, Seconds};
@@ -147,13 +147,12 @@ struct Pictures<'a> {
 impl Pictures<'_> {
     /// Names of files and their SVG text.
     fn all(&self) -> Result<[(&'static str, String); 2], PlotError> {
-        let (step, marks) = self.around_the_step();
-        Ok([("step.svg", step.to_svg_with(&marks)?), ("error.svg", self.errors().to_svg()?)])
+        Ok([("step.svg", self.around_the_step().to_svg()?), ("error.svg", self.errors().to_svg()?)])
     }
 
     /// The samples around the step: those of the first and the last contender as marks on the exact curve,
     /// and the step without the other signals.
-    fn around_the_step(&self) -> (Chart, Vec<Marks>) {
+    fn around_the_step(&self) -> Chart {
         let latency = self.spec.latency.unwrap_or(0);
         let centre = STEP_AT.in_fast_periods(self.spec.fast_period).0 as usize + latency;
         let time = |n: usize| (self.spec.fast_period * (n as f64 - latency as f64)).0 - STEP_AT.0;
@@ -168,18 +167,18 @@ impl Pictures<'_> {
             are_rings: false,
             points: window.clone().map(|n| (time(n) * 1e3, contender.samples[n], String::new())).collect(),
         };
-        let chart = Chart {
+        let shown = self.contenders.first().into_iter().chain(self.contenders.last());
+        Chart {
             title: "Around the step: chirp, tones and step through the converters".into(),
             x_label: "time after the step, ms".into(),
-            x_scale: AxisScale::Linear,
             y_label: "amplitude, 1 = full scale".into(),
             series: vec![
                 curve("ideal fast converter", &self.captured.target),
                 curve("its response to the step alone", self.step),
             ],
-        };
-        let shown = self.contenders.first().into_iter().chain(self.contenders.last());
-        (chart, shown.map(marks).collect())
+            marks: shown.map(marks).collect(),
+            ..Chart::default()
+        }
     }
 
     /// RMS error in decibels over intervals of 20 ms. The chirp sweeps with time, so time stands for
@@ -203,9 +202,9 @@ impl Pictures<'_> {
         Chart {
             title: "Error while the chirp rises from 50 Hz to 13 kHz, step at 1 s".into(),
             x_label: "time, s".into(),
-            x_scale: AxisScale::Linear,
             y_label: "RMS error in 20 ms, dB of full scale".into(),
             series: self.contenders.iter().map(curve).collect(),
+            ..Chart::default()
         }
     }
 }

@@ -126,8 +126,8 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     if let Some(path) = &args.plot {
         let comparison = report.reference.as_ref().map(|of| (of.file.as_str(), &of.comparison));
         let drawn = Drawn { label: &report.file, measurement: report.measurement.as_ref(), comparison };
-        let (chart, marks) = spur_chart(drawn, &settings, || capture.spectrum(settings.window));
-        write_picture(path, &chart, &marks, args.force)?;
+        let chart = spur_chart(drawn, &settings, || capture.spectrum(settings.window));
+        write_picture(path, &chart, args.force)?;
     }
     report.warnings.iter().for_each(|warning| warn(&format!("{}: {warning}", Quoted(&report.file))));
     show(&report, args.json, Report::text)

@@ -6,7 +6,7 @@ use super::written::{begin_file, check_outputs, write_bytes, write_together};
 use hybank::bank::Bank;
 use hybank::design::{DesignError, Options, design};
 use hybank::overview::{Picture, pictures};
-use hybank::plot::{AxisScale, Chart, Marks, PlotError, Series};
+use hybank::plot::{Chart, PlotError, Series};
 use hybank::spec::{DesignSpec, Spec};
 use std::path::{Path, PathBuf};
 
@@ -48,7 +48,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     }
     let mut files = Vec::new();
     for Picture { name, chart, .. } in all {
-        let picture = args.format.file(&chart, &[]).in_file(&args.bank)?;
+        let picture = args.format.file(&chart).in_file(&args.bank)?;
         files.push((args.output.join(format!("{name}.{}", args.format.extension())), picture));
     }
     let paths: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
@@ -85,18 +85,18 @@ impl PictureFormat {
     }
 
     /// The bytes of the file of a chart.
-    pub(super) fn file(self, chart: &Chart, marks: &[Marks]) -> Result<Vec<u8>, PlotError> {
+    pub(super) fn file(self, chart: &Chart) -> Result<Vec<u8>, PlotError> {
         match self {
-            Self::Svg => chart.to_svg_with(marks).map(String::into_bytes),
-            Self::Png => chart.to_png_with(marks),
+            Self::Svg => chart.to_svg().map(String::into_bytes),
+            Self::Png => chart.to_png(),
         }
     }
 }
 
 /// Writes a picture: PNG if the name ends in .png, else SVG.
-pub(super) fn write_picture(path: &Path, chart: &Chart, marks: &[Marks], force: bool) -> Result<(), Failure> {
+pub(super) fn write_picture(path: &Path, chart: &Chart, force: bool) -> Result<(), Failure> {
     let format = PictureFormat::of(path).unwrap_or(PictureFormat::Svg);
-    write_bytes(path, &format.file(chart, marks).in_file(path)?, force)
+    write_bytes(path, &format.file(chart).in_file(path)?, force)
 }
 
 /// Points of a curve.
@@ -163,8 +163,8 @@ fn chart(title: &str, x_label: &str, points: Vec<(f64, f64)>, bank: &Bank) -> Ch
     Chart {
         title: title.into(),
         x_label: x_label.into(),
-        x_scale: AxisScale::Linear,
         y_label: "gamma, dB (h = 1)".into(),
         series,
+        ..Chart::default()
     }
 }

@@ -198,8 +198,7 @@ impl Job<'_> {
         let (rate, is_complex) = (self.output_rate(reader)?, reader.is_complex());
         let workers = self.args.workers()?;
         let settings = Settings { workers: workers.as_ref(), ..self.settings() };
-        let pipeline = Pipeline::new(self.bank, plan, settings, self.format, is_complex);
-        let mut pipeline = pipeline.map_err(Failure::running)?;
+        let mut pipeline = Pipeline::new(self.bank, plan, settings, self.format, is_complex);
         let tracked = self.args.track.begin(self.args.force, observer.events())?;
         if let Some(follower) = self.args.track.follower(self.bank, self.bank_path, rate)? {
             let retuner = tracked.retuner(follower, self.bank, self.options()).map_err(Failure::running)?;

@@ -163,9 +163,9 @@ impl Run<'_> {
     /// The samples of channel `i`, and how many of their parts `clipped`.
     fn capture(&self, i: usize, converter: &Converter, clipped: &mut usize) -> Parts {
         let Self { problem, signal, frames, .. } = *self;
-        let (real, imaginary) = signal.analog.captured(problem, i, converter, self.args.gain, frames);
-        *clipped = real.clipped + imaginary.as_ref().map_or(0, |imaginary| imaginary.clipped);
-        (real.samples, imaginary.map(|imaginary| imaginary.samples))
+        let delivered = signal.analog.captured(problem, i, converter, self.args.gain, frames);
+        *clipped = delivered.clipped;
+        (delivered.samples, delivered.imaginary)
     }
 
     fn target(&self) -> Parts {

@@ -5,7 +5,7 @@ use crate::{Banks, Figure, Outcome};
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::design::error_response;
 use hybank::design::responses::{analysis_gains, fir_response, front_end_gains, impulse_responses};
-use hybank::plot::{AxisScale, Chart, Series};
+use hybank::plot::{Chart, Series};
 use hybank::units::{Hertz, RadiansPerFastPeriod};
 use std::f64::consts::{PI, TAU};
 
@@ -162,7 +162,7 @@ fn error(banks: &Banks) -> Outcome<Chart> {
 /// A chart of named curves.
 pub(super) fn chart(title: &str, x: &str, y: &str, curves: Vec<(String, Vec<(f64, f64)>)>) -> Chart {
     let series = curves.into_iter().map(|(label, points)| Series { label, points }).collect();
-    Chart { title: title.into(), x_label: x.into(), x_scale: AxisScale::Linear, y_label: y.into(), series }
+    Chart { title: title.into(), x_label: x.into(), y_label: y.into(), series, ..Chart::default() }
 }
 
 /// States of a recursive bank.

@@ -6,29 +6,22 @@
 
 import importlib
 
-from hybank import _pickles  # noqa: F401
 from hybank._functions import analyze, calibrate, import_taps, measure, simulate, verify
-from hybank._hybank import (
+from hybank._hybank import Bank, HybankError, Recording, SpecError, Stream, __version__, align, load
+from hybank._inputs import Captures, read
+from hybank._results import (
     Alignment,
     Analysis,
-    Bank,
     Calibration,
     Capture,
+    Comparison,
     Figures,
     FuseReport,
     Gamma,
-    HybankError,
     Measurement,
-    Recording,
-    SpecError,
-    Stream,
+    Record,
     Verified,
-    __version__,
-    align,
-    load,
 )
-from hybank._inputs import Captures, read
-from hybank._results import Comparison, Record
 from hybank._spec import (
     Channel,
     Signal,

@@ -4,15 +4,8 @@ import operator
 
 import numpy as np
 
-from hybank._hybank import (
-    MOST_PIXELS,
-    Geometry,
-    HybankError,
-    View,
-    render_calibrated,
-    render_rectified,
-    render_uncalibrated,
-)
+from hybank._hybank import MOST_PIXELS, HybankError, render_calibrated, render_rectified, render_uncalibrated
+from hybank._results import Geometry, View
 
 __all__ = ["Geometry", "View", "render"]
 

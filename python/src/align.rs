@@ -4,44 +4,13 @@ use crate::arrays::{Held, Shape};
 use crate::background;
 use crate::calibrate::{records, reference_of};
 use crate::errors::refused;
+use crate::results::Made;
 use crate::sources;
 use hybank::figures::Alone;
-use hybank::track::{self, AlignSettings, AlignedChannel, DriftModel};
+use hybank::track::{self, AlignSettings, AlignedChannel, Alignment, DriftModel};
 use hybank::units::Seconds;
 use numpy::PyArray1;
 use pyo3::prelude::*;
-
-/// How recordings lie in time. Arrays have one value per channel; half-widths are in the spec.
-#[pyclass(frozen, get_all, module = "hybank")]
-#[derive(FromPyObject)]
-pub(crate) struct Alignment {
-    /// The spec with these values, as TOML.
-    spec: String,
-    /// Samples to leave out at the beginning of each recording, and samples of each that remain.
-    skip: Vec<usize>,
-    frames: usize,
-    /// Seconds, at the first frame.
-    delay: Py<PyArray1<f64>>,
-    /// By how many ppm each clock is fast.
-    drift_ppm: Py<PyArray1<f64>>,
-    gain: Py<PyArray1<f64>>,
-    offset: Py<PyArray1<f64>>,
-    /// The delays over time as JSON lines: what `hybank fuse --track` reads.
-    track: String,
-    /// The best channel alone and all together in dB, whatever the filters are, and whether one suffices.
-    alone_db: f64,
-    together_db: f64,
-    one_suffices: bool,
-    /// What a reader of the values must know.
-    warnings: Vec<String>,
-}
-
-#[pymethods]
-impl Alignment {
-    fn __repr__(&self) -> String {
-        format!("<hybank.Alignment of {} channels: {} frames>", self.skip.len(), self.frames)
-    }
-}
 
 /// When recordings began, how their clocks drift, their polarities, gains and offsets.
 ///
@@ -71,12 +40,12 @@ impl Alignment {
 /// [0, 500]
 #[pyfunction]
 #[pyo3(signature = (x, spec, *, reference = None, within = None))]
-pub(crate) fn align(
-    x: Vec<Bound<'_, PyAny>>,
-    spec: &Bound<'_, PyAny>,
+pub(crate) fn align<'py>(
+    x: Vec<Bound<'py, PyAny>>,
+    spec: &Bound<'py, PyAny>,
     reference: Option<usize>,
     within: Option<f64>,
-) -> PyResult<Alignment> {
+) -> PyResult<Bound<'py, PyAny>> {
     let py = spec.py();
     let spec = sources::spec(spec)?;
     if within.is_some_and(|time| time.is_nan() || time < 0.0) {
@@ -100,21 +69,21 @@ pub(crate) fn align(
     result(py, &found, alone)
 }
 
-fn result(py: Python<'_>, found: &track::Alignment, alone: Alone) -> PyResult<Alignment> {
-    let column =
-        |of: fn(&AlignedChannel) -> f64| PyArray1::from_iter(py, found.channels.iter().map(of)).unbind();
-    Ok(Alignment {
-        spec: found.spec.to_toml().map_err(refused)?,
-        skip: found.channels.iter().map(|channel| channel.skip).collect(),
-        frames: found.frames,
-        delay: column(|channel| channel.delay.value.0),
-        drift_ppm: column(|channel| 1e6 * channel.drift.value),
-        gain: column(|channel| channel.gain.value),
-        offset: column(|channel| channel.offset.value),
-        track: found.readings.iter().map(|reading| reading.line() + "\n").collect(),
-        alone_db: alone.snr_db.0,
-        together_db: alone.together_db.0,
-        one_suffices: alone.suffices(),
-        warnings: found.warnings.iter().map(ToString::to_string).collect(),
-    })
+fn result<'py>(py: Python<'py>, found: &Alignment, alone: Alone) -> PyResult<Bound<'py, PyAny>> {
+    let column = |of: fn(&AlignedChannel) -> f64| PyArray1::from_iter(py, found.channels.iter().map(of));
+    let lines = found.readings.iter().map(|reading| reading.line() + "\n");
+    Made::new(py, "Alignment")?
+        .with("spec", found.spec.to_toml().map_err(refused)?)?
+        .with("skip", found.channels.iter().map(|channel| channel.skip).collect::<Vec<_>>())?
+        .with("frames", found.frames)?
+        .with("delay", column(|channel| channel.delay.value.0))?
+        .with("drift_ppm", column(|channel| 1e6 * channel.drift.value))?
+        .with("gain", column(|channel| channel.gain.value))?
+        .with("offset", column(|channel| channel.offset.value))?
+        .with("track", lines.collect::<String>())?
+        .with("alone_db", alone.snr_db.0)?
+        .with("together_db", alone.together_db.0)?
+        .with("one_suffices", alone.suffices())?
+        .with("warnings", found.warnings.iter().map(ToString::to_string).collect::<Vec<_>>())?
+        .object()
 }

@@ -5,7 +5,7 @@ use crate::background;
 use crate::errors::{choose, file_error, no_others, refused};
 use crate::fuse::{self, Request, parse_algorithm, parse_gaps};
 use crate::pictures;
-use crate::results::{Figures, Gamma};
+use crate::results::{figures, of_report};
 use crate::running::{Extras, Follow};
 use crate::sources;
 use crate::stream::Stream;
@@ -160,9 +160,8 @@ impl Bank {
 
     /// The worst-case error with its bounds.
     #[getter]
-    fn gamma(&self) -> Gamma {
-        let bank::Gamma { norm, upper, lower, noncausal, worst_case, tracked } = self.bank.gamma;
-        Gamma { norm, upper, lower, noncausal, worst_case, tracked }
+    fn gamma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        of_report(py, "Gamma", &self.bank.gamma)
     }
 
     /// The delay of each channel in seconds.
@@ -250,10 +249,10 @@ impl Bank {
     }
 
     #[doc = include_str!("docs/Bank.figures.rst")]
-    fn figures(&self, py: Python<'_>) -> PyResult<Figures> {
+    fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let bank = Arc::clone(&self.bank);
-        let figures = background::run(py, None, move |_| hybank::figures::Figures::new(&bank))?;
-        figures.map(Figures::from).map_err(refused)
+        let found = background::run(py, None, move |_| hybank::figures::Figures::new(&bank))?;
+        figures(py, found.map_err(refused)?)
     }
 
     #[doc = include_str!("docs/Bank.pictures.rst")]
@@ -340,7 +339,7 @@ impl Bank {
             algorithm: parse_algorithm(algorithm)?,
             keep_latency,
         };
-        let (y, report) = fuse::fuse(bank, &frames, shape, dtype.as_ref(), &request)?;
+        let [y, report] = fuse::fuse(bank, &frames, shape, dtype.as_ref(), &request)?;
         if full_output { Ok((y, report).into_pyobject(py)?.into_any()) } else { Ok(y) }
     }
 

@@ -5,10 +5,10 @@ use crate::background::Signals;
 use crate::errors::{choose, refused};
 use crate::formats::Format;
 use crate::outputs::NewArray;
-use crate::results::FuseReport;
+use crate::results::Made;
 use crate::running::{Extras, Running};
 use hybank::bank::Bank;
-use hybank::pipeline::{self, DroppedLatency, GapPolicy, Outcome, PipelineError, Settings};
+use hybank::pipeline::{self, DroppedLatency, GapPolicy, GapSummary, Outcome, PipelineError, Settings};
 use hybank::runtime::{Algorithm, Frames, Options, PcmFrames, Plan, Precision, ThreadPool};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -75,7 +75,7 @@ pub(crate) fn fuse<'py>(
     shape: Shape,
     dtype: Option<&Bound<'py, PyAny>>,
     request: &Request,
-) -> PyResult<(Bound<'py, PyAny>, FuseReport)> {
+) -> PyResult<[Bound<'py, PyAny>; 2]> {
     let py = x.py();
     let held = Held::new(x, shape)?;
     let format = Format::of_output(held.format, dtype)?;
@@ -94,7 +94,7 @@ pub(crate) fn fuse<'py>(
     let clipped = room.clipped;
     let y = array.finish()?;
     let outcome = Outcome { clipped, ..outcome };
-    Ok((y, report(py, outcome, settings.dropped.samples(&plan))))
+    Ok([y, report(py, outcome, settings.dropped.samples(&plan))?.object()?])
 }
 
 /// As [`fuse`], with filters that follow the delays.
@@ -103,7 +103,7 @@ fn followed<'py>(
     held: &Held<'py>,
     format: Format,
     request: &Request,
-) -> PyResult<(Bound<'py, PyAny>, FuseReport)> {
+) -> PyResult<[Bound<'py, PyAny>; 2]> {
     let py = held.py();
     let dropped = request.settings().dropped;
     let mut running = Running::new(bank, format, request.algorithm, &request.extras, dropped)?;
@@ -126,8 +126,8 @@ fn followed<'py>(
     tracks.warn(py)?;
     let y = PyArray1::from_vec(py, outputs.samples).call_method1("view", (format.name(),))?;
     let mask = outcome.gaps.is_some().then_some(outputs.mask);
-    let report = report(py, Outcome { mask, ..outcome }, latency_dropped);
-    Ok((y, FuseReport { track: Some(tracks.log(py)?), ..report }))
+    let report = report(py, Outcome { mask, ..outcome }, latency_dropped)?;
+    Ok([y, report.with("track", tracks.log(py)?)?.object()?])
 }
 
 fn piece<'a>(all: &PcmFrames<'a>, frames: Range<usize>) -> PcmFrames<'a> {
@@ -135,21 +135,22 @@ fn piece<'a>(all: &PcmFrames<'a>, frames: Range<usize>) -> PcmFrames<'a> {
     PcmFrames { bytes: &all.bytes[frames.start * size..frames.end * size], ..*all }
 }
 
-fn report(py: Python<'_>, outcome: Outcome, latency_dropped: usize) -> FuseReport {
+fn report(py: Python<'_>, outcome: Outcome, latency_dropped: usize) -> PyResult<Made<'_>> {
     let Outcome { plan, gaps, mask, .. } = outcome;
-    FuseReport {
-        algorithm: plan.algorithm.to_owned(),
-        numbers: plan.numbers.to_owned(),
-        isa: plan.isa,
-        latency_dropped,
-        clipped: outcome.clipped,
-        replaced: outcome.replaced,
-        state_resets: outcome.state_resets,
-        missing: gaps.as_ref().map(|gaps| gaps.missing),
-        gaps: gaps.map(|gaps| gaps.list.iter().map(|gap| (gap.channel, gap.first, gap.length)).collect()),
-        mask: mask.map(|mask| marks(py, &mask)),
-        track: None,
-    }
+    let list = |gaps: GapSummary| -> Vec<_> {
+        gaps.list.iter().map(|gap| (gap.channel, gap.first, gap.length)).collect()
+    };
+    Made::new(py, "FuseReport")?
+        .with("algorithm", plan.algorithm)?
+        .with("numbers", plan.numbers)?
+        .with("isa", plan.isa)?
+        .with("latency_dropped", latency_dropped)?
+        .with("clipped", outcome.clipped)?
+        .with("replaced", outcome.replaced)?
+        .with("state_resets", outcome.state_resets)?
+        .with("missing", gaps.as_ref().map(|gaps| gaps.missing))?
+        .with("gaps", gaps.map(list))?
+        .with("mask", mask.map(|mask| marks(py, &mask)))
 }
 
 /// True where a byte is not 0.

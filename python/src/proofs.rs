@@ -3,7 +3,7 @@
 use crate::background;
 use crate::bank::Bank;
 use crate::errors::{refused, refused_in};
-use crate::results::{Analysis, Verified, any, record};
+use crate::results::of_report;
 use crate::sources;
 use crate::values::{shares, times};
 use hybank::bank::{self, check_digest};
@@ -16,13 +16,23 @@ use std::sync::Arc;
 
 /// Proves the gammas of a bank, from a path or a bank in memory.
 #[pyfunction]
-pub(crate) fn verify(bank: &Bound<'_, PyAny>, search: bool) -> PyResult<Verified> {
+pub(crate) fn verify<'py>(bank: &Bound<'py, PyAny>, search: bool) -> PyResult<Bound<'py, PyAny>> {
     let given = Given::new(bank)?;
     let certificate_in_bank = given.bank.proof.as_ref().is_some_and(|proof| proof.upper.is_some());
     let (bank_in, search) = (Arc::clone(&given.bank), search && !certificate_in_bank);
     let verified = background::run(bank.py(), None, move |_| proven(&bank_in, search))?;
     let verified = verified.map_err(|error| refused_in(&given.name, error))?;
-    Ok(Verified::new(verified, given.digest, certificate_in_bank))
+    let report = Report { verified, digest: given.digest, certificate_in_bank };
+    of_report(bank.py(), "Verified", &report)
+}
+
+/// Proven bounds, and where the proof is from.
+#[derive(serde::Serialize)]
+struct Report {
+    #[serde(flatten)]
+    verified: checker::Verified,
+    digest: Option<bool>,
+    certificate_in_bank: bool,
 }
 
 fn proven(bank: &bank::Bank, search: bool) -> Result<checker::Verified, String> {
@@ -36,19 +46,19 @@ fn proven(bank: &bank::Bank, search: bool) -> Result<checker::Verified, String> 
 /// The error of a bank, with the delays of its spec or with others, and over boxes of errors.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
-pub(crate) fn analyze(
-    bank: &Bound<'_, PyAny>,
-    delay_error: Option<&Bound<'_, PyAny>>,
+pub(crate) fn analyze<'py>(
+    bank: &Bound<'py, PyAny>,
+    delay_error: Option<&Bound<'py, PyAny>>,
     certify: bool,
-    delay_box: Option<&Bound<'_, PyAny>>,
-    gain_box: Option<&Bound<'_, PyAny>>,
-    cutoff_box: Option<&Bound<'_, PyAny>>,
-    jitter: Option<&Bound<'_, PyAny>>,
-    reference: Option<&Bound<'_, PyAny>>,
-    accuracy: Option<&Bound<'_, PyAny>>,
+    delay_box: Option<&Bound<'py, PyAny>>,
+    gain_box: Option<&Bound<'py, PyAny>>,
+    cutoff_box: Option<&Bound<'py, PyAny>>,
+    jitter: Option<&Bound<'py, PyAny>>,
+    reference: Option<&Bound<'py, PyAny>>,
+    accuracy: Option<&Bound<'py, PyAny>>,
     sensitivity: bool,
     sweep: bool,
-) -> PyResult<Analysis> {
+) -> PyResult<Bound<'py, PyAny>> {
     let py = bank.py();
     let given = Given::new(bank)?;
     let widths = BoxWidths {
@@ -83,16 +93,7 @@ pub(crate) fn analyze(
     }
     let bank_in = Arc::clone(&given.bank);
     let found = background::run(py, None, move |_| Studied::new(&bank_in, &own, certify, questions, sweep))?;
-    let found = found.map_err(|error| refused_in(&given.name, error))?;
-    Ok(Analysis {
-        scale: Some(record(py, &found.scale)?),
-        certified: any(py, found.certified.as_ref())?,
-        worst_case: any(py, found.study.worst_case.as_ref())?,
-        sensitivity: any(py, found.study.sensitivity.as_ref())?,
-        jitter: any(py, found.study.jitter.as_ref())?,
-        sweep: any(py, found.sweep.as_ref())?,
-        ..Analysis::from(found.analysis)
-    })
+    of_report(py, "Analysis", &found.map_err(|error| refused_in(&given.name, error))?)
 }
 
 /// A channel from 1, or "none".
@@ -105,10 +106,13 @@ fn reference_channel(given: &Bound<'_, PyAny>) -> PyResult<ReferenceChannel> {
 }
 
 /// All that is known of the errors of a bank.
+#[derive(serde::Serialize)]
 struct Studied {
+    #[serde(flatten)]
     analysis: design::Analysis,
     scale: design::GammaScale,
     certified: Option<design::Certified>,
+    #[serde(flatten)]
     study: ErrorStudy,
     sweep: Option<Sweep>,
 }

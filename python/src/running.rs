@@ -121,8 +121,7 @@ impl Running {
     ) -> PyResult<Self> {
         let settings = Settings { dropped, ..extras.settings() };
         let plan: Plan = plan(bank, format, algorithm, settings)?;
-        let pipeline = Pipeline::new(bank, &plan, settings, format.number, format.complex);
-        let mut pipeline = pipeline.map_err(refused)?;
+        let mut pipeline = Pipeline::new(bank, &plan, settings, format.number, format.complex);
         let tracked = Arc::new(Mutex::new(Tracked::default()));
         if let Some(Follow { source, tracking, rate }) = &extras.follow {
             let options =

@@ -3,7 +3,7 @@
 use crate::arrays::{Held, Shape};
 use crate::background;
 use crate::errors::refused;
-use crate::results::Capture;
+use crate::results::Made;
 use crate::sources;
 use crate::values::{numbers, shares, times};
 use hybank::design::Problem;
@@ -19,8 +19,8 @@ use pyo3::types::{PyList, PyString};
 /// What virtual converters capture of a signal: a text like `chirp:50Hz..8kHz@1s`, or samples.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
-pub(crate) fn simulate(
-    source: &Bound<'_, PyAny>,
+pub(crate) fn simulate<'py>(
+    source: &Bound<'py, PyAny>,
     signal: &Bound<'_, PyAny>,
     imaginary: Option<&Bound<'_, PyAny>>,
     samples: Option<usize>,
@@ -35,7 +35,7 @@ pub(crate) fn simulate(
     cutoff_error: Option<&Bound<'_, PyAny>>,
     offset: Option<&Bound<'_, PyAny>>,
     seed: u64,
-) -> PyResult<Capture> {
+) -> PyResult<Bound<'py, PyAny>> {
     let py = source.py();
     if !gain.is_finite() {
         return Err(refused(format!("gain: {gain} is not a finite number")));
@@ -65,25 +65,21 @@ pub(crate) fn simulate(
         let each = each.map(|(i, each)| signal.captured(&problem, i, &each.converter, gain, frames));
         (each.collect::<Vec<_>>(), signal.target(&problem, gain, frames))
     })?;
-    let clipped = captured
-        .iter()
-        .map(|(real, imaginary)| real.clipped + imaginary.as_ref().map_or(0, |imaginary| imaginary.clipped));
-    let clipped = clipped.collect();
+    let clipped: Vec<usize> = captured.iter().map(|one| one.clipped).collect();
     let target = match &target.1 {
         None => PyArray1::from_vec(py, target.0).into_any(),
         Some(imaginary) => PyArray1::from_vec(py, complex(&target.0, imaginary)).into_any(),
     };
-    Ok(Capture { channels: channels(py, captured)?.unbind(), target: target.unbind(), clipped })
+    let made = Made::new(py, "Capture")?.with("channels", channels(py, captured)?)?;
+    made.with("target", target)?.with("clipped", clipped)?.object()
 }
 
 /// The samples of all converters.
-fn channels(py: Python<'_>, captured: Vec<(Delivered, Option<Delivered>)>) -> PyResult<Bound<'_, PyAny>> {
-    if captured.iter().all(|(_, imaginary)| imaginary.is_none()) {
-        return rows(py, captured.into_iter().map(|(real, _)| real.samples).collect());
+fn channels(py: Python<'_>, captured: Vec<Delivered>) -> PyResult<Bound<'_, PyAny>> {
+    if captured.iter().all(|one| one.imaginary.is_none()) {
+        return rows(py, captured.into_iter().map(|one| one.samples).collect());
     }
-    let both = |(real, imaginary): (Delivered, Option<Delivered>)| {
-        complex(&real.samples, &imaginary.map_or_else(Vec::new, |imaginary| imaginary.samples))
-    };
+    let both = |one: Delivered| complex(&one.samples, &one.imaginary.unwrap_or_default());
     rows(py, captured.into_iter().map(both).collect())
 }
 

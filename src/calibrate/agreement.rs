@@ -12,7 +12,6 @@ use super::starts::{Starts, starts};
 use crate::sine_fit::Estimate;
 use crate::spec::Spec;
 use crate::units::FastPeriods;
-use std::fmt;
 
 /// Least frames of captures that are judged.
 const LEAST_FRAMES: usize = 1024;
@@ -56,43 +55,26 @@ pub struct Agreement {
 }
 
 /// What captures say beside contradictions.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Verdict {
     /// One alias per band, at the delays and gains of the spec, has this share of their power.
+    #[error(
+        "the captures agree with the spec, which explains at least {} % of their power",
+        (1e4 * .0).floor().min(9999.0) / 100.0
+    )]
     Explained(f64),
     /// Aliases overlap, or the signal fits other starts as well.
+    #[error("this signal does not tell whether the captures agree with the spec")]
     Undecided,
     /// They have fewer than 1024 frames.
+    #[error("fewer than {LEAST_FRAMES} frames do not tell whether the captures agree with the spec")]
     Short,
     /// They hold no signal.
+    #[error("the captures hold no signal")]
     NoSignal,
     /// There is one channel, or there are too many.
+    #[error("captures are compared with the spec for 2 to {MOST_CHANNELS} channels")]
     Channels,
-}
-
-impl fmt::Display for Verdict {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Explained(share) => {
-                let least = (1e4 * share).floor().min(9999.0) / 100.0;
-                write!(
-                    f,
-                    "the captures agree with the spec, which explains at least {least} % of their power"
-                )
-            }
-            Self::Undecided => {
-                f.write_str("this signal does not tell whether the captures agree with the spec")
-            }
-            Self::Short => write!(
-                f,
-                "fewer than {LEAST_FRAMES} frames do not tell whether the captures agree with the spec"
-            ),
-            Self::NoSignal => f.write_str("the captures hold no signal"),
-            Self::Channels => {
-                write!(f, "captures are compared with the spec for 2 to {MOST_CHANNELS} channels")
-            }
-        }
-    }
 }
 
 /// Frames of captures of so many channels that [`agreement`] needs at most; 0 if it cannot compare them.

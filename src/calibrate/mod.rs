@@ -68,17 +68,17 @@ use crate::units::{FastPeriods, Hertz};
 use estimates::Fitted;
 
 /// The kind of signal that was captured.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub enum CalibrationSignal<'a> {
+pub enum CalibrationSignal {
     /// Tones near these analog frequencies; an empty list for tones below half the fast rate that are to be
     /// found.
-    Tones(&'a [Hertz]),
+    Tones(Vec<Hertz>),
     /// The samples of a waveform, taken at 0, T, 2 T, .. It is band-limited, and where it lies in the
     /// captures is found.
     Waveform {
         /// The samples.
-        samples: &'a [f64],
+        samples: Vec<f64>,
         /// T.
         spacing: FastPeriods,
     },
@@ -103,7 +103,7 @@ pub struct Settings {
 pub fn calibrate(
     spec: &Spec,
     records: &[Record],
-    signal: CalibrationSignal<'_>,
+    signal: &CalibrationSignal,
     settings: Settings,
 ) -> Result<Calibration, CalibrateError> {
     calibrate_pooled(spec, &[Acquisition { name: "the captures", records }], signal, settings)
@@ -117,7 +117,7 @@ pub fn calibrate(
 pub fn calibrate_pooled(
     spec: &Spec,
     acquisitions: &[Acquisition<'_>],
-    signal: CalibrationSignal<'_>,
+    signal: &CalibrationSignal,
     settings: Settings,
 ) -> Result<Calibration, CalibrateError> {
     for Acquisition { name, records } in acquisitions {
@@ -135,7 +135,7 @@ pub fn calibrate_pooled(
         }
         _ if !spec.layout().is_plain() => return Err(CalibrateError::OwnRates),
         (CalibrationSignal::Waveform { samples, spacing }, [Acquisition { records, .. }]) => {
-            waveform::Training::new(&model, records, samples, spacing, settings)?.fit()?
+            waveform::Training::new(&model, records, samples, *spacing, settings)?.fit()?
         }
         (CalibrationSignal::Any, [Acquisition { records, .. }]) => {
             blind::Blind::new(&model, records, usize::MAX)?.fit(settings)?
@@ -161,7 +161,7 @@ pub fn calibrate_pooled(
 }
 
 /// All records are real, or all are complex and hold tones.
-pub(crate) fn check_parts(records: &[Record], signal: CalibrationSignal<'_>) -> Result<(), CalibrateError> {
+pub(crate) fn check_parts(records: &[Record], signal: &CalibrationSignal) -> Result<(), CalibrateError> {
     let complex = records.iter().filter(|record| record.imaginary.is_some()).count();
     match signal {
         CalibrationSignal::Tones(_) if complex == records.len() => Ok(()),

@@ -4,7 +4,6 @@ use crate::bank::{Bank, SynthesisFilters};
 use crate::measure::{MeasureError, Measurement, Settings, Spur, measure};
 use crate::simulate::interleaved;
 use crate::units::Hertz;
-use std::fmt;
 
 /// Fast samples at either end that are not measured, beside the latency and the length of the filters: a
 /// recursive bank settles in that time.
@@ -84,18 +83,13 @@ pub struct BeforeAfter {
 }
 
 /// Why one of two recordings cannot be measured.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{which}: {error}")]
 pub struct Unmeasured {
     /// What it is.
     pub which: &'static str,
     /// Why.
     pub error: MeasureError,
-}
-
-impl fmt::Display for Unmeasured {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.which, self.error)
-    }
 }
 
 impl BeforeAfter {

@@ -7,7 +7,7 @@ use crate::bank::Bank;
 use crate::design::DesignError;
 use crate::measure::{Cause, Measurement, Spur};
 use crate::pipeline::{PipelineError, Settings, fused};
-use crate::plot::{Chart, Marks, PlotError};
+use crate::plot::{Chart, PlotError};
 use crate::quantity::readable;
 use crate::simulate::interleaved;
 use crate::spec::SpecProblem;
@@ -85,9 +85,9 @@ impl CapturesOnPage {
         );
         let (spectra, measured) = match measured {
             Ok(measured) => {
-                let (chart, marks) = before_after(&measured.before, &measured.after);
+                let chart = before_after(&measured.before, &measured.after);
                 let caption = format!("{what} Each cause of spurs has one colour.");
-                (Figure::marked(&chart, &marks, &caption), Some(measured))
+                (Figure::new(&chart, &caption), Some(measured))
             }
             Err(reason) => {
                 let plain = interleaved(&bank.sample_delays(), bank.ratio, bank.wait(), &channels);
@@ -198,11 +198,7 @@ struct Figure {
 
 impl Figure {
     fn new(chart: &Chart, caption: &str) -> Result<Self, PlotError> {
-        Self::marked(chart, &[], caption)
-    }
-
-    fn marked(chart: &Chart, marks: &[Marks], caption: &str) -> Result<Self, PlotError> {
-        Ok(Self { svg: chart.to_svg_with(marks)?, caption: caption.to_owned() })
+        Ok(Self { svg: chart.to_svg()?, caption: caption.to_owned() })
     }
 
     fn html(&self) -> Markup {

@@ -99,12 +99,12 @@ fn tones(bank: &Bank) -> Result<Chart, DesignError> {
     Ok(Chart {
         title: "Images and error of gain".into(),
         x_label: format!("input {x_label}"),
-        x_scale: AxisScale::Linear,
         y_label: "relative to the tone, dB".into(),
         series: vec![
             curve("largest image", |tone| tone.image),
             curve("error of gain and phase", |tone| tone.gain_error),
         ],
+        ..Chart::default()
     })
 }
 
@@ -173,6 +173,7 @@ fn of_target_and_channels(bank: &Bank, title: &str, frequencies: &[Hertz], all: 
         x_scale: AxisScale::Decades,
         y_label: "gain, dB".into(),
         series: (0..count).map(curve).collect(),
+        ..Chart::default()
     }
 }
 
@@ -211,6 +212,7 @@ fn gains(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
         x_scale: AxisScale::Decades,
         y_label: "gain, dB".into(),
         series,
+        ..Chart::default()
     }
 }
 
@@ -222,9 +224,9 @@ fn group_delays(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
     Chart {
         title: "Group delay of the synthesis filters, where they pass".into(),
         x_label,
-        x_scale: AxisScale::Linear,
         y_label,
         series,
+        ..Chart::default()
     }
 }
 
@@ -244,9 +246,9 @@ fn phases(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
     Chart {
         title: "Phase of the synthesis filters, where they pass".into(),
         x_label,
-        x_scale: AxisScale::Linear,
         y_label,
         series,
+        ..Chart::default()
     }
 }
 
@@ -265,9 +267,9 @@ fn impulses(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
     Chart {
         title: "Impulse responses of the synthesis filters".into(),
         x_label: "fast samples".into(),
-        x_scale: AxisScale::Linear,
         y_label: "tap".into(),
         series: filter_names(bank).into_iter().zip(responses).take(MOST_CHANNELS).map(curve).collect(),
+        ..Chart::default()
     }
 }
 
@@ -289,9 +291,9 @@ fn error(bank: &Bank) -> Result<Chart, DesignError> {
     Ok(Chart {
         title,
         x_label: x_label + ", modulo the slow rate",
-        x_scale: AxisScale::Linear,
         y_label: "gain, dB (h = 1)".into(),
         series,
+        ..Chart::default()
     })
 }
 
@@ -311,11 +313,11 @@ fn delay_error(bank: &Bank) -> Result<Chart, DesignError> {
     Ok(Chart {
         title: "gamma with delays that are not those of the bank".into(),
         x_label: "error of each delay, fast samples".into(),
-        x_scale: AxisScale::Linear,
         y_label: "gamma (h = 1)".into(),
         series: vec![Series {
             label: "gamma".into(),
             points: (-DELAY_ERRORS..=DELAY_ERRORS).map(gamma).collect::<Result<_, _>>()?,
         }],
+        ..Chart::default()
     })
 }

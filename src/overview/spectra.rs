@@ -1,7 +1,7 @@
 //! The spectra of recordings of one signal.
 
 use crate::measure::{Spectrum, Window};
-use crate::plot::{AxisScale, Chart, Series};
+use crate::plot::{Chart, Series};
 use crate::quantity::scale_of;
 use crate::units::{Decibels, Hertz};
 
@@ -27,8 +27,8 @@ pub fn spectra(rate: Hertz, recordings: &[(&str, &[f64])]) -> Chart {
     Chart {
         title: "Spectra of the captures".into(),
         x_label: format!("frequency, {unit}"),
-        x_scale: AxisScale::Linear,
         y_label: "amplitude, dBFS".into(),
         series: spectra.into_iter().map(series).collect(),
+        ..Chart::default()
     }
 }

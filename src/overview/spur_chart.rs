@@ -1,7 +1,7 @@
 //! The spectra of measured recordings with their spurs marked.
 
 use crate::measure::{Cause, Comparison, Measurement, Settings, Spectrum, Spur};
-use crate::plot::{AxisScale, Chart, Marks, Series};
+use crate::plot::{Chart, Marks, Series};
 use crate::quantity::scale_of;
 use crate::units::{Decibels, Hertz};
 
@@ -23,12 +23,9 @@ pub struct Drawn<'a> {
     pub comparison: Option<(&'a str, &'a Comparison)>,
 }
 
-/// The chart of a recording and its marks. `spectrum` is that of the recording, if it was not measured.
-pub fn spur_chart(
-    drawn: Drawn<'_>,
-    settings: &Settings,
-    spectrum: impl FnOnce() -> Spectrum,
-) -> (Chart, Vec<Marks>) {
+/// The chart of a recording, with marks at its spurs. `spectrum` is that of the recording, if it was not
+/// measured.
+pub fn spur_chart(drawn: Drawn<'_>, settings: &Settings, spectrum: impl FnOnce() -> Spectrum) -> Chart {
     let own;
     let spectrum = match drawn.measurement {
         Some(measured) => &measured.spectrum,
@@ -43,8 +40,8 @@ pub fn spur_chart(
         let points = scale.points(&comparison.error_spectrum);
         series.push(Series { label: format!("error against {reference}"), points });
     }
-    let marks = drawn.measurement.map(|measured| scale.marks(measured, false, &|_| true));
-    (scale.chart(title(drawn), settings, series), marks.unwrap_or_default())
+    let marks = drawn.measurement.map(|measured| scale.marks(measured, false, &|_| true)).unwrap_or_default();
+    Chart { marks, ..scale.chart(title(drawn), settings, series) }
 }
 
 fn title(drawn: Drawn<'_>) -> String {
@@ -61,7 +58,7 @@ fn title(drawn: Drawn<'_>) -> String {
 
 /// Two measurements of one signal over one axis: the spurs of the first one are rings, those of the second
 /// one discs, and each cause has one colour. A spur that both have is named once.
-pub fn before_after(before: &Measurement, after: &Measurement) -> (Chart, Vec<Marks>) {
+pub fn before_after(before: &Measurement, after: &Measurement) -> Chart {
     let scale = Scale::of(&[&before.spectrum, &after.spectrum], after.full_scale);
     let series = [("interleaved (rings)", before), ("fused (discs)", after)];
     let series = series
@@ -75,7 +72,7 @@ pub fn before_after(before: &Measurement, after: &Measurement) -> (Chart, Vec<Ma
         before.sfdr.0, after.sfdr.0, before.sinad.0, after.sinad.0
     );
     let settings = Settings { window: after.window, ..Settings::default() };
-    (scale.chart(title, &settings, series.into()), marks)
+    Chart { marks, ..scale.chart(title, &settings, series.into()) }
 }
 
 /// The spurs of a recording that are marked: those above the noise, and the worst one of interleaving.
@@ -110,9 +107,9 @@ impl Scale {
         Chart {
             title,
             x_label: format!("frequency ({})", self.unit),
-            x_scale: AxisScale::Linear,
             y_label: format!("dBFS (window: {:.2} bins of noise)", settings.window.noise_bandwidth()),
             series,
+            ..Chart::default()
         }
     }
 

@@ -1,7 +1,7 @@
 //! The one loop of all runs: fills gaps, filters, drops the latency and keeps the marks aligned.
 
 use super::gaps::GapFiller;
-use super::{Gap, GapPolicy, Outcome, PipelineError};
+use super::{Gap, GapPolicy, Outcome};
 use crate::bank::Bank;
 use crate::runtime::{
     Input, Interleaved, Isa, Options, Output, Plan, ProcessError, Sample, SplitOutput, Stream, SwapError,
@@ -73,22 +73,17 @@ pub(super) struct Fusion<'a> {
 
 impl<'a> Fusion<'a> {
     /// A new signal of so many parts through `plan`, which must be the plan of `bank`.
-    pub(super) fn new(
-        bank: &Bank,
-        plan: &Plan,
-        parts: usize,
-        settings: Settings<'a>,
-    ) -> Result<Self, PipelineError> {
+    pub(super) fn new(bank: &Bank, plan: &Plan, parts: usize, settings: Settings<'a>) -> Self {
         let filler = |policy| GapFiller::new(bank, policy, parts, plan.extra_latency());
-        Ok(Self {
+        Self {
             streams: vec![Stream::new(plan); parts],
-            gaps: settings.gaps.map(filler).transpose()?,
+            gaps: settings.gaps.map(filler),
             workers: settings.workers,
             skip: settings.dropped.samples(plan),
             kept: 0..0,
             replaced: 0,
             offsets: bank.layout().each(&bank.offsets),
-        })
+        }
     }
 
     /// The stream of the real parts.

@@ -6,7 +6,7 @@
 //! as affected.
 
 use crate::bank::{Bank, FrameLayout, FrameSample, SynthesisFilters};
-use crate::runtime::{BuildError, Input, Isa};
+use crate::runtime::{Input, Isa};
 use std::ops::Range;
 
 /// Maximum number of gaps that a report lists; further gaps are only counted, so that memory stays bounded.
@@ -91,25 +91,11 @@ pub(super) struct GapFiller {
 impl GapFiller {
     /// A filler for the channels and taps of a bank, and samples of so many parts. The outputs are
     /// `extra_latency` samples later than those of the definition.
-    ///
-    /// # Errors
-    /// [`BuildError::NoRatio`] and [`BuildError::NoChannels`] for a bank without outputs or inputs.
-    pub(super) fn new(
-        bank: &Bank,
-        policy: GapPolicy,
-        parts: usize,
-        extra_latency: usize,
-    ) -> Result<Self, BuildError> {
+    pub(super) fn new(bank: &Bank, policy: GapPolicy, parts: usize, extra_latency: usize) -> Self {
         let ratio = bank.ratio;
-        if ratio == 0 {
-            return Err(BuildError::NoRatio);
-        }
-        if bank.channel_count() == 0 {
-            return Err(BuildError::NoChannels);
-        }
         let converter = |&offset: &f64| Converter { offset, last: [offset; 2], open: None };
         let layout = bank.layout();
-        Ok(Self {
+        Self {
             policy,
             ratio,
             affected: nonzero_phases(bank).map(|nonzero| AffectedOutputs::new(ratio, &nonzero)),
@@ -121,7 +107,7 @@ impl GapFiller {
             numbers: vec![Vec::new(); parts],
             marks: vec![0; extra_latency],
             used: 0,
-        })
+        }
     }
 
     /// Takes the next frames of all `parts` of the samples. True if [`GapFiller::filled`] has to take their

@@ -46,7 +46,7 @@ pub fn fuse(
         output.select(0);
     }
     check(plan, parts, output.capacity(), wanted)?;
-    let mut fusion = Fusion::new(bank, plan, parts.len(), settings)?;
+    let mut fusion = Fusion::new(bank, plan, parts.len(), settings);
     let most = step(bank, plan, settings);
     let mut mask = Vec::new();
     let (mut first, mut written) = (0, 0);

@@ -3,7 +3,6 @@
 use super::GapSummary;
 use crate::io::InputWarning;
 use crate::runtime::PlanSummary;
-use std::fmt;
 
 /// Counts and settings of a finished run.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -32,19 +31,33 @@ pub struct Outcome {
 }
 
 /// A fault that was tolerated.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Warning {
     /// A fault of an input.
+    #[error(transparent)]
     Input(InputWarning),
     /// The inputs of these names have no frames.
+    #[error("{}: no samples to fuse (the length is zero), so the output has none", .0.join(", "))]
     Empty(Vec<String>),
     /// This many input samples were NaN or infinite.
+    #[error("{} missing, NaN or infinite and {} replaced by 0", counted(*.0, "input sample"), were(*.0))]
     Replaced(u64),
     /// This many output samples saturated.
+    #[error("{} clipped", counted(*.0, "output sample"))]
     Clipped(u64),
     /// A recursion's state was not finite this many times.
+    #[error("{} the filter state was not finite and was set to zero", if *.0 == 1 { "once".to_owned() } else { format!("{} times", .0) })]
     StateReset(u64),
+}
+
+fn were(count: u64) -> &'static str {
+    if count == 1 { "was" } else { "were" }
+}
+
+/// So many things, and the verb that follows them.
+fn counted(count: u64, what: &str) -> String {
+    format!("{count} {what}{} {}", if count == 1 { "" } else { "s" }, were(count))
 }
 
 impl Outcome {
@@ -54,29 +67,5 @@ impl Outcome {
         let replaced = counted(self.replaced, Warning::Replaced);
         let clipped = counted(self.clipped, Warning::Clipped);
         [replaced, clipped, counted(self.state_resets, Warning::StateReset)].into_iter().flatten()
-    }
-}
-
-impl fmt::Display for Warning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Input(warning) => warning.fmt(f),
-            Self::Empty(inputs) => {
-                let inputs = inputs.join(", ");
-                write!(f, "{inputs}: no samples to fuse (the length is zero), so the output has none")
-            }
-            Self::Replaced(1) => {
-                f.write_str("1 input sample was missing, NaN or infinite and was replaced by 0")
-            }
-            Self::Replaced(count) => {
-                write!(f, "{count} input samples were missing, NaN or infinite and were replaced by 0")
-            }
-            Self::Clipped(1) => f.write_str("1 output sample was clipped"),
-            Self::Clipped(count) => write!(f, "{count} output samples were clipped"),
-            Self::StateReset(1) => f.write_str("once the filter state was not finite and was set to zero"),
-            Self::StateReset(count) => {
-                write!(f, "{count} times the filter state was not finite and was set to zero")
-            }
-        }
     }
 }

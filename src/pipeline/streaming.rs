@@ -41,20 +41,17 @@ impl<'a> Pipeline<'a> {
     /// A new signal through `plan`, which must be the plan of `bank`. Outputs have numbers of `format`. If
     /// the samples are complex, real and imaginary parts take turns in the input and in the output; a bank
     /// is real, so it runs on both.
-    ///
-    /// # Errors
-    /// [`PipelineError::Build`] for a bank without outputs or inputs whose gaps are to be filled.
     pub fn new(
         bank: &Bank,
         plan: &Plan,
         settings: Settings<'a>,
         format: PcmFormat,
         is_complex: bool,
-    ) -> Result<Self, PipelineError> {
-        let fusion = Fusion::new(bank, plan, 1 + usize::from(is_complex), settings)?;
+    ) -> Self {
+        let fusion = Fusion::new(bank, plan, 1 + usize::from(is_complex), settings);
         let steps = if settings.workers.is_some() { PARALLEL_STEPS } else { 1 };
         let step = (steps * STEP_BYTES / plan.ratio() / format.bytes()).max(1);
-        Ok(Self { fusion, retuner: None, format, step, samples: 0, clipped: 0, buffer: Vec::new() })
+        Self { fusion, retuner: None, format, step, samples: 0, clipped: 0, buffer: Vec::new() }
     }
 
     /// The same pipeline, whose filters change as `retuner` says. Its plan adds no latency.

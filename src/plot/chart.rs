@@ -58,7 +58,7 @@ pub(super) type Ranges = (Range<f64>, Range<f64>);
 pub(super) type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 
 /// Curves over a common axis.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Chart {
     /// Title.
     pub title: String,
@@ -70,6 +70,8 @@ pub struct Chart {
     pub y_label: String,
     /// The curves, drawn in this order.
     pub series: Vec<Series>,
+    /// Points over the curves, in the colours that follow theirs.
+    pub marks: Vec<Marks>,
 }
 
 /// A chart that could not be drawn.
@@ -95,14 +97,9 @@ pub enum PlotError {
 impl Chart {
     /// The chart as SVG text.
     pub fn to_svg(&self) -> Result<String, PlotError> {
-        self.to_svg_with(&[])
-    }
-
-    /// The chart as SVG text with points over the curves, in the colours that follow those of the curves.
-    pub fn to_svg_with(&self, marks: &[Marks]) -> Result<String, PlotError> {
-        let ranges = self.ranges(marks)?;
+        let ranges = self.ranges()?;
         let mut svg = String::new();
-        self.draw(SVGBackend::with_string(&mut svg, ENLARGED), marks, ranges)
+        self.draw(SVGBackend::with_string(&mut svg, ENLARGED), ranges)
             .map_err(|error| self.failed(&error))?;
         Ok(scale_by_view_box(&svg))
     }
@@ -111,8 +108,8 @@ impl Chart {
         PlotError::Drawing { title: self.title.clone(), reason: error.to_string() }
     }
 
-    pub(super) fn ranges(&self, marks: &[Marks]) -> Result<Ranges, PlotError> {
-        let marked = || marks.iter().flat_map(|m| &m.points).map(|(x, y, _)| (*x, *y));
+    pub(super) fn ranges(&self) -> Result<Ranges, PlotError> {
+        let marked = || self.marks.iter().flat_map(|m| &m.points).map(|(x, y, _)| (*x, *y));
         let drawn = || self.series.iter().flat_map(|s| &s.points).copied().chain(marked());
         let points = || drawn().filter(|(x, y)| self.is_drawn(*x, *y));
         if points().next().is_none() {
@@ -138,15 +135,16 @@ impl Chart {
         (0..self.series.len()).map(|k| Look::Line(dashes_over(covered(k)))).collect()
     }
 
-    fn entries<'a>(&'a self, looks: &'a [Look], marks: &'a [Marks]) -> impl Iterator<Item = Entry<'a>> {
+    fn entries<'a>(&'a self, looks: &'a [Look]) -> impl Iterator<Item = Entry<'a>> {
         let line = |((series, look), colour): ((&'a Series, &Look), &RGBColor)| Entry {
             label: &series.label,
             look: *look,
             style: line_style(colour),
         };
         let lines = self.series.iter().zip(looks).zip(COLOURS.iter().cycle()).map(line);
+        let marks = &self.marks;
         let is_first = |k: usize| !marks[..k].iter().any(|earlier| earlier.label == marks[k].label);
-        let points = self.styled(marks).enumerate().filter(move |(k, _)| is_first(*k));
+        let points = self.styled().enumerate().filter(move |(k, _)| is_first(*k));
         lines.chain(points.map(|(_, (marks, style))| Entry {
             label: &marks.label,
             look: Look::Points,
@@ -155,18 +153,18 @@ impl Chart {
     }
 
     /// The marks with the style of their circles.
-    fn styled<'a>(&self, marks: &'a [Marks]) -> impl Iterator<Item = (&'a Marks, ShapeStyle)> + use<'a> {
-        marks.iter().zip(COLOURS.iter().cycle().skip(self.series.len())).map(|(marks, next)| {
+    fn styled(&self) -> impl Iterator<Item = (&Marks, ShapeStyle)> {
+        self.marks.iter().zip(COLOURS.iter().cycle().skip(self.series.len())).map(|(marks, next)| {
             let colour = marks.colour.map_or(*next, |[r, g, b]| RGBColor(r, g, b));
             (marks, if marks.are_rings { line_style(&colour) } else { colour.filled() })
         })
     }
 
-    pub(super) fn draw<B: DrawingBackend>(&self, backend: B, marks: &[Marks], (x, y): Ranges) -> Drawn<B> {
+    pub(super) fn draw<B: DrawingBackend>(&self, backend: B, (x, y): Ranges) -> Drawn<B> {
         let root = backend.into_drawing_area();
         root.fill(&WHITE)?;
         let looks = self.looks(y.end - y.start);
-        let legend = Legend::new(self.entries(&looks, marks), (WIDTH - 2 * SIDE) as i32);
+        let legend = Legend::new(self.entries(&looks), (WIDTH - 2 * SIDE) as i32);
         let below = root.margin(8 * OVERSIZE, 8 * OVERSIZE, SIDE * OVERSIZE, SIDE * OVERSIZE);
         let (title, below) = below.split_vertically(28 * OVERSIZE);
         // At the left, where a narrow screen begins.
@@ -180,24 +178,19 @@ impl Chart {
             .x_label_area_size(44 * OVERSIZE)
             .y_label_area_size(72 * OVERSIZE);
         match self.x_scale {
-            AxisScale::Linear => self.draw_on(builder.build_cartesian_2d(x, y)?, &looks, marks)?,
+            AxisScale::Linear => self.draw_on(builder.build_cartesian_2d(x, y)?, &looks)?,
             AxisScale::Decades => {
-                self.draw_on(builder.build_cartesian_2d(x.log_scale(), y)?, &looks, marks)?;
+                self.draw_on(builder.build_cartesian_2d(x.log_scale(), y)?, &looks)?;
             }
         }
         root.present()?;
         Ok(())
     }
 
-    fn draw_on<B: DrawingBackend, X: Across>(
-        &self,
-        mut chart: Axes<'_, B, X>,
-        looks: &[Look],
-        marks: &[Marks],
-    ) -> Drawn<B> {
+    fn draw_on<B: DrawingBackend, X: Across>(&self, mut chart: Axes<'_, B, X>, looks: &[Look]) -> Drawn<B> {
         self.draw_axes(&mut chart)?;
         self.draw_lines(&mut chart, looks)?;
-        self.draw_marks(&mut chart, marks)
+        self.draw_marks(&mut chart)
     }
 
     fn draw_axes<B: DrawingBackend, X: Across>(&self, chart: &mut Axes<'_, B, X>) -> Drawn<B> {
@@ -239,16 +232,12 @@ impl Chart {
 
     /// Circles with their texts beside them, where these cover neither each other nor a circle. A text for
     /// which there is no room is left out.
-    fn draw_marks<B: DrawingBackend, X: Across>(
-        &self,
-        chart: &mut Axes<'_, B, X>,
-        marks: &[Marks],
-    ) -> Drawn<B> {
+    fn draw_marks<B: DrawingBackend, X: Across>(&self, chart: &mut Axes<'_, B, X>) -> Drawn<B> {
         let text_style = TextStyle::from(text(MARK_FONT)).color(&RGBColor(60, 60, 60));
         let (across, down) = chart.plotting_area().get_pixel_range();
         let mut room = Room::new(across, down);
         let mut texts = Vec::new();
-        for (marks, style) in self.styled(marks) {
+        for (marks, style) in self.styled() {
             for (x, y, text) in marks.points.iter().filter(|(x, y, _)| self.is_drawn(*x, *y)) {
                 room.take_circle(chart.backend_coord(&(*x, *y)));
                 chart.draw_series([Circle::new((*x, *y), RADIUS, style)])?;
@@ -303,15 +292,14 @@ mod tests {
 
     fn chart(points: Vec<(f64, f64)>) -> Chart {
         let series = vec![Series { label: "error <1>".into(), points }];
-        let x_scale = AxisScale::Linear;
-        Chart { title: "t".into(), x_label: "x".into(), x_scale, y_label: "y".into(), series }
+        Chart { title: "t".into(), x_label: "x".into(), y_label: "y".into(), series, ..Chart::default() }
     }
 
     #[test]
     fn marks_are_drawn_with_their_texts() {
         let points = vec![(1.0, 2.0, "spur".to_owned()), (f64::NAN, 0.0, "absent".to_owned())];
-        let marks = [Marks { label: "offset".into(), colour: None, are_rings: false, points }];
-        let svg = chart(vec![(0.0, 1.0), (2.0, 3.0)]).to_svg_with(&marks).unwrap();
+        let marks = vec![Marks { label: "offset".into(), colour: None, are_rings: false, points }];
+        let svg = Chart { marks, ..chart(vec![(0.0, 1.0), (2.0, 3.0)]) }.to_svg().unwrap();
         // One circle for the point and one in the legend.
         assert_eq!(svg.matches("<circle").count(), 2);
         assert!(svg.contains("spur") && svg.contains("offset") && !svg.contains("absent"));
@@ -326,7 +314,8 @@ mod tests {
             are_rings,
             points: vec![(1.0, y, "1/4".to_owned())],
         };
-        let svg = chart(vec![(0.0, 1.0), (2.0, 3.0)]).to_svg_with(&[of(2.0, true), of(1.0, false)]).unwrap();
+        let marks = vec![of(2.0, true), of(1.0, false)];
+        let svg = Chart { marks, ..chart(vec![(0.0, 1.0), (2.0, 3.0)]) }.to_svg().unwrap();
         assert_eq!(svg.matches("<circle").count(), 3);
         assert_eq!(svg.matches("#FF7F0E").count(), 3, "{svg}");
         assert_eq!(svg.matches("offset").count(), 1);
@@ -336,7 +325,7 @@ mod tests {
     fn decades_are_evenly_apart_and_zero_is_left_out() {
         let points = (0..=1000).map(|k| (f64::from(k), 1.0)).collect();
         let decades = Chart { x_scale: AxisScale::Decades, ..chart(points) };
-        assert_eq!(decades.ranges(&[]).unwrap().0, 1.0..1000.0);
+        assert_eq!(decades.ranges().unwrap().0, 1.0..1000.0);
         let svg = decades.to_svg().unwrap();
         let at = |label: &str| -> f64 {
             let before = svg[..svg.rfind(&format!("\n{label}\n")).unwrap()].rfind("x=\"").unwrap() + 3;
@@ -374,7 +363,7 @@ mod tests {
     #[test]
     fn a_level_curve_is_drawn_level() {
         let height = |apart: f64| {
-            let (_, up) = chart(vec![(0.0, -30.0), (1.0, -30.0 + apart)]).ranges(&[]).unwrap();
+            let (_, up) = chart(vec![(0.0, -30.0), (1.0, -30.0 + apart)]).ranges().unwrap();
             up.end - up.start
         };
         assert!((0.02..0.04).contains(&height(1e-7)), "{}", height(1e-7));

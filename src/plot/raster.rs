@@ -4,7 +4,7 @@
 //! plotters' own pixels draw a wide curve as one polygon, whose mitres stick out far where a spectrum has a
 //! narrow line. Here a segment is all that is within half the width of it, so the joints are round.
 
-use super::chart::{Chart, ENLARGED, Marks, PlotError};
+use super::chart::{Chart, ENLARGED, PlotError};
 use super::legend::OVERSIZE;
 use plotters_backend::{BackendColor, BackendCoord, BackendStyle, DrawingBackend, DrawingErrorKind};
 use std::convert::Infallible;
@@ -15,14 +15,9 @@ const FINENESS: u32 = 2;
 impl Chart {
     /// The chart as a PNG file of 1920 by 900 pixels.
     pub fn to_png(&self) -> Result<Vec<u8>, PlotError> {
-        self.to_png_with(&[])
-    }
-
-    /// As [`Self::to_svg_with`], as a PNG file of 1920 by 900 pixels.
-    pub fn to_png_with(&self, marks: &[Marks]) -> Result<Vec<u8>, PlotError> {
-        let ranges = self.ranges(marks)?;
+        let ranges = self.ranges()?;
         let mut pixels = Pixels::white(ENLARGED.0 as usize, ENLARGED.1 as usize);
-        self.draw(Canvas(&mut pixels), marks, ranges).map_err(|error| self.failed(&error))?;
+        self.draw(Canvas(&mut pixels), ranges).map_err(|error| self.failed(&error))?;
         pixels.reduced((OVERSIZE / FINENESS) as usize).png().map_err(|error| self.failed(&error))
     }
 }

@@ -32,26 +32,14 @@ pub struct Captured {
 /// Captures `periods` slow periods of `signal`, or frames: slow samples k = 0 .. periods of each channel, or
 /// so many times the samples that it has in a frame, and M times as many reference samples.
 pub fn capture(problem: &Problem, signal: &Analog, periods: usize) -> Captured {
-    let mut channels: Vec<_> = recordings(problem, signal, periods).collect();
-    let target = channels.pop().unwrap_or_default();
-    Captured { channels, target }
-}
-
-/// As [`capture`], one converter after another, so that only one recording is in memory: the channels in
-/// their order, and the target last.
-pub fn recordings<'a>(
-    problem: &'a Problem,
-    signal: &'a Analog,
-    periods: usize,
-) -> impl Iterator<Item = Vec<f64>> + 'a {
-    let slow = move |samples: Range<usize>| {
+    let slow = |samples: Range<usize>| {
         let channel = &problem.channels[samples.start];
         let instants = instants(problem, &samples, periods);
         let samples = signal.filtered(&problem.front_ends[channel.front_end], instants);
         samples.into_iter().map(|sample| channel.gain * sample).collect()
     };
-    let target = move || target(problem, signal, periods);
-    problem.converters().into_iter().map(slow).chain(std::iter::once_with(target))
+    let channels = problem.converters().into_iter().map(slow).collect();
+    Captured { channels, target: target(problem, signal, periods) }
 }
 
 /// The instants of the samples of a converter, whose `samples` per frame these are, on its own time axis.

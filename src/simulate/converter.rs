@@ -40,9 +40,11 @@ pub struct Converter {
 /// What a converter delivered.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Delivered {
-    /// Sample k.
+    /// Sample k, or its real part.
     pub samples: Vec<f64>,
-    /// Samples that saturated.
+    /// The imaginary parts of a complex signal.
+    pub imaginary: Option<Vec<f64>>,
+    /// Samples, or parts of them, that saturated.
     pub clipped: usize,
 }
 
@@ -77,20 +79,9 @@ impl Converter {
         self.capture_part(problem, channel, signal, level, periods, Purpose::Noise)
     }
 
-    /// As [`Converter::capture`], of the imaginary part of a complex signal: the converter of the other part
-    /// has the same clock and front end, hence the same jitter, and noise of its own.
-    pub fn capture_imaginary(
-        &self,
-        problem: &Problem,
-        channel: usize,
-        signal: &Analog,
-        level: f64,
-        periods: usize,
-    ) -> Delivered {
-        self.capture_part(problem, channel, signal, level, periods, Purpose::ImaginaryNoise)
-    }
-
-    fn capture_part(
+    /// As [`Converter::capture`], with noise of a purpose: of a complex signal the converters of both parts
+    /// have the same clock and front end, hence the same jitter, and noise of their own.
+    pub(super) fn capture_part(
         &self,
         problem: &Problem,
         channel: usize,
@@ -137,7 +128,7 @@ impl Converter {
                 clipped += usize::from(saturated);
             }
         }
-        Delivered { samples, clipped }
+        Delivered { samples, imaginary: None, clipped }
     }
 }
 

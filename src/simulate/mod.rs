@@ -22,7 +22,7 @@ mod source;
 mod walk;
 mod workload;
 
-pub use capture::{Analog, Captured, capture, interleaved, recordings, target};
+pub use capture::{Analog, Captured, capture, interleaved, target};
 pub use complex::ComplexSource;
 pub use converter::{Converter, Delivered};
 pub use errors::{ConverterErrors, ErrorRule, ErrorsOfConverter, RefusedError, VirtualConverter};

@@ -1,5 +1,6 @@
 //! A real or complex analog signal.
 
+use super::normal::Purpose;
 use super::{Analog, ComplexSource, Converter, Delivered, WorkloadError, frames, target};
 use crate::design::Problem;
 use crate::units::Seconds;
@@ -50,12 +51,12 @@ impl Signal {
         converter: &Converter,
         level: f64,
         frames: usize,
-    ) -> (Delivered, Option<Delivered>) {
-        let imaginary = self.imaginary.as_ref();
-        (
-            converter.capture(problem, i, &self.real, level, frames),
-            imaginary.map(|part| converter.capture_imaginary(problem, i, part, level, frames)),
-        )
+    ) -> Delivered {
+        let real = converter.capture(problem, i, &self.real, level, frames);
+        let Some(part) = &self.imaginary else { return real };
+        let imaginary = converter.capture_part(problem, i, part, level, frames, Purpose::ImaginaryNoise);
+        let clipped = real.clipped + imaginary.clipped;
+        Delivered { imaginary: Some(imaginary.samples), clipped, ..real }
     }
 
     /// The samples of both parts, times `level`, of the ideal fast converter.

@@ -6,7 +6,6 @@ use crate::sampling::SamplingError;
 use crate::spec::{HALF_WIDTH, Spec};
 use crate::units::Seconds;
 use serde::Serialize;
-use std::fmt;
 
 /// What is known of all channels. As JSON it is a line that [`super::Reading::parse`] reads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -72,10 +71,13 @@ impl Logged {
 }
 
 /// What a user should know at once.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrackWarning {
     /// Measurements contradicted a delay again and again; it was taken from the last of them.
+    #[error(
+        "the delay of channel {channel} was lost at frame {frame}: measurements contradicted it again and again; it starts again"
+    )]
     Lost {
         /// From 1.
         channel: usize,
@@ -83,6 +85,14 @@ pub enum TrackWarning {
         frame: u64,
     },
     /// A delay leaves the box for which the taps were designed; the taps stay at its end.
+    #[error(
+        "the delay of channel {channel} leaves the ± {:e} s for which the taps were designed, at frame {frame}; the taps \
+         stay at the end of that range: design with a larger [uncertainty] delay {}",
+        half.0, .enough.map_or_else(
+            || "or cut the recordings there and fuse the rest with a bank for its delays".to_owned(),
+            |enough| format!("(from ± {:e} s on no delay leaves it)", enough.0),
+        )
+    )]
     OutsideTheBox {
         /// From 1.
         channel: usize,
@@ -95,6 +105,10 @@ pub enum TrackWarning {
     },
     /// No curve through the readings of a channel was found, so a filter follows them, which knows the past
     /// only.
+    #[error(
+        "channel {channel}: no curve goes through its readings, so each is followed with those before it only: \
+         {reason}; check their frames, delays and half-widths"
+    )]
     NotSmoothed {
         /// From 1.
         channel: usize,
@@ -102,6 +116,10 @@ pub enum TrackWarning {
         reason: SamplingError,
     },
     /// Two channels will sample at one instant.
+    #[error(
+        "the channels {} and {} will sample at one instant in {:.3e} s: no bank recovers the signal there",
+        channels[0], channels[1], after.0
+    )]
     Coincidence {
         /// From 1.
         channels: [usize; 2],
@@ -118,41 +136,6 @@ impl TrackWarning {
             (Self::OutsideTheBox { channel: a, .. }, Self::OutsideTheBox { channel: b, .. }) => a == b,
             (Self::Coincidence { channels: a, .. }, Self::Coincidence { channels: b, .. }) => a == b,
             _ => false,
-        }
-    }
-}
-
-impl fmt::Display for TrackWarning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Lost { channel, frame } => write!(
-                f,
-                "the delay of channel {channel} was lost at frame {frame}: measurements contradicted it again and again; it starts again"
-            ),
-            Self::OutsideTheBox { channel, half, frame, enough } => {
-                let remedy = match enough {
-                    Some(enough) => format!("(from ± {:e} s on no delay leaves it)", enough.0),
-                    None => {
-                        "or cut the recordings there and fuse the rest with a bank for its delays".to_owned()
-                    }
-                };
-                write!(
-                    f,
-                    "the delay of channel {channel} leaves the ± {:e} s for which the taps were designed, at frame {frame}; the taps \
-                     stay at the end of that range: design with a larger [uncertainty] delay {remedy}",
-                    half.0
-                )
-            }
-            Self::NotSmoothed { channel, reason } => write!(
-                f,
-                "channel {channel}: no curve goes through its readings, so each is followed with those before it only: \
-                 {reason}; check their frames, delays and half-widths"
-            ),
-            Self::Coincidence { channels: [a, b], after } => write!(
-                f,
-                "the channels {a} and {b} will sample at one instant in {:.3e} s: no bank recovers the signal there",
-                after.0
-            ),
         }
     }
 }

@@ -122,7 +122,7 @@ fn by_any_signal(
     records: &[Record],
 ) -> Result<Vec<Option<DelayMeasurement>>, NotMeasured> {
     let fit = Fit { delay: true, gain: true, offset: false, cutoff: None };
-    let found = calibrate(spec, records, CalibrationSignal::Any, Settings { fit, reference })?;
+    let found = calibrate(spec, records, &CalibrationSignal::Any, Settings { fit, reference })?;
     let h = spec.fast_period;
     let measured = |estimate: &crate::calibrate::ChannelEstimate| {
         let Estimate { value, sigma } = estimate.delay?;

@@ -18,7 +18,7 @@ mod tables;
 #[allow(dead_code, unreachable_pub, unused_imports)]
 mod theory;
 
-use hybank::plot::{AxisScale, Chart, Series};
+use hybank::plot::{Chart, Series};
 use page::{Page, Verdict};
 use std::path::PathBuf;
 
@@ -86,7 +86,7 @@ fn decades(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 /// A chart of labelled curves.
 fn chart(title: impl Into<String>, [x, y]: [&str; 2], curves: Vec<(&str, Curve)>) -> Chart {
     let series = curves.into_iter().map(|(label, points)| Series { label: label.into(), points }).collect();
-    Chart { title: title.into(), x_label: x.into(), x_scale: AxisScale::Linear, y_label: y.into(), series }
+    Chart { title: title.into(), x_label: x.into(), y_label: y.into(), series, ..Chart::default() }
 }
 
 /// What is measured and what is predicted at some levels.

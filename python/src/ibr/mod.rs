@@ -5,6 +5,7 @@ mod views;
 
 use crate::background;
 use crate::errors::{choose, refused};
+use crate::results::Made;
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::Measure;
 use hybank_ibr::interpolate::Cover;
@@ -13,40 +14,21 @@ use hybank_ibr::propagate::{CalibratedView, RectifiedView};
 use nalgebra::Matrix3x4;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
-pub(crate) use uncalibrated::{Geometry, render_uncalibrated};
+pub(crate) use uncalibrated::render_uncalibrated;
 use views::Views;
-
-/// A rendered view.
-#[pyclass(frozen, get_all, module = "hybank")]
-#[derive(FromPyObject)]
-pub(crate) struct View {
-    /// Intensities 0 to 255: (H, W), or (H, W, 3) if an image has colours.
-    image: Py<PyAny>,
-    /// Depth at the virtual camera, NaN in holes: (H, W). Without cameras only its order has a meaning.
-    depth: Py<PyAny>,
-    /// 0 where a view saw the pixel, 1 in cracks, 2 where no view saw it, 3 where only guessed depth shows
-    /// it: (H, W).
-    mask: Py<PyAny>,
-    /// Share of the pixels that samples cover.
-    coverage: f64,
-    /// True where the view was rendered: (H, W). Without cameras that is the convex hull of the points.
-    region: Py<PyAny>,
-    /// The estimated geometry of views without cameras; None for others.
-    geometry: Option<Py<Geometry>>,
-}
 
 /// The view from `at` on the line of rectified cameras, from images (H, W, C) and maps (H, W).
 #[pyfunction]
 #[pyo3(signature = (images, maps, positions, at, method, fill))]
-pub(crate) fn render_rectified(
-    py: Python<'_>,
+pub(crate) fn render_rectified<'py>(
+    py: Python<'py>,
     images: Vec<PyReadonlyArray3<'_, f32>>,
     maps: Vec<PyReadonlyArray2<'_, f32>>,
     positions: Vec<f64>,
     at: f64,
     method: &str,
     fill: bool,
-) -> PyResult<View> {
+) -> PyResult<Bound<'py, PyAny>> {
     let (views, settings) = (Views::new(&images, &maps, Measure::Disparity, fill)?, settings(method)?);
     let rendering = background::run(py, None, move |_| {
         let view = |((image, disparity), &position): (_, &f64)| RectifiedView {
@@ -57,15 +39,15 @@ pub(crate) fn render_rectified(
         let views: Vec<_> = views.both().zip(&positions).map(view).collect();
         rectified::render(&views, at, &settings)
     })?;
-    View::new(py, &rendering.map_err(refused)?, None, None)
+    made(py, &rendering.map_err(refused)?, None, None)
 }
 
 /// The view of `camera` with `size` (H, W), from images, depths and cameras (3, 4).
 #[pyfunction]
 #[pyo3(signature = (images, maps, cameras, camera, size, method, fill))]
 #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
-pub(crate) fn render_calibrated(
-    py: Python<'_>,
+pub(crate) fn render_calibrated<'py>(
+    py: Python<'py>,
     images: Vec<PyReadonlyArray3<'_, f32>>,
     maps: Vec<PyReadonlyArray2<'_, f32>>,
     cameras: Vec<PyReadonlyArray2<'_, f64>>,
@@ -73,7 +55,7 @@ pub(crate) fn render_calibrated(
     size: (usize, usize),
     method: &str,
     fill: bool,
-) -> PyResult<View> {
+) -> PyResult<Bound<'py, PyAny>> {
     let (views, settings) = (Views::new(&images, &maps, Measure::Depth, fill)?, settings(method)?);
     let cameras = cameras.iter().map(metric).collect::<PyResult<Vec<_>>>()?;
     let camera = metric(&camera)?;
@@ -82,7 +64,7 @@ pub(crate) fn render_calibrated(
         let views: Vec<_> = views.both().zip(&cameras).map(view).collect();
         calibrated::render(&views, &camera, (size.1, size.0), &settings)
     })?;
-    View::new(py, &rendering.map_err(refused)?, None, None)
+    made(py, &rendering.map_err(refused)?, None, None)
 }
 
 fn settings(method: &str) -> PyResult<RenderSettings> {
@@ -97,35 +79,32 @@ fn metric(matrix: &PyReadonlyArray2<'_, f64>) -> PyResult<Camera> {
     Camera::metric(Matrix3x4::from_fn(|i, j| rows[[i, j]]), false).map_err(refused)
 }
 
-impl View {
-    /// A rendering as arrays; without a region it is the whole image.
-    fn new(
-        py: Python<'_>,
-        rendering: &Rendering,
-        region: Option<Vec<bool>>,
-        geometry: Option<Geometry>,
-    ) -> PyResult<Self> {
-        let (width, height) = rendering.image.size();
-        let image = PyArray1::from_slice(py, rendering.image.data());
-        let image = match rendering.image.channels() {
-            1 => image.reshape([height, width])?.into_any(),
-            channels => image.reshape([height, width, channels])?.into_any(),
-        };
-        let mask = rendering.mask.iter().map(|cover| match cover {
-            Cover::Seen => 0u8,
-            Cover::Crack => 1,
-            Cover::Disocclusion => 2,
-            Cover::Guessed => 3,
-        });
-        let region = region.unwrap_or_else(|| vec![true; width * height]);
-        let depth = PyArray1::from_slice(py, rendering.depth.data());
-        Ok(Self {
-            image: image.unbind(),
-            depth: depth.reshape([height, width])?.into_any().unbind(),
-            mask: PyArray1::from_iter(py, mask).reshape([height, width])?.into_any().unbind(),
-            coverage: rendering.coverage(),
-            region: PyArray1::from_vec(py, region).reshape([height, width])?.into_any().unbind(),
-            geometry: geometry.map(|geometry| Py::new(py, geometry)).transpose()?,
-        })
-    }
+/// A rendering as arrays; without a region it is the whole image.
+fn made<'py>(
+    py: Python<'py>,
+    rendering: &Rendering,
+    region: Option<Vec<bool>>,
+    geometry: Option<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (width, height) = rendering.image.size();
+    let image = PyArray1::from_slice(py, rendering.image.data());
+    let image = match rendering.image.channels() {
+        1 => image.reshape([height, width])?.into_any(),
+        channels => image.reshape([height, width, channels])?.into_any(),
+    };
+    let mask = rendering.mask.iter().map(|cover| match cover {
+        Cover::Seen => 0u8,
+        Cover::Crack => 1,
+        Cover::Disocclusion => 2,
+        Cover::Guessed => 3,
+    });
+    let region = region.unwrap_or_else(|| vec![true; width * height]);
+    Made::new(py, "View")?
+        .with("image", image)?
+        .with("depth", PyArray1::from_slice(py, rendering.depth.data()).reshape([height, width])?)?
+        .with("mask", PyArray1::from_iter(py, mask).reshape([height, width])?)?
+        .with("coverage", rendering.coverage())?
+        .with("region", PyArray1::from_vec(py, region).reshape([height, width])?)?
+        .with("geometry", geometry)?
+        .object()
 }

@@ -1,38 +1,17 @@
 //! Views without cameras: images and tracks.
 
-use super::View;
+use super::made;
 use super::views::image;
 use crate::background;
 use crate::errors::refused;
+use crate::results::of_report;
 use hybank_ibr::image::Image;
 use hybank_ibr::pipeline::RenderSettings;
-use hybank_ibr::pipeline::uncalibrated::{GeometryReport, OrderBy, Target, UncalibratedSettings, render};
+use hybank_ibr::pipeline::uncalibrated::{OrderBy, Target, UncalibratedSettings, render};
 use hybank_ibr::uncalibrated::Point;
 use numpy::{PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
-
-/// The geometry that was estimated from tracks.
-#[pyclass(frozen, get_all, module = "hybank")]
-#[derive(FromPyObject)]
-pub(crate) struct Geometry {
-    /// Points that both of the first two views see.
-    matches: usize,
-    /// Of these, those within the threshold of the fundamental matrix.
-    inliers: usize,
-    /// Root mean square Sampson distance of the inliers, pixels.
-    sampson_rms: f64,
-    /// Points from which the virtual camera was estimated.
-    sightings: usize,
-    /// Of these, those within the threshold of the virtual camera.
-    resection_inliers: usize,
-    /// Root mean square reprojection error of these, pixels.
-    resection_rms: f64,
-    /// Share of the guessed calibrations that agree on the order of depth.
-    order_agreement: f64,
-    /// What decided the order of depth: given, calibrations, colours, both or nothing.
-    order_by: String,
-}
 
 /// One position for each track and view.
 type Tracks = Vec<Vec<Option<Point>>>;
@@ -41,15 +20,15 @@ type Tracks = Vec<Vec<Option<Point>>>;
 /// given by the positions (P, 2) of the points in it, or lies between the first two views.
 #[pyfunction]
 #[pyo3(signature = (images, tracks, points, between, size, reverse_order))]
-pub(crate) fn render_uncalibrated(
-    py: Python<'_>,
+pub(crate) fn render_uncalibrated<'py>(
+    py: Python<'py>,
     images: Vec<PyReadonlyArray3<'_, f32>>,
     tracks: PyReadonlyArray3<'_, f64>,
     points: Option<PyReadonlyArray2<'_, f64>>,
     between: f64,
     size: (usize, usize),
     reverse_order: bool,
-) -> PyResult<View> {
+) -> PyResult<Bound<'py, PyAny>> {
     let images = images.iter().map(image).collect::<PyResult<Vec<_>>>()?;
     let tracks = positions(&tracks);
     let target = points.map_or(Target::Between(between), |points| Target::Tracks(column(&points)));
@@ -69,7 +48,8 @@ pub(crate) fn render_uncalibrated(
             2,
         )?;
     }
-    View::new(py, &done.rendering, Some(done.region), Some(Geometry::from(done.geometry)))
+    let geometry = of_report(py, "Geometry", &done.geometry)?;
+    made(py, &done.rendering, Some(done.region), Some(geometry))
 }
 
 fn positions(tracks: &PyReadonlyArray3<'_, f64>) -> Tracks {
@@ -86,26 +66,4 @@ fn column(points: &PyReadonlyArray2<'_, f64>) -> Vec<Option<Point>> {
 /// `None` where a point is not seen.
 fn point(x: f64, y: f64) -> Option<Point> {
     (!x.is_nan() && !y.is_nan()).then(|| Point::new(x, y))
-}
-
-impl From<GeometryReport> for Geometry {
-    fn from(report: GeometryReport) -> Self {
-        Self {
-            matches: report.matches,
-            inliers: report.inliers,
-            sampson_rms: report.sampson_rms,
-            sightings: report.sightings,
-            resection_inliers: report.resection_inliers,
-            resection_rms: report.resection_rms,
-            order_agreement: report.order_agreement,
-            order_by: match report.order_by {
-                OrderBy::Given => "given",
-                OrderBy::Calibrations => "calibrations",
-                OrderBy::Colours => "colours",
-                OrderBy::Both => "both",
-                OrderBy::Nothing => "nothing",
-            }
-            .to_owned(),
-        }
-    }
 }

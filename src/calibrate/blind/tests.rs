@@ -89,7 +89,7 @@ fn intervals_cover_with_one_alias_and_with_three() {
             let frames = 2048;
             let signal = band_limited(2 * frames * ratio, band, &mut dice);
             let records = captures(&truth, &signal, frames, noise, &mut dice);
-            let found = calibrate(&spec, &records, CalibrationSignal::Any, BLIND).unwrap();
+            let found = calibrate(&spec, &records, &CalibrationSignal::Any, BLIND).unwrap();
             all.extend(scaled(&truth, &spec, &found));
         }
         assert_covers(&all, trials);
@@ -103,9 +103,10 @@ fn a_signal_that_fills_all_aliases_is_refused() {
     let (spec, mut dice) = (spec(2, &[1.0, 0.0]), Random(1));
     let signal: Vec<f64> = (0..8192).map(|_| gaussian(&mut dice)).collect();
     let records = captures(&spec, &signal, 2048, 1e-4, &mut dice);
-    let refused = calibrate(&spec, &records, CalibrationSignal::Any, BLIND).unwrap_err();
+    let refused = calibrate(&spec, &records, &CalibrationSignal::Any, BLIND).unwrap_err();
     assert_eq!(refused, CalibrateError::AllAliasesOccupied { channels: 2 });
-    let few = calibrate(&spec, &captures(&spec, &signal, 100, 0.0, &mut dice), CalibrationSignal::Any, BLIND);
+    let few =
+        calibrate(&spec, &captures(&spec, &signal, 100, 0.0, &mut dice), &CalibrationSignal::Any, BLIND);
     assert_eq!(few.unwrap_err(), CalibrateError::TooShort { frames: 100, needed: 256 });
 }
 
@@ -115,7 +116,7 @@ fn swapped_captures_are_recognised() {
     let signal = band_limited(8192, 0.4 * PI, &mut dice);
     let mut records = captures(&spec, &signal, 2048, 1e-3, &mut dice);
     records.swap(0, 1);
-    let refused = calibrate(&spec, &records, CalibrationSignal::Any, BLIND).unwrap_err();
+    let refused = calibrate(&spec, &records, &CalibrationSignal::Any, BLIND).unwrap_err();
     assert_eq!(refused, CalibrateError::WrongOrder { order: vec![2, 1] });
 }
 
@@ -126,7 +127,7 @@ fn offsets_are_relative_to_the_reference() {
     truth.channels[1].offset = 0.02;
     let signal = band_limited(8192, 0.4 * PI, &mut dice);
     let records = captures(&truth, &signal, 2048, 1e-3, &mut dice);
-    let found = calibrate(&spec, &records, CalibrationSignal::Any, BLIND).unwrap();
+    let found = calibrate(&spec, &records, &CalibrationSignal::Any, BLIND).unwrap();
     let offset = found.channels[1].offset.unwrap();
     assert!((offset.value - 0.02).abs() < 5.0 * offset.sigma && offset.sigma < 1e-4, "{offset:?}");
     assert_eq!(found.channels[0].offset.unwrap().sigma, 0.0);
@@ -144,7 +145,7 @@ fn speech_gives_its_delay_to_1e_5_fast_periods() {
     for off in [0.0, 0.05, -0.3] {
         let mut spec = Spec::from_toml(&text, "spec.toml").unwrap();
         spec.channels[1].delay.0 += off / 48_000.0;
-        let found = calibrate(&spec, &records, CalibrationSignal::Any, BLIND).unwrap();
+        let found = calibrate(&spec, &records, &CalibrationSignal::Any, BLIND).unwrap();
         let delay = found.channels[1].delay.unwrap();
         println!("speech: error {:.1e}, sigma {:.1e} fast periods", delay.value.0 - 0.6, delay.sigma.0);
         assert!((delay.value.0 - 0.6).abs() < 1e-5, "{delay:?}");

@@ -47,7 +47,12 @@ fn by_waveform(
     cutoff: Option<Cutoff>,
 ) -> Result<Calibration, CalibrateError> {
     let settings = Settings { fit: Fit { cutoff, ..Fit::default() }, reference: 0 };
-    calibrate(spec, records, CalibrationSignal::Waveform { samples, spacing: SPACING }, settings)
+    calibrate(
+        spec,
+        records,
+        &CalibrationSignal::Waveform { samples: samples.to_vec(), spacing: SPACING },
+        settings,
+    )
 }
 
 /// The standard deviation is s / sqrt(g^2 sum v'^2), and the intervals hold the truth.

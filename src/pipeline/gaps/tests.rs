@@ -15,7 +15,7 @@ fn random_taps(channels: usize, taps: usize, random: &mut Random) -> Vec<Vec<f64
 }
 
 fn filler(bank: &Bank, policy: GapPolicy) -> GapFiller {
-    GapFiller::new(bank, policy, 1, 0).unwrap()
+    GapFiller::new(bank, policy, 1, 0)
 }
 
 /// Fills whole frames; their marks, and whether they were filled.
@@ -153,7 +153,7 @@ fn a_complex_sample_is_missing_with_either_of_its_parts() {
         (GapPolicy::Hold, [[1.0, 1.0, 1.0, 4.0], [10.0, 10.0, 10.0, 40.0]]),
         (GapPolicy::Zero, [[1.0, 0.25, 0.25, 4.0], [10.0, 0.25, 0.25, 40.0]]),
     ] {
-        let mut gaps = GapFiller::new(&bank, policy, 2, 0).unwrap();
+        let mut gaps = GapFiller::new(&bank, policy, 2, 0);
         assert!(gaps.fill(&[&real, &imaginary].map(|part| Interleaved::new(part, 1).unwrap())));
         assert_eq!([gaps.filled(0), gaps.filled(1)], want);
         assert_eq!(gaps.marks(0..4), [0, 1, 1, 0]);
@@ -169,7 +169,7 @@ fn marks_come_later_by_the_latency_of_the_algorithm_whatever_the_blocks() {
     for latency in [0, 1, 6, 50] {
         let mut want = vec![0; latency];
         want.extend(samples.iter().map(|x| u8::from(x.is_nan())));
-        let mut gaps = GapFiller::new(&bank, GapPolicy::Zero, 1, latency).unwrap();
+        let mut gaps = GapFiller::new(&bank, GapPolicy::Zero, 1, latency);
         let mut got = Vec::new();
         for block in [&samples[..3], &samples[3..3], &samples[3..20], &samples[20..]] {
             gaps.fill(&[Interleaved::new(block, 1).unwrap()]);

@@ -42,7 +42,7 @@ fn command(
     settings: Settings<'_>,
     (format, is_complex): (PcmFormat, bool),
 ) -> (Written, Outcome) {
-    let mut pipeline = Pipeline::new(bank, plan, settings, format, is_complex).unwrap();
+    let mut pipeline = Pipeline::new(bank, plan, settings, format, is_complex);
     let mut written = Written::default();
     let mut write = |block: Block<'_>| {
         written.samples.extend_from_slice(block.samples);

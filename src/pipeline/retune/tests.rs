@@ -59,7 +59,7 @@ fn run(samples: &[f64], cut: usize) -> (Vec<f64>, Vec<f64>) {
 
 fn pipeline() -> Pipeline<'static> {
     let plan = bank().plan(options()).unwrap();
-    Pipeline::new(&bank(), &plan, Settings::default(), PcmFormat::F64Le, false).unwrap()
+    Pipeline::new(&bank(), &plan, Settings::default(), PcmFormat::F64Le, false)
 }
 
 /// Pushes samples in pieces of so many frames.
@@ -232,7 +232,7 @@ fn a_thread_that_died_ends_the_run_with_an_error() {
 #[test]
 fn filters_of_complex_samples_do_not_change_in_silence() {
     let plan = bank().plan(options()).unwrap();
-    let complex = Pipeline::new(&bank(), &plan, Settings::default(), PcmFormat::F64Le, true).unwrap();
+    let complex = Pipeline::new(&bank(), &plan, Settings::default(), PcmFormat::F64Le, true);
     let refused = complex.retuned_by(changing(false, &Arc::default())).unwrap_err();
     assert!(matches!(refused, PipelineError::RetunedComplex));
 }

@@ -54,7 +54,7 @@ fn only_samples_of_the_output_are_counted_as_clipped() {
         let skip = skip + plan.extra_latency();
         assert_eq!(skip, plan.latency());
         for format in [PcmFormat::S8, PcmFormat::S16Le, PcmFormat::S24Be, PcmFormat::F32Le] {
-            let mut pipeline = Pipeline::new(&bank, &plan, Settings::default(), format, false).unwrap();
+            let mut pipeline = Pipeline::new(&bank, &plan, Settings::default(), format, false);
             let mut got = Vec::new();
             let bytes: Vec<u8> = input.iter().flat_map(|x| x.to_le_bytes()).collect();
             // Pieces of 3 frames, so that borders of blocks and of what is kept meet in all ways.
@@ -81,7 +81,7 @@ fn complex(input: &[[f32; 2]], gaps: Option<GapPolicy>) -> (Vec<f32>, Outcome) {
     let bank = Bank { delays: vec![Seconds(0.0); 2], ..Bank::bare(SynthesisFilters::Fir(taps), 2) };
     let plan = bank.plan(Options::default()).unwrap();
     let settings = Settings { gaps, dropped: DroppedLatency::Nothing, ..Settings::default() };
-    let mut pipeline = Pipeline::new(&bank, &plan, settings, PcmFormat::F32Le, true).unwrap();
+    let mut pipeline = Pipeline::new(&bank, &plan, settings, PcmFormat::F32Le, true);
     let bytes: Vec<u8> = input.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
     let mut output = Vec::new();
     for piece in bytes.chunks(16 * 3) {

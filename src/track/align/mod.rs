@@ -94,7 +94,7 @@ pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result
     let AlignSettings { reference, within, .. } = settings;
     let fit = Settings { fit: Fit::default(), reference };
     check(spec, records, fit)?;
-    check_parts(records, CalibrationSignal::Any)?;
+    check_parts(records, &CalibrationSignal::Any)?;
     if !spec.layout().is_plain() {
         return Err(AlignError::Rates);
     }

@@ -153,7 +153,7 @@ impl<'a> Pieces<'a> {
         }
         let (begin, frames) = longest_run(&parts);
         let parts: Vec<Record> = parts.iter().map(|part| part.part(begin..begin + frames)).collect();
-        let found = calibrate(&spec, &parts, CalibrationSignal::Any, self.settings)?;
+        let found = calibrate(&spec, &parts, &CalibrationSignal::Any, self.settings)?;
         let centre = (first + begin) as f64 + 0.5 * (frames as f64 - 1.0);
         let mut channels = found.channels;
         for (i, channel) in channels.iter_mut().enumerate() {

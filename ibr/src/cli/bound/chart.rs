@@ -2,7 +2,7 @@
 
 use crate::analysis::{Cause, Totals, ViewError};
 use crate::image::Image;
-use hybank::plot::{AxisScale, Chart, PlotError, Series};
+use hybank::plot::{Chart, PlotError, Series};
 use image::{ImageFormat, RgbImage};
 use std::io::Cursor;
 use std::path::Path;
@@ -73,9 +73,9 @@ fn numbers(predicted: &ViewError, truth: Option<&Image>) -> Chart {
     Chart {
         title: "Error of the image rows, predicted from the inputs".into(),
         x_label: "image row".into(),
-        x_scale: AxisScale::Linear,
         y_label: "grey levels".into(),
         series,
+        ..Chart::default()
     }
 }
 
@@ -91,9 +91,9 @@ fn causes(predicted: &ViewError) -> Chart {
     Chart {
         title: "What the estimate comes from".into(),
         x_label: "image row".into(),
-        x_scale: AxisScale::Linear,
         y_label: "grey levels".into(),
         series: Cause::ALL.into_iter().map(of_cause).collect(),
+        ..Chart::default()
     }
 }
 

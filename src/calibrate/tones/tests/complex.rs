@@ -82,7 +82,7 @@ fn what_complex_captures_do_not_tell_is_said() {
     assert!(found.channels.iter().all(|channel| channel.offset.is_none()));
     let other = by_tones(&spec, &records, &[41e3]);
     assert!(matches!(other, Err(CalibrateError::OtherSign { .. })), "{other:?}");
-    let blind = calibrate(&spec, &records, CalibrationSignal::Any, Settings::default());
+    let blind = calibrate(&spec, &records, &CalibrationSignal::Any, Settings::default());
     assert!(matches!(blind, Err(CalibrateError::ComplexSamples { complex: 4, records: 4 })));
     let mut mixed = records.clone();
     mixed[1].imaginary = None;

@@ -19,13 +19,13 @@ const SKEWS: [f64; 4] = [0.01, 0.01, 0.002, 0.0];
 
 fn by_tones(spec: &Spec, records: &[Record], given: &[f64]) -> Result<Calibration, CalibrateError> {
     let given: Vec<Hertz> = given.iter().map(|&f| Hertz(f)).collect();
-    calibrate(spec, records, CalibrationSignal::Tones(&given), Settings::default())
+    calibrate(spec, records, &CalibrationSignal::Tones(given), Settings::default())
 }
 
 fn with_cutoff(spec: &Spec, records: &[Record], given: &[f64]) -> Result<Calibration, CalibrateError> {
     let given: Vec<Hertz> = given.iter().map(|&f| Hertz(f)).collect();
     let settings = Settings { fit: Fit { cutoff: Some(Cutoff::Whole), ..Fit::default() }, reference: 0 };
-    calibrate(spec, records, CalibrationSignal::Tones(&given), settings)
+    calibrate(spec, records, &CalibrationSignal::Tones(given), settings)
 }
 
 fn hertz(list: &[f64]) -> Vec<Hertz> {
@@ -254,10 +254,10 @@ fn the_reference_keeps_the_values_of_the_spec() {
     let truth = with_errors(&spec, &random_errors(&mut dice, 4, SKEWS));
     let records = tones(&truth, &[Hertz(203e3)], 2048, 1e-4, &mut dice);
     let settings = Settings { reference: 2, ..Settings::default() };
-    let found = calibrate(&spec, &records, CalibrationSignal::Tones(&[Hertz(203e3)]), settings).unwrap();
+    let found = calibrate(&spec, &records, &CalibrationSignal::Tones(vec![Hertz(203e3)]), settings).unwrap();
     assert_eq!((found.channels[2].delay, found.channels[2].gain), (None, None));
     assert!(errors(&truth, &found).scaled.iter().all(|x| x.abs() < 5.0));
     let only_gain = Settings { fit: Fit { delay: false, offset: false, ..Fit::default() }, reference: 0 };
-    let found = calibrate(&spec, &records, CalibrationSignal::Tones(&[Hertz(203e3)]), only_gain).unwrap();
+    let found = calibrate(&spec, &records, &CalibrationSignal::Tones(vec![Hertz(203e3)]), only_gain).unwrap();
     assert!(found.channels.iter().all(|c| c.delay.is_none() && c.offset.is_none()));
 }

@@ -19,7 +19,7 @@ const NAMES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
 fn pooled(spec: &Spec, all: &[Vec<Record>], given: &[f64]) -> Result<Calibration, CalibrateError> {
     let all: Vec<Acquisition<'_>> =
         all.iter().zip(NAMES).map(|(records, name)| Acquisition { name, records }).collect();
-    calibrate_pooled(spec, &all, CalibrationSignal::Tones(&hertz(given)), Settings::default())
+    calibrate_pooled(spec, &all, &CalibrationSignal::Tones(hertz(given)), Settings::default())
 }
 
 fn acquired(truth: &Spec, dice: &mut Random) -> Vec<Vec<Record>> {
@@ -79,7 +79,7 @@ fn faults_name_the_acquisition() {
     let short = pooled(&spec, &all, &LIST).unwrap_err().to_string();
     assert!(short.starts_with("b: captures: 3, but channels in the spec: 4"), "{short}");
     let any = [Acquisition { name: "a", records: &all[0] }; 2];
-    let refused = calibrate_pooled(&spec, &any, CalibrationSignal::Any, Settings::default()).unwrap_err();
+    let refused = calibrate_pooled(&spec, &any, &CalibrationSignal::Any, Settings::default()).unwrap_err();
     assert_eq!(refused, CalibrateError::NotPooled { acquisitions: 2 });
 }
 

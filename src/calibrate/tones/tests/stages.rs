@@ -33,7 +33,7 @@ fn with_pole(spec: &Spec, dice: &mut Random, factor: f64) -> Spec {
 
 fn fitted(spec: &Spec, records: &[Record], cutoff: Option<Cutoff>) -> Result<Calibration, CalibrateError> {
     let settings = Settings { fit: Fit { cutoff, ..Fit::default() }, reference: 0 };
-    calibrate(spec, records, CalibrationSignal::Tones(&LIST.map(Hertz)), settings)
+    calibrate(spec, records, &CalibrationSignal::Tones(LIST.map(Hertz).to_vec()), settings)
 }
 
 #[test]
