@@ -42,7 +42,7 @@ fn sampled_worst_case() {
     ] {
         let problem = problem(&bank, taps, points);
         stopwatch::time(&format!("sampled worst case, {name}"), || {
-            sampled::minimise(&problem, &Settings::DEFAULT)
+            sampled::minimise(&problem, &Settings::DEFAULT, &|| false)
         });
     }
 }
@@ -55,10 +55,17 @@ fn mean_square_under_cap() {
     ] {
         let problem = problem(&bank, taps, points);
         let settings = Settings::DEFAULT;
-        let best = sampled::minimise(&problem, &settings).expect("settings are the defaults");
+        let best = sampled::minimise(&problem, &settings, &|| false).expect("settings are the defaults");
         let square = sampled::MeanSquareObjective::noiseless(vec![1.0; points], problem.channels());
         stopwatch::time(&format!("mean square under cap, {name}"), || {
-            sampled::mean_square_under_cap(&problem, &square, 1.001 * best.gamma, &best.taps, &settings)
+            sampled::mean_square_under_cap(
+                &problem,
+                &square,
+                1.001 * best.gamma,
+                &best.taps,
+                &settings,
+                &|| false,
+            )
         });
     }
 }

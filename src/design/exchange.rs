@@ -187,7 +187,7 @@ pub(super) struct Exchange<E: AffineError> {
     pub(super) lower_for_all: f64,
     /// The dual matrices that prove `lower`.
     pub(super) dual: Vec<DualPoint>,
-    /// Ends the exchange between two rounds, with the best unknowns so far.
+    /// Ends the exchange with the best unknowns so far.
     pub(super) stop: Stop,
     /// What the last search for the least gamma left open, or that for the least mean square after it,
     /// unless it was stopped.
@@ -336,7 +336,7 @@ impl<E: AffineError> Exchange<E> {
     /// Solves the problem on the points.
     fn round(&mut self, tolerances: Tolerances, tolerance: f64) -> Result<Round<E::Scenario>, DesignError> {
         let settings = Settings { tol_gap_rel: tolerance, ..Settings::DEFAULT };
-        let solution = sampled::minimise(&self.problem, &settings)?;
+        let solution = sampled::minimise(&self.problem, &settings, &|| self.stop.is_due())?;
         self.count_round(solution.iterations);
         self.raise_lower_bound(solution.lower, solution.dual);
         // The optimum lies anywhere between the two.
@@ -391,6 +391,7 @@ impl<E: AffineError> Exchange<E> {
                 cap_at_points,
                 &start.taps,
                 &settings,
+                &|| self.stop.is_due(),
             );
             let found = match found {
                 Ok(found) => found,

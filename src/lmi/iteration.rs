@@ -11,7 +11,8 @@ pub enum Outcome {
     Solved,
     /// No further progress, but the duality gap is within the reduced tolerance.
     SolvedInaccurate,
-    /// The iteration limit was reached first; the best iterate and its bounds are returned.
+    /// The iteration limit was reached first, or the caller ended the iteration; the best iterate and its
+    /// bounds are returned.
     IterationLimit,
     /// Rounding errors stopped the progress; the best iterate and its bounds are returned.
     NumericalTrouble,
@@ -75,6 +76,9 @@ pub(super) fn centering(ratio: f64) -> f64 {
     ratio.clamp(0.0, 1.0).powi(3).clamp(CENTERING[0], CENTERING[1])
 }
 
+/// Whether the caller wants the iteration to end with what it has. Once due, it stays due.
+pub type IsDue<'a> = &'a dyn Fn() -> bool;
+
 /// A primal-dual iterate, as the loop sees it.
 pub(super) trait Iterate {
     /// The relative duality gap of the iterate, or a cheap estimate of it.
@@ -84,15 +88,20 @@ pub(super) trait Iterate {
     /// estimate is within the tolerance, and at the end.
     fn judged_gap(&mut self) -> Result<f64, LmiError>;
 
-    /// Makes one predictor-corrector step; `None` if rounding errors prevent it.
+    /// Makes one predictor-corrector step; `None` if rounding errors prevent it or the caller ends it.
     fn step(&mut self) -> Option<()>;
 }
 
-/// Iterates until the gap is within its tolerance, the progress ends or the limit is reached. Returns the
-/// outcome and the number of steps.
-pub(super) fn run(iterate: &mut impl Iterate, settings: &Settings) -> Result<(Outcome, usize), LmiError> {
+/// Iterates until the gap is within its tolerance, the progress ends, the limit is reached or the end `is_due`.
+/// Returns the outcome and the number of steps. An iterate whose end is due is not judged: that takes as long
+/// as several steps.
+pub(super) fn run(
+    iterate: &mut impl Iterate,
+    settings: &Settings,
+    is_due: IsDue<'_>,
+) -> Result<(Outcome, usize), LmiError> {
     let (mut least, mut waited, mut steps) = (f64::INFINITY, 0, 0);
-    while steps < settings.max_iterations {
+    while steps < settings.max_iterations && !is_due() {
         let gap = iterate.gap();
         if gap <= settings.tol_gap_rel && iterate.judged_gap()? <= settings.tol_gap_rel {
             return Ok((Outcome::Solved, steps));
@@ -103,6 +112,9 @@ pub(super) fn run(iterate: &mut impl Iterate, settings: &Settings) -> Result<(Ou
             break;
         }
         steps += 1;
+    }
+    if is_due() {
+        return Ok((Outcome::IterationLimit, steps));
     }
     let outcome = match iterate.judged_gap()? {
         gap if gap <= settings.tol_gap_rel => Outcome::Solved,

@@ -19,4 +19,4 @@ pub mod sampled;
 mod testbank;
 
 pub use error::LmiError;
-pub use iteration::{Outcome, Settings};
+pub use iteration::{IsDue, Outcome, Settings};

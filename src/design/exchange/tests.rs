@@ -139,7 +139,8 @@ fn the_exchange_ends_where_a_dense_grid_does() {
     for a in [0.4, -0.7] {
         let dense: Vec<Point> =
             (0..=600).map(|k| geometric(a, 1.0, &[1.0, 2.0]).point(PI * f64::from(k) / 600.0)).collect();
-        let dense = sampled::minimise(&Problem::new(dense, vec![3]).unwrap(), &Settings::DEFAULT).unwrap();
+        let dense =
+            sampled::minimise(&Problem::new(dense, vec![3]).unwrap(), &Settings::DEFAULT, &|| false).unwrap();
         let mut exchange = exchange(geometric(a, 1.0, &[1.0, 2.0]), 3, 0.0);
         let best = exchange.optimise().unwrap();
         assert!(

@@ -50,7 +50,8 @@ fn under_cap(error: &TapError<'_>, cap: f64) -> Result<Option<SmallerTaps>, Desi
     let objective = MeanSquareObjective { weights, noise: vec![1.0; channels] };
     let start = polyphase(error.problem.taps, error.ratio);
     let settings = Settings { tol_gap_rel: ACCURACY, ..Settings::DEFAULT };
-    match mean_square_under_cap(&problem, &objective, cap, &start, &settings) {
+    match mean_square_under_cap(&problem, &objective, cap, &start, &settings, &|| error.problem.stop.is_due())
+    {
         Ok(found) => Ok(Some(SmallerTaps { gamma: cap, taps: impulse_responses(&found.taps, length) })),
         Err(LmiError::Cap { .. }) => Ok(None),
         Err(error) => Err(error.into()),

@@ -69,7 +69,7 @@ impl<'a> OrderSearch<'a> {
         let system = problem.plant.system();
         Ok(Self {
             problem,
-            samples: PlantSamples::new(problem.plant)?,
+            samples: PlantSamples::new(problem.plant, problem.stop)?,
             splits: splits(problem)?,
             full: figures(problem, &FirWithTail::new(problem.bank)?)?,
             banks: BTreeMap::new(),

@@ -4,6 +4,7 @@
 use super::dynamics::Dynamics;
 use crate::design::DesignError;
 use crate::design::exchange::{AffineError, Exchange, LocatedPeak, Location, Peaks};
+use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
 use crate::linalg::Complex;
 use crate::lmi::Settings;
@@ -25,6 +26,8 @@ const LEAST_DISTANCE: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub(super) struct PlantSamples<'a> {
     pub(super) plant: &'a LiftedPlant,
+    /// Ends each problem with the best outputs so far.
+    stop: &'a Stop,
     /// The first GRID + 1 are uniform, unless the samples are coarse.
     pub(super) samples: Vec<Point>,
 }
@@ -34,8 +37,8 @@ impl<'a> PlantSamples<'a> {
     ///
     /// # Errors
     /// [`DesignError::Lti`] if the plant is not stable.
-    pub(super) fn new(plant: &'a LiftedPlant) -> Result<Self, DesignError> {
-        let mut samples = Self { plant, samples: Vec::new() };
+    pub(super) fn new(plant: &'a LiftedPlant, stop: &'a Stop) -> Result<Self, DesignError> {
+        let mut samples = Self { plant, stop, samples: Vec::new() };
         let uniform = (0..=GRID).map(|k| PI * k as f64 / GRID as f64);
         let near = (1..=TOWARDS_ZERO).map(|k| PI / GRID as f64 * 0.5_f64.powi(k as i32));
         for omega in uniform.chain(near).chain(resonances(&stable_poles(plant.system())?)) {
@@ -46,7 +49,7 @@ impl<'a> PlantSamples<'a> {
 
     /// One frequency in [`COARSE`], enough to rank candidates by their worst case.
     pub(super) fn coarse(&self) -> Self {
-        Self { plant: self.plant, samples: self.samples.iter().step_by(COARSE).cloned().collect() }
+        Self { samples: self.samples.iter().step_by(COARSE).cloned().collect(), ..*self }
     }
 
     /// Adds a frequency, unless it is known.
@@ -71,7 +74,7 @@ impl<'a> PlantSamples<'a> {
     /// output matrices.
     pub(super) fn worst_case(&self, dynamics: &Dynamics, accuracy: f64) -> Result<Solution, DesignError> {
         let settings = Settings { tol_gap_rel: accuracy, ..Settings::DEFAULT };
-        Ok(sampled::minimise(&self.problem(dynamics)?, &settings)?)
+        Ok(sampled::minimise(&self.problem(dynamics)?, &settings, &|| self.stop.is_due())?)
     }
 
     /// The bank of least gamma with these dynamics and, within `gamma_margin`, of least mean square. The
@@ -84,8 +87,10 @@ impl<'a> PlantSamples<'a> {
         let problem = self.problem(dynamics)?;
         let objective = MeanSquareObjective::noiseless(self.weights(), problem.channels());
         let regressors = FrequencyResponse::new(&dynamics.regressors()?);
+        let stop = self.stop.clone();
         let error = OutputError { samples: self, dynamics, regressors };
         let mut exchange = Exchange::new(error, problem, std::iter::repeat(()), objective, gamma_margin)?;
+        exchange.stop = stop;
         let best = exchange.optimise()?;
         let frequencies: Vec<f64> = exchange.locations().iter().map(|location| location.frequency).collect();
         frequencies.into_iter().for_each(|omega| self.add(omega));

@@ -160,7 +160,8 @@ fn no_other_outputs_is_better() {
         let built =
             |outputs: &Mat| error(&plant, &dynamics.with_outputs(outputs).unwrap().realise().unwrap());
         assert!((h2_norm(&built(&square)).unwrap() / norm - 1.0).abs() < 1e-9);
-        let best = PlantSamples::new(&plant).unwrap().best_bank(&dynamics, 0.0).unwrap().realise().unwrap();
+        let best =
+            PlantSamples::new(&plant, &NEVER).unwrap().best_bank(&dynamics, 0.0).unwrap().realise().unwrap();
         let mut worst = Mat::zeros(2, square.ncols());
         worst.columns_mut(0, best.order()).copy_from(best.c());
         worst.columns_mut(best.order(), 2).copy_from(best.d());
@@ -206,7 +207,7 @@ fn a_refinement_that_fails_says_so() {
     let bank = bank_of(Method::Iir, &plant);
     let root = state_covariance_root(&plant, &bank).unwrap();
     let start = Dynamics::balanced(&bank, 0, &root).unwrap().truncated(2);
-    let mut samples = PlantSamples::new(&plant).unwrap();
+    let mut samples = PlantSamples::new(&plant, &NEVER).unwrap();
     let refine =
         |samples: &PlantSamples<'_>| pole_refinement::refined(Aim::WorstCase, samples, &start, 4).unwrap();
     assert_eq!(refine(&samples).failure, None);

@@ -11,7 +11,7 @@ use super::problem::{MeanSquareObjective, Point, Problem, Taps};
 use super::quadratic::Quadratic;
 use crate::lmi::factor::RegularisedCholesky;
 use crate::lmi::iteration::{self, Iterate, RANK};
-use crate::lmi::{LmiError, Outcome, Settings};
+use crate::lmi::{IsDue, LmiError, Outcome, Settings};
 
 /// Taps of least mean square under a cap.
 #[derive(Debug, Clone)]
@@ -57,13 +57,15 @@ pub(crate) fn least_squares(
 ///
 /// `start` must satisfy the cap strictly: the taps of [`super::minimise`] with a cap a little above
 /// their gamma. If the unconstrained least-squares taps satisfy the cap they are returned at once.
-/// The result is never worse than the start, and satisfies the cap, however the iteration ended.
+/// The result is never worse than the start, and satisfies the cap, however the iteration ended; when the end
+/// `is_due`, it is the best so far.
 pub fn mean_square_under_cap(
     problem: &Problem,
     square: &MeanSquareObjective,
     cap: f64,
     start: &Taps,
     settings: &Settings,
+    is_due: IsDue<'_>,
 ) -> Result<MeanSquare, LmiError> {
     problem.check_taps(start)?;
     let free = least_squares(problem, square, RANK)?;
@@ -83,12 +85,12 @@ pub fn mean_square_under_cap(
     let quadratic = Quadratic::new(&reduced, square, start, cap, unit);
     let zero = vec![0.0; reduced.layout.unknowns()];
     let curvature = RegularisedCholesky::new(quadratic.curvature(&reduced));
-    let engine = Engine::new(&reduced, Objective::MeanSquare(quadratic), zero, 1.0);
+    let engine = Engine::new(&reduced, Objective::MeanSquare(quadratic), zero, 1.0, is_due);
     let (Some(engine), Ok(curvature)) = (engine, curvature) else {
         return Ok(best.finish(Outcome::NumericalTrouble, free_square, 0));
     };
     let mut run = Run { engine, curvature };
-    let (outcome, iterations) = iteration::run(&mut run, settings)?;
+    let (outcome, iterations) = iteration::run(&mut run, settings, is_due)?;
     let step = reduced.taps(&run.engine.x);
     let found = start.iter().zip(step).map(|(f, d)| f + d * cap).collect();
     best.offer(best.within_cap(found)?)?;

@@ -57,7 +57,7 @@ fn report(name: &str, problem: &Problem, s: &Solution, seconds: f64) {
 
 fn solve(name: &str, problem: &Problem) -> Solution {
     let start = std::time::Instant::now();
-    let s = minimise(problem, &Settings::DEFAULT).unwrap();
+    let s = minimise(problem, &Settings::DEFAULT, &|| false).unwrap();
     report(name, problem, &s, start.elapsed().as_secs_f64());
     check(problem, &s);
     s

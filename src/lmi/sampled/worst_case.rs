@@ -7,7 +7,7 @@ use super::prepare::Reduced;
 use super::problem::{Problem, Taps};
 use crate::linalg::{self, CMat};
 use crate::lmi::iteration::{self, GAP_OF_ZERO, Iterate, RANK};
-use crate::lmi::{LmiError, Outcome, Settings};
+use crate::lmi::{IsDue, LmiError, Outcome, Settings};
 
 /// The start lies this factor above the worst point of the least-squares taps (in t), far enough inside for
 /// the first Newton step.
@@ -33,11 +33,11 @@ pub struct Solution {
 /// Minimises the worst-case norm. See the module's text for the problem and the method.
 ///
 /// Every well-formed problem has a solution: the result holds the best taps found, their worst case over the
-/// points and a lower bound, whatever the outcome.
+/// points and a lower bound, whatever the outcome. When the end `is_due`, they are the best so far.
 ///
 /// # Errors
 /// [`LmiError::Linalg`] if a decomposition does not converge.
-pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, LmiError> {
+pub fn minimise(problem: &Problem, settings: &Settings, is_due: IsDue<'_>) -> Result<Solution, LmiError> {
     let mut reduced = Reduced::new(problem)?;
     if reduced.layout.unknowns() == 0 {
         return fixed(problem);
@@ -53,11 +53,14 @@ pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, LmiE
     reduced.w = reduced.error(&x);
     reduced.rescale(scale);
     let zero = vec![0.0; x.len()];
-    let Some(engine) = Engine::new(&reduced, Objective::WorstCase, zero, START_MARGIN) else {
+    let Some(engine) = Engine::new(&reduced, Objective::WorstCase, zero, START_MARGIN, is_due) else {
         return Ok(best.finish(Outcome::NumericalTrouble, 0));
     };
     let mut run = Run { problem, reduced: &reduced, basis: &basis, start: x, scale, engine, best };
-    let (outcome, iterations) = iteration::run(&mut run, settings)?;
+    let (outcome, iterations) = iteration::run(&mut run, settings, is_due)?;
+    if is_due() {
+        run.offer_taps()?;
+    }
     Ok(run.best.finish(outcome, iterations))
 }
 
@@ -111,6 +114,19 @@ struct Run<'a> {
     best: Best,
 }
 
+impl Run<'_> {
+    /// Takes the taps of the iterate if they are better.
+    fn offer_taps(&mut self) -> Result<(), LmiError> {
+        let x: Vec<f64> = self.start.iter().zip(&self.engine.x).map(|(a, b)| a + self.scale * b).collect();
+        let taps = self.reduced.taps(&x);
+        let (gamma, _) = self.problem.worst(&taps)?;
+        if gamma < self.best.gamma {
+            (self.best.taps, self.best.gamma) = (taps, gamma);
+        }
+        Ok(())
+    }
+}
+
 impl Iterate for Run<'_> {
     /// A quarter of the complementarity gap and of the residual: from there on, the gap of the bound that
     /// the dual matrices prove is usually within the tolerance.
@@ -121,13 +137,8 @@ impl Iterate for Run<'_> {
 
     /// From the computed norm of the taps of the iterate and the lower bound that its dual matrices give.
     fn judged_gap(&mut self) -> Result<f64, LmiError> {
+        self.offer_taps()?;
         let best = &mut self.best;
-        let x: Vec<f64> = self.start.iter().zip(&self.engine.x).map(|(a, b)| a + self.scale * b).collect();
-        let taps = self.reduced.taps(&x);
-        let (gamma, _) = self.problem.worst(&taps)?;
-        if gamma < best.gamma {
-            (best.taps, best.gamma) = (taps, gamma);
-        }
         let cover = bound::cover(self.problem, self.reduced, self.basis, (&best.taps, best.gamma))?;
         let (lower, dual) =
             bound::from_iterate(self.problem, self.reduced, self.basis, &self.engine.cone.z, cover)?;

@@ -1,5 +1,6 @@
 use super::*;
 use crate::design::Problem;
+use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
 use crate::spec::Spec;
 
@@ -14,7 +15,8 @@ fn plant() -> LiftedPlant {
 #[test]
 fn gradients_are_those_of_the_error() {
     let plant = plant();
-    let samples = PlantSamples::new(&plant).unwrap();
+    let never = Stop::default();
+    let samples = PlantSamples::new(&plant, &never).unwrap();
     for lags in [0, 1] {
         let start = Dynamics {
             lags,

@@ -40,14 +40,47 @@ fn exactly_reproducible_targets_give_zero() {
 #[test]
 fn an_exhausted_iteration_limit_keeps_valid_bounds() {
     let problem = random_problem(31, (2, 2, 4), 30, &[5, 5]);
-    let full = minimise(&problem, &Settings::DEFAULT).unwrap();
+    let full = minimise(&problem, &Settings::DEFAULT, &|| false).unwrap();
     for max_iterations in 0..6 {
-        let s = minimise(&problem, &Settings { max_iterations, ..Settings::DEFAULT }).unwrap();
+        let s = minimise(&problem, &Settings { max_iterations, ..Settings::DEFAULT }, &|| false).unwrap();
         check(&problem, &s);
         assert_eq!(s.outcome, Outcome::IterationLimit);
         assert_eq!(s.iterations, max_iterations);
         assert!(s.gamma >= full.lower.value && s.lower.value <= full.gamma && s.lower.value > 0.0);
     }
+}
+
+/// However often it is asked before its end is due, the iteration ends without another whole step, and keeps the
+/// best taps so far.
+#[test]
+fn an_iteration_whose_end_is_due_ends_at_once_with_its_best_taps() {
+    let problem = random_problem(31, (2, 2, 4), 30, &[5, 5]);
+    let full = minimise(&problem, &Settings::DEFAULT, &|| false).unwrap();
+    let square = MeanSquareObjective::noiseless(vec![1.0; 30], problem.channels());
+    let cap = full.gamma * 1.01;
+    let of_start = problem.mean_square(&full.taps, &square);
+    let points = 30;
+    let (mut first, mut last) = (f64::INFINITY, f64::INFINITY);
+    for before in [0, 1, 7, points, 5 * points, 20 * points, 60 * points] {
+        let asked = std::cell::Cell::new(0);
+        let is_due = || {
+            asked.set(asked.get() + 1);
+            asked.get() > before
+        };
+        let s = minimise(&problem, &Settings::DEFAULT, &is_due).unwrap();
+        check(&problem, &s);
+        assert_eq!(s.outcome, Outcome::IterationLimit);
+        assert!(asked.get() <= before + 12, "{} {before}", asked.get());
+        assert!(s.gamma >= full.lower.value && s.lower.value <= full.gamma);
+        last = s.gamma;
+        first = first.min(if before == 0 { s.gamma } else { first });
+        asked.set(0);
+        let ms =
+            mean_square_under_cap(&problem, &square, cap, &full.taps, &Settings::DEFAULT, &is_due).unwrap();
+        assert!(asked.get() <= before + 12, "{} {before}", asked.get());
+        assert!(ms.mean_square <= of_start && ms.gamma <= cap && ms.lower <= ms.mean_square, "{ms:?}");
+    }
+    assert!(last < first, "{last} {first}");
 }
 
 #[test]
@@ -70,14 +103,14 @@ fn what_is_no_problem_is_refused() {
         Problem::new(good.points().to_vec(), vec![1]),
         Err(LmiError::Count { given: 1, wanted: 2, .. })
     ));
-    let s = minimise(&good, &Settings::DEFAULT).unwrap();
+    let s = minimise(&good, &Settings::DEFAULT, &|| false).unwrap();
     let channels = good.channels();
     let with = |weights: &[f64], noise: &[f64]| MeanSquareObjective {
         weights: weights.to_vec(),
         noise: noise.to_vec(),
     };
     let capped = |square: &MeanSquareObjective, cap, taps| {
-        mean_square_under_cap(&good, square, cap, taps, &Settings::DEFAULT)
+        mean_square_under_cap(&good, square, cap, taps, &Settings::DEFAULT, &|| false)
     };
     let ones = MeanSquareObjective::noiseless(vec![1.0; 3], channels);
     let refused = |weights: &[f64], noise: &[f64]| capped(&with(weights, noise), 1.0, &s.taps).unwrap_err();

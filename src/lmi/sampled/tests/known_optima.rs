@@ -49,7 +49,8 @@ fn steep_front_ends_are_solved_to_a_proven_gap() {
         assert!(is_solved(s.outcome) && relative_gap(&s) < 1e-5, "{}", relative_gap(&s));
         let cap = 1.01 * s.gamma;
         let square = MeanSquareObjective::noiseless(vec![1.0; 97], 8);
-        let ms = mean_square_under_cap(&problem, &square, cap, &s.taps, &Settings::DEFAULT).unwrap();
+        let ms =
+            mean_square_under_cap(&problem, &square, cap, &s.taps, &Settings::DEFAULT, &|| false).unwrap();
         println!(
             "{:?} {} -> {} >= {}, {} steps",
             ms.outcome,
@@ -125,7 +126,7 @@ fn general_conic_solver_agrees() {
         let weights = (0..omegas.len()).map(|l| 0.5 + 0.1 * l as f64).collect();
         let square = MeanSquareObjective::noiseless(weights, problem.channels());
         let settings = Settings::DEFAULT;
-        let ms = mean_square_under_cap(&problem, &square, cap, &s.taps, &settings).unwrap();
+        let ms = mean_square_under_cap(&problem, &square, cap, &s.taps, &settings, &|| false).unwrap();
         println!("{:?}", (ms.outcome, ms.mean_square, ms.lower, ms.iterations));
         assert_eq!(ms.outcome, Outcome::Solved, "{sizes:?}");
         assert!((ms.mean_square - capped).abs() < 2e-7 * capped, "{sizes:?}: {}", ms.mean_square);
