@@ -145,7 +145,7 @@ fn cones(plant: &LiftedPlant, taps: usize) -> Result<Cones, DesignError> {
 fn clarabel(spec: &Spec) -> Result<(f64, f64), Box<dyn Error>> {
     let latency = spec.latency.ok_or("the spec gives no latency")?;
     let taps = spec.design.taps.ok_or("the spec gives no taps")?;
-    let plant = LiftedPlant::new(&Problem::new(spec, latency)?)?;
+    let plant = LiftedPlant::new(&Problem::new(spec, latency)?);
     let cones = cones(&plant, taps)?;
     let a = cones.matrix();
     let unknowns = a.n;

@@ -286,9 +286,9 @@ impl<'a> ErrorGrid<'a> {
 impl AffineError for ErrorGrid<'_> {
     type Scenario = usize;
 
-    fn at(&self, location: &Location<usize>) -> Result<Point, DesignError> {
+    fn at(&self, location: &Location<usize>) -> Point {
         let s = location.scenario;
-        Ok(self.of_exchange(s, &self.scenarios[s].at(location.frequency)))
+        self.of_exchange(s, &self.scenarios[s].at(location.frequency))
     }
 
     fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<usize>, DesignError> {

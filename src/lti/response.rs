@@ -125,7 +125,7 @@ mod tests {
             let a = Mat::from_fn(n, n, |i, j| 0.9 * ((i * 5 + j * 3 + 1) as f64).sin() / (n as f64));
             let b = Mat::from_fn(n, 3, |i, j| ((i + j) as f64).cos());
             let c = Mat::from_fn(2, n, |i, j| ((i * 2 + j) as f64).sin());
-            check(&StateSpace::new(a, b, c, Mat::from_element(2, 3, 0.5)).unwrap());
+            check(&StateSpace::new(a, b, c, Mat::from_element(2, 3, 0.5)));
         }
     }
 
@@ -137,7 +137,7 @@ mod tests {
             b[0] = 1.0;
             let mut c = Mat::zeros(1, n);
             c[n - 1] = 1.0;
-            check(&StateSpace::new(a, b, c, Mat::zeros(1, 1)).unwrap());
+            check(&StateSpace::new(a, b, c, Mat::zeros(1, 1)));
         }
     }
 
@@ -155,9 +155,8 @@ mod tests {
                 Mat::from_fn(n, 3, |i, j| b[(i, j)] * unit(i)),
                 Mat::from_fn(2, n, |i, j| c[(i, j)] / unit(j)),
                 Mat::zeros(2, 3),
-            )
-            .unwrap();
-            let plain = StateSpace::new(a, b, c, Mat::zeros(2, 3)).unwrap();
+            );
+            let plain = StateSpace::new(a, b, c, Mat::zeros(2, 3));
             let response = FrequencyResponse::new(&scaled);
             for w in [0.0, 0.3, 1.1, 2.7] {
                 let (got, want) = (response.at_frequency(w), plain.response_at(Complex::from_polar(1.0, w)));

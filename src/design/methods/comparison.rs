@@ -55,7 +55,7 @@ pub(crate) fn separation(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
 fn fir_taps(problem: &Problem, taps: usize) -> Result<Vec<Vec<f64>>, DesignError> {
     let noiseless = Problem { noise: vec![0.0; problem.channels.len()], ..problem.clone() };
     let settings = Settings { taps, ..Settings::default() };
-    fir::taps_of_least_gamma(&LiftedPlant::new(&noiseless)?, &settings)
+    fir::taps_of_least_gamma(&LiftedPlant::new(&noiseless), &settings)
 }
 
 /// The channels as inputs of the second step: with integer delays, with the latency that the first step

@@ -8,7 +8,7 @@ fn plant() -> LiftedPlant {
     let text = "fast_period = 1.0\nratio = 2\nlatency = 10\n\
         target = { filter = { num = [0.25], den = [1.0, 1.0, 0.25] } }\n\
         channel = [{ delay = 1.2 }, { delay = 0.6 }]\ndesign = { method = \"iir\" }";
-    LiftedPlant::new(&Problem::new(&Spec::from_toml(text, "spec.toml").unwrap(), 10).unwrap()).unwrap()
+    LiftedPlant::new(&Problem::new(&Spec::from_toml(text, "spec.toml").unwrap(), 10).unwrap())
 }
 
 /// Both gradients against differences.
