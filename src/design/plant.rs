@@ -8,6 +8,7 @@ use super::merging::Repeats;
 use super::problem::Problem;
 use crate::bank::SynthesisFilters;
 use crate::linalg::{self, CMat, Complex, Mat};
+use crate::lmi::sampled::Point;
 use crate::lti::gramian::h2_norm;
 use crate::lti::peak::{
     Peak, hinf_norm, hinf_norm_with_response, resonances, stable_poles, unexplained_peak,
@@ -151,12 +152,12 @@ impl LiftedPlant {
         self.driving(filters).map_outputs(&linalg::hstack(&[&-&unity, &unity]))
     }
 
-    /// (H, W) at e^{j omega}, omega in radians per slow period. The columns are compressed to at most N + M,
+    /// H and W at e^{j omega}, omega in radians per slow period. The columns are compressed to at most N + M,
     /// which keeps `[H; W] [H; W]*`.
-    pub fn response(&self, omega: f64) -> (CMat, CMat) {
+    pub fn at(&self, omega: f64) -> Point {
         let g = linalg::lq_factor(&self.at_frequency(omega));
         let (n, m) = (self.channels(), self.ratio());
-        (g.rows(0, n).into_owned(), g.rows(n, m).into_owned())
+        Point { omega, h: g.rows(0, n).into_owned(), w: g.rows(n, m).into_owned() }
     }
 
     /// ||K|| with the frequency at which it is attained, radians per slow period.

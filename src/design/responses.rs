@@ -95,8 +95,8 @@ pub fn analysis_gains(bank: &Bank, frequencies: &[Hertz]) -> Result<Vec<Vec<f64>
     let noise = vec![0.0; channels.len()];
     let plant = LiftedPlant::new(&Problem { ratio: 1, latency: 0, channels, noise, ..problem });
     let gains = |frequency: &Hertz| {
-        let (h, w) = plant.response(frequency.angular().per_fast_period(bank.fast_period).0);
-        w.row_iter().chain(h.row_iter()).map(|row| row.norm()).collect()
+        let point = plant.at(frequency.angular().per_fast_period(bank.fast_period).0);
+        point.w.row_iter().chain(point.h.row_iter()).map(|row| row.norm()).collect()
     };
     Ok(frequencies.iter().map(gains).collect())
 }
@@ -118,8 +118,7 @@ pub fn error_response(bank: &Bank, points: usize) -> Result<Vec<(Hertz, f64)>, D
     let step = PI / points.saturating_sub(1).max(1) as f64;
     let at = |k: usize| {
         let omega = step * k as f64;
-        let (h, w) = plant.response(omega);
-        let gain = linalg::largest_singular_value(&(w - filters.at(omega) * h))?;
+        let gain = linalg::largest_singular_value(&plant.at(omega).error(&filters.at(omega)))?;
         Ok((RadiansPerSlowPeriod(omega).in_hertz(bank.slow_period()), gain))
     };
     (0..points).map(at).collect()

@@ -4,7 +4,7 @@ use super::StateSpace;
 use crate::linalg::{self, CMat, Complex, Mat};
 use nalgebra::linalg::Hessenberg;
 
-/// Evaluates G(z) = c (zI - a)^-1 b + d at many z.
+/// Evaluates G(z) = c (zI - a)^-1 b + d at many points z of the unit circle.
 ///
 /// With a' = Q H Q' the transposed problem (zI - H) X = Q' c' has as many right-hand sides as the system
 /// has outputs, which here are few. Then G = X' Q' b + d.
@@ -31,16 +31,11 @@ impl FrequencyResponse {
         }
     }
 
-    /// G(z), p x m.
-    pub fn at(&self, z: Complex<f64>) -> CMat {
-        let mut x = linalg::to_complex(&self.outputs);
-        self.solve_shifted(z, &mut x);
-        self.through_inputs(&x) + &self.feedthrough
-    }
-
     /// G(e^{jw}), p x m.
     pub fn at_frequency(&self, w: f64) -> CMat {
-        self.at(Complex::from_polar(1.0, w))
+        let mut x = linalg::to_complex(&self.outputs);
+        self.solve_shifted(Complex::from_polar(1.0, w), &mut x);
+        self.through_inputs(&x) + &self.feedthrough
     }
 
     /// X' Q' b. The inputs are real: one product for the real and imaginary parts together.

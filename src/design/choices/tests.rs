@@ -74,11 +74,7 @@ fn least_mean_square(problem: &Problem, latency: usize, taps: usize) -> f64 {
     let ratio = problem.ratio;
     let lags: Vec<usize> = (0..ratio).map(|p| taps.saturating_sub(p).div_ceil(ratio)).collect();
     let count = 256;
-    let points = (0..=count).map(|k| {
-        let omega = std::f64::consts::PI * k as f64 / count as f64;
-        let (h, w) = plant.response(omega);
-        sampled::Point { omega, h, w }
-    });
+    let points = (0..=count).map(|k| plant.at(std::f64::consts::PI * k as f64 / count as f64));
     let grid = sampled::Problem::new(points.collect(), lags);
     let weight = |k: usize| if k == 0 || k == count { 0.5 } else { 1.0 } / count as f64;
     let weights: Vec<f64> = (0..=count).map(weight).collect();

@@ -20,7 +20,7 @@ pub(crate) fn sinc(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis
         return Err(DesignError::SincNeedsNyquist { channels, ratio });
     }
     let offsets: Vec<f64> = problem.delays().iter().map(|delay| -delay.0).collect();
-    let sets = Recurrent::new(&offsets, ratio)?;
+    let sets = Recurrent::new(&offsets)?;
     let taps = |i: usize| {
         let mut taps = sets.taps(i, problem.latency as f64, settings.taps);
         taps.iter_mut().for_each(|tap| *tap /= problem.channels[i].converter_gain);

@@ -54,13 +54,8 @@ impl<'a> PlantSamples<'a> {
     /// Adds a frequency, unless it is known.
     fn add(&mut self, omega: f64) {
         if self.samples.iter().all(|known| (known.omega - omega).abs() >= LEAST_DISTANCE) {
-            self.samples.push(self.at(omega));
+            self.samples.push(self.plant.at(omega));
         }
-    }
-
-    fn at(&self, omega: f64) -> Point {
-        let (h, w) = self.plant.response(omega);
-        Point { omega, w, h }
     }
 
     fn problem(&self, dynamics: &Dynamics) -> sampled::Problem {
@@ -115,7 +110,7 @@ impl AffineError for OutputError<'_> {
     type Scenario = ();
 
     fn at(&self, location: &Location<()>) -> Point {
-        driving(&self.regressors, self.samples.at(location.frequency))
+        driving(&self.regressors, self.samples.plant.at(location.frequency))
     }
 
     fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<()>, DesignError> {

@@ -17,6 +17,13 @@ pub struct Point {
     pub h: CMat,
 }
 
+impl Point {
+    /// K = W - F H for the filters' response F.
+    pub(crate) fn error(&self, filters: &CMat) -> CMat {
+        &self.w - filters * &self.h
+    }
+}
+
 /// The secondary objective: the weighted mean square of the error, and the power of the noise that the
 /// channels themselves add,
 ///
@@ -103,7 +110,7 @@ impl Problem {
     /// `K_l = W_l - sum_j e^{-i omega_l j} F_j H_l`.
     pub(crate) fn error_at(&self, l: usize, taps: &Taps) -> CMat {
         let point = &self.points[l];
-        &point.w - response(taps, point.omega, self.rows(), self.channels()) * &point.h
+        point.error(&response(taps, point.omega, self.rows(), self.channels()))
     }
 
     /// Largest `sigma_max(K_l)` over the points, and the index of the point where it is attained.
