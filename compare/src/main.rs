@@ -16,6 +16,7 @@
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SupportedConeT};
 use hybank::design::{DesignError, LiftedPlant, Options, Problem, design};
+use hybank::lmi::sampled::Point;
 use hybank::spec::Spec;
 use nalgebra::{Complex, DMatrix};
 use std::error::Error;
@@ -114,7 +115,7 @@ fn cones(plant: &LiftedPlant, taps: usize) -> Result<Cones, DesignError> {
         Cones { columns: vec![Vec::new(); 1 + channels * taps], right: Vec::new(), orders: Vec::new() };
     for k in 0..=intervals {
         let omega = PI * k as f64 / intervals as f64;
-        let (h, w) = plant.response(omega);
+        let Point { h, w, .. } = plant.at(omega);
         let rest = w.columns(channels, w.ncols() - channels).into_owned();
         let order = ratio + channels;
         let mut constant = CMat::identity(order, order);
@@ -145,7 +146,7 @@ fn cones(plant: &LiftedPlant, taps: usize) -> Result<Cones, DesignError> {
 fn clarabel(spec: &Spec) -> Result<(f64, f64), Box<dyn Error>> {
     let latency = spec.latency.ok_or("the spec gives no latency")?;
     let taps = spec.design.taps.ok_or("the spec gives no taps")?;
-    let plant = LiftedPlant::new(&Problem::new(spec, latency)?)?;
+    let plant = LiftedPlant::new(&Problem::new(spec, latency)?);
     let cones = cones(&plant, taps)?;
     let a = cones.matrix();
     let unknowns = a.n;

@@ -106,7 +106,7 @@ fn analysis(bank: &Bank) -> Outcome<Chart> {
 
 /// Magnitude and phase of F_1 and F_2.
 fn synthesis(bank: &Bank) -> Outcome<[Chart; 2]> {
-    let responses = impulse_responses(bank)?;
+    let responses = impulse_responses(bank);
     let curve = |value: &dyn Fn(&[f64]) -> Vec<f64>| {
         let points =
             |taps: &Vec<f64>| value(taps).into_iter().enumerate().map(|(k, y)| (frequency(k), y)).collect();

@@ -1,48 +1,44 @@
 //! Matrices from blocks: side by side, on top of one another, and along the diagonal.
 
-use super::LinalgError;
 use nalgebra::{ComplexField, DMatrix};
 
 /// `[p_1 p_2 ..]`: the `parts` side by side. No parts give a 0 x 0 matrix.
 ///
-/// # Errors
-/// [`LinalgError::Sizes`] if the numbers of rows differ.
-pub fn hstack<T: ComplexField>(parts: &[&DMatrix<T>]) -> Result<DMatrix<T>, LinalgError> {
-    let Some(first) = parts.first() else { return Ok(DMatrix::zeros(0, 0)) };
-    check("hstack", "rows", parts, |m| m.nrows())?;
-    let mut whole = DMatrix::zeros(first.nrows(), parts.iter().map(|m| m.ncols()).sum());
+/// # Panics
+/// If the numbers of rows differ.
+pub fn hstack<T: ComplexField>(parts: &[&DMatrix<T>]) -> DMatrix<T> {
+    let rows = parts.first().map_or(0, |first| first.nrows());
+    let mut whole = DMatrix::zeros(rows, parts.iter().map(|m| m.ncols()).sum());
     let mut start = 0;
     for part in parts {
         whole.columns_mut(start, part.ncols()).copy_from(part);
         start += part.ncols();
     }
-    Ok(whole)
+    whole
 }
 
 /// `[p_1; p_2; ..]`: the `parts` on top of one another, the first one uppermost. No parts give a 0 x 0
 /// matrix.
 ///
-/// # Errors
-/// [`LinalgError::Sizes`] if the numbers of columns differ.
-pub fn vstack<T: ComplexField>(parts: &[&DMatrix<T>]) -> Result<DMatrix<T>, LinalgError> {
-    let Some(first) = parts.first() else { return Ok(DMatrix::zeros(0, 0)) };
-    check("vstack", "columns", parts, |m| m.ncols())?;
-    let mut whole = DMatrix::zeros(parts.iter().map(|m| m.nrows()).sum(), first.ncols());
+/// # Panics
+/// If the numbers of columns differ.
+pub fn vstack<T: ComplexField>(parts: &[&DMatrix<T>]) -> DMatrix<T> {
+    let columns = parts.first().map_or(0, |first| first.ncols());
+    let mut whole = DMatrix::zeros(parts.iter().map(|m| m.nrows()).sum(), columns);
     let mut start = 0;
     for part in parts {
         whole.rows_mut(start, part.nrows()).copy_from(part);
         start += part.nrows();
     }
-    Ok(whole)
+    whole
 }
 
 /// The matrix of the given rows of blocks, `from_blocks(&[&[&a, &b], &[&c, &d]]) = [a b; c d]`.
 ///
-/// # Errors
-/// [`LinalgError::Sizes`] if the blocks of a row differ in their numbers of rows, or the rows in their
-/// widths.
-pub fn from_blocks<T: ComplexField>(rows: &[&[&DMatrix<T>]]) -> Result<DMatrix<T>, LinalgError> {
-    let rows = rows.iter().map(|row| hstack(row)).collect::<Result<Vec<_>, _>>()?;
+/// # Panics
+/// If the blocks of a row differ in their numbers of rows, or the rows in their widths.
+pub fn from_blocks<T: ComplexField>(rows: &[&[&DMatrix<T>]]) -> DMatrix<T> {
+    let rows: Vec<DMatrix<T>> = rows.iter().map(|row| hstack(row)).collect();
     vstack(&rows.iter().collect::<Vec<_>>())
 }
 
@@ -57,20 +53,4 @@ pub fn block_diagonal<T: ComplexField>(parts: &[&DMatrix<T>]) -> DMatrix<T> {
         start = (start.0 + part.nrows(), start.1 + part.ncols());
     }
     whole
-}
-
-/// Every part has the size of the first one, as `size` counts it.
-fn check<T>(
-    operation: &'static str,
-    shared: &'static str,
-    parts: &[&DMatrix<T>],
-    size: impl Fn(&DMatrix<T>) -> usize,
-) -> Result<(), LinalgError> {
-    let shape = |m: &DMatrix<T>| (m.nrows(), m.ncols());
-    match parts.iter().find(|part| size(part) != size(parts[0])) {
-        None => Ok(()),
-        Some(other) => {
-            Err(LinalgError::Sizes { operation, shared, first: shape(parts[0]), other: shape(other) })
-        }
-    }
 }

@@ -48,18 +48,6 @@ pub enum LinalgError {
         /// Columns of the matrix.
         cols: usize,
     },
-    /// The sizes of the matrices do not match.
-    #[error("{operation} needs as many {shared} in each matrix, got {}x{} and {}x{}", first.0, first.1, other.0, other.1)]
-    Sizes {
-        /// The operation.
-        operation: &'static str,
-        /// The size that must be equal: rows or columns.
-        shared: &'static str,
-        /// Rows and columns of the first matrix.
-        first: (usize, usize),
-        /// Rows and columns of the one that does not fit it.
-        other: (usize, usize),
-    },
     /// A matrix holds NaN or infinity.
     #[error("the {rows} x {cols} matrix given to {routine} holds a value that is not finite")]
     NotFinite {

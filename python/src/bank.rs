@@ -228,9 +228,9 @@ impl Bank {
         let rows = background::run(py, None, move |_| {
             let angular = |f: &Hertz| f.angular().per_fast_period(bank.fast_period);
             let row = |taps: &Vec<f64>| of.iter().map(|f| fir_response(taps, angular(f)).0).collect();
-            impulse_responses(&bank).map(|taps| taps.iter().map(row).collect::<Vec<Vec<Complex64>>>())
+            impulse_responses(&bank).iter().map(row).collect::<Vec<Vec<Complex64>>>()
         })?;
-        let rows = PyArray2::from_vec2(py, &rows.map_err(refused)?)?;
+        let rows = PyArray2::from_vec2(py, &rows)?;
         Ok((PyArray1::from_iter(py, frequencies.iter().map(|f| f.0)), rows))
     }
 
@@ -427,7 +427,7 @@ impl Bank {
                 "ss would have {states} states, and dense matrices of at most {MOST_DENSE_STATES} are made; use taps"
             )));
         }
-        let filters = design::filters::lifted(&self.bank.filters, self.bank.ratio).map_err(refused)?;
+        let filters = design::filters::lifted(&self.bank.filters, self.bank.ratio);
         Ok(design::filters::to_block(&filters))
     }
 }

@@ -60,7 +60,7 @@ pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, Design
     }
     let shifted = problem.with_delay_errors(&errors);
     shifted.check_size()?;
-    let plant = LiftedPlant::new(&shifted)?;
+    let plant = LiftedPlant::new(&shifted);
     let peak = resolved_norm(&moved_by(bank, delay_errors), plant.bank_norm(&bank.filters)?)?;
     let noncausal = if shifted.resolves_delays() { Some(plant.noncausal_bound()?.gain) } else { None };
     Ok(Analysis {
@@ -91,27 +91,27 @@ fn moved_by<'a>(bank: &'a Bank, delay_errors: &[Seconds]) -> Cow<'a, Bank> {
 /// As [`analyze`].
 pub fn analyze_mean(bank: &Bank) -> Result<MeanAnalysis, DesignError> {
     let problem = Problem::of_bank(bank)?;
-    mean_of(bank, &LiftedPlant::new(&problem)?)
+    mean_of(bank, &LiftedPlant::new(&problem))
 }
 
 /// Rms of the output noise for independent noise of unit rms on all slow samples; a bank needs no front ends
 /// for that.
 ///
 /// # Errors
-/// [`DesignError::RaggedStateSpace`] and [`DesignError::Lti`] for filters that are none, or unstable ones.
+/// [`DesignError::Lti`] for unstable filters.
 pub fn noise_gain(bank: &Bank) -> Result<f64, DesignError> {
-    Ok(h2_norm(&filters::lifted(&bank.filters, bank.ratio)?)? / (bank.ratio as f64).sqrt())
+    Ok(h2_norm(&filters::lifted(&bank.filters, bank.ratio))? / (bank.ratio as f64).sqrt())
 }
 
 fn mean_of(bank: &Bank, plant: &LiftedPlant) -> Result<MeanAnalysis, DesignError> {
-    let filters = filters::lifted(&bank.filters, bank.ratio)?;
-    let error = plant.error_system(&filters)?;
+    let filters = filters::lifted(&bank.filters, bank.ratio);
+    let error = plant.error_system(&filters);
     let noise_rms: Vec<f64> = plant.problem().noise.iter().map(|power| power.sqrt()).collect();
     let per_sample = (bank.ratio as f64).sqrt();
     Ok(MeanAnalysis {
         rms_error: h2_norm(&error)? / per_sample,
         noise_gain: h2_norm(&filters)? / per_sample,
-        output_noise: h2_norm(&filters.scale_inputs(&noise_rms)?)? / per_sample,
+        output_noise: h2_norm(&filters.scale_inputs(&noise_rms))? / per_sample,
     })
 }
 
@@ -135,9 +135,9 @@ impl GammaScale {
     /// too many delay-chain states.
     pub fn new(bank: &Bank) -> Result<Self, DesignError> {
         let problem = Problem::of_bank(bank)?;
-        let plant = LiftedPlant::new(&problem)?;
+        let plant = LiftedPlant::new(&problem);
         let zero = StateSpace::gain(Mat::zeros(problem.ratio, problem.channels.len()));
-        let reference = plant.reference()?;
+        let reference = plant.reference();
         Ok(Self {
             zero_output: plant.norm(&zero)?.gain,
             interleaving: plant.fir_norm(&interleaving(&problem))?.gain,

@@ -223,11 +223,11 @@ fn error_of_order(spec: &Spec, problem: &Problem) -> Result<f64, DesignError> {
     let mut spec = spec.clone();
     spec.design.method = Method::H2;
     let merged = problem.merge_channels(Repeats::of(&spec)).of_unit_size()?;
-    let plant = LiftedPlant::new(&merged.problem)?;
+    let plant = LiftedPlant::new(&merged.problem);
     let synthesis = methods::synthesise(Method::H2, &plant, &settings(&spec)?)?;
     let realised = realise(&spec, problem, &merged, &plant, &synthesis, &Stop::default())?;
-    let system = filters::lifted(&realised.filters, problem.ratio)?;
-    whole_error(&LiftedPlant::new(problem)?, &Filters::StateSpace(system))
+    let system = filters::lifted(&realised.filters, problem.ratio);
+    whole_error(&LiftedPlant::new(problem), &Filters::StateSpace(system))
 }
 
 /// The fewest taps per channel whose least error reaches the SNR that `spec` asks for, or which is within
@@ -292,9 +292,9 @@ fn lengthened(
     for designs in 0..LENGTHENINGS {
         compared(designs)?;
         let settings = Settings { taps, ..settings(spec)? };
-        let plant = LiftedPlant::new(&Problem { latency, ..problem.clone() })?;
+        let plant = LiftedPlant::new(&Problem { latency, ..problem.clone() });
         let error = whole_error(&plant, &methods::synthesise(Method::Fir, &plant, &settings)?.filters)?;
-        let target = h2_norm(&plant.reference()?)? / (plant.ratio() as f64).sqrt();
+        let target = h2_norm(&plant.reference())? / (plant.ratio() as f64).sqrt();
         best = f64::max(best, 20.0 * (target / error).log10());
         if error <= target * 10f64.powf(-wanted / 20.0) {
             return Ok(Choice { taps, latency });
@@ -357,10 +357,10 @@ fn with_uncertain_instants(spec: &Spec) -> Spec {
 /// The root of the mean square of error and noise together, per fast sample.
 fn whole_error(plant: &LiftedPlant, filters: &Filters) -> Result<f64, DesignError> {
     let system = match filters {
-        Filters::Fir(taps) => StateSpace::fir(&filters::polyphase(taps, plant.ratio()))?,
+        Filters::Fir(taps) => StateSpace::fir(&filters::polyphase(taps, plant.ratio())),
         Filters::StateSpace(system) => system.clone(),
     };
-    let error = plant.with_noise()?.error_system(&system)?;
+    let error = plant.with_noise().error_system(&system);
     Ok(h2_norm(&error)? / (plant.ratio() as f64).sqrt())
 }
 

@@ -58,8 +58,8 @@ impl Covariances {
     /// # Errors
     /// [`DesignError`] if a decomposition fails or a front end is not stable.
     pub(crate) fn new(problem: &Problem) -> Result<Self, DesignError> {
-        let joint = JointState::new(problem)?;
-        let (transition, input) = joint.over(problem.ratio as f64)?;
+        let joint = JointState::new(problem);
+        let (transition, input) = joint.over(problem.ratio as f64);
         let root = controllability_root(&transition, &input)?;
         let slopes = joint.slopes() * &root;
         let mut poles = problem.signal.as_ref().map_or(Ok(Vec::new()), |w| linalg::eigenvalues(w.a()))?;

@@ -120,7 +120,7 @@ fn designed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
     } else {
         problem.merge_channels(Repeats::of(spec)).of_unit_size()?
     };
-    let plant = LiftedPlant::new(&merged.problem)?;
+    let plant = LiftedPlant::new(&merged.problem);
     let synthesis = methods::synthesise(spec.design.method, &plant, &settings)?;
     (options.observer)(Stage::Realisation, effort);
     let realised = realise(&complete, &problem, &merged, &plant, &synthesis, &stop)?;
@@ -151,10 +151,10 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
     if taps.len() != channels || taps.iter().any(|list| list.len() != length) {
         return Err(DesignError::TapCount { lists: taps.len(), channels });
     }
-    let plant = LiftedPlant::new(&problem)?;
+    let plant = LiftedPlant::new(&problem);
     let synthesis = Synthesis::of_taps(&plant, taps.clone())?;
     let filters = SynthesisFilters::Fir(taps);
-    let rounding = plant.rounding(&filters::lifted(&filters, problem.ratio)?)?;
+    let rounding = plant.rounding(&filters::lifted(&filters, problem.ratio))?;
     let realised = Realised { filters, peak: synthesis.peak, rounding, reduction: None, integers: None };
     Ok(judge(&complete, complete.clone(), realised, &synthesis).without_unresolved_bounds(&problem).proved(
         &DualSolution::default(),

@@ -5,8 +5,7 @@ use super::limits::{
 };
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
-use crate::lmi::LmiError;
-use crate::lti::{LtiError, StateSpaceError};
+use crate::lti::LtiError;
 use crate::messages::Number;
 use crate::sampling::SamplingError;
 use crate::spec::{SpecProblem, WordLengths};
@@ -35,12 +34,6 @@ pub enum DesignError {
     /// A decomposition failed.
     #[error(transparent)]
     Linalg(#[from] LinalgError),
-    /// Matrix sizes do not match.
-    #[error(transparent)]
-    Shapes(#[from] StateSpaceError),
-    /// A linear matrix inequality was not well formed, or could not be set up.
-    #[error(transparent)]
-    Lmi(#[from] LmiError),
     /// No certificate was found, not even for a gamma up to 10 % above the computed norm.
     #[error(
         "the computed gamma could not be proven: no certificate passes up to 10 % above it, {}{}; the front ends may be too \
@@ -236,14 +229,6 @@ pub enum DesignError {
         shortest: usize,
         /// The longest one.
         longest: usize,
-    },
-    /// A bank's state-space matrices have rows of unequal lengths.
-    #[error("the bank's state-space matrices do not fit: expected {rows} rows of {cols} numbers")]
-    RaggedStateSpace {
-        /// Expected rows.
-        rows: usize,
-        /// Expected columns.
-        cols: usize,
     },
     /// A bank's recursive filters are unstable.
     #[error(

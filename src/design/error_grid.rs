@@ -105,11 +105,6 @@ impl<'a> Scenario<'a> {
         Self { plant, factors, weight, points: Vec::new() }
     }
 
-    fn at(&self, omega: f64) -> Point {
-        let (h, w) = self.plant.response(omega);
-        Point { omega, h, w }
-    }
-
     /// The filters' response from that of the taps.
     fn filters(&self, taps: &CMat) -> CMat {
         let channels = taps.ncols() / self.factors.len();
@@ -232,7 +227,7 @@ impl<'a> ErrorGrid<'a> {
         let scenario = &self.scenarios[s];
         let at = |frequency: f64| {
             let filters = scenario.filters(&filters::response(taps.taps, frequency));
-            Ok(Peak { gain: gain(&error(&scenario.at(frequency), &filters))?, frequency })
+            Ok(Peak { gain: gain(&scenario.plant.at(frequency).error(&filters))?, frequency })
         };
         let maxima = local_maxima(&grid).into_iter().filter(|[_, peak, _]| peak.gain >= PRUNE_LEVEL * level);
         maxima.map(|around| refine(at, around, FLAT_GAIN)).collect()
@@ -264,12 +259,12 @@ impl<'a> ErrorGrid<'a> {
 
     fn error(&self, s: usize, k: usize, taps: &GridResponse<'_>) -> CMat {
         let response = taps.values[k].get_or_init(|| filters::response(taps.taps, self.frequencies.all[k]));
-        error(self.point(s, k), &self.scenarios[s].filters(response))
+        self.point(s, k).error(&self.scenarios[s].filters(response))
     }
 
     fn point(&self, s: usize, k: usize) -> &Point {
         let scenario = &self.scenarios[s];
-        scenario.points[k].get_or_init(|| scenario.at(self.frequencies.all[k]))
+        scenario.points[k].get_or_init(|| scenario.plant.at(self.frequencies.all[k]))
     }
 
     /// A point of a scenario among those of all, with columns of zeros where a scenario with coinciding
@@ -286,9 +281,9 @@ impl<'a> ErrorGrid<'a> {
 impl AffineError for ErrorGrid<'_> {
     type Scenario = usize;
 
-    fn at(&self, location: &Location<usize>) -> Result<Point, DesignError> {
+    fn at(&self, location: &Location<usize>) -> Point {
         let s = location.scenario;
-        Ok(self.of_exchange(s, &self.scenarios[s].at(location.frequency)))
+        self.of_exchange(s, &self.scenarios[s].plant.at(location.frequency))
     }
 
     fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<usize>, DesignError> {
@@ -297,16 +292,6 @@ impl AffineError for ErrorGrid<'_> {
         let found = self.peaks(taps, if self.scenarios.len() == 1 { 0.0 } else { level })?;
         Ok(Peaks { estimate: found.estimate.max(gamma), ..found })
     }
-}
-
-/// K = W - F H for the filters' response F.
-fn error(point: &Point, filters: &CMat) -> CMat {
-    &point.w - filters * &point.h
-}
-
-/// K at a point for the filters with the taps `lags`.
-pub(super) fn error_at(point: &Point, lags: &[Mat]) -> CMat {
-    error(point, &filters::response(lags, point.omega))
 }
 
 fn gain(error: &CMat) -> Result<f64, DesignError> {

@@ -25,7 +25,7 @@ use super::limits::Stop;
 use super::unfinished::{EndOfSearch, Unfinished};
 use crate::linalg::{self, CMat};
 use crate::lmi::sampled::{self, Covered, LowerBound, MeanSquareObjective, Point, Problem, Taps};
-use crate::lmi::{LmiError, Outcome, Settings};
+use crate::lmi::{FINEST_GAP, Outcome};
 
 /// Relative width of the interval `[lower, gamma]` at which the exchange ends.
 pub(crate) const GAMMA_ACCURACY: f64 = 5e-7;
@@ -64,7 +64,7 @@ impl Tolerances {
     /// Every problem as closely as the last one, for few rounds: five are rarely needed.
     fn steady(accuracy: f64) -> Self {
         let loosest = POINTS_ACCURACY * accuracy;
-        Self { accuracy, loosest, mean_square: Settings::DEFAULT.tol_gap_rel, active: 0.0, rounds: 16 }
+        Self { accuracy, loosest, mean_square: FINEST_GAP, active: 0.0, rounds: 16 }
     }
 
     /// For many rounds. Each problem is solved only as closely as the peaks between its points require: an
@@ -90,10 +90,7 @@ pub(super) trait AffineError {
     type Scenario: Clone + PartialEq + std::fmt::Debug;
 
     /// W and H at a location.
-    ///
-    /// # Errors
-    /// [`DesignError`] if a decomposition does not converge.
-    fn at(&self, location: &Location<Self::Scenario>) -> Result<Point, DesignError>;
+    fn at(&self, location: &Location<Self::Scenario>) -> Point;
 
     /// The peaks of `sigma_max(K)` for the unknowns `taps`, whose largest value at the points is `gamma`.
     /// Peaks up to `level` may be left out.
@@ -187,7 +184,7 @@ pub(super) struct Exchange<E: AffineError> {
     pub(super) lower_for_all: f64,
     /// The dual matrices that prove `lower`.
     pub(super) dual: Vec<DualPoint>,
-    /// Ends the exchange between two rounds, with the best unknowns so far.
+    /// Ends the exchange with the best unknowns so far.
     pub(super) stop: Stop,
     /// What the last search for the least gamma left open, or that for the least mean square after it,
     /// unless it was stopped.
@@ -202,23 +199,19 @@ impl<E: AffineError> Exchange<E> {
     /// Starts from the points of `problem`, which belong to these scenarios. `objective` has a weight for
     /// each of them, `gamma_margin` is the relative excess of gamma granted to it, at least
     /// [`LEAST_MARGIN`].
-    ///
-    /// # Errors
-    /// [`DesignError::Sampled`] if the objective does not fit the problem.
     pub(super) fn new(
         error: E,
         problem: Problem,
         scenarios: impl IntoIterator<Item = E::Scenario>,
         objective: MeanSquareObjective,
         gamma_margin: f64,
-    ) -> Result<Self, DesignError> {
-        problem.check_objective(&objective)?;
+    ) -> Self {
         let frequencies = problem.points().iter().map(|point| point.omega);
         let located =
             frequencies.zip(scenarios).map(|(frequency, scenario)| Location { frequency, scenario });
         let locations = located.collect();
         let gamma_margin = gamma_margin.max(LEAST_MARGIN);
-        Ok(Self {
+        Self {
             error,
             problem,
             locations,
@@ -231,7 +224,7 @@ impl<E: AffineError> Exchange<E> {
             unfinished: None,
             rounds: 0,
             iterations: 0,
-        })
+        }
     }
 
     /// The error that is minimised.
@@ -287,7 +280,7 @@ impl<E: AffineError> Exchange<E> {
     }
 
     /// Adds points at the given locations, except where there is one. Returns whether any was added.
-    pub(super) fn add(&mut self, locations: &[Location<E::Scenario>]) -> Result<bool, DesignError> {
+    pub(super) fn add(&mut self, locations: &[Location<E::Scenario>]) -> bool {
         let known = self.locations.len();
         for location in locations {
             if !self.locations.iter().any(|other| other.is_near(location)) {
@@ -295,11 +288,10 @@ impl<E: AffineError> Exchange<E> {
             }
         }
         let added = &self.locations[known..];
-        let points: Vec<Point> =
-            added.iter().map(|location| self.error.at(location)).collect::<Result<_, _>>()?;
+        let points: Vec<Point> = added.iter().map(|location| self.error.at(location)).collect();
         self.objective.weights.extend(std::iter::repeat_n(0.0, added.len()));
-        self.problem = self.problem.with_points(points)?;
-        Ok(known < self.locations.len())
+        self.problem = self.problem.with_points(points);
+        known < self.locations.len()
     }
 
     fn minimise_gamma(&mut self, tolerances: Tolerances) -> Result<Candidate<E::Scenario>, DesignError> {
@@ -314,7 +306,7 @@ impl<E: AffineError> Exchange<E> {
             }
             // Without a peak to add it is the problem on the points that is not solved closely enough. If
             // it cannot be, that is the end.
-            let added = self.add(&last.above)?;
+            let added = self.add(&last.above);
             if !added && (last.outcome != Outcome::Solved || tolerance <= tolerances.finest()) {
                 reason = EndOfSearch::of(last.outcome);
                 break;
@@ -335,8 +327,7 @@ impl<E: AffineError> Exchange<E> {
 
     /// Solves the problem on the points.
     fn round(&mut self, tolerances: Tolerances, tolerance: f64) -> Result<Round<E::Scenario>, DesignError> {
-        let settings = Settings { tol_gap_rel: tolerance, ..Settings::DEFAULT };
-        let solution = sampled::minimise(&self.problem, &settings)?;
+        let solution = sampled::minimise(&self.problem, tolerance, &|| self.stop.is_due())?;
         self.count_round(solution.iterations);
         self.raise_lower_bound(solution.lower, solution.dual);
         // The optimum lies anywhere between the two.
@@ -366,7 +357,7 @@ impl<E: AffineError> Exchange<E> {
         }
         self.objective.weights = weights;
         self.locations = locations;
-        self.problem = Problem::new(points, self.problem.lags().to_vec())?;
+        self.problem = Problem::new(points, self.problem.lags().to_vec());
         Ok(())
     }
 
@@ -379,7 +370,6 @@ impl<E: AffineError> Exchange<E> {
     ) -> Result<Candidate<E::Scenario>, DesignError> {
         let cap = start.peaks.estimate * (1.0 + self.gamma_margin);
         let cap_at_points = start.peaks.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);
-        let settings = Settings { tol_gap_rel: tolerances.mean_square, ..Settings::DEFAULT };
         let mut left = None;
         for _ in 0..tolerances.rounds {
             if self.stop.is_due() {
@@ -390,14 +380,11 @@ impl<E: AffineError> Exchange<E> {
                 &self.objective,
                 cap_at_points,
                 &start.taps,
-                &settings,
-            );
-            let found = match found {
-                Ok(found) => found,
-                // Gamma is zero up to rounding, so no cap lies above it, and no other unknowns are better.
-                Err(LmiError::Cap { .. }) => return Ok(start),
-                Err(error) => return Err(error.into()),
-            };
+                tolerances.mean_square,
+                &|| self.stop.is_due(),
+            )?;
+            // Gamma may be zero up to rounding: no cap lies above it then, and no other unknowns are better.
+            let Some(found) = found else { return Ok(start) };
             self.count_round(found.iterations);
             let (lower, square) = (found.lower, found.mean_square);
             let candidate = self.judge(found.taps, found.gamma, cap_at_points)?;
@@ -410,7 +397,7 @@ impl<E: AffineError> Exchange<E> {
             let of_start = self.problem.mean_square(&start.taps, &self.objective);
             let unfinished = |reason| Unfinished::of_mean_square(lower, of_start, reason);
             left = unfinished(EndOfSearch::Rounds);
-            if !self.add(&candidate.peaks.above(cap_at_points))? {
+            if !self.add(&candidate.peaks.above(cap_at_points)) {
                 left = unfinished(EndOfSearch::MissedPeaks);
                 break;
             }

@@ -49,12 +49,12 @@ impl FilterResponse {
     /// Of the filters of `bank`.
     ///
     /// # Errors
-    /// As [`lifted`]; [`DesignError::Lti`] for unstable filters.
+    /// [`DesignError::Lti`] for unstable filters.
     pub(crate) fn new(bank: &Bank) -> Result<Self, DesignError> {
         Ok(match &bank.filters {
             SynthesisFilters::Fir(taps) => Self::Polynomial(polyphase(taps, bank.ratio)),
             block @ SynthesisFilters::StateSpace(_) => {
-                let system = lifted(block, bank.ratio)?;
+                let system = lifted(block, bank.ratio);
                 let resonances = resonances(&stable_poles(&system)?);
                 Self::Recursive { response: FrequencyResponse::new(&system), resonances }
             }
@@ -90,11 +90,11 @@ impl FilterResponse {
 
 /// F(z) of a bank as one system: N slow samples in and M fast samples out per slow period.
 ///
-/// # Errors
-/// [`DesignError::RaggedStateSpace`] for matrices with rows of unequal lengths.
-pub fn lifted(filters: &SynthesisFilters, ratio: usize) -> Result<StateSpace, DesignError> {
+/// # Panics
+/// For matrices that form no system: see [`Bank::check`].
+pub fn lifted(filters: &SynthesisFilters, ratio: usize) -> StateSpace {
     match filters {
-        SynthesisFilters::Fir(taps) => Ok(StateSpace::fir(&polyphase(taps, ratio))?),
+        SynthesisFilters::Fir(taps) => StateSpace::fir(&polyphase(taps, ratio)),
         SynthesisFilters::StateSpace(block) => from_block(block, ratio),
     }
 }
@@ -102,29 +102,24 @@ pub fn lifted(filters: &SynthesisFilters, ratio: usize) -> Result<StateSpace, De
 /// Refuses unstable filters: their output would grow to infinity without a message.
 ///
 /// # Errors
-/// [`DesignError::UnstableBank`]; [`DesignError::RaggedStateSpace`] as [`lifted`].
+/// [`DesignError::UnstableBank`]; [`DesignError::Linalg`] if the eigenvalues do not converge.
 pub fn check_stable(bank: &Bank) -> Result<(), DesignError> {
     let SynthesisFilters::StateSpace(_) = &bank.filters else { return Ok(()) };
-    match lifted(&bank.filters, bank.ratio)?.spectral_radius()? {
+    match lifted(&bank.filters, bank.ratio).spectral_radius()? {
         radius if radius < 1.0 => Ok(()),
         radius => Err(DesignError::UnstableBank { radius }),
     }
 }
 
-fn from_block(block: &bank::StateSpace, ratio: usize) -> Result<StateSpace, DesignError> {
+fn from_block(block: &bank::StateSpace, ratio: usize) -> StateSpace {
     let (n, channels) = (block.a.len(), block.d.first().map_or(0, Vec::len));
-    let a = matrix(&block.a, n, n)?;
-    let b = matrix(&block.b, n, channels)?;
-    let c = matrix(&block.c, ratio, n)?;
-    let d = matrix(&block.d, ratio, channels)?;
-    Ok(StateSpace::new(a, b, c, d)?)
-}
-
-fn matrix(rows: &[Vec<f64>], r: usize, c: usize) -> Result<Mat, DesignError> {
-    if rows.len() != r || rows.iter().any(|row| row.len() != c) {
-        return Err(DesignError::RaggedStateSpace { rows: r, cols: c });
-    }
-    Ok(Mat::from_fn(r, c, |i, j| rows[i][j]))
+    let matrix = |rows: &[Vec<f64>], r: usize, c: usize| Mat::from_fn(r, c, |i, j| rows[i][j]);
+    StateSpace::new(
+        matrix(&block.a, n, n),
+        matrix(&block.b, n, channels),
+        matrix(&block.c, ratio, n),
+        matrix(&block.d, ratio, channels),
+    )
 }
 
 /// A system as a bank holds it: lists of rows.
@@ -155,7 +150,7 @@ mod tests {
         let taps = vec![vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0], vec![-1.0, 0.5, 0.25]];
         for ratio in [1, 2, 3, 7, 9] {
             let filters = SynthesisFilters::Fir(taps.clone());
-            let system = lifted(&filters, ratio).unwrap();
+            let system = lifted(&filters, ratio);
             for (i, filter) in taps.iter().enumerate() {
                 let mut x = system.b().column(i).into_owned();
                 let mut answer: Vec<f64> = system.d().column(i).iter().copied().collect();
@@ -168,7 +163,7 @@ mod tests {
             }
             // Conversion to the matrices of a bank file and back changes nothing.
             let stored = SynthesisFilters::StateSpace(to_block(&system));
-            assert_eq!(lifted(&stored, ratio).unwrap(), system);
+            assert_eq!(lifted(&stored, ratio), system);
         }
     }
 
@@ -184,17 +179,5 @@ mod tests {
         assert_eq!(check_stable(&bank(-0.99)), Ok(()));
         assert_eq!(check_stable(&bank(-1.25)), Err(DesignError::UnstableBank { radius: 1.25 }));
         assert_eq!(check_stable(&Bank::bare(SynthesisFilters::Fir(vec![vec![9.0]]), 1)), Ok(()));
-    }
-
-    #[test]
-    fn rows_of_unequal_lengths_are_refused() {
-        let block = bank::StateSpace {
-            a: vec![vec![0.5, 0.0], vec![0.0]],
-            b: vec![vec![1.0], vec![1.0]],
-            c: vec![vec![1.0, 1.0]],
-            d: vec![vec![0.0]],
-        };
-        let ragged = lifted(&SynthesisFilters::StateSpace(block), 1);
-        assert_eq!(ragged, Err(DesignError::RaggedStateSpace { rows: 2, cols: 2 }));
     }
 }

@@ -145,7 +145,7 @@ struct Innovation {
 
 impl<'a> History<'a> {
     fn new(problem: &'a Problem, frames: usize, instants: RangeInclusive<i64>) -> Result<Self, DesignError> {
-        let (ratio, joint) = (problem.ratio as i64, JointState::new(problem)?);
+        let (ratio, joint) = (problem.ratio as i64, JointState::new(problem));
         let at = |p: i64| GridTime::fast_sample(p as f64, problem.fast_period);
         let mut periods = (instants.start().div_euclid(ratio), instants.end().div_euclid(ratio));
         let mut sources: Vec<(GridTime, Source)> = (0..ratio).map(|p| (at(p), Source::Target(p))).collect();
@@ -161,11 +161,11 @@ impl<'a> History<'a> {
         let ends = sources.iter().skip(1).map(|slot| slot.0).chain([at(ratio)]).collect::<Vec<_>>();
         let slot = |(&(phase, source), end): (&(GridTime, Source), GridTime)| {
             let length = end.since(phase).0;
-            let segment = (length > 0.0).then(|| joint.over(length)).transpose()?;
-            Ok(Slot { source, segment })
+            let segment = (length > 0.0).then(|| joint.over(length));
+            Slot { source, segment }
         };
-        let slots = sources.iter().zip(ends).map(slot).collect::<Result<_, DesignError>>()?;
-        let (transition, input) = joint.over(problem.ratio as f64)?;
+        let slots = sources.iter().zip(ends).map(slot).collect();
+        let (transition, input) = joint.over(problem.ratio as f64);
         let prior = controllability_root(&transition, &input)?.resize_horizontally(joint.order(), 0.0);
         Ok(Self { problem, joint, prior, frames, instants, slots, periods: periods.0..=periods.1 })
     }

@@ -13,7 +13,6 @@
 //! period then come *after* the state at its beginning and need no delay chains. An older sample is the
 //! sample at the same phase of the period, delayed by whole periods.
 
-use super::DesignError;
 use super::problem::Problem;
 use crate::linalg::{self, Mat};
 use crate::lti::StateSpace;
@@ -48,24 +47,24 @@ struct Sample {
 }
 
 /// The exactly equivalent lifted system of `problem`.
-pub(super) fn lift(problem: &Problem) -> Result<Lifted, DesignError> {
+pub(super) fn lift(problem: &Problem) -> Lifted {
     let timeline = problem.timeline();
     let delays = delays(&timeline);
-    let undelayed = follow_state(problem, &timeline, &samples(problem, &timeline))?;
+    let undelayed = follow_state(problem, &timeline, &samples(problem, &timeline));
     let ends = delays.iter().scan(undelayed.order(), |end, &delay| {
         *end += delay;
         Some(*end)
     });
     let chains = ends.zip(&delays).map(|(end, &delay)| if delay == 0 { 0..0 } else { end - delay..end });
     let chains = chains.take(problem.channels.len()).collect();
-    let system = undelayed.series(&StateSpace::delays(&delays))?.compress_inputs();
-    Ok(Lifted { system, chains, undelayed: undelayed.compress_inputs(), delays })
+    let system = undelayed.series(&StateSpace::delays(&delays)).compress_inputs();
+    Lifted { system, chains, undelayed: undelayed.compress_inputs(), delays }
 }
 
 /// The outputs [y; y'; z] without their delays by whole periods, and these delays. y' are the derivatives of
 /// the measurements with respect to time, so -y' those with respect to the delays. Front ends of relative
 /// degree 1 have none: their slope contains the input itself, which is left out here.
-pub(super) fn lift_with_slopes(problem: &Problem) -> Result<(StateSpace, Vec<usize>), DesignError> {
+pub(super) fn lift_with_slopes(problem: &Problem) -> (StateSpace, Vec<usize>) {
     let timeline = problem.timeline();
     let mut samples = samples(problem, &timeline);
     let slopes: Vec<Sample> =
@@ -74,7 +73,7 @@ pub(super) fn lift_with_slopes(problem: &Problem) -> Result<(StateSpace, Vec<usi
     let at = problem.channels.len();
     delays.splice(at..at, delays[..at].to_vec());
     samples.splice(at..at, slopes);
-    Ok((follow_state(problem, &timeline, &samples)?.compress_inputs(), delays))
+    (follow_state(problem, &timeline, &samples).compress_inputs(), delays)
 }
 
 /// The samples of all outputs, the measurements first.
@@ -93,18 +92,14 @@ fn delays(timeline: &Timeline) -> Vec<usize> {
 
 /// Propagates the joint analog state through one period. The outputs of the returned system are the
 /// samples, without their delays by whole periods.
-fn follow_state(
-    problem: &Problem,
-    timeline: &Timeline,
-    samples: &[Sample],
-) -> Result<StateSpace, DesignError> {
-    let joint = JointState::new(problem)?;
+fn follow_state(problem: &Problem, timeline: &Timeline, samples: &[Sample]) -> StateSpace {
+    let joint = JointState::new(problem);
     let mut rows = vec![(Mat::zeros(1, 0), Mat::zeros(1, 0)); samples.len()];
     let mut state = Mat::identity(joint.order(), joint.order());
     let mut input = Mat::zeros(joint.order(), 0);
     let mut before = timeline.start();
     for (instant, &now) in timeline.instants().iter().enumerate() {
-        (state, input) = joint.advance(&state, &input, now.since(before).0)?;
+        (state, input) = joint.advance(&state, &input, now.since(before).0);
         before = now;
         for (row, sample) in rows.iter_mut().zip(samples).filter(|(_, sample)| sample.instant == instant) {
             let outputs = if sample.slope { &joint.slopes } else { &joint.c };
@@ -116,7 +111,7 @@ fn follow_state(
     let (c, d): (Vec<Mat>, Vec<Mat>) =
         rows.into_iter().map(|(c, d)| (c, d.resize_horizontally(width, 0.0))).unzip();
     let stacked = |rows: &[Mat]| linalg::vstack(&rows.iter().collect::<Vec<_>>());
-    Ok(StateSpace::new(state, input, stacked(&c)?, stacked(&d)?)?)
+    StateSpace::new(state, input, stacked(&c), stacked(&d))
 }
 
 /// The filter W of the signal and all distinct front ends, which it drives: dx/dt = A x + B f, row i of C
@@ -138,24 +133,24 @@ pub(super) struct JointState {
 }
 
 impl JointState {
-    pub(super) fn new(problem: &Problem) -> Result<Self, DesignError> {
+    pub(super) fn new(problem: &Problem) -> Self {
         let front_ends = &problem.front_ends;
         let b: Vec<&Mat> = front_ends.iter().map(|filter| filter.b()).collect();
         let c: Vec<&Mat> = front_ends.iter().map(|filter| filter.c()).collect();
-        let (b, c) = (linalg::vstack(&b)?, linalg::block_diagonal(&c));
+        let (b, c) = (linalg::vstack(&b), linalg::block_diagonal(&c));
         let Some(signal) = &problem.signal else {
             let slopes: Vec<Mat> = front_ends.iter().map(|filter| filter.c() * filter.a()).collect();
             let blocks = front_ends.iter().map(|filter| filter.a().clone()).collect();
             let slopes = linalg::block_diagonal(&slopes.iter().collect::<Vec<_>>());
-            return Ok(Self { transition: StateTransition::new(blocks), b, c, slopes });
+            return Self { transition: StateTransition::new(blocks), b, c, slopes };
         };
         let blocks: Vec<&Mat> = std::iter::once(signal.a()).chain(front_ends.iter().map(|f| f.a())).collect();
         let mut a = linalg::block_diagonal(&blocks);
         let own = signal.order();
         a.view_mut((own, 0), (b.nrows(), own)).copy_from(&(&b * signal.c()));
-        let b = linalg::vstack(&[signal.b(), &(b * signal.d())])?;
-        let c = linalg::hstack(&[&Mat::zeros(c.nrows(), own), &c])?;
-        Ok(Self { slopes: &c * &a, transition: StateTransition::new(vec![a]), b, c })
+        let b = linalg::vstack(&[signal.b(), &(b * signal.d())]);
+        let c = linalg::hstack(&[&Mat::zeros(c.nrows(), own), &c]);
+        Self { slopes: &c * &a, transition: StateTransition::new(vec![a]), b, c }
     }
 
     pub(super) fn order(&self) -> usize {
@@ -178,14 +173,14 @@ impl JointState {
     }
 
     /// (e^{A l}, S) of a segment of length l: x <- e^{A l} x + S w with S S* = G(l).
-    pub(super) fn over(&self, length: f64) -> Result<(Mat, Mat), DesignError> {
-        Ok((self.transition.over(length), gramian_root(&self.transition, &self.b, length)?))
+    pub(super) fn over(&self, length: f64) -> (Mat, Mat) {
+        (self.transition.over(length), gramian_root(&self.transition, &self.b, length))
     }
 
     /// x <- e^{A l} x + S w_new over a segment of length l: the new inputs become further columns.
-    fn advance(&self, state: &Mat, input: &Mat, length: f64) -> Result<(Mat, Mat), DesignError> {
-        let (transition, root) = self.over(length)?;
-        Ok((&transition * state, linalg::hstack(&[&(&transition * input), &root])?))
+    fn advance(&self, state: &Mat, input: &Mat, length: f64) -> (Mat, Mat) {
+        let (transition, root) = self.over(length);
+        (&transition * state, linalg::hstack(&[&(&transition * input), &root]))
     }
 }
 

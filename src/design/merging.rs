@@ -143,8 +143,8 @@ impl Problem {
     /// # Errors
     /// As [`Problem::measurement_units`].
     pub(super) fn measurement_sizes(&self) -> Result<Vec<f64>, DesignError> {
-        let joint = JointState::new(self)?;
-        let (transition, input) = joint.over(self.ratio as f64)?;
+        let joint = JointState::new(self);
+        let (transition, input) = joint.over(self.ratio as f64);
         let outputs = joint.c() * controllability_root(&transition, &input)?;
         let size = |channel: &Channel| channel.gain.abs() * outputs.row(channel.front_end).norm();
         Ok(self.channels.iter().map(size).collect())

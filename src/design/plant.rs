@@ -8,6 +8,7 @@ use super::merging::Repeats;
 use super::problem::Problem;
 use crate::bank::SynthesisFilters;
 use crate::linalg::{self, CMat, Complex, Mat};
+use crate::lmi::sampled::Point;
 use crate::lti::gramian::h2_norm;
 use crate::lti::peak::{
     Peak, hinf_norm, hinf_norm_with_response, resonances, stable_poles, unexplained_peak,
@@ -56,21 +57,15 @@ struct Cache {
 
 impl LiftedPlant {
     /// The exactly equivalent plant of `problem`.
-    ///
-    /// # Errors
-    /// [`DesignError::Linalg`] or [`DesignError::Shapes`] never for a [`Problem`] made by [`Problem::new`].
-    pub fn new(problem: &Problem) -> Result<Self, DesignError> {
-        Ok(Self { problem: problem.clone(), lifted: lift(problem)?, cache: Cache::default() })
+    pub fn new(problem: &Problem) -> Self {
+        Self { problem: problem.clone(), lifted: lift(problem), cache: Cache::default() }
     }
 
     /// The same plant with the noise of the converters: each channel that has noise gets an input of unit
     /// power that adds to its samples alone, D_y = `[D_y, diag(s_i)]`. A channel with noise is no state of
     /// its delay chain any more, so its [`chain`](Self::chain) is empty. The norm of the error system of
     /// this plant is that of signal and noise, and so is its mean square.
-    ///
-    /// # Errors
-    /// [`DesignError::Shapes`] never: the sizes fit.
-    pub(super) fn with_noise(&self) -> Result<Self, DesignError> {
+    pub(super) fn with_noise(&self) -> Self {
         self.with_noise_scaled(1.0)
     }
 
@@ -80,10 +75,7 @@ impl LiftedPlant {
     }
 
     /// As [`Self::with_noise`], with `share` of the rms of the noise.
-    ///
-    /// # Errors
-    /// As [`Self::with_noise`].
-    pub(super) fn with_noise_scaled(&self, share: f64) -> Result<Self, DesignError> {
+    pub(super) fn with_noise_scaled(&self, share: f64) -> Self {
         let noise = &self.problem.noise;
         let noisy: Vec<usize> = (0..noise.len()).filter(|&i| noise[i] > 0.0).collect();
         let chains = self.lifted.chains.iter().zip(noise);
@@ -91,17 +83,17 @@ impl LiftedPlant {
         let rms = |i: usize, k: usize| if noisy[k] == i { share * noise[i].sqrt() } else { 0.0 };
         let added = |system: &StateSpace| {
             let d = Mat::from_fn(system.outputs(), noisy.len(), rms);
-            let b = linalg::hstack(&[system.b(), &Mat::zeros(system.order(), noisy.len())])?;
-            let d = linalg::hstack(&[system.d(), &d])?;
-            Ok::<_, DesignError>(StateSpace::new(system.a().clone(), b, system.c().clone(), d)?)
+            let b = linalg::hstack(&[system.b(), &Mat::zeros(system.order(), noisy.len())]);
+            let d = linalg::hstack(&[system.d(), &d]);
+            StateSpace::new(system.a().clone(), b, system.c().clone(), d)
         };
         let lifted = Lifted {
-            system: added(&self.lifted.system)?,
+            system: added(&self.lifted.system),
             chains: chains.collect(),
-            undelayed: added(&self.lifted.undelayed)?,
+            undelayed: added(&self.lifted.undelayed),
             delays: self.lifted.delays.clone(),
         };
-        Ok(Self { problem: self.problem.clone(), lifted, cache: Cache::default() })
+        Self { problem: self.problem.clone(), lifted, cache: Cache::default() }
     }
 
     /// The problem in normalised time from which the plant was made.
@@ -125,19 +117,13 @@ impl LiftedPlant {
     }
 
     /// H(z), N x n_w.
-    ///
-    /// # Errors
-    /// [`DesignError::Shapes`] never: the outputs are there.
-    pub fn measurement(&self) -> Result<StateSpace, DesignError> {
-        Ok(self.lifted.system.select_outputs(0..self.channels())?)
+    pub fn measurement(&self) -> StateSpace {
+        self.lifted.system.select_outputs(0..self.channels())
     }
 
     /// W(z), M x n_w.
-    ///
-    /// # Errors
-    /// [`DesignError::Shapes`] never: the outputs are there.
-    pub fn reference(&self) -> Result<StateSpace, DesignError> {
-        Ok(self.lifted.system.select_outputs(self.channels()..self.channels() + self.ratio())?)
+    pub fn reference(&self) -> StateSpace {
+        self.lifted.system.select_outputs(self.channels()..self.channels() + self.ratio())
     }
 
     /// The states of the delay chain of `channel`, newest sample first. The range is empty unless the
@@ -149,49 +135,53 @@ impl LiftedPlant {
 
     /// `[X y; z]`: the outputs of `filters` X, which the measurements drive, and below them the references.
     ///
-    /// # Errors
-    /// [`DesignError::Shapes`] unless `filters` has N inputs.
-    pub fn driving(&self, filters: &StateSpace) -> Result<StateSpace, DesignError> {
+    /// # Panics
+    /// Unless `filters` has N inputs.
+    pub fn driving(&self, filters: &StateSpace) -> StateSpace {
         let (n, m, x) = (self.channels(), self.ratio(), filters.outputs());
-        let all = self.lifted.system.cascade(0..n, filters)?;
-        Ok(all.select_outputs((n + m..n + m + x).chain(n..n + m))?)
+        let all = self.lifted.system.cascade(0..n, filters);
+        all.select_outputs((n + m..n + m + x).chain(n..n + m))
     }
 
     /// The error system K = W - F H, M x n_w; states of the plant first.
     ///
-    /// # Errors
-    /// [`DesignError::Shapes`] unless `filters` is M x N.
-    pub fn error_system(&self, filters: &StateSpace) -> Result<StateSpace, DesignError> {
+    /// # Panics
+    /// Unless `filters` is M x N.
+    pub fn error_system(&self, filters: &StateSpace) -> StateSpace {
         let unity = Mat::identity(self.ratio(), self.ratio());
-        Ok(self.driving(filters)?.map_outputs(&linalg::hstack(&[&-&unity, &unity])?)?)
+        self.driving(filters).map_outputs(&linalg::hstack(&[&-&unity, &unity]))
     }
 
-    /// (H, W) at e^{j omega}, omega in radians per slow period. The columns are compressed to at most N + M,
+    /// H and W at e^{j omega}, omega in radians per slow period. The columns are compressed to at most N + M,
     /// which keeps `[H; W] [H; W]*`.
-    pub fn response(&self, omega: f64) -> (CMat, CMat) {
+    pub fn at(&self, omega: f64) -> Point {
         let g = linalg::lq_factor(&self.at_frequency(omega));
         let (n, m) = (self.channels(), self.ratio());
-        (g.rows(0, n).into_owned(), g.rows(n, m).into_owned())
+        Point { omega, h: g.rows(0, n).into_owned(), w: g.rows(n, m).into_owned() }
     }
 
     /// ||K|| with the frequency at which it is attained, radians per slow period.
     ///
     /// # Errors
-    /// [`DesignError::Shapes`] unless `filters` is M x N, [`DesignError::Lti`] if the error system is not
-    /// stable.
+    /// [`DesignError::Lti`] if the error system is not stable.
+    ///
+    /// # Panics
+    /// Unless `filters` is M x N.
     pub fn norm(&self, filters: &StateSpace) -> Result<Peak, DesignError> {
-        Ok(hinf_norm(&self.error_system(filters)?)?)
+        Ok(hinf_norm(&self.error_system(filters))?)
     }
 
     /// As [`LiftedPlant::norm`], faster for FIR filters `taps[i][n] = f_i[n]`: their response is a
     /// polynomial, and the response of the plant is prepared once for all filters.
     ///
     /// # Errors
-    /// [`DesignError::Shapes`] unless there is a filter for each channel, [`DesignError::Lti`] if the plant
-    /// is not stable.
+    /// [`DesignError::Lti`] if the plant is not stable.
+    ///
+    /// # Panics
+    /// Unless there is a filter for each channel.
     pub fn fir_norm(&self, taps: &[Vec<f64>]) -> Result<Peak, DesignError> {
         let lags = filters::polyphase(taps, self.ratio());
-        let system = self.error_system(&self.delay_lines(&lags)?)?;
+        let system = self.error_system(&self.delay_lines(&lags, &self.problem.measurement_units()?));
         let (n, m) = (self.channels(), self.ratio());
         let response = |w: f64| {
             let g = self.at_frequency(w);
@@ -204,25 +194,26 @@ impl LiftedPlant {
         Ok(hinf_norm_with_response(&system, &response, initial)?)
     }
 
-    /// FIR filters whose delay lines hold measurements of about unit size.
-    fn delay_lines(&self, lags: &[Mat]) -> Result<StateSpace, DesignError> {
-        let units = self.problem.measurement_units()?;
+    /// FIR filters whose delay lines hold measurements of about unit size, each in its unit.
+    fn delay_lines(&self, lags: &[Mat], units: &[f64]) -> StateSpace {
         let mut of_unit_size = lags.to_vec();
         for lag in &mut of_unit_size {
-            lag.column_iter_mut().zip(&units).for_each(|(mut column, unit)| column.unscale_mut(*unit));
+            lag.column_iter_mut().zip(units).for_each(|(mut column, unit)| column.unscale_mut(*unit));
         }
-        Ok(StateSpace::fir(&of_unit_size)?.scale_inputs(&units)?)
+        StateSpace::fir(&of_unit_size).scale_inputs(units)
     }
 
     /// ||K|| of a bank's filters, computed from the coefficients in the bank.
     ///
     /// # Errors
-    /// As [`LiftedPlant::norm`]; [`DesignError::RaggedStateSpace`] for matrices with rows of unequal
-    /// lengths.
+    /// As [`LiftedPlant::norm`].
+    ///
+    /// # Panics
+    /// As [`LiftedPlant::norm`], and for matrices that form no system: see [`Bank::check`](crate::bank::Bank::check).
     pub fn bank_norm(&self, filters: &SynthesisFilters) -> Result<Peak, DesignError> {
         match filters {
             SynthesisFilters::Fir(taps) => self.fir_norm(taps),
-            SynthesisFilters::StateSpace(_) => self.norm(&filters::lifted(filters, self.ratio())?),
+            SynthesisFilters::StateSpace(_) => self.norm(&filters::lifted(filters, self.ratio())),
         }
     }
 
@@ -233,7 +224,7 @@ impl LiftedPlant {
     /// [`DesignError::Lti`] if the plant or `filters` are not stable.
     pub fn rounding(&self, filters: &StateSpace) -> Result<f64, DesignError> {
         let inverse: Vec<f64> = self.problem.measurement_units()?.iter().map(|unit| 1.0 / unit).collect();
-        Ok(f64::EPSILON * h2_norm(&filters.scale_inputs(&inverse)?)? * self.measurement_size()?)
+        Ok(f64::EPSILON * h2_norm(&filters.scale_inputs(&inverse))? * self.measurement_size()?)
     }
 
     /// ||H||_2 of measurements of about unit size.
@@ -242,7 +233,7 @@ impl LiftedPlant {
             Some(&size) => Ok(size),
             None => {
                 let units = self.problem.measurement_units()?;
-                let size = h2_norm(&self.measurement()?.scale_outputs(&units)?)?;
+                let size = h2_norm(&self.measurement().scale_outputs(&units))?;
                 Ok(*self.cache.measurement_size.get_or_init(|| size))
             }
         }
@@ -263,8 +254,8 @@ impl LiftedPlant {
         let references = self.channels()..self.channels() + self.ratio();
         // Delays by whole periods turn the rows of the response, which changes neither the span of the
         // measurements nor the singular values.
-        let undelayed = self.lifted.undelayed.select_outputs(distinct.iter().copied().chain(references))?;
-        Ok(unexplained_peak(&undelayed.scale_outputs(&scales)?, distinct.len())?)
+        let undelayed = self.lifted.undelayed.select_outputs(distinct.iter().copied().chain(references));
+        Ok(unexplained_peak(&undelayed.scale_outputs(&scales), distinct.len())?)
     }
 
     /// `[H; W]` at e^{j omega}. A delay by whole periods is a factor of its row, so the time does not depend

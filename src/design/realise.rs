@@ -49,13 +49,13 @@ pub(super) fn realise(
     synthesis: &Synthesis,
     stop: &Stop,
 ) -> Result<Realised, DesignError> {
-    let whole = if merged.are_unchanged() { merged_plant.clone() } else { LiftedPlant::new(problem)? };
+    let whole = if merged.are_unchanged() { merged_plant.clone() } else { LiftedPlant::new(problem) };
     let realisation = Realisation { spec, problem, whole: &whole, merged, stop };
     let realised = match &synthesis.filters {
         Filters::Fir(taps) => realisation.with_integers(realisation.fir(taps, synthesis.peak)?),
         Filters::StateSpace(system) => realisation.state_space(system, synthesis.peak.gain),
     }?;
-    let rounding = whole.rounding(&filters::lifted(&realised.filters, spec.ratio)?)?;
+    let rounding = whole.rounding(&filters::lifted(&realised.filters, spec.ratio))?;
     Ok(Realised { rounding, ..realised })
 }
 
@@ -108,7 +108,7 @@ impl Realisation<'_> {
     /// A smaller bank has a channel that is whole periods older as well: it costs no state, whereas the bank
     /// would need states to keep the newer channel's samples as long.
     fn state_space(&self, system: &StateSpace, norm: f64) -> Result<Realised, DesignError> {
-        let full = self.fastest_realisation(&system.map_inputs(&self.merged.shares())?, norm)?;
+        let full = self.fastest_realisation(&system.map_inputs(&self.merged.shares()), norm)?;
         let (Some(reduction), SynthesisFilters::StateSpace(block)) =
             (self.spec.design.reduction, &full.filters)
         else {
@@ -116,8 +116,8 @@ impl Realisation<'_> {
         };
         let distinct = self.problem.merge_channels(Repeats::AtOneInstant).of_unit_size()?;
         let problem = ReductionProblem {
-            plant: &LiftedPlant::new(&distinct.problem)?,
-            bank: &system.map_inputs(&self.merged.shares_of(&distinct))?,
+            plant: &LiftedPlant::new(&distinct.problem),
+            bank: &system.map_inputs(&self.merged.shares_of(&distinct)),
             order: block.a.len(),
             width: self.whole.channels(),
             aim: if self.spec.design.method == Method::H2 { Aim::MeanSquare } else { Aim::WorstCase },
@@ -128,7 +128,7 @@ impl Realisation<'_> {
         let evaluated = match smaller {
             None => full,
             Some(smaller) => {
-                let whole = smaller.map_inputs(&distinct.shares())?;
+                let whole = smaller.map_inputs(&distinct.shares());
                 self.reduced_realisation(&whole, record.reduced.figures.gamma)?
             }
         };
@@ -139,7 +139,7 @@ impl Realisation<'_> {
     fn reduced_realisation(&self, reduced: &FirWithTail, promised: f64) -> Result<Realised, DesignError> {
         match self.fast_realisation(reduced, promised)? {
             Some(found) => Ok(found),
-            None => evaluate(self.whole, block_filters(&reduced.realise()?)),
+            None => evaluate(self.whole, block_filters(&reduced.realise())),
         }
     }
 
@@ -156,7 +156,7 @@ impl Realisation<'_> {
     fn fast_realisation(&self, split: &FirWithTail, promised: f64) -> Result<Option<Realised>, DesignError> {
         let candidates = [split.parallel_form(), split.triangular_form().map(Some)];
         for candidate in candidates.into_iter().filter_map(|form| form.ok().flatten()) {
-            match evaluate(self.whole, block_filters(&candidate.realise()?)) {
+            match evaluate(self.whole, block_filters(&candidate.realise())) {
                 Ok(found) if found.peak.gain <= promised * (1.0 + REALISATION_ACCURACY) => {
                     return Ok(Some(found));
                 }

@@ -15,20 +15,17 @@ const MOST_PERIODS: usize = 4096;
 
 /// The impulse responses `f_i[n]` of the synthesis filters at the fast rate, all of one length. That of a
 /// recursive filter ends where 1e-12 of its energy is left, or after 4,096 slow periods.
-///
-/// # Errors
-/// [`DesignError::RaggedStateSpace`] for matrices with rows of unequal lengths.
-pub fn impulse_responses(bank: &Bank) -> Result<Vec<Vec<f64>>, DesignError> {
+pub fn impulse_responses(bank: &Bank) -> Vec<Vec<f64>> {
     let lags = match &bank.filters {
-        SynthesisFilters::Fir(taps) => return Ok(taps.clone()),
-        SynthesisFilters::StateSpace(_) => lags_of_recursion(bank)?,
+        SynthesisFilters::Fir(taps) => return taps.clone(),
+        SynthesisFilters::StateSpace(_) => lags_of_recursion(bank),
     };
-    Ok(filters::impulse_responses(&lags, lags.len() * bank.ratio))
+    filters::impulse_responses(&lags, lags.len() * bank.ratio)
 }
 
 /// F_0 = D, F_j = C A^(j-1) B.
-fn lags_of_recursion(bank: &Bank) -> Result<Vec<Mat>, DesignError> {
-    let system = filters::lifted(&bank.filters, bank.ratio)?;
+fn lags_of_recursion(bank: &Bank) -> Vec<Mat> {
+    let system = filters::lifted(&bank.filters, bank.ratio);
     let mut lags = vec![system.d().clone()];
     let mut state = system.b().clone();
     let mut energies = vec![system.d().norm_squared()];
@@ -46,7 +43,7 @@ fn lags_of_recursion(bank: &Bank) -> Result<Vec<Mat>, DesignError> {
     });
     let kept = lags.len() - tail.count();
     lags.truncate(kept.max(1));
-    Ok(lags)
+    lags
 }
 
 /// `F(e^{j w}) = sum_n f[n] e^{-j w n}` and its group delay, `-d arg F / d w`, in fast samples.
@@ -96,10 +93,10 @@ pub fn analysis_gains(bank: &Bank, frequencies: &[Hertz]) -> Result<Vec<Vec<f64>
     let first = problem.converters().into_iter().map(|channels| &problem.channels[channels.start]);
     let channels: Vec<Channel> = first.map(undelayed).collect();
     let noise = vec![0.0; channels.len()];
-    let plant = LiftedPlant::new(&Problem { ratio: 1, latency: 0, channels, noise, ..problem })?;
+    let plant = LiftedPlant::new(&Problem { ratio: 1, latency: 0, channels, noise, ..problem });
     let gains = |frequency: &Hertz| {
-        let (h, w) = plant.response(frequency.angular().per_fast_period(bank.fast_period).0);
-        w.row_iter().chain(h.row_iter()).map(|row| row.norm()).collect()
+        let point = plant.at(frequency.angular().per_fast_period(bank.fast_period).0);
+        point.w.row_iter().chain(point.h.row_iter()).map(|row| row.norm()).collect()
     };
     Ok(frequencies.iter().map(gains).collect())
 }
@@ -116,13 +113,12 @@ pub fn analysis_gains(bank: &Bank, frequencies: &[Hertz]) -> Result<Vec<Vec<f64>
 pub fn error_response(bank: &Bank, points: usize) -> Result<Vec<(Hertz, f64)>, DesignError> {
     let problem = Problem::of_bank(bank)?;
     problem.check_size()?;
-    let plant = LiftedPlant::new(&problem)?;
+    let plant = LiftedPlant::new(&problem);
     let filters = filters::FilterResponse::new(bank)?;
     let step = PI / points.saturating_sub(1).max(1) as f64;
     let at = |k: usize| {
         let omega = step * k as f64;
-        let (h, w) = plant.response(omega);
-        let gain = linalg::largest_singular_value(&(w - filters.at(omega) * h))?;
+        let gain = linalg::largest_singular_value(&plant.at(omega).error(&filters.at(omega)))?;
         Ok((RadiansPerSlowPeriod(omega).in_hertz(bank.slow_period()), gain))
     };
     (0..points).map(at).collect()
@@ -164,7 +160,7 @@ mod tests {
             d: vec![vec![1.0], vec![1.0]],
         };
         let bank = Bank::bare(SynthesisFilters::StateSpace(block), 2);
-        let responses = impulse_responses(&bank).unwrap();
+        let responses = impulse_responses(&bank);
         let want = |n: usize| {
             if n == 1 {
                 1.0
@@ -208,8 +204,8 @@ mod tests {
             [include_str!("../../filters/thesis-fir.json"), include_str!("../../filters/thesis-iir.json")]
         {
             let bank = Bank::from_json(text, "bank.json").unwrap();
-            let plant = LiftedPlant::new(&Problem::of_bank(&bank).unwrap()).unwrap();
-            let error = plant.error_system(&filters::lifted(&bank.filters, bank.ratio).unwrap()).unwrap();
+            let plant = LiftedPlant::new(&Problem::of_bank(&bank).unwrap());
+            let error = plant.error_system(&filters::lifted(&bank.filters, bank.ratio));
             let points = error_response(&bank, 9).unwrap();
             assert_eq!(points.len(), 9);
             for (k, (hertz, gain)) in points.iter().enumerate() {

@@ -187,7 +187,7 @@ fn without_signal(spec: &Spec, latency: usize) -> Result<Problem, DesignError> {
 
 fn any_input(bank: &Bank, spec: &Spec, plain: &Problem) -> Result<Option<f64>, DesignError> {
     match spec.signal {
-        Some(_) => Ok(Some(LiftedPlant::new(plain)?.bank_norm(&bank.filters)?.gain)),
+        Some(_) => Ok(Some(LiftedPlant::new(plain).bank_norm(&bank.filters)?.gain)),
         None => Ok(None),
     }
 }

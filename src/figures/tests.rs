@@ -243,7 +243,7 @@ fn recursive_banks_have_the_figures_of_their_taps() {
     let system =
         System { ratio: 3, latency: 12, filter: BUTTERWORTH_2, delays: &[2.1, 0.9, 0.2], band: 0.35 };
     let fir = system.bank(FIR_24);
-    let block = filters::to_block(&filters::lifted(&fir.filters, 3).unwrap());
+    let block = filters::to_block(&filters::lifted(&fir.filters, 3));
     let recursive = Bank { filters: SynthesisFilters::StateSpace(block), ..fir.clone() };
     let [a, b] = [fir, recursive].map(|bank| Figures::new(&bank).unwrap());
     assert!((a.snr.total_db - b.snr.total_db).0.abs() < 1e-3, "{a:?} {b:?}");

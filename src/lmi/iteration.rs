@@ -1,6 +1,6 @@
-//! What the interior-point methods share: their settings, their loop, their step rule and their outcome.
+//! What the interior-point methods share: their loop, their step rule and their outcome.
 
-use super::LmiError;
+use crate::linalg::LinalgError;
 
 /// How an iteration ended. Bounds, residuals and iterates are returned beside it; a hard problem is not an
 /// error.
@@ -11,21 +11,18 @@ pub enum Outcome {
     Solved,
     /// No further progress, but the duality gap is within the reduced tolerance.
     SolvedInaccurate,
-    /// The iteration limit was reached first; the best iterate and its bounds are returned.
+    /// The iteration limit was reached first, or the caller ended the iteration; the best iterate and its
+    /// bounds are returned.
     IterationLimit,
     /// Rounding errors stopped the progress; the best iterate and its bounds are returned.
     NumericalTrouble,
 }
 
-/// When an iteration ends.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
-    /// Maximum number of predictor-corrector steps.
-    pub max_iterations: usize,
-    /// Duality gap at which the iteration ends, relative to gamma.
-    pub tol_gap_rel: f64,
-}
+/// Relative duality gap that is as small as rounding errors allow.
+pub const FINEST_GAP: f64 = 1e-9;
 
+/// Maximum number of predictor-corrector steps.
+const MOST_STEPS: usize = 80;
 /// Duality gap that counts as zero, relative to the size of the data: the largest `sigma_max(W_l)`.
 pub(super) const GAP_OF_ZERO: f64 = 1e-13;
 /// Relative duality gap up to which a stalled run still counts as solved.
@@ -44,11 +41,6 @@ const PATIENCE: usize = 6;
 const SHORTEST_STEP: f64 = 1e-7;
 /// Bounds of Mehrotra's centering: a step always aims inside of the cone, and always lowers the gap.
 const CENTERING: [f64; 2] = [1e-8, 0.9];
-
-impl Settings {
-    /// As close as rounding errors allow.
-    pub const DEFAULT: Self = Self { max_iterations: 80, tol_gap_rel: 1e-9 };
-}
 
 /// Lengths of a step, in parts of a Newton step.
 #[derive(Debug, Clone, Copy)]
@@ -75,6 +67,9 @@ pub(super) fn centering(ratio: f64) -> f64 {
     ratio.clamp(0.0, 1.0).powi(3).clamp(CENTERING[0], CENTERING[1])
 }
 
+/// Whether the caller wants the iteration to end with what it has. Once due, it stays due.
+pub type IsDue<'a> = &'a dyn Fn() -> bool;
+
 /// A primal-dual iterate, as the loop sees it.
 pub(super) trait Iterate {
     /// The relative duality gap of the iterate, or a cheap estimate of it.
@@ -82,19 +77,24 @@ pub(super) trait Iterate {
 
     /// The relative duality gap of the best solution, this iterate included. It is asked for when the
     /// estimate is within the tolerance, and at the end.
-    fn judged_gap(&mut self) -> Result<f64, LmiError>;
+    fn judged_gap(&mut self) -> Result<f64, LinalgError>;
 
-    /// Makes one predictor-corrector step; `None` if rounding errors prevent it.
+    /// Makes one predictor-corrector step; `None` if rounding errors prevent it or the caller ends it.
     fn step(&mut self) -> Option<()>;
 }
 
-/// Iterates until the gap is within its tolerance, the progress ends or the limit is reached. Returns the
-/// outcome and the number of steps.
-pub(super) fn run(iterate: &mut impl Iterate, settings: &Settings) -> Result<(Outcome, usize), LmiError> {
+/// Iterates until the relative gap is within its tolerance, the progress ends, the limit is reached or the end `is_due`.
+/// Returns the outcome and the number of steps. An iterate whose end is due is not judged: that takes as long
+/// as several steps.
+pub(super) fn run(
+    iterate: &mut impl Iterate,
+    tol_gap_rel: f64,
+    is_due: IsDue<'_>,
+) -> Result<(Outcome, usize), LinalgError> {
     let (mut least, mut waited, mut steps) = (f64::INFINITY, 0, 0);
-    while steps < settings.max_iterations {
+    while steps < MOST_STEPS && !is_due() {
         let gap = iterate.gap();
-        if gap <= settings.tol_gap_rel && iterate.judged_gap()? <= settings.tol_gap_rel {
+        if gap <= tol_gap_rel && iterate.judged_gap()? <= tol_gap_rel {
             return Ok((Outcome::Solved, steps));
         }
         waited = if gap < PROGRESS * least { 0 } else { waited + 1 };
@@ -104,10 +104,13 @@ pub(super) fn run(iterate: &mut impl Iterate, settings: &Settings) -> Result<(Ou
         }
         steps += 1;
     }
+    if is_due() {
+        return Ok((Outcome::IterationLimit, steps));
+    }
     let outcome = match iterate.judged_gap()? {
-        gap if gap <= settings.tol_gap_rel => Outcome::Solved,
+        gap if gap <= tol_gap_rel => Outcome::Solved,
         gap if gap <= REDUCED_GAP => Outcome::SolvedInaccurate,
-        _ if steps >= settings.max_iterations => Outcome::IterationLimit,
+        _ if steps >= MOST_STEPS => Outcome::IterationLimit,
         _ => Outcome::NumericalTrouble,
     };
     Ok((outcome, steps))

@@ -10,7 +10,6 @@
 //! bounds on the optimum and an [`Outcome`]. Rounding errors limit the relative accuracy of the optimum to
 //! about 1e-9.
 
-mod error;
 mod factor;
 mod iteration;
 pub mod sampled;
@@ -18,5 +17,4 @@ pub mod sampled;
 #[path = "../../tests/support/testbank.rs"]
 mod testbank;
 
-pub use error::LmiError;
-pub use iteration::{Outcome, Settings};
+pub use iteration::{FINEST_GAP, IsDue, Outcome};

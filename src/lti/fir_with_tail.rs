@@ -9,7 +9,7 @@
 
 use super::gramian::{balanced, h2_norm};
 use super::parallel_form::{parallel_form, triangular_form};
-use super::{LtiError, StateSpace, StateSpaceError};
+use super::{LtiError, StateSpace};
 use crate::linalg::{self, Mat};
 
 /// States that together change the response by less than this fraction are left out. That is a quarter of
@@ -33,18 +33,15 @@ impl FirWithTail {
     /// [`LtiError`] if the system is not stable.
     pub(crate) fn new(system: &StateSpace) -> Result<Self, LtiError> {
         let chains = Chains::new(system.a());
-        let Self { head, tail } = Self::split(system, chains.longest)?;
-        let tail = tail.select_states(chains.core)?;
+        let Self { head, tail } = Self::split(system, chains.longest);
+        let tail = tail.select_states(chains.core);
         let energy = head.iter().map(Mat::norm_squared).sum::<f64>() + h2_norm(&tail)?.powi(2);
         Ok(Self { head, tail: balanced(&tail, TRUNCATION_TOLERANCE * energy.sqrt())? })
     }
 
     /// The same transfer function with q = `length` and all states in the tail:
     /// `y[k] = sum h_j u[k - j] + c a^q x[k - q]`.
-    ///
-    /// # Errors
-    /// [`StateSpaceError`] never: the parts fit.
-    pub(crate) fn split(system: &StateSpace, length: usize) -> Result<Self, StateSpaceError> {
+    pub(crate) fn split(system: &StateSpace, length: usize) -> Self {
         let mut head = vec![system.d().clone()];
         let mut c = system.c().clone();
         for _ in 0..length {
@@ -52,33 +49,22 @@ impl FirWithTail {
             c *= system.a();
         }
         let zero = Mat::zeros(system.outputs(), system.inputs());
-        Ok(Self { head, tail: StateSpace::new(system.a().clone(), system.b().clone(), c, zero)? })
+        Self { head, tail: StateSpace::new(system.a().clone(), system.b().clone(), c, zero) }
     }
 
     /// The tail x+ = a x + b u after a head of q = `length`, with `outputs` = [c h_q .. h_0].
-    ///
-    /// # Errors
-    /// [`StateSpaceError`] if the shapes do not fit.
-    pub(crate) fn with_outputs(
-        outputs: &Mat,
-        length: usize,
-        a: &Mat,
-        b: &Mat,
-    ) -> Result<Self, StateSpaceError> {
+    pub(crate) fn with_outputs(outputs: &Mat, length: usize, a: &Mat, b: &Mat) -> Self {
         let (p, n, m) = (outputs.nrows(), a.nrows(), b.ncols());
         let tap = |j: usize| outputs.columns(n + (length - j) * m, m).into_owned();
         let c = outputs.columns(0, n).into_owned();
-        let tail = StateSpace::new(a.clone(), b.clone(), c, Mat::zeros(p, m))?;
-        Ok(Self { head: (0..=length).map(tap).collect(), tail })
+        let tail = StateSpace::new(a.clone(), b.clone(), c, Mat::zeros(p, m));
+        Self { head: (0..=length).map(tap).collect(), tail }
     }
 
     /// The same outputs for inputs u = `gain` v.
-    ///
-    /// # Errors
-    /// [`StateSpaceError::Gain`] unless `gain` has a row for each input.
-    pub(crate) fn map_inputs(&self, gain: &Mat) -> Result<Self, StateSpaceError> {
-        let tail = self.tail.map_inputs(gain)?;
-        Ok(Self { head: self.head.iter().map(|tap| tap * gain).collect(), tail })
+    pub(crate) fn map_inputs(&self, gain: &Mat) -> Self {
+        let tail = self.tail.map_inputs(gain);
+        Self { head: self.head.iter().map(|tap| tap * gain).collect(), tail }
     }
 
     /// a, b, c of the tail, with d = 0.
@@ -110,16 +96,13 @@ impl FirWithTail {
 
     /// One system: the states of the tail first, then the past inputs from the oldest to the newest. So `a`
     /// is block triangular and as sparse as possible.
-    ///
-    /// # Errors
-    /// [`StateSpaceError`] never for a value made by [`FirWithTail::new`]: its parts fit.
-    pub(crate) fn realise(&self) -> Result<StateSpace, StateSpaceError> {
+    pub(crate) fn realise(&self) -> StateSpace {
         let (q, m, n) = (self.head_length(), self.tail.inputs(), self.tail.order());
         let line = StateSpace::delay_line(m, q);
         let unity = Mat::identity(self.tail.outputs(), self.tail.outputs());
         let newest_last = self.head.iter().rev().chain([&unity]);
-        let sum = linalg::hstack(&newest_last.collect::<Vec<_>>())?;
-        let whole = line.cascade(0..m, &self.tail)?.map_outputs(&sum)?;
+        let sum = linalg::hstack(&newest_last.collect::<Vec<_>>());
+        let whole = line.cascade(0..m, &self.tail).map_outputs(&sum);
         whole.select_states((q * m..q * m + n).chain(0..q * m))
     }
 }
@@ -194,7 +177,7 @@ mod tests {
         c[(0, first + long - 1)] = 1.0;
         c[(1, second + short - 1)] = 1.0;
         c[(1, 0)] = 0.25;
-        StateSpace::new(a, b, c, Mat::from_element(2, 2, 0.125)).unwrap()
+        StateSpace::new(a, b, c, Mat::from_element(2, 2, 0.125))
     }
 
     #[test]
@@ -206,7 +189,7 @@ mod tests {
             let parallel = split.parallel_form().unwrap().unwrap();
             let triangular = split.triangular_form().unwrap();
             for form in [split, parallel, triangular] {
-                let made = form.realise().unwrap();
+                let made = form.realise();
                 assert_eq!(made.order(), 2 + 2 * long);
                 check_same(&system, &made, 1e-12);
             }
@@ -221,7 +204,6 @@ mod tests {
             .unwrap()
             .unwrap()
             .realise()
-            .unwrap()
             .a()
             .clone();
         assert!(a[(0, 0)] == a[(1, 1)] && a[(0, 1)] == -a[(1, 0)]);
@@ -240,26 +222,26 @@ mod tests {
         let a = Mat::from_fn(6, 6, |i, j| f64::from(u8::from(i == j + 1)));
         let b = Mat::from_fn(6, 1, |i, _| 1.0 + i as f64);
         let c = Mat::from_fn(2, 6, |i, j| (i + 2 * j) as f64);
-        let system = StateSpace::new(a, b, c, Mat::zeros(2, 1)).unwrap();
+        let system = StateSpace::new(a, b, c, Mat::zeros(2, 1));
         let split = FirWithTail::new(&system).unwrap();
         assert_eq!((split.head_length(), split.tail.order()), (6, 0));
-        assert_eq!(impulse_responses(&system, 20), impulse_responses(&split.realise().unwrap(), 20));
+        assert_eq!(impulse_responses(&system, 20), impulse_responses(&split.realise(), 20));
     }
 
     #[test]
     fn without_chains_there_is_no_line() {
         let a = Mat::from_row_slice(3, 3, &[0.5, 0.4, 0.0, -0.4, 0.5, 0.0, 0.1, 0.0, -0.9]);
         let (b, c) = (Mat::from_element(3, 1, 1.0), Mat::from_row_slice(1, 3, &[1.0, -1.0, 2.0]));
-        let system = StateSpace::new(a, b, c, Mat::zeros(1, 1)).unwrap();
+        let system = StateSpace::new(a, b, c, Mat::zeros(1, 1));
         let split = FirWithTail::new(&system).unwrap();
         assert_eq!((split.head_length(), split.tail.order()), (0, 3));
-        check_same(&system, &split.parallel_form().unwrap().unwrap().realise().unwrap(), 1e-13);
+        check_same(&system, &split.parallel_form().unwrap().unwrap().realise(), 1e-13);
     }
 
     #[test]
     fn an_unstable_system_is_refused() {
         let one = Mat::from_element(1, 1, 1.0);
-        let system = StateSpace::new(one.clone() * 1.5, one.clone(), one.clone(), one).unwrap();
+        let system = StateSpace::new(one.clone() * 1.5, one.clone(), one.clone(), one);
         assert!(FirWithTail::new(&system).is_err());
     }
 }

@@ -3,9 +3,10 @@
 //! The elementary systems ([`StateSpace::gain`], [`StateSpace::delays`], [`StateSpace::delay_line`],
 //! [`StateSpace::fir`]) and their connections. States of the first operand come first. Nothing is reduced:
 //! states that cancel stay, and each entry of the result is an entry of an operand or one product of two of
-//! them, so that no digits are lost.
+//! them, so that no digits are lost. Systems whose numbers of inputs and outputs do not fit each other are a
+//! fault of the caller, and end in a panic.
 
-use super::{StateSpace, StateSpaceError};
+use super::StateSpace;
 use crate::linalg::{self, Mat};
 use nalgebra::DVector;
 use std::ops::Range;
@@ -45,130 +46,82 @@ impl StateSpace {
         }
     }
 
-    /// `F(z) = sum_j z^-j F_j`, with a shift register for each input: the states hold its last samples,
-    /// newest first.
-    ///
-    /// # Errors
-    /// [`StateSpaceError::Linalg`] if the shapes of the `F_j` differ; an empty list gives the system
-    /// without inputs and outputs.
-    pub(crate) fn fir(taps: &[Mat]) -> Result<Self, StateSpaceError> {
-        let Some(d) = taps.first() else { return Ok(Self::gain(Mat::zeros(0, 0))) };
+    /// `F(z) = sum_j z^-j F_j`, all `F_j` of one shape, with a shift register for each input: the states hold
+    /// its last samples, newest first. An empty list gives the system without inputs and outputs.
+    pub(crate) fn fir(taps: &[Mat]) -> Self {
+        let Some(d) = taps.first() else { return Self::gain(Mat::zeros(0, 0)) };
         let (stored, inputs) = (taps.len() - 1, d.ncols());
-        linalg::vstack(&taps.iter().collect::<Vec<_>>())?;
-        linalg::hstack(&taps.iter().collect::<Vec<_>>())?;
         let lengths = vec![stored; inputs];
         let Self { a, b, .. } = Self::delays(&lengths);
         let c = Mat::from_fn(d.nrows(), inputs * stored, |p, state| {
             taps[state % stored + 1][(p, state / stored)]
         });
-        Ok(Self { a, b, c, d: d.clone() })
+        Self { a, b, c, d: d.clone() }
     }
 
-    /// `next` driven by this system: the transfer function `N(z) G(z)`.
-    ///
-    /// # Errors
-    /// [`StateSpaceError::Connection`] unless `next` has an input for each output.
-    pub(crate) fn series(&self, next: &Self) -> Result<Self, StateSpaceError> {
-        if self.outputs() != next.inputs() {
-            let (first, second) = (self.d.shape(), next.d.shape());
-            return Err(StateSpaceError::Connection { first, second });
-        }
-        Ok(Self {
+    /// `next`, which has an input for each output, driven by this system: the transfer function
+    /// `N(z) G(z)`.
+    pub(crate) fn series(&self, next: &Self) -> Self {
+        Self {
             a: linalg::from_blocks(&[
                 &[&self.a, &Mat::zeros(self.order(), next.order())],
                 &[&(&next.b * &self.c), &next.a],
-            ])?,
-            b: linalg::vstack(&[&self.b, &(&next.b * &self.d)])?,
-            c: linalg::hstack(&[&(&next.d * &self.c), &next.c])?,
+            ]),
+            b: linalg::vstack(&[&self.b, &(&next.b * &self.d)]),
+            c: linalg::hstack(&[&(&next.d * &self.c), &next.c]),
             d: &next.d * &self.d,
-        })
+        }
     }
 
     /// `[G; N G_o]`: this system with all its outputs, and below them those of `next`, which the given
     /// `outputs` o drive. Both use the same state of this system, which the result contains once.
-    ///
-    /// # Errors
-    /// [`StateSpaceError::Connection`] unless `next` has an input for each of the `outputs`,
-    /// [`StateSpaceError::Selection`] if there are no such outputs.
-    pub(crate) fn cascade(&self, outputs: Range<usize>, next: &Self) -> Result<Self, StateSpaceError> {
-        let driven = self.select_outputs(outputs)?.series(next)?;
+    pub(crate) fn cascade(&self, outputs: Range<usize>, next: &Self) -> Self {
+        let driven = self.select_outputs(outputs).series(next);
         let unread = Mat::zeros(self.outputs(), next.order());
-        Ok(Self {
-            c: linalg::from_blocks(&[&[&self.c, &unread], &[&driven.c]])?,
-            d: linalg::vstack(&[&self.d, &driven.d])?,
+        Self {
+            c: linalg::from_blocks(&[&[&self.c, &unread], &[&driven.c]]),
+            d: linalg::vstack(&[&self.d, &driven.d]),
             ..driven
-        })
+        }
     }
 
     /// `T G`: each output a combination of the former ones.
-    ///
-    /// # Errors
-    /// [`StateSpaceError::Gain`] unless `gain` has a column for each output.
-    pub(crate) fn map_outputs(&self, gain: &Mat) -> Result<Self, StateSpaceError> {
-        if gain.ncols() != self.outputs() {
-            let (count, gain) = (self.outputs(), gain.shape());
-            return Err(StateSpaceError::Gain { ports: "outputs", count, gain });
-        }
-        Ok(Self { a: self.a.clone(), b: self.b.clone(), c: gain * &self.c, d: gain * &self.d })
+    pub(crate) fn map_outputs(&self, gain: &Mat) -> Self {
+        Self { a: self.a.clone(), b: self.b.clone(), c: gain * &self.c, d: gain * &self.d }
     }
 
     /// `G T`: each input a combination of new ones.
-    ///
-    /// # Errors
-    /// [`StateSpaceError::Gain`] unless `gain` has a row for each input.
-    pub(crate) fn map_inputs(&self, gain: &Mat) -> Result<Self, StateSpaceError> {
-        if gain.nrows() != self.inputs() {
-            let (count, gain) = (self.inputs(), gain.shape());
-            return Err(StateSpaceError::Gain { ports: "inputs", count, gain });
-        }
-        Ok(Self { a: self.a.clone(), b: &self.b * gain, c: self.c.clone(), d: &self.d * gain })
+    pub(crate) fn map_inputs(&self, gain: &Mat) -> Self {
+        Self { a: self.a.clone(), b: &self.b * gain, c: self.c.clone(), d: &self.d * gain }
     }
 
     /// `G diag(gains)`.
-    ///
-    /// # Errors
-    /// [`StateSpaceError::Gain`] unless there is a gain for each input.
-    pub(crate) fn scale_inputs(&self, gains: &[f64]) -> Result<Self, StateSpaceError> {
+    pub(crate) fn scale_inputs(&self, gains: &[f64]) -> Self {
         self.map_inputs(&Mat::from_diagonal(&DVector::from_column_slice(gains)))
     }
 
     /// `diag(gains) G`.
-    ///
-    /// # Errors
-    /// [`StateSpaceError::Gain`] unless there is a gain for each output.
-    pub(crate) fn scale_outputs(&self, gains: &[f64]) -> Result<Self, StateSpaceError> {
+    pub(crate) fn scale_outputs(&self, gains: &[f64]) -> Self {
         self.map_outputs(&Mat::from_diagonal(&DVector::from_column_slice(gains)))
     }
 
     /// The same system with the given outputs only, in that order; an output may be taken twice.
-    ///
-    /// # Errors
-    /// [`StateSpaceError::Selection`] if one of them is not there.
-    pub(crate) fn select_outputs(
-        &self,
-        outputs: impl IntoIterator<Item = usize>,
-    ) -> Result<Self, StateSpaceError> {
-        let rows = selection("outputs", self.outputs(), outputs)?;
+    pub(crate) fn select_outputs(&self, outputs: impl IntoIterator<Item = usize>) -> Self {
+        let rows: Vec<usize> = outputs.into_iter().collect();
         let (c, d) = (self.c.select_rows(&rows), self.d.select_rows(&rows));
-        Ok(Self { a: self.a.clone(), b: self.b.clone(), c, d })
+        Self { a: self.a.clone(), b: self.b.clone(), c, d }
     }
 
     /// The given states only, in that order, the others held at zero. With all states given this is a
     /// change of their order, which keeps the transfer function.
-    ///
-    /// # Errors
-    /// [`StateSpaceError::Selection`] if one of them is not there.
-    pub(crate) fn select_states(
-        &self,
-        states: impl IntoIterator<Item = usize>,
-    ) -> Result<Self, StateSpaceError> {
-        let kept = selection("states", self.order(), states)?;
-        Ok(Self {
+    pub(crate) fn select_states(&self, states: impl IntoIterator<Item = usize>) -> Self {
+        let kept: Vec<usize> = states.into_iter().collect();
+        Self {
             a: self.a.select_rows(&kept).select_columns(&kept),
             b: self.b.select_rows(&kept),
             c: self.c.select_columns(&kept),
             d: self.d.clone(),
-        })
+        }
     }
 }
 
@@ -176,18 +129,6 @@ impl StateSpace {
 fn diagonal(sizes: &[usize], block: impl Fn(usize) -> Mat) -> Mat {
     let blocks: Vec<Mat> = sizes.iter().map(|&n| block(n)).collect();
     linalg::block_diagonal(&blocks.iter().collect::<Vec<_>>())
-}
-
-fn selection(
-    ports: &'static str,
-    count: usize,
-    chosen: impl IntoIterator<Item = usize>,
-) -> Result<Vec<usize>, StateSpaceError> {
-    let chosen: Vec<usize> = chosen.into_iter().collect();
-    match chosen.iter().find(|&&index| index >= count) {
-        None => Ok(chosen),
-        Some(&index) => Err(StateSpaceError::Selection { ports, index, count }),
-    }
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ pub(crate) use gramian::GramianCoordinates;
 pub use refine::Peak;
 pub use response::FrequencyResponse;
 pub(crate) use riccati::bounded_real_riccati;
-pub use state_space::{StateSpace, StateSpaceError};
+pub use state_space::StateSpace;
 
 use crate::linalg::LinalgError;
 
@@ -43,9 +43,6 @@ pub enum LtiError {
         /// The last change.
         change: f64,
     },
-    /// Matrices that do not form a system.
-    #[error(transparent)]
-    Shapes(#[from] StateSpaceError),
     /// A decomposition failed.
     #[error(transparent)]
     Linalg(#[from] LinalgError),

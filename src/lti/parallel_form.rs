@@ -45,7 +45,7 @@ pub(crate) fn parallel_form(system: &StateSpace) -> Result<Option<StateSpace>, L
 /// [`LtiError`] if the iteration does not converge.
 pub(crate) fn triangular_form(system: &StateSpace) -> Result<StateSpace, LtiError> {
     let (q, t) = linalg::real_schur(system.a())?;
-    Ok(StateSpace::new(t, q.transpose() * system.b(), system.c() * q, system.d().clone())?)
+    Ok(StateSpace::new(t, q.transpose() * system.b(), system.c() * q, system.d().clone()))
 }
 
 /// A real pole, or the one of a conjugate pair above the real axis, with its eigenvector.
@@ -102,7 +102,7 @@ fn sections(modes: &[Mode], mut b: Mat, mut c: Mat, d: Mat) -> Result<StateSpace
         a.view_mut((first, first), (order, order)).copy_from(&block);
         first += order;
     }
-    Ok(StateSpace::new(a, b, c, d)?)
+    Ok(StateSpace::new(a, b, c, d))
 }
 
 /// The power of two by which to divide the states of a section for Gramians of equal trace.
@@ -119,7 +119,7 @@ mod tests {
         let n = a.nrows();
         let b = Mat::from_fn(n, 2, |i, j| 1.0 + ((i + 3 * j) as f64).sin());
         let c = Mat::from_fn(3, n, |i, j| ((2 * i + j) as f64).cos());
-        StateSpace::new(a, b, c, Mat::from_fn(3, 2, |i, j| (i * 2 + j) as f64)).unwrap()
+        StateSpace::new(a, b, c, Mat::from_fn(3, 2, |i, j| (i * 2 + j) as f64))
     }
 
     /// Largest difference of the responses, by LU at each frequency, relative to the larger one.
@@ -190,7 +190,7 @@ mod tests {
         let a = Mat::from_row_slice(3, 3, &[0.5, 0.8, 0.0, -0.8, 0.5, 0.0, 0.0, 0.0, 0.3]);
         let b = Mat::from_column_slice(3, 1, &[1e30, 1e30, 1e-40]);
         let c = Mat::from_row_slice(1, 3, &[1e-25, 0.0, 1e40]);
-        let made = parallel_form(&StateSpace::new(a, b, c, Mat::zeros(1, 1)).unwrap()).unwrap().unwrap();
+        let made = parallel_form(&StateSpace::new(a, b, c, Mat::zeros(1, 1))).unwrap().unwrap();
         for (first, size) in [(0, 2), (2, 1)] {
             let a = made.a().view((first, first), (size, size)).into_owned();
             let p = controllability_root(&a, &made.b().rows(first, size).into_owned()).unwrap().norm();
@@ -248,8 +248,7 @@ mod tests {
 
     #[test]
     fn no_state_is_no_trouble() {
-        let empty =
-            StateSpace::new(Mat::zeros(0, 0), Mat::zeros(0, 2), Mat::zeros(3, 0), Mat::zeros(3, 2)).unwrap();
+        let empty = StateSpace::new(Mat::zeros(0, 0), Mat::zeros(0, 2), Mat::zeros(3, 0), Mat::zeros(3, 2));
         assert_eq!(parallel_form(&empty).unwrap(), Some(empty.clone()));
         assert_eq!(triangular_form(&empty).unwrap(), empty);
     }

@@ -13,7 +13,7 @@
 use super::refine::{FLAT_GAIN, higher, upper_estimate};
 pub(crate) use super::refine::{Peak, local_maxima, refine};
 use super::{FrequencyResponse, LtiError, StateSpace};
-use crate::linalg::{self, CMat, Complex, LinalgError, Scalar};
+use crate::linalg::{self, CMat, Complex, Scalar};
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
 
@@ -233,11 +233,11 @@ impl<'a> Search<'a> {
         let real = centre == 0.0 || centre == PI;
         let eigenvalues = if real {
             let turn = if centre == PI { 1.0 } else { -1.0 };
-            let matrix = hamiltonian_about(turn, &self.system, self.measurements, level)?;
+            let matrix = hamiltonian_about(turn, &self.system, self.measurements, level);
             linalg::candidate_eigenvalues(&matrix)
         } else {
             let turn = -Complex::from_polar(1.0, -centre);
-            let matrix = hamiltonian_about(turn, &self.system, self.measurements, level)?;
+            let matrix = hamiltonian_about(turn, &self.system, self.measurements, level);
             linalg::candidate_eigenvalues(&matrix)
         };
         let eigenvalues = match eigenvalues {
@@ -282,12 +282,7 @@ type Parts<T> = (DMatrix<T>, DMatrix<T>, DMatrix<T>, DMatrix<T>);
 /// opposite to the centre of the Cayley transform, e^{j centre}. `turn` is -e^{-j centre}, which is real for
 /// the centres 0 and pi. The gain is that of the outputs from `measurements` on, after subtraction of the
 /// part that the outputs before explain.
-fn hamiltonian_about<T: Scalar>(
-    turn: T,
-    system: &StateSpace,
-    measurements: usize,
-    level: f64,
-) -> Result<DMatrix<T>, LinalgError> {
+fn hamiltonian_about<T: Scalar>(turn: T, system: &StateSpace, measurements: usize, level: f64) -> DMatrix<T> {
     let [a, b, c, d] = [system.a(), system.b(), system.c(), system.d()].map(|m| m.map(T::from_real));
     hamiltonian(&cayley((a * turn, b * turn, c, d)), measurements, level)
 }
@@ -306,18 +301,14 @@ fn cayley<T: Scalar>((a, b, c, d): Parts<T>) -> Parts<T> {
 /// The Hamiltonian matrix of a continuous-time system whose eigenvalues on the imaginary axis mark
 /// gain = `level`. The gain is that of the outputs from `measurements` on, after subtraction of the part
 /// that the outputs before explain.
-fn hamiltonian<T: Scalar>(
-    (a, b, c, d): &Parts<T>,
-    measurements: usize,
-    level: f64,
-) -> Result<DMatrix<T>, LinalgError> {
+fn hamiltonian<T: Scalar>((a, b, c, d): &Parts<T>, measurements: usize, level: f64) -> DMatrix<T> {
     let mut r = d * d.adjoint();
     for i in measurements..r.nrows() {
         r[(i, i)] -= T::from_real(level * level);
     }
     let s = b * d.adjoint();
     let n = a.nrows();
-    let solved = linalg::solve(&r, &linalg::hstack(&[c, &s.adjoint()])?);
+    let solved = linalg::solve(&r, &linalg::hstack(&[c, &s.adjoint()]));
     let (rc, rs) = (solved.columns(0, n), solved.columns(n, n));
     let drift = a - &s * rc;
     let (b_part, c_part) = (b * b.adjoint() - s * rs, c.adjoint() * rc);

@@ -51,8 +51,7 @@ impl Iterate {
     /// One doubling; returns the relative change of x.
     fn double(&mut self) -> f64 {
         let n = self.f.nrows();
-        // Matrices of different sizes are in no equation, so they have no solution.
-        let Ok(right) = linalg::hstack(&[&self.f, &self.g]) else { return f64::NAN };
+        let right = linalg::hstack(&[&self.f, &self.g]);
         let solved = linalg::solve(&identity_plus(&self.g, &self.x), &right);
         let (wf, wg) = (solved.columns(0, n), solved.columns(n, n));
         let dx = linalg::symmetric_part(&(self.f.transpose() * (&self.x * wf)));

@@ -4,16 +4,6 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SamplingError {
-    /// The number of recurrent sample sets is not the period.
-    #[error(
-        "{offsets} sample sets were given for period {period}; band-limited interpolation needs exactly one set per fast period, so give {period} offsets"
-    )]
-    OffsetCount {
-        /// Offsets given.
-        offsets: usize,
-        /// Period in fast periods.
-        period: usize,
-    },
     /// Two recurrent sets sample the same instants.
     #[error(
         "sample sets {first} and {second} are {distance:e} fast periods apart modulo the period; two sets must not coincide, so change one of the delays"

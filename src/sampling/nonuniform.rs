@@ -2,25 +2,6 @@
 //!
 //! The model of the thesis (sections 3.2 and 3.4): a sample is taken at x + mu instead of x and has the
 //! value f(x + mu) + e, with |e| <= E and |mu| <= B known.
-//!
-//! # Aperture jitter of converters
-//!
-//! Here x is time, mu the aperture jitter and e the error of quantisation. A signal whose spectrum ends at
-//! the frequency F and that stays within A has |f'| <= 2 pi F A and |f''| <= (2 pi F)^2 A (Bernstein), which
-//! is [`Smoothness::band_limited`]. Jitter is equivalent to a value error of |f'| B, so B seconds cost no
-//! more than half a step of an n-bit converter, A 2^{-n}, up to F = 2^{-n} / (2 pi B):
-//!
-//! ```
-//! use hybank::sampling::nonuniform::Smoothness;
-//! let (bits, jitter) = (12, 1e-12);
-//! let highest = 0.5_f64.powi(bits) / (std::f64::consts::TAU * jitter);
-//! let worst = Smoothness::band_limited(1.0, highest).slope * jitter;
-//! assert!((worst - 0.5_f64.powi(12)).abs() < 1e-12 && (highest / 1e6 - 38.86).abs() < 0.01);
-//! // Random jitter of this root mean square leaves a sine of that frequency 72.2 dB: the rms slope is
-//! // 1 / sqrt(2) of the largest, and so is the rms of the sine of its amplitude.
-//! let snr = -20.0 * (std::f64::consts::TAU * highest * jitter).log10();
-//! assert!((snr - 72.2).abs() < 0.1);
-//! ```
 
 /// One sample as a measurement: nominal position, value, and a bound on the error of each.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,30 +40,12 @@ pub struct Smoothness {
     pub curvature: f64,
 }
 
-impl Smoothness {
-    /// Of a function with |f| <= `amplitude` whose spectrum ends at `frequency` (cycles per unit of x), by
-    /// Bernstein's inequality; a sine of that frequency and amplitude reaches both.
-    pub fn band_limited(amplitude: f64, frequency: f64) -> Self {
-        let omega = std::f64::consts::TAU * frequency;
-        Self { slope: omega * amplitude, curvature: omega * omega * amplitude }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn exact(x: f64, value: f64) -> Measured {
         Measured { x, value, error: 0.0, jitter: 0.0 }
-    }
-
-    #[test]
-    fn a_sine_attains_bernsteins_inequality() {
-        let limits = Smoothness::band_limited(1.5, 2.0);
-        let at = |k: i32| std::f64::consts::TAU * 2.0 * f64::from(k) / 1000.0;
-        let slope = (0..1000).map(|k| 1.5 * std::f64::consts::TAU * 2.0 * at(k).cos()).fold(0.0, f64::max);
-        assert!((limits.slope - slope).abs() < 1e-9);
-        assert!((limits.curvature / slope / (std::f64::consts::TAU * 2.0) - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -23,16 +23,12 @@ pub struct Recurrent {
 }
 
 impl Recurrent {
-    /// Sample sets at `offsets[i] + k * period`, all in fast periods.
+    /// Sample sets at `offsets[i] + k M`, all in fast periods; M is the number of offsets.
     ///
     /// # Errors
-    /// [`SamplingError::OffsetCount`] unless there are `period >= 1` offsets,
     /// [`SamplingError::NotFinite`] for an offset that is not finite, and
     /// [`SamplingError::Coinciding`] when two offsets agree modulo the period (to 1e-9).
-    pub fn new(offsets: &[f64], period: usize) -> Result<Self, SamplingError> {
-        if offsets.len() != period || period == 0 {
-            return Err(SamplingError::OffsetCount { offsets: offsets.len(), period });
-        }
+    pub fn new(offsets: &[f64]) -> Result<Self, SamplingError> {
         if let Some(index) = offsets.iter().position(|t| !t.is_finite()) {
             return Err(SamplingError::NotFinite { name: "offset", index, value: offsets[index] });
         }
@@ -127,7 +123,7 @@ mod tests {
     fn uniform_offsets_give_the_sinc() {
         for m in 1..=6 {
             let offsets: Vec<f64> = (0..m).map(|i| i as f64).collect();
-            let sets = Recurrent::new(&offsets, m).unwrap();
+            let sets = Recurrent::new(&offsets).unwrap();
             for i in 0..m {
                 for step in -97..97 {
                     let u = step as f64 * 0.137;
@@ -139,7 +135,7 @@ mod tests {
 
     #[test]
     fn every_function_is_one_at_its_sample_and_zero_at_all_others() {
-        let sets = Recurrent::new(&[-1.2, -0.6, 0.31, 1.9], 4).unwrap();
+        let sets = Recurrent::new(&[-1.2, -0.6, 0.31, 1.9]).unwrap();
         for i in 0..4 {
             for q in 0..4 {
                 for k in -5..=5 {
@@ -154,7 +150,7 @@ mod tests {
     #[test]
     fn tones_below_nyquist_are_reproduced() {
         for offsets in [vec![0.0, 0.6], vec![0.0, 0.9, 2.2], vec![-2.4, 0.2, 1.0, 2.7]] {
-            let sets = Recurrent::new(&offsets, offsets.len()).unwrap();
+            let sets = Recurrent::new(&offsets).unwrap();
             for omega in [0.0, 0.4, 1.3, 2.6] {
                 for t in [0.37, -1.9, 2.05] {
                     let got = tone_through(&sets, omega, 0.8, t, 4000);
@@ -170,7 +166,7 @@ mod tests {
         // f(t) = sum_k [f(2k) + (t - 2k) f'(2k)] sinc^2((t - 2k)/2), the limit of M = 2.
         let f = |t: f64| (sinc(0.37 * (t - 0.3))).powi(2);
         let slope = |t: f64| (f(t + 1e-6) - f(t - 1e-6)) / 2e-6;
-        let sets = Recurrent::new(&[0.0, 1e-5], 2).unwrap();
+        let sets = Recurrent::new(&[0.0, 1e-5]).unwrap();
         let grid = |offset: f64| (-400..=400).map(|k| f(2.0 * k as f64 + offset)).collect::<Vec<_>>();
         let samples = [grid(0.0), grid(1e-5)];
         for t in [0.4, 1.1, -2.7] {
@@ -182,14 +178,14 @@ mod tests {
             assert!((close - hermite).abs() < 1e-4 && (close - f(t)).abs() < 1e-4, "{close} {hermite}");
         }
         assert!(matches!(
-            Recurrent::new(&[0.25, 2.25], 2),
+            Recurrent::new(&[0.25, 2.25]),
             Err(SamplingError::Coinciding { first: 0, second: 1, distance }) if distance < 1e-12
         ));
     }
 
     #[test]
     fn taps_reproduce_a_pulse_after_the_latency() {
-        let sets = Recurrent::new(&[-1.2, -0.6], 2).unwrap();
+        let sets = Recurrent::new(&[-1.2, -0.6]).unwrap();
         let (latency, length) = (400.0, 801);
         let f = |t: f64| sinc(0.35 * (t - 201.3)).powi(2);
         let channel = |i: usize| (0..400).map(|k| f(2.0 * k as f64 + sets.offsets[i])).collect::<Vec<_>>();
@@ -211,10 +207,8 @@ mod tests {
 
     #[test]
     fn bad_offsets_are_named() {
-        assert_eq!(Recurrent::new(&[0.0], 2), Err(SamplingError::OffsetCount { offsets: 1, period: 2 }));
-        assert_eq!(Recurrent::new(&[], 0), Err(SamplingError::OffsetCount { offsets: 0, period: 0 }));
         assert!(matches!(
-            Recurrent::new(&[0.0, f64::NAN], 2),
+            Recurrent::new(&[0.0, f64::NAN]),
             Err(SamplingError::NotFinite { name: "offset", index: 1, .. })
         ));
     }
@@ -226,7 +220,7 @@ mod tests {
             m in 1_usize..6, jitter in prop::collection::vec(-0.3..0.3_f64, 6), t in -3.0..3.0_f64
         ) {
             let offsets: Vec<f64> = (0..m).map(|i| i as f64 + jitter[i]).collect();
-            let sets = Recurrent::new(&offsets, m).unwrap();
+            let sets = Recurrent::new(&offsets).unwrap();
             let f = |t: f64| sinc(0.45 * (t - 0.2)).powi(2);
             let grid: Vec<Vec<f64>> = offsets
                 .iter()
@@ -242,14 +236,14 @@ mod tests {
 
         #[test]
         fn functions_do_not_depend_on_a_common_shift(shift in -50.0..50.0_f64, u in -9.0..9.0_f64) {
-            let near = Recurrent::new(&[0.0, 0.7, 2.2], 3).unwrap();
-            let far = Recurrent::new(&[shift, 0.7 + shift, 2.2 + shift], 3).unwrap();
+            let near = Recurrent::new(&[0.0, 0.7, 2.2]).unwrap();
+            let far = Recurrent::new(&[shift, 0.7 + shift, 2.2 + shift]).unwrap();
             prop_assert!((near.psi(1, u) - far.psi(1, u)).abs() < 1e-11);
         }
 
         #[test]
         fn tone_phase_does_not_matter(phase in -PI..PI) {
-            let sets = Recurrent::new(&[0.0, 0.6], 2).unwrap();
+            let sets = Recurrent::new(&[0.0, 0.6]).unwrap();
             let got = tone_through(&sets, 1.7, phase, 0.21, 2000);
             prop_assert!((got - (1.7 * 0.21 + phase).cos()).abs() < 4e-3);
         }

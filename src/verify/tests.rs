@@ -101,8 +101,8 @@ fn cases() -> Vec<(&'static str, Bank)> {
 /// K(z) K(z)* by the designer's route.
 fn designers(bank: &Bank, omega: f64) -> CMat {
     let problem = Problem::new(bank.spec.as_ref().unwrap(), bank.latency).unwrap();
-    let filters = filters::lifted(&bank.filters, bank.ratio).unwrap();
-    let error = LiftedPlant::new(&problem).unwrap().error_system(&filters).unwrap();
+    let filters = filters::lifted(&bank.filters, bank.ratio);
+    let error = LiftedPlant::new(&problem).error_system(&filters);
     let k = FrequencyResponse::new(&error).at_frequency(omega);
     &k * k.adjoint()
 }
@@ -145,7 +145,7 @@ fn the_state_equations_have_the_same_response() {
     for (name, bank) in cases() {
         let error = EnclosedErrorSystem::new(&bank).unwrap();
         let Midpoint { a, b, c, d } = error.midpoint().unwrap();
-        let system = crate::lti::StateSpace::new(a, b, c, d).unwrap();
+        let system = crate::lti::StateSpace::new(a, b, c, d);
         for omega in [0.1, 1.3, 3.0] {
             let k = FrequencyResponse::new(&system).at_frequency(omega);
             let theirs = designers(&bank, omega);

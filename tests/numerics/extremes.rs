@@ -56,12 +56,9 @@ fn designed(spec: &Value) -> Result<Bank, String> {
     let options = Options { proof: ProofSearch::Skip, ..Options::default() };
     match design(&spec, &options) {
         Ok(found) => Ok(found.bank),
-        Err(
-            error @ (DesignError::Lti(_)
-            | DesignError::Linalg(_)
-            | DesignError::Lmi(_)
-            | DesignError::Shapes(_)),
-        ) => Err(format!("raw: {error}, iteration")),
+        Err(error @ (DesignError::Lti(_) | DesignError::Linalg(_))) => {
+            Err(format!("raw: {error}, iteration"))
+        }
         Err(error) => Err(error.to_string()),
     }
 }

@@ -176,9 +176,9 @@ fn g13_jitter_of_the_optimal_bank() {
 fn g14_singular_values_of_the_error_system() {
     let spec = with_taps(thesis(10, &[1.2, 0.6]), 22);
     let bank = design(&spec).unwrap().bank;
-    let plant = LiftedPlant::new(&Problem::new(&spec, 10).unwrap()).unwrap();
-    let filters = lifted(&bank.filters, 2).unwrap();
-    let error = FrequencyResponse::new(&plant.error_system(&filters).unwrap());
+    let plant = LiftedPlant::new(&Problem::new(&spec, 10).unwrap());
+    let filters = lifted(&bank.filters, 2);
+    let error = FrequencyResponse::new(&plant.error_system(&filters));
     for (w, golden) in [(0.0, [0.0399320, 0.0105444]), (PI, [0.0336757, 0.0112080])] {
         let sigma = hybank::linalg::singular_values(&error.at_frequency(w)).unwrap();
         for (value, golden) in sigma.iter().zip(golden) {

@@ -11,7 +11,7 @@ const TINY: f64 = 1e-9;
 /// fast rate.
 fn noncausal(order: usize, cutoff: f64) -> f64 {
     let spec = alike(&butterworth(order, TAU * cutoff), 2, 10, &[1.2, 0.6]);
-    LiftedPlant::new(&Problem::new(&spec, 10).unwrap()).unwrap().noncausal_bound().unwrap().gain
+    LiftedPlant::new(&Problem::new(&spec, 10).unwrap()).noncausal_bound().unwrap().gain
 }
 
 /// The cutoffs of the design guide.

@@ -46,8 +46,8 @@ fn noise_gains_are_sums_of_squared_taps() {
 #[test]
 fn the_error_is_that_of_its_frequency_response() {
     let bank = bank();
-    let plant = LiftedPlant::new(&Problem::of_bank(&bank).unwrap()).unwrap();
-    let error = plant.error_system(&filters::lifted(&bank.filters, 2).unwrap()).unwrap();
+    let plant = LiftedPlant::new(&Problem::of_bank(&bank).unwrap());
+    let error = plant.error_system(&filters::lifted(&bank.filters, 2));
     let count = 4096;
     let response = |k: usize| error.response_at(Complex::from_polar(1.0, 2.0 * PI * k as f64 / count as f64));
     let (mut square, mut most) = (0.0, 0.0f64);

@@ -70,16 +70,12 @@ fn the_errors_are_those_of_the_least_squares_taps() {
 
 /// By QR on a grid of frequencies that is exact for the periodic part of the error.
 fn least_mean_square(problem: &Problem, latency: usize, taps: usize) -> f64 {
-    let plant = LiftedPlant::new(&Problem { latency, ..problem.clone() }).unwrap();
+    let plant = LiftedPlant::new(&Problem { latency, ..problem.clone() });
     let ratio = problem.ratio;
     let lags: Vec<usize> = (0..ratio).map(|p| taps.saturating_sub(p).div_ceil(ratio)).collect();
     let count = 256;
-    let points = (0..=count).map(|k| {
-        let omega = std::f64::consts::PI * k as f64 / count as f64;
-        let (h, w) = plant.response(omega);
-        sampled::Point { omega, h, w }
-    });
-    let grid = sampled::Problem::new(points.collect(), lags).unwrap();
+    let points = (0..=count).map(|k| plant.at(std::f64::consts::PI * k as f64 / count as f64));
+    let grid = sampled::Problem::new(points.collect(), lags);
     let weight = |k: usize| if k == 0 || k == count { 0.5 } else { 1.0 } / count as f64;
     let weights: Vec<f64> = (0..=count).map(weight).collect();
     let square = sampled::MeanSquareObjective { weights, noise: problem.noise.clone() };
@@ -228,7 +224,7 @@ fn signals_in_a_band_get_the_latency_that_their_samples_need() {
         let spec = Spec::from_toml(&text, "spec.toml").unwrap();
         let error = |latency: usize| {
             let problem = Problem::new(&with_usual_noise(&spec), latency).unwrap();
-            let plant = LiftedPlant::new(&problem).unwrap();
+            let plant = LiftedPlant::new(&problem);
             let instants = -(latency as i64)..=ratio as i64 - 1 - latency as i64;
             let best = best_taps(&problem, 48 / ratio, instants).unwrap();
             let tap = |i: usize, n: usize| best[n % ratio][i][n / ratio];

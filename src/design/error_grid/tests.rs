@@ -10,7 +10,7 @@ fn plant(ratio: usize) -> LiftedPlant {
          target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n\
          channel = [{{ delay = 1.2 }}, {{ delay = 0.6 }}]\ndesign = {{ method = \"iir\" }}"
     );
-    LiftedPlant::new(&Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), 6).unwrap()).unwrap()
+    LiftedPlant::new(&Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), 6).unwrap())
 }
 
 fn taps(count: usize) -> Vec<Vec<f64>> {
@@ -36,7 +36,7 @@ fn mean_squares_are_squared_h2_norms() {
         let plant = plant(ratio);
         let lags = filters::polyphase(&taps(count), ratio);
         let square = ErrorGrid::new(&plant, lags.len()).unwrap().mean_square(&lags);
-        let error = plant.error_system(&StateSpace::fir(&lags).unwrap()).unwrap();
+        let error = plant.error_system(&StateSpace::fir(&lags));
         let want = h2_norm(&error).unwrap().powi(2);
         assert!((square / want - 1.0).abs() < 1e-9, "{square} {want}");
     }
@@ -47,7 +47,7 @@ fn mean_squares_are_squared_h2_norms() {
 #[test]
 fn the_highest_peak_is_that_of_the_whole_grid() {
     let spec = Spec::from_toml(include_str!("../../../filters/thesis-fir.toml"), "spec.toml").unwrap();
-    let plant = LiftedPlant::new(&Problem::new(&spec, 10).unwrap()).unwrap();
+    let plant = LiftedPlant::new(&Problem::new(&spec, 10).unwrap());
     let mut random = crate::random::Random(5);
     for lags in [1, 3, 11] {
         let grid = ErrorGrid::new(&plant, lags).unwrap();

@@ -35,7 +35,7 @@ pub(crate) fn synthesise(
     let taps = of_phases(&problem, length, |frames, instants| {
         let normal = samples.among(frames);
         let targets: Vec<Mat> = instants.map(|instant| samples.with_target(frames, instant)).collect();
-        let weights = linalg::solve_positive(&normal, &linalg::hstack(&targets.iter().collect::<Vec<_>>())?)?;
+        let weights = linalg::solve_positive(&normal, &linalg::hstack(&targets.iter().collect::<Vec<_>>()))?;
         let channels = problem.channels.len();
         let of = |k: usize, i: usize| (0..frames).map(|j| weights[(j * channels + i, k)]).collect();
         Ok((0..targets.len()).map(|k| (0..channels).map(|i| of(k, i)).collect()).collect())

@@ -20,7 +20,7 @@ pub(crate) fn sinc(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis
         return Err(DesignError::SincNeedsNyquist { channels, ratio });
     }
     let offsets: Vec<f64> = problem.delays().iter().map(|delay| -delay.0).collect();
-    let sets = Recurrent::new(&offsets, ratio)?;
+    let sets = Recurrent::new(&offsets)?;
     let taps = |i: usize| {
         let mut taps = sets.taps(i, problem.latency as f64, settings.taps);
         taps.iter_mut().for_each(|tap| *tap /= problem.channels[i].converter_gain);
@@ -55,7 +55,7 @@ pub(crate) fn separation(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
 fn fir_taps(problem: &Problem, taps: usize) -> Result<Vec<Vec<f64>>, DesignError> {
     let noiseless = Problem { noise: vec![0.0; problem.channels.len()], ..problem.clone() };
     let settings = Settings { taps, ..Settings::default() };
-    fir::taps_of_least_gamma(&LiftedPlant::new(&noiseless)?, &settings)
+    fir::taps_of_least_gamma(&LiftedPlant::new(&noiseless), &settings)
 }
 
 /// The channels as inputs of the second step: with integer delays, with the latency that the first step

@@ -129,7 +129,7 @@ impl Innovations {
         let feedthroughs = relative_feedthroughs(plant, &direct, &sizes);
         let least = feedthroughs.iter().map(|&(_, share)| share).fold(1.0, f64::min);
         let informative = feedthroughs.into_iter().filter(|&(_, share)| share > INNOVATION_FLOOR);
-        Self::separate(plant, informative.map(|(channel, _)| channel).collect(), delayed, least)
+        Ok(Self::separate(plant, informative.map(|(channel, _)| channel).collect(), delayed, least))
     }
 
     fn separate(
@@ -137,13 +137,13 @@ impl Innovations {
         direct: Vec<usize>,
         delayed: Vec<DelayedChannel>,
         least_feedthrough: f64,
-    ) -> Result<Self, DesignError> {
-        let measurement = plant.system().select_outputs(direct.iter().copied())?;
-        let reference = plant.reference()?;
+    ) -> Self {
+        let measurement = plant.system().select_outputs(direct.iter().copied());
+        let reference = plant.reference();
         let system = plant.system();
         let (known, references, n) = (direct.len(), plant.ratio(), system.order());
         // [D_f; D_z; B] = L Q: in the rotated inputs D is lower triangular.
-        let l = linalg::lq_factor(&linalg::vstack(&[measurement.d(), reference.d(), system.b()])?);
+        let l = linalg::lq_factor(&linalg::vstack(&[measurement.d(), reference.d(), system.b()]));
         let rest = l.ncols() - known;
         let block =
             |row: usize, col: usize, rows: usize, cols: usize| l.view((row, col), (rows, cols)).into_owned();
@@ -154,11 +154,11 @@ impl Innovations {
         let cf = linalg::solve_lower(&root, measurement.c());
         let c1 = reference.c() - &x * &cf;
         let f = system.a() - &b1 * &cf;
-        let c2 = linalg::vstack(&[&cf, &last_links(&delayed, n)])?;
+        let c2 = linalg::vstack(&[&cf, &last_links(&delayed, n)]);
         let p0 = chain_variances(&delayed, n);
         let channels = plant.channels();
         let (conclusive, plain) = (false, None);
-        Ok(Self {
+        Self {
             f,
             b1,
             b2,
@@ -174,7 +174,7 @@ impl Innovations {
             least_feedthrough,
             conclusive,
             plain,
-        })
+        }
     }
 
     /// Whether the feedthrough of a channel is rounding, so that the channel was left out.
@@ -252,7 +252,7 @@ impl Innovations {
 
     /// (F, G, H) of the Riccati equation Delta = F Delta (I + G Delta)^-1 F' + H for a positive E.
     fn weights(&self, e: &Mat) -> Result<(Mat, Mat, Mat), LinalgError> {
-        let solved = linalg::solve_positive(e, &linalg::hstack(&[&self.c1, &self.y])?)?;
+        let solved = linalg::solve_positive(e, &linalg::hstack(&[&self.c1, &self.y]))?;
         let (ec, ey) = (solved.columns(0, self.c1.ncols()), solved.columns(self.c1.ncols(), self.y.ncols()));
         let by = &self.b2 * self.y.transpose();
         let f = &self.f + &by * ec;
@@ -293,19 +293,19 @@ impl Innovations {
         let filter = match &self.plain {
             None => self.with_gain(&gain),
             Some((forward, plain)) => plain.with_gain(&(forward * gain)),
-        }?;
+        };
         (filter.spectral_radius().ok()? < 1.0).then_some(filter)
     }
 
     /// The filter that corrects its state by `gain` times the innovation.
-    fn with_gain(&self, gain: &Mat) -> Option<Filter> {
+    fn with_gain(&self, gain: &Mat) -> Filter {
         let Self { f, b1, c1, c2, .. } = self;
         let (mut k, mut df) = (f * gain, c1 * gain);
         let (a, c) = (f - &k * c2, c1 - &df * c2);
         let known = self.direct.len();
         k.columns_mut(0, known).zip_apply(b1, |gain, feedthrough| *gain += feedthrough);
         df.columns_mut(0, known).zip_apply(&self.x, |gain, feedthrough| *gain += feedthrough);
-        StateSpace::new(a, self.on_channels(&k), c, self.on_channels(&df)).ok()
+        StateSpace::new(a, self.on_channels(&k), c, self.on_channels(&df))
     }
 
     /// From gains on yw to gains on the channels, zero for those left out.

@@ -27,8 +27,7 @@ const MISSED_PEAK_LIMIT: usize = 8;
 /// converters' noise at the output: `||K||_2^2 + sum_i noise_i ||f_i||^2`.
 ///
 /// # Errors
-/// [`DesignError::Lti`] for unstable plants; [`DesignError::Linalg`] or [`DesignError::Lmi`] if a
-/// decomposition fails.
+/// [`DesignError::Lti`] for unstable plants; [`DesignError::Linalg`] if a decomposition fails.
 pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
     let mut exchange = exchange(plant, settings)?;
     let best = least_gamma(plant, settings.taps, &mut exchange)?;
@@ -65,8 +64,8 @@ fn exchange<'a>(plant: &'a LiftedPlant, settings: &Settings) -> Result<Exchange<
     let noise = plant.problem().noise.clone();
     let margin = settings.gamma_margin.unwrap_or_else(|| usual_margin(&noise));
     let objective = MeanSquareObjective { weights, noise };
-    let problem = Problem::new(points, lags)?;
-    let mut exchange = Exchange::new(grid, problem, std::iter::repeat(0), objective, margin)?;
+    let problem = Problem::new(points, lags);
+    let mut exchange = Exchange::new(grid, problem, std::iter::repeat(0), objective, margin);
     exchange.stop = settings.stop.clone();
     Ok(exchange)
 }
@@ -102,7 +101,7 @@ fn least_gamma(
     for _ in 0..MISSED_PEAK_LIMIT {
         if !best.is_missed()
             || exchange.stop.is_due()
-            || !exchange.add(&[Location { frequency: best.peak.frequency, scenario: 0 }])?
+            || !exchange.add(&[Location { frequency: best.peak.frequency, scenario: 0 }])
         {
             break;
         }

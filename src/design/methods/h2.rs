@@ -26,7 +26,7 @@ const SAME_ERROR: f64 = 1.0 + 1e-6;
 /// [`DesignError::RiccatiFailed`] if the Riccati equation could not be solved, [`DesignError::Lti`] if the
 /// plant is not stable.
 pub(crate) fn synthesise(plant: &LiftedPlant, stop: &Stop) -> Result<Synthesis, DesignError> {
-    let noisy = plant.with_noise()?;
+    let noisy = plant.with_noise();
     let innovations = Innovations::in_all_coordinates(&noisy)?;
     // gamma is that of the signal alone, so the noise counts in the filters and not in the bounds.
     let mut iteration = GammaIteration::new(plant, &[Rc::new(Innovations::new(plant)?)], &Stop::default())?;
@@ -64,7 +64,7 @@ fn precise<F: Number>(plant: &LiftedPlant, limit: usize) -> Result<Option<Filter
 
 /// ||K||_2 with the noise; infinite for a filter that rounding made unstable.
 fn rms_error(plant: &LiftedPlant, filter: &Filter) -> Result<f64, DesignError> {
-    match h2_norm(&plant.error_system(filter)?) {
+    match h2_norm(&plant.error_system(filter)) {
         Err(LtiError::Unstable { .. }) => Ok(f64::INFINITY),
         norm => Ok(norm?),
     }

@@ -99,7 +99,7 @@ fn relaxed_with_noise(
     cap: f64,
 ) -> Result<Option<Evaluated>, DesignError> {
     for share in NOISE_SHARES {
-        let noisy = plant.with_noise_scaled(share)?;
+        let noisy = plant.with_noise_scaled(share);
         for form in Innovations::in_all_coordinates(&noisy)? {
             let mean_square = if share == 1.0 { form.h2() } else { None };
             let central = match form.h_infinity(cap) {

@@ -188,8 +188,7 @@ impl<F: Number> PreciseFiltering<F> {
         (0..gramian.nrows()).for_each(|i| gramian[(i, i)] = gramian[(i, i)] + gramian[(i, i)] * noise);
         let root = dense::cholesky(&gramian)?;
         let (a, b) = (dense::solve_lower(&root, &product(a, &root)), dense::solve_lower(&root, b));
-        let filter =
-            StateSpace::new(nearest(&a), nearest(&b), nearest(&product(c, &root)), nearest(d)).ok()?;
+        let filter = StateSpace::new(nearest(&a), nearest(&b), nearest(&product(c, &root)), nearest(d));
         (filter.spectral_radius().ok()? < 1.0).then_some(filter)
     }
 }

@@ -159,7 +159,7 @@ fn least_worst_norm(
             break (taps, worst.peak.gain, is_missed);
         }
         let scenario = exchange.error_mut().search.include(&worst.point)?;
-        if !exchange.add(&[Location { frequency: worst.peak.frequency, scenario }])? {
+        if !exchange.add(&[Location { frequency: worst.peak.frequency, scenario }]) {
             break (taps, worst.peak.gain, is_missed);
         }
     };
@@ -184,15 +184,15 @@ struct BoxError {
 impl AffineError for BoxError {
     type Scenario = Combination;
 
-    fn at(&self, location: &Location<Combination>) -> Result<Point, DesignError> {
+    fn at(&self, location: &Location<Combination>) -> Point {
         let response = self.search.plant().response(location.frequency);
         let h = self.search.plant().measurements(&response, &location.scenario);
         let count = h.nrows();
-        let g = linalg::lq_factor(&linalg::vstack(&[&h, &response.references])?);
+        let g = linalg::lq_factor(&linalg::vstack(&[&h, &response.references]));
         let rows = |first: usize, rows: usize| -> CMat {
             g.rows(first, rows).into_owned().resize_horizontally(self.inputs, Default::default())
         };
-        Ok(Point { omega: location.frequency, h: rows(0, count), w: rows(count, g.nrows() - count) })
+        Point { omega: location.frequency, h: rows(0, count), w: rows(count, g.nrows() - count) }
     }
 
     fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<Combination>, DesignError> {
@@ -210,11 +210,11 @@ fn exchange(
     let (points, weights) = ErrorGrid::new(plant, lags[0])?.coarse(0);
     let noise = plant.problem().noise.clone();
     let margin = settings.gamma_margin.unwrap_or(MARGIN).max(MARGIN);
-    let problem = SampledProblem::new(points, lags)?;
+    let problem = SampledProblem::new(points, lags);
     let without_errors = std::iter::repeat(vec![0; search.plant().errors.delays.len()]);
     let error = BoxError { search, inputs: plant.channels() + plant.ratio() };
     let objective = MeanSquareObjective { weights, noise };
-    let mut exchange = Exchange::new(error, problem, without_errors, objective, margin)?;
+    let mut exchange = Exchange::new(error, problem, without_errors, objective, margin);
     exchange.stop = settings.stop.clone();
     Ok(exchange)
 }
@@ -276,7 +276,7 @@ impl RobustProblem {
     pub(super) fn moved_plants(&self, plant: &LiftedPlant) -> Result<Vec<MovedPlant>, DesignError> {
         let moved = |point: ErrorPoint| {
             let problem = Problem::with_errors(&self.spec, plant.problem().latency, &point)?;
-            Ok(MovedPlant { plant: LiftedPlant::new(&problem)?, point })
+            Ok(MovedPlant { plant: LiftedPlant::new(&problem), point })
         };
         scenarios(&self.errors).into_iter().map(moved).collect()
     }

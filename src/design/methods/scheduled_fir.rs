@@ -93,7 +93,7 @@ pub(crate) fn synthesise(
     let reach = Reach::new(&moved, fixed.peak.gain)?;
     let sides = Sides::new(problem);
     let grid = sides.grid(plant, moved, &reach, settings)?;
-    let mut exchange = sides.exchange(plant, grid, settings)?;
+    let mut exchange = sides.exchange(plant, grid, settings);
     exchange.stop = settings.stop.clone();
     let found = sides.least_ratio(&mut exchange, &search, &reach, settings)?;
     let of_fixed = worst_of(&search, fixed_taps)?.peak.gain;
@@ -243,7 +243,7 @@ impl Sides {
                 .filter(|(_, (scenario, peak))| scenario.weight * peak.gain > enough)
                 .map(|(scenario, (_, peak))| Location { frequency: peak.frequency, scenario })
                 .collect();
-            if !exchange.add(&missed)? {
+            if !exchange.add(&missed) {
                 return Ok(scheduled);
             }
         }
@@ -301,11 +301,11 @@ impl Sides {
         plant: &LiftedPlant,
         grid: ErrorGrid<'a>,
         settings: &Settings,
-    ) -> Result<Exchange<ErrorGrid<'a>>, DesignError> {
+    ) -> Exchange<ErrorGrid<'a>> {
         let (points, weights, scenarios) = self.first_points(&grid);
         let noise = self.noise(&plant.problem().noise, grid.scenarios());
         let margin = settings.gamma_margin.unwrap_or(MARGIN).max(MARGIN);
-        let problem = SampledProblem::new(points, tap_lags(plant.ratio(), settings.taps))?;
+        let problem = SampledProblem::new(points, tap_lags(plant.ratio(), settings.taps));
         Exchange::new(grid, problem, scenarios, MeanSquareObjective { weights, noise }, margin)
     }
 

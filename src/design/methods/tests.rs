@@ -57,7 +57,7 @@ fn spec(case: &Case, method: Method) -> Spec {
 /// A plant without identical channels, as the designer passes it to a method.
 fn plant(case: &Case) -> LiftedPlant {
     let problem = Problem::new(&spec(case, Method::Iir), case.latency).unwrap();
-    LiftedPlant::new(&problem.merge_channels(Repeats::AtOneInstant).problem).unwrap()
+    LiftedPlant::new(&problem.merge_channels(Repeats::AtOneInstant).problem)
 }
 
 fn settings(case: &Case, method: Method) -> Settings {
@@ -81,7 +81,7 @@ fn filter_response(filters: &Filters, ratio: usize, z: Complex<f64>) -> CMat {
 
 /// The largest gain of W - F H on a dense grid, from the responses of the three.
 fn dense_grid(plant: &LiftedPlant, filters: &Filters) -> f64 {
-    let (h, w) = (plant.measurement().unwrap(), plant.reference().unwrap());
+    let (h, w) = (plant.measurement(), plant.reference());
     let gain = |k: usize| {
         let z = Complex::from_polar(1.0, PI * k as f64 / 1500.0);
         let error = w.response_at(z) - filter_response(filters, plant.ratio(), z) * h.response_at(z);
@@ -156,9 +156,9 @@ fn a_margin_is_spent_on_the_mean_square() {
     let h2 = |filters: &Filters| {
         let system = match filters {
             Filters::StateSpace(system) => system.clone(),
-            Filters::Fir(taps) => lifted(&crate::bank::SynthesisFilters::Fir(taps.clone()), 2).unwrap(),
+            Filters::Fir(taps) => lifted(&crate::bank::SynthesisFilters::Fir(taps.clone()), 2),
         };
-        crate::lti::gramian::h2_norm(&plant.error_system(&system).unwrap()).unwrap()
+        crate::lti::gramian::h2_norm(&plant.error_system(&system)).unwrap()
     };
     for method in [Method::Fir, Method::Iir] {
         let tight = settings(&CASES[0], method);
@@ -175,14 +175,12 @@ fn a_margin_is_spent_on_the_mean_square() {
 fn squares(plant: &LiftedPlant, filters: &Filters) -> [f64; 3] {
     let system = match filters {
         Filters::StateSpace(system) => system.clone(),
-        Filters::Fir(taps) => {
-            lifted(&crate::bank::SynthesisFilters::Fir(taps.clone()), plant.ratio()).unwrap()
-        }
+        Filters::Fir(taps) => lifted(&crate::bank::SynthesisFilters::Fir(taps.clone()), plant.ratio()),
     };
     let square = |system: &crate::lti::StateSpace| crate::lti::gramian::h2_norm(system).unwrap().powi(2);
     let rms: Vec<f64> = plant.problem().noise.iter().map(|power| power.sqrt()).collect();
-    let noise = square(&system.clone().scale_inputs(&rms).unwrap());
-    [square(&plant.error_system(&system).unwrap()), noise, square(&system).sqrt()]
+    let noise = square(&system.clone().scale_inputs(&rms));
+    [square(&plant.error_system(&system)), noise, square(&system).sqrt()]
 }
 
 /// The recursive optimum is at least as good as that of many taps, whatever the noise; and noise that is
@@ -205,13 +203,13 @@ fn the_recursive_mean_square_optimum_counts_noise() {
             );
             let spec = Spec::from_toml(&text, "spec.toml").unwrap();
             let problem = Problem::new(&spec, 6).unwrap().merge_channels(Repeats::of(&spec));
-            let plant = LiftedPlant::new(&problem.of_unit_size().unwrap().problem).unwrap();
+            let plant = LiftedPlant::new(&problem.of_unit_size().unwrap().problem);
             let of = |taps: usize| {
                 let settings = Settings { taps, ..Settings::default() };
                 squares(&plant, &synthesise(Method::H2, &plant, &settings).unwrap().filters)
             };
             let (recursive, fir) = (of(0), of(60));
-            let zero = crate::lti::gramian::h2_norm(&plant.reference().unwrap()).unwrap().powi(2);
+            let zero = crate::lti::gramian::h2_norm(&plant.reference()).unwrap().powi(2);
             let total = |squares: [f64; 3]| squares[0] + squares[1];
             assert!(
                 total(recursive) <= total(fir) * (1.0 + 1e-4) + 1e-20 * zero,

@@ -49,7 +49,7 @@ impl EnclosedGains<'_> {
     /// precision is not resolved.
     pub(super) fn peak(&self, proof: &Proof) -> Result<Option<(f64, DualWitness)>, DesignError> {
         let Some(Midpoint { a, b, c, d }) = self.0.midpoint() else { return Ok(None) };
-        let system = StateSpace::new(a, b, c, d)?;
+        let system = StateSpace::new(a, b, c, d);
         let computed = hinf_norm(&system)?.frequency;
         let Some(there) = self.at(computed)? else { return Ok(None) };
         if self.0.states() > MAX_LONG_STATES {

@@ -97,7 +97,7 @@ fn binding_witnesses(bank: &Bank, dual: &[DualPoint]) -> Result<Vec<DualWitness>
     let merged = Problem::of_bank(bank)?.merge_channels(Repeats::AtOneInstant);
     let units = merged.problem.measurement_units()?;
     let merged = merged.of_unit_size()?;
-    let plant = LiftedPlant::new(&merged.problem)?;
+    let plant = LiftedPlant::new(&merged.problem);
     let parts = &merged.shares;
     let directions = directions(dual, max_witnesses(taps.len() * taps[0].len()))?;
     let mut least = TapLeastSquares::new(&plant, &directions, taps[0].len());

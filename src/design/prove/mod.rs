@@ -210,7 +210,7 @@ fn stated(proven: f64) -> f64 {
 /// the samples.
 fn noncausal_witness(bank: &Bank) -> Result<DualWitness, DesignError> {
     let merged = Problem::of_bank(bank)?.merge_channels(Repeats::AtWholePeriods).of_unit_size()?;
-    let plant = LiftedPlant::new(&merged.problem)?;
+    let plant = LiftedPlant::new(&merged.problem);
     let (n, m) = (plant.channels(), plant.ratio());
     let frequency = plant.noncausal_bound()?.frequency;
     let l = linalg::lq_factor(&FrequencyResponse::new(plant.system()).at_frequency(frequency));

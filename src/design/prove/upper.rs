@@ -63,7 +63,7 @@ pub(super) fn certificate(
     let raw = error.midpoint().ok_or(DesignError::NotCertified { states, failure: None })?;
     let units = Units::of(&raw, error.scale())?;
     let middle = units.of_one(&raw);
-    let system = StateSpace::new(middle.a.clone(), middle.b.clone(), middle.c.clone(), middle.d.clone())?;
+    let system = StateSpace::new(middle.a.clone(), middle.b.clone(), middle.c.clone(), middle.d.clone());
     let peak = hinf_norm(&system)?;
     let response = system.response_at(Complex::from_polar(1.0, peak.frequency));
     let mut peak_witness = witness(peak.frequency, &leading_direction(&response)?);
@@ -199,7 +199,7 @@ impl Riccati {
         let Midpoint { a, b, c, d } = middle;
         let (n, m) = (a.nrows(), c.nrows());
         let state_noise = Mat::from_diagonal_element(n, n, noise / (n.max(1) as f64).sqrt());
-        let inputs = linalg::hstack(&[&c.transpose(), &state_noise])?;
+        let inputs = linalg::hstack(&[&c.transpose(), &state_noise]);
         let k = GramianCoordinates::new(&a.transpose(), &inputs, 0.0)?;
         let outputs = k.b.columns(0, m).into_owned();
         Ok(Self { c: b.tr_mul(&k.basis), a: k.a, b: outputs, d: d.transpose(), inverse: k.inverse })

@@ -2,7 +2,7 @@
 
 use super::lattice::Span;
 use crate::design::DesignError;
-use crate::design::error_grid::error_at;
+use crate::design::filters::response;
 use crate::design::limits::Stop;
 use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lmi::sampled::Point;
@@ -51,7 +51,8 @@ impl<'a> Descent<'a> {
         lags: &[Mat],
         real: f64,
     ) -> Result<Self, DesignError> {
-        let errors: Vec<CMat> = points.iter().map(|point| error_at(point, lags)).collect();
+        let errors: Vec<CMat> =
+            points.iter().map(|point| point.error(&response(lags, point.omega))).collect();
         let ratio = lags[0].nrows();
         let (gains, order) = (Vec::new(), (0..points.len()).collect());
         let mut descent =

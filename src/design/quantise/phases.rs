@@ -4,9 +4,9 @@ use super::lattice::{Span, closest};
 use super::problem::{RIDGE, Tap, TapError};
 use crate::bank::{FixedPoint, signed_digits};
 use crate::design::DesignError;
-use crate::design::error_grid::error_at;
-use crate::design::filters::polyphase;
+use crate::design::filters::{polyphase, response};
 use crate::linalg::{self, CMat, Complex, Mat};
+use crate::lmi::sampled::Point;
 use crate::spec::MAX_BITS;
 
 /// Changes that lower the mean square, one after the other.
@@ -172,7 +172,8 @@ impl Phases {
         let ratio = error.ratio;
         let (step, taps) = (words.step(), words.taps());
         let lags = polyphase(&taps, ratio);
-        let errors: Vec<CMat> = error.points.iter().map(|point| error_at(point, &lags)).collect();
+        let error_at = |point: &Point| point.error(&response(&lags, point.omega));
+        let errors: Vec<CMat> = error.points.iter().map(error_at).collect();
         let weights = error.grid.mean_weights();
         let correlations = error.forms.correlations(&weights, lags.len());
         let noise = |i: usize| error.problem.noise.get(i).copied().unwrap_or(0.0);

@@ -6,7 +6,6 @@ use crate::design::DesignError;
 use crate::design::filters::{impulse_responses, polyphase};
 use crate::design::methods::tap_lags;
 use crate::lmi::sampled::{MeanSquareObjective, Problem, mean_square_under_cap};
-use crate::lmi::{LmiError, Settings};
 
 /// gamma of the smaller taps over that of the optimal ones, in decibels.
 const LOSSES_DB: [f64; 12] = [0.02, 0.1, 0.3, 1.0, 2.0, 4.0, 7.0, 11.0, 16.0, 24.0, 36.0, 60.0];
@@ -25,7 +24,7 @@ pub(super) struct SmallerTaps {
 /// first.
 ///
 /// # Errors
-/// [`DesignError::Lmi`] if a decomposition fails.
+/// [`DesignError::Linalg`] if a decomposition fails.
 pub(super) fn smaller_taps(error: &TapError<'_>) -> Result<Vec<SmallerTaps>, DesignError> {
     let zero_output = zero_output(error);
     let caps = LOSSES_DB.map(|db| error.real_gamma * 10f64.powf(db / 20.0));
@@ -46,13 +45,10 @@ fn under_cap(error: &TapError<'_>, cap: f64) -> Result<Option<SmallerTaps>, Desi
     let (points, mut weights) = error.grid.coarse(0);
     weights.iter_mut().for_each(|weight| *weight *= ERROR_WEIGHT);
     let lags = tap_lags(error.ratio, length);
-    let problem = Problem::new(points, lags)?;
+    let problem = Problem::new(points, lags);
     let objective = MeanSquareObjective { weights, noise: vec![1.0; channels] };
     let start = polyphase(error.problem.taps, error.ratio);
-    let settings = Settings { tol_gap_rel: ACCURACY, ..Settings::DEFAULT };
-    match mean_square_under_cap(&problem, &objective, cap, &start, &settings) {
-        Ok(found) => Ok(Some(SmallerTaps { gamma: cap, taps: impulse_responses(&found.taps, length) })),
-        Err(LmiError::Cap { .. }) => Ok(None),
-        Err(error) => Err(error.into()),
-    }
+    let is_due = || error.problem.stop.is_due();
+    let found = mean_square_under_cap(&problem, &objective, cap, &start, ACCURACY, &is_due)?;
+    Ok(found.map(|found| SmallerTaps { gamma: cap, taps: impulse_responses(&found.taps, length) }))
 }

@@ -18,7 +18,7 @@ fn optimum(spec: &str) -> (LiftedPlant, Vec<Vec<f64>>) {
     let spec = Spec::from_toml(spec, "spec.toml").unwrap();
     let found = design(&spec, &Options::without_proof()).unwrap();
     let SynthesisFilters::Fir(taps) = found.bank.filters else { unreachable!() };
-    (LiftedPlant::new(&Problem::new(&spec, found.bank.latency).unwrap()).unwrap(), taps)
+    (LiftedPlant::new(&Problem::new(&spec, found.bank.latency).unwrap()), taps)
 }
 
 fn problem<'a>(plant: &'a LiftedPlant, taps: &'a [Vec<f64>]) -> QuantisationProblem<'a> {

@@ -32,7 +32,7 @@ impl Dynamics {
     /// largest effect first. `state_root` is a square root of the covariance of the bank's states when the
     /// plant drives it.
     pub(super) fn balanced(bank: &StateSpace, lags: usize, state_root: &Mat) -> Result<Self, DesignError> {
-        let tail = FirWithTail::split(bank, lags)?.tail().clone();
+        let tail = FirWithTail::split(bank, lags).tail().clone();
         let floor = ROUNDING_SHARE * (tail.c() * state_root).norm();
         let tail = balanced_when_driven(&tail, state_root, floor)?;
         Ok(Self { lags, a: tail.a().clone(), b: tail.b().clone() })
@@ -75,15 +75,15 @@ impl Dynamics {
 
     /// The regressors of the output, `X = [x; u[k - lags]; ..; u[k]]`, as outputs of a system with the
     /// inputs u.
-    pub(super) fn regressors(&self) -> Result<StateSpace, DesignError> {
+    pub(super) fn regressors(&self) -> StateSpace {
         let (r, n) = (self.tail_order(), self.channels());
         let all = Mat::identity(r + n * (self.lags + 1), r + n * (self.lags + 1));
-        Ok(FirWithTail::with_outputs(&all, self.lags, &self.a, &self.b)?.realise()?)
+        FirWithTail::with_outputs(&all, self.lags, &self.a, &self.b).realise()
     }
 
     /// The bank y = `outputs` X, with `outputs` the output matrices side by side, M x (r + N (lags + 1)).
-    pub(super) fn with_outputs(&self, outputs: &Mat) -> Result<FirWithTail, DesignError> {
-        Ok(FirWithTail::with_outputs(outputs, self.lags, &self.a, &self.b)?)
+    pub(super) fn with_outputs(&self, outputs: &Mat) -> FirWithTail {
+        FirWithTail::with_outputs(outputs, self.lags, &self.a, &self.b)
     }
 
     /// Largest modulus of the poles, infinite if the eigenvalues do not converge.
@@ -97,7 +97,7 @@ const RANK_TOLERANCE: f64 = 1e-12;
 
 /// Square root of the covariance of the states of `bank` when the plant drives it with white noise.
 pub(super) fn state_covariance_root(plant: &LiftedPlant, bank: &StateSpace) -> Result<Mat, DesignError> {
-    let error = plant.error_system(bank)?;
+    let error = plant.error_system(bank);
     let root = controllability_root(error.a(), error.b())?;
     Ok(root.rows(plant.system().order(), bank.order()).into_owned())
 }
@@ -124,9 +124,9 @@ pub(super) fn mean_square(plant: &LiftedPlant, dynamics: &Dynamics) -> Result<(M
 
 /// Rows X and Z with the covariance `[X; Z] [X; Z]'` of the regressors and the reference.
 fn covariance_roots(plant: &LiftedPlant, dynamics: &Dynamics) -> Result<(Mat, Mat), DesignError> {
-    let driven = plant.driving(&dynamics.regressors()?)?;
+    let driven = plant.driving(&dynamics.regressors());
     let root = controllability_root(driven.a(), driven.b())?;
-    let t = linalg::hstack(&[&(driven.c() * &root), driven.d()])?;
+    let t = linalg::hstack(&[&(driven.c() * &root), driven.d()]);
     let regressors = driven.outputs() - plant.ratio();
     Ok((t.rows(0, regressors).into_owned(), t.rows(regressors, plant.ratio()).into_owned()))
 }

@@ -69,7 +69,7 @@ impl<'a> OrderSearch<'a> {
         let system = problem.plant.system();
         Ok(Self {
             problem,
-            samples: PlantSamples::new(problem.plant)?,
+            samples: PlantSamples::new(problem.plant, problem.stop)?,
             splits: splits(problem)?,
             full: figures(problem, &FirWithTail::new(problem.bank)?)?,
             banks: BTreeMap::new(),
@@ -220,7 +220,7 @@ impl<'a> OrderSearch<'a> {
         let mut samples = samples.clone();
         let bank = match self.problem.aim {
             Aim::WorstCase => samples.best_bank(&dynamics, self.problem.gamma_margin)?,
-            Aim::MeanSquare => dynamics.with_outputs(&mean_square(self.problem.plant, &dynamics)?.0)?,
+            Aim::MeanSquare => dynamics.with_outputs(&mean_square(self.problem.plant, &dynamics)?.0),
         };
         let figures = figures(self.problem, &bank)?;
         Ok(ReducedBank { dynamics, bank, figures, samples })
@@ -306,7 +306,7 @@ impl<'a> OrderSearch<'a> {
 
 /// The error of a bank.
 fn figures(problem: &ReductionProblem<'_>, bank: &FirWithTail) -> Result<Figures, DesignError> {
-    let error = problem.plant.error_system(&bank.realise()?)?;
+    let error = problem.plant.error_system(&bank.realise());
     let gamma = crate::lti::peak::hinf_norm(&error)?.gain;
     Ok(Figures { gamma, rms_error: h2_norm(&error)? / (problem.plant.ratio() as f64).sqrt() })
 }

@@ -4,9 +4,9 @@
 use super::dynamics::Dynamics;
 use crate::design::DesignError;
 use crate::design::exchange::{AffineError, Exchange, LocatedPeak, Location, Peaks};
+use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
 use crate::linalg::Complex;
-use crate::lmi::Settings;
 use crate::lmi::sampled::{self, MeanSquareObjective, Point, Solution, Taps};
 use crate::lti::peak::{Peak, peaks_above, resonances, stable_poles};
 use crate::lti::{FirWithTail, FrequencyResponse};
@@ -25,6 +25,8 @@ const LEAST_DISTANCE: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub(super) struct PlantSamples<'a> {
     pub(super) plant: &'a LiftedPlant,
+    /// Ends each problem with the best outputs so far.
+    stop: &'a Stop,
     /// The first GRID + 1 are uniform, unless the samples are coarse.
     pub(super) samples: Vec<Point>,
 }
@@ -34,8 +36,8 @@ impl<'a> PlantSamples<'a> {
     ///
     /// # Errors
     /// [`DesignError::Lti`] if the plant is not stable.
-    pub(super) fn new(plant: &'a LiftedPlant) -> Result<Self, DesignError> {
-        let mut samples = Self { plant, samples: Vec::new() };
+    pub(super) fn new(plant: &'a LiftedPlant, stop: &'a Stop) -> Result<Self, DesignError> {
+        let mut samples = Self { plant, stop, samples: Vec::new() };
         let uniform = (0..=GRID).map(|k| PI * k as f64 / GRID as f64);
         let near = (1..=TOWARDS_ZERO).map(|k| PI / GRID as f64 * 0.5_f64.powi(k as i32));
         for omega in uniform.chain(near).chain(resonances(&stable_poles(plant.system())?)) {
@@ -46,32 +48,26 @@ impl<'a> PlantSamples<'a> {
 
     /// One frequency in [`COARSE`], enough to rank candidates by their worst case.
     pub(super) fn coarse(&self) -> Self {
-        Self { plant: self.plant, samples: self.samples.iter().step_by(COARSE).cloned().collect() }
+        Self { samples: self.samples.iter().step_by(COARSE).cloned().collect(), ..*self }
     }
 
     /// Adds a frequency, unless it is known.
     fn add(&mut self, omega: f64) {
         if self.samples.iter().all(|known| (known.omega - omega).abs() >= LEAST_DISTANCE) {
-            self.samples.push(self.at(omega));
+            self.samples.push(self.plant.at(omega));
         }
     }
 
-    fn at(&self, omega: f64) -> Point {
-        let (h, w) = self.plant.response(omega);
-        Point { omega, w, h }
-    }
-
-    fn problem(&self, dynamics: &Dynamics) -> Result<sampled::Problem, DesignError> {
-        let regressors = FrequencyResponse::new(&dynamics.regressors()?);
+    fn problem(&self, dynamics: &Dynamics) -> sampled::Problem {
+        let regressors = FrequencyResponse::new(&dynamics.regressors());
         let points = self.samples.iter().map(|sample| driving(&regressors, sample.clone())).collect();
-        Ok(sampled::Problem::new(points, vec![1; self.plant.ratio()])?)
+        sampled::Problem::new(points, vec![1; self.plant.ratio()])
     }
 
     /// The problem's solution at the sampled frequencies, to a relative accuracy. Its only tap holds the
     /// output matrices.
     pub(super) fn worst_case(&self, dynamics: &Dynamics, accuracy: f64) -> Result<Solution, DesignError> {
-        let settings = Settings { tol_gap_rel: accuracy, ..Settings::DEFAULT };
-        Ok(sampled::minimise(&self.problem(dynamics)?, &settings)?)
+        Ok(sampled::minimise(&self.problem(dynamics), accuracy, &|| self.stop.is_due())?)
     }
 
     /// The bank of least gamma with these dynamics and, within `gamma_margin`, of least mean square. The
@@ -81,15 +77,17 @@ impl<'a> PlantSamples<'a> {
         dynamics: &Dynamics,
         gamma_margin: f64,
     ) -> Result<FirWithTail, DesignError> {
-        let problem = self.problem(dynamics)?;
+        let problem = self.problem(dynamics);
         let objective = MeanSquareObjective::noiseless(self.weights(), problem.channels());
-        let regressors = FrequencyResponse::new(&dynamics.regressors()?);
+        let regressors = FrequencyResponse::new(&dynamics.regressors());
+        let stop = self.stop.clone();
         let error = OutputError { samples: self, dynamics, regressors };
-        let mut exchange = Exchange::new(error, problem, std::iter::repeat(()), objective, gamma_margin)?;
+        let mut exchange = Exchange::new(error, problem, std::iter::repeat(()), objective, gamma_margin);
+        exchange.stop = stop;
         let best = exchange.optimise()?;
         let frequencies: Vec<f64> = exchange.locations().iter().map(|location| location.frequency).collect();
         frequencies.into_iter().for_each(|omega| self.add(omega));
-        dynamics.with_outputs(&best.taps[0])
+        Ok(dynamics.with_outputs(&best.taps[0]))
     }
 
     /// Trapezoidal weights of the uniform frequencies, zeros for the others.
@@ -111,13 +109,13 @@ struct OutputError<'a> {
 impl AffineError for OutputError<'_> {
     type Scenario = ();
 
-    fn at(&self, location: &Location<()>) -> Result<Point, DesignError> {
-        Ok(driving(&self.regressors, self.samples.at(location.frequency)))
+    fn at(&self, location: &Location<()>) -> Point {
+        driving(&self.regressors, self.samples.plant.at(location.frequency))
     }
 
     fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<()>, DesignError> {
-        let bank = self.dynamics.with_outputs(&taps[0])?;
-        let error = self.samples.plant.error_system(&bank.realise()?)?;
+        let bank = self.dynamics.with_outputs(&taps[0]);
+        let error = self.samples.plant.error_system(&bank.realise());
         let peaks = peaks_above(&error, level)?;
         let estimate = peaks.iter().map(|peak| peak.gain).fold(gamma, f64::max);
         let located = |peak: Peak| {

@@ -96,13 +96,13 @@ fn worst_case_gradient(samples: &PlantSamples<'_>, dynamics: &Dynamics) -> Resul
         Mat::identity(r, r),
         c.clone(),
         Mat::zeros(c.nrows(), r),
-    )?);
+    ));
     let driven = FrequencyResponse::new(&StateSpace::new(
         dynamics.a.clone(),
         dynamics.b.clone(),
         Mat::identity(r, r),
         Mat::zeros(r, n),
-    )?);
+    ));
     let (mut da, mut db) = (Mat::zeros(r, r), Mat::zeros(r, n));
     let mut total = 0.0;
     for (sample, y) in samples.samples.iter().zip(&found.dual) {
@@ -129,7 +129,7 @@ fn worst_case_gradient(samples: &PlantSamples<'_>, dynamics: &Dynamics) -> Resul
 fn mean_square_gradient(samples: &PlantSamples<'_>, dynamics: &Dynamics) -> Result<(f64, Mat), DesignError> {
     let plant = samples.plant;
     let (outputs, norm) = mean_square(plant, dynamics)?;
-    let error = plant.error_system(&dynamics.with_outputs(&outputs)?.realise()?)?;
+    let error = plant.error_system(&dynamics.with_outputs(&outputs).realise());
     let square = |root: Mat| &root * root.transpose();
     let p = square(controllability_root(error.a(), error.b())?);
     let q = square(controllability_root(&error.a().transpose(), &error.c().transpose())?);
@@ -137,7 +137,7 @@ fn mean_square_gradient(samples: &PlantSamples<'_>, dynamics: &Dynamics) -> Resu
     let (n, r, channels) = (plant.system().order(), dynamics.tail_order(), dynamics.channels());
     let inner = da.view((n, n), (r, r)).into_owned();
     let outer = if dynamics.lags == 0 {
-        let h = plant.system().select_outputs(0..plant.channels())?;
+        let h = plant.system().select_outputs(0..plant.channels());
         da.view((n, 0), (r, n)) * h.c().transpose() + db.rows(n, r) * h.d().transpose()
     } else {
         da.view((n, n + r), (r, channels)).into_owned()

@@ -230,7 +230,7 @@ impl BoxPlant {
     /// # Errors
     /// As [`Problem::with_errors`].
     pub(in crate::design) fn moved(&self, point: &ErrorPoint) -> Result<LiftedPlant, DesignError> {
-        LiftedPlant::new(&Problem::with_errors(&self.spec, self.latency, point)?)
+        Ok(LiftedPlant::new(&Problem::with_errors(&self.spec, self.latency, point)?))
     }
 
     /// All responses at a frequency in radians per slow period.
@@ -276,7 +276,7 @@ fn lifted(spec: &Spec, latency: usize, nodes: &[Node]) -> Result<LiftedPlant, De
         gains: vec![0.0; nodes.len()],
         cutoffs: nodes.iter().map(|node| node.cutoff).collect(),
     };
-    LiftedPlant::new(&Problem::with_errors(&Spec { channels, ..spec.clone() }, latency, &errors)?)
+    Ok(LiftedPlant::new(&Problem::with_errors(&Spec { channels, ..spec.clone() }, latency, &errors)?))
 }
 
 /// The nodes of all channels: at `centre`, and `offsets` of the half-widths beside it. The first node of

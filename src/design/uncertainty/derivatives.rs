@@ -47,15 +47,15 @@ pub struct DelayDerivatives {
 /// As [`super::super::analyze`].
 pub fn delay_derivatives(bank: &Bank) -> Result<DelayDerivatives, DesignError> {
     let problem = Problem::of_bank(bank)?;
-    let plant = LiftedPlant::new(&problem)?;
+    let plant = LiftedPlant::new(&problem);
     let peak = plant.bank_norm(&bank.filters)?;
-    let (system, delays) = lift_with_slopes(&problem)?;
+    let (system, delays) = lift_with_slopes(&problem);
     let mut response = FrequencyResponse::new(&system).at_frequency(peak.frequency);
     for (mut row, &delay) in response.row_iter_mut().zip(&delays) {
         row *= Complex::from_polar(1.0, -peak.frequency * delay as f64);
     }
     let (n, m) = (plant.channels(), plant.ratio());
-    let block = filters::lifted(&bank.filters, bank.ratio)?;
+    let block = filters::lifted(&bank.filters, bank.ratio);
     let f = block.response_at(Complex::from_polar(1.0, peak.frequency));
     let k = response.rows(2 * n, m) - &f * response.rows(0, n);
     let svd = linalg::svd(&k)?;
@@ -77,7 +77,7 @@ pub fn delay_derivatives(bank: &Bank) -> Result<DelayDerivatives, DesignError> {
         own.map(&derivative).sum::<f64>()
     };
     let converters = (0..bank.channel_count()).map(of_converter);
-    let others = peaks_above(&plant.error_system(&block)?, peak.gain * (1.0 - EQUAL_PEAKS))?;
+    let others = peaks_above(&plant.error_system(&block), peak.gain * (1.0 - EQUAL_PEAKS))?;
     let other = others.iter().any(|other| (other.frequency - peak.frequency).abs() > SAME_PEAK);
     let single = svd.s.get(1).is_none_or(|&second| second < peak.gain * (1.0 - EQUAL_PEAKS));
     Ok(DelayDerivatives {

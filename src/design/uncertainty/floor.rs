@@ -55,7 +55,7 @@ pub fn floor(bank: &Bank, errors: &ErrorBox, worst: &ErrorPoint) -> Result<Floor
     let common_shift = common_shift(&problem, FastPeriods(half));
     let there = moved(bank, worst)?;
     let noncausal =
-        if there.resolves_delays() { Some(LiftedPlant::new(&there)?.noncausal_bound()?.gain) } else { None };
+        if there.resolves_delays() { Some(LiftedPlant::new(&there).noncausal_bound()?.gain) } else { None };
     Ok(Floor { common_shift, noncausal })
 }
 

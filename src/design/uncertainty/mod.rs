@@ -54,7 +54,7 @@ pub fn worst_case(
 /// As [`worst_case`].
 pub fn affordable(bank: &Bank, errors: &ErrorBox, loss: f64) -> Result<f64, DesignError> {
     errors.check(bank.channel_count())?;
-    let plant = LiftedPlant::new(&Problem::of_bank(bank)?)?;
+    let plant = LiftedPlant::new(&Problem::of_bank(bank)?);
     let allowed = plant.bank_norm(&bank.filters)?.gain * (1.0 + loss);
     let is_certified = |factor: f64| -> Result<bool, DesignError> {
         let scaled = errors.scaled(factor);

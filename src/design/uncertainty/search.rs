@@ -48,7 +48,7 @@ pub fn norm_at(
     point: &ErrorPoint,
     taps: Taps,
 ) -> Result<(f64, RadiansPerSlowPeriod), DesignError> {
-    let peak = LiftedPlant::new(&moved(bank, point)?)?.bank_norm(&taps.filters(bank, point))?;
+    let peak = LiftedPlant::new(&moved(bank, point)?).bank_norm(&taps.filters(bank, point))?;
     Ok((peak.gain, RadiansPerSlowPeriod(peak.frequency)))
 }
 

@@ -5,12 +5,13 @@
 
 use crate::linalg::Complex;
 use crate::linalg::blocks::{Block, Blocks, SmallCholesky};
+use crate::lmi::IsDue;
 
 /// Steps of the search for the boundary of the cone: each halves the bracket.
 const BISECTIONS: usize = 8;
 
 /// All LMIs of a problem.
-pub(super) struct Cone {
+pub(super) struct Cone<'a> {
     /// Rows of the first block of each LMI.
     pub(super) m: usize,
     /// Rows of the second.
@@ -30,6 +31,7 @@ pub(super) struct Cone {
     wide: Blocks,
     full: Blocks,
     other: Blocks,
+    is_due: IsDue<'a>,
 }
 
 /// A direction in the slack: change of t and of all `K_l`.
@@ -39,8 +41,8 @@ pub(super) struct SlackStep {
     pub(super) k: Blocks,
 }
 
-impl Cone {
-    pub(super) fn new(t: f64, k: Blocks, g: Blocks) -> Self {
+impl<'a> Cone<'a> {
+    pub(super) fn new(t: f64, k: Blocks, g: Blocks, is_due: IsDue<'a>) -> Self {
         let (count, m, k1) = (k.count(), k.rows(), k.cols());
         let order = m + k1;
         Self {
@@ -56,7 +58,15 @@ impl Cone {
             wide: Blocks::zeros(1, m, order),
             full: Blocks::zeros(1, order, order),
             other: Blocks::zeros(1, order, order),
+            is_due,
         }
+    }
+
+    /// The points one after the other, up to the moment at which the caller wants an end. The decompositions of
+    /// a single point may take a second; what was computed is of no use when not all points were visited.
+    fn points(&self) -> impl Iterator<Item = usize> + use<'a> {
+        let is_due = self.is_due;
+        (0..self.count()).take_while(move |_| !is_due())
     }
 
     pub(super) fn count(&self) -> usize {
@@ -72,7 +82,7 @@ impl Cone {
     /// a slack is not positive definite.
     pub(super) fn invert(&mut self) -> bool {
         let (m, k1) = (self.m, self.k1);
-        for l in 0..self.count() {
+        for l in self.points() {
             schur(&mut self.small, self.t, self.g.block(l), self.k.block(l));
             if !self.chol.factor(self.small.block_mut(0)) {
                 return false;
@@ -147,7 +157,7 @@ impl Cone {
         corrector: Option<&Blocks>,
         out: &mut Blocks,
     ) {
-        for l in 0..self.count() {
+        for l in self.points() {
             fill_slack(&mut self.full, self.m, step, l);
             self.other.block_mut(0).set_product(1.0, self.x.block(l).plain(), self.full.block(0).plain());
             let mut block = out.block_mut(l);
@@ -165,7 +175,7 @@ impl Cone {
 
     /// `out = sym(X dS dZ)`, the second-order term of the predictor.
     pub(super) fn corrector(&mut self, step: &SlackStep, dz: &Blocks, out: &mut Blocks) {
-        for l in 0..self.count() {
+        for l in self.points() {
             fill_slack(&mut self.full, self.m, step, l);
             self.other.block_mut(0).set_product(1.0, self.x.block(l).plain(), self.full.block(0).plain());
             let mut block = out.block_mut(l);
@@ -178,7 +188,7 @@ impl Cone {
     pub(super) fn max_primal_step(&mut self, step: &SlackStep, most: f64) -> f64 {
         let mut longest = most;
         let mut trial = Blocks::zeros(1, self.m, self.k1);
-        for l in 0..self.count() {
+        for l in self.points() {
             let (k, dk, g) = (self.k.block(l), step.k.block(l), self.g.block(l));
             let (small, chol, t) = (&mut self.small, &mut self.chol, self.t);
             longest = bisect(longest, |alpha| {
@@ -195,7 +205,7 @@ impl Cone {
     /// Largest step, up to `most`, for which all dual matrices stay positive definite.
     pub(super) fn max_dual_step(&mut self, dz: &Blocks, most: f64) -> f64 {
         let mut longest = most;
-        for l in 0..self.count() {
+        for l in self.points() {
             let (z, d) = (self.z.block(l), dz.block(l));
             let (full, chol) = (&mut self.full, &mut self.chol);
             longest = bisect(longest, |alpha| {

@@ -10,6 +10,7 @@ use super::prepare::Reduced;
 use super::quadratic::Quadratic;
 use crate::linalg::Mat;
 use crate::linalg::blocks::Blocks;
+use crate::lmi::IsDue;
 use crate::lmi::factor::RegularisedCholesky;
 use crate::lmi::iteration::{self, StepLengths, centering};
 use std::cell::OnceCell;
@@ -33,7 +34,7 @@ pub(super) struct Engine<'a> {
     objective: Objective,
     /// The unknown taps in reduced coordinates.
     pub(super) x: Vec<f64>,
-    pub(super) cone: Cone,
+    pub(super) cone: Cone<'a>,
     curvature: Option<Mat>,
     projected_x: ChannelProjection,
     projected_z: ChannelProjection,
@@ -41,6 +42,7 @@ pub(super) struct Engine<'a> {
     corrector: Blocks,
     /// At the present iterate, once it is known.
     equality: OnceCell<Equality>,
+    is_due: IsDue<'a>,
 }
 
 /// The dual equality.
@@ -60,10 +62,16 @@ struct Direction {
 
 impl<'a> Engine<'a> {
     /// Starts at the taps `x` with `t`, which must be above every `sigma_max(K_l)^2`; `None` otherwise.
-    pub(super) fn new(reduced: &'a Reduced, objective: Objective, x: Vec<f64>, t: f64) -> Option<Self> {
+    pub(super) fn new(
+        reduced: &'a Reduced,
+        objective: Objective,
+        x: Vec<f64>,
+        t: f64,
+        is_due: IsDue<'a>,
+    ) -> Option<Self> {
         let (count, m, k1) = (reduced.count(), reduced.layout.rows, reduced.h.cols());
         let (n, order) = (reduced.layout.channels, m + k1);
-        let mut cone = Cone::new(t, reduced.error(&x), reduced.g.clone());
+        let mut cone = Cone::new(t, reduced.error(&x), reduced.g.clone(), is_due);
         if !cone.invert() {
             return None;
         }
@@ -86,6 +94,7 @@ impl<'a> Engine<'a> {
             dz: Blocks::zeros(count, order, order),
             corrector: Blocks::zeros(count, order, order),
             equality: OnceCell::new(),
+            is_due,
         })
     }
 
@@ -174,14 +183,15 @@ impl<'a> Engine<'a> {
         Direction { taps, slack: SlackStep { t, k } }
     }
 
-    /// One step; `None` if rounding errors prevent it. The iterate changes only if all goes well.
+    /// One step; `None` if rounding errors prevent it or its end is due. The iterate changes only if all goes
+    /// well.
     pub(super) fn step(&mut self) -> Option<()> {
         if !self.cone.invert() {
             return None;
         }
         let gap = self.cone.gap();
         let mu = gap / self.cone.order() as f64;
-        let newton = self.newton()?;
+        let newton = self.newton().filter(|_| !(self.is_due)())?;
         let cost = self.equality().cost.clone();
         let mut dz = std::mem::replace(&mut self.dz, Blocks::zeros(0, 0, 0));
         let mut corrector = std::mem::replace(&mut self.corrector, Blocks::zeros(0, 0, 0));
@@ -201,7 +211,7 @@ impl<'a> Engine<'a> {
         let StepLengths { primal, dual } = self.max_steps(&full, &dz, 1.0 / fraction);
         let length = StepLengths { primal: fraction * primal, dual: fraction * dual };
 
-        let done = self.advance(&full, &dz, length);
+        let done = if (self.is_due)() { None } else { self.advance(&full, &dz, length) };
         self.dz = dz;
         self.corrector = corrector;
         done

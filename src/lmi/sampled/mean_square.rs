@@ -9,9 +9,10 @@ use super::interior::{Engine, Objective};
 use super::prepare::Reduced;
 use super::problem::{MeanSquareObjective, Point, Problem, Taps};
 use super::quadratic::Quadratic;
+use crate::linalg::LinalgError;
 use crate::lmi::factor::RegularisedCholesky;
 use crate::lmi::iteration::{self, Iterate, RANK};
-use crate::lmi::{LmiError, Outcome, Settings};
+use crate::lmi::{IsDue, Outcome};
 
 /// Taps of least mean square under a cap.
 #[derive(Debug, Clone)]
@@ -36,14 +37,11 @@ const WAY_TO_CAP: f64 = 0.999;
 
 /// Taps that minimise the secondary objective, by a QR factorisation (never by normal equations); least norm
 /// among directions weaker than `tol_rank` times the strongest.
-///
-/// Fails if weights or noise do not fit: see [`MeanSquareObjective`].
 pub(crate) fn least_squares(
     problem: &Problem,
     square: &MeanSquareObjective,
     tol_rank: f64,
-) -> Result<Taps, LmiError> {
-    problem.check_objective(square)?;
+) -> Result<Taps, LinalgError> {
     let reduced = Reduced::new(problem)?;
     if reduced.layout.unknowns() == 0 {
         return Ok(problem.zero_taps());
@@ -53,51 +51,53 @@ pub(crate) fn least_squares(
     Ok(reduced.taps(&basis.least_squares(&reduced, &reduced.w, tol_rank)))
 }
 
-/// Minimises the secondary objective subject to `sigma_max(K_l) <= cap` at every point.
+/// Minimises the secondary objective subject to `sigma_max(K_l) <= cap` at every point, to a relative duality
+/// gap; `None` if the start does not satisfy the cap strictly.
 ///
-/// `start` must satisfy the cap strictly: the taps of [`super::minimise`] with a cap a little above
+/// The usual start are the taps of [`super::minimise`] with a cap a little above
 /// their gamma. If the unconstrained least-squares taps satisfy the cap they are returned at once.
-/// The result is never worse than the start, and satisfies the cap, however the iteration ended.
+/// The result is never worse than the start, and satisfies the cap, however the iteration ended; when the end
+/// `is_due`, it is the best so far.
 pub fn mean_square_under_cap(
     problem: &Problem,
     square: &MeanSquareObjective,
     cap: f64,
     start: &Taps,
-    settings: &Settings,
-) -> Result<MeanSquare, LmiError> {
-    problem.check_taps(start)?;
+    tol_gap_rel: f64,
+    is_due: IsDue<'_>,
+) -> Result<Option<MeanSquare>, LinalgError> {
     let free = least_squares(problem, square, RANK)?;
     let free_square = problem.mean_square(&free, square);
     let mut best = Best::new(problem, square, cap, start)?;
     best.offer(free)?;
     if best.mean_square == free_square {
-        return Ok(best.finish(Outcome::Solved, free_square, 0));
+        return Ok(Some(best.finish(Outcome::Solved, free_square, 0)));
     }
     if best.gamma >= cap {
-        return Err(LmiError::Cap { cap, gamma: best.gamma });
+        return Ok(None);
     }
     // From the start, in units of the cap and of the start's own mean square.
     let unit = best.mean_square / (cap * cap);
-    let mut reduced = Reduced::new(&residual_problem(problem, start)?)?;
+    let mut reduced = Reduced::new(&residual_problem(problem, start))?;
     reduced.rescale(cap);
     let quadratic = Quadratic::new(&reduced, square, start, cap, unit);
     let zero = vec![0.0; reduced.layout.unknowns()];
     let curvature = RegularisedCholesky::new(quadratic.curvature(&reduced));
-    let engine = Engine::new(&reduced, Objective::MeanSquare(quadratic), zero, 1.0);
+    let engine = Engine::new(&reduced, Objective::MeanSquare(quadratic), zero, 1.0, is_due);
     let (Some(engine), Ok(curvature)) = (engine, curvature) else {
-        return Ok(best.finish(Outcome::NumericalTrouble, free_square, 0));
+        return Ok(Some(best.finish(Outcome::NumericalTrouble, free_square, 0)));
     };
     let mut run = Run { engine, curvature };
-    let (outcome, iterations) = iteration::run(&mut run, settings)?;
+    let (outcome, iterations) = iteration::run(&mut run, tol_gap_rel, is_due)?;
     let step = reduced.taps(&run.engine.x);
     let found = start.iter().zip(step).map(|(f, d)| f + d * cap).collect();
     best.offer(best.within_cap(found)?)?;
     let lower = (best.mean_square - run.duality_gap() * (unit * cap * cap)).max(free_square);
-    Ok(best.finish(outcome, lower, iterations))
+    Ok(Some(best.finish(outcome, lower, iterations)))
 }
 
 /// The problem with the error of `start` as its reference.
-fn residual_problem(problem: &Problem, start: &Taps) -> Result<Problem, LmiError> {
+fn residual_problem(problem: &Problem, start: &Taps) -> Problem {
     let point = |l: usize| {
         let p = &problem.points()[l];
         Point { omega: p.omega, w: problem.error_at(l, start), h: p.h.clone() }
@@ -120,14 +120,14 @@ impl<'a> Best<'a> {
         square: &'a MeanSquareObjective,
         cap: f64,
         start: &Taps,
-    ) -> Result<Self, LmiError> {
+    ) -> Result<Self, LinalgError> {
         let (gamma, _) = problem.worst(start)?;
         let mean_square = problem.mean_square(start, square);
         Ok(Self { problem, square, cap, taps: start.clone(), mean_square, gamma })
     }
 
     /// Takes the taps if they respect the cap and improve.
-    fn offer(&mut self, taps: Taps) -> Result<(), LmiError> {
+    fn offer(&mut self, taps: Taps) -> Result<(), LinalgError> {
         let mean_square = self.problem.mean_square(&taps, self.square);
         let (gamma, _) = self.problem.worst(&taps)?;
         if gamma <= self.cap && (mean_square < self.mean_square || self.gamma > self.cap) {
@@ -138,7 +138,7 @@ impl<'a> Best<'a> {
 
     /// The taps, or, if rounding has put them beyond the cap, ones on the way to them from the best so far.
     /// Gamma and the objective are convex, so what lies between is under the cap and an improvement.
-    fn within_cap(&self, taps: Taps) -> Result<Taps, LmiError> {
+    fn within_cap(&self, taps: Taps) -> Result<Taps, LinalgError> {
         let (gamma, _) = self.problem.worst(&taps)?;
         if gamma <= self.cap || self.gamma >= self.cap {
             return Ok(taps);
@@ -174,7 +174,7 @@ impl Iterate for Run<'_> {
         self.duality_gap() / self.engine.value().max(f64::MIN_POSITIVE)
     }
 
-    fn judged_gap(&mut self) -> Result<f64, LmiError> {
+    fn judged_gap(&mut self) -> Result<f64, LinalgError> {
         Ok(self.gap())
     }
 

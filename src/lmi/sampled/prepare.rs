@@ -4,8 +4,7 @@
 use super::fourier::{Layout, Phases};
 use super::problem::{Problem, Taps};
 use crate::linalg::blocks::Blocks;
-use crate::linalg::{self, CMat, Mat};
-use crate::lmi::LmiError;
+use crate::linalg::{self, CMat, LinalgError, Mat};
 
 /// Singular values of the row-normalised channels below this are rounding errors; their directions are
 /// dropped.
@@ -31,7 +30,7 @@ pub(super) struct Reduced {
 }
 
 impl Reduced {
-    pub(super) fn new(problem: &Problem) -> Result<Self, LmiError> {
+    pub(super) fn new(problem: &Problem) -> Result<Self, LinalgError> {
         let (m, n, q) = (problem.rows(), problem.channels(), problem.inputs());
         let count = problem.points().len();
         let (k1, k) = (n.min(q), (m + n).min(q));
@@ -115,7 +114,7 @@ fn stack(h: &CMat, w: &CMat) -> CMat {
 
 /// n x N real matrix after which the channels, summed over all points, have unit mean power each and
 /// no correlation. Equal channels become one, zero channels none.
-fn mixing(channels: &Blocks) -> Result<Mat, LmiError> {
+fn mixing(channels: &Blocks) -> Result<Mat, LinalgError> {
     let (n, k, count) = (channels.rows(), channels.cols(), channels.count());
     let half = k * count;
     let mut all = Mat::from_fn(n, 2 * half, |i, c| {

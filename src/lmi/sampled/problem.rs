@@ -1,7 +1,6 @@
-//! The data of a sampled problem, checked once.
+//! The data of a sampled problem.
 
-use crate::linalg::{self, CMat, Complex, Mat};
-use crate::lmi::LmiError;
+use crate::linalg::{self, CMat, Complex, LinalgError, Mat};
 
 /// Real taps: `F_j` is M x N, one matrix for each lag j. Entries beyond a row's own number of lags
 /// are zero.
@@ -16,6 +15,13 @@ pub struct Point {
     pub w: CMat,
     /// Responses of the measurements, N x q.
     pub h: CMat,
+}
+
+impl Point {
+    /// K = W - F H for the filters' response F.
+    pub(crate) fn error(&self, filters: &CMat) -> CMat {
+        &self.w - filters * &self.h
+    }
 }
 
 /// The secondary objective: the weighted mean square of the error, and the power of the noise that the
@@ -39,7 +45,7 @@ impl MeanSquareObjective {
     }
 }
 
-/// A sampled worst-case norm problem with consistent sizes and finite data.
+/// A sampled worst-case norm problem with consistent sizes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
     points: Vec<Point>,
@@ -47,20 +53,18 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Checks the sizes. `lags[p]` is the number of lags of row p, M of them; 0 fixes the row at zero.
-    pub fn new(points: Vec<Point>, lags: Vec<usize>) -> Result<Self, LmiError> {
-        let first = points.first();
-        let (m, n, q) = first.map_or((0, 0, 0), |first| (first.w.nrows(), first.h.nrows(), first.w.ncols()));
-        if m == 0 || n == 0 || q == 0 {
-            return Err(LmiError::Empty { points: points.len(), m, n, q });
-        }
-        check_count("numbers of lags", lags.len(), m)?;
-        for (l, point) in points.iter().enumerate() {
-            check_size("W", l, &point.w, (m, q))?;
-            check_size("H", l, &point.h, (n, q))?;
-            check_finite(l, point)?;
-        }
-        Ok(Self { points, lags })
+    /// `lags[p]` is the number of lags of row p, M of them; 0 fixes the row at zero.
+    ///
+    /// # Panics
+    /// Unless there is a point, all points have the sizes of the first, and each row has its lags.
+    pub fn new(points: Vec<Point>, lags: Vec<usize>) -> Self {
+        let (w, h) = (points[0].w.shape(), points[0].h.shape());
+        let fits = points.iter().all(|point| point.w.shape() == w && point.h.shape() == h);
+        assert!(
+            fits && h.1 == w.1 && lags.len() == w.0,
+            "the points of a problem have one size: {w:?}, {h:?}"
+        );
+        Self { points, lags }
     }
 
     /// The points.
@@ -99,18 +103,18 @@ impl Problem {
     }
 
     /// The same problem with more points.
-    pub(crate) fn with_points(&self, more: impl IntoIterator<Item = Point>) -> Result<Self, LmiError> {
+    pub(crate) fn with_points(&self, more: impl IntoIterator<Item = Point>) -> Self {
         Self::new(self.points.iter().cloned().chain(more).collect(), self.lags.clone())
     }
 
     /// `K_l = W_l - sum_j e^{-i omega_l j} F_j H_l`.
     pub(crate) fn error_at(&self, l: usize, taps: &Taps) -> CMat {
         let point = &self.points[l];
-        &point.w - response(taps, point.omega, self.rows(), self.channels()) * &point.h
+        point.error(&response(taps, point.omega, self.rows(), self.channels()))
     }
 
     /// Largest `sigma_max(K_l)` over the points, and the index of the point where it is attained.
-    pub(crate) fn worst(&self, taps: &Taps) -> Result<(f64, usize), LmiError> {
+    pub(crate) fn worst(&self, taps: &Taps) -> Result<(f64, usize), LinalgError> {
         let mut worst = (0.0, 0);
         for l in 0..self.points.len() {
             let sigma = linalg::largest_singular_value(&self.error_at(l, taps))?;
@@ -129,35 +133,6 @@ impl Problem {
             |f: &Mat| f.column_iter().zip(&square.noise).map(|(c, n)| n * c.norm_squared()).sum::<f64>();
         errors + taps.iter().map(noise).sum::<f64>()
     }
-
-    /// Refuses taps of the wrong size or with entries beyond a row's number of lags.
-    pub(crate) fn check_taps(&self, taps: &Taps) -> Result<(), LmiError> {
-        let (m, n) = (self.rows(), self.channels());
-        if let Some(f) = taps.iter().find(|f| f.shape() != (m, n)) {
-            return Err(LmiError::Size { name: "a tap".into(), given: f.shape(), wanted: (m, n) });
-        }
-        for (lag, f) in taps.iter().enumerate() {
-            let beyond = |p: &usize| lag >= self.lags[*p] && f.row(*p).iter().any(|x| *x != 0.0);
-            if let Some(row) = (0..m).find(beyond) {
-                return Err(LmiError::TapBeyondLags { row, lag, lags: self.lags[row] });
-            }
-        }
-        Ok(())
-    }
-
-    pub(crate) fn check_objective(&self, square: &MeanSquareObjective) -> Result<(), LmiError> {
-        check_count("noise powers", square.noise.len(), self.channels())?;
-        check_count("weights", square.weights.len(), self.points.len())?;
-        let bad = |value: &f64| !(value.is_finite() && *value >= 0.0);
-        if let Some(index) = square.noise.iter().position(bad) {
-            return Err(LmiError::Weight { name: "noise power", index, value: square.noise[index] });
-        }
-        let all_zero = square.weights.iter().all(|w| *w == 0.0).then_some(0);
-        if let Some(index) = square.weights.iter().position(bad).or(all_zero) {
-            return Err(LmiError::Weight { name: "weight", index, value: square.weights[index] });
-        }
-        Ok(())
-    }
 }
 
 /// `F(omega) = sum_j e^{-i omega j} F_j`.
@@ -168,29 +143,4 @@ pub(crate) fn response(taps: &[Mat], omega: f64, m: usize, n: usize) -> CMat {
         f.zip_apply(fj, |z, x| *z += phase * x);
     }
     f
-}
-
-/// Refuses a matrix of point `l` whose shape is not `wanted`.
-pub(super) fn check_size(name: &str, l: usize, a: &CMat, wanted: (usize, usize)) -> Result<(), LmiError> {
-    let given = a.shape();
-    if given == wanted {
-        return Ok(());
-    }
-    Err(LmiError::Size { name: format!("{name} of point {l}"), given, wanted })
-}
-
-/// Refuses lists of the wrong length.
-pub(super) fn check_count(name: &'static str, given: usize, wanted: usize) -> Result<(), LmiError> {
-    if given == wanted { Ok(()) } else { Err(LmiError::Count { name, given, wanted }) }
-}
-
-fn check_finite(l: usize, point: &Point) -> Result<(), LmiError> {
-    let finite = |a: &CMat| a.iter().all(|z| z.re.is_finite() && z.im.is_finite());
-    let name = match (point.omega.is_finite(), finite(&point.w), finite(&point.h)) {
-        (false, _, _) => "omega",
-        (_, false, _) => "W",
-        (_, _, false) => "H",
-        _ => return Ok(()),
-    };
-    Err(LmiError::NotFinite { name: format!("{name} of point {l}") })
 }

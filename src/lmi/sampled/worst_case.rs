@@ -5,9 +5,9 @@ use super::bound::{self, Covered, LowerBound};
 use super::interior::{Engine, Objective, norm};
 use super::prepare::Reduced;
 use super::problem::{Problem, Taps};
-use crate::linalg::{self, CMat};
+use crate::linalg::{self, CMat, LinalgError};
 use crate::lmi::iteration::{self, GAP_OF_ZERO, Iterate, RANK};
-use crate::lmi::{LmiError, Outcome, Settings};
+use crate::lmi::{IsDue, Outcome};
 
 /// The start lies this factor above the worst point of the least-squares taps (in t), far enough inside for
 /// the first Newton step.
@@ -30,14 +30,14 @@ pub struct Solution {
     pub iterations: usize,
 }
 
-/// Minimises the worst-case norm. See the module's text for the problem and the method.
+/// Minimises the worst-case norm, to a relative duality gap. See the module's text for the problem and the method.
 ///
 /// Every well-formed problem has a solution: the result holds the best taps found, their worst case over the
-/// points and a lower bound, whatever the outcome.
+/// points and a lower bound, whatever the outcome. When the end `is_due`, they are the best so far.
 ///
 /// # Errors
-/// [`LmiError::Linalg`] if a decomposition does not converge.
-pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, LmiError> {
+/// [`LinalgError`] if the data are not finite or a decomposition does not converge.
+pub fn minimise(problem: &Problem, tol_gap_rel: f64, is_due: IsDue<'_>) -> Result<Solution, LinalgError> {
     let mut reduced = Reduced::new(problem)?;
     if reduced.layout.unknowns() == 0 {
         return fixed(problem);
@@ -45,7 +45,7 @@ pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, LmiE
     let basis = Basis::new(&reduced, vec![1.0; reduced.count()])?;
     let x = basis.least_squares(&reduced, &reduced.w, RANK);
     let best = Best::new(problem, reduced.taps(&x))?;
-    if best.relative_gap() <= settings.tol_gap_rel {
+    if best.relative_gap() <= tol_gap_rel {
         return Ok(best.finish(Outcome::Solved, 0));
     }
     // Shift and scale to the least-squares solution: the rest is of order one.
@@ -53,16 +53,19 @@ pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, LmiE
     reduced.w = reduced.error(&x);
     reduced.rescale(scale);
     let zero = vec![0.0; x.len()];
-    let Some(engine) = Engine::new(&reduced, Objective::WorstCase, zero, START_MARGIN) else {
+    let Some(engine) = Engine::new(&reduced, Objective::WorstCase, zero, START_MARGIN, is_due) else {
         return Ok(best.finish(Outcome::NumericalTrouble, 0));
     };
     let mut run = Run { problem, reduced: &reduced, basis: &basis, start: x, scale, engine, best };
-    let (outcome, iterations) = iteration::run(&mut run, settings)?;
+    let (outcome, iterations) = iteration::run(&mut run, tol_gap_rel, is_due)?;
+    if is_due() {
+        run.offer_taps()?;
+    }
     Ok(run.best.finish(outcome, iterations))
 }
 
 /// A problem without taps: its singular vectors attain the lower bound.
-fn fixed(problem: &Problem) -> Result<Solution, LmiError> {
+fn fixed(problem: &Problem) -> Result<Solution, LinalgError> {
     let taps = problem.zero_taps();
     let (gamma, worst_point) = problem.worst(&taps)?;
     let mut dual = bound::zero_dual(problem);
@@ -82,7 +85,7 @@ struct Best {
 }
 
 impl Best {
-    fn new(problem: &Problem, taps: Taps) -> Result<Self, LmiError> {
+    fn new(problem: &Problem, taps: Taps) -> Result<Self, LinalgError> {
         let (gamma, _) = problem.worst(&taps)?;
         let floor = GAP_OF_ZERO * problem.worst(&problem.zero_taps())?.0;
         let (lower, dual) = (LowerBound::zero(), bound::zero_dual(problem));
@@ -111,6 +114,19 @@ struct Run<'a> {
     best: Best,
 }
 
+impl Run<'_> {
+    /// Takes the taps of the iterate if they are better.
+    fn offer_taps(&mut self) -> Result<(), LinalgError> {
+        let x: Vec<f64> = self.start.iter().zip(&self.engine.x).map(|(a, b)| a + self.scale * b).collect();
+        let taps = self.reduced.taps(&x);
+        let (gamma, _) = self.problem.worst(&taps)?;
+        if gamma < self.best.gamma {
+            (self.best.taps, self.best.gamma) = (taps, gamma);
+        }
+        Ok(())
+    }
+}
+
 impl Iterate for Run<'_> {
     /// A quarter of the complementarity gap and of the residual: from there on, the gap of the bound that
     /// the dual matrices prove is usually within the tolerance.
@@ -120,14 +136,9 @@ impl Iterate for Run<'_> {
     }
 
     /// From the computed norm of the taps of the iterate and the lower bound that its dual matrices give.
-    fn judged_gap(&mut self) -> Result<f64, LmiError> {
+    fn judged_gap(&mut self) -> Result<f64, LinalgError> {
+        self.offer_taps()?;
         let best = &mut self.best;
-        let x: Vec<f64> = self.start.iter().zip(&self.engine.x).map(|(a, b)| a + self.scale * b).collect();
-        let taps = self.reduced.taps(&x);
-        let (gamma, _) = self.problem.worst(&taps)?;
-        if gamma < best.gamma {
-            (best.taps, best.gamma) = (taps, gamma);
-        }
         let cover = bound::cover(self.problem, self.reduced, self.basis, (&best.taps, best.gamma))?;
         let (lower, dual) =
             bound::from_iterate(self.problem, self.reduced, self.basis, &self.engine.cone.z, cover)?;

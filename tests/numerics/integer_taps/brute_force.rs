@@ -41,8 +41,8 @@ impl BruteForce {
         let order = (0..=GRID).map(|k| (k * 37) % (GRID + 1));
         let omegas: Vec<f64> = order.map(|k| std::f64::consts::PI * k as f64 / GRID as f64).collect();
         let responses = omegas.iter().map(|&omega| {
-            let (h, w) = plant.response(omega);
-            (w, h)
+            let point = plant.at(omega);
+            (point.w, point.h)
         });
         let responses = responses.collect();
         Self { omegas, responses, ratio: plant.ratio(), channels: plant.channels(), taps, bits }

@@ -61,7 +61,7 @@ fn outcome(spec: &Spec, bits: u32) -> Option<Outcome> {
         Err(error) => panic!("{}: {error}", spec.name),
     };
     let seconds = begin.elapsed().as_secs_f64();
-    let plant = LiftedPlant::new(&Problem::new(&spec, found.bank.latency).unwrap()).unwrap();
+    let plant = LiftedPlant::new(&Problem::new(&spec, found.bank.latency).unwrap());
     let SynthesisFilters::Fir(taps) = &found.bank.filters else { panic!("no taps") };
     let gamma = found.bank.gamma.norm.unwrap();
     let best = match BruteForce::new(&plant, taps[0].len(), bits).better_than(gamma) {

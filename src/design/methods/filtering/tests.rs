@@ -12,7 +12,7 @@ fn plant(latency: usize, delays: &str) -> LiftedPlant {
          target = {{ filter = {{ num = [2.0], den = [1.0, 2.0] }} }}\n\
          channel = [{delays}]\ndesign = {{ method = \"iir\" }}"
     );
-    LiftedPlant::new(&Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), latency).unwrap()).unwrap()
+    LiftedPlant::new(&Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), latency).unwrap())
 }
 
 fn plants() -> [LiftedPlant; 3] {
@@ -29,7 +29,7 @@ fn plants() -> [LiftedPlant; 3] {
 fn residual(plant: &LiftedPlant, p: &Mat, gamma: Option<f64>) -> f64 {
     let system = match gamma {
         Some(_) => plant.system().clone(),
-        None => plant.measurement().unwrap(),
+        None => plant.measurement(),
     };
     let (a, b, c, d) = (system.a(), system.b(), system.c(), system.d());
     let m = a * p * c.transpose() + b * d.transpose();

@@ -253,9 +253,9 @@ fn no_other_taps_are_better() {
 /// The mean square of error and noise of a bank whose delays are off by so much, by its error system.
 fn square_at(design: &Design, errors: [f64; 2]) -> f64 {
     let problem = Problem::of_bank(&design.bank).unwrap().with_delay_errors(&errors.map(FastPeriods));
-    let plant = LiftedPlant::new(&problem).unwrap().with_noise().unwrap();
-    let filters = lifted(&design.bank.filters, 2).unwrap();
-    h2_norm(&plant.error_system(&filters).unwrap()).unwrap().powi(2) / 2.0
+    let plant = LiftedPlant::new(&problem).with_noise();
+    let filters = lifted(&design.bank.filters, 2);
+    h2_norm(&plant.error_system(&filters)).unwrap().powi(2) / 2.0
 }
 
 /// The mean over Gaussian errors of the second delay, by Gauss-Legendre rules of four points between the

@@ -12,7 +12,7 @@ fn plant(latency: usize, delays: &str) -> LiftedPlant {
          target = {{ filter = {{ num = [2.0], den = [1.0, 2.0] }} }}\n\
          channel = [{delays}]\ndesign = {{ method = \"iir\" }}"
     );
-    LiftedPlant::new(&Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), latency).unwrap()).unwrap()
+    LiftedPlant::new(&Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), latency).unwrap())
 }
 
 /// All channels with feedthrough, and one delayed by whole periods.

@@ -1,5 +1,6 @@
 use super::*;
 use crate::design::Problem;
+use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
 use crate::spec::Spec;
 
@@ -7,14 +8,15 @@ fn plant() -> LiftedPlant {
     let text = "fast_period = 1.0\nratio = 2\nlatency = 10\n\
         target = { filter = { num = [0.25], den = [1.0, 1.0, 0.25] } }\n\
         channel = [{ delay = 1.2 }, { delay = 0.6 }]\ndesign = { method = \"iir\" }";
-    LiftedPlant::new(&Problem::new(&Spec::from_toml(text, "spec.toml").unwrap(), 10).unwrap()).unwrap()
+    LiftedPlant::new(&Problem::new(&Spec::from_toml(text, "spec.toml").unwrap(), 10).unwrap())
 }
 
 /// Both gradients against differences.
 #[test]
 fn gradients_are_those_of_the_error() {
     let plant = plant();
-    let samples = PlantSamples::new(&plant).unwrap();
+    let never = Stop::default();
+    let samples = PlantSamples::new(&plant, &never).unwrap();
     for lags in [0, 1] {
         let start = Dynamics {
             lags,

@@ -72,7 +72,7 @@ fn nearly_equal_channels_are_solved_to_the_reduced_gap() {
 #[test]
 fn the_same_bits_on_every_run() {
     let problem = random_problem(41, (2, 2, 4), 30, &[5, 5]);
-    let (a, b) = (minimise(&problem, &Settings::DEFAULT), minimise(&problem, &Settings::DEFAULT));
+    let (a, b) = (minimise(&problem, FINEST_GAP, &|| false), minimise(&problem, FINEST_GAP, &|| false));
     assert_eq!(a.unwrap().taps, b.unwrap().taps);
 }
 
@@ -91,7 +91,7 @@ proptest::proptest! {
             p.w *= Complex::new(up, 0.0);
             p.h.row_mut(0).iter_mut().for_each(|z| *z *= gain);
         });
-        let s = minimise(&problem, &Settings::DEFAULT).unwrap();
+        let s = minimise(&problem, FINEST_GAP, &|| false).unwrap();
         check(&problem, &s);
         let zero = problem.worst(&problem.zero_taps()).unwrap().0;
         proptest::prop_assert!(is_solved(s.outcome), "{:?}", s);

@@ -49,7 +49,8 @@ fn steep_front_ends_are_solved_to_a_proven_gap() {
         assert!(is_solved(s.outcome) && relative_gap(&s) < 1e-5, "{}", relative_gap(&s));
         let cap = 1.01 * s.gamma;
         let square = MeanSquareObjective::noiseless(vec![1.0; 97], 8);
-        let ms = mean_square_under_cap(&problem, &square, cap, &s.taps, &Settings::DEFAULT).unwrap();
+        let ms =
+            mean_square_under_cap(&problem, &square, cap, &s.taps, FINEST_GAP, &|| false).unwrap().unwrap();
         println!(
             "{:?} {} -> {} >= {}, {} steps",
             ms.outcome,
@@ -82,7 +83,7 @@ fn one_step_prediction_meets_the_nehari_bound() {
             let z = Complex::from_polar(1.0, omega);
             Point { omega, w: CMat::from_element(1, 1, z / (one - z * a)), h: CMat::identity(1, 1) }
         };
-        let problem = Problem::new(testbank::grid(301).into_iter().map(point).collect(), vec![80]).unwrap();
+        let problem = Problem::new(testbank::grid(301).into_iter().map(point).collect(), vec![80]);
         let s = solve("Nehari", &problem);
         let want = 1.0 / (1.0 - a * a);
         assert!((s.gamma - want).abs() < 1e-8 * want, "a = {a}: {} instead of {want}", s.gamma);
@@ -124,8 +125,8 @@ fn general_conic_solver_agrees() {
         assert!((s.gamma - gamma).abs() < 1e-7 * gamma, "{sizes:?}: {} instead of {gamma}", s.gamma);
         let weights = (0..omegas.len()).map(|l| 0.5 + 0.1 * l as f64).collect();
         let square = MeanSquareObjective::noiseless(weights, problem.channels());
-        let settings = Settings::DEFAULT;
-        let ms = mean_square_under_cap(&problem, &square, cap, &s.taps, &settings).unwrap();
+        let ms =
+            mean_square_under_cap(&problem, &square, cap, &s.taps, FINEST_GAP, &|| false).unwrap().unwrap();
         println!("{:?}", (ms.outcome, ms.mean_square, ms.lower, ms.iterations));
         assert_eq!(ms.outcome, Outcome::Solved, "{sizes:?}");
         assert!((ms.mean_square - capped).abs() < 2e-7 * capped, "{sizes:?}: {}", ms.mean_square);

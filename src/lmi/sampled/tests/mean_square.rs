@@ -7,12 +7,14 @@ use super::*;
 fn mean_square_under_a_cap_is_never_worse_than_the_start() {
     for (seed, (sizes, points, lags)) in SHAPES.into_iter().enumerate() {
         let problem = random_problem(seed as u64, sizes, points, lags);
-        let s = minimise(&problem, &Settings::DEFAULT).unwrap();
+        let s = minimise(&problem, FINEST_GAP, &|| false).unwrap();
         let square = MeanSquareObjective::noiseless(vec![1.0; points], problem.channels());
         let mut last = problem.mean_square(&s.taps, &square) * (1.0 + 1e-12);
         for slack in [1e-6, 1e-3, 1e-1, 10.0] {
             let cap = s.gamma * (1.0 + slack);
-            let ms = mean_square_under_cap(&problem, &square, cap, &s.taps, &Settings::DEFAULT).unwrap();
+            let ms = mean_square_under_cap(&problem, &square, cap, &s.taps, FINEST_GAP, &|| false)
+                .unwrap()
+                .unwrap();
             println!(
                 "{sizes:?} slack {slack}: {:?} {} {} {}",
                 ms.outcome, ms.mean_square, ms.lower, ms.iterations
@@ -32,7 +34,7 @@ fn mean_square_under_a_cap_is_never_worse_than_the_start() {
 fn noise_of_the_channels_is_like_points_of_its_own() {
     let (m, n, q, lags) = (2, 2, 5, [3, 2]);
     let problem = random_problem(11, (m, n, q), 9, &lags);
-    let s = minimise(&problem, &Settings::DEFAULT).unwrap();
+    let s = minimise(&problem, FINEST_GAP, &|| false).unwrap();
     for noise in [[0.3, 2.0], [0.0, 1.0], [1e-6, 1e3]] {
         let square = MeanSquareObjective { weights: vec![1.0; 9], noise: noise.to_vec() };
         let (circle, faint) = (8, 1e-4);
@@ -43,7 +45,7 @@ fn noise_of_the_channels_is_like_points_of_its_own() {
         });
         let mut weights = vec![1.0; 9];
         weights.extend(vec![1.0 / (faint * faint * circle as f64); circle]);
-        let longer = problem.with_points(points).unwrap();
+        let longer = problem.with_points(points);
         let alike = MeanSquareObjective::noiseless(weights, n);
         let value = problem.mean_square(&s.taps, &square);
         assert!((longer.mean_square(&s.taps, &alike) - value).abs() < 1e-9 * value);
@@ -53,7 +55,7 @@ fn noise_of_the_channels_is_like_points_of_its_own() {
         for slack in [1e-3, 0.05, 0.5] {
             let cap = (1.0 + slack) * s.gamma;
             let capped = |p: &Problem, q: &MeanSquareObjective| {
-                mean_square_under_cap(p, q, cap, &s.taps, &Settings::DEFAULT).unwrap()
+                mean_square_under_cap(p, q, cap, &s.taps, FINEST_GAP, &|| false).unwrap().unwrap()
             };
             let (a, b) = (capped(&problem, &square), capped(&longer, &alike));
             assert!(
