@@ -143,17 +143,11 @@ pub(super) struct Known {
 
 /// What differs between the predictions for rectified rigs and for general cameras.
 pub trait Predicted: Viewpoint {
-    /// The size of a virtual view, where it is not that of the photographs.
-    type Size: Copy;
-
-    /// The size of a virtual view like this image.
-    fn size_of(image: &Image) -> Self::Size;
-
-    /// The view of this camera.
+    /// The view of this camera with `size` pixels; that of a rectified rig has the size of the photographs.
     fn render(
         &self,
         views: &[View<'_, Self>],
-        size: Self::Size,
+        size: (usize, usize),
         settings: &RenderSettings,
     ) -> Result<Rendering, RenderError>;
 
@@ -161,7 +155,7 @@ pub trait Predicted: Viewpoint {
     fn examine(
         &self,
         views: &[View<'_, Self>],
-        size: Self::Size,
+        size: (usize, usize),
         study: &Study<'_>,
     ) -> Result<Examined, RenderError>;
 
@@ -169,7 +163,7 @@ pub trait Predicted: Viewpoint {
     fn memory(
         &self,
         views: &[View<'_, Self>],
-        size: Self::Size,
+        size: (usize, usize),
         settings: &RenderSettings,
     ) -> Result<(Extent, f64), RenderError>;
 

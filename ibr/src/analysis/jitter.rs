@@ -62,6 +62,6 @@ pub fn depth_jitter<P: Predicted>(
     }
     let maps = with_noise(views, deviation, 1);
     let noisy: Vec<_> = views.iter().zip(&maps).map(|(v, map)| View { map, ..*v }).collect();
-    let changed = camera.render(&noisy, P::size_of(view), settings)?.image;
+    let changed = camera.render(&noisy, view.size(), settings)?.image;
     Ok(local_mean(&difference(&changed, view), view.size()))
 }

@@ -28,7 +28,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     /// Those of [`crate::pipeline`].
     pub fn new(views: &[View<'a, P>], settings: &RenderSettings) -> Result<Self, RenderError> {
         if let Some(first) = views.first() {
-            let (extent, bytes) = first.camera.memory(views, P::size_of(first.image), settings)?;
+            let (extent, bytes) = first.camera.memory(views, first.image.size(), settings)?;
             extent.check(bytes)?;
         }
         let agreement = Agreement::of(views);
@@ -43,7 +43,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
         let calibration = calibrate(&views, &known, |others, truth| {
             let spacing = truth.camera.spacing(&views);
             let study = Study { settings: &unmoved, known: &known, spacing, bounds: false, limits: None };
-            let examined = truth.camera.examine(others, P::size_of(truth.image), &study)?;
+            let examined = truth.camera.examine(others, truth.image.size(), &study)?;
             let errors = difference(&examined.rendering.image.quantised(), truth.image);
             Ok((examined.regressors, errors))
         })?;
@@ -69,7 +69,12 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     ///
     /// # Errors
     /// Those of [`crate::pipeline`].
-    pub fn at(&self, camera: &P, size: P::Size, limits: Option<&Limits>) -> Result<ViewError, RenderError> {
+    pub fn at(
+        &self,
+        camera: &P,
+        size: (usize, usize),
+        limits: Option<&Limits>,
+    ) -> Result<ViewError, RenderError> {
         let (extent, bytes) = camera.memory(&self.views(), size, &self.settings)?;
         extent.check(bytes)?;
         let study = Study { bounds: true, limits, ..self.study(camera) };
@@ -77,7 +82,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     }
 
     /// The view of `camera`, as it is rendered from the views.
-    pub(super) fn render(&self, camera: &P, size: P::Size) -> Result<Rendering, RenderError> {
+    pub(super) fn render(&self, camera: &P, size: (usize, usize)) -> Result<Rendering, RenderError> {
         camera.render(&self.views(), size, &RenderSettings { offset: 0.0, ..self.settings })
     }
 
@@ -90,7 +95,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     ) -> Result<Vec<f32>, RenderError> {
         let maps: Vec<DepthMap> = self.maps.iter().map(|(map, _)| changed(map)).collect();
         let views: Vec<_> = self.views().into_iter().zip(&maps).map(|(v, map)| View { map, ..v }).collect();
-        let image = camera.render(&views, P::size_of(rendered), &self.settings)?.image;
+        let image = camera.render(&views, rendered.size(), &self.settings)?.image;
         Ok(local_mean(&difference(&image, rendered), image.size()))
     }
 
@@ -99,7 +104,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     pub(super) fn with_view(
         &self,
         camera: &P,
-        size: P::Size,
+        size: (usize, usize),
         another: &View<'_, P>,
     ) -> Result<f64, RenderError> {
         let views = [self.views(), vec![*another]].concat();

@@ -7,7 +7,6 @@ use crate::lanes::bounds;
 pub(crate) use fill::fill_empty_rows;
 pub use fill::fill_unknown;
 pub(crate) use fill::{NONE, for_holes};
-pub use relief::Relief;
 pub(crate) use relief::{JUMP, Reliefs, TILE};
 
 /// The quantity that a map holds.

@@ -63,7 +63,7 @@ fn no_model(folder: &Path) -> InputError {
         _ => format!("there is no such folder; {CHECK_THE_PATH}"),
     };
     let reason = format!("there is neither cameras.txt nor cameras.bin: {remedy}");
-    InputError::content(folder, Location::File, reason)
+    InputError::file(folder, reason)
 }
 
 fn parse_binary(cameras: &[u8], images: &[u8], folder: &Path) -> Result<CameraList, InputError> {

@@ -6,7 +6,8 @@ use crate::cli::arguments::BoundArguments;
 use crate::cli::failure::Failure;
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded};
-use crate::image::{Image, ImageError, Levels, pfm};
+use crate::files::refuse_pixels_without_memory;
+use crate::image::{Image, Levels, pfm};
 use hybank::messages::Quoted;
 use std::path::{Path, PathBuf};
 
@@ -53,7 +54,7 @@ impl Outputs {
         if let Some(path) = &self.map {
             // A picture or three numbers per pixel, and the file.
             let size = predicted.rendering.image.size();
-            ImageError::refuse_without_memory(path, size, 36.0).map_err(Failure::input)?;
+            refuse_pixels_without_memory(path, size, 36.0).map_err(Failure::input)?;
             let (map, largest) = map(predicted, path)?;
             white = largest;
             all.push(map);

@@ -5,7 +5,8 @@ use crate::cli::failure::Failure;
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded};
 use crate::depth::{FAR, Measure};
-use crate::image::{Image, ImageError, Levels, encode_levels, encode_with_alpha, pfm};
+use crate::files::refuse_pixels_without_memory;
+use crate::image::{Image, Levels, encode_levels, encode_with_alpha, pfm};
 use crate::interpolate::Cover;
 use crate::pipeline::Rendering;
 use hybank::messages::Quoted;
@@ -137,7 +138,7 @@ impl Outputs {
         let (mut all, mut white) = (Vec::new(), None);
         for (part, path) in &self.parts {
             // Numbers or a picture, and the file.
-            ImageError::refuse_without_memory(path, rendering.image.size(), 20.0).map_err(Failure::input)?;
+            refuse_pixels_without_memory(path, rendering.image.size(), 20.0).map_err(Failure::input)?;
             all.push(match part {
                 Part::View => self.view(rendering, path)?,
                 Part::Mask => output::encoded(&mask_image(rendering), path, Levels::Eight)?,

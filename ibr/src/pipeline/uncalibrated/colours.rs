@@ -56,19 +56,9 @@ impl Advantage {
         Ok(all)
     }
 
-    /// Mean over the pixels in grey levels, positive if the order is kept.
-    pub(super) fn mean(&self) -> f64 {
-        self.sum / self.count.max(1) as f64
-    }
-
     /// The sum in standard deviations.
     pub(super) fn deviations(&self) -> f64 {
         self.sum / self.squares.max(f64::MIN_POSITIVE).sqrt()
-    }
-
-    /// Pixels.
-    pub(super) fn pixels(&self) -> usize {
-        self.count
     }
 
     /// The order of depth by the photographs and the guessed calibrations. Each of them errs now and
@@ -76,7 +66,8 @@ impl Advantage {
     /// of 5 deviations needs both. Weaker hints of both together were wrong in 3 of 100 cropped pairs.
     pub(super) fn order(&self, guess: &Order) -> (Handedness, OrderBy) {
         let shown = if self.sum > 0.0 { Handedness::Kept } else { Handedness::Reversed };
-        let clear = self.pixels() >= FEWEST_PIXELS && self.mean().abs() >= LEAST_ADVANTAGE;
+        let mean = self.sum / self.count.max(1) as f64;
+        let clear = self.count >= FEWEST_PIXELS && mean.abs() >= LEAST_ADVANTAGE;
         let (deviations, agree) = (self.deviations().abs(), shown == guess.hand);
         let firm = clear && deviations >= DEVIATIONS_TOGETHER;
         if clear && deviations >= DEVIATIONS_ALONE {

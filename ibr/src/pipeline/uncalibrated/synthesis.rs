@@ -59,7 +59,7 @@ pub(super) fn render<const ORDER: usize, const C: usize>(
     problem.add(&samples)?;
     drop(samples);
     problem.seen().zip(&mut region).for_each(|(seen, inside)| *inside |= seen);
-    let fit = problem.solve_watched(Some(&region), &|share| watch(GATHERED + (1.0 - GATHERED) * share))?;
+    let fit = problem.solve(Some(&region), &|share| watch(GATHERED + (1.0 - GATHERED) * share))?;
     let views = (0..images.len()).collect();
     let rendering = Rendering::of_plane::<C>(fit, report, views, Agreement::default());
     Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone() })

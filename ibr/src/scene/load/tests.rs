@@ -21,7 +21,7 @@ fn scene(text: &str) -> (tempfile::TempDir, PathBuf) {
 fn read(text: &str, options: &LoadOptions) -> Result<Scene, String> {
     let (_dir, path) = scene(text);
     let spec = parse(text, &path).map_err(|e| e.to_string())?;
-    load(&spec, &path, options).map_err(|e| e.to_string())
+    load(&spec, &path, options, &|_| ()).map_err(|e| e.to_string())
 }
 
 const RIG: &str = r#"

@@ -3,7 +3,7 @@
 use super::normal::residual;
 use super::*;
 use crate::uncalibrated::fundamental::tests::Synthetic;
-use crate::uncalibrated::random::Dice;
+use crate::uncalibrated::random::dice::Dice;
 
 const NOISE: f64 = 0.5;
 
