@@ -1,4 +1,5 @@
-//! Reading input files: whole, up to a size limit since a device may never end, and what is wrong with files.
+//! Reading input files: whole, up to a size limit since a device may never end, and what is wrong with
+//! files.
 
 use hybank::files::{self, Bound, FileError, read_bytes};
 use hybank::memory::check_memory;

@@ -1,6 +1,6 @@
 //! The error of any number of views, with weights that are calibrated once.
 
-use super::estimate::{Calibration, Known, Predicted, Study, ViewError, calibrate, equalised, judge};
+use super::estimate::{Calibration, Known, Predicted, Study, ViewError, equalised, judge};
 use super::jitter::map_noise;
 use super::regressors::{difference, local_mean};
 use super::sure::Limits;
@@ -40,13 +40,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
         let known = Known { variogram: Variogram::of(images.iter()), noise: map_noise(&views) };
         // A registration offset belongs to the virtual view only.
         let unmoved = RenderSettings { offset: 0.0, ..settings };
-        let calibration = calibrate(&views, &known, |others, truth| {
-            let spacing = truth.camera.spacing(&views);
-            let study = Study { settings: &unmoved, known: &known, spacing, bounds: false, limits: None };
-            let examined = truth.camera.examine(others, truth.image.size(), &study)?;
-            let errors = difference(&examined.rendering.image.quantised(), truth.image);
-            Ok((examined.regressors, errors))
-        })?;
+        let calibration = Calibration::of(&views, &unmoved, &known)?;
         Ok(Self { images, maps, settings, known, calibration, agreement })
     }
 

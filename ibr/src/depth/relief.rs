@@ -20,8 +20,8 @@ struct Scale {
 /// The surroundings of some neighbouring pixels, in the order of their columns: arrays of a fixed length,
 /// whose loops the compiler turns into vector instructions. The entries of unknown pixels mean nothing.
 pub(crate) struct Reliefs {
-    /// Change of the value per pixel to the right, on the surface of the pixel: the mean over the neighbours on
-    /// it, 0 without any.
+    /// Change of the value per pixel to the right, on the surface of the pixel: the mean over the
+    /// neighbours on it, 0 without any.
     pub(crate) across: [f32; TILE],
     /// The same down.
     pub(crate) down: [f32; TILE],

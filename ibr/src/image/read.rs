@@ -175,11 +175,13 @@ mod tests {
         let mut bytes = b"P5 33554433 1 255\n".to_vec();
         bytes.resize(bytes.len() + MOST_PIXELS + 1, 7);
         let (_dir, path) = temporary("wide.pgm", &bytes);
-        let message = read_image(&path).unwrap_err().to_string();
-        assert!(message.contains("33554433 x 1") && message.contains("--max-pixels"), "{message}");
-        assert!(matches!(read_map(&path), Err(InputError::TooLarge { most: MOST_PIXELS, .. })));
+        for message in [read_image(&path).unwrap_err().to_string(), read_map(&path).unwrap_err().to_string()]
+        {
+            let parts = ["33554433 x 1", "the limit of 33554432", "--max-pixels"];
+            assert!(parts.iter().all(|part| message.contains(part)), "{message}");
+        }
         let (_dir, small) = temporary("small.pgm", b"P5 3 1 255\n\x01\x02\x03");
-        assert!(matches!(read_image_within(&small, 2), Err(InputError::TooLarge { most: 2, .. })));
+        assert!(read_image_within(&small, 2).unwrap_err().to_string().contains("the limit of 2;"));
         assert_eq!(read_image_within(&small, 3).unwrap().width(), 3);
     }
 
@@ -188,7 +190,7 @@ mod tests {
         let missing = read_image(Path::new("/nowhere/at all.png")).unwrap_err().to_string();
         assert!(missing.contains("/nowhere/at all.png"), "{missing}");
         let (_dir, path) = temporary("x.png", b"not an image");
-        let damaged = read_image(&path).unwrap_err();
-        assert!(matches!(damaged, InputError::Decode { .. }), "{damaged}");
+        let damaged = read_image(&path).unwrap_err().to_string();
+        assert!(damaged.contains("x.png: ") && damaged.contains("the readable formats are PNG"), "{damaged}");
     }
 }

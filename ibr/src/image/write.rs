@@ -166,20 +166,18 @@ mod tests {
         }
         let image = Image::filled(2, 2, 1, 7.0);
         let refused = encode(&image, Path::new("x.jpg"), Levels::Sixteen);
-        assert!(matches!(refused, Err(InputError::Levels { .. })));
+        assert!(
+            refused.unwrap_err().to_string().contains("16 bits per value are written to .png files only")
+        );
     }
 
     #[test]
     fn unknown_endings_and_folders_are_refused() {
         let image = Image::filled(2, 2, 1, 7.0);
-        assert!(matches!(
-            encode(&image, Path::new("x.gif"), Levels::Eight),
-            Err(InputError::UnknownFormat { .. })
-        ));
-        assert!(matches!(
-            encode(&image, Path::new("x"), Levels::Eight),
-            Err(InputError::UnknownFormat { .. })
-        ));
-        assert!(matches!(save(&image, Path::new("/nowhere/x.png")), Err(InputError::File(_))));
+        for name in ["x.gif", "x"] {
+            let refused = encode(&image, Path::new(name), Levels::Eight).unwrap_err().to_string();
+            assert!(refused.contains("the extension is not an image format; use .png"), "{refused}");
+        }
+        assert!(matches!(save(&image, Path::new("/nowhere/x.png")), Err(InputError::Create(_))));
     }
 }

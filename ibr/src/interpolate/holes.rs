@@ -17,8 +17,9 @@ pub enum HoleFill {
     Leave,
 }
 
-/// Neighbouring samples farther apart than this, in units of their spacing on the surface (at least one pixel),
-/// have a hole between them. A pixel belongs to a hole if no sample lies within half of this distance.
+/// Neighbouring samples farther apart than this, in units of their spacing on the surface (at least one
+/// pixel), have a hole between them. A pixel belongs to a hole if no sample lies within half of this
+/// distance.
 pub(super) const GAP: f64 = 1.5;
 
 /// Distance up to which a sample of this spacing covers pixels.

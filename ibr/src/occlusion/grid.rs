@@ -12,8 +12,8 @@ use std::ops::Range;
 ///
 /// Most samples are visible, and the least depth around some of them shows it; only the others are compared
 /// with what may hide them. O(n) where few samples share a pixel. Of many, those of a cell are a k-d tree:
-/// O(n log n) to build it, and a search looks at the boxes that the border of a ball cuts. Parallel, with the
-/// same bits for any number of threads.
+/// O(n log n) to build it, and a search looks at the boxes that the border of a ball cuts. Parallel, with
+/// the same bits for any number of threads.
 pub fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) -> usize {
     let hidden = hidden(samples, test);
     let before = samples.len();
@@ -228,7 +228,8 @@ mod tests {
         assert_eq!(pair.len(), 2);
     }
 
-    /// Many samples in few cells, at few places or at all different ones: the trees decide as the definition.
+    /// Many samples in few cells, at few places or at all different ones: the trees decide as the
+    /// definition.
     #[test]
     fn a_crowd_hides_as_the_definition_says() {
         let part = |k: usize, step: f64| (k as f64 * step).fract();

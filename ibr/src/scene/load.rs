@@ -64,8 +64,8 @@ pub fn parse(text: &str, path: &Path) -> Result<SceneSpec, InputError> {
     })
 }
 
-/// Reads all files of a scene. Relative paths start in the folder of the scene file `path`. `watch` is called
-/// with the share of the views that are read.
+/// Reads all files of a scene. Relative paths start in the folder of the scene file `path`. `watch` is
+/// called with the share of the views that are read.
 ///
 /// # Errors
 /// [`InputError`], naming file, view and numbers.

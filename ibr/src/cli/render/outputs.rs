@@ -1,5 +1,6 @@
 //! The files of one virtual view.
 
+use crate::analysis::difference;
 use crate::cli::arguments::RenderArguments;
 use crate::cli::failure::Failure;
 use crate::cli::heat;
@@ -202,14 +203,10 @@ fn counts<'a>(rendering: &Rendering, path: &'a Path) -> Result<Encoded<'a>, Fail
     Ok(Encoded { bytes, path })
 }
 
-/// Absolute difference from the photograph in grey levels, mean over the channels.
+/// Absolute difference from the photograph in grey levels, mean over the channels; of the brightness, if only
+/// one of them has colours.
 fn errors<'a>(image: &Image, truth: &Image, path: &'a Path) -> Result<(Encoded<'a>, Option<f32>), Failure> {
-    let pixels = image.width() * image.height();
-    let difference = |p: usize| {
-        let (a, b) = (image.pixel::<3>(p), truth.pixel::<3>(p));
-        a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>() / 3.0
-    };
-    let values: Vec<f32> = (0..pixels).map(difference).collect();
+    let values = difference(image, truth);
     if path.extension().is_some_and(|ending| ending == "pfm") {
         return Ok((numbers(values, image.size(), path), None));
     }
