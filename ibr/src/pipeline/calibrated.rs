@@ -211,7 +211,7 @@ mod tests {
         let fit = plane::interpolate(&samples, (40, 30), &settings.interpolation).unwrap();
         assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
         // In bands only the order of summation differs.
-        let footprint = Footprint::new(&views, &target, &frame);
+        let footprint = Footprint::of(&views, &(0..views.len()).collect::<Vec<_>>(), &target, &frame);
         let mut problem = PlaneProblem::<2, 1>::new((40, 30), &settings.interpolation).unwrap();
         let mut work = Work::default();
         for rows in [0..7, 7..8, 8..30] {

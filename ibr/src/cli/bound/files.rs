@@ -33,7 +33,7 @@ impl Outputs {
         let named = [("--map", &self.map), ("--plot", &self.plot)];
         let named = named.iter().filter_map(|(option, path)| Some((*option, path.as_deref()?)));
         output::check_names(&named.collect::<Vec<_>>())?;
-        if let Some(plot) = self.plot.as_ref().filter(|plot| chart::Format::of(plot).is_none()) {
+        if let Some(plot) = self.plot.as_ref().filter(|plot| chart::format(plot).is_none()) {
             let message = "a plot is written as .svg or .png";
             return Err(Failure::Usage(format!("--plot {}: {message}", Quoted(plot))));
         }
@@ -60,7 +60,7 @@ impl Outputs {
             all.push(map);
         }
         if let Some(path) = &self.plot {
-            let bytes = chart::file(predicted, truth, path).map_err(Failure::input)?;
+            let bytes = chart::file(predicted, truth, path)?;
             all.push(Encoded { bytes, path });
         }
         Ok((all, white))
