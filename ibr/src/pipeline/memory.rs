@@ -5,6 +5,7 @@
 
 use super::{Method, RenderError, RenderSettings};
 use crate::interpolate::Degree;
+use crate::interpolate::plane::PlaneProblem;
 use crate::sample::Sample;
 use hybank::memory::check_memory;
 use hybank::sampling::Fit2;
@@ -154,10 +155,10 @@ impl Extent {
     fn plane(&self, degree: Degree, gathering: f64) -> f64 {
         let Self { size, .. } = *self;
         let memory = match (degree, self.channels) {
-            (Degree::Linear, 3) => Fit2::<2, 3>::memory(size.0, size.1),
-            (Degree::Linear, _) => Fit2::<2, 1>::memory(size.0, size.1),
-            (Degree::Cubic, 3) => Fit2::<4, 3>::memory(size.0, size.1),
-            (Degree::Cubic, _) => Fit2::<4, 1>::memory(size.0, size.1),
+            (Degree::Linear, 3) => plane_memory::<2, 3>(size),
+            (Degree::Linear, _) => plane_memory::<2, 1>(size),
+            (Degree::Cubic, 3) => plane_memory::<4, 3>(size),
+            (Degree::Cubic, _) => plane_memory::<4, 1>(size),
         };
         let pixels = self.virtual_pixels();
         // Depths, their distances, and counts; then the mask instead of the distances.
@@ -187,5 +188,14 @@ fn order(degree: Degree) -> usize {
     match degree {
         Degree::Linear => 2,
         Degree::Cubic => 4,
+    }
+}
+
+fn plane_memory<const ORDER: usize, const C: usize>(
+    (width, height): (usize, usize),
+) -> hybank::sampling::fit2::Memory {
+    match PlaneProblem::<ORDER, C>::is_turned((width, height)) {
+        true => Fit2::<ORDER, C>::memory(height, width),
+        false => Fit2::<ORDER, C>::memory(width, height),
     }
 }

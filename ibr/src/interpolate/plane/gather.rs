@@ -9,6 +9,9 @@ use hybank::sampling::fit2::Fit2Rows;
 use rayon::prelude::*;
 use std::ops::Range;
 
+/// Samples whose rows and columns are exchanged at a time.
+const TURNED_AT_A_TIME: usize = 4096;
+
 /// Some rows of the image with all that samples change there.
 struct Part<'a, const ORDER: usize, const C: usize> {
     size: (usize, usize),
@@ -97,7 +100,14 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     /// [`InterpolationError::NotFinite`].
     pub fn add(&mut self, samples: &[Sample<C>]) -> Result<(), InterpolationError> {
         check_samples(samples)?;
-        self.added += self.whole().add(samples);
+        if !self.turned {
+            self.added += self.whole().add(samples);
+            return Ok(());
+        }
+        for part in samples.chunks(TURNED_AT_A_TIME) {
+            let turned: Vec<Sample<C>> = part.iter().map(|s| Sample { x: s.y, y: s.x, ..*s }).collect();
+            self.added += self.whole().add(&turned);
+        }
         Ok(())
     }
 
@@ -114,7 +124,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     ) -> Result<(), InterpolationError> {
         // A sample changes the rows of its splines and those within its reach.
         let margin = reach(LARGEST_SPACING).ceil() as usize + ORDER - 1;
-        if bands.iter().any(|band| band.len() < 2 * margin) {
+        if self.turned || bands.iter().any(|band| band.len() < 2 * margin) {
             return bands.iter().try_for_each(|band| self.add(&make(band)));
         }
         for parity in 0..2 {

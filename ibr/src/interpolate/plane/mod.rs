@@ -105,6 +105,9 @@ const GUESSED: f32 = 1e4;
 pub struct PlaneProblem<const ORDER: usize, const C: usize> {
     width: usize,
     height: usize,
+    /// Whether rows and columns are exchanged in all fields: the equations of a narrow image would be mostly
+    /// the zeros beside its rows.
+    turned: bool,
     fit: Fit2<ORDER, C>,
     /// Depth of the sample nearest to each pixel centre, NaN where none lies within half a gap.
     depth: Vec<f32>,
@@ -122,6 +125,8 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     /// [`InterpolationError::Setting`].
     pub fn new((width, height): (usize, usize), settings: &Settings) -> Result<Self, InterpolationError> {
         settings.check()?;
+        let turned = Self::is_turned((width, height));
+        let (width, height) = if turned { (height, width) } else { (width, height) };
         let pixels = width * height;
         // Written at once: pages that are read first and written later take the system twice the time.
         let mut counts = vec![0; pixels];
@@ -129,6 +134,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         Ok(Self {
             width,
             height,
+            turned,
             fit: Fit2::new(width, height),
             depth: vec![f32::NAN; pixels],
             distance: vec![f32::INFINITY; pixels],
@@ -143,9 +149,17 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         self.added
     }
 
+    /// Whether an image takes a third less memory with rows and columns exchanged.
+    pub(crate) fn is_turned((width, height): (usize, usize)) -> bool {
+        let bytes = |width, height| Fit2::<ORDER, C>::memory(width, height).with_multigrid;
+        bytes(width, height) > 1.5 * bytes(height, width)
+    }
+
     /// Whether a sample lies within half a gap of each pixel.
     pub fn seen(&self) -> impl Iterator<Item = bool> + '_ {
-        self.depth.iter().map(|depth| !depth.is_nan())
+        let upright = |p: usize| p % self.height * self.width + p / self.height;
+        let index = move |p: usize| if self.turned { upright(p) } else { p };
+        (0..self.depth.len()).map(move |p| !self.depth[index(p)].is_nan())
     }
 
     /// Fits the image. With `region`, only the pixels where it is true are filled and fitted together;
@@ -158,11 +172,13 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         region: Option<&[bool]>,
         watch: Watch<'_>,
     ) -> Result<PlaneFit, InterpolationError> {
-        let (width, height) = (self.width, self.height);
+        let (width, height, turned) = (self.width, self.height, self.turned);
         if self.added == 0 {
+            let (width, height) = if turned { (height, width) } else { (width, height) };
             return Err(InterpolationError::NoSamples { width, height });
         }
-        let inside = |p: usize| region.is_none_or(|r| r.get(p).copied().unwrap_or(false));
+        let given = |p: usize| if turned { p % width * height + p / width } else { p };
+        let inside = |p: usize| region.is_none_or(|r| r.get(given(p)).copied().unwrap_or(false));
         let mut mask = background::classify(&self.depth, width, &self.settings.depth_test);
         let guessed = mask.iter_mut().zip(std::mem::take(&mut self.distance));
         let guessed = guessed.filter(|(cover, distance)| **cover == Cover::Seen && *distance >= GUESSED);
@@ -186,8 +202,13 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
             super::rows::blacken(&mask, &mut values, C);
         }
         values.iter_mut().for_each(|v| *v = v.clamp(0.0, 255.0));
-        let depth = DepthMap::from_known((width, height), depth, Measure::Depth);
-        Ok(PlaneFit { values, mask, depth, counts, convergence })
+        if !turned {
+            let depth = DepthMap::from_known((width, height), depth, Measure::Depth);
+            return Ok(PlaneFit { values, mask, depth, counts, convergence });
+        }
+        let depth = DepthMap::from_known((height, width), by_columns(depth, width, 1), Measure::Depth);
+        let (values, mask) = (by_columns(values, width, C), by_columns(mask, width, 1));
+        Ok(PlaneFit { values, mask, depth, counts: by_columns(counts, width, 1), convergence })
     }
 
     /// Gives every disoccluded pixel a sample with value and depth of the surface that continues into it.
@@ -262,6 +283,20 @@ pub(crate) fn fit_surface(values: &[f32], shape: &[f32], width: usize, settings:
 pub(crate) fn surface_memory(width: usize, height: usize) -> f64 {
     let memory = Fit2::<2, 1>::memory(width, height);
     memory.equations.max(memory.solving) + 8.0 * width as f64 * height as f64
+}
+
+/// The pixels of an image by columns, from those by rows of `width`.
+fn by_columns<T: Copy>(pixels: Vec<T>, width: usize, channels: usize) -> Vec<T> {
+    let height = pixels.len() / (width * channels);
+    if width == 1 || height == 1 {
+        return pixels;
+    }
+    let mut columns = Vec::with_capacity(pixels.len());
+    for (x, y) in (0..width).flat_map(|x| (0..height).map(move |y| (x, y))) {
+        let first = (y * width + x) * channels;
+        columns.extend_from_slice(&pixels[first..first + channels]);
+    }
+    columns
 }
 
 /// The complete third stage for samples at any position: a value for every pixel, and the mask.
