@@ -124,11 +124,11 @@ impl Loader<'_> {
     }
 
     fn start_of(&self, goal: &Goal, first: First) -> Loaded<Wanted> {
-        self.wanted(goal.target.camera.as_ref(), goal.target.colmap_image.as_deref(), goal, first)
+        self.wanted(goal.target.camera.as_ref(), goal.target.camera_of.as_deref(), goal, first)
     }
 
     fn end_of_path(&self, goal: &Goal, first: First) -> Loaded<Wanted> {
-        let (rows, image) = (goal.target.to_camera.as_ref(), goal.target.to_colmap_image.as_deref());
+        let (rows, image) = (goal.target.to_camera.as_ref(), goal.target.to_camera_of.as_deref());
         if rows.is_none() && image.is_none() {
             let name = &goal.name;
             return Err(
