@@ -1,7 +1,7 @@
 //! Reading input files: whole, up to a size limit since a device may never end, and what is wrong with
 //! files.
 
-use hybank::files::{self, Bound, FileError, read_bytes};
+use hybank::files::{self, Bound, FileError};
 use hybank::memory::check_memory;
 use hybank::messages::Quoted;
 use std::fmt;
@@ -105,18 +105,13 @@ impl InputError {
     }
 }
 
-/// The bytes of a file.
-pub(crate) fn read(path: &Path, remedy: &'static str) -> Result<Vec<u8>, InputError> {
-    read_bytes(path, IMAGE).map_err(|source| InputError::Read { source, remedy })
-}
-
 /// The bytes of a file, if there is `room` for what is made of them, in bytes.
-pub(crate) fn read_with_room(
+pub(crate) fn read_bytes(
     path: &Path,
     remedy: &'static str,
     room: impl Fn(&[u8]) -> f64,
 ) -> Result<Vec<u8>, InputError> {
-    let bytes = read(path, remedy)?;
+    let bytes = files::read_bytes(path, IMAGE).map_err(|source| InputError::Read { source, remedy })?;
     refuse_without_memory(path, room(&bytes)).map(|()| bytes)
 }
 

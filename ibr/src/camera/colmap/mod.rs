@@ -38,7 +38,7 @@ pub fn read_model(folder: &Path) -> Result<CameraList, InputError> {
     }
     if !folder.join("cameras.txt").exists() && folder.join("cameras.bin").exists() {
         let room = |bytes: &[u8]| LISTED * binary::most_records(bytes) as f64;
-        let load = |name: &str| files::read_with_room(&folder.join(name), FILES, room);
+        let load = |name: &str| files::read_bytes(&folder.join(name), FILES, room);
         let (cameras, images) = (load("cameras.bin")?, load("images.bin")?);
         return join(folder, "bin", Location::Record, binary::cameras(&cameras), binary::images(&images));
     }
@@ -75,7 +75,7 @@ pub fn parse_model(cameras: &str, images: &str, folder: &Path) -> Result<CameraL
     join(folder, "txt", Location::Line, parse_cameras(cameras), parse_images(images))
 }
 
-/// The images with their cameras, from what the two files in a folder say; `at` is where in a file a fault is.
+/// The images with their cameras, from what the two files in a folder say; `at` is where a fault is.
 fn join(
     folder: &Path,
     ending: &str,

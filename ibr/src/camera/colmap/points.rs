@@ -36,7 +36,7 @@ pub fn read_points(folder: &Path) -> Result<Vec<ScenePoint>, InputError> {
     }
     let (text, bytes) = (folder.join("points3D.txt"), folder.join("points3D.bin"));
     if !text.exists() && bytes.exists() {
-        let file = files::read_with_room(&bytes, FILES, |bytes| PARSED * bytes.len() as f64)?;
+        let file = files::read_bytes(&bytes, FILES, |bytes| PARSED * bytes.len() as f64)?;
         let fault = |(record, reason)| InputError::content(&bytes, Location::Record(record), reason);
         return binary_points(&file).map_err(fault);
     }

@@ -203,8 +203,8 @@ fn counts<'a>(rendering: &Rendering, path: &'a Path) -> Result<Encoded<'a>, Fail
     Ok(Encoded { bytes, path })
 }
 
-/// Absolute difference from the photograph in grey levels, mean over the channels; of the brightness, if only
-/// one of them has colours.
+/// Absolute difference from the photograph in grey levels, mean over the channels; of the brightness, if
+/// only one of them has colours.
 fn errors<'a>(image: &Image, truth: &Image, path: &'a Path) -> Result<(Encoded<'a>, Option<f32>), Failure> {
     let values = difference(image, truth);
     if path.extension().is_some_and(|ending| ending == "pfm") {

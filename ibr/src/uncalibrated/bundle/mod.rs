@@ -54,9 +54,9 @@ impl Bundle {
     /// Adjusts all cameras and points. A sighting with the distance d counts as `scale`^2 ln(1 + d^2 /
     /// `scale`^2), so that mistakes far beyond `scale` pixels hardly count (Cauchy).
     ///
-    /// Cameras and points keep their signs; their scales are those of before. Whether no step lowers the cost
-    /// any more; `None`, and nothing changed, if an observation names no camera or point, or the start is
-    /// not finite.
+    /// Cameras and points keep their signs; their scales are those of before. Returns whether no step lowers
+    /// the cost any more; `None`, and nothing changed, if an observation names no camera or point, or the
+    /// start is not finite.
     pub fn adjust(&mut self, scale: f64) -> Option<bool> {
         let frame = Frame::of(self)?;
         let mut problem = frame.normalised(self, scale);
