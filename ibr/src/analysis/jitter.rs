@@ -23,7 +23,7 @@ const LEAST_SHARE: f64 = 1e-4;
 /// interpolated, which leaves the share k of its variance, 2/3 between two neighbours and 4/9 between four.
 /// The median makes hidden points harmless. Errors that both maps share, and offsets between the cameras, do
 /// not show.
-pub fn map_noise<P: Viewpoint>(views: &[View<'_, P>]) -> f64 {
+pub(super) fn map_noise<P: Viewpoint>(views: &[View<'_, P>]) -> f64 {
     let nearest = Nearest::new(views);
     let lookups = |j: usize| {
         let (a, b) = (&views[nearest.before(j)?], &views[j]);
