@@ -83,6 +83,7 @@ fn local_limit(e: &Evidence, depth_error: f32) -> f32 {
 mod tests {
     use super::*;
     use crate::depth::{DepthMap, Measure};
+    use crate::image::Image;
 
     #[test]
     fn further_views_lie_between_neighbours_or_opposite_of_them() {

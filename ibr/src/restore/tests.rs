@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::camera::Camera;
+use crate::depth::Measure;
 use crate::image::Image;
 use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use crate::uncalibrated::random::dice::Dice;

@@ -35,7 +35,8 @@ const LEAST_ADVANTAGE: f64 = 10.0;
 pub(super) struct Advantage {
     sum: f64,
     squares: f64,
-    count: usize,
+    /// Pixels.
+    pub(super) count: usize,
 }
 
 impl Advantage {
@@ -56,6 +57,11 @@ impl Advantage {
         Ok(all)
     }
 
+    /// Mean over the pixels in grey levels, positive if the order is kept.
+    pub(super) fn mean(&self) -> f64 {
+        self.sum / self.count.max(1) as f64
+    }
+
     /// The sum in standard deviations.
     pub(super) fn deviations(&self) -> f64 {
         self.sum / self.squares.max(f64::MIN_POSITIVE).sqrt()
@@ -66,8 +72,7 @@ impl Advantage {
     /// of 5 deviations needs both. Weaker hints of both together were wrong in 3 of 100 cropped pairs.
     pub(super) fn order(&self, guess: &Order) -> (Handedness, OrderBy) {
         let shown = if self.sum > 0.0 { Handedness::Kept } else { Handedness::Reversed };
-        let mean = self.sum / self.count.max(1) as f64;
-        let clear = self.count >= FEWEST_PIXELS && mean.abs() >= LEAST_ADVANTAGE;
+        let clear = self.count >= FEWEST_PIXELS && self.mean().abs() >= LEAST_ADVANTAGE;
         let (deviations, agree) = (self.deviations().abs(), shown == guess.hand);
         let firm = clear && deviations >= DEVIATIONS_TOGETHER;
         if clear && deviations >= DEVIATIONS_ALONE {

@@ -86,7 +86,7 @@ fn outcome(kind: Kind, seed: u64) -> Option<(OrderBy, bool)> {
         by_calibrations == truth,
         advantage.mean().abs(),
         advantage.deviations().abs(),
-        advantage.pixels(),
+        advantage.count,
         (advantage.mean() > 0.0) == (truth == Handedness::Kept)
     );
     Some((found.geometry.order_by, truth == found.hand))
