@@ -15,7 +15,7 @@ use std::ops::Range;
 /// O(n log n) to build it, and a search looks at the boxes that the border of a ball cuts. Parallel, with
 /// the same bits for any number of threads.
 pub fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) -> usize {
-    let hidden = hidden(samples, test);
+    let hidden = hidden(samples.iter().copied(), test);
     let before = samples.len();
     let mut flags = hidden.iter();
     samples.retain(|_| !flags.next().copied().unwrap_or(false));
@@ -23,12 +23,16 @@ pub fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) ->
 }
 
 /// Which samples are hidden.
-pub(crate) fn hidden<const C: usize>(samples: &[Sample<C>], test: &DepthTest) -> Vec<bool> {
+pub(crate) fn hidden<const C: usize>(
+    samples: impl ExactSizeIterator<Item = Sample<C>>,
+    test: &DepthTest,
+) -> Vec<bool> {
+    let count = samples.len();
     let points = Points::of(samples);
     let mut search = PlaneSearch::default();
     search.clear(&points.extent(), points.len());
     search.enter(&points, test);
-    let mut flags = vec![false; samples.len()];
+    let mut flags = vec![false; count];
     search.hidden(&points, test).iter().for_each(|i| flags[*i as usize] = true);
     flags
 }
@@ -205,7 +209,7 @@ mod tests {
     }
 
     fn check(samples: &[Sample<1>], test: &DepthTest) {
-        assert_eq!(hidden(samples, test), test.hidden_by_definition(samples), "{test:?}");
+        assert_eq!(hidden(samples.iter().copied(), test), test.hidden_by_definition(samples), "{test:?}");
     }
 
     #[test]
@@ -283,7 +287,7 @@ mod tests {
                 })
                 .collect();
             let test = DepthTest { epsilon, relative, absolute: 0.1, parallax: 0.0 };
-            let mut points = Points::of(&samples);
+            let mut points = Points::of(samples.iter().copied());
             raw.iter().enumerate().for_each(|(i, s)| points.own[i] = s.4 > 1);
             let own = |i: &usize| points.own[*i];
             let hidden = test.hidden_by_definition(&samples);

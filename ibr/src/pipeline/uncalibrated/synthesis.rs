@@ -105,9 +105,9 @@ fn remove_occluded<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTes
     // In place, since the list may take most of the memory.
     samples.sort_unstable_by_key(|s| (s.doubtful, s.view, s.pixel));
     let (before, sound) = (samples.len(), samples.partition_point(|s| !s.doubtful));
-    let mut hidden = occlusion::hidden(samples, test);
+    let mut hidden = occlusion::hidden(samples.iter().copied(), test);
     if sound < before {
-        hidden[..sound].copy_from_slice(&occlusion::hidden(&samples[..sound], test));
+        hidden[..sound].copy_from_slice(&occlusion::hidden(samples[..sound].iter().copied(), test));
     }
     let mut flags = hidden.into_iter();
     samples.retain(|_| flags.next() == Some(false));
