@@ -1,6 +1,7 @@
-//! Reading input files: whole, up to a size limit since a device may never end, and what is wrong with them.
+//! Reading input files: whole, up to a size limit since a device may never end, and what is wrong with
+//! files.
 
-use hybank::files::{self, Bound, FileError, read_bytes};
+use hybank::files::{self, Bound, FileError};
 use hybank::memory::check_memory;
 use hybank::messages::Quoted;
 use std::fmt;
@@ -12,7 +13,7 @@ pub(crate) const CHECK_THE_PATH: &str = "check the path (paths in a scene are re
 const IMAGE: Bound = Bound { bytes: 1 << 30, kind: "an image or map", remedy: "shrink it" };
 const TEXT: Bound = Bound { bytes: 1 << 28, kind: "a text file", remedy: "is it the right file?" };
 
-/// What is wrong with an input file: a scene, tracks, cameras, images or maps.
+/// What is wrong with a file (a scene, tracks, cameras, images or maps), or with images that do not fit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum InputError {
@@ -33,6 +34,33 @@ pub enum InputError {
         at: Location,
         /// What is wrong, and the remedy.
         reason: String,
+    },
+    /// It cannot be created, or get its name.
+    #[error(transparent)]
+    Create(#[from] FileError),
+    /// Two images that belong together differ in size.
+    #[error("{left} has {} x {} pixels and {right} has {} x {}: they must agree", sizes[0].0, sizes[0].1, sizes[1].0, sizes[1].1)]
+    Sizes {
+        /// Name of the first image.
+        left: String,
+        /// Name of the second image.
+        right: String,
+        /// Width and height of both.
+        sizes: [(usize, usize); 2],
+    },
+    /// A buffer that does not hold width * height * channels values.
+    #[error("{width} x {height} pixels of {channels} channels need {expected} values, {given} were given")]
+    Buffer {
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
+        /// Channels, 1 or 3.
+        channels: usize,
+        /// Values needed.
+        expected: usize,
+        /// Values given.
+        given: usize,
     },
 }
 
@@ -70,20 +98,20 @@ impl InputError {
     pub(crate) fn content(path: &Path, at: Location, reason: impl ToString) -> Self {
         Self::Content { path: path.into(), at, reason: reason.to_string() }
     }
-}
 
-/// The bytes of a file.
-pub(crate) fn read(path: &Path, remedy: &'static str) -> Result<Vec<u8>, InputError> {
-    read_bytes(path, IMAGE).map_err(|source| InputError::Read { source, remedy })
+    /// That all of a file cannot be used, or not be written.
+    pub(crate) fn file(path: &Path, reason: impl ToString) -> Self {
+        Self::content(path, Location::File, reason)
+    }
 }
 
 /// The bytes of a file, if there is `room` for what is made of them, in bytes.
-pub(crate) fn read_with_room(
+pub(crate) fn read_bytes(
     path: &Path,
     remedy: &'static str,
     room: impl Fn(&[u8]) -> f64,
 ) -> Result<Vec<u8>, InputError> {
-    let bytes = read(path, remedy)?;
+    let bytes = files::read_bytes(path, IMAGE).map_err(|source| InputError::Read { source, remedy })?;
     refuse_without_memory(path, room(&bytes)).map(|()| bytes)
 }
 
@@ -100,7 +128,18 @@ pub(crate) fn read_text(
 /// Refuses a file that takes more memory, in bytes, than this process may use.
 pub(crate) fn refuse_without_memory(path: &Path, bytes: f64) -> Result<(), InputError> {
     let refused = |shortage| format!("to read it takes {shortage}; is it the right file?");
-    check_memory(bytes).map_err(|shortage| InputError::content(path, Location::File, refused(shortage)))
+    check_memory(bytes).map_err(|shortage| InputError::file(path, refused(shortage)))
+}
+
+/// Refuses an image of a file that takes more memory, by its bytes per pixel, than this process may use.
+pub(crate) fn refuse_pixels_without_memory(
+    path: &Path,
+    (width, height): (usize, usize),
+    per_pixel: f64,
+) -> Result<(), InputError> {
+    let refused = |shortage| format!("{width} x {height} pixels take {shortage}; crop or shrink the image");
+    check_memory(per_pixel * width as f64 * height as f64)
+        .map_err(|shortage| InputError::file(path, refused(shortage)))
 }
 
 /// The text of a stream called `name`.

@@ -90,7 +90,7 @@ mod tests {
         let sparse = map(3, 2, Measure::Depth, |_, _| 1.0);
         assert!(densify(&sparse, 6, &image).is_ok());
         assert!(matches!(densify(&sparse, 4, &image), Err(DepthError::Size { .. })));
-        assert!(matches!(densify(&sparse, 0, &image), Err(DepthError::Step)));
+        assert!(matches!(densify(&sparse, 0, &image), Err(DepthError::Setting(_))));
         let whole = map(13, 7, Measure::Depth, |x, _| 1.0 + x as f32);
         assert_eq!(densify(&whole, 1, &image).unwrap(), whole);
     }

@@ -23,6 +23,12 @@ pub(crate) const NOT_NEGATIVE: Rule =
     Rule { holds: |v| v.is_finite() && v >= 0.0, words: "a finite number >= 0" };
 pub(crate) const POSITIVE: Rule =
     Rule { holds: |v| v.is_finite() && v > 0.0, words: "a positive finite number" };
+pub(crate) const SCALE: Rule = Rule {
+    holds: |v| v.is_finite() && v > 0.0,
+    words: "a positive number (stored value / scale = depth or disparity)",
+};
+pub(crate) const PIXELS: Rule = Rule { holds: f64::is_finite, words: "a finite number of pixels" };
+pub(crate) const STEP: Rule = Rule { holds: |v| v >= 1.0, words: "at least 1 pixel" };
 pub(crate) const SHARE: Rule = Rule { holds: |v| (0.0..=1.0).contains(&v), words: "a number from 0 to 1" };
 
 impl Rule {

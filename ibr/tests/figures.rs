@@ -249,7 +249,8 @@ fn house(from: &[usize], wanted: usize) -> Option<House> {
     let target = Target::Tracks(house_tracks(&path, &[wanted]).into_iter().map(|t| t[0]).collect());
     let images: Vec<&Image> = images.iter().collect();
     let (settings, special) = (RenderSettings::default(), UncalibratedSettings::default());
-    let done = uncalibrated::render(&images, &tracks, &target, truth.size(), &settings, &special).unwrap();
+    let done =
+        uncalibrated::render(&images, &tracks, &target, truth.size(), &settings, &special, &|_| ()).unwrap();
     let house = House { done, truth };
     let region = &house.done.region;
     let share = region.iter().filter(|inside| **inside).count() as f64 / region.len() as f64;

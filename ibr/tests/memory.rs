@@ -206,7 +206,7 @@ fn views_from_tracks_take_what_is_estimated() {
         let target = Target::Between(0.5);
         let mut samples = 0;
         let work = || {
-            let done = uncalibrated::render(&images, &tracks, &target, size, &settings, &special);
+            let done = uncalibrated::render(&images, &tracks, &target, size, &settings, &special, &|_| ());
             samples = done.unwrap().rendering.report.propagated;
         };
         let measured = peak(&pool, work);
@@ -230,8 +230,8 @@ fn predictions_take_what_is_estimated() {
             pool.install(|| Extent::new(size, &[&image, &image], None).of_rig_prediction(&settings));
         let work = || {
             let predictor = Predictor::new(&views, &settings).unwrap();
-            let now = predictor.at(&0.5, (), None).unwrap();
-            drop(Advice::on(&predictor, &0.5, (), &now).unwrap());
+            let now = predictor.at(&0.5, views[0].image.size(), None).unwrap();
+            drop(Advice::on(&predictor, &0.5, views[0].image.size(), &now).unwrap());
         };
         estimates.compare(&format!("prediction of a rig, {size:?}"), size, estimate, peak(&pool, work));
         let maps = [1, 2].map(|seed| noisy_map(size, 5.0, Measure::Depth, seed));

@@ -157,7 +157,7 @@ fn images() {
         let seed = encode(&colour, &path, Levels::Eight).unwrap();
         survive_rounds(trials::rounds(300), &[&seed], |bytes| {
             std::fs::write(&path, bytes).unwrap();
-            let named = |error: hybank_ibr::image::ImageError| {
+            let named = |error: hybank_ibr::files::InputError| {
                 let message = error.to_string();
                 assert!(message.contains(name), "{message}");
             };

@@ -4,7 +4,7 @@ use hybank_ibr::camera::Camera;
 use hybank_ibr::image::{Image, quality};
 use hybank_ibr::pipeline::RenderSettings;
 use hybank_ibr::pipeline::uncalibrated::{
-    OrderBy, Target, UncalibratedRendering, UncalibratedSettings, render, render_watched,
+    OrderBy, Target, UncalibratedRendering, UncalibratedSettings, render,
 };
 use hybank_ibr::uncalibrated::Point;
 use nalgebra::{Matrix3x4, Rotation3, Vector3};
@@ -87,7 +87,8 @@ fn run_with(reverse_order: bool, cameras: [Camera; 3]) -> (UncalibratedRendering
     let target = Target::Tracks(all.iter().map(|t| t[2]).collect());
     let special = UncalibratedSettings { reverse_order, ..UncalibratedSettings::default() };
     let settings = RenderSettings::default();
-    let done = render(&[&images[0], &images[1]], &pairs, &target, SIZE, &settings, &special).unwrap();
+    let done =
+        render(&[&images[0], &images[1]], &pairs, &target, SIZE, &settings, &special, &|_| ()).unwrap();
     let truth = view(&cameras[2]);
     let q = quality::compare(&done.rendering.image, &truth, Some(&done.region)).unwrap().unwrap();
     (done, q.psnr)
@@ -128,12 +129,14 @@ fn progress_is_reported_in_every_stage() {
     let watch = |share: f64| shares.lock().unwrap().push((share, start.elapsed().as_secs_f64()));
     let (settings, special) = (RenderSettings::default(), UncalibratedSettings::default());
     let views = [&images[0], &images[1]];
-    let got =
-        render_watched(&views, &pairs, &Target::Between(0.5), SIZE, &settings, &special, &watch).unwrap();
+    let got = render(&views, &pairs, &Target::Between(0.5), SIZE, &settings, &special, &watch).unwrap();
     let shares = shares.into_inner().unwrap();
     println!("shares and seconds {shares:.3?}, all {:.3} s", start.elapsed().as_secs_f64());
     assert!(shares.windows(2).all(|pair| pair[0].0 <= pair[1].0), "{shares:?}");
     let within = |low: f64, high: f64| shares.iter().any(|(share, _)| *share > low && *share < high);
     assert!(within(0.0, 0.45) && within(0.45, 0.6) && within(0.6, 0.9) && within(0.9, 1.01), "{shares:?}");
-    assert_eq!(got, render(&views, &pairs, &Target::Between(0.5), SIZE, &settings, &special).unwrap());
+    assert_eq!(
+        got,
+        render(&views, &pairs, &Target::Between(0.5), SIZE, &settings, &special, &|_| ()).unwrap()
+    );
 }

@@ -31,7 +31,7 @@ impl Case {
     pub(crate) fn rendered(&self, damage: Damage, folder: &Path) -> Result<Rendered, Box<dyn Error>> {
         let spec = damage.applied(&self.spec, &self.path, folder)?;
         let options = LoadOptions { depth_step: damage.step(), ..LoadOptions::default() };
-        let scene = scene::load(&spec, &self.path, &options)?;
+        let scene = scene::load(&spec, &self.path, &options, &|_| ())?;
         let rendering = render(&scene)?;
         let psnr = quality::compare(&rendering.image, &self.truth, None)?.map_or(f64::NAN, |q| q.psnr);
         let outliers = scene.outliers.iter().sum::<f64>() / scene.outliers.len().max(1) as f64;

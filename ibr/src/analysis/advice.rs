@@ -52,7 +52,7 @@ impl Advice {
     pub fn on<P: Predicted>(
         predictor: &Predictor<'_, P>,
         camera: &P,
-        size: P::Size,
+        size: (usize, usize),
         now: &ViewError,
     ) -> Result<Self, RenderError> {
         let (views, before) = (predictor.views(), now.totals().estimate);

@@ -143,17 +143,11 @@ pub(super) struct Known {
 
 /// What differs between the predictions for rectified rigs and for general cameras.
 pub trait Predicted: Viewpoint {
-    /// The size of a virtual view, where it is not that of the photographs.
-    type Size: Copy;
-
-    /// The size of a virtual view like this image.
-    fn size_of(image: &Image) -> Self::Size;
-
-    /// The view of this camera.
+    /// The view of this camera with `size` pixels; that of a rectified rig has the size of the photographs.
     fn render(
         &self,
         views: &[View<'_, Self>],
-        size: Self::Size,
+        size: (usize, usize),
         settings: &RenderSettings,
     ) -> Result<Rendering, RenderError>;
 
@@ -161,7 +155,7 @@ pub trait Predicted: Viewpoint {
     fn examine(
         &self,
         views: &[View<'_, Self>],
-        size: Self::Size,
+        size: (usize, usize),
         study: &Study<'_>,
     ) -> Result<Examined, RenderError>;
 
@@ -169,7 +163,7 @@ pub trait Predicted: Viewpoint {
     fn memory(
         &self,
         views: &[View<'_, Self>],
-        size: Self::Size,
+        size: (usize, usize),
         settings: &RenderSettings,
     ) -> Result<(Extent, f64), RenderError>;
 
@@ -203,32 +197,6 @@ pub(super) fn equalised<'a>(images: impl Iterator<Item = &'a Image>, gains: &[Ex
     images.enumerate().map(scaled).collect()
 }
 
-/// Leaves views out in turn and explains the errors of their renderings by the causes. `examine` renders a
-/// view from the others and gives regressors and errors of its pixels.
-pub(super) fn calibrate<View: Copy>(
-    views: &[View],
-    known: &Known,
-    examine: impl Fn(&[View], &View) -> Result<(Vec<Regressors>, Vec<f32>), RenderError>,
-) -> Result<Calibration, RenderError> {
-    let (mut absolute, mut square) = (LeastSquares::default(), LeastSquares::default());
-    let used = if views.len() < 2 { 0 } else { views.len().min(LEFT_OUT) };
-    for k in 0..used {
-        let mut others = views.to_vec();
-        let truth = others.remove(k * views.len() / used);
-        let (regressors, errors) = examine(&others, &truth)?;
-        for (x, error) in regressors.iter().zip(errors) {
-            absolute.add(x, f64::from(error));
-            square.add(&x.map(|v| v * v), f64::from(error * error));
-        }
-    }
-    Ok(Calibration {
-        absolute: absolute.solve(&TYPICAL, PRIOR),
-        square: square.solve(&TYPICAL_SQUARE, PRIOR),
-        views: used,
-        disparity_noise: known.noise,
-    })
-}
-
 /// What is found of a rendering before its causes are weighed.
 pub struct Examined {
     pub(super) rendering: Rendering,
@@ -259,6 +227,34 @@ pub(super) fn judge(examined: Examined, calibration: Calibration) -> ViewError {
 }
 
 impl Calibration {
+    /// Leaves views out in turn, renders them from the others and explains the errors by the causes.
+    pub(super) fn of<P: Predicted>(
+        views: &[View<'_, P>],
+        settings: &RenderSettings,
+        known: &Known,
+    ) -> Result<Self, RenderError> {
+        let (mut absolute, mut square) = (LeastSquares::default(), LeastSquares::default());
+        let used = if views.len() < 2 { 0 } else { views.len().min(LEFT_OUT) };
+        for k in 0..used {
+            let mut others = views.to_vec();
+            let truth = others.remove(k * views.len() / used);
+            let spacing = truth.camera.spacing(views);
+            let study = Study { settings, known, spacing, bounds: false, limits: None };
+            let examined = truth.camera.examine(&others, truth.image.size(), &study)?;
+            let errors = difference(&examined.rendering.image.quantised(), truth.image);
+            for (x, error) in examined.regressors.iter().zip(errors) {
+                absolute.add(x, f64::from(error));
+                square.add(&x.map(|v| v * v), f64::from(error * error));
+            }
+        }
+        Ok(Self {
+            absolute: absolute.solve(&TYPICAL, PRIOR),
+            square: square.solve(&TYPICAL_SQUARE, PRIOR),
+            views: used,
+            disparity_noise: known.noise,
+        })
+    }
+
     /// What each regressor adds to the estimate of a pixel.
     fn parts(&self, x: &Regressors) -> Regressors {
         std::array::from_fn(|k| self.absolute[k] * x[k])

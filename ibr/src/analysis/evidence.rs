@@ -30,8 +30,6 @@ pub struct Evidence {
     pub disparity_gain: f32,
     /// Change of the pixel when the fit is fitted once more: its bias.
     pub bias: f32,
-    /// Difference between what the two most influential views say, NaN where only one says anything.
-    pub disagreement: f32,
     /// Influence of samples whose depth or colour is doubtful.
     pub doubtful: f32,
     /// Largest slope of the samples nearby.
@@ -139,16 +137,10 @@ struct RowEvidence<const ORDER: usize, const C: usize> {
     fit: RowWork<ORDER, C>,
     again: RowWork<ORDER, C>,
     response: Response,
-    of_views: Vec<ViewShare<C>>,
+    /// The influence of each view on a pixel.
+    of_views: Vec<f64>,
     values: Vec<f32>,
     mask: Vec<Cover>,
-}
-
-/// What one view contributes to a pixel.
-#[derive(Clone, Copy)]
-struct ViewShare<const C: usize> {
-    influence: f64,
-    value: [f64; C],
 }
 
 impl<const ORDER: usize, const C: usize> RowEvidence<ORDER, C> {
@@ -221,7 +213,7 @@ impl<const ORDER: usize, const C: usize> RowEvidence<ORDER, C> {
         let x = column as f64;
         self.fit.respond(x, &mut self.response);
         self.of_views.clear();
-        self.of_views.resize(job.rows.views.len(), ViewShare { influence: 0.0, value: [0.0; C] });
+        self.of_views.resize(job.rows.views.len(), 0.0);
         let mut e = Evidence::default();
         let from = self.strip.samples.partition_point(|s| s.x < x - INFLUENCE);
         for (s, limit) in
@@ -234,24 +226,21 @@ impl<const ORDER: usize, const C: usize> RowEvidence<ORDER, C> {
             e.shift += (h * away) as f32;
             e.spread += (h.abs() * away * away) as f32;
             e.doubtful += if s.doubtful { h.abs() as f32 } else { 0.0 };
-            let share = &mut self.of_views[usize::from(s.view)];
-            share.influence += h;
-            share.value.iter_mut().zip(s.value).for_each(|(sum, v)| *sum += h * f64::from(v));
+            self.of_views[usize::from(s.view)] += h;
             if away.abs() <= NEAR as f64 {
                 e.steepest = e.steepest.max(limit.slope);
                 e.sharpest = e.sharpest.max(limit.curvature);
                 e.residual = e.residual.max(limit.residual);
             }
         }
-        for (share, view) in self.of_views.iter().zip(job.rows.views) {
-            let (g2, distance) = (share.influence.powi(2), (view.camera - job.rows.camera.position).abs());
+        for (influence, view) in self.of_views.iter().zip(job.rows.views) {
+            let (g2, distance) = (influence.powi(2), (view.camera - job.rows.camera.position).abs());
             e.views += g2 as f32;
             e.disparity_gain += (g2 * distance * distance) as f32;
-            if share.influence > 0.02 {
+            if *influence > 0.02 {
                 e.distance = e.distance.max(distance as f32);
             }
         }
-        e.disagreement = disagreement(&mut self.of_views);
         e
     }
 
@@ -302,18 +291,6 @@ impl<const ORDER: usize, const C: usize> RowEvidence<ORDER, C> {
     }
 }
 
-/// Mean over the channels of the difference between the two views of the largest influence.
-fn disagreement<const C: usize>(views: &mut [ViewShare<C>]) -> f32 {
-    views.sort_by(|a, b| b.influence.total_cmp(&a.influence));
-    match views {
-        [a, b, ..] if b.influence > 0.1 => {
-            let difference = |c: usize| (a.value[c] / a.influence - b.value[c] / b.influence).abs();
-            ((0..C).map(difference).sum::<f64>() / C as f64) as f32
-        }
-        _ => f32::NAN,
-    }
-}
-
 /// Slopes and residual at a sample.
 #[derive(Debug, Clone, Copy, Default)]
 struct Nearby {
@@ -354,7 +331,6 @@ mod tests {
             assert!(near(e.bias, 0.0) && near(e.residual, 0.0) && near(e.shift, 0.0), "{e:?}");
             assert!(e.reach >= e.held && e.spread > 0.1 && near(e.distance, 0.5), "{e:?}");
         }
-        assert!(near(two.evidence[270].disagreement, 0.0) && one.evidence[270].disagreement.is_nan());
         assert!(two.edges.iter().all(|e| *e == 0.0));
     }
 

@@ -17,12 +17,6 @@ use nalgebra::{Matrix3x4, Vector3};
 const TAIL: f64 = 3.0;
 
 impl Predicted for Camera {
-    type Size = (usize, usize);
-
-    fn size_of(image: &Image) -> (usize, usize) {
-        image.size()
-    }
-
     fn render(
         &self,
         views: &[CalibratedView<'_>],

@@ -23,7 +23,7 @@ const LEAST_SHARE: f64 = 1e-4;
 /// interpolated, which leaves the share k of its variance, 2/3 between two neighbours and 4/9 between four.
 /// The median makes hidden points harmless. Errors that both maps share, and offsets between the cameras, do
 /// not show.
-pub fn map_noise<P: Viewpoint>(views: &[View<'_, P>]) -> f64 {
+pub(super) fn map_noise<P: Viewpoint>(views: &[View<'_, P>]) -> f64 {
     let nearest = Nearest::new(views);
     let lookups = |j: usize| {
         let (a, b) = (&views[nearest.before(j)?], &views[j]);
@@ -62,6 +62,6 @@ pub fn depth_jitter<P: Predicted>(
     }
     let maps = with_noise(views, deviation, 1);
     let noisy: Vec<_> = views.iter().zip(&maps).map(|(v, map)| View { map, ..*v }).collect();
-    let changed = camera.render(&noisy, P::size_of(view), settings)?.image;
+    let changed = camera.render(&noisy, view.size(), settings)?.image;
     Ok(local_mean(&difference(&changed, view), view.size()))
 }

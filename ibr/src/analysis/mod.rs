@@ -47,8 +47,10 @@ mod variogram;
 pub use advice::{Advice, AnotherView};
 pub use estimate::{Calibration, Predicted, Totals, ViewError};
 pub use evidence::{Evidence, PixelEvidence, collect_evidence};
-pub use jitter::{depth_jitter, map_noise, with_noise};
+pub use jitter::{depth_jitter, with_noise};
 pub use predictor::Predictor;
+#[cfg(feature = "cli")]
+pub(crate) use regressors::difference;
 pub use sure::Limits;
 
 /// What an error comes from.

@@ -1,6 +1,6 @@
 //! The error of any number of views, with weights that are calibrated once.
 
-use super::estimate::{Calibration, Known, Predicted, Study, ViewError, calibrate, equalised, judge};
+use super::estimate::{Calibration, Known, Predicted, Study, ViewError, equalised, judge};
 use super::jitter::map_noise;
 use super::regressors::{difference, local_mean};
 use super::sure::Limits;
@@ -28,7 +28,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     /// Those of [`crate::pipeline`].
     pub fn new(views: &[View<'a, P>], settings: &RenderSettings) -> Result<Self, RenderError> {
         if let Some(first) = views.first() {
-            let (extent, bytes) = first.camera.memory(views, P::size_of(first.image), settings)?;
+            let (extent, bytes) = first.camera.memory(views, first.image.size(), settings)?;
             extent.check(bytes)?;
         }
         let agreement = Agreement::of(views);
@@ -40,13 +40,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
         let known = Known { variogram: Variogram::of(images.iter()), noise: map_noise(&views) };
         // A registration offset belongs to the virtual view only.
         let unmoved = RenderSettings { offset: 0.0, ..settings };
-        let calibration = calibrate(&views, &known, |others, truth| {
-            let spacing = truth.camera.spacing(&views);
-            let study = Study { settings: &unmoved, known: &known, spacing, bounds: false, limits: None };
-            let examined = truth.camera.examine(others, P::size_of(truth.image), &study)?;
-            let errors = difference(&examined.rendering.image.quantised(), truth.image);
-            Ok((examined.regressors, errors))
-        })?;
+        let calibration = Calibration::of(&views, &unmoved, &known)?;
         Ok(Self { images, maps, settings, known, calibration, agreement })
     }
 
@@ -69,7 +63,12 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     ///
     /// # Errors
     /// Those of [`crate::pipeline`].
-    pub fn at(&self, camera: &P, size: P::Size, limits: Option<&Limits>) -> Result<ViewError, RenderError> {
+    pub fn at(
+        &self,
+        camera: &P,
+        size: (usize, usize),
+        limits: Option<&Limits>,
+    ) -> Result<ViewError, RenderError> {
         let (extent, bytes) = camera.memory(&self.views(), size, &self.settings)?;
         extent.check(bytes)?;
         let study = Study { bounds: true, limits, ..self.study(camera) };
@@ -77,7 +76,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     }
 
     /// The view of `camera`, as it is rendered from the views.
-    pub(super) fn render(&self, camera: &P, size: P::Size) -> Result<Rendering, RenderError> {
+    pub(super) fn render(&self, camera: &P, size: (usize, usize)) -> Result<Rendering, RenderError> {
         camera.render(&self.views(), size, &RenderSettings { offset: 0.0, ..self.settings })
     }
 
@@ -90,7 +89,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     ) -> Result<Vec<f32>, RenderError> {
         let maps: Vec<DepthMap> = self.maps.iter().map(|(map, _)| changed(map)).collect();
         let views: Vec<_> = self.views().into_iter().zip(&maps).map(|(v, map)| View { map, ..v }).collect();
-        let image = camera.render(&views, P::size_of(rendered), &self.settings)?.image;
+        let image = camera.render(&views, rendered.size(), &self.settings)?.image;
         Ok(local_mean(&difference(&image, rendered), image.size()))
     }
 
@@ -99,7 +98,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     pub(super) fn with_view(
         &self,
         camera: &P,
-        size: P::Size,
+        size: (usize, usize),
         another: &View<'_, P>,
     ) -> Result<f64, RenderError> {
         let views = [self.views(), vec![*another]].concat();

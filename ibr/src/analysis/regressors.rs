@@ -96,7 +96,7 @@ pub(super) fn hole_distances(mask: &[Cover], width: usize) -> Vec<usize> {
 const WINDOW: usize = 2;
 
 /// |a - b| of each pixel, mean over the channels; of the brightness, if only one image has colours.
-pub(super) fn difference(a: &Image, b: &Image) -> Vec<f32> {
+pub(crate) fn difference(a: &Image, b: &Image) -> Vec<f32> {
     if a.channels() != b.channels() {
         return difference(&a.to_grey(), &b.to_grey());
     }

@@ -4,7 +4,6 @@ use super::estimate::{Examined, Predicted, Study};
 use super::evidence::{Evidence, collect_evidence};
 use super::jitter::depth_jitter;
 use super::regressors::regressors;
-use crate::image::Image;
 use crate::pipeline::memory::Extent;
 use crate::pipeline::{RenderError, RenderSettings, Rendering, rectified as pipeline};
 use crate::propagate::RectifiedView;
@@ -13,14 +12,10 @@ use crate::propagate::RectifiedView;
 const REACH: f64 = 3.0;
 
 impl Predicted for f64 {
-    type Size = ();
-
-    fn size_of(_: &Image) {}
-
     fn render(
         &self,
         views: &[RectifiedView<'_>],
-        (): (),
+        _: (usize, usize),
         settings: &RenderSettings,
     ) -> Result<Rendering, RenderError> {
         pipeline::render(views, *self, settings)
@@ -29,7 +24,7 @@ impl Predicted for f64 {
     fn examine(
         &self,
         views: &[RectifiedView<'_>],
-        (): (),
+        _: (usize, usize),
         study: &Study<'_>,
     ) -> Result<Examined, RenderError> {
         let Study { settings, known, spacing, limits, .. } = *study;
@@ -44,7 +39,7 @@ impl Predicted for f64 {
     fn memory(
         &self,
         views: &[RectifiedView<'_>],
-        (): (),
+        _: (usize, usize),
         settings: &RenderSettings,
     ) -> Result<(Extent, f64), RenderError> {
         let extent = pipeline::extent(views, settings);
@@ -88,6 +83,7 @@ fn local_limit(e: &Evidence, depth_error: f32) -> f32 {
 mod tests {
     use super::*;
     use crate::depth::{DepthMap, Measure};
+    use crate::image::Image;
 
     #[test]
     fn further_views_lie_between_neighbours_or_opposite_of_them() {

@@ -3,6 +3,7 @@
 
 use crate::files::{self, CHECK_THE_PATH, InputError, Location};
 use hybank::messages::Quoted;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Difference between `doffs` and the principal points that rounding explains, in pixels.
@@ -36,99 +37,75 @@ pub fn read_calibration(path: &Path) -> Result<Calibration, InputError> {
 /// [`InputError`].
 pub fn parse_calibration(text: &str, path: &Path) -> Result<Calibration, InputError> {
     let keys = Keys::new(text, path)?;
+    let refused = |reason: String| Err(InputError::file(path, reason));
     let [left, right] = [keys.matrix("cam0")?, keys.matrix("cam1")?];
     let focal = left[0];
     if !(focal > 0.0 && (right[0] - focal).abs() <= 1e-6 * focal) {
-        return keys.contradiction(format!(
+        return refused(format!(
             "the cameras have focal lengths {focal} and {}: those of a rectified pair are positive and equal",
             right[0]
         ));
     }
     let between = right[2] - left[2];
-    let offset = if keys.has("doffs") { keys.number("doffs")? } else { between };
+    let offset = if keys.values.contains_key("doffs") { keys.number("doffs")? } else { between };
     if (offset - between).abs() > ROUNDING {
-        return keys.contradiction(format!(
+        return refused(format!(
             "doffs = {offset}, but the principal points of cam0 and cam1 are {between} apart"
         ));
     }
     let (baseline, size) = (keys.number("baseline")?, (keys.side("width")?, keys.side("height")?));
     if baseline <= 0.0 {
-        return keys.contradiction(format!("baseline = {baseline}: it must be positive"));
+        return refused(format!("baseline = {baseline}: it must be positive"));
     }
     Ok(Calibration { focal, offset, baseline, size })
 }
 
-/// The lines `key=value` of a file.
+/// The values of a file by their keys, with their lines.
 struct Keys<'a> {
     path: &'a Path,
-    lines: Vec<(usize, &'a str, &'a str)>,
+    values: BTreeMap<&'a str, (usize, &'a str)>,
 }
 
-type Read<T> = Result<T, InputError>;
-
 impl<'a> Keys<'a> {
-    fn new(text: &'a str, path: &'a Path) -> Read<Self> {
-        let mut keys = Self { path, lines: Vec::new() };
-        for (i, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-            let Some((key, value)) = line.split_once('=') else {
-                return keys.at(i + 1, "a line is `key=value`".into());
-            };
-            if keys.has(key.trim()) {
-                return keys.at(i + 1, format!("{} is given twice", key.trim()));
+    fn new(text: &'a str, path: &'a Path) -> Result<Self, InputError> {
+        let mut values = BTreeMap::new();
+        for (line, content) in (1..).zip(text.lines()).filter(|(_, content)| !content.trim().is_empty()) {
+            let fault = |reason: String| InputError::content(path, Location::Line(line), reason);
+            let (key, value) =
+                content.split_once('=').ok_or_else(|| fault("a line is `key=value`".into()))?;
+            if values.insert(key.trim(), (line, value.trim())).is_some() {
+                return Err(fault(format!("{} is given twice", key.trim())));
             }
-            keys.lines.push((i + 1, key.trim(), value.trim()));
         }
-        Ok(keys)
+        Ok(Self { path, values })
     }
 
-    fn at<T>(&self, line: usize, reason: String) -> Read<T> {
-        Err(InputError::content(self.path, Location::Line(line), reason))
+    /// What `read` makes of a value; `rule` says what it must be.
+    fn get<T>(&self, key: &str, rule: &str, read: impl Fn(&str) -> Option<T>) -> Result<T, InputError> {
+        let Some((line, value)) = self.values.get(key) else {
+            return Err(InputError::file(self.path, format!("`{key}` is missing; it is a line `{key}=..`")));
+        };
+        read(value).ok_or_else(|| {
+            let reason = format!("{key} is \"{}\": it must be {rule}", Quoted(value));
+            InputError::content(self.path, Location::Line(*line), reason)
+        })
     }
 
-    fn contradiction<T>(&self, reason: String) -> Read<T> {
-        Err(InputError::content(self.path, Location::File, reason))
+    fn number(&self, key: &str) -> Result<f64, InputError> {
+        self.get(key, "a finite number", |value| value.parse().ok().filter(|v: &f64| v.is_finite()))
     }
 
-    fn has(&self, key: &str) -> bool {
-        self.lines.iter().any(|(_, known, _)| *known == key)
+    fn side(&self, key: &str) -> Result<usize, InputError> {
+        self.get(key, "a positive whole number of pixels", |value| value.parse().ok().filter(|n| *n > 0))
     }
 
-    fn value(&self, key: &str) -> Read<(usize, &'a str)> {
-        match self.lines.iter().find(|(_, known, _)| *known == key) {
-            Some((line, _, value)) => Ok((*line, value)),
-            None => self.contradiction(format!("`{key}` is missing; it is a line `{key}=..`")),
-        }
-    }
-
-    fn number(&self, key: &str) -> Read<f64> {
-        let (line, value) = self.value(key)?;
-        match value.parse::<f64>() {
-            Ok(number) if number.is_finite() => Ok(number),
-            _ => self.at(line, format!("{key} is \"{}\": it must be a finite number", Quoted(value))),
-        }
-    }
-
-    fn side(&self, key: &str) -> Read<usize> {
-        let (line, value) = self.value(key)?;
-        match value.parse::<usize>() {
-            Ok(side) if side > 0 => Ok(side),
-            _ => self.at(
-                line,
-                format!("{key} is \"{}\": it must be a positive whole number of pixels", Quoted(value)),
-            ),
-        }
-    }
-
-    /// The nine numbers of `[a b c; d e f; g h i]`.
-    fn matrix(&self, key: &str) -> Read<[f64; 9]> {
-        let (line, value) = self.value(key)?;
-        let inner = value.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')).unwrap_or("");
-        let words = inner.split([' ', ';', ',']).filter(|word| !word.is_empty());
-        let numbers: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
-        match <[f64; 9]>::try_from(numbers) {
-            Ok(matrix) if matrix.iter().all(|v| v.is_finite()) => Ok(matrix),
-            _ => self.at(line, format!("{key} must be a 3 x 3 matrix [f 0 cx; 0 f cy; 0 0 1]")),
-        }
+    fn matrix(&self, key: &str) -> Result<[f64; 9], InputError> {
+        self.get(key, "a 3 x 3 matrix [f 0 cx; 0 f cy; 0 0 1]", |value| {
+            let inner = value.strip_prefix('[')?.strip_suffix(']')?;
+            let words = inner.split([' ', ';', ',']).filter(|word| !word.is_empty());
+            let numbers: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
+            <[f64; 9]>::try_from(numbers).ok().filter(|matrix| matrix.iter().all(|v| v.is_finite()))
+        })
     }
 }
 

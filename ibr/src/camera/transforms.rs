@@ -47,7 +47,7 @@ pub fn read_transforms(path: &Path) -> Result<CameraList, InputError> {
 /// # Errors
 /// [`InputError`].
 pub fn parse_transforms(text: &str, path: &Path) -> Result<CameraList, InputError> {
-    let json = |reason: String| InputError::content(path, Location::File, reason);
+    let json = |reason: String| InputError::file(path, reason);
     let file: FileSpec = serde_json::from_str(text).map_err(|e| json(of_json(&e.to_string())))?;
     let straight = ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE"];
     if let Some(model) = file.camera_model.filter(|model| !straight.contains(&model.as_str())) {
@@ -75,7 +75,7 @@ pub fn parse_transforms(text: &str, path: &Path) -> Result<CameraList, InputErro
             inner,
         })
     };
-    let frames = file.frames.into_iter().enumerate().map(one).collect::<Result<_, _>>()?;
+    let frames = file.frames.into_iter().enumerate().map(one).collect::<Result<_, InputError>>()?;
     Ok(CameraList::new(path.into(), frames))
 }
 

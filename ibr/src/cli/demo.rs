@@ -8,7 +8,8 @@ use super::progress::Progress;
 use super::summary::Summary;
 use crate::camera::Camera;
 use crate::depth::DepthMap;
-use crate::image::{Image, ImageError, Levels, quality};
+use crate::files::refuse_pixels_without_memory;
+use crate::image::{Image, Levels, quality};
 use crate::partial::densify;
 use crate::pipeline::{RenderSettings, Rendering, rectified};
 use crate::propagate::RectifiedView;
@@ -40,7 +41,7 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
         ));
     }
     output::name_leftovers(&[&arguments.output]);
-    ImageError::refuse_without_memory(&arguments.output, arguments.size, SHEET).map_err(Failure::input)?;
+    refuse_pixels_without_memory(&arguments.output, arguments.size, SHEET).map_err(Failure::input)?;
     let progress = Progress::new(4);
     progress.step("drawing the scene");
     let (left, left_map) = view(0.0, arguments.size)?;

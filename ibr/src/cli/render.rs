@@ -11,9 +11,10 @@ use super::inputs;
 use super::output;
 use super::progress::Progress;
 use super::summary::Summary;
-use crate::image::{Image, ImageError, quality};
-use crate::pipeline::uncalibrated::{Target, UncalibratedSettings};
-use crate::pipeline::{RenderSettings, Rendering, Watch, calibrated, rectified, uncalibrated};
+use crate::files::refuse_pixels_without_memory;
+use crate::image::{Image, quality};
+use crate::pipeline::uncalibrated::UncalibratedSettings;
+use crate::pipeline::{Rendering, Watch, calibrated, rectified, uncalibrated};
 use crate::scene::{self, Kind, Scene, SourceView};
 use concerns::Concerns;
 use hybank::messages::Quoted;
@@ -115,7 +116,7 @@ fn check_nearest(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure
              fewer views in the scene instead"
         )));
     }
-    let views = kind.views();
+    let views = kind.images().len();
     if count > views {
         inputs::warn(&format!("--nearest {count}: there are {views} views to render from, and all are used"));
     }
@@ -156,31 +157,18 @@ fn render(
             let done = calibrated::render_watched(&views, &cameras[frame], *size, &settings, watch);
             done.map(whole).map_err(Failure::input)
         }
-        Kind::Uncalibrated { targets, .. } => {
-            render_uncalibrated(&scene.kind, &targets[frame], &settings, arguments, watch)
+        Kind::Uncalibrated { images, tracks, targets, size } => {
+            let images: Vec<&Image> = images.iter().collect();
+            let (seed, reverse_order) = (arguments.seed, arguments.reverse_order);
+            let mut special = UncalibratedSettings { seed, reverse_order, ..UncalibratedSettings::default() };
+            special.plane.degree = settings.interpolation.plane.degree;
+            let done =
+                uncalibrated::render(&images, tracks, &targets[frame], *size, &settings, &special, watch)
+                    .map_err(Failure::input)?;
+            let geometry = Some(done.geometry);
+            Ok(Rendered { rendering: done.rendering, hull: Some(done.region), geometry })
         }
     }
-}
-
-fn render_uncalibrated(
-    kind: &Kind,
-    target: &Target,
-    settings: &RenderSettings,
-    arguments: &RenderArguments,
-    watch: Watch<'_>,
-) -> Result<Rendered, Failure> {
-    let Kind::Uncalibrated { images, tracks, size, .. } = kind else {
-        return Err(Failure::input("the scene has calibrated views"));
-    };
-    let images: Vec<&Image> = images.iter().collect();
-    let mut special = UncalibratedSettings::default();
-    special.robust.seed = arguments.seed;
-    special.plane.degree = settings.interpolation.plane.degree;
-    special.reverse_order = arguments.reverse_order;
-    let done = uncalibrated::render_watched(&images, tracks, target, *size, settings, &special, watch)
-        .map_err(Failure::input)?;
-    let geometry = Some(done.geometry);
-    Ok(Rendered { rendering: done.rendering, hull: Some(done.region), geometry })
 }
 
 /// Figures of merit over the region of the rendering, and over the whole image if the two differ.
@@ -188,7 +176,7 @@ fn compare(summary: &mut Summary, done: &Rendered, truth: &Image, path: &Path) -
     let named = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", Quoted(path)));
     let image = &done.rendering.image;
     // Both are rounded.
-    ImageError::refuse_without_memory(path, image.size(), 24.0).map_err(Failure::input)?;
+    refuse_pixels_without_memory(path, image.size(), 24.0).map_err(Failure::input)?;
     let whole = quality::compare(image, truth, None).map_err(|e| named(&e))?;
     let Some(hull) = &done.hull else {
         whole.iter().for_each(|q| summary.compare(q));

@@ -60,8 +60,7 @@ impl SceneArguments {
             fill,
             max_pixels: self.max_pixels,
         };
-        let scene =
-            scene::load_watched(&source.spec, &source.path, &options, watch).map_err(Failure::input)?;
+        let scene = scene::load(&source.spec, &source.path, &options, watch).map_err(Failure::input)?;
         inputs::notes(&scene);
         Ok(scene)
     }

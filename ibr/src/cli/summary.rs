@@ -5,8 +5,7 @@ use crate::image::quality::Quality;
 use crate::interpolate::HoleCount;
 use crate::interpolate::plane::Convergence;
 use crate::pipeline::uncalibrated::GeometryReport;
-use crate::pipeline::{Agreement, Rendering};
-use crate::sample::Dropped;
+use crate::pipeline::{Agreement, Rendering, Report};
 use serde::Serialize;
 
 /// Everything `--json` prints. Figures of merit are null without a truth; an infinite PSNR (equal images)
@@ -26,7 +25,7 @@ pub(super) struct Summary {
     pub(super) views: Vec<usize>,
     /// Error in grey levels that is white in the picture of --error.
     pub(super) error_white: Option<f32>,
-    pub(super) samples: SampleCount,
+    pub(super) samples: Report,
     pub(super) holes: HoleCount,
     /// Unknown depths filled before propagation.
     pub(super) filled_depths: usize,
@@ -45,14 +44,6 @@ pub(super) struct Summary {
     pub(super) depths: Option<String>,
 }
 
-#[derive(Debug, Serialize)]
-pub(super) struct SampleCount {
-    pub(super) propagated: usize,
-    pub(super) occluded: usize,
-    pub(super) used: usize,
-    pub(super) dropped: Dropped,
-}
-
 impl Summary {
     /// A summary without figures of merit.
     pub(super) fn new(rendering: &Rendering, seconds: f64, filled_depths: usize) -> Self {
@@ -67,12 +58,7 @@ impl Summary {
             preparation_seconds: 0.0,
             views: rendering.views.clone(),
             error_white: None,
-            samples: SampleCount {
-                propagated: r.propagated,
-                occluded: r.occluded,
-                used: r.used,
-                dropped: r.dropped,
-            },
+            samples: *r,
             holes: r.holes,
             filled_depths,
             size: [width, height],

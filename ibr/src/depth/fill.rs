@@ -20,51 +20,33 @@ pub fn fill_unknown(map: &mut DepthMap) -> usize {
         return 0;
     }
     let was_unknown: Vec<bool> = map.data.iter().map(|v| v.is_nan()).collect();
-    match map.measure {
-        Measure::Disparity => {
-            let width = map.width;
-            map.data.chunks_exact_mut(width).for_each(|row| fill_row(row, Measure::Disparity));
-            let filled: Vec<bool> = map.data.chunks_exact(width).map(|row| !row[0].is_nan()).collect();
-            fill_empty_rows(&filled, &mut map.data);
-        }
-        Measure::Depth => fill_surfaces(map),
+    let mut found = Vec::new();
+    for_holes(&map.data, map.width, |p, around| {
+        let side = |q: u32| map.data.get(q as usize).copied();
+        let value = match map.measure {
+            Measure::Disparity => match (side(around[0]), side(around[1])) {
+                (Some(a), Some(b)) => Some(map.measure.farther(a, b)),
+                (a, b) => a.or(b),
+            },
+            Measure::Depth => of_one_surface(around, side),
+        };
+        found.extend(value.map(|value| (p as u32, value)));
+    });
+    found.iter().for_each(|(p, value)| map.data[*p as usize] = *value);
+    if map.measure == Measure::Disparity {
+        let filled: Vec<bool> = map.data.chunks_exact(map.width).map(|row| !row[0].is_nan()).collect();
+        fill_empty_rows(&filled, &mut map.data);
     }
     let filled = |(was_unknown, v): (bool, &f32)| was_unknown && !v.is_nan();
     map.guessed = was_unknown.into_iter().zip(&map.data).map(filled).collect();
     unknown - map.unknown()
 }
 
-/// Fills the holes that have one surface around them.
-fn fill_surfaces(map: &mut DepthMap) {
-    let mut found = Vec::new();
-    for_holes(&map.data, map.width, |p, around| {
-        let side = |q: u32| map.data.get(q as usize).copied();
-        let pairs = around.as_chunks().0.iter().filter_map(|[a, b]| Some([side(*a)?, side(*b)?]));
-        let (near, far) = pairs.flatten().fold((f32::MAX, 0.0), |(near, far), v| (v.min(near), v.max(far)));
-        if far > 0.0 && far - near < JUMP * near {
-            found.push((p, far));
-        }
-    });
-    found.iter().for_each(|(p, depth)| map.data[*p] = *depth);
-}
-
-fn fill_row(row: &mut [f32], measure: Measure) {
-    let mut x = 0;
-    while x < row.len() {
-        if !row[x].is_nan() {
-            x += 1;
-            continue;
-        }
-        let end = row[x..].iter().position(|v| !v.is_nan()).map_or(row.len(), |n| x + n);
-        let left = x.checked_sub(1).map(|i| row[i]);
-        let right = row.get(end).copied();
-        let value = match (left, right) {
-            (Some(a), Some(b)) => measure.farther(a, b),
-            (a, b) => a.or(b).unwrap_or(f32::NAN),
-        };
-        row[x..end].fill(value);
-        x = end;
-    }
+/// The farther depth of the sides of a hole that has one surface around it.
+fn of_one_surface(around: [u32; 4], side: impl Fn(u32) -> Option<f32>) -> Option<f32> {
+    let pairs = around.as_chunks().0.iter().filter_map(|[a, b]| Some([side(*a)?, side(*b)?]));
+    let (near, far) = pairs.flatten().fold((f32::MAX, 0.0), |(near, far), v| (v.min(near), v.max(far)));
+    (far > 0.0 && far - near < JUMP * near).then_some(far)
 }
 
 /// Copies rows of nothing from the nearest row of something (the upper of two); `filled` marks those.

@@ -4,10 +4,10 @@ mod fill;
 mod relief;
 
 use crate::lanes::bounds;
+use crate::setting::{PIXELS, SCALE, STEP, SettingError};
 pub(crate) use fill::fill_empty_rows;
 pub use fill::fill_unknown;
 pub(crate) use fill::{NONE, for_holes};
-pub use relief::Relief;
 pub(crate) use relief::{JUMP, Reliefs, TILE};
 
 /// The quantity that a map holds.
@@ -49,12 +49,10 @@ impl Measure {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DepthError {
-    /// The scale that turns stored numbers into depth is not a positive number.
-    #[error("the scale is {scale}: it must be a positive number (stored value / scale = depth or disparity)")]
-    Scale {
-        /// The scale given.
-        scale: f64,
-    },
+    /// The scale that turns stored numbers into depth, the offset of the disparities, or the step between
+    /// depth samples is outside its range.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// A map does not fit its image.
     #[error(
         "the map has {} x {} values, the image {} x {} pixels; with step {step} the map must have {} x {}",
@@ -70,21 +68,12 @@ pub enum DepthError {
         /// Width and height that would fit.
         expected: (usize, usize),
     },
-    /// The offset of the disparities is not finite.
-    #[error("the disparity offset is {offset}: it must be a finite number of pixels")]
-    Offset {
-        /// The offset.
-        offset: f64,
-    },
     /// All values of the map are unknown.
     #[error("none of the {values} values is a usable number: without any depth nothing can be rendered")]
     AllUnknown {
         /// Values in the map.
         values: usize,
     },
-    /// A step of zero.
-    #[error("the step between depth samples is 0: it must be at least 1 pixel")]
-    Step,
 }
 
 /// The depth of what is infinitely far away, in every map and at every camera. It is finite, so that such
@@ -122,7 +111,7 @@ impl DepthMap {
     /// of positive infinity are [`FAR`] away, and infinite disparities are unknown.
     ///
     /// # Errors
-    /// [`DepthError::Scale`], [`DepthError::Size`] when the numbers do not fill the map, and
+    /// [`DepthError::Setting`], [`DepthError::Size`] when the numbers do not fill the map, and
     /// [`DepthError::AllUnknown`] when none of them is known.
     pub fn new(
         (width, height): (usize, usize),
@@ -130,9 +119,7 @@ impl DepthMap {
         scale: f64,
         measure: Measure,
     ) -> Result<Self, DepthError> {
-        if !(scale.is_finite() && scale > 0.0) {
-            return Err(DepthError::Scale { scale });
-        }
+        SCALE.check("the scale", scale)?;
         if stored.len() != width.saturating_mul(height) {
             let (map, image) = ((stored.len(), 1), (width, height));
             return Err(DepthError::Size { map, image, step: 1, expected: image });
@@ -155,11 +142,9 @@ impl DepthMap {
     /// not positive become unknown.
     ///
     /// # Errors
-    /// [`DepthError::Offset`] and [`DepthError::AllUnknown`].
+    /// [`DepthError::Setting`] and [`DepthError::AllUnknown`].
     pub fn with_offset(mut self, offset: f64) -> Result<Self, DepthError> {
-        if !offset.is_finite() {
-            return Err(DepthError::Offset { offset });
-        }
+        PIXELS.check("the disparity offset", offset)?;
         self.offset = offset;
         let behind = |v: f32| f64::from(v) + offset < f64::from(f32::MIN_POSITIVE);
         self.data.iter_mut().filter(|v| behind(**v)).for_each(|v| *v = f32::NAN);
@@ -234,11 +219,9 @@ impl DepthMap {
     /// Every `step`-th value in both directions, from the first, as from a coarse sensor.
     ///
     /// # Errors
-    /// [`DepthError::Step`] for step 0, [`DepthError::AllUnknown`] when no known value is left.
+    /// [`DepthError::Setting`] for step 0, [`DepthError::AllUnknown`] when no known value is left.
     pub fn decimated(&self, step: usize) -> Result<Self, DepthError> {
-        if step == 0 {
-            return Err(DepthError::Step);
-        }
+        STEP.check("the step between depth samples", step as f64)?;
         let rows = (0..self.height).step_by(step);
         let data: Vec<f32> = rows.flat_map(|y| self.row(y).iter().copied().step_by(step)).collect();
         if data.iter().all(|v| v.is_nan()) {
@@ -266,11 +249,9 @@ impl DepthMap {
     /// Refuses a map whose size does not fit an image of `size` with one value every `step` pixels.
     ///
     /// # Errors
-    /// [`DepthError::Step`] and [`DepthError::Size`].
+    /// [`DepthError::Setting`] and [`DepthError::Size`].
     pub fn fits(&self, image: (usize, usize), step: usize) -> Result<(), DepthError> {
-        if step == 0 {
-            return Err(DepthError::Step);
-        }
+        STEP.check("the step between depth samples", step as f64)?;
         let expected = (image.0.div_ceil(step), image.1.div_ceil(step));
         if self.size() == expected {
             return Ok(());
@@ -365,7 +346,7 @@ mod tests {
         let map = || DepthMap::new((3, 1), vec![5.0, -3.0, -8.0], 1.0, Measure::Disparity).unwrap();
         let placed = map().with_offset(6.0).unwrap();
         assert_eq!((placed.offset(), placed.unknown()), (6.0, 1));
-        assert!(matches!(map().with_offset(f64::NAN), Err(DepthError::Offset { .. })));
+        assert!(matches!(map().with_offset(f64::NAN), Err(DepthError::Setting(_))));
         assert!(matches!(map().with_offset(-5.0), Err(DepthError::AllUnknown { .. })));
     }
 
@@ -375,7 +356,7 @@ mod tests {
         assert_eq!(new(vec![0.0, f32::NAN], 1.0), Err(DepthError::AllUnknown { values: 2 }));
         assert!(matches!(new(vec![1.0; 3], 1.0), Err(DepthError::Size { map: (3, 1), .. })));
         for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(matches!(new(vec![1.0; 2], scale), Err(DepthError::Scale { .. })));
+            assert!(matches!(new(vec![1.0; 2], scale), Err(DepthError::Setting(_))));
         }
     }
 
@@ -387,6 +368,6 @@ mod tests {
         assert_eq!((coarse.size(), coarse.data()), ((3, 2), &[1.0, 4.0, 7.0, 22.0, 25.0, 28.0][..]));
         assert!(coarse.fits((7, 5), 3).is_ok() && coarse.fits((9, 6), 3).is_ok());
         assert!(matches!(coarse.fits((10, 6), 3), Err(DepthError::Size { expected: (4, 2), .. })));
-        assert_eq!(map.decimated(0), Err(DepthError::Step));
+        assert!(matches!(map.decimated(0), Err(DepthError::Setting(_))));
     }
 }

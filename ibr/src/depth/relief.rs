@@ -5,20 +5,6 @@ use super::{DepthMap, Measure};
 /// A difference of this share of the nearer depth separates two surfaces: the depth test's default sigma.
 pub(crate) const JUMP: f32 = 0.05;
 
-/// The surroundings of a pixel of known depth.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Relief {
-    /// Change of the value per pixel to the right, on the surface of the pixel.
-    pub across: f64,
-    /// Change of the value per pixel down.
-    pub down: f64,
-    /// Whether one of the four neighbours lies on a nearer surface. The colour of such a pixel is often
-    /// mixed with that of the nearer surface.
-    pub behind_edge: bool,
-    /// Whether one of the four neighbours lies on a farther surface: the surface of the pixel ends here.
-    pub outline: bool,
-}
-
 /// Pixels of a row whose surroundings are found together.
 pub(crate) const TILE: usize = 64;
 
@@ -34,22 +20,16 @@ struct Scale {
 /// The surroundings of some neighbouring pixels, in the order of their columns: arrays of a fixed length,
 /// whose loops the compiler turns into vector instructions. The entries of unknown pixels mean nothing.
 pub(crate) struct Reliefs {
+    /// Change of the value per pixel to the right, on the surface of the pixel: the mean over the
+    /// neighbours on it, 0 without any.
     pub(crate) across: [f32; TILE],
+    /// The same down.
     pub(crate) down: [f32; TILE],
+    /// Whether one of the four neighbours lies on a nearer surface. The colour of such a pixel is often
+    /// mixed with that of the nearer surface.
     pub(crate) behind_edge: [bool; TILE],
+    /// Whether one of the four neighbours lies on a farther surface: the surface of the pixel ends here.
     pub(crate) outline: [bool; TILE],
-}
-
-impl Reliefs {
-    /// The surroundings of the pixel with this number in the tile.
-    fn at(&self, i: usize) -> Relief {
-        Relief {
-            across: f64::from(self.across[i]),
-            down: f64::from(self.down[i]),
-            behind_edge: self.behind_edge[i],
-            outline: self.outline[i],
-        }
-    }
 }
 
 /// A tile and its neighbours, NaN outside the map.
@@ -62,10 +42,9 @@ struct Surroundings {
 }
 
 impl DepthMap {
-    /// The surroundings of a pixel. Slopes are means over the neighbours on the same surface, and 0 without
-    /// any.
-    pub fn relief(&self, x: usize, y: usize) -> Relief {
-        self.reliefs(x, y).at(0)
+    /// Whether one of the four neighbours of a pixel lies on a nearer surface.
+    pub fn is_behind_edge(&self, x: usize, y: usize) -> bool {
+        self.reliefs(x, y).behind_edge[0]
     }
 
     /// The surroundings of the pixels of a row from this column on, up to the end of the row or a tile.
@@ -168,14 +147,20 @@ mod tests {
             20.0, //
         ];
         let map = DepthMap::new((5, 2), data, 1.0, Measure::Depth).unwrap();
-        let near = |a: f64, b: f64| (a - b).abs() < 1e-5;
-        let inner = map.relief(1, 0);
-        assert!(near(inner.across, 0.2) && near(inner.down, 0.1) && !inner.behind_edge, "{inner:?}");
-        let edge = map.relief(2, 0);
-        assert!(near(edge.across, 0.2) && edge.down == 0.0 && !edge.behind_edge, "{edge:?}");
-        let far = map.relief(3, 0);
-        assert!(far.across == 0.0 && far.behind_edge && !far.outline && edge.outline, "{far:?}");
-        assert!(!map.relief(4, 1).behind_edge);
+        let near = |a: f32, b: f32| (a - b).abs() < 1e-5;
+        let inner = relief(&map, 1, 0);
+        assert!(near(inner.0, 0.2) && near(inner.1, 0.1) && !inner.2, "{inner:?}");
+        let edge = relief(&map, 2, 0);
+        assert!(near(edge.0, 0.2) && edge.1 == 0.0 && !edge.2, "{edge:?}");
+        let far = relief(&map, 3, 0);
+        assert!(far.0 == 0.0 && far.2 && !far.3 && edge.3, "{far:?}");
+        assert!(!map.is_behind_edge(4, 1));
+    }
+
+    /// Slopes across and down, behind an edge, on an outline.
+    fn relief(map: &DepthMap, x: usize, y: usize) -> (f32, f32, bool, bool) {
+        let Reliefs { across, down, behind_edge, outline } = map.reliefs(x, y);
+        (across[0], down[0], behind_edge[0], outline[0])
     }
 
     /// A tile has what its pixels have one by one, at the borders of map and tile too.
@@ -191,8 +176,10 @@ mod tests {
             let map = DepthMap::new((width, height), data.clone(), 1.0, measure).unwrap();
             for (x, y) in (0..width * height).map(|p| (p % width, p / width)) {
                 if !map.row(y)[x].is_nan() {
-                    let start = x - x % TILE;
-                    assert_eq!(map.reliefs(start, y).at(x - start), map.relief(x, y), "{measure:?} {x} {y}");
+                    let i = x % TILE;
+                    let all = map.reliefs(x - i, y);
+                    let of_tile = (all.across[i], all.down[i], all.behind_edge[i], all.outline[i]);
+                    assert_eq!(of_tile, relief(&map, x, y), "{measure:?} {x} {y}");
                 }
             }
         }
@@ -201,7 +188,7 @@ mod tests {
     #[test]
     fn nearer_disparities_are_larger() {
         let map = DepthMap::new((3, 1), vec![4.0, 4.1, 8.0], 1.0, Measure::Disparity).unwrap();
-        assert_eq!([0, 1, 2].map(|x| map.relief(x, 0).behind_edge), [false, true, false]);
-        assert!((map.relief(1, 0).across - 0.1).abs() < 1e-5);
+        assert_eq!([0, 1, 2].map(|x| map.is_behind_edge(x, 0)), [false, true, false]);
+        assert!((relief(&map, 1, 0).0 - 0.1).abs() < 1e-5);
     }
 }

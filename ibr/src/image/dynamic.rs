@@ -1,6 +1,7 @@
 //! Conversion from and to the types of the `image` crate.
 
-use super::{Image, ImageError};
+use super::Image;
+use crate::files::InputError;
 use ::image::{DynamicImage, ImageBuffer};
 
 /// Bits per value of a PNG file.
@@ -26,11 +27,11 @@ impl From<&Image> for DynamicImage {
 /// Grey or RGB, 8 or 16 bits or floats (white is 1), with or without alpha, which is ignored.
 ///
 /// # Errors
-/// [`ImageError::Buffer`] for an image without pixels.
+/// [`InputError::Buffer`] for an image without pixels.
 impl TryFrom<&DynamicImage> for Image {
-    type Error = ImageError;
+    type Error = InputError;
 
-    fn try_from(picture: &DynamicImage) -> Result<Self, ImageError> {
+    fn try_from(picture: &DynamicImage) -> Result<Self, InputError> {
         super::read::whole_image(picture, 1.0)
     }
 }

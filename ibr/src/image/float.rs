@@ -1,7 +1,8 @@
 //! Maps of numbers as other programs write them: OpenEXR, TIFF with floats or wide integers, NumPy arrays.
 
+use super::Image;
 use super::source::Source;
-use super::{Image, ImageError};
+use crate::files::InputError;
 use exr::meta::MetaData;
 use exr::prelude::{ReadChannels, ReadLayers, read};
 use npyz::{Deserialize, NpyFile, Order};
@@ -9,7 +10,7 @@ use std::io::Cursor;
 use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 
-type Decoded = Result<Image, ImageError>;
+type Decoded = Result<Image, InputError>;
 
 /// Names of the channel with the depth among those of an OpenEXR file.
 const DEPTHS: [&str; 5] = ["Z", "depth", "Depth", "depth.Z", "Depth.Z"];
@@ -59,7 +60,7 @@ pub(super) fn exr(file: &Source<'_>) -> Decoded {
 
 /// A TIFF file with numbers that no other image has: floats, or integers of 32 bits. `None` of another
 /// file.
-pub(super) fn tiff(file: &Source<'_>) -> Result<Option<Image>, ImageError> {
+pub(super) fn tiff(file: &Source<'_>) -> Result<Option<Image>, InputError> {
     if !is_tiff(file.bytes) {
         return Ok(None);
     }

@@ -19,129 +19,6 @@ pub use texture::Texture;
 pub use write::{begin, encode, encode_levels, encode_with_alpha, save};
 
 use crate::files::InputError;
-use hybank::memory::{MemoryShortage, check_memory};
-use hybank::messages::Quoted;
-use std::path::{Path, PathBuf};
-
-/// Errors of image files, and of images that do not fit together.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ImageError {
-    /// The file cannot be opened or read.
-    #[error(transparent)]
-    Read(#[from] InputError),
-    /// The file is not an image of a known format, or is damaged.
-    #[error(
-        "{}: {}; the readable formats are PNG, JPEG, TIFF, PPM, PGM, PFM, OpenEXR and NPY",
-        Quoted(path),
-        Quoted(reason)
-    )]
-    Decode {
-        /// The file.
-        path: PathBuf,
-        /// The decoder's message.
-        reason: String,
-    },
-    /// The file has too many pixels.
-    #[error(
-        "{}: {width} x {height} pixels are more than the limit of {most}; crop or shrink the image, or allow so many with --max-pixels",
-        Quoted(path)
-    )]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-        /// Width in pixels.
-        width: usize,
-        /// Height in pixels.
-        height: usize,
-        /// Most pixels.
-        most: usize,
-    },
-    /// There is no memory to unpack or to pack so many pixels.
-    #[error("{}: {width} x {height} pixels take {shortage}; crop or shrink the image", Quoted(path))]
-    Memory {
-        /// The file.
-        path: PathBuf,
-        /// Width in pixels.
-        width: usize,
-        /// Height in pixels.
-        height: usize,
-        /// What the work takes, and what there is.
-        shortage: MemoryShortage,
-    },
-    /// The file cannot be created or get its name.
-    #[error(transparent)]
-    File(#[from] hybank::files::FileError),
-    /// The file cannot be written.
-    #[error("{}: {reason}", Quoted(path))]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        reason: String,
-    },
-    /// The extension of the output file is not a known format.
-    #[error("{}: the extension is not an image format; use .png, .jpg, .ppm, .pgm or .pfm", Quoted(path))]
-    UnknownFormat {
-        /// The file.
-        path: PathBuf,
-    },
-    /// 16 bits per value in a format that this crate writes with 8.
-    #[error("{}: 16 bits per value are written to .png files only; .pfm files have floats", Quoted(path))]
-    Levels {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A depth or disparity map with colours.
-    #[error(
-        "{}: a depth or disparity map has one value per pixel, but pixel ({x}, {y}) has different red, green and blue; save it as a grey image",
-        Quoted(path)
-    )]
-    ColouredMap {
-        /// The file.
-        path: PathBuf,
-        /// Column of the first coloured pixel.
-        x: usize,
-        /// Row of the first coloured pixel.
-        y: usize,
-    },
-    /// Two images that belong together differ in size.
-    #[error("{left} has {} x {} pixels and {right} has {} x {}: they must agree", sizes[0].0, sizes[0].1, sizes[1].0, sizes[1].1)]
-    Sizes {
-        /// Name of the first image.
-        left: String,
-        /// Name of the second image.
-        right: String,
-        /// Width and height of both.
-        sizes: [(usize, usize); 2],
-    },
-    /// A buffer that does not hold width * height * channels values.
-    #[error("{width} x {height} pixels of {channels} channels need {expected} values, {given} were given")]
-    Buffer {
-        /// Width in pixels.
-        width: usize,
-        /// Height in pixels.
-        height: usize,
-        /// Channels, 1 or 3.
-        channels: usize,
-        /// Values needed.
-        expected: usize,
-        /// Values given.
-        given: usize,
-    },
-}
-
-impl ImageError {
-    /// Refuses an image of a file that takes more memory, by its bytes per pixel, than this process may use.
-    pub(crate) fn refuse_without_memory(
-        path: &Path,
-        (width, height): (usize, usize),
-        per_pixel: f64,
-    ) -> Result<(), Self> {
-        let refused = |shortage| Self::Memory { path: path.into(), width, height, shortage };
-        check_memory(per_pixel * width as f64 * height as f64).map_err(refused)
-    }
-}
 
 /// A grey or RGB image, rows from the top, channels interleaved; black is 0 and white 255.
 #[derive(Debug, Clone, PartialEq)]
@@ -156,11 +33,11 @@ impl Image {
     /// An image from its values.
     ///
     /// # Errors
-    /// [`ImageError::Buffer`] unless `channels` is 1 or 3, neither side is 0 and the sizes multiply.
-    pub fn new(width: usize, height: usize, channels: usize, data: Vec<f32>) -> Result<Self, ImageError> {
+    /// [`InputError::Buffer`] unless `channels` is 1 or 3, neither side is 0 and the sizes multiply.
+    pub fn new(width: usize, height: usize, channels: usize, data: Vec<f32>) -> Result<Self, InputError> {
         let expected = width.saturating_mul(height).saturating_mul(channels);
         if expected == 0 || !(channels == 1 || channels == 3) || data.len() != expected {
-            return Err(ImageError::Buffer { width, height, channels, expected, given: data.len() });
+            return Err(InputError::Buffer { width, height, channels, expected, given: data.len() });
         }
         Ok(Self { width, height, channels, data })
     }
@@ -290,12 +167,12 @@ impl Image {
     /// Refuses another image of a different size; the names appear in the message.
     ///
     /// # Errors
-    /// [`ImageError::Sizes`].
-    pub fn same_size(&self, name: &str, other: (usize, usize), other_name: &str) -> Result<(), ImageError> {
+    /// [`InputError::Sizes`].
+    pub fn same_size(&self, name: &str, other: (usize, usize), other_name: &str) -> Result<(), InputError> {
         if self.size() == other {
             return Ok(());
         }
-        Err(ImageError::Sizes { left: name.into(), right: other_name.into(), sizes: [self.size(), other] })
+        Err(InputError::Sizes { left: name.into(), right: other_name.into(), sizes: [self.size(), other] })
     }
 }
 
@@ -314,7 +191,7 @@ mod tests {
         assert!(Image::new(2, 2, 3, vec![0.0; 12]).is_ok());
         assert!(matches!(
             Image::new(2, 2, 3, vec![0.0; 11]),
-            Err(ImageError::Buffer { expected: 12, given: 11, .. })
+            Err(InputError::Buffer { expected: 12, given: 11, .. })
         ));
         assert!(Image::new(0, 2, 1, vec![]).is_err());
         assert!(Image::new(1, 1, 2, vec![0.0; 2]).is_err());

@@ -1,6 +1,7 @@
 //! Figures of merit of a rendering against a photograph: PSNR, SSIM and mean absolute error.
 
-use super::{Image, ImageError};
+use super::Image;
+use crate::files::InputError;
 
 /// Figures of merit on the scale 0..255.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -21,13 +22,13 @@ pub struct Quality {
 /// A grey image is compared with an RGB one as grey. `None` when the mask is empty.
 ///
 /// # Errors
-/// [`ImageError::Sizes`] when the sizes differ, [`ImageError::Buffer`] for a mask of another size.
-pub fn compare(image: &Image, truth: &Image, mask: Option<&[bool]>) -> Result<Option<Quality>, ImageError> {
+/// [`InputError::Sizes`] when the sizes differ, [`InputError::Buffer`] for a mask of another size.
+pub fn compare(image: &Image, truth: &Image, mask: Option<&[bool]>) -> Result<Option<Quality>, InputError> {
     image.same_size("the rendered view", truth.size(), "the truth")?;
     let (width, height) = image.size();
     if let Some(mask) = mask.filter(|m| m.len() != width * height) {
         let expected = width * height;
-        return Err(ImageError::Buffer { width, height, channels: 1, expected, given: mask.len() });
+        return Err(InputError::Buffer { width, height, channels: 1, expected, given: mask.len() });
     }
     let grey = image.channels() != truth.channels();
     let rounded = |image: &Image| if grey { image.to_grey().quantised() } else { image.quantised() };
@@ -174,7 +175,7 @@ mod tests {
         let q = compare(&a, &b, Some(&mask)).unwrap().unwrap();
         assert_eq!((q.pixels, q.mae), (2, 15.0));
         assert_eq!(compare(&a, &b, Some(&[false; 16])).unwrap(), None);
-        assert!(matches!(compare(&a, &b, Some(&[true; 15])), Err(ImageError::Buffer { .. })));
-        assert!(matches!(compare(&a, &Image::filled(4, 5, 1, 0.0), None), Err(ImageError::Sizes { .. })));
+        assert!(matches!(compare(&a, &b, Some(&[true; 15])), Err(InputError::Buffer { .. })));
+        assert!(matches!(compare(&a, &Image::filled(4, 5, 1, 0.0), None), Err(InputError::Sizes { .. })));
     }
 }

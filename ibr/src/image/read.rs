@@ -1,8 +1,8 @@
 //! Reading images and depth maps from files.
 
 use super::source::Source;
-use super::{Image, ImageError, colmap_map, float, pfm};
-use crate::files::{self, CHECK_THE_PATH};
+use super::{Image, colmap_map, float, pfm};
+use crate::files::{self, CHECK_THE_PATH, InputError};
 use image::{DynamicImage, ImageReader};
 use std::io::Cursor;
 use std::path::Path;
@@ -16,9 +16,8 @@ pub const MOST_PIXELS: usize = 1 << 25;
 /// An alpha channel is ignored.
 ///
 /// # Errors
-/// [`ImageError::Read`], [`ImageError::Decode`], [`ImageError::TooLarge`] and [`ImageError::Memory`], naming
-/// the file.
-pub fn read_image(path: &Path) -> Result<Image, ImageError> {
+/// [`InputError`], naming the file.
+pub fn read_image(path: &Path) -> Result<Image, InputError> {
     read_image_within(path, MOST_PIXELS)
 }
 
@@ -26,7 +25,7 @@ pub fn read_image(path: &Path) -> Result<Image, ImageError> {
 ///
 /// # Errors
 /// As [`read_image`].
-pub fn read_image_within(path: &Path, most: usize) -> Result<Image, ImageError> {
+pub fn read_image_within(path: &Path, most: usize) -> Result<Image, InputError> {
     match load(path, most)? {
         Loaded::Float(mut image) => {
             image.data_mut().iter_mut().for_each(|v| *v *= 255.0);
@@ -41,8 +40,8 @@ pub fn read_image_within(path: &Path, most: usize) -> Result<Image, ImageError> 
 /// Returns width, height and the values, rows from the top.
 ///
 /// # Errors
-/// As [`read_image`], and [`ImageError::ColouredMap`] for an RGB file whose channels differ.
-pub fn read_map(path: &Path) -> Result<(usize, usize, Vec<f32>), ImageError> {
+/// As [`read_image`], and for an RGB file whose channels differ.
+pub fn read_map(path: &Path) -> Result<(usize, usize, Vec<f32>), InputError> {
     read_map_within(path, MOST_PIXELS)
 }
 
@@ -50,7 +49,7 @@ pub fn read_map(path: &Path) -> Result<(usize, usize, Vec<f32>), ImageError> {
 ///
 /// # Errors
 /// As [`read_map`].
-pub fn read_map_within(path: &Path, most: usize) -> Result<(usize, usize, Vec<f32>), ImageError> {
+pub fn read_map_within(path: &Path, most: usize) -> Result<(usize, usize, Vec<f32>), InputError> {
     let image = match load(path, most)? {
         Loaded::Float(map) => map,
         Loaded::Whole(picture) => {
@@ -62,14 +61,18 @@ pub fn read_map_within(path: &Path, most: usize) -> Result<(usize, usize, Vec<f3
     single_channel(path, image)
 }
 
-fn single_channel(path: &Path, image: Image) -> Result<(usize, usize, Vec<f32>), ImageError> {
+fn single_channel(path: &Path, image: Image) -> Result<(usize, usize, Vec<f32>), InputError> {
     let (width, height) = image.size();
     if image.channels() == 1 {
         return Ok((width, height, image.data));
     }
     let coloured = |p: &[f32]| p[0].to_bits() != p[1].to_bits() || p[1].to_bits() != p[2].to_bits();
     if let Some(i) = image.data.chunks_exact(3).position(coloured) {
-        return Err(ImageError::ColouredMap { path: path.into(), x: i % width, y: i / width });
+        let (x, y) = (i % width, i / width);
+        let reason = format!(
+            "a depth or disparity map has one value per pixel, but pixel ({x}, {y}) has different red, green and blue; save it as a grey image"
+        );
+        return Err(InputError::file(path, reason));
     }
     Ok((width, height, image.data.iter().copied().step_by(3).collect()))
 }
@@ -80,7 +83,7 @@ enum Loaded {
 }
 
 /// The numbers of a format that only maps have.
-fn float_map(file: &Source<'_>) -> Result<Option<Image>, ImageError> {
+fn float_map(file: &Source<'_>) -> Result<Option<Image>, InputError> {
     let decoded = match file.bytes {
         [b'P', b'F' | b'f', ..] => pfm::decode(file.bytes),
         bytes if colmap_map::is_map(bytes) => colmap_map::decode(bytes),
@@ -92,10 +95,9 @@ fn float_map(file: &Source<'_>) -> Result<Option<Image>, ImageError> {
     file.check_size(map.width(), map.height()).map(|()| Some(map))
 }
 
-fn load(path: &Path, most: usize) -> Result<Loaded, ImageError> {
-    let bytes = files::read(path, CHECK_THE_PATH)?;
+fn load(path: &Path, most: usize) -> Result<Loaded, InputError> {
     // The numbers of a float map are as many bytes again.
-    files::refuse_without_memory(path, bytes.len() as f64)?;
+    let bytes = files::read_bytes(path, CHECK_THE_PATH, |bytes| bytes.len() as f64)?;
     let source = Source { path, bytes: &bytes, most };
     if let Some(map) = float_map(&source)? {
         return Ok(Loaded::Float(map));
@@ -120,7 +122,7 @@ fn is_deep(picture: &DynamicImage) -> bool {
 }
 
 /// Values on the scale 0..255, times `factor`; white is 1 in floats.
-pub(super) fn whole_image(picture: &DynamicImage, factor: f32) -> Result<Image, ImageError> {
+pub(super) fn whole_image(picture: &DynamicImage, factor: f32) -> Result<Image, InputError> {
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     if matches!(picture, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)) {
         let data = picture.to_rgb32f().as_raw().iter().map(|v| v * 255.0 * factor).collect();
@@ -172,11 +174,13 @@ mod tests {
         let mut bytes = b"P5 33554433 1 255\n".to_vec();
         bytes.resize(bytes.len() + MOST_PIXELS + 1, 7);
         let (_dir, path) = temporary("wide.pgm", &bytes);
-        let message = read_image(&path).unwrap_err().to_string();
-        assert!(message.contains("33554433 x 1") && message.contains("--max-pixels"), "{message}");
-        assert!(matches!(read_map(&path), Err(ImageError::TooLarge { most: MOST_PIXELS, .. })));
+        for message in [read_image(&path).unwrap_err().to_string(), read_map(&path).unwrap_err().to_string()]
+        {
+            let parts = ["33554433 x 1", "the limit of 33554432", "--max-pixels"];
+            assert!(parts.iter().all(|part| message.contains(part)), "{message}");
+        }
         let (_dir, small) = temporary("small.pgm", b"P5 3 1 255\n\x01\x02\x03");
-        assert!(matches!(read_image_within(&small, 2), Err(ImageError::TooLarge { most: 2, .. })));
+        assert!(read_image_within(&small, 2).unwrap_err().to_string().contains("the limit of 2;"));
         assert_eq!(read_image_within(&small, 3).unwrap().width(), 3);
     }
 
@@ -185,7 +189,7 @@ mod tests {
         let missing = read_image(Path::new("/nowhere/at all.png")).unwrap_err().to_string();
         assert!(missing.contains("/nowhere/at all.png"), "{missing}");
         let (_dir, path) = temporary("x.png", b"not an image");
-        let damaged = read_image(&path).unwrap_err();
-        assert!(matches!(damaged, ImageError::Decode { .. }), "{damaged}");
+        let damaged = read_image(&path).unwrap_err().to_string();
+        assert!(damaged.contains("x.png: ") && damaged.contains("the readable formats are PNG"), "{damaged}");
     }
 }

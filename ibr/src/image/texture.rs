@@ -101,7 +101,7 @@ impl Block {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::uncalibrated::random::Dice;
+    use crate::uncalibrated::random::dice::Dice;
 
     /// A surface of this root mean square slope with noise.
     fn photograph(slope: f64, noise: f64, channels: usize) -> Image {

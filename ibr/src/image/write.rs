@@ -1,7 +1,8 @@
 //! Encoding images in the format of the file extension.
 
 use super::dynamic::{Levels, picture};
-use super::{Image, ImageError, pfm};
+use super::{Image, pfm};
+use crate::files::{InputError, refuse_pixels_without_memory};
 use hybank::files::AtomicFile;
 use image::{DynamicImage, ImageBuffer, ImageFormat};
 use std::io::{Cursor, Write};
@@ -12,9 +13,8 @@ use std::path::Path;
 /// Values are rounded half up, to more than 256 levels in PNG only; .pfm keeps floats with white = 1.
 ///
 /// # Errors
-/// [`ImageError::UnknownFormat`] for another extension, [`ImageError::Levels`] for 16 bits in another
-/// format, [`ImageError::Write`] if the encoder fails.
-pub fn encode(image: &Image, path: &Path, levels: Levels) -> Result<Vec<u8>, ImageError> {
+/// [`InputError`] for another extension or 16 bits in another format, or if the encoder fails.
+pub fn encode(image: &Image, path: &Path, levels: Levels) -> Result<Vec<u8>, InputError> {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let format = match ending.as_str() {
         "png" => ImageFormat::Png,
@@ -22,14 +22,18 @@ pub fn encode(image: &Image, path: &Path, levels: Levels) -> Result<Vec<u8>, Ima
         "ppm" | "pgm" | "pnm" => ImageFormat::Pnm,
         "pfm" => {
             let room = 12.0 * image.channels() as f64;
-            return ImageError::refuse_without_memory(path, image.size(), room).map(|()| encode_float(image));
+            return refuse_pixels_without_memory(path, image.size(), room).map(|()| encode_float(image));
         }
-        _ => return Err(ImageError::UnknownFormat { path: path.into() }),
+        _ => {
+            let remedy = "use .png, .jpg, .ppm, .pgm or .pfm";
+            return Err(InputError::file(path, format!("the extension is not an image format; {remedy}")));
+        }
     };
     if levels == Levels::Sixteen && format != ImageFormat::Png {
-        return Err(ImageError::Levels { path: path.into() });
+        let reason = "16 bits per value are written to .png files only; .pfm files have floats";
+        return Err(InputError::file(path, reason));
     }
-    ImageError::refuse_without_memory(path, image.size(), packing(image.channels(), levels))?;
+    refuse_pixels_without_memory(path, image.size(), packing(image.channels(), levels))?;
     // A .ppm is always written in colour, a .pgm in grey.
     match ending.as_str() {
         "ppm" => write_picture(&image.to_rgb().to_dynamic(levels), format, path),
@@ -48,8 +52,8 @@ fn packing(channels: usize, levels: Levels) -> f64 {
 /// Writes the image to a file that appears only when it is whole, in the place of one that exists.
 ///
 /// # Errors
-/// As [`encode`], and [`ImageError::File`] if the system fails.
-pub fn save(image: &Image, path: &Path) -> Result<(), ImageError> {
+/// As [`encode`], and [`InputError::Create`] if the system fails.
+pub fn save(image: &Image, path: &Path) -> Result<(), InputError> {
     Ok(begin(&encode(image, path, Levels::Eight)?, path, true)?.commit()?)
 }
 
@@ -57,10 +61,10 @@ pub fn save(image: &Image, path: &Path) -> Result<(), ImageError> {
 /// [`commit_all`](hybank::files::commit_all).
 ///
 /// # Errors
-/// [`ImageError::File`], also if the file exists and `replace` is not set, and [`ImageError::Write`].
-pub fn begin(bytes: &[u8], path: &Path, replace: bool) -> Result<AtomicFile, ImageError> {
+/// [`InputError`], also if the file exists and `replace` is not set.
+pub fn begin(bytes: &[u8], path: &Path, replace: bool) -> Result<AtomicFile, InputError> {
     let mut file = AtomicFile::create(path, replace)?;
-    file.write_all(bytes).map_err(|e| ImageError::Write { path: path.into(), reason: e.to_string() })?;
+    file.write_all(bytes).map_err(|e| InputError::file(path, e))?;
     Ok(file)
 }
 
@@ -73,14 +77,14 @@ fn encode_float(image: &Image) -> Vec<u8> {
 /// The bytes of a PNG file of whole numbers, one per pixel; `path` appears in messages.
 ///
 /// # Errors
-/// [`ImageError::Write`] if the encoder fails, [`ImageError::Buffer`] if the numbers do not fill the size.
+/// [`InputError`] if the encoder fails, or the numbers do not fill the size.
 pub fn encode_levels(
     numbers: &[u16],
     (width, height): (usize, usize),
     path: &Path,
-) -> Result<Vec<u8>, ImageError> {
+) -> Result<Vec<u8>, InputError> {
     fills(numbers, (width, height))?;
-    ImageError::refuse_without_memory(path, (width, height), packing(1, Levels::Sixteen))?;
+    refuse_pixels_without_memory(path, (width, height), packing(1, Levels::Sixteen))?;
     let grey = ImageBuffer::from_raw(width as u32, height as u32, numbers.to_vec());
     write_picture(&grey.map(DynamicImage::ImageLuma16).unwrap_or_default(), ImageFormat::Png, path)
 }
@@ -95,9 +99,9 @@ pub fn encode_with_alpha(
     alpha: &[f32],
     path: &Path,
     levels: Levels,
-) -> Result<Vec<u8>, ImageError> {
+) -> Result<Vec<u8>, InputError> {
     fills(alpha, image.size())?;
-    ImageError::refuse_without_memory(path, image.size(), packing(image.channels() + 1, levels))?;
+    refuse_pixels_without_memory(path, image.size(), packing(image.channels() + 1, levels))?;
     let pixels = image.data().chunks_exact(image.channels()).zip(alpha);
     let values = pixels.flat_map(|(pixel, alpha)| pixel.iter().copied().chain([255.0 * alpha]));
     let picture = picture(values, image.size(), image.channels() + 1, levels);
@@ -105,18 +109,17 @@ pub fn encode_with_alpha(
 }
 
 /// Refuses numbers that are not one per pixel.
-fn fills<T>(numbers: &[T], (width, height): (usize, usize)) -> Result<(), ImageError> {
+fn fills<T>(numbers: &[T], (width, height): (usize, usize)) -> Result<(), InputError> {
     let (expected, given) = (width.saturating_mul(height), numbers.len());
     if given == expected {
         return Ok(());
     }
-    Err(ImageError::Buffer { width, height, channels: 1, expected, given })
+    Err(InputError::Buffer { width, height, channels: 1, expected, given })
 }
 
-fn write_picture(picture: &DynamicImage, format: ImageFormat, path: &Path) -> Result<Vec<u8>, ImageError> {
+fn write_picture(picture: &DynamicImage, format: ImageFormat, path: &Path) -> Result<Vec<u8>, InputError> {
     let mut bytes = Cursor::new(Vec::new());
-    let failed = |e: image::ImageError| ImageError::Write { path: path.into(), reason: e.to_string() };
-    picture.write_to(&mut bytes, format).map_err(failed)?;
+    picture.write_to(&mut bytes, format).map_err(|e| InputError::file(path, e))?;
     Ok(bytes.into_inner())
 }
 
@@ -163,20 +166,18 @@ mod tests {
         }
         let image = Image::filled(2, 2, 1, 7.0);
         let refused = encode(&image, Path::new("x.jpg"), Levels::Sixteen);
-        assert!(matches!(refused, Err(ImageError::Levels { .. })));
+        assert!(
+            refused.unwrap_err().to_string().contains("16 bits per value are written to .png files only")
+        );
     }
 
     #[test]
     fn unknown_endings_and_folders_are_refused() {
         let image = Image::filled(2, 2, 1, 7.0);
-        assert!(matches!(
-            encode(&image, Path::new("x.gif"), Levels::Eight),
-            Err(ImageError::UnknownFormat { .. })
-        ));
-        assert!(matches!(
-            encode(&image, Path::new("x"), Levels::Eight),
-            Err(ImageError::UnknownFormat { .. })
-        ));
-        assert!(matches!(save(&image, Path::new("/nowhere/x.png")), Err(ImageError::File(_))));
+        for name in ["x.gif", "x"] {
+            let refused = encode(&image, Path::new(name), Levels::Eight).unwrap_err().to_string();
+            assert!(refused.contains("the extension is not an image format; use .png"), "{refused}");
+        }
+        assert!(matches!(save(&image, Path::new("/nowhere/x.png")), Err(InputError::Create(_))));
     }
 }

@@ -17,29 +17,15 @@ pub enum HoleFill {
     Leave,
 }
 
-/// Definition and filling of holes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HoleSettings {
-    /// Neighbouring samples farther apart than this, in units of their spacing on the surface (at least one
-    /// pixel), have a hole between them. A pixel belongs to a hole if no sample lies within half of this
-    /// distance.
-    pub gap: f64,
-    /// Hole filling.
-    pub fill: HoleFill,
-}
+/// Neighbouring samples farther apart than this, in units of their spacing on the surface (at least one
+/// pixel), have a hole between them. A pixel belongs to a hole if no sample lies within half of this
+/// distance.
+pub(super) const GAP: f64 = 1.5;
 
-impl HoleSettings {
-    /// Distance up to which a sample of this spacing covers pixels.
-    #[inline]
-    pub(crate) fn reach(&self, spacing: f32) -> f64 {
-        self.gap / 2.0 * f64::from(spacing.clamp(1.0, LARGEST_SPACING))
-    }
-}
-
-impl Default for HoleSettings {
-    fn default() -> Self {
-        Self { gap: 1.5, fill: HoleFill::Background }
-    }
+/// Distance up to which a sample of this spacing covers pixels.
+#[inline]
+pub(super) fn reach(spacing: f32) -> f64 {
+    GAP / 2.0 * f64::from(spacing.clamp(1.0, LARGEST_SPACING))
 }
 
 /// Origin of the value of a pixel of the virtual image.

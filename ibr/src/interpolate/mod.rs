@@ -8,7 +8,7 @@ mod holes;
 pub mod plane;
 pub mod rows;
 
-pub use holes::{Cover, HoleCount, HoleFill, HoleSettings};
+pub use holes::{Cover, HoleCount, HoleFill};
 
 use crate::occlusion::DepthTest;
 use crate::setting::{NOT_NEGATIVE, POSITIVE, SettingError};
@@ -56,8 +56,8 @@ pub struct Settings {
     pub fit: FitSettings,
     /// The plane fit.
     pub plane: plane::PlaneSettings,
-    /// Holes and their filling.
-    pub holes: HoleSettings,
+    /// What holes are filled with.
+    pub fill: HoleFill,
     /// The depth test of stage two; it decides which depths belong to one surface.
     pub depth_test: DepthTest,
 }
@@ -120,7 +120,6 @@ impl Settings {
         NOT_NEGATIVE.check("lambda", self.fit.lambda)?;
         NOT_NEGATIVE.check("tau", self.fit.tau)?;
         POSITIVE.check("variation", self.fit.variation)?;
-        POSITIVE.check("gap", self.holes.gap)?;
         POSITIVE.check("stiffness", self.plane.stiffness)?;
         POSITIVE.check("edge stiffness", self.plane.edge_stiffness)?;
         POSITIVE.check("tolerance", self.plane.tolerance)?;

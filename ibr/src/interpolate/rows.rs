@@ -6,6 +6,7 @@
 //! ```
 
 use super::extend::{Level, mean};
+use super::holes::{GAP, reach};
 use super::{Cover, HoleFill, InterpolationError, Settings};
 use crate::depth::{fill_empty_rows, for_holes};
 use crate::sample::Sample;
@@ -62,7 +63,7 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
             slope_weight: settings.fit.lambda * v,
         }));
         mark(samples, settings, mask);
-        if settings.holes.fill == HoleFill::Background {
+        if settings.fill == HoleFill::Background {
             self.continue_background(samples, settings);
             let edge = self.width as f64 - 1.0;
             self.replicate(clean(samples.iter(), settings).unwrap_or(first), -1.0, first.x, settings);
@@ -78,7 +79,7 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
         for (out, value) in values.as_chunks_mut::<C>().0.iter_mut().zip(self.fit.knot_values(0)) {
             *out = value.map(|v| v.clamp(0.0, 255.0) as f32);
         }
-        if settings.holes.fill == HoleFill::Leave {
+        if settings.fill == HoleFill::Leave {
             blacken(mask, values, C);
         }
         Ok(true)
@@ -137,7 +138,7 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
     fn continue_background(&mut self, samples: &[Sample<C>], settings: &Settings) {
         for i in 1..samples.len() {
             let (left, right) = (&samples[i - 1], &samples[i]);
-            if right.x - left.x > settings.holes.gap && !one_surface(left, right, settings) {
+            if right.x - left.x > GAP && !one_surface(left, right, settings) {
                 let farther = if right.depth > left.depth {
                     clean(samples[i..].iter(), settings).unwrap_or(right)
                 } else {
@@ -182,10 +183,10 @@ fn clean<'a, const C: usize>(
 /// Marks the pixels near a sample and those between neighbours on one surface as seen, and those in wider
 /// gaps of one depth as cracks.
 fn mark<const C: usize>(samples: &[Sample<C>], settings: &Settings, mask: &mut [Cover]) {
-    let reach = |s: &Sample<C>| settings.holes.reach(s.spacing);
+    let reach = |s: &Sample<C>| reach(s.spacing);
     for pair in samples.windows(2) {
         let gap = pair[1].x - pair[0].x;
-        if gap > settings.holes.gap && one_surface(&pair[0], &pair[1], settings) {
+        if gap > GAP && one_surface(&pair[0], &pair[1], settings) {
             let near = gap <= 2.0 * reach(&pair[0]).max(reach(&pair[1]));
             let seen = if pair[0].guessed || pair[1].guessed { Cover::Guessed } else { Cover::Seen };
             let cover = if near { seen } else { Cover::Crack };
@@ -212,7 +213,7 @@ fn mark<const C: usize>(samples: &[Sample<C>], settings: &Settings, mask: &mut [
 
 /// Depth of the sample nearest to each pixel of a row, NaN where none reaches it. The samples are sorted by
 /// column.
-pub fn nearest_depths<const C: usize>(samples: &[Sample<C>], settings: &Settings, depths: &mut [f32]) {
+pub fn nearest_depths<const C: usize>(samples: &[Sample<C>], depths: &mut [f32]) {
     let mut next = 0;
     for (j, depth) in depths.iter_mut().enumerate() {
         let x = j as f64;
@@ -220,7 +221,7 @@ pub fn nearest_depths<const C: usize>(samples: &[Sample<C>], settings: &Settings
             next += 1;
         }
         let sides = [next.checked_sub(1), Some(next)].into_iter().flatten().filter_map(|i| samples.get(i));
-        let within = sides.filter(|s| !s.guessed && (s.x - x).abs() <= settings.holes.reach(s.spacing));
+        let within = sides.filter(|s| !s.guessed && (s.x - x).abs() <= reach(s.spacing));
         let nearest = within.min_by(|a, b| (a.x - x).abs().total_cmp(&(b.x - x).abs()));
         *depth = nearest.map_or(f32::NAN, |s| s.depth);
     }
@@ -297,7 +298,7 @@ fn interpolate_with<const ORDER: usize, const C: usize>(
         return Err(InterpolationError::NoSamples { width, height });
     }
     let mut depths = vec![f32::NAN; width * height];
-    rows.iter().zip(depths.chunks_exact_mut(width)).for_each(|(row, out)| nearest_depths(row, settings, out));
+    rows.iter().zip(depths.chunks_exact_mut(width)).for_each(|(row, out)| nearest_depths(row, out));
     finish::<C>(&filled, &mask, &depths, settings, &mut values);
     Ok((values, mask))
 }
@@ -311,7 +312,7 @@ pub(crate) fn finish<const C: usize>(
     settings: &Settings,
     values: &mut [f32],
 ) {
-    let fill = settings.holes.fill;
+    let fill = settings.fill;
     if fill != HoleFill::Leave {
         fill_empty_rows(filled, values);
     }
@@ -354,7 +355,6 @@ fn continue_surfaces<const C: usize>(mask: &[Cover], depths: &[f32], width: usiz
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interpolate::HoleSettings;
     use crate::setting::SettingError;
 
     fn sample(x: f64, depth: f32, value: f32) -> Sample<1> {
@@ -366,7 +366,7 @@ mod tests {
     }
 
     fn filling(fill: HoleFill) -> Settings {
-        Settings { holes: HoleSettings { fill, ..HoleSettings::default() }, ..Settings::default() }
+        Settings { fill, ..Settings::default() }
     }
 
     #[test]

@@ -50,7 +50,7 @@ fn photographs_that_cannot_be_matched_are_named() {
     for alone in [&[view(0.0)][..], &[view(1.0), view(1.0)]] {
         assert_eq!(depths(alone, Measure::Disparity).unwrap_err(), MatchError::Alone(0));
     }
-    let dice = &mut crate::uncalibrated::random::Dice::new(3);
+    let dice = &mut crate::uncalibrated::random::dice::Dice::new(3);
     let mut noise = || {
         let data = (0..64 * 48).map(|_| 100.0 + 50.0 * dice.normal() as f32).collect();
         Image::new(64, 48, 1, data).unwrap()

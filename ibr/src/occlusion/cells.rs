@@ -88,17 +88,42 @@ impl Cells {
             far = own.fold(none.1, |far, (d, _)| largest(far, *d));
         }
         let spacing = bounds::<_, 4>(&points.spacing[places], (0.0, 0.0)).1;
-        let reach = ROUNDING * test.radius(spacing);
-        let last = |count: usize| count as u32 - 1;
+        Run { near, far, ..self.around(across, down, test.radius(spacing)) }
+    }
+
+    /// The cells within a radius of a rectangle.
+    #[inline]
+    fn around(&self, across: (f64, f64), down: (f64, f64), radius: f64) -> Run {
+        let reach = ROUNDING * radius;
         let cells = |(low, high): (f64, f64), origin: f64, count: usize| {
-            let cell = |v: f64| (((v - origin) * self.raster.scale) as u32).min(last(count));
+            let cell = |v: f64| (((v - origin) * self.raster.scale) as u32).min(count as u32 - 1);
             [cell(low - reach), cell(high + reach)]
         };
-        let (columns, rows) = (
-            cells(across, self.raster.left, self.raster.columns),
-            cells(down, self.raster.top, self.raster.rows),
-        );
-        Run { columns, rows, near, far }
+        let columns = cells(across, self.raster.left, self.raster.columns);
+        Run { columns, rows: cells(down, self.raster.top, self.raster.rows), ..Run::EMPTY }
+    }
+
+    /// The number of cells.
+    pub(super) fn count(&self) -> usize {
+        self.far.len()
+    }
+
+    /// The cell of a sample.
+    #[inline]
+    pub(super) fn cell(&self, points: &Points, i: usize) -> usize {
+        let (column, row) = self.raster.cell(points.x[i], points.y[i]);
+        row * self.raster.columns + column
+    }
+
+    /// Calls `with` for each cell in which a sample may hide a suspect.
+    pub(super) fn reached(&self, points: &Points, test: &DepthTest, i: usize, mut with: impl FnMut(usize)) {
+        let (x, y, depth) = (points.x[i], points.y[i], f64::from(points.depth[i]));
+        let Run { columns, rows, .. } = self.around((x, x), (y, y), test.radius(points.spacing[i]));
+        for row in rows[0]..=rows[1] {
+            let cells =
+                (columns[0]..=columns[1]).map(|column| row as usize * self.raster.columns + column as usize);
+            cells.filter(|cell| test.hides(depth, f64::from(self.far[*cell]))).for_each(&mut with);
+        }
     }
 
     /// Calls `with` for each cell of a run, for some of them repeatedly.
@@ -128,8 +153,7 @@ impl Cells {
                 continue;
             }
             for i in (k * RUN..(k + 1) * RUN).filter(|i| points.own[*i]) {
-                let (column, row) = self.raster.cell(points.x[i], points.y[i]);
-                let cell = row * self.raster.columns + column;
+                let cell = self.cell(points, i);
                 if hides(self.near[cell], points.depth[i]) {
                     self.far[cell] = largest(self.far[cell], points.depth[i]);
                     suspects.push(i as u32);

@@ -1,24 +1,21 @@
 //! Occlusion removal in the plane. A coarse grid finds the samples near depth edges; these are compared with
-//! those in the cells around them, of the size of the radius. Samples whose radii differ by a factor of two
-//! or more lie in different grids.
+//! those whose radii reach into their cell.
 
+use super::DepthTest;
 use super::cells::Cells;
-use super::points::{Extent, Points, Raster};
-use super::{DepthTest, LARGEST_SPACING};
+use super::points::{Extent, Points};
 use crate::sample::Sample;
 use rayon::prelude::*;
-
-/// Most cells per sample, so that a tiny radius on a wide plane does not exhaust the memory.
-const CELLS_A_SAMPLE: usize = 4;
+use std::ops::Range;
 
 /// Removes the hidden samples and keeps the order of the others; returns how many were removed.
 ///
-/// The ball of a sample meets at most nine cells. Most samples are visible, and the least depth around some
-/// of them shows it; only the others are compared with the members. O(n) for the depths, and O(k) for
-/// samples near nearer ones, k the number of samples in nine cells. Parallel, with the same bits for any
-/// number of threads.
+/// Most samples are visible, and the least depth around some of them shows it; only the others are compared
+/// with what may hide them. O(n) where few samples share a pixel. Of many, those of a cell are a k-d tree:
+/// O(n log n) to build it, and a search looks at the boxes that the border of a ball cuts. Parallel, with
+/// the same bits for any number of threads.
 pub fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) -> usize {
-    let hidden = hidden(samples, test);
+    let hidden = hidden(samples.iter().copied(), test);
     let before = samples.len();
     let mut flags = hidden.iter();
     samples.retain(|_| !flags.next().copied().unwrap_or(false));
@@ -26,12 +23,16 @@ pub fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) ->
 }
 
 /// Which samples are hidden.
-pub(crate) fn hidden<const C: usize>(samples: &[Sample<C>], test: &DepthTest) -> Vec<bool> {
+pub(crate) fn hidden<const C: usize>(
+    samples: impl ExactSizeIterator<Item = Sample<C>>,
+    test: &DepthTest,
+) -> Vec<bool> {
+    let count = samples.len();
     let points = Points::of(samples);
     let mut search = PlaneSearch::default();
     search.clear(&points.extent(), points.len());
     search.enter(&points, test);
-    let mut flags = vec![false; samples.len()];
+    let mut flags = vec![false; count];
     search.hidden(&points, test).iter().for_each(|i| flags[*i as usize] = true);
     flags
 }
@@ -39,18 +40,21 @@ pub(crate) fn hidden<const C: usize>(samples: &[Sample<C>], test: &DepthTest) ->
 /// Finds hidden samples; work memory that is used again.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PlaneSearch {
-    extent: Extent,
     cells: Cells,
     suspects: Vec<u32>,
-    grids: [Grid; LEVELS],
-    members: Vec<Member>,
+    hiders: Vec<u32>,
+    /// The hiders whose radii reach into each cell with suspects, cell after cell.
+    members: Vec<u32>,
+    /// The first member of each cell, and the end of the last one.
+    starts: Vec<usize>,
+    /// Bounds of the nodes of the trees, see [`node`].
+    bounds: Vec<Bounds>,
     hidden: Vec<u32>,
 }
 
 impl PlaneSearch {
     /// Begins a search among at most `count` samples in a rectangle.
     pub(crate) fn clear(&mut self, extent: &Extent, count: usize) {
-        self.extent = *extent;
         self.cells.clear(extent, count);
     }
 
@@ -65,106 +69,133 @@ impl PlaneSearch {
         self.hidden.clear();
         if !self.suspects.is_empty() {
             self.gather(points, test);
-            let Self { suspects, grids, members, hidden, .. } = self;
+            let Self { cells, suspects, members, starts, bounds, hidden, .. } = self;
+            let search = Search { points, test, members, bounds };
             let is_hidden = |i: &u32| {
-                let (i, members) = (*i as usize, &members[..]);
-                let [x, y] = [points.x[i], points.y[i]];
-                grids.iter().any(|grid| grid.hides(x, y, points.depth[i], members, test))
+                let cell = cells.cell(points, *i as usize);
+                search.hides(starts[cell]..starts[cell + 1], *i as usize)
             };
             hidden.par_extend(suspects.par_iter().with_min_len(4096).copied().filter(is_hidden));
         }
         &self.hidden
     }
 
-    /// Fills the grids with the samples that may hide others.
+    /// Sorts the samples that may hide others by the cells into which they reach, and plants trees where a
+    /// cell has many.
     fn gather(&mut self, points: &Points, test: &DepthTest) {
-        let Self { extent, cells, grids, members, .. } = self;
-        members.clear();
-        grids.iter_mut().for_each(|grid| grid.heads.clear());
-        cells.hiders(points, test, |i| {
-            let (x, y, depth, spacing) = (points.x[i], points.y[i], points.depth[i], points.spacing[i]);
-            let level = level(spacing);
-            let grid = &mut grids[level];
-            if grid.heads.is_empty() {
-                grid.place(extent, test.radius(LIMITS[level]), CELLS_A_SAMPLE * points.len() + 16);
-            }
-            let next = grid.insert(members.len() as u32, x, y);
-            members.push(Member { x, y, radius: test.radius(spacing), depth, next });
-        });
+        let Self { cells, hiders, members, starts, bounds, .. } = self;
+        hiders.clear();
+        cells.hiders(points, test, |i| hiders.push(i as u32));
+        starts.clear();
+        starts.resize(cells.count() + 1, 0);
+        for i in hiders.iter() {
+            cells.reached(points, test, *i as usize, |cell| starts[cell] += 1);
+        }
+        let mut sum = 0;
+        for start in starts.iter_mut() {
+            sum += *start;
+            *start = sum;
+        }
+        members.resize(sum, 0);
+        for i in hiders.iter().rev() {
+            cells.reached(points, test, *i as usize, |cell| {
+                starts[cell] -= 1;
+                members[starts[cell]] = *i;
+            });
+        }
+        bounds.resize(node(sum) + 1, Bounds::NONE);
+        for cell in starts.windows(2) {
+            plant(points, test, members, bounds, cell[0]..cell[1]);
+        }
     }
 }
 
-/// Largest spacing of the samples in each grid. The spacing on a surface seen from two sides is a little
-/// above and below 1, and most samples are in the grid with the smallest cells.
-const LIMITS: [f32; LEVELS] = [1.2, 2.4, 4.8, LARGEST_SPACING];
-const LEVELS: usize = 4;
+/// Members that are compared one by one.
+const FEW: usize = 32;
 
-/// No sample.
-const NONE: u32 = u32::MAX;
-
-/// The grid of a sample.
-#[inline]
-fn level(spacing: f32) -> usize {
-    LIMITS[..LEVELS - 1].iter().map(|limit| usize::from(spacing > *limit)).sum()
+/// The place of the bounds of a node: the node of more than [`FEW`] members is called by the middle of their
+/// range, and two middles are half of that apart at least.
+fn node(middle: usize) -> usize {
+    middle / (FEW / 2)
 }
 
-/// Samples of similar radius in square cells, those of a cell as a linked list: neighbouring samples of a
-/// view come one after the other, so building it touches one cell after the other.
-#[derive(Debug, Clone, Default)]
-struct Grid {
-    raster: Raster,
-    /// The last member of each cell; empty without members.
-    heads: Vec<u32>,
-}
-
-/// A sample that may hide others.
+/// Column, row and radius of some members, and their least depth.
 #[derive(Debug, Clone, Copy)]
-struct Member {
-    x: f64,
-    y: f64,
-    radius: f64,
-    depth: f32,
-    /// The one before it in its cell.
-    next: u32,
+struct Bounds {
+    low: [f64; 3],
+    high: [f64; 3],
+    near: f32,
 }
 
-impl Grid {
-    /// Places an empty grid over the extent of all samples, with cells no smaller than `radius`.
-    fn place(&mut self, extent: &Extent, radius: f64, most: usize) {
-        // Members within the radius lie in neighbouring cells, even if the positions in the grid round.
-        self.raster = Raster::over(extent, 1.0001 * radius, most);
-        self.heads.resize(self.raster.columns * self.raster.rows, NONE);
-    }
+impl Bounds {
+    const NONE: Self = Self { low: [f64::INFINITY; 3], high: [f64::NEG_INFINITY; 3], near: f32::INFINITY };
 
-    /// Adds a member; returns the one before it in its cell.
-    #[inline]
-    fn insert(&mut self, index: u32, x: f64, y: f64) -> u32 {
-        let (column, row) = self.raster.cell(x, y);
-        std::mem::replace(&mut self.heads[row * self.raster.columns + column], index)
+    fn with(mut self, at: [f64; 3], depth: f32) -> Self {
+        for (k, v) in at.into_iter().enumerate() {
+            (self.low[k], self.high[k]) = (self.low[k].min(v), self.high[k].max(v));
+        }
+        self.near = self.near.min(depth);
+        self
     }
+}
 
-    /// Whether any member hides a sample with this position and depth: comparison with those in the nine
-    /// cells around.
-    fn hides(&self, x: f64, y: f64, depth: f32, members: &[Member], test: &DepthTest) -> bool {
-        if self.heads.is_empty() {
+/// Column, row and radius of a sample.
+fn ball(points: &Points, test: &DepthTest, i: u32) -> [f64; 3] {
+    let i = i as usize;
+    [points.x[i], points.y[i], test.radius(points.spacing[i])]
+}
+
+/// Sorts members into halves of halves, each time where they differ most.
+fn plant(points: &Points, test: &DepthTest, members: &mut [u32], bounds: &mut [Bounds], range: Range<usize>) {
+    if range.len() <= FEW {
+        return;
+    }
+    let (half, own) = (range.len() / 2, &mut members[range.clone()]);
+    let all =
+        own.iter().fold(Bounds::NONE, |all, i| all.with(ball(points, test, *i), points.depth[*i as usize]));
+    let extent = |k: &usize| all.high[*k] - all.low[*k];
+    let axis = (0..3).max_by(|a, b| extent(a).total_cmp(&extent(b))).unwrap_or(0);
+    let at = |i: &u32| ball(points, test, *i)[axis];
+    own.select_nth_unstable_by(half, |a, b| at(a).total_cmp(&at(b)));
+    let middle = range.start + half;
+    bounds[node(middle)] = all;
+    plant(points, test, members, bounds, range.start..middle);
+    plant(points, test, members, bounds, middle..range.end);
+}
+
+/// The trees, while suspects are looked for.
+struct Search<'a> {
+    points: &'a Points,
+    test: &'a DepthTest,
+    members: &'a [u32],
+    bounds: &'a [Bounds],
+}
+
+impl Search<'_> {
+    /// Whether any of some members hides a sample. Distances from bounds round as those from members do, so
+    /// that both decide alike.
+    fn hides(&self, range: Range<usize>, suspect: usize) -> bool {
+        let Self { points, test, members, bounds } = *self;
+        let (x, y, depth) = (points.x[suspect], points.y[suspect], f64::from(points.depth[suspect]));
+        if range.len() <= FEW {
+            return members[range].iter().any(|i| {
+                let [column, row, radius] = ball(points, test, *i);
+                let near = f64::from(points.depth[*i as usize]);
+                test.hides(near, depth) && DepthTest::close(x - column, y - row, radius)
+            });
+        }
+        let middle = range.start + range.len() / 2;
+        let Bounds { low, high, near } = bounds[node(middle)];
+        let nearest = |k: usize, at: f64| (low[k] - at).max(at - high[k]).max(0.0);
+        let farthest = |k: usize, at: f64| (at - low[k]).max(high[k] - at);
+        if !test.hides(f64::from(near), depth) || !DepthTest::close(nearest(0, x), nearest(1, y), high[2]) {
             return false;
         }
-        let (column, row) = self.raster.cell(x, y);
-        let columns = column.saturating_sub(1)..(column + 2).min(self.raster.columns);
-        let hides = |m: &Member| {
-            test.hides(f64::from(m.depth), f64::from(depth)) && DepthTest::close(x - m.x, y - m.y, m.radius)
-        };
-        (row.saturating_sub(1)..(row + 2).min(self.raster.rows)).any(|r| {
-            let cells = &self.heads[r * self.raster.columns..][columns.clone()];
-            cells.iter().any(|head| list(members, *head).any(hides))
-        })
+        // All of them are close, and so is the one with the least depth.
+        DepthTest::close(farthest(0, x), farthest(1, y), low[2])
+            || self.hides(range.start..middle, suspect)
+            || self.hides(middle..range.end, suspect)
     }
-}
-
-/// The members of the list that begins with `head`.
-#[inline]
-fn list(members: &[Member], head: u32) -> impl Iterator<Item = &Member> {
-    std::iter::successors(members.get(head as usize), |m| members.get(m.next as usize))
 }
 
 #[cfg(test)]
@@ -178,7 +209,7 @@ mod tests {
     }
 
     fn check(samples: &[Sample<1>], test: &DepthTest) {
-        assert_eq!(hidden(samples, test), test.hidden_by_definition(samples), "{test:?}");
+        assert_eq!(hidden(samples.iter().copied(), test), test.hidden_by_definition(samples), "{test:?}");
     }
 
     #[test]
@@ -199,6 +230,24 @@ mod tests {
         let mut pair = vec![sample(0.0, 0.0, -3.0), sample(3.0, 4.0, -2.0), sample(3.0, 4.1, -2.0)];
         assert_eq!(remove(&mut pair, &test), 1);
         assert_eq!(pair.len(), 2);
+    }
+
+    /// Many samples in few cells, at few places or at all different ones: the trees decide as the
+    /// definition.
+    #[test]
+    fn a_crowd_hides_as_the_definition_says() {
+        let part = |k: usize, step: f64| (k as f64 * step).fract();
+        for (places, spread) in [(1.0, 1.0), (4.0, 1.0), (1e9, 1.0), (1e9, 0.01)] {
+            let at = |v: f64| (v * places).floor() / places * spread * 5.0;
+            let crowd = |k: usize| Sample {
+                spacing: (1.0 + 9.0 * part(k, 0.569_840_291)) as f32,
+                ..sample(at(part(k, 0.754_877_666)), at(part(k, 0.618_033_989)), 1.0 + part(k, 0.437) as f32)
+            };
+            let samples: Vec<Sample<1>> = (0..3000).map(crowd).collect();
+            for epsilon in [0.02, 0.7] {
+                check(&samples, &DepthTest { epsilon, ..DepthTest::default() });
+            }
+        }
     }
 
     proptest! {
@@ -238,7 +287,7 @@ mod tests {
                 })
                 .collect();
             let test = DepthTest { epsilon, relative, absolute: 0.1, parallax: 0.0 };
-            let mut points = Points::of(&samples);
+            let mut points = Points::of(samples.iter().copied());
             raw.iter().enumerate().for_each(|(i, s)| points.own[i] = s.4 > 1);
             let own = |i: &usize| points.own[*i];
             let hidden = test.hidden_by_definition(&samples);

@@ -21,10 +21,10 @@ pub(crate) struct Points {
 }
 
 impl Points {
-    pub(crate) fn of<const C: usize>(samples: &[Sample<C>]) -> Self {
+    pub(crate) fn of<const C: usize>(samples: impl ExactSizeIterator<Item = Sample<C>>) -> Self {
         let mut points = Self::default();
         points.resize(samples.len().next_multiple_of(RUN));
-        for (i, s) in samples.iter().enumerate() {
+        for (i, s) in samples.enumerate() {
             (points.x[i], points.y[i]) = (s.x, s.y);
             (points.depth[i], points.spacing[i], points.own[i]) = (s.depth, s.spacing, true);
         }

@@ -1,6 +1,6 @@
 //! Occlusion removal within one row: sort by column, then a sliding minimum of the depth.
 
-use super::DepthTest;
+use super::{DepthTest, hidden};
 use crate::lanes::{largest, least};
 use crate::sample::Sample;
 use std::ops::Range;
@@ -16,6 +16,10 @@ struct Key {
     /// Index of the sample in the order given.
     index: u32,
 }
+
+/// So many keys near depth edges are searched as in the plane: comparing each with those within its radius
+/// would take a time in proportion to the square of the number of views.
+const CROWD: usize = 4096;
 
 /// Keys whose depths are compared as a whole.
 const CHUNK: usize = 8;
@@ -134,8 +138,13 @@ impl<const C: usize> RowScratch<C> {
             if start < chunk {
                 let around = self.around(start..chunk, radius);
                 let around = around.start * CHUNK..(around.end * CHUNK).min(n);
-                self.mark_hidden(around.clone(), samples, test);
-                self.sweep(around, start * CHUNK..(chunk * CHUNK).min(n), samples, test);
+                let own = start * CHUNK..(chunk * CHUNK).min(n);
+                if around.len() > CROWD {
+                    self.search(around, own, samples, test);
+                } else {
+                    self.mark_hidden(around.clone(), samples, test);
+                    self.sweep(around, own, samples, test);
+                }
             }
         }
     }
@@ -160,6 +169,15 @@ impl<const C: usize> RowScratch<C> {
             end += 1;
         }
         start..end
+    }
+
+    /// Collects the survivors among the keys `own`, which the keys `around` may hide, as in the plane.
+    fn search(&mut self, around: Range<usize>, own: Range<usize>, samples: &[Sample<C>], test: &DepthTest) {
+        let Self { keys, survivors, .. } = self;
+        let on_line = |k: &Key| Sample { y: 0.0, ..samples[k.index as usize] };
+        let hidden = hidden(keys[around.clone()].iter().map(on_line), test);
+        let visible = own.filter(|i| !hidden[*i - around.start]);
+        survivors.extend(visible.map(|i| samples[keys[i].index as usize]));
     }
 
     /// Marks what samples of a larger radius than epsilon hide; the sweep covers the radius epsilon.
@@ -300,6 +318,16 @@ mod tests {
         let crowd: Vec<Sample<1>> =
             (0..200).map(|i| sample(((i * 37) % 90) as f64 * 0.01, 1.0 + ((i * 13) % 7) as f32, i)).collect();
         check(&crowd, &test, &mut scratch);
+        // As many views as are searched in another way, with radii of one and of several pixels.
+        let part = |k: u32, step: f64| (f64::from(k) * step).fract();
+        for spacing in [0.0, 5.0] {
+            let view = |k: u32| Sample {
+                spacing: (1.0 + spacing * part(k, 0.569_840_291)) as f32,
+                ..sample(9.0 * part(k, 0.754_877_666), 1.0 + part(k, 0.618_033_989) as f32, k)
+            };
+            let crowd: Vec<Sample<1>> = (0..2 * CROWD as u32).map(view).collect();
+            check(&crowd, &test, &mut scratch);
+        }
     }
 
     proptest! {

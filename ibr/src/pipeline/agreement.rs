@@ -339,7 +339,7 @@ mod tests {
         // Noise of 10 grey levels in photographs of one exposure.
         let shots = [0.0, 1.0].map(record);
         let disparities = shots.each_ref().map(|s| rig_disparity(&s.1, SIZE.0));
-        let dice = &mut crate::uncalibrated::random::Dice::new(3);
+        let dice = &mut crate::uncalibrated::random::dice::Dice::new(3);
         let noisy = shots.each_ref().map(|shot| {
             let mut image = shot.0.clone();
             image.data_mut().iter_mut().for_each(|v| *v += 10.0 * dice.normal() as f32);

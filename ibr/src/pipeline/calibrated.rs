@@ -136,7 +136,7 @@ fn render_with<const ORDER: usize, const C: usize>(
         return Err(RenderError::NoOverlap { pixels, dropped });
     }
     let report = Report { propagated, occluded: propagated - used, used, dropped, ..Report::default() };
-    let fit = problem.solve_watched(None, &|share| watch(GATHERING + (1.0 - GATHERING) * share))?;
+    let fit = problem.solve(None, &|share| watch(GATHERING + (1.0 - GATHERING) * share))?;
     Ok(Rendering::of_plane::<C>(fit, report, chosen, agreement))
 }
 
@@ -211,7 +211,7 @@ mod tests {
         let fit = plane::interpolate(&samples, (40, 30), &settings.interpolation).unwrap();
         assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
         // In bands only the order of summation differs.
-        let footprint = Footprint::new(&views, &target, &frame);
+        let footprint = Footprint::of(&views, &(0..views.len()).collect::<Vec<_>>(), &target, &frame);
         let mut problem = PlaneProblem::<2, 1>::new((40, 30), &settings.interpolation).unwrap();
         let mut work = Work::default();
         for rows in [0..7, 7..8, 8..30] {
@@ -220,7 +220,7 @@ mod tests {
             problem.add(&band).unwrap();
         }
         assert_eq!(problem.samples(), samples.len());
-        let banded = problem.solve(None).unwrap();
+        let banded = problem.solve(None, &|_| ()).unwrap();
         assert_eq!(banded.mask, fit.mask);
         let worst = banded.values.iter().zip(&fit.values).fold(0.0, |w: f32, (a, b)| w.max((a - b).abs()));
         assert!(worst < 1e-2, "{worst}");

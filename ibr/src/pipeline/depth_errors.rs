@@ -2,6 +2,7 @@
 //! another.
 
 use crate::depth::{DepthMap, FAR, Measure};
+use crate::propagate::{View, Viewpoint};
 
 /// Every so many pixels of a map are looked up.
 const LOOKUP_STEP: usize = 7;
@@ -137,14 +138,22 @@ pub(crate) struct DisparityGain {
 }
 
 impl DisparityGain {
+    /// Of the errors of a view's map, seen from a camera.
+    pub(crate) fn between<P: Viewpoint>(view: &View<'_, P>, camera: &P) -> Self {
+        match view.map.measure() {
+            Measure::Disparity => Self::along_rows(view.camera.distance(camera)),
+            Measure::Depth => Self::of(view.map, view.camera.map_to(camera)),
+        }
+    }
+
     /// Of errors of disparity, at this distance along the rows.
-    pub(crate) fn along_rows(distance: f64) -> Self {
+    pub(super) fn along_rows(distance: f64) -> Self {
         Self { xx: distance * distance, ..Self::default() }
     }
 
     /// From the map of pixels and their depths to the other view. The pixels that move farthest, a tenth,
     /// are left out: points close to a camera move without limit.
-    pub(crate) fn of(map: &DepthMap, to: impl Fn(f64, f64, f64) -> (f64, f64, f64)) -> Self {
+    fn of(map: &DepthMap, to: impl Fn(f64, f64, f64) -> (f64, f64, f64)) -> Self {
         const STEPS: usize = 16;
         let (width, height) = map.size();
         let columns = (0..width).step_by(width.div_ceil(STEPS).max(1));
@@ -193,7 +202,7 @@ mod tests {
     use super::*;
     use crate::camera::Camera;
     use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
-    use crate::uncalibrated::random::Dice;
+    use crate::uncalibrated::random::dice::Dice;
 
     const SIZE: (usize, usize) = (240, 180);
 

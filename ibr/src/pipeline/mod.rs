@@ -168,8 +168,10 @@ pub struct Report {
     /// Pixels that did not become samples.
     pub dropped: Dropped,
     /// Pixels of the virtual image without a sample.
+    #[serde(skip)]
     pub holes: HoleCount,
     /// How the plane fit ended; `None` for the row fit.
+    #[serde(skip)]
     pub convergence: Option<Convergence>,
 }
 

@@ -136,7 +136,7 @@ fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rend
             let row = b * block + k;
             *count = strip.survivors_of_row(job, row);
             rows::count(&strip.samples, samples);
-            nearest_depths(&strip.samples, &job.settings.interpolation, keys);
+            nearest_depths(&strip.samples, keys);
             (job.watch)((ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / height as f64);
             fit.interpolate(&strip.samples, &job.settings.interpolation, values, mask)
                 .map(|_| ())
@@ -166,7 +166,7 @@ fn render_plane<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Ren
     }
     let report = total(counts.iter(), HoleCount::default());
     enough(job, &report)?;
-    let fit = problem.solve_watched(None, job.watch)?;
+    let fit = problem.solve(None, job.watch)?;
     let mut keys = fit.depth.data().to_vec();
     job.disparities(&mut keys);
     let depth = DepthMap::from_known((width, height), keys, Measure::Disparity);

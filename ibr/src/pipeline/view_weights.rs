@@ -4,7 +4,6 @@ use super::depth_errors::{DisparityGain, median};
 use super::exposure::drifts;
 use super::{Agreement, Exposure};
 use crate::camera::Camera;
-use crate::depth::Measure;
 use crate::image::Image;
 use crate::propagate::{CalibratedView, View, Viewpoint};
 use crate::sample::Sample;
@@ -135,11 +134,7 @@ impl ViewWeights {
 
     /// The same with the displacements that errors of depth cause.
     fn with_disparity_gains<P: Viewpoint>(self, views: &[View<'_, P>], camera: &P) -> Self {
-        let gain = |view: &View<'_, P>| match view.map.measure() {
-            Measure::Disparity => DisparityGain::along_rows(view.camera.distance(camera)),
-            Measure::Depth => DisparityGain::of(view.map, view.camera.map_to(camera)),
-        };
-        Self { disparity_gains: views.iter().map(gain).collect(), ..self }
+        Self { disparity_gains: views.iter().map(|v| DisparityGain::between(v, camera)).collect(), ..self }
     }
 
     /// As [`ViewWeights::of`], with the distances in position and direction.

@@ -45,13 +45,7 @@ struct Tile {
 }
 
 impl Footprint {
-    /// Looks at the tiles of all views, in parallel over the rows.
-    pub fn new(views: &[CalibratedView<'_>], camera: &Camera, frame: &Frame) -> Self {
-        let all: Vec<usize> = (0..views.len()).collect();
-        Self::of(views, &all, camera, frame)
-    }
-
-    /// As [`Footprint::new`], for some of the views, by number.
+    /// Looks at the tiles of the `chosen` views, by number, in parallel over the rows.
     pub fn of(views: &[CalibratedView<'_>], chosen: &[usize], camera: &Camera, frame: &Frame) -> Self {
         let maps: Vec<Relative> = views.iter().map(|v| v.camera.relative_to(camera)).collect();
         let rows: Vec<(usize, usize)> =
@@ -159,7 +153,8 @@ pub fn calibrated<const C: usize>(
     camera: &Camera,
     frame: &Frame,
 ) -> (Vec<Sample<C>>, Dropped) {
-    let footprint = Footprint::new(views, camera, frame);
+    let all: Vec<usize> = (0..views.len()).collect();
+    let footprint = Footprint::of(views, &all, camera, frame);
     let samples = footprint.samples_between(views, f64::MIN, f64::MAX);
     let dropped = footprint.dropped(samples.len());
     (samples, dropped)

@@ -49,17 +49,12 @@ impl Frame {
     /// Whether a position lies in the frame.
     #[inline]
     pub fn holds(&self, x: f64, y: f64) -> bool {
-        self.holds_column(x) & self.holds_row(y)
+        self.holds_column(x) & (y >= self.rows.0) & (y <= self.rows.1)
     }
 
     #[inline]
     fn holds_column(&self, x: f64) -> bool {
         (x >= -self.margin) & (x <= self.width as f64 - 1.0 + self.margin)
-    }
-
-    #[inline]
-    fn holds_row(&self, y: f64) -> bool {
-        (y >= self.rows.0) & (y <= self.rows.1)
     }
 }
 

@@ -17,7 +17,7 @@ mod surface;
 pub use colour::coloured;
 pub(crate) use surface::from_scattered;
 
-use crate::depth::{DepthMap, Measure};
+use crate::depth::DepthMap;
 use crate::interpolate::plane::surface_memory;
 use crate::pipeline::{APERTURE, Agreement, DisparityGain, NEGLIGIBLE};
 use crate::propagate::{Nearest, View, Viewpoint};
@@ -93,11 +93,7 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, Mem
 /// Whether errors of a map displace its samples by more than the fit notices, in the nearest other view.
 fn is_noticeable<P: Viewpoint>(views: &[View<'_, P>], view: usize, other: Option<usize>, error: f64) -> bool {
     let Some(other) = other.filter(|_| error > 0.0) else { return false };
-    let (from, to) = (&views[view], &views[other]);
-    let gain = match from.map.measure() {
-        Measure::Disparity => DisparityGain::along_rows(from.camera.distance(&to.camera)),
-        Measure::Depth => DisparityGain::of(from.map, from.camera.map_to(&to.camera)),
-    };
+    let gain = DisparityGain::between(&views[view], &views[other].camera);
     gain.product([1.0, 0.0, 1.0]) * error * error > NEGLIGIBLE * APERTURE
 }
 

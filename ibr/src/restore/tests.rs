@@ -2,9 +2,10 @@
 
 use super::*;
 use crate::camera::Camera;
+use crate::depth::Measure;
 use crate::image::Image;
 use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
-use crate::uncalibrated::random::Dice;
+use crate::uncalibrated::random::dice::Dice;
 
 const SIZE: (usize, usize) = (240, 180);
 

@@ -1,12 +1,11 @@
 //! A scene file for what lies in a folder: a COLMAP workspace, the frames of transforms.json, a rectified
 //! pair of Middlebury, or two photographs.
 
-use super::SceneError;
 use crate::camera::colmap::{PLACES, is_model, read_model};
 use crate::camera::transforms::read_transforms;
 use crate::camera::{Camera, CameraList, Frame};
 use crate::depth::{DepthMap, Measure};
-use crate::files::{InputError, Location};
+use crate::files::InputError;
 use crate::image::{read_image, read_map};
 use crate::pipeline::Agreement;
 use crate::propagate::RectifiedView;
@@ -27,13 +26,13 @@ const PHOTOGRAPHS: [&str; 7] = ["png", "jpg", "jpeg", "ppm", "pgm", "tif", "tiff
 const KNOWN: &str = "a folder with a COLMAP model and its images, transforms.json, calib.txt beside im0.png and im1.png, \
                      disp2.png and disp6.png beside im2.png and im6.png, or two photographs of a rectified rig";
 
-type Described<T> = Result<T, SceneError>;
+type Described<T> = Result<T, InputError>;
 
 /// The text of a scene file in the folder `beside`, for a folder, a `transforms.json` or the left and the
 /// right photograph of a rectified rig. Its virtual view is half-way between two views.
 ///
 /// # Errors
-/// [`SceneError`] of a file, or that there is no scene.
+/// [`InputError`] of a file, or that there is no scene.
 pub fn describe(paths: &[PathBuf], beside: &Path) -> Described<String> {
     let text = Text { beside };
     match paths {
@@ -44,13 +43,9 @@ pub fn describe(paths: &[PathBuf], beside: &Path) -> Described<String> {
             let missing = paths.iter().find(|path| !path.exists());
             let path = missing.or(paths.first()).map_or(Path::new(""), PathBuf::as_path);
             let reason = if missing.is_some() { "there is no such file or folder" } else { "it is no scene" };
-            Err(wrong(path, format!("{reason}; give {KNOWN}")))
+            Err(InputError::file(path, format!("{reason}; give {KNOWN}")))
         }
     }
-}
-
-fn wrong(path: &Path, reason: String) -> SceneError {
-    InputError::content(path, Location::File, reason).into()
 }
 
 /// The text of a scene file that stands in a folder.
@@ -88,7 +83,7 @@ impl Text<'_> {
         }
         match &photographs(folder)?[..] {
             [left, right] => self.of_pair([left, right]),
-            found => Err(wrong(
+            found => Err(InputError::file(
                 folder,
                 format!(
                     "there is no scene in this folder of {} photographs; a scene is {KNOWN}, which may also be given by their names",
@@ -106,7 +101,7 @@ impl Text<'_> {
             Err(_) => absolute(),
         };
         let text = written.to_str().ok_or_else(|| {
-            wrong(path, "a scene file is text in UTF-8, and this path is not; rename it".into())
+            InputError::file(path, "a scene file is text in UTF-8, and this path is not; rename it")
         })?;
         Ok(toml::Value::String(text.into()).to_string())
     }
@@ -185,7 +180,7 @@ impl Text<'_> {
         let above = workspace(model).unwrap_or(folder);
         let images = [above, folder, model].map(|place| place.join("images"));
         let images = images.iter().find(|images| images.is_dir()).ok_or_else(|| {
-            wrong(folder, "the photographs of the COLMAP model are looked for in a folder `images` beside it, which is not there".into())
+            InputError::file(folder, "the photographs of the COLMAP model are looked for in a folder `images` beside it, which is not there")
         })?;
         let head = format!("# Views of a COLMAP model.\ncolmap = {}\n", self.path(model)?);
         self.of_list(head, &list, |frame| {
@@ -227,16 +222,15 @@ impl Text<'_> {
         }
         let Some(first) = there.first() else {
             let reason = format!("none of the {} photographs that it lists is there", list.frames.len());
-            return Err(wrong(list.path(), reason));
+            return Err(InputError::file(list.path(), reason));
         };
         let apart = |a: &Placed<'_>, b: &Placed<'_>| (a.camera.centre() - b.camera.centre()).norm();
         let others = there.iter().filter(|other| apart(other, first) > 0.0);
         let second = others.min_by(|a, b| apart(a, first).total_cmp(&apart(b, first))).unwrap_or(first);
-        let camera = first.camera.towards(&second.camera, 0.5).map_err(|source| SceneError::Camera {
-            path: list.path().into(),
-            which: "the virtual camera".into(),
-            source,
-        })?;
+        let camera = first
+            .camera
+            .towards(&second.camera, 0.5)
+            .map_err(|source| InputError::file(list.path(), format!("the virtual camera: {source}")))?;
         let names = [first, second].map(|placed| Quoted(&placed.frame.image).to_string());
         let count = there.len();
         there.sort_by(|a, b| {
@@ -285,7 +279,7 @@ fn workspace(model: &Path) -> Option<&Path> {
 
 /// The files in a folder, in the order of their names.
 fn files(folder: &Path) -> Described<Vec<PathBuf>> {
-    let listed = std::fs::read_dir(folder).map_err(|e| wrong(folder, e.to_string()))?;
+    let listed = std::fs::read_dir(folder).map_err(|e| InputError::file(folder, e.to_string()))?;
     let mut files: Vec<PathBuf> =
         listed.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_file()).collect();
     files.sort();
@@ -318,11 +312,7 @@ fn scale_of(left: (&Path, &Path), right: (&Path, &Path)) -> Described<Option<(f6
             .map(|(image, size, stored, path)| {
                 let map = DepthMap::new(*size, stored.clone(), scale, Measure::Disparity);
                 let fitting = map.and_then(|map| map.fits(image.size(), 1).map(|()| map));
-                fitting.map_err(|source| SceneError::Depth {
-                    view: image_name(path),
-                    path: path.to_path_buf(),
-                    source,
-                })
+                fitting.map_err(|e| InputError::file(path, e))
             })
             .collect::<Result<_, _>>()?;
         let view = |k: usize| RectifiedView { image: &views[k].0, map: &maps[k], camera: k as f64 };
@@ -332,8 +322,4 @@ fn scale_of(left: (&Path, &Path), right: (&Path, &Path)) -> Described<Option<(f6
         }
     }
     Ok(best)
-}
-
-fn image_name(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }

@@ -14,7 +14,7 @@ pub use complete::complete;
 pub use goals::MOST_FRAMES;
 
 use super::spec::{SceneSpec, ViewSpec};
-use super::{Kind, Scene, SceneError, SourceView};
+use super::{Kind, Scene, SourceView};
 use crate::camera::middlebury::Calibration;
 use crate::files::{InputError, Location};
 use crate::image::{Image, MOST_PIXELS, read_image_within};
@@ -53,39 +53,32 @@ impl Default for LoadOptions {
 /// Parses the text of a scene file; `path` appears in messages.
 ///
 /// # Errors
-/// [`SceneError::Input`] with line, column and the keys known there.
-pub fn parse(text: &str, path: &Path) -> Result<SceneSpec, SceneError> {
+/// [`InputError`] with line, column and the keys known there.
+pub fn parse(text: &str, path: &Path) -> Result<SceneSpec, InputError> {
     toml::from_str(text).map_err(|e| {
         let reason = of_document(e.message()) + &keys::hint(e.message());
         let Some(place) = e.span().map(|span| messages::Location::find(text, span)) else {
-            return incomplete(path, reason);
+            return InputError::file(path, reason);
         };
         InputError::content(path, Location::Column(place.line, place.column), format!("{reason}\n{place}"))
-            .into()
     })
 }
 
-/// Reads all files of a scene. Relative paths start in the folder of the scene file `path`.
+/// Reads all files of a scene. Relative paths start in the folder of the scene file `path`. `watch` is
+/// called with the share of the views that are read.
 ///
 /// # Errors
-/// [`SceneError`], naming file, view and numbers.
-pub fn load(spec: &SceneSpec, path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
-    load_watched(spec, path, options, &|_| ())
-}
-
-/// As [`load`]; `watch` is called with the share of the views that are read.
-///
-/// # Errors
-/// As [`load`].
-pub fn load_watched(
+/// [`InputError`], naming file, view and numbers.
+pub fn load(
     spec: &SceneSpec,
     path: &Path,
     options: &LoadOptions,
     watch: Watch<'_>,
-) -> Result<Scene, SceneError> {
+) -> Result<Scene, InputError> {
     let spec = &complete(spec, path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    Loader { spec, path, folder, options, watch, models: Models::default() }.load()
+    Loader { spec, path, folder, options, watch, models: Models::default(), filled: AtomicUsize::new(0) }
+        .load()
 }
 
 struct Loader<'a> {
@@ -95,20 +88,15 @@ struct Loader<'a> {
     options: &'a LoadOptions,
     watch: Watch<'a>,
     models: Models,
+    /// Unknown depths that were filled.
+    filled: AtomicUsize,
 }
 
-type Loaded<T> = Result<T, SceneError>;
-
-/// That the scene file contradicts itself, or what it lacks.
-fn incomplete(path: &Path, reason: String) -> SceneError {
-    InputError::content(path, Location::File, reason).into()
-}
+type Loaded<T> = Result<T, InputError>;
 
 /// What was read of a scene.
 struct Inputs {
     kind: Kind,
-    /// Unknown depths that were filled.
-    filled: usize,
     calibration: Option<Calibration>,
     /// What was decided, for the user.
     notes: Vec<String>,
@@ -126,17 +114,17 @@ impl Loader<'_> {
         }
         let goals = self.goals()?;
         let own = index.map(|i| &self.spec.view[i]);
-        let Inputs { mut kind, filled, calibration, mut notes } =
-            if views.iter().any(|v| v.position.is_some()) {
-                self.rectified(&views, own, &goals)?
-            } else if views.iter().any(|v| v.camera.is_some() || self.source_of(v).is_some()) {
-                self.calibrated(&views, left_out.as_ref(), &goals)?
-            } else {
-                self.uncalibrated(&views, own, &goals)?
-            };
+        let Inputs { mut kind, calibration, mut notes } = if views.iter().any(|v| v.position.is_some()) {
+            self.rectified(&views, own, &goals)?
+        } else if views.iter().any(|v| v.camera.is_some() || self.source_of(v).is_some()) {
+            self.calibrated(&views, left_out.as_ref(), &goals)?
+        } else {
+            self.uncalibrated(&views, own, &goals)?
+        };
         notes.extend(self.spec.notes.iter().cloned());
         notes.extend(note_of_dark(&kind.images()));
         let outliers = self.restored(&mut kind, &mut notes)?;
+        let filled = self.filled.load(Ordering::Relaxed);
         Ok(Scene { kind, offset: self.offset(&goals)?, filled, outliers, calibration, notes })
     }
 
@@ -155,8 +143,9 @@ impl Loader<'_> {
         })
     }
 
-    fn incomplete(&self, reason: impl Into<String>) -> SceneError {
-        incomplete(self.path, reason.into())
+    /// That the scene file contradicts itself, or what it lacks.
+    fn incomplete(&self, reason: impl ToString) -> InputError {
+        InputError::file(self.path, reason)
     }
 
     /// Refuses two views with the same name; images without a name may be used twice.
@@ -193,7 +182,7 @@ impl Loader<'_> {
     }
 
     fn image(&self, path: &Path) -> Loaded<Image> {
-        Ok(read_image_within(&self.file(path), self.options.max_pixels)?)
+        read_image_within(&self.file(path), self.options.max_pixels)
     }
 
     fn need<T>(&self, value: Option<T>, view: &ViewSpec, key: &str, kind: &str) -> Loaded<T> {

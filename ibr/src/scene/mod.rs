@@ -7,19 +7,16 @@ mod spec;
 pub use folder::describe;
 #[cfg(feature = "cli")]
 pub(crate) use load::room_to_parse;
-pub use load::{LoadOptions, MOST_FRAMES, complete, load, load_watched, parse};
+pub use load::{LoadOptions, MOST_FRAMES, complete, load, parse};
 pub use spec::{SceneSpec, TargetSpec, ViewSpec};
 
+use crate::camera::Camera;
 use crate::camera::middlebury::Calibration;
-use crate::camera::{Camera, CameraError};
-use crate::depth::{DepthError, DepthMap};
-use crate::files::InputError;
-use crate::image::{Image, ImageError};
+use crate::depth::DepthMap;
+use crate::image::Image;
 use crate::pipeline::uncalibrated::Target;
 use crate::propagate::View;
 use crate::uncalibrated::Point;
-use hybank::messages::Quoted;
-use std::path::PathBuf;
 
 /// A scene, read and checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,15 +69,6 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Views to render from.
-    pub fn views(&self) -> usize {
-        match self {
-            Self::Rectified { views, .. } => views.len(),
-            Self::Calibrated { views, .. } => views.len(),
-            Self::Uncalibrated { images, .. } => images.len(),
-        }
-    }
-
     /// The photographs of the views.
     pub fn images(&self) -> Vec<&Image> {
         match self {
@@ -116,36 +104,4 @@ impl<P: Copy> SourceView<P> {
     pub fn view(&self) -> View<'_, P> {
         View { image: &self.image, map: &self.map, camera: self.camera }
     }
-}
-
-/// Errors of a scene.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SceneError {
-    /// A camera of the scene.
-    #[error("{}: {which}: {source}", Quoted(path))]
-    Camera {
-        /// The scene file.
-        path: PathBuf,
-        /// Which camera.
-        which: String,
-        /// The problem.
-        source: CameraError,
-    },
-    /// A depth map of the scene.
-    #[error("view \"{}\": {}: {source}", Quoted(view), Quoted(path))]
-    Depth {
-        /// The view.
-        view: String,
-        /// The map.
-        path: PathBuf,
-        /// The problem.
-        source: DepthError,
-    },
-    /// An image of the scene.
-    #[error(transparent)]
-    Image(#[from] ImageError),
-    /// The scene file, its tracks, or a file of its cameras.
-    #[error(transparent)]
-    Input(#[from] InputError),
 }

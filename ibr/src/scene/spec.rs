@@ -81,15 +81,13 @@ pub struct TargetSpec {
     /// 3 x 4 camera matrix, in pixels.
     pub camera: Option<[[f64; 4]; 3]>,
     /// Name of the image of the COLMAP model or transforms file whose camera is used.
-    #[serde(alias = "camera_of")]
-    pub colmap_image: Option<String>,
+    pub camera_of: Option<String>,
     /// Position at the end of a path along the baseline.
     pub to_position: Option<f64>,
     /// Camera at the end of a path.
     pub to_camera: Option<[[f64; 4]; 3]>,
     /// Image of the COLMAP model or transforms file with the camera at the end of a path.
-    #[serde(alias = "to_camera_of")]
-    pub to_colmap_image: Option<String>,
+    pub to_camera_of: Option<String>,
     /// Views on the path, both ends included.
     pub frames: Option<usize>,
     /// Width and height in pixels.
@@ -102,8 +100,6 @@ pub struct TargetSpec {
     pub to_between: Option<f64>,
     /// Added to every column, in pixels.
     pub offset: Option<f64>,
-    /// File of tracks, unless given at the top.
-    pub matches: Option<PathBuf>,
 }
 
 /// Where a map comes from.
@@ -133,8 +129,7 @@ impl SceneSpec {
         let images = self.view.iter().map(|view| &view.image);
         let maps = self.view.iter().flat_map(|view| [&view.disparity, &view.depth]).flatten();
         let maps = maps.filter(|map| matches!(MapSource::of(map), MapSource::File(_)));
-        let lists = [&self.matches, &self.transforms, &self.calib].into_iter();
-        let lists = lists.chain(self.targets.iter().map(|target| &target.matches)).flatten();
+        let lists = [&self.matches, &self.transforms, &self.calib].into_iter().flatten();
         let models = self.view.iter().map(|view| &view.colmap).chain([&self.colmap]).flatten();
         let models = models.flat_map(|model| {
             ["cameras.txt", "images.txt", "cameras.bin", "images.bin"].map(|file| model.join(file))
@@ -150,24 +145,23 @@ impl TargetSpec {
         [["camera", "camera_of"], ["to_camera", "to_camera_of"], ["from_tracks", "between"]];
 
     /// Keys that one kind of scene has: the key, the kind, and whether it is given.
-    pub(super) fn keys(&self) -> [(&'static str, &'static str, bool); 10] {
+    pub(super) fn keys(&self) -> [(&'static str, &'static str, bool); 9] {
         [
             ("position", "rectified", self.position.is_some()),
             ("to_position", "rectified", self.to_position.is_some()),
             ("camera", "calibrated", self.camera.is_some()),
-            ("camera_of", "calibrated", self.colmap_image.is_some()),
+            ("camera_of", "calibrated", self.camera_of.is_some()),
             ("to_camera", "calibrated", self.to_camera.is_some()),
-            ("to_camera_of", "calibrated", self.to_colmap_image.is_some()),
+            ("to_camera_of", "calibrated", self.to_camera_of.is_some()),
             ("from_tracks", "matches-only", self.from_tracks.is_some()),
             ("between", "matches-only", self.between.is_some()),
             ("to_between", "matches-only", self.to_between.is_some()),
-            ("matches", "matches-only", self.matches.is_some()),
         ]
     }
 
     /// Whether the end of a path is given.
     pub(super) fn has_end(&self) -> bool {
-        let cameras = self.to_camera.is_some() || self.to_colmap_image.is_some();
+        let cameras = self.to_camera.is_some() || self.to_camera_of.is_some();
         self.to_position.is_some() || self.to_between.is_some() || cameras
     }
 }

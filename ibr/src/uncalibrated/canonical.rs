@@ -19,11 +19,6 @@ pub struct CanonicalPair {
     pub cameras: [Matrix3x4<f64>; 2],
 }
 
-/// \[v\]_x with \[v\]_x w = v x w.
-pub fn cross_matrix(v: &Vector3<f64>) -> Matrix3<f64> {
-    Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
-}
-
 /// The canonical pair of F (in pixels) for the matches that agree with it.
 ///
 /// # Errors
@@ -35,7 +30,7 @@ pub fn canonical_pair(f: &Matrix3<f64>, matches: &[Match]) -> Result<CanonicalPa
     let f = f / f.norm();
     let (u, _, _) = linear::svd3(&f).ok_or(GeometryError::Numerical { what: "epipole" })?;
     let epipole: Vector3<f64> = u.column(2).into_owned();
-    let base = cross_matrix(&epipole) * f;
+    let base = epipole.cross_matrix() * f;
     let a = best_plane(&base, &epipole, matches, &first, &second)
         .ok_or(GeometryError::Numerical { what: "reference plane" })?;
     let mut one = Matrix3x4::zeros();
@@ -79,7 +74,7 @@ mod tests {
         let pair = canonical_pair(&f, &matches).unwrap();
         let two = &pair.cameras[1];
         let (m, e): (Matrix3<f64>, Vector3<f64>) = (two.fixed_columns::<3>(0).into(), two.column(3).into());
-        let back = pair.second.matrix().transpose() * (cross_matrix(&e) * m) * pair.first.matrix();
+        let back = pair.second.matrix().transpose() * (e.cross_matrix() * m) * pair.first.matrix();
         let back = back / back.norm();
         let sign = if back.dot(&f) < 0.0 { -1.0 } else { 1.0 };
         assert!((back * sign - f).norm() < 1e-9, "{back} {f}");

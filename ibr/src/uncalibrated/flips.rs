@@ -158,7 +158,7 @@ impl Quad {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::uncalibrated::random::Dice;
+    use crate::uncalibrated::random::dice::Dice;
 
     /// Features on a disturbed grid of 7 x 7 points, ten pixels apart, with chi from their positions.
     fn mesh(chi: impl Fn(&Point) -> f64, shake: f64) -> Mesh {

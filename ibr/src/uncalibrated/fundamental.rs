@@ -4,7 +4,7 @@
 
 use super::normalise::Normalisation;
 use super::random::consensus;
-use super::{GeometryError, Match, RobustSettings, homogeneous};
+use super::{GeometryError, Match, homogeneous};
 use crate::linear;
 use nalgebra::Matrix3;
 
@@ -74,11 +74,15 @@ fn chosen(matches: &[Match], indices: &[usize]) -> Vec<Match> {
     indices.iter().map(|i| matches[*i]).collect()
 }
 
-/// F by RANSAC over samples of eight, refitted on the inliers until their set is stable.
+/// Sampson distance below which a match is an inlier of F, in pixels.
+const EPIPOLAR: f64 = 1.0;
+
+/// F by RANSAC over samples of eight, refitted on the inliers until their set is stable; the same seed gives
+/// the same bits.
 ///
 /// # Errors
 /// [`GeometryError`]: fewer than 8 matches or inliers, coordinates that are not finite, planar matches.
-pub fn robust(matches: &[Match], settings: &RobustSettings) -> Result<Fundamental, GeometryError> {
+pub fn robust(matches: &[Match], seed: u64) -> Result<Fundamental, GeometryError> {
     if matches.len() < 8 {
         return Err(GeometryError::TooFew { what: "matches", found: matches.len(), needed: 8 });
     }
@@ -86,10 +90,10 @@ pub fn robust(matches: &[Match], settings: &RobustSettings) -> Result<Fundamenta
     if let Some(index) = matches.iter().position(|m| !finite(m)) {
         return Err(GeometryError::NotFinite { index });
     }
-    let best = consensus::<8>(matches.len(), settings, |sample| {
-        Some(inliers(&eight_point(&chosen(matches, &sample)).ok()?, matches, settings.epipolar))
+    let best = consensus::<8>(matches.len(), seed, |sample| {
+        Some(inliers(&eight_point(&chosen(matches, &sample)).ok()?, matches, EPIPOLAR))
     });
-    let (threshold, total) = (settings.epipolar, matches.len());
+    let (threshold, total) = (EPIPOLAR, matches.len());
     if best.len() < 8 {
         refuse_planes(matches, threshold)?;
         let (what, inliers) = ("fundamental matrix", best.len());
@@ -205,33 +209,28 @@ pub(crate) mod tests {
         for i in (0..120).step_by(3) {
             matches[i].second += Point::new(20.0 + i as f64, 35.0 - 0.7 * i as f64);
         }
-        let settings = RobustSettings::default();
-        let found = robust(&matches, &settings).unwrap();
+        let found = robust(&matches, 1).unwrap();
         let good = |i: &usize| !i.is_multiple_of(3);
         assert_eq!(found.inliers.iter().filter(|i| good(i)).count(), 80);
         assert!(found.inliers.iter().filter(|i| !good(i)).count() <= 3, "{:?}", found.inliers);
-        assert_eq!(found, robust(&matches, &settings).unwrap());
+        assert_eq!(found, robust(&matches, 1).unwrap());
     }
 
     #[test]
     fn planes_rotations_and_few_matches_are_refused() {
-        let settings = RobustSettings::default();
         let scene = Synthetic::new(50, true);
-        assert!(matches!(robust(&scene.matches(), &settings), Err(GeometryError::Planar { .. })));
+        assert!(matches!(robust(&scene.matches(), 1), Err(GeometryError::Planar { .. })));
         let mut noisy = scene.matches();
         for (i, m) in noisy.iter_mut().enumerate() {
             m.second += Point::new(0.2 * ((i % 5) as f64 - 2.0) / 2.0, 0.2 * ((i % 3) as f64 - 1.0));
         }
-        assert!(matches!(robust(&noisy, &settings), Err(GeometryError::Planar { .. })));
+        assert!(matches!(robust(&noisy, 1), Err(GeometryError::Planar { .. })));
         let few = &Synthetic::new(7, false).matches();
-        assert_eq!(
-            robust(few, &settings),
-            Err(GeometryError::TooFew { what: "matches", found: 7, needed: 8 })
-        );
+        assert_eq!(robust(few, 1), Err(GeometryError::TooFew { what: "matches", found: 7, needed: 8 }));
         let mut broken = Synthetic::new(20, false).matches();
         broken[4].first.x = f64::NAN;
-        assert_eq!(robust(&broken, &settings), Err(GeometryError::NotFinite { index: 4 }));
+        assert_eq!(robust(&broken, 1), Err(GeometryError::NotFinite { index: 4 }));
         let same = vec![Match { first: Point::new(1.0, 2.0), second: Point::new(3.0, 4.0) }; 30];
-        assert!(robust(&same, &settings).is_err());
+        assert!(robust(&same, 1).is_err());
     }
 }

@@ -91,11 +91,15 @@ fn in_front(rays: &[[Point; 2]], r: &Matrix3<f64>, t: &Vector3<f64>) -> Vec<Opti
     rays.iter().map(point).collect()
 }
 
-/// The guess that fits F best, of one per focal length.
+/// The guess with the focal length that fits F best.
 pub fn best(f: &Matrix3<f64>, matches: &[Match], sizes: [(usize, usize); 2]) -> Option<MetricGuess> {
     let side = sizes.iter().map(|s| s.0.max(s.1)).max().unwrap_or(1) as f64;
-    let guesses = FOCAL_LENGTHS.iter().filter_map(|factor| guess(f, matches, sizes, factor * side));
-    guesses.max_by(|a, b| a.fit.total_cmp(&b.fit))
+    let fits = FOCAL_LENGTHS.iter().filter_map(|factor| {
+        let focal = factor * side;
+        Some((focal, Essential::of(f, &sizes.map(|size| calibration(focal, size)))?.fit))
+    });
+    let (focal, _) = fits.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    guess(f, matches, sizes, focal)
 }
 
 /// The image points of the matches behind `guess` in a camera between the two views. Rotation and centre

@@ -107,27 +107,6 @@ pub enum GeometryError {
     },
 }
 
-/// Thresholds and seeds of the robust estimators.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RobustSettings {
-    /// Seed of the random samples: the same seed gives the same bits.
-    pub seed: u64,
-    /// Sampson distance below which a match is an inlier of F, in pixels.
-    pub epipolar: f64,
-    /// Reprojection error below which a sighting is an inlier of a resected camera, in pixels.
-    pub reprojection: f64,
-    /// Probability of drawing at least one sample without outliers.
-    pub confidence: f64,
-    /// Greatest number of samples drawn.
-    pub trials: usize,
-}
-
-impl Default for RobustSettings {
-    fn default() -> Self {
-        Self { seed: 1, epipolar: 1.0, reprojection: 2.0, confidence: 0.999, trials: 5000 }
-    }
-}
-
 pub(crate) fn homogeneous(p: &Point) -> nalgebra::Vector3<f64> {
     p.push(1.0)
 }

@@ -2,7 +2,7 @@
 
 use super::normalise::Normalisation;
 use super::random::consensus;
-use super::{GeometryError, Point, RobustSettings};
+use super::{GeometryError, Point};
 use crate::linear;
 use nalgebra::{Matrix3x4, SMatrix, SVector, Vector4};
 
@@ -33,17 +33,20 @@ const DEGENERATE: f64 = 1e-9;
 /// Steps of the refinement.
 const STEPS: usize = 10;
 
-/// Estimates the camera from points and their images.
+/// Reprojection error below which a sighting is an inlier, in pixels.
+pub(crate) const REPROJECTION: f64 = 2.0;
+
+/// Estimates the camera from points and their images; the same seed gives the same bits.
 ///
 /// # Errors
 /// [`GeometryError`]: fewer than 6 sightings or inliers, points that leave the camera undetermined.
-pub fn resect(sightings: &[Sighting], settings: &RobustSettings) -> Result<Resection, GeometryError> {
+pub fn resect(sightings: &[Sighting], seed: u64) -> Result<Resection, GeometryError> {
     let what = "matches of known points in the virtual view";
     if sightings.len() < NEEDED {
         return Err(GeometryError::TooFew { what, found: sightings.len(), needed: NEEDED });
     }
-    let threshold = settings.reprojection;
-    let mut set = consensus::<NEEDED>(sightings.len(), settings, |sample| {
+    let threshold = REPROJECTION;
+    let mut set = consensus::<NEEDED>(sightings.len(), seed, |sample| {
         Some(inliers(&direct(&sample.map(|i| sightings[i])).ok()?, sightings, threshold))
     });
     let mut camera = Matrix3x4::zeros();
@@ -168,7 +171,7 @@ mod tests {
     fn the_camera_comes_back_in_any_frame() {
         let scene = Synthetic::new(40, false);
         let h = projective();
-        let found = resect(&sightings(&scene, &h), &RobustSettings::default()).unwrap();
+        let found = resect(&sightings(&scene, &h), 1).unwrap();
         assert_eq!(found.inliers.len(), 40);
         assert!(found.rms < 1e-6, "{}", found.rms);
         let want = scene.cameras[2] * h.try_inverse().unwrap();
@@ -185,17 +188,16 @@ mod tests {
             let noise = Point::new(((i * 7) % 5) as f64 - 2.0, ((i * 3) % 5) as f64 - 2.0) * 0.1;
             s.image += if i % 4 == 0 { Point::new(40.0, -25.0) } else { noise };
         }
-        let found = resect(&seen, &RobustSettings::default()).unwrap();
+        let found = resect(&seen, 1).unwrap();
         assert_eq!(found.inliers.len(), 45);
         assert!(found.rms < 0.25, "{}", found.rms);
     }
 
     #[test]
     fn five_points_and_planes_are_not_enough() {
-        let settings = RobustSettings::default();
         let few = sightings(&Synthetic::new(5, false), &projective());
-        assert!(matches!(resect(&few, &settings), Err(GeometryError::TooFew { found: 5, needed: 6, .. })));
+        assert!(matches!(resect(&few, 1), Err(GeometryError::TooFew { found: 5, needed: 6, .. })));
         let flat = sightings(&Synthetic::new(40, true), &projective());
-        assert!(resect(&flat, &settings).is_err());
+        assert!(resect(&flat, 1).is_err());
     }
 }

@@ -16,8 +16,7 @@ pub struct Tracks {
 }
 
 impl Tracks {
-    /// Reads a track file; empty lines and text after a `#` are ignored. A point that is not seen is
-    /// one `-`, or one for each coordinate.
+    /// Reads a track file; empty lines and text after a `#` are ignored.
     ///
     /// # Errors
     /// [`InputError`], with file and line.
@@ -30,29 +29,24 @@ impl Tracks {
     /// # Errors
     /// [`InputError`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, InputError> {
-        let fault = |line: usize, reason| InputError::content(path, Location::Line(line), reason);
-        let mut lines = Vec::new();
+        let mut tracks = Self { columns: 0, rows: Vec::new() };
         for (i, line) in text.lines().enumerate() {
-            let content = line.split('#').next().unwrap_or("");
-            let words = words(content).map_err(|word| {
-                fault(i + 1, format!("\"{}\" is neither a finite number nor \"-\"", Quoted(word)))
-            })?;
-            if !words.is_empty() {
-                lines.push((i + 1, words));
+            let fault = |reason| InputError::content(path, Location::Line(i + 1), reason);
+            let row = columns(line.split('#').next().unwrap_or("")).map_err(fault)?;
+            if row.is_empty() {
+                continue;
             }
+            if tracks.rows.is_empty() {
+                tracks.columns = row.len();
+            }
+            if row.len() != tracks.columns {
+                let reason = format!("{} columns where the file has {}; {FORMAT}", row.len(), tracks.columns);
+                return Err(fault(reason));
+            }
+            tracks.rows.push(row);
         }
-        // One dash per point, unless only one dash per coordinate gives all lines the same number of
-        // columns.
-        let single = columns(&lines, one_dash);
-        let rows = match columns(&lines, two_dashes) {
-            Ok(rows) if single.is_err() => rows,
-            _ => single.map_err(|(line, found, expected)| {
-                fault(line, format!("{found} columns where the file has {expected}; {FORMAT}"))
-            })?,
-        };
-        let empty = || InputError::content(path, Location::File, "there is no track in the file");
-        let columns = rows.first().map(Vec::len).ok_or_else(empty)?;
-        Ok(Self { columns, rows })
+        let empty = || InputError::file(path, "there is no track in the file");
+        (!tracks.rows.is_empty()).then_some(tracks).ok_or_else(empty)
     }
 
     /// Number of views that the tracks run over.
@@ -66,70 +60,34 @@ impl Tracks {
     }
 }
 
-/// Bytes that the tracks of a text take while they are read, in both ways to count dashes.
+/// Bytes that the tracks of a text take while they are read.
 fn room(text: &str) -> f64 {
-    const WORD: f64 = 130.0;
-    const LINE: f64 = 160.0;
+    const WORD: f64 = 50.0;
+    const LINE: f64 = 100.0;
     WORD * text.split_whitespace().count() as f64 + LINE * text.lines().count() as f64
 }
 
-type Words = Vec<Option<f64>>;
-type Rows = Vec<Vec<Option<Point>>>;
-
-/// Numbers, and `None` for each dash; the error is the word that is neither.
-fn words(line: &str) -> Result<Words, String> {
-    let word = |w: &str| match w {
-        "-" => Ok(None),
-        w => w.parse().ok().filter(|v: &f64| v.is_finite()).map(Some).ok_or_else(|| w.to_string()),
-    };
-    line.split_whitespace().map(word).collect()
-}
-
-/// Number of words in the first column of a line, and the point if there is one.
-type Reading = fn(&[Option<f64>]) -> (usize, Option<Point>);
-
-/// Reads all lines in one way; the error is the line, its columns and those of the first line.
-fn columns(lines: &[(usize, Words)], read: Reading) -> Result<Rows, (usize, usize, usize)> {
-    let mut rows = Rows::new();
-    for (line, words) in lines {
-        let (row, whole) = columns_of(words, read);
-        let expected = rows.first().map_or(words.len().div_ceil(2), Vec::len);
-        if !whole || (!rows.is_empty() && row.len() != expected) {
-            return Err((*line, row.len(), expected));
-        }
-        rows.push(row);
-    }
-    Ok(rows)
-}
-
-/// The columns of a line, and whether all of them were complete.
-fn columns_of(words: &[Option<f64>], read: Reading) -> (Vec<Option<Point>>, bool) {
-    let (mut row, mut rest) = (Vec::new(), words);
-    while !rest.is_empty() {
-        let (taken, point) = read(rest);
-        let column = &rest[..taken.min(rest.len())];
-        if column.len() < taken || (point.is_none() && column.iter().any(Option::is_some)) {
-            return (row, false);
-        }
+/// The columns of a line.
+fn columns(line: &str) -> Result<Vec<Option<Point>>, String> {
+    let mut words = line.split_whitespace();
+    let mut row = Vec::new();
+    while let Some(word) = words.next() {
+        let point = match word {
+            "-" => None,
+            x => {
+                let y = words.next().filter(|y| *y != "-");
+                let y = y.ok_or_else(|| format!("\"{}\" has no second coordinate; {FORMAT}", Quoted(x)))?;
+                Some(Point::new(number(x)?, number(y)?))
+            }
+        };
         row.push(point);
-        rest = &rest[taken..];
     }
-    (row, true)
+    Ok(row)
 }
 
-fn one_dash(words: &[Option<f64>]) -> (usize, Option<Point>) {
-    match words {
-        [None, ..] => (1, None),
-        [Some(x), Some(y), ..] => (2, Some(Point::new(*x, *y))),
-        _ => (2, None),
-    }
-}
-
-fn two_dashes(words: &[Option<f64>]) -> (usize, Option<Point>) {
-    match words {
-        [Some(x), Some(y), ..] => (2, Some(Point::new(*x, *y))),
-        _ => (2, None),
-    }
+fn number(word: &str) -> Result<f64, String> {
+    let number = word.parse().ok().filter(|v: &f64| v.is_finite());
+    number.ok_or_else(|| format!("\"{}\" is neither a finite number nor \"-\"", Quoted(word)))
 }
 
 #[cfg(test)]
@@ -141,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn one_dash_or_two_for_what_is_not_seen() {
+    fn a_dash_is_for_what_is_not_seen() {
         let want = [
             vec![Some(Point::new(1.0, 2.0)), None, Some(Point::new(3.0, 4.5))],
             vec![None, None, Some(Point::new(5.0, 6.0))],
@@ -149,8 +107,9 @@ mod tests {
         ];
         let one = parse("# tracks\n1 2 - 3 4.5\n\n- - 5 6 # far\n1 1 2 2 3 3\n").unwrap();
         assert_eq!((one.columns(), one.rows()), (3, &want[..]));
-        let two = parse("1 2 - - 3 4.5\n- - - - 5 6\n1 1 2 2 3 3\n").unwrap();
-        assert_eq!(two, one);
+        assert!(
+            parse("1 2 - - 3 4.5\n1 1 2 2 3 3\n").unwrap_err().to_string().starts_with("t.txt:2: 3 columns")
+        );
     }
 
     #[test]
@@ -158,7 +117,8 @@ mod tests {
         let message = |text| parse(text).unwrap_err().to_string();
         assert!(message("1 2 3 4\n1 2 3 x\n").starts_with("t.txt:2: \"x\" is neither"));
         assert!(message("1 2 3 4\n1 2\n").starts_with("t.txt:2: 1 columns where the file has 2"));
-        assert!(message("1 2 3\n").starts_with("t.txt:1:"));
+        assert!(message("1 2 3\n").starts_with("t.txt:1: \"3\" has no second"));
+        assert!(message("1 - 3\n").starts_with("t.txt:1: \"1\" has no second"));
         assert!(message("1 nan\n").contains("nan"));
         assert!(message("# nothing\n").contains("no track"));
         assert!(Tracks::read(Path::new("/nowhere")).unwrap_err().to_string().contains("/nowhere"));

@@ -157,7 +157,8 @@ fn residual(views: &[RectifiedView<'_>], position: f64, image: &Image) -> Vec<f6
 fn predict(name: &str, rig: &Rig, which: &[usize], position: f64, truth: &Image, offset: f64) -> Verdict {
     let views = rig.views(which);
     let settings = RenderSettings { offset, ..RenderSettings::default() };
-    let predicted = Predictor::new(&views, &settings).unwrap().at(&position, (), None).unwrap();
+    let predicted =
+        Predictor::new(&views, &settings).unwrap().at(&position, views[0].image.size(), None).unwrap();
     judge(name, &predicted, &views, position, truth)
 }
 

@@ -126,11 +126,11 @@ fn no_pixel_exceeds_its_sure_bound() {
 fn a_sure_bound_needs_limits() {
     let rig = degraded(&synthetic(&[0.0, 1.0, 0.5]), 0.0, 1e-3);
     let predictor = Predictor::new(&rig.views(&[0, 1]), &RenderSettings::default()).unwrap();
-    let without = predictor.at(&0.5, (), None).unwrap();
+    let without = predictor.at(&0.5, rig.images[0].size(), None).unwrap();
     assert!(without.sure_bound.is_empty() && without.totals().sure_bound.is_none());
     assert!(without.within_sure_bound(&rig.images[2]).is_none());
     let limits = Limits { curvature: 60.0, intensity: 1.0, disparity: 0.01 };
-    let with = predictor.at(&0.5, (), Some(&limits)).unwrap();
+    let with = predictor.at(&0.5, rig.images[0].size(), Some(&limits)).unwrap();
     assert_eq!(with.estimate, without.estimate);
     assert_eq!(with.within_sure_bound(&rig.images[2]), Some(1.0));
     assert!(with.rows().iter().all(|row| row.sure_bound.is_some()));

@@ -36,7 +36,7 @@ pub(crate) fn render_uncalibrated<'py>(
     let special = UncalibratedSettings { reverse_order, ..UncalibratedSettings::default() };
     let run = move |_: &_| {
         let images: Vec<&Image> = images.iter().collect();
-        render(&images, &tracks, &target, size, &RenderSettings::default(), &special)
+        render(&images, &tracks, &target, size, &RenderSettings::default(), &special, &|_| ())
     };
     let done = background::run(py, None, run)?.map_err(refused)?;
     if done.geometry.order_by == OrderBy::Nothing {

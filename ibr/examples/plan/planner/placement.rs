@@ -140,7 +140,7 @@ fn trust(wanted: &Wanted<'_>, candidate: &Candidate<'_>) -> Vec<f32> {
         let (column, row) = (x as usize, p / width);
         let other = f64::from(candidate.disparity.row(row)[column]);
         let same = (other - d).abs() <= (SAME_POINT * d).max(1.0);
-        match (same, candidate.disparity.relief(column, row).behind_edge) {
+        match (same, candidate.disparity.is_behind_edge(column, row)) {
             (false, _) => 0.0,
             (true, true) => DOUBTFUL_WEIGHT,
             (true, false) => 1.0,

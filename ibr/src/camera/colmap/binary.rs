@@ -6,7 +6,7 @@
 //!              count of points u64, per point: x f64, y f64, point id i64
 //! ```
 
-use super::{Pose, inner, pose};
+use super::{Fault, Pose, inner, pose};
 use crate::camera::list::Inner;
 use std::collections::BTreeMap;
 
@@ -36,9 +36,6 @@ pub(super) fn most_records(bytes: &[u8]) -> usize {
     let stated = bytes.first_chunk().map_or(0, |count| u64::from_le_bytes(*count));
     usize::try_from(stated).map_or(usize::MAX, |stated| stated).min(bytes.len() / RECORD)
 }
-
-/// What is wrong with a file, and the number of the record from 1.
-pub(super) type Fault = (usize, String);
 
 /// The cameras by their ids.
 pub(super) fn cameras(bytes: &[u8]) -> Result<BTreeMap<u64, Inner>, Fault> {

@@ -38,8 +38,9 @@ pub fn read_model(folder: &Path) -> Result<CameraList, InputError> {
     }
     if !folder.join("cameras.txt").exists() && folder.join("cameras.bin").exists() {
         let room = |bytes: &[u8]| LISTED * binary::most_records(bytes) as f64;
-        let load = |name: &str| files::read_with_room(&folder.join(name), FILES, room);
-        return parse_binary(&load("cameras.bin")?, &load("images.bin")?, folder);
+        let load = |name: &str| files::read_bytes(&folder.join(name), FILES, room);
+        let (cameras, images) = (load("cameras.bin")?, load("images.bin")?);
+        return join(folder, "bin", Location::Record, binary::cameras(&cameras), binary::images(&images));
     }
     // Two lines per image.
     let room = |text: &str| LISTED / 2.0 * text.lines().count() as f64;
@@ -63,16 +64,7 @@ fn no_model(folder: &Path) -> InputError {
         _ => format!("there is no such folder; {CHECK_THE_PATH}"),
     };
     let reason = format!("there is neither cameras.txt nor cameras.bin: {remedy}");
-    InputError::content(folder, Location::File, reason)
-}
-
-fn parse_binary(cameras: &[u8], images: &[u8], folder: &Path) -> Result<CameraList, InputError> {
-    let fault = |name: &str, (record, reason): (usize, String)| {
-        InputError::content(&folder.join(name), Location::Record(record), reason)
-    };
-    let inners = binary::cameras(cameras).map_err(|e| fault("cameras.bin", e))?;
-    let poses = binary::images(images).map_err(|e| fault("images.bin", e))?;
-    join(&inners, poses, &folder.join("images.bin")).map_err(|e| fault("images.bin", e))
+    InputError::file(folder, reason)
 }
 
 /// The same from the texts of the two files; `folder` appears in messages.
@@ -80,27 +72,33 @@ fn parse_binary(cameras: &[u8], images: &[u8], folder: &Path) -> Result<CameraLi
 /// # Errors
 /// [`InputError`].
 pub fn parse_model(cameras: &str, images: &str, folder: &Path) -> Result<CameraList, InputError> {
-    let fault = |name: &str, (line, reason): (usize, String)| {
-        InputError::content(&folder.join(name), Location::Line(line), reason)
-    };
-    let inners = parse_cameras(cameras).map_err(|e| fault("cameras.txt", e))?;
-    let poses = parse_images(images).map_err(|e| fault("images.txt", e))?;
-    join(&inners, poses, &folder.join("images.txt")).map_err(|e| fault("images.txt", e))
+    join(folder, "txt", Location::Line, parse_cameras(cameras), parse_images(images))
 }
 
-/// The images of the file `path` by their names; the error is the line or record of one whose camera is not
-/// listed.
-fn join(inners: &BTreeMap<u64, Inner>, poses: Vec<Pose>, path: &Path) -> Result<CameraList, (usize, String)> {
+/// The images with their cameras, from what the two files in a folder say; `at` is where a fault is.
+fn join(
+    folder: &Path,
+    ending: &str,
+    at: fn(usize) -> Location,
+    cameras: Result<BTreeMap<u64, Inner>, Fault>,
+    images: Result<Vec<Pose>, Fault>,
+) -> Result<CameraList, InputError> {
+    let path = |name: &str| folder.join(format!("{name}.{ending}"));
+    let fault = |name: &str, (place, reason): Fault| InputError::content(&path(name), at(place), reason);
+    let cameras = cameras.map_err(|e| fault("cameras", e))?;
+    let images = images.map_err(|e| fault("images", e))?;
     let mut frames = BTreeMap::new();
-    for (k, Pose { at, id, camera, pose, name }) in poses.into_iter().enumerate() {
-        let inner = *inners.get(&camera).ok_or_else(|| {
-            (at, format!("image \"{}\" has camera {camera}, which the cameras do not list", Quoted(&name)))
-        })?;
-        frames
-            .insert(name.clone(), Frame { image: name.into(), depth: None, number: k + 1, id, pose, inner });
+    for (number, Pose { at, id, camera, pose, name }) in (1..).zip(images) {
+        let unlisted =
+            || format!("image \"{}\" has camera {camera}, which the cameras do not list", Quoted(&name));
+        let inner = *cameras.get(&camera).ok_or_else(|| fault("images", (at, unlisted())))?;
+        frames.insert(name.clone(), Frame { image: name.into(), depth: None, number, id, pose, inner });
     }
-    Ok(CameraList::new(path.into(), frames.into_values().collect()))
+    Ok(CameraList::new(path("images"), frames.into_values().collect()))
 }
+
+/// What is wrong with a file, with the number of the line or the record from 1.
+type Fault = (usize, String);
 
 /// Lines with content, with their numbers.
 fn content(text: &str) -> impl Iterator<Item = (usize, &str)> {
@@ -113,7 +111,7 @@ fn number<T: std::str::FromStr>(word: Option<&str>, name: &str) -> Result<T, Str
 }
 
 /// CAMERA_ID MODEL WIDTH HEIGHT PARAMS...
-fn parse_cameras(text: &str) -> Result<BTreeMap<u64, Inner>, (usize, String)> {
+fn parse_cameras(text: &str) -> Result<BTreeMap<u64, Inner>, Fault> {
     let lines = content(text).filter(|(_, l)| !l.is_empty());
     lines.map(|(i, line)| parse_camera(line).map_err(|reason| (i, reason))).collect()
 }
@@ -187,7 +185,7 @@ struct Pose {
 }
 
 /// Two lines per image: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then its points, which are ignored.
-fn parse_images(text: &str) -> Result<Vec<Pose>, (usize, String)> {
+fn parse_images(text: &str) -> Result<Vec<Pose>, Fault> {
     let mut lines = content(text);
     let mut poses = Vec::new();
     while let Some((i, line)) = lines.next() {

@@ -6,7 +6,7 @@
 //!               per image: id u32, index u32
 //! ```
 
-use super::{binary, content, is_model, no_model, number};
+use super::{Fault, binary, content, is_model, no_model, number};
 use crate::files::{self, InputError, Location};
 use nalgebra::Vector3;
 use std::path::Path;
@@ -36,7 +36,7 @@ pub fn read_points(folder: &Path) -> Result<Vec<ScenePoint>, InputError> {
     }
     let (text, bytes) = (folder.join("points3D.txt"), folder.join("points3D.bin"));
     if !text.exists() && bytes.exists() {
-        let file = files::read_with_room(&bytes, FILES, |bytes| PARSED * bytes.len() as f64)?;
+        let file = files::read_bytes(&bytes, FILES, |bytes| PARSED * bytes.len() as f64)?;
         let fault = |(record, reason)| InputError::content(&bytes, Location::Record(record), reason);
         return binary_points(&file).map_err(fault);
     }
@@ -60,7 +60,7 @@ fn finite(value: f64) -> Result<f64, String> {
     if value.is_finite() { Ok(value) } else { Err(format!("the coordinate {value} is not finite")) }
 }
 
-fn binary_points(bytes: &[u8]) -> Result<Vec<ScenePoint>, binary::Fault> {
+fn binary_points(bytes: &[u8]) -> Result<Vec<ScenePoint>, Fault> {
     binary::records(bytes, |rest| {
         let _: [u8; 8] = binary::take(rest)?;
         let mut coordinate = || finite(binary::float(rest)?);

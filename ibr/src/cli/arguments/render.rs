@@ -112,7 +112,7 @@ impl RenderArguments {
         let mut settings = RenderSettings { nearest, keep_smoothing, ..self.scene.settings(offset) };
         settings.method = self.method;
         let stage = &mut settings.interpolation;
-        stage.holes.fill = self.fill;
+        stage.fill = self.fill;
         match self.degree {
             Some(Degree::Linear) => stage.fit.degree = Degree::Linear,
             Some(Degree::Cubic) => stage.plane = PlaneSettings::CUBIC,

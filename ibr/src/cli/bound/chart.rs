@@ -1,45 +1,28 @@
 //! The plot of a prediction: the numbers of every image row, and below them what the estimate comes from.
 
 use crate::analysis::{Cause, Totals, ViewError};
+use crate::cli::failure::Failure;
 use crate::image::Image;
-use hybank::plot::{Chart, PlotError, Series};
+use hybank::plot::{Chart, Series};
 use image::{ImageFormat, RgbImage};
 use std::io::Cursor;
 use std::path::Path;
 
-/// A file that could not be made.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum ChartError {
-    #[error(transparent)]
-    Plot(#[from] PlotError),
-    #[error("the two charts could not be joined: {0}")]
-    Join(#[from] image::ImageError),
-}
-
-/// The format of a plot.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Format {
-    Svg,
-    Png,
-}
-
-impl Format {
-    /// The format that the extension of a file names, if it is one.
-    pub(super) fn of(path: &Path) -> Option<Self> {
-        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
-            "svg" => Some(Self::Svg),
-            "png" => Some(Self::Png),
-            _ => None,
-        }
-    }
+/// The format that the extension of a file names, if plots are written in it.
+pub(super) fn format(path: &Path) -> Option<&'static str> {
+    let ending = path.extension()?.to_str()?;
+    ["svg", "png"].into_iter().find(|format| ending.eq_ignore_ascii_case(format))
 }
 
 /// The bytes of the plot, one chart above the other.
-pub(super) fn file(predicted: &ViewError, truth: Option<&Image>, path: &Path) -> Result<Vec<u8>, ChartError> {
+pub(super) fn file(predicted: &ViewError, truth: Option<&Image>, path: &Path) -> Result<Vec<u8>, Failure> {
     let charts = [numbers(predicted, truth), causes(predicted)];
-    match Format::of(path) {
-        Some(Format::Png) => stacked_pixels(&charts),
-        _ => Ok(stacked_svg(&charts[0].to_svg()?, &charts[1].to_svg()?).into_bytes()),
+    match format(path) {
+        Some("png") => stacked_pixels(&charts),
+        _ => {
+            let [above, below] = charts.map(|chart| chart.to_svg().map_err(Failure::input));
+            Ok(stacked_svg(&above?, &below?).into_bytes())
+        }
     }
 }
 
@@ -113,16 +96,18 @@ fn stacked_svg(above: &str, below: &str) -> String {
 }
 
 /// Two charts as one PNG file, one above the other.
-fn stacked_pixels(charts: &[Chart; 2]) -> Result<Vec<u8>, ChartError> {
+fn stacked_pixels(charts: &[Chart; 2]) -> Result<Vec<u8>, Failure> {
     let mut data = Vec::new();
     let (mut width, mut height) = (0, 0);
     for chart in charts {
-        let pixels = image::load_from_memory_with_format(&chart.to_png()?, ImageFormat::Png)?.to_rgb8();
+        let png = chart.to_png().map_err(Failure::input)?;
+        let pixels = image::load_from_memory_with_format(&png, ImageFormat::Png).map_err(Failure::input)?;
+        let pixels = pixels.to_rgb8();
         (width, height) = (pixels.width(), height + pixels.height());
         data.extend(pixels.into_raw());
     }
     let whole = RgbImage::from_raw(width, height, data).unwrap_or_default();
     let mut bytes = Cursor::new(Vec::new());
-    whole.write_to(&mut bytes, ImageFormat::Png)?;
+    whole.write_to(&mut bytes, ImageFormat::Png).map_err(Failure::input)?;
     Ok(bytes.into_inner())
 }

@@ -6,7 +6,8 @@ use crate::cli::arguments::BoundArguments;
 use crate::cli::failure::Failure;
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded};
-use crate::image::{Image, ImageError, Levels, pfm};
+use crate::files::refuse_pixels_without_memory;
+use crate::image::{Image, Levels, pfm};
 use hybank::messages::Quoted;
 use std::path::{Path, PathBuf};
 
@@ -32,7 +33,7 @@ impl Outputs {
         let named = [("--map", &self.map), ("--plot", &self.plot)];
         let named = named.iter().filter_map(|(option, path)| Some((*option, path.as_deref()?)));
         output::check_names(&named.collect::<Vec<_>>())?;
-        if let Some(plot) = self.plot.as_ref().filter(|plot| chart::Format::of(plot).is_none()) {
+        if let Some(plot) = self.plot.as_ref().filter(|plot| chart::format(plot).is_none()) {
             let message = "a plot is written as .svg or .png";
             return Err(Failure::Usage(format!("--plot {}: {message}", Quoted(plot))));
         }
@@ -53,13 +54,13 @@ impl Outputs {
         if let Some(path) = &self.map {
             // A picture or three numbers per pixel, and the file.
             let size = predicted.rendering.image.size();
-            ImageError::refuse_without_memory(path, size, 36.0).map_err(Failure::input)?;
+            refuse_pixels_without_memory(path, size, 36.0).map_err(Failure::input)?;
             let (map, largest) = map(predicted, path)?;
             white = largest;
             all.push(map);
         }
         if let Some(path) = &self.plot {
-            let bytes = chart::file(predicted, truth, path).map_err(Failure::input)?;
+            let bytes = chart::file(predicted, truth, path)?;
             all.push(Encoded { bytes, path });
         }
         Ok((all, white))

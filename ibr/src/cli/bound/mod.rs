@@ -2,7 +2,6 @@
 
 mod chart;
 mod files;
-mod predictor;
 mod report;
 
 use super::arguments::BoundArguments;
@@ -10,13 +9,12 @@ use super::failure::Failure;
 use super::inputs;
 use super::output;
 use super::progress::Progress;
-use crate::analysis::{Limits, ViewError};
+use crate::analysis::{Advice, Limits, Predicted, Predictor, ViewError};
 use crate::image::Image;
 use crate::pipeline::{RenderError, Watch};
-use crate::scene::{self, Kind, Scene};
+use crate::scene::{self, Kind, Scene, SourceView};
 use files::Outputs;
 use hybank::messages::Quoted;
-use predictor::Predictor;
 use report::{Frames, Summary};
 use std::path::Path;
 
@@ -26,34 +24,60 @@ pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
     progress.step("reading");
     let (scene, truth) = read(arguments, &|share| progress.within(share))?;
     progress.step("calibrating");
-    let settings = arguments.scene.settings(scene.offset);
-    let named = |e: RenderError| Failure::input(e).in_file(&arguments.scene.file);
-    let predictor = Predictor::new(&scene.kind, &settings, limits).map_err(named)?;
-    progress.step("predicting");
-    let frames = scene.kind.frames();
-    let (mut summaries, mut written) = (Vec::new(), Vec::new());
-    let mut worst: Option<(usize, f64, ViewError)> = None;
-    for frame in 0..frames {
-        let predicted = predictor.at(frame).map_err(named)?;
-        let mut summary = Summary::new(&predicted, predictor.agreement(), &scene.outliers);
-        summary.measure(&predicted, truth.as_ref(), arguments.scene.truth.as_deref())?;
-        let outputs = Outputs::of(arguments, (frames > 1).then_some(frame));
-        let (encoded, white) = outputs.encoded(&predicted, truth.as_ref())?;
-        summary.white = white;
-        written.extend(output::begin(&encoded, arguments.scene.force)?);
-        summaries.push(summary);
-        let estimate = predicted.totals().estimate;
-        if worst.as_ref().is_none_or(|(_, largest, _)| estimate > *largest) {
-            worst = Some((frame, estimate, predicted));
-        }
-        progress.within((frame + 1) as f64 / (frames + 1) as f64);
+    let job = Job { arguments, scene: &scene, limits, truth, progress };
+    match &scene.kind {
+        Kind::Rectified { views, positions } => job.predict(views, positions, views[0].image.size()),
+        Kind::Calibrated { views, cameras, size } => job.predict(views, cameras, *size),
+        Kind::Uncalibrated { .. } => Err(Failure::input(RenderError::NoViews)),
     }
-    let Some((worst, _, now)) = worst else { return Err(Failure::input(RenderError::NoViews)) };
-    summaries[worst].advice = Some(predictor.advice(worst, &now).map_err(named)?);
-    output::commit(written)?;
-    drop(progress);
-    inputs::warn_of_contradictions(predictor.agreement(), &scene.kind);
-    Frames { summaries, worst }.print(predictor.agreement(), arguments.scene.json)
+}
+
+/// What was asked for and read.
+struct Job<'a> {
+    arguments: &'a BoundArguments,
+    scene: &'a Scene,
+    limits: Option<Limits>,
+    truth: Option<Image>,
+    progress: Progress,
+}
+
+impl Job<'_> {
+    /// Predicts the views of `cameras`, writes their files and prints the report.
+    fn predict<P: Predicted>(
+        self,
+        views: &[SourceView<P>],
+        cameras: &[P],
+        size: (usize, usize),
+    ) -> Result<(), Failure> {
+        let Self { arguments, scene, limits, truth, progress } = self;
+        let named = |e: RenderError| Failure::input(e).in_file(&arguments.scene.file);
+        let views: Vec<_> = views.iter().map(SourceView::view).collect();
+        let predictor = Predictor::new(&views, &arguments.scene.settings(scene.offset)).map_err(named)?;
+        progress.step("predicting");
+        let (mut summaries, mut written) = (Vec::new(), Vec::new());
+        let mut worst: Option<(usize, f64, ViewError)> = None;
+        for (frame, camera) in cameras.iter().enumerate() {
+            let predicted = predictor.at(camera, size, limits.as_ref()).map_err(named)?;
+            let mut summary = Summary::new(&predicted, predictor.agreement(), &scene.outliers);
+            summary.measure(&predicted, truth.as_ref(), arguments.scene.truth.as_deref())?;
+            let outputs = Outputs::of(arguments, (cameras.len() > 1).then_some(frame));
+            let (encoded, white) = outputs.encoded(&predicted, truth.as_ref())?;
+            summary.white = white;
+            written.extend(output::begin(&encoded, arguments.scene.force)?);
+            summaries.push(summary);
+            let estimate = predicted.totals().estimate;
+            if worst.as_ref().is_none_or(|(_, largest, _)| estimate > *largest) {
+                worst = Some((frame, estimate, predicted));
+            }
+            progress.within((frame + 1) as f64 / (cameras.len() + 1) as f64);
+        }
+        let Some((worst, _, now)) = worst else { return Err(Failure::input(RenderError::NoViews)) };
+        summaries[worst].advice = Some(Advice::on(&predictor, &cameras[worst], size, &now).map_err(named)?);
+        output::commit(written)?;
+        drop(progress);
+        inputs::warn_of_contradictions(predictor.agreement(), &scene.kind);
+        Frames { summaries, worst }.print(predictor.agreement(), arguments.scene.json)
+    }
 }
 
 /// Checks that need no file, and the limits for a sure bound.

@@ -1,11 +1,13 @@
 //! The files of one virtual view.
 
+use crate::analysis::difference;
 use crate::cli::arguments::RenderArguments;
 use crate::cli::failure::Failure;
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded};
 use crate::depth::{FAR, Measure};
-use crate::image::{Image, ImageError, Levels, encode_levels, encode_with_alpha, pfm};
+use crate::files::refuse_pixels_without_memory;
+use crate::image::{Image, Levels, encode_levels, encode_with_alpha, pfm};
 use crate::interpolate::Cover;
 use crate::pipeline::Rendering;
 use hybank::messages::Quoted;
@@ -137,7 +139,7 @@ impl Outputs {
         let (mut all, mut white) = (Vec::new(), None);
         for (part, path) in &self.parts {
             // Numbers or a picture, and the file.
-            ImageError::refuse_without_memory(path, rendering.image.size(), 20.0).map_err(Failure::input)?;
+            refuse_pixels_without_memory(path, rendering.image.size(), 20.0).map_err(Failure::input)?;
             all.push(match part {
                 Part::View => self.view(rendering, path)?,
                 Part::Mask => output::encoded(&mask_image(rendering), path, Levels::Eight)?,
@@ -201,14 +203,10 @@ fn counts<'a>(rendering: &Rendering, path: &'a Path) -> Result<Encoded<'a>, Fail
     Ok(Encoded { bytes, path })
 }
 
-/// Absolute difference from the photograph in grey levels, mean over the channels.
+/// Absolute difference from the photograph in grey levels, mean over the channels; of the brightness, if
+/// only one of them has colours.
 fn errors<'a>(image: &Image, truth: &Image, path: &'a Path) -> Result<(Encoded<'a>, Option<f32>), Failure> {
-    let pixels = image.width() * image.height();
-    let difference = |p: usize| {
-        let (a, b) = (image.pixel::<3>(p), truth.pixel::<3>(p));
-        a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>() / 3.0
-    };
-    let values: Vec<f32> = (0..pixels).map(difference).collect();
+    let values = difference(image, truth);
     if path.extension().is_some_and(|ending| ending == "pfm") {
         return Ok((numbers(values, image.size(), path), None));
     }

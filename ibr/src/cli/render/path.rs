@@ -4,7 +4,8 @@ use super::{Outputs, Summary, outputs};
 use crate::cli::arguments::RenderArguments;
 use crate::cli::failure::Failure;
 use crate::cli::output;
-use crate::image::{FrameRate, Image, ImageError, Levels, y4m};
+use crate::files::refuse_pixels_without_memory;
+use crate::image::{FrameRate, Image, Levels, y4m};
 use hybank::files::AtomicFile;
 use serde::Serialize;
 use std::io::Write;
@@ -87,7 +88,7 @@ impl Film {
 
     pub(super) fn append(&mut self, image: &Image) -> Result<(), Failure> {
         let path = self.file.as_ref().map_or("standard output".into(), |file| file.name().to_string());
-        ImageError::refuse_without_memory(Path::new(&path), image.size(), 6.0).map_err(Failure::input)?;
+        refuse_pixels_without_memory(Path::new(&path), image.size(), 6.0).map_err(Failure::input)?;
         let mut bytes = Vec::new();
         if !self.begun {
             bytes = y4m::header(image.size(), image.channels(), self.fps);

@@ -1,7 +1,8 @@
 //! Samples enter the normal equations: into the whole image, or into several parts of it at a time.
 
 use super::{Fit2Sample, GUESSED, PlaneProblem};
-use crate::interpolate::{HoleSettings, InterpolationError, check_samples};
+use crate::interpolate::holes::reach;
+use crate::interpolate::{InterpolationError, check_samples};
 use crate::occlusion::LARGEST_SPACING;
 use crate::sample::Sample;
 use hybank::sampling::fit2::Fit2Rows;
@@ -14,7 +15,6 @@ const TURNED_AT_A_TIME: usize = 4096;
 /// Some rows of the image with all that samples change there.
 struct Part<'a, const ORDER: usize, const C: usize> {
     size: (usize, usize),
-    holes: HoleSettings,
     /// Index of the first pixel.
     first: usize,
     fit: Fit2Rows<'a, ORDER, C>,
@@ -26,12 +26,11 @@ struct Part<'a, const ORDER: usize, const C: usize> {
 impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
     /// The part before a row of the image, and the rest.
     fn split(self, row: usize) -> (Self, Self) {
-        let (size, holes, pixel) = (self.size, self.holes, row * self.size.0);
+        let (size, pixel) = (self.size, row * self.size.0);
         let (fit, at) = (self.fit.split_at(row), pixel - self.first);
         let (depth, distance) = (self.depth.split_at_mut(at), self.distance.split_at_mut(at));
         let counts = self.counts.split_at_mut(at);
-        let part =
-            |first, fit, depth, distance, counts| Self { size, holes, first, fit, depth, distance, counts };
+        let part = |first, fit, depth, distance, counts| Self { size, first, fit, depth, distance, counts };
         (
             part(self.first, fit.0, depth.0, distance.0, counts.0),
             part(pixel, fit.1, depth.1, distance.1, counts.1),
@@ -57,7 +56,7 @@ impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
     /// closer, and counts it at its nearest pixel.
     fn register(&mut self, s: &Sample<C>) {
         let (width, height) = self.size;
-        let half = self.holes.reach(s.spacing);
+        let half = reach(s.spacing);
         let range = |centre: f64, length: usize| {
             // Casts cut toward zero; rounding functions are library calls on baseline x86-64. A pixel too
             // many fails the test of the distance below.
@@ -86,7 +85,6 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     fn whole(&mut self) -> Part<'_, ORDER, C> {
         Part {
             size: (self.width, self.height),
-            holes: self.settings.holes,
             first: 0,
             fit: self.fit.rows(),
             depth: &mut self.depth,
@@ -125,7 +123,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         make: impl Fn(&Range<usize>) -> Vec<Sample<C>> + Sync,
     ) -> Result<(), InterpolationError> {
         // A sample changes the rows of its splines and those within its reach.
-        let margin = self.settings.holes.reach(LARGEST_SPACING).ceil() as usize + ORDER - 1;
+        let margin = reach(LARGEST_SPACING).ceil() as usize + ORDER - 1;
         if self.turned || bands.iter().any(|band| band.len() < 2 * margin) {
             return bands.iter().try_for_each(|band| self.add(&make(band)));
         }

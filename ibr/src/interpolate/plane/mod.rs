@@ -163,19 +163,11 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     }
 
     /// Fits the image. With `region`, only the pixels where it is true are filled and fitted together;
-    /// all others become black disocclusions.
+    /// all others become black disocclusions. `watch` is called with the share of the fit that is done.
     ///
     /// # Errors
     /// [`InterpolationError::NoSamples`] when no sample was added.
-    pub fn solve(self, region: Option<&[bool]>) -> Result<PlaneFit, InterpolationError> {
-        self.solve_watched(region, &|_| ())
-    }
-
-    /// As [`PlaneProblem::solve`]; `watch` is called with the share of the fit that is done.
-    ///
-    /// # Errors
-    /// As [`PlaneProblem::solve`].
-    pub fn solve_watched(
+    pub fn solve(
         mut self,
         region: Option<&[bool]>,
         watch: Watch<'_>,
@@ -191,11 +183,11 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         let guessed = mask.iter_mut().zip(std::mem::take(&mut self.distance));
         let guessed = guessed.filter(|(cover, distance)| **cover == Cover::Seen && *distance >= GUESSED);
         guessed.for_each(|(cover, _)| *cover = Cover::Guessed);
-        let background = self.settings.holes.fill == HoleFill::Background;
+        let background = self.settings.fill == HoleFill::Background;
         if background && mask.contains(&Cover::Disocclusion) {
             self.fill_background(&mask, &inside);
         }
-        let left_out = self.settings.holes.fill == HoleFill::Leave;
+        let left_out = self.settings.fill == HoleFill::Leave;
         let fitted = |p: usize| inside(p) && !(left_out && mask[p].is_hole());
         let (counts, mut depth) = (std::mem::take(&mut self.counts), std::mem::take(&mut self.depth));
         let (mut values, convergence) = self.fitted(&depth, &fitted, watch);
@@ -329,7 +321,7 @@ fn interpolate_with<const ORDER: usize, const C: usize>(
 ) -> Result<PlaneFit, InterpolationError> {
     let mut problem = PlaneProblem::<ORDER, C>::new(size, settings)?;
     problem.add(samples)?;
-    problem.solve(None)
+    problem.solve(None, &|_| ())
 }
 
 #[cfg(test)]

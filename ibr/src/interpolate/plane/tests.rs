@@ -1,7 +1,6 @@
 //! The plane fit against the dense solution of its normal equations, and hole filling.
 
 use super::*;
-use crate::interpolate::HoleSettings;
 
 fn sample(x: f64, y: f64, depth: f32, value: f32) -> Sample<1> {
     Sample { x, y, depth, value: [value], ..Sample::BLANK }
@@ -53,7 +52,7 @@ fn equal_to_the_dense_solution() {
     let samples = scattered(size, |x, y| 128.0 + 60.0 * (x * 1.1).sin() * (y * 0.9).cos());
     let mut settings = Settings::default();
     settings.plane.tolerance = 1e-9;
-    settings.holes.fill = HoleFill::Bridge;
+    settings.fill = HoleFill::Bridge;
     let fit = interpolate(&samples, (size, size), &settings).unwrap();
     let n = size * size;
     let mut a = vec![vec![0.0; n + 1]; n];
@@ -118,8 +117,8 @@ fn disocclusions_take_the_farther_side() {
         assert!(row[11..20].iter().all(|v| (v - 40.0).abs() < 5.0), "{row:?}");
         assert!(row[9] > 190.0, "{row:?}");
         assert!(fit.mask[160..170].iter().all(|c| *c == Cover::Disocclusion));
-        let holes = HoleSettings { fill: HoleFill::Leave, ..HoleSettings::default() };
-        let left = interpolate(&samples, (30, 12), &Settings { holes, ..with(plane) }).unwrap();
+        let fill = HoleFill::Leave;
+        let left = interpolate(&samples, (30, 12), &Settings { fill, ..with(plane) }).unwrap();
         assert!(left.values[160..170].iter().all(|v| *v == 0.0));
     }
 }
@@ -130,7 +129,7 @@ fn outside_the_region_nothing_is_invented() {
     let mut problem = PlaneProblem::<2, 1>::new((14, 10), &Settings::default()).unwrap();
     problem.add(&samples).unwrap();
     let region: Vec<bool> = (0..140).map(|p| p % 14 < 10).collect();
-    let fit = problem.solve(Some(&region)).unwrap();
+    let fit = problem.solve(Some(&region), &|_| ()).unwrap();
     for (p, inside) in region.iter().enumerate() {
         let want = if *inside { 80.0 } else { 0.0 };
         assert!((fit.values[p] - want).abs() < 0.1, "{p} {}", fit.values[p]);
@@ -146,9 +145,9 @@ fn bands_add_up_and_empty_problems_fail() {
     let (a, b) = samples.split_at(50);
     problem.add(a).unwrap();
     problem.add(b).unwrap();
-    assert_eq!(problem.solve(None).unwrap(), whole);
+    assert_eq!(problem.solve(None, &|_| ()).unwrap(), whole);
     let empty = PlaneProblem::<2, 1>::new((4, 3), &Settings::default()).unwrap();
-    assert_eq!(empty.solve(None), Err(InterpolationError::NoSamples { width: 4, height: 3 }));
+    assert_eq!(empty.solve(None, &|_| ()), Err(InterpolationError::NoSamples { width: 4, height: 3 }));
 }
 
 /// A hole of 200 x 200 pixels that only the smoothing spans: the diagonal preconditioner needs hundreds of
@@ -163,8 +162,8 @@ fn large_holes_converge_and_are_harmonic_inside() {
         .map(|p| ((p % side) as f64, (p / side) as f64))
         .map(|(x, y)| sample(x, y, 1.0, tone(x, y) as f32))
         .collect();
-    let holes = HoleSettings { fill: HoleFill::Bridge, ..HoleSettings::default() };
-    let fit = interpolate(&samples, (side, side), &Settings { holes, ..Settings::default() }).unwrap();
+    let fill = HoleFill::Bridge;
+    let fit = interpolate(&samples, (side, side), &Settings { fill, ..Settings::default() }).unwrap();
     assert!(fit.convergence.reached && fit.convergence.steps < 120, "{:?}", fit.convergence);
     // A plane has no second differences, so the smoothing keeps it.
     let (x, y) = (120, 100);
@@ -197,7 +196,7 @@ fn narrow_images_are_flat_ones_turned() {
             let mut problem = PlaneProblem::<ORDER, 1>::new(size, &settings).unwrap();
             problem.add(samples).unwrap();
             let seen: Vec<bool> = problem.seen().collect();
-            (problem.solve(Some(region)).unwrap(), seen)
+            (problem.solve(Some(region), &|_| ()).unwrap(), seen)
         };
         let (narrow, seen) = fitted(&samples, (width, length), &region);
         let (flat, seen_flat) = fitted(&exchanged, (length, width), &flat_region);

@@ -1,6 +1,5 @@
 //! The two views from which a scene is reconstructed first, chosen among all of them.
 
-use super::UncalibratedSettings;
 use crate::linear;
 use crate::uncalibrated::fundamental;
 use crate::uncalibrated::{Match, Point};
@@ -13,17 +12,13 @@ const MOST_PAIRS: usize = 60;
 
 /// All views by number, the base pair first: the pair with the most matches that agree on one F, each
 /// counted the more, the more the points move against each other. The first two views if no pair has an F.
-pub(super) fn order(
-    tracks: &[Vec<Option<Point>>],
-    views: usize,
-    settings: &UncalibratedSettings,
-) -> Vec<usize> {
+pub(super) fn order(tracks: &[Vec<Option<Point>>], views: usize, seed: u64) -> Vec<usize> {
     let pairs = (0..views).flat_map(|i| (i + 1..views).map(move |j| [i, j]));
     let mut common: Vec<([usize; 2], Vec<Match>)> =
         pairs.map(|pair| (pair, matches(tracks, pair[0], pair[1]))).collect();
     common.sort_by_key(|(_, matches)| std::cmp::Reverse(matches.len()));
     let score = |matches: &[Match]| {
-        let f = fundamental::robust(matches, &settings.robust).ok()?;
+        let f = fundamental::robust(matches, seed).ok()?;
         let agreeing: Vec<Match> = f.inliers.iter().map(|i| matches[*i]).collect();
         let parallax = parallax(&agreeing)?;
         Some(agreeing.len() as f64 * parallax / (parallax + PARALLAX))
@@ -78,7 +73,7 @@ mod tests {
         let close = |j: usize| scene.image(0, j) + (scene.image(1, j) - scene.image(0, j)) * 0.01;
         let track = |j: usize| vec![Some(scene.image(0, j)), Some(close(j)), Some(scene.image(1, j))];
         let tracks: Vec<_> = (0..60).map(track).collect();
-        let order = order(&tracks, 3, &UncalibratedSettings::default());
+        let order = order(&tracks, 3, 1);
         assert!(order[..2].contains(&2) && order.len() == 3, "{order:?}");
     }
 }

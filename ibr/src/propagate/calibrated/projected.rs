@@ -4,7 +4,6 @@ use super::row_map::RowMap;
 use super::{CalibratedView, Frame, Tile};
 use crate::camera::Relative;
 use crate::depth::{Reliefs, TILE, or_far};
-use crate::image::Image;
 use crate::occlusion::{Points, RUN};
 use crate::propagate::{spacing, weight};
 use crate::sample::Sample;
@@ -57,32 +56,23 @@ impl Projected {
         let reliefs = view.map.reliefs(column, row);
         let mut places = Places::new(&RowMap::new(map, row), column, &depths, &reliefs, count);
         places.keep(frame, own, count);
-        self.append(&places, count);
         let (mut doubtful, mut guessed) = (reliefs.behind_edge, [false; TILE]);
         for (i, is_guessed) in view.map.guessed_from(first_pixel).iter().take(count.min(TILE)).enumerate() {
             guessed[i] = *is_guessed;
             doubtful[i] |= *is_guessed;
         }
-        self.guessed.extend_from_slice(&guessed[..count]);
-        self.append_trust(&places, &reliefs, &doubtful, count);
-        let first_place = self.doubtful.len() - count;
-        self.tiles.push(ProjectedTile { view: tile.view, first_pixel: first_pixel as u32, first_place });
-    }
-
-    fn append(&mut self, places: &Places, count: usize) {
-        let points = &mut self.points;
+        let spacings: [f32; TILE] = std::array::from_fn(|i| spacing(places.distance[i], reliefs.outline[i]));
+        let weights: [f32; TILE] = std::array::from_fn(|i| weight(places.area[i], doubtful[i]));
+        let (points, first_pixel) = (&mut self.points, first_pixel as u32);
+        self.tiles.push(ProjectedTile { view: tile.view, first_pixel, first_place: points.len() });
         points.x.extend_from_slice(&places.x[..count]);
         points.y.extend_from_slice(&places.y[..count]);
         points.depth.extend(places.depth[..count].iter().map(|d| *d as f32));
         points.own.extend_from_slice(&places.own[..count]);
-    }
-
-    fn append_trust(&mut self, places: &Places, reliefs: &Reliefs, doubtful: &[bool; TILE], count: usize) {
-        let spacings: [f32; TILE] = std::array::from_fn(|i| spacing(places.distance[i], reliefs.outline[i]));
-        let weights: [f32; TILE] = std::array::from_fn(|i| weight(places.area[i], doubtful[i]));
-        self.points.spacing.extend_from_slice(&spacings[..count]);
+        points.spacing.extend_from_slice(&spacings[..count]);
         self.weights.extend_from_slice(&weights[..count]);
         self.doubtful.extend_from_slice(&doubtful[..count]);
+        self.guessed.extend_from_slice(&guessed[..count]);
     }
 
     /// What the depth test needs.
@@ -102,73 +92,29 @@ impl Projected {
 
     /// The band's own samples.
     pub(crate) fn samples<const C: usize>(&self, views: &[CalibratedView<'_>]) -> Vec<Sample<C>> {
+        let Self { points, weights, doubtful, guessed, tiles } = self;
         let mut samples = Vec::with_capacity(self.count());
-        let ends = self.tiles.iter().skip(1).map(|next| next.first_place).chain([self.points.len()]);
-        for (tile, end) in self.tiles.iter().zip(ends) {
+        let ends = tiles.iter().skip(1).map(|next| next.first_place).chain([points.len()]);
+        for (tile, end) in tiles.iter().zip(ends) {
             let image = views[usize::from(tile.view)].image;
-            for (k, run) in (tile.first_place / RUN..end / RUN).enumerate() {
-                let run = self.run(run);
-                let sample = |i: usize| run.sample(image, tile, k * RUN, i);
-                match run.own {
-                    [true, true, true, true, true, true, true, true] => samples.extend((0..RUN).map(sample)),
-                    own => samples.extend((0..RUN).filter(|i| own[*i]).map(sample)),
+            let sample = |i: usize| {
+                let pixel = tile.first_pixel + (i - tile.first_place) as u32;
+                Sample {
+                    x: points.x[i],
+                    y: points.y[i],
+                    depth: points.depth[i],
+                    value: image.pixel::<C>(pixel as usize),
+                    spacing: points.spacing[i],
+                    weight: weights[i],
+                    pixel,
+                    view: tile.view,
+                    doubtful: doubtful[i],
+                    guessed: guessed[i],
                 }
-            }
+            };
+            samples.extend((tile.first_place..end).filter(|i| points.own[*i]).map(sample));
         }
         samples
-    }
-
-    #[inline]
-    fn run(&self, number: usize) -> Run<'_> {
-        let points = &self.points;
-        Run {
-            x: &points.x.as_chunks().0[number],
-            y: &points.y.as_chunks().0[number],
-            depth: &points.depth.as_chunks().0[number],
-            spacing: &points.spacing.as_chunks().0[number],
-            own: &points.own.as_chunks().0[number],
-            weights: &self.weights.as_chunks().0[number],
-            doubtful: &self.doubtful.as_chunks().0[number],
-            guessed: &self.guessed.as_chunks().0[number],
-        }
-    }
-}
-
-/// Some neighbouring pixels of a tile.
-struct Run<'a> {
-    x: &'a [f64; RUN],
-    y: &'a [f64; RUN],
-    depth: &'a [f32; RUN],
-    spacing: &'a [f32; RUN],
-    own: &'a [bool; RUN],
-    weights: &'a [f32; RUN],
-    doubtful: &'a [bool; RUN],
-    guessed: &'a [bool; RUN],
-}
-
-impl Run<'_> {
-    /// The sample of pixel i of the run that begins `start` pixels after the tile.
-    #[inline]
-    fn sample<const C: usize>(
-        &self,
-        image: &Image,
-        tile: &ProjectedTile,
-        start: usize,
-        i: usize,
-    ) -> Sample<C> {
-        let pixel = tile.first_pixel + (start + i) as u32;
-        Sample {
-            x: self.x[i],
-            y: self.y[i],
-            depth: self.depth[i],
-            value: image.pixel::<C>(pixel as usize),
-            spacing: self.spacing[i],
-            weight: self.weights[i],
-            pixel,
-            view: tile.view,
-            doubtful: self.doubtful[i],
-            guessed: self.guessed[i],
-        }
     }
 }
 

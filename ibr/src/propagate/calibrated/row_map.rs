@@ -86,21 +86,6 @@ impl<'a> RowMap<'a> {
         Projection { at: (p[0] * inverse, p[1] * inverse, p[2]), ray, inverse }
     }
 
-    /// What one pixel of known depth becomes.
-    #[inline]
-    fn fate(&self, x: f64, depth: f32, frame: &Frame) -> Fate {
-        let (u, v, d) = if self.linear { self.project(x, f64::from(depth)).at } else { self.bend(x, depth) };
-        let u = u + frame.offset;
-        // NaN: outside the domain of the lens model.
-        if d <= 0.0 || u.is_infinite() || v.is_infinite() {
-            Fate::Behind
-        } else if frame.holds_column(u) && frame.holds_row(v) {
-            Fate::Sample { row: v }
-        } else {
-            Fate::Outside
-        }
-    }
-
     /// The displacements of a landing, in virtual pixels, for a step of one pixel to the right and for one
     /// down, on a surface whose depth changes by `slopes` per pixel in these directions.
     ///
@@ -176,22 +161,18 @@ impl<'a> RowMap<'a> {
 
     /// The same from every pixel, and the number of pixels behind the virtual camera.
     pub(super) fn each(&self, column: usize, depths: &[f32], frame: &Frame) -> (Reach, usize) {
-        let mut behind = 0;
-        let mut rows = (f64::INFINITY, f64::NEG_INFINITY);
-        for (x, depth) in depths.iter().enumerate().filter(|(_, d)| !d.is_nan()) {
-            match self.fate((column + x) as f64, *depth, frame) {
-                Fate::Sample { row } => rows = (rows.0.min(row), rows.1.max(row)),
-                Fate::Behind => behind += 1,
-                Fate::Outside => {}
+        let (mut behind, mut rows) = (0, (f64::INFINITY, f64::NEG_INFINITY));
+        for (x, depth) in (column..).zip(depths).filter(|(_, d)| !d.is_nan()) {
+            let (x, depth) = (x as f64, *depth);
+            let (u, v, d) =
+                if self.linear { self.project(x, f64::from(depth)).at } else { self.bend(x, depth) };
+            // NaN: outside the domain of the lens model.
+            if d <= 0.0 || u.is_infinite() || v.is_infinite() {
+                behind += 1;
+            } else if frame.holds(u + frame.offset, v) {
+                rows = (rows.0.min(v), rows.1.max(v));
             }
         }
         (Reach { columns: (f64::MIN, f64::MAX), rows, spacing: LARGEST_SPACING }, behind)
     }
-}
-
-/// The outcome for one pixel of known depth.
-enum Fate {
-    Sample { row: f64 },
-    Behind,
-    Outside,
 }

@@ -37,7 +37,7 @@ fn bands_together_are_the_whole() {
     let target = camera([0.0, 0.0, 0.4], 0.0);
     let frame = Frame::whole(SIZE.0, SIZE.1, 0.5, 0.0);
     let (all, dropped) = calibrated::<1>(&views, &target, &frame);
-    let footprint = Footprint::new(&views, &target, &frame);
+    let footprint = Footprint::of(&views, &[0, 1], &target, &frame);
     assert_eq!(footprint.dropped(all.len()), dropped);
     assert!(footprint.most_samples() >= all.len());
     assert_eq!(all.len() + dropped.total(), 2 * SIZE.0 * SIZE.1);
@@ -57,7 +57,7 @@ fn the_spacing_of_a_tile_is_bounded() {
     let views = [camera([0.2, 0.0, 0.0], 0.05), camera([-0.3, 0.1, -0.2], -0.3), target]
         .map(|camera| CalibratedView { image: &image, map: &depth, camera });
     let frame = Frame::whole(SIZE.0, SIZE.1, 20.0, 0.0);
-    let footprint = Footprint::new(&views, &target, &frame);
+    let footprint = Footprint::of(&views, &[0, 1, 2], &target, &frame);
     let (mut found, mut near) = (0, 0);
     for tile in &footprint.tiles {
         let mut projected = Projected::default();
@@ -83,7 +83,7 @@ fn bands_hide_what_the_whole_hides() {
         let test = DepthTest { epsilon, ..DepthTest::default() };
         let (mut want, _) = calibrated::<1>(&views, &target, &frame);
         assert!(crate::occlusion::remove(&mut want, &test) > 100);
-        let footprint = Footprint::new(&views, &target, &frame);
+        let footprint = Footprint::of(&views, &[0, 1], &target, &frame);
         let (mut projected, mut search, mut got) = (Projected::default(), PlaneSearch::default(), Vec::new());
         for own in [(f64::MIN, 1.0), (1.0, 23.5), (23.5, 24.0), (24.0, 70.0), (70.0, f64::MAX)] {
             search.clear(&footprint.band_around(own, &test).extent(), footprint.most_between(own, &test));
@@ -109,7 +109,7 @@ fn every_pixel_is_looked_at_about_once() {
         camera,
     });
     let frame = Frame::whole(SIZE.0, SIZE.1, 0.5, 0.0);
-    let footprint = Footprint::new(&views, &camera([0.0, 0.0, 0.0], 0.0), &frame);
+    let footprint = Footprint::of(&views, &[0, 1], &camera([0.0, 0.0, 0.0], 0.0), &frame);
     let looked_at: usize = (0..8)
         .map(|k| frame.band(k as f64 * 11.25, (k + 1) as f64 * 11.25))
         .map(|band| footprint.reaching(band.rows, |_| 0.0).count())

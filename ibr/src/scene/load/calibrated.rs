@@ -1,15 +1,16 @@
 //! Scenes of general cameras: 3 x 4 matrices, COLMAP models or transforms files, and depths.
 
 use super::left_out::LeftOut;
-use super::maps::{Given, Read, Stored, Whole};
+use super::maps::{Given, Read};
 use super::models::Source;
 use super::{Goal, Inputs, Loaded, Loader, each, pixels};
 use crate::camera::Camera;
 use crate::camera::ListedCamera;
 use crate::camera::resize::{Size, factors};
 use crate::depth::Measure;
+use crate::files::InputError;
 use crate::image::Image;
-use crate::scene::{Kind, SceneError, ViewSpec};
+use crate::scene::{Kind, ViewSpec};
 use hybank::messages::Quoted;
 use nalgebra::Matrix3x4;
 
@@ -56,8 +57,8 @@ impl Loader<'_> {
         };
         let notes = notes(sources.iter().filter_map(|s| s.1));
         let read = sources.into_iter().map(|s| s.0).collect();
-        let Whole { views, filled } = self.matched(views, read, Measure::Depth)?;
-        Ok(Inputs { kind: Kind::Calibrated { views, cameras, size }, filled, calibration: None, notes })
+        let views = self.matched(views, read, Measure::Depth)?;
+        Ok(Inputs { kind: Kind::Calibrated { views, cameras, size }, calibration: None, notes })
     }
 
     /// A view, and how its camera was resized.
@@ -74,7 +75,7 @@ impl Loader<'_> {
         let map = self.stored(view, &image, &given)?;
         let (camera, resized) = self.camera_of(view, image.size())?;
         let points = |image: &Image, camera: &Camera| self.of_points(view, image, camera);
-        Ok((self.read(view, &given, Stored { image, camera, map }, points)?, resized))
+        Ok((self.read(view, &given, Read { image, camera, map }, points)?, resized))
     }
 
     /// The camera of the view that is left out, or of an image that the file of cameras lists, and the size
@@ -115,22 +116,19 @@ impl Loader<'_> {
             |goal| camera(self.start_of(goal, first)?, goal),
             |goal, from, share| {
                 let to = camera(self.end_of_path(goal, first)?, goal)?;
-                from.towards(&to, share).map_err(|source| SceneError::Camera {
-                    path: self.path.into(),
-                    which: format!("the path of {}", goal.name),
-                    source,
-                })
+                let path = || format!("the path of {}", goal.name);
+                from.towards(&to, share).map_err(|source| self.bad_camera(&path(), source))
             },
         )?;
         Ok((cameras, size))
     }
 
     fn start_of(&self, goal: &Goal, first: First) -> Loaded<Wanted> {
-        self.wanted(goal.target.camera.as_ref(), goal.target.colmap_image.as_deref(), goal, first)
+        self.wanted(goal.target.camera.as_ref(), goal.target.camera_of.as_deref(), goal, first)
     }
 
     fn end_of_path(&self, goal: &Goal, first: First) -> Loaded<Wanted> {
-        let (rows, image) = (goal.target.to_camera.as_ref(), goal.target.to_colmap_image.as_deref());
+        let (rows, image) = (goal.target.to_camera.as_ref(), goal.target.to_camera_of.as_deref());
         if rows.is_none() && image.is_none() {
             let name = &goal.name;
             return Err(
@@ -145,8 +143,8 @@ impl Loader<'_> {
         Camera::metric(matrix, self.spec.mirrored).map_err(|source| self.bad_camera(which, source))
     }
 
-    fn bad_camera(&self, which: &str, source: crate::camera::CameraError) -> SceneError {
-        SceneError::Camera { path: self.path.into(), which: which.into(), source }
+    fn bad_camera(&self, which: &str, source: crate::camera::CameraError) -> InputError {
+        self.incomplete(format!("{which}: {source}"))
     }
 
     /// The camera of a view whose image has this size.

@@ -1,9 +1,10 @@
 //! Scenes whose views are listed in files of other programs.
 
-use super::{Loaded, incomplete};
+use super::Loaded;
 use crate::camera::Frame;
 use crate::camera::middlebury::read_calibration;
 use crate::camera::transforms::read_transforms;
+use crate::files::InputError;
 use crate::scene::{SceneSpec, ViewSpec};
 use hybank::messages::{Number, Quoted};
 use std::path::Path;
@@ -16,7 +17,7 @@ const STORED_PER_UNIT: f64 = 1000.0;
 /// `path` is the scene file.
 ///
 /// # Errors
-/// `SceneError` of the file.
+/// `InputError` of the file.
 pub fn complete(spec: &SceneSpec, path: &Path) -> Loaded<SceneSpec> {
     let mut whole = spec.clone();
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -38,7 +39,7 @@ pub fn complete(spec: &SceneSpec, path: &Path) -> Loaded<SceneSpec> {
                     Quoted(file),
                     Number(calibration.offset)
                 );
-                return Err(incomplete(path, reason));
+                return Err(InputError::file(path, reason));
             }
         }
     }
@@ -66,7 +67,7 @@ fn transforms_views(file: &Path, folder: &Path, scale: Option<f64>) -> Loaded<Ve
     };
     let views: Vec<ViewSpec> = all.frames.iter().filter_map(view).collect();
     match all.frames.first() {
-        Some(frame) if views.is_empty() => Err(all.without_depth(frame).into()),
+        Some(frame) if views.is_empty() => Err(all.without_depth(frame)),
         _ => Ok(views),
     }
 }

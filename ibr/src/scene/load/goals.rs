@@ -1,7 +1,8 @@
 //! The virtual views of a scene: one, a list, or paths.
 
 use super::{Loaded, Loader};
-use crate::scene::{SceneError, TargetSpec};
+use crate::files::InputError;
+use crate::scene::TargetSpec;
 use hybank::memory::check_memory;
 
 /// Most virtual views of a scene.
@@ -126,7 +127,7 @@ impl Loader<'_> {
     pub(super) fn size(&self, goals: &[Goal], own: (usize, usize)) -> Loaded<(usize, usize)> {
         let (w, h) = self.common(goals, "size", |target| target.size)?.map_or(own, |[w, h]| (w, h));
         let pixels = w.saturating_mul(h);
-        let refused = |reason: String| -> SceneError {
+        let refused = |reason: String| -> InputError {
             self.incomplete(format!("the virtual view has {w} x {h} pixels: {reason}"))
         };
         if pixels == 0 {

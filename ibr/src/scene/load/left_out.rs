@@ -2,7 +2,8 @@
 
 use super::{Loaded, Loader};
 use crate::camera::names::{self, NameError};
-use crate::scene::{SceneError, ViewSpec};
+use crate::files::InputError;
+use crate::scene::ViewSpec;
 use hybank::messages::Quoted;
 
 /// What `--view` names.
@@ -39,7 +40,7 @@ impl Loader<'_> {
         }
     }
 
-    pub(super) fn no_such_view(&self, name: &str) -> SceneError {
+    pub(super) fn no_such_view(&self, name: &str) -> InputError {
         let labels: Vec<String> = self.spec.view.iter().map(ViewSpec::label).collect();
         let known = names::list(&labels.iter().map(String::as_str).collect::<Vec<_>>(), ", ");
         self.incomplete(format!("there is no view \"{}\"; the views are {known}", Quoted(name)))

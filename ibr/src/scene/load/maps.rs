@@ -3,13 +3,15 @@
 use super::{Loaded, Loader};
 use crate::camera::Camera;
 use crate::depth::{DepthMap, Measure, fill_unknown};
-use crate::image::{Image, ImageError, read_map_within};
+use crate::files::{InputError, refuse_pixels_without_memory};
+use crate::image::{Image, read_map_within};
 use crate::matching::{Photograph, depths};
 use crate::partial::densify;
 use crate::propagate::Viewpoint;
 use crate::scene::spec::MapSource;
-use crate::scene::{SceneError, SourceView, ViewSpec};
+use crate::scene::{SourceView, ViewSpec};
 use std::path::Path;
+use std::sync::atomic::Ordering;
 
 /// Bytes per pixel of a view that is being read and made dense.
 pub(super) const LOADING_BYTES: f64 = 110.0;
@@ -17,23 +19,8 @@ pub(super) const LOADING_BYTES: f64 = 110.0;
 /// A view whose map, if it is to be found from the photographs, waits for the others.
 pub(super) struct Read<P> {
     pub(super) image: Image,
-    map: Option<DepthMap>,
-    pub(super) camera: P,
-    /// Unknown values that were filled.
-    filled: usize,
-}
-
-/// The image of a view with its camera, and its map if a file has it.
-pub(super) struct Stored<P> {
-    pub(super) image: Image,
-    pub(super) camera: P,
     pub(super) map: Option<DepthMap>,
-}
-
-/// Views with dense maps, and the number of unknown values that were filled.
-pub(super) struct Whole<P> {
-    pub(super) views: Vec<SourceView<P>>,
-    pub(super) filled: usize,
+    pub(super) camera: P,
 }
 
 /// What a view says of its map.
@@ -64,51 +51,49 @@ impl Loader<'_> {
         };
         let path = self.file(file);
         let (width, height, stored) = read_map_within(&path, self.options.max_pixels)?;
-        let depth_error = |source| SceneError::Depth { view: view.label(), path: path.clone(), source };
+        let bad = |e| InputError::file(&path, format!("{}: {e}", view.named()));
         let map = DepthMap::new((width, height), stored, given.scale.unwrap_or(1.0), given.measure);
         let map = map.and_then(|map| match view.disparity_offset {
             Some(offset) => map.with_offset(offset),
             None => Ok(map),
         });
-        let map = map.map_err(depth_error)?;
-        map.fits(image.size(), view.step.unwrap_or(1)).map_err(depth_error)?;
+        let map = map.map_err(bad)?;
+        map.fits(image.size(), view.step.unwrap_or(1)).map_err(bad)?;
         Ok(Some(map))
     }
 
-    /// A view with its map; `points` gives that of the points of a model.
+    /// A view with its map made dense; `points` gives that of the points of a model.
     pub(super) fn read<P>(
         &self,
         view: &ViewSpec,
         given: &Given<'_>,
-        stored: Stored<P>,
+        mut read: Read<P>,
         points: impl Fn(&Image, &P) -> Loaded<DepthMap>,
     ) -> Loaded<Read<P>> {
-        let Stored { image, camera, map } = stored;
-        let map = match map {
-            Some(map) => map,
-            None if MapSource::of(given.map) == MapSource::Points => points(&image, &camera)?,
-            None => return Ok(Read { image, map: None, camera, filled: 0 }),
-        };
-        let (map, filled) = self.dense(view, map, &image, given.map)?;
-        Ok(Read { image, map: Some(map), camera, filled })
+        if MapSource::of(given.map) == MapSource::Points {
+            read.map = Some(points(&read.image, &read.camera)?);
+        }
+        let dense = read.map.map(|map| self.dense(view, map, &read.image, given.map)).transpose()?;
+        Ok(Read { map: dense, ..read })
     }
 
-    /// A map with a value for every pixel of its image that is wanted, and the number of those that were
-    /// unknown.
-    fn dense(&self, view: &ViewSpec, map: DepthMap, image: &Image, file: &Path) -> Loaded<(DepthMap, usize)> {
+    /// A map with a value for every pixel of its image that is wanted.
+    fn dense(&self, view: &ViewSpec, map: DepthMap, image: &Image, file: &Path) -> Loaded<DepthMap> {
         let path = self.file(file);
-        let depth_error = |source| SceneError::Depth { view: view.label(), path: path.clone(), source };
+        let bad = |e| InputError::file(&path, format!("{}: {e}", view.named()));
         let given = view.step.unwrap_or(1);
         let step = if given == 1 { self.options.depth_step } else { given };
         if step == 1 && !map.is_scattered() {
             let mut map = map;
-            let filled = if self.options.fill { fill_unknown(&mut map) } else { 0 };
-            return Ok((map, filled));
+            if self.options.fill {
+                self.filled.fetch_add(fill_unknown(&mut map), Ordering::Relaxed);
+            }
+            return Ok(map);
         }
-        ImageError::refuse_without_memory(&path, image.size(), LOADING_BYTES)?;
-        let coarse = if given == 1 { map.decimated(step).map_err(depth_error)? } else { map };
-        let dense = densify(&coarse, step, image).map_err(depth_error)?;
-        Ok((dense, coarse.unknown()))
+        refuse_pixels_without_memory(&path, image.size(), LOADING_BYTES)?;
+        let coarse = if given == 1 { map.decimated(step).map_err(bad)? } else { map };
+        self.filled.fetch_add(coarse.unknown(), Ordering::Relaxed);
+        densify(&coarse, step, image).map_err(bad)
     }
 
     /// The views with the maps that are found from the photographs.
@@ -117,34 +102,29 @@ impl Loader<'_> {
         views: &[&ViewSpec],
         read: Vec<Read<P>>,
         measure: Measure,
-    ) -> Loaded<Whole<P>> {
+    ) -> Loaded<Vec<SourceView<P>>> {
         let photographs: Vec<_> =
             read.iter().map(|read| Photograph { image: &read.image, camera: read.camera }).collect();
         let found = match read.iter().all(|read| read.map.is_some()) {
             true => Vec::new(),
-            false => depths(&photographs, measure).map_err(|e| self.incomplete(e.to_string()))?,
+            false => depths(&photographs, measure).map_err(|e| self.incomplete(e))?,
         };
         let mut found = found.into_iter();
-        let mut whole = Whole { views: Vec::new(), filled: 0 };
-        for (view, read) in views.iter().zip(read) {
-            let matched = found.next();
-            let (map, filled) = match (read.map, matched) {
-                (Some(map), _) => (map, read.filled),
+        let whole = |(view, Read { image, map, camera }): (&&ViewSpec, Read<P>)| {
+            let map = match (map, found.next()) {
+                (Some(map), _) => map,
                 (None, Some(map)) => {
                     let map = match view.disparity_offset {
-                        Some(offset) => {
-                            map.with_offset(offset).map_err(|e| self.incomplete(e.to_string()))?
-                        }
+                        Some(offset) => map.with_offset(offset).map_err(|e| self.incomplete(e))?,
                         None => map,
                     };
-                    self.dense(view, map, &read.image, Path::new("matched"))?
+                    self.dense(view, map, &image, Path::new("matched"))?
                 }
                 (None, None) => return Err(self.incomplete("a view without a map")),
             };
-            whole.filled += filled;
-            whole.views.push(SourceView { image: read.image, map, camera: read.camera });
-        }
-        Ok(whole)
+            Ok(SourceView { image, map, camera })
+        };
+        views.iter().zip(read).map(whole).collect()
     }
 
     /// The depths of the points of a model that this view shows, unknown elsewhere.

@@ -1,6 +1,6 @@
 //! Scenes of a rectified rig: positions and disparities.
 
-use super::maps::{Given, Stored, Whole};
+use super::maps::{Given, Read};
 use super::{Goal, Inputs, Loaded, Loader, each, pixels};
 use crate::camera::middlebury::{Calibration, read_calibration};
 use crate::depth::Measure;
@@ -33,7 +33,7 @@ impl Loader<'_> {
             let given = Given { map, scale: view.disparity_scale, measure: Measure::Disparity };
             let image = self.image(&view.image)?;
             let map = self.stored(view, &image, &given)?;
-            self.read(view, &given, Stored { image, camera: position, map }, |_, _| {
+            self.read(view, &given, Read { image, camera: position, map }, |_, _| {
                 Err(self.incomplete(format!(
                     "{} has disparity = \"points\", which a rectified rig does not have; give it a map or \"matched\"",
                     view.named()
@@ -48,9 +48,9 @@ impl Loader<'_> {
         self.no_other_size(goals, first)?;
         let calibration = self.calibration(first)?;
         let is_matched = views.iter().any(|view| !view.is_stored());
-        let Whole { views, filled } = self.matched(views, sources, Measure::Disparity)?;
+        let views = self.matched(views, sources, Measure::Disparity)?;
         let notes = note_of_exchange(&views).filter(|_| is_matched).into_iter().collect();
-        Ok(Inputs { kind: Kind::Rectified { views, positions }, filled, calibration, notes })
+        Ok(Inputs { kind: Kind::Rectified { views, positions }, calibration, notes })
     }
 
     /// A rectified virtual view is as large as the views.

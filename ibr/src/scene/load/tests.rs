@@ -21,7 +21,7 @@ fn scene(text: &str) -> (tempfile::TempDir, PathBuf) {
 fn read(text: &str, options: &LoadOptions) -> Result<Scene, String> {
     let (_dir, path) = scene(text);
     let spec = parse(text, &path).map_err(|e| e.to_string())?;
-    load(&spec, &path, options).map_err(|e| e.to_string())
+    load(&spec, &path, options, &|_| ()).map_err(|e| e.to_string())
 }
 
 const RIG: &str = r#"
@@ -63,7 +63,7 @@ fn paths_have_both_ends() {
         ("to_position = 1.0", "how many views"),
         ("to_position = 1.0\nframes = 1", "2 to 9999"),
         ("to_position = nan\nframes = 3", "finite"),
-        ("to_colmap_image = \"a\"\nframes = 3", "`to_camera_of`, which has no meaning in a rectified scene"),
+        ("to_camera_of = \"a\"\nframes = 3", "`to_camera_of`, which has no meaning in a rectified scene"),
     ] {
         let message = read(&(RIG.to_string() + keys), &defaults).unwrap_err();
         assert!(message.contains(words), "{message}");

@@ -15,7 +15,7 @@ impl Loader<'_> {
         left_out: Option<&ViewSpec>,
         goals: &[Goal],
     ) -> Loaded<Inputs> {
-        let file = self.matches_file(views, goals)?;
+        let file = self.matches_file(views)?;
         self.keys_of(goals, "matches-only")?;
         let tracks = Tracks::read(&self.file(file))?;
         let virtual_columns = match left_out {
@@ -38,7 +38,7 @@ impl Loader<'_> {
         let size = self.size(goals, own)?;
         let tracks = tracks.rows().iter().map(pick).collect();
         let kind = Kind::Uncalibrated { images, tracks, targets, size };
-        Ok(Inputs { kind, filled: 0, calibration: None, notes: Vec::new() })
+        Ok(Inputs { kind, calibration: None, notes: Vec::new() })
     }
 
     /// What the goals ask for; `in_column` gives the positions in a column of the tracks.
@@ -61,9 +61,8 @@ impl Loader<'_> {
     }
 
     /// The file of tracks, if there are at least two views and none has camera keys.
-    fn matches_file<'a>(&'a self, views: &[&ViewSpec], goals: &'a [Goal]) -> Loaded<&'a Path> {
-        let in_goals = || goals.iter().find_map(|goal| goal.target.matches.as_deref());
-        let file = self.spec.matches.as_deref().or_else(in_goals).ok_or_else(|| {
+    fn matches_file(&self, views: &[&ViewSpec]) -> Loaded<&Path> {
+        let file = self.spec.matches.as_deref().ok_or_else(|| {
             self.incomplete(
                 "the views have neither `position` and `disparity`, nor `camera` and `depth`, and there is no `matches` file; give cameras or tracks",
             )

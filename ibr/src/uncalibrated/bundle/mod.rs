@@ -50,47 +50,36 @@ pub struct Bundle {
     pub observations: Vec<Observation>,
 }
 
-/// How an adjustment ended.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Adjusted {
-    /// Steps tried.
-    pub steps: usize,
-    /// Mean robust cost per observation before, square pixels.
-    pub before: f64,
-    /// The same after; never more than before.
-    pub after: f64,
-    /// Whether no step lowers the cost any more.
-    pub converged: bool,
-}
-
 impl Bundle {
     /// Adjusts all cameras and points. A sighting with the distance d counts as `scale`^2 ln(1 + d^2 /
     /// `scale`^2), so that mistakes far beyond `scale` pixels hardly count (Cauchy).
     ///
-    /// Cameras and points keep their signs; their scales are those of before. `None`, and nothing changed,
-    /// if an observation names no camera or point, or the start is not finite.
-    pub fn adjust(&mut self, scale: f64) -> Option<Adjusted> {
+    /// Cameras and points keep their signs; their scales are those of before. Returns whether no step lowers
+    /// the cost any more; `None`, and nothing changed, if an observation names no camera or point, or the
+    /// start is not finite.
+    pub fn adjust(&mut self, scale: f64) -> Option<bool> {
         let frame = Frame::of(self)?;
         let mut problem = frame.normalised(self, scale);
-        let before = problem.cost(&problem.cameras, &problem.points)?;
-        let mut found = Adjusted { steps: 0, before, after: before, converged: false };
-        let mut damping = DAMPING.0;
-        while found.steps < STEPS && !found.converged && damping <= DAMPING.2 {
-            found.steps += 1;
+        let mut least = problem.cost(&problem.cameras, &problem.points)?;
+        let (mut damping, mut converged) = (DAMPING.0, false);
+        for _ in 0..STEPS {
             let moved = problem.moved(damping);
             let next = moved.as_ref().and_then(|(cameras, points)| problem.cost(cameras, points));
             match (moved, next) {
-                (Some((cameras, points)), Some(cost)) if cost < found.after => {
-                    found.converged = found.after - cost < CONVERGED * found.after || cost < EXACT;
+                (Some((cameras, points)), Some(cost)) if cost < least => {
+                    converged = least - cost < CONVERGED * least || cost < EXACT;
                     (problem.cameras, problem.points) = (cameras, points);
-                    (found.after, damping) = (cost, (0.1 * damping).max(DAMPING.1));
+                    (least, damping) = (cost, (0.1 * damping).max(DAMPING.1));
                 }
                 _ => damping *= 10.0,
             }
+            converged |= damping > DAMPING.2;
+            if converged {
+                break;
+            }
         }
-        found.converged |= damping > DAMPING.2;
         frame.restore(&problem, self);
-        Some(found)
+        Some(converged)
     }
 }
 

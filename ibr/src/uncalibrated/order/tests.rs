@@ -4,7 +4,7 @@ use super::*;
 use crate::uncalibrated::Point;
 use crate::uncalibrated::canonical::canonical_pair;
 use crate::uncalibrated::fundamental::eight_point;
-use crate::uncalibrated::random::Dice;
+use crate::uncalibrated::random::dice::Dice;
 use crate::uncalibrated::triangulate::triangulate;
 use nalgebra::Rotation3;
 
