@@ -83,7 +83,7 @@ impl Loader<'_> {
         let list = self.models.get(source)?;
         let refused = |e: NameError| self.incomplete(format!("{which}: {}: {e}", Quoted(list.path())));
         let (frame, _) = list.find(image).map_err(refused)?;
-        Ok(list.camera(frame, fallback)?)
+        list.camera(frame, fallback)
     }
 
     /// The name of an image in a file of cameras, and whether its folders agree with it.
