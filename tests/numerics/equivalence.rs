@@ -98,7 +98,7 @@ fn brute_force(case: &Case, frames: usize, fineness: usize) -> f64 {
 fn computed(case: &Case) -> f64 {
     let plant = LiftedPlant::new(&case.problem);
     let filters = SynthesisFilters::Fir(case.taps.clone());
-    plant.norm(&lifted(&filters, case.problem.ratio).unwrap()).unwrap().gain
+    plant.norm(&lifted(&filters, case.problem.ratio)).unwrap().gain
 }
 
 fn check(name: &str, case: &Case) {
