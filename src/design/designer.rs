@@ -95,7 +95,8 @@ impl Options<'_> {
 ///
 /// A design that reaches its time limit or is ended by [`Options::stop`] gives the best bank so far, whose
 /// gamma may lie above the least; [`Design::proof`] is then [`DesignError::Stopped`]. It ends between two
-/// steps of its searches; a single equation or norm is computed to its end.
+/// steps of its searches or two sample points of an interior-point method; a single equation or norm is
+/// computed to its end.
 ///
 /// # Errors
 /// [`DesignError`] if the spec breaks a rule of [`Spec::check`], a filter of the spec is not a valid front

@@ -313,7 +313,8 @@ impl<E: AffineError> Exchange<E> {
             }
             tolerance = tolerances.tolerance(if added { gamma / self.lower - 1.0 } else { 0.0 });
             last = self.round(tolerances, tolerance)?;
-            if last.candidate.peaks.estimate < best.peaks.estimate {
+            // Once the design is stopped, the estimate of the new taps is that of the points alone.
+            if !self.stop.is_due() && last.candidate.peaks.estimate < best.peaks.estimate {
                 best = last.candidate.clone();
             }
         }
@@ -406,8 +407,13 @@ impl<E: AffineError> Exchange<E> {
         Ok(start)
     }
 
+    /// The taps with the peaks of their error. None is searched once the design is stopped: `gamma`, that of
+    /// the points, stands for them.
     fn judge(&self, taps: Taps, gamma: f64, level: f64) -> Result<Candidate<E::Scenario>, DesignError> {
-        let peaks = self.error.peaks(&taps, gamma, level)?;
+        let peaks = match self.stop.is_due() {
+            true => Peaks { estimate: gamma, peaks: Vec::new() },
+            false => self.error.peaks(&taps, gamma, level)?,
+        };
         Ok(Candidate { taps, peaks })
     }
 

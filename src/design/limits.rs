@@ -79,8 +79,8 @@ impl fmt::Display for Stage {
 }
 
 /// Ends a design before it is complete, with the best filters so far and without a proof. Clones end the
-/// same design, from any thread. It takes effect between two rounds of a search,
-/// and between two sample points of a problem that an interior-point method solves.
+/// same design, from any thread. It takes effect between two rounds of a search, and between two sample
+/// points of a problem that an interior-point method solves.
 #[derive(Debug, Clone, Default)]
 pub struct Stop {
     deadline: Option<Instant>,

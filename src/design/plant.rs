@@ -152,8 +152,8 @@ impl LiftedPlant {
         self.driving(filters).map_outputs(&linalg::hstack(&[&-&unity, &unity]))
     }
 
-    /// H and W at e^{j omega}, omega in radians per slow period. The columns are compressed to at most N + M,
-    /// which keeps `[H; W] [H; W]*`.
+    /// H and W at e^{j omega}, omega in radians per slow period. The columns are compressed to at
+    /// most N + M, which keeps `[H; W] [H; W]*`.
     pub fn at(&self, omega: f64) -> Point {
         let g = linalg::lq_factor(&self.at_frequency(omega));
         let (n, m) = (self.channels(), self.ratio());
@@ -209,7 +209,8 @@ impl LiftedPlant {
     /// As [`LiftedPlant::norm`].
     ///
     /// # Panics
-    /// As [`LiftedPlant::norm`], and for matrices that form no system: see [`Bank::check`](crate::bank::Bank::check).
+    /// As [`LiftedPlant::norm`], and for matrices that form no system: see
+    /// [`Bank::check`](crate::bank::Bank::check).
     pub fn bank_norm(&self, filters: &SynthesisFilters) -> Result<Peak, DesignError> {
         match filters {
             SynthesisFilters::Fir(taps) => self.fir_norm(taps),

@@ -83,9 +83,9 @@ pub(super) trait Iterate {
     fn step(&mut self) -> Option<()>;
 }
 
-/// Iterates until the relative gap is within its tolerance, the progress ends, the limit is reached or the end `is_due`.
-/// Returns the outcome and the number of steps. An iterate whose end is due is not judged: that takes as long
-/// as several steps.
+/// Iterates until the relative gap is within its tolerance, the progress ends, the limit is reached or
+/// the end `is_due`. Returns the outcome and the number of steps. An iterate whose end is due is not
+/// judged: that takes as long as several steps.
 pub(super) fn run(
     iterate: &mut impl Iterate,
     tol_gap_rel: f64,

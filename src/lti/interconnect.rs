@@ -46,8 +46,8 @@ impl StateSpace {
         }
     }
 
-    /// `F(z) = sum_j z^-j F_j`, all `F_j` of one shape, with a shift register for each input: the states hold
-    /// its last samples, newest first. An empty list gives the system without inputs and outputs.
+    /// `F(z) = sum_j z^-j F_j`, all `F_j` of one shape, with a shift register for each input: the states
+    /// hold its last samples, newest first. An empty list gives the system without inputs and outputs.
     pub(crate) fn fir(taps: &[Mat]) -> Self {
         let Some(d) = taps.first() else { return Self::gain(Mat::zeros(0, 0)) };
         let (stored, inputs) = (taps.len() - 1, d.ncols());

@@ -202,3 +202,14 @@ fn known_frequencies_are_not_added_twice() {
     assert!(exchange.add(&[at(1.0), at(1.0)]));
     assert_eq!(exchange.locations().len(), 6);
 }
+
+/// The peaks of taps cost as much as the problem itself, so none is looked for after the end: on a grid
+/// without an interval the search would fail.
+#[test]
+fn a_stopped_exchange_ends_with_the_taps_of_its_points() {
+    let unsearchable = Geometric { grid: 0, ..geometric(0.8, 1.0, &[1.0]) };
+    let mut exchange = exchange(unsearchable, 2, 0.0);
+    exchange.stop.now();
+    let found = exchange.optimise().unwrap();
+    assert_eq!(found.peaks.estimate, exchange.problem.worst(&found.taps).unwrap().0);
+}

@@ -62,8 +62,9 @@ impl<'a> Cone<'a> {
         }
     }
 
-    /// The points one after the other, up to the moment at which the caller wants an end. The decompositions of
-    /// a single point may take a second; what was computed is of no use when not all points were visited.
+    /// The points one after the other, up to the moment at which the caller wants an end. The
+    /// decompositions of a single point may take a second; what was computed is of no use when not all
+    /// points were visited.
     fn points(&self) -> impl Iterator<Item = usize> + use<'a> {
         let is_due = self.is_due;
         (0..self.count()).take_while(move |_| !is_due())

@@ -183,8 +183,8 @@ impl<'a> Engine<'a> {
         Direction { taps, slack: SlackStep { t, k } }
     }
 
-    /// One step; `None` if rounding errors prevent it or its end is due. The iterate changes only if all goes
-    /// well.
+    /// One step; `None` if rounding errors prevent it or its end is due. The iterate changes only if all
+    /// goes well.
     pub(super) fn step(&mut self) -> Option<()> {
         if !self.cone.invert() {
             return None;

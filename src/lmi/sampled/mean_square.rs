@@ -51,13 +51,13 @@ pub(crate) fn least_squares(
     Ok(reduced.taps(&basis.least_squares(&reduced, &reduced.w, tol_rank)))
 }
 
-/// Minimises the secondary objective subject to `sigma_max(K_l) <= cap` at every point, to a relative duality
-/// gap; `None` if the start does not satisfy the cap strictly.
+/// Minimises the secondary objective subject to `sigma_max(K_l) <= cap` at every point, to a relative
+/// duality gap; `None` if the start does not satisfy the cap strictly.
 ///
 /// The usual start are the taps of [`super::minimise`] with a cap a little above
 /// their gamma. If the unconstrained least-squares taps satisfy the cap they are returned at once.
-/// The result is never worse than the start, and satisfies the cap, however the iteration ended; when the end
-/// `is_due`, it is the best so far.
+/// The result is never worse than the start, and satisfies the cap, however the iteration ended; when
+/// the end `is_due`, it is the best so far.
 pub fn mean_square_under_cap(
     problem: &Problem,
     square: &MeanSquareObjective,

@@ -30,7 +30,8 @@ pub struct Solution {
     pub iterations: usize,
 }
 
-/// Minimises the worst-case norm, to a relative duality gap. See the module's text for the problem and the method.
+/// Minimises the worst-case norm, to a relative duality gap. See the module's text for the problem and
+/// the method.
 ///
 /// Every well-formed problem has a solution: the result holds the best taps found, their worst case over the
 /// points and a lower bound, whatever the outcome. When the end `is_due`, they are the best so far.

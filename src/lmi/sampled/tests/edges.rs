@@ -38,8 +38,8 @@ fn exactly_reproducible_targets_give_zero() {
     }
 }
 
-/// However often it is asked before its end is due, the iteration ends without another whole step, and keeps the
-/// best taps so far.
+/// However often it is asked before its end is due, the iteration ends without another whole step, and
+/// keeps the best taps so far.
 #[test]
 fn an_iteration_whose_end_is_due_ends_at_once_with_its_best_taps() {
     let problem = random_problem(31, (2, 2, 4), 30, &[5, 5]);
