@@ -12,8 +12,8 @@ use hybank::io::{PcmFrames, StallWatch};
 use hybank::pipeline::{Gap, Pipeline};
 use hybank::runtime::Input;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -56,7 +56,7 @@ impl ObserverArgs {
     /// Begins to observe a run.
     pub(super) fn begin(&self, force: bool) -> Result<RunObserver, Failure> {
         let report = self.report().map(|path| ReportFile::create(path, force)).transpose()?;
-        RunObserver::begin(EventWriter::new(report, Instant::now(), Box::new(say_line)))
+        Ok(RunObserver::begin(EventWriter::new(report, Instant::now(), Box::new(say_line))))
     }
 }
 
@@ -64,10 +64,9 @@ impl ObserverArgs {
 pub(super) struct RunObserver {
     events: Events,
     waiting: Receiver<Option<Event>>,
-    /// Writes until the run is over, and gives the writer back.
-    thread: Option<JoinHandle<EventWriter>>,
-    /// `None` while the thread has it, or if that has died.
-    writer: Option<EventWriter>,
+    writer: Arc<Mutex<EventWriter>>,
+    /// Without one, the observer writes step by step.
+    thread: Option<JoinHandle<()>>,
     check: Option<CaptureCheck>,
     /// What has been reported.
     frames: u64,
@@ -89,16 +88,15 @@ struct OpenGap {
 }
 
 impl RunObserver {
-    fn begin(writer: EventWriter) -> Result<Self, Failure> {
+    fn begin(writer: EventWriter) -> Self {
         let (messages, waiting) = bounded(WAITING);
-        let received = waiting.clone();
-        let thread = Builder::new().name("events".into()).spawn(move || write_all(writer, &received));
-        let refused = |error| Failure::Input(format!("cannot start the thread that reports events: {error}"));
-        let thread = Some(thread.map_err(refused)?);
+        let writer = Arc::new(Mutex::new(writer));
+        let (shared, received) = (Arc::clone(&writer), waiting.clone());
+        let thread = Builder::new().name("events".into()).spawn(move || write_all(&shared, &received)).ok();
         let events = Events { messages, dropped: Arc::default() };
-        let (writer, check, open) = (None, None, Vec::new());
+        let (check, open) = (None, Vec::new());
         let [frames, samples, replaced, clipped] = [0; 4];
-        Ok(Self { events, waiting, writer, thread, check, frames, samples, gaps: 0, replaced, clipped, open })
+        Self { events, waiting, writer, thread, check, frames, samples, gaps: 0, replaced, clipped, open }
     }
 
     /// Where events are told from other threads.
@@ -141,6 +139,11 @@ impl RunObserver {
         gaps[self.gaps..].iter().for_each(|&gap| self.events.report(Event::Gap(gap)));
         self.gaps = gaps.len();
         self.open_gaps(pipeline);
+        if self.thread.is_none()
+            && let Some(mut writer) = self.writer()
+        {
+            writer.say_due(Instant::now());
+        }
     }
 
     fn open_gaps(&mut self, pipeline: &Pipeline<'_>) {
@@ -160,7 +163,7 @@ impl RunObserver {
 
     /// Nothing more is said on standard error; gives whether gaps were.
     pub(super) fn quiet(&mut self) -> bool {
-        self.writer().is_some_and(|writer| {
+        self.writer().is_some_and(|mut writer| {
             writer.quiet(Instant::now());
             writer.has_said_gaps
         })
@@ -194,26 +197,28 @@ impl RunObserver {
     }
 
     /// The writer, once it has written what waits; `None` if its thread has died.
-    fn writer(&mut self) -> Option<&mut EventWriter> {
+    fn writer(&mut self) -> Option<MutexGuard<'_, EventWriter>> {
         if let Some(thread) = self.thread.take() {
-            // A thread that has died takes nothing, and gives nothing back.
+            // A thread that has died takes nothing, and leaves the writer poisoned.
             let _ = self.events.messages.send(None);
-            self.writer = thread.join().ok();
+            let _ = thread.join();
         }
-        let writer = self.writer.as_mut()?;
+        let mut writer = self.writer.lock().ok()?;
         self.waiting.try_iter().flatten().for_each(|event| writer.take(event, Instant::now()));
         Some(writer)
     }
 }
 
 /// The thread, until the run is over.
-fn write_all(mut writer: EventWriter, events: &Receiver<Option<Event>>) -> EventWriter {
+fn write_all(writer: &Mutex<EventWriter>, events: &Receiver<Option<Event>>) {
     let mut due = LONG;
     loop {
-        match events.recv_timeout(due) {
+        let event = events.recv_timeout(due);
+        let Ok(mut writer) = writer.lock() else { return };
+        match event {
             Ok(Some(event)) => writer.take(event, Instant::now()),
             Err(RecvTimeoutError::Timeout) => writer.say_due(Instant::now()),
-            Ok(None) | Err(RecvTimeoutError::Disconnected) => return writer,
+            Ok(None) | Err(RecvTimeoutError::Disconnected) => return,
         }
         due = writer.next().map_or(LONG, |next| next.saturating_duration_since(Instant::now()));
     }
@@ -230,7 +235,7 @@ mod tests {
     #[test]
     fn a_writer_that_died_is_an_error_at_the_end_of_the_run() {
         let print = Box::new(|line: &str| panic!("{line}"));
-        let mut observer = RunObserver::begin(EventWriter::new(None, Instant::now(), print)).unwrap();
+        let mut observer = RunObserver::begin(EventWriter::new(None, Instant::now(), print));
         observer.events().report(Event::Warning { text: "a message that cannot be written".into() });
         assert!(!observer.quiet());
         let Err(Failure::Input(message)) = observer.end(&serde_json::json!({})) else { panic!("no failure") };

@@ -129,6 +129,9 @@ pub(crate) fn reference_of(spec: &Spec, given: Option<usize>) -> PyResult<usize>
     }
 }
 
+/// An estimate of a channel, if it was fitted.
+type Of<'a> = &'a dyn Fn(&ChannelEstimate) -> Option<Estimate<f64>>;
+
 fn result<'py>(py: Python<'py>, spec: &Spec, found: &Calibration) -> PyResult<Bound<'py, PyAny>> {
     let (calibrated, more) = applied(spec, found);
     let mut made = Made::new(py, "Calibration")?;
@@ -136,7 +139,7 @@ fn result<'py>(py: Python<'py>, spec: &Spec, found: &Calibration) -> PyResult<Bo
         value: delay.value.in_seconds(spec.fast_period).0,
         sigma: delay.sigma.in_seconds(spec.fast_period).0,
     };
-    let columns: [(&str, &dyn Fn(&ChannelEstimate) -> Option<Estimate<f64>>); 4] = [
+    let columns: [(&str, Of<'_>); 4] = [
         ("delay", &|channel| channel.delay.map(seconds)),
         ("gain", &|channel| channel.gain),
         ("offset", &|channel| channel.offset),
