@@ -1,10 +1,10 @@
 //! Numbers of 256 and of 512 bits, where 106 bits are not enough.
 //!
-//! A number of B bits is `sign * m * 2^(exponent - B)` with an integer m of B / 64 words whose top bit is set,
-//! so that `2^(exponent - 1) <= |x| < 2^exponent`. Sums and products are computed in integers and drop what
-//! does not fit: their relative error is below 2^(2 - B). Quotients and roots take Newton's iteration and a
-//! last step with the residual; theirs is below 2^(4 - B) (docs/proof.md derives both). An exponent beyond
-//! [`MAX_EXPONENT`] makes a number unknown, so that nothing overflows or underflows unseen.
+//! A number of B bits is `sign * m * 2^(exponent - B)` with an integer m of B / 64 words whose top bit is
+//! set, so that `2^(exponent - 1) <= |x| < 2^exponent`. Sums and products are computed in integers and drop
+//! what does not fit: their relative error is below 2^(2 - B). Quotients and roots take Newton's iteration
+//! and a last step with the residual; theirs is below 2^(4 - B) (docs/proof.md derives both). An exponent
+//! beyond [`MAX_EXPONENT`] makes a number unknown, so that nothing overflows or underflows unseen.
 
 use super::number::Number;
 use std::cmp::Ordering;
@@ -35,8 +35,8 @@ impl<const WORDS: usize> Default for BigFloat<WORDS> {
     }
 }
 
-/// The words `words[..]` as a number below `2^exponent`; what lies more bits below the first bit set than the
-/// number has is dropped.
+/// The words `words[..]` as a number below `2^exponent`; bits are dropped that lie further below the first
+/// one set than the number has bits.
 fn normalised<const WORDS: usize>(words: &[u64], exponent: i64, negative: bool) -> BigFloat<WORDS> {
     let Some(top) = words.iter().rposition(|&word| word != 0) else { return BigFloat::ZERO };
     let mut leading = [0; MOST_WORDS + 1];

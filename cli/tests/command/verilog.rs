@@ -323,7 +323,7 @@ fn random_banks_have_no_differing_bit_in_a_million_frames() {
     }
 }
 
-/// Without a title, with one channel and one phase, and where fewer bits or clocks are there than one may think.
+/// Without a title, with one channel and one phase, and with fewer bits or clocks than one may think.
 #[test]
 fn the_header_and_the_warnings_say_what_the_circuit_does() {
     let desk = Desk::empty();

@@ -223,8 +223,8 @@ struct LongSystem {
 }
 
 impl LongSystem {
-    /// Rows of a lower triangular R with P = R R' at the level `gamma`, and of what rounding to doubles takes
-    /// from it. The noise on the states adds about `noise` to the norm. `None` if there is no such P.
+    /// Rows of a lower triangular R with P = R R' at the level `gamma`, and of what rounding to doubles
+    /// takes from it. The noise on the states adds about `noise` to the norm. `None` if there is no such P.
     fn root<const WORDS: usize>(&self, gamma: f64, noise: f64) -> Option<[Vec<Vec<f64>>; 2]> {
         let equation = LongRiccati::<WORDS>::new(&self.error, 2.0 * gamma * noise / self.energy);
         let root = cholesky(&equation.limit(gamma)?)?;

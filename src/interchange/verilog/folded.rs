@@ -85,8 +85,8 @@ struct Rom {
 }
 
 impl Rom {
-    /// The products of the sample `a` with its taps at each clock, unless all are zero. What the taps have in
-    /// common, a power of two or all of it, needs no ROM.
+    /// The products of the sample `a` with its taps at each clock, unless all are zero. What the taps have
+    /// in common, a power of two or all of it, needs no ROM.
     fn product(&mut self, netlist: &mut Netlist, a: &Word, name: &str, taps: &[i64]) -> Option<Term> {
         let nonzero = taps.iter().filter(|tap| **tap != 0);
         let shift = nonzero.map(|tap| tap.trailing_zeros()).min()?;
