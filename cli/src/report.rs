@@ -9,6 +9,7 @@ use hybank::bank::Bank;
 use hybank::design::DesignError;
 use hybank::io::{OfflineSamples, ReadOptions};
 use hybank::overview::page::{CapturesOnPage, MOST_FRAMES, Page, PageError};
+use hybank::pipeline::matching::{channels_of_raw, samples_per_frame};
 use hybank::units::Hertz;
 use std::path::{Path, PathBuf};
 
@@ -86,9 +87,12 @@ impl Args {
     fn captures(&self, bank: &Bank) -> Result<CapturesOnPage, Failure> {
         let full_scale = bank.spec.as_ref().and_then(|spec| spec.full_scale);
         let turns = self.turns.turns(bank, &self.bank)?;
-        let captures = self.reading.options(self.inputs.len(), bank.channel_count());
+        let (layout, count) = (bank.layout(), self.inputs.len());
+        let captures = self.reading.options(count, channels_of_raw(&layout, count));
         let full_scale = captures.full_scale.or(full_scale);
-        let captures = ReadOptions { full_scale, interleaving: turns.as_ref(), ..captures };
+        let samples_per_frame = samples_per_frame(&layout, count);
+        let captures =
+            ReadOptions { full_scale, interleaving: turns.as_ref(), samples_per_frame, ..captures };
         let mut reader = start(&self.inputs, captures, crossbeam_channel::never())?;
         self.reading.scale.check(&reader)?;
         let rate = Hertz(output_rate(bank, &self.bank, &reader)?);

@@ -68,6 +68,9 @@ fn the_promised_snr_is_measured() {
     let expected = noise_db + 20.0 * (level(&wav::samples(&desk, "cap/target.wav")) / 0.25).log10();
     let snr = measured["reference"]["snr_db"].as_f64().unwrap_or_else(|| panic!("{measured}"));
     assert!((snr - expected).abs() < 0.3, "{snr} instead of {expected}: {measured}");
+    desk.good(&["report", "bank.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "page.html"]);
+    let page = text(&desk.read("page.html"));
+    assert!(page.contains("interleaved as if they were taken in turn, and fused by the bank"));
 }
 
 /// A stream of interleaved frames, of one file or pipe per converter, and `fuse` give the same bits.

@@ -53,9 +53,11 @@ impl Tally {
             (Some(0), _) => self.done += 1,
             (Some(1), _) => {
                 self.refused += 1;
-                // One message; other lines show the place in a file.
+                // One message; other lines show the place in a file, or say which input a slow machine waits for.
                 let said = message.lines().filter(|line| line.starts_with("hybank: "));
-                let errors = said.filter(|line| !line.starts_with("hybank: warning"));
+                let is_note =
+                    |line: &&str| ["warning", "waiting for "].iter().any(|word| line[8..].starts_with(word));
+                let errors = said.filter(|line| !is_note(line));
                 assert_eq!(errors.count(), 1, "{what}");
             }
             (Some(127), _) => self.not_started += 1,
