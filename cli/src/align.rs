@@ -16,7 +16,7 @@ use hybank::messages::{Number, Quoted};
 use hybank::quantity::{self, Time};
 use hybank::sine_fit::Estimate;
 use hybank::spec::{DesignOverrides, Spec};
-use hybank::track::{AlignSettings, AlignedChannel, Alignment, DriftModel, align};
+use hybank::track::{AlignError, AlignSettings, AlignedChannel, Alignment, DriftModel, align};
 use hybank::units::Seconds;
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -92,6 +92,10 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let spec = file.for_outputs(&[&args.output])?;
     let others = args.written(spec.channels.len());
     args.check_outputs(&others)?;
+    if !spec.layout().is_plain() {
+        // Before the rates of the recordings, which are rightly not that of the frames.
+        return Err(Failure::of(&args.spec, AlignError::Rates));
+    }
     say_understood(Some(&spec));
     let mut warnings = Vec::new();
     let read = args.read(&spec, &mut warnings);

@@ -69,6 +69,8 @@ fn the_promised_snr_is_measured() {
     let snr = measured["reference"]["snr_db"].as_f64().unwrap_or_else(|| panic!("{measured}"));
     assert!((snr - expected).abs() < 0.3, "{snr} instead of {expected}: {measured}");
     desk.good(&["report", "bank.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "page.html"]);
+    let align = ["align", "spec.toml", "cap/ch1.wav", "cap/ch2.wav", "-o", "aligned.toml"];
+    desk.refused(1, &align, &["spec.toml", "all channels need one rate"]);
     let page = text(&desk.read("page.html"));
     assert!(page.contains("interleaved as if they were taken in turn, and fused by the bank"));
 }
