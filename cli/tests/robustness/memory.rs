@@ -53,7 +53,7 @@ impl Tally {
             (Some(0), _) => self.done += 1,
             (Some(1), _) => {
                 self.refused += 1;
-                // One message; other lines show the place in a file, or say which input a slow machine waits for.
+                // One message; other lines show the place in a file, or name an input that is slow to come.
                 let said = message.lines().filter(|line| line.starts_with("hybank: "));
                 let is_note =
                     |line: &&str| ["warning", "waiting for "].iter().any(|word| line[8..].starts_with(word));
