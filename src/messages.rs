@@ -1,4 +1,4 @@
-//! What messages hold that this program did not write: foreign text, lines of files, and numbers of any
+//! What messages hold that this program did not write (foreign text, lines of files), and numbers of any
 //! size.
 //!
 //! Names of files, keys, headers and cells may hold control characters, which a terminal obeys, and may be
@@ -311,6 +311,13 @@ impl fmt::Display for Location {
         let carets = "^".repeat(self.width.min(SHOWN_CHARACTERS / 2));
         write!(f, "{margin} |\n{number} | {line}\n{margin} | {indent}{carets}")
     }
+}
+
+/// A number of things, with a plural where it is not 1.
+pub fn counted(count: impl fmt::Display, name: &str) -> String {
+    let count = count.to_string();
+    let ending = if count == "1" { "" } else { "s" };
+    format!("{count} {name}{ending}")
 }
 
 #[cfg(test)]

@@ -13,9 +13,8 @@ use hybank::calibrate::{
     Acquisition, CalibrateError, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning,
     applied, calibrate_pooled,
 };
-use hybank::io::{MultiReader, OfflineSamples, ReadOptions, WORK_BYTES};
+use hybank::io::{MultiReader, OfflineSamples, WORK_BYTES};
 use hybank::messages::{Number, Quoted};
-use hybank::pipeline::matching::{channels_of_raw, samples_per_frame};
 use hybank::spec::{DesignOverrides, Spec};
 use hybank::units::FastPeriods;
 use std::path::{Path, PathBuf};
@@ -228,11 +227,7 @@ impl Args {
     ) -> Result<Captures, Failure> {
         let layout = spec.layout();
         let turns = self.turns.by_delay(&spec.delays_in_fast_periods(), &layout, &self.spec)?;
-        let captures = self.reading.options(paths.len(), channels_of_raw(&layout, paths.len()));
-        let samples_per_frame = samples_per_frame(&layout, paths.len());
-        let full_scale = captures.full_scale.or(spec.full_scale);
-        let captures =
-            ReadOptions { interleaving: turns.as_ref(), samples_per_frame, full_scale, ..captures };
+        let captures = self.reading.of_converters(paths.len(), &layout, turns.as_ref(), spec.full_scale);
         let mut reader = start(paths, captures, interrupts())?;
         self.reading.scale.check(&reader)?;
         check_channels(spec, &reader)?;

@@ -75,6 +75,20 @@ impl CaptureArgs {
         let full_scale = self.scale.given();
         ReadOptions { coding: self.format, channels, only, full_scale, ..ReadOptions::files() }
     }
+
+    /// For `inputs` captures of the converters of a spec, which states `full_scale` if they do not.
+    pub(super) fn of_converters<'a>(
+        self,
+        inputs: usize,
+        layout: &'a FrameLayout,
+        interleaving: Option<&'a TimeInterleaving>,
+        full_scale: Option<FullScale>,
+    ) -> ReadOptions<'a> {
+        let own = self.options(inputs, matching::channels_of_raw(layout, inputs));
+        let samples_per_frame = matching::samples_per_frame(layout, inputs);
+        let full_scale = own.full_scale.or(full_scale);
+        ReadOptions { interleaving, samples_per_frame, full_scale, ..own }
+    }
 }
 
 /// Refuses a number of channels for captures that state theirs.

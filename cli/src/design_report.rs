@@ -8,8 +8,9 @@ use hybank::design::{
 };
 use hybank::figures::Figures;
 use hybank::messages::Quoted;
+use hybank::messages::counted;
 use hybank::overview::{
-    Fact, counted, decibels, figure_facts, frequency, six_digits, understood, uselessness, warnings,
+    Fact, decibels, figure_facts, frequency, six_digits, understood, uselessness, warnings,
 };
 use hybank::spec::Method;
 use hybank::units::Hertz;

@@ -6,7 +6,8 @@ use hybank::design::{
     Design, DesignError, Options, OrderErrorPoint, OrderReduction, RobustStudy, TrackingStudy, design,
 };
 use hybank::figures::{snr, target_band};
-use hybank::overview::{band, counted, decibels_of};
+use hybank::messages::counted;
+use hybank::overview::{band, decibels_of};
 use hybank::spec::{Method, SignalSpec, Spec, WordLengths};
 use hybank::units::{Decibels, Hertz};
 

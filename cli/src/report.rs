@@ -7,9 +7,8 @@ use super::print::{Failure, name, warn};
 use super::written::{check_output, write_text};
 use hybank::bank::Bank;
 use hybank::design::DesignError;
-use hybank::io::{OfflineSamples, ReadOptions};
+use hybank::io::OfflineSamples;
 use hybank::overview::page::{CapturesOnPage, MOST_FRAMES, Page, PageError};
-use hybank::pipeline::matching::{channels_of_raw, samples_per_frame};
 use hybank::units::Hertz;
 use std::path::{Path, PathBuf};
 
@@ -87,12 +86,8 @@ impl Args {
     fn captures(&self, bank: &Bank) -> Result<CapturesOnPage, Failure> {
         let full_scale = bank.spec.as_ref().and_then(|spec| spec.full_scale);
         let turns = self.turns.turns(bank, &self.bank)?;
-        let (layout, count) = (bank.layout(), self.inputs.len());
-        let captures = self.reading.options(count, channels_of_raw(&layout, count));
-        let full_scale = captures.full_scale.or(full_scale);
-        let samples_per_frame = samples_per_frame(&layout, count);
-        let captures =
-            ReadOptions { full_scale, interleaving: turns.as_ref(), samples_per_frame, ..captures };
+        let layout = bank.layout();
+        let captures = self.reading.of_converters(self.inputs.len(), &layout, turns.as_ref(), full_scale);
         let mut reader = start(&self.inputs, captures, crossbeam_channel::never())?;
         self.reading.scale.check(&reader)?;
         let rate = Hertz(output_rate(bank, &self.bank, &reader)?);

@@ -6,7 +6,7 @@ use super::print::{Failure, InFile, name, show};
 use hybank::bank::{Bank, FixedPoint, SynthesisFilters, check_digest};
 use hybank::design;
 use hybank::messages::Quoted;
-use hybank::overview::counted;
+use hybank::messages::counted;
 use hybank::verify::uncertainty::check_stated;
 use hybank::verify::{BoundedBanks, Verified, verify};
 use std::path::PathBuf;

@@ -18,5 +18,5 @@ pub use pictures::{Picture, pictures};
 pub use spectra::spectra;
 pub use spur_chart::{Drawn, before_after, spur_chart};
 pub use terms::{Fact, band, figure_facts, rounded as decibels_of};
-pub use text::{change, counted, decibels, frequency, six_digits};
+pub use text::{change, decibels, frequency, six_digits};
 pub use understood::understood;

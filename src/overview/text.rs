@@ -2,7 +2,6 @@
 
 use crate::quantity::readable;
 use crate::units::Hertz;
-use std::fmt::Display;
 
 /// A number in at most six significant digits.
 pub fn six_digits(value: f64) -> String {
@@ -28,13 +27,6 @@ pub fn decibels(value: f64, reference: f64) -> String {
 /// A frequency with its unit; in normalised time it is a share of the output rate.
 pub fn frequency(hertz: Hertz, is_normalised: bool) -> String {
     if is_normalised { format!("{:.4} of the output rate", hertz.0) } else { readable(hertz.0, "Hz") }
-}
-
-/// A number of things, with a plural where it is not 1.
-pub fn counted(count: impl Display, name: &str) -> String {
-    let count = count.to_string();
-    let ending = if count == "1" { "" } else { "s" };
-    format!("{count} {name}{ending}")
 }
 
 /// A relative change: per cent, or a factor above 1000 %. What would be below zero is no number: a slope

@@ -1,7 +1,7 @@
 //! What was understood from a spec, in one line of the user's units.
 
-use super::text::counted;
 use crate::analog::StrictlyProper;
+use crate::messages::counted;
 use crate::quantity::readable;
 use crate::spec::Spec;
 use std::f64::consts::{PI, TAU};

@@ -2,6 +2,7 @@
 
 use super::GapSummary;
 use crate::io::InputWarning;
+use crate::messages::counted;
 use crate::runtime::PlanSummary;
 
 /// Counts and settings of a finished run.
@@ -41,10 +42,10 @@ pub enum Warning {
     #[error("{}: no samples to fuse (the length is zero), so the output has none", .0.join(", "))]
     Empty(Vec<String>),
     /// This many input samples were NaN or infinite.
-    #[error("{} missing, NaN or infinite and {} replaced by 0", counted(*.0, "input sample"), were(*.0))]
+    #[error("{} {were} missing, NaN or infinite and {were} replaced by 0", counted(.0, "input sample"), were = were(*.0))]
     Replaced(u64),
     /// This many output samples saturated.
-    #[error("{} clipped", counted(*.0, "output sample"))]
+    #[error("{} {} clipped", counted(.0, "output sample"), were(*.0))]
     Clipped(u64),
     /// A recursion's state was not finite this many times.
     #[error("{} the filter state was not finite and was set to zero", if *.0 == 1 { "once".to_owned() } else { format!("{} times", .0) })]
@@ -55,17 +56,12 @@ fn were(count: u64) -> &'static str {
     if count == 1 { "was" } else { "were" }
 }
 
-/// So many things, and the verb that follows them.
-fn counted(count: u64, what: &str) -> String {
-    format!("{count} {what}{} {}", if count == 1 { "" } else { "s" }, were(count))
-}
-
 impl Outcome {
     /// The faults that the filters tolerated.
     pub fn warnings(&self) -> impl Iterator<Item = Warning> + use<> {
-        let counted = |count: u64, warning: fn(u64) -> Warning| (count > 0).then(|| warning(count));
-        let replaced = counted(self.replaced, Warning::Replaced);
-        let clipped = counted(self.clipped, Warning::Clipped);
-        [replaced, clipped, counted(self.state_resets, Warning::StateReset)].into_iter().flatten()
+        let any = |count: u64, warning: fn(u64) -> Warning| (count > 0).then(|| warning(count));
+        let replaced = any(self.replaced, Warning::Replaced);
+        let clipped = any(self.clipped, Warning::Clipped);
+        [replaced, clipped, any(self.state_resets, Warning::StateReset)].into_iter().flatten()
     }
 }

@@ -83,7 +83,7 @@ pub fn encode_levels(
     (width, height): (usize, usize),
     path: &Path,
 ) -> Result<Vec<u8>, InputError> {
-    fills(numbers, (width, height))?;
+    fills(numbers, width, height)?;
     refuse_pixels_without_memory(path, (width, height), packing(1, Levels::Sixteen))?;
     let grey = ImageBuffer::from_raw(width as u32, height as u32, numbers.to_vec());
     write_picture(&grey.map(DynamicImage::ImageLuma16).unwrap_or_default(), ImageFormat::Png, path)
@@ -100,7 +100,7 @@ pub fn encode_with_alpha(
     path: &Path,
     levels: Levels,
 ) -> Result<Vec<u8>, InputError> {
-    fills(alpha, image.size())?;
+    fills(alpha, image.width(), image.height())?;
     refuse_pixels_without_memory(path, image.size(), packing(image.channels() + 1, levels))?;
     let pixels = image.data().chunks_exact(image.channels()).zip(alpha);
     let values = pixels.flat_map(|(pixel, alpha)| pixel.iter().copied().chain([255.0 * alpha]));
@@ -109,7 +109,7 @@ pub fn encode_with_alpha(
 }
 
 /// Refuses numbers that are not one per pixel.
-fn fills<T>(numbers: &[T], (width, height): (usize, usize)) -> Result<(), InputError> {
+fn fills<T>(numbers: &[T], width: usize, height: usize) -> Result<(), InputError> {
     let (expected, given) = (width.saturating_mul(height), numbers.len());
     if given == expected {
         return Ok(());

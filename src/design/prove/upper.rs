@@ -25,6 +25,9 @@ use nalgebra::DMatrix as Matrix;
 const EXCESSES: [f64; 8] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
 /// The relative excesses that are tried in double precision before more bits are used.
 const FINE_EXCESSES: usize = 3;
+/// Words of 64 bits of the numbers that are tried: 256 bits, and 512.
+const FEWER_WORDS: usize = 4;
+const MORE_WORDS: usize = 8;
 /// The relative excesses that are tried in 256 and in 512 bits.
 const LONG_EXCESSES: [f64; 3] = [1e-7, 1e-5, 1e-3];
 /// The same in units of `FLOOR`, for norms that are zero up to rounding.
@@ -101,7 +104,7 @@ pub(super) fn certificate(
         let mut tried = excesses.iter().take_while(|_| !stop.is_due());
         tried.find_map(|excess| {
             let level = level(excess);
-            search.of_long::<4>(&long, level).or_else(|| search.of_long::<8>(&long, level))
+            search.of_long::<FEWER_WORDS>(&long, level).or_else(|| search.of_long::<MORE_WORDS>(&long, level))
         })
     };
     let found = fine.iter().find_map(&mut in_doubles).or_else(long);
@@ -365,8 +368,8 @@ mod tests {
 
     #[test]
     fn one_pole_has_its_quadratic_root() {
-        roots_are_those_of_the_quadratic::<4>();
-        roots_are_those_of_the_quadratic::<8>();
+        roots_are_those_of_the_quadratic::<FEWER_WORDS>();
+        roots_are_those_of_the_quadratic::<MORE_WORDS>();
     }
 
     fn roots_are_those_of_the_quadratic<const WORDS: usize>() {
