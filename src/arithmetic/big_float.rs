@@ -57,7 +57,12 @@ fn joined(high: u64, low: u64, shift: u32) -> u64 {
 /// All words but the lowest one, after a shift to the left by less than a word.
 #[inline]
 fn upper<const WORDS: usize>(words: &[u64], shift: u32) -> [u64; WORDS] {
-    std::array::from_fn(|k| joined(words[k + 1], words[k], shift))
+    let mut shifted = [0; WORDS];
+    // No `array::from_fn`, which is a call for each entry at the levels of optimisation below the last one.
+    for (word, pair) in shifted.iter_mut().zip(words.windows(2)) {
+        *word = joined(pair[1], pair[0], shift);
+    }
+    shifted
 }
 
 /// 2^power, a normal double.

@@ -2,7 +2,7 @@
 
 use super::MeasureError;
 use crate::linalg::least_squares::{LeastSquares, Minimum, NoMinimum, NormalEquations, StepLimits, minimise};
-use crate::linalg::{Mat, fourier};
+use crate::linalg::{Mat, dot, fourier};
 use crate::sine_fit::Channel;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -149,8 +149,7 @@ impl<'a> Alignment<'a> {
         let point = move |n: usize| {
             let begin = (n as i64 - self.whole - reach) as usize;
             let near = &self.reference[begin..=begin + 2 * REACH];
-            let sum = |weights: &[f64]| near.iter().zip(weights).map(|(x, c)| x * c).sum::<f64>();
-            let (value, slope) = (sum(&weights), sum(&slopes));
+            let (value, slope) = (dot(near, &weights), dot(near, &slopes));
             Point { n, value, slope, error: self.samples[n] - self.gain * value - self.offset }
         };
         self.probed().map(point).filter(|point| point.error.is_finite())

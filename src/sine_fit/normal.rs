@@ -2,7 +2,7 @@
 
 use super::Channel;
 use crate::linalg::least_squares::NormalEquations;
-use crate::linalg::{Complex, Mat};
+use crate::linalg::{Complex, Mat, dot};
 use std::f64::consts::{PI, TAU};
 
 /// Samples that are handled at a time: the columns of a few tones fit the first-level cache.
@@ -42,15 +42,6 @@ fn rotation(cycles: f64, n: f64) -> Complex<f64> {
 pub(super) fn fractional_cycles(cycles: f64, n: f64) -> f64 {
     let product = cycles * n;
     product - product.round() + cycles.mul_add(n, -product)
-}
-
-/// The inner product of two blocks. Eight partial sums let the compiler use vector instructions.
-fn dot(x: &[f64], y: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    for (x, y) in x.as_chunks::<8>().0.iter().zip(y.as_chunks::<8>().0) {
-        sums = std::array::from_fn(|k| sums[k] + x[k] * y[k]);
-    }
-    sums.iter().sum()
 }
 
 /// The parameters at which a channel is linearised: the coefficients of 1, cosine and sine of each tone,
