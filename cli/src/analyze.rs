@@ -14,7 +14,7 @@ use hybank::design::{self, Analysis, Certified, GammaScale, MeanAnalysis};
 use hybank::figures::Figures;
 use hybank::overview::{decibels, frequency, six_digits, understood};
 use hybank::plot::{Chart, Series};
-use hybank::quantity::{self, readable};
+use hybank::quantity::{self, Time, readable};
 use hybank::units::Seconds;
 use hybank::verify::uncertainty::{ErrorBox, ErrorPoint, WorstCase};
 use std::fmt::Write as _;
@@ -43,9 +43,9 @@ Examples:
 pub(super) struct Args {
     /// The bank (JSON); `-` is standard input
     bank: PathBuf,
-    /// True delay minus the delay in the bank, one value per channel, in seconds
-    #[arg(long, value_delimiter = ',', value_parser = finite)]
-    delay_error: Vec<Seconds>,
+    /// True delay minus the delay in the bank, one value per channel: 10ps, 1e-11 or "0.01 samples"
+    #[arg(long, value_name = "TIMES", value_delimiter = ',', value_parser = quantity::time)]
+    delay_error: Vec<Time>,
     /// Also prove an upper bound of gamma (bounded-real lemma, with every rounding error bounded)
     #[arg(long)]
     certify: bool,
@@ -76,20 +76,15 @@ fn loss(text: &str) -> Result<f64, String> {
     }
 }
 
-fn finite(text: &str) -> Result<Seconds, String> {
-    match text.trim().parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(Seconds(value)),
-        _ => Err("delay errors are finite numbers, in seconds".to_owned()),
-    }
-}
-
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check()?;
     let bank = load(&args.bank)?;
     let errors = args.errors.error_box(&bank).map_err(|refused| bad_box(&refused))?;
     let jitter = args.errors.jitter_of(&bank).map_err(|refused| bad_box(&refused))?;
     let questions = Questions { errors, jitter, sensitivity: args.sensitivity, loss: args.accuracy };
-    let analysis = design::analyze(&bank, &args.delay_error).in_file(&args.bank)?;
+    let delay_errors: Vec<Seconds> =
+        args.delay_error.iter().map(|error| error.in_seconds(bank.fast_period)).collect();
+    let analysis = design::analyze(&bank, &delay_errors).in_file(&args.bank)?;
     let certified = args.certify.then(|| design::certify(&bank)).transpose().in_file(&args.bank)?;
     let errors = ErrorStudy::new(&bank, questions).in_file(&args.bank)?;
     if let Some((path, worst)) = args.sweep.as_ref().zip(errors.worst_case.as_ref()) {

@@ -22,18 +22,26 @@ pub(super) enum FileKind {
     Unknown,
 }
 
+const FLAC: &str = "a FLAC recording";
+const NUMPY: &str = "a NumPy array";
+const MATLAB: &str = "a MATLAB file";
+const TAR: &str = "an archive (tar)";
+const SIGMF: &str = "the metadata of a SigMF recording";
+const ARCHIVE: &str = "a ZIP or npz archive";
+
 /// First bytes of files, from the byte at which they stand.
-const MAGIC: [(usize, &[u8], &str); 11] = [
+const MAGIC: [(usize, &[u8], &str); 12] = [
+    (0, b"RIFX", "a big-endian WAV recording"),
     (8, b"WAVE", "a WAV recording"),
-    (0, b"fLaC", "a FLAC recording"),
+    (0, b"fLaC", FLAC),
     (0, b"OggS", "an Ogg recording"),
     (0, b"ID3", "an MP3 recording"),
     (8, b"AIFF", "an AIFF recording"),
-    (0, b"\x93NUMPY", "a NumPy array"),
-    (0, b"MATLAB 5", "a MATLAB file"),
-    (0, b"PK\x03\x04", "a ZIP or npz archive"),
+    (0, b"\x93NUMPY", NUMPY),
+    (0, b"MATLAB 5", MATLAB),
+    (0, b"PK\x03\x04", ARCHIVE),
     (0, b"\x89PNG", "a picture"),
-    (257, b"ustar", "an archive (tar)"),
+    (257, b"ustar", TAR),
     (1, b"ELF", "a program"),
 ];
 
@@ -53,7 +61,7 @@ impl FileKind {
         if begin.starts_with('{') {
             return match begin {
                 _ if begin.contains(FORMAT) => Self::Bank,
-                _ if begin.contains("core:datatype") => Self::Named("the metadata of a SigMF recording"),
+                _ if begin.contains("core:datatype") => Self::Named(SIGMF),
                 _ => Self::Unknown,
             };
         }
@@ -66,6 +74,17 @@ impl FileKind {
                 .any(|key| line.trim_start().starts_with(key))
         };
         if begin.lines().any(is_key) { Self::Spec } else { Self::Unknown }
+    }
+
+    /// How a recording of this kind is read.
+    fn way_in(self) -> &'static str {
+        match self {
+            Self::Named(ARCHIVE) => "which is not read; save each array alone, with numpy.save",
+            Self::Named(FLAC | NUMPY | MATLAB | TAR | SIGMF) => {
+                "and neither its name nor --format says so; rename it to the usual ending"
+            }
+            _ => "which is not read; convert it to a WAV recording",
+        }
     }
 
     /// Of the file at `path`; unknown unless it is a regular file that can be read.
@@ -111,10 +130,7 @@ pub(super) fn unreadable(error: IoError) -> Failure {
             "{}: this is {found}, and a recording is needed; give the captures after the bank or the spec",
             Quoted(file)
         )),
-        found => Failure::Input(format!(
-            "{}: this is {found}, and neither its name nor --format says so; rename it to the usual ending",
-            Quoted(file)
-        )),
+        found => Failure::Input(format!("{}: this is {found}, {}", Quoted(file), found.way_in())),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::bank_file::load;
 use super::print::{Failure, InFile, print};
-use super::written::{begin_file, check_outputs, write_bytes, write_together};
+use super::written::{begin_file, check_folder, check_outputs, write_bytes, write_together};
 use hybank::bank::Bank;
 use hybank::design::{DesignError, Options, design};
 use hybank::overview::{Picture, pictures};
@@ -41,6 +41,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    check_folder(&args.output)?;
     let bank = load(&args.bank)?;
     let mut all = pictures(&bank).in_file(&args.bank)?;
     if args.sweeps {

@@ -3,11 +3,12 @@
 use super::bank_file::load;
 use super::capture_args::{CaptureArgs, InterleavedArgs, output_rate};
 use super::capture_file::{start, unread};
-use super::print::{Failure, name, warn};
+use super::print::{Failure, is_dash, name, warn};
 use super::written::{check_output, write_text};
 use hybank::bank::Bank;
 use hybank::design::DesignError;
 use hybank::io::OfflineSamples;
+use hybank::messages::Quoted;
 use hybank::overview::page::{CapturesOnPage, MOST_FRAMES, Page, PageError};
 use hybank::units::Hertz;
 use std::path::{Path, PathBuf};
@@ -44,6 +45,12 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.reading.check(args.turns.is_given())?;
     args.turns.check(args.inputs.len())?;
     let inputs: Vec<&Path> = args.inputs.iter().chain([&args.bank]).map(PathBuf::as_path).collect();
+    if !is_dash(&args.output)
+        && args.output.extension().is_some_and(|ending| ending != "html" && ending != "htm")
+    {
+        let message = "a report is a page; give it a name that ends in .html, and print that for a PDF";
+        return Err(Failure::Usage(format!("{}: {message}", Quoted(&args.output))));
+    }
     check_output(&args.output, &inputs, args.force)?;
     let bank = load(&args.bank)?;
     if bank.spec.is_none() {

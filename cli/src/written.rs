@@ -75,18 +75,18 @@ pub(super) fn write_together<T>(
 
 /// Makes a folder, if it is not there.
 pub(super) fn create_folder(folder: &Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder).map_err(|error| {
-        let is_file = folder.ancestors().any(|part| part.exists() && !part.is_dir());
-        Failure::of(
-            folder,
-            match is_file {
-                true => {
-                    "a file has this name, or that of a folder above; give the name of a folder".to_owned()
-                }
-                false => format!("cannot create the folder: {error}"),
-            },
-        )
-    })
+    check_folder(folder)?;
+    let refused = |error| Failure::of(folder, format!("cannot create the folder: {error}"));
+    std::fs::create_dir_all(folder).map_err(refused)
+}
+
+/// Refuses a folder that no run can make, before the work is done.
+pub(super) fn check_folder(folder: &Path) -> Result<(), Failure> {
+    if folder.ancestors().any(|part| part.exists() && !part.is_dir()) {
+        let problem = "a file has this name, or that of a folder above; give the name of a folder";
+        return Err(Failure::of(folder, problem));
+    }
+    Ok(())
 }
 
 /// A recording of one channel to be written.

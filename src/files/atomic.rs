@@ -26,11 +26,16 @@ static NAMED: Mutex<Vec<String>> = Mutex::new(Vec::new());
 pub fn remove_unfinished() -> Vec<String> {
     let named = names_given();
     let files = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
-    files.iter().for_each(|(path, begun)| begun.remove(path));
+    files.iter().for_each(|(path, begun)| drop(begun.remove(path)));
     std::mem::forget(files);
     let committed = named.clone();
     std::mem::forget(named);
     committed
+}
+
+/// The names of the files of this process that have been committed, in their order.
+pub fn committed() -> Vec<String> {
+    names_given().clone()
 }
 
 /// For whoever gives names, until it is done.
@@ -97,8 +102,8 @@ impl AtomicFile {
         &self.name
     }
 
-    /// From now on the file stays under its hidden name if it gets no other: what is written to it, as what
-    /// is recorded live, cannot be made again.
+    /// From now on what is written stays under the hidden name if it gets no other: what is recorded live
+    /// cannot be made again.
     pub fn keep(&mut self) {
         self.is_unique = true;
     }
@@ -191,13 +196,20 @@ impl AtomicFile {
         None
     }
 
-    /// Makes the new name final.
-    fn confirm(mut self, placed: Placed) {
-        if placed != Placed::Exchanged {
-            self.forget();
-        }
-        // Otherwise the hidden name is that of the old file, which goes with this value.
-        self.is_unique = false;
+    /// Makes the new name final. What was replaced has the hidden name now, and goes.
+    fn confirm(mut self, placed: Placed) -> Result<(), FileError> {
+        let removed = match placed {
+            Placed::Exchanged => self.begun.remove(&self.beside),
+            Placed::New | Placed::Replaced => Ok(()),
+        };
+        let (file, hidden) = (self.name.clone(), self.beside.display().to_string());
+        self.forget();
+        removed.map_err(|source| FileError::OldFileStays { file, hidden, source })
+    }
+
+    /// Whether nothing has been written to the open file.
+    fn holds_nothing(&self) -> bool {
+        self.file.as_ref().is_some_and(|file| file.metadata().is_ok_and(|known| known.len() == 0))
     }
 
     /// Nothing has the hidden name any more.
@@ -222,8 +234,9 @@ impl AtomicFile {
 impl Drop for AtomicFile {
     fn drop(&mut self) {
         if !self.beside.as_os_str().is_empty() {
-            if !self.is_unique {
-                self.begun.remove(&self.beside);
+            if !self.is_unique || self.holds_nothing() {
+                // The error that led here, or the end of the process, matters more.
+                let _ = self.begun.remove(&self.beside);
             }
             self.forget();
         }
@@ -251,6 +264,7 @@ impl Seek for AtomicFile {
 ///
 /// # Errors
 /// As [`AtomicFile::commit`], for the first file that fails; the others are taken back.
+/// [`FileError::OldFileStays`] if all are in place and a file that one replaced could not be removed.
 pub fn commit_all(mut files: Vec<AtomicFile>) -> Result<(), FileError> {
     // Late disk errors occur here, before the first file gets its name.
     files.iter_mut().try_for_each(AtomicFile::seal)?;
@@ -268,8 +282,8 @@ pub fn commit_all(mut files: Vec<AtomicFile>) -> Result<(), FileError> {
         }
     }
     named.extend(placed.iter().map(|(file, _)| file.name.clone()));
-    placed.into_iter().for_each(|(file, how)| file.confirm(how));
-    Ok(())
+    let confirmed: Vec<_> = placed.into_iter().map(|(file, how)| file.confirm(how)).collect();
+    confirmed.into_iter().collect()
 }
 
 fn unfinished<R>(change: impl FnOnce(&mut BTreeMap<PathBuf, Begun>) -> R) -> R {

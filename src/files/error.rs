@@ -52,6 +52,16 @@ pub enum FileError {
         /// Hidden name of the unfinished file.
         hidden: String,
     },
+    /// An output is in place, and the file that it replaced could not be removed.
+    #[error("{}: it is written; the file that it replaced is still there as {}: {source}; remove that", Quoted(.file), Quoted(.hidden))]
+    OldFileStays {
+        /// Name of the output.
+        file: String,
+        /// Hidden name of the file that had its name before.
+        hidden: String,
+        /// What the system says.
+        source: io::Error,
+    },
     /// A set of outputs of which some could not be taken back.
     #[error("{error}; already in place and not taken back: {}", .stay.join(" and "))]
     InPart {

@@ -59,11 +59,8 @@ impl Begun {
     }
 
     /// Removes it from `path`; what another program put there stays.
-    pub(super) fn remove(self, path: &Path) {
-        if self.is_at(path) {
-            // The error that led here, or the end of the process, matters more.
-            let _ = fs::remove_file(path);
-        }
+    pub(super) fn remove(self, path: &Path) -> io::Result<()> {
+        if self.is_at(path) { fs::remove_file(path) } else { Ok(()) }
     }
 }
 

@@ -32,7 +32,7 @@ mod rename;
 pub mod signals;
 mod streams;
 
-pub use atomic::{AtomicFile, check_output, commit_all, remove_unfinished};
+pub use atomic::{AtomicFile, check_output, commit_all, committed, remove_unfinished};
 #[cfg(feature = "runtime")]
 pub(crate) use bounded::fill;
 pub use bounded::{Bound, SPEC_OR_BANK, bytes_of, read_bytes, read_text, text_in};

@@ -23,6 +23,11 @@ pub(super) trait Capture: Read {
         InputNotes::default()
     }
 
+    /// Bytes of further samples, which are not read; known after [`Capture::chunks_after`].
+    fn further_bytes(&self) -> u64 {
+        0
+    }
+
     /// Chunks after the samples, once these have all been read.
     fn chunks_after(&mut self) -> Vec<WavChunk> {
         Vec::new()

@@ -106,6 +106,14 @@ pub enum InputFault {
         /// Number of its bytes that were present.
         bytes: usize,
     },
+    /// Samples follow in another chunk.
+    #[error(
+        "{bytes} bytes of samples follow in another data chunk and were left out; write the recording with one data chunk"
+    )]
+    FurtherSamples {
+        /// Number of these bytes.
+        bytes: u64,
+    },
     /// The input ended before the last sample whose number at the converter is given.
     #[error("it ends before the last of the samples whose number is given")]
     TimestampsBeyondEnd,

@@ -107,8 +107,10 @@ impl InputFrames {
         let (missing_bytes, bytes) = (self.frames.inner.missing_bytes(), self.frames.carry.len());
         let truncated = (missing_bytes > 0).then_some(InputFault::Truncated { missing_bytes });
         let cut = (bytes > 0).then_some(InputFault::CutFrame { bytes });
+        let bytes = self.frames.inner.further_bytes();
+        let further = (bytes > 0).then_some(InputFault::FurtherSamples { bytes });
         let scale = self.scaling.as_ref().and_then(Scaling::fault);
-        truncated.into_iter().chain(cut).chain(scale).collect()
+        truncated.into_iter().chain(cut).chain(further).chain(scale).collect()
     }
 }
 

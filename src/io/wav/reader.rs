@@ -14,6 +14,8 @@ const JUSTIFICATION_SAMPLES: usize = 16384;
 pub struct WavReader<R> {
     header: WavHeader,
     data: Take<Chain<Cursor<Vec<u8>>, R>>,
+    /// Bytes in further data chunks.
+    further: u64,
 }
 
 impl<R: Read> WavReader<R> {
@@ -30,7 +32,7 @@ impl<R: Read> WavReader<R> {
             header.layout = SampleLayout { format: PcmFormat::S24Le, container: 4 };
         }
         let data = Cursor::new(peeked).chain(inner).take(header.data_bytes.unwrap_or(u64::MAX));
-        Ok(Self { header, data })
+        Ok(Self { header, data, further: 0 })
     }
 
     /// The header.
@@ -60,6 +62,10 @@ impl<R: Read> Capture for WavReader<R> {
         self.header.data_bytes.map_or(0, |_| self.data.limit())
     }
 
+    fn further_bytes(&self) -> u64 {
+        self.further
+    }
+
     fn notes(&self) -> InputNotes {
         InputNotes { chunks: self.header.chunks.clone(), ..InputNotes::default() }
     }
@@ -76,6 +82,9 @@ impl<R: Read> Capture for WavReader<R> {
             let [a, b, c, d, size @ ..] = head;
             let (id, size) = ([a, b, c, d], u64::from(u32::from_le_bytes(size)));
             pad = size % 2;
+            if &id == b"data" {
+                self.further = self.further.saturating_add(size);
+            }
             if WavChunk::may_be(&id, size, &chunks) {
                 let mut bytes = vec![0; size as usize];
                 if inner.read_exact(&mut bytes).is_err() {
