@@ -44,7 +44,7 @@ impl<const ORDER: usize> BSpline<ORDER> {
     #[inline]
     pub fn locate(x: f64) -> (i64, f64) {
         // Even degrees have their breaks half-way between the knots.
-        const { assert!(ORDER >= 2 && ORDER % 2 == 0, "splines of odd degree") }
+        const { assert!(ORDER >= 2 && ORDER.is_multiple_of(2), "splines of odd degree") }
         let floor = floor(x);
         (floor - (Self::DEGREE / 2) as i64, x - floor as f64)
     }
