@@ -16,7 +16,7 @@ use hybank::messages::{Number, Quoted};
 use hybank::quantity::{self, Time};
 use hybank::sine_fit::Estimate;
 use hybank::spec::{DesignOverrides, Spec};
-use hybank::track::{AlignError, AlignSettings, AlignedChannel, Alignment, DriftModel, align};
+use hybank::track::{AlignError, AlignSettings, AlignedChannel, Alignment, align};
 use hybank::units::Seconds;
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -174,7 +174,7 @@ impl Args {
         Ok(AlignSettings {
             reference: reference(self.reference, spec)?,
             within,
-            model: DriftModel::wandering(WANDER * unit.sqrt()),
+            rate_walk: (WANDER * unit.sqrt()).powi(2),
         })
     }
 

@@ -8,11 +8,10 @@ use super::print::{
     Failure, InFile, check_json, check_strict, is_dash, say, say_line, say_understood, show, warn,
 };
 use super::written::{check_output, write_text};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use hybank::design::{self, DesignError, Effort, Limits, Options, Stage};
 use hybank::messages::Quoted;
-use hybank::spec::{DesignOverrides, Method, Reduction, Spec, Tracking, WordLengths};
+use hybank::spec::{DesignOverrides, Method, Reduction, Spec, WordLengths};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -49,7 +48,7 @@ pub(super) struct Args {
     #[arg(short, long)]
     output: PathBuf,
     /// Design method, in place of that of the spec
-    #[arg(long, value_parser = named(Method::ALL.map(|method| (method.name(), method))))]
+    #[arg(long, value_enum)]
     method: Option<Method>,
     /// Taps per channel, in place of those of the spec
     #[arg(long)]
@@ -79,8 +78,8 @@ pub(super) struct Args {
     digits: bool,
     /// Taps that follow the delays while the bank runs, optimal over the delays of the spec's [uncertainty]
     /// (method fir)
-    #[arg(long, value_parser = named(Tracking::ALL.map(|tracking| (tracking.name(), tracking))))]
-    tracking: Option<Tracking>,
+    #[arg(long, value_parser = ["affine"])]
+    tracking: Option<String>,
     /// Use at most this many states (methods iir and h2)
     #[arg(long)]
     order: Option<usize>,
@@ -107,15 +106,6 @@ pub(super) struct Args {
     json: bool,
 }
 
-/// By name, so that completions know the names.
-fn named<T: Copy + Send + Sync + 'static, const K: usize>(
-    known: [(&'static str, T); K],
-) -> impl TypedValueParser<Value = T> {
-    PossibleValuesParser::new(known.map(|(name, _)| name)).try_map(move |given| {
-        known.iter().find(|(name, _)| *name == given).map(|&(_, value)| value).ok_or("unknown name")
-    })
-}
-
 fn overrides(args: &Args) -> DesignOverrides {
     DesignOverrides {
         method: args.method,
@@ -126,7 +116,7 @@ fn overrides(args: &Args) -> DesignOverrides {
         fraction_bits: args.fraction_bits,
         loss_db: args.loss_db,
         digits: args.digits,
-        tracking: args.tracking,
+        tracking: args.tracking.is_some(),
         reduction: args.order.map(Reduction::Order).or(args.reduction_loss_db.map(Reduction::Loss)),
     }
 }

@@ -112,7 +112,7 @@ fn sweeps(bank: &Bank) -> Result<Vec<Picture>, DesignError> {
     let design = DesignSpec {
         bits: None,
         fraction_bits: None,
-        tracking: None,
+        tracking: false,
         reduction: None,
         ..spec.design.clone()
     };

@@ -45,13 +45,12 @@ impl TrackArgs {
             let message = "--track changes the filters at single frames, and overlap-save filters in blocks; use direct";
             return usage(message.into());
         }
-        let refused = |option: &str, value: &dyn std::fmt::Display, error: TrackError| {
-            Failure::Usage(format!("{option} {value}: {error}"))
-        };
         let tracking = self.tracking();
         tracking.check_frames().map_err(|e| refused("--track-frames", &self.track_frames, e))?;
         tracking.check_wander().map_err(|e| refused("--track-wander", &self.track_wander, e))?;
-        self.kind(text)?;
+        if Tracking::file(text).is_none() {
+            Tracking::source(text).map_err(|error| refused("--track", &text, error))?;
+        }
         if self.log().is_some_and(|log| log.as_os_str() == "-") {
             return usage("--track-log -: the log cannot go to standard output; give it a file".into());
         }
@@ -67,14 +66,6 @@ impl TrackArgs {
         Tracking { frames: self.track_frames, wander: self.track_wander }
     }
 
-    fn kind(&self, text: &str) -> Result<Kind, Failure> {
-        if Path::new(text).extension().is_some_and(|extension| extension == "jsonl") {
-            return Ok(Kind::File(PathBuf::from(text)));
-        }
-        let source = Tracking::source(text);
-        source.map(Kind::Source).map_err(|error| Failure::Usage(format!("--track {text}: {error}")))
-    }
-
     /// Whether delays are followed.
     pub(super) fn is_wanted(&self) -> bool {
         self.track.is_some()
@@ -82,19 +73,18 @@ impl TrackArgs {
 
     /// The file of delays, which is an input.
     pub(super) fn input(&self) -> Option<&Path> {
-        let text = self.track.as_deref()?;
-        matches!(self.kind(text), Ok(Kind::File(_))).then(|| Path::new(text))
+        self.track.as_deref().and_then(Tracking::file)
     }
 
     /// What follows the delays of the channels, if that is asked for; `rate` is that of the output.
     pub(super) fn follower(&self, bank: &Bank, path: &Path, rate: f64) -> Result<Option<Follower>, Failure> {
         let Some(text) = self.track.as_deref() else { return Ok(None) };
-        let source = match self.kind(text)? {
-            Kind::Source(source) => source,
-            Kind::File(file) => {
-                let (text, channels) = (read_text(&file)?, bank.channel_count());
+        let source = match Tracking::file(text) {
+            None => Tracking::source(text).map_err(|error| refused("--track", &text, error))?,
+            Some(file) => {
                 let name = file.display().to_string();
-                DelaySource::Readings(Reading::parse(&text, &name, channels).map_err(Failure::input)?)
+                let readings = Reading::parse(&read_text(file)?, &name, bank.channel_count());
+                DelaySource::Readings(readings.map_err(Failure::input)?)
             }
         };
         let follower = self.tracking().follower(bank, source, rate);
@@ -107,12 +97,6 @@ impl TrackArgs {
         let record = TrackRecord { log, warnings: Vec::new() };
         Ok(Tracked { record: Arc::new(Mutex::new(record)), events })
     }
-}
-
-/// What --track says.
-enum Kind {
-    Source(DelaySource),
-    File(PathBuf),
 }
 
 /// What is recorded of a run whose delays are followed.
@@ -159,6 +143,10 @@ impl TrackRecord {
         let line = serde_json::to_string(log).unwrap_or_default();
         writeln!(file, "{line}").map_err(IoError::system(file.name(), "write it"))
     }
+}
+
+fn refused(option: &str, value: &dyn std::fmt::Display, error: TrackError) -> Failure {
+    Failure::Usage(format!("{option} {value}: {error}"))
 }
 
 fn locked(record: &Mutex<TrackRecord>) -> MutexGuard<'_, TrackRecord> {

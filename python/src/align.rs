@@ -7,7 +7,7 @@ use crate::errors::refused;
 use crate::results::Made;
 use crate::sources;
 use hybank::figures::Alone;
-use hybank::track::{self, AlignSettings, AlignedChannel, Alignment, DriftModel};
+use hybank::track::{self, AlignSettings, AlignedChannel, Alignment};
 use hybank::units::Seconds;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -58,7 +58,7 @@ pub(crate) fn align<'py>(
     let settings = AlignSettings {
         reference: reference_of(&spec, reference)?,
         within: within.map(Seconds),
-        model: DriftModel::wandering(1e-6),
+        rate_walk: 1e-12,
     };
     let found = background::run(py, None, move |_| {
         let found = track::align(&spec, &all, settings).map_err(|error| error.to_string())?;

@@ -149,7 +149,7 @@ impl Bank {
     /// True if the bank carries a proof of its gamma.
     #[getter]
     fn proven(&self) -> bool {
-        self.bank.proof.as_ref().is_some_and(|proof| proof.upper.is_some())
+        self.bank.has_certificate()
     }
 
     /// The spec with all defaults filled in, as TOML; None for a bank made elsewhere.

@@ -18,7 +18,7 @@ use std::sync::Arc;
 #[pyfunction]
 pub(crate) fn verify<'py>(bank: &Bound<'py, PyAny>, search: bool) -> PyResult<Bound<'py, PyAny>> {
     let given = Given::new(bank)?;
-    let certificate_in_bank = given.bank.proof.as_ref().is_some_and(|proof| proof.upper.is_some());
+    let certificate_in_bank = given.bank.has_certificate();
     let (bank_in, search) = (Arc::clone(&given.bank), search && !certificate_in_bank);
     let verified = background::run(bank.py(), None, move |_| proven(&bank_in, search))?;
     let verified = verified.map_err(|error| refused_in(&given.name, error))?;

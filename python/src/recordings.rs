@@ -1,7 +1,8 @@
 //! `hybank.Recording`: frames of a WAV or SigMF file from any place, for workers that read spans of it.
 
-use crate::errors::refused;
+use crate::errors::{file_error, refused};
 use crate::formats::Format;
+use hybank::files::FileError;
 use hybank::io::wav::WavReader;
 use hybank::io::{SigmfMeta, StreamHeader, is_sigmf, sigmf_files};
 use hybank::runtime::{Input, Isa, PcmFrames, Precision, Sample};
@@ -143,10 +144,5 @@ fn lost(meta: &SigmfMeta) -> bool {
 
 /// A refusal of the system, as Python has it.
 fn system(path: &Path, error: std::io::Error) -> PyErr {
-    match error.raw_os_error() {
-        Some(number) => {
-            pyo3::exceptions::PyOSError::new_err((number, error.kind().to_string(), path.to_owned()))
-        }
-        None => refused(format!("{}: {error}", path.display())),
-    }
+    file_error(FileError::system(&path.display().to_string(), "read it")(error))
 }

@@ -11,7 +11,6 @@ use hybank::pipeline::{Block, DroppedLatency, Gap, GapPolicy, Pipeline, Pipeline
 use hybank::runtime::{Algorithm, Options, PcmFrames, Plan, Precision};
 use hybank::track::{DelaySource, Logged, Reading, Tracking};
 use pyo3::prelude::*;
-use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// How delays are followed.
@@ -51,7 +50,7 @@ fn source(bank: &Bank, track: &Bound<'_, PyAny>) -> PyResult<DelaySource> {
         Reading::parse(text, name, bank.channel_count()).map(DelaySource::Readings).map_err(refused)
     };
     match sources::path(track) {
-        Some(path) if Path::new(&path).extension().is_some_and(|extension| extension == "jsonl") => {
+        Some(path) if Tracking::file(&path.to_string_lossy()).is_some() => {
             readings(&sources::read(&path)?, &path.display().to_string())
         }
         Some(text) => Tracking::source(&text.to_string_lossy()).map_err(refused),

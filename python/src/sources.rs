@@ -31,7 +31,7 @@ pub(crate) fn spec_with(source: &Bound<'_, PyAny>, keys: DesignOverrides) -> PyR
     let Some(path) = path(source) else {
         let beside = Measurements::in_folder(PathBuf::new());
         let table = values::table(source)?;
-        let spec = Spec::from_data_and_files(table, "spec", keys, &|wanted| beside.model(wanted));
+        let spec = Spec::from_data(table, "spec", keys, &|wanted| beside.model(wanted));
         return spec.map_err(|error| spec_error(py, &error));
     };
     let (text, name) = (read(&path)?, path.display().to_string());

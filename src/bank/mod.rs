@@ -132,6 +132,11 @@ impl Gamma {
 }
 
 impl Bank {
+    /// Whether the bank carries a certificate of its gamma.
+    pub fn has_certificate(&self) -> bool {
+        self.proof.as_ref().is_some_and(|proof| proof.upper.is_some())
+    }
+
     /// A bank of filters that were designed elsewhere: h = 1, no latency, no delays, gains of one, no
     /// offsets, unknown front ends and gammas.
     pub fn bare(filters: SynthesisFilters, ratio: usize) -> Self {

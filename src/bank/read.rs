@@ -4,7 +4,7 @@ use crate::messages::of_json;
 use crate::spec::Fault;
 use crate::spec::document::Node;
 use crate::spec::reader::{Fields, Value};
-use crate::spec::{DesignOverrides, Method, SpecProblem, decode};
+use crate::spec::{DesignOverrides, Method, SpecProblem, decode, no_models};
 use crate::units::Seconds;
 
 use super::digest::{digest, is_digest};
@@ -87,7 +87,8 @@ fn read(document: &Value<'_>) -> Result<Bank, BankError> {
     check_header(document)?;
     let top = document.fields(&KEYS)?;
     top.optional("digest").map(|value| stated_digest(&value)).transpose()?;
-    let spec = top.optional("spec").map(|v| decode::spec(&v, DesignOverrides::default())).transpose()?;
+    let spec =
+        top.optional("spec").map(|v| decode::spec(&v, DesignOverrides::default(), &no_models)).transpose()?;
     let method = Method::ALL.map(|m| (m.name(), m));
     let channels = top.required("channels", REWRITE)?.items("a list of channels")?;
     let channels = channels.iter().map(|c| c.fields(&CHANNEL_KEYS)).collect::<Result<Vec<_>, _>>()?;

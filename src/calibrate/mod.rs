@@ -45,6 +45,7 @@ mod order;
 mod record;
 mod starts;
 #[cfg(test)]
+#[path = "tests/testbench.rs"]
 mod testbench;
 mod tones;
 mod warning;

@@ -312,6 +312,4 @@ fn proven_worst_case(bank: &Bank, errors: &ErrorBox, taps: Taps) -> Result<f64, 
 }
 
 #[cfg(test)]
-mod signal_tests;
-#[cfg(test)]
 mod tests;

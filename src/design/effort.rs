@@ -115,7 +115,7 @@ pub fn remedy(spec: &Spec) -> &'static str {
         Method::Fir if spec.design.has_integers() => {
             "use fewer taps, leave out bits, take a smaller ratio or fewer channels"
         }
-        Method::Fir if spec.design.tracking.is_some() => {
+        Method::Fir if spec.design.tracking => {
             "use fewer taps or channels, a smaller ratio, or leave out tracking"
         }
         Method::Fir if spec.uncertainty.is_some() => {
@@ -205,7 +205,7 @@ impl Sizes {
     /// The method itself.
     fn method(&self, spec: &Spec) -> Effort {
         match spec.design.method {
-            Method::Fir => self.exchange(RobustProblem::of(spec), spec.design.tracking.is_some()),
+            Method::Fir => self.exchange(RobustProblem::of(spec), spec.design.tracking),
             Method::H2 if spec.is_fir() && Deviations::of(spec).is_some() => self.averaged(),
             Method::H2 if spec.is_fir() => self.smoother(2.0, self.lags(), self.ratio),
             Method::Iir | Method::H2 => {

@@ -12,14 +12,14 @@ use std::io::{self, Read, Seek, SeekFrom, Take};
 use std::path::Path;
 
 /// A recording, which reads as its samples.
-pub(super) struct SigmfReader<R> {
+pub(super) struct SigmfReader {
     meta: Box<SigmfMeta>,
     header: StreamHeader,
     timestamps: Timestamps,
-    samples: R,
+    samples: Take<File>,
 }
 
-impl SigmfReader<Take<File>> {
+impl SigmfReader {
     /// Opens the recording that the name of either of its files means.
     pub(super) fn open(path: &Path) -> Result<Self, IoError> {
         let (meta_path, _) = file_pair(path, None);
@@ -78,13 +78,13 @@ impl SigmfReader<Take<File>> {
     }
 }
 
-impl<R: Read> Read for SigmfReader<R> {
+impl Read for SigmfReader {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         self.samples.read(bytes)
     }
 }
 
-impl<R: Read> Capture for SigmfReader<R> {
+impl Capture for SigmfReader {
     fn stream_header(&self) -> StreamHeader {
         self.header
     }

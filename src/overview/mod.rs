@@ -6,7 +6,6 @@ mod measured;
 #[cfg(feature = "page")]
 pub mod page;
 mod pictures;
-mod spectra;
 mod spur_chart;
 mod terms;
 mod text;
@@ -15,8 +14,7 @@ mod understood;
 pub use facts::{ChannelFact, Facts, uselessness, warnings};
 pub use measured::{BeforeAfter, Figure, Unmeasured, causes, column};
 pub use pictures::{Picture, pictures};
-pub use spectra::spectra;
-pub use spur_chart::{Drawn, before_after, spur_chart};
+pub use spur_chart::{Drawn, before_after, spectra, spur_chart};
 pub use terms::{Fact, band, figure_facts, rounded as decibels_of};
 pub use text::{change, decibels, frequency, six_digits};
 pub use understood::understood;

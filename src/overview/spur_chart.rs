@@ -1,6 +1,6 @@
-//! The spectra of measured recordings with their spurs marked.
+//! The spectra of recordings, of measured ones with their spurs marked.
 
-use crate::measure::{Cause, Comparison, Measurement, Settings, Spectrum, Spur};
+use crate::measure::{Cause, Comparison, Measurement, Settings, Spectrum, Spur, Window};
 use crate::plot::{Chart, Marks, Series};
 use crate::quantity::scale_of;
 use crate::units::{Decibels, Hertz};
@@ -34,14 +34,14 @@ pub fn spur_chart(drawn: Drawn<'_>, settings: &Settings, spectrum: impl FnOnce()
             &own
         }
     };
-    let scale = Scale::of(&[spectrum], settings.full_scale);
+    let scale = Scale::of([spectrum], settings.full_scale);
     let mut series = vec![Series { label: drawn.label.to_owned(), points: scale.points(spectrum) }];
     if let Some((reference, comparison)) = drawn.comparison {
         let points = scale.points(&comparison.error_spectrum);
         series.push(Series { label: format!("error against {reference}"), points });
     }
     let marks = drawn.measurement.map(|measured| scale.marks(measured, false, &|_| true)).unwrap_or_default();
-    Chart { marks, ..scale.chart(title(drawn), settings, series) }
+    Chart { marks, ..scale.chart(title(drawn), settings.window, series) }
 }
 
 fn title(drawn: Drawn<'_>) -> String {
@@ -59,7 +59,7 @@ fn title(drawn: Drawn<'_>) -> String {
 /// Two measurements of one signal over one axis: the spurs of the first one are rings, those of the second
 /// one discs, and each cause has one colour. A spur that both have is named once.
 pub fn before_after(before: &Measurement, after: &Measurement) -> Chart {
-    let scale = Scale::of(&[&before.spectrum, &after.spectrum], after.full_scale);
+    let scale = Scale::of([&before.spectrum, &after.spectrum], after.full_scale);
     let series = [("interleaved (rings)", before), ("fused (discs)", after)];
     let series = series
         .map(|(label, measured)| Series { label: label.into(), points: scale.points(&measured.spectrum) });
@@ -71,8 +71,17 @@ pub fn before_after(before: &Measurement, after: &Measurement) -> Chart {
         "SFDR {:.1} -> {:.1} dBc, SINAD {:.1} -> {:.1} dB",
         before.sfdr.0, after.sfdr.0, before.sinad.0, after.sinad.0
     );
-    let settings = Settings { window: after.window, ..Settings::default() };
-    Chart { marks, ..scale.chart(title, &settings, series.into()) }
+    Chart { marks, ..scale.chart(title, after.window, series.into()) }
+}
+
+/// The spectra of recordings of the rate `rate`, each with its name.
+pub fn spectra(rate: Hertz, recordings: &[(&str, &[f64])]) -> Chart {
+    let window = Window::Bh7;
+    let spectra: Vec<_> = recordings.iter().map(|(_, x)| Spectrum::new(x, rate, window)).collect();
+    let scale = Scale::of(&spectra, 1.0);
+    let series = recordings.iter().zip(&spectra);
+    let series = series.map(|(&(label, _), of)| Series { label: label.into(), points: scale.points(of) });
+    scale.chart("Spectra of the captures".into(), window, series.collect())
 }
 
 /// The spurs of a recording that are marked: those above the noise, and the worst one of interleaving.
@@ -93,21 +102,21 @@ struct Scale {
 }
 
 impl Scale {
-    fn of(spectra: &[&Spectrum], full_scale: f64) -> Self {
-        let ends = spectra.iter().map(|spectrum| spectrum.frequency(spectrum.amplitudes.len()).0);
+    fn of<'a>(spectra: impl IntoIterator<Item = &'a Spectrum> + Clone, full_scale: f64) -> Self {
+        let ends = spectra.clone().into_iter().map(|of| of.frequency(of.amplitudes.len()).0);
         let end = ends.fold(0.0, f64::max);
         // Below 1 kHz the unit is hertz.
         let (factor, unit) = if end < 1e3 { (1.0, "Hz".to_owned()) } else { scale_of(end, "Hz") };
-        let all = spectra.iter().flat_map(|spectrum| &spectrum.amplitudes);
+        let all = spectra.into_iter().flat_map(|spectrum| &spectrum.amplitudes);
         let largest = all.fold(0.0, |most: f64, a| most.max(*a));
         Self { unit, factor, full_scale, floor: Decibels::of_amplitude(largest / full_scale).0 - DEPTH }
     }
 
-    fn chart(&self, title: String, settings: &Settings, series: Vec<Series>) -> Chart {
+    fn chart(&self, title: String, window: Window, series: Vec<Series>) -> Chart {
         Chart {
             title,
             x_label: format!("frequency ({})", self.unit),
-            y_label: format!("dBFS (window: {:.2} bins of noise)", settings.window.noise_bandwidth()),
+            y_label: format!("dBFS (window: {:.2} bins of noise)", window.noise_bandwidth()),
             series,
             ..Chart::default()
         }

@@ -44,7 +44,7 @@ pub struct FitSample<const C: usize> {
 
 /// Accumulates samples into the normal equations of one spline space and solves them.
 ///
-/// ORDER = degree + 1 >= 2; C values per sample, which share one factorisation. The fit owns its
+/// ORDER = degree + 1, 2 or 4; C values per sample, which share one factorisation. The fit owns its
 /// work memory: [`Fit::reset`] starts the next problem, without allocating if that is no larger.
 #[derive(Debug, Clone)]
 pub struct Fit<const ORDER: usize, const C: usize> {
@@ -59,7 +59,6 @@ pub struct Fit<const ORDER: usize, const C: usize> {
 impl<const ORDER: usize, const C: usize> Fit<ORDER, C> {
     /// An empty problem with the coefficients `first .. first + knots`.
     pub fn new(first: i64, knots: usize) -> Self {
-        const { assert!(ORDER >= 2, "a fit needs splines of degree one or more") }
         let mut fit = Self { first, knots, band: Vec::new(), rhs: Vec::new() };
         fit.reset(first, knots);
         fit

@@ -1,6 +1,6 @@
 //! The sampling core that both crates stand on.
 //!
-//! * [`kernel`]: centred B-splines of any degree, with slopes, and the sinc;
+//! * [`kernel`]: centred B-splines of odd degree, with slopes, and the sinc;
 //! * [`fit`]: regularised, weighted least squares in a shift-invariant spline space, solved in O(M n^2);
 //! * `fit2`: the same for images, with tensor products (feature `fit2`);
 //! * [`recurrent`]: perfect reconstruction from M interleaved sample sets (Yen's formula);

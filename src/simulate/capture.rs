@@ -1,4 +1,4 @@
-//! The captures of all converters of a problem, and the samples of the ideal fast converter.
+//! Analog signals, and the samples of the ideal fast converter.
 
 use super::recording::Recording;
 use super::response::{self, Instants, sample};
@@ -8,7 +8,6 @@ use crate::analog::StrictlyProper;
 use crate::design::Problem;
 use crate::design::{NearestSample, nearest_samples};
 use crate::units::FastPeriods;
-use std::ops::Range;
 
 /// An analog signal in normalised time.
 #[derive(Debug, Clone)]
@@ -17,36 +16,6 @@ pub enum Analog {
     Known(NormalisedSource),
     /// A recording, periodic and band-limited.
     Recorded(Recording),
-}
-
-/// The slow samples of all channels and the reference fast samples over the same time.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Captured {
-    /// `channels[i][k]` = g_i (phi_i * f)(k T_i - D_i), with the gain g_i of the converter and without its
-    /// offset; T_i = M unless converters have rates of their own.
-    pub channels: Vec<Vec<f64>>,
-    /// `target[n]` = (phi_0 * f)(n - m0), M samples per slow period, m0 without the wait for a frame.
-    pub target: Vec<f64>,
-}
-
-/// Captures `periods` slow periods of `signal`, or frames: slow samples k = 0 .. periods of each channel, or
-/// so many times the samples that it has in a frame, and M times as many reference samples.
-pub fn capture(problem: &Problem, signal: &Analog, periods: usize) -> Captured {
-    let slow = |samples: Range<usize>| {
-        let channel = &problem.channels[samples.start];
-        let instants = instants(problem, &samples, periods);
-        let samples = signal.filtered(&problem.front_ends[channel.front_end], instants);
-        samples.into_iter().map(|sample| channel.gain * sample).collect()
-    };
-    let channels = problem.converters().into_iter().map(slow).collect();
-    Captured { channels, target: target(problem, signal, periods) }
-}
-
-/// The instants of the samples of a converter, whose `samples` per frame these are, on its own time axis.
-pub(super) fn instants(problem: &Problem, samples: &Range<usize>, periods: usize) -> Instants {
-    let delay = problem.channels[samples.start].delay.later_by(-(problem.wait as f64));
-    let step = FastPeriods(problem.ratio as f64 / samples.len() as f64);
-    Instants { first: -delay.in_fast_periods(), step, count: periods * samples.len() }
 }
 
 /// The reference samples (phi_0 * f)(n - m0), M per slow period, with the latency m0 of the problem without
@@ -107,6 +76,7 @@ pub fn interleaved(delays: &[FastPeriods], ratio: usize, latency: usize, channel
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simulate::capture;
     use crate::spec::Spec;
     use crate::units::Seconds;
 

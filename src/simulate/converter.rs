@@ -1,11 +1,12 @@
 //! A virtual converter with errors of its own.
 
-use super::capture::{Analog, instants};
+use super::capture::{Analog, target};
 use super::normal::{Normal, Purpose};
 use super::quantiser::Quantiser;
 use super::response::Instants;
 use crate::design::Problem;
 use crate::units::FastPeriods;
+use std::ops::Range;
 
 /// How a converter differs from the ideal sampler of a channel. Sample k of channel i, with the front end
 /// Phi_i and the gain g_i of the problem, is
@@ -130,6 +131,31 @@ impl Converter {
         }
         Delivered { samples, imaginary: None, clipped }
     }
+}
+
+/// The instants of the samples of a converter, whose `samples` per frame these are, on its own time axis.
+fn instants(problem: &Problem, samples: &Range<usize>, periods: usize) -> Instants {
+    let delay = problem.channels[samples.start].delay.later_by(-(problem.wait as f64));
+    let step = FastPeriods(problem.ratio as f64 / samples.len() as f64);
+    Instants { first: -delay.in_fast_periods(), step, count: periods * samples.len() }
+}
+
+/// The slow samples of all channels and the reference fast samples over the same time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Captured {
+    /// `channels[i][k]` = g_i (phi_i * f)(k T_i - D_i), with the gain g_i of the converter and without its
+    /// offset; T_i = M unless converters have rates of their own.
+    pub channels: Vec<Vec<f64>>,
+    /// `target[n]` = (phi_0 * f)(n - m0), M samples per slow period, m0 without the wait for a frame.
+    pub target: Vec<f64>,
+}
+
+/// Captures `periods` slow periods of `signal`, or frames: slow samples k = 0 .. periods of each channel, or
+/// so many times the samples that it has in a frame, and M times as many reference samples.
+pub fn capture(problem: &Problem, signal: &Analog, periods: usize) -> Captured {
+    let slow = |i| Converter::ideal().capture(problem, i, signal, 1.0, periods).samples;
+    let channels = (0..problem.converters().len()).map(slow).collect();
+    Captured { channels, target: target(problem, signal, periods) }
 }
 
 #[cfg(test)]

@@ -22,9 +22,9 @@ mod source;
 mod walk;
 mod workload;
 
-pub use capture::{Analog, Captured, capture, interleaved, target};
+pub use capture::{Analog, interleaved, target};
 pub use complex::ComplexSource;
-pub use converter::{Converter, Delivered};
+pub use converter::{Captured, Converter, Delivered, capture};
 pub use errors::{ConverterErrors, ErrorRule, ErrorsOfConverter, RefusedError, VirtualConverter};
 pub use parse::ParseSourceError;
 pub use quantiser::Quantiser;

@@ -36,8 +36,6 @@
 //! longest one, which makes the columns nearly orthogonal.
 
 mod error;
-#[cfg(test)]
-mod exponential_tests;
 mod gauss_newton;
 mod normal;
 mod result;

@@ -1,3 +1,5 @@
+mod exponential;
+
 use super::*;
 use crate::linalg::{Mat, svd};
 use crate::random::Random;

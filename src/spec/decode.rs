@@ -1,9 +1,9 @@
 //! Turns a document into a [`Spec`]: resolves units, fills in omitted filters, checks all rules.
 
-use super::design::{DesignOverrides, Method, Reduction, Tracking};
+use super::design::{AFFINE, DesignOverrides, Method, Reduction};
 use super::error::KeyProblem;
 use super::filter_reader::{FILTER_FORMS, filter};
-use super::measured::{FilterModel, FilterModels, MeasuredFilter, Measurement, no_models};
+use super::measured::{FilterModel, FilterModels, MeasuredFilter, Measurement};
 use super::reader::{Either, Fields, Value};
 use super::word_lengths::{WordLengths, check_fraction_bits};
 use super::{
@@ -55,13 +55,8 @@ const SAME_MEANING: &str = "they have the same meaning, keep one of them";
 /// Errors of models below this, in decibels, are not carried into the uncertainty: 1.2e-4 of the gain.
 const LEAST_MODEL_ERROR_DB: f64 = 1e-3;
 
-/// Reads the whole spec, whose filters are not measurements.
-pub(crate) fn spec(document: &Value<'_>, overrides: DesignOverrides) -> Result<Spec, Fault> {
-    spec_with(document, overrides, &no_models)
-}
-
 /// Reads the whole spec.
-pub(crate) fn spec_with(
+pub(crate) fn spec(
     document: &Value<'_>,
     overrides: DesignOverrides,
     models: &FilterModels<'_>,
@@ -376,7 +371,7 @@ fn written(table: &Fields<'_>) -> Result<DesignOverrides, Fault> {
         fraction_bits: table.read("fraction_bits", |v| fraction_bits(&v))?,
         loss_db: table.read("loss_db", |v| v.number_in(limits::check_word_loss))?.map(|db| db + 0.0),
         digits: table.read("digits", |v| v.boolean())?.unwrap_or(false),
-        tracking: table.read("tracking", |v| v.name("tracking", &Tracking::ALL.map(|t| (t.name(), t))))?,
+        tracking: table.read("tracking", |v| v.name("tracking", &[(AFFINE, true)]))?.unwrap_or(false),
         reduction: match table.either(
             "order",
             "reduction_loss_db",

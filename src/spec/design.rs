@@ -4,11 +4,12 @@ use super::error::{KeyProblem, blame};
 use super::limits;
 use super::word_lengths::{WordLengths, check_fraction_bits};
 use super::{FrameLayout, SpecProblem, UncertaintySpec};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 /// How the synthesis filters are designed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[non_exhaustive]
 pub enum Method {
     /// Finite impulse responses of given length, least gamma.
@@ -21,16 +22,6 @@ pub enum Method {
     Sinc,
     /// First a fractional-delay filter per channel, then a bank for integer delays (for comparison).
     Separation,
-}
-
-/// How the taps of an FIR bank follow delays that change while it runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-#[non_exhaustive]
-pub enum Tracking {
-    /// The taps are affine functions of the delays, optimal over the box of delays of the `[uncertainty]`
-    /// table.
-    Affine,
 }
 
 /// The keys of a `[design]` table. `M` is the [`Method`], or an option of it where it may be left out.
@@ -60,12 +51,20 @@ pub struct DesignTable<M> {
     /// Whether `loss_db` asks for few signed digits, not for few bits.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub digits: bool,
-    /// Taps that follow the delays, for the method `fir`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tracking: Option<Tracking>,
+    /// Taps of the method `fir` that follow delays which change while the bank runs: affine functions of the
+    /// delays, optimal over the box of the `[uncertainty]` table.
+    #[serde(skip_serializing_if = "std::ops::Not::not", serialize_with = "as_affine")]
+    pub tracking: bool,
     /// Order reduction, for recursive methods.
     #[serde(flatten)]
     pub reduction: Option<Reduction>,
+}
+
+/// The way in which taps follow delays, in spec files.
+pub(super) const AFFINE: &str = "affine";
+
+fn as_affine<S: Serializer>(_: &bool, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(AFFINE)
 }
 
 /// A `[design]` table with its defaults filled in.
@@ -138,18 +137,6 @@ impl Method {
     }
 }
 
-impl Tracking {
-    /// Every way.
-    pub const ALL: [Self; 1] = [Self::Affine];
-
-    /// The name in spec files and on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Affine => "affine",
-        }
-    }
-}
-
 impl Reduction {
     /// The key in spec files.
     pub const fn key(self) -> &'static str {
@@ -187,7 +174,7 @@ impl<M> DesignTable<M> {
             ("fraction_bits", self.fraction_bits.is_some()),
             ("loss_db", self.loss_db.is_some()),
             ("digits", self.digits),
-            ("tracking", self.tracking.is_some()),
+            ("tracking", self.tracking),
         ];
         keys.into_iter()
             .filter(|(_, given)| *given)
@@ -269,7 +256,7 @@ impl DesignSpec {
         }
         blame("target_snr_db", self.target_snr_db.map_or(Ok(()), limits::check_target_snr))?;
         // Taps that follow the delays are functions of all delays but one.
-        let functions = if self.tracking.is_some() { layout.samples().len() } else { 1 };
+        let functions = if self.tracking { layout.samples().len() } else { 1 };
         match (self.method, self.taps) {
             (Method::Fir, Some(taps)) => {
                 blame("taps", limits::check_optimised_taps(taps, layout.count().saturating_mul(functions)))
@@ -295,7 +282,7 @@ impl DesignSpec {
         let conflict =
             |first, second, remedy| Some((second, SpecProblem::Conflict { first, second, remedy }));
         match self.reduction {
-            _ if self.has_integers() && self.tracking.is_some() => conflict(
+            _ if self.has_integers() && self.tracking => conflict(
                 if self.bits.is_some() { "bits" } else { "loss_db" },
                 "tracking",
                 "taps that follow the delays are no integers; leave out one of the two",
@@ -330,7 +317,7 @@ impl DesignSpec {
             return blame(reduction.key(), conflict(reduction.key(), remedy));
         }
         let remedy = match uncertainty {
-            _ if self.tracking.is_none() => return Ok(()),
+            _ if !self.tracking => return Ok(()),
             Some(table) if table.has_delays(channels) => return Ok(()),
             None => "tracking needs to know how far the delays may move: give [uncertainty] delay",
             Some(_) => {
@@ -361,7 +348,7 @@ impl DesignOverrides {
             fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| keeps("fraction_bits"))),
             loss_db: self.loss_db.or(file.loss_db.filter(|_| keeps("loss_db"))),
             digits: self.digits || file.digits && keeps("digits"),
-            tracking: self.tracking.or(file.tracking.filter(|_| keeps("tracking"))),
+            tracking: self.tracking || file.tracking && keeps("tracking"),
             reduction: self.reduction.or(file.reduction.filter(|_| keeps("order"))),
         }
     }

@@ -39,6 +39,6 @@ pub struct FilterModel {
 pub type FilterModels<'a> = dyn Fn(&MeasuredFilter) -> Result<FilterModel, String> + 'a;
 
 /// For texts that have no folder.
-pub(super) fn no_models(_: &MeasuredFilter) -> Result<FilterModel, String> {
+pub(crate) fn no_models(_: &MeasuredFilter) -> Result<FilterModel, String> {
     Err("a measured filter is read where the spec is a file; give the fitted filter instead".to_owned())
 }

@@ -24,7 +24,7 @@ mod word_lengths;
 mod write;
 
 pub use crate::messages::Location;
-pub use design::{DesignOverrides, DesignSpec, DesignTable, Method, Reduction, Tracking};
+pub use design::{DesignOverrides, DesignSpec, DesignTable, Method, Reduction};
 pub use edit::with_measurements_renamed;
 pub(crate) use error::{Fault, shown_path};
 pub use error::{SpecError, SpecProblem};
@@ -36,6 +36,7 @@ pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_T
 pub(crate) use limits::{MAX_ENTRY, check_fast_period, check_gain};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES, MAX_TARGET_SNR_DB};
 pub use limits::{check_noise, check_offset, within};
+pub(crate) use measured::no_models;
 pub use measured::{FilterModel, FilterModels, MeasuredFilter, Measurement};
 pub use passband::Passband;
 pub use signal::{Band, SignalSpec, SignalSpectrum, USUAL_RMS};
@@ -162,29 +163,17 @@ impl Spec {
     /// # Errors
     /// [`SpecError`] with line, column, rule and remedy for the first thing that is wrong.
     pub fn from_toml(text: &str, file_name: &str) -> Result<Self, SpecError> {
-        Self::from_toml_with(text, file_name, DesignOverrides::default())
+        Self::from_toml_and_files(text, file_name, DesignOverrides::default(), &no_models)
     }
 
     /// Reads a spec file's text with parts of its `[design]` table replaced before it is checked: a file
-    /// without taps is complete when the command line gives them.
+    /// without taps is complete when the command line gives them. Filters may be measurements in other
+    /// files, of which `models` makes filters. Their errors become half-widths of the gains in the
+    /// uncertainty, where they matter.
     ///
     /// # Errors
-    /// As [`Spec::from_toml`]; [`SpecError::overridden`] distinguishes errors in `overrides` from errors in
-    /// the file.
-    pub fn from_toml_with(
-        text: &str,
-        file_name: &str,
-        overrides: DesignOverrides,
-    ) -> Result<Self, SpecError> {
-        Self::from_toml_and_files(text, file_name, overrides, &measured::no_models)
-    }
-
-    /// As [`Spec::from_toml_with`], for a spec whose filters may be measurements in other files. `models`
-    /// makes filters of them. Their errors become half-widths of the gains in the uncertainty, where they
-    /// matter.
-    ///
-    /// # Errors
-    /// As [`Spec::from_toml_with`], and those of `models`.
+    /// As [`Spec::from_toml`], and those of `models`; [`SpecError::overridden`] distinguishes errors in
+    /// `overrides` from errors in the file.
     pub fn from_toml_and_files(
         text: &str,
         file_name: &str,
@@ -195,30 +184,22 @@ impl Spec {
             let (problem, span) = unparsed(text, &error);
             SpecError::new(file_name, text, span, String::new(), problem)
         })?;
-        decode::spec_with(&reader::Value::root(&document), overrides, models)
+        decode::spec(&reader::Value::root(&document), overrides, models)
             .map_err(|fault| SpecError::of(file_name, text, fault))
     }
 
-    /// Reads a spec from data that have no text: the tables and lists of another language, with the keys of
-    /// a spec file. `name` is used only in messages.
+    /// As [`Spec::from_toml_and_files`], of data that have no text: the tables and lists of another language,
+    /// with the keys of a spec file. `name` is used only in messages.
     ///
     /// # Errors
-    /// As [`Spec::from_toml`], without a location; the path of keys says where.
-    pub fn from_data<'de, D: Deserializer<'de>>(data: D, name: &str) -> Result<Self, SpecError> {
-        Self::from_data_and_files(data, name, DesignOverrides::default(), &measured::no_models)
-    }
-
-    /// As [`Spec::from_toml_and_files`], of data.
-    ///
-    /// # Errors
-    /// As [`Spec::from_data`], and those of `models`.
-    pub fn from_data_and_files<'de, D: Deserializer<'de>>(
+    /// As [`Spec::from_toml_and_files`], without a location; the path of keys says where.
+    pub fn from_data<'de, D: Deserializer<'de>>(
         data: D,
         name: &str,
         overrides: DesignOverrides,
         models: &FilterModels<'_>,
     ) -> Result<Self, SpecError> {
-        read_data(data, name, |document| decode::spec_with(document, overrides, models))
+        read_data(data, name, |document| decode::spec(document, overrides, models))
     }
 
     /// The spec as a TOML file that reads back equal.

@@ -1,14 +1,8 @@
 //! A spec as a document: the same keys in TOML and in the `spec` of a bank file.
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Serialize, Serializer};
 
-use super::Fault;
-use super::document::Node;
-use super::filter_reader::filter;
-use super::reader::Value;
-use super::{
-    ChannelSpec, DesignOverrides, DesignSpec, FilterSpec, Fitting, SignalSpec, Spec, UncertaintySpec, decode,
-};
+use super::{ChannelSpec, DesignSpec, FilterSpec, Fitting, SignalSpec, Spec, UncertaintySpec};
 use crate::quantity::FullScale;
 use crate::units::Seconds;
 
@@ -58,23 +52,4 @@ impl Serialize for Spec {
         }
         .serialize(serializer)
     }
-}
-
-impl<'de> Deserialize<'de> for Spec {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let node = Node::deserialize(deserializer)?;
-        decode::spec(&Value::root(&node), DesignOverrides::default()).map_err(custom)
-    }
-}
-
-impl<'de> Deserialize<'de> for FilterSpec {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let node = Node::deserialize(deserializer)?;
-        filter(&Value::root(&node)).map_err(custom)
-    }
-}
-
-fn custom<E: serde::de::Error>(fault: Fault) -> E {
-    let Fault { path, problem, .. } = fault;
-    E::custom(if path.is_empty() { problem.to_string() } else { format!("{path}: {problem}") })
 }

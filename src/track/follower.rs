@@ -1,7 +1,7 @@
 //! Follows the delays of a bank's channels block by block, and says how its taps are to change.
 
 use super::error::NotMeasured;
-use super::filter::{DelayFilter, DelayMeasurement, DelayState, DriftModel};
+use super::filter::{DelayFilter, DelayMeasurement, DelayState};
 use super::frame_shift::{least_half, shift_for};
 use super::log::{Logged, TrackWarning};
 use super::readings::Reading;
@@ -33,8 +33,8 @@ const HORIZON: f64 = 60.0;
 pub struct FollowSettings {
     /// Frames of a block: of one measurement.
     pub block_frames: usize,
-    /// How delays change.
-    pub model: DriftModel,
+    /// Variance by which a rate walks in a second, in (s/s)^2 / s.
+    pub rate_walk: f64,
     /// Standard deviation of the rates at the beginning, seconds per second.
     pub rate_deviation: f64,
     /// By how much a rate changes in a second at most, for the bound of the error between readings; it
@@ -128,7 +128,7 @@ impl Follower {
         let (mut trackers, mut warnings) = (Vec::new(), Vec::new());
         for &j in &followed {
             let timeline = match &source {
-                DelaySource::Readings(readings) => Timeline::new(readings, j, frame, settings.model),
+                DelaySource::Readings(readings) => Timeline::new(readings, j, frame, settings.rate_walk),
                 DelaySource::Pilot(_) | DelaySource::AnySignal => Ok(None),
             };
             let timeline = timeline.unwrap_or_else(|reason| {
@@ -138,7 +138,12 @@ impl Follower {
             // Each begins with the delay of the spec and its interval.
             let (delay, sigma) = (spec.channels[j].delay, of_all[j].0 / HALF_WIDTH);
             let state = DelayState::known(delay, sigma, settings.rate_deviation);
-            trackers.push(DelayTracker::new(j, of_all[j], DelayFilter::new(state, settings.model), timeline));
+            trackers.push(DelayTracker::new(
+                j,
+                of_all[j],
+                DelayFilter::new(state, settings.rate_walk),
+                timeline,
+            ));
         }
         let no_shifts = vec![0; spec.channels.len()];
         Ok(Self {
@@ -244,13 +249,11 @@ impl Follower {
         self.shifts.front().map_or(&self.last_shifts, |shifts| shifts)
     }
 
-    /// A block shows the mean of a delay over it. With a rate that walks by q and a delay that walks by p in
-    /// a second, the variance of its distance from the delay at the centre of the time T is q T^3 / 320 + p
-    /// T / 12.
+    /// A block shows the mean of a delay over it. With a rate that walks by q in a second, the variance of its
+    /// distance from the delay at the centre of the time T is q T^3 / 320.
     fn mean_of_block(&self) -> f64 {
-        let DriftModel { delay_walk, rate_walk } = self.settings.model;
         let t = self.frame_time().0 * self.settings.block_frames as f64;
-        rate_walk * t.powi(3) / 320.0 + delay_walk * t / 12.0
+        self.settings.rate_walk * t.powi(3) / 320.0
     }
 
     /// Updates the filters; a measurement that was refused is none.

@@ -1,7 +1,7 @@
 //! Delays that drift, followed while a bank runs.
 //!
-//! Each channel's delay relative to the reference changes: the delay itself walks at random, and so does the
-//! rate at which it changes (two free-running clocks). A [`DelayFilter`] is the Kalman filter of one delay
+//! Each channel's delay relative to the reference changes, and the rate at which it changes walks at random (two
+//! free-running clocks). A [`DelayFilter`] is the Kalman filter of one delay
 //! and its rate: measurements of block fits enter with their variance, silence lets the variance grow. A
 //! tracker per channel refuses measurements that contradict the filter, and says whether it is locked.
 //! [`Coincidence`] warns ahead of delays that come together, where no bank recovers the signal. A
@@ -11,11 +11,11 @@
 //! [`align`] measures them so for whole recordings, which may have begun at any time.
 //!
 //! ```
-//! use hybank::track::{DelayFilter, DelayMeasurement, DriftModel, DelayState};
+//! use hybank::track::{DelayFilter, DelayMeasurement, DelayState};
 //! use hybank::units::Seconds;
 //! // Clocks whose rate walks by 1e-9 in a second; delays known to 1 ns at the beginning, rates to 10 ppm.
-//! let model = DriftModel { delay_walk: 0.0, rate_walk: 1e-18 };
-//! let mut filter = DelayFilter::new(DelayState::known(Seconds(3e-9), 1e-9, 1e-5), model);
+//! let rate_walk = 1e-18;
+//! let mut filter = DelayFilter::new(DelayState::known(Seconds(3e-9), 1e-9, 1e-5), rate_walk);
 //! for block in 0..100 {
 //!     filter.advance(Seconds(0.01));
 //!     // The delay grows by 2 ppm.
@@ -43,7 +43,7 @@ mod tracking;
 pub use align::{AlignError, AlignSettings, AlignWarning, AlignedChannel, Alignment, align};
 pub use coincidence::Coincidence;
 pub use error::{ReadingProblem, TrackError};
-pub use filter::{DelayFilter, DelayMeasurement, DelayState, DriftModel, Innovation};
+pub use filter::{DelayFilter, DelayMeasurement, DelayState, Innovation};
 pub use follower::{Change, FollowSettings, Followed, Follower};
 pub use log::{Logged, TrackWarning};
 pub use readings::Reading;

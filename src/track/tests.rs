@@ -30,8 +30,8 @@ fn bank(half: f64) -> Bank {
 }
 
 fn settings(wander: f64) -> FollowSettings {
-    let model = DriftModel { delay_walk: 0.0, rate_walk: wander * wander };
-    FollowSettings { block_frames: 4096, model, rate_deviation: 1e-4, rate_change: wander }
+    let rate_walk = wander * wander;
+    FollowSettings { block_frames: 4096, rate_walk, rate_deviation: 1e-4, rate_change: wander }
 }
 
 /// A normal number by the sum of twelve uniform ones.

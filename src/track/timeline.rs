@@ -1,6 +1,6 @@
 //! Delays at any instant from readings that are known beforehand.
 
-use super::filter::{DelayState, DriftModel};
+use super::filter::DelayState;
 use super::readings::Reading;
 use crate::sampling::nonuniform::{Measured, Smoothness};
 use crate::sampling::{SamplingError, SmoothingSpline};
@@ -17,7 +17,7 @@ const BESIDE: usize = 4;
 const ROUNDING: f64 = 0.288_675_134_594_812_9;
 
 /// The delay of one channel over time, from all readings of it: those after an instant count as much as
-/// those before it. The model is that of a [`super::DelayFilter`], so this is its smoother.
+/// those before it. The rate walks as in a [`super::DelayFilter`], so this is its smoother.
 #[derive(Debug, Clone)]
 pub(super) struct Timeline {
     spline: SmoothingSpline,
@@ -26,8 +26,8 @@ pub(super) struct Timeline {
 }
 
 impl Timeline {
-    /// Of channel `i`, with the time of a frame. `None` with readings of fewer than two frames, and for
-    /// models in which the delay itself walks, which is no spline: then the filter follows them.
+    /// Of channel `i`, with the time of a frame. `None` with readings of fewer than two frames: then the
+    /// filter follows them.
     ///
     /// # Errors
     /// [`SamplingError`] if no spline goes through the readings.
@@ -35,7 +35,7 @@ impl Timeline {
         readings: &[Reading],
         i: usize,
         frame: Seconds,
-        model: DriftModel,
+        rate_walk: f64,
     ) -> Result<Option<Self>, SamplingError> {
         let of = |reading: &Reading| {
             let (delay, sigma) = reading.delays[i]?;
@@ -44,12 +44,12 @@ impl Timeline {
         };
         let mut all: Vec<(u64, Measured)> = readings.iter().filter_map(of).collect();
         let has_two_frames = all.iter().any(|sample| sample.0 != all[0].0);
-        if model.delay_walk > 0.0 || !has_two_frames {
+        if !has_two_frames {
             return Ok(None);
         }
         let mut refused = Vec::new();
         for _ in 0..ROUNDS {
-            let spline = spline(&all, model)?;
+            let spline = spline(&all, rate_walk)?;
             let worst = contradictory(&spline);
             // Without two instants nothing is left to be judged by.
             if worst.is_empty() || all.len() < worst.len() + 2 {
@@ -59,7 +59,7 @@ impl Timeline {
                 refused.push(all.remove(k).0);
             }
         }
-        Ok(Some(Self { spline: spline(&all, model)?, refused }))
+        Ok(Some(Self { spline: spline(&all, rate_walk)?, refused }))
     }
 
     /// What is known at a time.
@@ -92,8 +92,8 @@ impl Timeline {
     }
 }
 
-fn spline(samples: &[(u64, Measured)], model: DriftModel) -> Result<SmoothingSpline, SamplingError> {
-    SmoothingSpline::new(samples.iter().map(|sample| sample.1).collect(), model.rate_walk)
+fn spline(samples: &[(u64, Measured)], rate_walk: f64) -> Result<SmoothingSpline, SamplingError> {
+    SmoothingSpline::new(samples.iter().map(|sample| sample.1).collect(), rate_walk)
 }
 
 /// The samples that contradict the others, each the worst of those beside it.
@@ -126,7 +126,7 @@ mod tests {
         (0..count).map(reading).collect()
     }
 
-    const MODEL: DriftModel = DriftModel { delay_walk: 0.0, rate_walk: 1e-12 };
+    const RATE_WALK: f64 = 1e-12;
 
     /// A rate that changes by 2 ppm in each second: the root mean square error of the smoother is half that
     /// of the filter, and less than the delays two readings ahead that a filter gives to the taps.
@@ -134,8 +134,8 @@ mod tests {
     fn readings_on_both_sides_halve_the_error_of_the_filter() {
         let (sigma, delay) = (2e-8, |t: f64| 1e-5 + 3e-6 * t + 5e-7 * (2.0 * t).sin());
         let all = readings(400, 20, sigma, delay);
-        let timeline = Timeline::new(&all, 0, FRAME, MODEL).unwrap().unwrap();
-        let mut filter = DelayFilter::new(DelayState::known(Seconds(1e-5), 1e-7, 1e-4), MODEL);
+        let timeline = Timeline::new(&all, 0, FRAME, RATE_WALK).unwrap().unwrap();
+        let mut filter = DelayFilter::new(DelayState::known(Seconds(1e-5), 1e-7, 1e-4), RATE_WALK);
         let (mut smoothed, mut filtered, mut predicted, mut stated) = (0.0, 0.0, 0.0, 0.0);
         for reading in &all {
             let time = FRAME * reading.frame as f64;
@@ -164,7 +164,7 @@ mod tests {
         for k in [3, 77, 78, 150] {
             all[k].delays[0].as_mut().unwrap().0 += Seconds(1e-6);
         }
-        let timeline = Timeline::new(&all, 0, FRAME, MODEL).unwrap().unwrap();
+        let timeline = Timeline::new(&all, 0, FRAME, RATE_WALK).unwrap().unwrap();
         let refused: Vec<u64> = (0..200).filter(|k| timeline.refuses(20 * k)).collect();
         assert_eq!(refused, [3, 77, 78, 150]);
         let known = timeline.at(Seconds(1.55));
@@ -177,7 +177,7 @@ mod tests {
         let delay = |t: f64| Some((Seconds(0.5e-6 * t * t), Seconds(1e-14)));
         let all: Vec<Reading> =
             [0, 4000].map(|f| Reading { frame: f, delays: vec![delay(1e-3 * f as f64)] }).into();
-        let timeline = Timeline::new(&all, 0, FRAME, MODEL).unwrap().unwrap();
+        let timeline = Timeline::new(&all, 0, FRAME, RATE_WALK).unwrap().unwrap();
         for t in [1.0, 2.0, 3.0] {
             let miss = timeline.at(Seconds(t)).delay.0 - 0.5e-6 * t * t;
             let bound = timeline.bound(Seconds(t), 1e-6).unwrap().0;
@@ -189,10 +189,9 @@ mod tests {
     }
 
     #[test]
-    fn one_reading_and_walks_of_the_delay_are_left_to_the_filter() {
+    fn one_reading_is_left_to_the_filter() {
         let all = readings(5, 20, 1e-8, |t| t);
-        assert!(Timeline::new(&all[..1], 0, FRAME, MODEL).unwrap().is_none());
-        assert!(Timeline::new(&all, 0, FRAME, DriftModel { delay_walk: 1e-20, ..MODEL }).unwrap().is_none());
+        assert!(Timeline::new(&all[..1], 0, FRAME, RATE_WALK).unwrap().is_none());
     }
 
     /// A reading whose interval is no number leaves no spline, which is an error and not a missing timeline.
@@ -200,7 +199,7 @@ mod tests {
     fn readings_without_a_spline_are_an_error() {
         let mut all = readings(5, 20, 1e-8, |t| t);
         all[2].delays[0].as_mut().unwrap().1 = Seconds(f64::NAN);
-        let refused = Timeline::new(&all, 0, FRAME, MODEL).unwrap_err();
+        let refused = Timeline::new(&all, 0, FRAME, RATE_WALK).unwrap_err();
         assert!(matches!(refused, SamplingError::NotFinite { .. }), "{refused}");
     }
 }

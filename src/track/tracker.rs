@@ -113,14 +113,12 @@ impl DelayTracker {
 
 #[cfg(test)]
 mod tests {
-    use super::super::DriftModel;
     use super::*;
 
     const WANTED: Seconds = Seconds(0.05);
 
     fn tracker() -> DelayTracker {
-        let model = DriftModel { delay_walk: 1e-4, rate_walk: 0.0 };
-        let filter = DelayFilter::new(DelayState::known(Seconds(1.0), 0.1, 0.01), model);
+        let filter = DelayFilter::new(DelayState::known(Seconds(1.0), 0.1, 0.01), 0.0);
         DelayTracker::new(0, Seconds(1.0), filter, None)
     }
 
@@ -135,7 +133,7 @@ mod tests {
         assert_eq!(tracker.take(0, measured(1.05), 0.01), Taken::Used);
         assert_eq!(tracker.lock(WANTED), Lock::Locked);
         let known = tracker.state().delay;
-        // sqrt(1e-4 + 1e-4 t + (0.01 t)^2) reaches 0.05 before 5 s.
+        // sqrt(1e-4 + (0.01 t)^2) reaches 0.05 before 5 s.
         tracker.advance(Seconds(5.0));
         assert_eq!((tracker.lock(WANTED), tracker.state().delay), (Lock::Held, known));
     }

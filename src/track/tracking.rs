@@ -1,10 +1,11 @@
 //! Taps that follow the delays while a pipeline runs.
 
-use super::{DelaySource, DriftModel, FollowSettings, Followed, Follower, Logged, TrackError, TrackWarning};
+use super::{DelaySource, FollowSettings, Followed, Follower, Logged, TrackError, TrackWarning};
 use crate::bank::Bank;
 use crate::pipeline::{Change, PipelineError, Retuner};
 use crate::quantity;
 use crate::runtime::{Options, Stream};
+use std::path::Path;
 
 /// Least frames of a measurement.
 const LEAST_FRAMES: usize = 256;
@@ -27,6 +28,11 @@ impl Default for Tracking {
 }
 
 impl Tracking {
+    /// The file of delays that were measured before, where `text` names one.
+    pub fn file(text: &str) -> Option<&Path> {
+        Some(Path::new(text)).filter(|path| path.extension().is_some_and(|extension| extension == "jsonl"))
+    }
+
     /// A tone of the frequency F, `pilot=F`, or any signal, `blind`.
     ///
     /// # Errors
@@ -75,7 +81,7 @@ impl Tracking {
         let wander = 1e-6 * self.wander;
         let settings = FollowSettings {
             block_frames: self.frames,
-            model: DriftModel::wandering(wander * unit.sqrt()),
+            rate_walk: (wander * unit.sqrt()).powi(2),
             rate_deviation: FIRST_RATE * wander,
             rate_change: wander * unit,
         };

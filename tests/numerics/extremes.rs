@@ -4,7 +4,7 @@
 use crate::support::random::Random;
 use hybank::bank::Bank;
 use hybank::design::{DesignError, Options, ProofSearch, analyze, design};
-use hybank::spec::Spec;
+use hybank::spec::{DesignOverrides, Spec};
 use serde_json::Value;
 use trials::rounds;
 
@@ -52,7 +52,9 @@ fn is_raw(message: &str) -> bool {
 
 /// Designs without a proof, for so long at most as such small designs take.
 fn designed(spec: &Value) -> Result<Bank, String> {
-    let spec = Spec::from_data(spec, "spec").map_err(|error| error.to_string())?;
+    let no_files = |_: &_| Err("no files".to_owned());
+    let spec = Spec::from_data(spec, "spec", DesignOverrides::default(), &no_files);
+    let spec = spec.map_err(|error| error.to_string())?;
     let options = Options { proof: ProofSearch::Skip, ..Options::default() };
     match design(&spec, &options) {
         Ok(found) => Ok(found.bank),

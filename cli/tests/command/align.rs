@@ -99,7 +99,7 @@ fn word(path: &std::path::Path) -> Vec<f64> {
 fn alone() -> String {
     let mut spec = Bank::from_json(BANK, "bank.json").unwrap().spec.unwrap();
     spec.channels.truncate(1);
-    (spec.uncertainty, spec.design.tracking) = (None, None);
+    (spec.uncertainty, spec.design.tracking) = (None, false);
     design(&spec, &Options::without_proof()).unwrap().bank.to_json().unwrap()
 }
 

@@ -1,3 +1,5 @@
+mod signal;
+
 use super::*;
 use crate::bank::SynthesisFilters;
 use crate::spec::Method;

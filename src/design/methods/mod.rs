@@ -30,7 +30,7 @@ use super::problem::Problem;
 use super::unfinished::Unfinished;
 use crate::lti::StateSpace;
 use crate::lti::peak::Peak;
-use crate::spec::{Method, Spec, Tracking};
+use crate::spec::{Method, Spec};
 use crate::units::FastPeriods;
 
 /// Settings of a method, in addition to the plant.
@@ -151,8 +151,8 @@ pub(crate) fn synthesise(
 ) -> Result<Synthesis, DesignError> {
     if let (Method::Fir, Some(problem)) = (method, &settings.robust) {
         return match problem.spec.design.tracking {
-            Some(Tracking::Affine) => scheduled_fir::synthesise(plant, settings, problem),
-            None => robust_fir::synthesise(plant, settings, problem),
+            true => scheduled_fir::synthesise(plant, settings, problem),
+            false => robust_fir::synthesise(plant, settings, problem),
         };
     }
     match method {

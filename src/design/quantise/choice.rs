@@ -5,8 +5,9 @@
 //! guess onwards, until one holds the loss and the next shorter one does not.
 
 use super::digits::{fewest_digits, is_left_out, without_zeros};
-use super::quantiser::{Quantised, Quantiser};
-use super::{QuantisationProblem, WordChoice, WordStudy, decades};
+use super::problem::Candidate;
+use super::quantiser::Quantiser;
+use super::{QuantisationProblem, WordChoice, WordStudy};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::spec::WordLengths;
@@ -51,12 +52,13 @@ pub fn quantise_within(
         false => few_taps,
     };
     let beside = &found[least.saturating_sub(BESIDE)..(least + BESIDE + 1).min(found.len())];
-    let words = beside.iter().map(|found| quantiser.loss(found)).collect();
+    let words = beside.iter().map(|found| quantiser.loss(found, None)).collect::<Result<_, _>>()?;
+    let snr_loss_db = quantiser.mean_square_loss_db(&chosen);
     let fixed_point = without_zeros(chosen.fixed_point);
     let choice = WordChoice {
         allowed_db: *loss_db,
         by_digits: *by_digits,
-        snr_loss_db: 10.0 * decades(chosen.mean_square, quantiser.error.real_mean_square),
+        snr_loss_db,
         taps_left_out: (0..problem.taps[0].len()).filter(|&n| is_left_out(&fixed_point, n)).count(),
         signed_digits: fixed_point.signed_digits(),
         signed_digits_of_fewest_bits,
@@ -87,7 +89,7 @@ fn scan(
     quantiser: &Quantiser<'_>,
     lengths: &Lengths,
     allowance: &Allowance,
-) -> Result<(Vec<Quantised>, usize), DesignError> {
+) -> Result<(Vec<Candidate>, usize), DesignError> {
     let all = &lengths.0;
     let guess = lengths.of_bits(quantiser.bits_by_rounding(), quantiser.error.problem.taps[0].len());
     let (mut first, mut end) = (guess.saturating_sub(BATCH / 2), (guess + BATCH / 2 + 1).min(all.len()));
@@ -102,7 +104,7 @@ fn scan(
         found.extend(quantiser.quantise_all(&all[end..after], None)?);
         end = after;
     }
-    let losses = found.iter().map(|found| quantiser.loss(found).mean_square_loss_db);
+    let losses = found.iter().map(|found| quantiser.mean_square_loss_db(found));
     let best = losses.fold(f64::INFINITY, f64::min);
     match found.iter().position(|found| quantiser.keeps(found)) {
         Some(least) => Ok((found, least)),
@@ -114,7 +116,7 @@ fn scan(
 
 /// The same bits with as many taps left out as the loss allows: those whose integers matter least, and the
 /// others chosen again. Bisection between numbers of taps of which the smaller keeps to the loss.
-fn leave_out(quantiser: &Quantiser<'_>, found: &Quantised) -> Result<Quantised, DesignError> {
+fn leave_out(quantiser: &Quantiser<'_>, found: &Candidate) -> Result<Candidate, DesignError> {
     let FixedPoint { bits, integers, .. } = &found.fixed_point;
     let powers = quantiser.error.powers();
     let size = |n: usize| -> f64 {

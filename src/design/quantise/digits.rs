@@ -9,7 +9,7 @@
 
 use super::phases::{Change, Digits, Phases};
 use super::problem::Candidate;
-use super::quantiser::{Quantised, Quantiser};
+use super::quantiser::Quantiser;
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::spec::{MAX_FRACTION_BITS, WordLengths};
@@ -26,10 +26,10 @@ const TRIALS: usize = 12;
 /// As [`Quantiser::quantise`].
 pub(super) fn fewest_digits(
     quantiser: &Quantiser<'_>,
-    starts: &[&Quantised],
+    starts: &[&Candidate],
     most: &WordLengths,
-) -> Result<Quantised, DesignError> {
-    let digits = |found: &Quantised| (found.fixed_point.signed_digits(), found.gamma);
+) -> Result<Candidate, DesignError> {
+    let digits = |found: &Candidate| (found.fixed_point.signed_digits(), found.gamma);
     let mut best = starts[0].clone();
     for (start, finer) in starts.iter().flat_map(|start| FINER.map(move |finer| (start, finer))) {
         let Some(words) = refined(&without_zeros(start.fixed_point.clone()), finer, most) else { continue };
@@ -39,9 +39,7 @@ pub(super) fn fewest_digits(
         }
         let stop = quantiser.error.problem.stop;
         while !stop.is_due() && save_digits(&mut phases, quantiser.most_mean_square)? {}
-        let shortened = shortened(phases.fixed_point(&words));
-        let Candidate { fixed_point, gamma, mean_square } = quantiser.error.candidate(shortened)?;
-        let found = Quantised { fixed_point, gamma, mean_square, rounded: best.rounded };
+        let found = quantiser.error.candidate(shortened(phases.fixed_point(&words)))?;
         if quantiser.keeps(&found) && digits(&found) < digits(&best) {
             best = found;
         }

@@ -32,7 +32,8 @@ pub use problem::QuantisationProblem;
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::spec::WordLengths;
-use quantiser::{Quantised, Quantiser};
+use problem::Candidate;
+use quantiser::Quantiser;
 
 /// Word lengths of a study, relative to the requested one.
 const NEIGHBOURS: [i32; 5] = [-2, -1, 0, 1, 2];
@@ -117,10 +118,11 @@ pub fn quantise(
     for k in 1..found.len() {
         if found[k - 1].is_better(&found[k], problem.gamma_margin) {
             let fixed_point = FixedPoint { bits: all[k].clone(), ..found[k - 1].fixed_point.clone() };
-            found[k] = Quantised { fixed_point, rounded: found[k].rounded, ..found[k - 1] };
+            found[k] = Candidate { fixed_point, ..found[k - 1] };
         }
     }
-    let words = found.iter().map(|found| quantiser.loss(found)).collect();
+    let loss = |found| quantiser.loss(found, fraction_bits);
+    let words = found.iter().map(loss).collect::<Result<_, _>>()?;
     let asked = match all.iter().position(|neighbour| neighbour == bits) {
         Some(index) => found.swap_remove(index),
         None => quantiser.quantise(bits, fraction_bits)?,

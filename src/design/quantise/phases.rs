@@ -192,11 +192,7 @@ impl Phases {
             noise(tap.channel) * taps[tap.channel][phase + tap.lag * ratio] - products.sum::<f64>()
         };
         let phase = |phase: usize| {
-            let count = (taps[0].len() - phase).div_ceil(ratio);
-            let of_lag = |lag| (0..taps.len()).map(move |channel| Tap { channel, lag });
-            let mut taps: Vec<Tap> = (0..count).flat_map(of_lag).collect();
-            // Taps with few bits are decided first, so that the others compensate for them.
-            taps.sort_by_key(|tap| std::cmp::Reverse(words.bits.bits(phase + tap.lag * ratio)));
+            let taps = Tap::of_phase(phase, error, &words.bits);
             let own = |a: usize| noise(taps[a].channel);
             let form = Mat::from_fn(taps.len(), taps.len(), |a, b| {
                 step * step * (correlations.between(taps[a], taps[b]) + if a == b { own(a) } else { 0.0 })

@@ -16,6 +16,7 @@ use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lmi::sampled::Point;
+use crate::spec::WordLengths;
 
 /// Taps to be replaced by integers times a power of two.
 #[derive(Debug, Clone, Copy)]
@@ -123,6 +124,18 @@ pub(super) struct Tap {
     pub(super) channel: usize,
     /// Delay in slow periods.
     pub(super) lag: usize,
+}
+
+impl Tap {
+    /// The taps of a phase of filters of these `bits`, in the order of time, those with few bits last. The
+    /// lattice search decides the last ones first, so that taps with more bits compensate for them.
+    pub(super) fn of_phase(phase: usize, error: &TapError<'_>, bits: &WordLengths) -> Vec<Self> {
+        let (taps, ratio) = (error.problem.taps, error.ratio);
+        let of_lag = |lag| (0..taps.len()).map(move |channel| Self { channel, lag });
+        let mut all: Vec<Self> = (0..(taps[0].len() - phase).div_ceil(ratio)).flat_map(of_lag).collect();
+        all.sort_by_key(|tap| std::cmp::Reverse(bits.bits(phase + tap.lag * ratio)));
+        all
+    }
 }
 
 /// `H H*` at the frequencies of a grid.

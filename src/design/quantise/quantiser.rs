@@ -25,20 +25,7 @@ const LEAST_EFFECT_OF_REAL_TAPS: f64 = 1e-3;
 /// Scales of few taps that are searched beyond the finest one that holds the optimal taps.
 const MAX_FINER_SCALES: i32 = 40;
 
-/// The integers chosen, with their error.
-#[derive(Debug, Clone)]
-pub(super) struct Quantised {
-    /// The integers with their scale.
-    pub(super) fixed_point: FixedPoint,
-    /// Estimate of gamma of the integers.
-    pub(super) gamma: f64,
-    /// Mean square of the error plus the converters' noise at the output, per slow period.
-    pub(super) mean_square: f64,
-    /// Estimate of gamma of the real taps, each rounded by itself at the finest scale at which all fit.
-    pub(super) rounded: f64,
-}
-
-impl Quantised {
+impl Candidate {
     /// Whether gamma is smaller, or about equal with a smaller mean square.
     pub(super) fn is_better(&self, other: &Self, gamma_margin: f64) -> bool {
         let alike = 1.0 + gamma_margin.max(GAMMA_TIE);
@@ -74,10 +61,9 @@ impl<'a> Quantiser<'a> {
         &self,
         bits: &WordLengths,
         fraction_bits: Option<i32>,
-    ) -> Result<Quantised, DesignError> {
+    ) -> Result<Candidate, DesignError> {
         let finest = fraction_bits.unwrap_or_else(|| self.finest_that_fits(bits));
         let fitting = Search::new(self.error.problem.taps, &self.error, bits, finest);
-        let rounded = self.error.gamma(&fitting.rounded())?;
         let zero_output = self.error.candidate(fitting.zero_output())?;
         let mut found = vec![zero_output.clone()];
         found.extend(fitting.run()?);
@@ -94,8 +80,7 @@ impl<'a> Quantiser<'a> {
         if self.most_mean_square.is_finite() {
             found.extend(self.improved(&found)?);
         }
-        let Candidate { fixed_point, gamma, mean_square } = self.best(found).unwrap_or(zero_output);
-        Ok(Quantised { fixed_point, gamma, mean_square, rounded })
+        Ok(self.best(found).unwrap_or(zero_output))
     }
 
     /// From the candidate of least mean square, one near the real taps of least mean square.
@@ -176,7 +161,7 @@ impl<'a> Quantiser<'a> {
         &self,
         all: &[WordLengths],
         fraction_bits: Option<i32>,
-    ) -> Result<Vec<Quantised>, DesignError> {
+    ) -> Result<Vec<Candidate>, DesignError> {
         std::thread::scope(|scope| {
             let begin = |bits| {
                 let search = move || self.quantise(bits, fraction_bits);
@@ -196,7 +181,7 @@ impl<'a> Quantiser<'a> {
     ///
     /// # Errors
     /// [`DesignError::Linalg`] if a decomposition fails.
-    pub(super) fn does_nothing(&self, found: &Quantised) -> Result<bool, DesignError> {
+    pub(super) fn does_nothing(&self, found: &Candidate) -> Result<bool, DesignError> {
         let fixed_point = &found.fixed_point;
         let zeros = fixed_point.integers.iter().map(|list| vec![0; list.len()]).collect();
         let zero_output = self.error.gamma(&FixedPoint { integers: zeros, ..fixed_point.clone() })?;
@@ -205,7 +190,7 @@ impl<'a> Quantiser<'a> {
     }
 
     /// Whether the mean square is as small as it should be.
-    pub(super) fn keeps(&self, found: &Quantised) -> bool {
+    pub(super) fn keeps(&self, found: &Candidate) -> bool {
         found.mean_square <= self.most_mean_square
     }
 
@@ -221,14 +206,33 @@ impl<'a> Quantiser<'a> {
         magnitude.ceil().clamp(0.0, f64::from(MAX_BITS)) as u32 + 1
     }
 
-    pub(super) fn loss(&self, found: &Quantised) -> WordLoss {
-        WordLoss {
-            bits: found.fixed_point.bits.clone(),
+    /// What integers lose whose scale was fixed to `fraction_bits`, or chosen.
+    ///
+    /// # Errors
+    /// [`DesignError::Linalg`] if a decomposition fails.
+    pub(super) fn loss(
+        &self,
+        found: &Candidate,
+        fraction_bits: Option<i32>,
+    ) -> Result<WordLoss, DesignError> {
+        let bits = found.fixed_point.bits.clone();
+        Ok(WordLoss {
             fraction_bits: found.fixed_point.fraction_bits,
             loss_db: 20.0 * decades(found.gamma, self.error.real_gamma),
-            mean_square_loss_db: 10.0 * decades(found.mean_square, self.error.real_mean_square),
-            rounded_loss_db: 20.0 * decades(found.rounded, self.error.real_gamma),
-        }
+            mean_square_loss_db: self.mean_square_loss_db(found),
+            rounded_loss_db: 20.0 * decades(self.rounded(&bits, fraction_bits)?, self.error.real_gamma),
+            bits,
+        })
+    }
+
+    pub(super) fn mean_square_loss_db(&self, found: &Candidate) -> f64 {
+        10.0 * decades(found.mean_square, self.error.real_mean_square)
+    }
+
+    /// Estimate of gamma of the real taps, each rounded by itself at the finest scale at which all fit.
+    pub(super) fn rounded(&self, bits: &WordLengths, fraction_bits: Option<i32>) -> Result<f64, DesignError> {
+        let finest = fraction_bits.unwrap_or_else(|| self.finest_that_fits(bits));
+        self.error.gamma(&Search::new(self.error.problem.taps, &self.error, bits, finest).rounded())
     }
 
     /// The most fraction bits, within their limits, with which each rounded tap fits its bits. Taps that are

@@ -106,7 +106,7 @@ impl<'a> Search<'a> {
         let correlations = self.error.forms.correlations(weights, lags);
         let mut integers = self.centre.clone();
         for phase in 0..ratio.min(self.spans.len()) {
-            let taps = self.taps_of(phase);
+            let taps = Tap::of_phase(phase, self.error, self.bits);
             let at = |tap: &Tap| phase + tap.lag * ratio;
             let centre: Vec<f64> = taps.iter().map(|tap| self.centre[tap.channel][at(tap)]).collect();
             let spans: Vec<Span> = taps.iter().map(|tap| self.spans[at(tap)]).collect();
@@ -116,18 +116,6 @@ impl<'a> Search<'a> {
             }
         }
         Ok(integers)
-    }
-
-    /// The taps of a phase in the order of time, those with few bits last. The lattice search decides the
-    /// last ones first, so that taps with more bits compensate for them.
-    fn taps_of(&self, phase: usize) -> Vec<Tap> {
-        let ratio = self.error.ratio;
-        let lags = (self.spans.len() - phase).div_ceil(ratio);
-        let mut taps: Vec<Tap> = (0..lags)
-            .flat_map(|lag| (0..self.centre.len()).map(move |channel| Tap { channel, lag }))
-            .collect();
-        taps.sort_by_key(|tap| std::cmp::Reverse(self.bits.bits(phase + tap.lag * ratio)));
-        taps
     }
 
     fn fixed_point(&self, integers: &Integers) -> FixedPoint {

@@ -184,7 +184,6 @@ proptest! {
         let samples: Vec<Sample> =
             raw.iter().map(|r| Sample { x: r.0, f: [r.1, r.2], w: r.3, mu: r.4 }).collect();
         check_dense::<2>(&samples, tau, 1e-6);
-        check_dense::<3>(&samples, tau, 1e-6);
         check_dense::<4>(&samples, tau, 1e-6);
     }
 }

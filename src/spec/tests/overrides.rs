@@ -4,8 +4,9 @@ use super::*;
 
 #[test]
 fn the_command_line_overrides_the_design() {
-    let with =
-        |text: &str, overrides| Spec::from_toml_with(text, "spec.toml", overrides).map(|spec| spec.design);
+    let with = |text: &str, overrides| {
+        Spec::from_toml_and_files(text, "spec.toml", overrides, &no_models).map(|spec| spec.design)
+    };
     let method = |method| DesignOverrides { method: Some(method), ..Default::default() };
     let no_taps = thesis_with("taps = 22", "");
     let taps = DesignOverrides { taps: Some(7), ..Default::default() };

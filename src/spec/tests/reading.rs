@@ -7,10 +7,11 @@ fn data_without_text_read_like_a_file_and_faults_carry_their_path() {
     let text = "fast_rate = 48e3\nratio = 2\ntarget = { filter = { family = \"rc\", cutoff = \"9 kHz\" } }\n\
         channel = [{ delay = 25e-6 }, { delay = \"12.5 us\" }]\ndesign = { method = \"iir\" }";
     let data: toml::Table = text.parse().unwrap();
-    assert_eq!(Spec::from_data(data.clone(), "spec").unwrap(), Spec::from_toml(text, "spec").unwrap());
+    let read = |data| Spec::from_data(data, "spec", DesignOverrides::default(), &no_models);
+    assert_eq!(read(data.clone()).unwrap(), Spec::from_toml(text, "spec").unwrap());
     let mut wrong = data;
     wrong["channel"][1]["delay"] = toml::Value::Float(f64::INFINITY);
-    let error = Spec::from_data(wrong, "spec").unwrap_err();
+    let error = read(wrong).unwrap_err();
     assert_eq!((error.path(), error.location()), ("channel[1].delay", None));
     assert!(error.to_string().starts_with("spec: channel 2.delay: "), "{error}");
 }

@@ -290,18 +290,6 @@ fn specs_in_memory_are_checked_too() {
 }
 
 #[test]
-fn serde_reads_a_filter_with_a_message_about_keys() {
-    let error =
-        serde_json::from_str::<FilterSpec>(r#"{ "num": [1], "den": [1, 2], "gian": 3 }"#).unwrap_err();
-    assert!(error.to_string().contains("unknown key \"gian\", did you mean \"gain\"?"), "{error}");
-    let null = serde_json::from_str::<FilterSpec>(r#"{ "num": [null], "den": [1, 2] }"#).unwrap_err();
-    assert!(null.to_string().contains("num[0]: expected a number, found null"), "{null}");
-    let twice =
-        serde_json::from_str::<FilterSpec>(r#"{ "num": [1], "num": [2], "den": [1, 2] }"#).unwrap_err();
-    assert!(twice.to_string().contains("given twice"), "{twice}");
-}
-
-#[test]
 fn a_signal_that_cannot_be_is_refused() {
     for (table, words) in [
         ("rms = 0.1", "the key band is missing; say which frequencies"),

@@ -70,7 +70,7 @@ impl<'a> Course<'a> {
         let slow = h * spec.ratio as f64;
         let timeline = |i: usize| match i == settings.reference {
             true => Some(None),
-            false => Timeline::new(&readings, i, slow, settings.model).ok()?.map(Some),
+            false => Timeline::new(&readings, i, slow, settings.rate_walk).ok()?.map(Some),
         };
         let timelines = (0..spec.channels.len()).map(timeline).collect::<Option<_>>()?;
         let &Stretches { first, end, .. } = stretches;
@@ -175,7 +175,7 @@ impl<'a> Course<'a> {
             let moved = (self.extent(i).half * 2.0).in_fast_periods(h);
             (moved.0 > NEGLIGIBLE).then_some(AlignWarning::TapsStay { channel: i + 1, moved })
         };
-        if spec.design.tracking.is_none() {
+        if !spec.design.tracking {
             warnings.extend((0..channels.len()).filter_map(moves));
         }
         (spec, raised)

@@ -13,8 +13,8 @@ mod tests;
 
 pub use error::{AlignError, AlignWarning};
 
+use super::Reading;
 use super::source::LEAST_LEVEL;
-use super::{DriftModel, Reading};
 use crate::calibrate::{
     CalibrationSignal, ChannelEstimate, Fit, LagLine, Record, Settings, Warning, check, check_parts, line,
 };
@@ -44,8 +44,8 @@ pub struct AlignSettings {
     pub reference: usize,
     /// How far apart the recordings began at most, if that is known.
     pub within: Option<Seconds>,
-    /// How delays change.
-    pub model: DriftModel,
+    /// Variance by which a rate walks in a second, in (s/s)^2 / s.
+    pub rate_walk: f64,
 }
 
 /// How recordings lie in time.

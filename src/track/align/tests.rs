@@ -19,7 +19,7 @@ fn spec(recorders: usize) -> Spec {
 }
 
 fn settings() -> AlignSettings {
-    AlignSettings { reference: 0, within: None, model: DriftModel::wandering(1e-6) }
+    AlignSettings { reference: 0, within: None, rate_walk: 1e-12 }
 }
 
 /// One recorder.
@@ -182,7 +182,7 @@ fn taps_that_stay_are_named() {
     let two = [PLAIN, Recorder { ppm: 60.0, ..PLAIN }];
     let recordings = recorded(&event, &two, &[60_000, 60_000], 1e-4);
     let mut both = spec(2);
-    both.design.tracking = None;
+    both.design.tracking = false;
     let found = align(&both, &records(&recordings), settings()).unwrap();
     assert!(
         matches!(

@@ -255,7 +255,7 @@ pub fn certifies(bank: &Bank, errors: &ErrorBox, taps: Taps, gamma: f64) -> Resu
 /// # Errors
 /// [`VerifyError::WorstCase`] or [`VerifyError::Tracked`] if one is not proven or there is no such table;
 /// else as [`worst_case`].
-pub fn check_stated(bank: &Bank) -> Result<(), VerifyError> {
+pub(crate) fn check_stated(bank: &Bank) -> Result<(), VerifyError> {
     let table = bank.spec.as_ref().and_then(|spec| spec.uncertainty.as_ref());
     let errors = table.map(|table| ErrorBox::of(table, bank.channel_count()));
     let is_proven =

@@ -8,7 +8,7 @@
 use hybank::bank::Bank;
 use hybank::design::{Options, design};
 use hybank::figures::Figures;
-use hybank::spec::Spec;
+use hybank::spec::{DesignOverrides, Spec};
 use serde_json::Value;
 
 const SYSTEMS: &str = include_str!("systems.json");
@@ -25,8 +25,12 @@ struct System {
 fn systems() -> Vec<System> {
     let list: Vec<Value> = serde_json::from_str(SYSTEMS).unwrap();
     let figures = |row: &Value| ["sfdr_db", "snr_db"].map(|key| row[key].as_f64().unwrap());
+    let spec = |data: &Value| {
+        let no_files = |_: &_| Err("no files".to_owned());
+        Spec::from_data(data, "systems.json", DesignOverrides::default(), &no_files).unwrap()
+    };
     let system = |row: &Value| System {
-        spec: Spec::from_data(&row["spec"], "systems.json").unwrap(),
+        spec: spec(&row["spec"]),
         without: figures(&row["without"]),
         with_band: figures(&row["with_band"]),
     };

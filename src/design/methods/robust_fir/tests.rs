@@ -106,7 +106,7 @@ fn scenarios_reach_the_ends_of_every_side() {
 /// The thesis example with taps that follow both delays.
 fn following(half: f64) -> Spec {
     let mut spec = thesis(half);
-    spec.design.tracking = Some(crate::spec::Tracking::Affine);
+    spec.design.tracking = true;
     spec
 }
 
@@ -115,7 +115,7 @@ fn norm_and_redesign(bank: &crate::bank::Bank, errors: [f64; 2]) -> (f64, f64) {
     let point = ErrorPoint { delays: errors.map(Seconds).to_vec(), ..ErrorPoint::none(2) };
     let (norm, _) = norm_at(bank, &point, Taps::Scheduled).unwrap();
     let mut spec = Spec { uncertainty: None, ..bank.spec.clone().unwrap() };
-    spec.design.tracking = None;
+    spec.design.tracking = false;
     spec.channels.iter_mut().zip(errors).for_each(|(channel, error)| channel.delay += Seconds(error));
     let redesign = design(&spec, &Options::without_proof()).unwrap();
     (norm, redesign.bank.gamma.norm.unwrap())

@@ -1,7 +1,7 @@
 //! Designs with a `[signal]`, against the same filter written as a stage of every front end.
 
-use super::*;
 use crate::design::analyze;
+use crate::design::designer::*;
 use crate::verify;
 
 /// Two channels with different front ends and gains, in two ways: a signal, and W in cascade by hand.

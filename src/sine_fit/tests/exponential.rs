@@ -1,9 +1,9 @@
 //! Tones of complex records.
 
-use super::result::wrapped;
-use super::{Channel, ComplexChannel, Component, Direction, SineFit, ToneFit, fit, fit_known};
 use crate::linalg::Complex;
 use crate::random::Random;
+use crate::sine_fit::result::wrapped;
+use crate::sine_fit::{Channel, ComplexChannel, Component, Direction, SineFit, ToneFit, fit, fit_known};
 use crate::units::Hertz;
 use std::f64::consts::TAU;
 
