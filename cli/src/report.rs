@@ -45,13 +45,13 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.reading.check(args.turns.is_given())?;
     args.turns.check(args.inputs.len())?;
     let inputs: Vec<&Path> = args.inputs.iter().chain([&args.bank]).map(PathBuf::as_path).collect();
+    check_output(&args.output, &inputs, args.force)?;
     if !is_dash(&args.output)
         && args.output.extension().is_some_and(|ending| ending != "html" && ending != "htm")
     {
         let message = "a report is a page; give it a name that ends in .html, and print that for a PDF";
         return Err(Failure::Usage(format!("{}: {message}", Quoted(&args.output))));
     }
-    check_output(&args.output, &inputs, args.force)?;
     let bank = load(&args.bank)?;
     if bank.spec.is_none() {
         return Err(Failure::of(&args.bank, DesignError::NoSpec));

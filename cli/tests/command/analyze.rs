@@ -82,6 +82,18 @@ fn flags_that_do_not_fit_are_refused() {
     refused(&["--accuracy", "1%"], &["--accuracy", "--delay-box"]);
     refused(&["--sweep", "x.csv"], &["--sweep", "--delay-box"]);
     refused(&["--delay-box", "1ps", "--delay-error", "0,0"], &["--delay-error"]);
+    refused(&["--delay-error", "0,1 parsec"], &["parsec", "10ps"]);
+}
+
+#[test]
+fn errors_of_delays_have_units() {
+    let desk = desk();
+    let gamma = |errors: &str| {
+        desk.json(&["analyze", "bank.json", "--delay-error", errors, "--json"])["gamma"].clone()
+    };
+    let in_seconds = gamma("1e-3,-2e-3");
+    assert_eq!(gamma("1ms,-2ms"), in_seconds);
+    assert_ne!(gamma("0,0"), in_seconds);
 }
 
 /// Two delays that doubles do not resolve: the bound is unknown, not zero.

@@ -104,7 +104,31 @@ fn a_closed_standard_stream_is_an_error_of_one_line() {
     // What goes to a file is there before the report that cannot be printed.
     let output = shell(&desk, "$H fuse bank.json a.wav b.wav -o out.wav >&-");
     assert_eq!(output.status.code(), Some(1), "{output:?}");
+    assert!(text(&output.stderr).trim_end().ends_with("; out.wav is written"), "{output:?}");
     assert_eq!(crate::support::wav::samples(&desk, "out.wav").len(), 100);
+}
+
+/// What has no sample yet is not kept for the sake of what was recorded.
+#[test]
+fn streams_that_fail_before_their_first_sample_leave_nothing() {
+    let desk = Desk::new();
+    desk.write("odd.wav", b"RIFF....WAVEnothing");
+    for args in [
+        "--input none --input none -o out.f32",
+        "-o out.f32 <&-",
+        "-o out.sigmf-meta <&-",
+        "-o out.f32 --gaps mask --mask out.mask <&-",
+        "--input odd.wav --format wav -o out.wav",
+        "-o out.f32 <.",
+    ] {
+        let output = shell(&desk, &format!("$H stream bank.json {args}"));
+        assert_eq!(output.status.code(), Some(1), "{args}: {output:?}");
+        assert!(
+            !names(&desk.path("")).iter().any(|name| name.contains("out.")),
+            "{args}: {:?}",
+            names(&desk.path(""))
+        );
+    }
 }
 
 #[test]
