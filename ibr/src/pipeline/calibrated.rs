@@ -212,7 +212,7 @@ mod tests {
         assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
         // In bands only the order of summation differs.
         let footprint = Footprint::of(&views, &(0..views.len()).collect::<Vec<_>>(), &target, &frame);
-        let mut problem = PlaneProblem::<2, 1>::new((40, 30), &settings.interpolation).unwrap();
+        let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation).unwrap();
         let mut work = Work::default();
         for rows in [0..7, 7..8, 8..30] {
             let (mut band, _) = visible_in(rows, 30, &footprint, &views, settings.depth_test(), &mut work);
