@@ -100,7 +100,11 @@ impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
         // and the inverse of the diagonal is one more. The matrix has a row of zeros.
         let equations = grid.bytes(offsets::<ORDER>().len() + C) + grid.row_bytes();
         let solving = equations + grid.bytes(3 * C + 1);
-        Memory { equations, solving, with_multigrid: solving + multigrid::bytes::<C>(grid, rows::reach(ORDER)) }
+        Memory {
+            equations,
+            solving,
+            with_multigrid: solving + multigrid::bytes::<C>(grid, rows::reach(ORDER)),
+        }
     }
 
     /// Width and height of the grid of coefficients. It has ORDER / 2 - 1 coefficients more than pixels on

@@ -90,13 +90,6 @@ pub(super) struct Added {
     pub(super) area: f64,
 }
 
-impl Added {
-    /// The mean area of a sample in pixels.
-    pub(super) fn mean_area(&self) -> f64 {
-        self.area / self.count as f64
-    }
-}
-
 impl std::ops::AddAssign for Added {
     fn add_assign(&mut self, other: Self) {
         self.count += other.count;
@@ -170,6 +163,15 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
             added?.into_iter().for_each(|added| self.added += added);
         }
         Ok(())
+    }
+
+    /// Multiplies the stiffness of bicubic splines by the mean area of the samples so far. That of bilinear
+    /// ones, which bending smooths, stays: they lose 0.2 to 0.6 dB by it where a view is magnified by two.
+    pub(crate) fn stiffened_by_area(mut self) -> Self {
+        if ORDER == 4 && self.added.count > 0 {
+            self.settings.plane.stiffness *= self.added.area / self.added.count as f64;
+        }
+        self
     }
 
     /// Adds a sample of weight one on a pixel.

@@ -10,10 +10,9 @@
 //! ```
 //!
 //! over neighbours pq and triples pqr in a row or column, where (D_p - D_q) / k is the depth difference in
-//! units of the depth test's sigma. The stiffness is that of the settings times the mean area of the samples
-//! in pixels, or more where the samples are noisy. The coefficients of the bilinear spline are the pixels.
-//! Its bending term smooths like a cubic spline: it removes noise and keeps slopes.
-//! [`hybank::sampling::fit2`] holds and solves the equations.
+//! units of the depth test's sigma. The coefficients of the bilinear spline are the pixels. Its bending term
+//! smooths like a cubic spline: it removes noise and keeps slopes. [`hybank::sampling::fit2`] holds and
+//! solves the equations.
 
 mod background;
 mod gather;
@@ -35,10 +34,9 @@ use rayon::prelude::*;
 pub struct PlaneSettings {
     /// Degree of the splines.
     pub degree: Degree,
-    /// Weight of the squared difference of neighbouring coefficients on one surface, times the mean area of
-    /// the samples in pixels.
+    /// Weight of the squared difference of neighbouring coefficients on one surface.
     pub stiffness: f64,
-    /// The least such weight that the noise of the samples demands, whatever their area.
+    /// The least such weight that the noise of the samples demands.
     pub noise_stiffness: f64,
     /// Weight of the squared second difference within one surface.
     pub bending: f64,
@@ -63,8 +61,15 @@ impl PlaneSettings {
     };
 
     /// Bicubic splines: the sharper image. They are smooth without bending, and need less stiffness, as they
-    /// follow what bilinear splines take for noise.
-    pub const CUBIC: Self = Self { degree: Degree::Cubic, stiffness: 0.02, bending: 0.0, ..Self::LINEAR };
+    /// follow what bilinear splines take for noise. In a hole an error has a residual in proportion to the
+    /// root of the stiffness, and the tolerance is less by that root.
+    pub const CUBIC: Self = Self {
+        degree: Degree::Cubic,
+        stiffness: 0.02,
+        bending: 0.0,
+        tolerance: 1.2e-5,
+        ..Self::LINEAR
+    };
 }
 
 impl Default for PlaneSettings {
@@ -260,7 +265,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     ) -> (Vec<f32>, Convergence) {
         let (mut settings, grid) = (self.settings, self.grid());
         let plane = &mut settings.plane;
-        plane.stiffness = (plane.stiffness * self.added.mean_area()).max(plane.noise_stiffness);
+        plane.stiffness = plane.stiffness.max(plane.noise_stiffness);
         let iteration = Iteration { tolerance: plane.tolerance, steps: plane.iterations };
         let springs = |direction, y| springs::of_row(depth, grid, inside, &settings, direction, y);
         let connected = self.fit.connect(springs, |coefficient| !inside(grid.pixel(coefficient)));
