@@ -126,7 +126,7 @@ fn disocclusions_take_the_farther_side() {
 #[test]
 fn outside_the_region_nothing_is_invented() {
     let samples = scattered(10, |_, _| 80.0);
-    let mut problem = PlaneProblem::<4, 1>::new((14, 10), &Settings::default()).unwrap();
+    let mut problem = PlaneProblem::<2, 1>::new((14, 10), &with(PlaneSettings::LINEAR)).unwrap();
     problem.add(&samples).unwrap();
     let region: Vec<bool> = (0..140).map(|p| p % 14 < 10).collect();
     let fit = problem.solve(Some(&region), &|_| ()).unwrap();
