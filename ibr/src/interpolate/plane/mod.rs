@@ -63,13 +63,8 @@ impl PlaneSettings {
     /// Bicubic splines: the sharper image. They are smooth without bending, and need less stiffness, as they
     /// follow what bilinear splines take for noise. In a hole an error has a residual in proportion to the
     /// root of the stiffness, and the tolerance is less by that root.
-    pub const CUBIC: Self = Self {
-        degree: Degree::Cubic,
-        stiffness: 0.02,
-        bending: 0.0,
-        tolerance: 1.2e-5,
-        ..Self::LINEAR
-    };
+    pub const CUBIC: Self =
+        Self { degree: Degree::Cubic, stiffness: 0.02, bending: 0.0, tolerance: 1.2e-5, ..Self::LINEAR };
 }
 
 impl Default for PlaneSettings {
