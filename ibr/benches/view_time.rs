@@ -11,6 +11,7 @@ mod stopwatch;
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::DepthMap;
 use hybank_ibr::image::Image;
+use hybank_ibr::interpolate::plane::PlaneSettings;
 use hybank_ibr::partial::densify;
 use hybank_ibr::pipeline::{Method, RenderSettings, calibrated, rectified};
 use hybank_ibr::propagate::{CalibratedView, RectifiedView};
@@ -51,7 +52,7 @@ fn time_chosen<T>(name: &str, task: impl FnMut() -> T) {
 fn full_depth(size: (usize, usize), positions: &[f64]) {
     let count = positions.len();
     let name = |method: &str| format!("{count} views, full depth, {method} {}x{}", size.0, size.1);
-    if !chosen(&name("rows")) && !chosen(&name("plane")) {
+    if !["rows", "plane", "linear plane"].iter().any(|method| chosen(&name(method))) {
         return;
     }
     let views = views(size, positions);
@@ -64,10 +65,13 @@ fn full_depth(size: (usize, usize), positions: &[f64]) {
     let free: Vec<CalibratedView<'_>> =
         views.iter().map(|v| CalibratedView { image: &v.image, map: &v.depth, camera: v.camera }).collect();
     let target = Camera::metric(rig_camera(0.5, size), false).expect("a rig camera is regular");
-    let settings = RenderSettings::default();
-    time_chosen(&name("plane"), || {
-        calibrated::render(&free, &target, size, &settings).expect("they overlap")
-    });
+    for (method, plane) in [("plane", PlaneSettings::CUBIC), ("linear plane", PlaneSettings::LINEAR)] {
+        let mut settings = RenderSettings::default();
+        settings.interpolation.plane = plane;
+        time_chosen(&name(method), || {
+            calibrated::render(&free, &target, size, &settings).expect("they overlap")
+        });
+    }
 }
 
 fn main() {

@@ -145,8 +145,8 @@ fn planes_take_what_is_estimated() {
     ] {
         let (size, of_views) = (scaled(size), scaled(of_views));
         let mut settings = RenderSettings::default();
-        if degree == Degree::Cubic {
-            settings.interpolation.plane = PlaneSettings::CUBIC;
+        if degree == Degree::Linear {
+            settings.interpolation.plane = PlaneSettings::LINEAR;
         }
         // Few steps: the memory does not depend on them.
         settings.interpolation.plane.iterations = 60;

@@ -161,7 +161,7 @@ fn render(
             let images: Vec<&Image> = images.iter().collect();
             let (seed, reverse_order) = (arguments.seed, arguments.reverse_order);
             let mut special = UncalibratedSettings { seed, reverse_order, ..UncalibratedSettings::default() };
-            special.plane.degree = settings.interpolation.plane.degree;
+            special.plane.degree = arguments.degree.unwrap_or(special.plane.degree);
             let done =
                 uncalibrated::render(&images, tracks, &targets[frame], *size, &settings, &special, watch)
                     .map_err(Failure::input)?;

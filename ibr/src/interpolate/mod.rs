@@ -121,6 +121,7 @@ impl Settings {
         NOT_NEGATIVE.check("tau", self.fit.tau)?;
         POSITIVE.check("variation", self.fit.variation)?;
         POSITIVE.check("stiffness", self.plane.stiffness)?;
+        NOT_NEGATIVE.check("noise stiffness", self.plane.noise_stiffness)?;
         POSITIVE.check("edge stiffness", self.plane.edge_stiffness)?;
         POSITIVE.check("tolerance", self.plane.tolerance)?;
         self.depth_test.check()

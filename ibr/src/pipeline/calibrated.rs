@@ -136,7 +136,8 @@ fn render_with<const ORDER: usize, const C: usize>(
         return Err(RenderError::NoOverlap { pixels, dropped });
     }
     let report = Report { propagated, occluded: propagated - used, used, dropped, ..Report::default() };
-    let fit = problem.solve(None, &|share| watch(GATHERING + (1.0 - GATHERING) * share))?;
+    let fit =
+        problem.stiffened_by_area().solve(None, &|share| watch(GATHERING + (1.0 - GATHERING) * share))?;
     Ok(Rendering::of_plane::<C>(fit, report, chosen, agreement))
 }
 
@@ -174,7 +175,6 @@ mod tests {
     use super::*;
     use crate::depth::{DepthMap, Measure};
     use crate::image::Image;
-    use crate::interpolate::plane;
     use crate::occlusion;
     use crate::propagate;
     use nalgebra::Matrix3x4;
@@ -208,11 +208,13 @@ mod tests {
         assert_eq!(got.report.occluded, occlusion::remove(&mut samples, settings.depth_test()));
         assert!(got.report.occluded > 0);
         ViewWeights::of(&views, &target).apply(&mut samples, |view| views[view].image);
-        let fit = plane::interpolate(&samples, (40, 30), &settings.interpolation).unwrap();
+        let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation).unwrap();
+        problem.add(&samples).unwrap();
+        let fit = problem.stiffened_by_area().solve(None, &|_| ()).unwrap();
         assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
         // In bands only the order of summation differs.
         let footprint = Footprint::of(&views, &(0..views.len()).collect::<Vec<_>>(), &target, &frame);
-        let mut problem = PlaneProblem::<2, 1>::new((40, 30), &settings.interpolation).unwrap();
+        let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation).unwrap();
         let mut work = Work::default();
         for rows in [0..7, 7..8, 8..30] {
             let (mut band, _) = visible_in(rows, 30, &footprint, &views, settings.depth_test(), &mut work);
@@ -220,7 +222,7 @@ mod tests {
             problem.add(&band).unwrap();
         }
         assert_eq!(problem.samples(), samples.len());
-        let banded = problem.solve(None, &|_| ()).unwrap();
+        let banded = problem.stiffened_by_area().solve(None, &|_| ()).unwrap();
         assert_eq!(banded.mask, fit.mask);
         let worst = banded.values.iter().zip(&fit.values).fold(0.0, |w: f32, (a, b)| w.max((a - b).abs()));
         assert!(worst < 1e-2, "{worst}");

@@ -26,8 +26,12 @@ impl RenderSettings {
     ///
     /// With W = sum of the weights of the samples per pixel, about that of the views, the second term is
     /// sum_k w_k J'(x_k)^2 / (W s^2). So lambda = sigma^2 / (W s^2) in the row fit. The plane fit counts
-    /// edges of pixels instead of samples, so its stiffness is sigma^2 / s^2; it is never less than that of
-    /// the settings, because samples of general cameras are also displaced.
+    /// edges of pixels instead of samples, so its stiffness is sigma^2 / s^2. Samples of general cameras are
+    /// also displaced, so there it is never less than the stiffness of the settings times the mean area a of
+    /// the samples: an error of the position adds to a sample a variance v in proportion to s^2. The
+    /// integral of |grad J|^2 over the image is the same for any magnification, since the squared slopes
+    /// fall as the area grows over which they are summed. A sample that stands for a pixels has the weight a
+    /// in the fit, and the two terms keep their ratio if the stiffness is a v / s^2.
     pub fn suited_to(&self, agreement: &Agreement, view_weights: &ViewWeights, measure: Measure) -> Self {
         let mut settings = Self { keep_smoothing: true, ..*self };
         let test = &mut settings.interpolation.depth_test;
@@ -49,7 +53,7 @@ impl RenderSettings {
         if slope > 0.0 {
             let (fit, plane) = (&mut settings.interpolation.fit, &mut settings.interpolation.plane);
             fit.lambda = (noise / slope / view_weights.total()).clamp(LEAST_SMOOTHING, MOST_SMOOTHING);
-            plane.stiffness = (noise / slope).min(MOST_SMOOTHING).max(plane.stiffness);
+            plane.noise_stiffness = (noise / slope).min(MOST_SMOOTHING);
         }
         settings
     }
@@ -104,6 +108,7 @@ mod tests {
         let kept = RenderSettings { keep_smoothing: true, ..default };
         assert_eq!(suited(&[noisy], &kept).interpolation, default.interpolation);
         let suited = suited(&[noisy], &default);
-        assert!(suited.interpolation.plane.stiffness > default.interpolation.plane.stiffness);
+        let (suited, default) = (suited.interpolation.plane, default.interpolation.plane);
+        assert!(suited.noise_stiffness > default.stiffness && suited.stiffness == default.stiffness);
     }
 }

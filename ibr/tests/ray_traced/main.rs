@@ -48,14 +48,15 @@ fn psnr_with(shots: &[Shot], target: &Eye, settings: &RenderSettings, what: &str
 fn a_stereo_pair_gives_the_view_between() {
     let pair = shots(&[eye(-0.2, 0.0, 0.0), eye(0.2, 0.0, 0.0)]);
     let got = psnr(&pair, &eye(0.0, 0.0, 0.0), "stereo");
-    assert!(got >= 40.8, "{got}");
+    assert!(got >= 44.8, "{got}");
 }
 
-/// Depths that err by a share of themselves in one map. Weights by distance alone gave 41.56, 41.20 and
-/// 36.00 dB: errors that displace samples by less than a pixel do not cost the density of two views.
+/// Depths that err by a share of themselves in one map. With weights by distance alone bilinear planes had
+/// 41.56, 41.20 and 36.00 dB: errors that displace samples by less than a pixel do not cost the density of
+/// two views.
 #[test]
 fn samples_with_errors_of_depth_count_less() {
-    for (deviation, nearer, least) in [(0.01, 0.0, 41.5), (0.02, 0.0, 41.2), (0.02, 1.0, 36.0)] {
+    for (deviation, nearer, least) in [(0.01, 0.0, 44.6), (0.02, 0.0, 44.0), (0.02, 1.0, 38.2)] {
         let mut pair = shots(&[eye(-0.2, 0.0, 0.0), eye(0.2, 0.0, 0.0)]);
         let mut normal = normal::normal(4);
         let values = pair[1].depth.data().iter().map(|d| d * (1.0 + deviation * normal()) as f32);
@@ -70,7 +71,7 @@ fn samples_with_errors_of_depth_count_less() {
 fn a_foreground_stays_opaque_when_the_camera_moves_forward() {
     let pair = shots(&[eye(-0.2, 0.0, 0.0), eye(0.2, 0.0, 0.0)]);
     let got = psnr(&pair, &eye(0.0, 0.0, 1.5), "forward");
-    assert!(got >= 31.5, "{got}");
+    assert!(got >= 38.8, "{got}");
 }
 
 #[test]
@@ -78,19 +79,19 @@ fn a_zoom_by_two_loses_little() {
     let pair = shots(&[eye(-0.1, 0.0, 0.0), eye(0.1, 0.0, 0.0)]);
     let target = Eye { zoom: 2.0, ..eye(0.0, 0.0, 0.0) };
     let got = psnr(&pair, &target, "zoom, two views");
-    assert!(got >= 37.0, "{got}");
+    assert!(got >= 39.0, "{got}");
 }
 #[test]
 fn a_zoom_by_two_from_one_view() {
     let pair = shots(&[eye(0.0, 0.0, 0.0)]);
     let target = Eye { zoom: 2.0, ..eye(0.0, 0.0, 0.0) };
     let got = psnr(&pair, &target, "zoom, one view");
-    assert!(got >= 37.0, "{got}");
+    assert!(got >= 39.1, "{got}");
 }
 
-fn bicubic() -> RenderSettings {
+fn bilinear() -> RenderSettings {
     let mut settings = RenderSettings::default();
-    settings.interpolation.plane = PlaneSettings::CUBIC;
+    settings.interpolation.plane = PlaneSettings::LINEAR;
     settings
 }
 
@@ -100,13 +101,13 @@ fn a_bicubic_plane_is_sharper() {
     let pair = shots(&[eye(-0.2, 0.0, 0.0), eye(0.2, 0.0, 0.0)]);
     let target = |zoom, forward| Eye { zoom, ..eye(0.0, 0.0, forward) };
     for (what, shots, target, gain) in [
-        ("stereo", &pair[..], target(1.0, 0.0), 2.5),
-        ("forward", &pair, target(1.0, 1.5), 2.0),
+        ("stereo", &pair[..], target(1.0, 0.0), 3.1),
+        ("forward", &pair, target(1.0, 1.5), 2.5),
         ("zoom", &pair, target(2.0, 0.0), 0.8),
         ("zoom, one view", &pair[..1], target(2.0, 0.0), -0.05),
     ] {
-        let linear = psnr(shots, &target, what);
-        let cubic = psnr_with(shots, &target, &bicubic(), &format!("{what}, bicubic"));
+        let linear = psnr_with(shots, &target, &bilinear(), &format!("{what}, bilinear"));
+        let cubic = psnr(shots, &target, what);
         assert!(cubic >= linear + gain, "{what}: {linear} {cubic}");
     }
 }
@@ -143,9 +144,9 @@ fn a_stretched_surface_is_bridged() {
     let disparity = DepthMap::new((width, height), disparities, 1.0, Measure::Disparity).unwrap();
     let image = picture(1.0);
     let view = RectifiedView { image: &image, map: &disparity, camera: 1.0 };
-    let linear = RenderSettings::default();
+    let cubic = RenderSettings::default();
     for (method, settings, least) in
-        [(Method::Rows, linear, 60.0), (Method::Plane, linear, 55.0), (Method::Plane, bicubic(), 56.2)]
+        [(Method::Rows, cubic, 60.0), (Method::Plane, bilinear(), 55.0), (Method::Plane, cubic, 56.2)]
     {
         let settings = RenderSettings { method, offset: -40.0, ..settings };
         let got = rectified::render(&[view], 0.0, &settings).unwrap();

@@ -8,9 +8,11 @@
 //! ```
 //!
 //! over neighbours pq and triples pqr in a row or column. The springs g and h differ from place to place:
-//! across the edge of an object they are weak. For ORDER 2 the coefficients are the pixels.
+//! across the edge of an object they are weak. For ORDER 2 the coefficients are the pixels. For ORDER 4 weak
+//! springs of third differences are added at each sample, so that coefficients three apart are not coupled
+//! (`rows::couplings`).
 //!
-//! Each equation has (2 ORDER - 1)^2 unknowns (and four more for h if ORDER is 2). A direct solution would
+//! Each equation has (ORDER + 1)^2 unknowns (and four more for h if ORDER is 2). A direct solution would
 //! fill in, so conjugate gradients solve all channels together, from the mean of the samples around each
 //! coefficient; a multigrid preconditioner takes over where holes are large.
 
@@ -81,7 +83,7 @@ pub struct Fit2<const ORDER: usize, const C: usize> {
 
 impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
     /// Couplings of a coefficient that samples cause, its own included.
-    const COUPLINGS: usize = ORDER + (ORDER - 1) * (2 * ORDER - 1);
+    const COUPLINGS: usize = 1 + rows::reach(ORDER) * (2 * rows::reach(ORDER) + 2);
 
     /// An empty problem for an image of `width` x `height` pixels.
     pub fn new(width: usize, height: usize) -> Self {
@@ -98,7 +100,11 @@ impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
         // and the inverse of the diagonal is one more. The matrix has a row of zeros.
         let equations = grid.bytes(offsets::<ORDER>().len() + C) + grid.row_bytes();
         let solving = equations + grid.bytes(3 * C + 1);
-        Memory { equations, solving, with_multigrid: solving + multigrid::bytes::<C>(grid, ORDER - 1) }
+        Memory {
+            equations,
+            solving,
+            with_multigrid: solving + multigrid::bytes::<C>(grid, rows::reach(ORDER)),
+        }
     }
 
     /// Width and height of the grid of coefficients. It has ORDER / 2 - 1 coefficients more than pixels on
@@ -146,7 +152,7 @@ impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
 
 /// Couplings of a matrix: those of samples first, as [`half_square`] has them, then those of triples.
 fn offsets<const ORDER: usize>() -> Vec<Offset> {
-    let mut offsets: Vec<Offset> = half_square(ORDER - 1).collect();
+    let mut offsets: Vec<Offset> = half_square(rows::reach(ORDER)).collect();
     let triples: Vec<Offset> = [(2, 0), (0, 2)].into_iter().filter(|o| !offsets.contains(o)).collect();
     offsets.extend(triples);
     offsets

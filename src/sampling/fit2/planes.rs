@@ -6,7 +6,7 @@ use rayon::prelude::*;
 pub(super) const LANES: usize = 16;
 
 /// Zeros to the right of each row, so that neighbours across the border are there and count nothing.
-const BORDER: usize = 3;
+const BORDER: usize = 2;
 
 /// Rows that are treated without asking for another thread.
 pub(super) const ROWS_AT_ONCE: usize = 8;

@@ -58,11 +58,11 @@ impl<'a, const ORDER: usize, const C: usize> Fit2Rows<'a, ORDER, C> {
         let (column, across) = span::<ORDER>(sample.x, self.size.0);
         let (row, down) = span::<ORDER>(sample.y, self.size.1);
         let rows = self.rows_from(row);
-        let weighted = self.add_couplings(column, &rows, &product(&down, &across), sample.weight);
-        for (row, own) in rows.iter().zip(&weighted) {
+        self.add_couplings(column, &rows, sample.weight, &couplings(&down), &couplings(&across));
+        for (row, down) in rows.iter().zip(down) {
             for (c, value) in sample.values.iter().enumerate() {
-                let sums = self.rhs.at::<ORDER>(c, column, *row);
-                (0..ORDER).for_each(|j| sums[j] += own[j] * value);
+                let (sums, factor) = (self.rhs.at::<ORDER>(c, column, *row), sample.weight * down * value);
+                (0..ORDER).for_each(|j| sums[j] += factor * across[j]);
             }
         }
     }
@@ -75,42 +75,69 @@ impl<'a, const ORDER: usize, const C: usize> Fit2Rows<'a, ORDER, C> {
         std::array::from_fn(|i| (row + i).min(last) - self.first)
     }
 
-    /// Adds weight b b', b the values of the splines from a coefficient on; returns weight b.
+    /// Adds the products of the couplings of both directions.
     #[inline(always)]
     fn add_couplings(
         &mut self,
         column: usize,
         rows: &[usize; ORDER],
-        b: &Tensor<ORDER>,
         weight: f32,
-    ) -> Tensor<ORDER> {
-        let weighted = b.map(|row| row.map(|b| weight * b));
-        for (i, own) in weighted.iter().enumerate() {
+        down: &Couplings<ORDER>,
+        across: &Couplings<ORDER>,
+    ) {
+        let (reach, across) = (reach(ORDER), to_both_sides(across));
+        for (i, row) in rows.iter().enumerate() {
             let mut plane = 0;
-            for other in &b[i..] {
+            for (rows_down, down) in down[..=reach.min(ORDER - 1 - i)].iter().enumerate() {
                 // Along the row to the right only, in rows below to both sides.
-                let left = if plane == 0 { 0 } else { ORDER - 1 };
-                for shift in 0..ORDER + left {
-                    let couplings = self.matrix.at::<ORDER>(plane, column, rows[i]);
-                    for j in 0..ORDER {
-                        if (left..left + ORDER).contains(&(j + shift)) {
-                            couplings[j] += own[j] * other[j + shift - left];
-                        }
-                    }
+                let left = if rows_down == 0 { 0 } else { reach };
+                let factor = weight * down[i];
+                for across in &across[MOST_REACH - left..=MOST_REACH + reach] {
+                    let sums = self.matrix.at::<ORDER>(plane, column, *row);
+                    (0..ORDER).for_each(|j| sums[j] += factor * across[j]);
                     plane += 1;
                 }
             }
         }
-        weighted
     }
 }
 
-/// A number for each of the splines around a position, row by row.
-type Tensor<const ORDER: usize> = [[f32; ORDER]; ORDER];
+/// Splines beside each one with which it is coupled.
+pub(super) const fn reach(order: usize) -> usize {
+    order / 2
+}
 
+/// That of bicubic splines.
+const MOST_REACH: usize = reach(4);
+
+/// Couplings of the splines around a position in one direction: `[k][j]` is that of splines j and j + k.
+type Couplings<const ORDER: usize> = [[f32; ORDER]; MOST_REACH + 1];
+
+/// The third difference of four numbers.
+const THIRD: [f32; 4] = [-1.0, 3.0, -3.0, 1.0];
+
+/// b b' for the values b of the splines. Of four splines the first and the last would be coupled by
+/// b_0 b_3 <= 1 / 2304. The square of the third difference d in this proportion takes that coupling away:
+/// b b' + b_0 b_3 d d' is definite too and has half as many entries in two directions. Coefficients of
+/// polynomials of degree 2 have no third difference.
 #[inline(always)]
-fn product<const ORDER: usize>(down: &[f32; ORDER], across: &[f32; ORDER]) -> Tensor<ORDER> {
-    down.map(|d| across.map(|a| d * a))
+fn couplings<const ORDER: usize>(b: &[f32; ORDER]) -> Couplings<ORDER> {
+    let share = if ORDER == 4 { b[0] * b[3] } else { 0.0 };
+    let coupling = |j: usize, k: usize| b[j] * b[k] + share * THIRD[j] * THIRD[k];
+    let of = |k, j| if j + k < ORDER { coupling(j, j + k) } else { 0.0 };
+    std::array::from_fn(|k| std::array::from_fn(|j| of(k, j)))
+}
+
+/// Couplings with the splines [`MOST_REACH`] to the left first, and to the right last.
+#[inline(always)]
+fn to_both_sides<const ORDER: usize>(right: &Couplings<ORDER>) -> [[f32; ORDER]; 2 * MOST_REACH + 1] {
+    std::array::from_fn(|place| match place.checked_sub(MOST_REACH) {
+        Some(k) => right[k],
+        None => {
+            let k = MOST_REACH - place;
+            std::array::from_fn(|j| if j >= k { right[k][j - k] } else { 0.0 })
+        }
+    })
 }
 
 /// First coefficient around a position, which is moved into a row of `length` pixels, and the weights of the

@@ -68,6 +68,23 @@ fn splines<const ORDER: usize>(position: f64, length: usize) -> Vec<f64> {
     weights
 }
 
+/// b b' of all splines at a position, and of bicubic ones the third difference of the four around it that
+/// takes away the coupling of the first with the last.
+fn couplings_of<const ORDER: usize>(position: f64, length: usize) -> Vec<Vec<f64>> {
+    let b = splines::<ORDER>(position, length);
+    let mut couplings: Vec<Vec<f64>> = b.iter().map(|x| b.iter().map(|y| x * y).collect()).collect();
+    let first = position as usize;
+    if ORDER == 4 && first + 3 < length {
+        let third = [-1.0, 3.0, -3.0, 1.0];
+        let share = b[first] * b[first + 3];
+        for (i, j) in (0..4).flat_map(|i| (0..4).map(move |j| (i, j))) {
+            couplings[first + i][first + j] += share * third[i] * third[j];
+        }
+        assert!(couplings[first][first + 3].abs() < 1e-12);
+    }
+    couplings
+}
+
 /// J at the pixels, by the definition.
 fn dense<const ORDER: usize>(samples: &[Fit2Sample<2>], (width, height): (usize, usize)) -> Vec<Vec<f64>> {
     let (w, h) = (width + ORDER - 2, height + ORDER - 2);
@@ -78,13 +95,13 @@ fn dense<const ORDER: usize>(samples: &[Fit2Sample<2>], (width, height): (usize,
     for s in samples {
         // At the last pixel the slope is that to its left.
         let inside = |position: f64, length: usize| position.min(length as f64 - 1.0 - 1e-9).max(0.0);
-        let across = splines::<ORDER>(inside(s.x, width), w);
-        let down = splines::<ORDER>(inside(s.y, height), h);
-        let value = product(&down, &across);
+        let (x, y) = (inside(s.x, width), inside(s.y, height));
+        let value = product(&splines::<ORDER>(y, h), &splines::<ORDER>(x, w));
+        let (down, across) = (couplings_of::<ORDER>(y, h), couplings_of::<ORDER>(x, w));
         let weight = f64::from(s.weight);
         for (p, row) in a.iter_mut().enumerate() {
             for q in 0..n {
-                row[q] += weight * value[p] * value[q];
+                row[q] += weight * down[p / w][q / w] * across[p % w][q % w];
             }
             (0..2).for_each(|c| row[n + c] += weight * value[p] * f64::from(s.values[c]));
         }

@@ -88,8 +88,8 @@ pub(in crate::cli) struct RenderArguments {
     /// Drop pixels of unknown depth instead of filling it from the farther neighbour.
     #[arg(long)]
     pub(in crate::cli) drop_unknown: bool,
-    /// Degree of the splines [default: cubic in rows, linear in the plane]. A cubic plane is sharper and
-    /// takes three times as long.
+    /// Degree of the splines [default: cubic; linear without cameras]. A linear plane takes less time and
+    /// is less sharp.
     #[arg(long, value_enum)]
     pub(in crate::cli) degree: Option<Degree>,
     /// Weight of the slope penalty of the row fit, px^2 [default: from the noise of the photographs, 0.01 to
@@ -114,9 +114,10 @@ impl RenderArguments {
         let stage = &mut settings.interpolation;
         stage.fill = self.fill;
         match self.degree {
-            Some(Degree::Linear) => stage.fit.degree = Degree::Linear,
-            Some(Degree::Cubic) => stage.plane = PlaneSettings::CUBIC,
-            None => {}
+            Some(Degree::Linear) => {
+                (stage.fit.degree, stage.plane) = (Degree::Linear, PlaneSettings::LINEAR);
+            }
+            Some(Degree::Cubic) | None => {}
         }
         stage.fit.lambda = self.lambda.unwrap_or(stage.fit.lambda);
         settings

@@ -37,16 +37,17 @@ impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
         )
     }
 
-    /// Adds samples that touch this part only; returns how many lie in the image.
-    fn add(&mut self, samples: &[Sample<C>]) -> usize {
+    /// Adds samples that touch this part only; returns those that lie in the image.
+    fn add(&mut self, samples: &[Sample<C>]) -> Added {
         let (right, bottom) = (self.size.0 as f64 - 1.0, self.size.1 as f64 - 1.0);
-        let mut added = 0;
+        let mut added = Added::default();
         for s in samples {
             let inside = s.x >= -0.5 && s.x <= right + 0.5 && s.y >= -0.5 && s.y <= bottom + 0.5;
             if inside {
                 self.register(s);
                 self.fit.add(&Fit2Sample { x: s.x, y: s.y, values: s.value, weight: s.weight });
-                added += 1;
+                added.count += 1;
+                added.area += f64::from(s.spacing).powi(2).max(1.0);
             }
         }
         added
@@ -81,6 +82,21 @@ impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
     }
 }
 
+/// Samples in the image.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Added {
+    pub(super) count: usize,
+    /// The sum of the areas that they stand for, at least a pixel each.
+    pub(super) area: f64,
+}
+
+impl std::ops::AddAssign for Added {
+    fn add_assign(&mut self, other: Self) {
+        self.count += other.count;
+        self.area += other.area;
+    }
+}
+
 impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     fn whole(&mut self) -> Part<'_, ORDER, C> {
         Part {
@@ -101,12 +117,14 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     pub fn add(&mut self, samples: &[Sample<C>]) -> Result<(), InterpolationError> {
         check_samples(samples)?;
         if !self.turned {
-            self.added += self.whole().add(samples);
+            let added = self.whole().add(samples);
+            self.added += added;
             return Ok(());
         }
         for part in samples.chunks(TURNED_AT_A_TIME) {
             let turned: Vec<Sample<C>> = part.iter().map(|s| Sample { x: s.y, y: s.x, ..*s }).collect();
-            self.added += self.whole().add(&turned);
+            let added = self.whole().add(&turned);
+            self.added += added;
         }
         Ok(())
     }
@@ -141,10 +159,19 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
                 let samples = make(band);
                 check_samples(&samples).map(|()| part.add(&samples))
             };
-            let added: Result<Vec<usize>, _> = parts.into_par_iter().with_max_len(1).map(add).collect();
-            self.added += added?.into_iter().sum::<usize>();
+            let added: Result<Vec<Added>, _> = parts.into_par_iter().with_max_len(1).map(add).collect();
+            added?.into_iter().for_each(|added| self.added += added);
         }
         Ok(())
+    }
+
+    /// Multiplies the stiffness of bicubic splines by the mean area of the samples so far. That of bilinear
+    /// ones, which bending smooths, stays: they lose 0.2 to 0.6 dB by it where a view is magnified by two.
+    pub(crate) fn stiffened_by_area(mut self) -> Self {
+        if ORDER == 4 && self.added.count > 0 {
+            self.settings.plane.stiffness *= self.added.area / self.added.count as f64;
+        }
+        self
     }
 
     /// Adds a sample of weight one on a pixel.

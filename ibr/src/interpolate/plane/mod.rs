@@ -23,6 +23,7 @@ use super::extend::{Level, mean};
 use super::{Cover, Degree, HoleFill, InterpolationError, Settings, Watch};
 use crate::depth::{DepthMap, Measure, NONE};
 use crate::sample::Sample;
+use gather::Added;
 use grid::Grid;
 use hybank::sampling::Fit2;
 use hybank::sampling::fit2::{Fit2Sample, Iteration};
@@ -35,6 +36,8 @@ pub struct PlaneSettings {
     pub degree: Degree,
     /// Weight of the squared difference of neighbouring coefficients on one surface.
     pub stiffness: f64,
+    /// The least such weight that the noise of the samples demands.
+    pub noise_stiffness: f64,
     /// Weight of the squared second difference within one surface.
     pub bending: f64,
     /// The part of the stiffness that remains across depth edges.
@@ -50,20 +53,23 @@ impl PlaneSettings {
     pub const LINEAR: Self = Self {
         degree: Degree::Linear,
         stiffness: 0.12,
+        noise_stiffness: 0.0,
         bending: 0.02,
         edge_stiffness: 1e-3,
         tolerance: 3e-5,
         iterations: 500,
     };
 
-    /// Bicubic splines: the sharper image in three times the time. They are smooth without bending, and need
-    /// less stiffness, as they follow what bilinear splines take for noise.
-    pub const CUBIC: Self = Self { degree: Degree::Cubic, stiffness: 0.02, bending: 0.0, ..Self::LINEAR };
+    /// Bicubic splines: the sharper image. They are smooth without bending, and need less stiffness, as they
+    /// follow what bilinear splines take for noise. In a hole an error has a residual in proportion to the
+    /// root of the stiffness, and the tolerance is less by that root.
+    pub const CUBIC: Self =
+        Self { degree: Degree::Cubic, stiffness: 0.02, bending: 0.0, tolerance: 1.2e-5, ..Self::LINEAR };
 }
 
 impl Default for PlaneSettings {
     fn default() -> Self {
-        Self::LINEAR
+        Self::CUBIC
     }
 }
 
@@ -115,7 +121,7 @@ pub struct PlaneProblem<const ORDER: usize, const C: usize> {
     distance: Vec<f32>,
     counts: Vec<u16>,
     settings: Settings,
-    added: usize,
+    added: Added,
 }
 
 impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
@@ -140,13 +146,13 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
             distance: vec![f32::INFINITY; pixels],
             counts,
             settings: *settings,
-            added: 0,
+            added: Added::default(),
         })
     }
 
     /// Samples that have been added.
     pub fn samples(&self) -> usize {
-        self.added
+        self.added.count
     }
 
     /// Whether an image takes a third less memory with rows and columns exchanged.
@@ -173,7 +179,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         watch: Watch<'_>,
     ) -> Result<PlaneFit, InterpolationError> {
         let (width, height, turned) = (self.width, self.height, self.turned);
-        if self.added == 0 {
+        if self.added.count == 0 {
             let (width, height) = if turned { (height, width) } else { (width, height) };
             return Err(InterpolationError::NoSamples { width, height });
         }
@@ -252,10 +258,12 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         inside: &(impl Fn(usize) -> bool + Sync),
         watch: Watch<'_>,
     ) -> (Vec<f32>, Convergence) {
-        let (plane, grid) = (&self.settings.plane, self.grid());
-        let springs = |direction, y| springs::of_row(depth, grid, inside, &self.settings, direction, y);
-        let connected = self.fit.connect(springs, |coefficient| !inside(grid.pixel(coefficient)));
+        let (mut settings, grid) = (self.settings, self.grid());
+        let plane = &mut settings.plane;
+        plane.stiffness = plane.stiffness.max(plane.noise_stiffness);
         let iteration = Iteration { tolerance: plane.tolerance, steps: plane.iterations };
+        let springs = |direction, y| springs::of_row(depth, grid, inside, &settings, direction, y);
+        let connected = self.fit.connect(springs, |coefficient| !inside(grid.pixel(coefficient)));
         let (values, ended) = connected.solve(&iteration, watch);
         let hybank::sampling::fit2::Convergence { steps, residual, reached } = ended;
         (values, Convergence { steps, residual, reached })

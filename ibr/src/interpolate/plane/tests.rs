@@ -50,7 +50,7 @@ fn bicubic_splines_follow_curves() {
 fn equal_to_the_dense_solution() {
     let size = 7;
     let samples = scattered(size, |x, y| 128.0 + 60.0 * (x * 1.1).sin() * (y * 0.9).cos());
-    let mut settings = Settings::default();
+    let mut settings = with(PlaneSettings::LINEAR);
     settings.plane.tolerance = 1e-9;
     settings.fill = HoleFill::Bridge;
     let fit = interpolate(&samples, (size, size), &settings).unwrap();
@@ -126,7 +126,7 @@ fn disocclusions_take_the_farther_side() {
 #[test]
 fn outside_the_region_nothing_is_invented() {
     let samples = scattered(10, |_, _| 80.0);
-    let mut problem = PlaneProblem::<2, 1>::new((14, 10), &Settings::default()).unwrap();
+    let mut problem = PlaneProblem::<2, 1>::new((14, 10), &with(PlaneSettings::LINEAR)).unwrap();
     problem.add(&samples).unwrap();
     let region: Vec<bool> = (0..140).map(|p| p % 14 < 10).collect();
     let fit = problem.solve(Some(&region), &|_| ()).unwrap();
@@ -141,12 +141,12 @@ fn outside_the_region_nothing_is_invented() {
 fn bands_add_up_and_empty_problems_fail() {
     let samples = scattered(9, |x, y| 10.0 * x + y);
     let whole = interpolate(&samples, (9, 9), &Settings::default()).unwrap();
-    let mut problem = PlaneProblem::<2, 1>::new((9, 9), &Settings::default()).unwrap();
+    let mut problem = PlaneProblem::<4, 1>::new((9, 9), &Settings::default()).unwrap();
     let (a, b) = samples.split_at(50);
     problem.add(a).unwrap();
     problem.add(b).unwrap();
     assert_eq!(problem.solve(None, &|_| ()).unwrap(), whole);
-    let empty = PlaneProblem::<2, 1>::new((4, 3), &Settings::default()).unwrap();
+    let empty = PlaneProblem::<4, 1>::new((4, 3), &Settings::default()).unwrap();
     assert_eq!(empty.solve(None, &|_| ()), Err(InterpolationError::NoSamples { width: 4, height: 3 }));
 }
 

@@ -48,7 +48,7 @@ pub struct UncalibratedSettings {
 
 impl Default for UncalibratedSettings {
     fn default() -> Self {
-        let plane = PlaneSettings { stiffness: 0.02, bending: 0.3, ..PlaneSettings::default() };
+        let plane = PlaneSettings { stiffness: 0.02, bending: 0.3, ..PlaneSettings::LINEAR };
         Self { seed: 1, reverse_order: false, plane }
     }
 }
