@@ -88,10 +88,10 @@ pub(in crate::cli) struct RenderArguments {
     /// Drop pixels of unknown depth instead of filling it from the farther neighbour.
     #[arg(long)]
     pub(in crate::cli) drop_unknown: bool,
-    /// Degree of the splines [default: cubic in rows, linear in the plane]. A cubic plane is sharper and
-    /// takes three times as long.
-    #[arg(long, value_enum)]
-    pub(in crate::cli) degree: Option<Degree>,
+    /// Degree of the splines of the plane; rows are cubic. A cubic plane is sharper and takes three times as
+    /// long.
+    #[arg(long, value_enum, default_value_t = Degree::Linear)]
+    pub(in crate::cli) degree: Degree,
     /// Weight of the slope penalty of the row fit, px^2 [default: from the noise of the photographs, 0.01 to
     /// 4].
     #[arg(long, value_name = "L")]
@@ -102,6 +102,9 @@ pub(in crate::cli) struct RenderArguments {
     /// Exchange near and far (scenes without cameras).
     #[arg(long)]
     pub(in crate::cli) reverse_order: bool,
+    /// Overwrite existing files.
+    #[arg(long)]
+    pub(in crate::cli) force: bool,
 }
 
 impl RenderArguments {
@@ -113,10 +116,8 @@ impl RenderArguments {
         settings.method = self.method;
         let stage = &mut settings.interpolation;
         stage.fill = self.fill;
-        match self.degree {
-            Some(Degree::Linear) => stage.fit.degree = Degree::Linear,
-            Some(Degree::Cubic) => stage.plane = PlaneSettings::CUBIC,
-            None => {}
+        if self.degree == Degree::Cubic {
+            stage.plane = PlaneSettings::CUBIC;
         }
         stage.fit.lambda = self.lambda.unwrap_or(stage.fit.lambda);
         settings
