@@ -3,6 +3,7 @@
 use hybank::messages::Quoted;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::ser::Serializer;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -16,7 +17,7 @@ pub struct SceneSpec {
     pub view: Vec<ViewSpec>,
     /// The virtual views, `[virtual]` or several `[[virtual]]`; none is needed if one of the views is left
     /// out and rendered.
-    #[serde(rename = "virtual", default, deserialize_with = "one_or_many")]
+    #[serde(rename = "virtual", default, deserialize_with = "one_or_many", serialize_with = "as_written")]
     pub targets: Vec<TargetSpec>,
     /// File of tracks over the views (uncalibrated scenes).
     pub matches: Option<PathBuf>,
@@ -187,6 +188,14 @@ impl ViewSpec {
     /// The view in messages.
     pub(super) fn named(&self) -> String {
         format!("view \"{}\"", Quoted(self.label()))
+    }
+}
+
+/// One table as `[virtual]`, and several as `[[virtual]]`.
+fn as_written<S: Serializer>(targets: &[TargetSpec], serializer: S) -> Result<S::Ok, S::Error> {
+    match targets {
+        [one] => one.serialize(serializer),
+        many => many.serialize(serializer),
     }
 }
 

@@ -83,7 +83,7 @@ impl Job<'_> {
 /// Checks that need no file, and the limits for a sure bound.
 fn check(arguments: &BoundArguments) -> Result<Option<Limits>, Failure> {
     arguments.scene.check()?;
-    arguments.outputs().check(Levels::Eight, &arguments.scene)?;
+    arguments.outputs().check(Levels::Eight, &arguments.scene, arguments.force)?;
     let limit = |name: &str, value: f64| match value.is_finite() && value >= 0.0 {
         true => Ok(value),
         false => Err(Failure::Usage(format!("{name} {value}: it must be a number that is not negative"))),
