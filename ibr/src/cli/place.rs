@@ -7,6 +7,7 @@ use super::{inputs, output};
 use crate::analysis::{Choice, Predicted, Predictor};
 use crate::image::{Image, quality};
 use crate::pipeline::{Agreement, RenderError};
+use crate::propagate::View;
 use crate::scene::{Kind, Scene, SourceView};
 use hybank::messages::{Quoted, counted};
 use serde::Serialize;
@@ -87,32 +88,39 @@ impl Job<'_> {
         let predictor = Predictor::new(&sources, &settings).map_err(named)?;
         let views = predictor.views();
         self.progress.step("choosing");
+        let estimate = |some: &[View<'_, P>], camera| predictor.estimate_from(some, camera, size);
+        let frames = cameras.len() as f64;
+        // What no view shows is an error, as it is of `bound`.
+        let all = cameras.iter().map(|camera| estimate(&views, camera)).sum::<Result<f64, RenderError>>();
+        let all = all.map_err(named)? / frames;
         let mean = |chosen: &[usize]| {
             let some = selected(&views, chosen);
-            let all = cameras.iter().map(|camera| match predictor.estimate_from(&some, camera, size) {
+            let of_frame = |camera| match estimate(&some, camera) {
                 Err(RenderError::NoOverlap { .. }) => Ok(NOTHING_SHOWN),
                 other => other,
-            });
-            Ok(all.sum::<Result<f64, RenderError>>()? / cameras.len() as f64)
+            };
+            Ok::<f64, RenderError>(cameras.iter().map(of_frame).sum::<Result<f64, RenderError>>()? / frames)
         };
-        let (count, every) = (self.arguments.choose, (0..views.len()).collect());
+        let count = self.arguments.choose;
         let watch = |share| self.progress.within(share);
         let choice = Choice::least(views.len(), count, mean, &watch).map_err(named)?;
         let Some(choice) = choice else { return Err(Failure::input(RenderError::NoViews)) };
-        let set = |chosen: Vec<usize>| {
+        let set = |chosen: Vec<usize>, estimate: f64| {
             let some = selected(&sources, &chosen);
             let render = || cameras[0].render(&some, size, &settings).map_err(named);
             Ok::<Set, Failure>(Set {
                 names: selected(&self.scene.names, &chosen),
-                estimate: mean(&chosen).map_err(named)?,
+                estimate,
                 measured: self.measured(|| Ok(render()?.image))?,
                 views: chosen,
             })
         };
+        let even = evenly(views.len(), count);
+        let of_even = mean(&even).map_err(named)?;
         let summary = Summary {
-            chosen: set(choice.views)?,
-            even: set(evenly(views.len(), count))?,
-            all: set(every)?,
+            chosen: set(choice.views, choice.error)?,
+            even: set(even, of_even)?,
+            all: set((0..views.len()).collect(), all)?,
             tried: choice.tried,
             exhaustive: choice.is_exhaustive,
             calibrated_on: predictor.calibration().views,

@@ -1,5 +1,5 @@
-//! The scene of what lies in a folder: a COLMAP workspace, the frames of transforms.json, a rectified pair of
-//! Middlebury, or two photographs.
+//! The scene of what lies in a folder: a COLMAP workspace, the frames of transforms.json, a rectified pair
+//! of Middlebury, or two photographs.
 
 use super::spec::{SceneSpec, TargetSpec, ViewSpec};
 use crate::camera::colmap::{PLACES, is_model, read_model};

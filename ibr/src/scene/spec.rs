@@ -168,8 +168,8 @@ impl TargetSpec {
 }
 
 impl ViewSpec {
-    /// Stored numbers per unit of depth in a map with whole numbers, if nothing else is said: thousandths, as
-    /// nerfstudio writes them.
+    /// Stored numbers per unit of depth in a map with whole numbers, if nothing else is said: thousandths,
+    /// as nerfstudio writes them.
     pub(super) fn usual_scale(map: &Path) -> Option<f64> {
         map.extension().is_some_and(|ending| ending == "png").then_some(1000.0)
     }

