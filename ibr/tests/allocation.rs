@@ -1,7 +1,7 @@
 //! The rows of a rendering allocate nothing once their work memory has grown to the longest row.
 
 use hybank_ibr::camera::Camera;
-use hybank_ibr::interpolate::rows::RowWork;
+use hybank_ibr::interpolate::rows::{self, RowWork};
 use hybank_ibr::interpolate::{Cover, Settings};
 use hybank_ibr::occlusion::{RowScratch, remove_in_row};
 use hybank_ibr::propagate::{Frame, RectifiedView, RigCamera, rectified_row};
@@ -24,9 +24,9 @@ fn rows_allocate_nothing() {
         camera: *position,
     });
     let (settings, camera) = (Settings::default(), RigCamera::new(&views, 0.5));
-    let frame = Frame::whole(SIZE.0, SIZE.1, RowWork::<4, 3>::MARGIN, 0.0);
+    let frame = Frame::whole(SIZE.0, SIZE.1, rows::MARGIN, 0.0);
     let mut samples: Vec<Sample<3>> = Vec::with_capacity(2 * SIZE.0);
-    let (mut scratch, mut work) = (RowScratch::default(), RowWork::<4, 3>::new(SIZE.0));
+    let (mut scratch, mut work) = (RowScratch::default(), RowWork::<3>::new(SIZE.0));
     let (mut values, mut mask) = (vec![0.0; 3 * SIZE.0], vec![Cover::Seen; SIZE.0]);
     let mut removed = 0;
     let mut render = |y: usize| {

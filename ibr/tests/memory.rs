@@ -226,8 +226,7 @@ fn predictions_take_what_is_estimated() {
         let maps = [1, 2].map(|seed| noisy_map(size, 0.8, Measure::Disparity, seed));
         let view = |k: usize| RectifiedView { image: &image, map: &maps[k], camera: k as f64 };
         let views = [0, 1].map(view);
-        let estimate =
-            pool.install(|| Extent::new(size, &[&image, &image], None).of_rig_prediction(&settings));
+        let estimate = pool.install(|| Extent::new(size, &[&image, &image], None).of_rig_prediction());
         let work = || {
             let predictor = Predictor::new(&views, &settings).unwrap();
             let now = predictor.at(&0.5, views[0].image.size(), None).unwrap();

@@ -1,9 +1,9 @@
 //! The response of a front end to an analytic source, exact to rounding at any uniformly spaced instants.
 
-use super::source::{NormalisedSource, Source};
+use super::source::{NormalisedSource, Source, Tone};
 use super::walk::{panel_rate, sample_at, sum};
 use crate::analog::StrictlyProper;
-use crate::linalg::{self, Mat};
+use crate::linalg::{self, Complex, Mat};
 use crate::units::FastPeriods;
 
 /// The instants first + n step, n = 0 .. count.
@@ -32,7 +32,8 @@ impl Instants {
 pub fn sample(filter: &StrictlyProper, source: &NormalisedSource, instants: Instants) -> Vec<f64> {
     match source {
         Source::Step { at, height } => step(filter, at.0, *height, instants),
-        Source::Tones(_) | Source::Chirp { .. } => {
+        Source::Tones(list) => tones(filter, list, instants),
+        Source::Chirp { .. } => {
             let times: Vec<FastPeriods> = (0..instants.count).map(|n| instants.at(n)).collect();
             sample_at(filter, source, &times)
         }
@@ -44,11 +45,19 @@ pub fn sample(filter: &StrictlyProper, source: &NormalisedSource, instants: Inst
 pub(super) fn work_bytes(source: &NormalisedSource, count: usize) -> usize {
     let nested = match source {
         Source::Sum(terms) => terms.iter().map(|term| work_bytes(term, count)).max().unwrap_or(0),
-        // The instants, and the order of those of a chirp.
-        Source::Chirp { .. } | Source::Tones(_) => count.saturating_mul(2 * size_of::<f64>()),
-        Source::Step { .. } => 0,
+        // The instants and their order.
+        Source::Chirp { .. } => count.saturating_mul(2 * size_of::<f64>()),
+        Source::Step { .. } | Source::Tones(_) => 0,
     };
     count.saturating_mul(size_of::<f64>()).saturating_add(nested)
+}
+
+/// Steady state: amplitude |Phi(j omega)| cos(omega t + phase + arg Phi(j omega)).
+fn tones(filter: &StrictlyProper, tones: &[Tone<FastPeriods>], instants: Instants) -> Vec<f64> {
+    let phasors: Vec<(f64, Complex<f64>)> =
+        tones.iter().map(|tone| (tone.omega.0, tone.response(filter))).collect();
+    let value = |t: f64| phasors.iter().map(|(omega, p)| (p * Complex::from_polar(1.0, omega * t)).re).sum();
+    (0..instants.count).map(|n| value(instants.at(n).0)).collect()
 }
 
 /// The state and the constant input form one autonomous system, (x, u)' = [A B; 0 0] (x, u), so A need not

@@ -27,8 +27,7 @@ const HALF_NODES: [(f64, f64); 8] = [
 
 /// (phi * f)(t) at the given instants in any order, accurate to rounding.
 ///
-/// A tone costs one complex exponential at each instant, amplitude |Phi(j omega)| cos(omega t + phase + arg
-/// Phi(j omega)); steps and chirps a panel for each instant, and
+/// A tone costs one complex exponential at each instant; steps and chirps a panel for each instant, and
 /// otherwise as many as [`sample`](super::sample) takes.
 pub fn sample_at(filter: &StrictlyProper, source: &NormalisedSource, times: &[FastPeriods]) -> Vec<f64> {
     match source {

@@ -65,7 +65,8 @@ impl Advice {
         for (coordinates, further) in camera.further(&views) {
             let (image, map) = imagined(predictor.render(&further, size)?);
             let another = View { image: &image, map: &map, camera: further };
-            advice.consider(coordinates, before - predictor.with_view(camera, size, &another)?);
+            let all = [&views[..], &[another]].concat();
+            advice.consider(coordinates, before - predictor.estimate_from(&all, camera, size)?);
         }
         Ok(advice)
     }

@@ -6,7 +6,6 @@ use super::regressors::{CAUSE_OF, REGRESSORS, Regressors, difference};
 use super::sure::Limits;
 use super::variogram::Variogram;
 use crate::image::Image;
-use crate::pipeline::memory::Extent;
 use crate::pipeline::{Exposure, RenderError, RenderSettings, Rendering};
 use crate::propagate::{View, Viewpoint};
 use std::ops::Range;
@@ -159,13 +158,13 @@ pub trait Predicted: Viewpoint {
         study: &Study<'_>,
     ) -> Result<Examined, RenderError>;
 
-    /// The sizes of a prediction of a view, and the bytes that it takes.
-    fn memory(
+    /// Refuses a prediction of a view for which there is too little memory.
+    fn check_memory(
         &self,
         views: &[View<'_, Self>],
         size: (usize, usize),
         settings: &RenderSettings,
-    ) -> Result<(Extent, f64), RenderError>;
+    ) -> Result<(), RenderError>;
 
     /// Mean distance between neighbouring views; of views at one point that from this camera, or one.
     fn spacing(&self, views: &[View<'_, Self>]) -> f64;

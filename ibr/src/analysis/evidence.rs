@@ -3,8 +3,8 @@
 
 use super::sure::{self, Limits};
 use crate::depth::Measure;
-use crate::interpolate::rows::RowWork;
-use crate::interpolate::{Cover, Degree, InterpolationError, Settings};
+use crate::interpolate::rows::{self, ORDER, RowWork};
+use crate::interpolate::{Cover, InterpolationError, Settings};
 use crate::pipeline::rectified::{self, Strip};
 use crate::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights};
 use crate::propagate::{Frame, RectifiedView, RigCamera};
@@ -71,17 +71,10 @@ pub fn collect_evidence(
     let view_weights = view_weights.with_gains(&rendering.agreement.gains);
     let (camera, (width, height)) = (RigCamera::new(views, position), rendering.image.size());
     let colour = rendering.image.channels() == 3;
-    let job = |margin| {
-        let frame = Frame::whole(width, height, margin, settings.offset);
-        let rows = rectified::Job { views, camera, view_weights, frame, settings, watch: &|_| () };
-        Job { rows, rendering: &rendering, limits }
-    };
-    let (evidence, edges, sure) = match (settings.interpolation.fit.degree, colour) {
-        (Degree::Linear, false) => collect::<2, 1>(&job(RowWork::<2, 1>::MARGIN))?,
-        (Degree::Linear, true) => collect::<2, 3>(&job(RowWork::<2, 3>::MARGIN))?,
-        (Degree::Cubic, false) => collect::<4, 1>(&job(RowWork::<4, 1>::MARGIN))?,
-        (Degree::Cubic, true) => collect::<4, 3>(&job(RowWork::<4, 3>::MARGIN))?,
-    };
+    let frame = Frame::whole(width, height, rows::MARGIN, settings.offset);
+    let rows = rectified::Job { views, camera, view_weights, frame, settings, watch: &|_| () };
+    let job = Job { rows, rendering: &rendering, limits };
+    let (evidence, edges, sure) = if colour { collect::<3>(&job)? } else { collect::<1>(&job)? };
     Ok(PixelEvidence { rendering, evidence, edges, sure })
 }
 
@@ -103,14 +96,14 @@ const UNSEEN: f32 = 255.0;
 
 type Collected = (Vec<Evidence>, Vec<f32>, Vec<f32>);
 
-fn collect<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Collected, RenderError> {
+fn collect<const C: usize>(job: &Job<'_>) -> Result<Collected, RenderError> {
     let (width, height) = job.rendering.image.size();
     let mut evidence = vec![Evidence::default(); width * height];
     let mut edges = vec![0.0; width * height];
     let mut sure = vec![UNSEEN; width * height];
     let numbers = edges.par_chunks_mut(width).zip(sure.par_chunks_mut(width));
     evidence.par_chunks_mut(width).zip(numbers).enumerate().try_for_each_init(
-        || RowEvidence::<ORDER, C>::new(job),
+        || RowEvidence::<C>::new(job),
         |work, (y, (evidence, (edges, sure)))| {
             if work.row(job, y, evidence)? {
                 work.edges(job, y, edges);
@@ -132,10 +125,10 @@ const INFLUENCE: f64 = 8.0;
 const NEAR: usize = 3;
 
 /// Work memory of one row.
-struct RowEvidence<const ORDER: usize, const C: usize> {
+struct RowEvidence<const C: usize> {
     strip: Strip<C>,
-    fit: RowWork<ORDER, C>,
-    again: RowWork<ORDER, C>,
+    fit: RowWork<C>,
+    again: RowWork<C>,
     response: Response,
     /// The influence of each view on a pixel.
     of_views: Vec<f64>,
@@ -143,7 +136,7 @@ struct RowEvidence<const ORDER: usize, const C: usize> {
     mask: Vec<Cover>,
 }
 
-impl<const ORDER: usize, const C: usize> RowEvidence<ORDER, C> {
+impl<const C: usize> RowEvidence<C> {
     fn new(job: &Job<'_>) -> Self {
         let width = job.rows.frame.width;
         Self {

@@ -8,7 +8,6 @@ use super::regressors::{hole_distances, slopes};
 use crate::camera::Camera;
 use crate::depth::DepthMap;
 use crate::image::Image;
-use crate::pipeline::memory::Extent;
 use crate::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights, calibrated as pipeline};
 use crate::propagate::{CalibratedView, Nearest, Viewpoint};
 use nalgebra::{Matrix3x4, Vector3};
@@ -59,14 +58,14 @@ impl Predicted for Camera {
         Ok(Examined { rendering, regressors, sure_bound: Vec::new(), local_limit })
     }
 
-    fn memory(
+    fn check_memory(
         &self,
         views: &[CalibratedView<'_>],
         size: (usize, usize),
         settings: &RenderSettings,
-    ) -> Result<(Extent, f64), RenderError> {
+    ) -> Result<(), RenderError> {
         let extent = pipeline::extent(views, self, size, settings)?;
-        Ok((extent, extent.of_camera_prediction(settings)))
+        extent.check(extent.of_camera_prediction(settings))
     }
 
     /// Mean distance between a view and the one nearest to it.

@@ -32,6 +32,7 @@
 
 mod advice;
 mod calibrate;
+mod choice;
 mod estimate;
 mod evidence;
 mod general;
@@ -45,6 +46,7 @@ mod sure;
 mod variogram;
 
 pub use advice::{Advice, AnotherView};
+pub use choice::Choice;
 pub use estimate::{Calibration, Predicted, Totals, ViewError};
 pub use evidence::{Evidence, PixelEvidence, collect_evidence};
 pub use jitter::{depth_jitter, with_noise};

@@ -28,8 +28,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     /// Those of [`crate::pipeline`].
     pub fn new(views: &[View<'a, P>], settings: &RenderSettings) -> Result<Self, RenderError> {
         if let Some(first) = views.first() {
-            let (extent, bytes) = first.camera.memory(views, first.image.size(), settings)?;
-            extent.check(bytes)?;
+            first.camera.check_memory(views, first.image.size(), settings)?;
         }
         let agreement = Agreement::of(views);
         let gains = if settings.keep_exposure { Vec::new() } else { without_drift(&agreement.gains) };
@@ -47,6 +46,11 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     /// How well the views agree, as they were given.
     pub fn agreement(&self) -> &Agreement {
         &self.agreement
+    }
+
+    /// The weights of the causes.
+    pub fn calibration(&self) -> &Calibration {
+        &self.calibration
     }
 
     /// The views, with one exposure.
@@ -69,8 +73,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
         size: (usize, usize),
         limits: Option<&Limits>,
     ) -> Result<ViewError, RenderError> {
-        let (extent, bytes) = camera.memory(&self.views(), size, &self.settings)?;
-        extent.check(bytes)?;
+        camera.check_memory(&self.views(), size, &self.settings)?;
         let study = Study { bounds: true, limits, ..self.study(camera) };
         Ok(judge(camera.examine(&self.views(), size, &study)?, self.calibration))
     }
@@ -93,16 +96,18 @@ impl<'a, P: Predicted> Predictor<'a, P> {
         Ok(local_mean(&difference(&image, rendered), image.size()))
     }
 
-    /// The mean estimate of the view of `camera` if `another` view were there too, with the weights as they
-    /// are.
-    pub(super) fn with_view(
+    /// The mean estimate of the view of `camera` from other views: some of those
+    /// of the predictor, or more. The weights and the distance between views stay as they are.
+    ///
+    /// # Errors
+    /// Those of [`crate::pipeline`].
+    pub fn estimate_from(
         &self,
+        views: &[View<'_, P>],
         camera: &P,
         size: (usize, usize),
-        another: &View<'_, P>,
     ) -> Result<f64, RenderError> {
-        let views = [self.views(), vec![*another]].concat();
-        let examined = camera.examine(&views, size, &self.study(camera))?;
+        let examined = camera.examine(views, size, &self.study(camera))?;
         Ok(self.calibration.mean(&examined.regressors))
     }
 }

@@ -4,7 +4,6 @@ use super::estimate::{Examined, Predicted, Study};
 use super::evidence::{Evidence, collect_evidence};
 use super::jitter::depth_jitter;
 use super::regressors::regressors;
-use crate::pipeline::memory::Extent;
 use crate::pipeline::{RenderError, RenderSettings, Rendering, rectified as pipeline};
 use crate::propagate::RectifiedView;
 
@@ -36,14 +35,14 @@ impl Predicted for f64 {
         Ok(Examined { rendering: found.rendering, regressors, sure_bound: found.sure, local_limit })
     }
 
-    fn memory(
+    fn check_memory(
         &self,
         views: &[RectifiedView<'_>],
         _: (usize, usize),
         settings: &RenderSettings,
-    ) -> Result<(Extent, f64), RenderError> {
+    ) -> Result<(), RenderError> {
         let extent = pipeline::extent(views, settings);
-        Ok((extent, extent.of_rig_prediction(settings)))
+        extent.check(extent.of_rig_prediction())
     }
 
     fn spacing(&self, views: &[RectifiedView<'_>]) -> f64 {

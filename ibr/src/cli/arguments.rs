@@ -24,6 +24,7 @@ const EXAMPLES: &str = "Examples:
   hybank-ibr render scene.toml --depth-step 6 -o sparse.png --json
   hybank-ibr render path.toml -o film.y4m
   hybank-ibr bound scene.toml --map error.png
+  hybank-ibr place scene.toml --choose 4
   hybank-ibr demo -o demo.png
 
 Exit codes: 0 done, 1 the input failed, 2 wrong usage.";
@@ -34,6 +35,8 @@ pub(super) enum Command {
     Render(Box<RenderArguments>),
     /// Predict the error of the virtual view without a photograph of it, and what to spend on next.
     Bound(BoundArguments),
+    /// Choose the views of a scene from which the virtual view has the least predicted error.
+    Place(PlaceArguments),
     /// Write the scene file of a folder: a COLMAP workspace, transforms.json, a pair of Middlebury, or two
     /// photographs.
     Init(InitArguments),
@@ -42,7 +45,7 @@ pub(super) enum Command {
     Demo(DemoArguments),
 }
 
-/// What `render` and `bound` share.
+/// What `render`, `bound` and `place` share.
 #[derive(Debug, Args)]
 pub(super) struct SceneArguments {
     /// Scene file (TOML), `-` for standard input, or a folder of which `init` makes a scene.
@@ -67,9 +70,6 @@ pub(super) struct SceneArguments {
     /// Print the results as one JSON object.
     #[arg(long)]
     pub(super) json: bool,
-    /// Overwrite existing files.
-    #[arg(long)]
-    pub(super) force: bool,
     /// Most pixels of the virtual view, and of each image and map. A rendering takes up to 160 bytes of
     /// memory per pixel.
     #[arg(long, value_name = "N", default_value_t = crate::image::MOST_PIXELS)]
@@ -122,6 +122,30 @@ pub(super) struct BoundArguments {
     /// Largest error of a disparity for a baseline of one, in pixels, for the sure bound.
     #[arg(long, value_name = "PX", default_value_t = 0.0, requires = "curvature")]
     pub(super) disparity_error: f64,
+    /// Overwrite existing files.
+    #[arg(long)]
+    pub(super) force: bool,
+}
+
+const PLACE_EXAMPLES: &str = "Examples:
+  hybank-ibr place scene.toml --choose 4
+      names the 4 views of the scene from which the virtual view has the least predicted error, and prints
+      that error beside those of all views and of 4 views that are spread evenly over the list
+  hybank-ibr place scene.toml --choose 2 --view centre --truth centre-photo.png
+      chooses among the other views for the place of one, and compares the predictions with its photograph
+
+The errors are the estimates of `bound`, of a path their mean over its views, with weights that are calibrated
+on all views of the scene. Up to 500 sets of views are all tried. Of more, greedy choices from five first
+views are improved by exchanges. Scenes without cameras are refused.";
+
+#[derive(Debug, Args)]
+#[command(after_help = PLACE_EXAMPLES)]
+pub(super) struct PlaceArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
+    /// Number of views to choose.
+    #[arg(long, value_name = "K")]
+    pub(super) choose: usize,
 }
 
 const INIT_EXAMPLES: &str = "Examples:

@@ -1,7 +1,6 @@
 //! `hybank-ibr demo`: a synthetic scene, rendered and compared with its exact view.
 
 use super::arguments::DemoArguments;
-use super::contact;
 use super::failure::Failure;
 use super::output;
 use super::progress::Progress;
@@ -15,11 +14,18 @@ use crate::pipeline::{RenderSettings, Rendering, rectified};
 use crate::propagate::RectifiedView;
 use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use hybank::messages::Quoted;
+use image::{DynamicImage, Rgb, RgbImage, imageops};
 use serde::Serialize;
 use std::time::Instant;
 
 /// Step of the coarse depth in the second rendering.
 const STEP: usize = 6;
+
+/// Pixels between the pictures of the sheet.
+const GAP: usize = 6;
+
+/// Factor of the differences that it shows.
+const GAIN: f32 = 4.0;
 
 /// Bytes per pixel of a view: six pictures, the sheet of them, and its file.
 const SHEET: f64 = 300.0;
@@ -57,16 +63,10 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
         render(&[rig(&left, &left_coarse, 0.0), rig(&right, &right_coarse, 1.0)], &exact)?;
     partial_summary.preparation_seconds = preparation;
     progress.step("writing");
-    let gain = 4.0;
-    let pictures = [
-        left,
-        exact.clone(),
-        right,
-        full.image.clone(),
-        contact::difference(&full.image, &exact, gain),
-        contact::difference(&partial.image, &exact, gain),
-    ];
-    let sheet = output::encoded(&contact::sheet(&pictures, 3), &arguments.output, Levels::Eight)?;
+    let [full, partial] = [&full.image, &partial.image];
+    let errors = [full, partial].map(|image| enlarged_difference(image, &exact));
+    let sheet = sheet([&left, &exact, &right, full, &errors[0], &errors[1]])?;
+    let sheet = output::encoded(&sheet, &arguments.output, Levels::Eight)?;
     output::write(&[sheet], arguments.force)?;
     drop(progress);
     report(&DemoSummary { full_depth: full_summary, partial_depth: partial_summary }, arguments)
@@ -98,11 +98,31 @@ fn render(views: &[RectifiedView<'_>], exact: &Image) -> Result<(Rendering, Summ
     Ok((rendering, summary))
 }
 
+/// Two rows of three pictures on white.
+fn sheet(pictures: [&Image; 6]) -> Result<Image, Failure> {
+    let (width, height) = pictures[0].size();
+    let side = |count: usize, length: usize| (count * (length + GAP) + GAP) as u32;
+    let mut sheet = RgbImage::from_pixel(side(3, width), side(2, height), Rgb([255; 3]));
+    for (k, picture) in pictures.iter().enumerate() {
+        let [left, top] = [k % 3 * (width + GAP), k / 3 * (height + GAP)].map(|before| (GAP + before) as i64);
+        imageops::replace(&mut sheet, &picture.to_dynamic(Levels::Eight).to_rgb8(), left, top);
+    }
+    Image::try_from(&DynamicImage::from(sheet)).map_err(Failure::input)
+}
+
+/// Mid-grey plus the difference of two images of one size, enlarged.
+fn enlarged_difference(a: &Image, b: &Image) -> Image {
+    let mut image = a.clone();
+    let values = a.data().iter().zip(b.data()).map(|(a, b)| 128.0 + GAIN * (a - b));
+    image.data_mut().iter_mut().zip(values).for_each(|(p, v)| *p = v);
+    image
+}
+
 fn report(summary: &DemoSummary, arguments: &DemoArguments) -> Result<(), Failure> {
     let text = || {
         let (full, partial) = (summary.full_depth.text(), summary.partial_depth.text());
         format!(
-            "exact depth at every pixel\n{full}\nexact depth at one pixel in {STEP} x {STEP}\n{partial}\n{}: left, exact, right; rendered, its error and that of partial depth (times 4)\n",
+            "exact depth at every pixel\n{full}\nexact depth at one pixel in {STEP} x {STEP}\n{partial}\n{}: left, exact, right; rendered, its error and that of partial depth (times {GAIN})\n",
             Quoted(&arguments.output)
         )
     };

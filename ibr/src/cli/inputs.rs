@@ -43,6 +43,14 @@ pub(super) fn line(agreement: &Agreement) -> Option<String> {
     ))
 }
 
+/// The line of a report about the weights of a prediction.
+pub(super) fn weights_line(calibrated_on: usize) -> String {
+    match calibrated_on {
+        0 => "weights   those of typical photographs: a single view cannot be left out".into(),
+        views => format!("weights   calibrated on {views} views, each left out in turn"),
+    }
+}
+
 /// Why no two views were compared.
 fn unchecked(agreement: &Agreement) -> Option<String> {
     match agreement.gains.len() {

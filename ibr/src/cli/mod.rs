@@ -2,13 +2,14 @@
 
 mod arguments;
 mod bound;
-mod contact;
 mod demo;
 mod failure;
 mod heat;
 mod init;
 mod inputs;
 mod output;
+mod outputs;
+mod place;
 mod progress;
 mod render;
 mod source;
@@ -39,6 +40,7 @@ pub fn run() -> ExitCode {
     let outcome = match arguments.command {
         Command::Render(arguments) => in_pool(arguments.scene.threads, || render::run(&arguments)),
         Command::Bound(arguments) => in_pool(arguments.scene.threads, || bound::run(&arguments)),
+        Command::Place(arguments) => in_pool(arguments.scene.threads, || place::run(&arguments)),
         Command::Init(arguments) => in_pool(arguments.threads, || init::run(&arguments)),
         Command::Demo(arguments) => in_pool(arguments.threads, || demo::run(&arguments)),
     };

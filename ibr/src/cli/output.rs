@@ -115,22 +115,3 @@ pub(super) fn report(
     }
     print_bytes(printable(&text()).as_bytes())
 }
-
-/// Refuses files beside the first that go to standard output or have its name, by their options.
-pub(super) fn check_names(files: &[(&str, &Path)]) -> Result<(), Failure> {
-    for (k, (option, path)) in files.iter().enumerate() {
-        let (name, shown) = (option.trim_start_matches('-'), Quoted(path));
-        if name != "o" && is_standard(path) {
-            return Err(Failure::Usage(format!(
-                "{option} -: the {name} cannot go to standard output; give it a file"
-            )));
-        }
-        if k > 0 && *path == files[0].1 {
-            let first = files[0].0;
-            return Err(Failure::Usage(format!(
-                "{first} and {option} both name {shown}; give the {name} a file of its own"
-            )));
-        }
-    }
-    Ok(())
-}

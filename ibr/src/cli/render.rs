@@ -9,16 +9,16 @@ use super::arguments::RenderArguments;
 use super::failure::Failure;
 use super::inputs;
 use super::output;
+use super::outputs::{Outputs, check_files};
 use super::progress::Progress;
 use super::summary::Summary;
 use crate::files::refuse_pixels_without_memory;
 use crate::image::{Image, quality};
 use crate::pipeline::uncalibrated::UncalibratedSettings;
 use crate::pipeline::{Rendering, Watch, calibrated, rectified, uncalibrated};
-use crate::scene::{self, Kind, Scene, SourceView};
+use crate::scene::{Kind, Scene, SourceView};
 use concerns::Concerns;
 use hybank::messages::Quoted;
-use outputs::Outputs;
 use path::Film;
 use std::path::Path;
 use std::time::Instant;
@@ -35,15 +35,10 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let progress = Progress::new(1);
     progress.step("reading");
     let start = Instant::now();
-    let scene = read(arguments, &|share| progress.within(share))?;
+    let (scene, files) = read(arguments, &|share| progress.within(share))?;
     let preparation = start.elapsed().as_secs_f64();
     check_nearest(&scene.kind, arguments)?;
-    let frames = scene.kind.frames();
-    path::check(arguments, frames)?;
-    let files = path::outputs(arguments, frames);
-    for file in files.iter().flat_map(Outputs::files) {
-        output::refuse_existing(file, arguments.scene.force)?;
-    }
+    let frames = files.len();
     let truth = arguments.scene.truth()?;
     drop(progress);
     let progress = Progress::new(frames as u64 + 1);
@@ -58,9 +53,9 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
         }
         concerns.add(&done);
         film.as_mut().map_or(Ok(()), |film| film.append(&done.rendering.image))?;
-        let (encoded, white) = files.encoded(&done.rendering, truth.as_ref())?;
+        let (encoded, white) = arguments.encoded(files, &done.rendering, truth.as_ref())?;
         summary.error_white = white;
-        written.extend(output::begin(&encoded, arguments.scene.force)?);
+        written.extend(output::begin(&encoded, arguments.force)?);
         summaries.push(summary);
     }
     progress.step("writing");
@@ -100,11 +95,7 @@ fn check(arguments: &RenderArguments) -> Result<(), Failure> {
         return Err(Failure::Usage("--nearest 0: at least one view must be used".into()));
     }
     arguments.scene.check()?;
-    let outputs = Outputs::of(arguments);
-    outputs.check()?;
-    let files: Vec<&Path> = outputs.files().collect();
-    output::refuse_overlaps(&files, &arguments.scene.inputs())?;
-    files.iter().try_for_each(|path| output::refuse_existing(path, arguments.scene.force))
+    arguments.check_outputs()
 }
 
 /// Refuses a choice of the nearest views where no camera is known, and warns of one that is none.
@@ -123,18 +114,15 @@ fn check_nearest(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure
     Ok(())
 }
 
-fn read(arguments: &RenderArguments, watch: Watch<'_>) -> Result<Scene, Failure> {
+/// The scene, and the files of each of its virtual views.
+fn read(arguments: &RenderArguments, watch: Watch<'_>) -> Result<(Scene, Vec<Outputs>), Failure> {
     let source = arguments.scene.source()?;
-    let frames: usize = match arguments.scene.view {
-        Some(_) => 1,
-        None => source.spec.targets.iter().map(|t| t.frames.unwrap_or(1).min(scene::MOST_FRAMES)).sum(),
-    };
-    let frames = frames.clamp(1, scene::MOST_FRAMES);
-    let all = path::outputs(arguments, frames);
+    let frames = source.frames(&arguments.scene);
+    path::check(arguments, frames)?;
+    let files = path::outputs(arguments, frames);
     let film = Some(arguments.output.as_path()).filter(|path| path::is_film(path, frames));
-    let film = film.filter(|path| !output::is_standard(path));
-    source.check_outputs(&all.iter().flat_map(Outputs::files).chain(film).collect::<Vec<_>>())?;
-    arguments.scene.load(&source, !arguments.drop_unknown, watch)
+    check_files(&files, film.filter(|path| !output::is_standard(path)), &source, arguments.force)?;
+    Ok((arguments.scene.load(&source, !arguments.drop_unknown, watch)?, files))
 }
 
 /// The virtual view `frame` of a list or path; 0 if there is one.

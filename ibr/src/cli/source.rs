@@ -7,7 +7,7 @@ use super::output;
 use crate::files;
 use crate::image::{Image, read_image_within};
 use crate::pipeline::{RenderSettings, Watch};
-use crate::scene::{self, LoadOptions, Scene, SceneSpec};
+use crate::scene::{self, Kind, LoadOptions, Scene, SceneSpec, TargetSpec};
 use hybank::files::StandardStream;
 use hybank::messages::Quoted;
 use std::path::{Path, PathBuf};
@@ -46,8 +46,7 @@ impl SceneArguments {
 
     /// Reads the scene file, with the views that other files list.
     pub(super) fn source(&self) -> Result<Source, Failure> {
-        let (path, text) = text(&self.file)?;
-        let spec = scene::parse(&text, &path).map_err(Failure::input)?;
+        let (path, spec) = spec(&self.file)?;
         let spec = scene::complete(&spec, &path).map_err(Failure::input)?;
         Ok(Source { path, spec })
     }
@@ -64,9 +63,32 @@ impl SceneArguments {
         inputs::notes(&scene);
         Ok(scene)
     }
+
+    /// Refuses scenes whose errors cannot be predicted, and a photograph of one view for several.
+    pub(super) fn refuse_what_has_no_prediction(&self, scene: &Scene) -> Result<(), Failure> {
+        match &scene.kind {
+            Kind::Uncalibrated { .. } => Err(Failure::Input(format!(
+                "{}: errors are predicted for views with depth; the cameras of this scene are unknown",
+                Quoted(&self.file)
+            ))),
+            kind if kind.frames() > 1 && self.truth.is_some() => Err(Failure::Usage(
+                "--truth: there is one photograph, but the scene has several virtual views; give it with --view \
+                 NAME, which predicts the place of one view"
+                    .into(),
+            )),
+            _ => Ok(()),
+        }
+    }
 }
 
 impl Source {
+    /// The virtual views that the scene has.
+    pub(super) fn frames(&self, arguments: &SceneArguments) -> usize {
+        let of_table = |table: &TargetSpec| table.frames.unwrap_or(1).min(scene::MOST_FRAMES);
+        let all: usize = self.spec.targets.iter().map(of_table).sum();
+        if arguments.view.is_some() { 1 } else { all.clamp(1, scene::MOST_FRAMES) }
+    }
+
     /// Refuses outputs that are one file, or an input of the scene, and names what killed runs left beside
     /// them.
     pub(super) fn check_outputs(&self, outputs: &[&Path]) -> Result<(), Failure> {
@@ -77,30 +99,32 @@ impl Source {
     }
 }
 
-/// The name and the text of a scene file, `-` for standard input.
-fn text(path: &Path) -> Result<(PathBuf, String), Failure> {
+/// The name and the content of a scene file, `-` for standard input.
+fn spec(path: &Path) -> Result<(PathBuf, SceneSpec), Failure> {
+    let parsed = |text: &str, path: PathBuf| match scene::parse(text, &path) {
+        Ok(spec) => Ok((path, spec)),
+        Err(error) => Err(Failure::input(error)),
+    };
     if output::is_standard(path) {
         let name = "standard input";
         StandardStream::Input.check().map_err(|error| Failure::Input(format!("{name}: {error}")))?;
         let text = files::text(std::io::stdin().lock(), name).map_err(Failure::input)?;
         let name = PathBuf::from("<stdin>");
         files::refuse_without_memory(&name, scene::room_to_parse(&text)).map_err(Failure::input)?;
-        return Ok((name, text));
+        return parsed(&text, name);
     }
     let folder = if path.is_dir() { Some(path) } else { path.parent().filter(|_| is_list(path)) };
     if let Some(folder) = folder {
         let own = folder.join("scene.toml");
         if !(path.is_dir() && own.is_file()) {
-            let text = scene::describe(&[path.to_owned()], folder).map_err(Failure::input)?;
-            return Ok((folder.join("<scene>"), text));
+            let scene = scene::describe(&[path.to_owned()], folder).map_err(Failure::input)?;
+            return Ok((folder.join("<scene>"), scene.spec));
         }
         failure::say_line(&format!("note: the scene of this folder is {}", Quoted(&own)));
-        return text(&own);
+        return spec(&own);
     }
-    Ok((
-        path.to_owned(),
-        files::read_text(path, "check the path", scene::room_to_parse).map_err(Failure::input)?,
-    ))
+    let text = files::read_text(path, "check the path", scene::room_to_parse).map_err(Failure::input)?;
+    parsed(&text, path.to_owned())
 }
 
 /// Whether a file lists cameras of which a scene is made.

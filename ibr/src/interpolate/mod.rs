@@ -17,7 +17,7 @@ use crate::setting::{NOT_NEGATIVE, POSITIVE, SettingError};
 /// order.
 pub type Watch<'a> = &'a (dyn Fn(f64) + Sync);
 
-/// Degree of the splines.
+/// Degree of the splines of the plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Degree {
@@ -27,11 +27,9 @@ pub enum Degree {
     Cubic,
 }
 
-/// Settings of the fit. Intensities are 0 to 255, positions are in pixels.
+/// Settings of the fit of rows. Intensities are 0 to 255, positions are in pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitSettings {
-    /// Degree of the splines.
-    pub degree: Degree,
     /// Weight of the squared slope at the samples, in px^2.
     pub lambda: f64,
     /// Weight of the squared differences of neighbouring coefficients; determines coefficients without
@@ -45,7 +43,7 @@ pub struct FitSettings {
 
 impl Default for FitSettings {
     fn default() -> Self {
-        Self { degree: Degree::Cubic, lambda: 0.1, tau: 0.05, variation: 0.02 }
+        Self { lambda: 0.1, tau: 0.05, variation: 0.02 }
     }
 }
 

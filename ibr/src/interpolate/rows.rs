@@ -16,9 +16,15 @@ use hybank::sampling::{Fit, FitSample};
 /// Keeps the normal equations definite if lambda and tau are 0; negligible beside any other weight.
 const RIDGE: f64 = 1e-9;
 
+/// Order of the splines of rows: cubic.
+pub(crate) const ORDER: usize = 4;
+
+/// Distance outside the image up to which samples are used, in pixels.
+pub const MARGIN: f64 = (ORDER - 2) as f64;
+
 /// Work memory of the row fit, reused from row to row.
 #[derive(Debug, Clone)]
-pub struct RowWork<const ORDER: usize, const C: usize> {
+pub struct RowWork<const C: usize> {
     fit: Fit<ORDER, C>,
     smoothing: Vec<f64>,
     sums: Vec<(f64, f64)>,
@@ -27,15 +33,12 @@ pub struct RowWork<const ORDER: usize, const C: usize> {
     width: usize,
 }
 
-impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
+impl<const C: usize> RowWork<C> {
     /// For rows of `width` >= 1 pixels.
     pub fn new(width: usize) -> Self {
         let fit = Fit::covering(width.max(1) - 1);
         Self { fit, smoothing: Vec::new(), sums: Vec::new(), fillers: Vec::new(), width }
     }
-
-    /// Distance outside the image up to which samples are used, in pixels.
-    pub const MARGIN: f64 = (ORDER - 2) as f64;
 
     /// Interpolates one row from its visible samples, sorted by column.
     ///
@@ -263,17 +266,6 @@ pub fn interpolate<const C: usize>(
     (width, height): (usize, usize),
     settings: &Settings,
 ) -> Result<(Vec<f32>, Vec<Cover>), InterpolationError> {
-    match settings.fit.degree {
-        super::Degree::Linear => interpolate_with::<2, C>(samples, (width, height), settings),
-        super::Degree::Cubic => interpolate_with::<4, C>(samples, (width, height), settings),
-    }
-}
-
-fn interpolate_with<const ORDER: usize, const C: usize>(
-    samples: &[Sample<C>],
-    (width, height): (usize, usize),
-    settings: &Settings,
-) -> Result<(Vec<f32>, Vec<Cover>), InterpolationError> {
     settings.check()?;
     super::check_samples(samples)?;
     if let Some(index) = samples.iter().position(|s| s.y.fract() != 0.0) {
@@ -285,7 +277,7 @@ fn interpolate_with<const ORDER: usize, const C: usize>(
     }
     let mut values = vec![0.0; width * height * C];
     let mut mask = vec![Cover::Disocclusion; width * height];
-    let mut work = RowWork::<ORDER, C>::new(width);
+    let mut work = RowWork::<C>::new(width);
     let mut filled = vec![false; height];
     let outputs = values.chunks_exact_mut(width * C).zip(mask.chunks_exact_mut(width));
     for (y, (row, (out, mask))) in rows.iter_mut().zip(outputs).enumerate() {

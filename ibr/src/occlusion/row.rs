@@ -46,7 +46,7 @@ impl Depths {
 }
 
 /// Work memory of the row routines, reused from row to row.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct RowScratch<const C: usize> {
     keys: Vec<Key>,
     sorted: Vec<Key>,
@@ -58,14 +58,6 @@ pub struct RowScratch<const C: usize> {
     /// Keys that a sample of enlarged radius hides.
     hidden: Vec<bool>,
     survivors: Vec<Sample<C>>,
-}
-
-impl<const C: usize> Default for RowScratch<C> {
-    fn default() -> Self {
-        let (keys, sorted, starts, chunks) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let (window, hidden, survivors) = (Vec::new(), Vec::new(), Vec::new());
-        Self { keys, sorted, starts, chunks, window, hidden, survivors }
-    }
 }
 
 impl<const C: usize> RowScratch<C> {

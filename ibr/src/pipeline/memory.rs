@@ -6,6 +6,7 @@
 use super::{Method, RenderError, RenderSettings};
 use crate::interpolate::Degree;
 use crate::interpolate::plane::PlaneProblem;
+use crate::interpolate::rows::ORDER;
 use crate::sample::Sample;
 use hybank::memory::check_memory;
 use hybank::sampling::Fit2;
@@ -87,18 +88,17 @@ impl Extent {
     }
 
     /// A row of samples, its equations, and work memory.
-    fn strip(&self, order: usize) -> f64 {
-        let knot = 8.0 * (order + self.channels) as f64;
+    fn strip(&self) -> f64 {
+        let knot = 8.0 * (ORDER + self.channels) as f64;
         self.size.0 as f64 * (knot + self.views as f64 * (2.0 * self.sample() + ROW_SAMPLE))
     }
 
     /// Bytes of a view of a rectified rig.
     pub fn of_rig(&self, settings: &RenderSettings) -> f64 {
-        let order = order(settings.interpolation.fit.degree);
         if settings.method == Method::Plane {
-            return BASE + self.plane(settings.interpolation.plane.degree, self.strip(order));
+            return BASE + self.plane(settings.interpolation.plane.degree, self.strip());
         }
-        let strips = rayon::current_num_threads().min(self.size.1) as f64 * self.strip(order);
+        let strips = rayon::current_num_threads().min(self.size.1) as f64 * self.strip();
         BASE + self.agreement().max(self.rendering() + ROW * self.size.1 as f64 + strips)
     }
 
@@ -125,9 +125,8 @@ impl Extent {
     }
 
     /// Bytes of the prediction of a view of a rectified rig, with what is known of views before it.
-    pub fn of_rig_prediction(&self, settings: &RenderSettings) -> f64 {
-        let order = order(settings.interpolation.fit.degree);
-        let strips = 2.0 * rayon::current_num_threads().min(self.size.1) as f64 * self.strip(order);
+    pub fn of_rig_prediction(&self) -> f64 {
+        let strips = 2.0 * rayon::current_num_threads().min(self.size.1) as f64 * self.strip();
         let found = (ROW_EVIDENCE + REGRESSORS) * self.virtual_pixels();
         BASE + self.predicted() + self.rendering() + found + strips
     }
@@ -184,18 +183,11 @@ pub(super) fn bands_of(pixels: usize, height: usize) -> usize {
     pixels.div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS)).max(1)
 }
 
-fn order(degree: Degree) -> usize {
-    match degree {
-        Degree::Linear => 2,
-        Degree::Cubic => 4,
-    }
-}
-
-fn plane_memory<const ORDER: usize, const C: usize>(
+fn plane_memory<const O: usize, const C: usize>(
     (width, height): (usize, usize),
 ) -> hybank::sampling::fit2::Memory {
-    match PlaneProblem::<ORDER, C>::is_turned((width, height)) {
-        true => Fit2::<ORDER, C>::memory(height, width),
-        false => Fit2::<ORDER, C>::memory(width, height),
+    match PlaneProblem::<O, C>::is_turned((width, height)) {
+        true => Fit2::<O, C>::memory(height, width),
+        false => Fit2::<O, C>::memory(width, height),
     }
 }

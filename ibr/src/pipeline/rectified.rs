@@ -47,11 +47,9 @@ pub fn render_watched(
     let extent = extent(views, settings);
     extent.check(extent.of_rig(settings))?;
     let colour = views.iter().any(|v| v.image.channels() == 3);
-    match (settings.interpolation.fit.degree, colour) {
-        (Degree::Linear, false) => render_with::<2, 1>(views, position, settings, watch),
-        (Degree::Linear, true) => render_with::<2, 3>(views, position, settings, watch),
-        (Degree::Cubic, false) => render_with::<4, 1>(views, position, settings, watch),
-        (Degree::Cubic, true) => render_with::<4, 3>(views, position, settings, watch),
+    match colour {
+        false => render_with::<1>(views, position, settings, watch),
+        true => render_with::<3>(views, position, settings, watch),
     }
 }
 
@@ -84,7 +82,7 @@ pub(crate) struct Job<'a> {
     pub(crate) watch: Watch<'a>,
 }
 
-fn render_with<const ORDER: usize, const C: usize>(
+fn render_with<const C: usize>(
     views: &[RectifiedView<'_>],
     position: f64,
     settings: &RenderSettings,
@@ -108,12 +106,12 @@ fn render_with<const ORDER: usize, const C: usize>(
             Degree::Linear => render_plane::<2, C>(&whole(0.5)),
             Degree::Cubic => render_plane::<4, C>(&whole(0.5)),
         },
-        Method::Auto | Method::Rows => render_rows::<ORDER, C>(&whole(RowWork::<ORDER, C>::MARGIN)),
+        Method::Auto | Method::Rows => render_rows::<C>(&whole(rows::MARGIN)),
     }?;
     Ok(Rendering { agreement, views: chosen, ..rendering })
 }
 
-fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> {
+fn render_rows<const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> {
     let Frame { width, height, .. } = job.frame;
     let mut values = vec![0.0; width * height * C];
     let mut mask = vec![Cover::Disocclusion; width * height];
@@ -128,7 +126,7 @@ fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rend
         .zip(mask.par_chunks_mut(block * width).zip(keys.par_chunks_mut(block * width)))
         .zip(samples.par_chunks_mut(block * width).zip(counts.par_chunks_mut(block)));
     outputs.enumerate().try_for_each(|(b, ((values, (mask, keys)), (samples, counts)))| {
-        let (mut strip, mut fit) = (Strip::<C>::new(job), RowWork::<ORDER, C>::new(width));
+        let (mut strip, mut fit) = (Strip::<C>::new(job), RowWork::<C>::new(width));
         let masks = mask.chunks_exact_mut(width).zip(keys.chunks_exact_mut(width));
         let tallies = samples.chunks_exact_mut(width).zip(counts);
         let rows = values.chunks_exact_mut(width * C).zip(masks).zip(tallies);

@@ -1,6 +1,7 @@
-//! A scene file for what lies in a folder: a COLMAP workspace, the frames of transforms.json, a rectified
-//! pair of Middlebury, or two photographs.
+//! The scene of what lies in a folder: a COLMAP workspace, the frames of transforms.json, a rectified pair
+//! of Middlebury, or two photographs.
 
+use super::spec::{SceneSpec, TargetSpec, ViewSpec};
 use crate::camera::colmap::{PLACES, is_model, read_model};
 use crate::camera::transforms::read_transforms;
 use crate::camera::{Camera, CameraList, Frame};
@@ -11,7 +12,6 @@ use crate::pipeline::Agreement;
 use crate::propagate::RectifiedView;
 use hybank::messages::Quoted;
 use std::collections::BTreeMap;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Views of general cameras that a scene has: those nearest to the virtual camera.
@@ -26,19 +26,37 @@ const PHOTOGRAPHS: [&str; 7] = ["png", "jpg", "jpeg", "ppm", "pgm", "tif", "tiff
 const KNOWN: &str = "a folder with a COLMAP model and its images, transforms.json, calib.txt beside im0.png and im1.png, \
                      disp2.png and disp6.png beside im2.png and im6.png, or two photographs of a rectified rig";
 
-type Described<T> = Result<T, InputError>;
+type Found<T> = Result<T, InputError>;
 
-/// The text of a scene file in the folder `beside`, for a folder, a `transforms.json` or the left and the
-/// right photograph of a rectified rig. Its virtual view is half-way between two views.
+/// A scene, and what its file says of it in comments.
+pub struct Described {
+    /// The scene.
+    pub spec: SceneSpec,
+    comments: Vec<String>,
+}
+
+impl Described {
+    /// The text of the scene file.
+    ///
+    /// # Errors
+    /// That of the encoder.
+    pub fn text(&self) -> Result<String, toml::ser::Error> {
+        let comments: String = self.comments.iter().map(|comment| format!("# {comment}\n")).collect();
+        Ok(comments + &toml::to_string(&self.spec)?)
+    }
+}
+
+/// The scene of a folder, a `transforms.json` or the left and the right photograph of a rectified rig, for a
+/// file in the folder `beside`. Its virtual view is half-way between two views.
 ///
 /// # Errors
 /// [`InputError`] of a file, or that there is no scene.
-pub fn describe(paths: &[PathBuf], beside: &Path) -> Described<String> {
-    let text = Text { beside };
+pub fn describe(paths: &[PathBuf], beside: &Path) -> Found<Described> {
+    let writer = Writer { beside };
     match paths {
-        [folder] if folder.is_dir() => text.of_folder(folder),
-        [file] if file.extension().is_some_and(|ending| ending == "json") => text.of_transforms(file),
-        [left, right] if left.is_file() && right.is_file() => text.of_pair([left, right]),
+        [folder] if folder.is_dir() => writer.of_folder(folder),
+        [file] if file.extension().is_some_and(|ending| ending == "json") => writer.of_transforms(file),
+        [left, right] if left.is_file() && right.is_file() => writer.of_pair([left, right]),
         _ => {
             let missing = paths.iter().find(|path| !path.exists());
             let path = missing.or(paths.first()).map_or(Path::new(""), PathBuf::as_path);
@@ -48,8 +66,8 @@ pub fn describe(paths: &[PathBuf], beside: &Path) -> Described<String> {
     }
 }
 
-/// The text of a scene file that stands in a folder.
-struct Text<'a> {
+/// Makes the scene of a file that stands in a folder.
+struct Writer<'a> {
     beside: &'a Path,
 }
 
@@ -61,8 +79,8 @@ struct Placed<'a> {
     depth: Option<PathBuf>,
 }
 
-impl Text<'_> {
-    fn of_folder(&self, folder: &Path) -> Described<String> {
+impl Writer<'_> {
+    fn of_folder(&self, folder: &Path) -> Found<Described> {
         let transforms = folder.join("transforms.json");
         if transforms.is_file() {
             return self.of_transforms(&transforms);
@@ -78,8 +96,8 @@ impl Text<'_> {
         if folder.join("calib.txt").is_file() {
             return self.of_calibrated_pair(folder);
         }
-        if let Some(text) = self.of_numbered(folder)? {
-            return Ok(text);
+        if let Some(scene) = self.of_numbered(folder)? {
+            return Ok(scene);
         }
         match &photographs(folder)?[..] {
             [left, right] => self.of_pair([left, right]),
@@ -94,59 +112,51 @@ impl Text<'_> {
     }
 
     /// A path as the scene file writes it.
-    fn path(&self, path: &Path) -> Described<String> {
-        let absolute = || std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-        let written = match path.strip_prefix(self.beside) {
-            Ok(inside) => inside.to_owned(),
-            Err(_) => absolute(),
-        };
-        let text = written.to_str().ok_or_else(|| {
-            InputError::file(path, "a scene file is text in UTF-8, and this path is not; rename it")
-        })?;
-        Ok(toml::Value::String(text.into()).to_string())
-    }
-
-    fn of_pair(&self, photographs: [&Path; 2]) -> Described<String> {
-        let mut text =
-            "# A rectified pair: the left photograph, and the right one. Its disparities are found from \
-                        them.\n"
-                .to_string();
-        for (position, photograph) in photographs.into_iter().enumerate() {
-            self.view_of_rig(&mut text, photograph, position, None)?;
+    fn path(&self, path: &Path) -> Found<PathBuf> {
+        if path.to_str().is_none() {
+            let reason = "a scene file is text in UTF-8, and this path is not; rename it";
+            return Err(InputError::file(path, reason));
         }
-        Ok(text + HALF_WAY)
+        match path.strip_prefix(self.beside) {
+            Ok(inside) => Ok(inside.to_owned()),
+            Err(_) => Ok(std::path::absolute(path).unwrap_or_else(|_| path.to_owned())),
+        }
     }
 
-    /// A view of a rig, with the file of its disparities if there is one.
-    fn view_of_rig(
-        &self,
-        text: &mut String,
-        photograph: &Path,
-        position: usize,
-        map: Option<&Path>,
-    ) -> Described<()> {
-        let image = self.path(photograph)?;
-        let map = map.map_or(Ok("\"matched\"".into()), |map| self.path(map))?;
-        let _ = write!(text, "\n[[view]]\nimage = {image}\nposition = {position}.0\ndisparity = {map}\n");
-        Ok(())
+    fn of_pair(&self, photographs: [&Path; 2]) -> Found<Described> {
+        let comment = "A rectified pair: the left photograph, and the right one. Its disparities are found from \
+                       them.";
+        self.of_rig(comment, photographs.map(|photograph| (photograph, None)))
+    }
+
+    /// Two views of a rig, with the files of their disparities if there are any.
+    fn of_rig(&self, comment: &str, views: [(&Path, Option<&Path>); 2]) -> Found<Described> {
+        let mut spec = SceneSpec { targets: vec![TargetSpec::default()], ..SceneSpec::default() };
+        spec.targets[0].position = Some(0.5);
+        for (position, (photograph, map)) in views.into_iter().enumerate() {
+            spec.view.push(ViewSpec {
+                image: self.path(photograph)?,
+                position: Some(position as f64),
+                disparity: Some(map.map_or(Ok("matched".into()), |map| self.path(map))?),
+                ..ViewSpec::default()
+            });
+        }
+        Ok(Described { spec, comments: vec![comment.into()] })
     }
 
     /// A pair of Middlebury of 2014 and later.
-    fn of_calibrated_pair(&self, folder: &Path) -> Described<String> {
-        let calibration = self.path(&folder.join("calib.txt"))?;
-        let mut text =
-            format!("# A pair of the Middlebury benchmark, with its calibration.\ncalib = {calibration}\n");
-        for position in 0..2 {
-            let maps = ["", "GT"].map(|end| folder.join(format!("disp{position}{end}.pfm")));
-            let map = maps.iter().find(|map| map.is_file());
-            let photograph = folder.join(format!("im{position}.png"));
-            self.view_of_rig(&mut text, &photograph, position, map.map(PathBuf::as_path))?;
-        }
-        Ok(text + HALF_WAY)
+    fn of_calibrated_pair(&self, folder: &Path) -> Found<Described> {
+        let photographs = [0, 1].map(|k| folder.join(format!("im{k}.png")));
+        let maps = [0, 1].map(|k| ["", "GT"].map(|end| folder.join(format!("disp{k}{end}.pfm"))));
+        let map = |k: usize| maps[k].iter().find(|map| map.is_file()).map(PathBuf::as_path);
+        let views = [0, 1].map(|k| (photographs[k].as_path(), map(k)));
+        let mut scene = self.of_rig("A pair of the Middlebury benchmark, with its calibration.", views)?;
+        scene.spec.calib = Some(self.path(&folder.join("calib.txt"))?);
+        Ok(scene)
     }
 
     /// Two numbered views of Middlebury before 2014, those with maps that are farthest apart.
-    fn of_numbered(&self, folder: &Path) -> Described<Option<String>> {
+    fn of_numbered(&self, folder: &Path) -> Found<Option<Described>> {
         let files = files(folder)?;
         let numbered = |start: &[&str]| -> BTreeMap<usize, &PathBuf> {
             let number = |path: &PathBuf| {
@@ -161,52 +171,52 @@ impl Text<'_> {
             .filter_map(|(number, image)| Some((image.as_path(), maps.get(number)?.as_path())))
             .collect();
         let [left, .., right] = both[..] else { return Ok(None) };
-        let mut text = "# Two views of a set of Middlebury.\n".to_string();
+        let views = [left, right].map(|(image, map)| (image, Some(map)));
+        let mut scene = self.of_rig("Two views of a set of Middlebury.", views)?;
         if let Some((scale, share)) = scale_of(left, right)? {
-            let _ = write!(
-                text,
-                "# With this scale the views agree in depth and colour at {:.0} % of the points.\ndisparity_scale = {scale:?}\n",
-                100.0 * share
-            );
+            let percent = 100.0 * share;
+            scene.comments.push(format!(
+                "With this scale the views agree in depth and colour at {percent:.0} % of the points."
+            ));
+            scene.spec.disparity_scale = Some(scale);
         }
-        for (position, (image, map)) in [left, right].into_iter().enumerate() {
-            self.view_of_rig(&mut text, image, position, Some(map))?;
-        }
-        Ok(Some(text + HALF_WAY))
+        Ok(Some(scene))
     }
 
-    fn of_model(&self, folder: &Path, model: &Path) -> Described<String> {
+    fn of_model(&self, folder: &Path, model: &Path) -> Found<Described> {
         let list = read_model(model)?;
         let above = workspace(model).unwrap_or(folder);
         let images = [above, folder, model].map(|place| place.join("images"));
         let images = images.iter().find(|images| images.is_dir()).ok_or_else(|| {
             InputError::file(folder, "the photographs of the COLMAP model are looked for in a folder `images` beside it, which is not there")
         })?;
-        let head = format!("# Views of a COLMAP model.\ncolmap = {}\n", self.path(model)?);
-        self.of_list(head, &list, |frame| {
+        let mut scene = self.of_list("Views of a COLMAP model.", &list, |frame| {
             let name = frame.image.to_string_lossy();
             let maps = above.join("stereo/depth_maps");
             let maps = ["geometric", "photometric"].map(|kind| maps.join(format!("{name}.{kind}.bin")));
             (images.join(&frame.image), maps.into_iter().find(|map| map.is_file()))
-        })
+        })?;
+        scene.spec.colmap = Some(self.path(model)?);
+        Ok(scene)
     }
 
-    fn of_transforms(&self, file: &Path) -> Described<String> {
+    fn of_transforms(&self, file: &Path) -> Found<Described> {
         let list = read_transforms(file)?;
         let beside = file.parent().unwrap_or(Path::new(""));
-        let head = format!("# Frames of transforms.json.\ntransforms = {}\n", self.path(file)?);
-        self.of_list(head, &list, |frame| {
+        let mut scene = self.of_list("Frames of transforms.json.", &list, |frame| {
             (beside.join(&frame.image), frame.depth.as_ref().map(|depth| beside.join(depth)))
-        })
+        })?;
+        scene.spec.transforms = Some(self.path(file)?);
+        Ok(scene)
     }
 
     /// Views of general cameras; `files` are the photograph and the depth map of a frame.
     fn of_list(
         &self,
-        head: String,
+        comment: &str,
         list: &CameraList,
         files: impl Fn(&Frame) -> (PathBuf, Option<PathBuf>),
-    ) -> Described<String> {
+    ) -> Found<Described> {
         let mut there = Vec::new();
         for frame in &list.frames {
             let (image, depth) = files(frame);
@@ -238,39 +248,33 @@ impl Text<'_> {
             distance(a).total_cmp(&distance(b))
         });
         there.truncate(MOST_VIEWS);
-        let mut text = head;
+        let mut comments = vec![comment.to_owned()];
         if count > there.len() {
-            let _ =
-                writeln!(text, "# The {MOST_VIEWS} of {count} views that are nearest to the virtual camera.");
+            let said = format!("The {MOST_VIEWS} of {count} views that are nearest to the virtual camera.");
+            comments.push(said);
         }
-        for placed in &there {
-            self.view_of_camera(&mut text, placed)?;
-        }
-        let _ = write!(
-            text,
-            "\n# Half-way between {} and {}; camera_of = \"..\" takes the camera of an image instead.\n[virtual]\ncamera = [\n",
-            names[0], names[1]
-        );
-        for row in camera.matrix().row_iter() {
-            let numbers: Vec<String> = row.iter().map(|v| format!("{v:?}")).collect();
-            let _ = writeln!(text, "  [{}],", numbers.join(", "));
-        }
-        Ok(text + "]\n")
+        let [one, other] = names;
+        comments.push(format!(
+            "The virtual camera is half-way between {one} and {other}; camera_of = \"..\" takes that of an image instead."
+        ));
+        let matrix = camera.matrix();
+        let rows = std::array::from_fn(|i| std::array::from_fn(|k| matrix[(i, k)]));
+        let target = TargetSpec { camera: Some(rows), ..TargetSpec::default() };
+        let view = there.iter().map(|placed| self.view_of_camera(placed)).collect::<Found<_>>()?;
+        let spec = SceneSpec { view, targets: vec![target], ..SceneSpec::default() };
+        Ok(Described { spec, comments })
     }
 
-    fn view_of_camera(&self, text: &mut String, placed: &Placed<'_>) -> Described<()> {
-        let image = self.path(&placed.image)?;
-        let depth = placed.depth.as_ref().map_or(Ok("\"matched\"".into()), |depth| self.path(depth))?;
-        let _ = write!(text, "\n[[view]]\nimage = {image}\ndepth = {depth}\n");
-        if placed.depth.as_ref().is_some_and(|depth| depth.extension().is_some_and(|ending| ending == "png"))
-        {
-            text.push_str("depth_scale = 1000.0\n");
-        }
-        Ok(())
+    fn view_of_camera(&self, placed: &Placed<'_>) -> Found<ViewSpec> {
+        let depth = placed.depth.as_ref().map_or(Ok("matched".into()), |depth| self.path(depth))?;
+        Ok(ViewSpec {
+            image: self.path(&placed.image)?,
+            depth_scale: ViewSpec::usual_scale(&depth),
+            depth: Some(depth),
+            ..ViewSpec::default()
+        })
     }
 }
-
-const HALF_WAY: &str = "\n[virtual]\nposition = 0.5\n";
 
 /// The folder with `sparse` and `stereo` above a model.
 fn workspace(model: &Path) -> Option<&Path> {
@@ -278,7 +282,7 @@ fn workspace(model: &Path) -> Option<&Path> {
 }
 
 /// The files in a folder, in the order of their names.
-fn files(folder: &Path) -> Described<Vec<PathBuf>> {
+fn files(folder: &Path) -> Found<Vec<PathBuf>> {
     let listed = std::fs::read_dir(folder).map_err(|e| InputError::file(folder, e.to_string()))?;
     let mut files: Vec<PathBuf> =
         listed.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_file()).collect();
@@ -286,7 +290,7 @@ fn files(folder: &Path) -> Described<Vec<PathBuf>> {
     Ok(files)
 }
 
-fn photographs(folder: &Path) -> Described<Vec<PathBuf>> {
+fn photographs(folder: &Path) -> Found<Vec<PathBuf>> {
     let is_photograph = |path: &PathBuf| {
         let ending = path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
         ending.is_some_and(|ending| PHOTOGRAPHS.contains(&ending.as_str()))
@@ -296,7 +300,7 @@ fn photographs(folder: &Path) -> Described<Vec<PathBuf>> {
 
 /// The scale of two maps of whole numbers with which most points agree, and the share of these; `None` for
 /// floats, which are pixels.
-fn scale_of(left: (&Path, &Path), right: (&Path, &Path)) -> Described<Option<(f64, f64)>> {
+fn scale_of(left: (&Path, &Path), right: (&Path, &Path)) -> Found<Option<(f64, f64)>> {
     let mut views = Vec::new();
     for (image, map) in [left, right] {
         let (width, height, stored) = read_map(map)?;

@@ -125,7 +125,8 @@ impl Loader<'_> {
         notes.extend(note_of_dark(&kind.images()));
         let outliers = self.restored(&mut kind, &mut notes)?;
         let filled = self.filled.load(Ordering::Relaxed);
-        Ok(Scene { kind, offset: self.offset(&goals)?, filled, outliers, calibration, notes })
+        let names = views.iter().map(|view| view.label()).collect();
+        Ok(Scene { kind, names, offset: self.offset(&goals)?, filled, outliers, calibration, notes })
     }
 
     /// Restores the maps and colours of a scene; the share of outliers in each map.

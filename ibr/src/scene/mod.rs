@@ -4,7 +4,7 @@ mod folder;
 mod load;
 mod spec;
 
-pub use folder::describe;
+pub use folder::{Described, describe};
 #[cfg(feature = "cli")]
 pub(crate) use load::room_to_parse;
 pub use load::{LoadOptions, MOST_FRAMES, complete, load, parse};
@@ -23,6 +23,8 @@ use crate::uncalibrated::Point;
 pub struct Scene {
     /// The kind of scene, with its views.
     pub kind: Kind,
+    /// The name of each view, or its image file.
+    pub names: Vec<String>,
     /// Registration offset of the virtual view in pixels.
     pub offset: f64,
     /// Unknown depths that were filled from their neighbours.

@@ -1,14 +1,15 @@
 //! A scene file as written.
 
 use hybank::messages::Quoted;
-use serde::Deserialize;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::ser::Serializer;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// A scene file.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
     /// The views.
@@ -16,7 +17,7 @@ pub struct SceneSpec {
     pub view: Vec<ViewSpec>,
     /// The virtual views, `[virtual]` or several `[[virtual]]`; none is needed if one of the views is left
     /// out and rendered.
-    #[serde(rename = "virtual", default, deserialize_with = "one_or_many")]
+    #[serde(rename = "virtual", default, deserialize_with = "one_or_many", serialize_with = "as_written")]
     pub targets: Vec<TargetSpec>,
     /// File of tracks over the views (uncalibrated scenes).
     pub matches: Option<PathBuf>,
@@ -29,7 +30,7 @@ pub struct SceneSpec {
     /// views.
     pub calib: Option<PathBuf>,
     /// Whether the world frame of the cameras is left-handed.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub mirrored: bool,
     /// Stored value / scale = disparity, in views that do not say it themselves.
     pub disparity_scale: Option<f64>,
@@ -41,7 +42,7 @@ pub struct SceneSpec {
 }
 
 /// A view.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ViewSpec {
     /// Name; defaults to the image file's.
@@ -73,7 +74,7 @@ pub struct ViewSpec {
 }
 
 /// The virtual view.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TargetSpec {
     /// Position along the baseline of a rectified rig, in baselines.
@@ -167,6 +168,12 @@ impl TargetSpec {
 }
 
 impl ViewSpec {
+    /// Stored numbers per unit of depth in a map with whole numbers, if nothing else is said: thousandths,
+    /// as nerfstudio writes them.
+    pub(super) fn usual_scale(map: &Path) -> Option<f64> {
+        map.extension().is_some_and(|ending| ending == "png").then_some(1000.0)
+    }
+
     /// Whether the numbers of the map are stored in a file.
     pub(super) fn is_stored(&self) -> bool {
         let map = self.depth.as_deref().or(self.disparity.as_deref());
@@ -181,6 +188,14 @@ impl ViewSpec {
     /// The view in messages.
     pub(super) fn named(&self) -> String {
         format!("view \"{}\"", Quoted(self.label()))
+    }
+}
+
+/// One table as `[virtual]`, and several as `[[virtual]]`.
+fn as_written<S: Serializer>(targets: &[TargetSpec], serializer: S) -> Result<S::Ok, S::Error> {
+    match targets {
+        [one] => one.serialize(serializer),
+        many => many.serialize(serializer),
     }
 }
 

@@ -136,8 +136,7 @@ fn subsets(all: usize, count: usize) -> Vec<Vec<usize>> {
 }
 
 /// Small photographs and disparities of a scene from positions on a line.
-fn small(scene: &SyntheticScene, positions: &[f64]) -> Rig {
-    let size = (64, 48);
+pub(super) fn small(scene: &SyntheticScene, positions: &[f64], size: (usize, usize)) -> Rig {
     let shot = |position: &f64| {
         let camera = Camera::metric(rig_camera(*position, size), false).unwrap();
         let (image, depth) = scene.view(&camera, size);
@@ -152,7 +151,7 @@ fn sites(seed: u64, places: usize) -> (Rig, Rig) {
     let scene = SyntheticScene::varied(seed);
     let mut random = Random(seed + 1);
     let positions: Vec<f64> = (0..places).map(|_| 4.0 * random.part() - 1.5).collect();
-    (small(&scene, &positions), small(&scene, &[0.0, 0.5, 1.0]))
+    (small(&scene, &positions, (64, 48)), small(&scene, &[0.0, 0.5, 1.0], (64, 48)))
 }
 
 fn placement(rig: &Rig, targets: &Rig) -> Placement {

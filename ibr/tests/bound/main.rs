@@ -5,6 +5,7 @@ mod advice;
 #[path = "../support/bilinear.rs"]
 mod bilinear;
 mod decisions;
+mod place;
 #[path = "../../examples/plan/planner/mod.rs"]
 #[allow(dead_code, unreachable_pub, unused_imports)]
 mod planner;

@@ -16,6 +16,7 @@ mod folders;
 mod foreign;
 mod mistakes;
 mod path;
+mod place;
 mod refuse;
 mod render;
 #[cfg(unix)]

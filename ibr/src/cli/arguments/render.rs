@@ -88,8 +88,8 @@ pub(in crate::cli) struct RenderArguments {
     /// Drop pixels of unknown depth instead of filling it from the farther neighbour.
     #[arg(long)]
     pub(in crate::cli) drop_unknown: bool,
-    /// Degree of the splines [default: cubic; linear without cameras]. A linear plane takes less time and
-    /// is less sharp.
+    /// Degree of the splines of the plane; rows are cubic [default: cubic; linear without cameras]. A linear
+    /// plane takes less time and is less sharp.
     #[arg(long, value_enum)]
     pub(in crate::cli) degree: Option<Degree>,
     /// Weight of the slope penalty of the row fit, px^2 [default: from the noise of the photographs, 0.01 to
@@ -102,6 +102,9 @@ pub(in crate::cli) struct RenderArguments {
     /// Exchange near and far (scenes without cameras).
     #[arg(long)]
     pub(in crate::cli) reverse_order: bool,
+    /// Overwrite existing files.
+    #[arg(long)]
+    pub(in crate::cli) force: bool,
 }
 
 impl RenderArguments {
@@ -113,11 +116,8 @@ impl RenderArguments {
         settings.method = self.method;
         let stage = &mut settings.interpolation;
         stage.fill = self.fill;
-        match self.degree {
-            Some(Degree::Linear) => {
-                (stage.fit.degree, stage.plane) = (Degree::Linear, PlaneSettings::LINEAR);
-            }
-            Some(Degree::Cubic) | None => {}
+        if self.degree == Some(Degree::Linear) {
+            stage.plane = PlaneSettings::LINEAR;
         }
         stage.fit.lambda = self.lambda.unwrap_or(stage.fit.lambda);
         settings

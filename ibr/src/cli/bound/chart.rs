@@ -2,28 +2,21 @@
 
 use crate::analysis::{Cause, Totals, ViewError};
 use crate::cli::failure::Failure;
+use crate::cli::outputs::ends_with;
 use crate::image::Image;
 use hybank::plot::{Chart, Series};
 use image::{ImageFormat, RgbImage};
 use std::io::Cursor;
 use std::path::Path;
 
-/// The format that the extension of a file names, if plots are written in it.
-pub(super) fn format(path: &Path) -> Option<&'static str> {
-    let ending = path.extension()?.to_str()?;
-    ["svg", "png"].into_iter().find(|format| ending.eq_ignore_ascii_case(format))
-}
-
 /// The bytes of the plot, one chart above the other.
 pub(super) fn file(predicted: &ViewError, truth: Option<&Image>, path: &Path) -> Result<Vec<u8>, Failure> {
     let charts = [numbers(predicted, truth), causes(predicted)];
-    match format(path) {
-        Some("png") => stacked_pixels(&charts),
-        _ => {
-            let [above, below] = charts.map(|chart| chart.to_svg().map_err(Failure::input));
-            Ok(stacked_svg(&above?, &below?).into_bytes())
-        }
+    if ends_with(path, "png") {
+        return stacked_pixels(&charts);
     }
+    let [above, below] = charts.map(|chart| chart.to_svg().map_err(Failure::input));
+    Ok(stacked_svg(&above?, &below?).into_bytes())
 }
 
 fn by_row(values: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {

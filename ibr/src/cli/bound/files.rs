@@ -6,71 +6,44 @@ use crate::cli::arguments::BoundArguments;
 use crate::cli::failure::Failure;
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded};
+use crate::cli::outputs::{Outputs, Part, ends_with};
 use crate::files::refuse_pixels_without_memory;
 use crate::image::{Image, Levels, pfm};
-use hybank::messages::Quoted;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// The files of one virtual view.
-pub(super) struct Outputs {
-    map: Option<PathBuf>,
-    plot: Option<PathBuf>,
+impl BoundArguments {
+    /// The files that were asked for.
+    pub(super) fn outputs(&self) -> Outputs {
+        Outputs::of(&[(Part::Map, self.map.as_ref()), (Part::Plot, self.plot.as_ref())])
+    }
 }
 
-impl Outputs {
-    /// Those that were asked for; of one of several views with its number.
-    pub(super) fn of(arguments: &BoundArguments, frame: Option<usize>) -> Self {
-        let name = |path: &PathBuf| frame.map_or(path.clone(), |frame| output::numbered(path, frame));
-        Self { map: arguments.map.as_ref().map(name), plot: arguments.plot.as_ref().map(name) }
-    }
-
-    pub(super) fn files(&self) -> Vec<&Path> {
-        [&self.map, &self.plot].into_iter().flatten().map(PathBuf::as_path).collect()
-    }
-
-    /// Checks that need no file.
-    pub(super) fn check(&self) -> Result<(), Failure> {
-        let named = [("--map", &self.map), ("--plot", &self.plot)];
-        let named = named.iter().filter_map(|(option, path)| Some((*option, path.as_deref()?)));
-        output::check_names(&named.collect::<Vec<_>>())?;
-        if let Some(plot) = self.plot.as_ref().filter(|plot| chart::format(plot).is_none()) {
-            let message = "a plot is written as .svg or .png";
-            return Err(Failure::Usage(format!("--plot {}: {message}", Quoted(plot))));
+/// The contents of the files of a view, and the estimate that is white in the picture of the map.
+pub(super) fn encoded<'a>(
+    outputs: &'a Outputs,
+    predicted: &ViewError,
+    truth: Option<&Image>,
+) -> Result<(Vec<Encoded<'a>>, Option<f32>), Failure> {
+    let (mut all, mut white) = (Vec::new(), None);
+    for (part, path) in &outputs.parts {
+        if *part == Part::Plot {
+            all.push(Encoded { bytes: chart::file(predicted, truth, path)?, path });
+            continue;
         }
-        self.map.as_ref().map_or(Ok(()), |map| output::refuse_format(map, Levels::Eight))
+        // A picture or three numbers per pixel, and the file.
+        let size = predicted.rendering.image.size();
+        refuse_pixels_without_memory(path, size, 36.0).map_err(Failure::input)?;
+        let (map, largest) = map(predicted, path)?;
+        white = largest;
+        all.push(map);
     }
-
-    pub(super) fn refuse_existing(&self, force: bool) -> Result<(), Failure> {
-        self.files().into_iter().try_for_each(|path| output::refuse_existing(path, force))
-    }
-
-    /// The contents of the files, and the estimate that is white in the picture of the map.
-    pub(super) fn encoded(
-        &self,
-        predicted: &ViewError,
-        truth: Option<&Image>,
-    ) -> Result<(Vec<Encoded<'_>>, Option<f32>), Failure> {
-        let (mut all, mut white) = (Vec::new(), None);
-        if let Some(path) = &self.map {
-            // A picture or three numbers per pixel, and the file.
-            let size = predicted.rendering.image.size();
-            refuse_pixels_without_memory(path, size, 36.0).map_err(Failure::input)?;
-            let (map, largest) = map(predicted, path)?;
-            white = largest;
-            all.push(map);
-        }
-        if let Some(path) = &self.plot {
-            let bytes = chart::file(predicted, truth, path)?;
-            all.push(Encoded { bytes, path });
-        }
-        Ok((all, white))
-    }
+    Ok((all, white))
 }
 
 /// A picture of the estimate, or the three numbers of every pixel as a float map.
 fn map<'a>(predicted: &ViewError, path: &'a Path) -> Result<(Encoded<'a>, Option<f32>), Failure> {
     let size = predicted.rendering.image.size();
-    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("pfm")) {
+    if ends_with(path, "pfm") {
         let first =
             if predicted.sure_bound.is_empty() { &predicted.local_limit } else { &predicted.sure_bound };
         let pixels = first.iter().zip(&predicted.expected).zip(&predicted.estimate);

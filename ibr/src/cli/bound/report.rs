@@ -130,10 +130,7 @@ impl Summary {
         }
         lines.push(format!("next      {}", self.remedy));
         lines.extend(self.advice.as_ref().filter(|_| self.inputs_agree != Some(false)).map(advice));
-        lines.push(match self.calibrated_on {
-            0 => "weights   those of typical photographs: a single view cannot be left out".into(),
-            views => format!("weights   calibrated on {views} views, each left out in turn"),
-        });
+        lines.push(inputs::weights_line(self.calibrated_on));
         lines.extend(inputs::line(agreement));
         lines.extend(self.measured.as_ref().map(measured));
         lines.join("\n") + "\n"

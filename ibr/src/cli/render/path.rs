@@ -1,9 +1,10 @@
 //! The files of a list of virtual views or of a path: numbered ones, which appear together, or one film.
 
-use super::{Outputs, Summary, outputs};
+use super::Summary;
 use crate::cli::arguments::RenderArguments;
 use crate::cli::failure::Failure;
 use crate::cli::output;
+use crate::cli::outputs::{self, Outputs, Part};
 use crate::files::refuse_pixels_without_memory;
 use crate::image::{FrameRate, Image, Levels, y4m};
 use hybank::files::AtomicFile;
@@ -37,12 +38,11 @@ pub(super) fn is_film(path: &Path, frames: usize) -> bool {
 
 /// The files of every view, without the film.
 pub(super) fn outputs(arguments: &RenderArguments, frames: usize) -> Vec<Outputs> {
-    let one = |frame| {
-        let files = Outputs::of(arguments);
-        let files = if is_film(&arguments.output, frames) { files.beside_film() } else { files };
-        if frames > 1 { files.numbered(frame) } else { files }
-    };
-    (0..frames).map(one).collect()
+    let mut files = arguments.outputs();
+    if is_film(&arguments.output, frames) {
+        files.parts.retain(|(part, _)| *part != Part::View);
+    }
+    files.of_frames(frames)
 }
 
 /// What several views have no use for.
@@ -82,7 +82,7 @@ impl Film {
         }
         #[cfg(unix)]
         hybank::files::remove_unfinished_on_signals();
-        let file = AtomicFile::create(path, arguments.scene.force).map_err(Failure::input)?;
+        let file = AtomicFile::create(path, arguments.force).map_err(Failure::input)?;
         Ok(Self { file: Some(file), fps, begun: false })
     }
 

@@ -9,10 +9,6 @@ use crate::scene::{SceneSpec, ViewSpec};
 use hybank::messages::{Number, Quoted};
 use std::path::Path;
 
-/// Stored numbers per unit of depth of a depth map with whole numbers, unless the scene says another one:
-/// millimetres, as nerfstudio writes them.
-const STORED_PER_UNIT: f64 = 1000.0;
-
 /// The scene with what its `transforms` or `calib` file adds: views if it lists none, and disparity offsets.
 /// `path` is the scene file.
 ///
@@ -56,12 +52,11 @@ fn transforms_views(file: &Path, folder: &Path, scale: Option<f64>) -> Loaded<Ve
     let beside = file.parent().unwrap_or(Path::new(""));
     let view = |frame: &Frame| {
         let depth = frame.depth.as_ref()?;
-        let whole_numbers = depth.extension().is_some_and(|ending| ending == "png");
         Some(ViewSpec {
             name: Some(frame.image.display().to_string()),
             image: beside.join(&frame.image),
             depth: Some(beside.join(depth)),
-            depth_scale: scale.or(whole_numbers.then_some(STORED_PER_UNIT)),
+            depth_scale: scale.or(ViewSpec::usual_scale(depth)),
             ..ViewSpec::default()
         })
     };
