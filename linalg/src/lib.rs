@@ -104,7 +104,7 @@ pub fn dot(x: &[f64], y: &[f64]) -> f64 {
     let ((x, x_rest), (y, y_rest)) = (x.as_chunks::<8>(), y.as_chunks::<8>());
     let mut sums = [0.0; 8];
     for (x, y) in x.iter().zip(y) {
-        // No `array::from_fn`, which is a call for each entry at the levels of optimisation below the last one.
+        // No `array::from_fn`, which is a call for each entry below the highest level of optimisation.
         sums.iter_mut().zip(x.iter().zip(y)).for_each(|(sum, (x, y))| *sum += x * y);
     }
     sums.iter_mut().zip(x_rest.iter().zip(y_rest)).for_each(|(sum, (x, y))| *sum += x * y);

@@ -58,7 +58,7 @@ fn joined(high: u64, low: u64, shift: u32) -> u64 {
 #[inline]
 fn upper<const WORDS: usize>(words: &[u64], shift: u32) -> [u64; WORDS] {
     let mut shifted = [0; WORDS];
-    // No `array::from_fn`, which is a call for each entry at the levels of optimisation below the last one.
+    // No `array::from_fn`, which is a call for each entry below the highest level of optimisation.
     for (word, pair) in shifted.iter_mut().zip(words.windows(2)) {
         *word = joined(pair[1], pair[0], shift);
     }

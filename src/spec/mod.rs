@@ -188,8 +188,8 @@ impl Spec {
             .map_err(|fault| SpecError::of(file_name, text, fault))
     }
 
-    /// As [`Spec::from_toml_and_files`], of data that have no text: the tables and lists of another language,
-    /// with the keys of a spec file. `name` is used only in messages.
+    /// As [`Spec::from_toml_and_files`], of data that have no text: the tables and lists of another
+    /// language, with the keys of a spec file. `name` is used only in messages.
     ///
     /// # Errors
     /// As [`Spec::from_toml_and_files`], without a location; the path of keys says where.

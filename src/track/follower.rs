@@ -249,8 +249,8 @@ impl Follower {
         self.shifts.front().map_or(&self.last_shifts, |shifts| shifts)
     }
 
-    /// A block shows the mean of a delay over it. With a rate that walks by q in a second, the variance of its
-    /// distance from the delay at the centre of the time T is q T^3 / 320.
+    /// A block shows the mean of a delay over it. With a rate that walks by q in a second, the variance of
+    /// its distance from the delay at the centre of the time T is q T^3 / 320.
     fn mean_of_block(&self) -> f64 {
         let t = self.frame_time().0 * self.settings.block_frames as f64;
         self.settings.rate_walk * t.powi(3) / 320.0

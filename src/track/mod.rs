@@ -1,8 +1,7 @@
 //! Delays that drift, followed while a bank runs.
 //!
-//! Each channel's delay relative to the reference changes, and the rate at which it changes walks at random (two
-//! free-running clocks). A [`DelayFilter`] is the Kalman filter of one delay
-//! and its rate: measurements of block fits enter with their variance, silence lets the variance grow. A
+//! Each channel's delay relative to the reference changes, and the rate at which it changes walks at random
+//! (two free-running clocks). A [`DelayFilter`] is the Kalman filter of one delay and its rate: measurements of block fits enter with their variance, silence lets the variance grow. A
 //! tracker per channel refuses measurements that contradict the filter, and says whether it is locked.
 //! [`Coincidence`] warns ahead of delays that come together, where no bank recovers the signal. A
 //! [`Follower`] measures the delays of a bank's channels block by block, by a pilot tone or by
