@@ -1,13 +1,14 @@
 //! Delays that drift, followed while a bank runs.
 //!
 //! Each channel's delay relative to the reference changes, and the rate at which it changes walks at random
-//! (two free-running clocks). A [`DelayFilter`] is the Kalman filter of one delay and its rate: measurements of block fits enter with their variance, silence lets the variance grow. A
-//! tracker per channel refuses measurements that contradict the filter, and says whether it is locked.
-//! [`Coincidence`] warns ahead of delays that come together, where no bank recovers the signal. A
-//! [`Follower`] measures the delays of a bank's channels block by block, by a pilot tone or by
-//! any signal, and says how taps that are affine in the delays are to change. Delays measured before
-//! are known on both sides of every instant: a smoothing spline of [`crate::sampling`] goes through them.
-//! [`align`] measures them so for whole recordings, which may have begun at any time.
+//! (two free-running clocks). A [`DelayFilter`] is the Kalman filter of one delay and its rate: measurements
+//! of block fits enter with their variance, silence lets the variance grow. A tracker per channel refuses
+//! measurements that contradict the filter, and says whether it is locked. [`Coincidence`] warns ahead of
+//! delays that come together, where no bank recovers the signal. A [`Follower`] measures the delays of a
+//! bank's channels block by block, by a pilot tone or by any signal, and says how taps that are affine in
+//! the delays are to change. Delays measured before are known on both sides of every instant: a smoothing
+//! spline of [`crate::sampling`] goes through them. [`align`] measures them so for whole recordings, which
+//! may have begun at any time.
 //!
 //! ```
 //! use hybank::track::{DelayFilter, DelayMeasurement, DelayState};
