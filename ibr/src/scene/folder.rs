@@ -6,7 +6,7 @@ use crate::camera::transforms::read_transforms;
 use crate::camera::{Camera, CameraList, Frame};
 use crate::depth::{DepthMap, Measure};
 use crate::files::InputError;
-use crate::image::{read_image, read_map};
+use crate::image::{image_size, read_image, read_map};
 use crate::pipeline::Agreement;
 use crate::propagate::RectifiedView;
 use hybank::messages::Quoted;
@@ -107,6 +107,7 @@ impl Text<'_> {
     }
 
     fn of_pair(&self, photographs: [&Path; 2]) -> Described<String> {
+        same_size(photographs)?;
         let mut text =
             "# A rectified pair: the left photograph, and the right one. Its disparities are found from \
                         them.\n"
@@ -136,11 +137,12 @@ impl Text<'_> {
         let calibration = self.path(&folder.join("calib.txt"))?;
         let mut text =
             format!("# A pair of the Middlebury benchmark, with its calibration.\ncalib = {calibration}\n");
-        for position in 0..2 {
+        let photographs = [0, 1].map(|position| folder.join(format!("im{position}.png")));
+        same_size([&photographs[0], &photographs[1]])?;
+        for (position, photograph) in photographs.iter().enumerate() {
             let maps = ["", "GT"].map(|end| folder.join(format!("disp{position}{end}.pfm")));
             let map = maps.iter().find(|map| map.is_file());
-            let photograph = folder.join(format!("im{position}.png"));
-            self.view_of_rig(&mut text, &photograph, position, map.map(PathBuf::as_path))?;
+            self.view_of_rig(&mut text, photograph, position, map.map(PathBuf::as_path))?;
         }
         Ok(text + HALF_WAY)
     }
@@ -161,6 +163,7 @@ impl Text<'_> {
             .filter_map(|(number, image)| Some((image.as_path(), maps.get(number)?.as_path())))
             .collect();
         let [left, .., right] = both[..] else { return Ok(None) };
+        same_size([left.0, right.0])?;
         let mut text = "# Two views of a set of Middlebury.\n".to_string();
         if let Some((scale, share)) = scale_of(left, right)? {
             let _ = write!(
@@ -292,6 +295,16 @@ fn photographs(folder: &Path) -> Described<Vec<PathBuf>> {
         ending.is_some_and(|ending| PHOTOGRAPHS.contains(&ending.as_str()))
     };
     Ok(files(folder)?.into_iter().filter(is_photograph).collect())
+}
+
+/// The photographs of a rectified rig have one size.
+fn same_size([left, right]: [&Path; 2]) -> Described<()> {
+    let sizes = [image_size(left)?, image_size(right)?];
+    if sizes[0] == sizes[1] {
+        return Ok(());
+    }
+    let [left, right] = [left, right].map(|path| Quoted(path).to_string());
+    Err(InputError::Sizes { left, right, sizes })
 }
 
 /// The scale of two maps of whole numbers with which most points agree, and the share of these; `None` for
