@@ -54,6 +54,19 @@ fn check_now(needed: f64) -> Result<(), MemoryShortage> {
     Err(MemoryShortage { needed, available: (free.min(wanted) - RESERVE).max(0.0) / ESTIMATES_LOW_BY })
 }
 
+/// Addresses that the C library takes at once for what a thread allocates, with its stack. A thread for which
+/// there is no such piece gets a page for every small allocation, so it takes many times what it is counted.
+const THREAD: f64 = 70e6;
+
+/// Share of the free addresses that threads may take.
+const FOR_THREADS: f64 = 0.25;
+
+/// As many threads as asked for, or fewer, and one at least, where addresses are limited (`ulimit -v`).
+pub fn affordable_threads(wanted: usize) -> usize {
+    let room = address_space().map_or(f64::INFINITY, |free| FOR_THREADS * free / THREAD);
+    wanted.min(room as usize).max(1)
+}
+
 /// Bytes that were found free and are not used up.
 struct Grant(AtomicUsize);
 
