@@ -420,6 +420,8 @@ mod tests {
                 "line 1, column 4: a text has a line break or another control character; write \\n or \\u and four \
                  digits",
             ),
+            ("EOF while parsing a value at line 1 column 0", "it is empty"),
+            ("invalid type: sequence, expected a map at line 1 column 0", "expected a table, found a list"),
             ("expected `,` or `}` at line 1 column 7", "line 1, column 7: expected `,` or `}`"),
         ] {
             assert_eq!(of_json(message), words);

@@ -370,6 +370,7 @@ mod tests {
     fn useless_maps_are_refused() {
         let new = |data: Vec<f32>, scale| DepthMap::new((2, 1), data, scale, Measure::Depth);
         assert_eq!(new(vec![0.0, f32::NAN], 1.0), Err(DepthError::AllUnknown { values: 2 }));
+        assert_eq!(new(vec![0.0, -3.0], 1.0), Err(DepthError::Negative { values: 2, negative: 1 }));
         assert!(matches!(new(vec![1.0; 3], 1.0), Err(DepthError::Size { map: (3, 1), .. })));
         for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(matches!(new(vec![1.0; 2], scale), Err(DepthError::Setting(_))));
