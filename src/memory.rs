@@ -54,8 +54,8 @@ fn check_now(needed: f64) -> Result<(), MemoryShortage> {
     Err(MemoryShortage { needed, available: (free.min(wanted) - RESERVE).max(0.0) / ESTIMATES_LOW_BY })
 }
 
-/// Addresses that the C library takes at once for what a thread allocates, with its stack. A thread for which
-/// there is no such piece gets a page for every small allocation, so it takes many times what it is counted.
+/// Addresses that the C library takes at once for what a thread allocates, with its stack. Without them a
+/// thread gets a page for every small allocation, so it takes many times what is counted.
 const THREAD: f64 = 70e6;
 
 /// Share of the free addresses that threads may take.

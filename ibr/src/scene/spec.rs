@@ -125,7 +125,8 @@ impl<'a> MapSource<'a> {
 }
 
 impl SceneSpec {
-    /// Every file that the scene names, and all files of its models, read or not; relative paths start in `folder`.
+    /// Every file that the scene names, and all files of its models, read or not; relative paths start in
+    /// `folder`.
     pub fn files(&self, folder: &Path) -> Vec<PathBuf> {
         let images = self.view.iter().map(|view| &view.image);
         let maps = self.view.iter().flat_map(|view| [&view.disparity, &view.depth]).flatten();

@@ -92,8 +92,8 @@ pub(in crate::cli) struct RenderArguments {
     /// takes three times as long.
     #[arg(long, value_enum)]
     pub(in crate::cli) degree: Option<Degree>,
-    /// Weight of the slope penalty of the row fit (rectified rigs), px^2 [default: from the noise of the photographs, 0.01 to
-    /// 4].
+    /// Weight of the slope penalty of the row fit (rectified rigs), px^2 [default: from the noise of the
+    /// photographs, 0.01 to 4].
     #[arg(long, value_name = "L")]
     pub(in crate::cli) lambda: Option<f64>,
     /// Seed of the robust estimators (scenes without cameras) [default: 1].
