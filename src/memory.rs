@@ -54,6 +54,19 @@ fn check_now(needed: f64) -> Result<(), MemoryShortage> {
     Err(MemoryShortage { needed, available: (free.min(wanted) - RESERVE).max(0.0) / ESTIMATES_LOW_BY })
 }
 
+/// Addresses that the C library takes at once for what a thread allocates, with its stack. Without them a
+/// thread gets a page for every small allocation, so it takes many times what is counted.
+const THREAD: f64 = 70e6;
+
+/// Share of the free addresses that threads may take.
+const FOR_THREADS: f64 = 0.25;
+
+/// As many threads as asked for, or fewer, and one at least, where addresses are limited (`ulimit -v`).
+pub fn affordable_threads(wanted: usize) -> usize {
+    let room = address_space().map_or(f64::INFINITY, |free| FOR_THREADS * free / THREAD);
+    wanted.min(room as usize).max(1)
+}
+
 /// Bytes that were found free and are not used up.
 struct Grant(AtomicUsize);
 
@@ -98,12 +111,13 @@ fn control_group() -> Option<f64> {
     number(fs::read_to_string("/sys/fs/cgroup/memory.max").ok()?.trim())
 }
 
-/// What the soft limit of the address space leaves beside what is in use.
+/// What the soft limit of the address space leaves beside what is in use. The C library reserves 64 MB of
+/// addresses for each thread; those that no one has touched are still free.
 fn address_space() -> Option<f64> {
     let text = fs::read_to_string("/proc/self/limits").ok()?;
     let line = text.lines().find(|line| line.starts_with("Max address space"))?;
     let limit = number(line.split_whitespace().nth(3)?)?;
-    Some((limit - used().unwrap_or(0.0)).max(0.0))
+    Some((limit - used().unwrap_or(0.0) + reserved()).max(0.0))
 }
 
 /// What addresses of 32 bits reach, as in WebAssembly.
@@ -116,6 +130,19 @@ fn used() -> Option<f64> {
     let text = fs::read_to_string("/proc/self/status").ok()?;
     let line = text.lines().find(|line| line.starts_with("VmSize:"))?;
     Some(1024.0 * number(line.split_whitespace().nth(1)?)?)
+}
+
+/// The addresses without a file that this process holds and may neither read nor write yet.
+fn reserved() -> f64 {
+    let bytes = |line: &str| {
+        let mut words = line.split_whitespace();
+        let (from, to) = words.next()?.split_once('-')?;
+        let is_reserved = words.next() == Some("---p") && words.nth(2) == Some("0");
+        let address = |digits| u64::from_str_radix(digits, 16).ok();
+        is_reserved.then_some(())?;
+        Some(address(to)?.checked_sub(address(from)?)? as f64)
+    };
+    fs::read_to_string("/proc/self/maps").unwrap_or_default().lines().filter_map(bytes).sum()
 }
 
 /// A positive number; "max" and "unlimited" are none.
@@ -131,6 +158,28 @@ mod tests {
     fn the_memory_of_this_machine_is_known_where_it_is_told() {
         if cfg!(target_os = "linux") {
             assert!(available_memory().is_some_and(|bytes| bytes > 1e8));
+        }
+    }
+
+    /// The first request of a thread reserves its part of the address space.
+    #[test]
+    fn what_is_reserved_for_threads_is_free() {
+        if cfg!(all(target_os = "linux", target_env = "gnu")) {
+            let (reserve, done) = (std::sync::Barrier::new(3), std::sync::Barrier::new(3));
+            std::thread::scope(|scope| {
+                for _ in 0..2 {
+                    scope.spawn(|| {
+                        let bytes = std::hint::black_box(vec![1_u8; 100]);
+                        reserve.wait();
+                        done.wait();
+                        drop(bytes);
+                    });
+                }
+                reserve.wait();
+                let (reserved, used) = (reserved(), used().unwrap());
+                done.wait();
+                assert!(reserved > 1e8 && reserved < used, "{reserved} of {used}");
+            });
         }
     }
 

@@ -83,8 +83,9 @@ fn place_of(message: &str) -> (Option<(&str, &str)>, &str) {
 /// What a message of serde or serde_json says, in plain words and with the line and the column.
 pub fn of_json(message: &str) -> String {
     match place_of(message) {
-        // Columns are counted from 1, so nothing was read.
-        (Some(("1", "0")), _) => "it is empty".into(),
+        // Columns are counted from 1: the fault is that of the whole text.
+        (Some(("1", "0")), what) if what.starts_with("EOF") => "it is empty".into(),
+        (Some(("1", "0")), _) => of_document(message),
         (Some((line, column)), _) => format!("line {line}, column {column}: {}", of_document(message)),
         (None, _) => of_document(message),
     }
@@ -419,6 +420,8 @@ mod tests {
                 "line 1, column 4: a text has a line break or another control character; write \\n or \\u and four \
                  digits",
             ),
+            ("EOF while parsing a value at line 1 column 0", "it is empty"),
+            ("invalid type: sequence, expected a map at line 1 column 0", "expected a table, found a list"),
             ("expected `,` or `}` at line 1 column 7", "line 1, column 7: expected `,` or `}`"),
         ] {
             assert_eq!(of_json(message), words);

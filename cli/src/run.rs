@@ -15,6 +15,7 @@ use hybank::io::{
     Arrival, BLOCK_BYTES, Container, MultiReader, OutputHeader, OutputNotes, PcmFormat, PcmFrames, Placement,
     ReadOptions, is_sigmf,
 };
+use hybank::memory::affordable_threads;
 use hybank::pipeline::matching;
 use hybank::pipeline::{DroppedLatency, FileOutputs, Outcome, Pipeline, Settings, Warning};
 use hybank::runtime::{Algorithm, Input, Options, Plan, Precision, ThreadPool};
@@ -70,11 +71,14 @@ fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
 impl RunArgs {
     /// Threads beside the calling one, if it does not do all.
     fn workers(&self) -> Result<Option<ThreadPool>, Failure> {
-        if self.threads == 1 {
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let wanted = if self.threads == 0 { cores() } else { self.threads.into() };
+        let threads = affordable_threads(wanted);
+        if threads == 1 {
             return Ok(None);
         }
         let refused = |error| Failure::Input(format!("--threads {}: {error}; ask for fewer", self.threads));
-        ThreadPool::new(self.threads.into()).map(Some).map_err(refused)
+        ThreadPool::new(threads).map(Some).map_err(refused)
     }
 
     /// Refuses impossible combinations of options, before any file is read. The command `prints` on standard

@@ -35,9 +35,9 @@ pub enum InputError {
         /// What is wrong, and the remedy.
         reason: String,
     },
-    /// It cannot be created, or get its name.
+    /// It cannot be written, or the reason why it cannot be read has its own remedy.
     #[error(transparent)]
-    Create(#[from] FileError),
+    File(#[from] FileError),
     /// Two images that belong together differ in size.
     #[error("{left} has {} x {} pixels and {right} has {} x {}: they must agree", sizes[0].0, sizes[0].1, sizes[1].0, sizes[1].1)]
     Sizes {
@@ -111,7 +111,7 @@ pub(crate) fn read_bytes(
     remedy: &'static str,
     room: impl Fn(&[u8]) -> f64,
 ) -> Result<Vec<u8>, InputError> {
-    let bytes = files::read_bytes(path, IMAGE).map_err(|source| InputError::Read { source, remedy })?;
+    let bytes = files::read_bytes(path, IMAGE).map_err(|source| unread(source, remedy))?;
     refuse_without_memory(path, room(&bytes)).map(|()| bytes)
 }
 
@@ -121,13 +121,22 @@ pub(crate) fn read_text(
     remedy: &'static str,
     room: impl Fn(&str) -> f64,
 ) -> Result<String, InputError> {
-    let text = files::read_text(path, TEXT).map_err(|source| InputError::Read { source, remedy })?;
+    let text = files::read_text(path, TEXT).map_err(|source| unread(source, remedy))?;
     refuse_without_memory(path, room(&text)).map(|()| text)
+}
+
+/// Why a file cannot be read; the remedy is for what the system refuses.
+fn unread(source: FileError, remedy: &'static str) -> InputError {
+    match source {
+        FileError::System { .. } => InputError::Read { source, remedy },
+        other => InputError::File(other),
+    }
 }
 
 /// Refuses a file that takes more memory, in bytes, than this process may use.
 pub(crate) fn refuse_without_memory(path: &Path, bytes: f64) -> Result<(), InputError> {
-    let refused = |shortage| format!("to read it takes {shortage}; is it the right file?");
+    let refused =
+        |shortage| format!("to read it takes {shortage}; allow more memory, or give the file that was meant");
     check_memory(bytes).map_err(|shortage| InputError::file(path, refused(shortage)))
 }
 

@@ -1,8 +1,10 @@
 //! Settings outside their range.
 
+use hybank::messages::Number;
+
 /// A number outside its range.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("{name} is {value}: it must be {rule}")]
+#[error("{name} is {}: it must be {rule}", Number(*.value))]
 pub struct SettingError {
     /// Name of the setting.
     pub name: &'static str,
@@ -21,6 +23,10 @@ pub(crate) struct Rule {
 pub(crate) const FINITE: Rule = Rule { holds: f64::is_finite, words: "a finite number" };
 pub(crate) const NOT_NEGATIVE: Rule =
     Rule { holds: |v| v.is_finite() && v >= 0.0, words: "a finite number >= 0" };
+/// In square pixels, the row is flat over a thousand of them from there on, and at 1e13 samples no longer
+/// count beside it.
+pub(crate) const SMOOTHING: Rule =
+    Rule { holds: |v| (0.0..=1e6).contains(&v), words: "a number from 0 to 1000000" };
 pub(crate) const POSITIVE: Rule =
     Rule { holds: |v| v.is_finite() && v > 0.0, words: "a positive finite number" };
 pub(crate) const SCALE: Rule = Rule {

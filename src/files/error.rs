@@ -99,7 +99,7 @@ pub enum FileError {
         remedy: &'static str,
     },
     /// The process may not use as much memory as reading takes.
-    #[error("{}: to read it takes {shortage}; give the file that was meant", Quoted(.file))]
+    #[error("{}: to read it takes {shortage}; allow more memory, or give the file that was meant", Quoted(.file))]
     Memory {
         /// Name of the file.
         file: String,

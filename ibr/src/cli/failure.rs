@@ -1,7 +1,8 @@
 //! Failure of a command: one message on stderr and an exit code.
 
-use hybank::messages::{Quoted, printable, shown};
+use hybank::messages::{Quoted, counted, printable, shown};
 use std::io::{IsTerminal, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// A failure with the one message that the user sees.
@@ -22,7 +23,7 @@ impl Failure {
     }
 
     /// The same failure, said of a file.
-    pub(super) fn in_file(self, path: &std::path::Path) -> Self {
+    pub(super) fn in_file(self, path: &Path) -> Self {
         match self {
             Self::Input(message) => Self::Input(format!("{}: {message}", Quoted(path))),
             other => other,
@@ -44,6 +45,18 @@ impl Failure {
         match error.kind() {
             std::io::ErrorKind::BrokenPipe => Self::ClosedPipe,
             _ => Self::Input(format!("standard output: {error}")),
+        }
+    }
+
+    /// The same failure, after these files were written.
+    pub(super) fn after_writing(self, files: &[String]) -> Self {
+        match (self, files) {
+            (Self::Input(message), [file]) => Self::Input(format!("{file} is written, but {message}")),
+            (Self::Input(message), [file, others @ ..]) => {
+                let others = counted(others.len(), "other file");
+                Self::Input(format!("{file} and {others} are written, but {message}"))
+            }
+            (other, _) => other,
         }
     }
 

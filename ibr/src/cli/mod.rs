@@ -18,7 +18,7 @@ mod summary;
 use arguments::{Arguments, Command};
 use failure::Failure;
 use hybank::files::StandardStream;
-use hybank::memory::check_memory;
+use hybank::memory::{affordable_threads, check_memory};
 use hybank::messages::quoted_usage;
 use std::process::ExitCode;
 
@@ -66,8 +66,8 @@ fn show(message: &clap::Error) -> ExitCode {
     }
 }
 
-/// Runs the work on the given number of threads, by default on all cores; on this thread if none can be
-/// started.
+/// Runs the work on the given number of threads, by default on all cores; on fewer where addresses are
+/// limited, and on this thread if that leaves one or none can be started.
 fn in_pool(threads: Option<usize>, work: impl FnOnce() -> Result<(), Failure> + Send) -> Result<(), Failure> {
     if threads.is_some_and(|threads| !(1..=MOST_THREADS).contains(&threads)) {
         let threads = threads.unwrap_or_default();
@@ -75,15 +75,18 @@ fn in_pool(threads: Option<usize>, work: impl FnOnce() -> Result<(), Failure> + 
     }
     refuse_without_memory()?;
     let builder = rayon::ThreadPoolBuilder::new;
-    let pool = match threads {
-        Some(threads) => builder()
-            .num_threads(threads)
+    let alone = || builder().num_threads(1).use_current_thread().build().map_err(Failure::input);
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    let pool = match (affordable_threads(threads.unwrap_or_else(cores)), threads) {
+        (1, _) => alone(),
+        (count, Some(threads)) => builder()
+            .num_threads(count)
             .build()
             .map_err(|error| Failure::Input(format!("--threads {threads}: {error}; ask for fewer"))),
-        None => builder()
-            .build()
-            .or_else(|_| builder().num_threads(1).use_current_thread().build())
-            .map_err(Failure::input),
+        // 0 stands for all cores, or for as many as RAYON_NUM_THREADS says.
+        (count, None) => {
+            builder().num_threads(if count < cores() { count } else { 0 }).build().or_else(|_| alone())
+        }
     }?;
     // The allocator gives each thread a part of the address space at its first request. Now that is counted
     // when work is compared with what is free.

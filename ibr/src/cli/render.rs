@@ -15,7 +15,7 @@ use super::summary::Summary;
 use crate::files::refuse_pixels_without_memory;
 use crate::image::{Image, quality};
 use crate::pipeline::uncalibrated::UncalibratedSettings;
-use crate::pipeline::{Rendering, Watch, calibrated, rectified, uncalibrated};
+use crate::pipeline::{Method, Rendering, Watch, calibrated, rectified, uncalibrated};
 use crate::scene::{Kind, Scene, SourceView};
 use concerns::Concerns;
 use hybank::messages::Quoted;
@@ -37,6 +37,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let start = Instant::now();
     let (scene, files) = read(arguments, &|share| progress.within(share))?;
     let preparation = start.elapsed().as_secs_f64();
+    check_kind(&scene.kind, arguments)?;
     check_nearest(&scene.kind, arguments)?;
     let frames = files.len();
     let truth = arguments.scene.truth()?;
@@ -60,10 +61,10 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     }
     progress.step("writing");
     written.extend(film.and_then(|film| film.file));
-    output::commit(written)?;
+    let written = output::commit(written)?;
     drop(progress);
     concerns.warn(&scene.kind);
-    path::report(&summaries, &files, arguments)
+    path::report(&summaries, &files, arguments).map_err(|failure| failure.after_writing(&written))
 }
 
 /// One virtual view of a scene, and its summary.
@@ -96,6 +97,27 @@ fn check(arguments: &RenderArguments) -> Result<(), Failure> {
     }
     arguments.scene.check()?;
     arguments.check_outputs()
+}
+
+/// Refuses options that only other kinds of scenes have a use for.
+fn check_kind(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure> {
+    let has_cameras = !matches!(kind, Kind::Uncalibrated { .. });
+    let in_rows = matches!(kind, Kind::Rectified { .. }) && arguments.method != Method::Plane;
+    let unused = [
+        ("--seed", "a scene without cameras", arguments.seed.is_some() && has_cameras),
+        ("--reverse-order", "a scene without cameras", arguments.reverse_order && has_cameras),
+        (
+            "--lambda",
+            "the row fit, so a rectified rig and --method rows",
+            arguments.lambda.is_some() && !in_rows,
+        ),
+    ];
+    match unused.iter().find(|(.., is_unused)| *is_unused) {
+        Some((option, needs, _)) => {
+            Err(Failure::Usage(format!("{option}: it is for {needs}; leave it out of this rendering")))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Refuses a choice of the nearest views where no camera is known, and warns of one that is none.
@@ -147,8 +169,9 @@ fn render(
         }
         Kind::Uncalibrated { images, tracks, targets, size } => {
             let images: Vec<&Image> = images.iter().collect();
-            let (seed, reverse_order) = (arguments.seed, arguments.reverse_order);
-            let mut special = UncalibratedSettings { seed, reverse_order, ..UncalibratedSettings::default() };
+            let mut special = UncalibratedSettings::default();
+            special.seed = arguments.seed.unwrap_or(special.seed);
+            special.reverse_order = arguments.reverse_order;
             special.plane.degree = arguments.degree.unwrap_or(special.plane.degree);
             let done =
                 uncalibrated::render(&images, tracks, &targets[frame], *size, &settings, &special, watch)

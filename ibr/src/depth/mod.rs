@@ -74,6 +74,16 @@ pub enum DepthError {
         /// Values in the map.
         values: usize,
     },
+    /// No depth of the map is positive.
+    #[error(
+        "none of the {values} depths is positive, and {negative} are negative: depths grow away from the camera; change their sign"
+    )]
+    Negative {
+        /// Depths in the map.
+        values: usize,
+        /// Those below 0.
+        negative: usize,
+    },
 }
 
 /// The depth of what is infinitely far away, in every map and at every camera. It is finite, so that such
@@ -112,7 +122,7 @@ impl DepthMap {
     ///
     /// # Errors
     /// [`DepthError::Setting`], [`DepthError::Size`] when the numbers do not fill the map, and
-    /// [`DepthError::AllUnknown`] when none of them is known.
+    /// [`DepthError::AllUnknown`] or [`DepthError::Negative`] when none of them is known.
     pub fn new(
         (width, height): (usize, usize),
         stored: Vec<f32>,
@@ -125,6 +135,7 @@ impl DepthMap {
             return Err(DepthError::Size { map, image, step: 1, expected: image });
         }
         let negatives = measure == Measure::Disparity && has_negatives(&stored);
+        let negative = stored.iter().filter(|v| **v < 0.0).count();
         let value = |v: f32| match measure {
             Measure::Disparity => known(v, scale, negatives),
             Measure::Depth if v == f32::INFINITY => FAR,
@@ -132,7 +143,12 @@ impl DepthMap {
         };
         let data: Vec<f32> = stored.into_iter().map(value).collect();
         if data.iter().all(|v| v.is_nan()) {
-            return Err(DepthError::AllUnknown { values: data.len() });
+            let values = data.len();
+            let is_reversed = measure == Measure::Depth && negative > 0;
+            return Err(match is_reversed {
+                true => DepthError::Negative { values, negative },
+                false => DepthError::AllUnknown { values },
+            });
         }
         Ok(Self::from_known((width, height), data, measure))
     }
@@ -354,6 +370,7 @@ mod tests {
     fn useless_maps_are_refused() {
         let new = |data: Vec<f32>, scale| DepthMap::new((2, 1), data, scale, Measure::Depth);
         assert_eq!(new(vec![0.0, f32::NAN], 1.0), Err(DepthError::AllUnknown { values: 2 }));
+        assert_eq!(new(vec![0.0, -3.0], 1.0), Err(DepthError::Negative { values: 2, negative: 1 }));
         assert!(matches!(new(vec![1.0; 3], 1.0), Err(DepthError::Size { map: (3, 1), .. })));
         for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(matches!(new(vec![1.0; 2], scale), Err(DepthError::Setting(_))));

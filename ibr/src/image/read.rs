@@ -35,6 +35,18 @@ pub fn read_image_within(path: &Path, most: usize) -> Result<Image, InputError> 
     }
 }
 
+/// Width and height of an image; its pixels are not unpacked where the format allows that.
+///
+/// # Errors
+/// As [`read_image`].
+pub(crate) fn image_size(path: &Path) -> Result<(usize, usize), InputError> {
+    let header = ImageReader::open(path).and_then(ImageReader::with_guessed_format).ok();
+    match header.and_then(|reader| reader.into_dimensions().ok()) {
+        Some((width, height)) => Ok((width as usize, height as usize)),
+        None => Ok(read_image(path)?.size()),
+    }
+}
+
 /// Reads a map of one value per pixel, as stored: 0..255, 0..65535 or floats.
 ///
 /// Returns width, height and the values, rows from the top.

@@ -52,7 +52,7 @@ fn packing(channels: usize, levels: Levels) -> f64 {
 /// Writes the image to a file that appears only when it is whole, in the place of one that exists.
 ///
 /// # Errors
-/// As [`encode`], and [`InputError::Create`] if the system fails.
+/// As [`encode`], and [`InputError::File`] if the system fails.
 pub fn save(image: &Image, path: &Path) -> Result<(), InputError> {
     Ok(begin(&encode(image, path, Levels::Eight)?, path, true)?.commit()?)
 }
@@ -178,6 +178,6 @@ mod tests {
             let refused = encode(&image, Path::new(name), Levels::Eight).unwrap_err().to_string();
             assert!(refused.contains("the extension is not an image format; use .png"), "{refused}");
         }
-        assert!(matches!(save(&image, Path::new("/nowhere/x.png")), Err(InputError::Create(_))));
+        assert!(matches!(save(&image, Path::new("/nowhere/x.png")), Err(InputError::File(_))));
     }
 }

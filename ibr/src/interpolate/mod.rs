@@ -11,7 +11,7 @@ pub mod rows;
 pub use holes::{Cover, HoleCount, HoleFill};
 
 use crate::occlusion::DepthTest;
-use crate::setting::{NOT_NEGATIVE, POSITIVE, SettingError};
+use crate::setting::{NOT_NEGATIVE, POSITIVE, SMOOTHING, SettingError};
 
 /// Called with the share of a piece of work that is done, 0 to 1, from any thread and not necessarily in
 /// order.
@@ -115,7 +115,7 @@ impl Settings {
     /// # Errors
     /// [`SettingError`].
     pub fn check(&self) -> Result<(), SettingError> {
-        NOT_NEGATIVE.check("lambda", self.fit.lambda)?;
+        SMOOTHING.check("lambda", self.fit.lambda)?;
         NOT_NEGATIVE.check("tau", self.fit.tau)?;
         POSITIVE.check("variation", self.fit.variation)?;
         POSITIVE.check("stiffness", self.plane.stiffness)?;

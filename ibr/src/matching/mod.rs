@@ -117,14 +117,22 @@ fn matched<P: Viewpoint>(sweeps: &[Sweep<P>]) -> Result<Vec<Vec<f32>>, MatchErro
     confirmed.collect()
 }
 
+/// The indices of the [`OTHERS`] smallest distances above 0, and of fewer if there are fewer. There may be
+/// thousands of photographs, so no more is kept.
+fn nearest(distances: impl Iterator<Item = f64>) -> Vec<usize> {
+    let mut found: Vec<(f64, usize)> = Vec::with_capacity(OTHERS + 1);
+    for (index, distance) in distances.enumerate().filter(|(_, distance)| *distance > 0.0) {
+        found.insert(found.partition_point(|(nearer, _)| *nearer <= distance), (distance, index));
+        found.truncate(OTHERS);
+    }
+    found.into_iter().map(|(_, index)| index).collect()
+}
+
 impl<P: Viewpoint> Sweep<P> {
     /// Finds the nearest other photographs, and takes the widest range.
     fn prepare(sweeps: &mut [Self], index: usize) -> Result<(), MatchError> {
         let sweep = &sweeps[index];
-        let distance = |other: &usize| sweep.camera.distance(&sweeps[*other].camera);
-        let mut others: Vec<usize> = (0..sweeps.len()).filter(|other| distance(other) > 0.0).collect();
-        others.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
-        others.truncate(OTHERS);
+        let others = nearest(sweeps.iter().map(|other| sweep.camera.distance(&other.camera)));
         let shift = others.iter().map(|k| sweep.shift(&sweeps[*k].camera)).fold(0.0, f64::max);
         let widest = (WIDEST * sweep.grey.width() as f64) as i32;
         let low = if sweep.measure == Measure::Disparity { -widest } else { 0 };

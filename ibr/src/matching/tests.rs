@@ -59,3 +59,18 @@ fn photographs_that_cannot_be_matched_are_named() {
     let views = [Photograph { image: &a, camera: 0.0 }, Photograph { image: &b, camera: 1.0 }];
     assert!(matches!(depths(&views, Measure::Disparity), Err(MatchError::Unlike(_))));
 }
+
+/// As sorting all of them gives, with the first of equal ones first, and in no more memory for more of them.
+#[test]
+fn the_nearest_are_kept_and_nothing_else() {
+    let distances = |count: usize| (0..count).map(|i| (i * 7919 % 1013) as f64);
+    for count in [0, 1, 2, 3, 50, 5000] {
+        let values: Vec<f64> = distances(count).collect();
+        let mut sorted: Vec<usize> = (0..count).filter(|i| values[*i] > 0.0).collect();
+        sorted.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+        sorted.truncate(OTHERS);
+        assert_eq!(nearest(distances(count)), sorted, "{count}");
+        assert!(nearest(distances(count)).capacity() <= OTHERS + 1);
+    }
+    assert_eq!(nearest([f64::NAN, f64::INFINITY, 0.0, 2.0].into_iter()), [3, 1]);
+}

@@ -7,7 +7,7 @@ use crate::camera::transforms::read_transforms;
 use crate::camera::{Camera, CameraList, Frame};
 use crate::depth::{DepthMap, Measure};
 use crate::files::InputError;
-use crate::image::{read_image, read_map};
+use crate::image::{image_size, read_image, read_map};
 use crate::pipeline::Agreement;
 use crate::propagate::RectifiedView;
 use hybank::messages::Quoted;
@@ -131,6 +131,7 @@ impl Writer<'_> {
 
     /// Two views of a rig, with the files of their disparities if there are any.
     fn of_rig(&self, comment: &str, views: [(&Path, Option<&Path>); 2]) -> Found<Described> {
+        same_size(views.map(|(photograph, _)| photograph))?;
         let mut spec = SceneSpec { targets: vec![TargetSpec::default()], ..SceneSpec::default() };
         spec.targets[0].position = Some(0.5);
         for (position, (photograph, map)) in views.into_iter().enumerate() {
@@ -296,6 +297,16 @@ fn photographs(folder: &Path) -> Found<Vec<PathBuf>> {
         ending.is_some_and(|ending| PHOTOGRAPHS.contains(&ending.as_str()))
     };
     Ok(files(folder)?.into_iter().filter(is_photograph).collect())
+}
+
+/// The photographs of a rectified rig have one size.
+fn same_size([left, right]: [&Path; 2]) -> Found<()> {
+    let sizes = [image_size(left)?, image_size(right)?];
+    if sizes[0] == sizes[1] {
+        return Ok(());
+    }
+    let [left, right] = [left, right].map(|path| Quoted(path).to_string());
+    Err(InputError::Sizes { left, right, sizes })
 }
 
 /// The scale of two maps of whole numbers with which most points agree, and the share of these; `None` for

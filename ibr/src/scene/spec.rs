@@ -1,5 +1,6 @@
 //! A scene file as written.
 
+use crate::camera::colmap::model_files;
 use hybank::messages::Quoted;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
@@ -125,16 +126,15 @@ impl<'a> MapSource<'a> {
 }
 
 impl SceneSpec {
-    /// Every file that the scene names; relative paths start in `folder`.
+    /// Every file that the scene names, and all files of its models, read or not; relative paths start in
+    /// `folder`.
     pub fn files(&self, folder: &Path) -> Vec<PathBuf> {
         let images = self.view.iter().map(|view| &view.image);
         let maps = self.view.iter().flat_map(|view| [&view.disparity, &view.depth]).flatten();
         let maps = maps.filter(|map| matches!(MapSource::of(map), MapSource::File(_)));
         let lists = [&self.matches, &self.transforms, &self.calib].into_iter().flatten();
         let models = self.view.iter().map(|view| &view.colmap).chain([&self.colmap]).flatten();
-        let models = models.flat_map(|model| {
-            ["cameras.txt", "images.txt", "cameras.bin", "images.bin"].map(|file| model.join(file))
-        });
+        let models = models.flat_map(|model| model_files().map(|file| model.join(file)));
         let files = images.chain(maps).chain(lists).cloned().chain(models);
         files.map(|file| folder.join(file)).collect()
     }

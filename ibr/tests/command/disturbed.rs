@@ -267,6 +267,43 @@ fn is_small_allocation(message: &str) -> bool {
     bytes.and_then(|bytes| bytes.parse::<usize>().ok()).is_some_and(|bytes| bytes < 1 << 14)
 }
 
+/// More memory never turns a result into a refusal: threads are started where there is room for them, and a
+/// scene of thousands of views takes what is estimated.
+#[cfg(target_os = "linux")]
+#[test]
+fn more_memory_is_never_worse() {
+    let dir = rig();
+    sized_scenes(dir.path());
+    let line = "render scene.toml -o out.png --threads 2 --force";
+    let limits = (60..300).step_by(10).chain([400, 550, 600]);
+    let ends = |limit: usize| shell(dir.path(), &format!("ulimit -v {limit}000; exec $H {line}"));
+    let codes: Vec<_> = limits.map(|limit| (limit, ends(limit).status.code())).collect();
+    let first = codes.iter().position(|(_, code)| *code == Some(0)).unwrap();
+    assert!(codes[first..].iter().all(|(_, code)| *code == Some(0)), "{codes:?}");
+    for limit in (88..135).step_by(4) {
+        let line = format!("ulimit -v {limit}000; exec $H render many.toml -o out.png --threads 2 --force");
+        let output = shell(dir.path(), &line);
+        assert!(matches!(output.status.code(), Some(0 | 1)), "{limit}: {}", stderr(&output));
+    }
+}
+
+/// Where standard output is closed, the message says that the files are there.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_report_that_cannot_be_printed_names_what_is_written() {
+    let dir = rig();
+    for (line, words) in [
+        ("render scene.toml -o x.png", "x.png is written, but standard output: "),
+        ("render scene.toml -o y.png --mask m.png", "y.png and 1 other file are written, but"),
+        ("bound scene.toml --map map.png", "map.png is written, but"),
+        ("bound scene.toml", "hybank-ibr: standard output: "),
+    ] {
+        let output = shell(dir.path(), &format!("exec $H {line} >&-"));
+        assert!(code(&output) == 1 && stderr(&output).contains(words), "{line}: {}", stderr(&output));
+    }
+    assert!(["x.png", "y.png", "m.png", "map.png"].iter().all(|name| dir.path().join(name).exists()));
+}
+
 /// Whatever the limit of the address space, a run ends with a result or with one message. The system ends it
 /// only where the last kilobytes are missing.
 #[cfg(target_os = "linux")]

@@ -123,6 +123,39 @@ fn a_workspace_of_colmap_is_matched_or_takes_its_points() {
     refused(dir.path(), &["render", "s.toml", "-o", "p.png"], 1, &["points3D.txt", "points3D.bin"]);
 }
 
+/// All files of a model are inputs, also those that are not read.
+#[test]
+fn no_file_of_a_model_is_replaced() {
+    let dir = workspace();
+    let of_model = |name: &str| format!("set/sparse/0/{name}");
+    for name in ["cameras.txt", "images.txt", "points3D.txt", "points3D.bin", "frames.bin", "rigs.bin"] {
+        let path = of_model(name);
+        if !dir.path().join(&path).exists() {
+            std::fs::write(dir.path().join(&path), "kept").unwrap();
+        }
+        let before = std::fs::read(dir.path().join(&path)).unwrap();
+        let words = [name, "it is also the input"];
+        refused(dir.path(), &["init", "set", "-o", &path, "--force"], 1, &words);
+        let depth = ["render", "set", "-o", "o.png", "--depth", "d.pfm", "--force"];
+        std::fs::hard_link(dir.path().join(&path), dir.path().join("d.pfm")).unwrap();
+        refused(dir.path(), &depth, 1, &["d.pfm", "it is also the input"]);
+        std::fs::remove_file(dir.path().join("d.pfm")).unwrap();
+        assert_eq!(std::fs::read(dir.path().join(&path)).unwrap(), before, "{name}");
+    }
+}
+
+/// Photographs of different sizes are no rectified rig.
+#[test]
+fn a_pair_of_two_sizes_is_refused() {
+    let dir = photographs(&[("left.png", "a.png"), ("right.png", "b.png")]);
+    save(&Image::filled(30, 20, 3, 9.0), &dir.path().join("set/b.png")).unwrap();
+    for inputs in [&["set"][..], &["set/a.png", "set/b.png"]] {
+        let arguments = [&["init"], inputs, &["-o", "s.toml"]].concat();
+        refused(dir.path(), &arguments, 1, &["set/a.png", "120 x 90", "set/b.png", "30 x 20"]);
+    }
+    assert!(!dir.path().join("s.toml").exists());
+}
+
 #[test]
 fn transforms_are_a_scene() {
     let dir = workspace();

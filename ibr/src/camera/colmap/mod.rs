@@ -48,6 +48,12 @@ pub fn read_model(folder: &Path) -> Result<CameraList, InputError> {
     parse_model(&load("cameras.txt")?, &load("images.txt")?, folder)
 }
 
+/// The names of all files of a model, in both formats.
+pub(crate) fn model_files() -> impl Iterator<Item = String> {
+    let names = ["cameras", "images", "points3D", "rigs", "frames"];
+    names.into_iter().flat_map(|name| ["txt", "bin"].map(|ending| format!("{name}.{ending}")))
+}
+
 /// Whether a folder has the file of cameras, in one of the formats.
 pub(crate) fn is_model(folder: &Path) -> bool {
     ["cameras.txt", "cameras.bin"].iter().any(|name| folder.join(name).is_file())

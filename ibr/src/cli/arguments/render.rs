@@ -69,9 +69,9 @@ pub(in crate::cli) struct RenderArguments {
     /// Write a PNG with an alpha channel: transparent where no view shows what is there.
     #[arg(long)]
     pub(in crate::cli) alpha: bool,
-    /// Frames per second that a film says it has: 25, 29.97 or 30000/1001.
-    #[arg(long, value_name = "RATE", default_value = "25")]
-    pub(in crate::cli) fps: FrameRate,
+    /// Frames per second that a film says it has: 25, 29.97 or 30000/1001 [default: 25].
+    #[arg(long, value_name = "RATE")]
+    pub(in crate::cli) fps: Option<FrameRate>,
     /// Use only the K views nearest to the virtual camera, by angle and distance; not in scenes without
     /// cameras.
     #[arg(long, value_name = "K")]
@@ -92,13 +92,13 @@ pub(in crate::cli) struct RenderArguments {
     /// plane takes less time and is less sharp.
     #[arg(long, value_enum)]
     pub(in crate::cli) degree: Option<Degree>,
-    /// Weight of the slope penalty of the row fit, px^2 [default: from the noise of the photographs, 0.01 to
-    /// 4].
+    /// Weight of the slope penalty of the row fit (rectified rigs), px^2 [default: from the noise of the
+    /// photographs, 0.01 to 4].
     #[arg(long, value_name = "L")]
     pub(in crate::cli) lambda: Option<f64>,
-    /// Seed of the robust estimators (scenes without cameras).
-    #[arg(long, default_value_t = 1)]
-    pub(in crate::cli) seed: u64,
+    /// Seed of the robust estimators (scenes without cameras) [default: 1].
+    #[arg(long)]
+    pub(in crate::cli) seed: Option<u64>,
     /// Exchange near and far (scenes without cameras).
     #[arg(long)]
     pub(in crate::cli) reverse_order: bool,

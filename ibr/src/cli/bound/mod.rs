@@ -73,10 +73,11 @@ impl Job<'_> {
         }
         let Some((worst, _, now)) = worst else { return Err(Failure::input(RenderError::NoViews)) };
         summaries[worst].advice = Some(Advice::on(&predictor, &cameras[worst], size, &now).map_err(named)?);
-        output::commit(written)?;
+        let written = output::commit(written)?;
         drop(progress);
         inputs::warn_of_contradictions(predictor.agreement(), &scene.kind);
-        Frames { summaries, worst }.print(predictor.agreement(), arguments.scene.json)
+        let printed = Frames { summaries, worst }.print(predictor.agreement(), arguments.scene.json);
+        printed.map_err(|failure| failure.after_writing(&written))
     }
 }
 

@@ -45,8 +45,13 @@ pub(super) fn outputs(arguments: &RenderArguments, frames: usize) -> Vec<Outputs
     files.of_frames(frames)
 }
 
-/// What several views have no use for.
+/// What several views, or files that are no film, have no use for.
 pub(super) fn check(arguments: &RenderArguments, frames: usize) -> Result<(), Failure> {
+    if arguments.fps.is_some() && !is_film(&arguments.output, frames) {
+        return Err(Failure::Usage(
+            "--fps: only a film has a frame rate; write a .y4m file, or leave out --fps".into(),
+        ));
+    }
     if frames < 2 {
         return Ok(());
     }
@@ -76,7 +81,7 @@ pub(super) struct Film {
 
 impl Film {
     pub(super) fn new(arguments: &RenderArguments) -> Result<Self, Failure> {
-        let (path, fps) = (&arguments.output, arguments.fps);
+        let (path, fps) = (&arguments.output, arguments.fps.unwrap_or(FrameRate { frames: 25, seconds: 1 }));
         if output::is_standard(path) {
             return Ok(Self { file: None, fps, begun: false });
         }

@@ -3,11 +3,17 @@
 use crate::scene::{SceneSpec, TargetSpec, ViewSpec};
 use serde::de::DeserializeOwned;
 
+/// Most bytes of a key that is compared with the known ones; a longer one is like none of them.
+const MOST_COMPARED: usize = 64;
+
 /// The table that has the key, or the known key most like it; empty if the message is about something else.
 pub(super) fn hint(message: &str) -> String {
     let Some(rest) = message.strip_prefix("unknown field ") else { return String::new() };
     let mut quoted = rest.split('`').skip(1).step_by(2);
     let Some(unknown) = quoted.next() else { return String::new() };
+    if unknown.len() > MOST_COMPARED {
+        return String::new();
+    }
     let tables = tables_with(unknown);
     if !tables.is_empty() {
         return format!("; `{unknown}` belongs {}", tables.join(" or "));
@@ -53,6 +59,10 @@ mod tests {
         assert!(unknown("camera_of").ends_with("belongs in [virtual]"));
         assert!(unknown("veiw").ends_with("did you mean `view`?"));
         assert_eq!(unknown("\" = 1\n"), "");
+        let long = |length: usize| format!("position{}", "n".repeat(length));
+        let hint = |key: &str| hint(&format!("unknown field `{key}`, expected `position`"));
+        assert!(hint(&long(9)).ends_with("did you mean `position`?"));
+        assert_eq!(hint(&long(MOST_COMPARED)), "");
         assert_eq!(hint("invalid type"), "");
     }
 }
