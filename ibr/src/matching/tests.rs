@@ -70,7 +70,8 @@ fn the_nearest_are_kept_and_nothing_else() {
         sorted.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
         sorted.truncate(OTHERS);
         assert_eq!(nearest(distances(count)), sorted, "{count}");
-        assert!(nearest(distances(count)).capacity() <= OTHERS + 1);
+        // The list of pairs becomes that of the indices in its place, in which twice as many have room.
+        assert!(nearest(distances(count)).capacity() <= 2 * (OTHERS + 1));
     }
     assert_eq!(nearest([f64::NAN, f64::INFINITY, 0.0, 2.0].into_iter()), [3, 1]);
 }
