@@ -1,6 +1,7 @@
 //! How far a command is: a bar with the time that is left on a terminal, else a line every half minute.
 
 use super::failure::say;
+use hybank::memory::affordable_threads;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -41,8 +42,11 @@ impl Progress {
             true => every(REDRAW, &done, || shown.tick()),
             false => every(LINE, &done, || say(&line(&shown.message(), share(&shown), begin.elapsed()))),
         };
-        // A thread that cannot be started is no reason to fail.
-        let _ = thread::Builder::new().name("progress".into()).spawn(show);
+        // Where addresses are limited, the work needs those of a thread. One that cannot be started is no
+        // reason to fail.
+        if affordable_threads(2) > 1 {
+            let _ = thread::Builder::new().name("progress".into()).spawn(show);
+        }
         Self { bar, begun: AtomicU64::new(0), _display: display }
     }
 
