@@ -112,7 +112,8 @@ fn control_group() -> Option<f64> {
 }
 
 /// What the soft limit of the address space leaves beside what is in use. The C library reserves 64 MB of
-/// addresses for each thread; those that no one has touched are still free.
+/// addresses for each thread. What is not used of them counts as free: small requests of the thread get it.
+/// Large ones do not, so [`check_now`] also tries for them.
 fn address_space() -> Option<f64> {
     let text = fs::read_to_string("/proc/self/limits").ok()?;
     let line = text.lines().find(|line| line.starts_with("Max address space"))?;

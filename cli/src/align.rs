@@ -16,7 +16,7 @@ use hybank::messages::{Number, Quoted};
 use hybank::quantity::{self, Time};
 use hybank::sine_fit::Estimate;
 use hybank::spec::{DesignOverrides, Spec};
-use hybank::track::{AlignError, AlignSettings, AlignedChannel, Alignment, align};
+use hybank::track::{AlignError, AlignSettings, AlignedChannel, Alignment, RATE_WALK, align};
 use hybank::units::Seconds;
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -24,8 +24,6 @@ use std::path::{Path, PathBuf};
 
 /// Bytes of memory for each sample: the sample, whether it is kept, and room to grow.
 const BYTES_PER_SAMPLE: f64 = 20.0;
-/// By how much the rate of a clock wanders in a second, as `fuse --track` takes it.
-const WANDER: f64 = 1e-6;
 /// Hertz of recordings that state no rate, for a spec in normalised time.
 const NORMALISED_RATE: f64 = 48_000.0;
 
@@ -171,11 +169,7 @@ impl Args {
         if within.is_some_and(|time| time < Seconds(0.0)) {
             return Err(Failure::Usage("--within: a time is not negative".into()));
         }
-        Ok(AlignSettings {
-            reference: reference(self.reference, spec)?,
-            within,
-            rate_walk: (WANDER * unit.sqrt()).powi(2),
-        })
+        Ok(AlignSettings { reference: reference(self.reference, spec)?, within, rate_walk: unit * RATE_WALK })
     }
 
     /// Writes all outputs, which appear together; `others` are those beside the spec.

@@ -7,8 +7,7 @@ use hybank::design::{
     analyze_mean,
 };
 use hybank::figures::Figures;
-use hybank::messages::Quoted;
-use hybank::messages::counted;
+use hybank::messages::{Quoted, counted};
 use hybank::overview::{
     Fact, decibels, figure_facts, frequency, six_digits, understood, uselessness, warnings,
 };

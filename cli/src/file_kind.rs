@@ -1,6 +1,7 @@
 //! Tells from its first bytes what a file is that was given in place of another.
 
 use super::print::Failure;
+use FileKind::{Foreign, Recording};
 use hybank::bank::FORMAT;
 use hybank::io::IoError;
 use hybank::messages::Quoted;
@@ -17,41 +18,46 @@ const HEAD: u64 = 4096;
 pub(super) enum FileKind {
     Bank,
     Spec,
-    /// A file of another program or of another command, with its name and article.
-    Named(&'static str),
+    /// A recording that is read where the name or an option says what it is.
+    Recording(&'static str),
+    /// A file of another program, and what to do where a recording is needed.
+    Foreign(&'static str, &'static str),
     Unknown,
 }
 
-const FLAC: &str = "a FLAC recording";
-const NUMPY: &str = "a NumPy array";
-const MATLAB: &str = "a MATLAB file";
-const TAR: &str = "an archive (tar)";
-const SIGMF: &str = "the metadata of a SigMF recording";
-const ARCHIVE: &str = "a ZIP or npz archive";
+const CONVERT: &str = "convert it to a WAV recording";
+const NO_RECORDING: &str = "give a recording";
+const WAV: FileKind = Recording("a WAV recording");
+const SIGMF: FileKind = Recording("the metadata of a SigMF recording");
+const PAGE: FileKind = Foreign("a page or a picture (HTML or SVG)", NO_RECORDING);
 
 /// First bytes of files, from the byte at which they stand.
-const MAGIC: [(usize, &[u8], &str); 12] = [
-    (0, b"RIFX", "a big-endian WAV recording"),
-    (8, b"WAVE", "a WAV recording"),
-    (0, b"fLaC", FLAC),
-    (0, b"OggS", "an Ogg recording"),
-    (0, b"ID3", "an MP3 recording"),
-    (8, b"AIFF", "an AIFF recording"),
-    (0, b"\x93NUMPY", NUMPY),
-    (0, b"MATLAB 5", MATLAB),
-    (0, b"PK\x03\x04", ARCHIVE),
-    (0, b"\x89PNG", "a picture"),
-    (257, b"ustar", TAR),
-    (1, b"ELF", "a program"),
+const MAGIC: [(usize, &[u8], FileKind); 12] = [
+    (
+        0,
+        b"RIFX",
+        Foreign("a big-endian WAV recording", "write it as RIFF, with the least significant byte first"),
+    ),
+    (8, b"WAVE", WAV),
+    (0, b"fLaC", Recording("a FLAC recording")),
+    (0, b"OggS", Foreign("an Ogg recording", CONVERT)),
+    (0, b"ID3", Foreign("an MP3 recording", CONVERT)),
+    (8, b"AIFF", Foreign("an AIFF recording", CONVERT)),
+    (0, b"\x93NUMPY", Recording("a NumPy array")),
+    (0, b"MATLAB 5", Recording("a MATLAB file")),
+    (0, b"PK\x03\x04", Foreign("a ZIP or npz archive", "save each array alone, with numpy.save")),
+    (0, b"\x89PNG", Foreign("a picture", NO_RECORDING)),
+    (257, b"ustar", Recording("an archive (tar)")),
+    (1, b"ELF", Foreign("a program", NO_RECORDING)),
 ];
 
 impl FileKind {
     /// Of a file that begins with these bytes.
     pub(super) fn of(bytes: &[u8]) -> Self {
         let is =
-            |&(at, magic, _): &(usize, &[u8], &str)| bytes.get(at..).is_some_and(|b| b.starts_with(magic));
+            |&(at, magic, _): &(usize, &[u8], Self)| bytes.get(at..).is_some_and(|b| b.starts_with(magic));
         match MAGIC.iter().find(|entry| is(entry)) {
-            Some((_, _, name)) => Self::Named(name),
+            Some((_, _, kind)) => *kind,
             None => Self::of_text(&String::from_utf8_lossy(bytes)),
         }
     }
@@ -61,12 +67,12 @@ impl FileKind {
         if begin.starts_with('{') {
             return match begin {
                 _ if begin.contains(FORMAT) => Self::Bank,
-                _ if begin.contains("core:datatype") => Self::Named(SIGMF),
+                _ if begin.contains("core:datatype") => SIGMF,
                 _ => Self::Unknown,
             };
         }
         if begin.starts_with('<') {
-            return Self::Named("a page or a picture (HTML or SVG)");
+            return PAGE;
         }
         let is_key = |line: &str| {
             ["fast_rate", "fast_period", "ratio", "[target]", "[[channel]]"]
@@ -74,17 +80,6 @@ impl FileKind {
                 .any(|key| line.trim_start().starts_with(key))
         };
         if begin.lines().any(is_key) { Self::Spec } else { Self::Unknown }
-    }
-
-    /// How a recording of this kind is read.
-    fn way_in(self) -> &'static str {
-        match self {
-            Self::Named(ARCHIVE) => "which is not read; save each array alone, with numpy.save",
-            Self::Named(FLAC | NUMPY | MATLAB | TAR | SIGMF) => {
-                "and neither its name nor --format says so; rename it to the usual ending"
-            }
-            _ => "which is not read; convert it to a WAV recording",
-        }
     }
 
     /// Of the file at `path`; unknown unless it is a regular file that can be read.
@@ -101,7 +96,7 @@ impl fmt::Display for FileKind {
         f.write_str(match self {
             Self::Bank => "a bank",
             Self::Spec => "a spec",
-            Self::Named(name) => name,
+            Self::Recording(name) | Self::Foreign(name, _) => name,
             Self::Unknown => "not known here",
         })
     }
@@ -125,12 +120,19 @@ pub(super) fn refuse_other(file: &str, found: FileKind, wanted: FileKind) -> Res
 pub(super) fn unreadable(error: IoError) -> Failure {
     let IoError::NotWav { file, .. } = &error else { return Failure::input(error) };
     match FileKind::of_file(Path::new(file)) {
-        FileKind::Unknown => Failure::input(error),
+        // A WAV header that the reader refused has its own error.
+        FileKind::Unknown | WAV => Failure::input(error),
         found @ (FileKind::Bank | FileKind::Spec) => Failure::Input(format!(
             "{}: this is {found}, and a recording is needed; give the captures after the bank or the spec",
             Quoted(file)
         )),
-        found => Failure::Input(format!("{}: this is {found}, {}", Quoted(file), found.way_in())),
+        found @ Recording(_) => Failure::Input(format!(
+            "{}: this is {found}, and neither its name nor --format says so; rename it to the usual ending",
+            Quoted(file)
+        )),
+        found @ Foreign(_, remedy) => {
+            Failure::Input(format!("{}: this is {found}, which is not read; {remedy}", Quoted(file)))
+        }
     }
 }
 
@@ -156,7 +158,7 @@ mod tests {
             (b"<!DOCTYPE html>\nratio of", "a page or a picture (HTML or SVG)"),
             (b"{\"global\": {\"core:datatype\": \"cf32_le\"}}", "the metadata of a SigMF recording"),
         ] {
-            assert_eq!(FileKind::of(bytes), FileKind::Named(name));
+            assert_eq!(FileKind::of(bytes).to_string(), name);
         }
     }
 }

@@ -4,10 +4,10 @@
 
 use hybank::calibrate::{CalibrateError, Warning};
 use hybank::design::DesignError;
-use hybank::files::{FileError, StandardStream, committed, leftovers};
+use hybank::files::{FileError, StandardStream, leftovers, unprinted};
 use hybank::interchange::ExportError;
 use hybank::io::IoError;
-use hybank::messages::{Quoted, counted, printable, shown};
+use hybank::messages::{Quoted, printable, shown};
 use hybank::overview::understood;
 use hybank::pipeline::PipelineError;
 use hybank::spec::Spec;
@@ -124,19 +124,12 @@ pub(super) fn show<R: serde::Serialize>(
     if json { print_json(report) } else { print(&printable(&text(report))) }
 }
 
-/// Why standard output could not be written, and what is written all the same.
+/// Why standard output could not be written.
 pub(super) fn print_failure(error: &std::io::Error) -> Failure {
-    if error.kind() == ErrorKind::BrokenPipe {
-        return Failure::ClosedPipe;
+    match error.kind() {
+        ErrorKind::BrokenPipe => Failure::ClosedPipe,
+        _ => Failure::Input(unprinted(error)),
     }
-    let written = match &committed()[..] {
-        [] => String::new(),
-        [one] => format!("; {} is written", Quoted(one)),
-        [first, others @ ..] => {
-            format!("; {} and {} are written", Quoted(first), counted(others.len(), "other file"))
-        }
-    };
-    Failure::Input(format!("standard output: cannot write it: {error}{written}"))
 }
 
 /// Prints text to standard error. Errors are ignored, so that no result is lost.

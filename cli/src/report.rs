@@ -11,6 +11,7 @@ use hybank::io::OfflineSamples;
 use hybank::messages::Quoted;
 use hybank::overview::page::{CapturesOnPage, MOST_FRAMES, Page, PageError};
 use hybank::units::Hertz;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Writes a page (HTML) about a bank: what it is for, its error with the proven bounds, its filters, its
@@ -46,9 +47,8 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.turns.check(args.inputs.len())?;
     let inputs: Vec<&Path> = args.inputs.iter().chain([&args.bank]).map(PathBuf::as_path).collect();
     check_output(&args.output, &inputs, args.force)?;
-    if !is_dash(&args.output)
-        && args.output.extension().is_some_and(|ending| ending != "html" && ending != "htm")
-    {
+    let is_page = |ending: &OsStr| ["html", "htm"].iter().any(|page| ending.eq_ignore_ascii_case(page));
+    if !is_dash(&args.output) && !args.output.extension().is_none_or(is_page) {
         let message = "a report is a page; give it a name that ends in .html, and print that for a PDF";
         return Err(Failure::Usage(format!("{}: {message}", Quoted(&args.output))));
     }

@@ -5,8 +5,7 @@ use super::file_kind::FileKind;
 use super::print::{Failure, InFile, name, show};
 use hybank::bank::{Bank, FixedPoint, SynthesisFilters, check_digest};
 use hybank::design;
-use hybank::messages::Quoted;
-use hybank::messages::counted;
+use hybank::messages::{Quoted, counted};
 use hybank::verify::{BoundedBanks, Verified, verify};
 use std::path::PathBuf;
 

@@ -58,7 +58,7 @@ pub(crate) fn align<'py>(
     let settings = AlignSettings {
         reference: reference_of(&spec, reference)?,
         within: within.map(Seconds),
-        rate_walk: 1e-12,
+        rate_walk: track::RATE_WALK,
     };
     let found = background::run(py, None, move |_| {
         let found = track::align(&spec, &all, settings).map_err(|error| error.to_string())?;

@@ -34,7 +34,7 @@ pub fn remove_unfinished() -> Vec<String> {
 }
 
 /// The names of the files of this process that have been committed, in their order.
-pub fn committed() -> Vec<String> {
+pub(super) fn committed() -> Vec<String> {
     names_given().clone()
 }
 

@@ -32,7 +32,7 @@ mod rename;
 pub mod signals;
 mod streams;
 
-pub use atomic::{AtomicFile, check_output, commit_all, committed, remove_unfinished};
+pub use atomic::{AtomicFile, check_output, commit_all, remove_unfinished};
 #[cfg(feature = "runtime")]
 pub(crate) use bounded::fill;
 pub use bounded::{Bound, SPEC_OR_BANK, bytes_of, read_bytes, read_text, text_in};
@@ -41,4 +41,4 @@ pub use hidden::{Leftover, leftovers};
 pub use identity::{is_same_file, refuse_overlaps};
 #[cfg(all(unix, feature = "signals"))]
 pub use signals::{fail_at_file_size_limit, remove_unfinished_on_signals};
-pub use streams::{StandardStream, note_closed_streams};
+pub use streams::{StandardStream, note_closed_streams, unprinted};

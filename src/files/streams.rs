@@ -1,6 +1,8 @@
 //! Standard streams that were closed when the program began (`>&-`). The standard library puts /dev/null in
 //! their place before `main`, which takes all that is written and has nothing to read.
 
+use super::atomic::committed;
+use crate::messages::{Quoted, counted};
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -50,4 +52,17 @@ impl StandardStream {
             false => Ok(()),
         }
     }
+}
+
+/// The message for standard output that cannot be written. It names what this process has written to files
+/// all the same.
+pub fn unprinted(error: &io::Error) -> String {
+    let written = match &committed()[..] {
+        [] => String::new(),
+        [one] => format!("; {} is written", Quoted(one)),
+        [first, others @ ..] => {
+            format!("; {} and {} are written", Quoted(first), counted(others.len(), "other file"))
+        }
+    };
+    format!("standard output: cannot write it: {error}{written}")
 }

@@ -40,7 +40,7 @@ mod timeline;
 mod tracker;
 mod tracking;
 
-pub use align::{AlignError, AlignSettings, AlignWarning, AlignedChannel, Alignment, align};
+pub use align::{AlignError, AlignSettings, AlignWarning, AlignedChannel, Alignment, RATE_WALK, align};
 pub use coincidence::Coincidence;
 pub use error::{ReadingProblem, TrackError};
 pub use filter::{DelayFilter, DelayMeasurement, DelayState, Innovation};

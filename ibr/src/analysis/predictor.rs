@@ -96,8 +96,8 @@ impl<'a, P: Predicted> Predictor<'a, P> {
         Ok(local_mean(&difference(&image, rendered), image.size()))
     }
 
-    /// The mean estimate of the view of `camera` from other views: some of those
-    /// of the predictor, or more. The weights and the distance between views stay as they are.
+    /// The mean estimate of the view of `camera` from other views: some of those of the predictor, or more.
+    /// The weights and the distance between views stay as they are.
     ///
     /// # Errors
     /// Those of [`crate::pipeline`].

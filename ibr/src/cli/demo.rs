@@ -67,10 +67,9 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
     let errors = [full, partial].map(|image| enlarged_difference(image, &exact));
     let sheet = sheet([&left, &exact, &right, full, &errors[0], &errors[1]])?;
     let sheet = output::encoded(&sheet, &arguments.output, Levels::Eight)?;
-    let written = output::write(&[sheet], arguments.force)?;
+    output::write(&[sheet], arguments.force)?;
     drop(progress);
-    let summary = DemoSummary { full_depth: full_summary, partial_depth: partial_summary };
-    report(&summary, arguments).map_err(|failure| failure.after_writing(&written))
+    report(&DemoSummary { full_depth: full_summary, partial_depth: partial_summary }, arguments)
 }
 
 fn view(position: f64, size: (usize, usize)) -> Result<(Image, DepthMap), Failure> {

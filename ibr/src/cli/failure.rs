@@ -1,6 +1,7 @@
 //! Failure of a command: one message on stderr and an exit code.
 
-use hybank::messages::{Quoted, counted, printable, shown};
+use hybank::files::unprinted;
+use hybank::messages::{Quoted, printable, shown};
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::process::ExitCode;
@@ -44,19 +45,7 @@ impl Failure {
     pub(super) fn printing(error: &std::io::Error) -> Self {
         match error.kind() {
             std::io::ErrorKind::BrokenPipe => Self::ClosedPipe,
-            _ => Self::Input(format!("standard output: {error}")),
-        }
-    }
-
-    /// The same failure, after these files were written.
-    pub(super) fn after_writing(self, files: &[String]) -> Self {
-        match (self, files) {
-            (Self::Input(message), [file]) => Self::Input(format!("{file} is written, but {message}")),
-            (Self::Input(message), [file, others @ ..]) => {
-                let others = counted(others.len(), "other file");
-                Self::Input(format!("{file} and {others} are written, but {message}"))
-            }
-            (other, _) => other,
+            _ => Self::Input(unprinted(error)),
         }
     }
 

@@ -59,7 +59,7 @@ pub(super) fn encoded<'a>(image: &Image, path: &'a Path, levels: Levels) -> Resu
 }
 
 /// Writes files, which appear together, and prints what goes to standard output.
-pub(super) fn write(outputs: &[Encoded<'_>], force: bool) -> Result<Vec<String>, Failure> {
+pub(super) fn write(outputs: &[Encoded<'_>], force: bool) -> Result<(), Failure> {
     commit(begin(outputs, force)?)
 }
 
@@ -76,10 +76,9 @@ pub(super) fn begin(outputs: &[Encoded<'_>], force: bool) -> Result<Vec<AtomicFi
     Ok(files)
 }
 
-/// Gives the files their names, all or none, and gives these names back.
-pub(super) fn commit(files: Vec<AtomicFile>) -> Result<Vec<String>, Failure> {
-    let names = files.iter().map(|file| file.name().to_string()).collect();
-    commit_all(files).map(|()| names).map_err(Failure::input)
+/// Gives the files their names, all or none.
+pub(super) fn commit(files: Vec<AtomicFile>) -> Result<(), Failure> {
+    commit_all(files).map_err(Failure::input)
 }
 
 /// The name of view `frame` of a path, from 0: its number from 1, of four digits, before the extension.

@@ -61,10 +61,10 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     }
     progress.step("writing");
     written.extend(film.and_then(|film| film.file));
-    let written = output::commit(written)?;
+    output::commit(written)?;
     drop(progress);
     concerns.warn(&scene.kind);
-    path::report(&summaries, &files, arguments).map_err(|failure| failure.after_writing(&written))
+    path::report(&summaries, &files, arguments)
 }
 
 /// One virtual view of a scene, and its summary.

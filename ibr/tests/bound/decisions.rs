@@ -1,13 +1,13 @@
 //! Decisions that rest on predictions, against what they turn out to cost.
 
 use super::planner::{
-    Candidate, Costs, Placement, RoundingCosts, Search, Wanted, price_of_depth_errors, rounded_map,
+    Candidate, Costs, Placement, RoundingCosts, Wanted, price_of_depth_errors, rounded_map,
 };
 use super::*;
 use crate::bilinear::bilinear;
+use hybank_ibr::analysis::Choice;
 use hybank_ibr::pipeline::rectified;
-use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::convert::Infallible;
 
 fn mean_square(image: &Image, truth: &Image) -> f64 {
     mean(image.data().iter().zip(truth.data()).map(|(a, b)| f64::from(a - b).powi(2)))
@@ -169,43 +169,33 @@ fn sweep() -> bool {
     trials::is_slow("placements of 4 cameras at 20 sites")
 }
 
-/// 3 of 12 cameras, searched from greedy choices, against all 220 subsets by the predicted error; 4 of 20
+/// 3 of 16 cameras, searched by exchanges, against all 560 subsets by the predicted error; 4 of 20
 /// against 4845 in 10 scenes with `HYBANK_SLOW=1`.
 #[test]
 fn a_searched_placement_is_close_to_the_best() {
-    let (scenes, places, count) = if sweep() { (10, 20, 4) } else { (1, 12, 3) };
+    // More sets than are all tried.
+    let (scenes, places, count) = if sweep() { (10, 20, 4) } else { (1, 16, 3) };
     for seed in 0..scenes {
         let (rig, targets) = sites(seed, places);
         let placement = placement(&rig, &targets);
-        let [greedy, searched] =
-            [placement.greedy(count), placement.searched(count)].map(|chosen| placement.predicted(&chosen));
+        let searched = placement.predicted(&placement.searched(count));
         let best = subsets(places, count).iter().map(|s| placement.predicted(s)).fold(f64::MAX, f64::min);
         let loss = 20.0 * (searched / best).log10();
-        println!(
-            "scene {seed}: greedy {greedy:.3}, searched {searched:.3}, best {best:.3} grey levels, {loss:.3} dB"
-        );
+        println!("scene {seed}: searched {searched:.3}, best {best:.3} grey levels, {loss:.3} dB");
         assert!(loss.abs() < 0.3, "scene {seed}: {loss}");
     }
 }
 
-/// Choices from which exchanges start.
-const STARTS: usize = 5;
-
-/// First candidates of greedy choices without exchanges.
-const FIRSTS: usize = 10;
-
-/// The same choice against the best of all subsets by rendering: 3 of 9 places, or 4 of 20 with
-/// `HYBANK_SLOW=1`. The criterion knows surfaces and no textures, so it loses up to 2.4 dB. With the
-/// rendered views themselves as the criterion, a single greedy choice loses up to 0.7 dB. The best of ten
-/// with other first candidates loses less than 0.3 dB, and so do exchanges from several starts.
+/// The same choice against the best of all subsets by rendering: 4 of 13 places, or 4 of 20 with
+/// `HYBANK_SLOW=1`. The criterion knows surfaces and no textures, so it loses up to 2.4 dB. The same search
+/// with the rendered views themselves as the criterion loses less than 0.3 dB.
 #[test]
 fn placement_gives_good_views() {
-    let (scenes, places, count) = if sweep() { (10, 20, 4) } else { (1, 9, 3) };
+    let (scenes, places, count) = if sweep() { (10, 20, 4) } else { (1, 13, 4) };
     let mut losses = Vec::new();
     for seed in 0..scenes {
         let (rig, targets) = sites(seed, places);
-        let known = RefCell::new(BTreeMap::new());
-        let render = |chosen: &[usize]| {
+        let error = |chosen: &[usize]| {
             let views = rig.views(chosen);
             let of_target = |i: usize| {
                 let settings = RenderSettings::default();
@@ -214,29 +204,20 @@ fn placement_gives_good_views() {
             };
             mean((0..3).map(of_target))
         };
-        let error = |chosen: &[usize]| {
-            let mut key = chosen.to_vec();
-            key.sort_unstable();
-            *known.borrow_mut().entry(key).or_insert_with_key(|key| render(key))
-        };
-        let psnr = |chosen: &[usize]| 10.0 * (255.0 * 255.0 / error(chosen)).log10();
-        let surfaces = psnr(&placement(&rig, &targets).greedy(count));
-        let search = Search { candidates: places, error: &error };
-        let greedy = psnr(&search.greedy(count));
-        let repeated = psnr(&search.greedy_from_several(FIRSTS, count));
-        let without = known.borrow().len();
-        let exchanged = psnr(&search.starting_with_several(STARTS, count));
-        let rendered = known.borrow().len();
-        let mut all: Vec<f64> = subsets(places, count).iter().map(|s| psnr(s)).collect();
+        let psnr = |error: f64| 10.0 * (255.0 * 255.0 / error).log10();
+        let surfaces = psnr(error(&placement(&rig, &targets).searched(count)));
+        let Ok(found) = Choice::least(places, count, |chosen| Ok::<f64, Infallible>(error(chosen)), &|_| ());
+        let found = found.unwrap();
+        assert!(!found.is_exhaustive);
+        let mut all: Vec<f64> = subsets(places, count).iter().map(|s| psnr(error(s))).collect();
         all.sort_by(f64::total_cmp);
-        let (best, median) = (all[all.len() - 1], all[all.len() / 2]);
+        let (by_views, best, median) = (psnr(found.error), all[all.len() - 1], all[all.len() / 2]);
         println!(
-            "scene {seed}: by surfaces {surfaces:.2} dB, by views greedy {greedy:.2}, from {FIRSTS} firsts {repeated:.2} \
-             ({without} sets), exchanged {exchanged:.2} ({rendered} with those), best {best:.2}, median {median:.2}"
+            "scene {seed}: by surfaces {surfaces:.2} dB, by views {by_views:.2} ({} sets), best {best:.2}, median {median:.2}",
+            found.tried
         );
         assert!(best - surfaces < 2.5, "scene {seed}: {surfaces} {best} {median}");
-        assert!(best - exchanged < 0.3, "scene {seed}: {exchanged} {best}");
-        assert!(best - repeated < 0.3, "scene {seed}: {repeated} {best}");
+        assert!(best - by_views < 0.3, "scene {seed}: {by_views} {best}");
         losses.push(best - surfaces);
     }
     assert!(mean(losses.iter().copied()) < 1.5, "{losses:.2?}");

@@ -293,10 +293,10 @@ fn more_memory_is_never_worse() {
 fn a_report_that_cannot_be_printed_names_what_is_written() {
     let dir = rig();
     for (line, words) in [
-        ("render scene.toml -o x.png", "x.png is written, but standard output: "),
-        ("render scene.toml -o y.png --mask m.png", "y.png and 1 other file are written, but"),
-        ("bound scene.toml --map map.png", "map.png is written, but"),
-        ("bound scene.toml", "hybank-ibr: standard output: "),
+        ("render scene.toml -o x.png", "; x.png is written"),
+        ("render scene.toml -o y.png --mask m.png", "; y.png and 1 other file are written"),
+        ("bound scene.toml --map map.png", "; map.png is written"),
+        ("bound scene.toml", "hybank-ibr: standard output: cannot write it: "),
     ] {
         let output = shell(dir.path(), &format!("exec $H {line} >&-"));
         assert!(code(&output) == 1 && stderr(&output).contains(words), "{line}: {}", stderr(&output));

@@ -37,6 +37,10 @@ const SHORT_PIECE: usize = 1024;
 const LEAST_PIECES: usize = 4;
 const MOST_PIECES: usize = 1024;
 
+/// Variance by which the rate of a clock walks in a second, in (s/s)^2 / s, unless more is known: that of 1 ppm,
+/// as in [`Tracking`](super::Tracking).
+pub const RATE_WALK: f64 = 1e-12;
+
 /// How recordings are aligned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AlignSettings {
@@ -44,7 +48,7 @@ pub struct AlignSettings {
     pub reference: usize,
     /// How far apart the recordings began at most, if that is known.
     pub within: Option<Seconds>,
-    /// Variance by which a rate walks in a second, in (s/s)^2 / s.
+    /// Variance by which a rate walks in a second, in (s/s)^2 / s; see [`RATE_WALK`].
     pub rate_walk: f64,
 }
 

@@ -175,10 +175,12 @@ fn recordings_that_are_not_read_are_named() {
     wav::write_pair(&desk, &[0.0; 9], &[0.0; 9]);
     let swapped = [b"RIFX", &desk.read("a.wav")[4..]].concat();
     for (bytes, words) in [
-        (swapped, ["big-endian", "convert it"]),
+        (swapped, ["big-endian", "write it as RIFF"]),
         (b"PK\x03\x04x.npy".to_vec(), ["npz", "numpy.save"]),
         (b"OggSvorbis".to_vec(), ["Ogg", "convert it"]),
         (b"fLaC\0\0\0\x22".to_vec(), ["FLAC", "rename it"]),
+        (b"\x89PNG\r\n".to_vec(), ["a picture", "give a recording"]),
+        (b"XXXX....WAVEfmt ".to_vec(), ["not a WAV file", "XXXX"]),
     ] {
         desk.write("c.wav", bytes);
         refused(

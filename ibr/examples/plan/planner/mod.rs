@@ -6,9 +6,7 @@ mod depth;
 mod placement;
 #[path = "../../thesis_views/theory/random.rs"]
 mod random;
-mod search;
 
 pub use bits::{RoundingCosts, rounded_map, sensitivity};
 pub use depth::price_of_depth_errors;
 pub use placement::{Candidate, Costs, Placement, Wanted};
-pub use search::Search;

@@ -73,11 +73,10 @@ impl Job<'_> {
         }
         let Some((worst, _, now)) = worst else { return Err(Failure::input(RenderError::NoViews)) };
         summaries[worst].advice = Some(Advice::on(&predictor, &cameras[worst], size, &now).map_err(named)?);
-        let written = output::commit(written)?;
+        output::commit(written)?;
         drop(progress);
         inputs::warn_of_contradictions(predictor.agreement(), &scene.kind);
-        let printed = Frames { summaries, worst }.print(predictor.agreement(), arguments.scene.json);
-        printed.map_err(|failure| failure.after_writing(&written))
+        Frames { summaries, worst }.print(predictor.agreement(), arguments.scene.json)
     }
 }
 
