@@ -37,8 +37,8 @@ const SHORT_PIECE: usize = 1024;
 const LEAST_PIECES: usize = 4;
 const MOST_PIECES: usize = 1024;
 
-/// Variance by which the rate of a clock walks in a second, in (s/s)^2 / s, unless more is known: that of 1 ppm,
-/// as in [`Tracking`](super::Tracking).
+/// Variance by which the rate of a clock walks in a second, in (s/s)^2 / s, unless more is known: that of
+/// 1 ppm, as in [`Tracking`](super::Tracking).
 pub const RATE_WALK: f64 = 1e-12;
 
 /// How recordings are aligned.

@@ -110,8 +110,8 @@ impl Placement {
         (0..pixels).map(of_pixel).sum::<f64>() / pixels as f64
     }
 
-    /// The places for `count` cameras with the least predicted error, as [`Choice::least`] finds them; none if
-    /// there are fewer candidates.
+    /// The places for `count` cameras with the least predicted error, as [`Choice::least`] finds them; none
+    /// if there are fewer candidates.
     pub fn searched(&self, count: usize) -> Vec<usize> {
         let candidates = self.sights.first().map_or(0, Vec::len);
         let error = |chosen: &[usize]| Ok::<f64, Infallible>(self.predicted(chosen));
