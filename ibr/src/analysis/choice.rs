@@ -7,8 +7,9 @@ use std::collections::BTreeMap;
 const MOST_SETS: f64 = 500.0;
 
 /// Choices from which exchanges start, each with another first view: the view that is best alone often is
-/// wrong beside others. Five found the best set of 4 among 20 places in ten scenes.
-const STARTS: usize = 5;
+/// wrong beside others. Of 4 among 20 places in ten scenes, seven found a set within 0.12 dB of the best one,
+/// five within 0.49 dB, and all twenty within 0.10 dB.
+const STARTS: usize = 7;
 
 /// Passes of exchanges, at most; two are usual.
 const PASSES: usize = 4;
@@ -30,7 +31,7 @@ impl Choice {
     /// The set of `count` out of `candidates` views with the least error, which `error` computes; `None` if
     /// there are not so many.
     ///
-    /// Up to 500 sets are all tried. Of more, greedy choices from five first views are improved by exchanges
+    /// Up to 500 sets are all tried. Of more, greedy choices from seven first views are improved by exchanges
     /// of single views as long as these help.
     ///
     /// # Errors

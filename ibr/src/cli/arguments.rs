@@ -135,7 +135,7 @@ const PLACE_EXAMPLES: &str = "Examples:
       chooses among the other views for the place of one, and compares the predictions with its photograph
 
 The errors are the estimates of `bound`, of a path their mean over its views, with weights that are calibrated
-on all views of the scene. Up to 500 sets of views are all tried. Of more, greedy choices from five first
+on all views of the scene. Up to 500 sets of views are all tried. Of more, greedy choices from seven first
 views are improved by exchanges. Scenes without cameras are refused.";
 
 #[derive(Debug, Args)]
