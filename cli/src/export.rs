@@ -7,8 +7,7 @@ use clap::ValueEnum;
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::design::analyze;
 use hybank::interchange::{
-    Circuit, ExportError, Format, Multipliers, Verilog, VerilogOptions, WordSizes, block_of_sections, export,
-    sections,
+    Circuit, Format, Multipliers, Verilog, VerilogOptions, block_of_sections, export, sections,
 };
 use hybank::messages::Quoted;
 use std::num::NonZeroU32;
@@ -117,18 +116,16 @@ impl VerilogArgs {
         numbers || circuit || self.testbench.is_some()
     }
 
-    fn options(&self, bank: &Bank, input_bits: Option<u32>) -> Result<VerilogOptions, ExportError> {
-        let plain = VerilogOptions::new(bank, input_bits)?;
-        Ok(VerilogOptions {
-            words: WordSizes {
-                output: self.output_bits.unwrap_or(plain.words.output),
-                accumulator: self.accumulator.unwrap_or(plain.words.accumulator),
-                ..plain.words
-            },
+    fn options(&self, input_bits: Option<u32>) -> VerilogOptions {
+        let plain = VerilogOptions::default();
+        VerilogOptions {
+            input_bits,
+            output_bits: self.output_bits,
+            accumulator_bits: self.accumulator,
             clocks_per_frame: self.clocks_per_frame.unwrap_or(plain.clocks_per_frame),
             pipeline: self.pipeline.unwrap_or(plain.pipeline),
             multipliers: self.multipliers.unwrap_or(plain.multipliers),
-        })
+        }
     }
 }
 
@@ -177,7 +174,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 
 /// Writes the module, and the testbench with it.
 fn write_verilog(args: &Args, bank: &Bank) -> Result<Circuit, Failure> {
-    let options = args.verilog.options(bank, args.input_bits).in_file(&args.bank)?;
+    let options = args.verilog.options(args.input_bits);
     // Linters want a module to have the name of its file.
     let stem = args.output.file_stem().and_then(|stem| stem.to_str());
     let name = args.name.as_deref().or(stem.filter(|_| !is_dash(&args.output))).unwrap_or("bank");

@@ -118,8 +118,15 @@ class Bank:
         format: Literal["c", "c99", "csv", "npz", "mat", "coe", "mem", "sos", "verilog"],
         name: str = "bank",
         input_bits: int | None = None,
+        output_bits: int | None = None,
+        accumulator: int | None = None,
+        clocks_per_frame: int | None = None,
+        pipeline: int | None = None,
+        multipliers: Literal["inferred", "shift-add"] | None = None,
+        testbench: _Path | None = None,
+        random_frames: int | None = None,
         overwrite: bool = True,
-    ) -> None: ...
+    ) -> Record | None: ...
     @property
     def channels(self) -> int: ...
     @property
@@ -195,6 +202,9 @@ class Bank:
         rate: float | None = None,
         full_output: Literal[True],
     ) -> tuple[NDArray[Any], FuseReport]: ...
+    def fuse_as_hardware(
+        self, x: NDArray[np.signedinteger[Any]], *, accumulator: int = 64, axis: int = -1, keep_latency: bool = False
+    ) -> NDArray[np.signedinteger[Any]]: ...
     def stream(
         self,
         *,

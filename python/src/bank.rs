@@ -4,21 +4,20 @@ use crate::arrays::framed;
 use crate::background;
 use crate::errors::{choose, file_error, no_others, refused};
 use crate::fuse::{self, Request, parse_algorithm, parse_gaps};
+use crate::hardware::{self, CircuitKeywords, begin_file};
 use crate::pictures;
-use crate::results::{figures, of_report};
+use crate::results::{figures, of_report, record};
 use crate::running::{Extras, Follow};
 use crate::sources;
 use crate::stream::Stream;
 use hybank::bank::{self, StateSpace, SynthesisFilters};
 use hybank::design;
 use hybank::design::responses::{fir_response, front_end_gains, impulse_responses};
-use hybank::files::AtomicFile;
 use hybank::interchange::{Format as Exported, export};
 use hybank::units::Hertz;
 use numpy::{Complex64, Element, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -79,8 +78,12 @@ impl Bank {
 
     #[doc = include_str!("docs/Bank.export.rst")]
     #[pyo3(
-        signature = (path, *, format, name = "bank", input_bits = None, overwrite = true, **unknown),
-        text_signature = "($self, path, *, format, name='bank', input_bits=None, overwrite=True)"
+        signature = (
+            path, *, format, name = "bank", input_bits = None, output_bits = None, accumulator = None,
+            clocks_per_frame = None, pipeline = None, multipliers = None, testbench = None, random_frames = None,
+            overwrite = true, **unknown
+        ),
+        text_signature = "($self, path, *, format, name='bank', input_bits=None, output_bits=None, accumulator=None, clocks_per_frame=None, pipeline=None, multipliers=None, testbench=None, random_frames=None, overwrite=True)"
     )]
     #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
     fn export(
@@ -89,13 +92,35 @@ impl Bank {
         format: &str,
         name: &str,
         input_bits: Option<u32>,
+        output_bits: Option<u32>,
+        accumulator: Option<u32>,
+        clocks_per_frame: Option<u32>,
+        pipeline: Option<u32>,
+        multipliers: Option<&str>,
+        testbench: Option<PathBuf>,
+        random_frames: Option<u32>,
         overwrite: bool,
         unknown: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<()> {
+    ) -> PyResult<Option<Py<PyAny>>> {
         no_others(slf.as_any(), "export", unknown)?;
         let format = choose("format", format, &FORMATS)?;
+        let keywords = CircuitKeywords {
+            output_bits,
+            accumulator,
+            clocks_per_frame,
+            pipeline,
+            multipliers,
+            testbench,
+            random_frames,
+        };
+        if format == Exported::Verilog {
+            let circuit = keywords.write(&slf.get().bank, &path, name, input_bits, overwrite)?;
+            return record(slf.py(), &circuit).map(Some);
+        }
+        keywords.check_none()?;
         let bytes = export(&slf.get().bank, format, name, input_bits).map_err(refused)?;
-        write_file(&path, &bytes, overwrite)
+        write_file(&path, &bytes, overwrite)?;
+        Ok(None)
     }
 
     /// The number of converters.
@@ -343,6 +368,25 @@ impl Bank {
         if full_output { Ok((y, report).into_pyobject(py)?.into_any()) } else { Ok(y) }
     }
 
+    #[doc = include_str!("docs/Bank.fuse_as_hardware.rst")]
+    #[pyo3(
+        signature = (x, *, accumulator = 64, axis = -1, keep_latency = false, **unknown),
+        text_signature = "($self, x, *, accumulator=64, axis=-1, keep_latency=False)"
+    )]
+    fn fuse_as_hardware<'py>(
+        slf: &Bound<'py, Self>,
+        x: &Bound<'py, PyAny>,
+        accumulator: u32,
+        axis: isize,
+        keep_latency: bool,
+        unknown: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        no_others(slf.as_any(), "fuse_as_hardware", unknown)?;
+        let bank = &slf.get().bank;
+        let (frames, shape) = framed(x, &bank.layout(), axis, false)?;
+        hardware::fuse(bank, &frames, shape, accumulator, keep_latency)
+    }
+
     #[doc = include_str!("docs/Bank.stream.rst")]
     #[pyo3(
         signature = (
@@ -439,9 +483,7 @@ fn frequency_count(n: i64) -> PyResult<usize> {
 
 /// Writes a file, which appears when it is whole.
 fn write_file(path: &Path, bytes: &[u8], overwrite: bool) -> PyResult<()> {
-    let mut file = AtomicFile::create(path, overwrite).map_err(file_error)?;
-    file.write_all(bytes)?;
-    file.commit().map_err(file_error)
+    begin_file(path, bytes, overwrite)?.commit().map_err(file_error)
 }
 
 /// The formats by name.

@@ -18,6 +18,7 @@ mod errors;
 mod files;
 mod formats;
 mod fuse;
+mod hardware;
 mod ibr;
 mod measure;
 mod outputs;

@@ -1,5 +1,6 @@
 """Calibration, measurement and export: values that are known, refusals, and the files of the command line."""
 
+import json
 import subprocess
 
 import numpy as np
@@ -152,6 +153,57 @@ def test_exports_are_those_of_the_command_line(binary, filters, tmp_path, format
         bank.export(tmp_path / "other", format="coe")
     with pytest.raises(FileExistsError):
         bank.export(tmp_path / "python", format=format, overwrite=False)
+
+
+def test_a_circuit_is_that_of_the_command_line(binary, filters, tmp_path):
+    fixed = hb.design(filters / "thesis-fir.toml", replace={"bits": 12}, proof=False)
+    fixed.save(tmp_path / "fixed.json")
+    options = {"input_bits": 12, "output_bits": 14, "accumulator": 30, "clocks_per_frame": 4, "pipeline": 2}
+    circuit = fixed.export(
+        tmp_path / "python.v", format="verilog", name="core", testbench=tmp_path / "p", random_frames=20, **options
+    )
+    words = [word for name, value in options.items() for word in ("--" + name.replace("_", "-"), str(value))]
+    names = ["--name", "core", "--testbench", tmp_path / "c", "--random-frames", "20"]
+    command = [binary, "export", tmp_path / "fixed.json", "-o", tmp_path / "command.v", "--json", *words, *names]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert (tmp_path / "python.v").read_text() == (tmp_path / "command.v").read_text()
+    for file in (tmp_path / "c").iterdir():
+        assert file.read_bytes() == (tmp_path / "p" / file.name).read_bytes()
+    printed = json.loads(done.stdout)
+    assert {name: printed[name] for name in vars(circuit)} == vars(circuit)
+    for keywords, words in [
+        ({"format": "c", "pipeline": 2}, "describe a circuit"),
+        ({"format": "verilog", "random_frames": 5}, "belong to a testbench"),
+        ({"format": "verilog", "clocks_per_frame": 0}, "clocks_per_frame: 0"),
+        ({"format": "verilog", "multipliers": "none"}, "choose inferred or shift-add"),
+        ({"format": "verilog"}, "bits of the samples"),
+    ]:
+        with pytest.raises(hb.HybankError, match=words):
+            fixed.export(tmp_path / "other", **keywords)
+    assert not (tmp_path / "other").exists()
+
+
+def test_integers_are_fused_as_by_the_command_line(binary, filters, tmp_path):
+    fixed = hb.design(filters / "thesis-fir.toml", replace={"bits": 12}, proof=False)
+    soundfile = pytest.importorskip("soundfile")
+    fixed.save(tmp_path / "fixed.json")
+    x = np.random.default_rng(3).integers(-32768, 32767, (2, 500)).astype("i2")
+    for row, name in zip(x, ("a.wav", "b.wav")):
+        soundfile.write(tmp_path / name, row, 24000, subtype="PCM_16")
+    command = [binary, "fuse", "fixed.json", "a.wav", "b.wav", "-o", "y.wav", "--bit-true", "--accumulator", "26"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    with pytest.warns(UserWarning):
+        y = fixed.fuse_as_hardware(x, accumulator=26)
+    assert (y == soundfile.read(tmp_path / "y.wav", dtype="int16")[0]).all()
+    with pytest.warns(UserWarning, match="sums did not fit the accumulator of 26 bits"):
+        late = fixed.fuse_as_hardware(x.T, accumulator=26, axis=0, keep_latency=True)
+    dropped = fixed.fuse(x / 2.0**15, full_output=True)[1].latency_dropped
+    assert dropped > 0 and (late[dropped:] == y[: len(y) - dropped]).all()
+    for samples, words in [(x / 2.0, "integers, not samples of f8"), (x.astype("u1"), "u1")]:
+        with pytest.raises(hb.HybankError, match=words):
+            fixed.fuse_as_hardware(samples)
+    with pytest.raises(hb.HybankError, match="integer taps"):
+        hb.load(filters / "thesis-fir.json").fuse_as_hardware(x)
 
 
 def test_tracking_is_a_key_of_a_design():

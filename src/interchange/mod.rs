@@ -77,7 +77,7 @@ pub fn export(
     match format {
         Format::C99 => c99::header(bank, name, input_bits).map(String::into_bytes),
         Format::Verilog => {
-            let options = VerilogOptions::new(bank, input_bits)?;
+            let options = VerilogOptions { input_bits, ..VerilogOptions::default() };
             Ok(Verilog::new(bank, name, &options)?.text.into_bytes())
         }
         Format::Csv => Ok(tables::csv(bank).into_bytes()),

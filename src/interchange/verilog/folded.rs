@@ -2,7 +2,6 @@
 //! after another, with their coefficients from a ROM; a tree adds the products of a phase, and an
 //! accumulator adds the clocks.
 
-use super::VerilogOptions;
 use super::netlist::{Netlist, Term, Word, constant, wrapped};
 use super::output::Output;
 use crate::interchange::bit_true::IntegerFilters;
@@ -48,10 +47,9 @@ pub(super) fn folded(
     netlist: &mut Netlist,
     filters: &IntegerFilters,
     schedule: &Schedule,
-    options: &VerilogOptions,
+    bits: u32,
     output: Output,
 ) -> (usize, usize) {
-    let bits = options.words.input;
     write_history(netlist, filters, schedule, bits);
     let mut rom = Rom { cases: vec![String::new(); schedule.clocks], bits: 0, products: BTreeMap::new() };
     let mut products = vec![Vec::new(); filters.taps.ratio];
@@ -70,7 +68,7 @@ pub(super) fn folded(
     write_control(netlist, &rom.cases, stage);
     for (p, sum) in sums.into_iter().enumerate() {
         let sum = sum.map(|term| Term { word: netlist.at_stage(term.word, stage), ..term });
-        accumulate(netlist, filters, p, sum, stage, options, output);
+        accumulate(netlist, filters, p, sum, stage, bits, output);
     }
     (schedule.clocks + stage + 2, rom.bits)
 }
@@ -190,11 +188,11 @@ fn accumulate(
     phase: usize,
     sum: Option<Term>,
     stage: usize,
-    options: &VerilogOptions,
+    input_bits: u32,
     output: Output,
 ) {
     let start = -i128::from(filters.constants[phase]);
-    let sums = filters.sums(phase, options.words.input);
+    let sums = filters.sums(phase, input_bits);
     // Where no sum wraps, the accumulator begins with the half that rounds. Sums on the way may leave its
     // bits and come back.
     let half = if netlist.holds(sums) { output.half() } else { 0 };

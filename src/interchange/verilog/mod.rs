@@ -31,11 +31,16 @@ pub enum Multipliers {
     ShiftAdd,
 }
 
-/// The circuit.
+/// The circuit that is wanted. The default takes a frame at every clock, and has a register after every
+/// adder, inferred multipliers, an accumulator that never wraps, and outputs of the bits of the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct VerilogOptions {
-    /// Bits of the words.
-    pub words: WordSizes,
+    /// Bits of the samples; `None` for those of the spec's widest converter.
+    pub input_bits: Option<u32>,
+    /// Bits of the outputs; `None` for those of the samples.
+    pub output_bits: Option<u32>,
+    /// Bits of the accumulator, in which sums wrap around; `None` for as many as no sum can leave.
+    pub accumulator_bits: Option<u32>,
     /// Clocks between two frames. With more than one, each multiplier serves as many taps.
     pub clocks_per_frame: NonZeroU32,
     /// Levels of adders between two registers.
@@ -44,20 +49,21 @@ pub struct VerilogOptions {
     pub multipliers: Multipliers,
 }
 
+impl Default for VerilogOptions {
+    fn default() -> Self {
+        let (one, multipliers) = (NonZeroU32::MIN, Multipliers::Inferred);
+        let (input_bits, output_bits, accumulator_bits) = (None, None, None);
+        Self { input_bits, output_bits, accumulator_bits, clocks_per_frame: one, pipeline: one, multipliers }
+    }
+}
+
 impl VerilogOptions {
-    /// A frame at every clock, a register after every adder, inferred multipliers, an accumulator that
-    /// never wraps, and outputs of the bits of the samples: of so many, or those of the widest converter.
-    ///
-    /// # Errors
-    /// [`ExportError::NoIntegers`], and [`ExportError::NoInputBits`] where the spec states none either.
-    pub fn new(bank: &Bank, input_bits: Option<u32>) -> Result<Self, ExportError> {
-        bank.fixed_point.as_ref().ok_or(ExportError::NoIntegers { format: "Verilog" })?;
+    fn words(&self, bank: &Bank) -> Result<WordSizes, ExportError> {
         let channels = bank.spec.iter().flat_map(|spec| &spec.channels);
         let widest = channels.filter_map(|channel| channel.bits).max();
-        let input = input_bits.or(widest).ok_or(ExportError::NoInputBits)?;
-        let words = WordSizes { input, accumulator: 64, output: input };
-        let one = NonZeroU32::MIN;
-        Ok(Self { words, clocks_per_frame: one, pipeline: one, multipliers: Multipliers::Inferred })
+        let input = self.input_bits.or(widest).ok_or(ExportError::NoInputBits)?;
+        let (accumulator, output) = (self.accumulator_bits.unwrap_or(64), self.output_bits.unwrap_or(input));
+        Ok(WordSizes { input, accumulator, output })
     }
 }
 
@@ -100,23 +106,23 @@ impl Verilog {
     /// The module `name` of a bank.
     ///
     /// # Errors
-    /// [`ExportError`] for a name that is no identifier, for sizes that are out of range, and for a bank
-    /// without integer taps.
+    /// [`ExportError`] for a name that is no identifier, for sizes that are out of range or that neither the
+    /// options nor the spec say, and for a bank without integer taps.
     pub fn new(bank: &Bank, name: &str, options: &VerilogOptions) -> Result<Self, ExportError> {
         check_name(name)?;
-        let words = options.words;
         let integers = bank.fixed_point.as_ref().ok_or(ExportError::NoIntegers { format: "Verilog" })?;
+        let words = options.words(bank)?;
         let model = BitTrue::new(bank, words)?;
         let needed = model.needed_bits();
         let filters = &model.filters.modulo(words.accumulator);
         let mut netlist = Netlist::new(options.pipeline.get(), words.accumulator);
         let output = Output::new(words.output, integers.fraction_bits);
         let (clocks_per_frame, latency_clocks, rom_bits) = match options.clocks_per_frame.get() as usize {
-            1 => (1, parallel(&mut netlist, filters, options, output), 0),
+            1 => (1, parallel(&mut netlist, filters, words.input, options.multipliers, output), 0),
             _ if options.multipliers == Multipliers::ShiftAdd => return Err(ExportError::ShiftAddRom),
             clocks => {
                 let schedule = Schedule::new(filters, clocks);
-                let (latency, rom) = folded(&mut netlist, filters, &schedule, options, output);
+                let (latency, rom) = folded(&mut netlist, filters, &schedule, words.input, output);
                 (schedule.clocks, latency, rom)
             }
         };

@@ -2,10 +2,10 @@
 //! its channel, the products of one phase and lag are added by a tree, and a chain of accumulators adds the
 //! lags.
 
+use super::Multipliers;
 use super::netlist::{Netlist, Term, Word, wrapped};
 use super::output::{Output, held_sum};
 use super::shift_add::multiples;
-use super::{Multipliers, VerilogOptions};
 use crate::interchange::bit_true::IntegerFilters;
 use crate::interchange::range::Range;
 use std::collections::BTreeMap;
@@ -15,18 +15,15 @@ use std::fmt::Write;
 pub(super) fn parallel(
     netlist: &mut Netlist,
     filters: &IntegerFilters,
-    options: &VerilogOptions,
+    input_bits: u32,
+    multipliers: Multipliers,
     output: Output,
 ) -> usize {
     let taps = &filters.taps;
-    let inputs: Vec<Word> = (1..=taps.channels)
-        .map(|i| Word::at(0, format!("x{i}"), Range::of_bits(options.words.input)))
-        .collect();
-    let products: Vec<_> = inputs
-        .iter()
-        .enumerate()
-        .map(|(i, x)| products(netlist, filters, i, x, options.multipliers))
-        .collect();
+    let inputs: Vec<Word> =
+        (1..=taps.channels).map(|i| Word::at(0, format!("x{i}"), Range::of_bits(input_bits))).collect();
+    let products: Vec<_> =
+        inputs.iter().enumerate().map(|(i, x)| products(netlist, filters, i, x, multipliers)).collect();
     let trees: Vec<Vec<Option<Term>>> = (0..taps.ratio)
         .map(|p| (0..taps.lags).map(|j| tree(netlist, filters, &products, p, j)).collect())
         .collect();

@@ -1,0 +1,146 @@
+//! A bank of integer taps for hardware: the exported circuit, and the model of its bits.
+
+use crate::arrays::{Held, Shape};
+use crate::errors::{choose, file_error, refused, warn};
+use hybank::bank::Bank;
+use hybank::files::{AtomicFile, commit_all, refuse_overlaps};
+use hybank::interchange::{BitTrue, Circuit, Multipliers, Verilog, VerilogOptions, WordSizes};
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use std::io::Write;
+use std::num::NonZeroU32;
+use std::path::{Path, PathBuf};
+
+/// Random frames of a testbench unless the caller says how many.
+const RANDOM_FRAMES: u32 = 1000;
+
+/// The keywords of a circuit.
+#[derive(Debug)]
+pub(crate) struct CircuitKeywords<'a> {
+    pub(crate) output_bits: Option<u32>,
+    pub(crate) accumulator: Option<u32>,
+    pub(crate) clocks_per_frame: Option<u32>,
+    pub(crate) pipeline: Option<u32>,
+    pub(crate) multipliers: Option<&'a str>,
+    pub(crate) testbench: Option<PathBuf>,
+    pub(crate) random_frames: Option<u32>,
+}
+
+impl CircuitKeywords<'_> {
+    /// Refuses keywords that another format would ignore.
+    pub(crate) fn check_none(&self) -> PyResult<()> {
+        let numbers = [self.output_bits, self.accumulator, self.clocks_per_frame, self.pipeline];
+        let is_given = numbers.iter().any(Option::is_some) || self.multipliers.is_some();
+        if is_given || self.testbench.is_some() || self.random_frames.is_some() {
+            return Err(refused(
+                "output_bits, accumulator, clocks_per_frame, pipeline, multipliers, testbench and random_frames \
+                 describe a circuit; give format=\"verilog\" or leave them out",
+            ));
+        }
+        Ok(())
+    }
+
+    fn options(&self, input_bits: Option<u32>) -> PyResult<VerilogOptions> {
+        let kinds = [("inferred", Multipliers::Inferred), ("shift-add", Multipliers::ShiftAdd)];
+        let plain = VerilogOptions::default();
+        let multipliers = self.multipliers.map(|name| choose("multipliers", name, &kinds)).transpose()?;
+        Ok(VerilogOptions {
+            input_bits,
+            output_bits: self.output_bits,
+            accumulator_bits: self.accumulator,
+            clocks_per_frame: at_least_one("clocks_per_frame", self.clocks_per_frame)?,
+            pipeline: at_least_one("pipeline", self.pipeline)?,
+            multipliers: multipliers.unwrap_or(plain.multipliers),
+        })
+    }
+
+    /// Writes the module, and the testbench with it; the files appear together.
+    pub(crate) fn write(
+        &self,
+        bank: &Bank,
+        path: &Path,
+        name: &str,
+        input_bits: Option<u32>,
+        overwrite: bool,
+    ) -> PyResult<Circuit> {
+        if self.random_frames.is_some() && self.testbench.is_none() {
+            return Err(refused(
+                "random_frames: they belong to a testbench; give its folder, or leave them out",
+            ));
+        }
+        let verilog = Verilog::new(bank, name, &self.options(input_bits)?).map_err(refused)?;
+        let mut files = Vec::new();
+        if let Some(folder) = &self.testbench {
+            std::fs::create_dir_all(folder)?;
+            let bench = verilog.testbench(self.random_frames.unwrap_or(RANDOM_FRAMES));
+            files.extend(bench.into_iter().map(|(name, text)| (folder.join(name), text)));
+        }
+        files.push((path.to_owned(), verilog.text));
+        let paths: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
+        refuse_overlaps(&paths, &[]).map_err(file_error)?;
+        let begin = |(path, text): &(PathBuf, String)| begin_file(path, text.as_bytes(), overwrite);
+        commit_all(files.iter().map(begin).collect::<PyResult<_>>()?).map_err(file_error)?;
+        Ok(verilog.circuit)
+    }
+}
+
+fn at_least_one(keyword: &str, given: Option<u32>) -> PyResult<NonZeroU32> {
+    let number = NonZeroU32::new(given.unwrap_or(1));
+    number.ok_or_else(|| refused(format!("{keyword}: 0 is too few; give 1 or more")))
+}
+
+/// A file that is whole but has no name yet.
+pub(crate) fn begin_file(path: &Path, bytes: &[u8], overwrite: bool) -> PyResult<AtomicFile> {
+    let mut file = AtomicFile::create(path, overwrite).map_err(file_error)?;
+    file.write_all(bytes)?;
+    Ok(file)
+}
+
+/// Fuses integers as hardware does. Words have the bits of the array, whose type the output has.
+pub(crate) fn fuse<'py>(
+    bank: &Bank,
+    x: &Bound<'py, PyAny>,
+    shape: Shape,
+    accumulator: u32,
+    keep_latency: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    let held = Held::new(x, shape)?;
+    if !held.format.name().starts_with('i') {
+        let given = held.format.name();
+        return Err(refused(format!(
+            "hardware takes integers, not samples of {given}; convert them to i1, i2 or i4"
+        )));
+    }
+    let bits = 8 * held.format.bytes() as u32;
+    let words = WordSizes { input: bits, accumulator, output: bits };
+    let mut model = BitTrue::new(bank, words).map_err(refused)?;
+    // A power of two: the product is the integer itself.
+    let full_scale = f64::from(bits - 1).exp2();
+    let mut frames: Vec<i32> = held.doubles(0)?.iter().map(|x| (x * full_scale) as i32).collect();
+    let skip = if keep_latency { 0 } else { bank.output_delay() };
+    let wanted = held.frames() * bank.ratio;
+    frames.extend(model.resting().repeat(skip.div_ceil(bank.ratio)));
+    let fast = x.py().detach(|| {
+        let mut fast = vec![0; frames.len() / shape.channels * bank.ratio];
+        let outputs = fast.chunks_exact_mut(bank.ratio);
+        frames.chunks_exact(shape.channels).zip(outputs).for_each(|(frame, fast)| model.process(frame, fast));
+        fast
+    });
+    warn_of_words(x.py(), &model, accumulator)?;
+    let y = PyArray1::from_slice(x.py(), &fast[skip..skip + wanted]);
+    y.call_method1("astype", (held.format.name(),))
+}
+
+fn warn_of_words(py: Python<'_>, model: &BitTrue, accumulator: u32) -> PyResult<()> {
+    let (wraps, saturated, needed) = (model.wraps(), model.saturations(), model.needed_bits());
+    if wraps > 0 {
+        let text = format!(
+            "{wraps} sums did not fit the accumulator of {accumulator} bits; {needed} always suffice"
+        );
+        warn(py, &text, 1)?;
+    }
+    if saturated > 0 {
+        warn(py, &format!("{saturated} output samples saturated"), 1)?;
+    }
+    Ok(())
+}
