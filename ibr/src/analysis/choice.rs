@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 const MOST_SETS: f64 = 500.0;
 
 /// Choices from which exchanges start, each with another first view: the view that is best alone often is
-/// wrong beside others. Of 4 among 20 places in ten scenes, seven found a set within 0.12 dB of the best one,
-/// five within 0.49 dB, and all twenty within 0.10 dB.
+/// wrong beside others. For 4 of 20 places in ten scenes, five found sets within 0.49 dB of the best ones,
+/// seven within 0.12 dB, and all twenty within 0.10 dB.
 const STARTS: usize = 7;
 
 /// Passes of exchanges, at most; two are usual.
@@ -31,8 +31,8 @@ impl Choice {
     /// The set of `count` out of `candidates` views with the least error, which `error` computes; `None` if
     /// there are not so many.
     ///
-    /// Up to 500 sets are all tried. Of more, greedy choices from seven first views are improved by exchanges
-    /// of single views as long as these help.
+    /// Up to 500 sets are all tried. Of more, greedy choices from seven first views are improved by
+    /// exchanges of single views as long as these help.
     ///
     /// # Errors
     /// Those of `error`.
