@@ -51,8 +51,8 @@ pub struct DesignTable<M> {
     /// Whether `loss_db` asks for few signed digits, not for few bits.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub digits: bool,
-    /// Delay-scheduled taps of the method `fir`, for delays that change while the bank runs: affine functions
-    /// of the delays, optimal over the box of the `[uncertainty]` table.
+    /// Delay-scheduled taps of the method `fir`, for delays that change while the bank runs: affine
+    /// functions of the delays, optimal over the box of the `[uncertainty]` table.
     #[serde(skip_serializing_if = "std::ops::Not::not", serialize_with = "as_affine")]
     pub tracking: bool,
     /// Order reduction, for recursive methods.
