@@ -1,13 +1,13 @@
 #!/bin/sh
 # Builds the fuzz targets with coverage on the stable toolchain and runs one of them, or `all` in turn.
 # usage: ./run.sh TARGET|all [seconds of each]; TARGET is the name of a file in fuzz_targets
-# Corpora, logs and what was found stay in $HYBANK_CORPUS. A line for each target has its counts.
+# Corpora, logs and what was found stay in hybank-corpus in the folder for temporary files. A line for each target has its counts.
 set -eu
 cd "$(dirname "$0")"
 targets=$(ls fuzz_targets | sed 's/\.rs$//')
 [ "${1:?usage: ./run.sh TARGET|all [seconds], TARGET one of: $(echo $targets)}" = all ] || targets=$1
 host=$(rustc -vV | sed -n 's/^host: //p')
-corpus=${HYBANK_CORPUS:-${TMPDIR:-/tmp}/hybank-corpus}
+corpus=${TMPDIR:-/tmp}/hybank-corpus
 RUSTFLAGS="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \
 -Cllvm-args=-sanitizer-coverage-trace-compares --cfg fuzzing -Ccodegen-units=1 -Cdebug-assertions" \

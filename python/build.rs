@@ -1,4 +1,4 @@
-//! The names of Python are found when the module is loaded; the linker of macOS has to be told so.
+//! The names of Python are found when the module is loaded; the linker of macOS needs that in its arguments.
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");

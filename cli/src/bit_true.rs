@@ -2,8 +2,8 @@
 
 use super::before_after;
 use super::output::begin_samples;
-use super::print::{Failure, check_strict, name, print, warn};
-use super::run::{Job, each_block, interrupted, print_report};
+use super::print::{Failure, check_strict, name, print, print_report, warn};
+use super::run::{Job, each_block, interrupted};
 use hybank::bank::Bank;
 use hybank::files::commit_all;
 use hybank::interchange::{BitTrue, WordSizes};

@@ -84,7 +84,7 @@ pub(super) struct Args {
     #[command(flatten)]
     reading: CaptureArgs,
     #[command(flatten)]
-    turns: InterleavedArgs,
+    interleaved: InterleavedArgs,
     /// Samples of this size and more are clipped and left out [default: the ends of integer formats, 1 for
     /// floats none of which is beyond]
     #[arg(long, value_name = "LEVEL")]
@@ -178,7 +178,7 @@ impl Args {
 
     /// Refuses impossible combinations of options, before any file is read.
     fn check_usage(&self) -> Result<(), Failure> {
-        self.reading.check(self.turns.is_given())?;
+        self.reading.check(self.interleaved.is_given())?;
         check_json(self.json, &self.output, "spec")?;
         let inputs = self.captures.iter().chain(&self.check).chain(&self.training).chain([&self.spec]);
         let inputs: Vec<&Path> = inputs.map(PathBuf::as_path).collect();
@@ -205,7 +205,7 @@ impl Args {
     /// How many files are one acquisition: as many as have the channels of the spec.
     fn files_of_one(&self, paths: &[PathBuf], spec: &Spec) -> Result<usize, Failure> {
         let [first, _, ..] = paths else { return Ok(1) };
-        if self.turns.is_given() {
+        if self.interleaved.is_given() {
             return Ok(1);
         }
         // What is no file cannot be read twice.
@@ -226,8 +226,9 @@ impl Args {
         warnings: &mut Vec<String>,
     ) -> Result<Captures, Failure> {
         let layout = spec.layout();
-        let turns = self.turns.by_delay(&spec.delays_in_fast_periods(), &layout, &self.spec)?;
-        let captures = self.reading.of_converters(paths.len(), &layout, turns.as_ref(), spec.full_scale);
+        let interleaving = self.interleaved.by_delay(&spec.delays_in_fast_periods(), &layout, &self.spec)?;
+        let captures =
+            self.reading.of_converters(paths.len(), &layout, interleaving.as_ref(), spec.full_scale);
         let mut reader = start(paths, captures, interrupts())?;
         self.reading.scale.check(&reader)?;
         check_channels(spec, &reader)?;

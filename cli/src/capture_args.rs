@@ -181,7 +181,7 @@ impl InterleavedArgs {
     }
 
     /// The channels of `bank` in the order in which they sample, if they take turns.
-    pub(super) fn turns(self, bank: &Bank, path: &Path) -> Result<Option<TimeInterleaving>, Failure> {
+    pub(super) fn interleaving(self, bank: &Bank, path: &Path) -> Result<Option<TimeInterleaving>, Failure> {
         self.by_delay(&bank.delays_in_fast_periods(), &bank.layout(), path)
     }
 
@@ -194,7 +194,7 @@ impl InterleavedArgs {
         path: &Path,
     ) -> Result<Option<TimeInterleaving>, Failure> {
         let Some(converters) = self.interleaved else { return Ok(None) };
-        let found = matching::turns(converters.into(), delays, layout);
+        let found = matching::interleaving(converters.into(), delays, layout);
         found.map(Some).map_err(|problem| match problem {
             NotInTurn::Apart { .. } => Failure::of(path, problem),
             _ => Failure::Usage(format!("--interleaved {converters}: {}: {problem}", Quoted(path))),

@@ -76,8 +76,7 @@ pub(super) struct Args {
     /// With --loss-db: taps of the fewest canonical signed digits, for multiplication by shifts and adders
     #[arg(long, requires = "loss_db")]
     digits: bool,
-    /// Taps that follow the delays while the bank runs, optimal over the delays of the spec's [uncertainty]
-    /// (method fir)
+    /// Delay-scheduled taps, optimal over the delays of the spec's [uncertainty] (method fir)
     #[arg(long, value_parser = ["affine"])]
     tracking: Option<String>,
     /// Use at most this many states (methods iir and h2)

@@ -38,7 +38,7 @@ pub(super) struct Report<'a> {
     /// For a spec with `[uncertainty]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     robust: Option<&'a RobustStudy>,
-    /// For taps that follow the delays.
+    /// For delay-scheduled taps.
     #[serde(skip_serializing_if = "Option::is_none")]
     tracking: Option<&'a TrackingStudy>,
     #[serde(flatten)]

@@ -106,7 +106,7 @@ pub(super) fn robust_text(study: &RobustStudy, proven: Option<f64>, unproven: Op
     )
 }
 
-/// Taps that follow the delays, and taps that stay, over the spec's uncertainty.
+/// Delay-scheduled and fixed taps over the spec's uncertainty.
 pub(super) fn tracking_text(study: &TrackingStudy, proven: Option<f64>, unproven: Option<&str>) -> String {
     let TrackingStudy { tracked, fixed, redesigned, ratio, least_ratio, .. } = study;
     let [worst, of_fixed, redesigned_worst] =
@@ -116,7 +116,7 @@ pub(super) fn tracking_text(study: &TrackingStudy, proven: Option<f64>, unproven
         "tracked    {worst} is the largest gain found over the spec's uncertainty ({}), {} without errors\n\
          redesigned {redesigned_worst} for the delays where that was found: {:.3} % less\n\
          \x20          at all delays at most {:.3} % above what is within reach there; no affine taps: below {:.3} %\n\
-         fixed      {of_fixed} is the largest found for the best taps that stay as they are\n",
+         fixed      {of_fixed} is the largest found for the best fixed taps\n",
         at_most(proven, unproven),
         number(tracked.nominal),
         100.0 * study.excess(),

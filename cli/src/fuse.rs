@@ -6,8 +6,8 @@ use super::bit_true::BitTrueArgs;
 use super::capture_args::CaptureArgs;
 use super::observer::RunObserver;
 use super::output::bits;
-use super::print::{Failure, is_dash, print, say_understood};
-use super::run::{Finished, Job, RunArgs, RunReport, print_report};
+use super::print::{Failure, is_dash, print, print_report, say_understood};
+use super::run::{Finished, Job, RunArgs, RunReport};
 use hybank::bank::Bank;
 use hybank::io::{Container, MultiReader, PcmFormat};
 use hybank::messages::{Quoted, counted};
@@ -118,7 +118,7 @@ impl Report<'_> {
 impl Args {
     /// Refuses impossible combinations of options, before any file is read.
     fn check(&self) -> Result<(), Failure> {
-        self.reading.check(self.run.turns.is_given())?;
+        self.reading.check(self.run.interleaved.is_given())?;
         self.before_after.check(&self.inputs, &self.output, self.run.force)?;
         let prints = self.before_after.is_wanted();
         self.run.check(&self.bank, &self.inputs, &self.output, Container::Wav, prints)

@@ -99,7 +99,7 @@ impl RunObserver {
         Self { events, waiting, writer, thread, check, frames, samples, gaps: 0, replaced, clipped, open }
     }
 
-    /// Where events are told from other threads.
+    /// Where other threads report events.
     pub(super) fn events(&self) -> Events {
         self.events.clone()
     }

@@ -264,3 +264,12 @@ fn of_calibration(error: &CalibrateError) -> Option<&'static str> {
         _ => None,
     }
 }
+
+/// The report as one JSON object: on standard output, or on standard error where samples go to standard
+/// output.
+pub(super) fn print_report(report: &impl serde::Serialize, samples: &Path) -> Result<(), Failure> {
+    if !is_dash(samples) {
+        return print_json(report);
+    }
+    say_json(report)
+}

@@ -36,15 +36,15 @@ pub(super) struct Args {
     #[command(flatten)]
     reading: CaptureArgs,
     #[command(flatten)]
-    turns: InterleavedArgs,
+    interleaved: InterleavedArgs,
     /// Replace an existing file
     #[arg(long)]
     force: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
-    args.reading.check(args.turns.is_given())?;
-    args.turns.check(args.inputs.len())?;
+    args.reading.check(args.interleaved.is_given())?;
+    args.interleaved.check(args.inputs.len())?;
     let inputs: Vec<&Path> = args.inputs.iter().chain([&args.bank]).map(PathBuf::as_path).collect();
     check_output(&args.output, &inputs, args.force)?;
     let is_page = |ending: &OsStr| ["html", "htm"].iter().any(|page| ending.eq_ignore_ascii_case(page));
@@ -75,7 +75,7 @@ impl Args {
     fn commands(&self) -> Vec<String> {
         let bank = self.bank.display();
         let inputs: String = self.inputs.iter().map(|path| format!(" {}", path.display())).collect();
-        let inputs = inputs + &self.reading.typed() + &self.turns.typed();
+        let inputs = inputs + &self.reading.typed() + &self.interleaved.typed();
         let mut commands = vec![
             "hybank design spec.toml -o bank.json  # the spec above, saved as spec.toml".to_owned(),
             format!("hybank verify {bank}"),
@@ -92,9 +92,10 @@ impl Args {
     /// The captures, fused by `bank`.
     fn captures(&self, bank: &Bank) -> Result<CapturesOnPage, Failure> {
         let full_scale = bank.spec.as_ref().and_then(|spec| spec.full_scale);
-        let turns = self.turns.turns(bank, &self.bank)?;
+        let interleaving = self.interleaved.interleaving(bank, &self.bank)?;
         let layout = bank.layout();
-        let captures = self.reading.of_converters(self.inputs.len(), &layout, turns.as_ref(), full_scale);
+        let captures =
+            self.reading.of_converters(self.inputs.len(), &layout, interleaving.as_ref(), full_scale);
         let mut reader = start(&self.inputs, captures, crossbeam_channel::never())?;
         self.reading.scale.check(&reader)?;
         let rate = Hertz(output_rate(bank, &self.bank, &reader)?);

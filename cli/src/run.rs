@@ -7,7 +7,7 @@ use super::gaps::{GapArgs, say_gaps};
 use super::interrupt::interrupts;
 use super::observer::{ObserverArgs, RunObserver};
 use super::output::{begin_samples, check_files};
-use super::print::{Failure, check_strict, is_dash, print_json, say_json, warn};
+use super::print::{Failure, check_strict, warn};
 use super::track::{TrackArgs, TrackRecord, Tracked};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hybank::bank::Bank;
@@ -29,7 +29,7 @@ pub(super) struct RunArgs {
     #[arg(long, value_parser = algorithms(), default_value_t = Algorithm::Auto)]
     algorithm: Algorithm,
     #[command(flatten)]
-    pub(super) turns: InterleavedArgs,
+    pub(super) interleaved: InterleavedArgs,
     #[command(flatten)]
     pub(super) gaps: GapArgs,
     #[command(flatten)]
@@ -93,7 +93,7 @@ impl RunArgs {
     ) -> Result<(), Failure> {
         check_stdin(inputs.iter().map(PathBuf::as_path).chain([bank]))?;
         self.gaps.check()?;
-        self.turns.check(inputs.len())?;
+        self.interleaved.check(inputs.len())?;
         self.observer.check(output, self.json || prints)?;
         self.track.check(self.algorithm)?;
         let inputs = inputs.iter().map(PathBuf::as_path).chain([bank]);
@@ -149,7 +149,7 @@ impl Job<'_> {
     ) -> Result<MultiReader, Failure> {
         let args = self.args;
         let lost = args.gaps.lost_samples(self.is_live)?;
-        let turns = args.turns.turns(self.bank, self.bank_path)?;
+        let interleaving = args.interleaved.interleaving(self.bank, self.bank_path)?;
         let stalls = observer.map(RunObserver::stall_watch);
         // Enough for all threads.
         let block_bytes = if args.threads == 1 { BLOCK_BYTES } else { 8 * BLOCK_BYTES };
@@ -157,7 +157,7 @@ impl Job<'_> {
         let layout = self.bank.layout();
         let files = ReadOptions {
             block_bytes,
-            interleaving: turns.as_ref(),
+            interleaving: interleaving.as_ref(),
             samples_per_frame: matching::samples_per_frame(&layout, inputs.len()),
             stalls: stalls.as_ref(),
             full_scale: self.scale.given().or(stated),
@@ -191,7 +191,7 @@ impl Job<'_> {
         output_rate(self.bank, self.bank_path, reader)
     }
 
-    /// Fuses all frames and writes the outputs; `each` is told how many frames a step had.
+    /// Fuses all frames and writes the outputs; `each` gets the number of frames of a step.
     pub(super) fn run(
         &self,
         plan: &Plan,
@@ -393,13 +393,4 @@ impl RunReport {
         self.warnings.extend(reported);
         self
     }
-}
-
-/// The report as one JSON object: on standard output, or on standard error where samples go to standard
-/// output.
-pub(super) fn print_report(report: &impl serde::Serialize, samples: &Path) -> Result<(), Failure> {
-    if !is_dash(samples) {
-        return print_json(report);
-    }
-    say_json(report)
 }

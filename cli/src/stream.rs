@@ -3,8 +3,8 @@
 use super::capture_args::{ScaleArgs, check_channels, coding};
 use super::observer::RunObserver;
 use super::output::is_wav;
-use super::print::{say_line, say_understood};
-use super::run::{Finished, Job, RunArgs, RunReport, print_report};
+use super::print::{print_report, say_line, say_understood};
+use super::run::{Finished, Job, RunArgs, RunReport};
 use super::{Failure, bank_file};
 use hybank::bank::Bank;
 use hybank::io::{Coding, Container, PcmFormat, ReadOptions, is_self_describing};

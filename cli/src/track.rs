@@ -1,4 +1,4 @@
-//! Taps that follow the delays while a bank runs: the options of `fuse` and `stream`, and what connects the
+//! Delay-scheduled taps: the options of `fuse` and `stream`, and what connects the
 //! follower of delays to the pipeline.
 
 use super::bank_file::read_text;

@@ -22,7 +22,7 @@ PERIOD_NS = 4
 
 def table(name):
     """The rows of integers of a file of vectors."""
-    path = Path(os.environ["HYBANK_VECTORS"], name)
+    path = Path(os.environ["VECTORS"], name)
     return [[int(number) for number in line.split()] for line in path.read_text().splitlines()]
 
 
@@ -79,7 +79,7 @@ def main():
         hdl_toplevel=core.stem,
         test_module="cocotb_core",
         test_dir=vectors / "cocotb",
-        extra_env={"HYBANK_VECTORS": str(vectors), "PYTHONPATH": str(Path(__file__).parent)},
+        extra_env={"VECTORS": str(vectors), "PYTHONPATH": str(Path(__file__).parent)},
     )
     tree = Path(results).read_text()
     sys.exit("<failure" in tree or "<error" in tree)

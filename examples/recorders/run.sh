@@ -21,7 +21,7 @@ hybank align "$here/spec.toml" captures/ch1.wav captures/ch2.wav -o aligned.toml
 hybank design aligned.toml -o bank.json
 hybank verify bank.json
 
-# With taps that stay, and with taps that follow the delay as `align` found it.
+# With fixed taps, and with delay-scheduled taps that follow the delay as `align` found it.
 hybank fuse bank.json aligned/ch1.wav aligned/ch2.wav -o fixed.wav
 hybank fuse bank.json aligned/ch1.wav aligned/ch2.wav -o fused.wav --track aligned/drift.jsonl
 hybank measure fixed.wav --ref captures/target.wav

@@ -1,7 +1,6 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
-mod assemble;
 mod balance;
 pub mod blocks;
 mod eigen;
@@ -10,7 +9,6 @@ pub mod least_squares;
 mod scalar;
 mod solve;
 
-pub use assemble::{block_diagonal, from_blocks, hstack, vstack};
 pub use balance::{power_of_two, state_scales};
 pub use eigen::{
     candidate_eigenvalues, eigen, eigenvalues, hermitian_eigenvalues, largest_singular_value, real_schur,
@@ -21,7 +19,7 @@ pub use solve::{PositiveFactor, cholesky, inverse, lq, lq_factor, solve, solve_l
 
 use faer::MatRef;
 pub use nalgebra::Complex;
-use nalgebra::DMatrix;
+use nalgebra::{ComplexField, DMatrix};
 
 /// Real matrix of run-time size.
 pub type Mat = DMatrix<f64>;
@@ -109,4 +107,57 @@ pub fn dot(x: &[f64], y: &[f64]) -> f64 {
     }
     sums.iter_mut().zip(x_rest.iter().zip(y_rest)).for_each(|(sum, (x, y))| *sum += x * y);
     sums.iter().sum()
+}
+
+/// `[p_1 p_2 ..]`: the `parts` side by side. No parts give a 0 x 0 matrix.
+///
+/// # Panics
+/// If the numbers of rows differ.
+pub fn hstack<T: ComplexField>(parts: &[&DMatrix<T>]) -> DMatrix<T> {
+    let rows = parts.first().map_or(0, |first| first.nrows());
+    let mut whole = DMatrix::zeros(rows, parts.iter().map(|m| m.ncols()).sum());
+    let mut start = 0;
+    for part in parts {
+        whole.columns_mut(start, part.ncols()).copy_from(part);
+        start += part.ncols();
+    }
+    whole
+}
+
+/// `[p_1; p_2; ..]`: the `parts` on top of one another, the first one uppermost. No parts give a 0 x 0
+/// matrix.
+///
+/// # Panics
+/// If the numbers of columns differ.
+pub fn vstack<T: ComplexField>(parts: &[&DMatrix<T>]) -> DMatrix<T> {
+    let columns = parts.first().map_or(0, |first| first.ncols());
+    let mut whole = DMatrix::zeros(parts.iter().map(|m| m.nrows()).sum(), columns);
+    let mut start = 0;
+    for part in parts {
+        whole.rows_mut(start, part.nrows()).copy_from(part);
+        start += part.nrows();
+    }
+    whole
+}
+
+/// The matrix of the given rows of blocks, `from_blocks(&[&[&a, &b], &[&c, &d]]) = [a b; c d]`.
+///
+/// # Panics
+/// If the blocks of a row differ in their numbers of rows, or the rows in their widths.
+pub fn from_blocks<T: ComplexField>(rows: &[&[&DMatrix<T>]]) -> DMatrix<T> {
+    let rows: Vec<DMatrix<T>> = rows.iter().map(|row| hstack(row)).collect();
+    vstack(&rows.iter().collect::<Vec<_>>())
+}
+
+/// `diag(p_1, p_2, ..)`: the `parts` along the diagonal, zeros elsewhere. Parts without rows or without
+/// columns take up columns or rows only.
+pub fn block_diagonal<T: ComplexField>(parts: &[&DMatrix<T>]) -> DMatrix<T> {
+    let (rows, cols) = parts.iter().fold((0, 0), |(r, c), m| (r + m.nrows(), c + m.ncols()));
+    let mut whole = DMatrix::zeros(rows, cols);
+    let mut start = (0, 0);
+    for part in parts {
+        whole.view_mut(start, part.shape()).copy_from(part);
+        start = (start.0 + part.nrows(), start.1 + part.ncols());
+    }
+    whole
 }

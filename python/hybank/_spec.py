@@ -77,7 +77,7 @@ def design(
     noise : float, optional
         Noise of all converters.
     tracking : {"affine"}, optional
-        Taps that follow the delays.
+        Delay-scheduled taps.
     replace : dict, optional
         With `source`: `latency` and the keys from `method` on, in place of those of the spec.
     proof : bool

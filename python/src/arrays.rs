@@ -6,10 +6,13 @@ use hybank::bank::FrameLayout;
 use hybank::memory::available_memory;
 use hybank::runtime::{Input, Isa, PcmFrames, SampleLayout};
 use numpy::ndarray::Axis;
-use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{
+    Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
-use pyo3::types::{PyList, PySlice, PyTuple};
+use pyo3::types::{PyDict, PyList, PySlice, PyTuple};
 
 /// Lists of doubles that a computation on samples holds at once, about: the samples, those of each channel,
 /// transforms and spectra.
@@ -272,4 +275,24 @@ fn plain<'py>(x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         true => array.call_method1("astype", ("f8",)),
         false => Ok(array),
     }
+}
+
+/// Rows of `columns` numbers as a read-only array; a matrix without rows keeps its columns.
+pub(crate) fn matrix(
+    py: Python<'_>,
+    rows: Vec<Vec<f64>>,
+    columns: usize,
+) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    let count = rows.len();
+    let flat: Vec<f64> = rows.into_iter().flatten().collect();
+    read_only(PyArray1::from_vec(py, flat).reshape([count, columns])?)
+}
+
+pub(crate) fn read_only<'py, T: Element, D: numpy::ndarray::Dimension>(
+    array: Bound<'py, numpy::PyArray<T, D>>,
+) -> PyResult<Bound<'py, numpy::PyArray<T, D>>> {
+    let flags = PyDict::new(array.py());
+    flags.set_item("write", false)?;
+    array.call_method("setflags", (), Some(&flags))?;
+    Ok(array)
 }

@@ -1,31 +1,25 @@
 //! `hybank.Bank` and `hybank.load`.
 
-use crate::arrays::framed;
+use crate::arrays::{framed, matrix, read_only};
 use crate::background;
-use crate::errors::{choose, file_error, no_others, refused};
+use crate::errors::{choose, no_others, refused};
 use crate::fuse::{self, Request, parse_algorithm, parse_gaps};
-use crate::hardware::{self, CircuitKeywords, begin_file};
+use crate::hardware::{self, CircuitKeywords};
+use crate::outputs::write_file;
 use crate::pictures;
+use crate::responses::{self, Matrices, Row, Rows};
 use crate::results::{figures, of_report, record};
 use crate::running::{Extras, Follow};
 use crate::sources;
 use crate::stream::Stream;
-use hybank::bank::{self, StateSpace, SynthesisFilters};
+use hybank::bank::{self, SynthesisFilters};
 use hybank::design;
-use hybank::design::responses::{fir_response, front_end_gains, impulse_responses};
 use hybank::interchange::{Format as Exported, export};
-use hybank::units::Hertz;
-use numpy::{Complex64, Element, PyArray1, PyArray2, PyArrayMethods};
+use numpy::{Complex64, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
-
-/// Most states of a realisation as dense matrices: 128 MiB.
-const MOST_DENSE_STATES: usize = 4096;
-
-/// Most frequencies of a response, which take a minute.
-const MOST_FREQUENCIES: usize = 10_000_000;
 
 #[doc = include_str!("docs/load.rst")]
 #[pyfunction]
@@ -33,9 +27,6 @@ pub(crate) fn load(path: PathBuf) -> PyResult<Bank> {
     let text = sources::read(&path)?;
     sources::parse_bank(&text, &path.display().to_string()).map(Bank::from)
 }
-
-/// A one-dimensional array of doubles.
-type Array<'py> = Bound<'py, PyArray1<f64>>;
 
 /// Synthesis filters with the data to run and verify them.
 #[pyclass(frozen, module = "hybank")]
@@ -48,14 +39,6 @@ impl From<bank::Bank> for Bank {
         Self { bank: Arc::new(bank) }
     }
 }
-
-/// `a`, `b`, `c` and `d`.
-type Matrices<'py> = (
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-);
 
 #[pymethods]
 impl Bank {
@@ -219,58 +202,25 @@ impl Bank {
     /// The matrices (a, b, c, d) of the bank per slow period: N inputs, M outputs.
     #[getter]
     fn ss<'py>(&self, py: Python<'py>) -> PyResult<Matrices<'py>> {
-        let StateSpace { a, b, c, d } = self.block()?;
-        let (states, channels) = (a.len(), self.bank.frame_samples());
-        Ok((
-            matrix(py, a, states)?,
-            matrix(py, b, channels)?,
-            matrix(py, c, states)?,
-            matrix(py, d, channels)?,
-        ))
+        responses::state_space(py, &self.bank)
     }
 
     #[doc = include_str!("docs/Bank.error_response.rst")]
     #[pyo3(signature = (n = 512))]
-    fn error_response<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Array<'py>, Array<'py>)> {
-        let count = frequency_count(n)?;
-        let bank = Arc::clone(&self.bank);
-        let points = background::run(py, None, move |_| design::error_response(&bank, count))?;
-        let points = points.map_err(refused)?;
-        let (hertz, gain): (Vec<f64>, Vec<f64>) =
-            points.into_iter().map(|(hertz, gain)| (hertz.0, gain)).unzip();
-        Ok((PyArray1::from_vec(py, hertz), PyArray1::from_vec(py, gain)))
+    fn error_response<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Row<'py>, Row<'py>)> {
+        responses::error_response(py, &self.bank, n)
     }
 
     #[doc = include_str!("docs/Bank.frequency_response.rst")]
     #[pyo3(signature = (n = 512))]
-    fn frequency_response<'py>(
-        &self,
-        py: Python<'py>,
-        n: i64,
-    ) -> PyResult<(Array<'py>, Bound<'py, PyArray2<Complex64>>)> {
-        let (frequencies, bank) = (self.frequencies(n)?, Arc::clone(&self.bank));
-        let of = frequencies.clone();
-        let rows = background::run(py, None, move |_| {
-            let angular = |f: &Hertz| f.angular().per_fast_period(bank.fast_period);
-            let row = |taps: &Vec<f64>| of.iter().map(|f| fir_response(taps, angular(f)).0).collect();
-            impulse_responses(&bank).iter().map(row).collect::<Vec<Vec<Complex64>>>()
-        })?;
-        let rows = PyArray2::from_vec2(py, &rows)?;
-        Ok((PyArray1::from_iter(py, frequencies.iter().map(|f| f.0)), rows))
+    fn frequency_response<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Row<'py>, Rows<'py, Complex64>)> {
+        responses::frequency_response(py, &self.bank, n)
     }
 
     #[doc = include_str!("docs/Bank.front_end_gains.rst")]
     #[pyo3(signature = (n = 512))]
-    fn front_end_gains<'py>(
-        &self,
-        py: Python<'py>,
-        n: i64,
-    ) -> PyResult<(Array<'py>, Bound<'py, PyArray2<f64>>)> {
-        let frequencies = self.frequencies(n)?;
-        let gains = front_end_gains(&self.bank, &frequencies).map_err(refused)?;
-        let count = 1 + self.bank.channel_count();
-        let rows: Vec<Vec<f64>> = (0..count).map(|i| gains.iter().map(|gains| gains[i]).collect()).collect();
-        Ok((PyArray1::from_iter(py, frequencies.iter().map(|f| f.0)), PyArray2::from_vec2(py, &rows)?))
+    fn front_end_gains<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Row<'py>, Rows<'py>)> {
+        responses::front_end_gains(py, &self.bank, n)
     }
 
     #[doc = include_str!("docs/Bank.figures.rst")]
@@ -449,43 +399,6 @@ impl Bank {
     }
 }
 
-impl Bank {
-    /// Equidistant frequencies from 0 to half the fast rate.
-    fn frequencies(&self, n: i64) -> PyResult<Vec<Hertz>> {
-        let count = frequency_count(n)?;
-        let step = 0.5 / self.bank.fast_period.0 / count.saturating_sub(1).max(1) as f64;
-        Ok((0..count).map(|k| Hertz(step * k as f64)).collect())
-    }
-
-    /// The bank as a state space, if it is not too large for dense matrices.
-    fn block(&self) -> PyResult<StateSpace> {
-        let lags = |f: &Vec<f64>| f.len().div_ceil(self.bank.ratio).saturating_sub(1);
-        let states = match &self.bank.filters {
-            SynthesisFilters::Fir(taps) => {
-                taps.iter().map(lags).max().unwrap_or(0).saturating_mul(taps.len())
-            }
-            _ => 0,
-        };
-        if states > MOST_DENSE_STATES {
-            return Err(refused(format!(
-                "ss would have {states} states, and dense matrices of at most {MOST_DENSE_STATES} are made; use taps"
-            )));
-        }
-        let filters = design::filters::lifted(&self.bank.filters, self.bank.ratio);
-        Ok(design::filters::to_block(&filters))
-    }
-}
-
-fn frequency_count(n: i64) -> PyResult<usize> {
-    let count = usize::try_from(n).ok().filter(|&count| count <= MOST_FREQUENCIES);
-    count.ok_or_else(|| refused(format!("n: {n} frequencies; give 0 to {MOST_FREQUENCIES}")))
-}
-
-/// Writes a file, which appears when it is whole.
-fn write_file(path: &Path, bytes: &[u8], overwrite: bool) -> PyResult<()> {
-    begin_file(path, bytes, overwrite)?.commit().map_err(file_error)
-}
-
 /// The formats by name.
 const FORMATS: [(&str, Exported); 9] = [
     ("c99", Exported::C99),
@@ -498,19 +411,3 @@ const FORMATS: [(&str, Exported); 9] = [
     ("sos", Exported::Sos),
     ("verilog", Exported::Verilog),
 ];
-
-/// Rows of `columns` numbers as a read-only array; a matrix without rows keeps its columns.
-fn matrix(py: Python<'_>, rows: Vec<Vec<f64>>, columns: usize) -> PyResult<Bound<'_, PyArray2<f64>>> {
-    let count = rows.len();
-    let flat: Vec<f64> = rows.into_iter().flatten().collect();
-    read_only(PyArray1::from_vec(py, flat).reshape([count, columns])?)
-}
-
-fn read_only<'py, T: Element, D: numpy::ndarray::Dimension>(
-    array: Bound<'py, numpy::PyArray<T, D>>,
-) -> PyResult<Bound<'py, numpy::PyArray<T, D>>> {
-    let flags = PyDict::new(array.py());
-    flags.set_item("write", false)?;
-    array.call_method("setflags", (), Some(&flags))?;
-    Ok(array)
-}

@@ -22,8 +22,8 @@ pub(crate) fn design(
     let keys = DesignOverrides::from_data(values::table(keys)?, "design");
     let mut spec = sources::spec_with(source, keys.map_err(|error| spec_error(py, &error))?)?;
     spec.latency = latency.or(spec.latency);
-    for doubt in warnings(&spec).unwrap_or_default() {
-        warn(py, &doubt, 3)?;
+    for warning in warnings(&spec).unwrap_or_default() {
+        warn(py, &warning, 3)?;
     }
     let proof = if proof { ProofSearch::Run } else { ProofSearch::Skip };
     let limits = if limits { Limits::Enforced } else { Limits::Off };

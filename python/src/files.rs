@@ -41,7 +41,7 @@ pub(crate) fn read<'py>(
     let layout = bank.map(hybank::bank::Bank::layout);
     let turns = match (options.interleaved, bank, &layout) {
         (Some(converters), Some(bank), Some(layout)) => {
-            let turns = matching::turns(converters, &bank.delays_in_fast_periods(), layout);
+            let turns = matching::interleaving(converters, &bank.delays_in_fast_periods(), layout);
             Some(turns.map_err(|problem| refused(format!("interleaved: {problem}")))?)
         }
         _ => None,
@@ -111,7 +111,7 @@ pub(crate) fn turns(source: &Bound<'_, PyAny>, interleaved: usize) -> PyResult<V
         Ok(bank) => (bank.get().bank.delays_in_fast_periods(), bank.get().bank.layout()),
         Err(_) => sources::spec(source).map(|spec| (spec.delays_in_fast_periods(), spec.layout()))?,
     };
-    let turns = matching::turns(interleaved, &delays, &layout);
+    let turns = matching::interleaving(interleaved, &delays, &layout);
     let turns = turns.map_err(|problem| refused(format!("interleaved: {problem}")))?;
     Ok(turns.channels().to_vec())
 }

@@ -2,12 +2,12 @@
 
 use crate::arrays::{Held, Shape};
 use crate::errors::{choose, file_error, refused, warn};
+use crate::outputs::begin_file;
 use hybank::bank::Bank;
-use hybank::files::{AtomicFile, commit_all, refuse_overlaps};
+use hybank::files::{commit_all, refuse_overlaps};
 use hybank::interchange::{BitTrue, Circuit, Multipliers, Verilog, VerilogOptions, WordSizes};
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use std::io::Write;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
@@ -87,13 +87,6 @@ impl CircuitKeywords<'_> {
 fn at_least_one(keyword: &str, given: Option<u32>) -> PyResult<NonZeroU32> {
     let number = NonZeroU32::new(given.unwrap_or(1));
     number.ok_or_else(|| refused(format!("{keyword}: 0 is too few; give 1 or more")))
-}
-
-/// A file that is whole but has no name yet.
-pub(crate) fn begin_file(path: &Path, bytes: &[u8], overwrite: bool) -> PyResult<AtomicFile> {
-    let mut file = AtomicFile::create(path, overwrite).map_err(file_error)?;
-    file.write_all(bytes)?;
-    Ok(file)
 }
 
 /// Fuses integers as hardware does. Words have the bits of the array, whose type the output has.

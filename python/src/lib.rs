@@ -25,6 +25,7 @@ mod outputs;
 mod pictures;
 mod proofs;
 mod recordings;
+mod responses;
 mod results;
 mod running;
 mod runs;

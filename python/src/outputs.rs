@@ -1,11 +1,14 @@
-//! New arrays for outputs.
+//! New arrays and files for outputs.
 
 use crate::arrays::{Held, Shape};
-use crate::errors::refused;
+use crate::errors::{file_error, refused};
 use crate::formats::Format;
+use hybank::files::AtomicFile;
 use hybank::runtime::{Input, Isa, Output, PcmFrames, PcmOutput, Sample};
 use numpy::{PyArray1, PyArrayMethods, PyReadwriteArray1};
 use pyo3::prelude::*;
+use std::io::Write;
+use std::path::Path;
 
 /// Bytes for which there is always memory. More are asked of NumPy by name, which raises `MemoryError` and
 /// takes a little longer.
@@ -68,4 +71,16 @@ fn zeros(py: Python<'_>, bytes: usize) -> PyResult<PyReadwriteArray1<'_, u8>> {
     }
     let zeros = py.import("numpy")?.call_method1("zeros", (bytes, "u1"))?;
     zeros.cast_into::<PyArray1<u8>>()?.try_readwrite().map_err(refused)
+}
+
+/// Writes a file, which appears when it is whole.
+pub(crate) fn write_file(path: &Path, bytes: &[u8], overwrite: bool) -> PyResult<()> {
+    begin_file(path, bytes, overwrite)?.commit().map_err(file_error)
+}
+
+/// A file that is whole but has no name yet.
+pub(crate) fn begin_file(path: &Path, bytes: &[u8], overwrite: bool) -> PyResult<AtomicFile> {
+    let mut file = AtomicFile::create(path, overwrite).map_err(file_error)?;
+    file.write_all(bytes)?;
+    Ok(file)
 }

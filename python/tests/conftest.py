@@ -11,6 +11,11 @@ import hybank as hb
 ROOT = Path(__file__).resolve().parents[2]
 
 
+def pytest_addoption(parser):
+    """An option of the tests of notebooks."""
+    parser.addoption("--write-notebooks", action="store_true", help="write outputs into the notebooks")
+
+
 @pytest.fixture(scope="session")
 def filters():
     """The folder of finished specs and banks."""

@@ -1,9 +1,8 @@
 """The notebooks run from top to bottom and have the outputs that they show.
 
-HYBANK_NOTEBOOKS=write pytest python/tests/test_notebooks.py    writes these outputs into the notebooks
+pytest python/tests/test_notebooks.py --write-notebooks    writes these outputs into the notebooks
 """
 
-import os
 import re
 from pathlib import Path
 
@@ -34,7 +33,7 @@ def shown(cells):
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebook_has_its_outputs(path, tmp_path, monkeypatch):
+def test_a_notebook_has_its_outputs(path, tmp_path, monkeypatch, request):
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
     pytest.importorskip("ipykernel")
     pytest.importorskip("matplotlib")
@@ -48,7 +47,7 @@ def test_a_notebook_has_its_outputs(path, tmp_path, monkeypatch):
         # Times of the run say nothing to a reader.
         cell.metadata.pop("execution", None)
     found = shown(notebook.cells)
-    if os.environ.get("HYBANK_NOTEBOOKS") == "write":
+    if request.config.getoption("--write-notebooks"):
         nbformat.write(notebook, path)
         return
     assert len(stored) == len(found) and any(text for text, _ in stored)

@@ -52,13 +52,13 @@ mod state;
 mod stream;
 #[cfg(test)]
 mod tests;
-#[cfg(feature = "rayon")]
-mod thread_pool;
 
 pub use adapters::{Frames, Input, Interleaved, Output, PcmOutput, Planar, SplitOutput, Zeros};
 pub use algorithms::choice::{Algorithm, ParseAlgorithmError, Precision};
 pub use algorithms::recursive::{DelayLines, DelayedInput, StateSpace};
 pub use error::{BuildError, ProcessError, StateError, SwapError};
+#[cfg(feature = "rayon")]
+pub use parallel::ThreadPool;
 pub use pcm::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
 pub use plan::{Options, Plan, PlanSummary};
 pub use sample::{Sample, Shape};
@@ -66,5 +66,3 @@ pub use simd::Isa;
 pub use simd::multiply_add_chains;
 pub use state::STATE_COUNTS;
 pub use stream::Stream;
-#[cfg(feature = "rayon")]
-pub use thread_pool::ThreadPool;

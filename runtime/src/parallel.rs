@@ -5,10 +5,11 @@
 //! than threads: a thread that is done takes the next one, so that a thread that was held up does not hold
 //! up all.
 
+use crate::Sample;
 use crate::adapters::{Frames, Input, SplitOutput};
 use crate::algorithms::Filter;
 use crate::algorithms::direct::{Direct, DirectState};
-use crate::{Sample, ThreadPool};
+use std::io;
 use std::ops::Range;
 
 /// Multiply-adds that are worth a chunk: some tens of microseconds, many times what it costs to hand it
@@ -88,5 +89,44 @@ impl<T: Sample, I: Input + Sync + ?Sized> Call<'_, T, I> {
                 (self.filter.process(&mut own, &chunk, output), Some(own))
             }
         }
+    }
+}
+
+/// Threads that wait for work; any number of streams may use them.
+///
+/// ```
+/// use hybank_runtime::{Interleaved, Options, Plan, Stream, ThreadPool};
+///
+/// let pool = ThreadPool::new(2)?;
+/// let taps = [vec![0.5, 1.0, 0.5, 0.0], vec![0.0, 0.5, 1.0, 0.5]];
+/// let plan = Plan::from_taps(&taps, 2, 1, Options::default())?;
+/// let (input, mut output) = (vec![0.5f32; 2000], vec![0.0f32; 2000]);
+/// Stream::new(&plan).run_parallel(&Interleaved::new(&input, 2)?, &mut output[..], &pool)?;
+/// assert_eq!(output[1998..], [1.0, 1.0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct ThreadPool {
+    pool: rayon::ThreadPool,
+}
+
+impl ThreadPool {
+    /// Starts `threads` threads, one for each processor if that is 0.
+    ///
+    /// # Errors
+    /// If the system starts no more threads.
+    pub fn new(threads: usize) -> io::Result<Self> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        Ok(Self { pool: pool.map_err(io::Error::other)? })
+    }
+
+    /// How many there are.
+    pub fn threads(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+
+    /// Runs a task on these threads and waits for it; what it joins may go to any of them.
+    pub(crate) fn install<R: Send>(&self, task: impl FnOnce() -> R + Send) -> R {
+        self.pool.install(task)
     }
 }

@@ -22,7 +22,6 @@
 //! Finally every state is scaled by a power of two so that its impulse response has unit energy up to
 //! rounding to that power: no state is large only because its pole is fast.
 
-mod balance;
 mod error;
 mod families;
 pub mod fit;

@@ -20,12 +20,12 @@ const COEFFICIENT_ERROR: f64 = 2.0 * Float512::ROUNDING;
 /// clusters, to which the eigenvalues are poor approximations.
 const MAX_STEPS: usize = 100;
 /// Relative correction from which the next approximation has all its digits, because each step triples them.
-const SETTLED: f64 = 1e-70;
+const CONVERGED_CORRECTION: f64 = 1e-70;
 /// Relative change of the first approximations by which they lose their symmetry: two real ones could not
 /// become a conjugate pair otherwise.
 const ASYMMETRY: f64 = 1e-10;
 /// Imaginary part over modulus of an approximation to a real root. The discs decide whether it is real.
-const REAL: f64 = 1e-100;
+const REAL_ROOT_TOLERANCE: f64 = 1e-100;
 /// Covers the rounding of the radii, which are computed with some hundred operations of 512 bits and then
 /// rounded to doubles.
 const OUTWARD: f64 = 1.0 + 1e-12;
@@ -109,7 +109,7 @@ fn refined(p: &[Float512], mut roots: Vec<Long>) -> Vec<Long> {
                 roots[i] = z - step;
             }
             // NaN compares as not settled.
-            settled &= size <= SETTLED * modulus(z).nearest();
+            settled &= size <= CONVERGED_CORRECTION * modulus(z).nearest();
         }
         if settled {
             break;
@@ -146,7 +146,7 @@ fn modulus(z: Long) -> Float512 {
 /// The approximations with exact symmetry: real roots on the axis, the others in conjugate pairs. `None` if
 /// some have no partner.
 fn symmetric(roots: Vec<Long>) -> Option<Vec<Long>> {
-    let is_real = |z: &Long| z.im.nearest().abs() <= REAL * modulus(*z).nearest();
+    let is_real = |z: &Long| z.im.nearest().abs() <= REAL_ROOT_TOLERANCE * modulus(*z).nearest();
     let (real_ones, others): (Vec<Long>, Vec<Long>) = roots.into_iter().partition(is_real);
     let (upper, lower): (Vec<Long>, Vec<Long>) = others.into_iter().partition(|z| z.im.nearest() > 0.0);
     let real_ones = real_ones.into_iter().map(|z| real(z.re));

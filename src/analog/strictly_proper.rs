@@ -6,8 +6,7 @@ use crate::spec::FilterSpec;
 use crate::units::{RadiansPerFastPeriod, Seconds};
 use std::ops::Deref;
 
-use super::balance::{output_energy, with_unit_states};
-use super::realise::Chain;
+use super::realise::{Chain, output_energy, with_unit_states};
 use super::section::Realisation;
 use super::{AnalogError, MAX_GAIN, MAX_NORMALISED_POLE, MIN_DAMPING_RATIO, MIN_GAIN, MIN_NORMALISED_POLE};
 

@@ -8,7 +8,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 /// Compensates for the rounding of the radius itself: at most a dozen operations in double precision.
 pub(crate) const OUTWARD: f64 = 1.0 + 32.0 * f64::EPSILON;
 /// Covers what underflows: the operations err by less than 2^-1070 there, and `nearest` by 2^-1074.
-const TINY: f64 = 1e-290;
+const UNDERFLOW_ERROR: f64 = 1e-290;
 
 /// All numbers x with `|x - mid| <= radius`. With an infinite or NaN radius the number is unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -58,7 +58,7 @@ impl<F: Number> Ball<F> {
     /// A bound on the modulus of the midpoint, up to a relative error of 2^-52.
     #[inline]
     fn size(self) -> f64 {
-        if self.mid == F::ZERO { 0.0 } else { self.mid.nearest().abs() + TINY }
+        if self.mid == F::ZERO { 0.0 } else { self.mid.nearest().abs() + UNDERFLOW_ERROR }
     }
 
     /// No value of the ball is less.
@@ -82,7 +82,7 @@ impl<F: Number> Ball<F> {
 
     #[inline]
     fn rounded(mid: F, inherited: f64) -> Self {
-        Self { mid, radius: (inherited + F::ROUNDING * mid.nearest().abs()) * OUTWARD + TINY }
+        Self { mid, radius: (inherited + F::ROUNDING * mid.nearest().abs()) * OUTWARD + UNDERFLOW_ERROR }
     }
 
     /// A number of which nothing is known.

@@ -14,8 +14,8 @@ const ROUNDING: f64 = 1.0 / (1u128 << 100) as f64;
 
 /// Quotients of dividends below this, and roots of radicands below this, are formed of operands times
 /// [`LIFT`]: their residuals would underflow, and with them the lower half of the result.
-const SMALL: f64 = f64::from_bits((1023 - 700) << 52);
-/// 2^300: lifts the smallest double above [`SMALL`] in two steps.
+const LEAST_UNLIFTED: f64 = f64::from_bits((1023 - 700) << 52);
+/// 2^300: lifts the smallest double above [`LEAST_UNLIFTED`] in two steps.
 const LIFT: f64 = f64::from_bits((1023 + 300) << 52);
 
 /// `high + low` with `|low| <= ulp(high) / 2`.
@@ -70,7 +70,7 @@ impl Number for DoubleDouble {
         if self == Self::ZERO {
             return self;
         }
-        if self.high.abs() < SMALL {
+        if self.high.abs() < LEAST_UNLIFTED {
             return self.times(LIFT).sqrt().times(1.0 / LIFT.sqrt());
         }
         let root = self.high.sqrt();
@@ -126,7 +126,7 @@ impl Div for DoubleDouble {
     type Output = Self;
     #[inline]
     fn div(self, other: Self) -> Self {
-        if self.high.abs() < SMALL && self.high != 0.0 {
+        if self.high.abs() < LEAST_UNLIFTED && self.high != 0.0 {
             return (self.times(LIFT) / other).times(1.0 / LIFT);
         }
         let first = self.high / other.high;

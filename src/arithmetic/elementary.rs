@@ -7,12 +7,12 @@ use std::sync::OnceLock;
 type Long = Ball<Float512>;
 
 /// A term below this, 2^-540, lies below the rounding of every sum of about one.
-const NEGLIGIBLE: f64 = f64::from_bits((1023 - 540) << 52);
+const NEGLIGIBLE_TERM: f64 = f64::from_bits((1023 - 540) << 52);
 /// Arguments of the exponential series are halved until they are below this.
-const REDUCED: f64 = 1.0 / 256.0;
+const LARGEST_SERIES_ARGUMENT: f64 = 1.0 / 256.0;
 /// Degree of the exponential series. The remainder is below 2 |r|^46 / 46! < 2^-550 |r| for |r| <= 1/256.
-const DEGREE: usize = 45;
-const REMAINDER: f64 = f64::from_bits((1023 - 550) << 52);
+const SERIES_DEGREE: usize = 45;
+const SERIES_REMAINDER: f64 = f64::from_bits((1023 - 550) << 52);
 /// Largest argument of an exponential.
 const MAX_ARGUMENT: f64 = 700.0;
 /// Newton's steps for a root, from a double on: each doubles the digits, up to a loss of four bits.
@@ -40,7 +40,7 @@ pub(crate) fn ln_10() -> Long {
 fn inverse_tangent(n: f64, sign: f64) -> Long {
     let step = Ball::from(sign) / Ball::from(n * n);
     let (mut power, mut sum, mut odd) = (Ball::from(1.0) / Ball::from(n), Ball::ZERO, 1.0);
-    while power.magnitude() > NEGLIGIBLE {
+    while power.magnitude() > NEGLIGIBLE_TERM {
         sum += power / Ball::from(odd);
         power = power * step;
         odd += 2.0;
@@ -83,15 +83,19 @@ impl Reduced {
         let mut size = x.magnitude();
         let is_supported = size <= MAX_ARGUMENT;
         let (mut halvings, mut unit) = (0, 1.0);
-        while is_supported && size > REDUCED {
+        while is_supported && size > LARGEST_SERIES_ARGUMENT {
             (size, unit, halvings) = (0.5 * size, 0.5 * unit, halvings + 1);
         }
         let r = x * Ball::from(unit);
         let powers = std::iter::successors(Some((0.0, Ball::from(1.0))), |&(k, term)| {
             Some((k + 1.0, term * r / Ball::from(k + 1.0)))
         });
-        let terms = powers.take(DEGREE + 1).map(|(_, term)| term).collect();
-        is_supported.then_some(Self { terms, remainder: size * REMAINDER + f64::MIN_POSITIVE, halvings })
+        let terms = powers.take(SERIES_DEGREE + 1).map(|(_, term)| term).collect();
+        is_supported.then_some(Self {
+            terms,
+            remainder: size * SERIES_REMAINDER + f64::MIN_POSITIVE,
+            halvings,
+        })
     }
 }
 

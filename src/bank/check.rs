@@ -163,13 +163,8 @@ impl Bank {
     }
 
     fn check_taps(&self, taps: &[Vec<f64>]) -> Checked {
-        check_length(
-            "channels",
-            taps.len(),
-            self.frame_samples(),
-            "tap lists",
-            "every channel has a filter",
-        )?;
+        let rule = "every channel has a filter";
+        check_length("channels", taps.len(), self.frame_samples(), "tap lists", rule)?;
         let expected = taps[0].len();
         if expected == 0 {
             return out_of_range(self.taps_path(0), 0.0, "taps", "a filter has at least one tap");

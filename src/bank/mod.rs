@@ -10,7 +10,6 @@
 mod check;
 mod digest;
 mod error;
-mod plan;
 mod proof;
 mod read;
 mod taps;
@@ -27,6 +26,7 @@ pub use taps::{FixedPoint, TapSlopes};
 pub use crate::runtime::StateSpace;
 pub use crate::spec::{FrameLayout, FrameSample};
 
+use crate::runtime::{BuildError, Options, Plan, Shape};
 use crate::spec::{Method, Spec};
 use crate::units::{FastPeriods, GridTime, Seconds};
 
@@ -86,9 +86,9 @@ pub enum SynthesisFilters {
 #[serde(deny_unknown_fields)]
 pub struct Gamma {
     /// Norm computed from the coefficients of this bank. Its relative error is at most
-    /// [`NORM_ACCURACY`](Self::NORM_ACCURACY), below [`TINY`](Self::TINY) at most
-    /// [`TINY_ACCURACY`](Self::TINY_ACCURACY), and rounding in the products of filters and front ends adds
-    /// an absolute one.
+    /// [`NORM_ACCURACY`](Self::NORM_ACCURACY), below [`TINY_NORM`](Self::TINY_NORM) at most
+    /// [`TINY_NORM_ACCURACY`](Self::TINY_NORM_ACCURACY), and rounding in the products of filters and front
+    /// ends adds an absolute one.
     pub norm: Option<f64>,
     /// An upper bound of the true norm of these coefficients: proven if the bank carries a proof, else the
     /// computed norm plus its stated error.
@@ -108,17 +108,18 @@ pub struct Gamma {
 }
 
 impl Gamma {
-    /// Relative error of a computed norm of at least [`TINY`](Self::TINY).
+    /// Relative error of a computed norm of at least [`TINY_NORM`](Self::TINY_NORM).
     pub const NORM_ACCURACY: f64 = 1e-9;
     /// Norms below this are computed with less accuracy.
-    pub const TINY: f64 = 1e-9;
-    /// Relative error of a computed norm below [`TINY`](Self::TINY). The largest one observed is 7 %.
-    pub const TINY_ACCURACY: f64 = 0.1;
+    pub const TINY_NORM: f64 = 1e-9;
+    /// Relative error of a computed norm below [`TINY_NORM`](Self::TINY_NORM). The largest one observed is
+    /// 7 %.
+    pub const TINY_NORM_ACCURACY: f64 = 0.1;
 
     /// The bounds of a bank with the computed `norm`, whose absolute error from rounding is `rounding`. No
     /// lower bound exceeds the upper bound.
     pub fn computed(norm: f64, rounding: f64, lower: f64, noncausal: f64) -> Self {
-        let accuracy = if norm < Self::TINY { Self::TINY_ACCURACY } else { Self::NORM_ACCURACY };
+        let accuracy = if norm < Self::TINY_NORM { Self::TINY_NORM_ACCURACY } else { Self::NORM_ACCURACY };
         let upper = norm * (1.0 + accuracy) + rounding;
         Self {
             norm: Some(norm),
@@ -209,6 +210,41 @@ impl Bank {
     /// D_i / h of every channel.
     pub fn delays_in_fast_periods(&self) -> Vec<FastPeriods> {
         self.grid_delays().into_iter().map(GridTime::in_fast_periods).collect()
+    }
+
+    /// Compiles the bank into a plan, which any number of streams of the runtime may share. Its streams
+    /// subtract the offsets of the converters.
+    ///
+    /// # Errors
+    /// [`BuildError`] if the bank's parts do not fit together, hold values that are not finite, or cannot
+    /// run with `options`.
+    pub fn plan(&self, options: Options) -> Result<Plan, BuildError> {
+        let channels = self.frame_samples();
+        let plan = match &self.filters {
+            SynthesisFilters::Fir(taps) if taps.len() != channels => {
+                Err(BuildError::FilterCount { delays: channels, filters: taps.len() })
+            }
+            SynthesisFilters::Fir(taps) => Plan::from_taps(taps, self.ratio, self.output_delay(), options),
+            SynthesisFilters::StateSpace(filter) => Plan::from_state_space(
+                filter,
+                Shape { channels, ratio: self.ratio },
+                self.output_delay(),
+                options,
+            ),
+        };
+        plan?.with_offsets(&self.layout().each(&self.offsets))
+    }
+
+    /// Bytes of memory that the plan of an FIR bank and one of its streams take, about; 0 for recursive
+    /// banks.
+    ///
+    /// # Errors
+    /// As [`Bank::plan`].
+    pub fn plan_bytes(&self, options: Options) -> Result<f64, BuildError> {
+        match &self.filters {
+            SynthesisFilters::Fir(taps) => Plan::bytes_of_taps(taps, self.ratio, options),
+            SynthesisFilters::StateSpace(_) => Ok(0.0),
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use crate::messages::of_json;
 use crate::spec::Fault;
 use crate::spec::document::Node;
 use crate::spec::reader::{Fields, Value};
-use crate::spec::{DesignOverrides, Method, SpecProblem, decode, no_models};
+use crate::spec::{DesignOverrides, Method, SpecProblem, decode, no_models, word_lengths};
 use crate::units::Seconds;
 
 use super::digest::{digest, is_digest};
@@ -188,8 +188,8 @@ fn fixed_point(value: &Value<'_>) -> Result<FixedPoint, Fault> {
     let list = |v: &Value<'_>| v.items("a list of integers")?.iter().map(integer).collect();
     let lists = required("integers")?.items("a list of integers for each channel")?;
     Ok(FixedPoint {
-        bits: decode::word_lengths(&required("bits")?)?,
-        fraction_bits: decode::fraction_bits(&required("fraction_bits")?)?,
+        bits: word_lengths::word_lengths(&required("bits")?)?,
+        fraction_bits: word_lengths::fraction_bits(&required("fraction_bits")?)?,
         integers: lists.iter().map(list).collect::<Result<_, _>>()?,
     })
 }

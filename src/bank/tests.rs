@@ -485,3 +485,22 @@ fn gains_and_offsets_that_do_not_fit_are_refused() {
         assert_eq!(error.path(), path, "{error}");
     }
 }
+
+#[test]
+fn a_bank_needs_as_many_filters_as_delays() {
+    let bank = Bank::bare(SynthesisFilters::Fir(vec![vec![1.0], vec![1.0]]), 2);
+    assert_eq!(bank.plan(Options::default()).unwrap().channels(), 2);
+    let refused =
+        Bank { delays: vec![Seconds(0.0)], samples: vec![1], ..bank }.plan(Options::default()).unwrap_err();
+    assert_eq!(refused, BuildError::FilterCount { delays: 1, filters: 2 });
+}
+
+#[test]
+fn offsets_are_subtracted_before_the_filters() {
+    let bank = Bank::bare(SynthesisFilters::Fir(vec![vec![1.0, 2.0], vec![10.0, 20.0]]), 2);
+    let bank = Bank { offsets: vec![0.5, -1.0], ..bank };
+    let mut stream = crate::runtime::Stream::new(&bank.plan(Options::default()).unwrap());
+    let mut out = [0.0; 2];
+    stream.process(&[1.5, 0.0], &mut out).unwrap();
+    assert_eq!(out, [11.0, 22.0]);
+}

@@ -29,7 +29,7 @@ const LEAST_LEVEL: f64 = 1e-3;
 /// not calibrated differ by a few per cent.
 const GAIN_ERROR: f64 = 0.05;
 /// The spec explains captures that leave this share of their power unexplained.
-const EXPLAINED: f64 = 0.1;
+const UNEXPLAINED_SHARE: f64 = 0.1;
 /// Share of the unexplained power that other delays or another order may leave to count.
 const CLEARLY_LESS: f64 = 0.1;
 /// Another order is looked for where the given one leaves more than this share of the power unexplained;
@@ -128,7 +128,7 @@ fn judged(spec: &Spec, found: &Starts, by_delays: Vec<Contradiction>) -> Agreeme
         contradictions = by_delays;
     }
     contradictions.extend(gains(spec, found));
-    let is_explained = found.implausible <= EXPLAINED;
+    let is_explained = found.implausible <= UNEXPLAINED_SHARE;
     let verdict = if is_explained { Verdict::Explained(1.0 - found.implausible) } else { Verdict::Undecided };
     Agreement { contradictions, verdict }
 }
@@ -159,7 +159,7 @@ fn shifted(spec: &Spec, found: &Starts) -> Vec<Contradiction> {
 
 /// Gains that differ from the median of all; of two channels that of the second from the first.
 fn gains(spec: &Spec, found: &Starts) -> Vec<Contradiction> {
-    if found.unexplained > EXPLAINED {
+    if found.unexplained > UNEXPLAINED_SHARE {
         return Vec::new();
     }
     let mut sorted = found.gains.clone();

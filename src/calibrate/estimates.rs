@@ -12,7 +12,7 @@ use crate::units::{FastPeriods, Hertz, Seconds};
 /// effect to five digits, and the fit follows the noise.
 pub(super) const WORST_CONDITION: f64 = 1e10;
 /// A misfit counts only if chance produces it once in a thousand runs: standard deviations of a Gaussian.
-const CHANCE: f64 = 3.09;
+const CHANCE_SIGMAS: f64 = 3.09;
 
 /// What a calibration found.
 #[derive(Debug, Clone, Default)]
@@ -127,7 +127,7 @@ impl Fitted {
 
 /// The square root of chi squared per degree of freedom, if it is more than chance.
 pub(super) fn contradiction(squares: f64, freedom: usize) -> Option<f64> {
-    let is_clear = freedom > 0 && squares > chi_squared_quantile(freedom, CHANCE);
+    let is_clear = freedom > 0 && squares > chi_squared_quantile(freedom, CHANCE_SIGMAS);
     is_clear.then(|| (squares / freedom as f64).sqrt())
 }
 
@@ -202,7 +202,7 @@ mod tests {
     fn quantiles_are_those_of_the_tables() {
         // The 99.9 % points of 1, 10 and 100 degrees of freedom.
         for (freedom, table) in [(1, 10.828), (10, 29.588), (100, 149.449)] {
-            let ours = chi_squared_quantile(freedom, CHANCE);
+            let ours = chi_squared_quantile(freedom, CHANCE_SIGMAS);
             assert!((ours / table - 1.0).abs() < 0.04, "{freedom}: {ours}");
         }
     }

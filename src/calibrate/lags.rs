@@ -13,10 +13,10 @@ use std::f64::consts::TAU;
 
 /// Samples of the longest probe: at 100 ppm the lag moves by three samples within it, and the peak of the
 /// correlation is as much lower.
-const LONGEST: usize = 1 << 15;
+const LONGEST_PROBE: usize = 1 << 15;
 /// A probe is this share of a recording, so that a quarter of it holds one, but no shorter than this.
-const SHARE: usize = 12;
-const SHORTEST: usize = 512;
+const PROBE_SHARE: usize = 12;
+const SHORTEST_PROBE: usize = 512;
 /// Most probes of a recording.
 const MOST_PROBES: usize = 8;
 /// Length of a transform in probes: longer ones take less work per sample and more memory.
@@ -31,17 +31,17 @@ const MOST_DRIFT: f64 = 5e-4;
 const LEAST_ODDS: f64 = 30.0;
 /// Other lags with this share of the log-odds of the best ones explain the recordings as well: voices that
 /// say different things correlate far beyond chance, but at many lags.
-const ALIKE: f64 = 0.5;
+const ALIKE_ODDS_SHARE: f64 = 0.5;
 /// Up to so many samples from the best lag it takes this share: a voice agrees with itself a pitch period
 /// later, but less well, and a tone nearly as well.
-const PITCH: f64 = 1024.0;
+const PITCH_SAMPLES: f64 = 1024.0;
 const ALIKE_WITHIN_PITCH: f64 = 0.9;
 /// Share of the largest possible correlation from which on recordings have something in common: different
 /// voices have 0.2, tones and loops 0.4.
 const IN_COMMON: f64 = 0.3;
 
 /// Samples on each side of those between which a recording is interpolated.
-const BEYOND: usize = 32;
+const INTERPOLATION_MARGIN: usize = 32;
 
 /// A stretch of a recording that is looked for in another one.
 struct Probe {
@@ -55,7 +55,8 @@ struct Probe {
 /// that begins at a multiple of half its length.
 fn probes(record: &Record) -> Vec<Probe> {
     let count = record.samples.len();
-    let length = 1 << (count / SHARE).clamp(SHORTEST.min(count / 2).max(1), LONGEST).ilog2();
+    let length =
+        1 << (count / PROBE_SHARE).clamp(SHORTEST_PROBE.min(count / 2).max(1), LONGEST_PROBE).ilog2();
     let parts = (2 * count / (3 * length)).clamp(1, MOST_PROBES);
     let part = count / parts;
     let loudest = |number: usize| {
@@ -89,11 +90,12 @@ pub(crate) fn stretch(record: &Record, first: i64, length: usize) -> Vec<f64> {
 /// and agrees with it in their middle, where the lag grows by `rate`.
 pub(crate) fn steadied(record: &Record, first: usize, length: usize, rate: f64) -> Record {
     let mut part = record.part(first..first + length);
-    let around = stretch(record, first as i64 - BEYOND as i64, length + 2 * BEYOND);
-    let begin = BEYOND as f64 - 0.5 * rate * (length as f64 - 1.0);
+    let around =
+        stretch(record, first as i64 - INTERPOLATION_MARGIN as i64, length + 2 * INTERPOLATION_MARGIN);
+    let begin = INTERPOLATION_MARGIN as f64 - 0.5 * rate * (length as f64 - 1.0);
     let instants = Instants { first: FastPeriods(begin), step: FastPeriods(1.0 + rate), count: length };
     let steady = Recording::new(&around, FastPeriods(1.0)).sample_through(|_| Complex::ONE, instants);
-    for ((sample, steady), own) in part.samples.iter_mut().zip(steady).zip(&around[BEYOND..]) {
+    for ((sample, steady), own) in part.samples.iter_mut().zip(steady).zip(&around[INTERPOLATION_MARGIN..]) {
         *sample += steady - own;
     }
     part
@@ -283,8 +285,8 @@ fn likeliest(lags: &[Lag]) -> Result<LagLine, NoLag> {
     for (odds, other) in lines(&others) {
         let lag = other.lag_at(line.at);
         let is_new = alike.iter().all(|known| (known - lag).abs() > 2.0 * NEIGHBOURS);
-        let is_within_pitch = (lag - line.lag).abs() <= PITCH;
-        let share = if is_within_pitch { ALIKE_WITHIN_PITCH } else { ALIKE };
+        let is_within_pitch = (lag - line.lag).abs() <= PITCH_SAMPLES;
+        let share = if is_within_pitch { ALIKE_WITHIN_PITCH } else { ALIKE_ODDS_SHARE };
         if is_new && (odds >= share * best || best < LEAST_ODDS) {
             alike.push(lag);
         }
@@ -354,59 +356,4 @@ fn fitted(lags: &[Lag]) -> LagLine {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::calibrate::testbench::gaussian;
-    use crate::random::Random;
-
-    /// The line of two whole recordings.
-    fn found(reference: &[f64], other: &[f64]) -> Result<LagLine, NoLag> {
-        let [reference, other] = [reference, other].map(|samples| Record::new(samples.to_vec()));
-        line(&reference, &other, f64::INFINITY)
-    }
-
-    fn noise(count: usize, dice: &mut Random) -> Vec<f64> {
-        (0..count).map(|_| gaussian(dice)).collect()
-    }
-
-    #[test]
-    fn lags_are_found_at_any_distance_and_length() {
-        let mut dice = Random(71);
-        let event = noise(400_000, &mut dice);
-        let heard = |first: usize, count: usize, gain: f64, dice: &mut Random| -> Vec<f64> {
-            event[first..first + count].iter().map(|x| gain * (x + 0.3 * gaussian(dice)) + 0.2).collect()
-        };
-        for (a, b) in
-            [((0, 1024), (100, 1100)), ((0, 300_000), (250_000, 150_000)), ((90_000, 9_000), (0, 200_000))]
-        {
-            let one = heard(a.0, a.1, 1.0, &mut dice);
-            let two = heard(b.0, b.1, -0.1, &mut dice);
-            let line = found(&one, &two).unwrap();
-            let lag = line.lag_at(a.1 as f64 / 2.0);
-            assert!((lag - (a.0 as f64 - b.0 as f64)).abs() < 1.5, "{a:?} {b:?} {line:?}");
-        }
-    }
-
-    #[test]
-    fn recordings_without_anything_in_common_have_no_lag() {
-        let mut dice = Random(72);
-        for count in [1024, 5000, 200_000] {
-            let [a, b] = [(); 2].map(|()| noise(count, &mut dice));
-            assert_eq!(found(&a, &b), Err(NoLag::NothingInCommon), "{count}");
-        }
-    }
-
-    #[test]
-    fn what_repeats_has_many_lags() {
-        let tone = |count: usize, early: f64| -> Vec<f64> {
-            (0..count).map(|k| (0.7 * (k as f64 + early)).sin()).collect()
-        };
-        let alike = found(&tone(200_000, 0.0), &tone(200_000, 70.3)).unwrap_err();
-        assert!(matches!(&alike, NoLag::Ambiguous(lags) if lags.len() > 1), "{alike:?}");
-        let mut dice = Random(73);
-        let once = noise(9_000, &mut dice);
-        let again: Vec<f64> = once.iter().cycle().take(150_000).copied().collect();
-        let alike = found(&again, &again[4_000..]).unwrap_err();
-        assert!(matches!(&alike, NoLag::Ambiguous(lags) if lags.len() > 1), "{alike:?}");
-    }
-}
+mod tests;

@@ -4,7 +4,7 @@ use crate::sine_fit::Channel;
 use std::ops::Range;
 
 /// Least share of equal samples in two records of the same recording.
-const SAME: f64 = 0.999;
+const SAME_SAMPLES_SHARE: f64 = 0.999;
 
 /// Captures that were taken together: one record per channel, whose samples of one index belong to one
 /// frame.
@@ -127,7 +127,7 @@ impl Record {
         let length = self.samples.len().min(other.samples.len());
         let equal = self.samples.iter().zip(&other.samples).filter(|(a, b)| a == b).count();
         let changes = self.samples.windows(2).any(|pair| pair[0] != pair[1]);
-        length > 16 && changes && equal as f64 >= SAME * length as f64
+        length > 16 && changes && equal as f64 >= SAME_SAMPLES_SHARE * length as f64
     }
 }
 

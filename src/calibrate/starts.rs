@@ -24,7 +24,7 @@ use std::f64::consts::TAU;
 /// Fewest frames that are compared.
 const LEAST_FRAMES: usize = 1024;
 /// Captures that leave no more unexplained are those of the spec.
-const EXPLAINED: f64 = 0.02;
+const UNEXPLAINED_SHARE: f64 = 0.02;
 /// Other starts must leave at most this share of what the nominal ones leave.
 const CLEARLY_LESS: f64 = 0.1;
 /// What a change of one channel must leave at most to be followed by that of another.
@@ -43,9 +43,9 @@ const MOST_STEPS: usize = 20;
 /// Share of the frames that must overlap: of short overlaps too many look alike.
 const OVERLAP: usize = 2;
 /// An alias is plausible if the front ends pass it with this share of the gain of the strongest one.
-const PLAUSIBLE: f64 = 0.05;
+const PLAUSIBLE_GAIN_SHARE: f64 = 0.05;
 /// With a signal in fewer bands any alias is possible: it may be a tone in any Nyquist zone.
-const BROAD: f64 = 8.0;
+const BROAD_SIGNAL_BANDS: f64 = 8.0;
 /// A signal in fewer bands, one tone or two, tells nothing of starts.
 const LEAST_BANDS: f64 = 2.5;
 /// Farthest aliases that are looked at, and farthest zones whose correlations are searched.
@@ -54,7 +54,7 @@ const FARTHEST_ZONE: usize = 4;
 /// Starts of a channel that are tried.
 const MOST_STARTS: usize = 6;
 /// A correlation peak of this share of the largest may be that of a nearer period.
-const LIKELY: f64 = 0.9;
+const LIKELY_PEAK_SHARE: f64 = 0.9;
 
 /// Starts and signs of all channels, and how well they explain the captures.
 #[derive(Clone)]
@@ -83,7 +83,7 @@ pub(super) fn starts(model: &Model, records: &[Record]) -> Option<Starts> {
     let captures = records.iter().map(|record| &record.samples[first..first + frames]).collect();
     let search = Search { model, nominal: Point::nominal(model, Fit::default(), 0), captures, frames };
     let nominal = search.judged(vec![0; records.len()], vec![1.0; records.len()])?;
-    if nominal.unexplained <= EXPLAINED {
+    if nominal.unexplained <= UNEXPLAINED_SHARE {
         return Some(nominal);
     }
     let found = search.improved(&nominal)?;
@@ -119,7 +119,7 @@ impl Search<'_> {
             let alike = changes.iter().filter(|(i, change)| i == channel && change.unexplained <= limit);
             let nearest = nearest(alike.map(|(_, change)| change), *channel, &present)?;
             present = self.refined(*channel, nearest)?;
-            if present.unexplained <= EXPLAINED * nominal.unexplained {
+            if present.unexplained <= UNEXPLAINED_SHARE * nominal.unexplained {
                 break;
             }
         }
@@ -198,13 +198,13 @@ impl Search<'_> {
             let least = |columns: &[CMat]| {
                 columns.iter().map(|column| band.unexplained(column)).fold(band.power(), f64::min)
             };
-            let weakest = columns.first().map_or(0.0, |strongest| PLAUSIBLE * strongest.norm());
+            let weakest = columns.first().map_or(0.0, |strongest| PLAUSIBLE_GAIN_SHARE * strongest.norm());
             any += least(columns);
             plausible += least(&columns[..columns.partition_point(|a| a.norm() >= weakest)]);
             all += band.power();
         }
         let implausible = plausible / all;
-        let unexplained = if width < BROAD { any / all } else { implausible };
+        let unexplained = if width < BROAD_SIGNAL_BANDS { any / all } else { implausible };
         let starts = Starts { early, signs, gains, unexplained, implausible, width };
         unexplained.is_finite().then_some(starts)
     }
@@ -285,7 +285,7 @@ fn highest(c: &[f64], most: usize) -> Vec<(f64, i64)> {
     let is_peak = |lag: &i64| at(*lag) >= at(lag - 1) && at(*lag) >= at(lag + 1);
     let mut peaks: Vec<(f64, i64)> = (-most..=most).filter(is_peak).map(|lag| (at(lag), lag)).collect();
     peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let least = peaks.first().map_or(0.0, |(height, _)| LIKELY * height);
+    let least = peaks.first().map_or(0.0, |(height, _)| LIKELY_PEAK_SHARE * height);
     let likely = peaks.iter().take_while(|(height, _)| *height >= least);
     let nearest = likely.min_by_key(|(_, lag)| lag.abs()).copied();
     peaks.into_iter().take(2).chain(nearest).collect()

@@ -33,14 +33,14 @@ const LEAST_FRAMES: usize = 64;
 const LAGS_PER_PERIOD: usize = 2;
 /// The waveform counts as periodic; instants closer to its ends than this (fast periods) are left out,
 /// because the captures do not see the other end.
-const MARGIN: f64 = 32.0;
+const END_MARGIN: f64 = 32.0;
 /// The iteration ends when a delay or a cut-off moves by less than this share of its standard deviation,
 const SMALL_STEP: f64 = 1e-3;
 /// or by less than this (fast periods): the rounding of the synthesis.
-const ROUNDING: f64 = 1e-12;
+const SYNTHESIS_ROUNDING: f64 = 1e-12;
 /// Half the distance of central differences: their error is a sixth of its square times v''', below 2e-6 of
 /// v'.
-const DIFFERENCE: f64 = 1e-3;
+const HALF_DIFFERENCE: f64 = 1e-3;
 /// Least share of the power that the waveform explains.
 const LEAST_SHARE: f64 = 0.5;
 /// A noise whose correlation of neighbours exceeds this many standard deviations is not white.
@@ -237,7 +237,7 @@ impl LeastSquares for ChannelFit<'_> {
 
     /// Gain and offset follow from the others.
     fn limits(&self, k: usize, sigma: f64) -> StepLimits {
-        let negligible = (SMALL_STEP * sigma * self.noise).max(ROUNDING);
+        let negligible = (SMALL_STEP * sigma * self.noise).max(SYNTHESIS_ROUNDING);
         match k {
             0 => StepLimits { largest: 1.0, negligible },
             3 => StepLimits { largest: f64::INFINITY, negligible },
@@ -273,7 +273,7 @@ impl ChannelFit<'_> {
 
     /// The frames whose instants the waveform covers.
     fn covered(&self) -> Result<Vec<usize>, CalibrateError> {
-        let inside = MARGIN..self.recording.duration().0 - MARGIN;
+        let inside = END_MARGIN..self.recording.duration().0 - END_MARGIN;
         let instant = |k: usize| k as f64 * self.ratio - self.values[0];
         let all = 0..self.record.samples.len();
         let kept: Vec<usize> = all.filter(|&k| self.record.keep[k] && inside.contains(&instant(k))).collect();
@@ -295,12 +295,12 @@ impl ChannelFit<'_> {
     /// v' by the delay, v and, if the cut-off is fitted, v' by ln c.
     fn columns(&self) -> Vec<Vec<f64>> {
         let difference = |above: Vec<f64>, below: Vec<f64>| -> Vec<f64> {
-            above.iter().zip(&below).map(|(a, b)| (a - b) / (2.0 * DIFFERENCE)).collect()
+            above.iter().zip(&below).map(|(a, b)| (a - b) / (2.0 * HALF_DIFFERENCE)).collect()
         };
-        let by_delay = difference(self.sampled(DIFFERENCE, 0.0), self.sampled(-DIFFERENCE, 0.0));
+        let by_delay = difference(self.sampled(HALF_DIFFERENCE, 0.0), self.sampled(-HALF_DIFFERENCE, 0.0));
         let mut columns = vec![by_delay, self.sampled(0.0, 0.0)];
         if self.parameters == 4 {
-            columns.push(difference(self.sampled(0.0, DIFFERENCE), self.sampled(0.0, -DIFFERENCE)));
+            columns.push(difference(self.sampled(0.0, HALF_DIFFERENCE), self.sampled(0.0, -HALF_DIFFERENCE)));
         }
         columns
     }

@@ -16,13 +16,13 @@ use crate::units::FastPeriods;
 use std::f64::consts::TAU;
 
 /// Deviations beyond which a Gaussian counts as zero: 2e-19 of its power lies outside.
-const REACH: f64 = 9.0;
+const GAUSSIAN_REACH: f64 = 9.0;
 /// Panels grow by this factor from the kink on, where fast poles still matter.
-const GROWTH: f64 = 1.5;
+const PANEL_GROWTH: f64 = 1.5;
 /// Least width of a panel over the deviation. Oscillations that are faster average out.
 const LEAST_PANEL: f64 = 1.0 / 256.0;
 /// Share of the power of a sample below which the difference of two covariances loses the digits of jitter.
-const RESOLVED: f64 = 1e-9;
+const RESOLVED_SHARE: f64 = 1e-9;
 
 /// The covariances of all front ends of a problem.
 pub(crate) struct Covariances {
@@ -38,9 +38,9 @@ pub(crate) struct Covariances {
 pub(crate) struct Averaged<'a> {
     covariances: &'a Covariances,
     deviation: f64,
-    /// Of the panels in [0, 2 REACH deviation].
+    /// Of the panels in [0, 2 GAUSSIAN_REACH deviation].
     nodes: Vec<Node>,
-    /// The state's part of the average at REACH deviations: e^{A u} X C' averaged over the Gaussian.
+    /// The state's part of the average at [`GAUSSIAN_REACH`]: e^{A u} X C' averaged over the Gaussian.
     far: Mat,
 }
 
@@ -87,7 +87,7 @@ impl Covariances {
         }
         let power = self.power(front_end);
         let difference = 2.0 * (power - self.averaged(deviation).at(front_end, front_end, 0.0));
-        if difference > RESOLVED * power {
+        if difference > RESOLVED_SHARE * power {
             return difference;
         }
         difference.max(self.slopes[front_end] * deviation.0 * deviation.0)
@@ -118,7 +118,7 @@ impl Covariances {
             let next = width.min(length - covered);
             widths.push(next);
             covered += next;
-            width = (GROWTH * width).min(widest);
+            width = (PANEL_GROWTH * width).min(widest);
         }
         widths
     }
@@ -130,7 +130,7 @@ impl Averaged<'_> {
         let (mut time, mut state) = (0.0, self.covariances.inputs.clone());
         let mut known: Option<(f64, Vec<Mat>)> = None;
         self.far = Mat::zeros(state.nrows(), state.ncols());
-        for width in self.covariances.panels(self.deviation, 2.0 * REACH * self.deviation) {
+        for width in self.covariances.panels(self.deviation, 2.0 * GAUSSIAN_REACH * self.deviation) {
             let transitions = match known.take() {
                 Some((same, transitions)) if same == width => transitions,
                 _ => NODES
@@ -142,7 +142,7 @@ impl Averaged<'_> {
             };
             for ((part, share), transition) in NODES.into_iter().zip(&transitions) {
                 let (at, weight, moved) = (time + part * width, share * width, transition * &state);
-                self.far += &moved * (weight * self.density(at - REACH * self.deviation));
+                self.far += &moved * (weight * self.density(at - GAUSSIAN_REACH * self.deviation));
                 self.nodes.push(Node { time: at, weight, value: joint.c() * moved });
             }
             state = &transitions[NODES.len()] * state;
@@ -162,7 +162,7 @@ impl Averaged<'_> {
             return self.at(b, a, -t);
         }
         let joint = &self.covariances.joint;
-        let beyond = t - REACH * self.deviation;
+        let beyond = t - GAUSSIAN_REACH * self.deviation;
         if beyond >= 0.0 {
             let state = joint.transition(beyond) * self.far.column(b);
             return (joint.c().row(a) * state)[0];

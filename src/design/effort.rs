@@ -18,16 +18,16 @@ use crate::spec::{Method, Reduction, Spec};
 
 /// Operations at that rate for an interior-point block, relative to the square of its order, and for a gain
 /// of such a block: cubes, but the rate of complex decompositions grows with the order.
-const BLOCK: f64 = 8500.0;
-const GAIN: f64 = 1000.0;
+const BLOCK_OPERATIONS: f64 = 8500.0;
+const GAIN_OPERATIONS: f64 = 1000.0;
 /// For the norm of a system, times the powers of its states: the eigenvalues of two matrices of twice the
 /// order, at a rate that grows with the order.
-const NORM: Powers = Powers { none: 5e7, square: 2e4, cube: 45.0 };
+const NORM_OPERATIONS: Powers = Powers { none: 5e7, square: 2e4, cube: 45.0 };
 /// For a Riccati equation with its trials, times the cube of the states.
-const RICCATI: f64 = 1500.0;
+const RICCATI_OPERATIONS: f64 = 1500.0;
 /// For a certificate in double precision, and for one in 512 bits with the bounds that need them.
-const CERTIFICATE: Powers = Powers { none: 1.5e8, square: 1.2e5, cube: 900.0 };
-const LONG_CERTIFICATE: f64 = 1.3e5;
+const CERTIFICATE_OPERATIONS: Powers = Powers { none: 1.5e8, square: 1.2e5, cube: 900.0 };
+const LONG_CERTIFICATE_OPERATIONS: f64 = 1.3e5;
 /// Certificates that are tried, and how fast: processors differ by a factor of four in small matrices.
 const CERTIFICATES: Range = Range { least: 0.25, most: 1.5 };
 /// Interior-point iterations of an exchange.
@@ -37,9 +37,9 @@ const SWEEPS: Range = Range { least: 5.0, most: 25.0 };
 /// Norms of each scenario of a robust design, and operations of the proof over its box: a limit holds for
 /// them.
 const NORMS_OF_SCENARIOS: Range = Range { least: 1.0, most: 4.0 };
-const BOX_PROOF: Range = Range { least: 3e9, most: 1e11 };
+const BOX_PROOF_OPERATIONS: Range = Range { least: 3e9, most: 1e11 };
 /// Operations of the refinement of poles, likewise.
-const POLE_REFINEMENT: f64 = 1.5e11;
+const POLE_REFINEMENT_OPERATIONS: f64 = 1.5e11;
 /// Histories through which the smoother passes for an open number of taps, whose lengths are doubled and
 /// then halved, and for an open latency.
 const HISTORIES: [f64; 2] = [24.0, 2.0];
@@ -51,8 +51,8 @@ const PERIODS_COMPARED: f64 = 6.0;
 const LONG_HISTORY: f64 = 256.0;
 const USUAL_FRAMES: usize = 24;
 /// Bytes of a real and of a complex number, and of everything that does not grow with the sizes.
-const REAL: f64 = 8.0;
-const COMPLEX: f64 = 16.0;
+const REAL_BYTES: f64 = 8.0;
+const COMPLEX_BYTES: f64 = 16.0;
 const BASE_BYTES: f64 = 10e6;
 
 /// The effort of the design of a spec, whose latency and taps may still be to be chosen; with the search for
@@ -72,12 +72,12 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
         effort = effort.then(sizes.integers().times(Range { least: 1.0, most }));
     }
     if proving && RobustProblem::of(spec).is_some() {
-        effort = effort.then(Effort::of(1.0, 0.0).times(BOX_PROOF));
+        effort = effort.then(Effort::of(1.0, 0.0).times(BOX_PROOF_OPERATIONS));
     }
     if spec.design.reduction.is_some() {
         // A norm for each order that is visited, and the refinement of its poles.
         let norms = sizes.norms().times(Range { least: 2.0, most: 2.0 * sizes.states.min(40.0) });
-        effort = effort.then(norms).perhaps(Effort::of(POLE_REFINEMENT, 0.0));
+        effort = effort.then(norms).perhaps(Effort::of(POLE_REFINEMENT_OPERATIONS, 0.0));
     }
     if matches!(spec.design.reduction, Some(Reduction::Order(_))) && spec.latency.is_none() {
         // The banks of some slow periods of latency are compared.
@@ -210,7 +210,7 @@ impl Sizes {
             Method::H2 if spec.is_fir() => self.smoother(2.0, self.lags(), self.ratio),
             Method::Iir | Method::H2 => {
                 let order = self.states + self.channels;
-                Effort::of(RICCATI * order.powi(3), 20.0 * REAL * order * order)
+                Effort::of(RICCATI_OPERATIONS * order.powi(3), 20.0 * REAL_BYTES * order * order)
             }
             Method::Sinc => Effort::default(),
             Method::Separation => self.exchange(None, false),
@@ -226,16 +226,17 @@ impl Sizes {
         let functions = if tracking { n } else { 1.0 };
         let (columns, unknowns) = (functions * n, functions * n * self.taps);
         let points = self.points();
-        let blocks = BLOCK * points * p * p;
+        let blocks = BLOCK_OPERATIONS * points * p * p;
         let products = points * (m.min(self.taps) * columns).powi(2) * (64.0 + 4.0 * self.lags());
         let iteration = blocks + products + unknowns.powi(3) / 12.0;
         // Scenarios take more rounds, on twice the points.
         let rounds = if scenarios > 0.0 { 4.0 + functions } else { 1.0 };
         let fine = FINE as f64 * points * (1.0 + scenarios);
-        let grid = fine * p * (12.0 * self.analog_states.powi(2) + GAIN * p);
-        let norms = Effort::of(scenarios * NORM.at(self.error_states()), 0.0).times(NORMS_OF_SCENARIOS);
-        let kept = COMPLEX * p * p * (fine + 9.0 * points);
-        let newton = Effort::of(rounds * iteration, kept + 3.0 * REAL * unknowns * unknowns);
+        let grid = fine * p * (12.0 * self.analog_states.powi(2) + GAIN_OPERATIONS * p);
+        let norms =
+            Effort::of(scenarios * NORM_OPERATIONS.at(self.error_states()), 0.0).times(NORMS_OF_SCENARIOS);
+        let kept = COMPLEX_BYTES * p * p * (fine + 9.0 * points);
+        let newton = Effort::of(rounds * iteration, kept + 3.0 * REAL_BYTES * unknowns * unknowns);
         newton.times(ITERATIONS).then(Effort::of(grid, 0.0)).then(norms)
     }
 
@@ -245,19 +246,19 @@ impl Sizes {
         let rows = self.channels * self.lags();
         let pairs = self.channels * self.outputs() * 2.0 * self.lags();
         let covariances = pairs * (160.0 * self.analog_states.powi(3) + 3e4);
-        Effort::of(covariances + 0.6 * rows.powi(3), 3.0 * REAL * rows * rows)
+        Effort::of(covariances + 0.6 * rows.powi(3), 3.0 * REAL_BYTES * rows * rows)
     }
 
     /// The fixed-point smoother so many times over so many frames, with so many samples of the target open.
     fn smoother(&self, times: f64, frames: f64, targets: f64) -> Effort {
         let (s, steps) = (self.analog_states, frames * self.outputs());
-        Effort::of(times * steps * 32.0 * s * s * (s + targets), COMPLEX * (s * s + steps * s))
+        Effort::of(times * steps * 32.0 * s * s * (s + targets), COMPLEX_BYTES * (s * s + steps * s))
     }
 
     /// The norm of the bank, of plain interleaving, and those of the search.
     fn norms(&self) -> Effort {
         let states = self.error_states();
-        Effort::of(3.0 * NORM.at(states), 20.0 * REAL * states * states)
+        Effort::of(3.0 * NORM_OPERATIONS.at(states), 20.0 * REAL_BYTES * states * states)
     }
 
     /// The search for a proof, which may need 512 bits where they are tried, and for FIR banks of least
@@ -267,12 +268,13 @@ impl Sizes {
         if states > MAX_SEARCHED_STATES as f64 {
             return Effort::default();
         }
-        let long = if states > MAX_LONG_STATES as f64 { 0.0 } else { LONG_CERTIFICATE * states.powi(3) };
+        let long =
+            if states > MAX_LONG_STATES as f64 { 0.0 } else { LONG_CERTIFICATE_OPERATIONS * states.powi(3) };
         let taps = if method == Method::Fir { self.channels * self.taps } else { 0.0 };
         let rows = 2.0 * max_witnesses(taps as usize) as f64 * self.channels;
         let witnesses = 4.0 * rows * taps * rows.min(taps);
-        let bytes = REAL * (30.0 * states * states + 5.0 * rows * taps);
-        let certificates = Effort::of(CERTIFICATE.at(states), bytes).times(CERTIFICATES);
+        let bytes = REAL_BYTES * (30.0 * states * states + 5.0 * rows * taps);
+        let certificates = Effort::of(CERTIFICATE_OPERATIONS.at(states), bytes).times(CERTIFICATES);
         certificates.perhaps(Effort::of(long + witnesses, 0.0))
     }
 
@@ -282,8 +284,8 @@ impl Sizes {
         let (phase, p) = (self.channels * self.lags(), self.outputs());
         let lattice = 60.0 * self.ratio * (0.2 * phase.powi(3) + 520.0 * phase * phase);
         let fine = FINE as f64 * self.points();
-        let step = fine * (32.0 * self.channels * p + GAIN * self.ratio) * self.ratio;
-        let bytes = COMPLEX * p * p * fine + 3.0 * REAL * phase * phase;
+        let step = fine * (32.0 * self.channels * p + GAIN_OPERATIONS * self.ratio) * self.ratio;
+        let bytes = COMPLEX_BYTES * p * p * fine + 3.0 * REAL_BYTES * phase * phase;
         Effort::of(lattice, bytes).then(Effort::of(self.channels * self.taps * step, 0.0).times(SWEEPS))
     }
 }

@@ -9,7 +9,6 @@
 //! may peak between two uniform points.
 
 use super::DesignError;
-use super::exchange::{AffineError, LocatedPeak, Location, Peaks};
 use super::filters;
 use super::plant::LiftedPlant;
 use crate::linalg::{self, CMat, Complex, Mat};
@@ -37,6 +36,60 @@ pub(super) const PRUNE_LEVEL: f64 = 0.96;
 const FLAT_GAIN: f64 = 1e-8;
 /// Further frequencies closer to an equidistant one than this share of their distance are left out.
 const LEAST_SHARE: f64 = 1e-6;
+
+/// Frequencies closer than this are one point, in radians.
+const LEAST_DISTANCE: f64 = 1e-7;
+
+/// Errors `K(omega) = W(omega) - sum_j e^{-i omega j} F_j H(omega)`, affine in the unknowns `F_j`: one for
+/// each scenario, all with the same unknowns.
+pub(super) trait AffineError {
+    /// What tells the scenarios apart; `()` where there is one.
+    type Scenario: Clone + PartialEq + std::fmt::Debug;
+
+    /// W and H at a location.
+    fn at(&self, location: &Location<Self::Scenario>) -> Point;
+
+    /// The peaks of `sigma_max(K)` for the unknowns `taps`, whose largest value at the points is `gamma`.
+    /// Peaks up to `level` may be left out.
+    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<Self::Scenario>, DesignError>;
+}
+
+/// A frequency in one of the scenarios.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Location<S> {
+    /// Radians per lag.
+    pub(super) frequency: f64,
+    pub(super) scenario: S,
+}
+
+impl<S: PartialEq> Location<S> {
+    pub(super) fn is_near(&self, other: &Self) -> bool {
+        (self.frequency - other.frequency).abs() <= LEAST_DISTANCE && self.scenario == other.scenario
+    }
+}
+
+/// A local maximum of `sigma_max(K)` over the frequencies.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct LocatedPeak<S> {
+    pub(super) gain: f64,
+    pub(super) location: Location<S>,
+}
+
+/// Local maxima of `sigma_max(K)` over the frequencies.
+#[derive(Debug, Clone)]
+pub(super) struct Peaks<S> {
+    /// Estimate of gamma; equal to gamma if no peak was missed.
+    pub(super) estimate: f64,
+    /// The peaks, in any order.
+    pub(super) peaks: Vec<LocatedPeak<S>>,
+}
+
+impl<S: Clone> Peaks<S> {
+    /// The locations of the peaks above `level`.
+    pub(super) fn above(&self, level: f64) -> Vec<Location<S>> {
+        self.peaks.iter().filter(|peak| peak.gain > level).map(|peak| peak.location.clone()).collect()
+    }
+}
 
 /// Intervals of the grid for mean squares, for filters of `lags` slow lags.
 pub(super) fn coarse_intervals(lags: usize) -> usize {

@@ -21,6 +21,7 @@
 //! exchange methods.
 
 use super::DesignError;
+use super::error_grid::{AffineError, Location, Peaks};
 use super::limits::Stop;
 use super::unfinished::{EndOfSearch, Unfinished};
 use crate::linalg::{self, CMat};
@@ -42,8 +43,6 @@ const PEAK_EXCESS: f64 = 0.2;
 const MARGIN_AT_POINTS: f64 = 0.75;
 /// Share of the distance between the largest peak and the bound to which the next problem is solved.
 const SHARE_OF_WIDTH: f64 = 0.3;
-/// Frequencies closer than this are one point, in radians.
-const LEAST_DISTANCE: f64 = 1e-7;
 
 /// The tolerance schedule: how closely the problems of the rounds are solved.
 #[derive(Debug, Clone, Copy)]
@@ -80,57 +79,6 @@ impl Tolerances {
     /// Of a problem whose predecessor left an interval of this relative width.
     fn tolerance(&self, width: f64) -> f64 {
         (SHARE_OF_WIDTH * width).min(self.loosest).max(self.finest())
-    }
-}
-
-/// Errors `K(omega) = W(omega) - sum_j e^{-i omega j} F_j H(omega)`, affine in the unknowns `F_j`: one for
-/// each scenario, all with the same unknowns.
-pub(super) trait AffineError {
-    /// What tells the scenarios apart; `()` where there is one.
-    type Scenario: Clone + PartialEq + std::fmt::Debug;
-
-    /// W and H at a location.
-    fn at(&self, location: &Location<Self::Scenario>) -> Point;
-
-    /// The peaks of `sigma_max(K)` for the unknowns `taps`, whose largest value at the points is `gamma`.
-    /// Peaks up to `level` may be left out.
-    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<Self::Scenario>, DesignError>;
-}
-
-/// A frequency in one of the scenarios.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Location<S> {
-    /// Radians per lag.
-    pub(super) frequency: f64,
-    pub(super) scenario: S,
-}
-
-impl<S: PartialEq> Location<S> {
-    fn is_near(&self, other: &Self) -> bool {
-        (self.frequency - other.frequency).abs() <= LEAST_DISTANCE && self.scenario == other.scenario
-    }
-}
-
-/// A local maximum of `sigma_max(K)` over the frequencies.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct LocatedPeak<S> {
-    pub(super) gain: f64,
-    pub(super) location: Location<S>,
-}
-
-/// Local maxima of `sigma_max(K)` over the frequencies.
-#[derive(Debug, Clone)]
-pub(super) struct Peaks<S> {
-    /// Estimate of gamma; equal to gamma if no peak was missed.
-    pub(super) estimate: f64,
-    /// The peaks, in any order.
-    pub(super) peaks: Vec<LocatedPeak<S>>,
-}
-
-impl<S: Clone> Peaks<S> {
-    /// The locations of the peaks above `level`.
-    fn above(&self, level: f64) -> Vec<Location<S>> {
-        self.peaks.iter().filter(|peak| peak.gain > level).map(|peak| peak.location.clone()).collect()
     }
 }
 

@@ -12,7 +12,7 @@ pub const TIME_LIMIT: Duration = Duration::from_secs(600);
 
 /// Operations per second of factorisations and products of large real matrices on one core
 /// (docs/figures.md).
-const RATE: f64 = 1e10;
+const OPERATIONS_PER_SECOND: f64 = 1e10;
 
 /// Maximum number of states of an error system whose certificate is searched in 512 bits: some seconds per
 /// gamma that is tried.
@@ -126,7 +126,11 @@ pub(super) struct Range {
 impl Effort {
     /// So many operations at the rate of dense linear algebra.
     pub(super) fn of(operations: f64, bytes: f64) -> Self {
-        Self { shortest: operations / RATE, longest: operations / RATE, bytes }
+        Self {
+            shortest: operations / OPERATIONS_PER_SECOND,
+            longest: operations / OPERATIONS_PER_SECOND,
+            bytes,
+        }
     }
 
     /// One step after the other; the memory of the first one is free again.

@@ -9,7 +9,7 @@ use crate::units::{GridTime, Hertz, RadiansPerFastPeriod, RadiansPerSlowPeriod};
 use std::f64::consts::PI;
 
 /// Energy of a recursive filter's response beyond which it counts as over, relative to all of it.
-const TAIL: f64 = 1e-12;
+const TAIL_ENERGY: f64 = 1e-12;
 /// Slow periods of a recursive filter's response that are computed at most.
 const MOST_PERIODS: usize = 4096;
 
@@ -39,7 +39,7 @@ fn lags_of_recursion(bank: &Bank) -> Vec<Mat> {
     let mut left = 0.0;
     let tail = energies.iter().rev().take_while(|&&energy| {
         left += energy;
-        left <= TAIL * total
+        left <= TAIL_ENERGY * total
     });
     let kept = lags.len() - tail.count();
     lags.truncate(kept.max(1));

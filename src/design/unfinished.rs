@@ -5,9 +5,9 @@ use serde::Serialize;
 use std::fmt;
 
 /// Multiple of the accuracy that a search aims at beyond which its bounds count as apart.
-const NOTICEABLE: f64 = 20.0;
+const NOTICEABLE_ACCURACIES: f64 = 20.0;
 /// Relative distance of a norm from its proven lower end at which nothing is left open.
-const MET: f64 = 1e-5;
+const MET_DISTANCE: f64 = 1e-5;
 /// The same of a mean square, relative to it: 0.04 dB, less than a measured SNR shows.
 const NOTICEABLE_SQUARE: f64 = 0.01;
 
@@ -68,7 +68,11 @@ impl Unfinished {
     /// Of the bounds `lower` and `gamma` of a search for this relative accuracy; `None` if they met.
     pub(super) fn of(lower: f64, gamma: f64, accuracy: f64, reason: EndOfSearch) -> Option<Self> {
         let width = gamma / lower - 1.0;
-        (width > NOTICEABLE * accuracy).then_some(Self { objective: Objective::Gamma, width, reason })
+        (width > NOTICEABLE_ACCURACIES * accuracy).then_some(Self {
+            objective: Objective::Gamma,
+            width,
+            reason,
+        })
     }
 
     /// What is left of it for a bank of the norm `gamma` where it is proven that no bank has less than
@@ -76,7 +80,7 @@ impl Unfinished {
     pub(super) fn unless_proven(self, lower: f64, gamma: f64) -> Option<Self> {
         let proven = gamma / lower - 1.0;
         match self.objective {
-            Objective::Gamma if proven <= MET => None,
+            Objective::Gamma if proven <= MET_DISTANCE => None,
             Objective::Gamma if proven < self.width => Some(Self { width: proven, ..self }),
             _ => Some(self),
         }

@@ -33,9 +33,9 @@ const GAUSS: [f64; 4] =
     [0.129_484_966_168_869_7, 0.279_705_391_489_276_64, 0.381_830_050_505_118_9, 0.417_959_183_673_469_4];
 
 /// Relative error of each mean at which refinement ends: 0.0004 dB of a power, far below what is printed.
-const ACCURACY: f64 = 1e-4;
+const MEAN_ACCURACY: f64 = 1e-4;
 /// Errors below this share of the largest mean are those of rounding, and no refinement takes them away.
-const ROUNDING: f64 = 1e-28;
+const ROUNDING_SHARE: f64 = 1e-28;
 
 /// Integrals of some functions over an interval, with the difference of the two rules.
 #[derive(Debug, Clone)]
@@ -71,9 +71,10 @@ impl Panel {
 
     /// Whether some function is less accurate here than this panel's share of the interval allows.
     fn is_rough(&self, totals: &[f64]) -> bool {
-        let floor = ROUNDING * totals.iter().copied().fold(0.0, f64::max);
+        let floor = ROUNDING_SHARE * totals.iter().copied().fold(0.0, f64::max);
         let share = (self.high - self.low) / PI;
-        let is_rough = |(error, total): (&f64, &f64)| error.abs() > share * (ACCURACY * total).max(floor);
+        let is_rough =
+            |(error, total): (&f64, &f64)| error.abs() > share * (MEAN_ACCURACY * total).max(floor);
         self.high - self.low > 1e-12 && self.errors.iter().zip(totals).any(is_rough)
     }
 }

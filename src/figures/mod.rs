@@ -21,7 +21,6 @@
 //! converters of 16 bits: without any noise one channel alone would be exact wherever the signal fits into
 //! it.
 
-mod alone;
 mod band;
 mod integral;
 mod powers;
@@ -34,9 +33,8 @@ mod spline;
 mod tests;
 mod tones;
 
-pub use alone::Alone;
 pub use band::{BandSource, FigureBand, Setup};
-pub use simple::{SimpleFigure, SimpleWay};
+pub use simple::{Alone, SimpleFigure, SimpleWay};
 pub use snr::Snr;
 pub use tones::Tone;
 

@@ -13,7 +13,7 @@ const ALL_UP_TO: f64 = 8.0;
 const ALL_UP_TO_LARGE: f64 = 2.0;
 const LARGE_RATIO: usize = 16;
 /// Beyond, one alias stands for a block of this share of its number: front ends are smooth there.
-const BLOCK: f64 = 0.1;
+const ALIAS_BLOCK_SHARE: f64 = 0.1;
 /// Aliases are counted up to this multiple of the largest pole. A front end of one pole passes 6e-5 of its
 /// power above, 0.0003 dB.
 const BEYOND_POLES: f64 = 1e4;
@@ -148,7 +148,7 @@ fn aliases(problem: &Problem) -> Vec<Alias> {
         (0..=2 * direct as i64).map(|k| Alias { number: k as f64 - direct, count: 1.0 }).collect();
     let (mut start, mut place) = (direct + 1.0, 0.0_f64);
     while start <= last {
-        let count = (BLOCK * start).ceil();
+        let count = (ALIAS_BLOCK_SHARE * start).ceil();
         place = (place + GOLDEN).fract();
         let number = start + (place * count).floor();
         found.extend([Alias { number, count }, Alias { number: -number, count }]);

@@ -123,11 +123,11 @@ impl Spline {
         let mut matrix = CMat::zeros(count, count);
         for i in 0..count {
             let (own, other) = parts(self.width(i));
-            let (next, turn) = self.next(i, theta);
+            let (next, phasor) = self.next(i, theta);
             matrix[(i, i)] += Complex::from(own);
             matrix[(next, next)] += Complex::from(own);
-            matrix[(i, next)] += turn * other;
-            matrix[(next, i)] += turn.conj() * other;
+            matrix[(i, next)] += phasor * other;
+            matrix[(next, i)] += phasor.conj() * other;
         }
         matrix
     }
@@ -141,7 +141,7 @@ impl Spline {
         moments: &CMat,
     ) -> nalgebra::RowDVector<Complex<f64>> {
         let last = self.knots.len() - 1;
-        let (i, turn, start) = match self.knots.iter().rposition(|knot| knot.time <= time) {
+        let (i, phasor, start) = match self.knots.iter().rposition(|knot| knot.time <= time) {
             Some(i) => (i, Complex::ONE, self.knots[i].time),
             None => (last, Complex::from_polar(1.0, -theta), self.knots[last].time - self.period),
         };
@@ -153,6 +153,6 @@ impl Spline {
             + values.row(next) * (ahead * (below / h))
             + moments.row(i) * cubic(above)
             + moments.row(next) * (ahead * cubic(below));
-        row * turn
+        row * phasor
     }
 }

@@ -18,7 +18,7 @@ const REFINED: usize = 8;
 const STEPS: usize = 40;
 /// A tone between two points of the grid is worse than theirs from this factor on: below, rounding would
 /// choose.
-const WORSE: f64 = 1.0 + 1e-9;
+const WORSE_FACTOR: f64 = 1.0 + 1e-9;
 /// The target counts as zero below this share of its largest gain in the band: 120 dB.
 const VANISHING: f64 = 1e-6;
 
@@ -138,7 +138,7 @@ impl ToneResponse {
             let (a, b) = (high - ratio * (high - low), low + ratio * (high - low));
             let [left, right] = [a, b].map(|f| self.at(f));
             for tone in [left, right] {
-                if value(&tone) > WORSE * value(&best) {
+                if value(&tone) > WORSE_FACTOR * value(&best) {
                     best = tone;
                 }
             }

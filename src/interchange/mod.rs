@@ -13,7 +13,6 @@ mod bit_true;
 mod c99;
 mod error;
 mod layout;
-mod range;
 mod read_taps;
 mod sections;
 mod tables;

@@ -29,11 +29,11 @@ pub(super) const GAP_OF_ZERO: f64 = 1e-13;
 const REDUCED_GAP: f64 = 1e-5;
 /// Combinations of unknowns whose effect is below this, relative to the largest, are dropped in the
 /// least-squares start.
-pub(super) const RANK: f64 = 1e-11;
+pub(super) const RANK_TOLERANCE: f64 = 1e-11;
 /// Largest fraction of the way to the boundary of the cone that a step goes.
 const STEP_FRACTION: f64 = 0.98;
 /// A gap below this share of the least one so far is progress.
-const PROGRESS: f64 = 0.9;
+const PROGRESS_SHARE: f64 = 0.9;
 /// Steps without progress after which an iteration has stalled. The gap of a hard problem does not shrink in
 /// every step.
 const PATIENCE: usize = 6;
@@ -97,7 +97,7 @@ pub(super) fn run(
         if gap <= tol_gap_rel && iterate.judged_gap()? <= tol_gap_rel {
             return Ok((Outcome::Solved, steps));
         }
-        waited = if gap < PROGRESS * least { 0 } else { waited + 1 };
+        waited = if gap < PROGRESS_SHARE * least { 0 } else { waited + 1 };
         least = least.min(gap);
         if waited > PATIENCE || iterate.step().is_none() {
             break;

@@ -12,7 +12,7 @@ const DOUBLING_LIMIT: usize = 60;
 /// Steps of the plain recursion after the doubling.
 const REFINEMENT_LIMIT: usize = 4;
 /// Relative change at which the doubling has converged.
-const CONVERGED: f64 = 1e-14;
+const CONVERGED_CHANGE: f64 = 1e-14;
 /// A relative residual above this is not a solution; below it the caller decides.
 const RESIDUAL_LIMIT: f64 = 1e-3;
 
@@ -34,7 +34,7 @@ pub(crate) fn solve_doubling(f: &Mat, g: &Mat, h: &Mat) -> Option<RiccatiSolutio
         if !change.is_finite() {
             return None;
         }
-        if change <= CONVERGED {
+        if change <= CONVERGED_CHANGE {
             return verify(f, g, h, iterate.x);
         }
     }

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 /// The lag has settled when it moves by less than this (samples): the rounding of the interpolation.
-const SETTLED: f64 = 1e-11;
+const SETTLED_LAG_STEP: f64 = 1e-11;
 /// A step of the lag is at most half a sample: beyond it the derivative at the start says nothing.
 const LARGEST_STEP: f64 = 0.5;
 /// The lag is lost when it is so many whole samples from its start.
@@ -22,20 +22,20 @@ const SEARCHED: usize = 1 << 20;
 const LEAST_PART: usize = 2;
 /// Lags whose correlation is this close to the largest are tried: the correlation at whole samples is below
 /// that at the lag itself.
-const LIKELY: f64 = 0.8;
+const LIKELY_PEAK_SHARE: f64 = 0.8;
 /// Coefficients that differ by less than this share are one: the noise of the recordings makes such
 /// differences between periods of a signal.
-const ALIKE: f64 = 1e-3;
+const ALIKE_COEFFICIENT_SHARE: f64 = 1e-3;
 /// Lags that are tried: so many of the largest correlation, and of those that exceed all nearer to 0.
 const MOST_LAGS: usize = 8;
 
 /// Samples on each side of an instant from which it is interpolated.
-const REACH: usize = 128;
+const INTERPOLATION_REACH: usize = 128;
 /// Shape of the Kaiser window: -118 dB outside a transition that begins at 0.485 fs.
-const BETA: f64 = 12.265;
+const KAISER_BETA: f64 = 12.265;
 /// Step of the derivative by the lag, in samples: the square of it, the error, is the square root of the
 /// rounding error.
-const STEP: f64 = 1e-4;
+const DERIVATIVE_STEP: f64 = 1e-4;
 
 /// The present lag, gain and offset.
 pub(super) struct Alignment<'a> {
@@ -93,7 +93,7 @@ impl LeastSquares for Alignment<'_> {
     /// Gain and offset follow from the lag.
     fn limits(&self, k: usize, _: f64) -> StepLimits {
         match k {
-            2 => StepLimits { largest: LARGEST_STEP, negligible: SETTLED },
+            2 => StepLimits { largest: LARGEST_STEP, negligible: SETTLED_LAG_STEP },
             _ => StepLimits { largest: f64::INFINITY, negligible: f64::INFINITY },
         }
     }
@@ -116,7 +116,7 @@ impl<'a> Alignment<'a> {
 
     /// The samples of the record that have a reference.
     pub(super) fn known(&self) -> Range<usize> {
-        let (reach, within) = (REACH as i64, &self.within);
+        let (reach, within) = (INTERPOLATION_REACH as i64, &self.within);
         let first = (self.whole + reach).max(within.start as i64);
         let last = (self.reference.len() as i64 - reach + self.whole).min(within.end as i64);
         usize::try_from(first).unwrap_or(0)..usize::try_from(last.max(first)).unwrap_or(0)
@@ -143,12 +143,13 @@ impl<'a> Alignment<'a> {
     /// The samples at which both are known.
     pub(super) fn points(&self) -> impl Iterator<Item = Point> {
         let weights = kernel(self.phase);
-        let (before, after) = (kernel(self.phase - STEP), kernel(self.phase + STEP));
-        let slopes: Vec<f64> = before.iter().zip(&after).map(|(a, b)| (b - a) / (2.0 * STEP)).collect();
-        let reach = REACH as i64;
+        let (before, after) = (kernel(self.phase - DERIVATIVE_STEP), kernel(self.phase + DERIVATIVE_STEP));
+        let slopes: Vec<f64> =
+            before.iter().zip(&after).map(|(a, b)| (b - a) / (2.0 * DERIVATIVE_STEP)).collect();
+        let reach = INTERPOLATION_REACH as i64;
         let point = move |n: usize| {
             let begin = (n as i64 - self.whole - reach) as usize;
-            let near = &self.reference[begin..=begin + 2 * REACH];
+            let near = &self.reference[begin..=begin + 2 * INTERPOLATION_REACH];
             let (value, slope) = (dot(near, &weights), dot(near, &slopes));
             Point { n, value, slope, error: self.samples[n] - self.gain * value - self.offset }
         };
@@ -167,22 +168,22 @@ impl<'a> Alignment<'a> {
             return Ok(equations);
         }
         let (samples, reference) = (self.samples.len(), self.reference.len());
-        let needed = LEAST_OVERLAP + 2 * REACH;
+        let needed = LEAST_OVERLAP + 2 * INTERPOLATION_REACH;
         Err(MeasureError::Overlap { samples, reference, overlap, lag: self.whole, needed })
     }
 }
 
-/// Coefficients c_j, j = -REACH ..= REACH, of x(n - phase) = sum over j of x[n - j] c_j for -1 < phase < 1,
-/// stored for increasing sample index: sinc(t) kaiser(t) at t = j - phase, scaled to keep constants. A phase
-/// of 0 gives the samples themselves.
+/// Coefficients c_j, |j| <= [`INTERPOLATION_REACH`], of x(n - phase) = sum over j of x[n - j] c_j for
+/// -1 < phase < 1, stored for increasing sample index: sinc(t) kaiser(t) at t = j - phase, scaled to keep
+/// constants. A phase of 0 gives the samples themselves.
 fn kernel(phase: f64) -> Vec<f64> {
-    let reach = REACH as f64;
+    let reach = INTERPOLATION_REACH as f64;
     let at = |i: usize| {
         let t = reach - i as f64 - phase;
         let share = 1.0 - (t / (reach + 1.0)).powi(2);
-        if share <= 0.0 { 0.0 } else { sinc(t) * bessel_i0(BETA * share.sqrt()) }
+        if share <= 0.0 { 0.0 } else { sinc(t) * bessel_i0(KAISER_BETA * share.sqrt()) }
     };
-    let values: Vec<f64> = (0..=2 * REACH).map(at).collect();
+    let values: Vec<f64> = (0..=2 * INTERPOLATION_REACH).map(at).collect();
     let sum: f64 = values.iter().sum();
     values.iter().map(|x| x / sum).collect()
 }
@@ -198,7 +199,7 @@ fn sinc(t: f64) -> f64 {
     }
 }
 
-/// The modified Bessel function I_0 by its power series; BETA is small.
+/// The modified Bessel function I_0 by its power series; KAISER_BETA is small.
 fn bessel_i0(x: f64) -> f64 {
     let quarter = 0.25 * x * x;
     let (mut term, mut sum) = (1.0, 1.0);
@@ -217,13 +218,13 @@ pub(super) fn likely_lags(samples: &[f64], reference: &[f64]) -> Vec<i64> {
     let largest = all.iter().fold(0.0, |most: f64, (_, c)| most.max(*c));
     let is_peak = |i: usize| {
         let below = |j: Option<usize>| j.and_then(|j| all.get(j)).is_none_or(|(_, c)| *c <= all[i].1);
-        all[i].1 >= LIKELY * largest && below(i.checked_sub(1)) && below(Some(i + 1))
+        all[i].1 >= LIKELY_PEAK_SHARE * largest && below(i.checked_sub(1)) && below(Some(i + 1))
     };
     let mut peaks: Vec<(i64, f64)> = (0..all.len()).filter(|&i| is_peak(i)).map(|i| all[i]).collect();
     peaks.sort_by_key(|(lag, _)| lag.abs());
     let mut rising: Vec<(i64, f64)> = Vec::new();
     for peak in &peaks {
-        if rising.last().is_none_or(|last| peak.1 > last.1 * (1.0 + ALIKE)) {
+        if rising.last().is_none_or(|last| peak.1 > last.1 * (1.0 + ALIKE_COEFFICIENT_SHARE)) {
             rising.push(*peak);
         }
     }

@@ -9,7 +9,7 @@ use crate::sine_fit::{Direction, Estimate, SineFit, ToneFit, find_tones, fit, lo
 use crate::units::{Decibels, Hertz, Radians};
 
 /// A tone that is given may be this far from the true one, in cycles per sample ..
-const NEAR: f64 = 1e-3;
+const NEAR_CYCLES: f64 = 1e-3;
 /// .. and at least so many cycles per record.
 const NEAR_BINS: f64 = 5.0;
 
@@ -205,7 +205,7 @@ fn starts(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Vec<H
     if settings.tones.is_empty() {
         return Ok(find_tones(&channels, rate, 1, Decibels(0.0))?);
     }
-    let within = rate * NEAR.max(NEAR_BINS / record.len().max(1) as f64);
+    let within = rate * NEAR_CYCLES.max(NEAR_BINS / record.len().max(1) as f64);
     let start = |tone: &Hertz| Ok(locate(&channels, rate, *tone, within)?);
     settings.tones.iter().map(start).collect()
 }

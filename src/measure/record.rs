@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_PI_2, SQRT_2};
 /// Fewest samples at either end that are looked at.
 const FEWEST: usize = 8;
 /// The power of a piece relative to the middle from which on it belongs to an end.
-const RAISED: f64 = 4.0;
+const RAISED_POWER: f64 = 4.0;
 
 /// The samples of a record. Powers are means over its parts, so that those of a tone of the amplitude A are
 /// A^2 / 2 for both kinds.
@@ -190,7 +190,7 @@ impl UnsettledEnds {
             return None;
         }
         let is_raised = |k: usize| {
-            [k..2 * k, n - 2 * k..n - k].into_iter().any(|at| mean_square(&rest[at]) > RAISED * middle)
+            [k..2 * k, n - 2 * k..n - k].into_iter().any(|at| mean_square(&rest[at]) > RAISED_POWER * middle)
         };
         let mut samples = FEWEST;
         while 8 * samples <= n && is_raised(samples) {

@@ -196,7 +196,7 @@ const ALL_ZERO: &str = "all integer taps are zero, so the output is zero: no bet
 /// Noise gains above this cause a warning: 20 dB.
 const LARGE_NOISE_GAIN: f64 = 10.0;
 /// A gamma above this share of that of zero output is hardly better than zero output.
-const USELESS: f64 = 0.9;
+const USELESS_SHARE: f64 = 0.9;
 /// A bank whose own errors leave less than this in the band of the signal reconstructs nothing.
 const LEAST_SNR: Decibels = Decibels(10.0);
 
@@ -225,7 +225,7 @@ fn large_noise_gain(bank: &Bank, noise_gain: f64) -> String {
 /// Why a bank is of no use, if it is: it is hardly better than silence, or leaves little of the signal that
 /// the spec states. The noise of the converters, which no bank removes, does not count.
 pub fn uselessness(bank: &Bank, scale: &GammaScale, figures: &Figures) -> Option<String> {
-    let gamma = bank.gamma.norm.filter(|gamma| *gamma > USELESS * scale.zero_output);
+    let gamma = bank.gamma.norm.filter(|gamma| *gamma > USELESS_SHARE * scale.zero_output);
     if let Some(gamma) = gamma.filter(|_| scale.zero_output > 0.0) {
         return Some(format!(
             "gamma is {:.0} % of that of zero output: the front ends or the delays leave nothing to reconstruct, or the \

@@ -10,7 +10,7 @@ const COLUMNS: usize = 1900;
 /// Spurs of a recording that are marked.
 const MOST_MARKS: usize = 24;
 /// Decibels below the largest bin at which the picture ends.
-const DEPTH: f64 = 180.0;
+const DEPTH_DB: f64 = 180.0;
 
 /// A recording whose spectrum is drawn.
 #[derive(Debug, Clone, Copy)]
@@ -109,7 +109,7 @@ impl Scale {
         let (factor, unit) = if end < 1e3 { (1.0, "Hz".to_owned()) } else { scale_of(end, "Hz") };
         let all = spectra.into_iter().flat_map(|spectrum| &spectrum.amplitudes);
         let largest = all.fold(0.0, |most: f64, a| most.max(*a));
-        Self { unit, factor, full_scale, floor: Decibels::of_amplitude(largest / full_scale).0 - DEPTH }
+        Self { unit, factor, full_scale, floor: Decibels::of_amplitude(largest / full_scale).0 - DEPTH_DB }
     }
 
     fn chart(&self, title: String, window: Window, series: Vec<Series>) -> Chart {

@@ -122,7 +122,7 @@ pub enum NotInTurn {
 ///
 /// # Errors
 /// [`NotInTurn`].
-pub fn turns(
+pub fn interleaving(
     converters: usize,
     delays: &[FastPeriods],
     layout: &FrameLayout,

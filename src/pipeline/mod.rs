@@ -10,7 +10,6 @@
 //! signal in memory. Complex samples are two streams over the same frames; a sample with one part missing
 //! is missing. The result is an [`Outcome`] with counts and [`Warning`]s; nothing is printed.
 
-mod error;
 mod fusion;
 mod gaps;
 pub mod matching;
@@ -20,11 +19,10 @@ mod outputs;
 mod retune;
 mod streaming;
 
-pub use error::PipelineError;
 pub use fusion::{DroppedLatency, Settings};
 pub use gaps::{Gap, GapPolicy, GapSummary, LISTED_GAPS};
 pub use offline::{fuse, fused};
-pub use outcome::{Outcome, Warning};
+pub use outcome::{Outcome, PipelineError, Warning};
 pub use outputs::FileOutputs;
 pub use retune::{Change, Retuner};
 pub use streaming::{Block, Pipeline};

@@ -40,8 +40,8 @@ pub fn fuse(
     settings: Settings<'_>,
     stop: &dyn Fn() -> bool,
 ) -> Result<Outcome, PipelineError> {
-    let frames = parts.first().map_or(0, Input::frames);
-    let wanted = frames * plan.ratio();
+    let (frames, ratio) = (parts.first().map_or(0, Input::frames), plan.ratio());
+    let wanted = frames.checked_mul(ratio).ok_or(ProcessError::TooManyFrames { frames, ratio })?;
     if parts.len() > 1 {
         output.select(0);
     }

@@ -1,9 +1,10 @@
-//! The result of a run.
+//! The result of a run, or its error.
 
 use super::GapSummary;
-use crate::io::InputWarning;
+use crate::files::FileError;
+use crate::io::{InputWarning, IoError};
 use crate::messages::counted;
-use crate::runtime::PlanSummary;
+use crate::runtime::{BuildError, PlanSummary, ProcessError, SwapError};
 
 /// Counts and settings of a finished run.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -63,5 +64,45 @@ impl Outcome {
         let replaced = any(self.replaced, Warning::Replaced);
         let clipped = any(self.clipped, Warning::Clipped);
         [replaced, clipped, any(self.state_resets, Warning::StateReset)].into_iter().flatten()
+    }
+}
+
+/// An error of one of the stages.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PipelineError {
+    /// The bank's parts do not fit together.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// The frames do not fit the bank.
+    #[error(transparent)]
+    Process(#[from] ProcessError),
+    /// A stream cannot go on with other filters.
+    #[error(transparent)]
+    Swap(#[from] SwapError),
+    /// An input cannot be read, or an output written.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// An output file cannot be created or renamed to its final name.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The thread that prepares changes of the filters cannot be started.
+    #[error("no thread for the changes of the filters: {0}")]
+    Thread(std::io::Error),
+    /// The thread that prepares changes of the filters ended before its work was done.
+    #[error("the thread that follows the delays has died; the outputs would be those of old delays")]
+    RetunerDied,
+    /// Filters cannot change for complex samples.
+    #[error("delays are measured in real samples; these are complex")]
+    RetunedComplex,
+    /// The caller of [`fuse`](super::fuse) stopped it.
+    #[error("the fusion was stopped")]
+    Stopped,
+}
+
+impl PipelineError {
+    /// True if the reader of an output pipe went away, which ends a stream quietly.
+    pub fn is_closed_pipe(&self) -> bool {
+        matches!(self, Self::Io(error) if error.is_closed_pipe())
     }
 }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 /// Share of an axis by which it goes on after its last point.
-const END: f64 = 1e-9;
+const END_SHARE: f64 = 1e-9;
 
 /// How an axis is divided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -63,7 +63,7 @@ pub(super) fn widened(range: &Range<f64>, share: f64, least: f64) -> Range<f64> 
         span => (share * span).max(0.5 * (least * size - span)),
     };
     // A tick at the end must not be lost by rounding.
-    let slack = END * (high - low);
+    let slack = END_SHARE * (high - low);
     low - margin - slack..high + margin + slack
 }
 

@@ -2,7 +2,7 @@
 //! grey edges.
 //!
 //! plotters' own pixels draw a wide curve as one polygon, whose mitres stick out far where a spectrum has a
-//! narrow line. Here a segment is all that is within half the width of it, so the joints are round.
+//! narrow line. Here a line is all that is within half the width of it, so the joints are round.
 
 use super::chart::{Chart, ENLARGED, PlotError};
 use super::legend::OVERSIZE;
@@ -51,11 +51,11 @@ impl DrawingBackend for Canvas<'_> {
     }
 
     fn draw_line<S: BackendStyle>(&mut self, from: BackendCoord, to: BackendCoord, style: &S) -> Drawn {
-        let segment = Segment::new(from, to, f64::from(style.stroke_width().max(1)) / 2.0);
+        let line = ThickLine::new(from, to, f64::from(style.stroke_width().max(1)) / 2.0);
         let height = self.0.height() as i32;
-        for y in segment.rows().start.max(0)..segment.rows().end.min(height) {
-            for x in segment.row(y).start.max(0)..segment.row(y).end.min(self.0.width as i32) {
-                if segment.covers(x, y) {
+        for y in line.rows().start.max(0)..line.rows().end.min(height) {
+            for x in line.row(y).start.max(0)..line.row(y).end.min(self.0.width as i32) {
+                if line.covers(x, y) {
                     self.draw_pixel((x, y), style.color())?;
                 }
             }
@@ -75,14 +75,14 @@ impl DrawingBackend for Canvas<'_> {
 }
 
 /// All points within a distance of a straight line between two points.
-struct Segment {
+struct ThickLine {
     from: (f64, f64),
     /// From one end to the other.
     step: (f64, f64),
     radius: f64,
 }
 
-impl Segment {
+impl ThickLine {
     fn new(from: BackendCoord, to: BackendCoord, radius: f64) -> Self {
         let from = (f64::from(from.0), f64::from(from.1));
         Self { from, step: (f64::from(to.0) - from.0, f64::from(to.1) - from.1), radius }

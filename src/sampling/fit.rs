@@ -11,13 +11,13 @@
 //! an addition). The normal equations have half bandwidth n = ORDER - 1 and are solved by an LDL^T
 //! factorisation without fill-in: O(M n^2) for any number of right-hand sides.
 
-mod bend;
 mod influence;
+mod roughness;
 
-pub use bend::Knowledge;
 pub use influence::Response;
+pub use roughness::PosteriorCovariance;
 
-use super::error::SamplingError;
+use super::SamplingError;
 use super::kernel::BSpline;
 
 /// A pivot below this share of the largest diagonal entry is rounding error.

@@ -25,7 +25,7 @@ fn floor(x: f64) -> i64 {
 }
 
 /// Added to a smaller number, it leaves no bits for a fraction: the sum is rounded to an integer.
-const ROUNDING: f64 = 1.5 * (1_u64 << 52) as f64;
+const ROUNDING_SUMMAND: f64 = 1.5 * (1_u64 << 52) as f64;
 
 /// Positions below it are rounded so; a quarter of what the sum can hold.
 const LARGEST_ROUNDED: f64 = (1_u64 << 50) as f64;
@@ -56,12 +56,13 @@ impl<const ORDER: usize> BSpline<ORDER> {
         let (mut knots, mut t) = ([0; N], [0.0; N]);
         let usual = x.iter().fold(true, |all, x| all & (x.abs() < LARGEST_ROUNDED));
         for i in 0..N {
-            let sum = x[i] + ROUNDING;
-            let nearest = sum - ROUNDING;
+            let sum = x[i] + ROUNDING_SUMMAND;
+            let nearest = sum - ROUNDING_SUMMAND;
             // The nearest integer may lie above.
             let above = nearest > x[i];
             let floor = nearest - if above { 1.0 } else { 0.0 };
-            let integer = (sum.to_bits() as i64).wrapping_sub(ROUNDING.to_bits() as i64) - i64::from(above);
+            let integer =
+                (sum.to_bits() as i64).wrapping_sub(ROUNDING_SUMMAND.to_bits() as i64) - i64::from(above);
             (knots[i], t[i]) = (integer - (Self::DEGREE / 2) as i64, x[i] - floor);
         }
         if !usual {

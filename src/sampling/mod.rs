@@ -10,7 +10,6 @@
 //! Unit spacing and f64 throughout, f32 in `fit2`; no dependency beyond the standard library, and rayon in
 //! `fit2`.
 
-mod error;
 pub mod fit;
 #[cfg(feature = "fit2")]
 pub mod fit2;
@@ -19,10 +18,57 @@ pub mod nonuniform;
 pub mod recurrent;
 pub mod smoothing;
 
-pub use error::SamplingError;
 pub use fit::{Fit, FitSample};
 #[cfg(feature = "fit2")]
 pub use fit2::Fit2;
 pub use kernel::{BSpline, sinc};
 pub use recurrent::Recurrent;
 pub use smoothing::SmoothingSpline;
+
+/// Faults of sample sets, offsets and settings handed to the sampling core.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SamplingError {
+    /// Two recurrent sets sample the same instants.
+    #[error(
+        "sample sets {first} and {second} are {distance:e} fast periods apart modulo the period; two sets must not coincide, so change one of the delays"
+    )]
+    Coinciding {
+        /// Index of one set.
+        first: usize,
+        /// Index of the other set.
+        second: usize,
+        /// Distance modulo the period, in fast periods.
+        distance: f64,
+    },
+    /// A number that has to be finite is not.
+    #[error("{name} {index} is {value}: every {name} must be a finite number")]
+    NotFinite {
+        /// What the number is.
+        name: &'static str,
+        /// Its index in the argument.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// A setting lies outside its range.
+    #[error("{name} is {value}: it must be {rule}")]
+    Setting {
+        /// Name of the setting.
+        name: &'static str,
+        /// Value given.
+        value: f64,
+        /// The range in words.
+        rule: &'static str,
+    },
+    /// The normal equations lost positive definiteness.
+    #[error(
+        "the normal equations are not positive definite at coefficient {column} (pivot {pivot:e}): no sample determines it; give the first differences a positive weight tau"
+    )]
+    NotDefinite {
+        /// Column of the failing pivot.
+        column: usize,
+        /// The pivot.
+        pivot: f64,
+    },
+}

@@ -9,7 +9,7 @@
 //! psi_i(u) = sinc(u / M) prod_{q /= i} sin(pi (u + t_i - t_q) / M) / sin(pi (t_i - t_q) / M)
 //! ```
 
-use super::error::SamplingError;
+use super::SamplingError;
 use super::kernel::{sin_pi, sinc};
 
 /// Offsets closer than this (in fast periods, modulo the period) count as coinciding: the factor

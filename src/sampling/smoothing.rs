@@ -14,8 +14,8 @@
 //! (2 sqrt(2) l). A filter, which knows the samples of one side only, has 4 times this variance. Between two
 //! exact samples at the distance T the variance is q a^2 b^2 / (3 T), a and b the distances from them.
 
-use super::error::SamplingError;
-use super::fit::{Fit, Knowledge, Response};
+use super::SamplingError;
+use super::fit::{Fit, PosteriorCovariance, Response};
 use super::nonuniform::{Measured, Smoothness};
 
 /// Knots per length over which samples act.
@@ -27,7 +27,7 @@ const LONGEST: f64 = 30.0;
 /// Deviation of the best sample, over that of a walk between two knots.
 const LEAST_ERROR: f64 = 1e-4;
 /// Knots to each side of a position over which samples have an influence, beside those of the longest gap.
-const REACH: usize = 24;
+const INFLUENCE_KNOTS: usize = 24;
 
 /// A smoothing spline with its samples.
 #[derive(Debug, Clone)]
@@ -36,13 +36,21 @@ pub struct SmoothingSpline {
     /// By increasing position.
     samples: Vec<Measured>,
     weights: Vec<f64>,
-    /// A line that is taken off before the fit: its value at the first sample, and its slope.
-    line: (f64, f64),
+    /// It is taken off before the fit.
+    line: Line,
     /// Distance of knots.
     step: f64,
     /// Knots that a response needs.
     reach: usize,
     walk: f64,
+}
+
+/// The line of least squares.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    /// At the first sample.
+    value: f64,
+    slope: f64,
 }
 
 /// What is known of the function at one position.
@@ -77,7 +85,7 @@ impl SmoothingSpline {
         }
         let line = line(&samples);
         let spacing = length / (samples.len() - 1) as f64;
-        let noise = 1.0 / median(samples.iter().map(|s| s.weight(line.1, 0.0)));
+        let noise = 1.0 / median(samples.iter().map(|s| s.weight(line.slope, 0.0)));
         let walk = walk.max(noise * spacing / (LONGEST * length).powi(4));
         if walk <= 0.0 {
             let (name, rule) = ("variance by which the slope walks", "positive where samples are exact");
@@ -88,22 +96,22 @@ impl SmoothingSpline {
         Self::fitted(samples, line, step, walk)
     }
 
-    fn fitted(samples: Vec<Measured>, line: (f64, f64), step: f64, walk: f64) -> Result<Self, SamplingError> {
+    fn fitted(samples: Vec<Measured>, line: Line, step: f64, walk: f64) -> Result<Self, SamplingError> {
         let first = samples[0].x;
         let end = ((samples[samples.len() - 1].x - first) / step).ceil() as usize;
         let mut fit = Fit::<4, 1>::new(-1, end + 4);
         let floor = LEAST_ERROR * (walk * step.powi(3)).sqrt();
         // In units of the walk, so that the numbers are near one.
         let unit = walk * step.powi(3);
-        let weights: Vec<f64> = samples.iter().map(|s| unit * s.weight(line.1, floor)).collect();
+        let weights: Vec<f64> = samples.iter().map(|s| unit * s.weight(line.slope, floor)).collect();
         for (s, weight) in samples.iter().zip(&weights) {
-            let value = s.value - line.0 - line.1 * (s.x - first);
+            let value = s.value - line.value - line.slope * (s.x - first);
             fit.add((s.x - first) / step, &[value], *weight, 0.0);
         }
-        fit.bend(1.0);
+        fit.add_roughness_penalty(1.0);
         fit.solve()?;
         let gap = samples.windows(2).map(|pair| pair[1].x - pair[0].x).fold(0.0, f64::max);
-        let reach = REACH + 2 * (gap / step).ceil() as usize;
+        let reach = INFLUENCE_KNOTS + 2 * (gap / step).ceil() as usize;
         Ok(Self { fit, samples, weights, line, step, reach, walk })
     }
 
@@ -118,10 +126,11 @@ impl SmoothingSpline {
         let inside = x.clamp(first, last);
         let position = (inside - first) / self.step;
         let unit = self.walk * self.step.powi(3);
-        let Knowledge { variance, covariance, slope_variance } = self.fit.knowledge(position);
+        let PosteriorCovariance { variance, covariance, slope_variance } =
+            self.fit.posterior_covariance(position);
         let found = Estimate {
-            value: self.fit.value(position)[0] + self.line.0 + self.line.1 * (inside - first),
-            slope: self.fit.slope(position)[0] / self.step + self.line.1,
+            value: self.fit.value(position)[0] + self.line.value + self.line.slope * (inside - first),
+            slope: self.fit.slope(position)[0] / self.step + self.line.slope,
             variance: unit * variance,
             covariance: unit * covariance / self.step,
             slope_variance: unit * slope_variance / (self.step * self.step),
@@ -209,14 +218,13 @@ fn check(samples: &[Measured], walk: f64) -> Result<(), SamplingError> {
     Err(SamplingError::Setting { name, value: walk, rule })
 }
 
-/// Value at the first sample and slope of the line of least squares.
-fn line(samples: &[Measured]) -> (f64, f64) {
+fn line(samples: &[Measured]) -> Line {
     let count = samples.len() as f64;
     let mean = |of: &dyn Fn(&Measured) -> f64| samples.iter().map(of).sum::<f64>() / count;
     let (x, y) = (mean(&|s| s.x), mean(&|s| s.value));
     let (xx, xy) = (mean(&|s| (s.x - x).powi(2)), mean(&|s| (s.x - x) * (s.value - y)));
     let slope = xy / xx;
-    (y + slope * (samples[0].x - x), slope)
+    Line { value: y + slope * (samples[0].x - x), slope }
 }
 
 /// The least distance of samples at different positions.

@@ -10,11 +10,9 @@
 mod capture;
 mod complex;
 mod converter;
-mod describe;
 mod errors;
 mod normal;
 mod parse;
-mod quantiser;
 mod recording;
 mod response;
 mod signal;
@@ -24,10 +22,9 @@ mod workload;
 
 pub use capture::{Analog, interleaved, target};
 pub use complex::ComplexSource;
-pub use converter::{Captured, Converter, Delivered, capture};
+pub use converter::{Captured, Converter, Delivered, Quantiser, capture};
 pub use errors::{ConverterErrors, ErrorRule, ErrorsOfConverter, RefusedError, VirtualConverter};
 pub use parse::ParseSourceError;
-pub use quantiser::Quantiser;
 pub use recording::Recording;
 pub use response::{Instants, sample};
 pub use signal::Signal;

@@ -7,7 +7,7 @@ use crate::units::{FastPeriods, RadiansPerFastPeriod};
 use std::f64::consts::{PI, TAU};
 
 /// A Taylor series ends where its terms are below this, relative to the first one.
-const NEGLIGIBLE: f64 = 1e-17;
+const NEGLIGIBLE_TERM: f64 = 1e-17;
 /// Terms of a Taylor series, at most; shifts up to [`Recording::most_shift`] take half of them.
 const MOST_TERMS: u32 = 128;
 /// Largest pi |shift| / T: e to this power is what rounding errors grow by.
@@ -102,7 +102,7 @@ impl Recording {
                 *power *= shift.0 * turn / order;
                 *y += *power * term;
             }
-            if bound < NEGLIGIBLE && order > largest * turn {
+            if bound < NEGLIGIBLE_TERM && order > largest * turn {
                 break;
             }
         }

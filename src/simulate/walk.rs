@@ -7,6 +7,7 @@
 use super::source::{NormalisedSource, Source};
 use crate::analog::StrictlyProper;
 use crate::units::FastPeriods;
+use std::ops::Range;
 
 /// 1 / 19! is below the rounding error.
 const TERMS: usize = 19;
@@ -39,9 +40,9 @@ pub fn sample_at(filter: &StrictlyProper, source: &NormalisedSource, times: &[Fa
             times.iter().map(value).collect()
         }
         Source::Sum(terms) => sum(times.len(), terms.iter().map(|term| sample_at(filter, term, times))),
-        Source::Step { at, .. } => walk(filter, source, (at.0, f64::INFINITY), 0.0, times),
+        Source::Step { at, .. } => walk(filter, source, at.0..f64::INFINITY, 0.0, times),
         Source::Chirp { length, start, end, .. } => {
-            walk(filter, source, (0.0, length.0), start.0.abs().max(end.0.abs()), times)
+            walk(filter, source, 0.0..length.0, start.0.abs().max(end.0.abs()), times)
         }
     }
 }
@@ -64,7 +65,7 @@ pub(super) fn panel_rate(filter: &StrictlyProper, band: f64) -> f64 {
 fn walk(
     filter: &StrictlyProper,
     source: &NormalisedSource,
-    support: (f64, f64),
+    support: Range<f64>,
     band: f64,
     times: &[FastPeriods],
 ) -> Vec<f64> {
@@ -82,7 +83,7 @@ fn walk(
 /// The state of a front end at a moving instant.
 struct Walker<'a> {
     source: &'a NormalisedSource,
-    support: (f64, f64),
+    support: Range<f64>,
     /// Panels per fast period.
     rate: f64,
     now: f64,
@@ -96,7 +97,7 @@ struct Walker<'a> {
 
 impl<'a> Walker<'a> {
     /// At rest at the beginning of the support.
-    fn new(filter: &StrictlyProper, source: &'a NormalisedSource, support: (f64, f64), rate: f64) -> Self {
+    fn new(filter: &StrictlyProper, source: &'a NormalisedSource, support: Range<f64>, rate: f64) -> Self {
         let n = filter.order();
         let a: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| filter.a()[(i, j)] / rate).collect()).collect();
         let mut inputs = vec![filter.b().iter().copied().collect::<Vec<f64>>()];
@@ -104,7 +105,7 @@ impl<'a> Walker<'a> {
             inputs.push(multiplied(&a, &inputs[m - 1], 1.0 / m as f64));
         }
         let c = filter.c().iter().copied().collect();
-        Self { source, support, rate, now: support.0, state: vec![0.0; n], a, inputs, c }
+        Self { now: support.start, source, support, rate, state: vec![0.0; n], a, inputs, c }
     }
 
     fn output(&self) -> f64 {
@@ -114,7 +115,7 @@ impl<'a> Walker<'a> {
     /// Moves on to `target`; stays where it is if that is not later.
     fn go_to(&mut self, target: f64) {
         // The source is not smooth at the end of its support, so a panel ends there.
-        for corner in [target.min(self.support.1), target] {
+        for corner in [target.min(self.support.end), target] {
             let length = corner - self.now;
             if length > 0.0 {
                 let count = (length * self.rate).ceil().clamp(1.0, MOST_PANELS);
@@ -134,7 +135,7 @@ impl<'a> Walker<'a> {
             term = multiplied(&self.a, &term, length * self.rate / m as f64);
             add(&mut self.state, &term, 1.0);
         }
-        if begin + 0.5 * length < self.support.1 {
+        if begin + 0.5 * length < self.support.end {
             for (moment, input) in self.moments(begin, length).iter().zip(&self.inputs) {
                 add(&mut self.state, input, *moment);
             }

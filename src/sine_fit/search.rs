@@ -11,7 +11,7 @@ use std::ops::Range;
 /// of B bins of Gaussian noise exceeds c ln B times the mean with probability B^(1-c).
 const SIGNIFICANCE: f64 = 4.0;
 /// A peak below this share of the largest sample is the rounding of the transform.
-const ROUNDING: f64 = 1e-13;
+const TRANSFORM_ROUNDING: f64 = 1e-13;
 /// Lines that are named where a tone is missing, and how far below the largest.
 const NAMED_LINES: usize = 5;
 const NAMED_RANGE: Decibels = Decibels(60.0);
@@ -151,7 +151,7 @@ impl Power {
     }
 
     fn is_significant(&self, at: usize, largest: f64) -> bool {
-        let rounding = ROUNDING * largest * self.length as f64;
+        let rounding = TRANSFORM_ROUNDING * largest * self.length as f64;
         let mut others: Vec<f64> =
             self.bins.iter().enumerate().filter(|(m, _)| m.abs_diff(at) > LOBE).map(|(_, x)| *x).collect();
         if self.bins[at] <= rounding * rounding {

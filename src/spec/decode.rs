@@ -2,10 +2,10 @@
 
 use super::design::{AFFINE, DesignOverrides, Method, Reduction};
 use super::error::KeyProblem;
-use super::filter_reader::{FILTER_FORMS, filter};
-use super::measured::{FilterModel, FilterModels, MeasuredFilter, Measurement};
+use super::filter::{FilterModel, FilterModels};
+use super::filter_reader::{FILTER_FORMS, front_end};
 use super::reader::{Either, Fields, Value};
-use super::word_lengths::{WordLengths, check_fraction_bits};
+use super::word_lengths::{fraction_bits, word_lengths};
 use super::{
     ChannelSpec, DesignSpec, Fault, FrameLayout, PerChannel, Spec, SpecProblem, UncertaintySpec, fitting,
     frames, limits, signal,
@@ -45,9 +45,6 @@ const DESIGN_KEYS: [&str; 12] = [
     "noise",
 ];
 const UNCERTAINTY_KEYS: [&str; 6] = ["delay", "delay_samples", "gain", "cutoff", "offset", "reference"];
-
-/// The keys of a filter that is a measurement.
-const MEASURED_KEYS: [&str; 5] = ["touchstone", "response", "order", "parameter", "deembed"];
 
 /// The advice for two keys of one value in two units.
 const SAME_MEANING: &str = "they have the same meaning, keep one of them";
@@ -389,48 +386,4 @@ fn overriding(overrides: &DesignOverrides, key: &'static str, problem: &SpecProb
     let other_length = key == "bits" && matches!(problem, SpecProblem::Range { unit: "entries", .. });
     let cause = if other_length && !overrides.gives(key) { "taps" } else { key };
     overrides.gives(cause).then_some(cause)
-}
-
-/// One number of bits, or a list of them. The length of the list is checked where that of the filters is
-/// known.
-pub(crate) fn word_lengths(value: &Value<'_>) -> Result<WordLengths, Fault> {
-    let words = match value.items("a number of bits, or a list of them") {
-        Ok(items) => WordLengths::PerTap(items.iter().map(Value::bits).collect::<Result<_, _>>()?),
-        Err(_) => WordLengths::Same(value.bits()?),
-    };
-    words.check_numbers().map_err(|problem| value.fault(problem))?;
-    Ok(words)
-}
-
-/// The exponent of the finest step.
-pub(crate) fn fraction_bits(value: &Value<'_>) -> Result<i32, Fault> {
-    let bits = value.integer("bits")?;
-    let bits = i32::try_from(bits).unwrap_or(if bits < 0 { i32::MIN } else { i32::MAX });
-    check_fraction_bits(bits).map_err(|problem| value.fault(problem))?;
-    Ok(bits)
-}
-
-/// A filter, which may be a measurement; a filter that is written is exact.
-fn front_end(value: &Value<'_>, h: Seconds, models: &FilterModels<'_>) -> Result<FilterModel, Fault> {
-    let mut known = FILTER_FORMS.concat();
-    known.extend(MEASURED_KEYS.iter().filter(|key| !FILTER_FORMS.concat().contains(key)));
-    let fields = value.fields(&known)?;
-    let remedy = "a filter has one measurement, keep one of them";
-    let (path, measurement, keys) = match fields.either("touchstone", "response", remedy)? {
-        Either::Neither => return Ok(FilterModel { filter: filter(value)?, error: Decibels(0.0) }),
-        Either::First(path) => {
-            let parameter = fields.read("parameter", |v| v.text().map(str::to_owned))?;
-            (path, Measurement::Touchstone(parameter), &MEASURED_KEYS[..])
-        }
-        Either::Second(path) => (path, Measurement::Response, &["response", "order", "deembed"][..]),
-    };
-    let fields = value.fields(keys)?;
-    let order = fields.required("order", "give the number of poles of the model")?.count("poles")?;
-    let deembed = fields.read("deembed", |v| v.time())?;
-    let deembed = deembed.map_or(Seconds(0.0), |delay| delay.in_seconds(h));
-    let path = path.text()?.to_owned();
-    let model = models(&MeasuredFilter { path, measurement, order, deembed })
-        .map_err(|message| value.fault(SpecProblem::Measurement { message }))?;
-    model.filter.check().map_err(|problem| value.fault(problem))?;
-    Ok(model)
 }

@@ -51,8 +51,8 @@ pub struct DesignTable<M> {
     /// Whether `loss_db` asks for few signed digits, not for few bits.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub digits: bool,
-    /// Taps of the method `fir` that follow delays which change while the bank runs: affine functions of the
-    /// delays, optimal over the box of the `[uncertainty]` table.
+    /// Delay-scheduled taps of the method `fir`, for delays that change while the bank runs: affine
+    /// functions of the delays, optimal over the box of the `[uncertainty]` table.
     #[serde(skip_serializing_if = "std::ops::Not::not", serialize_with = "as_affine")]
     pub tracking: bool,
     /// Order reduction, for recursive methods.
@@ -60,7 +60,7 @@ pub struct DesignTable<M> {
     pub reduction: Option<Reduction>,
 }
 
-/// The way in which taps follow delays, in spec files.
+/// The schedule of delay-scheduled taps, in spec files.
 pub(super) const AFFINE: &str = "affine";
 
 fn as_affine<S: Serializer>(_: &bool, serializer: S) -> Result<S::Ok, S::Error> {
@@ -255,7 +255,7 @@ impl DesignSpec {
             return blame("fraction_bits", Err(SpecProblem::MissingKey { key: "bits", remedy }));
         }
         blame("target_snr_db", self.target_snr_db.map_or(Ok(()), limits::check_target_snr))?;
-        // Taps that follow the delays are functions of all delays but one.
+        // Delay-scheduled taps are functions of all delays but one.
         let functions = if self.tracking { layout.samples().len() } else { 1 };
         match (self.method, self.taps) {
             (Method::Fir, Some(taps)) => {
@@ -285,7 +285,7 @@ impl DesignSpec {
             _ if self.has_integers() && self.tracking => conflict(
                 if self.bits.is_some() { "bits" } else { "loss_db" },
                 "tracking",
-                "taps that follow the delays are no integers; leave out one of the two",
+                "delay-scheduled taps are no integers; leave out one of the two",
             ),
             _ if self.loss_db.is_some() && self.fraction_bits.is_some() => conflict(
                 "loss_db",

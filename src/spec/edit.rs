@@ -10,7 +10,7 @@ use super::{
 use crate::units::{Decibels, Seconds};
 
 /// Largest relative difference of two delays that differ only by the rounding of their unit.
-const ROUNDING: f64 = 1e-12;
+const DELAY_ROUNDING: f64 = 1e-12;
 
 /// Replacements of ranges of a text.
 struct Edits<'a> {
@@ -121,7 +121,7 @@ fn read(text: &str, models: &FilterModels<'_>) -> Result<Spec, SpecError> {
 }
 
 fn rounded_to(read: Seconds, own: Seconds) -> Seconds {
-    if (read.0 - own.0).abs() <= ROUNDING * own.0.abs() { own } else { read }
+    if (read.0 - own.0).abs() <= DELAY_ROUNDING * own.0.abs() { own } else { read }
 }
 
 fn entries(node: &Node) -> Option<&[Entry]> {

@@ -1,7 +1,9 @@
 //! Reads an analog filter in whichever form it is written.
 
+use super::filter::{FilterModel, FilterModels, MeasuredFilter, Measurement};
 use super::reader::{Either, Fields, Value};
 use super::{Family, Fault, FilterProblem, FilterSpec, Passband, SpecProblem};
+use crate::units::{Decibels, Seconds};
 
 /// The keys of each written form of a filter; the first one names the form.
 pub(super) const FILTER_FORMS: [&[&str]; 5] = [
@@ -12,9 +14,41 @@ pub(super) const FILTER_FORMS: [&[&str]; 5] = [
     &["cascade"],
 ];
 
+/// The keys of a filter that is a measurement.
+const MEASURED_KEYS: [&str; 5] = ["touchstone", "response", "order", "parameter", "deembed"];
+
 /// Reads one filter in whichever form it is written.
 pub(super) fn filter(value: &Value<'_>) -> Result<FilterSpec, Fault> {
     checked_filter(value, FilterSpec::check)
+}
+
+/// A filter, which may be a measurement; a filter that is written is exact.
+pub(super) fn front_end(
+    value: &Value<'_>,
+    h: Seconds,
+    models: &FilterModels<'_>,
+) -> Result<FilterModel, Fault> {
+    let mut known = FILTER_FORMS.concat();
+    known.extend(MEASURED_KEYS.iter().filter(|key| !FILTER_FORMS.concat().contains(key)));
+    let fields = value.fields(&known)?;
+    let remedy = "a filter has one measurement, keep one of them";
+    let (path, measurement, keys) = match fields.either("touchstone", "response", remedy)? {
+        Either::Neither => return Ok(FilterModel { filter: filter(value)?, error: Decibels(0.0) }),
+        Either::First(path) => {
+            let parameter = fields.read("parameter", |v| v.text().map(str::to_owned))?;
+            (path, Measurement::Touchstone(parameter), &MEASURED_KEYS[..])
+        }
+        Either::Second(path) => (path, Measurement::Response, &["response", "order", "deembed"][..]),
+    };
+    let fields = value.fields(keys)?;
+    let order = fields.required("order", "give the number of poles of the model")?.count("poles")?;
+    let deembed = fields.read("deembed", |v| v.time())?;
+    let deembed = deembed.map_or(Seconds(0.0), |delay| delay.in_seconds(h));
+    let path = path.text()?.to_owned();
+    let model = models(&MeasuredFilter { path, measurement, order, deembed })
+        .map_err(|message| value.fault(SpecProblem::Measurement { message }))?;
+    model.filter.check().map_err(|problem| value.fault(problem))?;
+    Ok(model)
 }
 
 /// Reads a filter that may have a direct term.

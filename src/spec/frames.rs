@@ -16,7 +16,7 @@ use crate::units::{FastPeriods, GridTime, Hertz, Seconds};
 use std::ops::Range;
 
 /// Rounding of a rate and of the fast period in a file, relative to their product.
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
+const RATE_ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// Most samples per frame for the near rates that a refusal names.
 const NEAR_FRAME: usize = 64;
 
@@ -136,7 +136,7 @@ impl Step {
         let step = 1.0 / (rate.0 * fast_period.0);
         let fraction = |q: usize| {
             let (scaled, nearest) = (step * q as f64, (step * q as f64).round());
-            let is_near = (scaled - nearest).abs() <= ROUNDING * scaled && nearest >= 1.0;
+            let is_near = (scaled - nearest).abs() <= RATE_ROUNDING * scaled && nearest >= 1.0;
             (is_near && nearest <= limits::MAX_RATIO as f64).then_some(Self { p: nearest as usize, q })
         };
         (1..=limits::MAX_CHANNELS).find_map(fraction)

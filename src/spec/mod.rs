@@ -15,20 +15,21 @@ mod filter_rules;
 mod fitting;
 mod frames;
 mod limits;
-mod measured;
 mod passband;
 pub(crate) mod reader;
 mod signal;
 mod uncertainty;
-mod word_lengths;
-mod write;
+pub(crate) mod word_lengths;
 
 pub use crate::messages::Location;
 pub use design::{DesignOverrides, DesignSpec, DesignTable, Method, Reduction};
 pub use edit::with_measurements_renamed;
 pub(crate) use error::{Fault, shown_path};
 pub use error::{SpecError, SpecProblem};
-pub use filter::{Family, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
+pub(crate) use filter::no_models;
+pub use filter::{
+    Family, FilterModel, FilterModels, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB, MeasuredFilter, Measurement,
+};
 pub use filter_problem::{FilterProblem, MAX_ORDER};
 pub use fitting::{Cutoff, Fitting, UnknownFitting};
 pub use frames::{FrameLayout, FrameSample};
@@ -36,8 +37,6 @@ pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_T
 pub(crate) use limits::{MAX_ENTRY, check_fast_period, check_gain};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES, MAX_TARGET_SNR_DB};
 pub use limits::{check_noise, check_offset, within};
-pub(crate) use measured::no_models;
-pub use measured::{FilterModel, FilterModels, MeasuredFilter, Measurement};
 pub use passband::Passband;
 pub use signal::{Band, SignalSpec, SignalSpectrum, USUAL_RMS};
 pub use uncertainty::{
@@ -49,7 +48,7 @@ pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 use crate::messages::of_document;
 use crate::quantity::{self, FullScale};
 use crate::units::{FastPeriods, GridTime, Hertz, Seconds};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::ops::Range;
 
 /// A spec with the units resolved (seconds) and the omitted channel filters filled in.
@@ -71,7 +70,7 @@ pub struct Spec {
     pub target: FilterSpec,
     /// Full scale of captures whose format does not say it, such as tables; 1 if `None`.
     pub full_scale: Option<FullScale>,
-    /// What a calibration fits unless it is told otherwise; empty for delays, gains and offsets.
+    /// What a calibration fits unless the command line says otherwise; empty for delays, gains and offsets.
     pub fit: Vec<Fitting>,
     /// The real channels, in the order of the recordings.
     pub channels: Vec<ChannelSpec>,
@@ -320,6 +319,54 @@ fn read_data<'de, D: Deserializer<'de>, T>(
     })?;
     read(&reader::Value::root(&document))
         .map_err(|fault| SpecError::of(name, "", Fault { span: None, ..fault }))
+}
+
+/// The written form of a [`Spec`], with all times in seconds and all defaults filled in.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(skip_serializing_if = "str::is_empty")]
+    name: &'a str,
+    fast_period: Seconds,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ratio: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    latency: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    full_scale: Option<FullScale>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    fit: &'a [Fitting],
+    target: Target<'a>,
+    channel: &'a [ChannelSpec],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    signal: Option<&'a SignalSpec>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    uncertainty: Option<&'a UncertaintySpec>,
+    design: &'a DesignSpec,
+}
+
+#[derive(Serialize)]
+struct Target<'a> {
+    filter: &'a FilterSpec,
+}
+
+impl Serialize for Spec {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        Document {
+            name: &self.name,
+            fast_period: self.fast_period,
+            // The rates say it.
+            ratio: self.layout().is_plain().then_some(self.ratio),
+            latency: self.latency,
+            full_scale: self.full_scale,
+            fit: &self.fit,
+            target: Target { filter: &self.target },
+            channel: &self.channels,
+            signal: self.signal.as_ref(),
+            uncertainty: self.uncertainty.as_ref(),
+            design: &self.design,
+        }
+        .serialize(serializer)
+    }
 }
 
 #[cfg(test)]

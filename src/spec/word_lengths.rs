@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
-use super::SpecProblem;
 use super::limits::{range, within};
+use super::reader::Value;
+use super::{Fault, SpecProblem};
 use crate::messages::Quoted;
 
 /// Most bits of a tap. Such integers are exact in a double and far finer than the error of any bank.
@@ -137,6 +138,25 @@ pub(crate) fn check_fraction_bits(fraction_bits: i32) -> Result<(), SpecProblem>
     );
     let most = f64::from(MAX_FRACTION_BITS);
     within(fraction_bits.into(), -most..=most, "bits", rule)
+}
+
+/// One number of bits, or a list of them. The length of the list is checked where that of the filters is
+/// known.
+pub(crate) fn word_lengths(value: &Value<'_>) -> Result<WordLengths, Fault> {
+    let words = match value.items("a number of bits, or a list of them") {
+        Ok(items) => WordLengths::PerTap(items.iter().map(Value::bits).collect::<Result<_, _>>()?),
+        Err(_) => WordLengths::Same(value.bits()?),
+    };
+    words.check_numbers().map_err(|problem| value.fault(problem))?;
+    Ok(words)
+}
+
+/// The exponent of the finest step.
+pub(crate) fn fraction_bits(value: &Value<'_>) -> Result<i32, Fault> {
+    let bits = value.integer("bits")?;
+    let bits = i32::try_from(bits).unwrap_or(if bits < 0 { i32::MIN } else { i32::MAX });
+    check_fraction_bits(bits).map_err(|problem| value.fault(problem))?;
+    Ok(bits)
 }
 
 #[cfg(test)]

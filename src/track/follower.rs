@@ -7,7 +7,7 @@ use super::log::{Logged, TrackWarning};
 use super::readings::Reading;
 use super::source::{DelaySource, check_pilot};
 use super::timeline::Timeline;
-use super::tracker::{DelayTracker, Lock, Taken};
+use super::tracker::{DelayTracker, FollowSettings, Lock, Taken};
 use super::{Coincidence, TrackError};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::calibrate::Model;
@@ -17,7 +17,7 @@ use std::collections::VecDeque;
 
 /// A delay counts as known when the half-width of its 95 % interval is below this, in fast periods, or below
 /// this share of the smallest side of the box.
-const KNOWN: f64 = 1e-3;
+const KNOWN_HALF_WIDTH: f64 = 1e-3;
 const KNOWN_SHARE: f64 = 0.02;
 /// A delay moves by at most this between two changes of the taps, in fast periods, where a change every
 /// [`LEAST_FRAMES`] frames suffices for that.
@@ -25,26 +25,12 @@ const LARGEST_STEP: f64 = 2e-4;
 const LEAST_FRAMES: usize = 16;
 /// Delays closer than this share of a fast period come together, and how far ahead that is reported, in
 /// blocks.
-const TOGETHER: f64 = 0.05;
-const HORIZON: f64 = 60.0;
-
-/// How delays are followed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FollowSettings {
-    /// Frames of a block: of one measurement.
-    pub block_frames: usize,
-    /// Variance by which a rate walks in a second, in (s/s)^2 / s.
-    pub rate_walk: f64,
-    /// Standard deviation of the rates at the beginning, seconds per second.
-    pub rate_deviation: f64,
-    /// By how much a rate changes in a second at most, for the bound of the error between readings; it
-    /// changes nothing else.
-    pub rate_change: f64,
-}
+const TOGETHER_DELAY: f64 = 0.05;
+const HORIZON_BLOCKS: f64 = 60.0;
 
 /// Delays at which the taps are to be from some frame on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Change {
+pub struct DelayChange {
     /// Frame of the block two blocks later, from 0.
     pub frame: usize,
     /// True delay minus that of the bank, per channel, with its shift; within the box for which the taps
@@ -59,7 +45,7 @@ pub struct Change {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Followed {
     /// For the block two blocks later.
-    pub changes: Vec<Change>,
+    pub changes: Vec<DelayChange>,
     /// What is known at the centre of this block.
     pub log: Logged,
     /// What a user should know at once; each is said once.
@@ -123,7 +109,8 @@ impl Follower {
             check_pilot(Model::new(&spec)?.slow_rate(), pilot, settings.block_frames)?;
         }
         let smallest = followed.iter().map(|&j| of_all[j].0).fold(f64::INFINITY, f64::min);
-        let wanted = Seconds((KNOWN * spec.fast_period.0).max(KNOWN_SHARE * smallest) / HALF_WIDTH);
+        let wanted =
+            Seconds((KNOWN_HALF_WIDTH * spec.fast_period.0).max(KNOWN_SHARE * smallest) / HALF_WIDTH);
         let frame = spec.fast_period * spec.ratio as f64;
         let (mut trackers, mut warnings) = (Vec::new(), Vec::new());
         for &j in &followed {
@@ -169,7 +156,7 @@ impl Follower {
     }
 
     /// What is known beforehand of the first two blocks; nothing where delays are measured in the samples.
-    pub fn beginning(&mut self) -> [Vec<Change>; 2] {
+    pub fn beginning(&mut self) -> [Vec<DelayChange>; 2] {
         if !matches!(self.source, DelaySource::Readings(_)) {
             return [Vec::new(), Vec::new()];
         }
@@ -329,7 +316,7 @@ impl Follower {
     }
 
     /// The shifts and delays of all channels at a frame of the stream.
-    fn change(&mut self, frame: usize, at: f64) -> Change {
+    fn change(&mut self, frame: usize, at: f64) -> DelayChange {
         let mut errors = vec![FastPeriods(0.0); self.spec.channels.len()];
         let mut shifts = self.last_shifts.clone();
         for (tracker, state) in self.expected(at) {
@@ -339,11 +326,11 @@ impl Follower {
             shifts[j] = shift;
         }
         self.last_shifts.clone_from(&shifts);
-        Change { frame, errors, shifts }
+        DelayChange { frame, errors, shifts }
     }
 
     /// Changes within the block that begins at frame `first`, often enough for its drift.
-    fn changes(&mut self, first: u64) -> Vec<Change> {
+    fn changes(&mut self, first: u64) -> Vec<DelayChange> {
         let frames = self.settings.block_frames;
         let middle = first as f64 + 0.5 * frames as f64;
         let fastest = self.expected(middle).map(|(_, state)| state.rate.abs()).fold(0.0, f64::max);
@@ -403,8 +390,8 @@ impl Follower {
         let known = |channel: &ChannelSpec| DelayState::known(channel.delay, 0.0, 0.0);
         let mut states: Vec<DelayState> = self.spec.channels.iter().map(known).collect();
         self.trackers.iter().for_each(|tracker| states[tracker.channel] = tracker.state());
-        let horizon = self.frame_time() * (HORIZON * self.settings.block_frames as f64);
-        let distance = self.spec.fast_period * TOGETHER;
+        let horizon = self.frame_time() * (HORIZON_BLOCKS * self.settings.block_frames as f64);
+        let distance = self.spec.fast_period * TOGETHER_DELAY;
         let found = Coincidence::ahead(&states, self.frame_time(), distance, horizon)?;
         let [a, b] = found.channels.map(|i| i + 1);
         Some(TrackWarning::Coincidence { channels: [a, b], after: found.after })

@@ -26,7 +26,6 @@
 //! ```
 
 mod align;
-mod coincidence;
 mod error;
 mod filter;
 mod follower;
@@ -41,12 +40,11 @@ mod tracker;
 mod tracking;
 
 pub use align::{AlignError, AlignSettings, AlignWarning, AlignedChannel, Alignment, RATE_WALK, align};
-pub use coincidence::Coincidence;
 pub use error::{ReadingProblem, TrackError};
-pub use filter::{DelayFilter, DelayMeasurement, DelayState, Innovation};
-pub use follower::{Change, FollowSettings, Followed, Follower};
+pub use filter::{Coincidence, DelayFilter, DelayMeasurement, DelayState, Innovation};
+pub use follower::{DelayChange, Followed, Follower};
 pub use log::{Logged, TrackWarning};
 pub use readings::Reading;
 pub use source::DelaySource;
-pub use tracker::Lock;
+pub use tracker::{FollowSettings, Lock};
 pub use tracking::Tracking;

@@ -15,7 +15,7 @@ const SEARCH_CYCLES: f64 = 2.0;
 /// apart from it.
 const MOST_OTHERS: usize = 8;
 const OTHERS_RANGE: Decibels = Decibels(60.0);
-const APART: f64 = 3.0;
+const APART_CYCLES: f64 = 3.0;
 /// Rms of a block, relative to full scale, below which it holds nothing to measure by: less than half a step
 /// of 24 bits and of any converter.
 pub(super) const LEAST_LEVEL: f64 = 1e-8;
@@ -109,7 +109,7 @@ fn by_pilot(
 
 /// The pilot first, and other tones that would count as noise if they were not fitted with it.
 fn with_others(channels: &[Channel<'_>], rate: Hertz, pilot: Hertz, frames: usize) -> Vec<Hertz> {
-    let is_other = |f: &Hertz| (alias(*f / rate) - alias(pilot / rate)).abs() * frames as f64 > APART;
+    let is_other = |f: &Hertz| (alias(*f / rate) - alias(pilot / rate)).abs() * frames as f64 > APART_CYCLES;
     // Tones that are not found count as noise.
     let found = sine_fit::find_tones(channels, rate, MOST_OTHERS, OTHERS_RANGE).unwrap_or_default();
     std::iter::once(pilot).chain(found.into_iter().filter(is_other)).collect()

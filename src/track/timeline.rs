@@ -8,13 +8,13 @@ use crate::spec::HALF_WIDTH;
 use crate::units::Seconds;
 
 /// Readings beyond this many standard deviations of what the others say are refused.
-const GATE: f64 = 5.0;
+const GATE_SIGMAS: f64 = 5.0;
 /// Rounds in which readings are refused, those that contradict the others most in each.
 const ROUNDS: usize = 12;
 /// Readings on each side of the worst one that are judged again without it.
 const BESIDE: usize = 4;
 /// Standard deviation of the time of a reading, in frames: it is rounded to a whole frame.
-const ROUNDING: f64 = 0.288_675_134_594_812_9;
+const TIME_ROUNDING: f64 = 0.288_675_134_594_812_9;
 
 /// The delay of one channel over time, from all readings of it: those after an instant count as much as
 /// those before it. The rate walks as in a [`super::DelayFilter`], so this is its smoother.
@@ -39,7 +39,7 @@ impl Timeline {
     ) -> Result<Option<Self>, SamplingError> {
         let of = |reading: &Reading| {
             let (delay, sigma) = reading.delays[i]?;
-            let (x, jitter) = (reading.frame as f64 * frame.0, ROUNDING * frame.0);
+            let (x, jitter) = (reading.frame as f64 * frame.0, TIME_ROUNDING * frame.0);
             Some((reading.frame, Measured { x, value: delay.0, error: sigma.0, jitter }))
         };
         let mut all: Vec<(u64, Measured)> = readings.iter().filter_map(of).collect();
@@ -101,7 +101,7 @@ fn contradictory(spline: &SmoothingSpline) -> Vec<usize> {
     let found: Vec<f64> = spline.contradictions().collect();
     let is_worst = |k: &usize| {
         let beside = k.saturating_sub(BESIDE)..(k + BESIDE + 1).min(found.len());
-        found[*k] > GATE && beside.into_iter().all(|j| j == *k || found[j] < found[*k])
+        found[*k] > GATE_SIGMAS && beside.into_iter().all(|j| j == *k || found[j] < found[*k])
     };
     (0..found.len()).filter(is_worst).collect()
 }

@@ -6,10 +6,24 @@ use super::timeline::Timeline;
 use crate::units::Seconds;
 
 /// Innovations beyond this many standard deviations are refused: one in 1.7 million by chance.
-const GATE: f64 = 5.0;
+const GATE_SIGMAS: f64 = 5.0;
 /// Refused measurements in a row after which a channel is lost: then the model is wrong, not the
 /// measurement.
 const MOST_REFUSED: u32 = 5;
+
+/// How delays are followed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FollowSettings {
+    /// Frames of a block: of one measurement.
+    pub block_frames: usize,
+    /// Variance by which a rate walks in a second, in (s/s)^2 / s.
+    pub rate_walk: f64,
+    /// Standard deviation of the rates at the beginning, seconds per second.
+    pub rate_deviation: f64,
+    /// By how much a rate changes in a second at most, for the bound of the error between readings; it
+    /// changes nothing else.
+    pub rate_change: f64,
+}
 
 /// Whether a channel's delay is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -96,7 +110,7 @@ impl DelayTracker {
         if let Some(timeline) = &self.timeline {
             return if timeline.refuses(frame) { Taken::Refused } else { Taken::Used };
         }
-        if self.filter.innovation(measurement).sigmas() <= GATE {
+        if self.filter.innovation(measurement).sigmas() <= GATE_SIGMAS {
             self.refused = 0;
             self.filter.update(measurement);
             return Taken::Used;

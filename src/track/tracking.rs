@@ -1,6 +1,6 @@
-//! Taps that follow the delays while a pipeline runs.
+//! Delay-scheduled taps of a pipeline.
 
-use super::{DelaySource, FollowSettings, Followed, Follower, Logged, TrackError, TrackWarning};
+use super::{DelayChange, DelaySource, FollowSettings, Followed, Follower, Logged, TrackError, TrackWarning};
 use crate::bank::Bank;
 use crate::pipeline::{Change, PipelineError, Retuner};
 use crate::quantity;
@@ -103,8 +103,8 @@ impl Follower {
     ) -> Result<Retuner, PipelineError> {
         let (bank, mut followed) = (bank.clone(), bank.clone());
         let offsets = bank.offsets.clone();
-        let mut changed = move |changes: Vec<super::Change>| -> Result<Vec<Change>, PipelineError> {
-            let change = |change: super::Change| {
+        let mut changed = move |changes: Vec<DelayChange>| -> Result<Vec<Change>, PipelineError> {
+            let change = |change: DelayChange| {
                 followed.filters = bank.filters_at(&change.errors);
                 let (frame, shifts) = (change.frame as u64, change.shifts);
                 Ok(Change { frame, stream: Stream::new(&followed.plan(options)?), shifts })

@@ -54,7 +54,7 @@ use crate::arithmetic::Number;
 const MAX_RECURSION_STATES: usize = 128;
 
 /// Relative change of P per period below which it has settled.
-const SETTLED: f64 = 1e-13;
+const SETTLED_CHANGE: f64 = 1e-13;
 
 /// The precision of the recursion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -144,7 +144,7 @@ impl<F: Number> CausalPlant<F> {
             }
             let next = from_below(&gram.view((0, 0), (n, n)).into_owned());
             let settled = |(a, b): (&Ball<F>, &Ball<F>)| {
-                (a.nearest() - b.nearest()).abs() <= SETTLED * b.nearest().abs()
+                (a.nearest() - b.nearest()).abs() <= SETTLED_CHANGE * b.nearest().abs()
             };
             if period >= n && p.iter().zip(&next).all(settled) {
                 return Recursion::Standing;

@@ -5,7 +5,7 @@ use super::slow_period::SlowPeriod;
 use crate::arithmetic::{DoubleDouble, Number};
 
 /// Remainder of the sum over the past, relative to the rounding error of an operation.
-const NEGLIGIBLE: f64 = 1e-9;
+const NEGLIGIBLE_REMAINDER: f64 = 1e-9;
 
 /// The samples that the taps of one output weight: those of distinct channels over whole periods.
 #[derive(Debug, Clone, Copy)]
@@ -34,7 +34,7 @@ impl<F: Number> Covariance<F> {
         let mut power = period.transition.clone();
         for _ in 0..64 {
             let size = ball::row_sum(&power) * ball::row_sum(&power.transpose());
-            if size < F::ROUNDING * NEGLIGIBLE {
+            if size < F::ROUNDING * NEGLIGIBLE_REMAINDER {
                 let rest = 1.01 * ball::row_sum(&state) * size;
                 let state = state.map(|x| x.widened(rest));
                 return Some(Self { state, transition: period.transition.clone() });

@@ -10,11 +10,11 @@ const CERTIFICATE_WIDTH: f64 = 1e-8;
 /// that a number was altered.
 const UNDERSTATED: f64 = 1e-6;
 /// Maximum relative width of the proven interval of the norm.
-const WIDEST: f64 = 0.2;
+const WIDEST_INTERVAL: f64 = 0.2;
 /// Norms below this, relative to the scale of the reference samples, are zero up to rounding.
-const FLOOR: f64 = 1e-10;
+const ZERO_NORM: f64 = 1e-10;
 /// Maximum width of the proven interval of such a norm, relative to the scale.
-const WIDEST_AT_FLOOR: f64 = 2e-6;
+const WIDEST_AT_ZERO_NORM: f64 = 2e-6;
 
 /// Which stated numbers a comparison accepts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,11 +46,11 @@ pub(super) fn compare(
     strictness: Strictness,
 ) -> Result<(), VerifyError> {
     let Verified { attained, upper, .. } = *proven;
-    let is_narrow = upper - attained <= (WIDEST * upper).max(WIDEST_AT_FLOOR * scale);
+    let is_narrow = upper - attained <= (WIDEST_INTERVAL * upper).max(WIDEST_AT_ZERO_NORM * scale);
     if !is_narrow {
         return Err(VerifyError::TooWide { attained, upper });
     }
-    compare_norm(gamma, proven, FLOOR * scale)?;
+    compare_norm(gamma, proven, ZERO_NORM * scale)?;
     compare_upper(gamma, proven, strictness)?;
     for (place, stated, bound) in
         [("gamma.lower", gamma.lower, proven.lower), ("gamma.noncausal", gamma.noncausal, proven.noncausal)]
@@ -65,7 +65,7 @@ pub(super) fn compare(
         if stated > bound {
             return disproved(place, stated, "only", bound);
         }
-        if stated < bound * (1.0 - UNDERSTATED) - FLOOR * scale {
+        if stated < bound * (1.0 - UNDERSTATED) - ZERO_NORM * scale {
             return disproved(place, stated, "a bound of at least", bound);
         }
     }

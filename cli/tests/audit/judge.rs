@@ -141,7 +141,7 @@ impl Judge {
         Self::off_by(bank, &Errors::none(channels), false, &mut Library::default())
     }
 
-    /// The same with channels that are off by `errors`, and with taps that follow the delays if they are to.
+    /// The same with channels that are off by `errors`, and with delay-scheduled taps if asked.
     pub(crate) fn off_by(bank: &Value, errors: &Errors, follows: bool, library: &mut Library) -> Self {
         let latency = bank["latency"].as_u64().expect("a latency") as usize;
         let plant = Plant::new(&bank["spec"], latency, errors, library);

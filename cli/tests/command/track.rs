@@ -1,4 +1,4 @@
-//! `--track`: taps that follow the delays while a bank runs.
+//! `--track`: delay-scheduled taps.
 
 use crate::support::{Desk, text};
 use serde_json::Value;
@@ -81,7 +81,7 @@ fn delays_are_followed() {
     a_stream_that_is_followed_has_the_same_bits_for_any_cut(&desk);
 }
 
-/// Two recordings with clocks of their own become one: far better than with taps that stay.
+/// Two recordings with clocks of their own become one: far better than with fixed taps.
 fn recordings_that_drift_apart_are_fused(desk: &Desk) {
     let inputs = ["cap/ch1.wav", "cap/ch2.wav"];
     let fuse = |output: &str, more: &[&str]| {

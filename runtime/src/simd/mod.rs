@@ -62,6 +62,6 @@ pub use isa::Isa;
 pub(crate) use pcm::{decode, encode, interleave};
 pub use peak::multiply_add_chains;
 pub(crate) use recursion::{ColumnTile, Form, Recursion, RecursionKernel, SectionVector};
-pub(crate) use transform::{Frames, SHORTEST_TRANSFORM, Segments, Spectra, Transform, row_samples};
+pub(crate) use transform::{OutputFrames, SHORTEST_TRANSFORM, Segments, Spectra, Transform, row_samples};
 pub(crate) use transform_kernel::TransformKernel;
 pub(crate) use vector::group_lanes;

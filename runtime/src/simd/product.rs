@@ -5,7 +5,7 @@
 
 use super::dispatch::{Element, Kernel};
 use super::passes::Complex;
-use super::transform::{Frames, Spectra, Transform, row_samples};
+use super::transform::{OutputFrames, Spectra, Transform, row_samples};
 use super::vector::{Vector, group_lanes};
 use std::marker::PhantomData;
 
@@ -22,7 +22,7 @@ pub(super) struct ScatterJob<'a, T: Element> {
     pub(super) transform: &'a Transform<T>,
     /// Groups of lanes one after another.
     pub(super) rows: &'a [T],
-    pub(super) to: Frames<'a, T>,
+    pub(super) to: OutputFrames<'a, T>,
 }
 
 /// The product at all frequencies, with D channels per row.
@@ -100,7 +100,7 @@ impl<T: Element, const D: usize> Kernel for Scatter<T, D> {
         if const { D > group_lanes::<T>() } {
             unreachable!("segments have a group of lanes at most");
         }
-        let ScatterJob { transform, rows, to: Frames { samples, stride, count } } = job;
+        let ScatterJob { transform, rows, to: OutputFrames { samples, stride, count } } = job;
         let plane = transform.plane();
         let groups = rows.len() / plane;
         let rows = rows.as_ptr().add((transform.len - count) * row_samples::<T>());

@@ -11,7 +11,7 @@
 //! and Sande 1966; Cooley and Tukey 1965).
 //!
 //! Two real blocks a and b are one complex block a + ib. As the filters are real, the product with their
-//! spectra gives y_a + i y_b: the parts need not be told apart. Spectra at f and F - f are conjugate, so
+//! spectra gives y_a + i y_b: the parts need not be separated. Spectra at f and F - f are conjugate, so
 //! both frequencies are made together from one load.
 //!
 //! Bits: all lanes do the same in the same order, whatever the instruction set.
@@ -105,7 +105,7 @@ pub(crate) struct Spectra<'a, T> {
 /// Where rows go: the last rows of each segment's real parts, then of its imaginary parts, segment after
 /// segment.
 #[derive(Debug)]
-pub(crate) struct Frames<'a, T> {
+pub(crate) struct OutputFrames<'a, T> {
     pub(crate) samples: &'a mut [T],
     /// M, samples from frame to frame.
     pub(crate) stride: usize,

@@ -4,7 +4,7 @@ use super::dispatch::{Element, compiled_narrow};
 use super::isa::Isa;
 use super::passes::{Forward, ForwardJob, Inverse, InverseJob};
 use super::product::{Product, ProductJob, Scatter, ScatterJob};
-use super::transform::{Frames, Segments, Spectra, Transform, row_samples};
+use super::transform::{OutputFrames, Segments, Spectra, Transform, row_samples};
 use super::vector::group_lanes;
 
 /// The kernels of one sample type.
@@ -81,7 +81,13 @@ impl<T: Element> TransformKernel<T> {
     ///
     /// # Panics
     /// If slices do not fit: the last frame needs whole lanes.
-    pub(crate) fn scatter(&self, transform: &Transform<T>, depth: usize, rows: &[T], to: Frames<'_, T>) {
+    pub(crate) fn scatter(
+        &self,
+        transform: &Transform<T>,
+        depth: usize,
+        rows: &[T],
+        to: OutputFrames<'_, T>,
+    ) {
         let (plane, group) = (transform.plane(), group_lanes::<T>());
         let groups = rows.len() / plane;
         assert!(depth.is_power_of_two() && depth <= group);

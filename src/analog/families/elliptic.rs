@@ -32,7 +32,7 @@ const MAX_TRANSFORMATIONS: usize = 32;
 /// that are narrower than 1e-9 of the cutoff.
 const MAX_TERMS: usize = 200;
 /// Size of a term of a theta series, 2^-540, that lies below the rounding of the others.
-const NEGLIGIBLE: f64 = f64::from_bits((1023 - 540) << 52);
+const NEGLIGIBLE_TERM: f64 = f64::from_bits((1023 - 540) << 52);
 
 /// Elliptic: ripple of `ripple_db` up to the cutoff, attenuation of at least `attenuation_db` (>
 /// `ripple_db` > 0) beyond the stop-band edge, which follows from order and ripples. An even order has as
@@ -141,7 +141,7 @@ fn theta(nome: Long, y: ComplexBall) -> ComplexBall {
         sum = sum + rising + falling;
         step = step * square;
         let last = size(rising) + size(falling);
-        if last <= NEGLIGIBLE && step.magnitude() * size(y).max(size(inverse)) <= 0.5 {
+        if last <= NEGLIGIBLE_TERM && step.magnitude() * size(y).max(size(inverse)) <= 0.5 {
             // The series of a real number is real.
             let im = if y.im.is_zero() { sum.im } else { sum.im.widened(last) };
             return ComplexBall::new(sum.re.widened(last), im);

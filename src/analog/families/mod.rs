@@ -7,24 +7,24 @@
 //!
 //! All are formulas in balls of 512 bits. Doubles are these numbers, rounded.
 
-mod bessel;
-mod chebyshev;
 mod elliptic;
 mod passband;
 
 pub(super) use elliptic::Selectivity;
 
+use super::polynomial::isolated;
 use super::roots::{Factors, RootSet};
 use super::{AnalogError, MIN_DAMPING_RATIO};
-use crate::arithmetic::{Ball, ComplexBall, Float512, elementary};
-use crate::spec::{Family, FilterProblem, Passband};
+use crate::arithmetic::{Ball, ComplexBall, Float512, Number, elementary};
+use crate::spec::{Family, FilterProblem, MAX_ORDER, Passband};
 use crate::units::Seconds;
+use std::sync::OnceLock;
 
 type Long = Ball<Float512>;
 
 /// Radius over midpoint up to which a number counts as resolved: its double is right then, and the
 /// proofs need a few digits more.
-const RESOLVED: f64 = 1e-40;
+const RESOLVED_RADIUS: f64 = 1e-40;
 
 /// A family member with its cutoff at |s| = 1.
 #[derive(Debug, Clone, Copy)]
@@ -69,7 +69,7 @@ pub(super) fn placed(member: &Member, passband: Passband, h: Seconds) -> Result<
 
 /// Whether all numbers are resolved and all poles have the least damping.
 fn is_damped(filter: &Factors<Long>) -> bool {
-    let is_resolved = |x: Long| x.radius() <= RESOLVED * x.nearest().abs();
+    let is_resolved = |x: Long| x.radius() <= RESOLVED_RADIUS * x.nearest().abs();
     let real = |&p: &Long| is_resolved(p) && p.nearest() < 0.0;
     let pair = |&(re, im): &(Long, Long)| {
         let (re, im, resolved) = (re.nearest(), im.nearest(), is_resolved(re) && is_resolved(im));
@@ -87,10 +87,10 @@ pub(super) fn prototype(member: &Member) -> Result<Factors<Long>, AnalogError> {
     let Member { order, ripple_db, attenuation_db, .. } = *member;
     Ok(match member.family {
         Family::Butterworth => butterworth(order),
-        Family::Chebyshev1 => chebyshev::first(order, ripple_db),
-        Family::Chebyshev2 => chebyshev::second(order, attenuation_db),
+        Family::Chebyshev1 => chebyshev1(order, ripple_db),
+        Family::Chebyshev2 => chebyshev2(order, attenuation_db),
         Family::Elliptic => elliptic::elliptic(order, ripple_db, attenuation_db),
-        Family::Bessel => bessel::bessel(order)?,
+        Family::Bessel => bessel(order)?,
         Family::Rc => butterworth(1),
     })
 }
@@ -151,6 +151,69 @@ fn excess_power(db: f64) -> Long {
 /// e^asinh(x).
 fn exp_asinh(x: Long) -> Long {
     x + (Ball::from(1.0) + x * x).sqrt()
+}
+
+/// Chebyshev 1: poles on an ellipse. The gain ripples by `ripple_db` (> 0 dB) below the cutoff and falls
+/// above it.
+fn chebyshev1(order: usize, ripple_db: f64) -> Factors<Long> {
+    let ripple = excess_power(ripple_db);
+    let stretch = elementary::root(exp_asinh(Ball::from(1.0) / ripple.sqrt()), order);
+    let poles = upper_roots(order, |angle| on_ellipse(stretch, angle));
+    let gain = dc_gain(order, ripple) * product_of_negatives(&poles);
+    Factors { zeros: RootSet::default(), poles, gain }
+}
+
+/// Chebyshev 2 (inverse Chebyshev): the attenuation is at least `attenuation_db` (> 0 dB) from the cutoff
+/// on. An even order has as many zeros as poles.
+fn chebyshev2(order: usize, attenuation_db: f64) -> Factors<Long> {
+    let stretch = elementary::root(exp_asinh(excess_power(attenuation_db).sqrt()), order);
+    let poles = upper_roots(order, |angle| {
+        let z = on_ellipse(stretch, angle);
+        z.scaled(Ball::from(1.0) / z.norm_sqr())
+    });
+    // The zeros are the inverse Chebyshev nodes; the middle one of an odd order is at infinity.
+    let mut zeros = upper_roots(order, |angle| ComplexBall::new(Ball::ZERO, Ball::from(1.0) / angle.im));
+    zeros.real.clear();
+    let gain = product_of_negatives(&poles) / product_of_negatives(&zeros);
+    Factors { zeros, poles, gain }
+}
+
+/// Bessel with `norm="phase"`: the poles are the zeros of the reverse Bessel polynomials (Grosswald, *Bessel
+/// polynomials*, 1978). The magnitude falls asymptotically as a Butterworth filter of the same order
+/// and cutoff; the phase at the cutoff is half of its total change. DC gain and leading coefficient are 1.
+///
+/// # Errors
+/// [`AnalogError::RootsNotIsolated`]. The tests cover all orders up to [`MAX_ORDER`].
+fn bessel(order: usize) -> Result<Factors<Long>, AnalogError> {
+    // The roots of an order are always the same, and those of a high order take milliseconds.
+    static POLES: [OnceLock<Option<RootSet<Long>>>; MAX_ORDER + 1] =
+        [const { OnceLock::new() }; MAX_ORDER + 1];
+    let poles = POLES.get(order).and_then(|poles| poles.get_or_init(|| scaled_roots(order)).clone());
+    let poles = poles.ok_or(AnalogError::RootsNotIsolated { what: "family" })?;
+    Ok(Factors { zeros: RootSet::default(), poles, gain: Ball::from(1.0) })
+}
+
+/// The zeros of theta_n in units of their geometric mean, theta_n(0)^(1/n).
+fn scaled_roots(n: usize) -> Option<RootSet<Long>> {
+    let coefficients = reverse_bessel(n);
+    let mean = elementary::root(Ball::exactly(*coefficients.last()?), n);
+    Some(isolated(&coefficients)?.scaled(Ball::from(1.0) / mean))
+}
+
+/// theta_n in descending powers, from theta_0 = 1, theta_1 = s + 1 and
+/// theta_n = (2n - 1) theta_(n-1) + s^2 theta_(n-2). Its integers are exact: the largest for n = 32 have 150
+/// bits.
+fn reverse_bessel(n: usize) -> Vec<Float512> {
+    let one = Float512::from(1.0);
+    let (mut previous, mut current) = (vec![one], vec![one, one]);
+    for k in 2..=n {
+        let factor = Float512::from(2.0 * k as f64 - 1.0);
+        let mut next: Vec<Float512> =
+            std::iter::once(Float512::ZERO).chain(current.iter().map(|&x| factor * x)).collect();
+        previous.iter().enumerate().for_each(|(i, &x)| next[i] += x);
+        (previous, current) = (current, next);
+    }
+    current
 }
 
 #[cfg(test)]

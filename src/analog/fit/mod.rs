@@ -8,7 +8,6 @@
 mod error;
 mod files;
 mod measured;
-mod poles;
 mod text;
 mod touchstone;
 mod vector_fit;

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 /// Share of the record at each end over which the window rises from 0 to 1. Its variance of 1.03 and its
 /// side lobes, which fall by 18 dB per octave, are both small.
-const TAPER: f64 = 0.05;
+const TAPER_SHARE: f64 = 0.05;
 /// The lowest bins hold the constant and what is left of it.
 const FIRST_BIN: usize = 3;
 /// Bins per band, if the record is long enough, and the most bands.
@@ -139,6 +139,6 @@ pub(super) fn occupied(bands: &[Band], least: f64) -> Vec<usize> {
 
 /// The window at the share `x` of its length: 1 in the middle, half a cosine at both ends.
 fn taper(x: f64) -> f64 {
-    let share = (x.min(1.0 - x) / TAPER).clamp(0.0, 1.0);
+    let share = (x.min(1.0 - x) / TAPER_SHARE).clamp(0.0, 1.0);
     0.5 - 0.5 * (PI * share).cos()
 }

@@ -44,9 +44,8 @@ pub(super) fn tones(
     noise: f64,
     dice: &mut Random,
 ) -> Vec<Record> {
-    let phases: Vec<f64> = frequencies.iter().map(|_| TAU * dice.part()).collect();
-    let records = waves(truth, frequencies, &phases, frames);
-    records.into_iter().map(|samples| noisy(samples, noise, dice)).collect()
+    let [real] = parts(truth, frequencies, [0.0], frames, noise, dice);
+    real.into_iter().map(Record::new).collect()
 }
 
 /// The same of tones e^{j w t} of either sign, with noise in both parts. Both parts have the offset.
@@ -57,18 +56,28 @@ pub(super) fn complex_tones(
     noise: f64,
     dice: &mut Random,
 ) -> Vec<Record> {
-    let phases: Vec<f64> = frequencies.iter().map(|_| TAU * dice.part()).collect();
-    let turned: Vec<f64> = phases.iter().map(|phase| phase - 0.25 * TAU).collect();
-    let parts = [phases, turned].map(|phases| waves(truth, frequencies, &phases, frames));
-    let [real, imaginary] = parts.map(|records| -> Vec<Record> {
-        records.into_iter().map(|samples| noisy(samples, noise, dice)).collect()
-    });
-    real.into_iter().zip(imaginary).map(|(real, imaginary)| Record::complex(real, imaginary)).collect()
+    let [real, imaginary] = parts(truth, frequencies, [0.0, 0.25 * TAU], frames, noise, dice);
+    let both = real.into_iter().zip(imaginary);
+    both.map(|(real, imaginary)| Record::complex(Record::new(real), Record::new(imaginary))).collect()
 }
 
-fn noisy(mut samples: Vec<f64>, noise: f64, dice: &mut Random) -> Record {
-    samples.iter_mut().for_each(|sample| *sample += noise * gaussian(dice));
-    Record::new(samples)
+/// Cosines of random phases, in each part with another lag of the phase, and noise.
+fn parts<const P: usize>(
+    truth: &Spec,
+    frequencies: &[Hertz],
+    lags: [f64; P],
+    frames: usize,
+    noise: f64,
+    dice: &mut Random,
+) -> [Vec<Vec<f64>>; P] {
+    let phases: Vec<f64> = frequencies.iter().map(|_| TAU * dice.part()).collect();
+    let mut parts = lags.map(|lag| {
+        let phases: Vec<f64> = phases.iter().map(|phase| phase - lag).collect();
+        waves(truth, frequencies, &phases, frames)
+    });
+    let samples = parts.iter_mut().flatten().flatten();
+    samples.for_each(|sample| *sample += noise * gaussian(dice));
+    parts
 }
 
 /// Cosines of these phases as the true converters deliver them.

@@ -13,7 +13,7 @@ const LARGEST_CUTOFF_ERROR: f64 = 0.1;
 /// The iteration ends when all steps are below this share of the standard deviation ..
 const SMALL_STEP: f64 = 1e-6;
 /// .. or below this: the rounding of responses and phases.
-const ROUNDING: f64 = 1e-12;
+const RESPONSE_ROUNDING: f64 = 1e-12;
 
 /// One tone in the channel.
 struct Row {
@@ -93,7 +93,7 @@ impl LeastSquares for ChannelFit<'_> {
     /// A cut-off that moves by more than a factor of e is refused anyway.
     fn limits(&self, k: usize, sigma: f64) -> StepLimits {
         let largest = if self.kinds[k] == Kind::Cutoff { 1.0 } else { f64::INFINITY };
-        StepLimits { largest, negligible: (SMALL_STEP * sigma).max(ROUNDING) }
+        StepLimits { largest, negligible: (SMALL_STEP * sigma).max(RESPONSE_ROUNDING) }
     }
 
     fn error(&self, why: NoMinimum) -> CalibrateError {

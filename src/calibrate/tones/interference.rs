@@ -8,7 +8,7 @@ use crate::sine_fit::{Direction, SineFit, alias};
 /// Harmonics that are looked at.
 const HARMONICS: std::ops::RangeInclusive<usize> = 2..=10;
 /// Two frequencies closer than this, in cycles per record, disturb each other.
-const RESOLUTION: f64 = 1.5;
+const RESOLVED_CYCLES: f64 = 1.5;
 /// Most phases of a tone that count as few: of more, errors of quantisation average as those of noise do.
 const FEW_PHASES: usize = 64;
 /// Periods of a pattern that tell it from noise.
@@ -17,7 +17,7 @@ const LEAST_PERIODS: usize = 8;
 /// The order of the harmonic of `fundamental` at a frequency (both cycles per sample) in a record.
 fn harmonic_at(cycles: f64, fundamental: f64, frames: usize) -> Option<usize> {
     let distance = |h: usize| (alias(h as f64 * fundamental) - alias(cycles)).abs();
-    HARMONICS.into_iter().find(|&h| distance(h) * (frames as f64) < RESOLUTION)
+    HARMONICS.into_iter().find(|&h| distance(h) * (frames as f64) < RESOLVED_CYCLES)
 }
 
 /// Whether a frequency (cycles per sample) is that of a harmonic of `fundamental` in a record of `frames`.

@@ -15,35 +15,27 @@ mod ambiguity;
 mod channel;
 mod interference;
 mod phasors;
+mod solution;
 #[cfg(test)]
 mod tests;
 
 use super::Settings;
 use super::error::CalibrateError;
 use super::estimates::{Fitted, Tone, contradiction};
-use super::fit::{Fit, Kind};
-use super::model::{Model, Point};
+use super::model::Model;
 use super::order::{Distances, other_order};
 use super::record::Acquisition;
 use super::warning::Warning;
-use crate::linalg::{Complex, Mat};
+use crate::linalg::Complex;
 use crate::sine_fit::{self, ChannelFit as SineChannel, Direction, Estimate, alias};
-use crate::spec::{Cutoff, Spec};
-use crate::units::{Decibels, FastPeriods, Hertz};
-use ambiguity::{Alias, modulus, nearest_delay, zone_of};
-use channel::{ChannelFit, Solution};
+use crate::spec::Spec;
+use crate::units::{Decibels, Hertz};
+use ambiguity::{Alias, zone_of};
 use interference::{is_harmonic, repeating_variances, widen_repeating};
 use phasors::{Captures, Measured};
+use solution::{CUTOFF_TONES, distinct, explained, outlying, solve};
 use std::borrow::Cow;
 
-/// What makes the misfit this many times smaller explains it: an acquisition that is left out, or a cut-off
-/// that is fitted.
-const EXPLAINED: f64 = 4.0;
-/// Least acquisitions of which one contradicts the others: of two nobody can tell which one is right.
-const OUTLYING_OF: usize = 3;
-/// Tones of several acquisitions closer than this share of their frequency are one: they tell nothing of a
-/// cut-off together.
-const SAME_FREQUENCY: f64 = 1e-2;
 /// Most tones that are looked for, and how far below the largest.
 const MOST_TONES: usize = 16;
 const TONE_RANGE: Decibels = Decibels(30.0);
@@ -53,11 +45,6 @@ const SEARCH_CYCLES: f64 = 3.0;
 /// Least distance from a multiple of half the slow rate in cycles per record. At half of it the errors of
 /// amplitude and phase are already twice those in the middle of a zone.
 const LEAST_CYCLES: f64 = 1.0;
-/// Tones that a cut-off needs.
-const CUTOFF_TONES: usize = 3;
-/// A delay farther from nominal than this share of its modulus is doubtful: the next value is three times
-/// as far at most.
-const DOUBTFUL_SHARE: f64 = 0.25;
 
 /// Calibrates from tones near `given`, or from those that are found. Of several acquisitions each holds at
 /// least one of the tones.
@@ -205,14 +192,6 @@ fn held(
     if held.is_empty() { Err(CalibrateError::NoneOfTheTones { lines }) } else { Ok(held) }
 }
 
-/// Number of different frequencies.
-fn distinct<'a>(tones: impl Iterator<Item = &'a Measured>) -> usize {
-    let mut all: Vec<f64> = tones.map(|tone| tone.frequency.0).collect();
-    all.sort_by(f64::total_cmp);
-    all.dedup_by(|a, b| (*a - *b).abs() < SAME_FREQUENCY * b.abs());
-    all.len()
-}
-
 impl Captures<'_> {
     /// The constant of each part of each converter, from those of the parts of all records.
     fn constants(&self, of_records: &[Estimate<f64>]) -> Vec<Estimate<f64>> {
@@ -325,133 +304,4 @@ fn check_order(model: &Model, tones: &[Measured], reference: usize) -> Result<()
         },
     };
     other_order(&distances, reference).map_or(Ok(()), |order| Err(CalibrateError::WrongOrder { order }))
-}
-
-/// Least squares over the tones of all acquisitions, channel by channel.
-fn solve(
-    model: &Model,
-    all: &[Tones],
-    settings: Settings,
-    warnings: &mut Vec<Warning>,
-) -> Result<Fitted, CalibrateError> {
-    let Settings { fit, reference } = settings;
-    let tones: Vec<&Measured> = all.iter().flat_map(|tones| &tones.measured).collect();
-    let frames = all.iter().map(|tones| tones.frames).sum();
-    let point = Point::nominal(model, fit, reference);
-    let (count, parameters) = (fit.kinds().len(), point.parameters.len());
-    let mut fitted = Fitted::new(point, Mat::zeros(parameters, parameters), frames);
-    fitted.modulus = modulus(&tones);
-    let channels = solve_channels(model, &tones, settings)?;
-    for (k, i) in model.others(reference).enumerate() {
-        let delay = nearest_delay(&tones, i, model.ratio as f64);
-        if let Some(modulus) = fitted.modulus.filter(|_| fit.delay)
-            && delay.abs() > DOUBTFUL_SHARE * modulus.0
-        {
-            warnings.push(Warning::DelayModulo { channel: i + 1, modulus });
-        }
-        let at = (k * count, k * count);
-        fitted.covariance.view_mut(at, (count, count)).copy_from(&channels[k].covariance);
-    }
-    let values: Vec<f64> = channels.iter().flat_map(|channel| channel.values.iter().copied()).collect();
-    fitted.point.advance(&values);
-    if fit.delay && fit.cutoff.is_none() {
-        warnings.push(Warning::CutoffAssumed { delay: cutoff_effect(model, &tones, reference) });
-    }
-    let squares = channels.iter().map(|channel| channel.squares).sum();
-    let misfit = fitted.widen(squares, channels.iter().map(|channel| channel.freedom).sum());
-    fitted.warnings.extend(misfit.map(|misfit| Warning::TonesDisagree { misfit }));
-    Ok(fitted)
-}
-
-/// The fits of all channels but the reference.
-fn solve_channels(
-    model: &Model,
-    tones: &[&Measured],
-    Settings { fit, reference }: Settings,
-) -> Result<Vec<Solution>, CalibrateError> {
-    let solve = |i| {
-        let delay = nearest_delay(tones, i, model.ratio as f64);
-        ChannelFit::new(model, i, fit, tones, delay).solve()
-    };
-    model.others(reference).map(solve).collect()
-}
-
-/// Square root of chi squared per degree of freedom of all channels, if there are any.
-fn misfit(channels: &[Solution]) -> Option<f64> {
-    let squares: f64 = channels.iter().map(|channel| channel.squares).sum();
-    let freedom: usize = channels.iter().map(|channel| channel.freedom).sum();
-    (freedom > 0).then(|| (squares / freedom as f64).sqrt())
-}
-
-/// The acquisitions without which the others agree: the one that explains most of the misfit of all, then
-/// among the others as long as at least [`OUTLYING_OF`] are left.
-fn outlying(model: &Model, all: &[Tones], names: &[&str], settings: Settings) -> Vec<Warning> {
-    // Tones that no longer determine the values tell nothing of their agreement.
-    let misfit_of = |list: &[usize]| {
-        let tones: Vec<&Measured> = list.iter().flat_map(|&k| &all[k].measured).collect();
-        misfit(&solve_channels(model, &tones, settings).ok()?)
-    };
-    let (mut left, mut warnings): (Vec<usize>, _) = ((0..all.len()).collect(), Vec::new());
-    while left.len() >= OUTLYING_OF
-        && let Some(misfit) = misfit_of(&left)
-    {
-        let without = |k: usize| left.iter().copied().filter(|&other| other != k).collect::<Vec<_>>();
-        let best = left.iter().filter_map(|&k| Some((k, misfit_of(&without(k))?)));
-        let best = best.min_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((k, others)) = best.filter(|(_, others)| misfit > EXPLAINED * others.max(1.0)) else {
-            break;
-        };
-        warnings.push(Warning::Outlying { name: names[k].to_owned(), misfit, others });
-        left = without(k);
-    }
-    warnings
-}
-
-/// The part of the front ends whose cut-offs, if they were fitted too, would make the tones agree. The
-/// intervals are widened so that they reach to the values of that fit.
-fn explained(
-    model: &Model,
-    spec: &Spec,
-    all: &[Tones],
-    settings: Settings,
-    fitted: &mut Fitted,
-) -> Option<Warning> {
-    let tones: Vec<&Measured> = all.iter().flat_map(|tones| &tones.measured).collect();
-    if distinct(tones.iter().copied()) < CUTOFF_TONES {
-        return None;
-    }
-    let stages = spec.channels.iter().map(|channel| channel.filter.stages().len()).min().unwrap_or(0);
-    let parts = (0..stages).filter(|_| stages > 1).map(Cutoff::Stage).chain([Cutoff::Whole]);
-    // A part that cannot be fitted explains nothing.
-    let candidate = |part: Cutoff| {
-        let fit = Fit { cutoff: Some(part), ..settings.fit };
-        let channels = solve_channels(&model.scaling(part, spec).ok()?, &tones, Settings { fit, ..settings });
-        let channels = channels.ok()?;
-        Some((fit, misfit(&channels)?, channels))
-    };
-    let all = parts.filter(|&part| settings.fit.cutoff != Some(part)).filter_map(candidate);
-    let (fit, misfit, channels) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    if fitted.misfit? < EXPLAINED * misfit.max(1.0) {
-        return None;
-    }
-    let own = solve_channels(model, &tones, settings).ok()?;
-    for ((i, own), other) in model.others(settings.reference).zip(own).zip(channels) {
-        for (kind, own) in settings.fit.kinds().into_iter().zip(own.values) {
-            let other = fit.kinds().into_iter().zip(&other.values).find(|(other, _)| *other == kind);
-            // Factors of different filters do not compare.
-            if let Some((_, other)) = other.filter(|_| kind != Kind::Cutoff) {
-                fitted.reach(i, kind, other - own);
-            }
-        }
-    }
-    Some(Warning::CutoffExplains { fit, misfit })
-}
-
-/// The largest change of a delay per per cent of cut-off: the mean of Im(s_it) / w_t over the tones.
-fn cutoff_effect(model: &Model, tones: &[&Measured], reference: usize) -> FastPeriods {
-    let of = |i: usize| {
-        let sum: f64 = tones.iter().map(|tone| model.cutoff_slope(i, tone.w, 0.0).im / tone.w).sum();
-        0.01 * (sum / tones.len() as f64).abs()
-    };
-    FastPeriods(model.others(reference).map(of).fold(0.0, f64::max))
 }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::design::error_grid::LocatedPeak;
 use crate::linalg::{self, Complex, Mat};
 use std::f64::consts::PI;
 

@@ -18,7 +18,7 @@ use crate::units::FastPeriods;
 
 /// Share of a sample's power that is added to it: covariances have no more digits. Errors of banks are known
 /// down to 140 dB below the samples.
-const RESOLUTION: f64 = 1e-14;
+const COVARIANCE_RESOLUTION: f64 = 1e-14;
 
 /// The `length` taps per channel with the least mean of `||K||_2^2` over the errors, plus
 /// `sum_i noise_i ||f_i||^2`. Its norm is that for channels without errors.
@@ -71,7 +71,7 @@ impl<'a> Samples<'a> {
             }
         }
         for r in 0..all.nrows() {
-            all[(r, r)] += RESOLUTION * all[(r, r)] + self.problem.noise[r % channels];
+            all[(r, r)] += COVARIANCE_RESOLUTION * all[(r, r)] + self.problem.noise[r % channels];
         }
         all
     }

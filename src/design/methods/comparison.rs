@@ -89,7 +89,7 @@ fn alone(slow: &Problem, i: usize, shift: FastPeriods, latency: usize) -> Proble
 }
 
 /// Whole fast samples that all channels are late: they delay the result, and no filter undoes them.
-fn common_delay(problem: &Problem) -> usize {
+fn shared_whole_delay(problem: &Problem) -> usize {
     let least = problem.delays().iter().map(|delay| delay.0).fold(f64::INFINITY, f64::min);
     least.max(0.0) as usize
 }
@@ -109,7 +109,7 @@ impl Split {
     /// A quarter of the latency beyond the common delay goes to the fractional delays, as far as the taps
     /// allow.
     fn new(problem: &Problem, length: usize) -> Self {
-        let latency = problem.latency.saturating_sub(common_delay(problem));
+        let latency = problem.latency.saturating_sub(shared_whole_delay(problem));
         let periods = (latency / (4 * problem.ratio)).min(length.saturating_sub(1) / (4 * problem.ratio));
         let delay_taps = 2 * periods + 1;
         Self { periods, delay_taps, bank_taps: length - problem.ratio * (delay_taps - 1) }
@@ -120,7 +120,7 @@ impl Split {
 /// phases are taken, the nearest delay).
 fn grid_delays(problem: &Problem) -> Vec<usize> {
     let mut taken = vec![false; problem.ratio];
-    let common = common_delay(problem);
+    let common = shared_whole_delay(problem);
     let chosen = |channel: &Channel| {
         let chosen = nearest(channel.delay.in_fast_periods().0 - common as f64, &taken);
         taken[chosen % problem.ratio] = true;

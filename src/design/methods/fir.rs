@@ -8,8 +8,8 @@
 
 use super::{GAMMA_ACCURACY, Settings, Synthesis, tap_lags};
 use crate::design::DesignError;
-use crate::design::error_grid::ErrorGrid;
-use crate::design::exchange::{DualSolution, Exchange, LEAST_MARGIN, Location};
+use crate::design::error_grid::{ErrorGrid, Location};
+use crate::design::exchange::{DualSolution, Exchange, LEAST_MARGIN};
 use crate::design::filters::impulse_responses;
 use crate::design::plant::LiftedPlant;
 use crate::lmi::sampled::{MeanSquareObjective, Problem};

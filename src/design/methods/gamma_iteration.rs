@@ -23,7 +23,7 @@ const ROUND_LIMIT: usize = 4;
 const CONFIRMED_BELOW: f64 = 2e-6;
 /// Another gamma-iteration follows if the trials at smaller gammas reduced gamma to less than this
 /// fraction.
-const WORTHWHILE: f64 = 0.9;
+const WORTHWHILE_REDUCTION: f64 = 0.9;
 
 /// Filters with the norm of their error system.
 #[derive(Debug, Clone)]
@@ -195,7 +195,7 @@ impl<'a> GammaIteration<'a> {
             let before = self.upper();
             self.try_below()?;
             // Also false if nothing was found.
-            let gained = self.upper() < WORTHWHILE * before;
+            let gained = self.upper() < WORTHWHILE_REDUCTION * before;
             if !gained {
                 break;
             }

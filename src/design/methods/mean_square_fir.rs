@@ -13,7 +13,7 @@ use std::ops::RangeInclusive;
 
 /// Noise of a sample relative to its size, below which the noise of a converter counts as this: samples that
 /// determine one another up to rounding are weighed alike, and not as huge differences.
-const ROUNDING: f64 = 1e-13;
+const INNOVATION_ROUNDING: f64 = 1e-13;
 
 /// The `settings.taps` taps per channel with the least `||K||_2^2 + sum_i noise_i ||f_i||^2`.
 ///
@@ -59,7 +59,7 @@ pub(super) fn with_rounding(plant: &LiftedPlant) -> Result<Problem, DesignError>
     let mut problem = plant.problem().clone();
     let sizes = problem.measurement_sizes()?;
     for (power, size) in problem.noise.iter_mut().zip(sizes) {
-        *power = power.max((ROUNDING * size).powi(2));
+        *power = power.max((INNOVATION_ROUNDING * size).powi(2));
     }
     Ok(problem)
 }

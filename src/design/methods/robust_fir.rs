@@ -8,13 +8,14 @@
 
 use super::{Filters, Settings, Synthesis, fir, tap_lags};
 use crate::design::DesignError;
-use crate::design::error_grid::ErrorGrid;
-use crate::design::exchange::{AffineError, Exchange, Location, Peaks, Tolerances};
+use crate::design::error_grid::{AffineError, ErrorGrid, Location, Peaks};
+use crate::design::exchange::{Exchange, Tolerances};
 use crate::design::filters::{impulse_responses, polyphase};
 use crate::design::plant::LiftedPlant;
 use crate::design::problem::Problem;
 use crate::design::uncertainty::box_plant::{BoxPlant, Combination};
-use crate::design::uncertainty::search::{BoxSearch, MovingFilters};
+use crate::design::uncertainty::moving_filters::MovingFilters;
+use crate::design::uncertainty::search::BoxSearch;
 use crate::design::unfinished::Unfinished;
 use crate::linalg::{self, CMat};
 use crate::lmi::sampled::{MeanSquareObjective, Point, Problem as SampledProblem, Taps};
@@ -149,10 +150,10 @@ fn least_worst_norm(
     let mut exchange = exchange(plant, search, settings)?;
     let mut rounds = 0;
     let (taps, largest_found, is_missed) = loop {
-        let found = exchange.optimise_at(Tolerances::gradual(ACCURACY))?;
+        let found = exchange.optimise_at(Tolerances::gradual(NORM_ACCURACY))?;
         let taps = impulse_responses(&found.taps, settings.taps);
         let worst = worst_of(&exchange.error().search, &taps)?;
-        let enough = found.peaks.estimate.max(exchange.lower) * (1.0 + ACCURACY);
+        let enough = found.peaks.estimate.max(exchange.lower) * (1.0 + NORM_ACCURACY);
         let is_missed = worst.peak.gain > enough;
         rounds += 1;
         if !is_missed || rounds == MISSED_ERROR_LIMIT || exchange.stop.is_due() {
@@ -163,7 +164,7 @@ fn least_worst_norm(
             break (taps, worst.peak.gain, is_missed);
         }
     };
-    let unfinished = exchange.unfinished_at(largest_found, is_missed, ACCURACY);
+    let unfinished = exchange.unfinished_at(largest_found, is_missed, NORM_ACCURACY);
     let peak = plant.fir_norm(&taps)?;
     let norms = RobustNorms { nominal: peak.gain, largest_found };
     let (lower, iterations) = (exchange.lower_for_all, exchange.iterations);
@@ -209,7 +210,7 @@ fn exchange(
     let lags = tap_lags(plant.ratio(), settings.taps);
     let (points, weights) = ErrorGrid::new(plant, lags[0])?.coarse(0);
     let noise = plant.problem().noise.clone();
-    let margin = settings.gamma_margin.unwrap_or(MARGIN).max(MARGIN);
+    let margin = settings.gamma_margin.unwrap_or(NORM_MARGIN).max(NORM_MARGIN);
     let problem = SampledProblem::new(points, lags);
     let without_errors = std::iter::repeat(vec![0; search.plant().errors.delays.len()]);
     let error = BoxError { search, inputs: plant.channels() + plant.ratio() };
@@ -220,9 +221,9 @@ fn exchange(
 }
 
 /// Relative width of the interval of the worst norm over the scenarios.
-pub(super) const ACCURACY: f64 = 1e-4;
+pub(super) const NORM_ACCURACY: f64 = 1e-4;
 /// Relative margin of that norm for the least mean square without errors.
-pub(super) const MARGIN: f64 = 2e-4;
+pub(super) const NORM_MARGIN: f64 = 2e-4;
 
 /// The norms of a bank, computed (h = 1).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]

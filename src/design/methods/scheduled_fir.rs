@@ -20,15 +20,18 @@
 //! interleaving has no error at all at its own delays.
 
 use super::robust_fir::worst_of;
-use super::robust_fir::{ACCURACY, MARGIN, MISSED_ERROR_LIMIT, MovedPlant, RobustNorms, RobustProblem};
+use super::robust_fir::{
+    MISSED_ERROR_LIMIT, MovedPlant, NORM_ACCURACY, NORM_MARGIN, RobustNorms, RobustProblem,
+};
 use super::{Filters, Settings, Synthesis, fir, tap_lags};
 use crate::bank::TapSlopes;
 use crate::design::DesignError;
-use crate::design::error_grid::{ErrorGrid, Scenario};
-use crate::design::exchange::{Exchange, Location, Tolerances};
+use crate::design::error_grid::{ErrorGrid, Location, Scenario};
+use crate::design::exchange::{Exchange, Tolerances};
 use crate::design::filters::impulse_responses;
 use crate::design::plant::LiftedPlant;
-use crate::design::uncertainty::search::{BoxSearch, MovingFilters};
+use crate::design::uncertainty::moving_filters::MovingFilters;
+use crate::design::uncertainty::search::BoxSearch;
 use crate::linalg::Mat;
 use crate::lmi::sampled::{MeanSquareObjective, Point, Problem as SampledProblem, Taps};
 use crate::lti::peak::Peak;
@@ -98,7 +101,7 @@ pub(crate) fn synthesise(
     let found = sides.least_ratio(&mut exchange, &search, &reach, settings)?;
     let of_fixed = worst_of(&search, fixed_taps)?.peak.gain;
     let worst = &exchange.error().scenarios()[found.worst];
-    let redesigned = fir::estimate(&worst.plant, settings.taps, ACCURACY)?;
+    let redesigned = fir::estimate(&worst.plant, settings.taps, NORM_ACCURACY)?;
     let peak = found.peaks[0];
     let study = TrackingStudy {
         errors: problem.errors.clone(),
@@ -117,7 +120,7 @@ pub(crate) fn synthesise(
         lower: fixed.lower.min(peak.gain),
         noncausal: fixed.noncausal.min(peak.gain),
         iterations: fixed.iterations + exchange.iterations,
-        unfinished: exchange.unfinished_at(found.ratio, found.is_missed, ACCURACY),
+        unfinished: exchange.unfinished_at(found.ratio, found.is_missed, NORM_ACCURACY),
         dual: fixed.dual,
         robust: None,
         affine: Some(AffineDesign { slopes: found.slopes, study }),
@@ -215,10 +218,10 @@ impl Sides {
     ) -> Result<Scheduled, DesignError> {
         let mut rounds = 0;
         loop {
-            let found = exchange.optimise_at(Tolerances::gradual(ACCURACY))?;
+            let found = exchange.optimise_at(Tolerances::gradual(NORM_ACCURACY))?;
             let (taps, slopes) = self.split(&found.taps, settings.taps);
             let filters = MovingFilters::scheduled(&taps, &slopes, search.plant().ratio(), self.fast_period);
-            let enough = found.peaks.estimate.max(exchange.lower) * (1.0 + ACCURACY);
+            let enough = found.peaks.estimate.max(exchange.lower) * (1.0 + NORM_ACCURACY);
             for point in search.worst_points(&filters)? {
                 let plant = search.plant().moved(&point)?;
                 let weight = 1.0 / reach.of(&plant)?;
@@ -304,7 +307,7 @@ impl Sides {
     ) -> Exchange<ErrorGrid<'a>> {
         let (points, weights, scenarios) = self.first_points(&grid);
         let noise = self.noise(&plant.problem().noise, grid.scenarios());
-        let margin = settings.gamma_margin.unwrap_or(MARGIN).max(MARGIN);
+        let margin = settings.gamma_margin.unwrap_or(NORM_MARGIN).max(NORM_MARGIN);
         let problem = SampledProblem::new(points, tap_lags(plant.ratio(), settings.taps));
         Exchange::new(grid, problem, scenarios, MeanSquareObjective { weights, noise }, margin)
     }

@@ -106,8 +106,8 @@ fn filters_for_another_number_of_channels_are_a_fault_of_the_caller() {
     let _ = plants()[0].norm(&StateSpace::gain(Mat::zeros(2, 3)));
 }
 
-/// The response of the prompt part times the delays is that of the whole system, and delays by whole periods
-/// change no bound.
+/// The response of the undelayed part times the delays is that of the whole system, and delays by whole
+/// periods change no bound.
 #[test]
 fn delays_by_whole_periods_are_factors_of_the_response() {
     for plant in plants() {

@@ -11,14 +11,14 @@ use crate::verify::{EnclosedErrorSystem, Midpoint};
 use std::f64::consts::PI;
 
 /// Norms below this, relative to the scale of the reference samples, are zero up to rounding.
-pub(super) const FLOOR: f64 = 1e-10;
+pub(super) const ZERO_NORM: f64 = 1e-10;
 /// Distances from the peak in doubles at which the enclosed gain is computed, in radians: from the rounding
 /// of a frequency to the width of a wide resonance.
-const BESIDE: [f64; 6] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
+const PEAK_OFFSETS: [f64; 6] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
 
 /// Whether a norm is zero up to rounding, so that more digits gain nothing.
 pub(super) fn is_zero(norm: f64, error: &EnclosedErrorSystem<'_>) -> bool {
-    norm <= FLOOR * error.scale()
+    norm <= ZERO_NORM * error.scale()
 }
 
 /// `computed`, the norm of `bank` in double precision, if its gain is the enclosed one at that frequency;
@@ -83,7 +83,7 @@ fn grid(system: &StateSpace, computed: f64, proof: &Proof) -> Result<Vec<f64>, D
         _ => &[],
     };
     let peak = proof.upper.as_ref().map(|certificate| &certificate.peak);
-    let beside = BESIDE.iter().flat_map(|distance| [computed - distance, computed + distance]);
+    let beside = PEAK_OFFSETS.iter().flat_map(|distance| [computed - distance, computed + distance]);
     let mut frequencies = resonances(&stable_poles(system)?);
     frequencies.extend(below.iter().chain(&proof.noncausal).chain(peak).map(frequency));
     frequencies.extend(beside.chain([computed]).filter(|frequency| (0.0..=PI).contains(frequency)));

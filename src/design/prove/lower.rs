@@ -7,8 +7,9 @@
 //! strongest; double precision loses them, but they lower the sum. They raise the error between the
 //! frequencies, so in 512 bits the energy of the error for a faint white input is added to the sum.
 
+use super::normal_equations::{MOST_LONG_TAPS, Normal};
 use super::witness;
-use crate::arithmetic::{Float512, Number, dense};
+use crate::arithmetic::Number;
 use crate::bank::{Bank, CausalWitness, DualWitness, LowerProof, SynthesisFilters};
 use crate::design::DesignError;
 use crate::design::limits::Stop;
@@ -19,9 +20,8 @@ use crate::design::problem::Problem;
 use crate::linalg::{self, CMat, Complex, Mat, power_of_two};
 use crate::lti::FrequencyResponse;
 use crate::spec::Method;
-use crate::verify::enclosed::ComplexParts;
 use crate::verify::{EnclosedErrorSystem, Precision, Recursion};
-use nalgebra::DMatrix as Matrix;
+use std::ops::Range;
 
 /// Directions with less than this share of the dual's weight are ignored: they move the bound by less than
 /// the accuracy of gamma.
@@ -32,7 +32,7 @@ const MAX_WITNESSES: usize = 256;
 /// With more taps, where their number is the time of the search.
 const MAX_WITNESSES_OF_MANY: usize = 64;
 /// Directions of tap space with less effect than this, relative to the strongest, are lost to rounding.
-const RANK: f64 = 1e-13;
+const RANK_TOLERANCE: f64 = 1e-13;
 /// Relative distance from the upper end within which a bound for FIR banks is not searched further for error
 /// systems of more than [`MANY_STATES`]: the finite horizon takes a minute there.
 const CLOSE_BOUND: f64 = 1e-3;
@@ -40,9 +40,6 @@ const MANY_STATES: usize = 48;
 /// Weight of the white input relative to that of all directions, times the size of the reference samples
 /// over gamma. The bound loses about this much of itself.
 const RIDGES: [f64; 2] = [1e-7, 1e-5];
-/// Most taps of all channels: for more, the factorisations take seconds, and no bank of the tests gained by
-/// them.
-const MOST_LONG_TAPS: usize = 256;
 /// Maximum number of slow periods in 106-bit arithmetic.
 const SHORT_PERIODS: usize = 512;
 /// Maximum number of slow periods in 512-bit arithmetic, where each takes some milliseconds.
@@ -50,7 +47,7 @@ const LONG_PERIODS: usize = 128;
 /// Relative distances of the first trial gammas below the upper end. Most banks are almost optimal.
 const FIRST_SHORTFALLS: [f64; 3] = [1e-6, 1e-5, 1e-4];
 /// Relative width of the interval at which the bisection ends.
-const WIDTH: f64 = 1e-5;
+const BISECTION_WIDTH: f64 = 1e-5;
 /// Maximum number of bisections in 106-bit arithmetic.
 const SHORT_BISECTIONS: usize = 24;
 /// Maximum number of bisections in 512-bit arithmetic.
@@ -63,7 +60,7 @@ pub(super) fn lower_proof(
     bank: &Bank,
     dual: &DualSolution,
     wanted: Option<f64>,
-    interval: (f64, f64),
+    interval: &Range<f64>,
     stop: &Stop,
 ) -> Result<Option<LowerProof>, DesignError> {
     let dual = &dual.points[..];
@@ -82,11 +79,12 @@ pub(super) fn lower_proof(
         }
     }
     let enough =
-        suffices(reached) || (error.states() > MANY_STATES && reached >= interval.1 * (1.0 - CLOSE_BOUND));
-    let causal = if reached > interval.0 && enough { None } else { causal_witness(error, interval, stop) };
+        suffices(reached) || (error.states() > MANY_STATES && reached >= interval.end * (1.0 - CLOSE_BOUND));
+    let causal =
+        if reached > interval.start && enough { None } else { causal_witness(error, interval, stop) };
     Ok(match causal {
         Some(witness) if witness.gamma > reached => Some(LowerProof::Causal(witness)),
-        _ => (reached > interval.0).then_some(LowerProof::Fir(witnesses)),
+        _ => (reached > interval.start).then_some(LowerProof::Fir(witnesses)),
     })
 }
 
@@ -221,7 +219,7 @@ impl<'a> TapLeastSquares<'a> {
         let units = self.units(&map);
         map.column_iter_mut().zip(&units).for_each(|(mut column, unit)| column.unscale_mut(*unit));
         let svd = linalg::svd(&map)?;
-        let floor = RANK * svd.s.first().copied().unwrap_or(0.0);
+        let floor = RANK_TOLERANCE * svd.s.first().copied().unwrap_or(0.0);
         let mut taps = Mat::zeros(map.ncols(), 1);
         // The second pass corrects the rounding errors of the first.
         for _ in 0..2 {
@@ -240,153 +238,13 @@ impl<'a> TapLeastSquares<'a> {
     }
 }
 
-/// The least-squares problem of the taps f_{p,j,i} in normal form.
-struct Normal<'a> {
-    directions: &'a [DualWitness],
-    /// For each direction z and Gamma.
-    moments: Vec<[ComplexParts; 2]>,
-    channels: usize,
-    ratio: usize,
-    /// Weight of the white input.
-    ridge: f64,
-    /// (lag j, output p) of the taps that there are, in the order of time.
-    times: Vec<(usize, usize)>,
-}
-
-/// (a + ib)(c + id).
-fn times([a, b]: [Float512; 2], [c, d]: [Float512; 2]) -> [Float512; 2] {
-    [a * c - b * d, a * d + b * c]
-}
-
-fn conjugate([a, b]: [Float512; 2]) -> [Float512; 2] {
-    [a, -b]
-}
-
-fn entry(m: &ComplexParts, i: usize, j: usize) -> [Float512; 2] {
-    [m[0][(i, j)], m[1][(i, j)]]
-}
-
-impl<'a> Normal<'a> {
-    /// F* a of the taps of least sum for the distinct `channels`, for each direction.
-    fn estimates(
-        error: &EnclosedErrorSystem<'_>,
-        bank: &Bank,
-        directions: &'a [DualWitness],
-        channels: &[usize],
-        ridge: f64,
-    ) -> Option<Vec<Vec<[Float512; 2]>>> {
-        let (ratio, SynthesisFilters::Fir(taps)) = (bank.ratio, &bank.filters) else { return None };
-        let length = taps[0].len();
-        if channels.len() * length > MOST_LONG_TAPS {
-            return None;
-        }
-        let [covariance, cross] = error.precise_covariance(channels, length.div_ceil(ratio))?;
-        let moments = directions.iter().map(|of| error.precise_gram(of.half, channels)).collect();
-        let times = (0..length).map(|n| (n / ratio, n % ratio)).collect();
-        let weight: f64 = directions.iter().flat_map(|d| &d.reference).flatten().map(|x| x * x).sum();
-        let ridge = ridge * weight * bank.gamma.norm.unwrap_or(0.0) / error.scale();
-        let normal = Self { directions, moments, channels: channels.len(), ratio, ridge, times };
-        let taps = normal.solve(&covariance, &cross)?;
-        Some((0..directions.len()).map(|t| normal.estimate(t, &taps)).collect())
-    }
-
-    fn a(&self, t: usize, p: usize) -> [Float512; 2] {
-        self.directions[t].reference[p].map(Float512::from)
-    }
-
-    /// z^0 .. z^-(count - 1).
-    fn powers(&self, t: usize, count: usize) -> Vec<[Float512; 2]> {
-        let back = conjugate(entry(&self.moments[t][0], 0, 0));
-        let one = [Float512::from(1.0), Float512::ZERO];
-        std::iter::successors(Some(one), |&power| Some(times(power, back))).take(count).collect()
-    }
-
-    /// The taps, in the order of time and, at one time, of the channels.
-    fn solve(&self, covariance: &Matrix<Float512>, cross: &Matrix<Float512>) -> Option<Vec<Float512>> {
-        let factor = dense::cholesky(&self.matrix(covariance))?;
-        let right = Matrix::from_vec(factor.nrows(), 1, self.right(cross));
-        let taps = dense::solve_factored(&factor, &right);
-        Some(taps.iter().copied().collect())
-    }
-
-    /// sum over directions of Re conj(a_p) a_p' z^-(j - j') Gamma_{i,i'}, and the white input.
-    fn matrix(&self, covariance: &Matrix<Float512>) -> Matrix<Float512> {
-        let (n, m) = (self.channels, self.ratio);
-        let lags = covariance.nrows() / n;
-        // By lag difference d >= 0, the outputs p, p' and the channels i, i'.
-        let index = |d: usize, (p, q): (usize, usize), (i, k): (usize, usize)| {
-            ((d * m + p) * m + q) * n * n + i * n + k
-        };
-        let mut sums = vec![Float512::ZERO; lags * m * m * n * n];
-        for t in 0..self.directions.len() {
-            let powers = self.powers(t, lags);
-            for (p, q) in pairs(m) {
-                let both = times(conjugate(self.a(t, p)), self.a(t, q));
-                for (i, k) in pairs(n) {
-                    let [re, im] = times(both, entry(&self.moments[t][1], m + i, m + k));
-                    for (d, power) in powers.iter().enumerate() {
-                        let sum = &mut sums[index(d, (p, q), (i, k))];
-                        *sum += re * power[0] - im * power[1];
-                    }
-                }
-            }
-        }
-        let at = |row: usize| (self.times[row / n], row % n);
-        Matrix::from_fn(self.times.len() * n, self.times.len() * n, |row, column| {
-            let (((j, p), i), ((l, q), k)) = (at(row.max(column)), at(row.min(column)));
-            let sum = sums[index(j - l, (p, q), (i, k))];
-            if p == q { sum + Float512::from(self.ridge) * covariance[(j * n + i, l * n + k)] } else { sum }
-        })
-    }
-
-    /// sum over directions of Re conj(a_p) z^-j (Gamma_hw a)_i, and the white input.
-    fn right(&self, cross: &Matrix<Float512>) -> Vec<Float512> {
-        let (n, m) = (self.channels, self.ratio);
-        let lags = self.times.last().map_or(0, |(lag, _)| lag + 1);
-        let white = |row: usize| {
-            let (lag, p) = self.times[row / n];
-            Float512::from(self.ridge) * cross[(p, lag * n + row % n)]
-        };
-        let mut sums: Vec<Float512> = (0..self.times.len() * n).map(white).collect();
-        for t in 0..self.directions.len() {
-            let powers = self.powers(t, lags);
-            for i in 0..n {
-                let from = |p: usize| times(entry(&self.moments[t][1], m + i, p), self.a(t, p));
-                let target = (0..m).map(from).fold([Float512::ZERO; 2], |[a, b], [c, d]| [a + c, b + d]);
-                for (row, &(lag, p)) in self.times.iter().enumerate() {
-                    let rotated = times(times(conjugate(self.a(t, p)), powers[lag]), target);
-                    sums[row * n + i] += rotated[0];
-                }
-            }
-        }
-        sums
-    }
-
-    /// F* a for direction t: sum over taps of f a_p z^j.
-    fn estimate(&self, t: usize, taps: &[Float512]) -> Vec<[Float512; 2]> {
-        let powers = self.powers(t, self.times.last().map_or(0, |(lag, _)| lag + 1));
-        let mut sums = vec![[Float512::ZERO; 2]; self.channels];
-        for (row, &(lag, p)) in self.times.iter().enumerate() {
-            let phasor = times(self.a(t, p), conjugate(powers[lag]));
-            for (i, sum) in sums.iter_mut().enumerate() {
-                let tap = taps[row * self.channels + i];
-                *sum = [sum[0] + tap * phasor[0], sum[1] + tap * phasor[1]];
-            }
-        }
-        sums
-    }
-}
-
-fn pairs(count: usize) -> impl Iterator<Item = (usize, usize)> {
-    (0..count).flat_map(move |a| (0..count).map(move |b| (a, b)))
-}
-
 /// The largest gamma found in the interval that no causal bank achieves.
 fn causal_witness(
     error: &EnclosedErrorSystem<'_>,
-    (lower, upper): (f64, f64),
+    interval: &Range<f64>,
     stop: &Stop,
 ) -> Option<CausalWitness> {
+    let Range { start: lower, end: upper } = *interval;
     let refuted = |gamma: f64, precision: Precision| {
         if stop.is_due() {
             return None;
@@ -405,7 +263,7 @@ fn causal_witness(
         return short;
     }
     let long = near.filter(|&gamma| gamma > reached).find_map(|gamma| refuted(gamma, Precision::Long));
-    let search = |precision, count| bisected((lower, upper), count, |gamma| refuted(gamma, precision));
+    let search = |precision, count| bisected(interval, count, |gamma| refuted(gamma, precision));
     long.or(short)
         .or_else(|| search(Precision::Short, SHORT_BISECTIONS))
         .or_else(|| search(Precision::Long, LONG_BISECTIONS))
@@ -413,13 +271,13 @@ fn causal_witness(
 
 /// `count` bisections between the ends, at the geometric mean because the ends may be far apart.
 fn bisected(
-    (lower, upper): (f64, f64),
+    interval: &Range<f64>,
     count: usize,
     refuted: impl Fn(f64) -> Option<CausalWitness>,
 ) -> Option<CausalWitness> {
-    let (mut best, mut below, mut standing) = (None, lower, upper);
+    let (mut best, mut below, mut standing) = (None, interval.start, interval.end);
     for _ in 0..count {
-        if standing - below <= WIDTH * standing {
+        if standing - below <= BISECTION_WIDTH * standing {
             break;
         }
         let gamma = if below > 0.0 { (below * standing).sqrt() } else { 0.1 * standing };

@@ -3,6 +3,7 @@
 
 mod enclosed_norm;
 mod lower;
+mod normal_equations;
 mod upper;
 
 use super::DesignError;
@@ -23,13 +24,13 @@ pub(super) use upper::MAX_SEARCHED_STATES;
 use upper::certificate;
 
 /// Relative distance below the designer's bound at which a proven bound still counts as its proof.
-const SHORTFALL: f64 = 0.5e-6;
+const PROVEN_SHORTFALL: f64 = 0.5e-6;
 /// Relative distance of a stated lower bound below the proven one: another machine may round an approximate
 /// inverse differently.
 const STATED_BELOW: f64 = 1e-12;
 /// Relative width of a proven interval above which the norm is looked for in the arithmetic of `verify`:
 /// twice the least excess of a certificate.
-const NARROW: f64 = 2e-8;
+const NARROW_INTERVAL: f64 = 2e-8;
 
 /// A gamma that is proven, not only computed.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -100,9 +101,9 @@ fn lower_ends(
         return Ok(Proof { upper: None, lower: None, noncausal: noncausal.map(|_| witness) });
     }
     // What the noncausal bound does not explain is looked for.
-    let wanted = bank.gamma.lower.map(|stated| stated.max(dual.bound) * (1.0 - SHORTFALL));
+    let wanted = bank.gamma.lower.map(|stated| stated.max(dual.bound) * (1.0 - PROVEN_SHORTFALL));
     let explained = wanted.is_some_and(|wanted| above >= wanted);
-    let found = || lower_proof(error, bank, dual, wanted, (above, upper), stop);
+    let found = || lower_proof(error, bank, dual, wanted, &(above..upper), stop);
     let lower = if explained { None } else { found()? };
     if stop.is_due() {
         return Err(DesignError::Stopped);
@@ -150,7 +151,7 @@ pub(crate) fn attach_proof(
 /// larger gain can lie elsewhere.
 fn is_resolved(norm: f64, verified: &Verified) -> bool {
     let is_the_gain = (norm - verified.attained).abs() <= Gamma::NORM_ACCURACY * norm;
-    is_the_gain && verified.upper <= verified.attained * (1.0 + NARROW)
+    is_the_gain && verified.upper <= verified.attained * (1.0 + NARROW_INTERVAL)
 }
 
 /// The largest gain in the arithmetic of `verify` in place of `norm`. Where it exceeds the one that `proof`

@@ -5,7 +5,7 @@
 //! error is a small difference of large numbers; the equation is then solved in 256 bits, and in 512 where
 //! these do not do either.
 
-use super::enclosed_norm::{EnclosedGains, FLOOR};
+use super::enclosed_norm::{EnclosedGains, ZERO_NORM};
 use super::{leading_direction, witness};
 use crate::arithmetic::dense::{cholesky, product, riccati_limit, select, solve, symmetric};
 use crate::arithmetic::{BigFloat, Float512, Number};
@@ -30,8 +30,8 @@ const FEWER_WORDS: usize = 4;
 const MORE_WORDS: usize = 8;
 /// The relative excesses that are tried in 256 and in 512 bits.
 const LONG_EXCESSES: [f64; 3] = [1e-7, 1e-5, 1e-3];
-/// The same in units of `FLOOR`, for norms that are zero up to rounding.
-const FLOOR_EXCESSES: [f64; 3] = [1.0, 1e2, 1e4];
+/// The same in units of `ZERO_NORM`, for norms that are zero up to rounding.
+const ZERO_NORM_EXCESSES: [f64; 3] = [1.0, 1e2, 1e4];
 /// Weights on all states, relative to the excess.
 const STATE_WEIGHTS: [f64; 2] = [1e-1, 1e-4];
 /// Significant digits of the certificate's numbers in the file.
@@ -39,7 +39,7 @@ const DIGITS: [usize; 4] = [9, 12, 15, 17];
 /// Significant digits of the corrections.
 const CORRECTION_DIGITS: [usize; 2] = [9, 17];
 /// Part of the excess that white noise on the states may take there.
-const NOISE: f64 = 1e-3;
+const NOISE_SHARE_OF_EXCESS: f64 = 1e-3;
 /// Maximum number of states of an error system for which the search tries to find a certificate. It needs
 /// eigenvalues of matrices twice as large.
 pub(in crate::design) const MAX_SEARCHED_STATES: usize = 512;
@@ -51,7 +51,7 @@ const STATE_NOISE: f64 = 0.1;
 const SAME_NORM: f64 = 1e-6;
 /// Relative distance of the enclosed gain at the peak from the norm above which double precision does not
 /// resolve the norm.
-const RESOLVED: f64 = 1e-7;
+const RESOLVED_NORM_GAP: f64 = 1e-7;
 
 /// The certificate with the least gamma, of those tried until `stop` is due, that passes.
 pub(super) fn certificate(
@@ -75,10 +75,10 @@ pub(super) fn certificate(
     let stated = bank.gamma.norm.map(|stated| stated / units.reference);
     let credible = stated.filter(|&stated| stated <= peak.gain * (1.0 + SAME_NORM));
     let mut norm = credible.unwrap_or(0.0).max(peak.gain);
-    let floor = FLOOR * error.scale() / units.reference;
+    let floor = ZERO_NORM * error.scale() / units.reference;
     let shown = error.attains(&peak_witness).unwrap_or(0.0) / units.reference;
     if norm > floor
-        && (shown - norm).abs() > RESOLVED * norm
+        && (shown - norm).abs() > RESOLVED_NORM_GAP * norm
         && let Some((gain, enclosed)) = EnclosedGains(error).peak(&Proof::default())?
     {
         (norm, peak_witness) = (gain / units.reference, enclosed);
@@ -97,9 +97,9 @@ pub(super) fn certificate(
     };
     let is_zero = norm <= floor;
     let (fine, coarse) =
-        if is_zero { (&FLOOR_EXCESSES[..], &[][..]) } else { EXCESSES.split_at(FINE_EXCESSES) };
+        if is_zero { (&ZERO_NORM_EXCESSES[..], &[][..]) } else { EXCESSES.split_at(FINE_EXCESSES) };
     let long = || {
-        let excesses = if is_zero { FLOOR_EXCESSES } else { LONG_EXCESSES };
+        let excesses = if is_zero { ZERO_NORM_EXCESSES } else { LONG_EXCESSES };
         let long = search.in_512_bits()?;
         let mut tried = excesses.iter().take_while(|_| !stop.is_due());
         tried.find_map(|excess| {
@@ -170,7 +170,7 @@ impl Search<'_> {
 
     /// In numbers of so many words, R as two doubles per entry where one does not do.
     fn of_long<const WORDS: usize>(&self, long: &LongSystem, level: Level) -> Option<Certificate> {
-        let noise = NOISE * level.excess;
+        let noise = NOISE_SHARE_OF_EXCESS * level.excess;
         let [factor, correction] = long.root::<WORDS>(level.middle(), noise)?;
         let passes = |correction| self.passes(level, factor.clone(), correction);
         let corrected = || CORRECTION_DIGITS.iter().find_map(|&digits| passes(rounded(&correction, digits)));

@@ -10,7 +10,7 @@
 //!
 //! The scale is the finest power of two at which the taps fit their bits, or one step finer with the
 //! largest taps clipped. Where that costs more than 0.05 dB, taps that are smaller than the optimal ones
-//! and still have almost their gamma are tried with finer steps (`smaller_taps`), and banks of few taps
+//! and still have almost their gamma are tried with finer steps (`quantiser`), and banks of few taps
 //! are searched through at all scales (`enumeration`). The zero output is always a candidate. Among all
 //! candidates with about the least gamma, the one with the least mean-square error and converter noise at
 //! the output is chosen.
@@ -24,7 +24,6 @@ mod phases;
 mod problem;
 mod quantiser;
 mod search;
-mod smaller_taps;
 
 pub use choice::{Allowance, quantise_within};
 pub use problem::QuantisationProblem;

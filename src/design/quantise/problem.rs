@@ -46,7 +46,7 @@ pub(super) struct Candidate {
 }
 
 /// Mean squares below this, relative to that of zero taps, are zero up to rounding.
-const FLOOR: f64 = 1e-20;
+const ZERO_MEAN_SQUARE: f64 = 1e-20;
 
 /// Estimates of the error of integer taps, on a grid of frequencies.
 pub(super) struct TapError<'a> {
@@ -77,7 +77,7 @@ impl<'a> TapError<'a> {
         let forms = Forms::new(&points);
         let real_gamma = grid.peaks(&lags, 0.0)?.estimate;
         let zeros = vec![vec![0.0; problem.taps[0].len()]; problem.taps.len()];
-        let least_mean_square = FLOOR * grid.mean_square(&polyphase(&zeros, ratio));
+        let least_mean_square = ZERO_MEAN_SQUARE * grid.mean_square(&polyphase(&zeros, ratio));
         let real = grid.mean_square(&lags) + output_noise(problem.noise, problem.taps);
         let real_mean_square = real.max(least_mean_square);
         Ok(Self { problem, ratio, grid, points, forms, real_gamma, real_mean_square, least_mean_square })

@@ -5,9 +5,9 @@
 use crate::linalg::Mat;
 
 /// A step must achieve this fraction of the decrease that the slope predicts ...
-const DECREASE: f64 = 1e-4;
+const ARMIJO_DECREASE: f64 = 1e-4;
 /// ... and must reduce the slope to this fraction.
-const CURVATURE: f64 = 0.5;
+const WOLFE_CURVATURE: f64 = 0.5;
 /// Halvings and doublings of a step.
 const LINE_LIMIT: usize = 24;
 /// Length of the first step relative to the norm of the start.
@@ -85,11 +85,11 @@ fn line_search(
         }
         *left -= 1;
         let x = &from.x + direction * t;
-        let tried = f(&x).filter(|(value, _)| *value <= from.value + DECREASE * t * slope);
+        let tried = f(&x).filter(|(value, _)| *value <= from.value + ARMIJO_DECREASE * t * slope);
         match tried {
             None => high = t,
             Some((value, gradient)) => {
-                let flat = gradient.dot(direction) >= CURVATURE * slope;
+                let flat = gradient.dot(direction) >= WOLFE_CURVATURE * slope;
                 found = Some(Evaluated { x, value, gradient });
                 if flat {
                     break;

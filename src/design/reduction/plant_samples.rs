@@ -3,7 +3,8 @@
 
 use super::dynamics::Dynamics;
 use crate::design::DesignError;
-use crate::design::exchange::{AffineError, Exchange, LocatedPeak, Location, Peaks};
+use crate::design::error_grid::{AffineError, LocatedPeak, Location, Peaks};
+use crate::design::exchange::Exchange;
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
 use crate::linalg::Complex;

@@ -20,7 +20,7 @@ use crate::lti::gramian::controllability_root;
 use crate::lti::{FrequencyResponse, StateSpace};
 
 /// Relative accuracy of gamma during the descent.
-const ACCURACY: f64 = 1e-6;
+const DESCENT_ACCURACY: f64 = 1e-6;
 /// Poles keep this distance from the unit circle, unless the start is closer.
 const STABILITY_MARGIN: f64 = 1e-3;
 
@@ -87,7 +87,7 @@ fn unpacked(like: &Dynamics, x: &Mat) -> Dynamics {
 
 /// gamma of the best output matrices, and its gradient.
 fn worst_case_gradient(samples: &PlantSamples<'_>, dynamics: &Dynamics) -> Result<(f64, Mat), DesignError> {
-    let found = samples.worst_case(dynamics, ACCURACY)?;
+    let found = samples.worst_case(dynamics, DESCENT_ACCURACY)?;
     let (r, n) = dynamics.b.shape();
     let c = found.taps[0].columns(0, r).into_owned();
     // C (zI - a)^-1.

@@ -5,6 +5,7 @@
 //! with one input for all. Errors of gains are factors of rows. No other plant is lifted while the worst
 //! combination is searched.
 
+use super::moving_filters::FiltersAt;
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::design::problem::Problem;
@@ -252,6 +253,12 @@ impl BoxPlant {
         CMat::from_fn(rows.len(), response.nodes.ncols(), |i, column| {
             response.nodes[(rows[i].0, column)] * Complex::from(rows[i].1)
         })
+    }
+
+    /// K of a combination.
+    pub(super) fn error(&self, response: &BoxResponse, filters: &FiltersAt, combination: &[usize]) -> CMat {
+        let moved = filters.moved(|j| self.options[j][combination[j]].delay.0);
+        &response.references - moved * self.measurements(response, combination)
     }
 
     /// The rows of a node's samples.

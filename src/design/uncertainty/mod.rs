@@ -7,6 +7,7 @@
 pub(super) mod box_plant;
 mod derivatives;
 mod floor;
+pub(super) mod moving_filters;
 pub(super) mod search;
 mod study;
 #[cfg(test)]

@@ -9,16 +9,15 @@
 //! So what is found is attained. That nothing larger was missed is not proven; `verify` has an upper bound.
 
 use super::box_plant::{BoxPlant, BoxResponse, Combination};
-use crate::bank::{Bank, SynthesisFilters, TapSlopes};
+use super::moving_filters::{FiltersAt, MovingFilters};
+use crate::bank::Bank;
 use crate::design::DesignError;
-use crate::design::error_grid::{Frequencies, PRUNE_LEVEL};
-use crate::design::exchange::{LocatedPeak, Location, Peaks};
-use crate::design::filters::{FilterResponse, polyphase, response};
+use crate::design::error_grid::{Frequencies, LocatedPeak, Location, PRUNE_LEVEL, Peaks};
 use crate::design::plant::LiftedPlant;
 use crate::design::problem::Problem;
-use crate::linalg::{self, CMat, Complex, Mat};
+use crate::linalg::{self, CMat, Complex};
 use crate::lti::peak::{Peak, local_maxima, refine};
-use crate::units::{RadiansPerSlowPeriod, Seconds};
+use crate::units::RadiansPerSlowPeriod;
 use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Taps};
 use std::cell::OnceCell;
 
@@ -74,63 +73,6 @@ pub(super) fn candidates(
     let norm = |point: ErrorPoint| Ok((norm_at(bank, &point, taps)?.1, point));
     let found = points.into_iter().map(norm).collect::<Result<Vec<_>, DesignError>>()?;
     Ok(found.into_iter().map(|(frequency, point)| (point, frequency)).collect())
-}
-
-/// Filters that may follow the delays.
-pub(in crate::design) struct MovingFilters {
-    nominal: FilterResponse,
-    /// For each channel whose delay the taps follow their change per second; none for fixed filters.
-    slopes: Vec<(usize, Vec<Mat>)>,
-}
-
-/// Their responses at one frequency.
-struct FiltersAt {
-    nominal: CMat,
-    slopes: Vec<(usize, CMat)>,
-}
-
-impl MovingFilters {
-    /// Fixed filters with the taps `lags`.
-    pub(in crate::design) fn fixed(lags: Vec<Mat>) -> Self {
-        Self { nominal: FilterResponse::Polynomial(lags), slopes: Vec::new() }
-    }
-
-    /// Taps with slopes per fast period.
-    pub(in crate::design) fn scheduled(
-        taps: &[Vec<f64>],
-        slopes: &TapSlopes,
-        ratio: usize,
-        fast_period: Seconds,
-    ) -> Self {
-        let by_delay = slopes.by_delay.iter().enumerate().filter(|(_, slope)| !slope.is_empty());
-        let per_second = by_delay.map(|(j, slope)| {
-            (j, polyphase(slope, ratio).into_iter().map(|lag| lag / fast_period.0).collect())
-        });
-        Self { nominal: FilterResponse::Polynomial(polyphase(taps, ratio)), slopes: per_second.collect() }
-    }
-
-    fn of(bank: &Bank, taps: Taps) -> Result<Self, DesignError> {
-        let fast_period = bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period);
-        match (taps, &bank.filters, &bank.tap_slopes) {
-            (Taps::Scheduled, SynthesisFilters::Fir(list), Some(slopes)) => {
-                Ok(Self::scheduled(list, slopes, bank.ratio, fast_period))
-            }
-            _ => Ok(Self { nominal: FilterResponse::new(bank)?, slopes: Vec::new() }),
-        }
-    }
-
-    fn at(&self, omega: f64) -> FiltersAt {
-        let slopes = self.slopes.iter().map(|(j, lags)| (*j, response(lags, omega)));
-        FiltersAt { nominal: self.nominal.at(omega), slopes: slopes.collect() }
-    }
-}
-
-impl FiltersAt {
-    /// F where the delays are off by `delays`, in seconds.
-    fn moved(&self, delays: impl Fn(usize) -> f64) -> CMat {
-        let move_by = |f: CMat, (j, slope): &(usize, CMat)| f + slope * Complex::from(delays(*j));
-        self.slopes.iter().fold(self.nominal.clone(), move_by)
-    }
 }
 
 /// A combination with its gain at some frequency.
@@ -369,14 +311,6 @@ impl BoxSearch {
             point = near.point(&found.combination);
         }
         Ok(point)
-    }
-}
-
-impl BoxPlant {
-    /// K of a combination.
-    fn error(&self, response: &BoxResponse, filters: &FiltersAt, combination: &[usize]) -> CMat {
-        let moved = filters.moved(|j| self.options()[j][combination[j]].delay.0);
-        &response.references - moved * self.measurements(response, combination)
     }
 }
 

@@ -7,9 +7,9 @@ use crate::units::{Hertz, Seconds};
 use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Slopes, Taps, WorstCase, slopes};
 
 /// Relative distance of the two ends that is asked for.
-const ACCURACY: f64 = 0.01;
+const BOUND_ACCURACY: f64 = 0.01;
 /// The same for banks of many channels.
-const ACCURACY_OF_MANY: f64 = 0.05;
+const BOUND_ACCURACY_OF_MANY: f64 = 0.05;
 /// Channels up to which the ends are asked for closely.
 const FEW_CHANNELS: usize = 4;
 
@@ -111,7 +111,8 @@ impl ErrorStudy {
 
 impl BoxStudy {
     fn new(bank: &Bank, errors: ErrorBox, loss: Option<f64>) -> Result<Self, DesignError> {
-        let accuracy = if bank.channel_count() <= FEW_CHANNELS { ACCURACY } else { ACCURACY_OF_MANY };
+        let accuracy =
+            if bank.channel_count() <= FEW_CHANNELS { BOUND_ACCURACY } else { BOUND_ACCURACY_OF_MANY };
         let case = worst_case(bank, &errors, Taps::Fixed, accuracy)?;
         let floor = floor(bank, &errors, &case.point)?;
         let affordable = loss.map(|loss| {

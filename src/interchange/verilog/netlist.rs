@@ -1,6 +1,6 @@
 //! Sums of integers in Verilog: each word as wide as its values need, with registers between the levels.
 
-use crate::interchange::range::Range;
+use crate::interchange::bit_true::Range;
 use std::collections::HashMap;
 use std::fmt::Write;
 

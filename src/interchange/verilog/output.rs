@@ -1,7 +1,7 @@
 //! From a sum to an output sample: rounded to the nearest integer, halves upwards, and saturated.
 
 use super::netlist::{Netlist, Word, constant, wrapped};
-use crate::interchange::range::Range;
+use crate::interchange::bit_true::Range;
 
 /// How sums become outputs.
 #[derive(Debug, Clone, Copy)]

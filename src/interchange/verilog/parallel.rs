@@ -7,7 +7,7 @@ use super::netlist::{Netlist, Term, Word, wrapped};
 use super::output::{Output, held_sum};
 use super::shift_add::multiples;
 use crate::interchange::bit_true::IntegerFilters;
-use crate::interchange::range::Range;
+use crate::interchange::bit_true::Range;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 

@@ -25,7 +25,7 @@ const RADIUS_FACTOR: f64 = 1e3;
 const RADIUS_SAFETY: f64 = 1.01;
 /// Rounding errors per operation of a sum, in units of the machine precision, in addition to its length:
 /// products, phases, singular values.
-const ROUNDING: f64 = 16.0;
+const ROUNDING_PER_OPERATION: f64 = 16.0;
 
 /// A proven lower bound.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,10 +66,11 @@ pub(crate) fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Resu
     }
     let value = pairwise(0..points.len(), &|l| re_inner(&dual[l], &points[l].w));
     let moduli: f64 = dual.iter().zip(points).map(|(y, p)| y.norm() * p.w.norm()).sum();
-    let depth = ROUNDING + (problem.rows() * problem.inputs()) as f64 + (points.len() as f64).log2();
+    let depth =
+        ROUNDING_PER_OPERATION + (problem.rows() * problem.inputs()) as f64 + (points.len() as f64).log2();
     let residual = residual_norm(problem, dual);
     let charged = value - residual * radius - depth * f64::EPSILON * moduli;
-    let proven = charged / (nuclear * (1.0 + (ROUNDING + points.len() as f64) * f64::EPSILON));
+    let proven = charged / (nuclear * (1.0 + (ROUNDING_PER_OPERATION + points.len() as f64) * f64::EPSILON));
     let value = if proven.is_finite() { proven.max(0.0) } else { 0.0 };
     Ok(LowerBound { value, residual, covered: Covered::Within(radius) })
 }
@@ -116,7 +117,7 @@ fn residual_norm(problem: &Problem, dual: &[CMat]) -> f64 {
     }
     let moduli: f64 = dual.iter().zip(&scaled).map(|(y, h)| y.norm() * h.norm()).sum();
     let angle = problem.points().iter().map(|p| p.omega.abs()).fold(0.0, f64::max) * lags as f64;
-    let depth = ROUNDING + problem.inputs() as f64 + (products.len() as f64).log2() + angle;
+    let depth = ROUNDING_PER_OPERATION + problem.inputs() as f64 + (products.len() as f64).log2() + angle;
     square.sqrt() + depth * f64::EPSILON * moduli * (lags as f64).sqrt()
 }
 

@@ -11,7 +11,7 @@ use super::problem::{MeanSquareObjective, Point, Problem, Taps};
 use super::quadratic::Quadratic;
 use crate::linalg::LinalgError;
 use crate::lmi::factor::RegularisedCholesky;
-use crate::lmi::iteration::{self, Iterate, RANK};
+use crate::lmi::iteration::{self, Iterate, RANK_TOLERANCE};
 use crate::lmi::{IsDue, Outcome};
 
 /// Taps of least mean square under a cap.
@@ -66,7 +66,7 @@ pub fn mean_square_under_cap(
     tol_gap_rel: f64,
     is_due: IsDue<'_>,
 ) -> Result<Option<MeanSquare>, LinalgError> {
-    let free = least_squares(problem, square, RANK)?;
+    let free = least_squares(problem, square, RANK_TOLERANCE)?;
     let free_square = problem.mean_square(&free, square);
     let mut best = Best::new(problem, square, cap, start)?;
     best.offer(free)?;

@@ -6,7 +6,7 @@ use super::interior::{Engine, Objective, norm};
 use super::prepare::Reduced;
 use super::problem::{Problem, Taps};
 use crate::linalg::{self, CMat, LinalgError};
-use crate::lmi::iteration::{self, GAP_OF_ZERO, Iterate, RANK};
+use crate::lmi::iteration::{self, GAP_OF_ZERO, Iterate, RANK_TOLERANCE};
 use crate::lmi::{IsDue, Outcome};
 
 /// The start lies this factor above the worst point of the least-squares taps (in t), far enough inside for
@@ -44,7 +44,7 @@ pub fn minimise(problem: &Problem, tol_gap_rel: f64, is_due: IsDue<'_>) -> Resul
         return fixed(problem);
     }
     let basis = Basis::new(&reduced, vec![1.0; reduced.count()])?;
-    let x = basis.least_squares(&reduced, &reduced.w, RANK);
+    let x = basis.least_squares(&reduced, &reduced.w, RANK_TOLERANCE);
     let best = Best::new(problem, reduced.taps(&x))?;
     if best.relative_gap() <= tol_gap_rel {
         return Ok(best.finish(Outcome::Solved, 0));

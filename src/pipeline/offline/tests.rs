@@ -3,7 +3,7 @@ use crate::bank::SynthesisFilters;
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
 use crate::pipeline::{Block, DroppedLatency, GapPolicy, Pipeline};
 use crate::random::Random;
-use crate::runtime::{Algorithm, Interleaved, Options, PcmOutput, Planar, Stream};
+use crate::runtime::{Algorithm, Interleaved, Options, PcmOutput, Planar, Stream, Zeros};
 use crate::units::Seconds;
 use std::cell::Cell;
 
@@ -176,4 +176,15 @@ fn segments_change_no_bit_and_a_fusion_ends_between_them() {
         assert!(matches!(run(questions - 1), Err(PipelineError::Stopped)), "{algorithm:?}");
         assert_eq!(asked.get(), questions, "{algorithm:?}");
     }
+}
+
+#[test]
+fn more_frames_than_can_be_counted_are_refused() {
+    let bank = bank(4, 2, 0);
+    let plan = bank.plan(Options::default()).unwrap();
+    // Twice as many samples are 0 modulo the size of a word.
+    let endless = Zeros { channels: 2, frames: usize::MAX / 2 + 1 };
+    let fused = fuse(&bank, &plan, &[endless], &mut [0.0; 4][..], Settings::default(), NEVER);
+    let wanted = ProcessError::TooManyFrames { frames: endless.frames, ratio: 2 };
+    assert!(matches!(fused, Err(PipelineError::Process(error)) if error == wanted));
 }

@@ -5,7 +5,7 @@ use crate::sampling::kernel::BSpline;
 
 /// Knots after which the response to one knot has decayed below 1e-6 where samples or filled holes are
 /// dense.
-const REACH: usize = 24;
+const INFLUENCE_KNOTS: usize = 24;
 
 /// The row of A^{-1} that belongs to one position, cut off where it has decayed: J(x) = sum_k z_k r_k with
 /// the right-hand sides r_k of the normal equations.
@@ -34,7 +34,7 @@ impl<const ORDER: usize, const C: usize> Fit<ORDER, C> {
     /// The response of J(x) to the right-hand sides; meaningful after [`Fit::solve`]. It solves A z = b(x)
     /// with the factors that `solve` left, within 24 knots of x: O(ORDER) per knot.
     pub fn respond(&self, x: f64, response: &mut Response) {
-        self.respond_within(x, REACH, response);
+        self.respond_within(x, INFLUENCE_KNOTS, response);
     }
 
     /// The same within `reach` knots of x.

@@ -6,7 +6,7 @@ use super::stencil::{Offset, Stencil};
 use rayon::prelude::*;
 
 /// Added to the diagonal of a coefficient without samples and springs.
-const HELD: f32 = 1e-6;
+const HELD_STIFFNESS: f32 = 1e-6;
 
 /// Rows whose springs a thread makes in turn; those down from the two rows before are made again.
 const BAND: usize = 32;
@@ -105,6 +105,6 @@ pub(super) fn hold(matrix: &mut Stencil, alone: impl Fn(usize) -> bool + Sync) {
     let width = matrix.grid().width;
     matrix.planes_mut().par_rows_mut().enumerate().with_min_len(ROWS_AT_ONCE).for_each(|(y, row)| {
         let diagonal = row[..width].iter_mut().enumerate();
-        diagonal.filter(|(x, _)| alone(y * width + x)).for_each(|(_, d)| *d += HELD);
+        diagonal.filter(|(x, _)| alone(y * width + x)).for_each(|(_, d)| *d += HELD_STIFFNESS);
     });
 }

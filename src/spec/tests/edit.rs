@@ -1,7 +1,7 @@
 //! New values in the text of a spec file.
 
 use super::*;
-use crate::spec::measured::no_models;
+use crate::spec::filter::no_models;
 use crate::units::{Decibels, FastPeriods};
 
 fn calibrated(text: &str) -> Spec {

@@ -26,7 +26,7 @@ const BESIDE: usize = 6;
 /// later.
 const MOST_MISFIT: f64 = 3.0;
 /// Fixed taps bear a delay that moves by this, in fast periods.
-const NEGLIGIBLE: f64 = 0.02;
+const NEGLIGIBLE_DELAY_CHANGE: f64 = 0.02;
 
 /// The delays of all channels, with samples that count from that of the reference.
 pub(super) struct Course<'a> {
@@ -173,7 +173,7 @@ impl<'a> Course<'a> {
         warnings.extend(notes.into_iter().map(AlignWarning::from));
         let moves = |i: usize| {
             let moved = (self.extent(i).half * 2.0).in_fast_periods(h);
-            (moved.0 > NEGLIGIBLE).then_some(AlignWarning::TapsStay { channel: i + 1, moved })
+            (moved.0 > NEGLIGIBLE_DELAY_CHANGE).then_some(AlignWarning::FixedTaps { channel: i + 1, moved })
         };
         if !spec.design.tracking {
             warnings.extend((0..channels.len()).filter_map(moves));

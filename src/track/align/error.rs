@@ -87,13 +87,13 @@ pub enum AlignError {
 /// What a reader of an alignment must know.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum AlignWarning {
-    /// A delay moves, and the taps stay.
+    /// A delay moves, and the taps are fixed.
     #[error(
         "the delay of channel {channel} moves by {:.3} fast periods while the recordings last, and the taps of this spec \
-         stay; give [design] tracking = \"affine\", so that taps can follow the table of delays",
+         are fixed; give [design] tracking = \"affine\", so that taps can follow the table of delays",
         moved.0
     )]
-    TapsStay {
+    FixedTaps {
         /// From 1.
         channel: usize,
         /// Largest minus smallest delay.

@@ -16,14 +16,14 @@ use crate::spec::Spec;
 /// Pieces on each side whose lags say where that of a piece is to be.
 const BESIDE: usize = 7;
 /// Samples by which the lag of a piece may differ from what the pieces beside it say.
-const NEAR: f64 = 1.5;
+const NEAR_LAG: f64 = 1.5;
 /// The delay of a piece is at most so many slow periods from its lag.
 const FARTHEST: f64 = 1.0;
 
 /// Another lag whose correlation has this share of the highest one says as much as that.
-const ALIKE: f64 = 0.9;
+const ALIKE_CORRELATION: f64 = 0.9;
 /// Samples from the highest correlation within which all others belong to its peak.
-const PEAK: usize = 2;
+const PEAK_SAMPLES: usize = 2;
 
 /// The recordings of all channels and where they are compared.
 pub(super) struct Pieces<'a> {
@@ -124,7 +124,9 @@ impl<'a> Pieces<'a> {
         let lag = (begin + best as i64 - first as i64) as f64 + part;
         let height = |n: usize| sums[n].abs();
         let is_peak = |n: usize| height(n) >= height(n - 1).max(height(n + 1));
-        let is_rival = |n: usize| n.abs_diff(best) > PEAK && is_peak(n) && height(n) >= ALIKE * height(best);
+        let is_rival = |n: usize| {
+            n.abs_diff(best) > PEAK_SAMPLES && is_peak(n) && height(n) >= ALIKE_CORRELATION * height(best)
+        };
         LocalLag { beyond: lag - expected, height: at, is_alone: !shifts.clone().any(is_rival) }
     }
 
@@ -174,7 +176,7 @@ impl<'a> Pieces<'a> {
 fn likely(local: &[LocalLag], number: usize) -> f64 {
     let beside = &local[number.saturating_sub(BESIDE)..(number + BESIDE + 1).min(local.len())];
     let (usual, own) = (weighted_median(beside.to_vec()), local[number].beyond);
-    if (own - usual).abs() <= NEAR { own } else { usual }
+    if (own - usual).abs() <= NEAR_LAG { own } else { usual }
 }
 
 /// By how much the lags of pieces that begin at these samples grow per sample: by least squares.

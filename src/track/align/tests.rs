@@ -187,7 +187,7 @@ fn taps_that_stay_are_named() {
     assert!(
         matches!(
             found.warnings[..],
-            [AlignWarning::TapsStay { channel: 2, moved }] if (moved.0 - 3.6).abs() < 0.1
+            [AlignWarning::FixedTaps { channel: 2, moved }] if (moved.0 - 3.6).abs() < 0.1
         ),
         "{:?}",
         found.warnings

@@ -11,8 +11,8 @@ use crate::units::RadiansPerSlowPeriod;
 use std::f64::consts::PI;
 
 /// Factor by which the accuracy is relaxed where a frequency does not reach it, and the loosest accuracy.
-const RELAXED: f64 = 1.25;
-const LOOSEST: f64 = 100.0;
+const RELAXATION: f64 = 1.25;
+const LOOSEST_RELAXATION: f64 = 100.0;
 /// Limit on the cells of one proof, and more of them for each step by which the accuracy is relaxed.
 const MAX_CELLS: usize = 20_000;
 const MORE_CELLS: usize = 500;
@@ -22,15 +22,15 @@ const MAX_OPERATIONS: f64 = 1e9;
 const MORE_OPERATIONS: f64 = 5e7;
 /// Cells whose bound exceeds the value at their centre by less than the square of this are not halved
 /// further for the sake of remainders.
-const NARROW: f64 = 0.02;
+const NARROW_CELL: f64 = 0.02;
 /// Cells that are so narrow are not halved for any reason.
-const NARROWEST: f64 = 1e-6;
+const NARROWEST_CELL: f64 = 1e-6;
 /// Share of the accuracy that the cut of the memory may use.
 const TAIL_SHARE: f64 = 1e-3;
 /// Relative size of what is not known of recursive filters.
 const FILTER_TAIL: f64 = 1e-20;
 /// Worst cases below this, relative to the reference samples, are zero up to rounding.
-const FLOOR: f64 = 1e-10;
+const ZERO_WORST_CASE: f64 = 1e-10;
 
 /// The proof of one worst case.
 pub(super) struct Cover<'a> {
@@ -142,7 +142,8 @@ impl<'a> Cover<'a> {
 
     /// The upper end that is to be proven.
     fn target(&self) -> f64 {
-        self.goal.unwrap_or_else(|| (self.lower() * (1.0 + self.accuracy)).max(FLOOR * self.judge.scale))
+        self.goal
+            .unwrap_or_else(|| (self.lower() * (1.0 + self.accuracy)).max(ZERO_WORST_CASE * self.judge.scale))
     }
 
     fn lower(&self) -> f64 {
@@ -151,8 +152,8 @@ impl<'a> Cover<'a> {
 
     /// Relaxes the accuracy by a step; false where it is not to be relaxed.
     fn relax(&mut self) -> bool {
-        self.accuracy *= RELAXED;
-        self.goal.is_none() && self.accuracy < LOOSEST
+        self.accuracy *= RELAXATION;
+        self.goal.is_none() && self.accuracy < LOOSEST_RELAXATION
     }
 
     /// Covers all frequencies; `None` if the work does not suffice.
@@ -202,8 +203,8 @@ impl<'a> Cover<'a> {
         let threshold = (self.target() - tail) * cosine_below(x) - tail;
         let narrow = match self.judge.compare(cell.centre(), threshold)? {
             Verdict::Below => return Ok(Outcome::Proven),
-            Verdict::Above(_) => x < NARROWEST,
-            Verdict::Open(_) => x < NARROW,
+            Verdict::Above(_) => x < NARROWEST_CELL,
+            Verdict::Open(_) => x < NARROW_CELL,
         };
         Ok(if narrow { Outcome::Narrow } else { Outcome::Wide })
     }

@@ -6,7 +6,7 @@ use super::super::VerifyError;
 use super::super::front_ends::FrontEnds;
 use super::super::slow_period::SlowPeriod;
 use super::super::timeline::{SamplingInstant, timeline};
-use super::{ErrorBox, ErrorPoint};
+use super::{ErrorBox, ErrorPoint, Side, Taps};
 use crate::bank::Bank;
 use crate::units::Seconds;
 use std::ops::Range;
@@ -47,6 +47,23 @@ impl Halvings {
     pub(super) fn none(converters: usize) -> Vec<Self> {
         vec![Self { delay: 0, cutoff: 0 }; converters]
     }
+}
+
+/// With one side halved once more. The gains have vertices only.
+pub(super) fn halved(side: Side, halvings: &[Halvings]) -> Vec<Halvings> {
+    let mut finer = halvings.to_vec();
+    match side {
+        Side::Delay(i) => finer[i].delay += 1,
+        Side::Cutoff(i) => finer[i].cutoff += 1,
+        Side::Gain(_) => {}
+    }
+    finer
+}
+
+/// The halvings of a grid: where the taps depend on the delays, a part has its ends and its middle.
+pub(super) fn on_grid(halvings: &[Halvings], taps: Taps) -> Vec<Halvings> {
+    let middle = u32::from(taps == Taps::Scheduled);
+    halvings.iter().map(|at| Halvings { delay: at.delay + middle, ..*at }).collect()
 }
 
 impl Grid {

@@ -8,9 +8,9 @@ use super::aliases::{Aliases, FrontEnd};
 use super::angle::Frequency;
 use super::at_frequency::{AtFrequency, Attained, Mix, Verdict, Work};
 use super::channel::{Channel, Memories, column_norm, sampled_transfer, signal_transfer};
-use super::gain::lower_gain;
-use super::grid::{Grid, Halvings};
+use super::grid::{Grid, Halvings, halved, on_grid};
 use super::memory::Memory;
+use super::quick::lower_gain;
 use super::remainder::Remainders;
 use super::scheduled::{self, Scheduled, moved};
 use super::transfer::Transfer;
@@ -353,23 +353,6 @@ fn channels(
         channel
     };
     (0..grid.channels.len()).map(channel).collect()
-}
-
-/// With one side halved once more. The gains have vertices only.
-fn halved(side: Side, halvings: &[Halvings]) -> Vec<Halvings> {
-    let mut finer = halvings.to_vec();
-    match side {
-        Side::Delay(i) => finer[i].delay += 1,
-        Side::Cutoff(i) => finer[i].cutoff += 1,
-        Side::Gain(_) => {}
-    }
-    finer
-}
-
-/// The halvings of a grid: where the taps depend on the delays, a part has its ends and its middle.
-fn on_grid(halvings: &[Halvings], taps: Taps) -> Vec<Halvings> {
-    let middle = u32::from(taps == Taps::Scheduled);
-    halvings.iter().map(|at| Halvings { delay: at.delay + middle, ..*at }).collect()
 }
 
 /// The rows of a grid of one point.

@@ -14,7 +14,7 @@ use crate::bank::SynthesisFilters;
 /// Maximum number of slow periods that are followed.
 const MAX_PERIODS: usize = 20_000;
 /// Relative size of the energy at which the explicit sum ends.
-const NEGLIGIBLE: f64 = 1e-22;
+const NEGLIGIBLE_ENERGY: f64 = 1e-22;
 
 /// A bound of sum_{j >= 0} ||E^j|| in row sums; `None` if the powers do not fall below 1/2 in time.
 ///
@@ -116,7 +116,7 @@ impl Memory {
             let square = ball::product_transposed(&ball::product(&row, covariance), &row)[(0, 0)];
             energies.push(outward(square.magnitude().sqrt()));
             moving.advance();
-            if energies[energies.len() - 1] <= NEGLIGIBLE * energies[0] {
+            if energies[energies.len() - 1] <= NEGLIGIBLE_ENERGY * energies[0] {
                 break;
             }
         }

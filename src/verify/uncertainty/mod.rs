@@ -35,7 +35,6 @@ mod angle;
 mod at_frequency;
 mod channel;
 mod cover;
-mod gain;
 mod grid;
 mod judge;
 mod memory;

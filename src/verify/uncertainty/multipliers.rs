@@ -39,14 +39,14 @@ use crate::linalg::{self, CMat, Complex, Mat};
 /// Steps of the descent.
 const STEPS: usize = 120;
 /// Step in the logarithm of a multiplier: the first one, and the factor from step to step.
-const STEP: f64 = 0.3;
-const STEP_FALLS: f64 = 0.98;
+const FIRST_STEP: f64 = 0.3;
+const STEP_FACTOR: f64 = 0.98;
 /// Multipliers to begin with, over the least ones of that shape.
 const STARTS: [f64; 5] = [1.05, 1.2, 1.5, 2.0, 3.0];
 /// Bounds that exceed the limit by these factors after so many steps hardly get below it.
-const HOPELESS: [(usize, f64); 2] = [(0, 1.1), (20, 1.02)];
+const PRUNE_LEVELS: [(usize, f64); 2] = [(0, 1.1), (20, 1.02)];
 /// Share of the squared limit that is left for the proof.
-const ROOM: f64 = 1e-7;
+const PROOF_SHARE: f64 = 1e-7;
 
 /// The vertices of a channel, all combinations of its ends: their number is a power of two.
 pub(super) type Vertices<'a> = &'a [Vertex];
@@ -58,7 +58,7 @@ pub(super) fn proves(at: &AtFrequency<'_>, channels: &[Vertices<'_>], limit: f64
     if limit.is_nan() || square <= 0.0 {
         return false;
     }
-    let found = Doubles::of(&problem).and_then(|doubles| doubles.multipliers(square * (1.0 - ROOM)));
+    let found = Doubles::of(&problem).and_then(|doubles| doubles.multipliers(square * (1.0 - PROOF_SHARE)));
     found.is_some_and(|multipliers| problem.is_proven(&multipliers, square))
 }
 
@@ -178,14 +178,14 @@ impl Doubles {
     /// Multipliers for which g^2 is at most `wanted`, if some are found.
     fn multipliers(&self, wanted: f64) -> Option<Vec<f64>> {
         let (mut multipliers, mut value) = self.start()?;
-        let mut step = STEP;
+        let mut step = FIRST_STEP;
         for number in 0..STEPS {
             if value.square <= wanted {
                 return Some(multipliers);
             }
-            let is_hopeless =
+            let is_pruned =
                 |&(steps, factor): &(usize, f64)| number >= steps && value.square > factor * factor * wanted;
-            if HOPELESS.iter().any(is_hopeless) {
+            if PRUNE_LEVELS.iter().any(is_pruned) {
                 return None;
             }
             let slopes: Vec<f64> = value.slopes.iter().zip(&multipliers).map(|(s, e)| s * e).collect();
@@ -203,7 +203,7 @@ impl Doubles {
                 Some((step, multipliers, value))
             });
             (step, multipliers, value) = found?;
-            step *= STEP_FALLS;
+            step *= STEP_FACTOR;
         }
         (value.square <= wanted).then_some(multipliers)
     }
@@ -274,8 +274,8 @@ fn largest_eigenvector(m: &CMat) -> Option<(f64, Vec<Complex<f64>>)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::gain::lower_gain;
     use super::super::grid::ChannelGrid;
+    use super::super::quick::lower_gain;
     use super::*;
     use crate::random::Random;
     use crate::units::Seconds;

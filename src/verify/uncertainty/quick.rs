@@ -5,16 +5,20 @@
 //! semidefinite, |G_cd| <= s_c s_d with s_c = sqrt(G_cc). With a_p = sum_c |A_pc| s_c each entry of the
 //! computed A G A* is wrong by at most eps a_p a_q for some small eps, so its largest eigenvalue is wrong by
 //! at most eps |a|^2.
+//!
+//! The other gains have bounds in balls: the root of the largest eigenvalue of K K*, proven.
 
-use super::super::ball::{self, Ball};
+use super::super::ball::{self, Ball, Matrix};
+use super::super::positive;
 use super::super::spectrum::ComplexMatrix;
+use crate::linalg;
 
 /// Relative rounding error of an operation.
-pub(super) const UNIT: f64 = 0.5 * f64::EPSILON;
+pub(super) const UNIT_ROUNDOFF: f64 = 0.5 * f64::EPSILON;
 /// Smaller squares are left to balls: nothing here may underflow.
-const LEAST: f64 = 1e-200;
+const LEAST_SQUARE: f64 = 1e-200;
 /// Relative error of a squared gain that is no obstacle to a decision.
-const SHARP: f64 = 1e-7;
+const SHARP_GAIN_ERROR: f64 = 1e-7;
 
 /// The Gram matrix and the filters of a frequency as doubles.
 #[derive(Debug)]
@@ -96,7 +100,7 @@ impl Terms {
         for [re, im, off] in column {
             self.re.push(weight * re);
             self.im.push(weight * im);
-            self.off.push(weight.abs() * (off + UNIT * (re.abs() + im.abs())));
+            self.off.push(weight.abs() * (off + UNIT_ROUNDOFF * (re.abs() + im.abs())));
         }
     }
 }
@@ -123,7 +127,7 @@ pub(super) struct Workspace {
 pub(super) enum Compared {
     /// It is proven to be at most the limit.
     Below,
-    /// It is larger, or closer to the limit than [`SHARP`].
+    /// It is larger, or closer to the limit than [`SHARP_GAIN_ERROR`].
     NotBelow,
     /// Double precision does not suffice.
     Unclear,
@@ -133,10 +137,12 @@ impl Quick {
     pub(super) fn new(gram: &ComplexMatrix, filters: &ComplexMatrix) -> Self {
         let n = gram.re.nrows();
         // A faint row gets a size of its own, so that the quotients below stay finite.
-        let size = |c: usize| gram.re[(c, c)].magnitude().sqrt() * (1.0 + 8.0 * UNIT) + LEAST.sqrt();
+        let size =
+            |c: usize| gram.re[(c, c)].magnitude().sqrt() * (1.0 + 8.0 * UNIT_ROUNDOFF) + LEAST_SQUARE.sqrt();
         let sizes: Vec<f64> = (0..n).map(size).collect();
         let share = |(c, d): (usize, usize)| {
-            (off(gram.re[(c, d)]) + off(gram.im[(c, d)])) / (sizes[c] * sizes[d]) * (1.0 + 8.0 * UNIT)
+            (off(gram.re[(c, d)]) + off(gram.im[(c, d)])) / (sizes[c] * sizes[d])
+                * (1.0 + 8.0 * UNIT_ROUNDOFF)
         };
         let pairs = (0..n).flat_map(|c| (0..n).map(move |d| (c, d)));
         let spread = pairs.map(share).fold(0.0, ball::nan_max);
@@ -150,14 +156,14 @@ impl Quick {
 
     /// Compares the gain of K = reference rows + `terms` with `limit`.
     pub(super) fn compare(&self, terms: &Terms, limit: f64, space: &mut Workspace) -> Compared {
-        let square = limit * limit * (1.0 - 8.0 * UNIT);
+        let square = limit * limit * (1.0 - 8.0 * UNIT_ROUNDOFF);
         if limit.is_nan() || limit <= 0.0 {
             return Compared::NotBelow;
         }
         let outputs = self.filters.outputs;
         let error = self.fill_map(terms, outputs, &mut space.map);
-        let is_sharp = square > LEAST && error < SHARP * square;
-        if square > LEAST && self.is_dominated(terms, square - error, space) {
+        let is_sharp = square > LEAST_SQUARE && error < SHARP_GAIN_ERROR * square;
+        if square > LEAST_SQUARE && self.is_dominated(terms, square - error, space) {
             Compared::Below
         } else if is_sharp {
             Compared::NotBelow
@@ -195,7 +201,7 @@ impl Quick {
             inexact += d * d;
         }
         // Each of the two products sums `count` complex terms, of which each is rounded four times.
-        let rounding = (16 * count + 64) as f64 * UNIT;
+        let rounding = (16 * count + 64) as f64 * UNIT_ROUNDOFF;
         let error = (self.spread + rounding) * all + 2.0 * (inexact * all).sqrt();
         error * (1.0 + 1e-10)
     }
@@ -238,7 +244,7 @@ impl Quick {
 
 /// How far an enclosed number is from its nearest double.
 pub(super) fn off(x: Ball) -> f64 {
-    (x.radius() + UNIT * x.magnitude()) * (1.0 + 8.0 * UNIT)
+    (x.radius() + UNIT_ROUNDOFF * x.magnitude()) * (1.0 + 8.0 * UNIT_ROUNDOFF)
 }
 
 /// Whether it is proven that the Hermitian matrix (lower triangle read) has no eigenvalue above `bound`: the
@@ -247,9 +253,9 @@ pub(super) fn off(x: Ball) -> f64 {
 fn is_dominated(m: &Complex, n: usize, bound: f64, factor: &mut Complex) -> bool {
     let trace: f64 = (0..n).map(|i| bound.abs() + m.re[i * n + i].abs()).sum();
     // Twice the order, and complex operations that round up to four times.
-    let rounding = (16 * n + 64) as f64 * UNIT * trace;
+    let rounding = (16 * n + 64) as f64 * UNIT_ROUNDOFF * trace;
     let shift = bound - 2.0 * rounding;
-    if shift.is_nan() || shift < LEAST {
+    if shift.is_nan() || shift < LEAST_SQUARE {
         return false;
     }
     factor.clear(n, n);
@@ -276,10 +282,43 @@ fn is_dominated(m: &Complex, n: usize, bound: f64, factor: &mut Complex) -> bool
     true
 }
 
+/// Relative margins over a computed eigenvalue at which a proof that it is an upper bound is tried.
+const MARGINS: [f64; 4] = [1e-9, 1e-6, 1e-3, 1.0];
+
+/// A proven upper bound of the root of the largest eigenvalue; at least tries to prove `wanted` if the
+/// eigenvalue is below.
+pub(super) fn upper_gain(square: &ComplexMatrix, wanted: f64) -> f64 {
+    let real = square.realified();
+    let Ok(values) = linalg::hermitian_eigenvalues(&ball::nearest(&real)) else { return f64::INFINITY };
+    let largest = values.into_iter().fold(0.0, f64::max);
+    let exceeds = |bound: f64| {
+        let shifted = Matrix::from_fn(real.nrows(), real.nrows(), |i, j| {
+            let entry = -real[(i, j)];
+            if i == j { entry + Ball::from(bound) } else { entry }
+        });
+        positive::exceeds(&shifted, 0.0)
+    };
+    let tight = wanted * wanted * (1.0 - 1e-14);
+    let tried = MARGINS.iter().map(|margin| largest * (1.0 + margin) + f64::MIN_POSITIVE);
+    let enough = (wanted > 0.0 && largest < tight).then_some(tight);
+    let proven = enough.into_iter().chain(tried).find(|&bound| exceeds(bound));
+    proven.map_or(f64::INFINITY, |bound| bound.sqrt() * (1.0 + 1e-15))
+}
+
+/// A proven lower bound of the same: the quotient of a direction near the eigenvector.
+pub(super) fn lower_gain(square: &ComplexMatrix) -> f64 {
+    let real = square.realified();
+    let Ok((values, vectors)) = linalg::symmetric_eigen(&ball::nearest(&real)) else { return 0.0 };
+    let Some(k) = (0..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b])) else { return 0.0 };
+    let direction: Matrix = ball::exact(&vectors.columns(k, 1).into_owned());
+    let transposed = direction.transpose();
+    let energy = ball::product(&transposed, &ball::product(&real, &direction))[(0, 0)];
+    let quotient = (energy / ball::product(&transposed, &direction)[(0, 0)]).lower();
+    if quotient > 0.0 { quotient.sqrt() * (1.0 - 1e-15) } else { 0.0 }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::super::ball::Matrix;
-    use super::super::gain::{lower_gain, upper_gain};
     use super::*;
     use crate::random::Random;
 

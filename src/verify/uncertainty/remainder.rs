@@ -32,8 +32,8 @@ use super::super::spectrum::ComplexMatrix;
 use super::Taps;
 use super::aliases::{Aliases, FarAliases, Weight};
 use super::angle::outward;
-use super::gain::upper_gain;
 use super::grid::Halvings;
+use super::quick::upper_gain;
 use std::rc::Rc;
 
 /// The uncertain row of a channel at a frequency.

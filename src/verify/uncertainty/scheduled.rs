@@ -27,9 +27,8 @@ use super::at_frequency::{
     AtFrequency, Attained, Limits, MAX_BOXES, Part, Verdict, Vertex, Work, column, scaled,
 };
 use super::channel::column_norm;
-use super::gain::{lower_gain, upper_gain};
 use super::grid::ChannelGrid;
-use super::quick::{self, Columns, Compared, Quick, Terms, Workspace};
+use super::quick::{self, Columns, Compared, Quick, Terms, Workspace, lower_gain, upper_gain};
 use super::remainder::Remainders;
 
 /// Points of a grid that a part needs to be halved: each half has its ends and its middle.
@@ -212,8 +211,10 @@ impl<'a> Scheduled<'a> {
             }
             // d_i / 2 S_ii = (delta(last) - delta(first)) / 4 S_ii, beside F_i / 2.
             let [first, last] = [part.first, part.last].map(|point| self.doubles.deltas[i][point]);
-            let width =
-                [last[0] - first[0], last[1] + first[1] + 2.0 * quick::UNIT * (last[0] - first[0]).abs()];
+            let width = [
+                last[0] - first[0],
+                last[1] + first[1] + 2.0 * quick::UNIT_ROUNDOFF * (last[0] - first[0]).abs(),
+            ];
             for (error, sign) in [(part.last, 1.0), (part.first, -1.0)] {
                 let mut bow = column.clone();
                 bow.iter_mut().flatten().for_each(|x| *x *= 0.5);
@@ -247,7 +248,7 @@ fn add(sum: &mut [[f64; 3]], column: impl Iterator<Item = [f64; 3]>, [factor, of
         *im += factor * y;
         let size = x.abs() + y.abs();
         // Each part is rounded in the product and in the sum.
-        let rounded = 2.0 * quick::UNIT * (factor.abs() * size + re.abs() + im.abs());
+        let rounded = 2.0 * quick::UNIT_ROUNDOFF * (factor.abs() * size + re.abs() + im.abs());
         *error += (factor.abs() + off) * own + off * size + rounded;
     }
 }

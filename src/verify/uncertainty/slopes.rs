@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 /// Cells per degree of the polynomials: the bounds are 0.3 % too large at most.
 const CELLS_PER_DEGREE: f64 = 10.0;
 /// Relative size of the tails.
-const TAIL: f64 = 1e-6;
+const TAIL_SIZE: f64 = 1e-6;
 /// Relative size of what is not known of recursive filters.
 const FILTER_TAIL: f64 = 1e-12;
 const MAX_DEGREE: usize = 4096;
@@ -94,7 +94,7 @@ fn of_channel(
     // The slope of a kernel that is x times faster is x^2 phi'(x t).
     let factor = (range[1] / range[0]).powf(1.5) * (1.0 + 1e-12);
     let whole = memory.whole();
-    let periods = memory.periods(TAIL * whole, MAX_DEGREE);
+    let periods = memory.periods(TAIL_SIZE * whole, MAX_DEGREE);
     let tail = outward(factor * memory.tail(periods));
     let (filter, last) = (lags.beyond(i, 0), lags.count() - 1);
     let filter_tail = lags.beyond(i, lags.count());

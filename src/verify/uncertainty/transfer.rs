@@ -6,7 +6,7 @@ use super::super::front_ends::Equations;
 use crate::arithmetic::{ComplexBall, DoubleDouble, Float512, Number};
 
 /// Relative error of the denominator up to which 106 bits suffice.
-const SHARP: f64 = 1e-6;
+const SHARP_DENOMINATOR: f64 = 1e-6;
 /// Relative change of the denominator over a piece of a range: what is made of it errs by a few times that.
 const PIECE_CHANGE: f64 = 0.03;
 /// Halvings of a range. Pieces are short near the poles only, so there are never many of them.
@@ -68,7 +68,7 @@ impl Transfer {
     /// An upper bound of |Phi(j u)|^2.
     pub(super) fn square(&self, u: Ball) -> f64 {
         let [num, den] = [square(&self.short.num, u), square(&self.short.den, u)];
-        if den.radius() <= SHARP * den.nearest() {
+        if den.radius() <= SHARP_DENOMINATOR * den.nearest() {
             return (num / den).upper();
         }
         // Near the poles a ball of frequencies is no small one.
@@ -85,7 +85,7 @@ impl Transfer {
     fn pieces(&self, centre: f64, half: f64, halvings: u32) -> Moduli {
         let expanded = self.expanded(centre);
         if !is_sharp(expanded.den_over(0, half), PIECE_CHANGE) {
-            if halvings == 0 || !is_sharp(expanded.den[0], SHARP) {
+            if halvings == 0 || !is_sharp(expanded.den[0], SHARP_DENOMINATOR) {
                 return Moduli { value: f64::INFINITY, curvature: f64::INFINITY };
             }
             let step = 0.5 * half;
@@ -102,7 +102,7 @@ impl Transfer {
 
     fn expanded(&self, u: f64) -> Expansion {
         let short = self.short.expanded(u, |x| x);
-        if is_sharp(short.den[0], SHARP) { short } else { self.long.expanded(u, Ball::shortened) }
+        if is_sharp(short.den[0], SHARP_DENOMINATOR) { short } else { self.long.expanded(u, Ball::shortened) }
     }
 
     /// a_0, a_1, .. with |Phi(s)| <= sum_p a_p |s|^-p for all |s| >= `from`; `None` where that is too close

@@ -9,9 +9,8 @@
 
 use super::angle::outward;
 use super::at_frequency::{AtFrequency, Attained, Limits, MAX_BOXES, Mix, Part, Verdict, Vertex, Work};
-use super::gain::{lower_gain, upper_gain};
 use super::multipliers::{self, Vertices};
-use super::quick::{Compared, Quick, Terms, Workspace};
+use super::quick::{Compared, Quick, Terms, Workspace, lower_gain, upper_gain};
 use super::remainder::Remainders;
 use std::collections::HashMap;
 

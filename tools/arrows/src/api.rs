@@ -4,7 +4,7 @@
 //! What is `pub` can be reached: the compiler's `unreachable_pub` sees to that. What stands under
 //! `#[doc(hidden)]` is no promise. Items that a macro makes appear as its call.
 
-use crate::imports::{File, head};
+use crate::imports::{File, head, is_test};
 use quote::ToTokens;
 use std::collections::BTreeSet;
 use std::io::Write;
@@ -80,7 +80,7 @@ impl VisitMut for Public {
 
     fn visit_item_impl_mut(&mut self, item: &mut ItemImpl) {
         let is_own = item.trait_.is_none();
-        item.items.retain(|item| is_own && is_public(item));
+        item.items.retain(|item| is_own && is_public(item) && !is_test(item));
         visit_mut::visit_item_impl_mut(self, item);
     }
 
@@ -132,13 +132,14 @@ impl VisitMut for Public {
     }
 
     fn visit_attributes_mut(&mut self, attributes: &mut Vec<Attribute>) {
-        let told = ["cfg", "derive", "non_exhaustive"];
-        attributes.retain(|attribute| told.iter().any(|name| attribute.path().is_ident(name)));
+        let kept = ["cfg", "derive", "non_exhaustive"];
+        attributes.retain(|attribute| kept.iter().any(|name| attribute.path().is_ident(name)));
     }
 }
 
 fn may_be_shown(item: &Item) -> bool {
     match item {
+        _ if is_test(item) => false,
         Item::Impl(_) => true,
         Item::Mod(item) if item.content.is_some() => true,
         Item::Macro(item) => item.ident.is_none(),

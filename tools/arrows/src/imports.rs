@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use syn::parse::{Parse, ParseStream};
 use syn::punctuated::Punctuated;
 use syn::visit::{self, Visit};
-use syn::visit_mut::{self, VisitMut};
 use syn::{Attribute, Expr, Meta, Token, UseTree, Visibility};
 
 #[derive(Clone)]
@@ -14,7 +13,6 @@ pub(crate) struct File {
     pub(crate) path: PathBuf,
     /// Names from the crate's on: `hybank`, `design`, `fir`.
     pub(crate) module: Vec<String>,
-    /// Without what stands under `#[cfg(test)]`.
     pub(crate) syntax: syn::File,
 }
 
@@ -46,8 +44,7 @@ impl Imports {
     pub(crate) fn read(&mut self, path: &Path, module: Vec<String>) -> Result<(), String> {
         let wrong = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
         let source = std::fs::read_to_string(path).map_err(|error| wrong(&error))?;
-        let mut syntax = syn::parse_file(&source).map_err(|error| wrong(&error))?;
-        WithoutTests.visit_file_mut(&mut syntax);
+        let syntax = syn::parse_file(&source).map_err(|error| wrong(&error))?;
         let file = self.files.len();
         let mut reader = Reader { file, module: module.clone(), children: Vec::new(), imports: self };
         reader.here();
@@ -165,6 +162,18 @@ impl Reader<'_> {
 }
 
 impl<'ast> Visit<'ast> for Reader<'_> {
+    fn visit_item(&mut self, item: &'ast syn::Item) {
+        if !is_test(item) {
+            visit::visit_item(self, item);
+        }
+    }
+
+    fn visit_impl_item(&mut self, item: &'ast syn::ImplItem) {
+        if !is_test(item) {
+            visit::visit_impl_item(self, item);
+        }
+    }
+
     fn visit_item_mod(&mut self, item: &'ast syn::ItemMod) {
         self.module.push(item.ident.to_string());
         if item.content.is_some() {
@@ -195,28 +204,8 @@ impl<'ast> Visit<'ast> for Reader<'_> {
     }
 }
 
-struct WithoutTests;
-
-impl VisitMut for WithoutTests {
-    fn visit_file_mut(&mut self, file: &mut syn::File) {
-        file.items.retain(|item| !is_test(item));
-        visit_mut::visit_file_mut(self, file);
-    }
-
-    fn visit_item_mod_mut(&mut self, item: &mut syn::ItemMod) {
-        if let Some((_, items)) = &mut item.content {
-            items.retain(|item| !is_test(item));
-        }
-        visit_mut::visit_item_mod_mut(self, item);
-    }
-
-    fn visit_item_impl_mut(&mut self, item: &mut syn::ItemImpl) {
-        item.items.retain(|item| !is_test(item));
-    }
-}
-
 /// Whether it stands under `#[cfg(test)]` or `#[cfg(all(test, ..))]`, but not `any` or `not`.
-fn is_test(item: &impl ToTokens) -> bool {
+pub(crate) fn is_test(item: &impl ToTokens) -> bool {
     let is_test = |attribute: &Attribute| {
         let Meta::List(list) = &attribute.meta else { return false };
         let text = list.tokens.to_string();

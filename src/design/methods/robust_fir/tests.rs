@@ -103,7 +103,7 @@ fn scenarios_reach_the_ends_of_every_side() {
     }
 }
 
-/// The thesis example with taps that follow both delays.
+/// The thesis example with taps that both delays schedule.
 fn following(half: f64) -> Spec {
     let mut spec = thesis(half);
     spec.design.tracking = true;
@@ -144,8 +144,8 @@ fn taps_that_follow_the_delays_are_nearly_as_good_as_a_redesign() {
     assert!(study.least_ratio <= study.ratio && study.least_ratio > study.ratio * (1.0 - 1e-3), "{study:?}");
 }
 
-/// The file states a worst case of the taps that follow, which `verify` proves; it refuses a smaller one,
-/// and a slope that was changed.
+/// The file states a worst case of the delay-scheduled taps, which `verify` proves; it refuses a smaller
+/// one, and a slope that was changed.
 #[test]
 fn the_worst_case_of_taps_that_follow_is_stated_and_proven() {
     let mut spec = following(0.05);

@@ -1,0 +1,159 @@
+use super::*;
+use crate::random::Random;
+
+/// Frames of big-endian 16-bit samples 0, 1, 2, ..
+fn input(channels: usize, breaks: &[(u64, u64)], dropouts: &[(usize, std::ops::Range<u64>)]) -> AlignedInput {
+    let layout = SampleLayout::packed(PcmFormat::S16Be);
+    let mut input = AlignedInput::new(StreamHeader::real(layout, channels));
+    let dropout = |(channel, frames): &(usize, std::ops::Range<u64>)| Dropout {
+        channel: Some(*channel),
+        frames: frames.clone(),
+    };
+    let lost = LostInInput { dropouts: dropouts.iter().map(dropout).collect(), ..LostInInput::default() };
+    input.lose(breaks.iter().map(|&(frame, lost)| Break { frame, lost }).collect(), lost);
+    input
+}
+
+/// All frames, from blocks of `block` frames, in steps of at most `step`.
+fn run(mut input: AlignedInput, frames: usize, block: usize, step: usize) -> Vec<Option<i16>> {
+    let channels = input.header.channels;
+    let bytes: Vec<u8> = (0..(frames * channels) as i16).flat_map(i16::to_be_bytes).collect();
+    let mut blocks = bytes.chunks(2 * channels * block);
+    let mut out = Vec::new();
+    loop {
+        if input.ready() == 0 && !input.ended() {
+            match blocks.next() {
+                Some(bytes) => drop(input.refill(Block { bytes: bytes.to_vec(), filled: bytes.len() })),
+                None => input.end(),
+            }
+            continue;
+        }
+        if input.is_over() {
+            return out;
+        }
+        let count = input.ready().min(step);
+        input.prepare(count);
+        let frames = input.view(count);
+        let values =
+            frames.bytes.chunks_exact(frames.layout.container).map(|b| frames.layout.format.decode(b));
+        out.extend(values.map(|x| x.is_finite().then_some((x * 32768.0) as i16)));
+        input.advance(count);
+    }
+}
+
+#[test]
+fn lost_frames_and_invalid_samples_come_out_as_nan_however_they_are_cut() {
+    let breaks = [(0, 2), (3, 2893)];
+    // Frames 2, 3, 4 of time are frames 0, 1, 2 of the input; 2898 is its frame 3.
+    let dropouts = [(1, 0..3), (0, 4..2899), (1, 2898..2900), (1, 2899..2901)];
+    let mut want = vec![None; 4];
+    want.extend([Some(0), None, Some(2), Some(3), None, Some(5)]);
+    want.extend(vec![None; 2 * 2893]);
+    want.extend([None, None, Some(8), None, Some(10), None, Some(12), Some(13)]);
+    for (block, step) in [(1, 1), (2, 3), (5, 1000), (7, usize::MAX)] {
+        assert_eq!(run(input(2, &breaks, &dropouts), 7, block, step), want, "{block} {step}");
+    }
+}
+
+#[test]
+fn frames_left_out_may_become_known_during_the_run() {
+    // Three frames are used, a break before frame 5 is reported in time and one before frame 6 late.
+    let mut live = input(1, &[], &[]);
+    let bytes: Vec<u8> = (0..9i16).flat_map(i16::to_be_bytes).collect();
+    let _ = live.refill(Block { filled: bytes.len(), bytes });
+    live.end();
+    let mut out = Vec::new();
+    let mut step = |live: &mut AlignedInput, frames: usize| {
+        live.prepare(frames);
+        let read = live.view(frames);
+        let sample = |b: &[u8]| Some(read.layout.format.decode(b) * 32768.0).filter(|x| x.is_finite());
+        out.extend(read.bytes.chunks_exact(read.layout.container).map(sample));
+        live.advance(frames);
+    };
+    step(&mut live, 3);
+    assert!(!live.leave_out(5, 2) && live.ready() == 2);
+    step(&mut live, 2);
+    assert_eq!(live.ready(), 2);
+    step(&mut live, 2);
+    step(&mut live, 2);
+    assert!(live.leave_out(6, 1) && live.ready() == 1);
+    step(&mut live, 1);
+    assert_eq!(live.ready(), 2);
+    step(&mut live, 2);
+    let want = [0, 1, 2, 3, 4, -1, -1, 5, 6, -1, 7, 8].map(|x| (x >= 0).then_some(f64::from(x)));
+    assert_eq!(out, want);
+}
+
+#[test]
+fn an_input_that_ends_early_leaves_later_timestamps_unreached() {
+    let mut short = input(1, &[(9, 4)], &[]);
+    assert_eq!(run(input(1, &[(3, 1)], &[]), 3, 2, 9), [Some(0), Some(1), Some(2), None]);
+    let _ = short.refill(Block { bytes: vec![0; 4], filled: 4 });
+    short.end();
+    short.prepare(2);
+    short.advance(2);
+    assert!(short.is_over() && short.has_unreached_breaks() && short.seen() == 2);
+    // From here on all frames are lost.
+    short.prepare(5);
+    assert_eq!(short.view(5).frames(), 5);
+    short.advance(5);
+    assert!(short.is_over() && short.seen() == 2);
+}
+
+#[test]
+fn covered_is_what_some_dropout_contains() {
+    let mut dice = Random(18);
+    for trial in 0..500 {
+        let channels = dice.count(1, 4);
+        let mut list: Vec<Dropout> = (0..dice.below(30))
+            .map(|_| {
+                let first = dice.below(100) as u64;
+                let channel = dice.below(channels + 1);
+                let frames = first..first + dice.count(1, 40) as u64;
+                Dropout { channel: (channel < channels).then_some(channel), frames }
+            })
+            .collect();
+        list.sort_by_key(|dropout| dropout.frames.start);
+        let mut dropouts = Dropouts::new(list.clone(), channels);
+        let mut time = 0;
+        while time < 200 {
+            let step = dropouts.until_change().min(dice.count(1, 10) as u64);
+            for frame in time..time + step {
+                for c in 0..channels {
+                    let contains = |dropout: &Dropout| {
+                        dropout.channel.is_none_or(|channel| channel == c) && dropout.frames.contains(&frame)
+                    };
+                    let wanted = list.iter().any(contains);
+                    assert_eq!(dropouts.covers(c), wanted, "trial {trial}, frame {frame}, channel {c}");
+                }
+            }
+            dropouts.advance(step);
+            time += step;
+        }
+    }
+}
+
+#[test]
+fn a_dropout_may_become_known_at_any_time_before_its_frames() {
+    let invalid = |channel, frames| Dropout { channel, frames };
+    let mut dropouts = Dropouts::new(vec![invalid(None, 50..51)], 2);
+    dropouts.advance(10);
+    assert!(!dropouts.add(invalid(Some(1), 12..14)) && !dropouts.any());
+    assert_eq!(dropouts.until_change(), 2);
+    // Of the frames 8 to 10 only the last is still ahead.
+    assert!(dropouts.add(invalid(Some(0), 8..11)));
+    assert!(dropouts.covers(0) && !dropouts.covers(1) && dropouts.until_change() == 1);
+    assert!(dropouts.add(invalid(Some(1), 3..5)) && !dropouts.covers(1));
+    dropouts.advance(1);
+    dropouts.advance(1);
+    assert!(dropouts.covers(1) && !dropouts.covers(0));
+}
+
+#[test]
+fn overlapping_dropouts_take_one_step() {
+    let overlapping = (0..100_000).map(|k| Dropout { channel: None, frames: k..k + 100_000 });
+    let mut dropouts = Dropouts::new(overlapping.collect(), 2);
+    assert_eq!(dropouts.until_change(), 199_999);
+    dropouts.advance(199_999);
+    assert!(!dropouts.any() && dropouts.until_change() == u64::MAX);
+}
