@@ -1,5 +1,7 @@
 //! Follows the delays of a bank's channels block by block, and says how its taps are to change.
 
+use super::TrackError;
+use super::coincidence::Coincidence;
 use super::error::NotMeasured;
 use super::filter::{DelayFilter, DelayMeasurement, DelayState};
 use super::frame_shift::{least_half, shift_for};
@@ -8,7 +10,6 @@ use super::readings::Reading;
 use super::source::{DelaySource, check_pilot};
 use super::timeline::Timeline;
 use super::tracker::{DelayTracker, Lock, Taken};
-use super::{Coincidence, TrackError};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::calibrate::Model;
 use crate::spec::{ChannelSpec, HALF_WIDTH, Spec};
@@ -30,40 +31,40 @@ const HORIZON: f64 = 60.0;
 
 /// How delays are followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FollowSettings {
+pub(super) struct FollowSettings {
     /// Frames of a block: of one measurement.
-    pub block_frames: usize,
+    pub(super) block_frames: usize,
     /// Variance by which a rate walks in a second, in (s/s)^2 / s.
-    pub rate_walk: f64,
+    pub(super) rate_walk: f64,
     /// Standard deviation of the rates at the beginning, seconds per second.
-    pub rate_deviation: f64,
+    pub(super) rate_deviation: f64,
     /// By how much a rate changes in a second at most, for the bound of the error between readings; it
     /// changes nothing else.
-    pub rate_change: f64,
+    pub(super) rate_change: f64,
 }
 
 /// Delays at which the taps are to be from some frame on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Change {
+pub(super) struct Change {
     /// Frame of the block two blocks later, from 0.
-    pub frame: usize,
+    pub(super) frame: usize,
     /// True delay minus that of the bank, per channel, with its shift; within the box for which the taps
     /// were designed.
-    pub errors: Vec<FastPeriods>,
+    pub(super) errors: Vec<FastPeriods>,
     /// Shift of each channel: frame k takes its sample k + s, whose delay is smaller by s slow periods. Not
     /// zero only where the box holds all delays of a slow period.
-    pub shifts: Vec<i64>,
+    pub(super) shifts: Vec<i64>,
 }
 
 /// What a block of samples led to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Followed {
+pub(super) struct Followed {
     /// For the block two blocks later.
-    pub changes: Vec<Change>,
+    pub(super) changes: Vec<Change>,
     /// What is known at the centre of this block.
-    pub log: Logged,
+    pub(super) log: Logged,
     /// What a user should know at once; each is said once.
-    pub warnings: Vec<TrackWarning>,
+    pub(super) warnings: Vec<TrackWarning>,
 }
 
 /// Follows the delays of the channels of a bank.
@@ -102,7 +103,11 @@ impl Follower {
     ///
     /// # Errors
     /// [`TrackError`] for a bank whose taps do not follow delays, or a pilot that cannot be measured.
-    pub fn new(bank: &Bank, source: DelaySource, settings: FollowSettings) -> Result<Self, TrackError> {
+    pub(super) fn new(
+        bank: &Bank,
+        source: DelaySource,
+        settings: FollowSettings,
+    ) -> Result<Self, TrackError> {
         if matches!(bank.filters, SynthesisFilters::StateSpace(_)) {
             return Err(TrackError::Recursive);
         }
@@ -164,12 +169,12 @@ impl Follower {
     }
 
     /// Frames of a block.
-    pub fn block_frames(&self) -> usize {
+    pub(super) fn block_frames(&self) -> usize {
         self.settings.block_frames
     }
 
     /// What is known beforehand of the first two blocks; nothing where delays are measured in the samples.
-    pub fn beginning(&mut self) -> [Vec<Change>; 2] {
+    pub(super) fn beginning(&mut self) -> [Vec<Change>; 2] {
         if !matches!(self.source, DelaySource::Readings(_)) {
             return [Vec::new(), Vec::new()];
         }
@@ -181,7 +186,7 @@ impl Follower {
 
     /// Takes the samples of the next block, a list per channel of the bank; NaN where one is missing. Each
     /// channel has the shift of the change at the first frame of the block; without such a change, no shift.
-    pub fn follow(&mut self, samples: &[Vec<f64>]) -> Followed {
+    pub(super) fn follow(&mut self, samples: &[Vec<f64>]) -> Followed {
         let frames = self.settings.block_frames as u64;
         let first = self.blocks * frames;
         self.blocks += 1;
