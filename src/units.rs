@@ -33,6 +33,7 @@
 //! ```
 
 mod grid_time;
+#[cfg(feature = "design")]
 mod timeline;
 
 use crate::messages::Number;
@@ -41,7 +42,8 @@ use std::fmt;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
 pub use grid_time::GridTime;
-pub use timeline::Timeline;
+#[cfg(feature = "design")]
+pub(crate) use timeline::Timeline;
 
 /// Declares a newtype over f64 with the arithmetic that keeps its unit.
 macro_rules! quantity {

@@ -3,6 +3,19 @@
 //! An interior-point method on sampled frequencies does the same few products and factorisations on
 //! hundreds of blocks of four to thirty rows, every iteration. The blocks live in one vector so that
 //! nothing is allocated in the loop; products and Cholesky factors are faer's kernels.
+//!
+//! ```
+//! use hybank_linalg::blocks::{Blocks, SmallCholesky};
+//! use hybank_linalg::{CMat, Complex};
+//! let mut blocks = Blocks::zeros(2, 1, 1);
+//! blocks.set(0, &CMat::from_element(1, 1, Complex::new(0.0, 3.0)));
+//! let mut square = blocks.clone();
+//! let factor = blocks.block(0);
+//! square.block_mut(1).set_product(1.0, factor.plain(), factor.adjoint());
+//! assert_eq!(square.block(1).at(0, 0), Complex::new(9.0, 0.0));
+//! assert!(SmallCholesky::new(1).factor(square.block_mut(1)));
+//! assert_eq!(square.to_matrix(1)[(0, 0)].re, 3.0);
+//! ```
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};

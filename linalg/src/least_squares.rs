@@ -1,4 +1,32 @@
 //! Nonlinear least squares: the iteration of Gauss and Newton, with one rule for its steps and for its end.
+//!
+//! ```
+//! use hybank_linalg::least_squares::{LeastSquares, NoMinimum, NormalEquations, StepLimits, minimise};
+//! /// x^2 = 2, from a start at 1.
+//! struct Root(f64);
+//! impl LeastSquares for Root {
+//!     type Error = NoMinimum;
+//!     const MOST_STEPS: usize = 20;
+//!     fn equations(&mut self) -> Result<NormalEquations, NoMinimum> {
+//!         let mut equations = NormalEquations::new(1);
+//!         equations.add(&[2.0 * self.0], 2.0 - self.0 * self.0);
+//!         Ok(equations)
+//!     }
+//!     fn advance(&mut self, step: &[f64]) -> bool {
+//!         self.0 += step[0];
+//!         self.0 > 0.0
+//!     }
+//!     fn limits(&self, _: usize, _: f64) -> StepLimits {
+//!         StepLimits { largest: 1.0, negligible: 1e-9 }
+//!     }
+//!     fn error(&self, why: NoMinimum) -> NoMinimum {
+//!         why
+//!     }
+//! }
+//! let mut root = Root(1.0);
+//! let minimum = minimise(&mut root).unwrap();
+//! assert!((root.0 - std::f64::consts::SQRT_2).abs() < 1e-12 && minimum.steps < 8);
+//! ```
 
 use crate::{Mat, PositiveFactor, power_of_two};
 

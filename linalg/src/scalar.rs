@@ -11,6 +11,17 @@ use faer::linalg::solvers::Solve;
 use nalgebra::{ComplexField, DMatrix};
 
 /// Thin singular value decomposition `m = u diag(s) v*`, s descending.
+///
+/// ```
+/// use hybank_linalg::{Mat, svd};
+/// let m = Mat::from_row_slice(2, 3, &[0.0, 0.0, 2.0, 1.0, 0.0, 0.0]);
+/// let found = svd(&m)?;
+/// assert!((found.s[0] - 2.0).abs() < 1e-15 && (found.s[1] - 1.0).abs() < 1e-15);
+/// assert_eq!((found.rank(1e-12), found.rank(0.6)), (2, 1));
+/// let scaled = &found.u * Mat::from_diagonal(&found.s.clone().into());
+/// assert!((scaled * found.v.transpose() - m).norm() < 1e-15);
+/// # Ok::<(), hybank_linalg::LinalgError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Svd<T: Scalar = f64> {
     /// Left vectors, rows x k.

@@ -46,6 +46,16 @@ pub fn solve_positive(m: &Mat, rhs: &Mat) -> Result<Mat, LinalgError> {
 }
 
 /// Cholesky factorisation of a symmetric positive definite matrix, kept for many right-hand sides.
+///
+/// ```
+/// use hybank_linalg::{LinalgError, Mat, PositiveFactor};
+/// let factor = PositiveFactor::new(&Mat::from_row_slice(2, 2, &[4.0, 2.0, 2.0, 2.0]))?;
+/// let column = |a, b| Mat::from_row_slice(2, 1, &[a, b]);
+/// assert!((factor.solve(&column(8.0, 6.0)) - column(1.0, 2.0)).norm() < 1e-15);
+/// let indefinite = PositiveFactor::new(&Mat::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0]));
+/// assert_eq!(indefinite.unwrap_err(), LinalgError::NotPositiveDefinite { pivot: 1 });
+/// # Ok::<(), LinalgError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct PositiveFactor {
     llt: Llt<f64>,

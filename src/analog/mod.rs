@@ -5,7 +5,7 @@
 //! they are realised.
 //!
 //! - [`StrictlyProper`] is the type that the designer works with: stable, strictly proper, real, normalised.
-//! - [`StableFilter`] is the same with a direct term: the filter W of a [`signal`].
+//! - [`StableFilter`] is the same with a direct term: the filter W of a signal.
 //! - `families` are the classical low-passes, enclosed.
 //! - [`fit`] makes filters of measured responses.
 //!
@@ -38,11 +38,11 @@ mod strictly_proper;
 
 pub(crate) use proportion::proportion;
 pub(crate) use section::Realisation;
+pub(crate) use signal::{SignalFilter, resolved_band, signal};
 pub(crate) use strictly_proper::enclosed;
 
 pub use error::AnalogError;
 pub use half_power::HalfPowerBand;
-pub use signal::{SignalFilter, resolved_band, signal};
 pub use strictly_proper::{StableFilter, StrictlyProper};
 
 /// Least -Re(p)/|p| of a pole: a quality factor of 5e8. Eigenvalues of a realisation are not known to

@@ -30,16 +30,16 @@ const LEAST_FLOOR_DB: f64 = 10.0;
 
 /// The written filter W of a signal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SignalFilter {
+pub(crate) struct SignalFilter {
     /// W.
-    pub filter: FilterSpec,
+    pub(crate) filter: FilterSpec,
     /// How far W is down outside the band, unless the spec gives W itself.
-    pub floor_db: Option<f64>,
+    pub(crate) floor_db: Option<f64>,
 }
 
 impl SignalFilter {
     /// Of the signal of `spec`; `None` for a spec without.
-    pub fn of(spec: &Spec) -> Option<Self> {
+    pub(crate) fn of(spec: &Spec) -> Option<Self> {
         let signal = spec.signal.as_ref()?;
         Some(match &signal.spectrum {
             SignalSpectrum::Filter(filter) => Self { filter: filter.clone(), floor_db: None },
@@ -52,14 +52,14 @@ impl SignalFilter {
 
     /// The floor that the spec asks for, or that the noise of its converters suggests, in decibels; `None`
     /// without a band.
-    pub fn asked_floor(spec: &Spec) -> Option<f64> {
+    pub(crate) fn asked_floor(spec: &Spec) -> Option<f64> {
         let signal = spec.signal.as_ref()?;
         signal.band().map(|_| signal.floor_db.unwrap_or_else(|| usual_floor(spec)))
     }
 
     /// The signal of `spec` with W in place of the band, so that it no longer depends on the rates of the
     /// spec.
-    pub fn written_out(spec: &Spec) -> Option<SignalSpec> {
+    pub(crate) fn written_out(spec: &Spec) -> Option<SignalSpec> {
         let (signal, own) = spec.signal.as_ref().zip(Self::of(spec))?;
         Some(SignalSpec { spectrum: SignalSpectrum::Filter(own.filter), floor_db: None, rms: signal.rms })
     }
@@ -92,12 +92,12 @@ impl SignalFilter {
 ///
 /// # Errors
 /// [`AnalogError`] for a filter that is not stable.
-pub fn signal(spec: &Spec) -> Result<Option<StableFilter>, AnalogError> {
+pub(crate) fn signal(spec: &Spec) -> Result<Option<StableFilter>, AnalogError> {
     SignalFilter::of(spec).map(|w| StableFilter::new(&w.filter, spec.fast_period)).transpose()
 }
 
 /// f_N: half the fast rate, or half the mean rate of all samples where there are fewer of them.
-pub fn resolved_band(spec: &Spec) -> Hertz {
+pub(crate) fn resolved_band(spec: &Spec) -> Hertz {
     let share = (spec.layout().count() as f64 / spec.ratio as f64).min(1.0);
     Hertz(0.5 * share / spec.fast_period.0)
 }

@@ -44,6 +44,16 @@ pub struct MeanAnalysis {
 
 /// Analyses `bank` with `delay_errors[i]` added to its delays; an empty slice means none.
 ///
+/// ```
+/// use hybank::{bank::Bank, design::{GammaScale, analyze}, units::Seconds};
+/// let bank = Bank::from_json(include_str!("../../filters/thesis-fir.json"), "thesis-fir.json")?;
+/// let (exact, late) = (analyze(&bank, &[])?, analyze(&bank, &[Seconds(0.0), Seconds(0.05)])?);
+/// assert!(exact.gamma < 0.039933 && late.gamma > exact.gamma);
+/// // Even so it is better than plain interleaving.
+/// assert!(late.gamma < GammaScale::new(&bank)?.interleaving);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`DesignError::NoSpec`] for a bank without front ends, [`DesignError::DelayErrorCount`] unless there is
 /// one error per channel, [`DesignError::TooLate`] for delays that need too many delay-chain states,
@@ -159,12 +169,12 @@ fn interleaving(problem: &Problem) -> Vec<Vec<f64>> {
 
 /// The slow sample nearest to the instant of an output phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NearestSample {
+pub(crate) struct NearestSample {
     /// Index of its channel, from 0.
-    pub channel: usize,
+    pub(crate) channel: usize,
     /// Age in slow periods: frame k gives the output sample the slow sample k - lag. Negative for a sample
     /// that is taken after the frame.
-    pub lag: i64,
+    pub(crate) lag: i64,
 }
 
 /// The nearest sample of each of the M output phases; empty without channels.
@@ -172,7 +182,7 @@ pub struct NearestSample {
 /// Phase p of frame k belongs to the instant k M + p - m0 in fast periods, and sample l of channel i to
 /// l M - D_i. Of equally near samples that of the first channel is taken. No lag is below `least_lag`: 0 for
 /// causal interleaving, `i64::MIN` where the whole recording is known.
-pub fn nearest_samples(
+pub(crate) fn nearest_samples(
     delays: &[FastPeriods],
     ratio: usize,
     latency: usize,

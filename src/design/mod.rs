@@ -28,9 +28,8 @@ pub mod uncertainty;
 mod unfinished;
 mod warnings;
 
-pub use analysis::{
-    Analysis, GammaScale, MeanAnalysis, NearestSample, analyze, analyze_mean, nearest_samples, noise_gain,
-};
+pub use analysis::{Analysis, GammaScale, MeanAnalysis, analyze, analyze_mean, noise_gain};
+pub(crate) use analysis::{NearestSample, nearest_samples};
 pub use choices::latency;
 pub use designer::{Design, Options, ProofSearch, design, judge_taps};
 pub use effort::remedy;

@@ -40,6 +40,17 @@ const FREQUENCIES_PER_LAG: usize = 4;
 /// the error, h = 1. The input w is norm-equivalent to the analog input: `[H; W] [H; W]*` equals that of
 /// the hybrid system, so K has the same singular values. F holds the polyphase components `F_{p,i}` of the
 /// synthesis filters.
+///
+/// ```
+/// use hybank::{bank::Bank, design::{LiftedPlant, Problem}};
+/// let bank = Bank::from_json(include_str!("../../filters/thesis-iir.json"), "thesis-iir.json")?;
+/// let plant = LiftedPlant::new(&Problem::of_bank(&bank)?);
+/// let (bound, peak) = (plant.noncausal_bound()?, plant.bank_norm(&bank.filters)?);
+/// // The bank is worst at f = 0, and no bank, causal or not, is better there.
+/// assert!(peak.gain < 0.039933 && peak.frequency < 1e-6);
+/// assert!((peak.gain / bound.gain - 1.0).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct LiftedPlant {
     problem: Problem,

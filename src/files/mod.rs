@@ -21,6 +21,21 @@
 //! A run that is killed (`kill -9`) leaves its unfinished files. [`leftovers`] finds them for the next run,
 //! which names them. `remove_unfinished_on_signals` (feature `signals`) removes them where a signal can be
 //! caught.
+//!
+//! ```
+//! use hybank::files::{AtomicFile, leftovers};
+//! use std::io::Write;
+//! let path = std::env::temp_dir().join(format!("hybank-files-{}.txt", std::process::id()));
+//! let mut file = AtomicFile::create(&path, false)?;
+//! file.write_all(b"whole")?;
+//! assert!(!path.exists() && file.hidden_name().exists());
+//! // This process can still finish its file.
+//! assert!(leftovers(&[&path]).is_empty());
+//! file.commit()?;
+//! assert_eq!(std::fs::read(&path)?, b"whole");
+//! # std::fs::remove_file(path)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod atomic;
 mod bounded;

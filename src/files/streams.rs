@@ -19,6 +19,13 @@ static IS_INPUT_CLOSED: AtomicBool = AtomicBool::new(false);
 static IS_OUTPUT_CLOSED: AtomicBool = AtomicBool::new(false);
 
 /// Notes which standard streams are closed. A program calls it before its `main`; later all are open.
+///
+/// ```
+/// use hybank::files::{StandardStream, note_closed_streams, unprinted};
+/// note_closed_streams();
+/// // This is an error in a program that was started with `>&-`.
+/// assert!(StandardStream::Output.check().map_err(|error| unprinted(&error)).is_ok());
+/// ```
 pub fn note_closed_streams() {
     #[cfg(unix)]
     {

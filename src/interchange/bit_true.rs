@@ -38,6 +38,22 @@ impl WordSizes {
 /// Nothing but these steps loses bits. The offsets are subtracted from the sums, where they are exact to
 /// 2^-f of a step; subtracted from the samples they would be rounded to whole steps. Samples before the
 /// first frame are the offsets, rounded to whole steps.
+///
+/// ```
+/// use hybank::bank::{Bank, FixedPoint, SynthesisFilters};
+/// use hybank::interchange::{BitTrue, WordSizes};
+/// use hybank::spec::WordLengths;
+/// // The taps 0.75 and -0.5 of one channel.
+/// let words = FixedPoint { bits: WordLengths::Same(4), fraction_bits: 2, integers: vec![vec![3, -2]] };
+/// let bank = Bank::bare(SynthesisFilters::Fir(words.taps()), 2);
+/// let bank = Bank { fixed_point: Some(words), ..bank };
+/// let mut integer_bank = BitTrue::new(&bank, WordSizes { input: 8, accumulator: 16, output: 8 })?;
+/// let mut output = [0; 2];
+/// integer_bank.process(&[2], &mut output);
+/// // 1.5 is rounded upwards.
+/// assert_eq!((output, integer_bank.wraps()), ([2, -1], 0));
+/// # Ok::<(), hybank::interchange::ExportError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct BitTrue {
     pub(super) filters: IntegerFilters,

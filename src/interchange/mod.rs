@@ -7,6 +7,20 @@
 //! ```text
 //! y[kM+p] = sum over j and i of  f_i[p + j M] (x_i[k - j] - offset_i).
 //! ```
+//!
+//! ```
+//! use hybank::bank::{Bank, SynthesisFilters};
+//! use hybank::interchange::{Format, PolyphaseTaps, export, taps_of_csv};
+//! let taps = vec![vec![0.5, -0.25, 1.0], vec![0.0, 2.0, -1.5]];
+//! let bank = Bank::bare(SynthesisFilters::Fir(taps.clone()), 2);
+//! let table = export(&bank, Format::Csv, "bank", None)?;
+//! assert!(table.starts_with(b"channel,phase,lag,value\n1,0,0,5e-1\n1,0,1,1e0\n1,1,0,-2.5e-1\n"));
+//! let ordered = PolyphaseTaps::new(&taps, bank.ratio);
+//! assert_eq!((ordered.get(1, 0, 1), ordered.nonzero()), (-1.5, 5));
+//! // The shorter phase is padded with a zero.
+//! assert_eq!(taps_of_csv(&table)?[0], [0.5, -0.25, 1.0, 0.0]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod arrays;
 mod bit_true;

@@ -35,6 +35,18 @@ impl Section {
 /// `c (zI - A)^-1 B_d = (c B_d z + c (A - tr A) B_d) / (z^2 - z tr A + det A)`. Nothing is factored, so the
 /// coefficients have the accuracy of the bank's.
 ///
+/// ```
+/// use hybank::bank::{Bank, SynthesisFilters};
+/// use hybank::interchange::{SparseBlock, block_of_sections, sections};
+/// let bank = Bank::from_json(include_str!("../../filters/thesis-iir.json"), "thesis-iir.json")?;
+/// let list = sections(&bank)?;
+/// // The product of two poles.
+/// assert!(list.iter().all(|section| section.a[1].abs() < 1.0));
+/// let block = SparseBlock::new(&block_of_sections(&list, bank.frame_samples(), bank.ratio));
+/// assert_eq!((block.inputs, block.outputs), (2, 2));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`ExportError::NoSections`] for FIR banks, and for poles that nearly coincide, whose states drive one
 /// another.

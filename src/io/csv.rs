@@ -18,6 +18,20 @@ const LAST_TIMES: usize = 16;
 const BUFFER: usize = TIMED_LINES * 64;
 
 /// Reads frames from a table of numbers.
+///
+/// ```
+/// use hybank::io::CsvReader;
+/// use std::io::Read;
+/// let text = "time (ms),left,right\n0,0.5,-1\n0.25,0.25,\n";
+/// let mut table = CsvReader::new(text.as_bytes(), "table.csv")?;
+/// assert_eq!((table.header().channels, table.header().rate), (2, Some(4000.0)));
+/// let mut bytes = Vec::new();
+/// table.read_to_end(&mut bytes)?;
+/// let samples: Vec<_> = bytes.as_chunks().0.iter().map(|sample| f64::from_le_bytes(*sample)).collect();
+/// assert_eq!(samples[..3], [0.5, -1.0, 0.25]);
+/// assert!(samples[3].is_nan());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct CsvReader<R> {
     table: Table<R>,

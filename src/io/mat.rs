@@ -42,7 +42,18 @@ struct Element {
     is_compressed: bool,
 }
 
-/// Opens the variable called `wanted`, or the only array of a file called `file`.
+/// Opens the variable called `wanted`, or the only array of a file called `name`.
+///
+/// ```
+/// use std::io::{Cursor, Read};
+/// let file = include_bytes!("../../tests/fixtures/mat/int16.mat");
+/// let mut array = hybank::io::open_mat(&mut Cursor::new(file), None, "int16.mat")?;
+/// let header = array.header();
+/// assert_eq!((header.channels, header.promised), (2, Some(40)));
+/// let mut frames = Vec::new();
+/// assert_eq!(array.read_to_end(&mut frames)?, 40 * header.frame_bytes());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// [`IoError::Malformed`] for other files and for variables that are no captures.

@@ -3,6 +3,29 @@
 //!
 //! A *frame* holds one sample of each channel of a file or stream. A sample is stored in one of the
 //! [`PcmFormat`]s; the full scale of integer formats is 1.0.
+//!
+//! A recording is written by [`SampleWriter`] and read by [`MultiReader`], side by side with others:
+//!
+//! ```
+//! use hybank::files::commit_all;
+//! use hybank::io::{Container, OutputHeader, PcmFormat, SampleWriter};
+//! use hybank::io::{MultiReader, OfflineSamples, ReadOptions};
+//!
+//! let path = std::env::temp_dir().join(format!("hybank-io-{}.wav", std::process::id()));
+//! let (container, format) = (Container::Wav, PcmFormat::S16Le);
+//! let header = OutputHeader { container, format, is_complex: false, rate: 48_000.0 };
+//! let mut writer = SampleWriter::create(&path, header, true)?;
+//! writer.write(&[0x00, 0x40, 0x00, 0xC0])?;
+//! commit_all(writer.finish()?)?;
+//!
+//! // This channel never asks for a stop.
+//! let recording = MultiReader::start(&[path.clone()], ReadOptions::files(), crossbeam_channel::never())?;
+//! let mut reader = recording.ok_or("stopped")?;
+//! assert!(reader.headers().all(|(_, header)| header.rate == Some(48_000.0)));
+//! assert_eq!(OfflineSamples::read(&mut reader, 1000)?.channels, [[0.5, -0.5]]);
+//! # std::fs::remove_file(path)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod aligned_input;
 mod array;

@@ -24,6 +24,17 @@ pub(super) fn open_npy<R: Read + Seek>(mut reader: R, file: &str) -> Result<Arra
 
 /// Reads the header of an array called `file`, up to its first number.
 ///
+/// ```
+/// use hybank::io::{PcmFormat, npy_header};
+/// let text = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }\n";
+/// let length = (text.len() as u16).to_le_bytes();
+/// let file = [b"\x93NUMPY\x01\x00", &length[..], text.as_bytes(), &[0; 24]].concat();
+/// let header = npy_header(&mut &file[..], "x.npy")?;
+/// assert_eq!((header.format, header.shape.as_slice()), (PcmFormat::F32Le, &[2, 3][..]));
+/// assert_eq!(header.offset as usize, file.len() - 6 * header.sample_bytes());
+/// # Ok::<(), hybank::io::IoError>(())
+/// ```
+///
 /// # Errors
 /// [`IoError::Malformed`] for other files and for arrays of anything but numbers.
 pub fn npy_header(reader: &mut impl Read, file: &str) -> Result<ArrayHeader, IoError> {

@@ -56,6 +56,15 @@ static CLOCK: LazyLock<Instant> = LazyLock::new(Instant::now);
 const WRITE_BYTES: usize = 64 << 10;
 
 /// A standard stream; [`is_output_stalled`] knows how long its writes wait.
+///
+/// ```
+/// use hybank::io::{Stdout, is_output_stalled};
+/// use std::{io::Write, time::Duration};
+/// let mut output = Stdout::for_samples()?;
+/// output.write_all(b"0.5,-0.5\n")?;
+/// assert!(!is_output_stalled(Duration::from_secs(1)));
+/// # Ok::<(), std::io::Error>(())
+/// ```
 pub struct Watched<W> {
     stream: W,
     began: &'static AtomicU64,

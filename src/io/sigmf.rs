@@ -20,6 +20,18 @@ pub(super) const META_FILE: Bound = Bound {
 };
 
 /// A SigMF metadata file. Keys that are not supported are kept.
+///
+/// ```
+/// use hybank::io::{PcmFormat, SigmfMeta};
+/// let text = r#"{"global": {"core:datatype": "ci16_le", "core:sample_rate": 2e6, "core:hw": "two mixers"},
+///     "captures": [{"core:sample_start": 0}, {"core:sample_start": 50, "core:global_index": 58}]}"#;
+/// let meta = SigmfMeta::parse(text, "radio.sigmf-meta")?;
+/// assert_eq!((meta.format("radio.sigmf-meta")?, meta.is_complex()), (PcmFormat::S16Le, true));
+/// assert_eq!(meta.global.other["core:hw"], "two mixers");
+/// // Eight frames were lost before the second capture.
+/// assert_eq!(meta.captures[1].global_index, Some(meta.captures[1].sample_start + 8));
+/// # Ok::<(), hybank::io::IoError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SigmfMeta {
     /// Properties of the whole recording.

@@ -24,6 +24,18 @@ pub struct TarFile {
 
 /// The plain files of an archive called `file`, in their order.
 ///
+/// ```
+/// let mut head = tar::Header::new_ustar();
+/// head.set_size(3);
+/// let mut archive = tar::Builder::new(Vec::new());
+/// archive.append_data(&mut head, "notes.txt", &b"two"[..])?;
+/// let bytes = archive.into_inner()?;
+/// let files = hybank::io::tar_files(&mut std::io::Cursor::new(&bytes), "recording.sigmf")?;
+/// assert_eq!((files.len(), files[0].name.as_str()), (1, "notes.txt"));
+/// assert_eq!(bytes[files[0].offset as usize..][..files[0].size as usize], *b"two");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`IoError::Malformed`] with the byte at which something is wrong, or the system's refusal.
 pub fn tar_files(archive: &mut (impl Read + Seek), file: &str) -> Result<Vec<TarFile>, IoError> {

@@ -8,6 +8,16 @@ use nalgebra::linalg::Hessenberg;
 ///
 /// With a' = Q H Q' the transposed problem (zI - H) X = Q' c' has as many right-hand sides as the system
 /// has outputs, which here are few. Then G = X' Q' b + d.
+///
+/// ```
+/// use hybank::linalg::Mat;
+/// use hybank::lti::{FrequencyResponse, StateSpace};
+/// // y[k] = u[k] + y[k - 1] / 2.
+/// let one = |x| Mat::from_element(1, 1, x);
+/// let response = FrequencyResponse::new(&StateSpace::new(one(0.5), one(1.0), one(0.5), one(1.0)));
+/// let gain = |w| response.at_frequency(w)[(0, 0)].norm();
+/// assert!((gain(0.0) - 2.0).abs() < 1e-15 && (gain(std::f64::consts::PI) - 2.0 / 3.0).abs() < 1e-15);
+/// ```
 #[derive(Debug, Clone)]
 pub struct FrequencyResponse {
     hessenberg: Mat,

@@ -1,4 +1,19 @@
 //! Checks that recordings fit a bank.
+//!
+//! ```
+//! use hybank::bank::{Bank, SynthesisFilters};
+//! use hybank::io::{Coding, MultiReader, PcmFormat, ReadOptions};
+//! use hybank::pipeline::matching::{InputMismatch, check_channels};
+//! let path = std::env::temp_dir().join(format!("hybank-matching-{}.raw", std::process::id()));
+//! std::fs::write(&path, [0; 16])?;
+//! let options = ReadOptions { coding: Coding::Raw(PcmFormat::S16Le), ..ReadOptions::files() };
+//! let reader = MultiReader::start(&[path.clone()], options, crossbeam_channel::never())?;
+//! let bank = Bank::bare(SynthesisFilters::Fir(vec![vec![1.0], vec![0.5]]), 2);
+//! let refused = check_channels(&bank, "bank.json", &reader.ok_or("stopped")?);
+//! assert!(matches!(refused, Err(InputMismatch::Channels { wanted: 2, given: 1, .. })));
+//! # std::fs::remove_file(path)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use crate::bank::{Bank, FrameLayout};
 use crate::io::{MultiReader, StreamHeader, TimeInterleaving, is_same_rate};

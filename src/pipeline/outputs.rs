@@ -8,6 +8,21 @@ use std::path::PathBuf;
 
 /// Samples to a file or standard output, the mask to a file of its own. [`FileOutputs::finish`] makes all
 /// files appear together; before it no file is visible.
+///
+/// ```
+/// use hybank::io::{Container, OutputHeader, PcmFormat, SampleWriter};
+/// use hybank::pipeline::{Block, FileOutputs};
+/// let path = std::env::temp_dir().join(format!("hybank-outputs-{}.raw", std::process::id()));
+/// let (container, format) = (Container::Raw, PcmFormat::S8);
+/// let header = OutputHeader { container, format, is_complex: false, rate: 1.0 };
+/// let mut outputs = FileOutputs::new(SampleWriter::create(&path, header, false)?, None, format);
+/// outputs.write(Block { samples: &[32, 0xC0], mask: None })?;
+/// assert!(outputs.peak() == 0.5 && !path.exists());
+/// outputs.finish()?;
+/// assert_eq!(std::fs::read(&path)?, [32, 0xC0]);
+/// # std::fs::remove_file(path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct FileOutputs {
     samples: SampleWriter,
     mask: Option<AtomicFile>,

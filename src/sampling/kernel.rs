@@ -1,21 +1,7 @@
-//! Interpolation kernels: centred B-splines of odd degree and the sinc, with the slopes of the splines.
+//! Interpolation kernels: centred B-splines of odd degree, with their slopes.
 //!
 //! M. Unser, "Splines: a perfect fit for signal and image processing", IEEE Signal Processing
 //! Magazine 16(6), 1999. Unit spacing throughout: x is counted in knots.
-
-use std::f64::consts::PI;
-
-/// sin(pi x). The argument is reduced before the multiplication, so integers give exactly 0.
-pub fn sin_pi(x: f64) -> f64 {
-    let turns = x.round();
-    let sine = (PI * (x - turns)).sin();
-    if turns.rem_euclid(2.0) == 0.0 { sine } else { -sine }
-}
-
-/// The sinc kernel sin(pi x) / (pi x), 1 at x = 0.
-pub fn sinc(x: f64) -> f64 {
-    if x == 0.0 { 1.0 } else { sin_pi(x) / (PI * x) }
-}
 
 /// The largest integer not above x, saturating. On baseline x86-64 `f64::floor` would be a library call.
 #[inline]
@@ -33,16 +19,16 @@ const LARGEST_ROUNDED: f64 = (1_u64 << 50) as f64;
 /// The centred B-spline of the odd degree ORDER - 1, as the weights at x of the ORDER splines that are
 /// nonzero there: `BSpline::<2>` is the hat, `BSpline::<4>` the cubic.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct BSpline<const ORDER: usize>;
+pub(super) struct BSpline<const ORDER: usize>;
 
 impl<const ORDER: usize> BSpline<ORDER> {
     /// The degree n = ORDER - 1.
-    pub const DEGREE: usize = ORDER - 1;
+    pub(super) const DEGREE: usize = ORDER - 1;
 
     /// First knot k with beta(x - k) possibly nonzero, and the position of x within the knot span, in \[0,
     /// 1).
     #[inline]
-    pub fn locate(x: f64) -> (i64, f64) {
+    pub(super) fn locate(x: f64) -> (i64, f64) {
         // Even degrees have their breaks half-way between the knots.
         const { assert!(ORDER >= 2 && ORDER.is_multiple_of(2), "splines of odd degree") }
         let floor = floor(x);
@@ -75,7 +61,7 @@ impl<const ORDER: usize> BSpline<ORDER> {
 
     /// First knot k0 and beta(x - k0 - j), j = 0..ORDER; the weights are >= 0 and sum to one.
     #[inline]
-    pub fn weights(x: f64) -> (i64, [f64; ORDER]) {
+    pub(super) fn weights(x: f64) -> (i64, [f64; ORDER]) {
         let (first, t) = Self::locate(x);
         (first, raise::<ORDER, 1>(&[t], ORDER).map(|[w]| w))
     }
@@ -84,14 +70,14 @@ impl<const ORDER: usize> BSpline<ORDER> {
     ///
     /// At a break of a hat the slope to the right is taken.
     #[inline]
-    pub fn slopes(x: f64) -> (i64, [f64; ORDER]) {
+    pub(super) fn slopes(x: f64) -> (i64, [f64; ORDER]) {
         let (first, t) = Self::locate(x);
         (first, differences(&raise::<ORDER, 1>(&[t], Self::DEGREE)).map(|[d]| d))
     }
 
     /// First knot, weights and slopes in one call.
     #[inline]
-    pub fn weights_and_slopes(x: f64) -> (i64, [f64; ORDER], [f64; ORDER]) {
+    pub(super) fn weights_and_slopes(x: f64) -> (i64, [f64; ORDER], [f64; ORDER]) {
         let ([first], w, d) = Self::weights_and_slopes_of(&[x]);
         (first, w.map(|[w]| w), d.map(|[d]| d))
     }
@@ -108,7 +94,7 @@ impl<const ORDER: usize> BSpline<ORDER> {
     /// are those of single calls.
     // Not inlined, the arrays would pass through memory, which takes half of a fit's time.
     #[inline(always)]
-    pub fn weights_and_slopes_of<const N: usize>(
+    pub(super) fn weights_and_slopes_of<const N: usize>(
         x: &[f64; N],
     ) -> ([i64; N], [[f64; N]; ORDER], [[f64; N]; ORDER]) {
         let (knots, t) = Self::locate_all(x);
@@ -257,17 +243,6 @@ mod tests {
                 "{x:?}"
             );
         }
-    }
-
-    #[test]
-    fn sine_and_sinc_at_integers_are_exact() {
-        for n in -1000..1000 {
-            assert_eq!(sin_pi(n as f64), 0.0);
-            assert_eq!(sinc(n as f64), f64::from(n == 0));
-        }
-        assert_eq!(sin_pi(0.5), 1.0);
-        assert_eq!(sin_pi(1.5), -1.0);
-        assert!((sinc(0.5) - 2.0 / PI).abs() < 1e-16);
     }
 
     proptest! {

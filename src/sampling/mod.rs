@@ -1,11 +1,11 @@
 //! The sampling core that both crates stand on.
 //!
-//! * [`kernel`]: centred B-splines of odd degree, with slopes, and the sinc;
+//! * `kernel`: centred B-splines of odd degree, with slopes;
 //! * [`fit`]: regularised, weighted least squares in a shift-invariant spline space, solved in O(M n^2);
 //! * `fit2`: the same for images, with tensor products (feature `fit2`);
-//! * [`recurrent`]: perfect reconstruction from M interleaved sample sets (Yen's formula);
+//! * `recurrent`: perfect reconstruction from M interleaved sample sets (Yen's formula);
 //! * [`nonuniform`]: samples with value errors and jitter;
-//! * [`smoothing`]: smoothing splines through such samples, with what is known between them.
+//! * `smoothing`: smoothing splines through such samples, with what is known between them.
 //!
 //! Unit spacing and f64 throughout, f32 in `fit2`; no dependency beyond the standard library, and rayon in
 //! `fit2`.
@@ -13,17 +13,20 @@
 pub mod fit;
 #[cfg(feature = "fit2")]
 pub mod fit2;
-pub mod kernel;
+mod kernel;
 pub mod nonuniform;
-pub mod recurrent;
-pub mod smoothing;
+#[cfg(feature = "design")]
+mod recurrent;
+#[cfg(feature = "design")]
+mod smoothing;
 
 pub use fit::{Fit, FitSample};
 #[cfg(feature = "fit2")]
 pub use fit2::Fit2;
-pub use kernel::{BSpline, sinc};
-pub use recurrent::Recurrent;
-pub use smoothing::SmoothingSpline;
+#[cfg(feature = "design")]
+pub(crate) use recurrent::Recurrent;
+#[cfg(feature = "design")]
+pub(crate) use smoothing::SmoothingSpline;
 
 /// Faults of sample sets, offsets and settings handed to the sampling core.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -10,7 +10,7 @@
 //! ```
 
 use super::SamplingError;
-use super::kernel::{sin_pi, sinc};
+use std::f64::consts::PI;
 
 /// Offsets closer than this (in fast periods, modulo the period) count as coinciding: the factor
 /// 1 / sin(pi d / M) would then amplify the rounding of the samples beyond the samples themselves.
@@ -18,7 +18,7 @@ const CLOSEST_OFFSETS: f64 = 1e-9;
 
 /// M sample sets of period M with distinct offsets, and their interpolation functions.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Recurrent {
+pub(crate) struct Recurrent {
     offsets: Vec<f64>,
 }
 
@@ -28,7 +28,7 @@ impl Recurrent {
     /// # Errors
     /// [`SamplingError::NotFinite`] for an offset that is not finite, and
     /// [`SamplingError::Coinciding`] when two offsets agree modulo the period (to 1e-9).
-    pub fn new(offsets: &[f64]) -> Result<Self, SamplingError> {
+    pub(crate) fn new(offsets: &[f64]) -> Result<Self, SamplingError> {
         if let Some(index) = offsets.iter().position(|t| !t.is_finite()) {
             return Err(SamplingError::NotFinite { name: "offset", index, value: offsets[index] });
         }
@@ -64,7 +64,7 @@ impl Recurrent {
     ///
     /// # Panics
     /// Unless `set < period`.
-    pub fn psi(&self, set: usize, u: f64) -> f64 {
+    fn psi(&self, set: usize, u: f64) -> f64 {
         let period = self.period() as f64;
         let here = self.offsets[set];
         let others = self.offsets.iter().enumerate().filter(|&(q, _)| q != set);
@@ -81,16 +81,38 @@ impl Recurrent {
     ///
     /// # Panics
     /// Unless `set < period`.
-    pub fn taps(&self, set: usize, latency: f64, length: usize) -> Vec<f64> {
+    pub(crate) fn taps(&self, set: usize, latency: f64, length: usize) -> Vec<f64> {
         (0..length).map(|n| self.psi(set, n as f64 - latency - self.offsets[set])).collect()
     }
+}
+
+/// sin(pi x). The argument is reduced before the multiplication, so integers give exactly 0.
+fn sin_pi(x: f64) -> f64 {
+    let turns = x.round();
+    let sine = (PI * (x - turns)).sin();
+    if turns.rem_euclid(2.0) == 0.0 { sine } else { -sine }
+}
+
+/// The sinc kernel sin(pi x) / (pi x), 1 at x = 0.
+fn sinc(x: f64) -> f64 {
+    if x == 0.0 { 1.0 } else { sin_pi(x) / (PI * x) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use std::f64::consts::PI;
+
+    #[test]
+    fn sine_and_sinc_at_integers_are_exact() {
+        for n in -1000..1000 {
+            assert_eq!(sin_pi(n as f64), 0.0);
+            assert_eq!(sinc(n as f64), f64::from(n == 0));
+        }
+        assert_eq!(sin_pi(0.5), 1.0);
+        assert_eq!(sin_pi(1.5), -1.0);
+        assert!((sinc(0.5) - 2.0 / PI).abs() < 1e-16);
+    }
 
     /// f(t) from finitely many samples, `samples[i][k] = f(t_i + (first + k) M)`; all others count as 0.
     fn interpolated(sets: &Recurrent, t: f64, samples: &[Vec<f64>], first: i64) -> f64 {

@@ -31,7 +31,7 @@ const INFLUENCE_KNOTS: usize = 24;
 
 /// A smoothing spline with its samples.
 #[derive(Debug, Clone)]
-pub struct SmoothingSpline {
+pub(crate) struct SmoothingSpline {
     fit: Fit<4, 1>,
     /// By increasing position.
     samples: Vec<Measured>,
@@ -55,17 +55,17 @@ struct Line {
 
 /// What is known of the function at one position.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
+pub(crate) struct Estimate {
     /// f(x).
-    pub value: f64,
+    pub(crate) value: f64,
     /// f'(x).
-    pub slope: f64,
+    pub(crate) slope: f64,
     /// Variance of f(x).
-    pub variance: f64,
+    pub(crate) variance: f64,
     /// Covariance of f(x) and f'(x).
-    pub covariance: f64,
+    pub(crate) covariance: f64,
     /// Variance of f'(x).
-    pub slope_variance: f64,
+    pub(crate) slope_variance: f64,
 }
 
 impl SmoothingSpline {
@@ -75,7 +75,7 @@ impl SmoothingSpline {
     /// # Errors
     /// [`SamplingError::NotFinite`] for numbers that are not finite, [`SamplingError::Setting`] for fewer
     /// than two positions, a walk below zero, or errors and a walk that are all zero.
-    pub fn new(mut samples: Vec<Measured>, walk: f64) -> Result<Self, SamplingError> {
+    pub(crate) fn new(mut samples: Vec<Measured>, walk: f64) -> Result<Self, SamplingError> {
         check(&samples, walk)?;
         samples.sort_by(|a, b| a.x.total_cmp(&b.x));
         let length = samples[samples.len() - 1].x - samples[0].x;
@@ -116,12 +116,12 @@ impl SmoothingSpline {
     }
 
     /// The samples by increasing position.
-    pub fn samples(&self) -> &[Measured] {
+    pub(crate) fn samples(&self) -> &[Measured] {
         &self.samples
     }
 
     /// What is known at x. Beyond the samples the function goes on as a line, and the variance grows.
-    pub fn at(&self, x: f64) -> Estimate {
+    pub(crate) fn at(&self, x: f64) -> Estimate {
         let (first, last) = (self.samples[0].x, self.samples[self.samples.len() - 1].x);
         let inside = x.clamp(first, last);
         let position = (inside - first) / self.step;
@@ -148,7 +148,7 @@ impl SmoothingSpline {
     /// ```
     ///
     /// The first term is zero up to rounding. It holds for the samples at hand, however they lie.
-    pub fn error_bound(&self, x: f64, f: Smoothness, factor: f64) -> f64 {
+    pub(crate) fn error_bound(&self, x: f64, f: Smoothness, factor: f64) -> f64 {
         let first = self.samples[0].x;
         let mut response = Response::default();
         self.fit.respond_within((x - first) / self.step, self.reach, &mut response);
@@ -171,7 +171,7 @@ impl SmoothingSpline {
     ///
     /// With the share h = w var of a sample in its own value, the others differ by r / (1 - h) from it, with
     /// the variance sigma^2 / (1 - h), r the residual.
-    pub fn contradictions(&self) -> impl Iterator<Item = f64> + '_ {
+    pub(crate) fn contradictions(&self) -> impl Iterator<Item = f64> + '_ {
         let unit = self.walk * self.step.powi(3);
         self.samples.iter().zip(&self.weights).map(move |(s, weight)| {
             let here = self.at(s.x);

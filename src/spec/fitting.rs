@@ -9,6 +9,12 @@ use super::reader::Value;
 use super::{Fault, FilterSpec, SpecProblem};
 
 /// A value of a channel that can be fitted.
+///
+/// ```
+/// use hybank::spec::{Cutoff, Fitting, UnknownFitting};
+/// assert_eq!("cutoff:2".parse(), Ok(Fitting::Cutoff(Cutoff::Stage(1))));
+/// assert_eq!("phase".parse::<Fitting>(), Err(UnknownFitting));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fitting {
     /// The delay.

@@ -145,17 +145,17 @@ impl DelayFilter {
 /// Two channels that will sample at one instant of the slow period. There they carry one measurement, and no
 /// bank recovers what the other one carried: the noncausal bound rises as they come closer.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Coincidence {
+pub(super) struct Coincidence {
     /// The channels, from 0.
-    pub channels: [usize; 2],
+    pub(super) channels: [usize; 2],
     /// Time until their delays are equal modulo the slow period.
-    pub after: Seconds,
+    pub(super) after: Seconds,
 }
 
 impl Coincidence {
     /// The first pair whose delays come within `distance` of each other modulo `slow_period`, at their
     /// present rates; `None` if there is none within `horizon`.
-    pub fn ahead(
+    pub(super) fn ahead(
         states: &[DelayState],
         slow_period: Seconds,
         distance: Seconds,

@@ -1,14 +1,14 @@
 //! Follows the delays of a bank's channels block by block, and says how its taps are to change.
 
+use super::TrackError;
 use super::error::NotMeasured;
-use super::filter::{DelayFilter, DelayMeasurement, DelayState};
+use super::filter::{Coincidence, DelayFilter, DelayMeasurement, DelayState};
 use super::frame_shift::{least_half, shift_for};
 use super::log::{Logged, TrackWarning};
 use super::readings::Reading;
 use super::source::{DelaySource, check_pilot};
 use super::timeline::Timeline;
 use super::tracker::{DelayTracker, FollowSettings, Lock, Taken};
-use super::{Coincidence, TrackError};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::calibrate::Model;
 use crate::spec::{ChannelSpec, HALF_WIDTH, Spec};
@@ -30,26 +30,26 @@ const HORIZON_BLOCKS: f64 = 60.0;
 
 /// Delays at which the taps are to be from some frame on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DelayChange {
+pub(super) struct DelayChange {
     /// Frame of the block two blocks later, from 0.
-    pub frame: usize,
+    pub(super) frame: usize,
     /// True delay minus that of the bank, per channel, with its shift; within the box for which the taps
     /// were designed.
-    pub errors: Vec<FastPeriods>,
+    pub(super) errors: Vec<FastPeriods>,
     /// Shift of each channel: frame k takes its sample k + s, whose delay is smaller by s slow periods. Not
     /// zero only where the box holds all delays of a slow period.
-    pub shifts: Vec<i64>,
+    pub(super) shifts: Vec<i64>,
 }
 
 /// What a block of samples led to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Followed {
+pub(super) struct Followed {
     /// For the block two blocks later.
-    pub changes: Vec<DelayChange>,
+    pub(super) changes: Vec<DelayChange>,
     /// What is known at the centre of this block.
-    pub log: Logged,
+    pub(super) log: Logged,
     /// What a user should know at once; each is said once.
-    pub warnings: Vec<TrackWarning>,
+    pub(super) warnings: Vec<TrackWarning>,
 }
 
 /// Follows the delays of the channels of a bank.
@@ -88,7 +88,11 @@ impl Follower {
     ///
     /// # Errors
     /// [`TrackError`] for a bank whose taps do not follow delays, or a pilot that cannot be measured.
-    pub fn new(bank: &Bank, source: DelaySource, settings: FollowSettings) -> Result<Self, TrackError> {
+    pub(super) fn new(
+        bank: &Bank,
+        source: DelaySource,
+        settings: FollowSettings,
+    ) -> Result<Self, TrackError> {
         if matches!(bank.filters, SynthesisFilters::StateSpace(_)) {
             return Err(TrackError::Recursive);
         }
@@ -151,12 +155,12 @@ impl Follower {
     }
 
     /// Frames of a block.
-    pub fn block_frames(&self) -> usize {
+    pub(super) fn block_frames(&self) -> usize {
         self.settings.block_frames
     }
 
     /// What is known beforehand of the first two blocks; nothing where delays are measured in the samples.
-    pub fn beginning(&mut self) -> [Vec<DelayChange>; 2] {
+    pub(super) fn beginning(&mut self) -> [Vec<DelayChange>; 2] {
         if !matches!(self.source, DelaySource::Readings(_)) {
             return [Vec::new(), Vec::new()];
         }
@@ -168,7 +172,7 @@ impl Follower {
 
     /// Takes the samples of the next block, a list per channel of the bank; NaN where one is missing. Each
     /// channel has the shift of the change at the first frame of the block; without such a change, no shift.
-    pub fn follow(&mut self, samples: &[Vec<f64>]) -> Followed {
+    pub(super) fn follow(&mut self, samples: &[Vec<f64>]) -> Followed {
         let frames = self.settings.block_frames as u64;
         let first = self.blocks * frames;
         self.blocks += 1;

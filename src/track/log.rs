@@ -16,12 +16,12 @@ pub struct Logged {
     pub time: Seconds,
     /// D_i; the reference has that of the spec.
     pub delay: Vec<Seconds>,
-    /// s_i: frames hold sample k + s_i of the channel; see [`super::Change::shifts`].
+    /// s_i: frames hold sample k + s_i of the channel.
     pub shift: Vec<i64>,
     /// Half-widths of their 95 % intervals; zero where a delay counts as exact.
     pub half_width: Vec<Seconds>,
     /// By how much the delays err at most between readings that are known beforehand: if each reading is
-    /// within its half-width and no rate changes by more than [`super::FollowSettings::rate_change`]. None
+    /// within its half-width and no rate changes by more than [`super::Tracking::wander`]. None
     /// outside the readings.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bound: Option<Vec<Option<Seconds>>>,

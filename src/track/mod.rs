@@ -3,7 +3,7 @@
 //! Each channel's delay relative to the reference changes, and the rate at which it changes walks at random
 //! (two free-running clocks). A [`DelayFilter`] is the Kalman filter of one delay and its rate: measurements
 //! of block fits enter with their variance, silence lets the variance grow. A tracker per channel refuses
-//! measurements that contradict the filter, and says whether it is locked. [`Coincidence`] warns ahead of
+//! measurements that contradict the filter, and says whether it is locked. A warning comes ahead of
 //! delays that come together, where no bank recovers the signal. A [`Follower`] measures the delays of a
 //! bank's channels block by block, by a pilot tone or by any signal, and says how taps that are affine in
 //! the delays are to change. Delays measured before are known on both sides of every instant: a smoothing
@@ -41,10 +41,10 @@ mod tracking;
 
 pub use align::{AlignError, AlignSettings, AlignWarning, AlignedChannel, Alignment, RATE_WALK, align};
 pub use error::{ReadingProblem, TrackError};
-pub use filter::{Coincidence, DelayFilter, DelayMeasurement, DelayState, Innovation};
-pub use follower::{DelayChange, Followed, Follower};
+pub use filter::{DelayFilter, DelayMeasurement, DelayState, Innovation};
+pub use follower::Follower;
 pub use log::{Logged, TrackWarning};
 pub use readings::Reading;
 pub use source::DelaySource;
-pub use tracker::{FollowSettings, Lock};
+pub use tracker::Lock;
 pub use tracking::Tracking;

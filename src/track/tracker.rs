@@ -13,7 +13,7 @@ const MOST_REFUSED: u32 = 5;
 
 /// How delays are followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FollowSettings {
+pub(super) struct FollowSettings {
     /// Frames of a block: of one measurement.
     pub block_frames: usize,
     /// Variance by which a rate walks in a second, in (s/s)^2 / s.

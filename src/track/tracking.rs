@@ -1,6 +1,8 @@
 //! Delay-scheduled taps of a pipeline.
 
-use super::{DelayChange, DelaySource, FollowSettings, Followed, Follower, Logged, TrackError, TrackWarning};
+use super::follower::{DelayChange, Followed, Follower};
+use super::tracker::FollowSettings;
+use super::{DelaySource, Logged, TrackError, TrackWarning};
 use crate::bank::Bank;
 use crate::pipeline::{Change, PipelineError, Retuner};
 use crate::quantity;
@@ -13,6 +15,42 @@ const LEAST_FRAMES: usize = 256;
 const FIRST_RATE: f64 = 100.0;
 
 /// How delays are followed, as a user asks for it.
+///
+/// ```
+/// use hybank::design::{Options, design};
+/// use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
+/// use hybank::pipeline::{Pipeline, Settings};
+/// use hybank::{spec::Spec, track::Tracking};
+/// let spec = r#"
+///     fast_rate = 96000.0
+///     ratio = 2
+///     latency = 3
+///     target = { filter = { num = [1e4], den = [1.0, 1e4] } }
+///     channel = [{ delay_samples = 0.0 }, { delay_samples = 1.0 }]
+///     design = { method = "fir", taps = 6, tracking = "affine" }
+///     uncertainty = { delay_samples = 0.01 }
+/// "#;
+/// let bank = design(&Spec::from_toml(spec, "spec.toml")?, &Options::without_proof())?.bank;
+/// let follower = Tracking::default().follower(&bank, Tracking::source("pilot=9kHz")?, 96e3)?;
+/// let (sender, logs) = std::sync::mpsc::channel();
+/// let retuner = follower.retuner(&bank, Default::default(), move |log, _| {
+///     sender.send(log).expect("the receiver is there");
+///     Ok(())
+/// })?;
+/// let plan = bank.plan(Default::default())?;
+/// let settings = Settings { is_retuned: true, ..Settings::default() };
+/// let pipeline = Pipeline::new(&bank, &plan, settings, PcmFormat::S16Le, false);
+/// let mut pipeline = pipeline.retuned_by(retuner)?;
+/// let layout = SampleLayout::packed(PcmFormat::S16Le);
+/// let silence = PcmFrames { layout, channels: 2, bytes: &[0; 4 * 4096] };
+/// pipeline.push(&[silence], &mut |_| Ok(()))?;
+/// pipeline.finish()?;
+/// // In silence nothing is measured, and the delays stay.
+/// let logs: Vec<_> = logs.iter().collect();
+/// assert_eq!(logs.len(), 2);
+/// assert!(logs.iter().all(|log| log.measured == [None, None] && log.delay[1] == bank.delays[1]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tracking {
     /// Frames of one measurement.

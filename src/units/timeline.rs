@@ -5,7 +5,7 @@ use super::{GridTime, Seconds};
 /// The instants of one slow period, which ends with the latest sample. An older sample counts as the sample
 /// at the same phase of the period, delayed by whole periods.
 #[derive(Debug, Clone)]
-pub struct Timeline {
+pub(crate) struct Timeline {
     start: GridTime,
     /// Ascending, each once, the end of the period last.
     instants: Vec<GridTime>,
@@ -17,7 +17,7 @@ pub struct Timeline {
 
 impl Timeline {
     /// Reduces the instants of samples on one grid modulo the slow period of `ratio` fast periods.
-    pub fn new(times: &[GridTime], ratio: usize) -> Self {
+    pub(crate) fn new(times: &[GridTime], ratio: usize) -> Self {
         let period = ratio as f64;
         let latest = times.iter().copied().max_by(|a, b| a.compare(*b));
         let latest = latest.unwrap_or(GridTime::fast_sample(0.0, Seconds(1.0)));
@@ -38,22 +38,22 @@ impl Timeline {
     }
 
     /// The beginning of the period.
-    pub fn start(&self) -> GridTime {
+    pub(crate) fn start(&self) -> GridTime {
         self.start
     }
 
     /// The different instants, ascending, the end of the period last.
-    pub fn instants(&self) -> &[GridTime] {
+    pub(crate) fn instants(&self) -> &[GridTime] {
         &self.instants
     }
 
     /// Index of a sample's instant.
-    pub fn of(&self, sample: usize) -> usize {
+    pub(crate) fn of(&self, sample: usize) -> usize {
         self.of[sample]
     }
 
     /// For each sample the whole slow periods by which it is older than its instant.
-    pub fn delay_periods(&self) -> &[f64] {
+    pub(crate) fn delay_periods(&self) -> &[f64] {
         &self.delay_periods
     }
 }

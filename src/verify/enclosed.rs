@@ -47,15 +47,15 @@ pub struct EnclosedErrorSystem<'a> {
 /// Midpoints of the enclosed error system, for the search for a certificate: xi+ = a xi + b w, e = c xi + d
 /// w with w white.
 #[derive(Debug, Clone)]
-pub struct Midpoint {
+pub(crate) struct Midpoint {
     /// n x n.
-    pub a: Mat,
+    pub(crate) a: Mat,
     /// n x m.
-    pub b: Mat,
+    pub(crate) b: Mat,
     /// M x n.
-    pub c: Mat,
+    pub(crate) c: Mat,
     /// M x m.
-    pub d: Mat,
+    pub(crate) d: Mat,
 }
 
 impl<'a> EnclosedErrorSystem<'a> {
@@ -234,7 +234,7 @@ impl<'a> EnclosedErrorSystem<'a> {
 
     /// The error system in double precision; `None` if the Gram matrix of its inputs has no root, which
     /// does not happen.
-    pub fn midpoint(&self) -> Option<Midpoint> {
+    pub(crate) fn midpoint(&self) -> Option<Midpoint> {
         let root = positive::root(&self.equations.gram)?;
         let (n, m) = (self.equations.order(), self.equations.outputs);
         let system = ball::nearest(&self.equations.system);
@@ -263,7 +263,7 @@ impl<'a> EnclosedErrorSystem<'a> {
     ///
     /// # Errors
     /// [`VerifyError`] naming the first mismatch.
-    pub fn judge(
+    pub(crate) fn judge(
         &self,
         gamma: &Gamma,
         proof: &Proof,

@@ -31,6 +31,21 @@
 //! slow periods apart, within 4 eps (1 + D_1 / h + D_2 / h) fast periods: the rounding of the delays.
 //!
 //! Not proven: that the spec describes the hardware.
+//!
+//! ```
+//! use hybank::bank::Bank;
+//! use hybank::verify::{EnclosedErrorSystem, Precision, Recursion, verify};
+//! let mut bank = Bank::from_json(include_str!("../../filters/thesis-fir.json"), "thesis-fir.json")?;
+//! let proven = verify(&bank)?;
+//! assert!(proven.lower <= proven.attained && proven.attained <= proven.upper && proven.upper < 0.039933);
+//! // No causal bank has half of this gamma: 12 slow periods prove it.
+//! let found = EnclosedErrorSystem::new(&bank)?.causal_recursion(0.5 * proven.lower, 12, Precision::Short);
+//! assert!(matches!(found, Recursion::Refuted { .. }));
+//! // A file that states more than is true is refused.
+//! bank.gamma.upper = Some(0.99 * proven.attained);
+//! assert!(verify(&bank).is_err());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod ball;
 mod causal;
@@ -53,9 +68,10 @@ pub mod uncertainty;
 mod upper;
 
 pub use self::causal::{Precision, Recursion};
-pub use self::enclosed::{EnclosedErrorSystem, Midpoint};
+pub use self::enclosed::EnclosedErrorSystem;
+pub(crate) use self::enclosed::Midpoint;
 pub use self::error::VerifyError;
-pub use self::statements::Strictness;
+pub(crate) use self::statements::Strictness;
 
 use crate::bank::{Bank, Proof};
 

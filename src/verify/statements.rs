@@ -18,7 +18,7 @@ const WIDEST_AT_ZERO_NORM: f64 = 2e-6;
 
 /// Which stated numbers a comparison accepts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Strictness {
+pub(crate) enum Strictness {
     /// Only numbers that are proven.
     Proven,
     /// All numbers that the proof does not refute.

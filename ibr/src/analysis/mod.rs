@@ -29,6 +29,32 @@
 //! by the variogram of the photographs. The weights of the causes are calibrated on the inputs themselves:
 //! each view is left out in turn and rendered from the others, and its photograph is the truth. A single
 //! view cannot be left out; it takes the weights of typical photographs.
+//!
+//! ```
+//! use hybank_ibr::analysis::{Advice, Limits, Predictor, collect_evidence};
+//! use hybank_ibr::camera::Camera;
+//! use hybank_ibr::pipeline::RenderSettings;
+//! use hybank_ibr::propagate::RectifiedView;
+//! use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
+//! let (size, settings) = ((64, 32), RenderSettings::default());
+//! let shots = [0.0, 1.0].map(|position| {
+//!     let camera = Camera::metric(rig_camera(position, size), false).expect("a pinhole camera");
+//!     let (image, depth) = SyntheticScene::default().view(&camera, size);
+//!     (image, rig_disparity(&depth, size.0), position)
+//! });
+//! let views = shots.each_ref().map(|(image, map, camera)| RectifiedView { image, map, camera: *camera });
+//! // The view half-way, its error, and what to spend on next.
+//! let predictor = Predictor::new(&views, &settings)?;
+//! let view = predictor.at(&0.5, size, None)?;
+//! assert!((0.1..20.0).contains(&view.totals().estimate));
+//! let advice = Advice::on(&predictor, &0.5, size, &view)?;
+//! assert_eq!(advice.cause, view.dominant());
+//! // The samples of each pixel, and the sure bound for surfaces of known curvature.
+//! let limits = Limits { curvature: 30.0, intensity: 3.0, disparity: 0.25 };
+//! let found = collect_evidence(&views, 0.5, &settings, Some(&limits))?;
+//! assert!(found.evidence[0].reach >= found.evidence[0].held && found.sure[0] > 3.0);
+//! # Ok::<(), hybank_ibr::pipeline::RenderError>(())
+//! ```
 
 mod advice;
 mod calibrate;

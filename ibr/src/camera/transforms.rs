@@ -44,6 +44,17 @@ pub fn read_transforms(path: &Path) -> Result<CameraList, InputError> {
 
 /// The same from the text of the file; `path` appears in messages.
 ///
+/// ```
+/// use hybank_ibr::camera::transforms::parse_transforms;
+/// let text = r#"{"w": 640, "h": 480, "fl_x": 500.0, "frames": [{"file_path": "images/0001.png",
+///     "transform_matrix": [[1, 0, 0, 2], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}]}"#;
+/// let list = parse_transforms(text, "transforms.json".as_ref())?;
+/// let (frame, _) = list.find("0001")?;
+/// let listed = list.camera(frame, (640, 480))?;
+/// assert_eq!((listed.size, listed.camera.centre().x), ((640, 480), 2.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`InputError`].
 pub fn parse_transforms(text: &str, path: &Path) -> Result<CameraList, InputError> {

@@ -2,6 +2,16 @@
 //!
 //! Colour is written as Y'CbCr of ITU-R BT.601 with full chroma resolution (C444), 16 to 235 and 16 to 240;
 //! grey as Y' alone (Cmono).
+//!
+//! ```
+//! use hybank_ibr::image::{FrameRate, Image, y4m};
+//! let rate: FrameRate = "29.97".parse()?;
+//! let mut film = y4m::header((2, 1), 1, rate);
+//! assert!(film.starts_with(b"YUV4MPEG2 W2 H1 F2997:100 "));
+//! y4m::append_frame(&Image::filled(2, 1, 1, 255.0), &mut film);
+//! assert!(film.ends_with(b"FRAME\n\xEB\xEB"));
+//! # Ok::<(), String>(())
+//! ```
 
 use super::{FrameRate, Image};
 

@@ -41,6 +41,15 @@ const LIMITS: f64 = 52.0;
 const ERRORS: f64 = 16.0;
 
 /// The sizes on which the memory depends.
+///
+/// ```
+/// use hybank_ibr::image::Image;
+/// use hybank_ibr::pipeline::{RenderSettings, memory::Extent};
+/// let (image, settings) = (Image::filled(400, 300, 3, 0.0), RenderSettings::default());
+/// let of = |size| Extent::new(size, &[&image, &image], None).of_cameras(&settings);
+/// // Bytes; a larger virtual view takes more.
+/// assert!(of((400, 300)) > 4e6 && of((800, 600)) > 2.0 * of((400, 300)));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
     /// Width and height of the virtual view.

@@ -23,7 +23,7 @@ const REACH: f64 = 1.01;
 /// virtual camera v is monotone in x and in d, so its extremes over a tile lie at the four corners of the
 /// ranges of x and d: four projections for 64 pixels.
 #[derive(Debug, Clone)]
-pub struct Footprint {
+pub(crate) struct Footprint {
     maps: Vec<Relative>,
     frame: Frame,
     tiles: Vec<Tile>,
@@ -46,7 +46,7 @@ struct Tile {
 
 impl Footprint {
     /// Looks at the tiles of the `chosen` views, by number, in parallel over the rows.
-    pub fn of(views: &[CalibratedView<'_>], chosen: &[usize], camera: &Camera, frame: &Frame) -> Self {
+    pub(crate) fn of(views: &[CalibratedView<'_>], chosen: &[usize], camera: &Camera, frame: &Frame) -> Self {
         let maps: Vec<Relative> = views.iter().map(|v| v.camera.relative_to(camera)).collect();
         let rows: Vec<(usize, usize)> =
             chosen.iter().flat_map(|&i| (0..views[i].image.height()).map(move |y| (i, y))).collect();
@@ -66,19 +66,19 @@ impl Footprint {
     }
 
     /// Samples in the frame, at most.
-    pub fn most_samples(&self) -> usize {
+    pub(crate) fn most_samples(&self) -> usize {
         self.tiles.len() * TILE
     }
 
     /// Pixels outside the frame or without depth, if this many are samples.
-    pub fn dropped(&self, samples: usize) -> Dropped {
+    pub(crate) fn dropped(&self, samples: usize) -> Dropped {
         let (unknown, behind) = (self.unknown, self.behind);
         Dropped { unknown, behind, outside: self.pixels.saturating_sub(unknown + behind + samples) }
     }
 
     /// The samples between two rows of the frame, both included: view by view and row by row (eq. 2.2 and
     /// 2.3).
-    pub fn samples_between<const C: usize>(
+    pub(crate) fn samples_between<const C: usize>(
         &self,
         views: &[CalibratedView<'_>],
         top: f64,

@@ -4,8 +4,8 @@ mod calibrated;
 mod nearest;
 mod view;
 
-pub(crate) use calibrated::Projected;
-pub use calibrated::{Footprint, calibrated};
+pub use calibrated::calibrated;
+pub(crate) use calibrated::{Footprint, Projected};
 pub(crate) use nearest::Nearest;
 pub use view::{CalibratedView, RectifiedView, View, Viewpoint};
 

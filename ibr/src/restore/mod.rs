@@ -58,6 +58,28 @@ pub fn memory(sizes: &[(usize, usize)], is_noisy: bool) -> f64 {
 ///
 /// # Errors
 /// [`MemoryShortage`]; maps without noise take much less than others.
+///
+/// ```
+/// use hybank_ibr::camera::Camera;
+/// use hybank_ibr::depth::{DepthMap, Measure};
+/// use hybank_ibr::{propagate::RectifiedView, restore::restore};
+/// use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
+/// let size = (64, 32);
+/// let mut shots = [0.0, 1.0].map(|position| {
+///     let camera = Camera::metric(rig_camera(position, size), false).expect("a pinhole camera");
+///     let (image, depth) = SyntheticScene::default().view(&camera, size);
+///     (image, rig_disparity(&depth, size.0), position)
+/// });
+/// // A value that contradicts all those around it.
+/// let (exact, wrong) = (shots[0].1.data()[1000], 40.0);
+/// let mut disparities = shots[0].1.data().to_vec();
+/// disparities[1000] = wrong;
+/// shots[0].1 = DepthMap::new(size, disparities, 1.0, Measure::Disparity)?;
+/// let views = shots.each_ref().map(|(image, map, camera)| RectifiedView { image, map, camera: *camera });
+/// let restored = &restore(&views)?[0];
+/// assert!(restored.outliers > 0.0 && (restored.map.data()[1000] - exact).abs() < 1.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, MemoryShortage> {
     let sizes: Vec<(usize, usize)> = views.iter().map(|view| view.map.size()).collect();
     check_memory(memory(&sizes, false))?;

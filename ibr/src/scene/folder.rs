@@ -49,6 +49,22 @@ impl Described {
 /// The scene of a folder, a `transforms.json` or the left and the right photograph of a rectified rig, for a
 /// file in the folder `beside`. Its virtual view is half-way between two views.
 ///
+/// ```
+/// use hybank_ibr::image::{Image, save};
+/// use hybank_ibr::scene::describe;
+/// let folder = std::env::temp_dir().join(format!("hybank-scene-{}", std::process::id()));
+/// std::fs::create_dir_all(&folder)?;
+/// let paths = ["left.png", "right.png"].map(|name| folder.join(name));
+/// for path in &paths {
+///     save(&Image::filled(8, 4, 1, 100.0), path)?;
+/// }
+/// let scene = describe(&paths, &folder)?;
+/// assert_eq!((scene.spec.view.len(), scene.spec.targets[0].position), (2, Some(0.5)));
+/// assert!(scene.text()?.contains("image = \"left.png\""));
+/// # std::fs::remove_dir_all(folder)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`InputError`] of a file, or that there is no scene.
 pub fn describe(paths: &[PathBuf], beside: &Path) -> Found<Described> {

@@ -78,6 +78,17 @@ pub trait SplitOutput: Output + Send {
 }
 
 /// Frames of zeros.
+///
+/// ```
+/// use hybank_runtime::{Options, Plan, Stream, Zeros};
+/// // The sample of the frame before.
+/// let mut stream = Stream::new(&Plan::from_taps(&[vec![0.0, 1.0]], 1, 0, Options::default())?);
+/// let mut output = [1.0f32; 2];
+/// stream.process(&[0.5f32], &mut output[..1])?;
+/// stream.run(&Zeros { channels: 1, frames: 2 }, &mut output[..])?;
+/// assert_eq!(output, [0.5, 0.0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Zeros {
     /// N.

@@ -16,6 +16,12 @@ use std::str::FromStr;
 /// How FIR filters are computed. All give the same sums up to rounding.
 ///
 /// The names are those of [`FromStr`] and [`Display`](fmt::Display): `auto`, `direct` and `overlap-save`.
+///
+/// ```
+/// use hybank_runtime::{Algorithm, ParseAlgorithmError};
+/// assert_eq!("overlap-save".parse(), Ok(Algorithm::OverlapSave { transform: None }));
+/// assert_eq!("fft".parse::<Algorithm>(), Err(ParseAlgorithmError("fft".into())));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Algorithm {

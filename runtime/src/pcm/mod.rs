@@ -11,6 +11,15 @@ use std::fmt;
 use std::str::FromStr;
 
 /// How one sample is stored.
+///
+/// ```
+/// use hybank_runtime::{ParsePcmFormatError, PcmFormat};
+/// assert_eq!("s24le".parse(), Ok(PcmFormat::S24Le));
+/// assert_eq!("s24".parse::<PcmFormat>(), Err(ParsePcmFormatError("s24".into())));
+/// let mut bytes = [0; 3];
+/// assert!(!PcmFormat::S24Le.encode(-0.5, &mut bytes));
+/// assert_eq!((bytes, PcmFormat::S24Le.decode(&bytes)), ([0, 0, 0xC0], -0.5));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum PcmFormat {

@@ -14,6 +14,22 @@ const MEASUREMENT: Bound =
     Bound { bytes: 64 << 20, kind: "a measured response", remedy: "give the file that was meant" };
 
 /// The measurements that a spec names, each read and fitted once.
+///
+/// ```
+/// use hybank::analog::fit::Measurements;
+/// use hybank::spec::{MeasuredFilter, Measurement};
+/// use hybank::units::Seconds;
+/// let folder = std::env::temp_dir().join(format!("hybank-fit-{}", std::process::id()));
+/// std::fs::create_dir_all(&folder)?;
+/// std::fs::write(folder.join("rc.csv"), "f (kHz),dB,deg\n0,0,0\n1,-3.0103,-45\n2,-6.9897,-63.4349\n")?;
+/// let measurements = Measurements::in_folder(folder.clone());
+/// let (path, measurement) = ("rc.csv".into(), Measurement::Response);
+/// let model = measurements.model(&MeasuredFilter { path, measurement, order: 1, deembed: Seconds(0.0) })?;
+/// assert!(model.error.0 < 1e-4);
+/// assert_eq!(measurements.files(), [folder.join("rc.csv")]);
+/// # std::fs::remove_dir_all(folder)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Measurements {
     folder: PathBuf,

@@ -45,6 +45,14 @@ pub struct Certified {
 
 /// Proves the bank's norm from both sides; see [`crate::verify`] for how.
 ///
+/// ```
+/// use hybank::{bank::Bank, design::certify};
+/// let bank = Bank::from_json(include_str!("../../../filters/thesis-fir.json"), "thesis-fir.json")?;
+/// let proven = certify(&bank)?;
+/// assert!(proven.gamma < 0.039933 && proven.gamma - proven.attained < 1e-7 * proven.gamma);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found.
 pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {

@@ -19,13 +19,13 @@ const BESIDE: usize = 2;
 
 /// What integer taps may lose and take.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Allowance {
+pub(in crate::design) struct Allowance {
     /// The most that the whole error may grow, in decibels.
-    pub loss_db: f64,
+    pub(in crate::design) loss_db: f64,
     /// The most bits.
-    pub most: WordLengths,
+    pub(in crate::design) most: WordLengths,
     /// Whether there are to be few signed digits.
-    pub by_digits: bool,
+    pub(in crate::design) by_digits: bool,
 }
 
 /// Integers near the filters of `problem`, whose norm is `real_gamma`, that lose no more SNR than allowed:
@@ -34,7 +34,7 @@ pub struct Allowance {
 ///
 /// # Errors
 /// [`DesignError::WordsLoseMore`] if the most bits lose more, else as [`super::quantise`].
-pub fn quantise_within(
+pub(in crate::design) fn quantise_within(
     problem: QuantisationProblem<'_>,
     real_gamma: f64,
     allowance: &Allowance,

@@ -25,8 +25,8 @@ mod problem;
 mod quantiser;
 mod search;
 
-pub use choice::{Allowance, quantise_within};
-pub use problem::QuantisationProblem;
+pub(super) use choice::{Allowance, quantise_within};
+pub(super) use problem::QuantisationProblem;
 
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
@@ -103,7 +103,7 @@ fn decades(a: f64, b: f64) -> f64 {
 /// [`DesignError::Spec`] if `bits` are out of their range, [`DesignError::AllZero`] if all taps are zero
 /// at the given scale, and [`DesignError::TinyTaps`] if they are no better there than zero taps. Without a
 /// given scale all taps may be zero, too: see [`FixedPoint::is_zero`].
-pub fn quantise(
+pub(super) fn quantise(
     problem: QuantisationProblem<'_>,
     real_gamma: f64,
     bits: &WordLengths,

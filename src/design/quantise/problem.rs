@@ -20,17 +20,17 @@ use crate::spec::WordLengths;
 
 /// Taps to be replaced by integers times a power of two.
 #[derive(Debug, Clone, Copy)]
-pub struct QuantisationProblem<'a> {
+pub(in crate::design) struct QuantisationProblem<'a> {
     /// The plant whose error counts.
-    pub plant: &'a LiftedPlant,
+    pub(in crate::design) plant: &'a LiftedPlant,
     /// One filter per channel, all of the same length.
-    pub taps: &'a [Vec<f64>],
+    pub(in crate::design) taps: &'a [Vec<f64>],
     /// Noise power of each channel.
-    pub noise: &'a [f64],
+    pub(in crate::design) noise: &'a [f64],
     /// Relative excess of gamma granted to the mean square.
-    pub gamma_margin: f64,
+    pub(in crate::design) gamma_margin: f64,
     /// Ends the search with the best integers so far.
-    pub stop: &'a Stop,
+    pub(in crate::design) stop: &'a Stop,
 }
 
 /// Integer taps with their error.

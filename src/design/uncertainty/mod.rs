@@ -3,6 +3,22 @@
 //!
 //! The two ends of the worst case are proven by [`crate::verify::uncertainty`]. Here they are searched, in
 //! double precision.
+//!
+//! ```
+//! use hybank::design::uncertainty::{BoxWidths, ErrorStudy, Questions, Sweep};
+//! use hybank::{bank::Bank, quantity};
+//! let bank = Bank::from_json(include_str!("../../../filters/thesis-fir.json"), "thesis-fir.json")?;
+//! // The second delay may be off by a hundredth of a fast period.
+//! let widths = BoxWidths { delay_box: vec![quantity::time("0.01 samples")?], ..BoxWidths::default() };
+//! let questions = Questions { errors: widths.error_box(&bank)?, loss: Some(0.5), ..Questions::default() };
+//! let worst = ErrorStudy::new(&bank, questions)?.worst_case.ok_or("no box")?;
+//! assert!(worst.case.lower > 0.0401 && worst.case.upper < 1.02 * worst.case.lower);
+//! // A larger box, too, costs less than half of gamma.
+//! assert!(worst.affordable.is_some_and(|part| part.factor > 1.0));
+//! let curves = Sweep::new(&bank, &worst.errors, &worst.case.point)?.curves;
+//! assert_eq!(curves[0].label, "channel 2");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub(super) mod box_plant;
 mod derivatives;

@@ -64,7 +64,7 @@ pub fn stream_header(format: PcmFormat, channels: u16, rate: u32) -> io::Result<
 
 /// A WAV file being written.
 #[derive(Debug)]
-pub struct WavFile<W> {
+pub(in crate::io) struct WavFile<W> {
     inner: W,
     frame_bytes: u16,
     header_bytes: u64,
@@ -76,7 +76,7 @@ impl<W: Write + Seek> WavFile<W> {
     ///
     /// # Errors
     /// `InvalidInput` if WAV has no such sample format, or no frames as long; or the writer's own.
-    pub fn new(mut inner: W, format: PcmFormat, channels: u16, rate: u32) -> io::Result<Self> {
+    pub(in crate::io) fn new(mut inner: W, format: PcmFormat, channels: u16, rate: u32) -> io::Result<Self> {
         let (fmt, frame_bytes) = fmt_chunk(format, channels, rate)?;
         let mut header = b"RIFF\0\0\0\0WAVEJUNK".to_vec();
         header.extend(DS64_BYTES.to_le_bytes());
@@ -88,7 +88,7 @@ impl<W: Write + Seek> WavFile<W> {
     }
 
     /// What it is written to.
-    pub fn inner_mut(&mut self) -> &mut W {
+    pub(in crate::io) fn inner_mut(&mut self) -> &mut W {
         &mut self.inner
     }
 
@@ -96,7 +96,7 @@ impl<W: Write + Seek> WavFile<W> {
     ///
     /// # Errors
     /// The writer's.
-    pub fn write_bytes(&mut self, bytes: &[u8]) -> io::Result<()> {
+    pub(in crate::io) fn write_bytes(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.inner.write_all(bytes)?;
         self.data_bytes += bytes.len() as u64;
         Ok(())
@@ -106,7 +106,7 @@ impl<W: Write + Seek> WavFile<W> {
     ///
     /// # Errors
     /// The writer's.
-    pub fn finish(mut self, chunks: &[WavChunk]) -> io::Result<W> {
+    pub(in crate::io) fn finish(mut self, chunks: &[WavChunk]) -> io::Result<W> {
         let mut after = vec![0; (self.data_bytes % 2) as usize];
         let pad = after.len();
         for WavChunk { id, bytes } in chunks {

@@ -15,6 +15,23 @@
 //! Each equation has (ORDER + 1)^2 unknowns (and four more for h if ORDER is 2). A direct solution would
 //! fill in, so conjugate gradients solve all channels together, from the mean of the samples around each
 //! coefficient; a multigrid preconditioner takes over where holes are large.
+//!
+//! ```
+//! use hybank::sampling::fit2::{Direction, Fit2, Fit2Sample, Iteration, Springs};
+//! // Two samples of an image of 4 x 3 pixels, of two surfaces: no springs from column 1 to column 2.
+//! let mut fit = Fit2::<2, 1>::new(4, 3);
+//! fit.rows().add(&Fit2Sample { x: 0.0, y: 1.0, values: [10.0], weight: 1.0 });
+//! fit.rows().add(&Fit2Sample { x: 3.0, y: 1.0, values: [20.0], weight: 1.0 });
+//! let springs = |direction, row| match direction {
+//!     Direction::Across => Springs { edge: vec![0.1, 0.0, 0.1, 0.0], ..Springs::none(4) },
+//!     Direction::Down if row < 2 => Springs { edge: vec![0.1; 4], ..Springs::none(4) },
+//!     Direction::Down => Springs::none(4),
+//! };
+//! let iteration = Iteration { tolerance: 1e-6, steps: 100 };
+//! let (pixels, convergence) = fit.connect(springs, |_| false).solve(&iteration, &|_| ());
+//! assert!(convergence.reached);
+//! assert!(pixels.iter().zip([10.0, 10.0, 20.0, 20.0].iter().cycle()).all(|(a, b)| (a - b).abs() < 1e-3));
+//! ```
 
 mod conjugate;
 mod multigrid;

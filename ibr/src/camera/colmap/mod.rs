@@ -5,7 +5,7 @@
 mod binary;
 mod points;
 
-pub use points::{ScenePoint, read_points};
+pub(crate) use points::{ScenePoint, read_points};
 
 use super::list::{CameraList, Frame, Inner};
 use crate::files::{self, CHECK_THE_PATH, InputError, Location};

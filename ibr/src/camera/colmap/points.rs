@@ -13,11 +13,11 @@ use std::path::Path;
 
 /// A point of the scene.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ScenePoint {
+pub(crate) struct ScenePoint {
     /// Where it is.
-    pub position: Vector3<f64>,
+    pub(crate) position: Vector3<f64>,
     /// The images that show it, by the numbers that the model gives them.
-    pub images: Vec<u64>,
+    pub(crate) images: Vec<u64>,
 }
 
 /// What to do if the file cannot be opened.
@@ -30,7 +30,7 @@ const PARSED: f64 = 4.0;
 ///
 /// # Errors
 /// [`InputError`] with the line or the record.
-pub fn read_points(folder: &Path) -> Result<Vec<ScenePoint>, InputError> {
+pub(crate) fn read_points(folder: &Path) -> Result<Vec<ScenePoint>, InputError> {
     if !is_model(folder) {
         return Err(no_model(folder));
     }

@@ -114,7 +114,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     ///
     /// # Errors
     /// [`InterpolationError::NotFinite`].
-    pub fn add(&mut self, samples: &[Sample<C>]) -> Result<(), InterpolationError> {
+    pub(crate) fn add(&mut self, samples: &[Sample<C>]) -> Result<(), InterpolationError> {
         check_samples(samples)?;
         if !self.turned {
             let added = self.whole().add(samples);
@@ -135,7 +135,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     ///
     /// # Errors
     /// As [`PlaneProblem::add`].
-    pub fn add_bands(
+    pub(crate) fn add_bands(
         &mut self,
         bands: &[Range<usize>],
         make: impl Fn(&Range<usize>) -> Vec<Sample<C>> + Sync,

@@ -108,7 +108,7 @@ const GUESSED: f32 = 1e4;
 
 /// Collects visible samples, all at once or band by band, and then fits the image.
 #[derive(Debug, Clone)]
-pub struct PlaneProblem<const ORDER: usize, const C: usize> {
+pub(crate) struct PlaneProblem<const ORDER: usize, const C: usize> {
     width: usize,
     height: usize,
     /// Whether rows and columns are exchanged in all fields: the equations of a narrow image would be mostly
@@ -129,7 +129,10 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     ///
     /// # Errors
     /// [`InterpolationError::Setting`].
-    pub fn new((width, height): (usize, usize), settings: &Settings) -> Result<Self, InterpolationError> {
+    pub(crate) fn new(
+        (width, height): (usize, usize),
+        settings: &Settings,
+    ) -> Result<Self, InterpolationError> {
         settings.check()?;
         let turned = Self::is_turned((width, height));
         let (width, height) = if turned { (height, width) } else { (width, height) };
@@ -151,7 +154,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     }
 
     /// Samples that have been added.
-    pub fn samples(&self) -> usize {
+    pub(crate) fn samples(&self) -> usize {
         self.added.count
     }
 
@@ -162,7 +165,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     }
 
     /// Whether a sample lies within half a gap of each pixel.
-    pub fn seen(&self) -> impl Iterator<Item = bool> + '_ {
+    pub(crate) fn seen(&self) -> impl Iterator<Item = bool> + '_ {
         let upright = |p: usize| p % self.height * self.width + p / self.height;
         let index = move |p: usize| if self.turned { upright(p) } else { p };
         (0..self.depth.len()).map(move |p| !self.depth[index(p)].is_nan())
@@ -173,7 +176,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     ///
     /// # Errors
     /// [`InterpolationError::NoSamples`] when no sample was added.
-    pub fn solve(
+    pub(crate) fn solve(
         mut self,
         region: Option<&[bool]>,
         watch: Watch<'_>,
@@ -308,6 +311,24 @@ fn by_columns<T: Copy>(pixels: Vec<T>, width: usize, channels: usize) -> Vec<T> 
 }
 
 /// The complete third stage for samples at any position: a value for every pixel, and the mask.
+///
+/// ```
+/// use hybank_ibr::depth::{DepthMap, Measure};
+/// use hybank_ibr::interpolate::{Settings, plane};
+/// use hybank_ibr::propagate::{Frame, RectifiedView, rectified};
+/// use hybank_ibr::{image::Image, occlusion::remove};
+/// let (size, settings) = ((32, 8), Settings::default());
+/// let image = Image::filled(32, 8, 1, 100.0);
+/// let map = DepthMap::new(size, vec![4.0; 256], 1.0, Measure::Disparity)?;
+/// let views = [0.0, 1.0].map(|camera| RectifiedView { image: &image, map: &map, camera });
+/// let (mut samples, _) = rectified::<1>(&views, 0.5, &Frame::whole(32, 8, 0.5, 0.0));
+/// remove(&mut samples, &settings.depth_test);
+/// let fit = plane::interpolate(&samples, size, &settings)?;
+/// assert!(fit.convergence.reached && fit.values.iter().all(|v| (v - 100.0).abs() < 0.1));
+/// // Both views show this pixel.
+/// assert_eq!(fit.counts[100], 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// [`InterpolationError`]: settings, samples that are not finite, and no sample at all.

@@ -8,6 +8,19 @@ pub type DelayedInput = (usize, usize);
 
 /// A state-space filter with its delay lines taken out:
 /// y = sum taps u + sum c x, x+ = sum a x + sum b u, where u are inputs of this frame and of earlier ones.
+///
+/// ```
+/// use hybank_runtime::{DelayLines, StateSpace};
+/// // y[k] = u[k] + u[k - 1] / 4 + s[k] with s[k + 1] = s[k] / 2 + u[k]: the second state is u[k - 1].
+/// let lines = DelayLines::new(&StateSpace {
+///     a: vec![vec![0.5, 0.0], vec![0.0, 0.0]],
+///     b: vec![vec![1.0], vec![1.0]],
+///     c: vec![vec![1.0, 0.25]],
+///     d: vec![vec![1.0]],
+/// });
+/// assert_eq!((lines.a, lines.c), (vec![vec![0.5]], vec![vec![1.0]]));
+/// assert_eq!(lines.taps.into_iter().collect::<Vec<_>>(), [((0, 0), vec![1.0]), ((0, 1), vec![0.25])]);
+/// ```
 #[derive(Debug)]
 pub struct DelayLines {
     /// For each past input that the output takes, its M factors.
