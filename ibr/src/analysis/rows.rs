@@ -27,6 +27,9 @@ impl Predicted for f64 {
         study: &Study<'_>,
     ) -> Result<Examined, RenderError> {
         let Study { settings, known, spacing, limits, .. } = *study;
+        if std::env::var_os("HB_C").is_some() && limits.is_none() {
+            return super::general::examine(self, views, views[0].image.size(), study);
+        }
         let found = collect_evidence(views, *self, settings, limits)?;
         let jitter = depth_jitter(views, self, settings, &found.rendering.image, known.noise)?;
         let regressors = regressors(&found, &jitter, &known.variogram, spacing);

@@ -5,7 +5,7 @@ use super::Exposure;
 use super::depth_errors::{self, FEWEST_POINTS, Lookups};
 use crate::depth::{DepthMap, JUMP, Measure};
 use crate::image::Texture;
-use crate::propagate::{Nearest, View, Viewpoint};
+use crate::propagate::{View, Viewpoint, nearest};
 use rayon::prelude::*;
 
 /// Pixels of each view that are compared, about.
@@ -70,9 +70,8 @@ impl Agreement {
         let mut agreement = Self { gains: vec![[1.0; 3]; views.len()], textures, ..Self::default() };
         // Those of good pairs, and of poor ones.
         let mut errors = [vec![Vec::new(); views.len()], vec![Vec::new(); views.len()]];
-        let nearest = Nearest::new(views);
         for j in 1..views.len() {
-            let Some(i) = nearest.before(j) else { continue };
+            let Some(i) = nearest(views, j, 0..j) else { continue };
             let found = Comparison::new(&views[i], &views[j]).verdict([i, j]);
             let Some(pair) = found else { continue };
             // Colours at points that do not correspond say nothing.
@@ -96,10 +95,19 @@ impl Agreement {
 
     /// Variance of the noise of a view, with its exposure; 0 if its photograph does not show it.
     pub(super) fn noise(&self, view: usize) -> f64 {
-        let texture = self.textures.get(view).copied().flatten();
-        // That of green, as the noise.
+        self.square(view, |texture| texture.noise)
+    }
+
+    /// Mean square slope of a view, with its exposure; 0 if its photograph does not show it.
+    pub(super) fn square_slope(&self, view: usize) -> f64 {
+        self.square(view, |texture| texture.slope)
+    }
+
+    fn square(&self, view: usize, of: impl Fn(&Texture) -> f64) -> f64 {
+        let texture = self.textures.get(view).and_then(Option::as_ref);
+        // That of green, as the texture.
         let gain = self.gains.get(view).map_or(1.0, |gain| gain[1]);
-        texture.map_or(0.0, |texture| (texture.noise * gain).powi(2))
+        texture.map_or(0.0, |texture| (of(texture) * gain).powi(2))
     }
 
     /// Standard deviation of the errors of a map; 0 if it is not known.
@@ -237,7 +245,7 @@ fn shrunk(found: f64, error: f64) -> f64 {
 
 /// Up to the share of the nearer one beyond which two samples lie on different surfaces, and for disparities
 /// up to one pixel.
-fn same_depth(a: f32, b: f32, map: &DepthMap) -> bool {
+pub(crate) fn same_depth(a: f32, b: f32, map: &DepthMap) -> bool {
     let tolerance = match map.measure() {
         Measure::Disparity => (JUMP * (a.min(b) + map.offset() as f32)).max(1.0),
         Measure::Depth => JUMP * a.min(b),

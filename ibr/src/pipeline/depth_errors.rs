@@ -128,57 +128,25 @@ pub(super) fn of_each([mut first, mut second]: [Lookups; 2]) -> Option<[f64; 2]>
     (both >= LEAST_AVERAGED).then(|| [(d1 - k1 * d2) / both, (d2 - k2 * d1) / both].map(|s| s.max(0.0)))
 }
 
-/// By how much errors of depth displace the samples of a view, as positions in the view itself: the mean of
-/// d d' over the pixels, d the displacement in pixels per pixel of disparity or per share of the depth.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct DisparityGain {
-    xx: f64,
-    xy: f64,
-    yy: f64,
-}
-
-impl DisparityGain {
-    /// Of the errors of a view's map, seen from a camera.
-    pub(crate) fn between<P: Viewpoint>(view: &View<'_, P>, camera: &P) -> Self {
-        match view.map.measure() {
-            Measure::Disparity => Self::along_rows(view.camera.distance(camera)),
-            Measure::Depth => Self::of(view.map, view.camera.map_to(camera)),
-        }
-    }
-
-    /// Of errors of disparity, at this distance along the rows.
-    pub(super) fn along_rows(distance: f64) -> Self {
-        Self { xx: distance * distance, ..Self::default() }
-    }
-
-    /// From the map of pixels and their depths to the other view. The pixels that move farthest, a tenth,
-    /// are left out: points close to a camera move without limit.
-    fn of(map: &DepthMap, to: impl Fn(f64, f64, f64) -> (f64, f64, f64)) -> Self {
-        const STEPS: usize = 16;
-        let (width, height) = map.size();
-        let columns = (0..width).step_by(width.div_ceil(STEPS).max(1));
-        let rows = (0..height).step_by(height.div_ceil(STEPS).max(1));
-        let pixels = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
-        let mut all: Vec<[f64; 2]> = pixels
-            .filter_map(|(x, y)| displacement([x as f64, y as f64, f64::from(map.row(y)[x])], map, &to))
-            .collect();
-        all.sort_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1])));
-        all.truncate(all.len() - all.len() / 10);
-        let mean = |product: &dyn Fn(&[f64; 2]) -> f64| {
-            all.iter().map(product).sum::<f64>() / all.len().max(1) as f64
-        };
-        Self { xx: mean(&|d| d[0] * d[0]), xy: mean(&|d| d[0] * d[1]), yy: mean(&|d| d[1] * d[1]) }
-    }
-
-    /// Mean square change of the value for an error of one in the depth, from the products x x, x y and y y
-    /// of the slopes of the view.
-    pub(crate) fn product(&self, [xx, xy, yy]: [f64; 3]) -> f64 {
-        self.xx * xx + 2.0 * self.xy * xy + self.yy * yy
-    }
+/// Mean square displacement of the samples of a view by an error of one in its map, a pixel of disparity or
+/// the whole depth, as positions in the view itself. The pixels that move farthest, a tenth, are left out:
+/// points close to a camera move without limit.
+pub(crate) fn displacement<P: Viewpoint>(view: &View<'_, P>, camera: &P) -> f64 {
+    const STEPS: usize = 16;
+    let (map, to) = (view.map, view.camera.map_to(camera));
+    let (width, height) = map.size();
+    let columns = (0..width).step_by(width.div_ceil(STEPS).max(1));
+    let rows = (0..height).step_by(height.div_ceil(STEPS).max(1));
+    let pixels = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+    let moved = |(x, y): (usize, usize)| displaced([x as f64, y as f64, f64::from(map.row(y)[x])], map, &to);
+    let mut squares: Vec<f64> = pixels.filter_map(moved).map(|[u, v]| u * u + v * v).collect();
+    squares.sort_by(f64::total_cmp);
+    squares.truncate(squares.len() - squares.len() / 10);
+    squares.iter().sum::<f64>() / squares.len().max(1) as f64
 }
 
 /// The displacement of one pixel within its own view that has the effect of a change of its depth.
-fn displacement(
+fn displaced(
     [x, y, depth]: [f64; 3],
     map: &DepthMap,
     to: impl Fn(f64, f64, f64) -> (f64, f64, f64),
@@ -256,23 +224,17 @@ mod tests {
     /// error of a depth by its disparity, in the pixels of a view of half the size and turned by a right
     /// angle too.
     #[test]
-    fn disparity_gains_are_displacements() {
-        let shots = shots();
-        let disparity = rig_disparity(&shots[0].1, SIZE.0);
-        let found = DisparityGain::of(&disparity, |x, y, d| (x - 0.4 * d, y, d));
-        assert!((found.xx - 0.16).abs() < 1e-9 && found.yy < 1e-9 && found.xy.abs() < 1e-9, "{found:?}");
-        assert!((found.xx - DisparityGain::along_rows(0.4).xx).abs() < 1e-9);
-        let map = shots[0].0.relative_to(&shots[1].0);
-        let middle = f64::from(disparity.middle().unwrap()).powi(2);
-        let found = DisparityGain::of(&shots[0].1, |x, y, d| map.map(x, y, d));
-        assert!((0.8..1.6).contains(&(found.xx / middle)) && found.yy < 1e-6 * middle, "{found:?} {middle}");
-        let turned = |x: f64, y: f64, d: f64| {
-            let (u, v, d) = map.map(x, y, d);
-            (-0.5 * v, 0.5 * u, d)
-        };
-        let again = DisparityGain::of(&shots[0].1, turned);
-        assert!((again.xx / found.xx - 1.0).abs() < 1e-6 && again.yy < 1e-6 * middle, "{again:?}");
-        assert!((found.product([9.0, 3.0, 1.0]) / found.xx / 9.0 - 1.0).abs() < 1e-3);
+    fn displacements_are_those_in_the_view_itself() {
+        let [(first, depth), (second, _)] = shots();
+        let (image, disparity) = (Image::filled(SIZE.0, SIZE.1, 1, 0.0), rig_disparity(&depth, SIZE.0));
+        let found = displacement(&View { image: &image, map: &disparity, camera: 0.0 }, &0.4);
+        assert!((found - 0.16).abs() < 1e-9, "{found}");
+        let view = View { image: &image, map: &depth, camera: first };
+        let (found, middle) = (displacement(&view, &second), f64::from(disparity.middle().unwrap()).powi(2));
+        assert!((0.8..1.6).contains(&(found / middle)), "{found} {middle}");
+        let turn = Matrix3::new(0.0, -0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0);
+        let again = displacement(&view, &Camera::projective(turn * second.matrix()).unwrap());
+        assert!((again / found - 1.0).abs() < 1e-6, "{again} {found}");
     }
 
     #[test]

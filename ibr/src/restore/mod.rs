@@ -19,8 +19,8 @@ pub(crate) use surface::from_scattered;
 
 use crate::depth::DepthMap;
 use crate::interpolate::plane::surface_memory;
-use crate::pipeline::{APERTURE, Agreement, DisparityGain, NEGLIGIBLE};
-use crate::propagate::{Nearest, View, Viewpoint};
+use crate::pipeline::{Agreement, displacement};
+use crate::propagate::{View, Viewpoint, nearest};
 use hybank::memory::{MemoryShortage, check_memory};
 use outliers::Parallax;
 
@@ -38,6 +38,10 @@ pub struct Restored {
 
 /// Bytes of all that is not in proportion to the pixels, about: points that are compared.
 const BASE: f64 = 5e5;
+
+/// Mean square displacement in pixels from which on errors are smoothed: a fiftieth of the variance of a
+/// position within a pixel.
+const NOTICEABLE: f64 = 0.02 / 12.0;
 
 /// Bytes per pixel of all views: parallaxes and restored maps.
 const HELD: f64 = 8.0;
@@ -65,7 +69,7 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, Mem
     let error = |view: usize| agreement.depth_error(view);
     let planes: Vec<Parallax> =
         views.iter().enumerate().map(|(i, v)| Parallax::of(v.map, error(i))).collect();
-    let (nearest, voters) = (Nearest::new(views), outliers::voters(&agreement.groups()));
+    let voters = outliers::voters(&agreement.groups());
     let one = |i: usize| {
         let view = &views[i];
         let rejected = outliers::rejected(views, &planes, &agreement.gains, &voters[i], i);
@@ -76,7 +80,7 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, Mem
             plane.replace(view.image, &rejected);
             guessed = rejected;
         }
-        if is_noticeable(views, i, nearest.other(i), error(i)) {
+        if is_noticeable(views, i, error(i)) {
             check_memory(surface_memory(view.map.width(), view.map.height()))?;
             plane.smooth(view.image);
         }
@@ -90,11 +94,13 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, Mem
     (0..views.len()).map(one).collect()
 }
 
-/// Whether errors of a map displace its samples by more than the fit notices, in the nearest other view.
-fn is_noticeable<P: Viewpoint>(views: &[View<'_, P>], view: usize, other: Option<usize>, error: f64) -> bool {
+/// Whether errors of a map displace its samples by more than the fit notices, in the nearest view from
+/// another place.
+fn is_noticeable<P: Viewpoint>(views: &[View<'_, P>], view: usize, error: f64) -> bool {
+    let is_elsewhere = |other: &usize| views[*other].camera.distance(&views[view].camera) > 0.0;
+    let other = nearest(views, view, (0..views.len()).filter(is_elsewhere));
     let Some(other) = other.filter(|_| error > 0.0) else { return false };
-    let gain = DisparityGain::between(&views[view], &views[other].camera);
-    gain.product([1.0, 0.0, 1.0]) * error * error > NEGLIGIBLE * APERTURE
+    displacement(&views[view], &views[other].camera) * error * error > NOTICEABLE
 }
 
 #[cfg(test)]
