@@ -3,8 +3,8 @@
 use hybank_linalg::{Mat, Svd, solve_positive, svd};
 use nalgebra::{Matrix3, SMatrix, SVector};
 
-/// The thin decomposition of rows, padded with zero rows up to `least`; `None` when an entry is not finite or
-/// the iteration does not converge.
+/// The thin decomposition of rows, padded with zero rows up to `least`; `None` when an entry is not finite
+/// or the iteration does not converge.
 fn decomposed<const N: usize>(rows: &[[f64; N]], least: usize) -> Option<Svd> {
     let entry = |i: usize, j: usize| rows.get(i).map_or(0.0, |row| row[j]);
     svd(&Mat::from_fn(rows.len().max(least), N, entry)).ok()

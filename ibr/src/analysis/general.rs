@@ -3,17 +3,14 @@
 
 use super::estimate::{Examined, Predicted, Study};
 use super::jitter::depth_jitter;
-use super::lookup::local_limits;
+use super::lookup::{TAIL, local_limits};
 use super::regressors::{hole_distances, slopes};
 use crate::camera::Camera;
-use crate::depth::{DepthMap, Measure};
+use crate::depth::DepthMap;
 use crate::image::Image;
 use crate::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights, calibrated as pipeline};
-use crate::propagate::{CalibratedView, View, Viewpoint, nearest};
+use crate::propagate::CalibratedView;
 use nalgebra::{Matrix3x4, Vector3};
-
-/// Largest share of its depth by which a noisy depth is wrong, in standard deviations.
-const TAIL: f64 = 3.0;
 
 impl Predicted for Camera {
     fn render(
@@ -31,7 +28,31 @@ impl Predicted for Camera {
         size: (usize, usize),
         study: &Study<'_>,
     ) -> Result<Examined, RenderError> {
-        examine(self, views, size, study)
+        let Study { settings, known, spacing, bounds, .. } = *study;
+        let rendering = self.render(views, size, settings)?;
+        let jitter = depth_jitter(views, self, settings, &rendering.image, known.noise)?;
+        let view_weights = ViewWeights::of(views, self).with_noise(&rendering.agreement);
+        let (shares, gain) = shares(views, self, &view_weights);
+        let gain = gain / (spacing * spacing);
+        let image = &rendering.image;
+        let (slopes, bends) = (slopes(image), bends(image));
+        let edges = edges(image, &rendering.depth, settings);
+        let distances = hole_distances(&rendering.mask, size.0);
+        let of_pixel = |p: usize| {
+            if distances[p] > 0 {
+                return [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, known.variogram.at(distances[p])];
+            }
+            // At most as many views share in a pixel as samples lie on it.
+            let shares = f64::max(shares, 1.0 / f64::from(rendering.counts[p].max(1)));
+            let displacement = ((shares + gain) / 2.0).sqrt();
+            let slope = f64::from(slopes[p]) * displacement;
+            let (bend, noise) = (f64::from(bends[p]), (1.0 + shares).sqrt());
+            [bend, noise, slope, f64::from(jitter[p]), f64::from(edges[p]), 0.0, 0.0]
+        };
+        let regressors = (0..size.0 * size.1).map(of_pixel).collect();
+        let limits = || local_limits(views, self, &rendering, TAIL * known.noise);
+        let local_limit = if bounds { limits() } else { Vec::new() };
+        Ok(Examined { rendering, regressors, sure_bound: Vec::new(), local_limit })
     }
 
     fn check_memory(
@@ -42,17 +63,6 @@ impl Predicted for Camera {
     ) -> Result<(), RenderError> {
         let extent = pipeline::extent(views, self, size, settings)?;
         extent.check(extent.of_camera_prediction(settings))
-    }
-
-    /// Mean distance between a view and the one nearest to it.
-    fn spacing(&self, views: &[CalibratedView<'_>]) -> f64 {
-        let distance = |i: usize| {
-            let other = nearest(views, i, (0..views.len()).filter(|other| *other != i));
-            other.map_or(f64::INFINITY, |other| views[other].camera.distance(&views[i].camera))
-        };
-        let mean = (0..views.len()).map(distance).sum::<f64>() / views.len() as f64;
-        let away = views.iter().map(|v| v.camera.distance(self)).fold(f64::INFINITY, f64::min);
-        [mean, away].into_iter().find(|s| *s > 0.0 && s.is_finite()).unwrap_or(1.0)
     }
 
     /// Half-way to the nearest view, or as far away on the other side; without a lens.
@@ -66,39 +76,6 @@ impl Predicted for Camera {
     }
 }
 
-pub(super) fn examine<P: Predicted>(
-    camera: &P,
-    views: &[View<'_, P>],
-    size: (usize, usize),
-    study: &Study<'_>,
-) -> Result<Examined, RenderError> {
-    let Study { settings, known, spacing, bounds, .. } = *study;
-    let rendering = camera.render(views, size, settings)?;
-    let jitter = depth_jitter(views, camera, settings, &rendering.image, known.noise)?;
-    let view_weights = ViewWeights::of(views, camera).with_noise(&rendering.agreement);
-    let (shares, gain) = shares(views, camera, &view_weights);
-    let gain = gain / (spacing * spacing);
-    let image = &rendering.image;
-    let (slopes, bends) = (slopes(image), bends(image));
-    let edges = edges(image, &rendering.depth, settings);
-    let distances = hole_distances(&rendering.mask, image.width());
-    let of_pixel = |p: usize| {
-        if distances[p] > 0 {
-            return [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, known.variogram.at(distances[p])];
-        }
-        // At most as many views share in a pixel as samples lie on it.
-        let shares = f64::max(shares, 1.0 / f64::from(rendering.counts[p].max(1)));
-        let displacement = ((shares + gain) / 2.0).sqrt();
-        let slope = f64::from(slopes[p]) * displacement;
-        let (bend, noise) = (f64::from(bends[p]), (1.0 + shares).sqrt());
-        [bend, noise, slope, f64::from(jitter[p]), f64::from(edges[p]), 0.0, 0.0]
-    };
-    let regressors = (0..distances.len()).map(of_pixel).collect();
-    let limits = || local_limits(views, camera, &rendering, TAIL * known.noise);
-    let local_limit = if bounds { limits() } else { Vec::new() };
-    Ok(Examined { rendering, regressors, sure_bound: Vec::new(), local_limit })
-}
-
 /// The camera with another centre, without its lens.
 fn moved(camera: &Camera, centre: Vector3<f64>) -> Option<Camera> {
     let m = camera.m();
@@ -110,11 +87,11 @@ fn moved(camera: &Camera, centre: Vector3<f64>) -> Option<Camera> {
 
 /// Sum of the squared shares of the views in a pixel that all of them see, and the same times their squared
 /// distances.
-fn shares<P: Viewpoint>(views: &[View<'_, P>], camera: &P, view_weights: &ViewWeights) -> (f64, f64) {
+fn shares(views: &[CalibratedView<'_>], camera: &Camera, view_weights: &ViewWeights) -> (f64, f64) {
     let weight = |i: usize| f64::from(view_weights.weight(i as u16));
     let total: f64 = (0..views.len()).map(weight).sum();
     let square = |i: usize| (weight(i) / total).powi(2);
-    let away = |i: usize| views[i].camera.distance(camera).powi(2);
+    let away = |i: usize| (views[i].camera.centre() - camera.centre()).norm_squared();
     ((0..views.len()).map(square).sum(), (0..views.len()).map(|i| square(i) * away(i)).sum())
 }
 
@@ -145,11 +122,7 @@ const BESIDE: f32 = 2.0 / 3.0;
 fn edges(image: &Image, depth: &DepthMap, settings: &RenderSettings) -> Vec<f32> {
     let ((width, height), channels) = (image.size(), image.channels());
     let test = settings.depth_test();
-    let key = |v: f32| match depth.measure() {
-        Measure::Disparity => 1.0 / (f64::from(v) + depth.offset()),
-        Measure::Depth => f64::from(v),
-    };
-    let known = |p: usize| Some(key(depth.data()[p])).filter(|d| !d.is_nan());
+    let known = |p: usize| Some(f64::from(depth.data()[p])).filter(|d| !d.is_nan());
     let mut edges = vec![0.0_f32; width * height];
     for p in 0..width * height {
         let across = (p % width + 1 < width).then_some((p + 1, 1));

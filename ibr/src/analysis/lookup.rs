@@ -1,8 +1,8 @@
-//! The local limit of a view of general cameras: what the photographs show at the places of its pixels.
+//! The local limit of a view: what the photographs show at the places of its pixels.
 //!
-//! The influences h_s of the samples on a pixel of the plane fit are not computed. They are taken to be
-//! positive with the sum one, to balance, and to have a second moment of half a square pixel along each
-//! axis. Then the limit of the row fit is
+//! The influences h_s of the samples on a pixel of the fit are not computed. They are taken to be positive
+//! with the sum one, to balance, and to have a second moment of half a square pixel along each axis. Then the
+//! limit is
 //!
 //! ```text
 //! |J - f| <= E + |f'| m + (1/4) (|f_xx| + |f_yy|)
@@ -20,6 +20,9 @@ use rayon::prelude::*;
 
 /// Pixels to each side over which local suprema are taken.
 const NEAR: usize = 3;
+
+/// Errors of depth reach this many standard deviations.
+pub(super) const TAIL: f64 = 3.0;
 
 /// The limit of a pixel that no view shows.
 const UNSEEN: f32 = 255.0;
@@ -48,7 +51,8 @@ impl Shown {
     }
 }
 
-/// The local limit of every pixel, in grey levels; `deviation` is the largest relative error of depth.
+/// The local limit of every pixel, in grey levels; `deviation` is the largest error of a disparity, or of a
+/// depth as a share of it.
 pub(super) fn local_limits<P: Viewpoint>(
     views: &[View<'_, P>],
     camera: &P,
@@ -138,4 +142,3 @@ impl<P: Viewpoint> Lookup<'_, P> {
         (inside && same_depth(d as f32, map.row(v.round() as usize)[u.round() as usize], map)).then_some(())
     }
 }
-

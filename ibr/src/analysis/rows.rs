@@ -1,14 +1,12 @@
 //! The error of a view of a rectified rig, rendered by rows.
 
 use super::estimate::{Examined, Predicted, Study};
-use super::evidence::{Evidence, collect_evidence};
+use super::evidence::collect_evidence;
 use super::jitter::depth_jitter;
+use super::lookup::{TAIL, local_limits};
 use super::regressors::regressors;
 use crate::pipeline::{RenderError, RenderSettings, Rendering, rectified as pipeline};
 use crate::propagate::RectifiedView;
-
-/// Errors of disparity reach this many standard deviations.
-const REACH: f64 = 3.0;
 
 impl Predicted for f64 {
     fn render(
@@ -26,15 +24,12 @@ impl Predicted for f64 {
         _: (usize, usize),
         study: &Study<'_>,
     ) -> Result<Examined, RenderError> {
-        let Study { settings, known, spacing, limits, .. } = *study;
-        if std::env::var_os("HB_C").is_some() && limits.is_none() {
-            return super::general::examine(self, views, views[0].image.size(), study);
-        }
+        let Study { settings, known, spacing, bounds, limits } = *study;
         let found = collect_evidence(views, *self, settings, limits)?;
         let jitter = depth_jitter(views, self, settings, &found.rendering.image, known.noise)?;
         let regressors = regressors(&found, &jitter, &known.variogram, spacing);
-        let reach = (REACH * known.noise) as f32;
-        let local_limit = found.evidence.iter().map(|e| local_limit(e, reach)).collect();
+        let limits = || local_limits(views, self, &found.rendering, TAIL * known.noise);
+        let local_limit = if bounds { limits() } else { Vec::new() };
         Ok(Examined { rendering: found.rendering, regressors, sure_bound: found.sure, local_limit })
     }
 
@@ -48,14 +43,6 @@ impl Predicted for f64 {
         extent.check(extent.of_rig_prediction())
     }
 
-    fn spacing(&self, views: &[RectifiedView<'_>]) -> f64 {
-        let positions = || views.iter().map(|v| v.camera);
-        let (low, high) = positions().fold((f64::MAX, f64::MIN), |(a, b), p| (a.min(p), b.max(p)));
-        let away = positions().map(|p| (p - self).abs()).fold(f64::MAX, f64::min);
-        let candidates = [(high - low) / (views.len() as f64 - 1.0).max(1.0), away];
-        candidates.into_iter().find(|s| *s > 0.0).unwrap_or(1.0)
-    }
-
     /// Half-way between the virtual camera and its neighbour on either side, or on a side without one as far
     /// away as the nearest view.
     fn further(&self, views: &[RectifiedView<'_>]) -> Vec<(Vec<f64>, f64)> {
@@ -64,21 +51,11 @@ impl Predicted for f64 {
             Some(away.fold(f64::INFINITY, f64::min)).filter(|away| away.is_finite())
         };
         let (below, above) = (nearest(-1.0), nearest(1.0));
-        let away = |own: Option<f64>, other: Option<f64>| {
-            own.map(|d| d / 2.0).or(other).unwrap_or_else(|| self.spacing(views))
-        };
+        let away = |own: Option<f64>, other: Option<f64>| own.map(|d| d / 2.0).or(other).unwrap_or(1.0);
         [self - away(below, above), self + away(above, below)]
             .map(|position| (vec![position], position))
             .into()
     }
-}
-
-/// The local limit of one pixel; `depth_error` bounds the error of disparities for a baseline of one.
-fn local_limit(e: &Evidence, depth_error: f32) -> f32 {
-    let geometry = e.steepest * (e.shift.abs() + depth_error * e.distance * e.reach);
-    let curvature = e.sharpest / 2.0 * e.spread;
-    let unseen = 255.0 * (1.0 - e.held).max(0.0);
-    (geometry + curvature + e.residual * e.reach + unseen).min(255.0)
 }
 
 #[cfg(test)]

@@ -76,7 +76,8 @@ impl PlaneSearch {
                 search.hides(starts[cell]..starts[cell + 1], *i as usize)
             };
             match suspects.len() > FEW_SUSPECTS {
-                true => hidden.par_extend(suspects.par_iter().with_min_len(FEW_SUSPECTS).copied().filter(is_hidden)),
+                true => hidden
+                    .par_extend(suspects.par_iter().with_min_len(FEW_SUSPECTS).copied().filter(is_hidden)),
                 false => hidden.extend(suspects.iter().copied().filter(is_hidden)),
             }
         }

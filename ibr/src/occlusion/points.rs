@@ -86,7 +86,7 @@ impl Raster {
         let Extent { left, right, top, bottom } = *extent;
         let cells = |edge: f64| ((right - left) / edge + 1.0) * ((bottom - top) / edge + 1.0);
         let mut edge = edge;
-        // The doubling ends at the latest when one cell holds all samples, or is infinite as a position may be.
+        // The doubling ends at the latest when one cell holds all samples; positions may be infinite.
         while cells(edge) > most as f64 && edge.is_finite() {
             edge *= 2.0;
         }

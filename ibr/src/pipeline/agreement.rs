@@ -95,19 +95,10 @@ impl Agreement {
 
     /// Variance of the noise of a view, with its exposure; 0 if its photograph does not show it.
     pub(super) fn noise(&self, view: usize) -> f64 {
-        self.square(view, |texture| texture.noise)
-    }
-
-    /// Mean square slope of a view, with its exposure; 0 if its photograph does not show it.
-    pub(super) fn square_slope(&self, view: usize) -> f64 {
-        self.square(view, |texture| texture.slope)
-    }
-
-    fn square(&self, view: usize, of: impl Fn(&Texture) -> f64) -> f64 {
-        let texture = self.textures.get(view).and_then(Option::as_ref);
-        // That of green, as the texture.
+        let texture = self.textures.get(view).copied().flatten();
+        // That of green, as the noise.
         let gain = self.gains.get(view).map_or(1.0, |gain| gain[1]);
-        texture.map_or(0.0, |texture| (of(texture) * gain).powi(2))
+        texture.map_or(0.0, |texture| (texture.noise * gain).powi(2))
     }
 
     /// Standard deviation of the errors of a map; 0 if it is not known.

@@ -2,7 +2,6 @@
 //! another.
 
 use crate::depth::{DepthMap, FAR, Measure};
-use crate::propagate::{View, Viewpoint};
 
 /// Every so many pixels of a map are looked up.
 const LOOKUP_STEP: usize = 7;
@@ -128,43 +127,6 @@ pub(super) fn of_each([mut first, mut second]: [Lookups; 2]) -> Option<[f64; 2]>
     (both >= LEAST_AVERAGED).then(|| [(d1 - k1 * d2) / both, (d2 - k2 * d1) / both].map(|s| s.max(0.0)))
 }
 
-/// Mean square displacement of the samples of a view by an error of one in its map, a pixel of disparity or
-/// the whole depth, as positions in the view itself. The pixels that move farthest, a tenth, are left out:
-/// points close to a camera move without limit.
-pub(crate) fn displacement<P: Viewpoint>(view: &View<'_, P>, camera: &P) -> f64 {
-    const STEPS: usize = 16;
-    let (map, to) = (view.map, view.camera.map_to(camera));
-    let (width, height) = map.size();
-    let columns = (0..width).step_by(width.div_ceil(STEPS).max(1));
-    let rows = (0..height).step_by(height.div_ceil(STEPS).max(1));
-    let pixels = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
-    let moved = |(x, y): (usize, usize)| displaced([x as f64, y as f64, f64::from(map.row(y)[x])], map, &to);
-    let mut squares: Vec<f64> = pixels.filter_map(moved).map(|[u, v]| u * u + v * v).collect();
-    squares.sort_by(f64::total_cmp);
-    squares.truncate(squares.len() - squares.len() / 10);
-    squares.iter().sum::<f64>() / squares.len().max(1) as f64
-}
-
-/// The displacement of one pixel within its own view that has the effect of a change of its depth.
-fn displaced(
-    [x, y, depth]: [f64; 3],
-    map: &DepthMap,
-    to: impl Fn(f64, f64, f64) -> (f64, f64, f64),
-) -> Option<[f64; 2]> {
-    const CHANGE: f64 = 1e-3;
-    let moved = match map.measure() {
-        Measure::Disparity => depth + CHANGE,
-        Measure::Depth => depth * (1.0 + CHANGE),
-    };
-    let here = to(x, y, depth);
-    let by = |(u, v, _): (f64, f64, f64)| ((u - here.0) / CHANGE, (v - here.1) / CHANGE);
-    let (right, below) = (by(to(x + CHANGE, y, depth)), by(to(x, y + CHANGE, depth)));
-    let (u, v) = by(to(x, y, moved));
-    let area = right.0 * below.1 - right.1 * below.0;
-    let found = [(u * below.1 - v * below.0) / area, (v * right.0 - u * right.1) / area];
-    found.iter().all(|d| d.is_finite()).then_some(found)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -218,23 +180,6 @@ mod tests {
         };
         let [first, second] = of_each([look(0, 1), look(1, 0)]).unwrap().map(f64::sqrt);
         assert!((0.0..0.004).contains(&first) && (0.007..0.009).contains(&second), "{first} {second}");
-    }
-
-    /// An error of a disparity displaces a point by as much, times the distance of the cameras; a relative
-    /// error of a depth by its disparity, in the pixels of a view of half the size and turned by a right
-    /// angle too.
-    #[test]
-    fn displacements_are_those_in_the_view_itself() {
-        let [(first, depth), (second, _)] = shots();
-        let (image, disparity) = (Image::filled(SIZE.0, SIZE.1, 1, 0.0), rig_disparity(&depth, SIZE.0));
-        let found = displacement(&View { image: &image, map: &disparity, camera: 0.0 }, &0.4);
-        assert!((found - 0.16).abs() < 1e-9, "{found}");
-        let view = View { image: &image, map: &depth, camera: first };
-        let (found, middle) = (displacement(&view, &second), f64::from(disparity.middle().unwrap()).powi(2));
-        assert!((0.8..1.6).contains(&(found / middle)), "{found} {middle}");
-        let turn = Matrix3::new(0.0, -0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0);
-        let again = displacement(&view, &Camera::projective(turn * second.matrix()).unwrap());
-        assert!((again / found - 1.0).abs() < 1e-6, "{again} {found}");
     }
 
     #[test]

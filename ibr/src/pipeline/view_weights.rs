@@ -1,6 +1,6 @@
 //! The share of each view in the virtual one, and its exposure.
 
-use super::depth_errors::{displacement, median};
+use super::depth_errors::median;
 use super::exposure::drifts;
 use super::{Agreement, Exposure};
 use crate::camera::Camera;
@@ -35,9 +35,6 @@ const LEAST_VARIANCE: f64 = 1.0;
 pub struct ViewWeights {
     weights: Vec<f32>,
     distances: Vec<f64>,
-    /// Mean square displacement of the samples of each view by an error of one in its map; empty if this is
-    /// not known.
-    displacements: Vec<f64>,
     /// Factors that give the views one exposure; empty if they are not wanted.
     gains: Vec<[f32; 3]>,
 }
@@ -56,7 +53,7 @@ impl ViewWeights {
             true => distances.iter().map(weight).collect(),
             false => vec![1.0; distances.len()],
         };
-        Self { weights, distances: distances.to_vec(), displacements: Vec::new(), gains: Vec::new() }
+        Self { weights, distances: distances.to_vec(), gains: Vec::new() }
     }
 
     /// The same for views whose surfaces are displaced: w_i is multiplied by (d_2 / d_i)^4 beyond the second
@@ -112,12 +109,7 @@ impl ViewWeights {
     /// For a virtual camera among the views.
     pub fn of<P: Viewpoint>(views: &[View<'_, P>], camera: &P) -> Self {
         let distances: Vec<f64> = views.iter().map(|v| v.camera.distance(camera)).collect();
-        Self::by_distance(&distances).with_displacements(views, camera)
-    }
-
-    /// The same with the displacements that errors of depth cause.
-    fn with_displacements<P: Viewpoint>(self, views: &[View<'_, P>], camera: &P) -> Self {
-        Self { displacements: views.iter().map(|v| displacement(v, camera)).collect(), ..self }
+        Self::by_distance(&distances)
     }
 
     /// As [`ViewWeights::of`], with the distances in position and direction.
@@ -135,34 +127,27 @@ impl ViewWeights {
             let turn = view.camera.axis().angle(&(pivot - from));
             (from - centre).norm() / reach + angle + turn
         };
-        Self::by_distance(&views.iter().map(distance).collect::<Vec<_>>()).with_displacements(views, camera)
+        Self::by_distance(&views.iter().map(distance).collect::<Vec<_>>())
     }
 
-    /// The same for photographs of unequal noise, and depths with unequal errors.
+    /// The same for photographs of unequal noise.
     ///
     /// Weights of least variance are inverse variances: that of the difference between the view and the
-    /// virtual one, v / w_i with v the variance of the differences between views. Noise of the photograph adds
-    /// to it, and so do errors of the depths. They displace a sample by b times the error delta_i, which is a
-    /// value error of the slope f' of the photograph times the displacement:
+    /// virtual one, v / w_i with v the variance of the differences between views. Noise of the photograph
+    /// adds to it:
     ///
     /// ```text
-    /// v / w_i + e_i - e_min,   e_i = sigma_i^2 + f'^2 b^2 delta_i^2
+    /// v / w_i + sigma_i^2 - sigma_min^2
     /// ```
     ///
-    /// Errors that all views have are left out: those of photographs are also in the ones that a view is
-    /// compared with, and smoothing does not remove displacements.
+    /// Noise that all views have is left out: it is also in the photographs that a view is compared with.
     pub fn with_noise(mut self, agreement: &Agreement) -> Self {
         let Some(variance) = agreement.variance() else { return self };
         let variance = variance.max(LEAST_VARIANCE);
-        let error = |view: usize| {
-            let displacement = self.displacements.get(view).copied().unwrap_or(0.0);
-            let jitter = displacement * agreement.depth_error(view).powi(2);
-            agreement.noise(view) + agreement.square_slope(view) * jitter
-        };
-        let errors: Vec<f64> = (0..self.weights.len()).map(error).collect();
-        let least = self.views().into_iter().map(|view| errors[view]).fold(f64::INFINITY, f64::min);
-        for (weight, error) in self.weights.iter_mut().zip(errors) {
-            let excess = (error - least).max(0.0);
+        let noise = |view: usize| agreement.noise(view);
+        let least = self.views().into_iter().map(noise).fold(f64::INFINITY, f64::min);
+        for (view, weight) in self.weights.iter_mut().enumerate() {
+            let excess = (noise(view) - least).max(0.0);
             *weight = (variance / (variance / f64::from(*weight) + excess)) as f32;
         }
         self
@@ -233,21 +218,6 @@ mod tests {
         assert!((f64::from(unequal[1]) - 1.0 / (1.0 + 72.0 / 70.0)).abs() < 1e-6, "{unequal:?}");
     }
 
-    /// The view with errors of depth counts less by the ratio of the variances.
-    #[test]
-    fn a_view_with_errors_of_depth_counts_less() {
-        let pair =
-            PairAgreement { views: [0, 1], points: 1000, share: 0.9, gain: [1.0; 3], difference: 10.0 };
-        let (depth_errors, texture) = (vec![0.0, 2.0], Some(Texture { noise: 0.0, slope: 5.0 }));
-        let agreement =
-            Agreement { pairs: vec![pair], gains: vec![[1.0; 3]; 2], textures: vec![texture; 2], depth_errors };
-        let view_weights =
-            ViewWeights { displacements: vec![0.25; 2], ..ViewWeights::by_distance(&[0.5, 0.5]) };
-        let [exact, erring] = view_weights.with_noise(&agreement).weights[..] else { unreachable!() };
-        assert_eq!(exact, 1.0);
-        assert!((f64::from(erring) - 100.0 / (100.0 + 25.0 * 0.25 * 4.0)).abs() < 1e-6, "{erring}");
-    }
-
     #[test]
     fn half_way_all_is_equal_and_at_a_view_that_view_decides() {
         assert_eq!(ViewWeights::by_distance(&[0.5, 0.5]).weights, [1.0, 1.0]);
@@ -262,9 +232,7 @@ mod tests {
         let mut samples = [Sample::<1> { value: [100.0], view: 1, ..Sample::BLANK }];
         ViewWeights::by_distance(&[1.0, 1.0]).with_gains(&[[1.0; 3]; 2]).apply(&mut samples);
         assert_eq!(samples[0].value, [100.0]);
-        ViewWeights::by_distance(&[1.0, 1.0])
-            .with_gains(&[[1.0; 3], [1.5; 3]])
-            .apply(&mut samples);
+        ViewWeights::by_distance(&[1.0, 1.0]).with_gains(&[[1.0; 3], [1.5; 3]]).apply(&mut samples);
         assert_eq!(samples[0].value, [150.0]);
         // The brightness drifts, or the colours beside a large difference of the brightness; the view is
         // three times as near to the second one.

@@ -17,9 +17,9 @@ mod surface;
 pub use colour::coloured;
 pub(crate) use surface::from_scattered;
 
-use crate::depth::DepthMap;
+use crate::depth::{DepthMap, Measure};
 use crate::interpolate::plane::surface_memory;
-use crate::pipeline::{Agreement, displacement};
+use crate::pipeline::Agreement;
 use crate::propagate::{View, Viewpoint, nearest};
 use hybank::memory::{MemoryShortage, check_memory};
 use outliers::Parallax;
@@ -101,6 +101,32 @@ fn is_noticeable<P: Viewpoint>(views: &[View<'_, P>], view: usize, error: f64) -
     let other = nearest(views, view, (0..views.len()).filter(is_elsewhere));
     let Some(other) = other.filter(|_| error > 0.0) else { return false };
     displacement(&views[view], &views[other].camera) * error * error > NOTICEABLE
+}
+
+/// Mean square displacement of the points of a view in another one by an error of one in its map, a pixel of
+/// disparity or the whole depth. The points that move farthest, a tenth, are left out: those close to a
+/// camera move without limit.
+fn displacement<P: Viewpoint>(view: &View<'_, P>, camera: &P) -> f64 {
+    const CHANGE: f64 = 1e-3;
+    const STEPS: usize = 16;
+    let (map, to) = (view.map, view.camera.map_to(camera));
+    let (width, height) = map.size();
+    let columns = (0..width).step_by(width.div_ceil(STEPS).max(1));
+    let rows = (0..height).step_by(height.div_ceil(STEPS).max(1));
+    let square = |(x, y): (usize, usize)| {
+        let value = f64::from(map.row(y)[x]);
+        let wrong = match map.measure() {
+            Measure::Disparity => value + CHANGE,
+            Measure::Depth => value * (1.0 + CHANGE),
+        };
+        let [(a, b, _), (c, d, _)] = [value, wrong].map(|value| to(x as f64, y as f64, value));
+        Some(((c - a).powi(2) + (d - b).powi(2)) / (CHANGE * CHANGE)).filter(|square| square.is_finite())
+    };
+    let pixels = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+    let mut squares: Vec<f64> = pixels.filter_map(square).collect();
+    squares.sort_by(f64::total_cmp);
+    squares.truncate(squares.len() - squares.len() / 10);
+    squares.iter().sum::<f64>() / squares.len().max(1) as f64
 }
 
 #[cfg(test)]
