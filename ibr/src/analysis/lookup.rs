@@ -1,8 +1,8 @@
 //! The local limit of a view: what the photographs show at the places of its pixels.
 //!
 //! The influences h_s of the samples on a pixel of the fit are not computed. They are taken to be positive
-//! with the sum one, to balance, and to have a second moment of half a square pixel along each axis. Then the
-//! limit is
+//! with the sum one, to balance, and to have a second moment of half a square pixel along each axis. Then
+//! the limit is
 //!
 //! ```text
 //! |J - f| <= E + |f'| m + (1/4) (|f_xx| + |f_yy|)
