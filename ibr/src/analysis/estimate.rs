@@ -7,7 +7,7 @@ use super::sure::Limits;
 use super::variogram::Variogram;
 use crate::image::Image;
 use crate::pipeline::{Exposure, RenderError, RenderSettings, Rendering};
-use crate::propagate::{View, Viewpoint, nearest};
+use crate::propagate::{View, Viewpoint};
 use std::ops::Range;
 
 /// Weights of the mean absolute error for photographs, from "Cones": bias, noise, slope, jitter, edge,
@@ -166,6 +166,9 @@ pub trait Predicted: Viewpoint {
         settings: &RenderSettings,
     ) -> Result<(), RenderError>;
 
+    /// Mean distance between neighbouring views; of views at one point that from this camera, or one.
+    fn spacing(&self, views: &[View<'_, Self>]) -> f64;
+
     /// Cameras that might help this one, with their coordinates.
     fn further(&self, views: &[View<'_, Self>]) -> Vec<(Vec<f64>, Self)>;
 }
@@ -180,18 +183,6 @@ pub struct Study<'a> {
     pub(super) bounds: bool,
     /// For the sure bound.
     pub(super) limits: Option<&'a Limits>,
-}
-
-/// Mean distance between a view and the one nearest to it; of views at one point that from the camera, or
-/// one.
-pub(super) fn spacing<P: Viewpoint>(camera: &P, views: &[View<'_, P>]) -> f64 {
-    let distance = |i: usize| {
-        let other = nearest(views, i, (0..views.len()).filter(|other| *other != i));
-        other.map_or(f64::INFINITY, |other| views[other].camera.distance(&views[i].camera))
-    };
-    let mean = (0..views.len()).map(distance).sum::<f64>() / views.len() as f64;
-    let away = views.iter().map(|v| v.camera.distance(camera)).fold(f64::INFINITY, f64::min);
-    [mean, away].into_iter().find(|s| *s > 0.0 && s.is_finite()).unwrap_or(1.0)
 }
 
 /// Photographs with one exposure.
@@ -246,7 +237,7 @@ impl Calibration {
         for k in 0..used {
             let mut others = views.to_vec();
             let truth = others.remove(k * views.len() / used);
-            let spacing = spacing(&truth.camera, views);
+            let spacing = truth.camera.spacing(views);
             let study = Study { settings, known, spacing, bounds: false, limits: None };
             let examined = truth.camera.examine(&others, truth.image.size(), &study)?;
             let errors = difference(&examined.rendering.image.quantised(), truth.image);

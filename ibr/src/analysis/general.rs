@@ -9,7 +9,7 @@ use crate::camera::Camera;
 use crate::depth::DepthMap;
 use crate::image::Image;
 use crate::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights, calibrated as pipeline};
-use crate::propagate::CalibratedView;
+use crate::propagate::{CalibratedView, Viewpoint, nearest};
 use nalgebra::{Matrix3x4, Vector3};
 
 impl Predicted for Camera {
@@ -63,6 +63,17 @@ impl Predicted for Camera {
     ) -> Result<(), RenderError> {
         let extent = pipeline::extent(views, self, size, settings)?;
         extent.check(extent.of_camera_prediction(settings))
+    }
+
+    /// Mean distance between a view and the one nearest to it.
+    fn spacing(&self, views: &[CalibratedView<'_>]) -> f64 {
+        let distance = |i: usize| {
+            let other = nearest(views, i, (0..views.len()).filter(|other| *other != i));
+            other.map_or(f64::INFINITY, |other| views[other].camera.distance(&views[i].camera))
+        };
+        let mean = (0..views.len()).map(distance).sum::<f64>() / views.len() as f64;
+        let away = views.iter().map(|v| v.camera.distance(self)).fold(f64::INFINITY, f64::min);
+        [mean, away].into_iter().find(|s| *s > 0.0 && s.is_finite()).unwrap_or(1.0)
     }
 
     /// Half-way to the nearest view, or as far away on the other side; without a lens.

@@ -1,6 +1,6 @@
 //! The error of any number of views, with weights that are calibrated once.
 
-use super::estimate::{Calibration, Known, Predicted, Study, ViewError, equalised, judge, spacing};
+use super::estimate::{Calibration, Known, Predicted, Study, ViewError, equalised, judge};
 use super::jitter::map_noise;
 use super::regressors::{difference, local_mean};
 use super::sure::Limits;
@@ -59,7 +59,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     }
 
     fn study(&self, camera: &P) -> Study<'_> {
-        let spacing = spacing(camera, &self.views());
+        let spacing = camera.spacing(&self.views());
         Study { settings: &self.settings, known: &self.known, spacing, bounds: false, limits: None }
     }
 

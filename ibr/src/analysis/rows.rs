@@ -43,6 +43,14 @@ impl Predicted for f64 {
         extent.check(extent.of_rig_prediction())
     }
 
+    fn spacing(&self, views: &[RectifiedView<'_>]) -> f64 {
+        let positions = || views.iter().map(|v| v.camera);
+        let (low, high) = positions().fold((f64::MAX, f64::MIN), |(a, b), p| (a.min(p), b.max(p)));
+        let away = positions().map(|p| (p - self).abs()).fold(f64::MAX, f64::min);
+        let candidates = [(high - low) / (views.len() as f64 - 1.0).max(1.0), away];
+        candidates.into_iter().find(|s| *s > 0.0).unwrap_or(1.0)
+    }
+
     /// Half-way between the virtual camera and its neighbour on either side, or on a side without one as far
     /// away as the nearest view.
     fn further(&self, views: &[RectifiedView<'_>]) -> Vec<(Vec<f64>, f64)> {
@@ -51,7 +59,9 @@ impl Predicted for f64 {
             Some(away.fold(f64::INFINITY, f64::min)).filter(|away| away.is_finite())
         };
         let (below, above) = (nearest(-1.0), nearest(1.0));
-        let away = |own: Option<f64>, other: Option<f64>| own.map(|d| d / 2.0).or(other).unwrap_or(1.0);
+        let away = |own: Option<f64>, other: Option<f64>| {
+            own.map(|d| d / 2.0).or(other).unwrap_or_else(|| self.spacing(views))
+        };
         [self - away(below, above), self + away(above, below)]
             .map(|position| (vec![position], position))
             .into()
