@@ -109,8 +109,8 @@ impl Outputs {
         self.parts.iter().map(|(_, path)| path.as_path()).filter(|path| !output::is_standard(path))
     }
 
-    /// Checks of names and formats.
-    pub(super) fn check(&self, levels: Levels) -> Result<(), Failure> {
+    /// Checks before the scene is read: names, formats, inputs that were typed, and files that exist.
+    pub(super) fn check(&self, levels: Levels, scene: &SceneArguments, force: bool) -> Result<(), Failure> {
         for (k, (part, path)) in self.parts.iter().enumerate() {
             let (option, shown) = (part.option(), Quoted(path));
             let name = option.trim_start_matches('-');
@@ -126,19 +126,20 @@ impl Outputs {
                 )));
             }
         }
-        self.parts.iter().try_for_each(|(part, path)| part.check(path, levels))
+        self.parts.iter().try_for_each(|(part, path)| part.check(path, levels))?;
+        output::refuse_overlaps(&self.files().collect::<Vec<_>>(), &scene.inputs())?;
+        self.files().try_for_each(|file| output::refuse_existing(file, force))
     }
 }
 
-/// Refuses files that exist, or are an input, before the views of the scene are read.
+/// Refuses files that exist, or are an input of the scene, before its views are read.
 pub(super) fn check_files(
     all: &[Outputs],
     film: Option<&Path>,
     source: &Source,
-    scene: &SceneArguments,
     force: bool,
 ) -> Result<(), Failure> {
     let files: Vec<&Path> = all.iter().flat_map(Outputs::files).chain(film).collect();
-    source.check_outputs(&files, scene)?;
+    source.check_outputs(&files)?;
     files.iter().try_for_each(|file| output::refuse_existing(file, force))
 }

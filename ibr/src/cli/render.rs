@@ -143,8 +143,7 @@ fn read(arguments: &RenderArguments, watch: Watch<'_>) -> Result<(Scene, Vec<Out
     path::check(arguments, frames)?;
     let files = path::outputs(arguments, frames);
     let film = Some(arguments.output.as_path()).filter(|path| path::is_film(path, frames));
-    let film = film.filter(|path| !output::is_standard(path));
-    check_files(&files, film, &source, &arguments.scene, arguments.force)?;
+    check_files(&files, film.filter(|path| !output::is_standard(path)), &source, arguments.force)?;
     Ok((arguments.scene.load(&source, !arguments.drop_unknown, watch)?, files))
 }
 

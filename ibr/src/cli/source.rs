@@ -33,6 +33,11 @@ impl SceneArguments {
         RenderSettings { offset, keep_exposure: self.keep_exposure, ..RenderSettings::default() }
     }
 
+    /// The input files that were typed.
+    pub(super) fn inputs(&self) -> Vec<&Path> {
+        [Some(self.file.as_path()), self.truth.as_deref()].into_iter().flatten().collect()
+    }
+
     /// The photograph to compare with.
     pub(super) fn truth(&self) -> Result<Option<Image>, Failure> {
         let read = |path| read_image_within(path, self.max_pixels);
@@ -84,12 +89,11 @@ impl Source {
         if arguments.view.is_some() { 1 } else { all.clamp(1, scene::MOST_FRAMES) }
     }
 
-    /// Refuses outputs that are one file, or an input, and names what killed runs left beside them.
-    pub(super) fn check_outputs(&self, outputs: &[&Path], arguments: &SceneArguments) -> Result<(), Failure> {
+    /// Refuses outputs that are one file, or an input of the scene, and names what killed runs left beside
+    /// them.
+    pub(super) fn check_outputs(&self, outputs: &[&Path]) -> Result<(), Failure> {
         let files = self.spec.files(self.path.parent().unwrap_or(Path::new("")));
-        let typed = [Some(arguments.file.as_path()), arguments.truth.as_deref()];
-        let inputs = typed.into_iter().flatten().chain(files.iter().map(PathBuf::as_path));
-        output::refuse_overlaps(outputs, &inputs.collect::<Vec<_>>())?;
+        output::refuse_overlaps(outputs, &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
         output::name_leftovers(outputs);
         Ok(())
     }

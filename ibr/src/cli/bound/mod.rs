@@ -83,7 +83,7 @@ impl Job<'_> {
 /// Checks that need no file, and the limits for a sure bound.
 fn check(arguments: &BoundArguments) -> Result<Option<Limits>, Failure> {
     arguments.scene.check()?;
-    arguments.outputs().check(Levels::Eight)?;
+    arguments.outputs().check(Levels::Eight, &arguments.scene, arguments.force)?;
     let limit = |name: &str, value: f64| match value.is_finite() && value >= 0.0 {
         true => Ok(value),
         false => Err(Failure::Usage(format!("{name} {value}: it must be a number that is not negative"))),
@@ -100,7 +100,7 @@ fn check(arguments: &BoundArguments) -> Result<Option<Limits>, Failure> {
 fn read(arguments: &BoundArguments, watch: Watch<'_>) -> Result<(Scene, Vec<Outputs>), Failure> {
     let source = arguments.scene.source()?;
     let files = arguments.outputs().of_frames(source.frames(&arguments.scene));
-    check_files(&files, None, &source, &arguments.scene, arguments.force)?;
+    check_files(&files, None, &source, arguments.force)?;
     let scene = arguments.scene.load(&source, true, watch)?;
     arguments.scene.refuse_what_has_no_prediction(&scene)?;
     if matches!(scene.kind, Kind::Calibrated { .. }) && arguments.curvature.is_some() {
