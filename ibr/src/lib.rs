@@ -24,5 +24,6 @@ pub mod synthetic;
 pub mod uncalibrated;
 
 #[cfg(test)]
+#[path = "../tests/support/trials.rs"]
 #[allow(dead_code, unreachable_pub)]
 mod trials;

@@ -1,33 +1,28 @@
-//! All calls of the decomposition library: singular values of small and tall matrices.
-//!
-//! Matrices and vectors of fixed size are nalgebra's; the decompositions are faer's.
+//! Small linear problems of vectors of fixed size, by the decompositions of `hybank-linalg`.
 
-use faer::Mat;
-use faer::linalg::solvers::{Solve, Svd};
+use hybank_linalg::{Mat, Svd, solve_positive, svd};
 use nalgebra::{Matrix3, SMatrix, SVector};
 
-/// The thin decomposition; `None` when an entry is not finite or the iteration does not converge.
-fn svd(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> f64) -> Option<Svd<f64>> {
-    let is_finite = (0..rows).all(|i| (0..columns).all(|j| entry(i, j).is_finite()));
-    is_finite.then(|| Mat::from_fn(rows, columns, entry).as_ref().thin_svd().ok())?
+/// The thin decomposition of rows, padded with zero rows up to `least`; `None` when an entry is not finite
+/// or the iteration does not converge.
+fn decomposed<const N: usize>(rows: &[[f64; N]], least: usize) -> Option<Svd> {
+    let entry = |i: usize, j: usize| rows.get(i).map_or(0.0, |row| row[j]);
+    svd(&Mat::from_fn(rows.len().max(least), N, entry)).ok()
 }
 
 /// The right singular vector of the least singular value, and all singular values from the largest.
 ///
 /// `rows` is any number of rows of N entries; fewer than N rows are padded with zero rows.
 pub(crate) fn least_vector<const N: usize>(rows: &[[f64; N]]) -> Option<(SVector<f64, N>, [f64; N])> {
-    let svd = svd(rows.len().max(N), N, |i, j| rows.get(i).map_or(0.0, |r| r[j]))?;
-    let values = svd.S().column_vector();
-    let vector = SVector::from_fn(|j, _| svd.V()[(j, N - 1)]);
-    Some((vector, std::array::from_fn(|k| values[k])))
+    let Svd { s, v, .. } = decomposed(rows, N)?;
+    Some((SVector::from_fn(|j, _| v[(j, N - 1)]), std::array::from_fn(|k| s[k])))
 }
 
 /// U, the singular values from the largest, and V of a 3 x 3 matrix: m = U diag(s) V^T.
 pub(crate) fn svd3(m: &Matrix3<f64>) -> Option<(Matrix3<f64>, [f64; 3], Matrix3<f64>)> {
-    let svd = svd(3, 3, |i, j| m[(i, j)])?;
-    let s = svd.S().column_vector();
-    let copy = |a: faer::MatRef<'_, f64>| Matrix3::from_fn(|i, j| a[(i, j)]);
-    Some((copy(svd.U()), [s[0], s[1], s[2]], copy(svd.V())))
+    let Svd { u, s, v } = svd(&Mat::from_column_slice(3, 3, m.as_slice())).ok()?;
+    let fixed = |m: &Mat| Matrix3::from_column_slice(m.as_slice());
+    Some((fixed(&u), [s[0], s[1], s[2]], fixed(&v)))
 }
 
 /// The least-squares solution of `rows` x = `rhs`, `None` when the columns are dependent (to 1e-12).
@@ -35,17 +30,11 @@ pub(crate) fn least_squares<const N: usize>(rows: &[[f64; N]], rhs: &[f64]) -> O
     if rows.len() < N || rhs.iter().any(|v| !v.is_finite()) {
         return None;
     }
-    let svd = svd(rows.len(), N, |i, j| rows[i][j])?;
-    let s = svd.S().column_vector();
-    if s[N - 1] <= 1e-12 * s[0] {
-        return None;
-    }
-    let mut solution = SVector::zeros();
-    for k in 0..N {
-        let along: f64 = (0..rows.len()).map(|i| svd.U()[(i, k)] * rhs[i]).sum::<f64>() / s[k];
-        solution += SVector::from_fn(|j, _| svd.V()[(j, k)] * along);
-    }
-    Some(solution)
+    let Svd { u, s, v } = decomposed(rows, N)?;
+    let along = |k: usize| u.column(k).iter().zip(rhs).map(|(u, r)| u * r).sum::<f64>() / s[k];
+    let along: [f64; N] = std::array::from_fn(along);
+    let solution = SVector::from_fn(|j, _| (0..N).map(|k| v[(j, k)] * along[k]).sum());
+    (s[N - 1] > 1e-12 * s[0]).then_some(solution)
 }
 
 /// One step of Gauss-Newton: solves J^T J dx = J^T r by Cholesky (N is at most 12).
@@ -60,14 +49,9 @@ pub(crate) fn normal_step<const N: usize>(
 /// or not finite.
 pub(crate) fn positive_solution(matrix: &[f64], rhs: &[f64]) -> Option<Vec<f64>> {
     let side = rhs.len();
-    if matrix.iter().chain(rhs).any(|v| !v.is_finite()) {
-        return None;
-    }
-    let factor =
-        Mat::from_fn(side, side, |i, j| matrix[i * side + j]).as_ref().llt(faer::Side::Lower).ok()?;
-    let x = factor.solve(Mat::from_fn(side, 1, |i, _| rhs[i]));
-    let found: Vec<f64> = (0..side).map(|i| x[(i, 0)]).collect();
-    found.iter().all(|v| v.is_finite()).then_some(found)
+    let matrix = Mat::from_fn(side, side, |i, j| matrix[i * side + j]);
+    let found = solve_positive(&matrix, &Mat::from_column_slice(side, 1, rhs)).ok()?;
+    found.iter().all(|v| v.is_finite()).then(|| found.as_slice().to_vec())
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ use hybank_ibr::partial::densify;
 use hybank_ibr::pipeline::uncalibrated::{Target, UncalibratedRendering, UncalibratedSettings};
 use hybank_ibr::pipeline::{Agreement, Method, RenderSettings, rectified, uncalibrated};
 use hybank_ibr::propagate::RectifiedView;
+use hybank_ibr::restore::restore;
 use hybank_ibr::uncalibrated::Point;
 use noise::noisy;
 use normal::normal;
@@ -117,11 +118,11 @@ fn erroneous(map: &DepthMap, deviation: f64, seed: u64) -> DepthMap {
     DepthMap::new(map.size(), values, 1.0, map.measure()).unwrap()
 }
 
-/// White errors of disparity, in pixels, in one map or in both. Samples on slopes of the photograph count
-/// less then than those of the other view; weights by distance alone gave 27.40, 28.14, 26.40 and 26.60 dB.
+/// White errors of disparity, in pixels, in one map or in both: they are measured, and smoothed when a scene
+/// is read. Without that the views have 28.0, 28.7, 27.8 and 27.2 dB.
 #[test]
-fn samples_with_errors_of_depth_count_less() {
-    for (errors, least) in [([1.0, 0.0], 27.6), ([0.0, 1.0], 28.1), ([0.0, 2.0], 26.6), ([1.0, 1.0], 26.59)] {
+fn errors_of_depth_are_measured_and_smoothed() {
+    for (errors, least) in [([1.0, 0.0], 29.3), ([0.0, 1.0], 28.9), ([0.0, 2.0], 28.5), ([1.0, 1.0], 29.1)] {
         let Some(mut pair) = pair("cones") else { return };
         for (seed, (map, error)) in (11..).zip(pair.maps.iter_mut().zip(errors)) {
             *map = erroneous(map, error, seed);
@@ -129,6 +130,9 @@ fn samples_with_errors_of_depth_count_less() {
         let found = Agreement::of(&views(&pair)).depth_errors;
         println!("errors {errors:?}, found {found:.2?}");
         assert!(found.iter().zip(errors).all(|(found, error)| (found - error).abs() <= 0.15), "{found:?}");
+        psnr(&pair, &RenderSettings::default());
+        let restored = restore(&views(&pair)).unwrap();
+        pair.maps.iter_mut().zip(restored).for_each(|(map, restored)| *map = restored.map);
         assert!(psnr(&pair, &RenderSettings::default()) >= least);
     }
 }

@@ -16,14 +16,6 @@ use rayon::prelude::*;
 /// One pixel of a virtual view. h_s is the influence of sample s on the pixel at x.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Evidence {
-    /// sum h_s over the samples; the rest comes from what fills holes.
-    pub held: f32,
-    /// sum |h_s|.
-    pub reach: f32,
-    /// sum h_s (x_s - x).
-    pub shift: f32,
-    /// sum |h_s| (x_s - x)^2.
-    pub spread: f32,
     /// sum over the views of (sum of the h_s of the view)^2: 1 for one view, 1/2 for two equal ones.
     pub views: f32,
     /// sum over the views of (sum of the h_s of the view)^2 (distance to the view)^2.
@@ -32,14 +24,6 @@ pub struct Evidence {
     pub bias: f32,
     /// Influence of samples whose depth or colour is doubtful.
     pub doubtful: f32,
-    /// Largest slope of the samples nearby.
-    pub steepest: f32,
-    /// Largest second difference of the samples nearby.
-    pub sharpest: f32,
-    /// Largest residual of the samples nearby.
-    pub residual: f32,
-    /// Largest distance of a view that counts at the pixel.
-    pub distance: f32,
 }
 
 /// A rendering with the evidence for each of its pixels.
@@ -121,9 +105,6 @@ fn collect<const C: usize>(job: &Job<'_>) -> Result<Collected, RenderError> {
 /// Pixels to each side beyond which no sample has an influence that counts: it falls by four per pixel.
 const INFLUENCE: f64 = 8.0;
 
-/// Pixels to each side over which local suprema are taken.
-const NEAR: usize = 3;
-
 /// Work memory of one row.
 struct RowEvidence<const C: usize> {
     strip: Strip<C>,
@@ -159,9 +140,8 @@ impl<const C: usize> RowEvidence<C> {
         if !fitted.map_err(failed)? {
             return Ok(false);
         }
-        let limits: Vec<Nearby> = self.strip.samples.iter().map(|s| self.limits(job, s)).collect();
         for (x, pixel) in evidence.iter_mut().enumerate() {
-            *pixel = self.pixel(job, x, &limits);
+            *pixel = self.pixel(job, x as f64);
         }
         self.bias(settings, evidence).map_err(failed)?;
         Ok(true)
@@ -202,64 +182,23 @@ impl<const C: usize> RowEvidence<C> {
         Ok(())
     }
 
-    fn pixel(&mut self, job: &Job<'_>, column: usize, limits: &[Nearby]) -> Evidence {
-        let x = column as f64;
+    fn pixel(&mut self, job: &Job<'_>, x: f64) -> Evidence {
         self.fit.respond(x, &mut self.response);
         self.of_views.clear();
         self.of_views.resize(job.rows.views.len(), 0.0);
         let mut e = Evidence::default();
         let from = self.strip.samples.partition_point(|s| s.x < x - INFLUENCE);
-        for (s, limit) in
-            self.strip.samples[from..].iter().zip(&limits[from..]).take_while(|(s, _)| s.x <= x + INFLUENCE)
-        {
+        for s in self.strip.samples[from..].iter().take_while(|s| s.x <= x + INFLUENCE) {
             let h = f64::from(s.weight) * self.response.at::<ORDER>(s.x);
-            let away = s.x - x;
-            e.held += h as f32;
-            e.reach += h.abs() as f32;
-            e.shift += (h * away) as f32;
-            e.spread += (h.abs() * away * away) as f32;
             e.doubtful += if s.doubtful { h.abs() as f32 } else { 0.0 };
             self.of_views[usize::from(s.view)] += h;
-            if away.abs() <= NEAR as f64 {
-                e.steepest = e.steepest.max(limit.slope);
-                e.sharpest = e.sharpest.max(limit.curvature);
-                e.residual = e.residual.max(limit.residual);
-            }
         }
-        for (influence, view) in self.of_views.iter().zip(job.rows.views) {
-            let (g2, distance) = (influence.powi(2), (view.camera - job.rows.camera.position).abs());
+        for (view, influence) in self.of_views.iter().enumerate() {
+            let (g2, distance) = (influence.powi(2), job.distance(view as u16));
             e.views += g2 as f32;
             e.disparity_gain += (g2 * distance * distance) as f32;
-            if *influence > 0.02 {
-                e.distance = e.distance.max(distance as f32);
-            }
         }
         e
-    }
-
-    /// Slope and second difference of the photograph around a sample's pixel, in virtual pixels, and the
-    /// residual of the fit there; the largest over the channels.
-    fn limits(&self, job: &Job<'_>, s: &Sample<C>) -> Nearby {
-        let image = job.rows.views[usize::from(s.view)].image;
-        let (pixel, width) = (s.pixel as usize, image.width());
-        let (column, gain) = (pixel % width, job.rows.view_weights.gain(s.view));
-        let at = |p: usize| {
-            let mut value = image.pixel::<C>(p);
-            value.iter_mut().zip(gain).for_each(|(v, g)| *v *= g);
-            value
-        };
-        let here = at(pixel);
-        let left = if column > 0 { at(pixel - 1) } else { here };
-        let right = if column + 1 < width { at(pixel + 1) } else { here };
-        let fitted = self.fit.value(s.x);
-        let mut limits = Nearby::default();
-        for c in 0..C {
-            let (a, b) = ((here[c] - left[c]).abs(), (right[c] - here[c]).abs());
-            limits.slope = limits.slope.max(a).max(b);
-            limits.curvature = limits.curvature.max((left[c] - 2.0 * here[c] + right[c]).abs());
-            limits.residual = limits.residual.max((s.value[c] - fitted[c] as f32).abs());
-        }
-        limits
     }
 
     /// The height of every jump of depth between neighbouring samples, on the pixels within 1.5 of it.
@@ -282,14 +221,6 @@ impl<const C: usize> RowEvidence<C> {
             }
         }
     }
-}
-
-/// Slopes and residual at a sample.
-#[derive(Debug, Clone, Copy, Default)]
-struct Nearby {
-    slope: f32,
-    curvature: f32,
-    residual: f32,
 }
 
 #[cfg(test)]
@@ -317,24 +248,18 @@ mod tests {
         let one = examined(&[0.0], 0.5, |_| 90.0);
         for (s, views, disparity_gain) in [(&two, 0.5, 0.125), (&one, 1.0, 0.25)] {
             let e = s.evidence[4 * 60 + 30];
-            assert!(
-                near(e.held, 1.0) && near(e.views, views) && near(e.disparity_gain, disparity_gain),
-                "{e:?}"
-            );
-            assert!(near(e.bias, 0.0) && near(e.residual, 0.0) && near(e.shift, 0.0), "{e:?}");
-            assert!(e.reach >= e.held && e.spread > 0.1 && near(e.distance, 0.5), "{e:?}");
+            assert!(near(e.views, views) && near(e.disparity_gain, disparity_gain), "{e:?}");
+            assert!(near(e.bias, 0.0), "{e:?}");
         }
         assert!(two.edges.iter().all(|e| *e == 0.0));
     }
 
-    /// The bias of a smoothing fit is large where the texture is fine, and slopes are those of the paint.
+    /// The bias of a smoothing fit is large where the texture is fine.
     #[test]
     fn fine_texture_has_a_bias() {
         let wave = |rate: f32| move |x: usize| 120.0 + 50.0 * (rate * x as f32).sin();
         let mean = |s: &PixelEvidence| s.evidence[250..290].iter().map(|e| e.bias).sum::<f32>() / 40.0;
         let (fine, coarse) = (examined(&[0.0, 1.0], 0.5, wave(1.8)), examined(&[0.0, 1.0], 0.5, wave(0.3)));
         assert!(mean(&fine) > 10.0 * mean(&coarse), "{} {}", mean(&fine), mean(&coarse));
-        let steepest = coarse.evidence[270].steepest;
-        assert!((10.0..15.1).contains(&steepest), "{steepest}");
     }
 }

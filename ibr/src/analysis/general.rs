@@ -3,17 +3,14 @@
 
 use super::estimate::{Examined, Predicted, Study};
 use super::jitter::depth_jitter;
-use super::lookup::local_limits;
+use super::lookup::{TAIL, local_limits};
 use super::regressors::{hole_distances, slopes};
 use crate::camera::Camera;
 use crate::depth::DepthMap;
 use crate::image::Image;
 use crate::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights, calibrated as pipeline};
-use crate::propagate::{CalibratedView, Nearest, Viewpoint};
+use crate::propagate::{CalibratedView, Viewpoint, nearest};
 use nalgebra::{Matrix3x4, Vector3};
-
-/// Largest share of its depth by which a noisy depth is wrong, in standard deviations.
-const TAIL: f64 = 3.0;
 
 impl Predicted for Camera {
     fn render(
@@ -70,8 +67,11 @@ impl Predicted for Camera {
 
     /// Mean distance between a view and the one nearest to it.
     fn spacing(&self, views: &[CalibratedView<'_>]) -> f64 {
-        let nearest = Nearest::new(views);
-        let mean = (0..views.len()).map(|i| nearest.distance(i)).sum::<f64>() / views.len() as f64;
+        let distance = |i: usize| {
+            let other = nearest(views, i, (0..views.len()).filter(|other| *other != i));
+            other.map_or(f64::INFINITY, |other| views[other].camera.distance(&views[i].camera))
+        };
+        let mean = (0..views.len()).map(distance).sum::<f64>() / views.len() as f64;
         let away = views.iter().map(|v| v.camera.distance(self)).fold(f64::INFINITY, f64::min);
         [mean, away].into_iter().find(|s| *s > 0.0 && s.is_finite()).unwrap_or(1.0)
     }

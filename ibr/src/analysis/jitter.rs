@@ -7,7 +7,7 @@ use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::pipeline::depth_errors::Lookups;
 use crate::pipeline::{RenderError, RenderSettings};
-use crate::propagate::{Nearest, View, Viewpoint};
+use crate::propagate::{View, Viewpoint, nearest};
 
 /// Errors of disparity below this many pixels change nothing that can be seen.
 const LEAST_DISPARITY: f64 = 0.02;
@@ -24,9 +24,8 @@ const LEAST_SHARE: f64 = 1e-4;
 /// The median makes hidden points harmless. Errors that both maps share, and offsets between the cameras, do
 /// not show.
 pub(super) fn map_noise<P: Viewpoint>(views: &[View<'_, P>]) -> f64 {
-    let nearest = Nearest::new(views);
     let lookups = |j: usize| {
-        let (a, b) = (&views[nearest.before(j)?], &views[j]);
+        let (a, b) = (&views[nearest(views, j, 0..j)?], &views[j]);
         Some(Lookups::of(a.map, b.map, a.camera.map_to(&b.camera)))
     };
     (1..views.len()).filter_map(lookups).fold(Lookups::default(), Lookups::and).common()

@@ -1,8 +1,8 @@
-//! The local limit of a view of general cameras: what the photographs show at the places of its pixels.
+//! The local limit of a view: what the photographs show at the places of its pixels.
 //!
-//! The influences h_s of the samples on a pixel of the plane fit are not computed. They are taken to be
-//! positive with the sum one, to balance, and to have a second moment of half a square pixel along each
-//! axis. Then the limit of the row fit is
+//! The influences h_s of the samples on a pixel of the fit are not computed. They are taken to be positive
+//! with the sum one, to balance, and to have a second moment of half a square pixel along each axis. Then
+//! the limit is
 //!
 //! ```text
 //! |J - f| <= E + |f'| m + (1/4) (|f_xx| + |f_yy|)
@@ -13,16 +13,16 @@
 //! deviations. Slopes and second differences are those of the photographs nearby, per pixel of the virtual
 //! view.
 
-use crate::camera::Camera;
-use crate::pipeline::Rendering;
-use crate::propagate::CalibratedView;
+use crate::depth::Measure;
+use crate::pipeline::{Rendering, same_depth};
+use crate::propagate::{View, Viewpoint};
 use rayon::prelude::*;
-
-/// Depths of one point differ by at most this share.
-const SAME_POINT: f64 = 0.05;
 
 /// Pixels to each side over which local suprema are taken.
 const NEAR: usize = 3;
+
+/// Errors of depth reach this many standard deviations.
+pub(super) const TAIL: f64 = 3.0;
 
 /// The limit of a pixel that no view shows.
 const UNSEEN: f32 = 255.0;
@@ -51,10 +51,11 @@ impl Shown {
     }
 }
 
-/// The local limit of every pixel, in grey levels; `deviation` is the largest relative error of depth.
-pub(super) fn local_limits(
-    views: &[CalibratedView<'_>],
-    camera: &Camera,
+/// The local limit of every pixel, in grey levels; `deviation` is the largest error of a disparity, or of a
+/// depth as a share of it.
+pub(super) fn local_limits<P: Viewpoint>(
+    views: &[View<'_, P>],
+    camera: &P,
     rendering: &Rendering,
     deviation: f64,
 ) -> Vec<f32> {
@@ -88,27 +89,31 @@ fn largest_nearby(shown: &[Shown], (width, height): (usize, usize)) -> Vec<Shown
 }
 
 /// A view in which the pixels of a rendering are looked up.
-struct Lookup<'a> {
-    view: &'a CalibratedView<'a>,
-    camera: &'a Camera,
+struct Lookup<'a, P> {
+    view: &'a View<'a, P>,
+    camera: &'a P,
     rendering: &'a Rendering,
     deviation: f64,
 }
 
-impl Lookup<'_> {
+impl<P: Viewpoint> Lookup<'_, P> {
     /// What the view shows at a pixel; nothing if it does not see its point.
     fn at(&self, p: usize) -> Option<Shown> {
         let width = self.rendering.image.width();
         let (x, y) = ((p % width) as f64, (p / width) as f64);
         let depth = f64::from(self.rendering.depth.data()[p]);
-        let (u, v, d) = self.view.camera.project(&self.camera.unproject(x, y, depth));
+        let there = self.camera.map_to(&self.view.camera);
+        let (u, v, d) = there(x, y, depth);
         self.shows(u, v, d)?;
         let beside = |dx: f64, dy: f64| {
-            let (u, v, _) = self.view.camera.project(&self.camera.unproject(x + dx, y + dy, depth));
+            let (u, v, _) = there(x + dx, y + dy, depth);
             (u, v)
         };
-        let moved = self.view.camera.unproject(u, v, d * (1.0 + self.deviation));
-        let (a, b, _) = self.camera.project(&moved);
+        let moved = match self.view.map.measure() {
+            Measure::Disparity => d + self.deviation,
+            Measure::Depth => d * (1.0 + self.deviation),
+        };
+        let (a, b, _) = self.view.camera.map_to(self.camera)(u, v, moved);
         let mut shown = Shown { moved: (a - x).hypot(b - y) as f32, ..Shown::default() };
         let image = self.view.image;
         let sides = [beside(-1.0, 0.0), beside(1.0, 0.0), beside(0.0, -1.0), beside(0.0, 1.0)];
@@ -130,10 +135,10 @@ impl Lookup<'_> {
 
     /// Whether the map has this depth around a place.
     fn shows(&self, u: f64, v: f64, d: f64) -> Option<()> {
-        let (width, height) = self.view.map.size();
+        let map = self.view.map;
+        let (width, height) = map.size();
         let inside = u >= 0.0 && v >= 0.0 && u <= width as f64 - 1.0 && v <= height as f64 - 1.0;
         // Also false for unknown depths.
-        let same = |seen: f32| (f64::from(seen) / d - 1.0).abs() <= SAME_POINT;
-        (inside && d > 0.0 && same(self.view.map.row(v.round() as usize)[u.round() as usize])).then_some(())
+        (inside && same_depth(d as f32, map.row(v.round() as usize)[u.round() as usize], map)).then_some(())
     }
 }

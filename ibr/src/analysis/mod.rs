@@ -5,23 +5,14 @@
 //! * **sure bound**: what the error does not exceed, for given [`Limits`] of the second derivative of the
 //!   virtual rows, of the errors of intensities and of those of disparities; for rectified rigs, rendered by
 //!   rows, and nothing where no limits are known (`sure.rs`);
-//! * **local limit**: the same with slopes, second differences and residuals of the samples nearby in the
-//!   place of such limits (below). It is not sure: photographs break it where surfaces reflect, where depth
-//!   is wrong in all views, and where something lies between the samples;
+//! * **local limit**: the same with slopes, second differences and residuals of the photographs nearby in
+//!   the place of such limits. It is not sure: photographs break it where surfaces reflect, where depth is
+//!   wrong in all views, and where something lies between the samples;
 //! * **expected**: the root of the expected square. By Jensen's inequality the expected error is not larger;
 //! * **estimate**: the expected absolute error against a photograph from the place of the virtual camera.
 //!
-//! With h_s the influence of sample s on the pixel at x (the fit is linear in the samples) the local limit
-//! of a rectified rig is
-//!
-//! ```text
-//! |f'| |sum h_s (x_s - x)| + (1/2) |f''| sum |h_s| (x_s - x)^2
-//!      + E_T sum |h_s| + E_D |f'| distance sum |h_s|
-//! ```
-//!
-//! and the whole range of values for the part of the pixel that fills a hole. For linear interpolation it is
-//! (1/8) |f''| D^2 + E_T + E_D B |f'|. That of general cameras has the same form for influences that are
-//! assumed (`lookup.rs`).
+//! The local limit has the form of that of linear interpolation, (1/8) |f''| D^2 + E_T + E_D B |f'|, with
+//! residuals, slopes and second differences of the photographs nearby (`lookup.rs`).
 //!
 //! The other two are sums over causes. The size of each cause is computed ([`collect_evidence()`]): the
 //! bias of the fit, by fitting the fit once more; the views that share in a pixel; the slope; the change

@@ -1,14 +1,12 @@
 //! The error of a view of a rectified rig, rendered by rows.
 
 use super::estimate::{Examined, Predicted, Study};
-use super::evidence::{Evidence, collect_evidence};
+use super::evidence::collect_evidence;
 use super::jitter::depth_jitter;
+use super::lookup::{TAIL, local_limits};
 use super::regressors::regressors;
 use crate::pipeline::{RenderError, RenderSettings, Rendering, rectified as pipeline};
 use crate::propagate::RectifiedView;
-
-/// Errors of disparity reach this many standard deviations.
-const REACH: f64 = 3.0;
 
 impl Predicted for f64 {
     fn render(
@@ -26,12 +24,12 @@ impl Predicted for f64 {
         _: (usize, usize),
         study: &Study<'_>,
     ) -> Result<Examined, RenderError> {
-        let Study { settings, known, spacing, limits, .. } = *study;
+        let Study { settings, known, spacing, bounds, limits } = *study;
         let found = collect_evidence(views, *self, settings, limits)?;
         let jitter = depth_jitter(views, self, settings, &found.rendering.image, known.noise)?;
         let regressors = regressors(&found, &jitter, &known.variogram, spacing);
-        let reach = (REACH * known.noise) as f32;
-        let local_limit = found.evidence.iter().map(|e| local_limit(e, reach)).collect();
+        let limits = || local_limits(views, self, &found.rendering, TAIL * known.noise);
+        let local_limit = if bounds { limits() } else { Vec::new() };
         Ok(Examined { rendering: found.rendering, regressors, sure_bound: found.sure, local_limit })
     }
 
@@ -68,14 +66,6 @@ impl Predicted for f64 {
             .map(|position| (vec![position], position))
             .into()
     }
-}
-
-/// The local limit of one pixel; `depth_error` bounds the error of disparities for a baseline of one.
-fn local_limit(e: &Evidence, depth_error: f32) -> f32 {
-    let geometry = e.steepest * (e.shift.abs() + depth_error * e.distance * e.reach);
-    let curvature = e.sharpest / 2.0 * e.spread;
-    let unseen = 255.0 * (1.0 - e.held).max(0.0);
-    (geometry + curvature + e.residual * e.reach + unseen).min(255.0)
 }
 
 #[cfg(test)]

@@ -24,7 +24,7 @@ pub fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) ->
 
 /// Which samples are hidden.
 pub(crate) fn hidden<const C: usize>(
-    samples: impl ExactSizeIterator<Item = Sample<C>>,
+    samples: impl ExactSizeIterator<Item = Sample<C>> + Clone,
     test: &DepthTest,
 ) -> Vec<bool> {
     let count = samples.len();
@@ -75,7 +75,11 @@ impl PlaneSearch {
                 let cell = cells.cell(points, *i as usize);
                 search.hides(starts[cell]..starts[cell + 1], *i as usize)
             };
-            hidden.par_extend(suspects.par_iter().with_min_len(4096).copied().filter(is_hidden));
+            match suspects.len() > FEW_SUSPECTS {
+                true => hidden
+                    .par_extend(suspects.par_iter().with_min_len(FEW_SUSPECTS).copied().filter(is_hidden)),
+                false => hidden.extend(suspects.iter().copied().filter(is_hidden)),
+            }
         }
         &self.hidden
     }
@@ -109,6 +113,9 @@ impl PlaneSearch {
         }
     }
 }
+
+/// Suspects that one thread decides on.
+const FEW_SUSPECTS: usize = 4096;
 
 /// Members that are compared one by one.
 const FEW: usize = 32;

@@ -21,14 +21,21 @@ pub(crate) struct Points {
 }
 
 impl Points {
-    pub(crate) fn of<const C: usize>(samples: impl ExactSizeIterator<Item = Sample<C>>) -> Self {
+    pub(crate) fn of<const C: usize>(samples: impl Iterator<Item = Sample<C>> + Clone) -> Self {
         let mut points = Self::default();
-        points.resize(samples.len().next_multiple_of(RUN));
-        for (i, s) in samples.enumerate() {
-            (points.x[i], points.y[i]) = (s.x, s.y);
-            (points.depth[i], points.spacing[i], points.own[i]) = (s.depth, s.spacing, true);
-        }
+        points.set(samples);
         points
+    }
+
+    /// Takes these samples in place of what there was.
+    pub(super) fn set<const C: usize>(&mut self, samples: impl Iterator<Item = Sample<C>> + Clone) {
+        self.resize(0);
+        self.x.extend(samples.clone().map(|s| s.x));
+        self.y.extend(samples.clone().map(|s| s.y));
+        self.depth.extend(samples.clone().map(|s| s.depth));
+        self.spacing.extend(samples.map(|s| s.spacing));
+        self.own.resize(self.x.len(), true);
+        self.resize(self.x.len().next_multiple_of(RUN));
     }
 
     /// Number of places.
@@ -79,8 +86,8 @@ impl Raster {
         let Extent { left, right, top, bottom } = *extent;
         let cells = |edge: f64| ((right - left) / edge + 1.0) * ((bottom - top) / edge + 1.0);
         let mut edge = edge;
-        // The doubling ends at the latest when one cell holds all samples.
-        while cells(edge) > most as f64 {
+        // The doubling ends at the latest when one cell holds all samples; positions may be infinite.
+        while cells(edge) > most as f64 && edge.is_finite() {
             edge *= 2.0;
         }
         let scale = 1.0 / edge;

@@ -1,66 +1,48 @@
-//! Occlusion removal within one row: sort by column, then a sliding minimum of the depth.
+//! Occlusion removal within one row: the search of the plane, with all samples on a line, and the order by
+//! column that the row fit takes.
 
-use super::{DepthTest, hidden};
+use super::DepthTest;
+use super::grid::PlaneSearch;
+use super::points::Points;
 use crate::lanes::{largest, least};
 use crate::sample::Sample;
-use std::ops::Range;
 
 /// Added to a number below it, it rounds to a whole one, which is the lower part of the bits of the sum.
 const WHOLE: f64 = (1_u64 << 52) as f64;
 
-/// The part of a sample that sorting and the depth test need: 16 bytes to move instead of 40.
+/// The part of a sample that sorting needs: 16 bytes to move instead of 48.
 #[derive(Debug, Clone, Copy, Default)]
 struct Key {
     x: f64,
-    depth: f32,
     /// Index of the sample in the order given.
     index: u32,
-}
-
-/// So many keys near depth edges are searched as in the plane: comparing each with those within its radius
-/// would take a time in proportion to the square of the number of views.
-const CROWD: usize = 4096;
-
-/// Keys whose depths are compared as a whole.
-const CHUNK: usize = 8;
-
-/// The least and the largest depth of some keys.
-#[derive(Debug, Clone, Copy)]
-struct Depths {
-    near: f32,
-    far: f32,
-}
-
-impl Depths {
-    const NONE: Self = Self { near: f32::INFINITY, far: f32::NEG_INFINITY };
-
-    /// A depth that is not a number hides nothing and is not hidden.
-    #[inline]
-    fn and(self, other: Self) -> Self {
-        Self { near: least(self.near, other.near), far: largest(self.far, other.far) }
-    }
-
-    fn of(keys: &[Key]) -> Self {
-        keys.iter().fold(Self::NONE, |all, k| all.and(Self { near: k.depth, far: k.depth }))
-    }
 }
 
 /// Work memory of the row routines, reused from row to row.
 #[derive(Debug, Clone, Default)]
 pub struct RowScratch<const C: usize> {
+    points: Points,
+    search: PlaneSearch,
     keys: Vec<Key>,
     sorted: Vec<Key>,
     starts: Vec<u32>,
-    /// The depths of each chunk of keys.
-    chunks: Vec<Depths>,
-    /// Indices of the window whose depths increase; the front is the nearest.
-    window: Vec<u32>,
-    /// Keys that a sample of enlarged radius hides.
-    hidden: Vec<bool>,
     survivors: Vec<Sample<C>>,
 }
 
 impl<const C: usize> RowScratch<C> {
+    /// Takes the keys of the samples that are visible.
+    fn find_visible(&mut self, samples: &[Sample<C>], test: &DepthTest) {
+        let Self { points, search, keys, .. } = self;
+        points.set(samples.iter().map(|s| Sample { y: 0.0, ..*s }));
+        search.clear(&points.extent(), points.len());
+        search.enter(points, test);
+        let mut hidden = search.hidden(points, test).iter().peekable();
+        let all = samples.iter().zip(0_u32..);
+        let visible = all.filter(|(_, index)| hidden.next_if_eq(&index).is_none());
+        keys.clear();
+        keys.extend(visible.map(|(s, index)| Key { x: s.x, index }));
+    }
+
     /// Sorts the keys by column, equal columns in the order given. Expected O(n): a counting sort into as
     /// many cells as there are keys, then insertion, which meets few keys per cell.
     fn sort(&mut self) {
@@ -102,117 +84,6 @@ impl<const C: usize> RowScratch<C> {
         }
         std::mem::swap(&mut self.sorted, &mut self.keys);
     }
-
-    /// Collects the survivors in the order of the keys.
-    ///
-    /// Within a surface no depths of neighbours are far enough apart for one sample to hide another: then
-    /// the least and the largest depth around a chunk of keys show that all of it is visible. Other chunks
-    /// are searched.
-    fn collect(&mut self, samples: &[Sample<C>], test: &DepthTest) {
-        let n = self.keys.len();
-        let radius = test.radius(samples.iter().fold(0.0, |most, s| largest(most, s.spacing)));
-        self.chunks.clear();
-        self.chunks.extend(self.keys.chunks(CHUNK).map(Depths::of));
-        self.hidden.clear();
-        self.hidden.resize(n, false);
-        let (mut chunk, count) = (0, self.chunks.len());
-        while chunk < count {
-            let start = chunk;
-            while chunk < count && self.is_flat(chunk, radius, test) {
-                chunk += 1;
-            }
-            let visible = &self.keys[start * CHUNK..(chunk * CHUNK).min(n)];
-            self.survivors.extend(visible.iter().map(|k| samples[k.index as usize]));
-            let start = chunk;
-            while chunk < count && !self.is_flat(chunk, radius, test) {
-                chunk += 1;
-            }
-            if start < chunk {
-                let around = self.around(start..chunk, radius);
-                let around = around.start * CHUNK..(around.end * CHUNK).min(n);
-                let own = start * CHUNK..(chunk * CHUNK).min(n);
-                if around.len() > CROWD {
-                    self.search(around, own, samples, test);
-                } else {
-                    self.mark_hidden(around.clone(), samples, test);
-                    self.sweep(around, own, samples, test);
-                }
-            }
-        }
-    }
-
-    /// Whether no sample near a chunk can hide another.
-    fn is_flat(&self, chunk: usize, radius: f64, test: &DepthTest) -> bool {
-        let around = self.around(chunk..chunk + 1, radius);
-        let Depths { near, far } = self.chunks[around].iter().fold(Depths::NONE, |all, d| all.and(*d));
-        !test.hides(f64::from(near), f64::from(far))
-    }
-
-    /// Some chunks and all that have keys within a radius of theirs.
-    #[inline]
-    fn around(&self, chunks: Range<usize>, radius: f64) -> Range<usize> {
-        let (mut start, mut end) = (chunks.start, chunks.end);
-        let close = |a: usize, b: usize| DepthTest::close(self.keys[b].x - self.keys[a].x, 0.0, radius);
-        let last = (end * CHUNK).min(self.keys.len()) - 1;
-        while start > 0 && close(start * CHUNK - 1, chunks.start * CHUNK) {
-            start -= 1;
-        }
-        while end < self.chunks.len() && close(last, end * CHUNK) {
-            end += 1;
-        }
-        start..end
-    }
-
-    /// Collects the survivors among the keys `own`, which the keys `around` may hide, as in the plane.
-    fn search(&mut self, around: Range<usize>, own: Range<usize>, samples: &[Sample<C>], test: &DepthTest) {
-        let Self { keys, survivors, .. } = self;
-        let on_line = |k: &Key| Sample { y: 0.0, ..samples[k.index as usize] };
-        let hidden = hidden(keys[around.clone()].iter().map(on_line), test);
-        let visible = own.filter(|i| !hidden[*i - around.start]);
-        survivors.extend(visible.map(|i| samples[keys[i].index as usize]));
-    }
-
-    /// Marks what samples of a larger radius than epsilon hide; the sweep covers the radius epsilon.
-    fn mark_hidden(&mut self, around: Range<usize>, samples: &[Sample<C>], test: &DepthTest) {
-        let (keys, hidden) = (&self.keys[around.clone()], &mut self.hidden[around]);
-        for (i, k) in keys.iter().enumerate() {
-            let radius = test.radius(samples[k.index as usize].spacing);
-            if radius > test.epsilon {
-                let close = |other: &Key| DepthTest::close(other.x - k.x, 0.0, radius);
-                let behind = |other: &Key| test.hides(f64::from(k.depth), f64::from(other.depth));
-                let before = (0..i).rev().take_while(|j| close(&keys[*j]));
-                let after = (i + 1..keys.len()).take_while(|j| close(&keys[*j]));
-                before.chain(after).filter(|j| behind(&keys[*j])).for_each(|j| hidden[j] = true);
-            }
-        }
-    }
-
-    /// Collects the survivors among the keys `own`, with a window of the nearest keys within epsilon, all of
-    /// which lie in `around`.
-    fn sweep(&mut self, around: Range<usize>, own: Range<usize>, samples: &[Sample<C>], test: &DepthTest) {
-        let Self { keys, window, hidden, survivors, .. } = self;
-        let test_close = |dx: f64| DepthTest::close(dx, 0.0, test.epsilon);
-        window.clear();
-        let (mut head, mut next) = (0, around.start);
-        for (k, hidden) in keys[own.clone()].iter().zip(&hidden[own]) {
-            while let Some(entering) =
-                keys[..around.end].get(next).filter(|e| e.x <= k.x || test_close(e.x - k.x))
-            {
-                while window.len() > head && keys[window[window.len() - 1] as usize].depth >= entering.depth {
-                    window.pop();
-                }
-                window.push(next as u32);
-                next += 1;
-            }
-            let close = |i: &u32| test_close(k.x - keys[*i as usize].x);
-            head += window[head..].iter().position(close).unwrap_or(0);
-            // A NaN position is close to nothing, not even to itself, so the sample is kept.
-            let nearest = window.get(head).filter(|i| close(i)).map(|i| keys[*i as usize].depth);
-            if !hidden && nearest.is_none_or(|n| !test.hides(f64::from(n), f64::from(k.depth))) {
-                survivors.push(samples[k.index as usize]);
-            }
-        }
-    }
 }
 
 /// Insertion sort for few samples, the library's stable sort for many.
@@ -240,15 +111,14 @@ pub fn remove_in_row<const C: usize>(
     scratch: &mut RowScratch<C>,
 ) -> usize {
     let before = samples.len();
-    let key = |(i, s): (usize, &Sample<C>)| Key { x: s.x, depth: s.depth, index: i as u32 };
-    scratch.keys.clear();
-    scratch.keys.extend(samples.iter().enumerate().map(key));
+    scratch.find_visible(samples, test);
     scratch.sort();
+    let RowScratch { keys, survivors, .. } = scratch;
     // The two lists are exchanged from row to row; both have the place that the next row asks for.
-    scratch.survivors.clear();
-    scratch.survivors.reserve_exact(samples.capacity());
-    scratch.collect(samples, test);
-    std::mem::swap(&mut scratch.survivors, samples);
+    survivors.clear();
+    survivors.reserve_exact(samples.capacity());
+    survivors.extend(keys.iter().map(|k| samples[k.index as usize]));
+    std::mem::swap(survivors, samples);
     before - samples.len()
 }
 
@@ -317,7 +187,7 @@ mod tests {
                 spacing: (1.0 + spacing * part(k, 0.569_840_291)) as f32,
                 ..sample(9.0 * part(k, 0.754_877_666), 1.0 + part(k, 0.618_033_989) as f32, k)
             };
-            let crowd: Vec<Sample<1>> = (0..2 * CROWD as u32).map(view).collect();
+            let crowd: Vec<Sample<1>> = (0..8192).map(view).collect();
             check(&crowd, &test, &mut scratch);
         }
     }

@@ -5,7 +5,7 @@ use super::Exposure;
 use super::depth_errors::{self, FEWEST_POINTS, Lookups};
 use crate::depth::{DepthMap, JUMP, Measure};
 use crate::image::Texture;
-use crate::propagate::{Nearest, View, Viewpoint};
+use crate::propagate::{View, Viewpoint, nearest};
 use rayon::prelude::*;
 
 /// Pixels of each view that are compared, about.
@@ -70,9 +70,8 @@ impl Agreement {
         let mut agreement = Self { gains: vec![[1.0; 3]; views.len()], textures, ..Self::default() };
         // Those of good pairs, and of poor ones.
         let mut errors = [vec![Vec::new(); views.len()], vec![Vec::new(); views.len()]];
-        let nearest = Nearest::new(views);
         for j in 1..views.len() {
-            let Some(i) = nearest.before(j) else { continue };
+            let Some(i) = nearest(views, j, 0..j) else { continue };
             let found = Comparison::new(&views[i], &views[j]).verdict([i, j]);
             let Some(pair) = found else { continue };
             // Colours at points that do not correspond say nothing.
@@ -237,7 +236,7 @@ fn shrunk(found: f64, error: f64) -> f64 {
 
 /// Up to the share of the nearer one beyond which two samples lie on different surfaces, and for disparities
 /// up to one pixel.
-fn same_depth(a: f32, b: f32, map: &DepthMap) -> bool {
+pub(crate) fn same_depth(a: f32, b: f32, map: &DepthMap) -> bool {
     let tolerance = match map.measure() {
         Measure::Disparity => (JUMP * (a.min(b) + map.offset() as f32)).max(1.0),
         Measure::Depth => JUMP * a.min(b),

@@ -124,7 +124,7 @@ fn render_with<const ORDER: usize, const C: usize>(
         if let Ok(mut pool) = pool.lock() {
             pool.push(work);
         }
-        view_weights.apply(&mut samples, |view| views[view].image);
+        view_weights.apply(&mut samples);
         propagated.fetch_add(all, Ordering::Relaxed);
         watch(GATHERING * (ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count as f64);
         samples
@@ -207,7 +207,7 @@ mod tests {
         assert_eq!((got.report.propagated, got.report.dropped), (samples.len(), dropped));
         assert_eq!(got.report.occluded, occlusion::remove(&mut samples, settings.depth_test()));
         assert!(got.report.occluded > 0);
-        ViewWeights::of(&views, &target).apply(&mut samples, |view| views[view].image);
+        ViewWeights::of(&views, &target).apply(&mut samples);
         let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation).unwrap();
         problem.add(&samples).unwrap();
         let fit = problem.stiffened_by_area().solve(None, &|_| ()).unwrap();
@@ -218,7 +218,7 @@ mod tests {
         let mut work = Work::default();
         for rows in [0..7, 7..8, 8..30] {
             let (mut band, _) = visible_in(rows, 30, &footprint, &views, settings.depth_test(), &mut work);
-            ViewWeights::of(&views, &target).apply(&mut band, |view| views[view].image);
+            ViewWeights::of(&views, &target).apply(&mut band);
             problem.add(&band).unwrap();
         }
         assert_eq!(problem.samples(), samples.len());

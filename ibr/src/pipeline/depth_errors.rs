@@ -2,7 +2,6 @@
 //! another.
 
 use crate::depth::{DepthMap, FAR, Measure};
-use crate::propagate::{View, Viewpoint};
 
 /// Every so many pixels of a map are looked up.
 const LOOKUP_STEP: usize = 7;
@@ -128,75 +127,6 @@ pub(super) fn of_each([mut first, mut second]: [Lookups; 2]) -> Option<[f64; 2]>
     (both >= LEAST_AVERAGED).then(|| [(d1 - k1 * d2) / both, (d2 - k2 * d1) / both].map(|s| s.max(0.0)))
 }
 
-/// By how much errors of depth displace the samples of a view, as positions in the view itself: the mean of
-/// d d' over the pixels, d the displacement in pixels per pixel of disparity or per share of the depth.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct DisparityGain {
-    xx: f64,
-    xy: f64,
-    yy: f64,
-}
-
-impl DisparityGain {
-    /// Of the errors of a view's map, seen from a camera.
-    pub(crate) fn between<P: Viewpoint>(view: &View<'_, P>, camera: &P) -> Self {
-        match view.map.measure() {
-            Measure::Disparity => Self::along_rows(view.camera.distance(camera)),
-            Measure::Depth => Self::of(view.map, view.camera.map_to(camera)),
-        }
-    }
-
-    /// Of errors of disparity, at this distance along the rows.
-    pub(super) fn along_rows(distance: f64) -> Self {
-        Self { xx: distance * distance, ..Self::default() }
-    }
-
-    /// From the map of pixels and their depths to the other view. The pixels that move farthest, a tenth,
-    /// are left out: points close to a camera move without limit.
-    fn of(map: &DepthMap, to: impl Fn(f64, f64, f64) -> (f64, f64, f64)) -> Self {
-        const STEPS: usize = 16;
-        let (width, height) = map.size();
-        let columns = (0..width).step_by(width.div_ceil(STEPS).max(1));
-        let rows = (0..height).step_by(height.div_ceil(STEPS).max(1));
-        let pixels = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
-        let mut all: Vec<[f64; 2]> = pixels
-            .filter_map(|(x, y)| displacement([x as f64, y as f64, f64::from(map.row(y)[x])], map, &to))
-            .collect();
-        all.sort_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1])));
-        all.truncate(all.len() - all.len() / 10);
-        let mean = |product: &dyn Fn(&[f64; 2]) -> f64| {
-            all.iter().map(product).sum::<f64>() / all.len().max(1) as f64
-        };
-        Self { xx: mean(&|d| d[0] * d[0]), xy: mean(&|d| d[0] * d[1]), yy: mean(&|d| d[1] * d[1]) }
-    }
-
-    /// Mean square change of the value for an error of one in the depth, from the products x x, x y and y y
-    /// of the slopes of the view.
-    pub(crate) fn product(&self, [xx, xy, yy]: [f64; 3]) -> f64 {
-        self.xx * xx + 2.0 * self.xy * xy + self.yy * yy
-    }
-}
-
-/// The displacement of one pixel within its own view that has the effect of a change of its depth.
-fn displacement(
-    [x, y, depth]: [f64; 3],
-    map: &DepthMap,
-    to: impl Fn(f64, f64, f64) -> (f64, f64, f64),
-) -> Option<[f64; 2]> {
-    const CHANGE: f64 = 1e-3;
-    let moved = match map.measure() {
-        Measure::Disparity => depth + CHANGE,
-        Measure::Depth => depth * (1.0 + CHANGE),
-    };
-    let here = to(x, y, depth);
-    let by = |(u, v, _): (f64, f64, f64)| ((u - here.0) / CHANGE, (v - here.1) / CHANGE);
-    let (right, below) = (by(to(x + CHANGE, y, depth)), by(to(x, y + CHANGE, depth)));
-    let (u, v) = by(to(x, y, moved));
-    let area = right.0 * below.1 - right.1 * below.0;
-    let found = [(u * below.1 - v * below.0) / area, (v * right.0 - u * right.1) / area];
-    found.iter().all(|d| d.is_finite()).then_some(found)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -250,29 +180,6 @@ mod tests {
         };
         let [first, second] = of_each([look(0, 1), look(1, 0)]).unwrap().map(f64::sqrt);
         assert!((0.0..0.004).contains(&first) && (0.007..0.009).contains(&second), "{first} {second}");
-    }
-
-    /// An error of a disparity displaces a point by as much, times the distance of the cameras; a relative
-    /// error of a depth by its disparity, in the pixels of a view of half the size and turned by a right
-    /// angle too.
-    #[test]
-    fn disparity_gains_are_displacements() {
-        let shots = shots();
-        let disparity = rig_disparity(&shots[0].1, SIZE.0);
-        let found = DisparityGain::of(&disparity, |x, y, d| (x - 0.4 * d, y, d));
-        assert!((found.xx - 0.16).abs() < 1e-9 && found.yy < 1e-9 && found.xy.abs() < 1e-9, "{found:?}");
-        assert!((found.xx - DisparityGain::along_rows(0.4).xx).abs() < 1e-9);
-        let map = shots[0].0.relative_to(&shots[1].0);
-        let middle = f64::from(disparity.middle().unwrap()).powi(2);
-        let found = DisparityGain::of(&shots[0].1, |x, y, d| map.map(x, y, d));
-        assert!((0.8..1.6).contains(&(found.xx / middle)) && found.yy < 1e-6 * middle, "{found:?} {middle}");
-        let turned = |x: f64, y: f64, d: f64| {
-            let (u, v, d) = map.map(x, y, d);
-            (-0.5 * v, 0.5 * u, d)
-        };
-        let again = DisparityGain::of(&shots[0].1, turned);
-        assert!((again.xx / found.xx - 1.0).abs() < 1e-6 && again.yy < 1e-6 * middle, "{again:?}");
-        assert!((found.product([9.0, 3.0, 1.0]) / found.xx / 9.0 - 1.0).abs() < 1e-3);
     }
 
     #[test]

@@ -10,13 +10,12 @@ mod smoothing;
 pub mod uncalibrated;
 mod view_weights;
 
-pub(crate) use agreement::GREY_LEVELS;
 pub use agreement::{Agreement, PairAgreement};
-pub(crate) use depth_errors::{DEVIATION_PER_MEDIAN, DisparityGain, median};
+pub(crate) use agreement::{GREY_LEVELS, same_depth};
+pub(crate) use depth_errors::{DEVIATION_PER_MEDIAN, median};
 pub use exposure::Exposure;
 pub(crate) use exposure::without_drift;
 pub use view_weights::ViewWeights;
-pub(crate) use view_weights::{APERTURE, NEGLIGIBLE};
 
 use crate::depth::DepthMap;
 use crate::image::Image;

@@ -233,7 +233,7 @@ impl<const C: usize> Strip<C> {
         count.propagated = self.samples.len();
         occlusion::remove_in_row(&mut self.samples, job.settings.depth_test(), &mut self.scratch);
         count.used = self.samples.len();
-        job.view_weights.apply(&mut self.samples, |view| job.views[view].image);
+        job.view_weights.apply(&mut self.samples);
         count
     }
 }
@@ -274,7 +274,7 @@ mod tests {
         let (mut samples, dropped) = propagate::rectified::<3>(&views(&parts), 0.4, &frame);
         let propagated = samples.len();
         let occluded = occlusion::remove(&mut samples, settings.depth_test());
-        ViewWeights::of(&views(&parts), &0.4).apply(&mut samples, |view| &parts[view].0);
+        ViewWeights::of(&views(&parts), &0.4).apply(&mut samples);
         let (values, mask) = rows::interpolate(&samples, (40, 9), &settings.interpolation).unwrap();
         assert_eq!(got.image.data(), values);
         assert_eq!(got.mask, mask);

@@ -1,13 +1,11 @@
 //! The share of each view in the virtual one, and its exposure.
 
-use super::depth_errors::{DisparityGain, median};
+use super::depth_errors::median;
 use super::exposure::drifts;
 use super::{Agreement, Exposure};
 use crate::camera::Camera;
-use crate::image::Image;
 use crate::propagate::{CalibratedView, View, Viewpoint};
 use crate::sample::Sample;
-use hybank::sampling::nonuniform::Measured;
 
 /// Keeps the weights finite at the place of a view, where that view then weighs this much more than its
 /// counterpart at the other end: (1 + SOFTENING) / SOFTENING to its inverse.
@@ -16,14 +14,6 @@ const SOFTENING: f64 = 0.2;
 /// The least variance of the differences between views: that of rounding to whole grey levels, with a
 /// margin.
 const LEAST_VARIANCE: f64 = 1.0;
-
-/// Variance of a position within a pixel, in square pixels. Errors of depth that displace samples by less
-/// say little: between samples the fit is no better.
-pub(crate) const APERTURE: f64 = 1.0 / 12.0;
-
-/// Errors of depth that change the weight of no sample by more than this share are left out: the slopes of
-/// all samples take a fifth of the time of a view.
-pub(crate) const NEGLIGIBLE: f64 = 0.02;
 
 /// Weights of the views: near ones count more.
 ///
@@ -45,10 +35,6 @@ pub(crate) const NEGLIGIBLE: f64 = 0.02;
 pub struct ViewWeights {
     weights: Vec<f32>,
     distances: Vec<f64>,
-    /// By how much errors of depth displace the samples of each view; empty if this is not known.
-    disparity_gains: Vec<DisparityGain>,
-    /// Errors of the samples of each view; empty if they are not known.
-    errors: Vec<SampleErrors>,
     /// Factors that give the views one exposure; empty if they are not wanted.
     gains: Vec<[f32; 3]>,
 }
@@ -67,13 +53,7 @@ impl ViewWeights {
             true => distances.iter().map(weight).collect(),
             false => vec![1.0; distances.len()],
         };
-        Self {
-            weights,
-            distances: distances.to_vec(),
-            disparity_gains: Vec::new(),
-            errors: Vec::new(),
-            gains: Vec::new(),
-        }
+        Self { weights, distances: distances.to_vec(), gains: Vec::new() }
     }
 
     /// The same for views whose surfaces are displaced: w_i is multiplied by (d_2 / d_i)^4 beyond the second
@@ -129,12 +109,7 @@ impl ViewWeights {
     /// For a virtual camera among the views.
     pub fn of<P: Viewpoint>(views: &[View<'_, P>], camera: &P) -> Self {
         let distances: Vec<f64> = views.iter().map(|v| v.camera.distance(camera)).collect();
-        Self::by_distance(&distances).with_disparity_gains(views, camera)
-    }
-
-    /// The same with the displacements that errors of depth cause.
-    fn with_disparity_gains<P: Viewpoint>(self, views: &[View<'_, P>], camera: &P) -> Self {
-        Self { disparity_gains: views.iter().map(|v| DisparityGain::between(v, camera)).collect(), ..self }
+        Self::by_distance(&distances)
     }
 
     /// As [`ViewWeights::of`], with the distances in position and direction.
@@ -152,25 +127,20 @@ impl ViewWeights {
             let turn = view.camera.axis().angle(&(pivot - from));
             (from - centre).norm() / reach + angle + turn
         };
-        Self::by_distance(&views.iter().map(distance).collect::<Vec<_>>()).with_disparity_gains(views, camera)
+        Self::by_distance(&views.iter().map(distance).collect::<Vec<_>>())
     }
 
-    /// The same for photographs of unequal noise, and depths with errors.
+    /// The same for photographs of unequal noise.
     ///
-    /// Weights of least variance are inverse variances ([`Measured::variance`]): that of the difference
-    /// between the view and the virtual one, v / w_i with v the variance of the differences between views.
-    /// Noise of the photograph adds to it, and so do errors of the depths. They displace a sample by its
-    /// disparity gain b times the error delta_i, which is a value error of the slope f' of the photograph
-    /// there times the displacement:
+    /// Weights of least variance are inverse variances: that of the difference between the view and the
+    /// virtual one, v / w_i with v the variance of the differences between views. Noise of the photograph
+    /// adds to it:
     ///
     /// ```text
-    /// v / w_i + (sigma_i^2 - sigma_min^2) + f'^2 (1 / 12 + b^2 delta_i^2)
+    /// v / w_i + sigma_i^2 - sigma_min^2
     /// ```
     ///
-    /// with the variance 1 / 12 of a position within a pixel. Noise that all views have is left out: it is
-    /// also in the photographs that a view is compared with. The last term belongs to single samples, and of
-    /// it only the ratio between views counts, so that slopes are not smoothed more. Disparity gains are
-    /// those of a typical pixel of the view.
+    /// Noise that all views have is left out: it is also in the photographs that a view is compared with.
     pub fn with_noise(mut self, agreement: &Agreement) -> Self {
         let Some(variance) = agreement.variance() else { return self };
         let variance = variance.max(LEAST_VARIANCE);
@@ -178,20 +148,7 @@ impl ViewWeights {
         let least = self.views().into_iter().map(noise).fold(f64::INFINITY, f64::min);
         for (view, weight) in self.weights.iter_mut().enumerate() {
             let excess = (noise(view) - least).max(0.0);
-            let error = (variance / f64::from(*weight) + excess).sqrt();
-            let mut typical = Measured { x: 0.0, value: 0.0, error, jitter: agreement.depth_error(view) };
-            *weight = (variance * typical.weight(0.0, 0.0)) as f32;
-            if let Some(disparity_gain) = self.disparity_gains.get(view) {
-                let displacement = disparity_gain.product([1.0, 0.0, 1.0]) * typical.jitter.powi(2);
-                if displacement < NEGLIGIBLE * APERTURE {
-                    typical.jitter = 0.0;
-                }
-                self.errors.push(SampleErrors {
-                    typical,
-                    disparity_gain: *disparity_gain,
-                    noise: noise(view),
-                });
-            }
+            *weight = (variance / (variance / f64::from(*weight) + excess)) as f32;
         }
         self
     }
@@ -225,117 +182,15 @@ impl ViewWeights {
         self.gains.get(usize::from(view)).copied().unwrap_or([1.0; 3])
     }
 
-    /// Multiplies the weight and the colours of every sample by those of its view, and the weight by what
-    /// the slope of its photograph makes of the errors of the depths.
-    pub fn apply<'a, const C: usize>(&self, samples: &mut [Sample<C>], image: impl Fn(usize) -> &'a Image) {
-        let is_exact = self.errors.iter().all(|errors| errors.typical.jitter == 0.0);
+    /// Multiplies the weight and the colours of every sample by those of its view.
+    pub fn apply<const C: usize>(&self, samples: &mut [Sample<C>]) {
         for samples in samples.chunk_by_mut(|a, b| a.view == b.view) {
-            let number = samples[0].view;
-            let (view, weight, gain) = (usize::from(number), self.weight(number), self.gain(number));
-            for part in samples.chunks_mut(PART) {
-                let shares = match self.errors.get(view).filter(|_| !is_exact) {
-                    Some(errors) => self.shares(errors, image(view), part, gain),
-                    None => [1.0; PART],
-                };
-                for (s, share) in part.iter_mut().zip(shares) {
-                    s.weight *= weight * share;
-                    s.value.iter_mut().zip(gain).for_each(|(v, g)| *v *= g);
-                }
+            let (weight, gain) = (self.weight(samples[0].view), self.gain(samples[0].view));
+            for s in samples {
+                s.weight *= weight;
+                s.value.iter_mut().zip(gain).for_each(|(v, g)| *v *= g);
             }
         }
-    }
-
-    /// Views from one to the next of those that stand for all in the sums over the views.
-    fn stride(&self) -> usize {
-        self.weights.len().div_ceil(MOST_SUMMED)
-    }
-
-    /// Weights of samples of one view over those without slope, where the weights of all views have the same
-    /// sum as without slope: the smoothing of the fit does not grow with the errors of depth.
-    fn shares<const C: usize>(
-        &self,
-        own: &SampleErrors,
-        image: &Image,
-        samples: &[Sample<C>],
-        gain: [f32; 3],
-    ) -> [f32; PART] {
-        let mut gradients = [Gradient([0.0; 3]); PART];
-        for (gradient, s) in gradients.iter_mut().zip(samples) {
-            *gradient = Gradient::of(image, s.pixel as usize, gain[1], own.noise);
-        }
-        let (mut sums, mut total) = ([0.0; PART], 0.0);
-        for (errors, weight) in self.errors.iter().zip(&self.weights).step_by(self.stride()) {
-            let weight = f64::from(*weight);
-            sums.iter_mut().zip(&gradients).for_each(|(sum, g)| *sum += weight * errors.share(g));
-            total += weight;
-        }
-        std::array::from_fn(|k| (own.share(&gradients[k]) * total / sums[k]) as f32)
-    }
-}
-
-/// Views over which the weights of each sample are summed: of more, evenly chosen ones show the same.
-const MOST_SUMMED: usize = 256;
-
-/// Samples whose weights are computed together: the compiler turns loops of a fixed length into vector
-/// instructions.
-const PART: usize = 64;
-
-/// Errors of the samples of a view.
-#[derive(Debug, Clone, PartialEq)]
-struct SampleErrors {
-    /// A sample where the photograph has no slope; its jitter is the error of depth.
-    typical: Measured,
-    disparity_gain: DisparityGain,
-    /// Variance of the noise of the photograph.
-    noise: f64,
-}
-
-impl SampleErrors {
-    /// Weight of a sample over that of one whose depth is exact.
-    fn share(&self, gradient: &Gradient) -> f64 {
-        if self.typical.jitter == 0.0 || !self.typical.error.is_finite() {
-            return 1.0;
-        }
-        let floor = APERTURE * (gradient.0[0] + gradient.0[2]).max(0.0);
-        let variance = |square_slope| self.typical.variance(square_slope) + floor;
-        variance(0.0) / variance(self.disparity_gain.product(gradient.0).max(0.0))
-    }
-}
-
-/// Mean over the channels of the products of the slopes of a photograph, with the factor for green: x x, x y
-/// and y y.
-#[derive(Clone, Copy)]
-struct Gradient([f64; 3]);
-
-impl Gradient {
-    /// By central differences, which have half the variance of the noise in each direction.
-    fn of(image: &Image, pixel: usize, gain: f32, noise: f64) -> Self {
-        let gain = f64::from(gain);
-        let [xx, xy, yy] = match image.channels() {
-            3 => Self::sums::<3>(image, pixel).map(|sum| gain * gain * sum / 3.0),
-            _ => Self::sums::<1>(image, pixel).map(|sum| gain * gain * sum),
-        };
-        Self([xx - 0.5 * noise, xy, yy - 0.5 * noise])
-    }
-
-    /// The sums of the products over the channels, with the noise.
-    fn sums<const N: usize>(image: &Image, pixel: usize) -> [f64; 3] {
-        let (width, height) = image.size();
-        // Pixels are counted in 32 bits, which divide faster.
-        let (x, y) = ((pixel as u32 % width as u32) as usize, (pixel as u32 / width as u32) as usize);
-        let [left, right] = [x > 0, x + 1 < width].map(usize::from);
-        let [above, below] = [y > 0, y + 1 < height].map(usize::from);
-        let value = |p: usize| image.pixel::<N>(p).map(f64::from);
-        let columns = [value(pixel - left), value(pixel + right)];
-        let rows = [value(pixel - above * width), value(pixel + below * width)];
-        let share = |steps: usize| if steps == 2 { 0.5 } else { 1.0 };
-        let (across, down) = (share(left + right), share(above + below));
-        let mut sums = [0.0; 3];
-        for c in 0..N {
-            let (u, v) = ((columns[1][c] - columns[0][c]) * across, (rows[1][c] - rows[0][c]) * down);
-            sums.iter_mut().zip([u * u, u * v, v * v]).for_each(|(sum, product)| *sum += product);
-        }
-        sums
     }
 }
 
@@ -363,30 +218,6 @@ mod tests {
         assert!((f64::from(unequal[1]) - 1.0 / (1.0 + 72.0 / 70.0)).abs() < 1e-6, "{unequal:?}");
     }
 
-    /// On a slope the view with errors of depth counts less by the ratio of the variances, and the other one
-    /// more; on a flat photograph both are alike.
-    #[test]
-    fn samples_with_errors_of_depth_count_less_on_slopes() {
-        let pair =
-            PairAgreement { views: [0, 1], points: 1000, share: 0.9, gain: [1.0; 3], difference: 10.0 };
-        let depth_errors = vec![0.0, 2.0];
-        let agreement = Agreement { pairs: vec![pair], depth_errors, ..Agreement::default() };
-        let disparity_gains = vec![DisparityGain::along_rows(0.5); 2];
-        let view_weights =
-            ViewWeights { disparity_gains, ..ViewWeights::by_distance(&[0.5, 0.5]) }.with_noise(&agreement);
-        let weights = |slope: f32| {
-            let image = Image::new(5, 5, 1, (0..25).map(|p| slope * (p % 5) as f32).collect()).unwrap();
-            let mut samples = [0, 1].map(|view| Sample::<1> { view, pixel: 12, ..Sample::BLANK });
-            view_weights.apply(&mut samples, |_| &image);
-            samples.map(|s| s.weight)
-        };
-        assert_eq!(weights(0.0), [1.0, 1.0]);
-        let [exact, erring] = weights(20.0);
-        let ratio = (100.0 + 400.0 / 12.0) / (100.0 + 400.0 * (1.0 / 12.0 + 1.0));
-        assert!((erring / exact - ratio).abs() < 1e-6, "{exact} {erring} {ratio}");
-        assert!((exact + erring - 2.0).abs() < 1e-6, "{exact} {erring}");
-    }
-
     #[test]
     fn half_way_all_is_equal_and_at_a_view_that_view_decides() {
         assert_eq!(ViewWeights::by_distance(&[0.5, 0.5]).weights, [1.0, 1.0]);
@@ -398,13 +229,10 @@ mod tests {
 
     #[test]
     fn exposures_are_matched() {
-        let image = Image::filled(1, 1, 1, 0.0);
         let mut samples = [Sample::<1> { value: [100.0], view: 1, ..Sample::BLANK }];
-        ViewWeights::by_distance(&[1.0, 1.0]).with_gains(&[[1.0; 3]; 2]).apply(&mut samples, |_| &image);
+        ViewWeights::by_distance(&[1.0, 1.0]).with_gains(&[[1.0; 3]; 2]).apply(&mut samples);
         assert_eq!(samples[0].value, [100.0]);
-        ViewWeights::by_distance(&[1.0, 1.0])
-            .with_gains(&[[1.0; 3], [1.5; 3]])
-            .apply(&mut samples, |_| &image);
+        ViewWeights::by_distance(&[1.0, 1.0]).with_gains(&[[1.0; 3], [1.5; 3]]).apply(&mut samples);
         assert_eq!(samples[0].value, [150.0]);
         // The brightness drifts, or the colours beside a large difference of the brightness; the view is
         // three times as near to the second one.

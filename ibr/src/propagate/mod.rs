@@ -1,12 +1,11 @@
 //! Stage one, propagation: every pixel with depth becomes a sample in the virtual image (thesis 2.3.1).
 
 mod calibrated;
-mod nearest;
 mod view;
 
 pub use calibrated::calibrated;
 pub(crate) use calibrated::{Footprint, Projected};
-pub(crate) use nearest::Nearest;
+pub(crate) use view::nearest;
 pub use view::{CalibratedView, RectifiedView, View, Viewpoint};
 
 use crate::depth::{Reliefs, TILE};

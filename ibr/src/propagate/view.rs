@@ -41,6 +41,17 @@ pub trait Viewpoint: Copy + Send + Sync {
     fn reduced(&self, by: usize) -> Self;
 }
 
+/// Of some views, by number, the one that is nearest to a view; of several the first.
+pub(crate) fn nearest<P: Viewpoint>(
+    views: &[View<'_, P>],
+    view: usize,
+    among: impl Iterator<Item = usize>,
+) -> Option<usize> {
+    let centre = views[view].camera.centre();
+    let away = among.map(|other| (other, (views[other].camera.centre() - centre).norm()));
+    away.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(other, _)| other)
+}
+
 impl Viewpoint for f64 {
     fn centre(&self) -> Vector3<f64> {
         Vector3::new(*self, 0.0, 0.0)

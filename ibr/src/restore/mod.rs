@@ -17,10 +17,10 @@ mod surface;
 pub use colour::coloured;
 pub(crate) use surface::from_scattered;
 
-use crate::depth::DepthMap;
+use crate::depth::{DepthMap, Measure};
 use crate::interpolate::plane::surface_memory;
-use crate::pipeline::{APERTURE, Agreement, DisparityGain, NEGLIGIBLE};
-use crate::propagate::{Nearest, View, Viewpoint};
+use crate::pipeline::Agreement;
+use crate::propagate::{View, Viewpoint, nearest};
 use hybank::memory::{MemoryShortage, check_memory};
 use outliers::Parallax;
 
@@ -38,6 +38,10 @@ pub struct Restored {
 
 /// Bytes of all that is not in proportion to the pixels, about: points that are compared.
 const BASE: f64 = 5e5;
+
+/// Mean square displacement in pixels from which on errors are smoothed: a fiftieth of the variance of a
+/// position within a pixel.
+const NOTICEABLE: f64 = 0.02 / 12.0;
 
 /// Bytes per pixel of all views: parallaxes and restored maps.
 const HELD: f64 = 8.0;
@@ -87,7 +91,7 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, Mem
     let error = |view: usize| agreement.depth_error(view);
     let planes: Vec<Parallax> =
         views.iter().enumerate().map(|(i, v)| Parallax::of(v.map, error(i))).collect();
-    let (nearest, voters) = (Nearest::new(views), outliers::voters(&agreement.groups()));
+    let voters = outliers::voters(&agreement.groups());
     let one = |i: usize| {
         let view = &views[i];
         let rejected = outliers::rejected(views, &planes, &agreement.gains, &voters[i], i);
@@ -98,7 +102,7 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, Mem
             plane.replace(view.image, &rejected);
             guessed = rejected;
         }
-        if is_noticeable(views, i, nearest.other(i), error(i)) {
+        if is_noticeable(views, i, error(i)) {
             check_memory(surface_memory(view.map.width(), view.map.height()))?;
             plane.smooth(view.image);
         }
@@ -112,11 +116,39 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, Mem
     (0..views.len()).map(one).collect()
 }
 
-/// Whether errors of a map displace its samples by more than the fit notices, in the nearest other view.
-fn is_noticeable<P: Viewpoint>(views: &[View<'_, P>], view: usize, other: Option<usize>, error: f64) -> bool {
+/// Whether errors of a map displace its samples by more than the fit notices, in the nearest view from
+/// another place.
+fn is_noticeable<P: Viewpoint>(views: &[View<'_, P>], view: usize, error: f64) -> bool {
+    let is_elsewhere = |other: &usize| views[*other].camera.distance(&views[view].camera) > 0.0;
+    let other = nearest(views, view, (0..views.len()).filter(is_elsewhere));
     let Some(other) = other.filter(|_| error > 0.0) else { return false };
-    let gain = DisparityGain::between(&views[view], &views[other].camera);
-    gain.product([1.0, 0.0, 1.0]) * error * error > NEGLIGIBLE * APERTURE
+    displacement(&views[view], &views[other].camera) * error * error > NOTICEABLE
+}
+
+/// Mean square displacement of the points of a view in another one by an error of one in its map, a pixel of
+/// disparity or the whole depth. The points that move farthest, a tenth, are left out: those close to a
+/// camera move without limit.
+fn displacement<P: Viewpoint>(view: &View<'_, P>, camera: &P) -> f64 {
+    const CHANGE: f64 = 1e-3;
+    const STEPS: usize = 16;
+    let (map, to) = (view.map, view.camera.map_to(camera));
+    let (width, height) = map.size();
+    let columns = (0..width).step_by(width.div_ceil(STEPS).max(1));
+    let rows = (0..height).step_by(height.div_ceil(STEPS).max(1));
+    let square = |(x, y): (usize, usize)| {
+        let value = f64::from(map.row(y)[x]);
+        let wrong = match map.measure() {
+            Measure::Disparity => value + CHANGE,
+            Measure::Depth => value * (1.0 + CHANGE),
+        };
+        let [(a, b, _), (c, d, _)] = [value, wrong].map(|value| to(x as f64, y as f64, value));
+        Some(((c - a).powi(2) + (d - b).powi(2)) / (CHANGE * CHANGE)).filter(|square| square.is_finite())
+    };
+    let pixels = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+    let mut squares: Vec<f64> = pixels.filter_map(square).collect();
+    squares.sort_by(f64::total_cmp);
+    squares.truncate(squares.len() - squares.len() / 10);
+    squares.iter().sum::<f64>() / squares.len().max(1) as f64
 }
 
 #[cfg(test)]

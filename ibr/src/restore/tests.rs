@@ -139,3 +139,17 @@ fn few_of_many_views_vote() {
         }
     }
 }
+
+/// An error of a disparity displaces a point by as much, times the distance of the cameras; a relative error
+/// of a depth by its disparity.
+#[test]
+fn errors_of_depth_are_displacements() {
+    let [first, second] = shots();
+    let rig = View { image: &first.image, map: &first.disparity, camera: 0.0 };
+    let found = displacement(&rig, &0.4);
+    assert!((found - 0.16).abs() < 1e-9, "{found}");
+    let general = View { image: &first.image, map: &first.depth, camera: first.camera };
+    let disparity = f64::from(first.disparity.middle().unwrap());
+    let ratio = displacement(&general, &second.camera) / disparity.powi(2);
+    assert!((0.8..1.6).contains(&ratio), "{ratio}");
+}

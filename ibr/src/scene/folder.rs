@@ -238,7 +238,7 @@ impl Writer<'_> {
         for frame in &list.frames {
             let (image, depth) = files(frame);
             if image.is_file() {
-                let fallback = if frame.has_size() { (0, 0) } else { read_image(&image)?.size() };
+                let fallback = if frame.has_size() { (0, 0) } else { image_size(&image)? };
                 let camera = list.camera(frame, fallback)?.camera;
                 there.push(Placed { frame, camera, image, depth });
             }

@@ -13,7 +13,7 @@ mod uncalibrated;
 pub use complete::complete;
 pub use goals::MOST_FRAMES;
 
-use super::spec::{SceneSpec, ViewSpec};
+use super::spec::{Key, SceneSpec, ViewSpec};
 use super::{Kind, Scene, SourceView};
 use crate::camera::middlebury::Calibration;
 use crate::files::{InputError, Location};
@@ -162,9 +162,9 @@ impl Loader<'_> {
     }
 
     /// Refuses keys of another kind of scene instead of ignoring them.
-    fn no_other_kind(&self, named: &str, kind: &str, others: &[(&str, bool)]) -> Loaded<()> {
-        match others.iter().find(|(_, given)| *given) {
-            Some((key, _)) => Err(self.incomplete(format!(
+    fn no_other_kind(&self, named: &str, kind: &str, keys: &[Key]) -> Loaded<()> {
+        match keys.iter().find(|key| key.is_given && !key.kinds.contains(kind)) {
+            Some(Key { name: key, .. }) => Err(self.incomplete(format!(
                 "{named} has `{key}`, which has no meaning in a {kind} scene; remove it, or give all views the keys of one kind"
             ))),
             None => Ok(()),

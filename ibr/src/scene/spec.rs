@@ -140,23 +140,35 @@ impl SceneSpec {
     }
 }
 
+/// A key that not all kinds of scenes have.
+pub(super) struct Key {
+    pub(super) name: &'static str,
+    /// The kinds that have it.
+    pub(super) kinds: &'static str,
+    pub(super) is_given: bool,
+}
+
+fn key<T>(name: &'static str, kinds: &'static str, value: &Option<T>) -> Key {
+    Key { name, kinds, is_given: value.is_some() }
+}
+
 impl TargetSpec {
     /// Keys of which a virtual view has one at most.
     pub(super) const EITHER: [[&'static str; 2]; 3] =
         [["camera", "camera_of"], ["to_camera", "to_camera_of"], ["from_tracks", "between"]];
 
-    /// Keys that one kind of scene has: the key, the kind, and whether it is given.
-    pub(super) fn keys(&self) -> [(&'static str, &'static str, bool); 9] {
+    /// Keys that not all kinds of scenes have.
+    pub(super) fn keys(&self) -> [Key; 9] {
         [
-            ("position", "rectified", self.position.is_some()),
-            ("to_position", "rectified", self.to_position.is_some()),
-            ("camera", "calibrated", self.camera.is_some()),
-            ("camera_of", "calibrated", self.camera_of.is_some()),
-            ("to_camera", "calibrated", self.to_camera.is_some()),
-            ("to_camera_of", "calibrated", self.to_camera_of.is_some()),
-            ("from_tracks", "matches-only", self.from_tracks.is_some()),
-            ("between", "matches-only", self.between.is_some()),
-            ("to_between", "matches-only", self.to_between.is_some()),
+            key("position", "rectified", &self.position),
+            key("to_position", "rectified", &self.to_position),
+            key("camera", "calibrated", &self.camera),
+            key("camera_of", "calibrated", &self.camera_of),
+            key("to_camera", "calibrated", &self.to_camera),
+            key("to_camera_of", "calibrated", &self.to_camera_of),
+            key("from_tracks", "matches-only", &self.from_tracks),
+            key("between", "matches-only", &self.between),
+            key("to_between", "matches-only", &self.to_between),
         ]
     }
 
@@ -168,6 +180,21 @@ impl TargetSpec {
 }
 
 impl ViewSpec {
+    /// Keys that not all kinds of scenes have.
+    pub(super) fn keys(&self) -> [Key; 9] {
+        [
+            key("disparity", "rectified", &self.disparity),
+            key("disparity_scale", "rectified", &self.disparity_scale),
+            key("disparity_offset", "rectified", &self.disparity_offset),
+            key("camera", "calibrated", &self.camera),
+            key("depth", "calibrated", &self.depth),
+            key("depth_scale", "calibrated", &self.depth_scale),
+            key("colmap", "calibrated", &self.colmap),
+            key("step", "rectified, calibrated", &self.step),
+            key("column", "matches-only", &self.column),
+        ]
+    }
+
     /// Stored numbers per unit of depth in a map with whole numbers, if nothing else is said: thousandths,
     /// as nerfstudio writes them.
     pub(super) fn usual_scale(map: &Path) -> Option<f64> {

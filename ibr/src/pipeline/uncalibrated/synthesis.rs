@@ -44,7 +44,7 @@ pub(super) fn render<const ORDER: usize, const C: usize>(
     let Goal { size, settings, plane, watch } = *goal;
     let frame = Frame::whole(size.0, size.1, 0.5, settings.offset);
     let (mut samples, dropped) = propagated::<C>(images, surfaces, scene, &frame, goal)?;
-    view_weights.apply(&mut samples, |view| images[view]);
+    view_weights.apply(&mut samples);
     let mut report = Report { dropped, propagated: samples.len(), ..Report::default() };
     let hull = hull_features(scene, images.len());
     let absolute = SIGMA_SHARE * chi_range(&hull);

@@ -48,7 +48,7 @@ impl Loader<'_> {
         goals: &[Goal],
     ) -> Loaded<Inputs> {
         self.a_camera_each()?;
-        self.keys_of(goals, "calibrated")?;
+        self.keys_of(views, goals, "calibrated")?;
         let sources = each(views, |view| self.source(view), |source| pixels(&source.0.image), self.watch)?;
         let first = First { size: sources[0].0.image.size(), resized: sources[0].1 };
         let (cameras, size) = match left_out {
@@ -63,12 +63,6 @@ impl Loader<'_> {
 
     /// A view, and how its camera was resized.
     fn source(&self, view: &ViewSpec) -> Loaded<(Read<Camera>, Option<Resized>)> {
-        let others = [
-            ("disparity", view.disparity.is_some()),
-            ("disparity_scale", view.disparity_scale.is_some()),
-            ("disparity_offset", view.disparity_offset.is_some()),
-        ];
-        self.no_other_kind(&view.named(), "calibrated", &others)?;
         let map = self.need(view.depth.as_deref(), view, "depth", "calibrated")?;
         let image = self.image(&view.image)?;
         let given = Given { map, scale: view.depth_scale, measure: Measure::Depth };

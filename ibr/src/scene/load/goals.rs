@@ -2,7 +2,7 @@
 
 use super::{Loaded, Loader};
 use crate::files::InputError;
-use crate::scene::TargetSpec;
+use crate::scene::{TargetSpec, ViewSpec};
 use hybank::memory::check_memory;
 
 /// Most virtual views of a scene.
@@ -43,12 +43,12 @@ impl Loader<'_> {
     }
 
     /// Refuses keys of another kind of scene than this, and two keys for one thing, instead of ignoring one.
-    pub(super) fn keys_of(&self, goals: &[Goal], kind: &str) -> Loaded<()> {
+    pub(super) fn keys_of(&self, views: &[&ViewSpec], goals: &[Goal], kind: &str) -> Loaded<()> {
+        views.iter().try_for_each(|view| self.no_other_kind(&view.named(), kind, &view.keys()))?;
         goals.iter().try_for_each(|Goal { target, name }| {
             let keys = target.keys();
-            let others = keys.map(|(key, of, given)| (key, given && of != kind));
-            self.no_other_kind(name, kind, &others)?;
-            let given = |wanted: &str| keys.iter().any(|(key, _, given)| *given && *key == wanted);
+            self.no_other_kind(name, kind, &keys)?;
+            let given = |wanted: &str| keys.iter().any(|key| key.is_given && key.name == wanted);
             match TargetSpec::EITHER.iter().find(|pair| pair.iter().all(|key| given(key))) {
                 Some([one, other]) => Err(self.incomplete(format!(
                     "{name} has both `{one}` and `{other}`; remove the one that is not meant"

@@ -14,19 +14,12 @@ impl Loader<'_> {
         left_out: Option<&ViewSpec>,
         goals: &[Goal],
     ) -> Loaded<Inputs> {
-        self.keys_of(goals, "rectified")?;
+        self.keys_of(views, goals, "rectified")?;
         let positions = match left_out {
             Some(view) => vec![self.virtual_position(view.position, "[virtual]")?],
             None => self.positions(goals)?,
         };
         let one = |view: &&ViewSpec| {
-            let others = [
-                ("camera", view.camera.is_some()),
-                ("depth", view.depth.is_some()),
-                ("depth_scale", view.depth_scale.is_some()),
-                ("colmap", view.colmap.is_some()),
-            ];
-            self.no_other_kind(&view.named(), "rectified", &others)?;
             let position = self.need(view.position, view, "position", "rectified")?;
             let position = self.finite(position, &view.named())?;
             let map = self.need(view.disparity.as_deref(), view, "disparity", "rectified")?;

@@ -16,7 +16,7 @@ impl Loader<'_> {
         goals: &[Goal],
     ) -> Loaded<Inputs> {
         let file = self.matches_file(views)?;
-        self.keys_of(goals, "matches-only")?;
+        self.keys_of(views, goals, "matches-only")?;
         let tracks = Tracks::read(&self.file(file))?;
         let virtual_columns = match left_out {
             Some(view) => vec![self.column_in_order(view)?],
@@ -60,22 +60,13 @@ impl Loader<'_> {
         })
     }
 
-    /// The file of tracks, if there are at least two views and none has camera keys.
+    /// The file of tracks, if there are at least two views.
     fn matches_file(&self, views: &[&ViewSpec]) -> Loaded<&Path> {
         let file = self.spec.matches.as_deref().ok_or_else(|| {
             self.incomplete(
                 "the views have neither `position` and `disparity`, nor `camera` and `depth`, and there is no `matches` file; give cameras or tracks",
             )
         })?;
-        for view in views {
-            let others = [
-                ("disparity", view.disparity.is_some()),
-                ("disparity_offset", view.disparity_offset.is_some()),
-                ("depth", view.depth.is_some()),
-                ("step", view.step.is_some()),
-            ];
-            self.no_other_kind(&view.named(), "matches-only", &others)?;
-        }
         match views.len() {
             0 | 1 => {
                 Err(self.incomplete(format!("{} view with tracks: at least two are needed", views.len())))

@@ -1,0 +1,1 @@
+../../../tools/trials/src/lib.rs
