@@ -54,17 +54,40 @@ fn check_now(needed: f64) -> Result<(), MemoryShortage> {
     Err(MemoryShortage { needed, available: (free.min(wanted) - RESERVE).max(0.0) / ESTIMATES_LOW_BY })
 }
 
-/// Addresses that the C library takes at once for what a thread allocates, with its stack. Without them a
-/// thread gets a page for every small allocation, so it takes many times what is counted.
-const THREAD: f64 = 70e6;
+/// Addresses of the stack of a thread, and some for what it allocates.
+const THREAD: f64 = 4e6;
 
 /// Share of the free addresses that threads may take.
 const FOR_THREADS: f64 = 0.25;
 
-/// As many threads as asked for, or fewer, and one at least, where addresses are limited (`ulimit -v`).
-pub fn affordable_threads(wanted: usize) -> usize {
+/// As many threads as asked for, by default one for each processor; fewer, and one at least, where addresses
+/// are limited (`ulimit -v`).
+pub fn affordable_threads(asked: Option<usize>) -> usize {
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let room = address_space().map_or(f64::INFINITY, |free| FOR_THREADS * free / THREAD);
-    wanted.min(room as usize).max(1)
+    asked.unwrap_or_else(cores).min(room as usize).max(1)
+}
+
+/// Begins the program again with one heap for all threads, where addresses are limited (`ulimit -v`). A
+/// program calls it before its `main`, with its standard streams as they were given.
+///
+/// Otherwise the C library reserves 64 MB of addresses for each thread, at any request of it that finds as
+/// many free: also those that were counted for the work. A single heap makes what is free known, so that
+/// more memory is never worse. The library reads its setting when the program is loaded.
+pub fn share_heap() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    {
+        use std::{env, os::unix::process::CommandExt, process::Command};
+        const HEAPS: &str = "MALLOC_ARENA_MAX";
+        if address_space().is_none() || env::var_os(HEAPS).is_some() {
+            return;
+        }
+        let mut words = env::args_os();
+        if let (Some(name), Ok(program)) = (words.next(), env::current_exe()) {
+            // Comes back only if the system refuses it; then the run goes on with several heaps.
+            let _ = Command::new(program).arg0(name).args(words).env(HEAPS, "1").exec();
+        }
+    }
 }
 
 /// Bytes that were found free and are not used up.
@@ -111,14 +134,12 @@ fn control_group() -> Option<f64> {
     number(fs::read_to_string("/sys/fs/cgroup/memory.max").ok()?.trim())
 }
 
-/// What the soft limit of the address space leaves beside what is in use. The C library reserves 64 MB of
-/// addresses for each thread. What is not used of them counts as free: small requests of the thread get it.
-/// Large ones do not, so [`check_now`] also tries for them.
+/// What the soft limit of the address space leaves beside what is in use.
 fn address_space() -> Option<f64> {
     let text = fs::read_to_string("/proc/self/limits").ok()?;
     let line = text.lines().find(|line| line.starts_with("Max address space"))?;
     let limit = number(line.split_whitespace().nth(3)?)?;
-    Some((limit - used().unwrap_or(0.0) + reserved()).max(0.0))
+    Some((limit - used().unwrap_or(0.0)).max(0.0))
 }
 
 /// What addresses of 32 bits reach, as in WebAssembly.
@@ -131,19 +152,6 @@ fn used() -> Option<f64> {
     let text = fs::read_to_string("/proc/self/status").ok()?;
     let line = text.lines().find(|line| line.starts_with("VmSize:"))?;
     Some(1024.0 * number(line.split_whitespace().nth(1)?)?)
-}
-
-/// The addresses without a file that this process holds and may neither read nor write yet.
-fn reserved() -> f64 {
-    let bytes = |line: &str| {
-        let mut words = line.split_whitespace();
-        let (from, to) = words.next()?.split_once('-')?;
-        let is_reserved = words.next() == Some("---p") && words.nth(2) == Some("0");
-        let address = |digits| u64::from_str_radix(digits, 16).ok();
-        is_reserved.then_some(())?;
-        Some(address(to)?.checked_sub(address(from)?)? as f64)
-    };
-    fs::read_to_string("/proc/self/maps").unwrap_or_default().lines().filter_map(bytes).sum()
 }
 
 /// A positive number; "max" and "unlimited" are none.
@@ -159,28 +167,6 @@ mod tests {
     fn the_memory_of_this_machine_is_known_where_it_is_told() {
         if cfg!(target_os = "linux") {
             assert!(available_memory().is_some_and(|bytes| bytes > 1e8));
-        }
-    }
-
-    /// The first request of a thread reserves its part of the address space.
-    #[test]
-    fn what_is_reserved_for_threads_is_free() {
-        if cfg!(all(target_os = "linux", target_env = "gnu")) {
-            let (reserve, done) = (std::sync::Barrier::new(3), std::sync::Barrier::new(3));
-            std::thread::scope(|scope| {
-                for _ in 0..2 {
-                    scope.spawn(|| {
-                        let bytes = std::hint::black_box(vec![1_u8; 100]);
-                        reserve.wait();
-                        done.wait();
-                        drop(bytes);
-                    });
-                }
-                reserve.wait();
-                let (reserved, used) = (reserved(), used().unwrap());
-                done.wait();
-                assert!(reserved > 1e8 && reserved < used, "{reserved} of {used}");
-            });
         }
     }
 

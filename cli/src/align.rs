@@ -9,7 +9,7 @@ use super::file_kind::FileKind;
 use super::interrupt::interrupts;
 use super::print::{Failure, check_json, is_dash, say_understood, show, warn};
 use super::written::{Mono, begin_file, begin_recording, check_outputs, write_text, write_together};
-use hybank::calibrate::Record;
+use hybank::calibrate::{CalibrateError, Record};
 use hybank::figures::Alone;
 use hybank::io::{Container, PcmFormat, ReadOptions, StreamHeader, is_same_rate};
 use hybank::messages::{Number, Quoted};
@@ -135,7 +135,12 @@ impl Args {
 
     /// The recordings, which have one rate; what was tolerated joins the `warnings`.
     fn read(&self, spec: &Spec, warnings: &mut Vec<String>) -> Result<Recordings, Failure> {
-        let options = self.reading.options(self.captures.len(), spec.channels.len());
+        // Before they are read, which takes long; one may hold several channels.
+        let (captures, channels) = (self.captures.len(), spec.channels.len());
+        if captures > channels {
+            return Err(Failure::input(CalibrateError::ChannelCount { channels, records: captures }));
+        }
+        let options = self.reading.options(captures, channels);
         let options = ReadOptions { full_scale: options.full_scale.or(spec.full_scale), ..options };
         let (mut all, mut formats, mut common) = (Vec::new(), Vec::new(), None);
         for path in &self.captures {

@@ -19,9 +19,10 @@ pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
     Ok(bank)
 }
 
-/// Compiles the bank of the file `path`, if the process may use as much memory as that takes.
-pub(super) fn plan(bank: &Bank, options: Options, path: &Path) -> Result<Plan, Failure> {
-    let bytes = bank.plan_bytes(options).in_file(path)?;
+/// Compiles the bank of the file `path`, if the process may use as much memory as that and so many streams
+/// take.
+pub(super) fn plan(bank: &Bank, options: Options, streams: usize, path: &Path) -> Result<Plan, Failure> {
+    let bytes = bank.plan_bytes(options, streams).in_file(path)?;
     check_memory(bytes).map_err(|shortage| {
         let remedy = "use shorter filters, or --algorithm direct";
         Failure::of(path, format!("to filter with it takes {shortage}; {remedy}"))

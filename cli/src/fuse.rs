@@ -148,7 +148,8 @@ impl Args {
         }
         let rate = job.output_rate(&reader)?;
         let progress = progress_bar(reader.promised_frames());
-        let finished = job.run(&job.plan()?, &mut reader, observer, &|frames| progress.inc(frames))?;
+        let plan = job.plan(reader.is_complex())?;
+        let finished = job.run(&plan, &mut reader, observer, &|frames| progress.inc(frames))?;
         progress.finish_and_clear();
         let seconds = begin.elapsed().as_secs_f64();
         let measure = self.measured(job)?;

@@ -52,7 +52,8 @@ use std::process::ExitCode;
 // inode, so nothing tells the two apart later. The macro allows itself the unsafe code that this takes.
 ctor::declarative::ctor! {
     #[ctor(unsafe)]
-    fn note_closed_streams() {
+    fn before_main() {
+        hybank::memory::share_heap();
         hybank::files::note_closed_streams();
     }
 }

@@ -71,9 +71,7 @@ fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
 impl RunArgs {
     /// Threads beside the calling one, if it does not do all.
     fn workers(&self) -> Result<Option<ThreadPool>, Failure> {
-        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-        let wanted = if self.threads == 0 { cores() } else { self.threads.into() };
-        let threads = affordable_threads(wanted);
+        let threads = affordable_threads(Some(self.threads.into()).filter(|&threads| threads > 0));
         if threads == 1 {
             return Ok(None);
         }
@@ -181,9 +179,9 @@ impl Job<'_> {
         self.settings().options(options)
     }
 
-    /// The plan of the run.
-    pub(super) fn plan(&self) -> Result<Plan, Failure> {
-        bank_file::plan(self.bank, self.options(), self.bank_path)
+    /// The plan of the run, whose samples may be complex: a stream for each part.
+    pub(super) fn plan(&self, may_be_complex: bool) -> Result<Plan, Failure> {
+        bank_file::plan(self.bank, self.options(), 1 + usize::from(may_be_complex), self.bank_path)
     }
 
     /// The rate of the output in hertz, if the inputs fit the bank.

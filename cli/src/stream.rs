@@ -8,6 +8,7 @@ use super::run::{Finished, Job, RunArgs, RunReport};
 use super::{Failure, bank_file};
 use hybank::bank::Bank;
 use hybank::io::{Coding, Container, PcmFormat, ReadOptions, is_self_describing};
+use hybank::messages::Quoted;
 use hybank::pipeline::DroppedLatency;
 use std::path::PathBuf;
 
@@ -50,6 +51,9 @@ pub(super) struct Args {
     /// SigMF recording (a name that ends in sigmf-meta) states its own format and channels
     #[arg(long, value_name = "FILE")]
     input: Vec<PathBuf>,
+    /// What is given as in `fuse`, without the option.
+    #[arg(hide = true)]
+    names: Vec<PathBuf>,
     /// The output file, which appears when it is complete (a SigMF recording if its name ends in
     /// sigmf-meta), or a FIFO; `-` is standard output
     #[arg(short, long, default_value = "-")]
@@ -85,6 +89,10 @@ struct Report<'a> {
 /// # Errors
 /// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    if let Some(name) = args.names.first() {
+        let message = format!("{}: give each input after --input, or none for standard input", Quoted(name));
+        return Err(Failure::Usage(message));
+    }
     let inputs = args.inputs();
     check_channels(args.channels, args.format)?;
     args.run.check(&args.bank, &inputs, &args.output, args.container(), false)?;
@@ -115,7 +123,8 @@ impl Args {
     }
 
     fn stream(&self, job: &Job<'_>, inputs: &[PathBuf], observer: &mut RunObserver) -> Result<(), Failure> {
-        let plan = job.plan()?;
+        // Before the inputs come; their headers may say complex samples.
+        let plan = job.plan(true)?;
         let channels = self.channels_of_each(inputs, job.bank);
         let raw = ReadOptions { coding: self.format, channels, ..ReadOptions::files() };
         let mut reader = job.start_reader(inputs, raw, Some(observer))?;

@@ -82,7 +82,7 @@ pub(super) fn create_folder(folder: &Path) -> Result<(), Failure> {
 
 /// Refuses a folder that no run can make, before the work is done.
 pub(super) fn check_folder(folder: &Path) -> Result<(), Failure> {
-    if folder.ancestors().any(|part| part.exists() && !part.is_dir()) {
+    if folder.ancestors().any(|part| part.symlink_metadata().is_ok() && !part.is_dir()) {
         let problem = "a file has this name, or that of a folder above; give the name of a folder";
         return Err(Failure::of(folder, problem));
     }

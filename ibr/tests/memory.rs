@@ -304,3 +304,41 @@ fn what_no_memory_holds_is_refused() {
         "{message}"
     );
 }
+
+/// What parsing takes, beside the text. The estimates are not low: what is refused for lack of memory is
+/// refused before it is parsed.
+#[test]
+fn texts_take_what_is_estimated() {
+    let n = 200_000;
+    let list = |item: &str| format!("a = [{}]\n", item.repeat(n));
+    let keys = |key: &str| (0..n).map(|k| format!("k{k}{key}")).collect::<String>();
+    let object = |member: &str| (0..n).map(|k| format!("\"{k}\":{member},")).collect::<String>();
+    let pool = pool();
+    for (name, highest, text) in [
+        ("a string", 4.0, format!("a = \"{}\"\n", "x".repeat(5 * n))),
+        ("integers", 1.4, list("1,")),
+        ("numbers", 1.4, list("1.5, ")),
+        ("long numbers", 1.4, list("1.2345678901234567, ")),
+        ("strings", 1.4, list("\"x\",")),
+        ("lists", 1.4, list("[1],")),
+        ("tables in a line", 1.4, list("{b=1},")),
+        ("empty tables", 7.0, list("{},")),
+        ("keys", 1.4, keys(" = 1\n")),
+        ("dotted keys", 1.4, keys(".b.c.1 = 1\n")),
+        ("tables", 1.4, "[[view]]\nposition = 1.0\n".repeat(n)),
+        ("comments", 3.0, "# nothing\n".repeat(n)),
+        ("empty lines", 1.4, "\n".repeat(n)),
+        ("JSON: numbers", 1.8, format!("{{\"a\": [{}1]}}", "1.5, ".repeat(n))),
+        ("JSON: members", 2.0, format!("{{{}\"a\":1}}", object("1"))),
+        ("JSON: objects", 1.8, format!("{{{}\"a\":1}}", object("{\"b\":1}"))),
+    ] {
+        let estimate = hybank::files::parsing_bytes(text.as_bytes());
+        let measured = peak(&pool, || match text.starts_with('{') {
+            true => drop(serde_json::from_str::<serde_json::Value>(&text)),
+            false => drop(hybank_ibr::scene::parse(&text, std::path::Path::new("scene.toml"))),
+        });
+        let ratio = estimate / measured;
+        println!("{name}: {:.1} MB, ratio {ratio:.2}", measured / 1e6);
+        assert!((0.75..highest).contains(&ratio), "{name}: {estimate} estimated, {measured} measured");
+    }
+}

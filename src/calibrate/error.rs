@@ -225,7 +225,8 @@ pub enum CalibrateError {
     Tones(#[from] SineFitError),
     /// The iteration did not settle.
     #[error(
-        "the fit did not settle within {steps} steps; check the order of the captures, the front ends and the delays of the spec"
+        "the fit did not settle within {steps} steps; check the order of the captures, the front ends and the delays of the \
+         spec, and without tones or a waveform that the signal leaves frequencies free"
     )]
     NoConvergence {
         /// Steps taken.

@@ -196,15 +196,16 @@ impl AtomicFile {
         None
     }
 
-    /// Makes the new name final. What was replaced has the hidden name now, and goes.
-    fn confirm(mut self, placed: Placed) -> Result<(), FileError> {
+    /// Makes the new name final. What was replaced has the hidden name now, and goes; otherwise gives that
+    /// name and the reason.
+    fn confirm(mut self, placed: Placed) -> Result<(), (String, io::Error)> {
         let removed = match placed {
             Placed::Exchanged => self.begun.remove(&self.beside),
             Placed::New | Placed::Replaced => Ok(()),
         };
-        let (file, hidden) = (self.name.clone(), self.beside.display().to_string());
+        let hidden = Quoted(&self.beside).to_string();
         self.forget();
-        removed.map_err(|source| FileError::OldFileStays { file, hidden, source })
+        removed.map_err(|source| (hidden, source))
     }
 
     /// Whether nothing has been written to the open file.
@@ -264,7 +265,7 @@ impl Seek for AtomicFile {
 ///
 /// # Errors
 /// As [`AtomicFile::commit`], for the first file that fails; the others are taken back.
-/// [`FileError::OldFileStays`] if all are in place and a file that one replaced could not be removed.
+/// [`FileError::OldFilesStay`] if all are in place and files that they replaced could not be removed.
 pub fn commit_all(mut files: Vec<AtomicFile>) -> Result<(), FileError> {
     // Late disk errors occur here, before the first file gets its name.
     files.iter_mut().try_for_each(AtomicFile::seal)?;
@@ -282,8 +283,12 @@ pub fn commit_all(mut files: Vec<AtomicFile>) -> Result<(), FileError> {
         }
     }
     named.extend(placed.iter().map(|(file, _)| file.name.clone()));
-    let confirmed: Vec<_> = placed.into_iter().map(|(file, how)| file.confirm(how)).collect();
-    confirmed.into_iter().collect()
+    let refused = placed.into_iter().filter_map(|(file, how)| file.confirm(how).err());
+    let (hidden, reasons): (Vec<_>, Vec<_>) = refused.unzip();
+    match reasons.into_iter().next() {
+        Some(source) => Err(FileError::OldFilesStay { hidden, source }),
+        None => Ok(()),
+    }
 }
 
 fn unfinished<R>(change: impl FnOnce(&mut BTreeMap<PathBuf, Begun>) -> R) -> R {

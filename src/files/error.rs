@@ -52,14 +52,12 @@ pub enum FileError {
         /// Hidden name of the unfinished file.
         hidden: String,
     },
-    /// An output is in place, and the file that it replaced could not be removed.
-    #[error("{}: it is written; the file that it replaced is still there as {}: {source}; remove that", Quoted(.file), Quoted(.hidden))]
-    OldFileStays {
-        /// Name of the output.
-        file: String,
-        /// Hidden name of the file that had its name before.
-        hidden: String,
-        /// What the system says.
+    /// All outputs are in place, and files that they replaced could not be removed.
+    #[error("the output is written; what it replaced is still there as {}: {source}; remove that", .hidden.join(" and "))]
+    OldFilesStay {
+        /// Hidden names of the files that had the names before, as text that may be printed.
+        hidden: Vec<String>,
+        /// What the system says of the first.
         source: io::Error,
     },
     /// A set of outputs of which some could not be taken back.

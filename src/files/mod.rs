@@ -50,7 +50,7 @@ mod streams;
 pub use atomic::{AtomicFile, check_output, commit_all, remove_unfinished};
 #[cfg(feature = "runtime")]
 pub(crate) use bounded::fill;
-pub use bounded::{Bound, SPEC_OR_BANK, bytes_of, read_bytes, read_text, text_in};
+pub use bounded::{Bound, SPEC_OR_BANK, bytes_of, parsing_bytes, read_bytes, read_text, text_in};
 pub use error::FileError;
 pub use hidden::{Leftover, leftovers};
 pub use identity::{is_same_file, refuse_overlaps};

@@ -114,6 +114,9 @@ pub enum InputFault {
         /// Number of these bytes.
         bytes: u64,
     },
+    /// The file of samples of a SigMF recording has another digest than its metadata state.
+    #[error("its samples do not have the core:sha512 of its metadata: they were changed or damaged later")]
+    Altered,
     /// The input ended before the last sample whose number at the converter is given.
     #[error("it ends before the last of the samples whose number is given")]
     TimestampsBeyondEnd,

@@ -6,6 +6,7 @@ use super::full_scale::Scaling;
 use super::open::InputSource;
 use super::wav::WavChunk;
 use super::{InputFault, IoError, StreamHeader};
+use crate::messages::counted;
 use crate::quantity::FullScale;
 use std::io::{self, Read};
 
@@ -102,15 +103,16 @@ impl InputFrames {
         Ok(self.source.arrange(frames, &self.stored))
     }
 
-    /// What was tolerated; complete at the end.
-    pub(super) fn faults(&self) -> Vec<InputFault> {
+    /// What was tolerated, at the end.
+    pub(super) fn faults(&mut self) -> Vec<InputFault> {
         let (missing_bytes, bytes) = (self.frames.inner.missing_bytes(), self.frames.carry.len());
         let truncated = (missing_bytes > 0).then_some(InputFault::Truncated { missing_bytes });
         let cut = (bytes > 0).then_some(InputFault::CutFrame { bytes });
         let bytes = self.frames.inner.further_bytes();
         let further = (bytes > 0).then_some(InputFault::FurtherSamples { bytes });
         let scale = self.scaling.as_ref().and_then(Scaling::fault);
-        truncated.into_iter().chain(cut).chain(further).chain(scale).collect()
+        let altered = self.frames.inner.is_altered().then_some(InputFault::Altered);
+        truncated.into_iter().chain(cut).chain(further).chain(scale).chain(altered).collect()
     }
 }
 
@@ -125,9 +127,8 @@ impl InputSource {
         if let Some(only) = self.only {
             if only >= channels {
                 let channel = only + 1;
-                return unfit(format!(
-                    "channel {channel} was asked for: it has {channels} channels, counted from 1"
-                ));
+                let there = counted(channels, "channel");
+                return unfit(format!("channel {channel} was asked for: it has {there}, counted from 1"));
             }
             return Ok(StreamHeader { channels: 1, ..header });
         }

@@ -18,6 +18,9 @@ use std::path::PathBuf;
 /// All blocks of all inputs together, unless that would make them smaller than a page.
 const ALL_BYTES: usize = 16 << 20;
 
+/// Each takes a thread; no bank has more channels.
+const MOST_INPUTS: usize = 1024;
+
 /// The result of waiting for frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Arrival {
@@ -62,6 +65,11 @@ impl MultiReader {
         options: ReadOptions<'_>,
         stop: Receiver<()>,
     ) -> Result<Option<Self>, IoError> {
+        if let Some(path) = paths.get(MOST_INPUTS) {
+            let problem =
+                format!("it is one of {} inputs; at most {MOST_INPUTS} are read together", paths.len());
+            return Err(IoError::unfit(&path.display().to_string())(problem));
+        }
         refuse_shared_pipes(paths)?;
         let block = (ALL_BYTES / BLOCKS / paths.len().max(1)).min(options.block_bytes).max(4096);
         let interleaving = options.interleaving.filter(|_| paths.len() == 1);

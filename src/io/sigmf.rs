@@ -181,6 +181,11 @@ impl SigmfMeta {
         extensions.iter().find(required)?.get("name")?.as_str()
     }
 
+    /// The SHA-512 of the file of samples, in hexadecimal digits, if it is stated.
+    pub(super) fn sha512(&self) -> Option<&str> {
+        self.global.other.get("core:sha512")?.as_str()
+    }
+
     /// The format of the numbers of the data type.
     ///
     /// # Errors

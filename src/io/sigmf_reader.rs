@@ -7,6 +7,7 @@ use super::timestamps::Timestamps;
 use super::{IoError, StreamHeader};
 use crate::files::{bytes_of, text_in};
 use crate::messages::Quoted;
+use sha2::{Digest as _, Sha512};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Take};
 use std::path::Path;
@@ -17,6 +18,8 @@ pub(super) struct SigmfReader {
     header: StreamHeader,
     timestamps: Timestamps,
     samples: Take<File>,
+    /// Of what has been read, if the metadata state one.
+    digest: Option<Sha512>,
 }
 
 impl SigmfReader {
@@ -74,13 +77,16 @@ impl SigmfReader {
         let header = meta.stream_header(name)?;
         let promised = bytes.map(|bytes| bytes / header.frame_bytes() as u64);
         let (header, timestamps) = (StreamHeader { promised, ..header }, meta.timestamps(name)?);
-        Ok(Self { meta: Box::new(meta), header, timestamps, samples })
+        let digest = meta.sha512().map(|_| Sha512::new());
+        Ok(Self { meta: Box::new(meta), header, timestamps, samples, digest })
     }
 }
 
 impl Read for SigmfReader {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        self.samples.read(bytes)
+        let count = self.samples.read(bytes)?;
+        self.digest.iter_mut().for_each(|digest| digest.update(&bytes[..count]));
+        Ok(count)
     }
 }
 
@@ -92,6 +98,17 @@ impl Capture for SigmfReader {
     fn notes(&self) -> InputNotes {
         let (sigmf, timestamps) = (Some(self.meta.clone()), self.timestamps.clone());
         InputNotes { sigmf, timestamps, ..InputNotes::default() }
+    }
+
+    fn is_altered(&mut self) -> bool {
+        // The digest is that of the whole file.
+        self.samples.set_limit(self.meta.global.trailing_bytes);
+        let mut bytes = [0; 4096];
+        while self.digest.is_some() && self.read(&mut bytes).is_ok_and(|count| count > 0) {}
+        let digits = |digest: Sha512| digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+        let found: Option<String> = self.digest.take().map(digits);
+        found
+            .is_some_and(|found| self.meta.sha512().is_some_and(|stated| !found.eq_ignore_ascii_case(stated)))
     }
 }
 

@@ -17,7 +17,7 @@
 
 use crate::bank::{Bank, FrameLayout};
 use crate::io::{MultiReader, StreamHeader, TimeInterleaving, is_same_rate};
-use crate::messages::{Number, Quoted};
+use crate::messages::{Number, Quoted, counted};
 use crate::units::FastPeriods;
 
 /// Recordings that do not fit a bank.
@@ -26,9 +26,8 @@ use crate::units::FastPeriods;
 pub enum InputMismatch {
     /// Another number of channels.
     #[error(
-        "{} has {wanted} channels, but the input has {given} ({files}); give one mono recording per channel or one of \
-         {wanted} channels",
-        Quoted(.bank)
+        "{} has {there}, but the input has {given} ({files}); give one mono recording per channel or one of {there}",
+        Quoted(.bank), there = counted(.wanted, "channel")
     )]
     Channels {
         /// The name of the bank.
@@ -75,8 +74,8 @@ pub enum InputMismatch {
     },
     /// A rate that is not the bank's.
     #[error(
-        "{}: the sample rate is {} Hz, but the bank is designed for slow channels of {} Hz; record at that rate or design \
-         a bank for this one",
+        "{}: the sample rate of each channel is {} Hz, but the bank is designed for slow channels of {} Hz; record at that \
+         rate or design a bank for this one",
         Quoted(.input), Number(*.rate), Number(*.wanted)
     )]
     Rate {
@@ -223,6 +222,8 @@ fn input_rate<'a>(
     }
     let wanted = 1.0 / bank.slow_period().0;
     if !bank.is_normalised() && header.other_rate(wanted).is_some() {
+        // Without the rounding of the periods: it would be shown.
+        let wanted = format!("{wanted:.11e}").parse().unwrap_or(wanted);
         return Err(InputMismatch::Rate { input: first.to_owned(), rate, wanted });
     }
     Ok(Some(rate))

@@ -1,6 +1,6 @@
 //! The follower on simulated recordings of clocks that drift, against the true delays.
 
-use super::follower::FollowSettings;
+use super::tracker::FollowSettings;
 use super::*;
 use crate::bank::{Bank, SynthesisFilters, TapSlopes};
 use crate::design::Problem;

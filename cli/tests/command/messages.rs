@@ -129,6 +129,48 @@ fn a_box_that_is_too_wide_is_named() {
     assert!(said.len() < 300, "{said}");
 }
 
+/// A jitter of seconds between samples of microseconds had a result, a gain of billions.
+#[test]
+fn jitter_that_leaves_no_order_is_refused() {
+    let desk = desk();
+    desk.write("spec.toml", THESIS);
+    desk.report(&["design", "spec.toml", "-o", "designed.json"]);
+    let args = |jitter| ["analyze", "designed.json", "--jitter", jitter];
+    desk.refused(2, &args("2"), &["--jitter", "a sample every 2 s", "no order"]);
+    assert!(desk.run(&args("1.9"), &[]).status.success());
+}
+
+/// "It has 1 channels", and a rate that no file has: 249999999.99999997 Hz.
+#[test]
+fn what_does_not_fit_a_bank_is_counted_as_people_do() {
+    let desk = desk();
+    let said =
+        desk.refused(1, &fuse(&["--channel", "2"]), &["a.wav: channel 2 was asked for: it has 1 channel,"]);
+    assert!(!said.contains("1 channels"), "{said}");
+    let bank = std::fs::read_to_string(desk.path("bank.json")).unwrap();
+    let mut fast: serde_json::Value = serde_json::from_str(&bank).unwrap();
+    fast["fast_period"] = (1.0 / 3e8).into();
+    desk.write("fast.json", fast.to_string());
+    let args = ["fuse", "fast.json", "a.wav", "b.wav", "-o", "out.wav"];
+    desk.refused(1, &args, &["each channel is ", "slow channels of 150000000 Hz;"]);
+}
+
+/// So many threads of readers that the system had no memory maps left: a panic of the standard library.
+#[test]
+fn thousands_of_inputs_are_refused_before_any_is_opened() {
+    let desk = desk();
+    let many = ["none.wav"; 20_000];
+    let args = [&["fuse", "bank.json", "-o", "out.wav"][..], &many].concat();
+    desk.refused(1, &args, &["none.wav", "20000 inputs", "at most 1024 are read together"]);
+}
+
+/// The usage of the program did not say how inputs are given.
+#[test]
+fn names_after_the_bank_of_a_stream_are_inputs() {
+    let desk = desk();
+    desk.refused(2, &["stream", "bank.json", "a.wav", "b.wav"], &["a.wav", "--input"]);
+}
+
 /// A sample that was "NaN, beyond the range of a 32-bit float", which no gain mends, and a number "with the
 /// unit \"\"".
 #[test]
@@ -221,12 +263,14 @@ fn a_tone_that_is_not_there_is_named_with_the_recordings() {
     desk.refused(1, &["measure", "a.wav", "--tone", "7kHz"], &["a.wav: no tone found near 7000 Hz"]);
 }
 
-/// "File exists (os error 17)".
+/// "File exists (os error 17)", also of a link that leads to itself.
 #[test]
+#[cfg(unix)]
 fn a_file_is_no_folder_for_captures() {
     let desk = Desk::with_spec(THESIS);
     desk.write("taken", "");
-    for folder in ["taken", "taken/inside"] {
+    std::os::unix::fs::symlink("loop", desk.path("loop")).unwrap();
+    for folder in ["taken", "taken/inside", "loop"] {
         let args = ["simulate", "spec.toml", "--source", "step@1", "-o", folder];
         let said = desk.refused(1, &args, &[folder, "a file has this name", "the name of a folder"]);
         assert!(!said.contains("os error"), "{said}");

@@ -193,7 +193,7 @@ fn archive(n: usize) -> Vec<u8> {
     (0..n).flat_map(file).chain([0; 1024]).collect()
 }
 
-fn bank(channels: usize, taps: usize) -> Vec<u8> {
+pub(crate) fn bank(channels: usize, taps: usize) -> Vec<u8> {
     let taps: Vec<f64> = (0..taps).map(|k| (k % 5) as f64).collect();
     let channel = json!({ "delay": 0.0, "taps": taps });
     let bank = json!({ "format": "hybank-bank", "version": 1, "spec": null, "fast_period": 1.0, "ratio": 2, "latency": 3,

@@ -1,7 +1,7 @@
 //! Too little memory: limits of the address space from 40 MB up. What an input makes large is refused with a
 //! message; only small allocations, which no input decides, may end the process.
 
-use crate::large::{LARGE, desk};
+use crate::large::{LARGE, bank, desk};
 use crate::support::Desk;
 use crate::support::random::Random;
 use crate::work::{jobs, recorder};
@@ -130,6 +130,34 @@ fn large_inputs_are_refused_in_words_where_the_memory_ends() {
         }
         std::fs::remove_file(desk.path(large.file)).unwrap();
         println!("{PARTS} {}: {tally}", large.parts);
+    }
+}
+
+/// Threads of readers and of the pool once reserved 64 MB of addresses each, at any time: a run with 72 MB
+/// was done, one with 170 MB refused or aborted. Long filters have transforms of tens of megabytes.
+#[test]
+fn more_memory_is_never_worse() {
+    let desk = crate::work::desk(20_000);
+    desk.write("long.json", bank(2, 40_000));
+    let mut limits: Vec<u64> =
+        (0..rounds(24)).map(|k| 40_000 + 360_000 * k as u64 / rounds(24) as u64).collect();
+    limits.retain(|&kilobytes| kilobytes as f64 >= least(&desk));
+    for line in [
+        "fuse long.json a.wav b.wav -o out.wav --force",
+        "fuse long.json a.wav b.wav -o out.wav --force --threads 2 --algorithm direct",
+        "stream long.json --input a.wav --input b.wav --format wav -o out.wav --force --algorithm overlap-save",
+        "design spec.toml -o designed.json --force",
+    ] {
+        let (mut tally, mut is_done) = (Tally::default(), false);
+        for kilobytes in &limits {
+            let what = format!("{line}, {kilobytes} kB");
+            let done = tally.judge(&limited(&desk, *kilobytes, line), &what);
+            assert!(done || !is_done, "{what}: less memory was enough");
+            is_done = done;
+        }
+        println!("{line}: {tally}");
+        assert_eq!(tally.ended, 0, "{line}: {tally}");
+        assert!(tally.done > 0 && tally.refused > 0, "{line}: {tally}");
     }
 }
 

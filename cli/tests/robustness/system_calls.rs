@@ -148,6 +148,29 @@ fn outputs_that_cannot_be_taken_back_are_named() {
     }
 }
 
+/// All outputs have their names, and the files that had them before cannot be removed.
+#[test]
+fn old_files_that_cannot_be_removed_are_named() {
+    if !is_there() {
+        return trials::skipped(&"old files that stay: strace is not there or may not trace");
+    }
+    let desk = desk(2_000);
+    let job = jobs(&desk).pop().unwrap();
+    let before = job.prepare(true);
+    let inject = ["-e", "trace=unlink", "-e", "inject=unlink:error=EIO:when=1+"];
+    let output = strace(&job, &[&["-o", "/dev/null"][..], &inject].concat()).output().unwrap();
+    let message = text(&output.stderr);
+    assert_eq!((output.status.code(), message.lines().count()), (Some(1), 1), "{message}");
+    assert!(message.contains("is written; what it replaced is still there as "), "{message}");
+    assert_eq!(job.judge(&before, &message), Some(true), "{message}");
+    let stay = job.unfinished();
+    assert_eq!(stay.len(), 2, "{message}");
+    for path in stay {
+        assert!(message.contains(path.file_name().unwrap().to_str().unwrap()), "{path:?}: {message}");
+        fs::remove_file(path).unwrap();
+    }
+}
+
 /// One run in which calls of this name fail.
 fn fail(job: &Job, call: &str, inject: &str, old: bool, tally: &mut Tally) {
     let before = job.prepare(old);

@@ -73,24 +73,16 @@ fn in_pool(threads: Option<usize>, work: impl FnOnce() -> Result<(), Failure> + 
         let threads = threads.unwrap_or_default();
         return Err(Failure::Usage(format!("--threads {threads}: it must be 1 to {MOST_THREADS}")));
     }
-    refuse_without_memory()?;
     let builder = rayon::ThreadPoolBuilder::new;
     let alone = || builder().num_threads(1).use_current_thread().build().map_err(Failure::input);
-    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-    let pool = match (affordable_threads(threads.unwrap_or_else(cores)), threads) {
+    let several = |count| builder().num_threads(count).build();
+    let pool = match (affordable_threads(threads), threads) {
         (1, _) => alone(),
-        (count, Some(threads)) => builder()
-            .num_threads(count)
-            .build()
+        (count, Some(threads)) => several(count)
             .map_err(|error| Failure::Input(format!("--threads {threads}: {error}; ask for fewer"))),
-        // 0 stands for all cores, or for as many as RAYON_NUM_THREADS says.
-        (count, None) => {
-            builder().num_threads(if count < cores() { count } else { 0 }).build().or_else(|_| alone())
-        }
+        (count, None) => several(count).or_else(|_| alone()),
     }?;
-    // The allocator gives each thread a part of the address space at its first request. Now that is counted
-    // when work is compared with what is free.
-    pool.broadcast(|_| drop(std::hint::black_box(Vec::<u8>::with_capacity(1))));
+    // With the stacks of the threads, which are in use now.
     refuse_without_memory()?;
     pool.install(work)
 }

@@ -44,7 +44,7 @@ impl Progress {
         };
         // Where addresses are limited, the work needs those of a thread. One that cannot be started is no
         // reason to fail.
-        if affordable_threads(2) > 1 {
+        if affordable_threads(Some(2)) > 1 {
             let _ = thread::Builder::new().name("progress".into()).spawn(show);
         }
         Self { bar, begun: AtomicU64::new(0), _display: display }

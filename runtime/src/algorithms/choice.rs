@@ -166,15 +166,18 @@ impl Algorithm {
 }
 
 impl ChosenAlgorithm {
-    /// Bytes of the coefficients and of the state of one stream, about.
-    pub(crate) fn bytes(self, taps: &[Vec<f64>], ratio: usize, precision: Precision) -> f64 {
+    /// Bytes of the coefficients, and of the states of a plan and of so many streams, about.
+    pub(crate) fn bytes(self, taps: &[Vec<f64>], ratio: usize, precision: Precision, streams: usize) -> f64 {
         let size = Size::new(taps, ratio, precision);
-        let numbers = match self {
+        let (coefficients, state) = match self {
             Self::OverlapSave(len) => size.shape(len).numbers(),
             // The filters of all phases and the history, both rounded up to whole vectors.
-            Self::Direct => 2.0 * (size.phase_taps * size.channels) as f64 * (size.ratio + 2) as f64,
+            Self::Direct => {
+                let history = 2.0 * (size.phase_taps * size.channels) as f64;
+                (history * size.ratio as f64, history)
+            }
         };
-        numbers * precision.bytes()
+        (coefficients + (1 + streams) as f64 * state) * precision.bytes()
     }
 }
 

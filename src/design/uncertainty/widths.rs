@@ -1,7 +1,7 @@
 //! A box of errors as it is asked for: half-widths, of one channel for all or of each.
 
 use crate::bank::Bank;
-use crate::quantity::Time;
+use crate::quantity::{Time, readable};
 use crate::spec::{ChannelCount, SpecProblem, check_delay_half_width, for_channels};
 use crate::units::Seconds;
 use crate::verify::uncertainty::ErrorBox;
@@ -88,6 +88,9 @@ pub enum BoxRule {
     /// A width below 0.
     #[error("the box reaches as far in both directions; give the positive half-width")]
     Negative,
+    /// Jitter with which samples are not in their order.
+    #[error("a converter takes a sample every {}; instants that are off by as much have no order, give less", readable(.0.0, "s"))]
+    Disorder(Seconds),
     /// A share that is too large for the proof.
     #[error("shares of 50% and more are not supported")]
     Share,
@@ -137,7 +140,10 @@ impl BoxWidths {
     /// # Errors
     /// [`RefusedBox`] of `jitter`.
     pub fn jitter_of(&self, bank: &Bank) -> Result<Option<Vec<Seconds>>, RefusedBox> {
-        let jitter = of("jitter", in_seconds(&self.jitter, bank))?;
+        let (jitter, period) = (of("jitter", in_seconds(&self.jitter, bank))?, bank.slow_period());
+        if jitter.iter().any(|jitter| jitter.0 >= period.0) {
+            return of("jitter", Err(BoxRule::Disorder(period)));
+        }
         let all = of("jitter", for_channels(&jitter, bank.channel_count()))?;
         Ok((!jitter.is_empty()).then_some(all))
     }

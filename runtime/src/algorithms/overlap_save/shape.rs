@@ -60,14 +60,14 @@ impl Shape {
         lanes / (self.batch() * self.ratio) as f64
     }
 
-    /// Numbers that the coefficients and the state of a stream hold.
-    pub(crate) fn numbers(&self) -> f64 {
+    /// Numbers of the coefficients, with the factors of the transform, and of a state.
+    pub(crate) fn numbers(&self) -> (f64, f64) {
         let [len, channels, ratio, batch] =
             [self.len, self.channels, self.ratio, self.batch()].map(|x| x as f64);
         let [inputs, outputs] = [self.inputs(), self.outputs()].map(|x| x as f64);
         let row = (2 * self.depth * self.segments) as f64;
         let samples = (self.history as f64 + batch) * channels + batch * ratio;
-        0.5 * len * outputs * channels * row + (inputs + outputs) * len * row + samples + 2.0 * len
+        (0.5 * len * outputs * channels * row + 3.0 * len, (inputs + outputs) * len * row + samples)
     }
 
     /// False if the spectra would take gigabytes.
