@@ -187,7 +187,7 @@ fn a_searched_placement_is_close_to_the_best() {
 }
 
 /// The same choice against the best of all subsets by rendering: 4 of 13 places, or 4 of 20 with
-/// `HYBANK_SLOW=1`. The criterion knows surfaces and no textures, so it loses up to 2.4 dB. The same search
+/// `HYBANK_SLOW=1`. The criterion knows surfaces and no textures, so it loses up to 2.1 dB. The same search
 /// with the rendered views themselves as the criterion loses less than 0.3 dB.
 #[test]
 fn placement_gives_good_views() {
