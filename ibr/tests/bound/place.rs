@@ -80,5 +80,6 @@ fn predicted_and_true_errors_rank_sets_of_views_alike() {
     println!("rank correlation {rank:.3} in the mean");
     // 0.75 in the first two scenes, and 0.67 in ten, in one of which the ranks hardly agree (0.21).
     assert!(rank > if scenes > 2 { 0.6 } else { 0.7 }, "{rank}");
-    assert!(all.iter().all(|found| found.loss < 1.05), "{:?}", all.iter().map(|f| f.loss).collect::<Vec<_>>());
+    let loss = all.iter().map(|found| found.loss).fold(1.0, f64::max);
+    assert!(loss < 1.05, "{loss}");
 }
