@@ -19,6 +19,18 @@ pub struct Feature {
 }
 
 /// Triangles between features of one view, which cover their convex hull.
+///
+/// ```
+/// use hybank_ibr::uncalibrated::Point;
+/// use hybank_ibr::uncalibrated::mesh::{Feature, Mesh};
+///
+/// // On a plane chi is an affine function of the pixel, here x / 4.
+/// let corners = [(0.0, 0.0), (4.0, 0.0), (0.0, 2.0), (4.0, 2.0)];
+/// let features = corners.map(|(x, y)| Feature { position: Point::new(x, y), chi: 0.25 * x });
+/// let mesh = Mesh::delaunay(&features);
+/// assert_eq!(mesh.triangles(), 2);
+/// assert_eq!(mesh.chi((5, 3))[5 + 2], 0.5);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
     pub(super) corners: Vec<Feature>,

@@ -9,8 +9,8 @@
 //! ```
 //!
 //! Surfaces say what is hidden, and nothing about textures. In ten ray-traced scenes of 64 x 48 pixels
-//! [`Placement::searched`] chose 4 of 20 places that lost 0.7 to 2.1 dB against the best of all subsets, each
-//! of which was rendered. By the criterion itself they were within 0.12 dB of the best subset.
+//! [`Placement::searched`] chose 4 of 20 places that lost 0.7 to 2.1 dB against the best of all subsets,
+//! each of which was rendered. By the criterion itself they were within 0.12 dB of the best subset.
 
 use hybank_ibr::analysis::Choice;
 use hybank_ibr::depth::DepthMap;
