@@ -305,7 +305,7 @@ fn banks_that_no_memory_holds_are_refused() {
         )
     };
     desk.write("long.json", bank(300_000));
-    desk.write("longest.json", bank(1_000_000));
+    desk.write("longest.json", bank(2_500_000));
     desk.write("in", bytes(&frames(50)));
     crate::support::wav::write_pair(&desk, &[0.0; 8], &[0.0; 8]);
     for (name, work) in [("long.json", "to filter with it"), ("longest.json", "to read it")] {
