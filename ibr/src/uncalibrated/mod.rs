@@ -12,7 +12,7 @@
 //! use hybank_ibr::uncalibrated::{Match, Point, canonical, fundamental, resection, triangulate};
 //!
 //! // Points of a scene, and where cameras that look along z from (x, 0, 0) see them.
-//! let place = |k: u32| [1.7, 2.3, 1.1].map(|step| (step * f64::from(k)) % 4.0);
+//! let place = |k: u32| [1.618, 2.414, 0.732].map(|step| (step * f64::from(k)) % 4.0);
 //! let scene: Vec<[f64; 3]> = (0..60).map(place).collect();
 //! let seen = |x: f64, p: &[f64; 3]| Point::new(p[0] - x, p[1]) * (200.0 / (p[2] + 5.0));
 //! let matches: Vec<Match> =
