@@ -83,7 +83,15 @@ pub fn share_heap() {
             return;
         }
         let mut words = env::args_os();
-        if let (Some(name), Ok(program)) = (words.next(), env::current_exe()) {
+        let Ok(program) = env::current_exe() else { return };
+        // The dynamic loader was called with the name of this program, which is not known here.
+        if program.file_name().is_some_and(|name| name.to_string_lossy().starts_with("ld-")) {
+            return;
+        }
+        // The file of a program that runs may have been removed.
+        let is_removed = program.as_os_str().as_encoded_bytes().ends_with(b" (deleted)");
+        let program = if is_removed { "/proc/self/exe".into() } else { program };
+        if let Some(name) = words.next() {
             // Comes back only if the system refuses it; then the run goes on with several heaps.
             let _ = Command::new(program).arg0(name).args(words).env(HEAPS, "1").exec();
         }

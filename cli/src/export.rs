@@ -184,7 +184,7 @@ fn write_verilog(args: &Args, bank: &Bank) -> Result<Circuit, Failure> {
         write_bytes(&args.output, verilog.text.as_bytes(), args.force)?;
         return Ok(verilog.circuit);
     };
-    let bench = verilog.testbench(args.verilog.random_frames.unwrap_or(1000));
+    let bench = verilog.testbench(args.verilog.random_frames.unwrap_or(1000)).map_err(Failure::input)?;
     let mut files: Vec<_> = bench.into_iter().map(|(name, text)| (folder.join(name), text)).collect();
     let circuit = verilog.circuit;
     files.push((args.output.clone(), verilog.text));

@@ -71,8 +71,8 @@ impl CircuitKeywords<'_> {
         let verilog = Verilog::new(bank, name, &self.options(input_bits)?).map_err(refused)?;
         let mut files = Vec::new();
         if let Some(folder) = &self.testbench {
+            let bench = verilog.testbench(self.random_frames.unwrap_or(RANDOM_FRAMES)).map_err(refused)?;
             std::fs::create_dir_all(folder)?;
-            let bench = verilog.testbench(self.random_frames.unwrap_or(RANDOM_FRAMES));
             files.extend(bench.into_iter().map(|(name, text)| (folder.join(name), text)));
         }
         files.push((path.to_owned(), verilog.text));

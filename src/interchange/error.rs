@@ -1,5 +1,6 @@
 //! Why a bank cannot be exported.
 
+use crate::memory::MemoryShortage;
 use crate::messages::Quoted;
 
 /// A format that cannot hold a bank.
@@ -14,6 +15,17 @@ pub enum ExportError {
         /// Name of the format.
         format: &'static str,
     },
+    /// A testbench of more random frames than a simulator runs.
+    #[error("a testbench of {given} random frames is not written; ask for {most} at most")]
+    Frames {
+        /// Those asked for.
+        given: u32,
+        /// At most so many.
+        most: u32,
+    },
+    /// The texts are more than this process may use.
+    #[error("the testbench takes {0}; ask for fewer random frames, or allow more memory")]
+    Memory(#[from] MemoryShortage),
     /// Integer code needs the full scale to which an offset is relative.
     #[error(
         "channel {channel} has the offset {offset} of full scale, and integers need the bits of the samples to \

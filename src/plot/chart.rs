@@ -3,6 +3,7 @@
 use super::axis::{AxisScale, Labels, extent, widened};
 use super::labels::{MARK_FONT, RADIUS, Room};
 use super::legend::{Dashes, Entry, Legend, Look, OVERSIZE, letters};
+use crate::memory::MemoryShortage;
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
@@ -75,7 +76,7 @@ pub struct Chart {
 }
 
 /// A chart that could not be drawn.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlotError {
     /// No finite point in any series.
@@ -84,6 +85,9 @@ pub enum PlotError {
         /// Title of the chart.
         title: String,
     },
+    /// Its pixels are more than this process may use.
+    #[error("the chart takes {0}; write it as .svg, or allow more memory")]
+    Memory(#[from] MemoryShortage),
     /// The drawing library failed.
     #[error("the chart `{title}` could not be drawn: {reason}")]
     Drawing {

@@ -18,6 +18,21 @@ fn shell(desk: &Desk, script: &str) -> Output {
     command.args(["-c", script]).output().unwrap()
 }
 
+/// Where addresses are limited the program begins again, but not what another file of its name is, nor the
+/// loader that was asked to run it.
+#[test]
+fn limited_addresses_run_the_same_program() {
+    let desk = Desk::new();
+    let script = "ulimit -v 200000; exec 8<gone; rm gone; /proc/self/fd/8 verify bank.json";
+    let output = shell(&desk, &format!("cp $H gone; cp /bin/echo 'gone (deleted)'; {script}"));
+    assert!(text(&output.stdout).contains("gamma"), "{output:?}");
+    let loader = "/lib64/ld-linux-x86-64.so.2";
+    if std::path::Path::new(loader).exists() {
+        let output = shell(&desk, &format!("ulimit -v 200000; {loader} $H verify bank.json"));
+        assert!(output.status.success(), "{output:?}");
+    }
+}
+
 #[test]
 fn warnings_that_cannot_be_written_cost_nothing() {
     let desk = Desk::new();

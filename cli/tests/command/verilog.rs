@@ -381,6 +381,9 @@ fn verilog_that_cannot_be_is_refused() {
     desk.refused(1, &more("b.json", &narrow), &["accumulator of 3 bits", "fraction bits", "hold all sums"]);
     desk.refused(2, &more("b.json", &["--input-bits", "8", "--pipeline", "0"]), &["--pipeline"]);
     desk.refused(2, &["export", "b.json", "-o", "b.csv", "--output-bits", "8"], &["--format verilog"]);
+    let many = ["--input-bits", "8", "--testbench", "t", "--random-frames", "4294967295"];
+    desk.refused(1, &more("b.json", &many), &["4294967295 random frames", "ask for 1000000 at most"]);
+    assert!(!desk.path("t").exists());
     desk.refused(2, &["export", "b.json", "-o", "-", "--format", "verilog", "--json"], &["--json"]);
     assert!(!desk.path("core.v").exists());
     // Without a name of its own the module has that of the file; the bits are those of the converters.

@@ -152,6 +152,21 @@ fn key<T>(name: &'static str, kinds: &'static str, value: &Option<T>) -> Key {
     Key { name, kinds, is_given: value.is_some() }
 }
 
+impl SceneSpec {
+    /// Keys of the top that not all kinds of scenes have.
+    pub(super) fn keys(&self) -> [Key; 7] {
+        [
+            key("matches", "matches-only", &self.matches),
+            key("colmap", "calibrated", &self.colmap),
+            key("transforms", "calibrated", &self.transforms),
+            key("calib", "rectified", &self.calib),
+            key("mirrored", "calibrated", &self.mirrored.then_some(())),
+            key("disparity_scale", "rectified", &self.disparity_scale),
+            key("depth_scale", "calibrated", &self.depth_scale),
+        ]
+    }
+}
+
 impl TargetSpec {
     /// Keys of which a virtual view has one at most.
     pub(super) const EITHER: [[&'static str; 2]; 3] =

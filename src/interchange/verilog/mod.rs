@@ -19,6 +19,7 @@ use netlist::Netlist;
 use output::Output;
 use parallel::parallel;
 use std::num::NonZeroU32;
+pub use testbench::MOST_RANDOM_FRAMES;
 
 /// How constants multiply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -148,7 +149,11 @@ impl Verilog {
 
     /// A test of the module: names and texts of its files. Its frames are impulses, full-scale steps, those
     /// that make the largest and the least sum of each phase, and `random` random ones.
-    pub fn testbench(&self, random: u32) -> Vec<(String, String)> {
+    ///
+    /// # Errors
+    /// [`ExportError::Frames`] for more random frames than [`MOST_RANDOM_FRAMES`], and
+    /// [`ExportError::Memory`].
+    pub fn testbench(&self, random: u32) -> Result<Vec<(String, String)>, ExportError> {
         testbench::files(self, random)
     }
 }

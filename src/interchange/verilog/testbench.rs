@@ -1,13 +1,25 @@
 //! A self-checking testbench: frames and the outputs that the bit-true model gives for them.
 
 use super::Verilog;
+use crate::interchange::ExportError;
 use crate::interchange::layout::PolyphaseTaps;
+use crate::memory::check_memory;
 use std::fmt::Write;
 
+/// Random frames of a testbench, at most: simulators take minutes for as many.
+pub const MOST_RANDOM_FRAMES: u32 = 1_000_000;
+
+/// Bytes of a word of a frame: as a number, and as a text that grows.
+const WORD_BYTES: f64 = 40.0;
+
 /// Names and texts of the files.
-pub(super) fn files(verilog: &Verilog, random: u32) -> Vec<(String, String)> {
+pub(super) fn files(verilog: &Verilog, random: u32) -> Result<Vec<(String, String)>, ExportError> {
+    if random > MOST_RANDOM_FRAMES {
+        return Err(ExportError::Frames { given: random, most: MOST_RANDOM_FRAMES });
+    }
     let mut model = verilog.model.clone();
     let taps = model.filters.taps.clone();
+    check_memory(WORD_BYTES * f64::from(random) * (taps.channels + taps.ratio) as f64)?;
     let frames = frames(&taps, verilog.model.words.input, &model.resting(), random);
     let mut outputs = vec![0; taps.ratio];
     let (mut input, mut expected) = (String::new(), String::new());
@@ -17,11 +29,11 @@ pub(super) fn files(verilog: &Verilog, random: u32) -> Vec<(String, String)> {
         write_line(&mut expected, &outputs);
     }
     let bench = bench(verilog, &taps, frames.len() / taps.channels);
-    vec![
+    Ok(vec![
         (format!("{}_tb.v", verilog.name), bench),
         ("input.txt".to_owned(), input),
         ("expected.txt".to_owned(), expected),
-    ]
+    ])
 }
 
 fn write_line(text: &mut String, words: &[i32]) {

@@ -44,6 +44,7 @@ impl Loader<'_> {
 
     /// Refuses keys of another kind of scene than this, and two keys for one thing, instead of ignoring one.
     pub(super) fn keys_of(&self, views: &[&ViewSpec], goals: &[Goal], kind: &str) -> Loaded<()> {
+        self.no_other_kind("the top of the file", kind, &self.spec.keys())?;
         views.iter().try_for_each(|view| self.no_other_kind(&view.named(), kind, &view.keys()))?;
         goals.iter().try_for_each(|Goal { target, name }| {
             let keys = target.keys();

@@ -84,6 +84,22 @@ fn paths_have_both_ends() {
 }
 
 #[test]
+fn keys_of_the_top_that_another_kind_has_are_refused() {
+    for key in [
+        "matches = \"t.txt\"",
+        "transforms = \"t.json\"",
+        "colmap = \"c\"",
+        "mirrored = true",
+        "depth_scale = 3.0",
+    ] {
+        let name = key.split(' ').next().unwrap();
+        let message = read(&format!("{key}\n{RIG}"), &LoadOptions::default()).unwrap_err();
+        let words = format!("the top of the file has `{name}`, which has no meaning in a rectified scene");
+        assert!(message.contains(&words), "{message}");
+    }
+}
+
+#[test]
 fn coarse_maps_are_made_dense() {
     let coarse = LoadOptions { depth_step: 2, ..LoadOptions::default() };
     let Kind::Rectified { views, .. } = read(RIG, &coarse).unwrap().kind else { panic!() };
