@@ -23,7 +23,7 @@ pub const SPEC_OR_BANK: Bound =
 
 /// Bytes of memory that parsing takes for each byte of a text, and for what some of them begin or end.
 /// Measured for texts of one kind each: strings, numbers, keys, lists, tables, comments. Of these the sum is
-/// low by a quarter at most. It is high, up to seven times, for tables without a key. The parser of TOML
+/// low by a quarter at most. It is high, up to five times, for tables without a key. The parser of TOML
 /// allocates 7 bytes for each byte first, whatever the text is.
 const JSON_BYTE: f64 = 4.0;
 const TOML_BYTE: f64 = 8.0;

@@ -16,14 +16,14 @@ fn noise(count: usize, dice: &mut Random) -> Vec<f64> {
 fn lags_are_found_at_any_distance_and_length() {
     let mut dice = Random(71);
     let event = noise(400_000, &mut dice);
-    let heard = |first: usize, count: usize, gain: f64, dice: &mut Random| -> Vec<f64> {
+    let recorded = |first: usize, count: usize, gain: f64, dice: &mut Random| -> Vec<f64> {
         event[first..first + count].iter().map(|x| gain * (x + 0.3 * gaussian(dice)) + 0.2).collect()
     };
     for (a, b) in
         [((0, 1024), (100, 1100)), ((0, 300_000), (250_000, 150_000)), ((90_000, 9_000), (0, 200_000))]
     {
-        let one = heard(a.0, a.1, 1.0, &mut dice);
-        let two = heard(b.0, b.1, -0.1, &mut dice);
+        let one = recorded(a.0, a.1, 1.0, &mut dice);
+        let two = recorded(b.0, b.1, -0.1, &mut dice);
         let line = found(&one, &two).unwrap();
         let lag = line.lag_at(a.1 as f64 / 2.0);
         assert!((lag - (a.0 as f64 - b.0 as f64)).abs() < 1.5, "{a:?} {b:?} {line:?}");

@@ -17,7 +17,7 @@ use crate::units::FastPeriods;
 /// What makes the misfit this many times smaller explains it: an acquisition that is left out, or a cut-off
 /// that is fitted.
 const EXPLAINED_RATIO: f64 = 4.0;
-/// Least acquisitions of which one contradicts the others: of two nobody can tell which one is right.
+/// Least acquisitions of which one contradicts the others: two that differ do not show which is wrong.
 const OUTLYING_OF: usize = 3;
 /// Tones of several acquisitions closer than this share of their frequency are one: they tell nothing of a
 /// cut-off together.

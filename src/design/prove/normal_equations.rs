@@ -87,8 +87,8 @@ impl<'a> Normal<'a> {
         let (n, m) = (self.channels, self.ratio);
         let lags = covariance.nrows() / n;
         // By lag difference d >= 0, the outputs p, p' and the channels i, i'.
-        let index = |d: usize, (p, q): (usize, usize), (i, k): (usize, usize)| {
-            ((d * m + p) * m + q) * n * n + i * n + k
+        let index = |d: usize, outputs: [usize; 2], channels: [usize; 2]| {
+            ((d * m + outputs[0]) * m + outputs[1]) * n * n + channels[0] * n + channels[1]
         };
         let mut sums = vec![Float512::ZERO; lags * m * m * n * n];
         for t in 0..self.directions.len() {
@@ -98,7 +98,7 @@ impl<'a> Normal<'a> {
                 for (i, k) in pairs(n) {
                     let [re, im] = times(both, entry(&self.moments[t][1], m + i, m + k));
                     for (d, power) in powers.iter().enumerate() {
-                        let sum = &mut sums[index(d, (p, q), (i, k))];
+                        let sum = &mut sums[index(d, [p, q], [i, k])];
                         *sum += re * power[0] - im * power[1];
                     }
                 }
@@ -107,7 +107,7 @@ impl<'a> Normal<'a> {
         let at = |row: usize| (self.times[row / n], row % n);
         Matrix::from_fn(self.times.len() * n, self.times.len() * n, |row, column| {
             let (((j, p), i), ((l, q), k)) = (at(row.max(column)), at(row.min(column)));
-            let sum = sums[index(j - l, (p, q), (i, k))];
+            let sum = sums[index(j - l, [p, q], [i, k])];
             if p == q { sum + Float512::from(self.ridge) * covariance[(j * n + i, l * n + k)] } else { sum }
         })
     }
