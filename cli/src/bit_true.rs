@@ -87,7 +87,7 @@ impl BitTrueArgs {
             measure: None,
         };
         let warnings: Vec<String> =
-            reader.warnings().iter().map(ToString::to_string).chain(report.warnings()).collect();
+            reader.warnings().iter().map(ToString::to_string).chain(run.model.warnings()).collect();
         check_strict(&warnings, job.args.strict)?;
         commit_all(run.output.finish().map_err(Failure::running)?).map_err(Failure::input)?;
         warnings.iter().for_each(|warning| warn(warning));
@@ -97,20 +97,6 @@ impl BitTrueArgs {
             Some(figures) => print(&before_after::text(figures)),
             None => Ok(()),
         }
-    }
-}
-
-impl Report {
-    fn warnings(&self) -> Vec<String> {
-        let Self { wrapped, saturated, needed_accumulator_bits, accumulator_bits, .. } = self;
-        let sums = (*wrapped > 0).then(|| {
-            format!(
-                "{wrapped} sums did not fit the accumulator of {accumulator_bits} bits; {needed_accumulator_bits} \
-                 always suffice"
-            )
-        });
-        let outputs = (*saturated > 0).then(|| format!("{saturated} output samples saturated"));
-        sums.into_iter().chain(outputs).collect()
     }
 }
 

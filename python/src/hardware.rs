@@ -119,21 +119,7 @@ pub(crate) fn fuse<'py>(
         frames.chunks_exact(shape.channels).zip(outputs).for_each(|(frame, fast)| model.process(frame, fast));
         fast
     });
-    warn_of_words(x.py(), &model, accumulator)?;
+    model.warnings().iter().try_for_each(|warning| warn(x.py(), warning, 1))?;
     let y = PyArray1::from_slice(x.py(), &fast[skip..skip + wanted]);
     y.call_method1("astype", (held.format.name(),))
-}
-
-fn warn_of_words(py: Python<'_>, model: &BitTrue, accumulator: u32) -> PyResult<()> {
-    let (wraps, saturated, needed) = (model.wraps(), model.saturations(), model.needed_bits());
-    if wraps > 0 {
-        let text = format!(
-            "{wraps} sums did not fit the accumulator of {accumulator} bits; {needed} always suffice"
-        );
-        warn(py, &text, 1)?;
-    }
-    if saturated > 0 {
-        warn(py, &format!("{saturated} output samples saturated"), 1)?;
-    }
-    Ok(())
 }

@@ -148,6 +148,17 @@ impl BitTrue {
     pub fn saturations(&self) -> u64 {
         self.saturated
     }
+
+    /// What a user should know: the sums that did not fit, and the outputs that saturated.
+    pub fn warnings(&self) -> Vec<String> {
+        let (wraps, saturated) = (self.wraps, self.saturated);
+        let (accumulator, needed) = (self.words.accumulator, self.needed_bits());
+        let sums = (wraps > 0).then(|| {
+            format!("{wraps} sums did not fit the accumulator of {accumulator} bits; {needed} always suffice")
+        });
+        let outputs = (saturated > 0).then(|| format!("{saturated} output samples saturated"));
+        sums.into_iter().chain(outputs).collect()
+    }
 }
 
 /// Refuses bits of a word outside 2 to `most`.
