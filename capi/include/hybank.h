@@ -5,11 +5,13 @@
  *
  *     hybank *bank = hybank_open("bank.json", "auto", 0);
  *     if (!bank) { puts(hybank_error()); return 1; }
- *     hybank_process(bank, input, frames, output);        N frames in, M frames out
+ *     hybank_process(bank, input, frames, output);        frames * N samples in, frames * M out
  *     hybank_flush(bank, output);                          the last hybank_flush_frames(bank) * M samples
  *     hybank_close(bank);
  *
- * One thread at a time may use a bank; different banks are independent. Only open and close allocate.
+ * One thread at a time may use a bank; different banks are independent. Only open, close and
+ * failures allocate. Whether the recursion of a bank is stable is not looked at here: `hybank design` writes stable banks alone,
+ * and `hybank verify` proves it of any file.
  *
  * Plain C of 1989 with the types of stdint.h, so that MATLAB's loadlibrary and cffi can read it. pycparser does, in a test;
  * it was not tried in MATLAB itself.

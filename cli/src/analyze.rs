@@ -100,7 +100,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let report = Report {
         understood: bank.spec.as_ref().map(understood).unwrap_or_default(),
         is_normalised: bank.is_normalised(),
-        scale: GammaScale::new(&bank).in_file(&args.bank)?,
+        scale: GammaScale::new(&bank, &delay_errors).in_file(&args.bank)?,
         analysis,
         certified,
         figures,

@@ -71,7 +71,7 @@ pub(super) struct Judged {
 impl Judged {
     /// Of a bank with its spec.
     pub(super) fn new(bank: &Bank) -> Result<Self, DesignError> {
-        let (mean, scale) = (analyze_mean(bank)?, GammaScale::new(bank)?);
+        let (mean, scale) = (analyze_mean(bank)?, GammaScale::new(bank, &[])?);
         Ok(Self { mean, scale, figures: Figures::new(bank)?, hint: None })
     }
 
@@ -274,14 +274,25 @@ impl Report<'_> {
     }
 
     fn lower_meaning(&self) -> &'static str {
-        match self.method {
+        match (self.method, self.lower_banks()) {
             _ if self.gamma.lower.is_none() => UNRESOLVED,
-            Method::Fir => "no bank of this length is better",
-            Method::Iir => "no causal bank is better",
-            _ if self.proof.proven.is_some_and(|proven| proven.lower_banks == BoundedBanks::Causal) => {
-                "no causal bank is better; this method does not aim at gamma"
+            (Method::Fir, _) => "no bank of this length is better",
+            (Method::Iir, _) => "no causal bank is better",
+            (_, BoundedBanks::Any) => "no bank at all is better; this method does not aim at gamma",
+            (_, BoundedBanks::Causal) => "no causal bank is better; this method does not aim at gamma",
+            (_, BoundedBanks::FirOfThisLength) => {
+                "no bank of this length is better; this method does not aim at gamma"
             }
-            _ => "no bank at all is better; this method does not aim at gamma",
+        }
+    }
+
+    /// The banks for which the lower bound holds. Without a proof, what exceeds the noncausal bound is due
+    /// to causality.
+    fn lower_banks(&self) -> BoundedBanks {
+        match self.proof.proven {
+            Some(proven) => proven.lower_banks,
+            None if self.gamma.lower > self.gamma.noncausal => BoundedBanks::Causal,
+            None => BoundedBanks::Any,
         }
     }
 

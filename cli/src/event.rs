@@ -282,9 +282,9 @@ impl ReportFile {
         let name = if is_dash(path) { "standard output".to_owned() } else { path.display().to_string() };
         let refused = |error| Failure::input(FileError::system(&name, "create it")(error));
         let file: Box<dyn Write + Send> = if is_dash(path) {
-            Box::new(Stdout::for_samples().map_err(refused)?)
+            Box::new(Stdout::for_samples().map_err(refused)?.for_reports())
         } else if is_pipe(path) {
-            Box::new(Stdout::fifo(path).map_err(refused)?)
+            Box::new(Stdout::fifo(path).map_err(refused)?.for_reports())
         } else {
             if !force && path.is_file() {
                 return Err(Failure::input(FileError::Exists { file: name }));

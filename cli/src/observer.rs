@@ -19,6 +19,8 @@ use std::time::{Duration, Instant};
 
 /// Events that wait to be written; further ones are counted only.
 const WAITING: usize = 4096;
+/// Time between two looks whether the thread that empties a full queue still runs.
+const FULL_QUEUE: Duration = Duration::from_millis(50);
 /// Time after which an input that gives nothing, or a gap that goes on, is reported.
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Longest sleep of the writer.
@@ -199,8 +201,9 @@ impl RunObserver {
     /// The writer, once it has written what waits; `None` if its thread has died.
     fn writer(&mut self) -> Option<MutexGuard<'_, EventWriter>> {
         if let Some(thread) = self.thread.take() {
-            // A thread that has died takes nothing, and leaves the writer poisoned.
-            let _ = self.events.messages.send(None);
+            // A thread that has died takes nothing, so that the queue may stay full, and leaves the writer
+            // poisoned.
+            while !thread.is_finished() && self.events.messages.send_timeout(None, FULL_QUEUE).is_err() {}
             let _ = thread.join();
         }
         let mut writer = self.writer.lock().ok()?;
@@ -236,7 +239,10 @@ mod tests {
     fn a_writer_that_died_is_an_error_at_the_end_of_the_run() {
         let print = Box::new(|line: &str| panic!("{line}"));
         let mut observer = RunObserver::begin(EventWriter::new(None, Instant::now(), print));
-        observer.events().report(Event::Warning { text: "a message that cannot be written".into() });
+        // More than the queue holds.
+        for _ in 0..WAITING + 2 {
+            observer.events().report(Event::Warning { text: "a message that cannot be written".into() });
+        }
         assert!(!observer.quiet());
         let Err(Failure::Input(message)) = observer.end(&serde_json::json!({})) else { panic!("no failure") };
         assert!(message.contains("has died"), "{message}");

@@ -35,7 +35,7 @@ pub(super) fn begin_samples(path: &Path, header: OutputHeader, force: bool) -> R
 }
 
 /// Encoded formats, which are not written.
-const ENCODED: [&str; 9] = ["flac", "mp3", "ogg", "oga", "opus", "m4a", "aac", "aif", "aiff"];
+const ENCODED: [&str; 10] = ["flac", "mp3", "ogg", "oga", "opus", "m4a", "aac", "aif", "aiff", "aifc"];
 /// Endings of WAV files.
 pub(super) const WAV: [&str; 4] = ["wav", "wave", "bwf", "rf64"];
 /// Formats with a structure, which are not written either.

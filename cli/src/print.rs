@@ -61,6 +61,11 @@ impl Failure {
             Self::Input(message) if !names.is_empty() => {
                 Self::Input(format!("{message}; what was recorded is in {}", names.join(" and ")))
             }
+            Self::ClosedPipe if !names.is_empty() => {
+                let files = names.join(" and ");
+                warn(&format!("the output was closed before the end; what was recorded is in {files}"));
+                Self::ClosedPipe
+            }
             other => other,
         }
     }

@@ -15,7 +15,8 @@ use std::path::PathBuf;
 /// Fuses slow samples as they arrive
 ///
 /// Reads interleaved frames (one sample of each channel, in the order of the bank) from standard input, or
-/// the channels of each --input. Writes the M output samples of a frame as soon as its inputs have arrived.
+/// the channels of each --input. Writes the M output samples of a frame as soon as its inputs have arrived;
+/// WAV with 24 valid bits in 32 is looked at for 64 KiB first.
 /// The output is causal: it is delayed by the latency of the bank, and nothing is dropped.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\

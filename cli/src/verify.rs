@@ -11,11 +11,11 @@ use std::path::PathBuf;
 
 /// Proves the gammas in a bank file, from the file alone
 ///
-/// Rebuilds the error system from the spec and the coefficients in the file. It shares no code with the
-/// designer and bounds every rounding error. It proves an upper and a lower bound of gamma with the
-/// certificate and the witnesses in the file. Each gamma that the file states must be proven. A file with an
-/// altered coefficient, gamma or matrix is refused: its digest does not match, or the proof fails. A bank
-/// without a proof is refused at once; --search looks for one.
+/// Rebuilds the error system from the spec and the coefficients in the file. It uses nothing of the design,
+/// its solvers or its norms, and bounds every rounding error. It proves an upper and a lower bound of gamma
+/// with the certificate and the witnesses in the file. Each gamma that the file states must be proven. A
+/// file with an altered coefficient, gamma or matrix is refused: its digest does not match, or the proof
+/// fails. A bank without a proof is refused at once; --search looks for one.
 ///
 /// The front ends are the filters as the spec writes them: their roots and state equations are enclosed.
 #[derive(Debug, clap::Args)]

@@ -105,9 +105,9 @@ fn followed<'py>(
     request: &Request,
 ) -> PyResult<[Bound<'py, PyAny>; 2]> {
     let py = held.py();
-    let dropped = request.settings().dropped;
-    let mut running = Running::new(bank, format, request.algorithm, &request.extras, dropped)?;
-    let (tracks, latency_dropped) = (running.tracks(), dropped.samples(running.pipeline.plan()));
+    let settings = request.settings();
+    let mut running = Running::new(bank, format, request.algorithm, &request.extras, settings)?;
+    let (tracks, latency_dropped) = (running.tracks(), settings.dropped.samples(running.pipeline.plan()));
     let (recordings, frames, signals) = (held.recordings()?, held.frames(), Signals::new());
     let done = py.detach(|| {
         for first in (0..frames).step_by(PIECE) {

@@ -130,7 +130,7 @@ impl Studied {
         let sweep = swept.map(|worst| Sweep::new(bank, &worst.errors, &worst.case.point)).transpose()?;
         Ok(Self {
             analysis: design::analyze(bank, delay_errors)?,
-            scale: design::GammaScale::new(bank)?,
+            scale: design::GammaScale::new(bank, delay_errors)?,
             certified: certify.then(|| design::certify(bank)).transpose()?,
             study,
             sweep,

@@ -7,7 +7,7 @@ use crate::results::record;
 use crate::sources;
 use hybank::bank::Bank;
 use hybank::io::IoError;
-use hybank::pipeline::{Block, DroppedLatency, Gap, GapPolicy, Pipeline, PipelineError, Settings};
+use hybank::pipeline::{Block, Gap, GapPolicy, Pipeline, PipelineError, Settings};
 use hybank::runtime::{Algorithm, Options, PcmFrames, Plan, Precision};
 use hybank::track::{DelaySource, Logged, Reading, Tracking};
 use pyo3::prelude::*;
@@ -86,8 +86,8 @@ struct Tracked {
 }
 
 /// A run. Its outputs are collected until they are taken.
-pub(crate) struct Running {
-    pub(crate) pipeline: Pipeline<'static>,
+pub(crate) struct Running<'a> {
+    pub(crate) pipeline: Pipeline<'a>,
     tracked: Arc<Mutex<Tracked>>,
     /// Input frames.
     pub(crate) frames: u64,
@@ -109,16 +109,15 @@ impl Outputs {
     }
 }
 
-impl Running {
-    /// A run of `bank` at its beginning, with the plan of these extras.
+impl<'a> Running<'a> {
+    /// A run of `bank` at its beginning, with the plan of these settings, which are those of the extras.
     pub(crate) fn new(
         bank: &Bank,
         format: Format,
         algorithm: Algorithm,
         extras: &Extras,
-        dropped: DroppedLatency,
+        settings: Settings<'a>,
     ) -> PyResult<Self> {
-        let settings = Settings { dropped, ..extras.settings() };
         let plan: Plan = plan(bank, format, algorithm, settings)?;
         let mut pipeline = Pipeline::new(bank, &plan, settings, format.number, format.complex);
         let tracked = Arc::new(Mutex::new(Tracked::default()));

@@ -5,7 +5,7 @@ use crate::errors::refused;
 use crate::formats::Format;
 use crate::running::{Extras, Outputs, Running, Tracks};
 use hybank::bank::Bank;
-use hybank::pipeline::{DroppedLatency, PipelineError};
+use hybank::pipeline::{DroppedLatency, PipelineError, Settings};
 use hybank::runtime::{self, Algorithm, Output, PcmFrames, PcmOutput, Plan, STATE_COUNTS, StateError};
 use pyo3::prelude::*;
 
@@ -20,7 +20,7 @@ pub(crate) enum Runs {
     /// By one stream for real samples, by two for the parts of complex ones.
     Streams { streams: Vec<runtime::Stream>, clipped: u64 },
     /// With gaps that are filled, or filters that follow the delays.
-    Running(Box<Running>),
+    Running(Box<Running<'static>>),
 }
 
 impl State {
@@ -54,7 +54,7 @@ impl State {
     /// A step of a stream that fills gaps or follows delays: its output samples.
     pub(crate) fn step(
         &mut self,
-        step: impl FnOnce(&mut Running) -> Result<(), PipelineError>,
+        step: impl FnOnce(&mut Running<'static>) -> Result<(), PipelineError>,
     ) -> PyResult<Vec<u8>> {
         self.check_open()?;
         let Runs::Running(running) = &mut self.runs else { return Ok(Vec::new()) };
@@ -83,7 +83,8 @@ impl Runs {
             let streams = vec![runtime::Stream::new(plan); 1 + usize::from(format.complex)];
             return Ok(Self::Streams { streams, clipped: 0 });
         }
-        let running = Running::new(bank, format, algorithm, extras, DroppedLatency::Nothing)?;
+        let settings = Settings { dropped: DroppedLatency::Nothing, ..extras.settings() };
+        let running = Running::new(bank, format, algorithm, extras, settings)?;
         Ok(Self::Running(Box::new(running)))
     }
 

@@ -88,7 +88,7 @@ impl Stream {
         self.check_parts(held.format)?;
         if self.extras.is_any() {
             let (recordings, frames) = (held.recordings()?, held.frames());
-            let push = |running: &mut Running| running.push(&recordings, frames);
+            let push = |running: &mut Running<'static>| running.push(&recordings, frames);
             let samples = x.py().detach(|| self.lock().step(push))?;
             return self.collected(x.py(), samples);
         }

@@ -50,7 +50,7 @@ pub struct MeanAnalysis {
 /// let (exact, late) = (analyze(&bank, &[])?, analyze(&bank, &[Seconds(0.0), Seconds(0.05)])?);
 /// assert!(exact.gamma < 0.039933 && late.gamma > exact.gamma);
 /// // Even so it is better than plain interleaving.
-/// assert!(late.gamma < GammaScale::new(&bank)?.interleaving);
+/// assert!(late.gamma < GammaScale::new(&bank, &[Seconds(0.0), Seconds(0.05)])?.interleaving);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
@@ -59,6 +59,20 @@ pub struct MeanAnalysis {
 /// one error per channel, [`DesignError::TooLate`] for delays that need too many delay-chain states,
 /// [`DesignError::Lti`] for unstable filters.
 pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, DesignError> {
+    let shifted = shifted(bank, delay_errors)?;
+    let plant = LiftedPlant::new(&shifted);
+    let peak = resolved_norm(&moved_by(bank, delay_errors), plant.bank_norm(&bank.filters)?)?;
+    let noncausal = if shifted.resolves_delays() { Some(plant.noncausal_bound()?.gain) } else { None };
+    Ok(Analysis {
+        gamma: peak.gain,
+        peak_hertz: RadiansPerSlowPeriod(peak.frequency).in_hertz(bank.slow_period()),
+        noncausal: noncausal.map(|bound| bound.min(peak.gain)),
+        mean: mean_of(bank, &plant)?,
+    })
+}
+
+/// The problem of the bank with `delay_errors[i]` added to its delays.
+fn shifted(bank: &Bank, delay_errors: &[Seconds]) -> Result<Problem, DesignError> {
     let problem = Problem::of_bank(bank)?;
     let count = bank.channel_count();
     if !delay_errors.is_empty() && delay_errors.len() != count {
@@ -70,15 +84,7 @@ pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, Design
     }
     let shifted = problem.with_delay_errors(&errors);
     shifted.check_size()?;
-    let plant = LiftedPlant::new(&shifted);
-    let peak = resolved_norm(&moved_by(bank, delay_errors), plant.bank_norm(&bank.filters)?)?;
-    let noncausal = if shifted.resolves_delays() { Some(plant.noncausal_bound()?.gain) } else { None };
-    Ok(Analysis {
-        gamma: peak.gain,
-        peak_hertz: RadiansPerSlowPeriod(peak.frequency).in_hertz(bank.slow_period()),
-        noncausal: noncausal.map(|bound| bound.min(peak.gain)),
-        mean: mean_of(bank, &plant)?,
-    })
+    Ok(shifted)
 }
 
 /// The bank with `delay_errors[i]` added to its delays.
@@ -138,14 +144,14 @@ pub struct GammaScale {
 }
 
 impl GammaScale {
-    /// Of the front ends, delays and latency of `bank`.
+    /// Of the front ends, delays and latency of `bank`, with `delay_errors[i]` added to the delays of the
+    /// samples that plain interleaving takes; an empty slice means none.
     ///
     /// # Errors
-    /// [`DesignError::NoSpec`] for a bank without front ends, [`DesignError::TooLate`] for delays that need
-    /// too many delay-chain states.
-    pub fn new(bank: &Bank) -> Result<Self, DesignError> {
+    /// As [`analyze`].
+    pub fn new(bank: &Bank, delay_errors: &[Seconds]) -> Result<Self, DesignError> {
         let problem = Problem::of_bank(bank)?;
-        let plant = LiftedPlant::new(&problem);
+        let plant = LiftedPlant::new(&shifted(bank, delay_errors)?);
         let zero = StateSpace::gain(Mat::zeros(problem.ratio, problem.channels.len()));
         let reference = plant.reference();
         Ok(Self {

@@ -41,8 +41,27 @@ const LENGTHENINGS: usize = 16;
 /// of reduced banks is not monotonic in the latency.
 const FRUITLESS_PERIODS: usize = 4;
 
-/// Called with the number of designs that were compared; an error ends the choice.
-type Compared<'a> = &'a dyn Fn(usize) -> Result<(), DesignError>;
+/// What follows the designs that a choice compares, and ends them.
+#[derive(Clone, Copy)]
+pub(super) struct Comparison<'a> {
+    /// Called with the number of designs that were compared.
+    pub(super) observer: &'a dyn Fn(usize),
+    /// When to end.
+    pub(super) stop: &'a Stop,
+}
+
+impl Comparison<'_> {
+    /// So many designs were compared, and another one begins.
+    fn after(self, designs: usize) -> Result<(), DesignError> {
+        (self.observer)(designs);
+        self.go_on()
+    }
+
+    /// A design that was ended early says nothing about its length or latency.
+    fn go_on(self) -> Result<(), DesignError> {
+        if self.stop.is_due() { Err(DesignError::Stopped) } else { Ok(()) }
+    }
+}
 
 /// What a spec that leaves something open gets; no taps for recursive filters.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -69,17 +88,17 @@ pub(super) fn with_taps(spec: &Spec) -> Result<Spec, DesignError> {
     Ok(complete)
 }
 
-/// The spec of [`with_taps`] with nothing left open: a latency and a number of taps as well. `compared`
-/// receives the number of designs that were compared.
+/// The spec of [`with_taps`] with nothing left open: a latency and a number of taps as well. `comparison`
+/// follows and ends the designs that are compared.
 ///
 /// # Errors
 /// As [`latency`]; [`DesignError::SnrOutOfReach`] or [`DesignError::SnrMissed`] if no number of taps has the
-/// SNR that the spec asks for; those of `compared`.
-pub(super) fn completed(spec: &Spec, compared: Compared<'_>) -> Result<Spec, DesignError> {
+/// SNR that the spec asks for; [`DesignError::Stopped`].
+pub(super) fn completed(spec: &Spec, comparison: Comparison<'_>) -> Result<Spec, DesignError> {
     let mut complete = spec.clone();
     let are_taps_open = spec.is_fir() && spec.design.taps.is_none();
     if are_taps_open || spec.latency.is_none() {
-        let Choice { taps, latency } = choose(spec, compared)?;
+        let Choice { taps, latency } = choose(spec, comparison)?;
         complete.latency = Some(latency);
         if are_taps_open {
             (complete.design.taps, complete.design.target_snr_db) = (Some(taps), None);
@@ -104,12 +123,12 @@ pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
     }
     let open = with_taps(spec)?;
     effort::check(&open, false, Limits::Enforced)?;
-    Ok(choose(&open, &|_| Ok(()))?.latency)
+    Ok(choose(&open, Comparison { observer: &|_| (), stop: &Stop::default() })?.latency)
 }
 
 /// Taps and latency where at least one of them is open.
-fn choose(spec: &Spec, compared: Compared<'_>) -> Result<Choice, DesignError> {
-    compared(0)?;
+fn choose(spec: &Spec, comparison: Comparison<'_>) -> Result<Choice, DesignError> {
+    comparison.after(0)?;
     // Delays that all channels have only add to the latency.
     let common = if spec.latency.is_some() { 0 } else { common_delay(spec) };
     let wanted = spec.design.target_snr_db;
@@ -128,7 +147,7 @@ fn choose(spec: &Spec, compared: Compared<'_>) -> Result<Choice, DesignError> {
         (_, None) => {
             let errors = LeastErrors::causal(&problem)?;
             let latency = match spec.design.reduction {
-                Some(Reduction::Order(_)) => latency_of_order(&noisy, &whole, &errors, compared)?,
+                Some(Reduction::Order(_)) => latency_of_order(&noisy, &whole, &errors, comparison)?,
                 _ => errors.shortest(),
             };
             Choice { taps: 0, latency }
@@ -136,7 +155,7 @@ fn choose(spec: &Spec, compared: Compared<'_>) -> Result<Choice, DesignError> {
     };
     let is_minimax = spec.design.method == Method::Fir && RobustProblem::of(spec).is_none();
     if let Some(wanted) = wanted.filter(|_| is_minimax) {
-        chosen = lengthened(spec, &merged, chosen, wanted, compared)?;
+        chosen = lengthened(spec, &merged, chosen, wanted, comparison)?;
     }
     Ok(Choice { latency: common + chosen.latency, ..chosen })
 }
@@ -159,7 +178,7 @@ fn latency_of_order(
     spec: &Spec,
     problem: &Problem,
     errors: &LeastErrors,
-    compared: Compared<'_>,
+    comparison: Comparison<'_>,
 ) -> Result<usize, DesignError> {
     let first = errors.shortest();
     let mut tried = Tried { errors: vec![f64::INFINITY; errors.longest() + 1], best: first, refused: None };
@@ -168,13 +187,16 @@ fn latency_of_order(
         if in_vain || is_almost(tried.least(), errors.lasting) {
             break;
         }
-        compared(tried.count())?;
-        tried.note(latency, error_of_order(spec, &Problem { latency, ..problem.clone() }));
+        comparison.after(tried.count())?;
+        tried.note(latency, error_of_order(spec, &Problem { latency, ..problem.clone() }, comparison.stop));
+        comparison.go_on()?;
     }
     for latency in (problem.wait..first).rev() {
         if is_almost(errors.rms(latency), tried.least()) {
-            compared(tried.count())?;
-            tried.note(latency, error_of_order(spec, &Problem { latency, ..problem.clone() }));
+            comparison.after(tried.count())?;
+            let problem = Problem { latency, ..problem.clone() };
+            tried.note(latency, error_of_order(spec, &problem, comparison.stop));
+            comparison.go_on()?;
         }
     }
     tried.shortest()
@@ -219,13 +241,14 @@ impl Tried {
 }
 
 /// The whole error of the bank of least mean square with as few states as `spec` asks for.
-fn error_of_order(spec: &Spec, problem: &Problem) -> Result<f64, DesignError> {
+fn error_of_order(spec: &Spec, problem: &Problem, stop: &Stop) -> Result<f64, DesignError> {
     let mut spec = spec.clone();
     spec.design.method = Method::H2;
     let merged = problem.merge_channels(Repeats::of(&spec)).of_unit_size()?;
     let plant = LiftedPlant::new(&merged.problem);
-    let synthesis = methods::synthesise(Method::H2, &plant, &settings(&spec)?)?;
-    let realised = realise(&spec, problem, &merged, &plant, &synthesis, &Stop::default())?;
+    let settings = Settings { stop: stop.clone(), ..settings(&spec)? };
+    let synthesis = methods::synthesise(Method::H2, &plant, &settings)?;
+    let realised = realise(&spec, problem, &merged, &plant, &synthesis, stop)?;
     let system = filters::lifted(&realised.filters, problem.ratio);
     whole_error(&LiftedPlant::new(problem), &Filters::StateSpace(system))
 }
@@ -284,16 +307,23 @@ fn lengthened(
     problem: &Problem,
     chosen: Choice,
     wanted: f64,
-    compared: Compared<'_>,
+    comparison: Comparison<'_>,
 ) -> Result<Choice, DesignError> {
     let Choice { mut taps, mut latency } = chosen;
     let most = MAX_OPTIMISED_TAPS / spec.layout().count();
     let mut best = f64::NEG_INFINITY;
     for designs in 0..LENGTHENINGS {
-        compared(designs)?;
-        let settings = Settings { taps, ..settings(spec)? };
+        if designs > 0 {
+            taps = (taps + (taps / 10).max(1)).min(most);
+        }
+        if designs > 0 && spec.latency.is_none() {
+            latency = LeastErrors::new(problem, taps, candidates(problem, taps))?.shortest();
+        }
+        comparison.after(designs)?;
+        let settings = Settings { taps, stop: comparison.stop.clone(), ..settings(spec)? };
         let plant = LiftedPlant::new(&Problem { latency, ..problem.clone() });
         let error = whole_error(&plant, &methods::synthesise(Method::Fir, &plant, &settings)?.filters)?;
+        comparison.go_on()?;
         let target = h2_norm(&plant.reference())? / (plant.ratio() as f64).sqrt();
         best = f64::max(best, 20.0 * (target / error).log10());
         if error <= target * 10f64.powf(-wanted / 20.0) {
@@ -301,10 +331,6 @@ fn lengthened(
         }
         if taps == most {
             break;
-        }
-        taps = (taps + (taps / 10).max(1)).min(most);
-        if spec.latency.is_none() {
-            latency = LeastErrors::new(problem, taps, candidates(problem, taps))?.shortest();
         }
     }
     Err(DesignError::SnrMissed { wanted, best, taps })

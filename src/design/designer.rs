@@ -1,6 +1,6 @@
 //! The steps from a spec to a finished bank.
 
-use super::choices::{completed, settings, with_taps};
+use super::choices::{Comparison, completed, settings, with_taps};
 use super::effort;
 use super::limits::{Effort, Limits, Stage, Stop};
 use super::merging::Repeats;
@@ -170,11 +170,8 @@ fn complete(spec: &Spec, options: &Options<'_>, stop: &Stop) -> Result<(Spec, Pr
     let checked = |spec: &Spec| effort::check(spec, options.proof == ProofSearch::Run, options.limits);
     let open = with_taps(spec)?;
     let mut effort = checked(&open)?;
-    let compared = |designs| {
-        (options.observer)(Stage::Latency { designs }, effort);
-        if stop.is_due() { Err(DesignError::Stopped) } else { Ok(()) }
-    };
-    let complete = completed(&open, &compared)?;
+    let observer = |designs| (options.observer)(Stage::Latency { designs }, effort);
+    let complete = completed(&open, Comparison { observer: &observer, stop })?;
     if complete != open {
         effort = checked(&complete)?;
     }

@@ -34,9 +34,9 @@ pub enum DesignError {
     /// A decomposition failed.
     #[error(transparent)]
     Linalg(#[from] LinalgError),
-    /// No certificate was found, not even for a gamma up to 10 % above the computed norm.
+    /// No certificate was found at any gamma that was tried: up to 10 % above the computed norm in general.
     #[error(
-        "the computed gamma could not be proven: no certificate passes up to 10 % above it, {}{}; the front ends may be too \
+        "the computed gamma could not be proven: no certificate passes at any gamma that was tried, {}{}; the front ends may be too \
          stiff or the channels too nearly equal",
         certificate_digits(*.states), failure_text(.failure.as_deref())
     )]

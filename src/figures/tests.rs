@@ -170,7 +170,7 @@ fn the_error_from_white_noise_is_that_of_the_error_system() {
         let rms = powers.signal.sqrt();
         assert!((rms / mean.rms_error - 1.0).abs() < accuracy, "{rms} {}", mean.rms_error);
         assert!((powers.unit_noise.sqrt() / mean.noise_gain - 1.0).abs() < 1e-4);
-        let scale = crate::design::GammaScale::new(&bank).unwrap();
+        let scale = crate::design::GammaScale::new(&bank, &[]).unwrap();
         assert!((target_power(&signal).sqrt() / scale.rms_reference - 1.0).abs() < accuracy);
     }
 }

@@ -6,6 +6,7 @@ use super::frames::{InputFrames, Message};
 use super::grouped::GroupedInput;
 use super::lost::{Dropout, Entry, LostInInput};
 use super::open::InputSource;
+use super::pipe::is_file;
 use super::stall::Wait;
 #[cfg(target_os = "linux")]
 use super::stdin_reader::read_stdin;
@@ -35,7 +36,7 @@ fn send_all(source: &InputSource, messages: &Sender<Result<Message, IoError>>, p
             }
         }
         // A pipe may stay open after the samples.
-        let chunks = if source.path.is_file() { frames.capture().chunks_after() } else { Vec::new() };
+        let chunks = if is_file(&source.path) { frames.capture().chunks_after() } else { Vec::new() };
         Ok(Message::End { faults: frames.faults(), chunks })
     };
     // If the receiver is gone, the message is not needed.

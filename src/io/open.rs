@@ -41,9 +41,11 @@ impl Kind {
             Some("csv" | "tsv") => Self::Csv,
             Some("npy") => Self::Npy,
             Some("flac") if cfg!(feature = "flac") => Self::Flac,
-            Some("flac" | "mp3" | "aif" | "aiff" | "aifc" | "ogg" | "oga" | "opus" | "m4a") => Self::Encoded,
+            Some("flac" | "mp3" | "aif" | "aiff" | "aifc" | "ogg" | "oga" | "opus" | "m4a" | "aac") => {
+                Self::Encoded
+            }
             _ if mat_variable(path).is_some() => Self::Mat,
-            Some("wav" | "wave") => Self::Wav,
+            Some("wav" | "wave" | "bwf" | "rf64") => Self::Wav,
             _ => match coding {
                 Coding::Csv => Self::Csv,
                 Coding::Wav if is_table(path) => Self::Csv,
@@ -54,8 +56,8 @@ impl Kind {
     }
 }
 
-/// True for inputs that state their own format and channels whatever the [`Coding`] is: names that end in
-/// `.wav`, SigMF recordings and archives, tables, arrays, and recordings that are decoded.
+/// True for inputs that state their own format and channels whatever the [`Coding`] is: names of WAV
+/// files, SigMF recordings and archives, tables, arrays, and recordings that are decoded.
 pub fn is_self_describing(path: &Path) -> bool {
     Kind::of(path, Coding::Raw(PcmFormat::U8)) != Kind::Raw
 }

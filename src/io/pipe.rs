@@ -49,6 +49,7 @@ fn stdout_file() -> io::Result<io::Stdout> {
 
 /// When the write to a stream that is under way began, in milliseconds since [`CLOCK`]; 0 for none.
 static STDOUT_WRITE_BEGAN: AtomicU64 = AtomicU64::new(0);
+static REPORT_WRITE_BEGAN: AtomicU64 = AtomicU64::new(0);
 static STDERR_WRITE_BEGAN: AtomicU64 = AtomicU64::new(0);
 static CLOCK: LazyLock<Instant> = LazyLock::new(Instant::now);
 
@@ -84,6 +85,12 @@ impl Stdout {
     /// The system's refusal to duplicate the descriptor.
     pub fn for_samples() -> io::Result<Self> {
         Ok(Watched::new(stdout_file()?, &STDOUT_WRITE_BEGAN))
+    }
+
+    /// The same stream for reports, which another thread writes than the samples: a report that gets through
+    /// says nothing about samples that wait.
+    pub fn for_reports(self) -> Self {
+        Self { began: &REPORT_WRITE_BEGAN, ..self }
     }
 }
 
@@ -148,10 +155,10 @@ impl<W: Write> Write for Watched<W> {
     }
 }
 
-/// True if a write of this process to standard output or standard error has waited for so long: its reader
-/// takes no more data.
+/// True if a write of this process to standard output, standard error or a report has waited for so long:
+/// its reader takes no more data.
 pub fn is_output_stalled(patience: Duration) -> bool {
-    [&STDOUT_WRITE_BEGAN, &STDERR_WRITE_BEGAN].into_iter().any(|began| {
+    [&STDOUT_WRITE_BEGAN, &REPORT_WRITE_BEGAN, &STDERR_WRITE_BEGAN].into_iter().any(|began| {
         let began = began.load(Ordering::Relaxed);
         began > 0 && CLOCK.elapsed() >= Duration::from_millis(began) + patience
     })
@@ -180,12 +187,29 @@ pub(super) fn refuse_shared_pipes(paths: &[PathBuf]) -> Result<(), IoError> {
     Ok(())
 }
 
+/// The path, and for `-` that of standard input.
+#[cfg(unix)]
+fn of_input(path: &Path) -> &Path {
+    if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path }
+}
+
+/// True for a file, which has an end, and for `-` if standard input is one.
+#[cfg(unix)]
+pub(super) fn is_file(path: &Path) -> bool {
+    of_input(path).is_file()
+}
+
+/// True for a file other than standard input.
+#[cfg(not(unix))]
+pub(super) fn is_file(path: &Path) -> bool {
+    path.as_os_str() != "-" && path.is_file()
+}
+
 /// True for a FIFO, pipe or socket, and for `-` if standard input is one.
 #[cfg(unix)]
 pub fn is_pipe(path: &Path) -> bool {
     use std::os::unix::fs::FileTypeExt;
-    let path = if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path };
-    path.metadata().is_ok_and(|known| known.file_type().is_fifo() || known.file_type().is_socket())
+    of_input(path).metadata().is_ok_and(|known| known.file_type().is_fifo() || known.file_type().is_socket())
 }
 
 /// True for standard input.

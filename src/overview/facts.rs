@@ -72,7 +72,7 @@ impl Facts {
             understood: understood(&Spec { latency: Some(bank.latency), ..spec.clone() }),
             error: figure_facts(&Figures::new(bank)?, bank.is_normalised())
                 .into_iter()
-                .chain(error_facts(bank, &GammaScale::new(bank)?, &analyze_mean(bank)?))
+                .chain(error_facts(bank, &GammaScale::new(bank, &[])?, &analyze_mean(bank)?))
                 .collect(),
             cost: cost_facts(bank),
             channels: channel_facts(bank, spec, &delay_derivatives(bank)?),

@@ -1,8 +1,8 @@
 //! Proves a bank's gammas from its file alone, in arithmetic that bounds every rounding error.
 //!
-//! This module shares no code with the designer: it neither searches nor optimises; it checks. The file
-//! holds the certificate and the witnesses of the proof ([`Proof`]). How they were
-//! found does not matter.
+//! This module uses nothing of the design, its solvers or its norms: it neither searches nor optimises; it
+//! checks. It shares front ends, instants and the arithmetic with the designer. The file holds the
+//! certificate and the witnesses of the proof ([`Proof`]). How they were found does not matter.
 //!
 //! # What is proven
 //! For the error system K of the bank's own coefficients (thesis Props. 5.1-5.3), in normalised time (h =

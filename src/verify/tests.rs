@@ -1,5 +1,5 @@
-//! Tests of the enclosed error system against the designer's, which shares no code with it, and of proofs
-//! that must be refused.
+//! Tests of the enclosed error system against the designer's lifted plant, which it does not use, and of
+//! proofs that must be refused.
 
 use super::spectrum::{self, ComplexMatrix};
 use super::*;

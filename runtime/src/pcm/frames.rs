@@ -64,10 +64,10 @@ impl<'a> PcmFrames<'a> {
         PcmFrames { layout: self.layout.part(), channels: self.channels / 2, bytes: &self.bytes[start..] }
     }
 
-    /// Some of the frames.
+    /// Some of the frames, fewer where the range ends beyond them.
     ///
     /// # Panics
-    /// If the range goes beyond them.
+    /// If the range begins beyond them.
     pub fn range(&self, frames: Range<usize>) -> PcmFrames<'a> {
         let size = self.frame_bytes();
         let end = (frames.end * size).min(self.bytes.len());

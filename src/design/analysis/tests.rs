@@ -98,7 +98,7 @@ fn recursive_bank(channels: &str, latency: usize) -> Bank {
 fn interleaving_of_perfect_converters_is_exact() {
     for latency in [1, 2, 7] {
         let bank = recursive_bank("{ delay = 1.0 }, { delay = 0.0 }", latency);
-        let scale = GammaScale::new(&bank).unwrap();
+        let scale = GammaScale::new(&bank, &[]).unwrap();
         assert!(scale.interleaving < 1e-12, "{latency}: {scale:?}");
     }
 }
@@ -107,7 +107,7 @@ fn interleaving_of_perfect_converters_is_exact() {
 /// the norm of the samples of |Phi|^2 that alias there, sum_k |Phi(2 pi k)|^2.
 #[test]
 fn the_gamma_of_zero_output_is_that_of_the_aliases_of_the_reference() {
-    let scale = GammaScale::new(&recursive_bank("{ delay = 1.2 }, { delay = 0.6 }", 4)).unwrap();
+    let scale = GammaScale::new(&recursive_bank("{ delay = 1.2 }, { delay = 0.6 }", 4), &[]).unwrap();
     let phi = |w: f64| 0.25 / (w * w + 0.25);
     let sum: f64 = (-2000..=2000).map(|k| phi(std::f64::consts::TAU * f64::from(k)).powi(2)).sum();
     assert!((scale.zero_output - sum.sqrt()).abs() < 1e-9, "{scale:?} {}", sum.sqrt());

@@ -14,6 +14,26 @@ fn problem(filter: &str, ratio: usize, delays: &[f64]) -> Problem {
     Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), 0).unwrap()
 }
 
+/// [`completed`] that nobody follows or ends.
+fn chosen(open: &Spec) -> Result<Spec, DesignError> {
+    completed(open, Comparison { observer: &|_| (), stop: &Stop::default() })
+}
+
+/// The comparison does not go on with a design that was ended early.
+#[test]
+fn a_choice_ends_with_the_design_that_was_ended() {
+    let stop = Stop::default();
+    let design = "method = \"fir\", target_snr_db = 40, noise = 1e-2";
+    let open = Spec { latency: Some(9), ..spec(design) };
+    let follow = |designs| {
+        if designs == 0 {
+            stop.now()
+        }
+    };
+    let refused = completed(&open, Comparison { observer: &follow, stop: &stop }).unwrap_err();
+    assert_eq!(refused, DesignError::Stopped);
+}
+
 const THESIS: &str = "{ num = [0.25], den = [1.0, 1.0, 0.25] }";
 const STEEP: &str = r#"{ family = "butterworth", order = 6, cutoff = 0.12 }"#;
 
@@ -128,7 +148,7 @@ fn as_many_taps_are_chosen_as_the_snr_needs() {
     {
         let mut open = spec(design);
         open.latency = Some(9);
-        let complete = completed(&with_taps(&open).unwrap(), &|_| Ok(())).unwrap();
+        let complete = chosen(&with_taps(&open).unwrap()).unwrap();
         let taps = complete.design.taps.unwrap();
         assert_eq!(complete.design.target_snr_db, None);
         let found = |taps: usize| {
@@ -148,7 +168,7 @@ fn as_many_taps_are_chosen_as_the_snr_needs() {
 #[test]
 fn an_snr_that_is_out_of_reach_is_refused_with_the_best_one() {
     let open = Spec { latency: Some(9), ..spec("target_snr_db = 200, method = \"h2\", noise = 1e-3") };
-    let refused = completed(&open, &|_| Ok(())).unwrap_err();
+    let refused = chosen(&open).unwrap_err();
     let DesignError::SnrOutOfReach { wanted, best, latency } = refused else { panic!("{refused}") };
     assert!(wanted == 200.0 && latency == 9 && (30.0..70.0).contains(&best), "{refused}");
 }
@@ -159,7 +179,7 @@ fn an_snr_that_is_out_of_reach_is_refused_with_the_best_one() {
 fn an_snr_that_banks_of_least_gamma_miss_is_refused_in_words() {
     let open = |snr: f64| {
         let design = format!("method = \"fir\", target_snr_db = {snr:?}, noise = 1e-2");
-        completed(&Spec { latency: Some(9), ..spec(&design) }, &|_| Ok(())).unwrap_err()
+        chosen(&Spec { latency: Some(9), ..spec(&design) }).unwrap_err()
     };
     let DesignError::SnrOutOfReach { best: most, .. } = open(200.0) else { panic!("200 dB are reached") };
     let refused = open(most - 0.01);
@@ -172,7 +192,7 @@ fn taps_that_are_left_open_are_almost_as_good_as_any() {
     for (design, channels) in [("method = \"fir\"", 1), ("method = \"fir\", noise = 1e-3", 2)] {
         let mut open = spec(design);
         open.channels.truncate(channels);
-        let complete = completed(&with_taps(&open).unwrap(), &|_| Ok(())).unwrap();
+        let complete = chosen(&with_taps(&open).unwrap()).unwrap();
         let (latency, taps) = (complete.latency.unwrap(), complete.design.taps.unwrap());
         // Over all latencies: those far from the chosen one are worse.
         let least = |taps: usize, latencies: std::ops::RangeInclusive<usize>| {

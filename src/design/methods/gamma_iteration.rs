@@ -99,12 +99,13 @@ impl<'a> GammaIteration<'a> {
     /// The filters with their norm; `None` if rounding errors made the filters unstable or are as large as
     /// the norm.
     pub(super) fn evaluate(&self, filters: Filter) -> Result<Option<Evaluated>, DesignError> {
-        match self.plant.norm(&filters) {
-            Ok(peak) if self.plant.rounding(&filters)? < peak.gain || self.is_negligible(peak.gain) => {
+        let norm = self.plant.norm(&filters);
+        match norm.and_then(|peak| Ok((self.plant.rounding(&filters)? < peak.gain, peak))) {
+            Ok((is_known, peak)) if is_known || self.is_negligible(peak.gain) => {
                 Ok(Some(Evaluated { filters, peak }))
             }
             Ok(_) => Ok(None),
-            Err(DesignError::Lti(LtiError::Unstable { .. })) => Ok(None),
+            Err(DesignError::Lti(LtiError::Unstable { .. } | LtiError::IterationLimit { .. })) => Ok(None),
             Err(other) => Err(other),
         }
     }

@@ -62,10 +62,10 @@ fn precise<F: Number>(plant: &LiftedPlant, limit: usize) -> Result<Option<Filter
     Ok(PreciseFiltering::<F>::new(plant)?.h2())
 }
 
-/// ||K||_2 with the noise; infinite for a filter that rounding made unstable.
+/// ||K||_2 with the noise; infinite for a filter that rounding made unstable, whose Gramian has no limit.
 fn rms_error(plant: &LiftedPlant, filter: &Filter) -> Result<f64, DesignError> {
     match h2_norm(&plant.error_system(filter)) {
-        Err(LtiError::Unstable { .. }) => Ok(f64::INFINITY),
+        Err(LtiError::IterationLimit { .. }) => Ok(f64::INFINITY),
         norm => Ok(norm?),
     }
 }

@@ -70,8 +70,8 @@ pub(super) fn has_no_error(bank: &Bank) -> bool {
     EnclosedErrorSystem::new(bank).is_ok_and(is_zero)
 }
 
-/// Searches for witnesses of the bank's gammas. Returns the proof and the bounds that it proves, which
-/// do not refute the `stated` gamma.
+/// Searches for witnesses of the bank's gammas. Returns the proof and the bounds that it proves,
+/// unless they refute what `stated` says; a default `stated` says nothing.
 ///
 /// `dual` is the dual solution of an FIR design. It proves the lower end if the noncausal bound does not.
 ///

@@ -10,10 +10,11 @@ pub(super) const TAG_EXTENSIBLE: u16 = 0xFFFE;
 
 /// Chunks that say something about the recording; others hold positions in its samples, or are unknown.
 const NOTES: [&[u8; 4]; 3] = [b"bext", b"iXML", b"LIST"];
-/// Longest chunk that is kept, and longest in all.
+/// Longest chunk that is kept, and longest in all before the samples; as much again after them.
 const LONGEST_NOTE: u64 = 1 << 20;
 const ALL_NOTES: usize = 4 << 20;
-/// Most chunks that are kept; recorders write a handful, and each costs a look at those before it.
+/// Most chunks that are kept before the samples, and again after them; recorders write a handful, and each
+/// costs a look at those before it.
 const MOST_NOTES: usize = 64;
 
 /// A chunk that says something about the recording: `bext`, `iXML`, or `LIST` of the type `INFO`.
@@ -131,7 +132,7 @@ impl WavHeader {
 
 /// The data size, unless it is one of the numbers with which streaming writers mean "until the end".
 /// `empty_possible`: the outer size promises chunks after the data, so that 0 may mean no samples.
-fn known_size(size: u64, frame: u64, empty_possible: bool) -> Option<u64> {
+pub(super) fn known_size(size: u64, frame: u64, empty_possible: bool) -> Option<u64> {
     // sox rounds its 0x7FFFF000 down to whole frames; others take the header off.
     let streamed_by_sox = size <= 0x7FFF_F000 && size + frame.max(128) > 0x7FFF_F000;
     let streamed = streamed_by_sox

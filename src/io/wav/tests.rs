@@ -363,6 +363,20 @@ fn past_four_gibibytes_a_file_becomes_rf64() {
     }
 }
 
+/// Sizes with which other programs say that they know none: what follows the samples would become samples.
+#[test]
+fn a_size_that_means_unknown_is_written_as_rf64() {
+    let block = vec![1; 1 << 20];
+    for (bytes, id) in [(0x7FFF_0000_u64, b"RIFF"), (0x7FFF_EFF8, b"RF64"), (0x7FFF_FF00, b"RF64")] {
+        let mut file = WavFile::new(Head::default(), PcmFormat::F32Le, 2, 8000).unwrap();
+        (0..bytes >> 20).for_each(|_| file.write_bytes(&block).unwrap());
+        file.write_bytes(&block[..(bytes % (1 << 20)) as usize]).unwrap();
+        let head = file.finish(&[]).unwrap().bytes;
+        assert_eq!(&head[..4], id);
+        assert_eq!(WavReader::new(&head[..], "head").unwrap().header().data_bytes, Some(bytes));
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(256) })]
 

@@ -1,9 +1,10 @@
 //! Writes WAV files: RIFF, or RF64 if the samples exceed 32-bit sizes.
 //!
 //! A file is begun as RIFF with a JUNK chunk where RF64's ds64 chunk would be; closing it writes
-//! either the two 32-bit sizes or, past 4 GiB, turns it into RF64 in place (EBU Tech 3306).
+//! either the two 32-bit sizes or, past 4 GiB and for sizes that readers take as unknown, turns it into RF64
+//! in place (EBU Tech 3306).
 
-use super::header::{TAG_EXTENSIBLE, TAG_FLOAT, TAG_PCM, WavChunk};
+use super::header::{TAG_EXTENSIBLE, TAG_FLOAT, TAG_PCM, WavChunk, known_size};
 use crate::io::PcmFormat;
 use std::io::{self, Seek, SeekFrom, Write};
 
@@ -117,8 +118,9 @@ impl<W: Write + Seek> WavFile<W> {
         }
         self.inner.write_all(&after)?;
         let riff_bytes = self.header_bytes + self.data_bytes + after.len() as u64 - 8;
+        let is_known = known_size(self.data_bytes, u64::from(self.frame_bytes), true).is_some();
         match u32::try_from(riff_bytes) {
-            Ok(size) if size < LEAST_UNKNOWN_SIZE => {
+            Ok(size) if is_known && size < LEAST_UNKNOWN_SIZE => {
                 self.write_at(4, &size.to_le_bytes())?;
                 self.write_at(self.header_bytes - 4, &(self.data_bytes as u32).to_le_bytes())?;
             }
