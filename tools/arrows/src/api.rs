@@ -8,12 +8,46 @@ use crate::imports::{File, head, is_test};
 use quote::ToTokens;
 use std::collections::BTreeSet;
 use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use syn::visit_mut::{self, VisitMut};
 use syn::{Attribute, Fields, Item, ItemImpl, Meta, Type, Visibility, parse_quote};
 
+/// The lists of the libraries among these files, each with the interface as it is now.
+fn interfaces(root: &Path, files: &[File]) -> Result<Vec<(PathBuf, String)>, String> {
+    let libraries = files.iter().filter(|file| file.module.len() == 1 && file.path.ends_with("lib.rs"));
+    let interface = |library: &File| {
+        let name = &library.module[0];
+        let list = root.join("tools/arrows/api").join(name).with_extension("txt");
+        Ok((list, listing(files.iter().filter(|file| file.module[0] == *name))?))
+    };
+    libraries.map(interface).collect()
+}
+
+/// Writes the lists as the crates are now.
+pub(crate) fn accept(root: &Path, files: &[File]) -> Result<(), String> {
+    let write = |(list, now): (PathBuf, String)| {
+        std::fs::write(&list, now).map_err(|error| format!("{}: {error}", list.display()))
+    };
+    interfaces(root, files)?.into_iter().try_for_each(write)
+}
+
+/// The first line of each list where the public interface of its crate is another one.
+pub(crate) fn faults(root: &Path, files: &[File]) -> Result<Vec<String>, String> {
+    let fault = |(list, found): (PathBuf, String)| {
+        let listed = std::fs::read_to_string(&list).ok()?;
+        let line = listed.lines().zip(found.lines()).take_while(|(listed, found)| listed == found).count();
+        let [was, is] = [&listed, &found].map(|text| text.lines().nth(line).unwrap_or("nothing more").trim());
+        let name = list.file_stem()?.display();
+        let remedy = "if that is meant, `cargo run -p arrows accept`";
+        let fault = format!("{name}: its public interface is not the listed one; {remedy}\n- {was}\n+ {is}");
+        (listed != found).then_some(fault)
+    };
+    Ok(interfaces(root, files)?.into_iter().filter_map(fault).collect())
+}
+
 /// The public items of these files, as rustfmt writes them.
-pub(crate) fn listing<'a>(files: impl Iterator<Item = &'a File>) -> Result<String, String> {
+fn listing<'a>(files: impl Iterator<Item = &'a File>) -> Result<String, String> {
     let (mut public, mut files): (_, Vec<File>) = (Public::default(), files.cloned().collect());
     files.retain(|file| !file.syntax.attrs.iter().any(is_hidden));
     files.sort_by(|a, b| a.module.cmp(&b.module));
@@ -148,8 +182,8 @@ fn may_be_shown(item: &Item) -> bool {
 }
 
 fn is_public(syntax: &impl ToTokens) -> bool {
-    let head = head(syntax);
-    matches!(head.visibility, Visibility::Public(_)) && !head.attributes.iter().any(is_hidden)
+    let (attributes, visibility) = head(syntax);
+    matches!(visibility, Visibility::Public(_)) && !attributes.iter().any(is_hidden)
 }
 
 fn is_hidden(attribute: &Attribute) -> bool {

@@ -8,15 +8,26 @@
 mod api;
 mod checks;
 mod imports;
+#[cfg(test)]
+mod tests;
 
+use imports::Imports;
 use std::path::Path;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let accepts = std::env::args().nth(1).is_some_and(|word| word == "accept");
-    let found = if accepts { checks::accept(&root) } else { checks::faults(&root) };
+    let accept = || api::accept(&root, &Imports::read(&root)?.files).map(|()| Vec::new());
+    let found = if accepts { accept() } else { faults(&root) };
     let faults = found.unwrap_or_else(|error| vec![format!("arrows: {error}")]);
     faults.iter().for_each(|fault| eprintln!("{fault}"));
     ExitCode::from(u8::from(!faults.is_empty()))
+}
+
+/// Every fault of the workspace in this folder.
+fn faults(root: &Path) -> Result<Vec<String>, String> {
+    let imports = Imports::read(root)?;
+    let interfaces = api::faults(root, &imports.files)?;
+    Ok([checks::faults(root, imports)?, interfaces].concat())
 }
