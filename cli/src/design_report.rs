@@ -15,6 +15,9 @@ use hybank::spec::Method;
 use hybank::units::Hertz;
 use hybank::verify::{BoundedBanks, Verified};
 
+/// Width of the interval of the least gamma, over gamma, of a design that was far from its end: 0.09 dB.
+const FAR_FROM_FINISHED: f64 = 0.01;
+
 /// The report; serialised it is that of `--json`.
 #[derive(Debug, serde::Serialize)]
 pub(super) struct Report<'a> {
@@ -212,9 +215,9 @@ impl Report<'_> {
         )
     }
 
-    /// Whether the least gamma may be lower by an amount that decides anything: 1 % is 0.09 dB.
+    /// Whether the least gamma may be lower by an amount that decides anything.
     fn is_far_from_finished(&self) -> bool {
-        self.unfinished.is_some_and(|left| left.width > 0.01)
+        self.unfinished.is_some_and(|left| left.width > FAR_FROM_FINISHED)
     }
 
     /// How integer taps were chosen for a loss.

@@ -149,7 +149,7 @@ impl Job<'_> {
         let lost = args.gaps.lost_samples(self.is_live)?;
         let interleaving = args.interleaved.interleaving(self.bank, self.bank_path)?;
         let stalls = observer.map(RunObserver::stall_watch);
-        // Enough for all threads.
+        // Each thread takes about a block at a time, and more threads gain little.
         let block_bytes = if args.threads == 1 { BLOCK_BYTES } else { 8 * BLOCK_BYTES };
         let stated = self.bank.spec.as_ref().and_then(|spec| spec.full_scale);
         let layout = self.bank.layout();

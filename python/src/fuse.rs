@@ -9,10 +9,9 @@ use crate::results::Made;
 use crate::running::{Extras, Running};
 use hybank::bank::Bank;
 use hybank::pipeline::{self, DroppedLatency, GapPolicy, GapSummary, Outcome, PipelineError, Settings};
-use hybank::runtime::{Algorithm, Frames, Options, PcmFrames, Plan, Precision, ThreadPool};
+use hybank::runtime::{Algorithm, Frames, Options, Plan, Precision, ThreadPool};
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use std::ops::Range;
 
 /// Most threads: more than any processor has, and as many as start at once.
 const MOST_THREADS: i64 = 1024;
@@ -115,7 +114,7 @@ fn followed<'py>(
                 return Err(PipelineError::Stopped);
             }
             let end = frames.min(first + PIECE);
-            let piece: Vec<_> = recordings.iter().map(|all| piece(all, first..end)).collect();
+            let piece: Vec<_> = recordings.iter().map(|all| all.range(first..end)).collect();
             running.push(&piece, end - first)?;
         }
         running.flush((frames * bank.ratio) as u64)?;
@@ -128,11 +127,6 @@ fn followed<'py>(
     let mask = outcome.gaps.is_some().then_some(outputs.mask);
     let report = report(py, Outcome { mask, ..outcome }, latency_dropped)?;
     Ok([y, report.with("track", tracks.log(py)?)?.object()?])
-}
-
-fn piece<'a>(all: &PcmFrames<'a>, frames: Range<usize>) -> PcmFrames<'a> {
-    let size = all.frame_bytes();
-    PcmFrames { bytes: &all.bytes[frames.start * size..frames.end * size], ..*all }
 }
 
 fn report(py: Python<'_>, outcome: Outcome, latency_dropped: usize) -> PyResult<Made<'_>> {

@@ -7,7 +7,8 @@ use super::timestamps::Break;
 use super::{PcmFormat, PcmFrames, SampleLayout, StreamHeader};
 use std::collections::VecDeque;
 
-/// Maximum number of lost frames that are handed out at a time.
+/// Lost frames that are handed out at a time, at most: few enough for the cache, so that a long gap takes no
+/// memory.
 const LOST_FRAMES: usize = 1024;
 
 /// Bytes that were read, whole frames.

@@ -15,7 +15,7 @@ use super::{InputFault, IoError, StreamHeader};
 use crossbeam_channel::{Receiver, Sender, bounded, select};
 use std::thread;
 
-/// Number of blocks in the pool of each input.
+/// Number of blocks in the pool of each input: one is read and one is used while two wait.
 pub(super) const BLOCKS: usize = 4;
 
 /// Sends all messages of an input until its end, or until the receiver is gone. Blocks to fill come from

@@ -15,10 +15,11 @@ use super::{InputWarning, IoError, PcmFrames, ReadOptions, StallWatch, StreamHea
 use crossbeam_channel::Receiver;
 use std::path::PathBuf;
 
-/// All blocks of all inputs together, unless that would make them smaller than a page.
+/// All blocks of all inputs together, unless that would make them smaller than a page: as much as a cache of
+/// the last level holds.
 const ALL_BYTES: usize = 16 << 20;
 
-/// Each takes a thread; no bank has more channels.
+/// Each takes a thread; no spec has more channels.
 const MOST_INPUTS: usize = 1024;
 
 /// The result of waiting for frames.

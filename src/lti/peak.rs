@@ -88,10 +88,13 @@ pub(crate) fn stable_poles(system: &StateSpace) -> Result<Vec<Complex<f64>>, Lti
     if radius >= 1.0 { Err(LtiError::Unstable { radius }) } else { Ok(poles) }
 }
 
+/// Radius of a pole from which on it may cause a peak that the first grid misses.
+const RESONANT_RADIUS: f64 = 0.5;
+
 /// Angles of the poles that may cause a peak, and angles near them at multiples of the pole's distance from
 /// the unit circle, which is the width of its resonance.
 pub(crate) fn resonances(poles: &[Complex<f64>]) -> Vec<f64> {
-    let near = poles.iter().filter(|p| p.im >= 0.0 && p.norm() > 0.5);
+    let near = poles.iter().filter(|p| p.im >= 0.0 && p.norm() > RESONANT_RADIUS);
     let about = |p: &Complex<f64>| WIDTHS.map(|width| p.arg() + width * (1.0 - p.norm()));
     near.flat_map(about).filter(|w| (0.0..=PI).contains(w)).collect()
 }

@@ -18,6 +18,11 @@ pub(super) struct TapSamples<'a> {
     pub(super) lags: usize,
 }
 
+/// 2^64 slow periods bring any stable filter to its steady state.
+const DOUBLINGS: usize = 64;
+/// Makes up for the roundings of the remainder's bound, sums of as many terms as there are states.
+const REMAINDER_OUTWARD: f64 = 1.01;
+
 /// Second moments of the samples for white noise of unit density at the input.
 pub(super) struct Covariance<F = DoubleDouble> {
     /// Of the analog state.
@@ -32,10 +37,10 @@ impl<F: Number> Covariance<F> {
         let n = period.order();
         let mut state = period.gram.view((0, 0), (n, n)).into_owned();
         let mut power = period.transition.clone();
-        for _ in 0..64 {
+        for _ in 0..DOUBLINGS {
             let size = ball::row_sum(&power) * ball::row_sum(&power.transpose());
             if size < F::ROUNDING * NEGLIGIBLE_REMAINDER {
-                let rest = 1.01 * ball::row_sum(&state) * size;
+                let rest = REMAINDER_OUTWARD * ball::row_sum(&state) * size;
                 let state = state.map(|x| x.widened(rest));
                 return Some(Self { state, transition: period.transition.clone() });
             }

@@ -25,6 +25,9 @@ use super::spectrum::{self, ComplexMatrix};
 use crate::arithmetic::Number;
 use crate::bank::DualWitness;
 
+/// Covers the roundings of a handful of operations in double precision.
+const FEW_ROUNDINGS: f64 = 1e-14;
+
 /// A bound for all FIR banks with `length` taps per channel, from `witnesses` whose sum does not depend on
 /// the taps; `None` if the precision of F does not suffice.
 pub(super) fn of_length<F: Number>(
@@ -42,9 +45,10 @@ pub(super) fn of_length<F: Number>(
     witnesses.iter().for_each(|witness| sums.add(period, witness));
     let added = measured.energy(&sums.residual, &units).sqrt().upper();
     let reference = covariance.of_reference(period, ratio).sqrt().upper();
-    let reached = sums.value.lower() - 1.001 * added * reference;
-    let paid = (sums.size.upper() + 1.001 * (ratio as f64).sqrt() * added) * (1.0 + 1e-14);
-    let bound = reached / paid * (1.0 - 1e-14);
+    let reached = sums.value.lower() - positive::SUM_OUTWARD * added * reference;
+    let paid =
+        (sums.size.upper() + positive::SUM_OUTWARD * (ratio as f64).sqrt() * added) * (1.0 + FEW_ROUNDINGS);
+    let bound = reached / paid * (1.0 - FEW_ROUNDINGS);
     bound.is_finite().then(|| bound.max(0.0))
 }
 

@@ -21,6 +21,7 @@ use super::slow_period::SlowPeriod;
 use super::spectrum::{self, ComplexMatrix};
 use crate::arithmetic::{DoubleDouble, Number, dense};
 use crate::bank::{DualWitness, SynthesisFilters};
+use std::ops::Range;
 
 /// The square of a lower bound of this bank's norm, from its gain at a frequency: `||K|| >= ||a* K(z)|| /
 /// ||a||`.
@@ -99,8 +100,11 @@ pub(super) fn unexplained(
     root((energy(&gram, &b) - missed) / reference.square())
 }
 
+/// Powers of ten down to which a least eigenvalue is looked for: 106 bits resolve no smaller ones.
+const EIGENVALUE_DECADES: Range<i32> = 1..29;
+
 /// A proven lower bound of the least eigenvalue, within a factor of ten.
 fn least_eigenvalue(m: &Matrix) -> Option<f64> {
     let size = (0..m.nrows()).map(|i| m[(i, i)].nearest()).fold(0.0, f64::max);
-    (1..29).map(|k| size * 0.1f64.powi(k)).find(|&least| positive::exceeds(m, least))
+    EIGENVALUE_DECADES.map(|k| size * 0.1f64.powi(k)).find(|&least| positive::exceeds(m, least))
 }

@@ -71,7 +71,7 @@ pub use self::causal::{Precision, Recursion};
 pub use self::enclosed::EnclosedErrorSystem;
 pub(crate) use self::enclosed::Midpoint;
 pub use self::error::VerifyError;
-pub(crate) use self::statements::Strictness;
+pub(crate) use self::statements::{Strictness, ZERO_NORM};
 
 use crate::bank::{Bank, Proof};
 

@@ -11,14 +11,23 @@ use crate::arithmetic::Number;
 use crate::arithmetic::dense::{cholesky, solve_factored};
 use nalgebra::DMatrix;
 
-/// R with R R' = m up to a shift of 1e-28 of its size, which makes a semidefinite m definite. The result is
-/// rounded and must not be used in a proof.
+/// Shift of a matrix whose diagonal is one: some thousand roundings of 106 bits, so that rounding makes no
+/// semidefinite matrix indefinite.
+const SEMIDEFINITE_SHIFT: f64 = 1e-28;
+/// Makes up for the roundings of a sum of bounds in double precision, up to 10^12 terms.
+pub(super) const SUM_OUTWARD: f64 = 1.001;
+/// Bound of a factorisation's error over its first-order term: the higher ones are far smaller than it.
+const FACTORING: f64 = 2.0;
+/// A lower bound of eigenvalues over the error that any proof of it must grant.
+const LEAST_BOUND: f64 = 2.0;
+
+/// R with R R' = m up to [`SEMIDEFINITE_SHIFT`] of its size. The result is rounded and must not be used in a proof.
 pub(super) fn root(m: &Matrix) -> Option<Matrix> {
     let n = m.nrows();
     let scales = scales(m);
     let shifted = DMatrix::from_fn(n, n, |i, j| {
         let scaled = m[(i, j)] * Ball::from(scales[i]) * Ball::from(scales[j]);
-        if i == j { (scaled + Ball::from(1e-28)).mid() } else { scaled.mid() }
+        if i == j { (scaled + Ball::from(SEMIDEFINITE_SHIFT)).mid() } else { scaled.mid() }
     });
     let factor = cholesky(&shifted)?;
     Some(Matrix::from_fn(n, n, |i, j| Ball::exactly(factor[(i, j)]) / Ball::from(scales[i])))
@@ -53,7 +62,7 @@ pub(super) fn scaled<F: Number>(m: &Matrix<F>, scales: &[f64]) -> Matrix<F> {
 /// Whether every symmetric matrix in the enclosure has no eigenvalue below `least`.
 pub(super) fn exceeds<F: Number>(m: &Matrix<F>, least: f64) -> bool {
     let n = m.nrows();
-    let shift = (ball::radius_sum(m) + factoring(m, least)) * 1.001 + least;
+    let shift = (ball::radius_sum(m) + factoring(m, least)) * SUM_OUTWARD + least;
     let shifted = DMatrix::from_fn(n, n, |i, j| {
         let (i, j) = (i.max(j), i.min(j));
         if i == j { (m[(i, j)] - Ball::from(shift)).mid() } else { m[(i, j)].mid() }
@@ -65,7 +74,7 @@ pub(super) fn exceeds<F: Number>(m: &Matrix<F>, least: f64) -> bool {
 fn factoring<F: Number>(m: &Matrix<F>, least: f64) -> f64 {
     let n = m.nrows();
     let trace: f64 = (0..n).map(|i| m[(i, i)].magnitude()).sum();
-    2.0 * (n + 2) as f64 * F::ROUNDING * (trace + n as f64 * least.abs())
+    FACTORING * (n + 2) as f64 * F::ROUNDING * (trace + n as f64 * least.abs())
 }
 
 /// A symmetric matrix of which every one in its enclosure is positive definite.
@@ -80,8 +89,7 @@ pub(super) struct Definite<F> {
 impl<F: Number> Definite<F> {
     /// `None` if that is not shown with the precision of F.
     pub(super) fn new(matrix: Matrix<F>) -> Option<Self> {
-        // The error that any proof must grant, times two: this is the least bound that can be shown.
-        let least = 2.0 * (ball::radius_sum(&matrix) + factoring(&matrix, 0.0));
+        let least = LEAST_BOUND * (ball::radius_sum(&matrix) + factoring(&matrix, 0.0));
         let shown = least > 0.0 && exceeds(&matrix, least);
         let factor = if shown { cholesky(&matrix.map(Ball::mid)) } else { None };
         factor.map(|factor| Self { matrix, factor, least })

@@ -12,7 +12,7 @@ const UNDERSTATED: f64 = 1e-6;
 /// Maximum relative width of the proven interval of the norm.
 const WIDEST_INTERVAL: f64 = 0.2;
 /// Norms below this, relative to the scale of the reference samples, are zero up to rounding.
-const ZERO_NORM: f64 = 1e-10;
+pub(crate) const ZERO_NORM: f64 = 1e-10;
 /// Maximum width of the proven interval of such a norm, relative to the scale.
 const WIDEST_AT_ZERO_NORM: f64 = 2e-6;
 

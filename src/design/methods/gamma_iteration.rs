@@ -11,6 +11,13 @@ use crate::lti::LtiError;
 use crate::lti::peak::{Peak, hinf_norm};
 use std::rc::Rc;
 
+/// Shares of [`GAMMA_ACCURACY`], which add up to less than one with the bracket: what a computed norm may
+/// exceed the gamma that a filter was promised for.
+const NORM_SHARE: f64 = 0.1;
+/// How far above the lower bound it is tried: a filter there is accurate enough.
+const LOWER_BOUND_SHARE: f64 = 0.8;
+/// Width of the bracket that ends the bisection.
+const BRACKET_SHARE: f64 = 0.5;
 /// Gammas below this fraction of ||W|| count as zero: the references are reproduced up to rounding errors.
 const ZERO_GAMMA: f64 = 1e-12;
 /// The bracket halves (on the logarithmic scale) in each trial.
@@ -165,7 +172,7 @@ impl<'a> GammaIteration<'a> {
             match solver.h_infinity(gamma) {
                 Trial::Achieved(filters) => {
                     let Some(found) = self.evaluate(filters.clone())? else { continue };
-                    let promise_kept = found.peak.gain <= gamma * (1.0 + 0.1 * GAMMA_ACCURACY);
+                    let promise_kept = found.peak.gain <= gamma * (1.0 + NORM_SHARE * GAMMA_ACCURACY);
                     self.keep(found);
                     if promise_kept {
                         return Ok(Trial::Achieved(filters));
@@ -181,7 +188,7 @@ impl<'a> GammaIteration<'a> {
     /// In most problems a causal filter achieves the noncausal bound, so it is tried first.
     pub(super) fn try_the_lower_bound(&mut self) -> Result<(), DesignError> {
         if !self.done() {
-            self.attempt(self.lower * (1.0 + 0.8 * GAMMA_ACCURACY))?;
+            self.attempt(self.lower * (1.0 + LOWER_BOUND_SHARE * GAMMA_ACCURACY))?;
         }
         Ok(())
     }
@@ -222,7 +229,7 @@ impl<'a> GammaIteration<'a> {
         let mut is_impossible = true;
         let (mut floor, mut ceiling) = (self.floor(), self.ceiling()?);
         for _ in 0..TRIAL_LIMIT {
-            if self.done() || ceiling <= floor * (1.0 + 0.5 * GAMMA_ACCURACY) {
+            if self.done() || ceiling <= floor * (1.0 + BRACKET_SHARE * GAMMA_ACCURACY) {
                 break;
             }
             let gamma = (floor * ceiling).sqrt();

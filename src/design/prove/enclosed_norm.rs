@@ -7,11 +7,9 @@ use crate::design::limits::MAX_LONG_STATES;
 use crate::linalg::{self, CMat, Complex};
 use crate::lti::StateSpace;
 use crate::lti::peak::{Peak, hinf_norm, hinf_norm_with_response, resonances, stable_poles};
-use crate::verify::{EnclosedErrorSystem, Midpoint};
+use crate::verify::{EnclosedErrorSystem, Midpoint, ZERO_NORM};
 use std::f64::consts::PI;
 
-/// Norms below this, relative to the scale of the reference samples, are zero up to rounding.
-pub(super) const ZERO_NORM: f64 = 1e-10;
 /// Distances from the peak in doubles at which the enclosed gain is computed, in radians: from the rounding
 /// of a frequency to the width of a wide resonance.
 const PEAK_OFFSETS: [f64; 6] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];

@@ -269,6 +269,9 @@ fn causal_witness(
         .or_else(|| search(Precision::Long, LONG_BISECTIONS))
 }
 
+/// The first gamma that is tried above nothing, over the one that stands: most bounds are within a decade.
+const FIRST_BISECTION: f64 = 0.1;
+
 /// `count` bisections between the ends, at the geometric mean because the ends may be far apart.
 fn bisected(
     interval: &Range<f64>,
@@ -280,7 +283,7 @@ fn bisected(
         if standing - below <= BISECTION_WIDTH * standing {
             break;
         }
-        let gamma = if below > 0.0 { (below * standing).sqrt() } else { 0.1 * standing };
+        let gamma = if below > 0.0 { (below * standing).sqrt() } else { FIRST_BISECTION * standing };
         match refuted(gamma) {
             Some(witness) => (best, below) = (Some(witness), gamma),
             None => standing = gamma,

@@ -5,7 +5,7 @@
 //! error is a small difference of large numbers; the equation is then solved in 256 bits, and in 512 where
 //! these do not do either.
 
-use super::enclosed_norm::{EnclosedGains, ZERO_NORM};
+use super::enclosed_norm::EnclosedGains;
 use super::{leading_direction, witness};
 use crate::arithmetic::dense::{cholesky, product, riccati_limit, select, solve, symmetric};
 use crate::arithmetic::{BigFloat, Float512, Number};
@@ -17,7 +17,7 @@ use crate::lti::gramian::{controllability_root, observability_root};
 use crate::lti::peak::hinf_norm;
 use crate::lti::{GramianCoordinates, LtiError, StateSpace, bounded_real_riccati};
 use crate::verify::enclosed::PreciseErrorSystem;
-use crate::verify::{EnclosedErrorSystem, Midpoint};
+use crate::verify::{EnclosedErrorSystem, Midpoint, ZERO_NORM};
 use nalgebra::DMatrix as Matrix;
 
 /// Relative excesses over the computed norm at which the search tries to find a certificate, smallest
@@ -163,9 +163,11 @@ impl Search<'_> {
 
     /// `None` for many states.
     fn in_512_bits(&self) -> Option<LongSystem> {
-        let is_small = self.error.states() <= MAX_LONG_STATES;
+        if self.error.states() > MAX_LONG_STATES {
+            return None;
+        }
         let energy = observability_root(&self.middle.a, &self.middle.c).ok()?.norm_squared();
-        is_small.then(|| LongSystem { error: self.units.of_long(&self.error.in_512_bits()), energy })
+        Some(LongSystem { error: self.units.of_long(&self.error.in_512_bits()), energy })
     }
 
     /// In numbers of so many words, R as two doubles per entry where one does not do.
