@@ -21,7 +21,8 @@ const FACTORING: f64 = 2.0;
 /// A lower bound of eigenvalues over the error that any proof of it must grant.
 const LEAST_BOUND: f64 = 2.0;
 
-/// R with R R' = m up to [`SEMIDEFINITE_SHIFT`] of its size. The result is rounded and must not be used in a proof.
+/// R with R R' = m up to [`SEMIDEFINITE_SHIFT`] of its size. The result is rounded and must not be used in a
+/// proof.
 pub(super) fn root(m: &Matrix) -> Option<Matrix> {
     let n = m.nrows();
     let scales = scales(m);
