@@ -300,9 +300,9 @@ fn check_gamma(gamma: &Gamma) -> Checked {
         }
     }
     let Some(upper) = gamma.upper else { return Ok(()) };
-    for (key, value) in bounds.into_iter().chain([norms[0]]) {
+    for (key, value) in bounds {
         if let Some(value) = value.filter(|&x| x > upper) {
-            let rule = format!("the norm and its lower bounds are at most gamma.upper, {upper}");
+            let rule = format!("a lower bound is at most gamma.upper, {upper}");
             return out_of_range(format!("gamma.{key}"), value, "(h = 1)", rule);
         }
     }
