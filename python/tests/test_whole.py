@@ -250,6 +250,7 @@ def test_delays_are_followed_as_by_the_command_line(folder, binary, tracked):
     x = capture.channels.astype("f4")
     y, report = tracked.fuse(x, track="pilot=3.1kHz", track_frames=1024, full_output=True)
     np.testing.assert_array_equal(y, floats(folder / "y.wav"))
+    np.testing.assert_array_equal(y, tracked.fuse(x, track="pilot=3.1kHz", track_frames=1024, threads=2))
     log = [json.loads(line) for line in (folder / "log.jsonl").read_text().splitlines()]
     assert json.loads(json.dumps(report.track, default=dict)) == log and len(log) > 10
     error = lambda y: np.std((y - capture.target)[-20000:-200])  # noqa: E731

@@ -171,6 +171,12 @@ fn what_a_wav_file_says_of_the_recording_survives() {
     assert_eq!((count(&chunk(b"bext", &bext)), count(&chunk(b"LIST", &info))), (1, 1));
     assert_eq!((count(b"cue "), count(b"adtl")), (0, 0));
     assert_eq!(found[4..8], (found.len() as u32 - 8).to_le_bytes());
+    // A file on standard input has an end too.
+    let stdin = std::fs::File::open(desk.path("noted.wav")).unwrap();
+    let args =
+        ["stream", "bank.json", "--format", "wav", "--input", "-", "--input", "b.wav", "-o", "live.wav"];
+    assert!(desk.command(&args).stdin(stdin).status().unwrap().success());
+    assert!(desk.read("live.wav").windows(6).any(|window| window == b"a tone"));
     // The causal output begins earlier by the latency of 3 samples.
     desk.good(&["fuse", "bank.json", "noted.wav", "b.wav", "-o", "causal.wav", "--keep-latency"]);
     let causal = desk.read("causal.wav");

@@ -318,6 +318,24 @@ fn a_closed_pipe_ends_quietly() {
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
 }
 
+/// What was recorded beside samples that nobody read any more cannot be recorded again.
+#[test]
+fn a_closed_pipe_names_the_mask_that_stays() {
+    let bench = Bench::new();
+    let mut child = bench.spawn(&["--gaps", "mask", "--mask", "mask"]);
+    let mut output = child.stdout.take().unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    let feeder = std::thread::spawn(move || while stdin.write_all(&[0; 65536]).is_ok() {});
+    output.read_exact(&mut [0; 65536]).unwrap();
+    drop(output);
+    let output = child.wait_with_output().unwrap();
+    feeder.join().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let warning = text(&output.stderr);
+    assert!(warning.contains("what was recorded is in .mask."), "{warning}");
+    assert!(bench.unfinished_bytes().is_some_and(|bytes| bytes > 0) && !bench.path("mask").exists());
+}
+
 /// A name that ends in wav says the format; --output-format says it too, and must agree.
 #[test]
 fn the_name_of_the_output_implies_wav() {
