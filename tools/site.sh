@@ -8,8 +8,8 @@ export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
 site=${1:-$CARGO_TARGET_DIR/site}
 environment=$CARGO_TARGET_DIR/site-python
 
-cargo build --quiet --workspace --exclude hybank-python --bins
-PYO3_NO_PYTHON=1 cargo build --quiet -p hybank-python --lib
+# One choice of packages, as it decides features of the crates that they share.
+PYO3_NO_PYTHON=1 cargo build --quiet --workspace --lib --bins
 cargo doc --quiet --no-deps -p hybank -p hybank-runtime -p hybank-linalg -p hybank-ibr --lib
 install -m 755 "$CARGO_TARGET_DIR/debug/lib_hybank.so" python/hybank/_hybank.abi3.so
 
