@@ -20,7 +20,7 @@ trap 'rm -rf "$work"' EXIT
 "$python" -m venv "$work/tools"
 "$work/tools/bin/pip" --quiet --disable-pip-version-check install 'maturin>=1.9,<2' auditwheel
 rm -rf "$folder/dist"
-(cd "$folder" && "$work/tools/bin/maturin" sdist --quiet --out dist)
+(cd "$folder" && "$work/tools/bin/maturin" sdist --out dist >/dev/null)
 (cd "$folder" && "$work/tools/bin/maturin" build --quiet --profile dist --out dist)
 "$work/tools/bin/auditwheel" show "$folder"/dist/*.whl
 for package in "$folder"/dist/*.tar.gz "$folder"/dist/*.whl; do

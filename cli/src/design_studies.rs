@@ -47,7 +47,7 @@ impl<'a> Words<'a> {
         };
         format!(
             "words      {} times 2^{}, {} left out, {}\n\
-             \x20          {:.3} dB of the SNR of the real taps lost, {} allowed; {why}\n",
+             \x20          {:.3} dB of the SNR of the real taps lost, {} allowed, over the whole spectrum of the signal; {why}\n",
             self.bits,
             -self.fraction_bits,
             counted(choice.taps_left_out, "tap"),

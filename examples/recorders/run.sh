@@ -9,9 +9,9 @@ work=${1:-$(mktemp -d)}
 mkdir -p "$work"
 cd "$work"
 
-# What the recorders write: a short sweep, three claps and a tone. Only `simulate` knows starts and clocks.
+# What the recorders write: a short sweep, another one above what they resolve, three claps and a tone. Only `simulate` knows starts and clocks.
 hybank simulate "$here/spec.toml" -o captures --samples 153600 --gain 0.08 --noise 1e-4 \
-    --source chirp:200Hz..15kHz@0.2s+step@0.31+step@0.46+step@0.58+tones:440Hz \
+    --source chirp:200Hz..15kHz@0.2s+chirp:33kHz..24kHz@0.3s+step@0.31+step@0.46+step@0.58+tones:440Hz \
     --delay-error 0,-50.4ms --drift 0,1.5
 
 # Starts, drift and gains from the recordings; the spec and the recordings that begin together.

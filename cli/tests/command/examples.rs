@@ -51,7 +51,7 @@ fn two_inertial_sensors_become_one() {
 }
 
 /// Two recordings that began apart, with clocks of their own, become one: better than one of them alone at
-/// best (15.8 dB), and than fixed taps.
+/// best (15.8 dB), than one resampled (31.8 dB), and than fixed taps.
 #[test]
 #[cfg(unix)]
 fn two_recorders_become_one() {
@@ -64,8 +64,8 @@ fn two_recorders_become_one() {
     assert!((drift - 1.5).abs() < 0.1, "{shown}");
     let ratios: Vec<f64> =
         shown.lines().filter_map(|line| line.strip_prefix("SNR  ")).map(decibels).collect();
-    // After the line of `design`: 57.9 dB in what remains once the ends are left out, and 59.7 dB of all.
-    assert!(matches!(ratios[..], [_, fixed, fused] if fixed < fused && fused > 59.0), "{shown}");
+    // After the line of `design`: 42.8 dB with fixed taps, and 59.2 dB.
+    assert!(matches!(ratios[..], [_, fixed, fused] if fixed < fused - 10.0 && fused > 59.0), "{shown}");
 }
 
 /// The circuit of the example gives the integers of the model, and its spurs are theirs.
