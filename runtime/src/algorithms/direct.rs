@@ -266,11 +266,13 @@ impl<T: Sample> Filter for Direct<T> {
         {
             return self.process_in_memory(&mut state.history, samples, head, out);
         }
-        let block = |first: usize| first..frames.min(first + self.block);
-        (0..frames)
-            .step_by(self.block)
-            .map(|first| self.process_block(state, input, block(first), output))
-            .sum()
+        let (mut done, mut replaced) = (0, 0);
+        while done < frames {
+            let end = frames.min(done + self.block);
+            replaced += self.process_block(state, input, done..end, output);
+            done = end;
+        }
+        replaced
     }
 
     fn count(&self, _place: usize) -> Count {
