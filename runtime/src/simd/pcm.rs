@@ -1,6 +1,6 @@
 //! Samples of PCM formats to f32 and back, and frames from rows, a lane group at a time.
 
-use super::dispatch::{Kernel, compiled_narrow};
+use super::dispatch::{Kernel, compiled, compiled_narrow};
 use super::fir::widths;
 use super::isa::Isa;
 use super::vector::Vector;
@@ -23,7 +23,7 @@ pub(crate) fn decode(isa: Isa, format: PcmFormat, bytes: &[u8], out: &mut [f32])
 pub(crate) fn encode(isa: Isa, format: PcmFormat, samples: &[f32], out: &mut [u8]) -> u64 {
     assert!(samples.len() * format.bytes() <= out.len());
     // SAFETY: the kernel asks nothing of its job.
-    unsafe { compiled_narrow::<Encode>(isa)((format, samples, out)) }
+    unsafe { compiled::<Encode>(isa)((format, samples, out)) }
 }
 
 /// Sample p of frame k of `out` = `rows[p * stride + k]`, for frames of `m` samples; returns the
@@ -95,11 +95,11 @@ impl Kernel for Encode {
         if format != PcmFormat::S16Le {
             return encode_each(format, samples, out);
         }
-        let (blocks, rest) = samples.as_chunks::<GROUP>();
-        let (groups, last) = out.split_at_mut(2 * GROUP * blocks.len());
+        let (vectors, rest) = samples.split_at(samples.len() / V::LANES * V::LANES);
+        let (places, last) = out.split_at_mut(2 * vectors.len());
         let mut clipped = 0;
-        for (samples, out) in blocks.iter().zip(groups.as_chunks_mut::<{ 2 * GROUP }>().0) {
-            // Both arrays hold a group.
+        for (samples, out) in vectors.chunks_exact(V::LANES).zip(places.chunks_exact_mut(2 * V::LANES)) {
+            // Both slices hold a vector.
             clipped += u64::from(V::load(samples.as_ptr()).store_i16(out.as_mut_ptr()));
         }
         clipped + encode_each(format, rest, last)
