@@ -275,6 +275,18 @@ impl Vector for Avx512F32 {
         }
     }
 
+    #[inline(always)]
+    unsafe fn load_i16(at: *const u8) -> Self {
+        let wide = _mm512_cvtepi16_epi32(_mm256_loadu_si256(at.cast()));
+        Self(_mm512_mul_ps(_mm512_cvtepi32_ps(wide), _mm512_set1_ps(1.0 / 32768.0)))
+    }
+
+    #[inline(always)]
+    unsafe fn load_i32(at: *const u8) -> Self {
+        let wide = _mm512_loadu_si512(at.cast());
+        Self(_mm512_mul_ps(_mm512_cvtepi32_ps(wide), _mm512_set1_ps(1.0 / 2147483648.0)))
+    }
+
     /// -32768.5 rounds to -32768, which fits, and 32767.5 to 32768, which does not.
     #[inline(always)]
     unsafe fn store_i16(self, at: *mut u8) -> u32 {
