@@ -22,7 +22,7 @@ use crate::{Plan, ProcessError, Sample, Shape, StateError, SwapError};
 ///
 /// | | NaN or infinity in the input | sums that overflow |
 /// |---|---|---|
-/// | direct | seen in the outputs; filtered again with zeros | filtered again at most once |
+/// | direct | seen in the outputs; frames that they reach filtered again | filtered again at most once |
 /// | overlap-save | replaced first; filtered once | the batch once more, from smaller numbers |
 /// | recursive | replaced first; filtered once | filtered once; state 0, [counted](Self::state_resets) |
 ///

@@ -70,7 +70,10 @@ impl<T: Sample> Direct<T> {
             .filter(|&len| len.saturating_mul(ratio) <= isize::MAX as usize / 64)
             .ok_or(BuildError::TooLong { history: phase_taps - 1, channels })?;
         let tiling = kernel.tiling(channels, len, ratio);
-        let block = (CACHE_SAMPLES / channels).saturating_sub(phase_taps).clamp(BLOCK_UNIT, 8 * BLOCK_UNIT)
+        // A short block of one channel would show what a block costs; outputs of more than one group of phases
+        // are written in several passes, and must stay in the cache too.
+        let most = if channels == 1 && ratio <= 4 { 16 * BLOCK_UNIT } else { 8 * BLOCK_UNIT };
+        let block = (CACHE_SAMPLES / channels).saturating_sub(phase_taps).clamp(BLOCK_UNIT, most)
             / BLOCK_UNIT
             * BLOCK_UNIT;
         let coefficient = |element, phase| T::from_f64(coefficient(taps, ratio, element, phase));

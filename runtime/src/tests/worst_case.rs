@@ -147,10 +147,12 @@ fn the_direct_algorithm_filters_few_frames_again_for_one_that_is_not_finite() {
             let mut out = vec![0.0; m * call];
             let mut work = |input: &[f32]| work::of(|| assert!(stream.process(input, &mut out).is_ok()));
             let usual = work(&input);
-            (n * call / 2..n * call).step_by(1000 * n).for_each(|place| input[place] = f32::NAN);
+            // Blocks of one channel are the longest ones, and two samples in a block would be too many.
+            let places = (n * call / 2..n * call).step_by(1000 * n.max(2));
+            let bad = places.clone().count();
+            places.for_each(|place| input[place] = f32::NAN);
             let again = (work(&input) - usual) * call / usual;
             // The frames of the windows, and those that fill a vector at each end.
-            let bad = call.div_ceil(2).div_ceil(1000);
             assert!(
                 (bad * k.min(call / 2)..=bad * (k + 48)).contains(&again),
                 "N {n} M {m} K {k}: {again} of {call} frames"
