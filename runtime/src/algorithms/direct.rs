@@ -5,7 +5,7 @@
 //! [kernels](crate::simd); it is the same wherever the frame stands in its call.
 //!
 //! NaN and infinity are detected in the output sums, not by a pass over the input. Frames of a block whose
-//! windows hold them are filtered again with zeros in their place, so that each frame is filtered at most twice.
+//! windows hold them are filtered again with zeros in their place: each frame is filtered at most twice.
 
 #[cfg(test)]
 mod tests;
@@ -70,8 +70,8 @@ impl<T: Sample> Direct<T> {
             .filter(|&len| len.saturating_mul(ratio) <= isize::MAX as usize / 64)
             .ok_or(BuildError::TooLong { history: phase_taps - 1, channels })?;
         let tiling = kernel.tiling(channels, len, ratio);
-        // A short block of one channel would show what a block costs; outputs of more than one group of phases
-        // are written in several passes, and must stay in the cache too.
+        // A short block of one channel would show what a block costs. Outputs of more than one group of
+        // phases are written in several passes, and must stay in the cache too.
         let most = if channels == 1 && ratio <= 4 { 16 * BLOCK_UNIT } else { 8 * BLOCK_UNIT };
         let block = (CACHE_SAMPLES / channels).saturating_sub(phase_taps).clamp(BLOCK_UNIT, most)
             / BLOCK_UNIT
@@ -118,7 +118,7 @@ impl<T: Sample> Direct<T> {
         // Whole vectors, so that all blocks after it are whole vectors too.
         let first = head + ((self.block - head) & !(vector - 1));
         let (mut done, mut end, mut replaced) = (0, frames.min(first), 0);
-        // The frame that the history comes before, and the first one whose window is finite.
+        // The history is that of frame `followed`; windows of frames before `clean` may hold NaN or infinity.
         let (mut followed, mut clean) = (0, 0);
         while done < frames {
             let filtered = done >= clean;
@@ -208,7 +208,7 @@ impl<T: Sample> Direct<T> {
         Lost { count, touched: places.start / self.channels..places.end.div_ceil(self.channels) + reach }
     }
 
-    /// Filters `touched` of the frames in the history's room, which are those of a range of the output.
+    /// Filters `touched` of the frames in the history's room, whose outputs are those of a range of frames.
     fn filter_again(&self, history: &History<T>, touched: Range<usize>, frames: Range<usize>, out: &mut [T]) {
         // Whole vectors take least time.
         let len = touched.len().next_multiple_of(self.filters.tiling().vector);
