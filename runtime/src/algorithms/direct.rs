@@ -118,7 +118,7 @@ impl<T: Sample> Direct<T> {
         // Whole vectors, so that all blocks after it are whole vectors too.
         let first = head + ((self.block - head) & !(vector - 1));
         let (mut done, mut end, mut replaced) = (0, frames.min(first), 0);
-        // The history is that of frame `followed`; windows of frames before `clean` may hold NaN or infinity.
+        // The history is that of frame `followed`. Windows of frames before `clean` may hold NaN.
         let (mut followed, mut clean) = (0, 0);
         while done < frames {
             let filtered = done >= clean;

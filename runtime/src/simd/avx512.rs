@@ -294,7 +294,7 @@ impl Vector for Avx512F32 {
         let low = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(scaled, _mm512_set1_ps(-32768.5));
         let high = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(scaled, _mm512_set1_ps(32767.5));
         let number = _mm512_cmp_ps_mask::<_CMP_ORD_Q>(scaled, scaled);
-        // What is too small becomes the least i32, and what is too large would; the last conversion saturates.
+        // What is too small becomes the least i32, and what is too large would. The conversion saturates.
         let wide = _mm512_maskz_cvtps_epi32(number, _mm512_min_ps(_mm512_set1_ps(32767.0), scaled));
         _mm256_storeu_si256(at.cast(), _mm512_cvtsepi32_epi16(wide));
         (low | high).count_ones()
