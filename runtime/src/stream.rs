@@ -22,7 +22,7 @@ use crate::{Plan, ProcessError, Sample, Shape, StateError, SwapError};
 ///
 /// | | NaN or infinity in the input | sums that overflow |
 /// |---|---|---|
-/// | direct | seen in the outputs; filtered again with zeros | filtered again at most once |
+/// | direct | seen in the outputs; frames that they reach filtered again | filtered again at most once |
 /// | overlap-save | replaced first; filtered once | the batch once more, from smaller numbers |
 /// | recursive | replaced first; filtered once | filtered once; state 0, [counted](Self::state_resets) |
 ///
@@ -105,13 +105,13 @@ impl Stream {
         input: &(impl Input + ?Sized),
         output: &mut (impl Output + ?Sized),
     ) -> Result<usize, ProcessError> {
-        let samples = self.check(input, output)?;
+        let frames = self.check(input, output)?;
         self.replaced += match self.plan.offsets() {
             Some(offsets) => self.engine.process(&WithoutOffsets { input, offsets }, output),
             None => self.engine.process(input, output),
         };
-        self.position += input.frames() as u64;
-        Ok(samples)
+        self.position += frames as u64;
+        Ok(frames * self.ratio())
     }
 
     /// As [`Stream::run`], on all threads of `pool` at once, with the same bits: each takes chunks of frames
@@ -128,13 +128,13 @@ impl Stream {
         output: &mut (impl SplitOutput + ?Sized),
         pool: &crate::ThreadPool,
     ) -> Result<usize, ProcessError> {
-        let samples = self.check(input, output)?;
+        let frames = self.check(input, output)?;
         self.replaced += match self.plan.offsets() {
             Some(offsets) => self.engine.process_parallel(&WithoutOffsets { input, offsets }, output, pool),
             None => self.engine.process_parallel(input, output, pool),
         };
-        self.position += input.frames() as u64;
-        Ok(samples)
+        self.position += frames as u64;
+        Ok(frames * self.ratio())
     }
 
     /// Brings out the last samples by [`Plan::flush_frames`] frames of zeros, which are part of the stream
@@ -144,11 +144,11 @@ impl Stream {
     /// [`ProcessError::OutputTooShort`]; nothing is processed then.
     pub fn flush(&mut self, output: &mut (impl Output + ?Sized)) -> Result<usize, ProcessError> {
         let zeros = Zeros { channels: self.channels(), frames: self.plan.flush_frames() };
-        let samples = self.check(&zeros, output)?;
+        let frames = self.check(&zeros, output)?;
         // Zeros without offsets: what no converter delivered.
         self.engine.process(&zeros, output);
-        self.position += zeros.frames as u64;
-        Ok(samples)
+        self.position += frames as u64;
+        Ok(frames * self.ratio())
     }
 
     /// Makes this stream, whatever it was, the continuation of `running` by its own plan, at the same frame
@@ -225,7 +225,7 @@ impl Stream {
         self.engine.count((position % self.plan.alignment() as u64) as usize)
     }
 
-    /// The samples that will be written, if everything fits.
+    /// The frames of a call, if everything fits.
     fn check(
         &self,
         input: &(impl Input + ?Sized),
@@ -241,7 +241,7 @@ impl Stream {
         if output.capacity() < wanted {
             return Err(ProcessError::OutputTooShort { given: output.capacity(), wanted });
         }
-        Ok(wanted)
+        Ok(frames)
     }
 
     fn shape(&self) -> Shape {

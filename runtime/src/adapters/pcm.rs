@@ -59,8 +59,11 @@ impl Input for [PcmFrames<'_>] {
 
     fn in_memory<T: Sample>(&self) -> Option<&[T]> {
         let [alone] = self else { return None };
-        let whole = &alone.bytes[..alone.bytes.len() / alone.frame_bytes() * alone.frame_bytes()];
-        if is_native::<T>(alone.layout) { bytemuck::try_cast_slice(whole).ok() } else { None }
+        if !is_native::<T>(alone.layout) {
+            return None;
+        }
+        let whole = alone.bytes.len() / alone.frame_bytes() * alone.frame_bytes();
+        bytemuck::try_cast_slice(&alone.bytes[..whole]).ok()
     }
 
     fn is_finite(&self, frames: Range<usize>) -> bool {

@@ -4,17 +4,17 @@
 //! they lie) with a vector of coefficients for each phase p. The order of the sum is that of the
 //! [kernels](crate::simd); it is the same wherever the frame stands in its call.
 //!
-//! NaN and infinity are detected in the output sums, not by a pass over the input. A block in which they are
-//! found is filtered again with zeros in their place, so that each frame is filtered at most twice.
+//! NaN and infinity are detected in the output sums, not by a pass over the input. Frames of a block whose
+//! windows hold them are filtered again with zeros in their place: each frame is filtered at most twice.
 
 #[cfg(test)]
 mod tests;
 
-use super::filter::{Facts, Filter, check_finite, phase_taps, replace_not_finite};
+use super::filter::{Facts, Filter, check_finite, phase_taps};
 use crate::adapters::{Input, Output};
 use crate::aligned::Aligned;
 use crate::history::History;
-use crate::simd::{FirKernel, Polyphase, Segment, Tiling};
+use crate::simd::{FirKernel, Polyphase, Replaced, Segment, Tiling, not_finite, replace_not_finite};
 use crate::state::{Count, Numbers};
 use crate::{BuildError, Isa, Sample};
 use std::ops::Range;
@@ -25,8 +25,6 @@ const CACHE_SAMPLES: usize = 4096;
 const BLOCK_UNIT: usize = 96;
 /// Copying all frames of a call of fewer samples is cheaper than one more tile of the kernel.
 const SHORT_CALL: usize = 256;
-/// Blocks of a segment where each frame is read only once, so that the cache does not matter.
-const SEGMENT_BLOCKS: usize = 8;
 
 /// Coefficients in the order of use.
 #[derive(Debug)]
@@ -52,6 +50,14 @@ pub(crate) struct DirectState<T: Sample> {
     output: Aligned<T>,
 }
 
+/// What was not finite in some frames.
+struct Lost {
+    /// Samples.
+    count: u64,
+    /// The frames whose windows hold them.
+    touched: Range<usize>,
+}
+
 impl<T: Sample> Direct<T> {
     /// `taps[i]` = f_i at the fast rate, M = `ratio` >= 1, N >= 1 filters.
     pub(crate) fn new(taps: &[Vec<f64>], ratio: usize, isa: Isa) -> Result<Self, BuildError> {
@@ -64,7 +70,10 @@ impl<T: Sample> Direct<T> {
             .filter(|&len| len.saturating_mul(ratio) <= isize::MAX as usize / 64)
             .ok_or(BuildError::TooLong { history: phase_taps - 1, channels })?;
         let tiling = kernel.tiling(channels, len, ratio);
-        let block = (CACHE_SAMPLES / channels).saturating_sub(phase_taps).clamp(BLOCK_UNIT, 8 * BLOCK_UNIT)
+        // A short block of one channel would show what a block costs. Outputs of more than one group of
+        // phases are written in several passes, and must stay in the cache too.
+        let most = if channels == 1 && ratio <= 4 { 16 * BLOCK_UNIT } else { 8 * BLOCK_UNIT };
+        let block = (CACHE_SAMPLES / channels).saturating_sub(phase_taps).clamp(BLOCK_UNIT, most)
             / BLOCK_UNIT
             * BLOCK_UNIT;
         let coefficient = |element, phase| T::from_f64(coefficient(taps, ratio, element, phase));
@@ -94,85 +103,118 @@ impl<T: Sample> Direct<T> {
         (pays && head <= self.block).then_some(head)
     }
 
-    /// Filters samples in the caller's memory to outputs there, segment by segment, until one may not be
-    /// finite; returns the frames before that segment, all of them if there is none, with the history that
-    /// follows them.
+    /// Filters samples in the caller's memory to outputs there, block by block; returns how many were not
+    /// finite and were taken as 0. Frames whose windows hold some of these go through the history.
     ///
-    /// The head is filtered last in its segment: its loads would straddle recent stores, and store
-    /// forwarding would stall.
-    fn process_in_memory(
-        &self,
-        history: &mut History<T>,
-        samples: &[T],
-        frames: usize,
-        out: &mut [T],
-    ) -> usize {
-        let Some(head) = self.head(frames) else { return 0 };
+    /// The head is filtered last in its block: its loads would straddle recent stores, and store forwarding
+    /// would stall.
+    fn process_in_memory(&self, history: &mut History<T>, samples: &[T], head: usize, out: &mut [T]) -> u64 {
         let (n, &Tiling { history: before, vector, .. }) = (self.channels, self.filters.tiling());
-        history.room(head).copy_from_slice(&samples[..head * n]);
-        let begin = Segment { x: history.view(), first: 0, frames: head };
+        let frames = samples.len() / n;
         let segment = |first: usize, end: usize| {
             let x = &samples[first * n - before..end * n];
             Segment { x, first, frames: end - first }
         };
-        let len = if self.filters.reads_once() { SEGMENT_BLOCKS * self.block } else { self.block };
-        // Whole vectors, so that all segments after it are whole vectors too.
-        let first = frames.min(head + ((len - head) & !(vector - 1)));
-        if !self.filters.run(&[segment(head, first), begin], out) {
-            return 0;
-        }
-        let mut done = first;
+        // Whole vectors, so that all blocks after it are whole vectors too.
+        let first = head + ((self.block - head) & !(vector - 1));
+        let (mut done, mut end, mut replaced) = (0, frames.min(first), 0);
+        // The history is that of frame `followed`. Windows of frames before `clean` may hold NaN.
+        let (mut followed, mut clean) = (0, 0);
         while done < frames {
-            let next = frames.min(done + len);
-            if !self.filters.run(&[segment(done, next)], out) {
-                break;
+            let filtered = done >= clean;
+            let finite = filtered
+                && if done == 0 {
+                    history.room(head).copy_from_slice(&samples[..head * n]);
+                    let begin = Segment { x: history.view(), first: 0, frames: head };
+                    self.filters.run(&[segment(head, end), begin], out)
+                } else {
+                    self.filters.run(&[segment(done, end)], out)
+                };
+            if !finite {
+                let again = if filtered { self.suspects(samples, done..end) } else { done..end };
+                if followed < again.start {
+                    history.load(&samples[..again.start * n]);
+                }
+                history.room(again.len()).copy_from_slice(&samples[again.start * n..again.end * n]);
+                let lost = self.replace(history, again.len());
+                let touched = if filtered { lost.touched.clone() } else { 0..again.len() };
+                self.filter_again(history, touched, again.clone(), out);
+                history.advance(again.len());
+                (replaced, followed) = (replaced + lost.count, again.end);
+                clean = clean.max(again.start + lost.touched.end);
+                // Where there are many, more are to come: the next block is not filtered in vain.
+                if 2 * lost.touched.len() > end - done {
+                    clean = clean.max(end + 1);
+                }
             }
-            done = next;
+            (done, end) = (end, frames.min(end + self.block));
         }
-        history.load(&samples[..done * n]);
-        done
+        if followed < frames {
+            history.load(samples);
+        }
+        replaced
     }
 
     /// Filters at most a block through the state's history; returns how many samples were not finite and
-    /// were taken as 0. If that is `expected`, they are looked for before filtering and not after it.
+    /// were taken as 0.
     fn process_block(
         &self,
         state: &mut DirectState<T>,
         input: &(impl Input + ?Sized),
         frames: Range<usize>,
         output: &mut (impl Output + ?Sized),
-        expected: bool,
     ) -> u64 {
         let DirectState { history, output: block } = state;
-        let room = history.room(frames.len());
-        input.load(self.isa, frames.start, room);
-        let known = if expected { replace_not_finite(room) } else { 0 };
-        let samples = frames.start * self.ratio..frames.end * self.ratio;
-        let found = match output.slots(samples.clone()) {
-            Some(slots) => self.filter_room(history, frames.len(), slots, expected),
+        let (len, samples) = (frames.len(), frames.start * self.ratio..frames.end * self.ratio);
+        input.load(self.isa, frames.start, history.room(len));
+        let mut filter = |out: &mut [T]| {
+            // Filtered first: hardly ever is there anything to replace.
+            if self.filters.run(&[Segment { x: history.view(), first: 0, frames: len }], out) {
+                return 0;
+            }
+            let lost = self.replace(history, len);
+            self.filter_again(history, lost.touched, 0..len, out);
+            lost.count
+        };
+        let replaced = match output.slots(samples.clone()) {
+            Some(slots) => filter(slots),
             None => {
                 let block = &mut block[..samples.len()];
-                let count = self.filter_room(history, frames.len(), block, expected);
+                let replaced = filter(block);
                 output.store(self.isa, samples.start, block);
-                count
+                replaced
             }
         };
-        history.advance(frames.len());
-        known + found
+        history.advance(len);
+        replaced
     }
 
-    /// Filters the frames in the history's room; returns how many samples were not finite and were taken as
-    /// 0, if it is not known that there are none.
-    fn filter_room(&self, history: &mut History<T>, frames: usize, out: &mut [T], known_finite: bool) -> u64 {
-        // Filtered first: hardly ever is there anything to replace.
-        if self.filters.run(&[Segment { x: history.view(), first: 0, frames }], out) || known_finite {
-            return 0;
+    /// The frames of a block in memory whose windows may hold samples that are not finite.
+    fn suspects(&self, samples: &[T], block: Range<usize>) -> Range<usize> {
+        let n = self.channels;
+        let places = not_finite(self.isa, &samples[block.start * n..block.end * n]);
+        let first = block.start + places.start / n;
+        if first < self.history_frames {
+            // The windows of the first frames begin in the history.
+            return block;
         }
-        let count = replace_not_finite(history.room(frames));
-        if count > 0 {
-            self.filters.run(&[Segment { x: history.view(), first: 0, frames }], out);
-        }
-        count
+        first..block.end.min(block.start + places.end.div_ceil(n) + self.history_frames)
+    }
+
+    /// Zeros in place of what is not finite in the frames of the history's room.
+    fn replace(&self, history: &mut History<T>, frames: usize) -> Lost {
+        let Replaced { count, places } = replace_not_finite(self.isa, history.room(frames));
+        let reach = if count > 0 { self.history_frames } else { 0 };
+        Lost { count, touched: places.start / self.channels..places.end.div_ceil(self.channels) + reach }
+    }
+
+    /// Filters `touched` of the frames in the history's room, whose outputs are those of a range of frames.
+    fn filter_again(&self, history: &History<T>, touched: Range<usize>, frames: Range<usize>, out: &mut [T]) {
+        // Whole vectors take least time.
+        let len = touched.len().next_multiple_of(self.filters.tiling().vector);
+        let len = len.min(frames.len() - touched.start);
+        let x = &history.view()[touched.start * self.channels..];
+        self.filters.run(&[Segment { x, first: frames.start + touched.start, frames: len }], out);
     }
 
     /// A state before frame `first` of `input`, as if all frames before it had been processed: at least
@@ -182,7 +224,7 @@ impl<T: Sample> Direct<T> {
         let mut samples = vec![T::default(); self.history_frames * self.channels];
         input.load(self.isa, first - self.history_frames, &mut samples);
         // They are counted where they are processed.
-        replace_not_finite(&mut samples);
+        replace_not_finite(self.isa, &mut samples);
         let mut state = self.state();
         state.history.load(&samples);
         state
@@ -221,15 +263,16 @@ impl<T: Sample> Filter for Direct<T> {
         input: &(impl Input + ?Sized),
         output: &mut (impl Output + ?Sized),
     ) -> u64 {
-        let (frames, mut done, mut expected) = (input.frames(), 0, false);
-        if let (Some(samples), Some(out)) = (input.in_memory(), output.slots(0..frames * self.ratio)) {
-            done = self.process_in_memory(&mut state.history, samples, frames, out);
-            expected = self.head(frames).is_some();
+        let frames = input.frames();
+        if let (Some(head), Some(samples)) = (self.head(frames), input.in_memory())
+            && let Some(out) = output.slots(0..frames * self.ratio)
+        {
+            return self.process_in_memory(&mut state.history, samples, head, out);
         }
-        let mut replaced = 0;
+        let (mut done, mut replaced) = (0, 0);
         while done < frames {
             let end = frames.min(done + self.block);
-            replaced += self.process_block(state, input, done..end, output, expected);
+            replaced += self.process_block(state, input, done..end, output);
             done = end;
         }
         replaced

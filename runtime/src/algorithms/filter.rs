@@ -70,13 +70,3 @@ pub(super) fn check_finite<T: Sample>(taps: &[Vec<f64>]) -> Result<(), BuildErro
     }
     Ok(())
 }
-
-/// Zeros in place of NaN and infinity, counted.
-pub(super) fn replace_not_finite<T: Sample>(samples: &mut [T]) -> u64 {
-    let mut count = 0;
-    for slot in samples.iter_mut().filter(|value| !value.is_finite()) {
-        *slot = T::default();
-        count += 1;
-    }
-    count
-}

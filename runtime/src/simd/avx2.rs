@@ -187,8 +187,7 @@ impl Vector for Avx2F32 {
         let wide = _mm256_cvtps_epi32(_mm256_min_ps(_mm256_set1_ps(32767.0), number));
         let packed = _mm_packs_epi32(_mm256_castsi256_si128(wide), _mm256_extracti128_si256::<1>(wide));
         _mm_storeu_si128(at.cast(), packed);
-        // Hardly ever is there anything to count.
-        if clipped == 0 { 0 } else { clipped.count_ones() }
+        clipped.count_ones()
     }
 }
 

@@ -119,8 +119,8 @@ macro_rules! instruction_sets {
 }
 
 instruction_sets! {
-    "x86_64" Avx2 avx2 avx2 "avx2,fma";
-    "x86_64" Avx512 avx512 avx2 "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma";
+    "x86_64" Avx2 avx2 avx2 "avx2,fma,popcnt";
+    "x86_64" Avx512 avx512 avx2 "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma,popcnt";
     "aarch64" Neon neon neon "neon";
 }
 

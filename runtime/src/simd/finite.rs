@@ -1,47 +1,127 @@
-//! Whether samples are numbers.
+//! Whether samples are numbers, and zeros in place of those that are not.
 
-use super::dispatch::{Element, Kernel, compiled_narrow};
+use super::dispatch::{Element, Kernel, compiled};
 use super::isa::Isa;
-use super::vector::Vector;
+use super::vector::{MOST_LANES, Vector};
 use std::marker::PhantomData;
+use std::ops::Range;
 
-/// Lanes of a partial sum; there are four of them, so that none waits long for the one before.
-const LANES: usize = 8;
-
-/// True only if all samples are finite; false also for sums past the largest number.
-pub(crate) fn all_finite<T: Element>(isa: Isa, samples: &[T]) -> bool {
-    // SAFETY: the kernel asks nothing of its job.
-    unsafe { compiled_narrow::<AllFinite<T>>(isa)(samples) }
+/// What was not finite.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Replaced {
+    /// Samples.
+    pub(crate) count: u64,
+    /// From the vector of the first one to that of the last one; empty if there is none.
+    pub(crate) places: Range<usize>,
 }
 
-struct AllFinite<T>(PhantomData<T>);
+/// Zeros in place of NaN and infinity.
+pub(crate) fn replace_not_finite<T: Element>(isa: Isa, samples: &mut [T]) -> Replaced {
+    // SAFETY: the kernel asks nothing of its job.
+    unsafe { compiled::<ReplaceNotFinite<T>>(isa)(samples) }
+}
 
-impl<T: Element> Kernel for AllFinite<T> {
+struct ReplaceNotFinite<T>(PhantomData<T>);
+
+impl<T: Element> Kernel for ReplaceNotFinite<T> {
     type Sample = T;
-    type Job<'a> = &'a [T];
-    type Output = bool;
+    type Job<'a> = &'a mut [T];
+    type Output = Replaced;
 
-    /// What is not finite stays so in a sum, and one addition a sample is cheap.
     #[inline(always)]
-    unsafe fn run<V: Vector<Sample = T>>(samples: &[T]) -> bool {
-        let [mut a, mut b, mut c, mut d] = [[T::default(); LANES]; 4];
-        let (blocks, rest) = samples.as_chunks::<{ 4 * LANES }>();
-        for x in blocks {
-            for l in 0..LANES {
-                a[l] = a[l] + x[l];
-                b[l] = b[l] + x[LANES + l];
-                c[l] = c[l] + x[2 * LANES + l];
-                d[l] = d[l] + x[3 * LANES + l];
+    unsafe fn run<V: Vector<Sample = T>>(samples: &mut [T]) -> Replaced {
+        let (mut counts, mut places) = ([0u32; MOST_LANES], 0..0);
+        let mut replace = |place: usize, samples: &mut [T]| {
+            for (count, sample) in counts.iter_mut().zip(&mut *samples) {
+                *count += u32::from(!sample.is_finite());
+                *sample = if sample.is_finite() { *sample } else { T::default() };
+            }
+            places = if places.is_empty() { place } else { places.start }..place + samples.len();
+        };
+        let whole = samples.len() / V::LANES * V::LANES;
+        let (vectors, rest) = samples.split_at_mut(whole);
+        for (index, vector) in vectors.chunks_exact_mut(V::LANES).enumerate() {
+            // The slice holds a vector.
+            if !V::load(vector.as_ptr()).finite() {
+                replace(index * V::LANES, vector);
             }
         }
-        let sum = rest.iter().fold(T::default(), |sum, &x| sum + x);
-        (0..LANES).fold(sum, |sum, l| sum + ((a[l] + b[l]) + (c[l] + d[l]))).is_finite()
+        if rest.iter().any(|sample| !sample.is_finite()) {
+            replace(whole, rest);
+        }
+        Replaced { count: counts.into_iter().map(u64::from).sum(), places }
     }
+}
+
+/// Vectors of a block, whose sum tells.
+const BLOCK: usize = 4;
+
+/// The samples from the block of the first one that is not finite to that of the last one; none if all are.
+pub(crate) fn not_finite<T: Element>(isa: Isa, samples: &[T]) -> Range<usize> {
+    // SAFETY: the kernel asks nothing of its job.
+    unsafe { compiled::<NotFinite<T>>(isa)(samples) }
+}
+
+/// True if all samples are finite.
+pub(crate) fn all_finite<T: Element>(isa: Isa, samples: &[T]) -> bool {
+    not_finite(isa, samples).is_empty()
+}
+
+struct NotFinite<T>(PhantomData<T>);
+
+impl<T: Element> Kernel for NotFinite<T> {
+    type Sample = T;
+    type Job<'a> = &'a [T];
+    type Output = Range<usize>;
+
+    /// What is not finite stays so in a sum, so that few samples are asked one by one.
+    #[inline(always)]
+    unsafe fn run<V: Vector<Sample = T>>(samples: &[T]) -> Range<usize> {
+        let (len, mut first, mut places) = (BLOCK * V::LANES, 0, 0..0);
+        while first < samples.len() {
+            let blocks = samples[first..].chunks_exact(len);
+            first += len * blocks.take_while(|block| sum::<V>(block).finite()).count();
+            let end = samples.len().min(first + len);
+            if samples[first..end].iter().fold(false, |any, sample| any | !sample.is_finite()) {
+                places = if places.is_empty() { first } else { places.start }..end;
+            }
+            first = end;
+        }
+        places
+    }
+}
+
+/// The sum of the vectors of a block, which is there.
+#[inline(always)]
+unsafe fn sum<V: Vector>(block: &[V::Sample]) -> V {
+    (1..BLOCK).fold(V::load(block.as_ptr()), |sum, v| sum.add(V::load(block.as_ptr().add(v * V::LANES))))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Zeros stand at some places after a call, and all others stay.
+    fn check_replaced(isa: Isa, mut samples: Vec<f32>, places: &[usize]) {
+        let (first, last) = (*places.iter().min().unwrap(), *places.iter().max().unwrap());
+        let mut want = samples.clone();
+        places.iter().for_each(|&place| want[place] = 0.0);
+        let replaced = replace_not_finite(isa, &mut samples);
+        assert_eq!((samples, replaced.count), (want, if first == last { 1 } else { 2 }));
+        let Range { start, end } = replaced.places;
+        assert!(
+            (start..start + MOST_LANES).contains(&first) && (last + 1..=last + MOST_LANES).contains(&end)
+        );
+    }
+
+    #[test]
+    fn sums_that_overflow_are_finite_samples() {
+        for isa in Isa::available() {
+            let mut samples = [f32::MAX; 200];
+            assert!(all_finite(isa, &samples));
+            assert_eq!(replace_not_finite(isa, &mut samples), Replaced { count: 0, places: 0..0 });
+        }
+    }
 
     #[test]
     fn what_is_not_finite_is_noticed_wherever_it_is() {
@@ -55,10 +135,12 @@ mod tests {
                     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
                         let mut samples = clean.clone();
                         samples[place] = bad;
-                        assert!(!all_finite(isa, &samples), "{bad} at {place} of {len}");
+                        assert!(not_finite(isa, &samples).contains(&place), "{bad} at {place} of {len}");
+                        check_replaced(isa, samples.clone(), &[place]);
                         // Two infinities do not cancel.
                         samples[(place + 64) % len] = -bad;
                         assert!(!all_finite(isa, &samples));
+                        check_replaced(isa, samples.clone(), &[place, (place + 64) % len]);
                         let wide: Vec<f64> = samples.iter().map(|&x| f64::from(x)).collect();
                         assert!(!all_finite(isa, &wide));
                     }

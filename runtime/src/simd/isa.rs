@@ -26,7 +26,7 @@ pub struct Isa(Kind);
 pub(super) enum Kind {
     /// What every processor of the architecture has.
     Portable,
-    /// x86-64 with AVX2 and FMA: 256-bit vectors.
+    /// x86-64 with AVX2, FMA and POPCNT: 256-bit vectors.
     #[cfg(target_arch = "x86_64")]
     Avx2,
     /// x86-64 with AVX-512 F, VL, BW and DQ: 512-bit vectors.
@@ -53,7 +53,11 @@ impl Kind {
         match self {
             Self::Portable => true,
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            Self::Avx2 => {
+                is_x86_feature_detected!("avx2")
+                    && is_x86_feature_detected!("fma")
+                    && is_x86_feature_detected!("popcnt")
+            }
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => {
                 Self::Avx2.is_available()
@@ -125,7 +129,9 @@ mod tests {
         let names: Vec<_> = Isa::available().map(Isa::name).collect();
         assert_eq!(
             names.contains(&"avx2"),
-            is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+            is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("fma")
+                && is_x86_feature_detected!("popcnt")
         );
         assert!(!names.contains(&"avx512") || is_x86_feature_detected!("avx512f"));
     }

@@ -56,7 +56,7 @@ mod vector;
 pub(crate) mod work;
 
 pub(crate) use dispatch::Element;
-pub(crate) use finite::all_finite;
+pub(crate) use finite::{Replaced, all_finite, not_finite, replace_not_finite};
 pub(crate) use fir::{FirKernel, Polyphase, Segment, Tiling};
 pub use isa::Isa;
 pub(crate) use pcm::{decode, encode, interleave};

@@ -1,6 +1,6 @@
-//! Samples of PCM formats to f32 and back, and frames from rows, a lane group at a time.
+//! Samples of PCM formats to f32 and back a vector at a time, and frames from rows a lane group at a time.
 
-use super::dispatch::{Kernel, compiled_narrow};
+use super::dispatch::{Kernel, compiled, compiled_narrow};
 use super::fir::widths;
 use super::isa::Isa;
 use super::vector::Vector;
@@ -13,7 +13,7 @@ const GROUP: usize = 8;
 /// rest.
 pub(crate) fn decode(isa: Isa, format: PcmFormat, bytes: &[u8], out: &mut [f32]) -> usize {
     // SAFETY: the kernel checks the lengths itself.
-    unsafe { compiled_narrow::<Decode>(isa)((format, bytes, out)) }
+    unsafe { compiled::<Decode>(isa)((format, bytes, out)) }
 }
 
 /// Encodes all samples; returns how many were clipped.
@@ -23,7 +23,7 @@ pub(crate) fn decode(isa: Isa, format: PcmFormat, bytes: &[u8], out: &mut [f32])
 pub(crate) fn encode(isa: Isa, format: PcmFormat, samples: &[f32], out: &mut [u8]) -> u64 {
     assert!(samples.len() * format.bytes() <= out.len());
     // SAFETY: the kernel asks nothing of its job.
-    unsafe { compiled_narrow::<Encode>(isa)((format, samples, out)) }
+    unsafe { compiled::<Encode>(isa)((format, samples, out)) }
 }
 
 /// Sample p of frame k of `out` = `rows[p * stride + k]`, for frames of `m` samples; returns the
@@ -46,22 +46,21 @@ pub(crate) fn interleave(
     unsafe { compiled_narrow::<Interleave>(isa)(Rows { rows, stride, m, frames, out: out.as_mut_ptr() }) }
 }
 
-/// Decodes whole groups with `$load`, of a format of so many bytes; the samples done.
-macro_rules! groups {
+/// Decodes whole vectors with `$load`, of a format of so many bytes; the samples done.
+macro_rules! vectors {
     ($out:ident, $bytes:ident, $size:literal, $at:ident => $load:expr) => {{
-        let (groups, _) = $out.as_chunks_mut::<GROUP>();
         let mut done = 0;
-        for (out, bytes) in groups.iter_mut().zip($bytes.as_chunks::<{ GROUP * $size }>().0) {
+        for (out, bytes) in $out.chunks_exact_mut(V::LANES).zip($bytes.chunks_exact($size * V::LANES)) {
             let $at = bytes.as_ptr();
-            // Both arrays hold a group.
+            // Both slices hold a vector.
             $load.store(out.as_mut_ptr());
-            done += GROUP;
+            done += V::LANES;
         }
         done
     }};
 }
 
-/// Whole groups; the samples done.
+/// Whole vectors; the samples done.
 struct Decode;
 
 impl Kernel for Decode {
@@ -73,10 +72,10 @@ impl Kernel for Decode {
     unsafe fn run<V: Vector<Sample = f32>>((format, bytes, out): Self::Job<'_>) -> usize {
         match format {
             PcmFormat::F32Le if cfg!(target_endian = "little") => {
-                groups!(out, bytes, 4, at => V::load(at.cast()))
+                vectors!(out, bytes, 4, at => V::load(at.cast()))
             }
-            PcmFormat::S16Le => groups!(out, bytes, 2, at => V::load_i16(at)),
-            PcmFormat::S32Le => groups!(out, bytes, 4, at => V::load_i32(at)),
+            PcmFormat::S16Le => vectors!(out, bytes, 2, at => V::load_i16(at)),
+            PcmFormat::S32Le => vectors!(out, bytes, 4, at => V::load_i32(at)),
             _ => 0,
         }
     }
@@ -95,11 +94,11 @@ impl Kernel for Encode {
         if format != PcmFormat::S16Le {
             return encode_each(format, samples, out);
         }
-        let (blocks, rest) = samples.as_chunks::<GROUP>();
-        let (groups, last) = out.split_at_mut(2 * GROUP * blocks.len());
+        let (vectors, rest) = samples.split_at(samples.len() / V::LANES * V::LANES);
+        let (places, last) = out.split_at_mut(2 * vectors.len());
         let mut clipped = 0;
-        for (samples, out) in blocks.iter().zip(groups.as_chunks_mut::<{ 2 * GROUP }>().0) {
-            // Both arrays hold a group.
+        for (samples, out) in vectors.chunks_exact(V::LANES).zip(places.chunks_exact_mut(2 * V::LANES)) {
+            // Both slices hold a vector.
             clipped += u64::from(V::load(samples.as_ptr()).store_i16(out.as_mut_ptr()));
         }
         clipped + encode_each(format, rest, last)

@@ -64,7 +64,7 @@ pub(crate) const fn group_lanes<T>() -> usize {
 }
 
 /// Lanes of the widest vector.
-const MOST_LANES: usize = 16;
+pub(super) const MOST_LANES: usize = 16;
 
 /// A vector of samples: one lane group or two.
 ///

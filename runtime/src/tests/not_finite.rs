@@ -50,6 +50,62 @@ fn what_is_not_finite_is_found_wherever_it_is() {
     }
 }
 
+/// Frames of samples that are not finite: at random distances of up to `most` frames, at the beginning and
+/// the end, and about the ends of the blocks that the direct algorithm filters at once.
+fn bad_frames(frames: usize, most: usize, noise: &mut Noise) -> Vec<usize> {
+    let mut bad: Vec<usize> =
+        [0, 1, 95, 96, frames - 1].into_iter().filter(|&frame| frame < frames).collect();
+    let mut frame = 0;
+    while frame < frames {
+        bad.push(frame);
+        frame += 1 + (noise.next().abs() * most as f64) as usize;
+    }
+    bad.extend((1..frames / 96).map(|block| 96 * block - 1));
+    if most > 300 {
+        bad.retain(|frame| frame % 5 < 2);
+    }
+    bad
+}
+
+#[test]
+fn what_is_not_finite_is_zero_at_any_distance() {
+    let mut noise = Noise(78);
+    // With histories within a block, and longer than one.
+    let shapes = [
+        (1, 1, 1),
+        (1, 1, 30),
+        (1, 4, 9),
+        (2, 2, 12),
+        (3, 2, 5),
+        (4, 4, 16),
+        (5, 3, 40),
+        (8, 6, 130),
+        (2, 1, 400),
+    ];
+    for ((n, m, lags), most) in shapes.into_iter().flat_map(|shape| [3, 60, 700].map(|most| (shape, most))) {
+        let bank = fir_bank(random_taps(n, lags * m, &mut noise), m);
+        let mut input = noise.samples(n * 5000);
+        let places: Vec<usize> =
+            bad_frames(5000, most, &mut noise).into_iter().map(|frame| frame * n + frame % n).collect();
+        places.iter().for_each(|&place| input[place] = 0.0);
+        let want = run(&bank, Options::default(), &input);
+        for (index, &place) in places.iter().enumerate() {
+            input[place] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY][index % 3];
+        }
+        let count = input.iter().filter(|x| !x.is_finite()).count() as u64;
+        for call in [5000, 2111, 700, 64, 17] {
+            let mut stream = start(&bank, Options::default()).unwrap();
+            let mut out = vec![0.0; want.len()];
+            for (x, y) in input.chunks(call * n).zip(out.chunks_mut(call * m)) {
+                stream.process(x, y).unwrap();
+            }
+            let different = out.iter().zip(&want).position(|(a, b)| a.to_bits() != b.to_bits());
+            let case = format!("N {n} M {m} K {lags}, up to {most} frames apart, calls of {call} frames");
+            assert_eq!((different, stream.replaced()), (None, count), "{case}");
+        }
+    }
+}
+
 #[test]
 fn what_is_not_finite_never_reaches_a_state() {
     let mut noise = Noise(7);

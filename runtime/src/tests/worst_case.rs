@@ -136,6 +136,31 @@ fn direct_and_overlap_save_filter_a_frame_twice_at_most() {
     }
 }
 
+/// NaN in one of a thousand frames: few others share a window with it.
+#[test]
+fn the_direct_algorithm_filters_few_frames_again_for_one_that_is_not_finite() {
+    let mut noise = Noise(72);
+    for (n, m, k) in SHAPES {
+        let mut stream = start(&fir_bank(random_taps(n, m * k, &mut noise), m), Options::default()).unwrap();
+        for call in [64, 1000, 16_000] {
+            let mut input = noise.samples(n * call);
+            let mut out = vec![0.0; m * call];
+            let mut work = |input: &[f32]| work::of(|| assert!(stream.process(input, &mut out).is_ok()));
+            let usual = work(&input);
+            // Blocks of one channel are the longest ones, and two samples in a block would be too many.
+            let places = (n * call / 2..n * call).step_by(1000 * n.max(2));
+            let bad = places.clone().count();
+            places.for_each(|place| input[place] = f32::NAN);
+            let again = (work(&input) - usual) * call / usual;
+            // The frames of the windows, and those that fill a vector at each end.
+            assert!(
+                (bad * k.min(call / 2)..=bad * (k + 48)).contains(&again),
+                "N {n} M {m} K {k}: {again} of {call} frames"
+            );
+        }
+    }
+}
+
 #[test]
 fn recursions_filter_a_frame_once() {
     let dense = StateSpace {

@@ -21,11 +21,12 @@ mod tests;
 
 pub(crate) use shape::Shape;
 
-use super::filter::{Facts, Filter, check_finite, phase_taps, replace_not_finite};
+use super::filter::{Facts, Filter, check_finite, phase_taps};
 use crate::adapters::{Input, Output};
 use crate::aligned::Aligned;
 use crate::simd::{
-    OutputFrames, Segments, Spectra, Transform, TransformKernel, all_finite, group_lanes, row_samples,
+    OutputFrames, Segments, Spectra, Transform, TransformKernel, all_finite, group_lanes, replace_not_finite,
+    row_samples,
 };
 use crate::state::{Count, Numbers};
 use crate::{BuildError, Isa, Sample};
@@ -199,7 +200,7 @@ impl<T: Sample> OverlapSave<T> {
         let n = self.shape.channels;
         let room = &mut state.samples[(self.shape.history + state.filled) * n..][..frames * n];
         input.load(self.isa, first, room);
-        if all_finite(self.isa, room) { 0 } else { replace_not_finite(room) }
+        replace_not_finite(self.isa, room).count
     }
 
     /// The outputs of a complete batch, whose frames are `outside` or in the state, to `slots` or the state.

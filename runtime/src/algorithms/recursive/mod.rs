@@ -16,11 +16,11 @@ mod tests;
 
 pub use self::delay_lines::{DelayLines, DelayedInput};
 use self::layout::Layout;
-use super::filter::{Facts, Filter, replace_not_finite};
+use super::filter::{Facts, Filter};
 use crate::adapters::{Input, Output};
 use crate::aligned::Aligned;
 use crate::history::History;
-use crate::simd::{FirKernel, Form, Polyphase, Recursion, RecursionKernel, Segment, all_finite};
+use crate::simd::{FirKernel, Form, Polyphase, Recursion, RecursionKernel, Segment, replace_not_finite};
 use crate::state::{Count, Numbers};
 use crate::{BuildError, Isa};
 
@@ -175,9 +175,7 @@ impl Filter for Recursive {
             let frames = (input.frames() - first).min(BLOCK - state.phase_offset);
             let samples = state.history.room(frames);
             input.load(self.isa, first, samples);
-            if !all_finite(self.isa, samples) {
-                replaced += replace_not_finite(samples);
-            }
+            replaced += replace_not_finite(self.isa, samples).count;
             self.filter(state, frames);
             output.store(self.isa, first * self.ratio, &state.output[..frames * self.ratio]);
             state.commit(frames);

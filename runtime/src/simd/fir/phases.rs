@@ -112,8 +112,12 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     #[inline(always)]
     fn check<const R: usize>(&mut self, sums: &[V; R]) {
         let checked = self.job.tiling.checked;
-        // Long filters are asked once a tile.
-        if checked & const { (1 << (R - 1)) - 1 } != 0 {
+        // Long filters are asked once a tile, short ones about every vector.
+        if checked == !0 {
+            for r in 0..R - 1 {
+                self.total = self.total.add(sums[r]);
+            }
+        } else if checked & const { (1 << (R - 1)) - 1 } != 0 {
             for r in 0..R - 1 {
                 if checked >> r & 1 == 1 {
                     keep_branch();

@@ -70,11 +70,6 @@ impl<T: Element> Polyphase<T> {
         &self.tiling
     }
 
-    /// True if each frame is read only once.
-    pub(crate) fn reads_once(&self) -> bool {
-        self.groups.len() == 1
-    }
-
     /// Phase p of frame t goes to `out[t M + p]`. The t-th frame of a segment begins at
     /// `x[tiling.history + t * tiling.hop]`; frames past the last one, up to whole vectors, are read too and
     /// mean nothing.
