@@ -106,6 +106,7 @@ fn check_kind(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure> {
     let unused = [
         ("--seed", "a scene without cameras", arguments.seed.is_some() && has_cameras),
         ("--reverse-order", "a scene without cameras", arguments.reverse_order && has_cameras),
+        ("--degree", "a scene with cameras", arguments.degree.is_some() && !has_cameras),
         (
             "--lambda",
             "the row fit, so a rectified rig and --method rows",
@@ -169,10 +170,8 @@ fn render(
         }
         Kind::Uncalibrated { images, tracks, targets, size } => {
             let images: Vec<&Image> = images.iter().collect();
-            let mut special = UncalibratedSettings::default();
-            special.seed = arguments.seed.unwrap_or(special.seed);
-            special.reverse_order = arguments.reverse_order;
-            special.plane.degree = arguments.degree.unwrap_or(special.plane.degree);
+            let seed = arguments.seed.unwrap_or(UncalibratedSettings::default().seed);
+            let special = UncalibratedSettings { seed, reverse_order: arguments.reverse_order };
             let done =
                 uncalibrated::render(&images, tracks, &targets[frame], *size, &settings, &special, watch)
                     .map_err(Failure::input)?;

@@ -136,8 +136,7 @@ fn render_with<const ORDER: usize, const C: usize>(
         return Err(RenderError::NoOverlap { pixels, dropped });
     }
     let report = Report { propagated, occluded: propagated - used, used, dropped, ..Report::default() };
-    let fit =
-        problem.stiffened_by_area().solve(None, &|share| watch(GATHERING + (1.0 - GATHERING) * share))?;
+    let fit = problem.stiffened_by_area().solve(&|share| watch(GATHERING + (1.0 - GATHERING) * share))?;
     Ok(Rendering::of_plane::<C>(fit, report, chosen, agreement))
 }
 
@@ -210,7 +209,7 @@ mod tests {
         ViewWeights::of(&views, &target).apply(&mut samples);
         let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation).unwrap();
         problem.add(&samples).unwrap();
-        let fit = problem.stiffened_by_area().solve(None, &|_| ()).unwrap();
+        let fit = problem.stiffened_by_area().solve(&|_| ()).unwrap();
         assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
         // In bands only the order of summation differs.
         let footprint = Footprint::of(&views, &(0..views.len()).collect::<Vec<_>>(), &target, &frame);
@@ -222,7 +221,7 @@ mod tests {
             problem.add(&band).unwrap();
         }
         assert_eq!(problem.samples(), samples.len());
-        let banded = problem.stiffened_by_area().solve(None, &|_| ()).unwrap();
+        let banded = problem.stiffened_by_area().solve(&|_| ()).unwrap();
         assert_eq!(banded.mask, fit.mask);
         let worst = banded.values.iter().zip(&fit.values).fold(0.0, |w: f32, (a, b)| w.max((a - b).abs()));
         assert!(worst < 1e-2, "{worst}");

@@ -30,9 +30,6 @@ const ROW_SAMPLE: f64 = 67.0;
 /// Bytes of a place in a band beside its sample: positions, depths, weights, cells.
 const PLACE: f64 = 45.0;
 
-/// The same of a sample whose place is known already: its position, depth and radius once more, and flags.
-const POINT: f64 = 35.0;
-
 /// Bytes per pixel of a prediction: of the evidence of a row fit, of the regressors with slopes, distances
 /// and jitter, of the search for local limits, and of the errors that are its result.
 const ROW_EVIDENCE: f64 = 28.0;
@@ -121,16 +118,13 @@ impl Extent {
             .max(self.plane(settings.interpolation.plane.degree, samples + self.samples as f64))
     }
 
-    /// Bytes of a view of views without cameras, all of whose samples are held at a time.
-    pub fn of_tracks(&self, degree: Degree) -> f64 {
-        let (samples, sample) = (self.samples as f64, self.sample());
-        // The brightness of all views; then the samples of one with their chi, or with the ends on each
-        // pixel.
-        let surfaced = 4.0 * self.pixels as f64;
-        let decided = 56.0 * self.largest as f64;
-        let tested = (sample + POINT) * samples;
-        let fitted = self.virtual_pixels() + self.plane(degree, sample * samples);
-        BASE + surfaced.max(decided).max(tested).max(fitted)
+    /// Bytes of a view of views without cameras.
+    pub fn of_tracks(&self) -> f64 {
+        // The brightness of all views, with what lies in front and behind on each pixel of one; then the
+        // depths in front in all views, and counts of the virtual one.
+        let decided = 4.0 * self.pixels as f64 + 36.0 * self.largest as f64;
+        let rendered = 4.0 * self.pixels as f64 + self.rendering() + 3.0 * self.virtual_pixels();
+        BASE + decided.max(rendered)
     }
 
     /// Bytes of the prediction of a view of a rectified rig, with what is known of views before it.

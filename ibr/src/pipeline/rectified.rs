@@ -164,7 +164,7 @@ fn render_plane<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Ren
     }
     let report = total(counts.iter(), HoleCount::default());
     enough(job, &report)?;
-    let fit = problem.solve(None, job.watch)?;
+    let fit = problem.solve(job.watch)?;
     let mut keys = fit.depth.data().to_vec();
     job.disparities(&mut keys);
     let depth = DepthMap::from_known((width, height), keys, Measure::Disparity);

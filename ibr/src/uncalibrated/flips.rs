@@ -6,7 +6,7 @@
 //! 2000). Diagonals are exchanged one by one while the colours improve.
 
 use super::Point;
-use super::mesh::{Facet, Feature, Mesh};
+use super::mesh::{Facet, Mesh, Shares};
 use std::collections::{BTreeMap, VecDeque};
 
 /// Pixels of a quadrilateral that are compared, about, at most.
@@ -29,10 +29,10 @@ fn edge(a: usize, b: usize) -> Edge {
     (a.min(b), a.max(b))
 }
 
-/// Exchanges diagonals of the mesh while pixels with the new chi fit other views better. `miss` returns how
-/// far the colour of a pixel with a chi differs from that in other views, in grey levels, and `None` for
-/// pixels that none of them shows.
-pub fn exchange(mesh: &mut Mesh, miss: impl Fn(&Point, f64) -> Option<f64>) -> usize {
+/// Exchanges diagonals of the mesh while the colours of the views improve. `miss` returns by how much the
+/// views differ, in grey levels, where the corners of a triangle have some shares, and `None` where no two
+/// of them show it.
+pub fn exchange(mesh: &mut Mesh, miss: impl Fn(&[usize; 3], Shares) -> Option<f64>) -> usize {
     let mut sides: BTreeMap<Edge, Vec<usize>> = BTreeMap::new();
     for (t, [a, b, c]) in mesh.triangles.iter().enumerate() {
         for e in [edge(*a, *b), edge(*b, *c), edge(*c, *a)] {
@@ -88,8 +88,8 @@ impl Quad {
     }
 
     /// Whether all four angles turn the same way, and none is nearly straight.
-    fn is_convex(&self, corners: &[Feature]) -> bool {
-        let at = self.around().map(|i| corners[i].position);
+    fn is_convex(&self, corners: &[Point]) -> bool {
+        let at = self.around().map(|i| corners[i]);
         let turn = |k: usize| {
             let (to, from) = (at[(k + 2) % 4] - at[(k + 1) % 4], at[(k + 1) % 4] - at[k]);
             from.perp(&to) / (from.norm() * to.norm())
@@ -99,21 +99,23 @@ impl Quad {
     }
 
     /// Compares the colours of its pixels under both diagonals.
-    fn is_better_exchanged(&self, corners: &[Feature], miss: &impl Fn(&Point, f64) -> Option<f64>) -> bool {
-        let [a, b, c, d] = [self.a, self.b, self.c, self.d].map(|i| corners[i]);
-        let facet = |corner: [Feature; 3]| Facet::new(&corner);
-        let facets = (facet([a, b, c]), facet([b, a, d]), facet([c, d, b]), facet([d, c, a]));
-        let (Some(left), Some(right), Some(after), Some(before)) = facets else { return false };
-        let beside = |from: &Feature, to: &Feature, p: &Point| {
-            (to.position - from.position).perp(&(p - from.position))
-        };
+    fn is_better_exchanged(
+        &self,
+        corners: &[Point],
+        miss: &impl Fn(&[usize; 3], Shares) -> Option<f64>,
+    ) -> bool {
+        let Self { a, b, c, d, .. } = *self;
+        let beside =
+            |from: usize, to: usize, p: &Point| (corners[to] - corners[from]).perp(&(p - corners[from]));
         // The sides of the diagonals on which c and b lie.
-        let (of_c, of_b) = (beside(&a, &b, &c.position), beside(&c, &d, &b.position));
+        let (of_c, of_b) = (beside(a, b, &corners[c]), beside(c, d, &corners[b]));
+        let miss =
+            |corner: [usize; 3], p: &Point| miss(&corner, Facet::new(&corner.map(|i| corners[i]))?.shares(p));
         let (mut old, mut new, mut count) = (0.0, 0.0, 0.0_f64);
         for p in self.pixels(corners) {
-            let now = if beside(&a, &b, &p) * of_c > 0.0 { &left } else { &right };
-            let then = if beside(&c, &d, &p) * of_b > 0.0 { &after } else { &before };
-            if let (Some(m), Some(n)) = (miss(&p, now.chi(&p)), miss(&p, then.chi(&p))) {
+            let now = if beside(a, b, &p) * of_c > 0.0 { [a, b, c] } else { [b, a, d] };
+            let then = if beside(c, d, &p) * of_b > 0.0 { [c, d, b] } else { [d, c, a] };
+            if let (Some(m), Some(n)) = (miss(now, &p), miss(then, &p)) {
                 (old, new, count) = (old + m, new + n, count + 1.0);
             }
         }
@@ -121,8 +123,8 @@ impl Quad {
     }
 
     /// Pixel centres within, on a grid that gives no more than about MOST_PIXELS.
-    fn pixels(&self, corners: &[Feature]) -> impl Iterator<Item = Point> {
-        let at = self.around().map(|i| corners[i].position);
+    fn pixels(&self, corners: &[Point]) -> impl Iterator<Item = Point> {
+        let at = self.around().map(|i| corners[i]);
         let area = (at[2] - at[0]).perp(&(at[3] - at[1])).abs() / 2.0;
         let step = (area / MOST_PIXELS).sqrt().ceil().max(1.0);
         let low = at.iter().fold(at[0], |l, p| l.inf(p)).map(|v| (v / step).ceil() * step);
@@ -160,20 +162,39 @@ mod tests {
     use super::*;
     use crate::uncalibrated::random::dice::Dice;
 
-    /// Features on a disturbed grid of 7 x 7 points, ten pixels apart, with chi from their positions.
-    fn mesh(chi: impl Fn(&Point) -> f64, shake: f64) -> Mesh {
+    /// Corners on a disturbed grid of 7 x 7 points, ten pixels apart.
+    fn mesh(shake: f64) -> Mesh {
         let dice = &mut Dice::new(5);
         let place = |k: usize| {
             let (dx, dy) = (dice.within(-shake, shake), dice.within(-shake, shake));
             Point::new(10.0 * (k % 7) as f64 + dx, 10.0 * (k / 7) as f64 + dy)
         };
-        let positions: Vec<Point> = (0..49).map(place).collect();
-        Mesh::delaunay(&positions.iter().map(|p| Feature { position: *p, chi: chi(p) }).collect::<Vec<_>>())
+        Mesh::delaunay((0..49).map(place).collect())
+    }
+
+    /// A position in a triangle, and the interpolant of `chi` there.
+    fn interpolated(
+        corners: &[Point],
+        corner: &[usize; 3],
+        shares: Shares,
+        chi: impl Fn(&Point) -> f64,
+    ) -> (Point, f64) {
+        let at = |k: usize| corners[corner[k]];
+        ((0..3).map(|k| at(k) * shares[k]).sum(), (0..3).map(|k| chi(&at(k)) * shares[k]).sum())
+    }
+
+    /// Exchanges edges until the interpolant of `chi` fits `shown`.
+    fn fit(mesh: &mut Mesh, chi: impl Fn(&Point) -> f64, shown: impl Fn(&Point) -> f64) -> usize {
+        let corners = mesh.corners.clone();
+        exchange(mesh, |corner, shares| {
+            let (p, chi) = interpolated(&corners, corner, shares, &chi);
+            Some((chi - shown(&p)).abs())
+        })
     }
 
     fn areas(mesh: &Mesh) -> Vec<f64> {
         let area = |t: &[usize; 3]| {
-            let [a, b, c] = t.map(|i| mesh.corners[i].position);
+            let [a, b, c] = t.map(|i| mesh.corners[i]);
             (b - a).perp(&(c - a)) / 2.0
         };
         mesh.triangles.iter().map(area).collect()
@@ -184,26 +205,28 @@ mod tests {
     fn a_ridge_is_found() {
         let roof = |p: &Point| (p.x - p.y).abs();
         let across = |p: &Point| (p.x + p.y - 60.0).abs();
-        let mut found = mesh(across, 0.0);
+        let mut found = mesh(0.0);
         let worst = |mesh: &Mesh| {
-            let at = |k: usize| Point::new((k % 61) as f64, (k / 61) as f64);
-            let chi = mesh.chi((61, 61));
-            chi.iter().enumerate().map(|(k, chi)| (chi - roof(&at(k))).abs()).fold(0.0, f64::max)
+            let mut worst = 0.0_f64;
+            mesh.visit(&mesh.corners, (61, 61), |_, corner, shares| {
+                let (p, chi) = interpolated(&mesh.corners, corner, shares, roof);
+                worst = worst.max((chi - roof(&p)).abs());
+            });
+            worst
         };
         // Delaunay's diagonals of a square are a matter of chance; these all cross the ridge.
-        exchange(&mut found, |p, chi| Some((chi - across(p)).abs()));
-        found.corners.iter_mut().for_each(|f| f.chi = roof(&f.position));
+        fit(&mut found, across, across);
         assert!(worst(&found) > 4.0);
-        exchange(&mut found, |p, chi| Some((chi - roof(p)).abs()));
+        fit(&mut found, roof, roof);
         assert!(worst(&found) < 1e-12, "{}", worst(&found));
     }
 
     #[test]
     fn a_plane_keeps_its_edges() {
         let plane = |p: &Point| 0.3 * p.x - 0.1 * p.y;
-        let mut found = mesh(plane, 3.0);
+        let mut found = mesh(3.0);
         let before = found.clone();
-        assert_eq!(exchange(&mut found, |p, chi| Some((chi - plane(p)).abs())), 0);
+        assert_eq!(fit(&mut found, plane, plane), 0);
         assert_eq!(exchange(&mut found, |_, _| None), 0);
         assert_eq!(found, before);
     }
@@ -211,9 +234,11 @@ mod tests {
     /// Colours without sense exchange edges at random; the triangles still cover the hull once.
     #[test]
     fn the_hull_stays_covered() {
-        let mut found = mesh(|p| (p.x * p.y).sin(), 4.0);
+        let mut found = mesh(4.0);
         let before: f64 = areas(&found).iter().sum();
-        let noise = |p: &Point, chi: f64| Some(50.0 * (1e4 * (p.x + 3.0 * p.y + chi)).sin().abs());
+        let noise = |corner: &[usize; 3], shares: Shares| {
+            Some(50.0 * (1e4 * (shares[0] + corner[0] as f64 * shares[1])).sin().abs())
+        };
         assert!(exchange(&mut found, noise) > 0);
         let after = areas(&found);
         assert!(after.iter().all(|a| a * before > 0.0), "{after:?}");

@@ -1,7 +1,7 @@
-//! Dense chi from sparse features: linear interpolation on Delaunay triangles in the image.
+//! Triangles between the features of a view.
 //!
-//! On a plane of the scene chi is an affine function of the pixel in every projective frame, so the
-//! interpolation is exact on planar facets; that of the projective depth itself would not be.
+//! On a plane of the scene chi is an affine function of the pixel in every projective frame, so linear
+//! interpolation on triangles is exact on planar facets; that of the projective depth itself would not be.
 
 use super::Point;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
@@ -9,38 +9,34 @@ use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 /// Of features closer than this, in pixels, only the first is used.
 const CLOSEST: f64 = 0.5;
 
-/// A feature with its chi.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Feature {
-    /// Position in pixels.
-    pub position: Point,
-    /// chi there.
-    pub chi: f64,
-}
+/// Shares of the corners of a triangle in a position; their sum is one.
+pub type Shares = [f64; 3];
 
-/// Triangles between features of one view, which cover their convex hull.
+/// Triangles between features, which cover their convex hull.
 ///
 /// ```
 /// use hybank_ibr::uncalibrated::Point;
-/// use hybank_ibr::uncalibrated::mesh::{Feature, Mesh};
+/// use hybank_ibr::uncalibrated::mesh::Mesh;
 ///
+/// let corners = [(0.0, 0.0), (4.0, 0.0), (0.0, 2.0), (4.0, 2.0)].map(|(x, y)| Point::new(x, y));
+/// let mesh = Mesh::delaunay(corners.to_vec());
 /// // On a plane chi is an affine function of the pixel, here x / 4.
-/// let corners = [(0.0, 0.0), (4.0, 0.0), (0.0, 2.0), (4.0, 2.0)];
-/// let features = corners.map(|(x, y)| Feature { position: Point::new(x, y), chi: 0.25 * x });
-/// let mesh = Mesh::delaunay(&features);
-/// assert_eq!(mesh.triangles(), 2);
-/// assert_eq!(mesh.chi((5, 3))[5 + 2], 0.5);
+/// let mut chi = [f64::NAN; 5 * 3];
+/// mesh.visit(&corners, (5, 3), |pixel, corner, shares| {
+///     chi[pixel] = (0..3).map(|k| shares[k] * 0.25 * corners[corner[k]].x).sum();
+/// });
+/// assert_eq!(chi[5 + 2], 0.5);
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
-    pub(super) corners: Vec<Feature>,
+    pub(crate) corners: Vec<Point>,
     /// Corners of each triangle by number, all in the same sense of rotation.
     pub(super) triangles: Vec<[usize; 3]>,
 }
 
 struct Vertex {
     position: Point2<f64>,
-    feature: Feature,
+    number: usize,
 }
 
 impl HasPosition for Vertex {
@@ -51,96 +47,82 @@ impl HasPosition for Vertex {
 }
 
 impl Mesh {
-    /// The Delaunay triangulation.
+    /// The Delaunay triangulation of some positions.
     ///
-    /// Features that are not finite, or too far out for the triangulation's exact predicates, are left out.
-    pub fn delaunay(features: &[Feature]) -> Self {
-        let triangulation = triangulate(features);
-        let corners = triangulation.vertices().map(|v| v.data().feature).collect();
-        let triangles = triangulation.inner_faces().map(|f| f.vertices().map(|v| v.index())).collect();
+    /// Positions that are not finite, or too far out for the triangulation's exact predicates, and those
+    /// next to others are no corners of triangles.
+    pub fn delaunay(corners: Vec<Point>) -> Self {
+        let mut triangulation: DelaunayTriangulation<Vertex> = DelaunayTriangulation::new();
+        for (number, corner) in corners.iter().enumerate() {
+            let position = Point2::new(corner.x, corner.y);
+            let apart = triangulation.nearest_neighbor(position).is_none_or(
+                |near: spade::handles::VertexHandle<'_, Vertex, _, _, _>| {
+                    near.position().distance_2(position) >= CLOSEST * CLOSEST
+                },
+            );
+            if apart {
+                // The library refuses coordinates beyond the range of its exact predicates.
+                let _ = triangulation.insert(Vertex { position, number });
+            }
+        }
+        let numbers = |face: spade::handles::FaceHandle<'_, spade::handles::InnerTag, Vertex, _, _, _>| {
+            face.vertices().map(|v| v.data().number)
+        };
+        let triangles = triangulation.inner_faces().map(numbers).collect();
         Self { corners, triangles }
     }
 
-    /// The number of triangles.
-    pub fn triangles(&self) -> usize {
-        self.triangles.len()
-    }
-
-    /// chi at every pixel centre within the hull, NaN outside; rows from the top.
-    pub fn chi(&self, size: (usize, usize)) -> Vec<f64> {
-        let mut chi = vec![f64::NAN; size.0 * size.1];
-        self.visit(size, |_, pixel, value| chi[pixel] = value);
-        chi
-    }
-
-    /// Calls `visit` with triangle, pixel and chi for every pixel centre of every triangle. A pixel on an
-    /// edge belongs to the triangles on both sides, which agree there.
-    pub fn visit(&self, size: (usize, usize), mut visit: impl FnMut(usize, usize, f64)) {
-        for (number, triangle) in self.triangles.iter().enumerate() {
-            let corner = triangle.map(|i| self.corners[i]);
-            visit_triangle(&corner, size, |pixel, chi| visit(number, pixel, chi));
+    /// Calls `visit` with pixel, corners and their shares for every pixel centre of every triangle, where
+    /// the corners lie at `places` in an image. A pixel on an edge belongs to the triangles on both sides.
+    pub fn visit(
+        &self,
+        places: &[Point],
+        size: (usize, usize),
+        mut visit: impl FnMut(usize, &[usize; 3], Shares),
+    ) {
+        for triangle in &self.triangles {
+            visit_triangle(&triangle.map(|i| places[i]), size, |p, shares| visit(p, triangle, shares));
         }
     }
 }
 
-/// chi at every pixel centre within the convex hull of the features by their Delaunay triangulation.
-pub fn dense_chi(features: &[Feature], size: (usize, usize)) -> Vec<f64> {
-    Mesh::delaunay(features).chi(size)
-}
-
-fn triangulate(features: &[Feature]) -> DelaunayTriangulation<Vertex> {
-    let mut triangulation = DelaunayTriangulation::new();
-    for f in features {
-        let position = Point2::new(f.position.x, f.position.y);
-        let apart = triangulation.nearest_neighbor(position).is_none_or(
-            |near: spade::handles::VertexHandle<'_, Vertex, _, _, _>| {
-                near.position().distance_2(position) >= CLOSEST * CLOSEST
-            },
-        );
-        if f.chi.is_finite() && apart {
-            // The library refuses coordinates beyond the range of its exact predicates; such features are
-            // skipped.
-            let _ = triangulation.insert(Vertex { position, feature: *f });
-        }
-    }
-    triangulation
-}
-
-/// chi as an affine function of the position: the plane through three features.
+/// The shares of three corners as affine functions of the position.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Facet {
-    origin: Feature,
-    slope: Point,
+    origin: Point,
+    slopes: [Point; 2],
 }
 
 impl Facet {
-    /// `None` for features on a line.
-    pub(super) fn new(corner: &[Feature; 3]) -> Option<Self> {
-        let [a, b, c] = corner;
-        let (ab, ac) = (b.position - a.position, c.position - a.position);
+    /// `None` for corners on a line.
+    pub(super) fn new([a, b, c]: &[Point; 3]) -> Option<Self> {
+        let (ab, ac) = (b - a, c - a);
         let area = ab.perp(&ac);
-        let (up, vp) = (b.chi - a.chi, c.chi - a.chi);
-        let slope = Point::new(up * ac.y - vp * ab.y, vp * ab.x - up * ac.x) / area;
-        (area != 0.0).then_some(Self { origin: *a, slope })
+        let slopes = [Point::new(ac.y, -ac.x) / area, Point::new(-ab.y, ab.x) / area];
+        (area != 0.0).then_some(Self { origin: *a, slopes })
     }
 
-    pub(super) fn chi(&self, position: &Point) -> f64 {
-        self.origin.chi + self.slope.dot(&(position - self.origin.position))
+    pub(super) fn shares(&self, position: &Point) -> Shares {
+        let [b, c] = self.slopes.map(|slope| slope.dot(&(position - self.origin)));
+        [1.0 - b - c, b, c]
     }
 }
 
-/// The linear interpolant at the pixel centres of a triangle, row by row.
-fn visit_triangle(corner: &[Feature; 3], (width, height): (usize, usize), mut visit: impl FnMut(usize, f64)) {
-    let Some(facet) = Facet::new(corner) else { return };
-    let positions = corner.map(|f| f.position);
-    let [a, b, c] = positions;
+/// The shares at the pixel centres of a triangle, row by row.
+fn visit_triangle(
+    corners: &[Point; 3],
+    (width, height): (usize, usize),
+    mut visit: impl FnMut(usize, Shares),
+) {
+    let Some(facet) = Facet::new(corners) else { return };
+    let [a, b, c] = corners;
     let top = a.y.min(b.y).min(c.y).ceil().max(0.0) as usize;
     let bottom = a.y.max(b.y).max(c.y).floor().min(height as f64 - 1.0);
     for y in top..(bottom + 1.0).max(0.0) as usize {
-        let Some((left, right)) = span(&positions, y as f64) else { continue };
+        let Some((left, right)) = span(corners, y as f64) else { continue };
         let end = (right.floor().min(width as f64 - 1.0) + 1.0).max(0.0) as usize;
         for x in left.ceil().max(0.0) as usize..end {
-            visit(y * width + x, facet.chi(&Point::new(x as f64, y as f64)));
+            visit(y * width + x, facet.shares(&Point::new(x as f64, y as f64)));
         }
     }
 }
@@ -166,8 +148,13 @@ fn span(corners: &[Point; 3], y: f64) -> Option<(f64, f64)> {
 mod tests {
     use super::*;
 
-    fn feature(x: f64, y: f64, chi: f64) -> Feature {
-        Feature { position: Point::new(x, y), chi }
+    /// What `value` gives for every corner, interpolated; NaN outside of the hull.
+    fn dense(corners: &[Point], size: (usize, usize), value: impl Fn(&Point) -> f64) -> Vec<f64> {
+        let mut dense = vec![f64::NAN; size.0 * size.1];
+        Mesh::delaunay(corners.to_vec()).visit(corners, size, |pixel, corner, shares| {
+            dense[pixel] = (0..3).map(|k| shares[k] * value(&corners[corner[k]])).sum();
+        });
+        dense
     }
 
     #[test]
@@ -175,10 +162,9 @@ mod tests {
         let f = |x: f64, y: f64| 0.3 - 0.02 * x + 0.05 * y;
         let positions =
             [(2.0, 1.0), (17.0, 2.0), (18.0, 12.0), (1.0, 13.0), (9.3, 6.1), (5.5, 9.2), (12.4, 3.3)];
-        let features: Vec<Feature> = positions.iter().map(|(x, y)| feature(*x, *y, f(*x, *y))).collect();
-        let chi = dense_chi(&features, (20, 15));
+        let corners = positions.map(|(x, y)| Point::new(x, y));
         let hull = [(2.0, 1.0), (17.0, 2.0), (18.0, 12.0), (1.0, 13.0)];
-        for (i, got) in chi.iter().enumerate() {
+        for (i, got) in dense(&corners, (20, 15), |p| f(p.x, p.y)).iter().enumerate() {
             let (x, y) = ((i % 20) as f64, (i / 20) as f64);
             let side = |k: usize| {
                 let (p, q): ((f64, f64), (f64, f64)) = (hull[k], hull[(k + 1) % 4]);
@@ -194,21 +180,20 @@ mod tests {
     }
 
     #[test]
-    fn doubles_broken_and_collinear_features_do_no_harm() {
-        let mut features = vec![
-            feature(0.0, 0.0, 1.0),
-            feature(9.0, 0.0, 1.0),
-            feature(0.0, 9.0, 1.0),
-            feature(0.1, 0.1, 77.0),
-            feature(f64::NAN, 1.0, 1.0),
-            feature(3.0, 3.0, f64::INFINITY),
-            feature(1e300, 1.0, 1.0),
-        ];
-        let chi = dense_chi(&features, (10, 10));
-        assert_eq!(chi[11], 1.0);
-        assert!(chi[99].is_nan());
-        features.truncate(2);
-        assert!(dense_chi(&features, (10, 10)).iter().all(|c| c.is_nan()));
-        assert!(dense_chi(&[], (3, 3)).iter().all(|c| c.is_nan()));
+    fn doubles_broken_and_collinear_corners_do_no_harm() {
+        let corners = [
+            (0.0, 0.0),
+            (9.0, 0.0),
+            (0.0, 9.0),
+            (0.1, 0.1),
+            (f64::NAN, 1.0),
+            (3.0, f64::INFINITY),
+            (1e300, 1.0),
+        ]
+        .map(|(x, y)| Point::new(x, y));
+        let found = dense(&corners, (10, 10), |p| if p.x == 0.1 { 77.0 } else { 1.0 });
+        assert!((found[11] - 1.0).abs() < 1e-12 && found[99].is_nan());
+        assert!(dense(&corners[..2], (10, 10), |_| 1.0).iter().all(|v| v.is_nan()));
+        assert!(dense(&[], (3, 3), |_| 1.0).iter().all(|v| v.is_nan()));
     }
 }

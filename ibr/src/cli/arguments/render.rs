@@ -88,8 +88,8 @@ pub(in crate::cli) struct RenderArguments {
     /// Drop pixels of unknown depth instead of filling it from the farther neighbour.
     #[arg(long)]
     pub(in crate::cli) drop_unknown: bool,
-    /// Degree of the splines of the plane; rows are cubic [default: cubic; linear without cameras]. A linear
-    /// plane takes less time and is less sharp.
+    /// Degree of the splines of the plane; rows are cubic, and scenes without cameras have none
+    /// [default: cubic]. A linear plane takes less time and is less sharp.
     #[arg(long, value_enum)]
     pub(in crate::cli) degree: Option<Degree>,
     /// Weight of the slope penalty of the row fit (rectified rigs), px^2 [default: from the noise of the

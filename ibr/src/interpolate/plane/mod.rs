@@ -164,49 +164,31 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         bytes(width, height) > 1.5 * bytes(height, width)
     }
 
-    /// Whether a sample lies within half a gap of each pixel.
-    pub(crate) fn seen(&self) -> impl Iterator<Item = bool> + '_ {
-        let upright = |p: usize| p % self.height * self.width + p / self.height;
-        let index = move |p: usize| if self.turned { upright(p) } else { p };
-        (0..self.depth.len()).map(move |p| !self.depth[index(p)].is_nan())
-    }
-
-    /// Fits the image. With `region`, only the pixels where it is true are filled and fitted together;
-    /// all others become black disocclusions. `watch` is called with the share of the fit that is done.
+    /// Fits the image. `watch` is called with the share of the fit that is done.
     ///
     /// # Errors
     /// [`InterpolationError::NoSamples`] when no sample was added.
-    pub(crate) fn solve(
-        mut self,
-        region: Option<&[bool]>,
-        watch: Watch<'_>,
-    ) -> Result<PlaneFit, InterpolationError> {
+    pub(crate) fn solve(mut self, watch: Watch<'_>) -> Result<PlaneFit, InterpolationError> {
         let (width, height, turned) = (self.width, self.height, self.turned);
         if self.added.count == 0 {
             let (width, height) = if turned { (height, width) } else { (width, height) };
             return Err(InterpolationError::NoSamples { width, height });
         }
-        let given = |p: usize| if turned { p % width * height + p / width } else { p };
-        let inside = |p: usize| region.is_none_or(|r| r.get(given(p)).copied().unwrap_or(false));
         let mut mask = background::classify(&self.depth, width, &self.settings.depth_test);
         let guessed = mask.iter_mut().zip(std::mem::take(&mut self.distance));
         let guessed = guessed.filter(|(cover, distance)| **cover == Cover::Seen && *distance >= GUESSED);
         guessed.for_each(|(cover, _)| *cover = Cover::Guessed);
         let background = self.settings.fill == HoleFill::Background;
         if background && mask.contains(&Cover::Disocclusion) {
-            self.fill_background(&mask, &inside);
+            self.fill_background(&mask);
         }
         let left_out = self.settings.fill == HoleFill::Leave;
-        let fitted = |p: usize| inside(p) && !(left_out && mask[p].is_hole());
+        let fitted = |p: usize| !(left_out && mask[p].is_hole());
         let (counts, mut depth) = (std::mem::take(&mut self.counts), std::mem::take(&mut self.depth));
         let (mut values, convergence) = self.fitted(&depth, &fitted, watch);
         // The depths that were continued into holes are those of the springs only.
         let holes = depth.iter_mut().zip(&mask).filter(|(_, cover)| **cover != Cover::Seen);
         holes.for_each(|(depth, _)| *depth = f32::NAN);
-        (0..width * height).filter(|p| !inside(*p)).for_each(|p| {
-            mask[p] = Cover::Disocclusion;
-            values[p * C..(p + 1) * C].fill(0.0);
-        });
         if left_out {
             super::rows::blacken(&mask, &mut values, C);
         }
@@ -221,7 +203,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     }
 
     /// Gives every disoccluded pixel a sample with value and depth of the surface that continues into it.
-    fn fill_background(&mut self, mask: &[Cover], inside: &dyn Fn(usize) -> bool) {
+    fn fill_background(&mut self, mask: &[Cover]) {
         let grid = self.grid();
         let sound = |(p, depth): (usize, &f32)| {
             let weight = if depth.is_nan() { 0.0 } else { self.fit.local_sums(grid.coefficient(p)).0 };
@@ -231,8 +213,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         let sources = background::sources(&sound, self.width, &self.settings.depth_test);
         let mut is_source = vec![false; sound.len()];
         drop(sound);
-        let holes = (0..mask.len()).filter(|p| mask[*p] == Cover::Disocclusion && inside(*p));
-        let holes = holes.filter(|p| sources[*p] != NONE);
+        let holes = (0..mask.len()).filter(|p| mask[*p] == Cover::Disocclusion && sources[*p] != NONE);
         holes.clone().for_each(|p| is_source[sources[p] as usize] = true);
         // The value of a seen pixel before the fit: its share of the right-hand side. The new samples must
         // not count in it.
@@ -350,7 +331,7 @@ fn interpolate_with<const ORDER: usize, const C: usize>(
 ) -> Result<PlaneFit, InterpolationError> {
     let mut problem = PlaneProblem::<ORDER, C>::new(size, settings)?;
     problem.add(samples)?;
-    problem.solve(None, &|_| ())
+    problem.solve(&|_| ())
 }
 
 #[cfg(test)]

@@ -1,13 +1,9 @@
 //! The order of depth from the photographs themselves.
 
 use super::OrderBy;
-use super::consistency::Surface;
 use super::reconstruction::Reconstruction;
-use super::synthesis::{chi_range, propagate_chi};
+use super::surface::{Surface, colour_at};
 use crate::image::Image;
-use crate::pipeline::RenderError;
-use crate::propagate::Frame;
-use crate::sample::Sample;
 use crate::uncalibrated::chirality::{self, Handedness};
 use crate::uncalibrated::order::Order;
 
@@ -40,21 +36,17 @@ pub(super) struct Advantage {
 }
 
 impl Advantage {
-    /// From both photographs of the base pair.
-    pub(super) fn of(
-        images: &[&Image],
-        surfaces: &[Surface],
-        scene: &Reconstruction,
-    ) -> Result<Self, RenderError> {
+    /// From both photographs of the base pair and the surfaces that they show.
+    pub(super) fn of(images: &[&Image], surfaces: &[Surface; 2], scene: &Reconstruction) -> Self {
         let mut all = Self::default();
         for (from, to) in [(0, 1), (1, 0)] {
-            for advantage in advantages(images, &surfaces[from], scene, from, to)? {
+            for advantage in advantages(images, &surfaces[from], scene, from, to) {
                 all.sum += advantage;
                 all.squares += advantage * advantage;
                 all.count += 1;
             }
         }
-        Ok(all)
+        all
     }
 
     /// Mean over the pixels in grey levels, positive if the order is kept.
@@ -65,6 +57,13 @@ impl Advantage {
     /// The sum in standard deviations.
     pub(super) fn deviations(&self) -> f64 {
         self.sum / self.squares.max(f64::MIN_POSITIVE).sqrt()
+    }
+
+    /// Whether a photograph is better left out where it is hidden by this order. Where two differ by d,
+    /// their mean errs by d / 2, and the one that is not hidden by d if the order misleads; so it may mislead
+    /// in a quarter of the pixels, which makes the mean half the root mean square.
+    pub(super) fn is_clear(&self, hand: Handedness) -> bool {
+        hand.sign() * self.deviations() > 0.5 * (self.count as f64).sqrt()
     }
 
     /// The order of depth by the photographs and the guessed calibrations. Each of them errs now and
@@ -87,8 +86,8 @@ impl Advantage {
     }
 }
 
-/// A pixel on which no sample falls.
-const NO_SAMPLE: u32 = u32::MAX;
+/// The colour of a point, and its depth if the order is kept.
+type Shown = (f32, [f32; 3]);
 
 /// For each pixel of view `to` on which points of two surfaces of view `from` fall: by how much the one that
 /// is nearer if the order is kept has the better colour.
@@ -98,43 +97,34 @@ fn advantages(
     scene: &Reconstruction,
     from: usize,
     to: usize,
-) -> Result<Vec<f64>, RenderError> {
-    let source = scene.camera(from)?;
-    let target = scene.camera(to)?;
-    let chi = surface.chi(images[from].size());
-    let (width, height) = images[to].size();
+) -> Vec<f64> {
+    let size = images[to].size();
     let sign = chirality::order_sign(&scene.cameras[to], Handedness::Kept);
-    let mut samples: Vec<Sample<3>> = Vec::with_capacity(chi.len());
-    let frame = Frame::whole(width, height, 0.0, 0.0);
-    propagate_chi(images[from], &chi, 0, &source.relative_to(&target), sign, &frame, |sample| {
-        samples.push(sample)
+    // The nearest and the farthest point on each pixel.
+    let mut ends: Vec<Option<[Shown; 2]>> = vec![None; size.0 * size.1];
+    surface.mesh.visit(&surface.places[to], size, |pixel, corner, shares| {
+        let place = surface.place_at(from, corner, surface.carried(shares, corner, to, from));
+        let Some(colour) = colour_at(images[from], &place) else { return };
+        let shown = ((sign * surface.chi_at(to, corner, shares)) as f32, colour);
+        let [near, far] = ends[pixel].get_or_insert([shown; 2]);
+        if shown.0 < near.0 {
+            *near = shown;
+        }
+        if shown.0 > far.0 {
+            *far = shown;
+        }
     });
-    let apart = (SURFACES_APART * chi_range(&scene.features(to))) as f32;
-    drop(chi);
-    // The nearest and the farthest sample on each pixel, by number.
-    let mut ends = vec![[NO_SAMPLE; 2]; width * height];
-    for (number, s) in samples.iter().enumerate() {
-        let p = (s.y + 0.5) as usize * width + (s.x + 0.5) as usize;
-        let Some([near, far]) = ends.get_mut(p) else { continue };
-        let depth = |number: u32| samples.get(number as usize).map(|s| s.depth);
-        if depth(*near).is_none_or(|near| s.depth < near) {
-            *near = number as u32;
-        }
-        if depth(*far).is_none_or(|far| s.depth > far) {
-            *far = number as u32;
-        }
-    }
-    let advantage = |(p, ends): (usize, &[u32; 2])| {
-        let [near, far] = ends.map(|number| samples.get(number as usize));
-        let (near, far) = near.zip(far).filter(|(near, far)| far.depth - near.depth > apart)?;
-        let shown = images[to].pixel::<3>(p);
-        let miss = |s: &Sample<3>| {
-            let sum: f32 = s.value.iter().zip(shown).map(|(a, b)| (a - b).abs()).sum();
+    let apart = surface.chi_apart(to, SURFACES_APART) as f32;
+    let advantage = |(pixel, ends): (usize, &Option<[Shown; 2]>)| {
+        let [near, far] = (*ends).filter(|[near, far]| far.0 - near.0 > apart)?;
+        let own = images[to].pixel::<3>(pixel);
+        let miss = |colour: [f32; 3]| {
+            let sum: f32 = colour.iter().zip(own).map(|(a, b)| (a - b).abs()).sum();
             (sum / 3.0).min(LARGEST_DIFFERENCE)
         };
-        Some(f64::from(miss(far) - miss(near)))
+        Some(f64::from(miss(far.1) - miss(near.1)))
     };
-    Ok(ends.iter().enumerate().filter_map(advantage).collect())
+    ends.iter().enumerate().filter_map(advantage).collect()
 }
 
 #[cfg(test)]
@@ -166,5 +156,14 @@ mod tests {
         let none = Advantage::default();
         assert_eq!(none.order(&guess(reversed, 0.99)), (reversed, OrderBy::Calibrations));
         assert_eq!(none.order(&guess(reversed, 0.9)), (reversed, OrderBy::Nothing));
+    }
+
+    /// One pixel of eight against the order is little, three of eight are too many.
+    #[test]
+    fn hidden_photographs_are_left_out_where_that_is_right() {
+        let (kept, reversed) = (Handedness::Kept, Handedness::Reversed);
+        let (clear, doubtful) = (advantage(64, 1.0), Advantage { sum: 320.0, ..advantage(64, 1.0) });
+        assert!(clear.is_clear(kept) && !clear.is_clear(reversed) && !doubtful.is_clear(kept));
+        assert!(advantage(64, -1.0).is_clear(reversed) && !Advantage::default().is_clear(kept));
     }
 }

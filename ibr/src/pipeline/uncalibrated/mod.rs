@@ -3,27 +3,28 @@
 mod all_views;
 mod base_pair;
 mod colours;
-mod consistency;
+mod morph;
 mod reconstruction;
-mod synthesis;
+mod surface;
 
 use super::memory::Extent;
 use super::{RenderError, RenderSettings, Rendering, Watch};
 use crate::image::Image;
-use crate::interpolate::Degree;
-use crate::interpolate::plane::PlaneSettings;
+use crate::interpolate::HoleFill;
 use crate::uncalibrated::Point;
 use crate::uncalibrated::order::Order;
 use colours::Advantage;
-use consistency::Surface;
+use morph::Goal;
+use rayon::prelude::*;
 use reconstruction::Reconstruction;
-use synthesis::Goal;
+use surface::Surface;
 
 /// Shares of the work, about, that are done when the scene is reconstructed, when its surfaces are meshed,
-/// and when the order of depth is decided.
+/// when the order of depth is decided, and when the virtual view has its triangles.
 const RECONSTRUCTED: f64 = 0.4;
 const SURFACES: f64 = 0.5;
-const DECIDED: f64 = 0.55;
+const DECIDED: f64 = 0.6;
+const MESHED: f64 = 0.8;
 
 /// The virtual camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,15 +42,11 @@ pub struct UncalibratedSettings {
     pub seed: u64,
     /// Exchange near and far, whatever decides their order.
     pub reverse_order: bool,
-    /// The plane fit. Positions from a mesh are wrong by fractions of a pixel, differently in each view,
-    /// which acts like noise on the values; so bending has more weight than for measured depth.
-    pub plane: PlaneSettings,
 }
 
 impl Default for UncalibratedSettings {
     fn default() -> Self {
-        let plane = PlaneSettings { stiffness: 0.02, bending: 0.3, ..PlaneSettings::LINEAR };
-        Self { seed: 1, reverse_order: false, plane }
+        Self { seed: 1, reverse_order: false }
     }
 }
 
@@ -86,7 +83,7 @@ pub enum OrderBy {
     Colours,
     /// Photographs and guessed calibrations together; neither would suffice alone.
     Both,
-    /// Neither; the order of more guesses was taken.
+    /// Neither: no surface hides another, and the photographs are blended where two lie on one ray.
     Nothing,
 }
 
@@ -125,9 +122,8 @@ pub fn render(
         return Err(RenderError::Tracks { images: images.len(), columns });
     }
     settings.check()?;
-    // How many samples fall in the view is known when the scene is reconstructed.
-    let extent = Extent { samples: 0, ..Extent::new(size, images, None) };
-    extent.check(extent.of_tracks(uncalibrated.plane.degree))?;
+    let extent = Extent::new(size, images, None);
+    extent.check(extent.of_tracks())?;
     let numbers = match target {
         Target::Tracks(_) if images.len() > 2 => base_pair::order(tracks, columns, uncalibrated.seed),
         _ => (0..columns).collect(),
@@ -136,37 +132,37 @@ pub fn render(
     // A row of another length was refused when the tracks were read.
     let reordered = |t: &Vec<Option<Point>>| numbers.iter().map(|i| t.get(*i).copied().flatten()).collect();
     let tracks: Vec<Vec<Option<Point>>> = tracks.iter().map(reordered).collect();
-    let mut scene = reconstruction::reconstruct(images, &tracks, target, uncalibrated.seed)?;
-    scene.numbers = numbers;
+    let mut scene = reconstruction::reconstruct(images, &tracks, target, &numbers, uncalibrated.seed)?;
+    scene.register(settings.offset);
     watch(RECONSTRUCTED);
-    let view_weights = synthesis::view_weights(&scene, images.len());
-    let surfaces = consistency::surfaces(images, &scene, view_weights.first_two())?;
+    let grey: Vec<Image> = images.par_iter().map(|image| image.to_grey()).collect();
+    let surfaces = [0, 1].map(|view| Surface::of(view, images[view].size(), view, &grey, &scene));
     watch(SURFACES);
-    decide(images, &surfaces, &mut scene)?;
+    let mut hides = decide(images, &surfaces, &mut scene);
     if uncalibrated.reverse_order {
-        scene.hand = scene.hand.reversed();
+        (scene.hand, hides) = (scene.hand.reversed(), true);
         (scene.geometry.order_by, scene.geometry.order_agreement) = (OrderBy::Given, 1.0);
     }
     watch(DECIDED);
-    let rest = |share| watch(DECIDED + (1.0 - DECIDED) * share);
-    let colour = images.iter().any(|i| i.channels() == 3);
-    let render = match (uncalibrated.plane.degree, colour) {
-        (Degree::Linear, false) => synthesis::render::<2, 1>,
-        (Degree::Linear, true) => synthesis::render::<2, 3>,
-        (Degree::Cubic, false) => synthesis::render::<4, 1>,
-        (Degree::Cubic, true) => synthesis::render::<4, 3>,
-    };
-    let goal = Goal { size, settings, plane: uncalibrated.plane, watch: &rest };
-    render(images, &surfaces, &scene, &view_weights, &goal)
+    let view_weights = morph::view_weights(&surfaces[0].places);
+    let surface = Surface::of(images.len(), size, view_weights.first_two()[0], &grey, &scene);
+    drop((grey, surfaces));
+    watch(MESHED);
+    let render =
+        if images.iter().any(|i| i.channels() == 3) { morph::render::<3> } else { morph::render::<1> };
+    let leave = settings.interpolation.fill == HoleFill::Leave;
+    let done = render(images, &surface, &scene, &view_weights, &Goal { size, hides, leave })?;
+    watch(1.0);
+    Ok(done)
 }
 
 /// Decides the order of depth from the photographs, which show what is in front, and the guessed
-/// calibrations.
-fn decide(images: &[&Image], surfaces: &[Surface], scene: &mut Reconstruction) -> Result<(), RenderError> {
+/// calibrations. Says whether surfaces hide others in the rendering.
+fn decide(images: &[&Image], surfaces: &[Surface; 2], scene: &mut Reconstruction) -> bool {
     let guess = Order { hand: scene.hand, agreement: scene.geometry.order_agreement };
-    let decided = Advantage::of(images, surfaces, scene)?.order(&guess);
-    (scene.hand, scene.geometry.order_by) = decided;
-    Ok(())
+    let advantage = Advantage::of(images, surfaces, scene);
+    (scene.hand, scene.geometry.order_by) = advantage.order(&guess);
+    scene.geometry.order_by != OrderBy::Nothing && advantage.is_clear(scene.hand)
 }
 
 #[cfg(test)]

@@ -9,7 +9,6 @@ use crate::setting::SHARE;
 use crate::uncalibrated::canonical::{CanonicalPair, canonical_pair};
 use crate::uncalibrated::chirality::{self, Handedness};
 use crate::uncalibrated::fundamental::{self, Fundamental};
-use crate::uncalibrated::mesh::Feature;
 use crate::uncalibrated::metric;
 use crate::uncalibrated::order::Order;
 use crate::uncalibrated::resection::{REPROJECTION, Resection, Sighting, resect};
@@ -19,6 +18,10 @@ use nalgebra::{Matrix3x4, Vector4};
 
 /// Matches used for a metric guess; the order of depth, one bit, needs no more.
 const GUESS_MATCHES: usize = 150;
+
+/// Sampson distance in pixels up to which a match is a point of the scene. Those of more than a pixel do not
+/// determine F, but a corner of the hull that is left out takes a large triangle with it.
+const FARTHEST: f64 = 3.0;
 
 /// The scene in a projective frame: oriented cameras (the virtual one last) and points.
 pub(super) struct Reconstruction {
@@ -33,10 +36,12 @@ pub(super) struct Reconstruction {
 }
 
 impl Reconstruction {
-    /// The camera of a view; the virtual one comes after all views.
-    pub(super) fn camera(&self, view: usize) -> Result<Camera, RenderError> {
-        Camera::projective(self.cameras[view])
-            .map_err(|source| RenderError::Geometry(GeometryError::Camera { which: self.name(view), source }))
+    /// Refuses singular cameras.
+    fn check(&self) -> Result<(), GeometryError> {
+        self.cameras.iter().enumerate().try_for_each(|(view, camera)| match Camera::projective(*camera) {
+            Ok(_) => Ok(()),
+            Err(source) => Err(GeometryError::Camera { which: self.name(view), source }),
+        })
     }
 
     /// A view by its name for messages.
@@ -44,32 +49,34 @@ impl Reconstruction {
         if view + 1 == self.cameras.len() {
             return "the virtual camera".into();
         }
-        format!("the camera of view {}", self.numbers.get(view).unwrap_or(&view) + 1)
+        format!("the camera of view {}", self.numbers[view] + 1)
     }
 
-    /// The features of one view with their chi, without points behind it.
-    pub(super) fn features(&self, view: usize) -> Vec<Feature> {
-        self.features_with(view, view)
+    /// Moves the virtual view by some columns.
+    pub(super) fn register(&mut self, columns: f64) {
+        let target = self.cameras.len() - 1;
+        let moved = self.cameras[target].row(0) + self.cameras[target].row(2) * columns;
+        self.cameras[target].set_row(0, &moved);
+        self.seen.iter_mut().filter_map(|seen| seen[target].as_mut()).for_each(|p| p.x += columns);
     }
 
-    /// Those of a view that another one has too.
-    pub(super) fn features_with(&self, view: usize, other: usize) -> Vec<Feature> {
-        let matrix = &self.cameras[view];
-        let feature = |(point, seen): (&Vector4<f64>, &Vec<Option<Point>>)| {
-            let position = seen[view]?;
-            seen[other]?;
-            let front = chirality::depth(matrix, point) > 0.0;
-            front.then(|| Feature { position, chi: chirality::chi(matrix, point) })
-        };
-        self.points.iter().zip(&self.seen).filter_map(feature).collect()
+    /// The place of a point in an image: where a photograph shows it, unless it projects elsewhere. In the
+    /// virtual view it is where it projects, as the camera errs less than a position in one image.
+    pub(super) fn place(&self, point: usize, image: usize) -> Point {
+        let p = self.cameras[image] * self.points[point];
+        let projected = p.xy() / p.z;
+        let fits = |seen: &Point| image + 1 < self.cameras.len() && (seen - projected).norm() <= REPROJECTION;
+        self.seen[point][image].filter(fits).unwrap_or(projected)
     }
 }
 
 /// Reconstructs the scene from the first two images and resects all further cameras, the virtual one last.
+/// `numbers` are those that the caller gave to the views.
 pub(super) fn reconstruct(
     images: &[&Image],
     tracks: &[Vec<Option<Point>>],
     target: &Target,
+    numbers: &[usize],
     seed: u64,
 ) -> Result<Reconstruction, RenderError> {
     let base = Base::new(images, tracks, seed)?;
@@ -101,7 +108,10 @@ pub(super) fn reconstruct(
         // Until the photographs have been asked.
         order_by: OrderBy::Nothing,
     };
-    Ok(Reconstruction { cameras, points, seen, hand: order.hand, geometry, numbers: Vec::new() })
+    let numbers = numbers.to_vec();
+    let scene = Reconstruction { cameras, points, seen, hand: order.hand, geometry, numbers };
+    scene.check()?;
+    Ok(scene)
 }
 
 /// Tracks with their positions in the virtual view as last column.
@@ -119,7 +129,7 @@ struct Base {
     f: Fundamental,
     sizes: [(usize, usize); 2],
     cameras: [Matrix3x4<f64>; 2],
-    /// Inliers of F that could be triangulated, with their matches and points.
+    /// Tracks near F that could be triangulated, with their matches and points.
     tracks: Vec<usize>,
     matches: Vec<Match>,
     points: Vec<Vector4<f64>>,
@@ -169,14 +179,15 @@ fn some<T: Copy>(all: &[T]) -> Vec<T> {
     all.iter().copied().step_by(all.len().div_ceil(GUESS_MATCHES).max(1)).collect()
 }
 
-/// Points of the inliers that can be triangulated, with their track numbers and matches.
+/// Points of the matches near F that can be triangulated, with their track numbers and matches.
 fn triangulated(
     pair: &CanonicalPair,
     numbered: &[(usize, Match)],
     f: &Fundamental,
 ) -> (Vec<usize>, Vec<Match>, Vec<Vector4<f64>>) {
     let mut all = (Vec::new(), Vec::new(), Vec::new());
-    for (track, m) in f.inliers.iter().map(|i| numbered[*i]) {
+    let near = |(_, m): &&(usize, Match)| fundamental::sampson(&f.matrix, m) < FARTHEST * FARTHEST;
+    for (track, m) in numbered.iter().filter(near).copied() {
         let (first, second) = (pair.first.apply(&m.first), pair.second.apply(&m.second));
         if let Some(x) = triangulate(&[(&pair.cameras[0], first), (&pair.cameras[1], second)]) {
             all.0.push(track);

@@ -66,10 +66,11 @@ fn outcome(kind: Kind, seed: u64) -> Option<(OrderBy, bool)> {
     }
     let images = [&shots[0].0, &shots[1].0];
     let target = Target::Tracks(tracks.iter().map(|t| t[1]).collect());
-    let mut found = reconstruction::reconstruct(&images, &tracks, &target, 1).ok()?;
-    let surfaces = consistency::surfaces(&images, &found, [0, 1]).ok()?;
-    let (by_calibrations, advantage) = (found.hand, Advantage::of(&images, &surfaces, &found).ok()?);
-    decide(&images, &surfaces, &mut found).ok()?;
+    let mut found = reconstruction::reconstruct(&images, &tracks, &target, &[0, 1], 1).ok()?;
+    let grey = images.map(|image| image.to_grey());
+    let surfaces = [0, 1].map(|view| Surface::of(view, SIZE, view, &grey, &found));
+    let (by_calibrations, advantage) = (found.hand, Advantage::of(&images, &surfaces, &found));
+    decide(&images, &surfaces, &mut found);
     // The truth: chi of the first camera against the true 1 / d.
     let (mut rows, mut chi) = (Vec::new(), Vec::new());
     for (point, seen) in found.points.iter().zip(&found.seen) {
