@@ -23,7 +23,7 @@ pub fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) ->
 }
 
 /// Which samples are hidden.
-pub(crate) fn hidden<const C: usize>(
+fn hidden<const C: usize>(
     samples: impl ExactSizeIterator<Item = Sample<C>> + Clone,
     test: &DepthTest,
 ) -> Vec<bool> {

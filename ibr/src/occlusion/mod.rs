@@ -22,8 +22,8 @@ mod grid;
 mod points;
 mod row;
 
+pub(crate) use grid::PlaneSearch;
 pub use grid::remove;
-pub(crate) use grid::{PlaneSearch, hidden};
 pub(crate) use points::{Extent, Points, RUN};
 pub use row::{RowScratch, remove_in_row};
 

@@ -123,7 +123,7 @@ impl Extent {
         // The brightness of all views, with what lies in front and behind on each pixel of one; then the
         // depths in front in all views, and counts of the virtual one.
         let decided = 4.0 * self.pixels as f64 + 36.0 * self.largest as f64;
-        let rendered = 4.0 * self.pixels as f64 + self.rendering() + 3.0 * self.virtual_pixels();
+        let rendered = 4.0 * self.pixels as f64 + self.rendering() + 4.0 * self.virtual_pixels();
         BASE + decided.max(rendered)
     }
 

@@ -6,7 +6,7 @@
 //! 2000). Diagonals are exchanged one by one while the colours improve.
 
 use super::Point;
-use super::mesh::{Facet, Mesh, Shares};
+use super::mesh::{Edge, Facet, Mesh, Shares, edge};
 use std::collections::{BTreeMap, VecDeque};
 
 /// Pixels of a quadrilateral that are compared, about, at most.
@@ -22,23 +22,11 @@ const LEAST_MEAN: f64 = 0.5;
 /// estimated, so the sum of all differences alone does not end the search.
 const MOST_LOOKS: usize = 20;
 
-/// Two corners by number, the smaller one first.
-type Edge = (usize, usize);
-
-fn edge(a: usize, b: usize) -> Edge {
-    (a.min(b), a.max(b))
-}
-
 /// Exchanges diagonals of the mesh while the colours of the views improve. `miss` returns by how much the
 /// views differ, in grey levels, where the corners of a triangle have some shares, and `None` where no two
 /// of them show it.
 pub fn exchange(mesh: &mut Mesh, miss: impl Fn(&[usize; 3], Shares) -> Option<f64>) -> usize {
-    let mut sides: BTreeMap<Edge, Vec<usize>> = BTreeMap::new();
-    for (t, [a, b, c]) in mesh.triangles.iter().enumerate() {
-        for e in [edge(*a, *b), edge(*b, *c), edge(*c, *a)] {
-            sides.entry(e).or_default().push(t);
-        }
-    }
+    let mut sides = mesh.sides();
     let mut queue: VecDeque<Edge> = sides.keys().copied().collect();
     let mut exchanged = 0;
     for _ in 0..MOST_LOOKS * sides.len() {

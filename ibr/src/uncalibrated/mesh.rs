@@ -5,6 +5,7 @@
 
 use super::Point;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
+use std::collections::BTreeMap;
 
 /// Of features closer than this, in pixels, only the first is used.
 const CLOSEST: f64 = 0.5;
@@ -31,7 +32,7 @@ pub type Shares = [f64; 3];
 pub struct Mesh {
     pub(crate) corners: Vec<Point>,
     /// Corners of each triangle by number, all in the same sense of rotation.
-    pub(super) triangles: Vec<[usize; 3]>,
+    pub(crate) triangles: Vec<[usize; 3]>,
 }
 
 struct Vertex {
@@ -72,6 +73,15 @@ impl Mesh {
         Self { corners, triangles }
     }
 
+    /// The triangles on both sides of each edge by number, one at the hull.
+    pub(crate) fn sides(&self) -> BTreeMap<Edge, Vec<usize>> {
+        let mut sides: BTreeMap<Edge, Vec<usize>> = BTreeMap::new();
+        for (t, triangle) in self.triangles.iter().enumerate() {
+            edges(triangle).into_iter().for_each(|edge| sides.entry(edge).or_default().push(t));
+        }
+        sides
+    }
+
     /// Calls `visit` with pixel, corners and their shares for every pixel centre of every triangle, where
     /// the corners lie at `places` in an image. A pixel on an edge belongs to the triangles on both sides.
     pub fn visit(
@@ -86,30 +96,42 @@ impl Mesh {
     }
 }
 
+/// Two corners by number, the smaller one first.
+pub(crate) type Edge = (usize, usize);
+
+pub(super) fn edge(a: usize, b: usize) -> Edge {
+    (a.min(b), a.max(b))
+}
+
+/// The edges of a triangle.
+pub(crate) fn edges([a, b, c]: &[usize; 3]) -> [Edge; 3] {
+    [edge(*a, *b), edge(*b, *c), edge(*c, *a)]
+}
+
 /// The shares of three corners as affine functions of the position.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Facet {
+pub(crate) struct Facet {
     origin: Point,
     slopes: [Point; 2],
 }
 
 impl Facet {
     /// `None` for corners on a line.
-    pub(super) fn new([a, b, c]: &[Point; 3]) -> Option<Self> {
+    pub(crate) fn new([a, b, c]: &[Point; 3]) -> Option<Self> {
         let (ab, ac) = (b - a, c - a);
         let area = ab.perp(&ac);
         let slopes = [Point::new(ac.y, -ac.x) / area, Point::new(-ab.y, ab.x) / area];
         (area != 0.0).then_some(Self { origin: *a, slopes })
     }
 
-    pub(super) fn shares(&self, position: &Point) -> Shares {
+    pub(crate) fn shares(&self, position: &Point) -> Shares {
         let [b, c] = self.slopes.map(|slope| slope.dot(&(position - self.origin)));
         [1.0 - b - c, b, c]
     }
 }
 
-/// The shares at the pixel centres of a triangle, row by row.
-fn visit_triangle(
+/// Calls `visit` with pixel and shares for every pixel centre of a triangle, row by row.
+pub(crate) fn visit_triangle(
     corners: &[Point; 3],
     (width, height): (usize, usize),
     mut visit: impl FnMut(usize, Shares),

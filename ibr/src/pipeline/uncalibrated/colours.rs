@@ -37,7 +37,7 @@ pub(super) struct Advantage {
 
 impl Advantage {
     /// From both photographs of the base pair and the surfaces that they show.
-    pub(super) fn of(images: &[&Image], surfaces: &[Surface; 2], scene: &Reconstruction) -> Self {
+    pub(super) fn of(images: &[&Image], surfaces: &[Surface], scene: &Reconstruction) -> Self {
         let mut all = Self::default();
         for (from, to) in [(0, 1), (1, 0)] {
             for advantage in advantages(images, &surfaces[from], scene, from, to) {
@@ -57,13 +57,6 @@ impl Advantage {
     /// The sum in standard deviations.
     pub(super) fn deviations(&self) -> f64 {
         self.sum / self.squares.max(f64::MIN_POSITIVE).sqrt()
-    }
-
-    /// Whether a photograph is better left out where it is hidden by this order. Where two differ by d,
-    /// their mean errs by d / 2, and the one that is not hidden by d if the order misleads; so it may mislead
-    /// in a quarter of the pixels, which makes the mean half the root mean square.
-    pub(super) fn is_clear(&self, hand: Handedness) -> bool {
-        hand.sign() * self.deviations() > 0.5 * (self.count as f64).sqrt()
     }
 
     /// The order of depth by the photographs and the guessed calibrations. Each of them errs now and
@@ -156,14 +149,5 @@ mod tests {
         let none = Advantage::default();
         assert_eq!(none.order(&guess(reversed, 0.99)), (reversed, OrderBy::Calibrations));
         assert_eq!(none.order(&guess(reversed, 0.9)), (reversed, OrderBy::Nothing));
-    }
-
-    /// One pixel of eight against the order is little, three of eight are too many.
-    #[test]
-    fn hidden_photographs_are_left_out_where_that_is_right() {
-        let (kept, reversed) = (Handedness::Kept, Handedness::Reversed);
-        let (clear, doubtful) = (advantage(64, 1.0), Advantage { sum: 320.0, ..advantage(64, 1.0) });
-        assert!(clear.is_clear(kept) && !clear.is_clear(reversed) && !doubtful.is_clear(kept));
-        assert!(advantage(64, -1.0).is_clear(reversed) && !Advantage::default().is_clear(kept));
     }
 }

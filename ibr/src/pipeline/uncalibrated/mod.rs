@@ -14,7 +14,7 @@ use crate::interpolate::HoleFill;
 use crate::uncalibrated::Point;
 use crate::uncalibrated::order::Order;
 use colours::Advantage;
-use morph::Goal;
+use morph::Meshes;
 use rayon::prelude::*;
 use reconstruction::Reconstruction;
 use surface::Surface;
@@ -136,33 +136,33 @@ pub fn render(
     scene.register(settings.offset);
     watch(RECONSTRUCTED);
     let grey: Vec<Image> = images.par_iter().map(|image| image.to_grey()).collect();
-    let surfaces = [0, 1].map(|view| Surface::of(view, images[view].size(), view, &grey, &scene));
+    let of_view = |view: usize| Surface::of(view, images[view].size(), view, &grey, &scene);
+    let surfaces: Vec<Surface> = (0..images.len()).into_par_iter().map(of_view).collect();
     watch(SURFACES);
-    let mut hides = decide(images, &surfaces, &mut scene);
+    decide(images, &surfaces, &mut scene);
     if uncalibrated.reverse_order {
-        (scene.hand, hides) = (scene.hand.reversed(), true);
+        scene.hand = scene.hand.reversed();
         (scene.geometry.order_by, scene.geometry.order_agreement) = (OrderBy::Given, 1.0);
     }
     watch(DECIDED);
     let view_weights = morph::view_weights(&surfaces[0].places);
     let surface = Surface::of(images.len(), size, view_weights.first_two()[0], &grey, &scene);
-    drop((grey, surfaces));
+    drop(grey);
     watch(MESHED);
     let render =
         if images.iter().any(|i| i.channels() == 3) { morph::render::<3> } else { morph::render::<1> };
-    let leave = settings.interpolation.fill == HoleFill::Leave;
-    let done = render(images, &surface, &scene, &view_weights, &Goal { size, hides, leave })?;
+    let leaves = settings.interpolation.fill == HoleFill::Leave;
+    let meshes = Meshes { virtually: &surface, shown: &surfaces };
+    let done = render(images, &meshes, &scene, &view_weights, size, leaves)?;
     watch(1.0);
     Ok(done)
 }
 
 /// Decides the order of depth from the photographs, which show what is in front, and the guessed
-/// calibrations. Says whether surfaces hide others in the rendering.
-fn decide(images: &[&Image], surfaces: &[Surface; 2], scene: &mut Reconstruction) -> bool {
+/// calibrations.
+fn decide(images: &[&Image], surfaces: &[Surface], scene: &mut Reconstruction) {
     let guess = Order { hand: scene.hand, agreement: scene.geometry.order_agreement };
-    let advantage = Advantage::of(images, surfaces, scene);
-    (scene.hand, scene.geometry.order_by) = advantage.order(&guess);
-    scene.geometry.order_by != OrderBy::Nothing && advantage.is_clear(scene.hand)
+    (scene.hand, scene.geometry.order_by) = Advantage::of(images, surfaces, scene).order(&guess);
 }
 
 #[cfg(test)]
