@@ -209,6 +209,8 @@ fn views_from_tracks_take_what_is_estimated() {
                 uncalibrated::render(&images, &tracks, &target, size, &settings, &special, &|_| ()).unwrap(),
             );
         };
+        // What a process allocates once for all is no part of a rendering.
+        pool.install(work);
         let measured = peak(&pool, work);
         let estimate = Extent::new(size, &images, None).of_tracks();
         estimates.compare(&format!("tracks, {size:?} from {views}"), size, estimate, measured);

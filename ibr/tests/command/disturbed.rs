@@ -184,7 +184,7 @@ fn renderings_that_no_memory_holds_are_refused() {
     for (line, limit) in [
         ("bound large.toml --map map.png", 500_000),
         ("render large.toml -o out.png --method plane", 420_000),
-        ("render tracked.toml -o out.png", 334_000),
+        ("render tracked.toml -o out.png", 234_000),
     ] {
         let refused = shell(dir.path(), &format!("ulimit -v {limit}; $H {line} --threads 1"));
         let message = stderr(&refused);

@@ -308,6 +308,9 @@ fn images_and_tracks_alone_are_enough() {
     std::fs::write(dir.path().join("b.toml"), format!("{views}[virtual]\nbetween = 0.5\n")).unwrap();
     let between = json(&run(dir.path(), &["render", "b.toml", "-o", "p.png", "--json"]));
     assert!(between["coverage"].as_f64().unwrap() > 0.5, "{between}");
+    let refused = run(dir.path(), &["render", "s.toml", "-o", "q.png", "--degree", "linear"]);
+    assert_eq!(code(&refused), 2);
+    assert!(stderr(&refused).contains("--degree: it is for a scene with cameras"), "{}", stderr(&refused));
     // Seven tracks are too few, and tracks of a plane do not determine the geometry.
     let few = "1 2 3 4 -\n".repeat(7);
     std::fs::write(dir.path().join("tracks.txt"), few).unwrap();
