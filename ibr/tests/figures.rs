@@ -263,9 +263,8 @@ fn house(from: &[usize], wanted: usize) -> Option<House> {
     Some(house)
 }
 
-/// More views beside two show more of the hull. On the pixels of the two they give +0.01, -0.21, +0.04 and
-/// -0.07 dB. What is left is the choice of edges of the meshes, for which more views are witnesses: with the
-/// mean of their colours instead of the best one the second case is -0.03 dB, and the first -0.75.
+/// More views beside two show more of the hull. On the pixels of the two they give +0.18, +0.20, +0.37 and
+/// +0.14 dB.
 #[test]
 fn model_house_from_more_views() {
     for (from, wanted) in [(&[2, 4, 1][..], 3), (&[1, 3, 4], 2), (&[1, 3, 0], 2), (&[2, 4, 1, 0], 3)] {
@@ -274,7 +273,7 @@ fn model_house_from_more_views() {
         let both: Vec<bool> = two.done.region.iter().zip(&more.done.region).map(|(a, b)| *a && *b).collect();
         let [two, more] = [&two, &more].map(|house| house.psnr(&both));
         println!("{from:?} -> {wanted}, on the pixels of both: {two:.2} dB from two, {more:.2} dB from all");
-        assert!(more >= two - 0.25, "{from:?}: {two} {more}");
+        assert!(more >= two + 0.1, "{from:?}: {two} {more}");
     }
 }
 

@@ -47,14 +47,12 @@ fn gain(pair: &Pair) -> f64 {
 fn ray_traced_pairs_are_no_worse_than_a_morph() {
     for seed in [1, 2] {
         let gain = gain(&pairs::ray_traced(seed));
-        assert!(gain >= 0.0, "{seed}: {gain:.3} dB");
+        assert!(gain >= 0.1, "{seed}: {gain:.3} dB");
     }
 }
 
 #[test]
 fn photographs_are_no_worse_than_a_morph() {
     let gains: Vec<f64> = pairs::of_data().map(|pair| gain(&pair)).collect();
-    assert!(gains.iter().all(|gain| *gain >= 0.0), "{gains:.3?}");
-    // All but four are clearly better.
-    assert!(gains.iter().filter(|gain| **gain < 0.05).count() <= 4, "{gains:.3?}");
+    assert!(gains.iter().all(|gain| *gain >= 0.2), "{gains:.3?}");
 }
