@@ -32,7 +32,7 @@ pub struct Sample<const C: usize> {
 
 impl<const C: usize> Sample<C> {
     /// A sample at the origin with unit spacing and weight and all other fields 0, for work memory.
-    pub const BLANK: Self = Self {
+    pub(crate) const BLANK: Self = Self {
         x: 0.0,
         y: 0.0,
         depth: 0.0,
@@ -57,17 +57,22 @@ pub struct Dropped {
     pub outside: usize,
 }
 
-impl Dropped {
-    /// All dropped samples.
-    pub fn total(&self) -> usize {
-        self.unknown + self.behind + self.outside
-    }
-}
-
 impl std::ops::AddAssign for Dropped {
     fn add_assign(&mut self, other: Self) {
         self.unknown += other.unknown;
         self.behind += other.behind;
         self.outside += other.outside;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Dropped;
+
+    impl Dropped {
+        /// All dropped samples.
+        pub(crate) fn total(&self) -> usize {
+            self.unknown + self.behind + self.outside
+        }
     }
 }

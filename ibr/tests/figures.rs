@@ -9,7 +9,7 @@ mod normal;
 
 use bilinear::bilinear;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
-use hybank_ibr::image::{Image, quality, read_image, read_map};
+use hybank_ibr::image::{Image, MOST_PIXELS, quality, read_image, read_map};
 use hybank_ibr::interpolate::plane::PlaneSettings;
 use hybank_ibr::partial::densify;
 use hybank_ibr::pipeline::uncalibrated::{Target, UncalibratedRendering, UncalibratedSettings};
@@ -34,9 +34,9 @@ struct Pair {
 
 fn pair(folder: &str) -> Option<Pair> {
     let path = data(folder)?;
-    let image = |name: &str| read_image(&path.join(name)).unwrap();
+    let image = |name: &str| read_image(&path.join(name), MOST_PIXELS).unwrap();
     let map = |name: &str| {
-        let (width, height, stored) = read_map(&path.join(name)).unwrap();
+        let (width, height, stored) = read_map(&path.join(name), MOST_PIXELS).unwrap();
         let mut map = DepthMap::new((width, height), stored, 4.0, Measure::Disparity).unwrap();
         fill_unknown(&mut map);
         map
@@ -194,7 +194,7 @@ fn cones_with_three_percent_of_the_depths() {
     let dense = |is_spline: bool| {
         let mut whole = pair("cones").unwrap();
         for (i, name) in ["disp2.png", "disp6.png"].iter().enumerate() {
-            let (width, height, stored) = read_map(&path.join(name)).unwrap();
+            let (width, height, stored) = read_map(&path.join(name), MOST_PIXELS).unwrap();
             let map = DepthMap::new((width, height), stored, 4.0, Measure::Disparity).unwrap();
             let start = std::time::Instant::now();
             let (coarse, image) = (map.decimated(6).unwrap(), &whole.images[i]);
@@ -247,7 +247,7 @@ impl House {
 
 fn house(from: &[usize], wanted: usize) -> Option<House> {
     let path = data("model_house")?;
-    let image = |v: &usize| read_image(&path.join(format!("house.{v:03}.png"))).unwrap();
+    let image = |v: &usize| read_image(&path.join(format!("house.{v:03}.png")), MOST_PIXELS).unwrap();
     let (images, truth) = (from.iter().map(image).collect::<Vec<_>>(), image(&wanted));
     let tracks = house_tracks(&path, from);
     let target = Target::Tracks(house_tracks(&path, &[wanted]).into_iter().map(|t| t[0]).collect());

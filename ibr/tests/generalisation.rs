@@ -11,7 +11,7 @@ mod normal;
 
 use bilinear::bilinear;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
-use hybank_ibr::image::{Image, quality, read_image, read_map};
+use hybank_ibr::image::{Image, MOST_PIXELS, quality, read_image, read_map};
 use hybank_ibr::interpolate::Cover;
 use hybank_ibr::partial::densify;
 use hybank_ibr::pipeline::{Method, RenderSettings, rectified};
@@ -254,10 +254,10 @@ fn every_kind_of_scene_profits_from_the_image_where_depth_is_coarse() {
 fn teddy_from_one_view() {
     let Some(path) = trials::data("ibr/teddy") else { return };
     let load = |image: &str, map: &str| {
-        let (width, height, stored) = read_map(&path.join(map)).unwrap();
+        let (width, height, stored) = read_map(&path.join(map), MOST_PIXELS).unwrap();
         let mut map = DepthMap::new((width, height), stored, 4.0, Measure::Disparity).unwrap();
         fill_unknown(&mut map);
-        (read_image(&path.join(image)).unwrap(), map)
+        (read_image(&path.join(image), MOST_PIXELS).unwrap(), map)
     };
     let ends = [load("im2.png", "disp2.png"), load("im6.png", "disp6.png")];
     for (from, to) in [(0, 1), (1, 0)] {

@@ -8,7 +8,7 @@ use hybank_ibr::camera::CameraList;
 use hybank_ibr::camera::colmap::parse_model;
 use hybank_ibr::camera::middlebury::parse_calibration;
 use hybank_ibr::camera::transforms::parse_transforms;
-use hybank_ibr::image::{Image, Levels, encode, pfm, read_image, read_map};
+use hybank_ibr::image::{Image, Levels, MOST_PIXELS, encode, pfm, read_image, read_map};
 use hybank_ibr::scene::parse;
 use hybank_ibr::uncalibrated::tracks::Tracks;
 use random::Random;
@@ -161,10 +161,10 @@ fn images() {
                 let message = error.to_string();
                 assert!(message.contains(name), "{message}");
             };
-            if let Ok((width, height, values)) = read_map(&path).map_err(named) {
+            if let Ok((width, height, values)) = read_map(&path, MOST_PIXELS).map_err(named) {
                 assert_eq!(values.len(), width * height);
             }
-            read_image(&path).map_err(named).is_ok_and(|image| {
+            read_image(&path, MOST_PIXELS).map_err(named).is_ok_and(|image| {
                 let (width, height) = image.size();
                 assert_eq!(image.data().len(), width * height * image.channels());
                 true

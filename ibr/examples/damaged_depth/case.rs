@@ -1,7 +1,7 @@
 //! A scene whose maps are damaged, and its true view.
 
 use super::damage::Damage;
-use hybank_ibr::image::{Image, quality, read_image};
+use hybank_ibr::image::{Image, MOST_PIXELS, quality, read_image};
 use hybank_ibr::pipeline::{RenderError, RenderSettings, Rendering, calibrated, rectified};
 use hybank_ibr::scene::{self, Kind, LoadOptions, Scene, SceneSpec, SourceView};
 use std::error::Error;
@@ -24,7 +24,7 @@ impl Case {
 
     pub(crate) fn read(name: &str, path: &Path, truth: &Path) -> Result<Self, Box<dyn Error>> {
         let spec = scene::parse(&std::fs::read_to_string(path)?, path)?;
-        Ok(Self { name: name.into(), spec, path: path.into(), truth: read_image(truth)? })
+        Ok(Self { name: name.into(), spec, path: path.into(), truth: read_image(truth, MOST_PIXELS)? })
     }
 
     /// The view rendered with damaged maps, which are written into a folder.

@@ -1,7 +1,7 @@
 //! Damages of depth maps, as cameras, matchers and lidar make them.
 
 use hybank_ibr::camera::Camera;
-use hybank_ibr::image::{Image, pfm, read_map};
+use hybank_ibr::image::{Image, MOST_PIXELS, pfm, read_map};
 use hybank_ibr::propagate::Viewpoint;
 use hybank_ibr::scene::SceneSpec;
 use nalgebra::Matrix3x4;
@@ -76,7 +76,7 @@ impl Damage {
                 (view.depth_scale, view.disparity_scale) = (None, None);
                 continue;
             }
-            let (width, height, mut values) = read_map(&beside.join(&map))?;
+            let (width, height, mut values) = read_map(&beside.join(&map), MOST_PIXELS)?;
             let seed = &mut Pcg64::seed_from_u64(100 + k as u64);
             match is_depth {
                 // Errors in pixels are errors of the reciprocal depth.

@@ -5,7 +5,7 @@ use crate::{Effort, Figure, Outcome, chart};
 use hybank_ibr::analysis::Predictor;
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
-use hybank_ibr::image::{Image, read_image, read_map};
+use hybank_ibr::image::{Image, MOST_PIXELS, read_image, read_map};
 use hybank_ibr::pipeline::RenderSettings;
 use hybank_ibr::propagate::RectifiedView;
 use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
@@ -70,9 +70,9 @@ fn data() -> Option<PathBuf> {
 }
 
 fn photographs(folder: &Path) -> Outcome<Pair> {
-    let image = |name: &str| read_image(&folder.join(name));
+    let image = |name: &str| read_image(&folder.join(name), MOST_PIXELS);
     let map = |name: &str| -> Outcome<DepthMap> {
-        let (width, height, stored) = read_map(&folder.join(name))?;
+        let (width, height, stored) = read_map(&folder.join(name), MOST_PIXELS)?;
         let mut map = DepthMap::new((width, height), stored, 4.0, Measure::Disparity)?;
         fill_unknown(&mut map);
         Ok(map)

@@ -179,8 +179,6 @@ pub struct Study<'a> {
     pub(super) known: &'a Known,
     /// Distance between neighbouring views.
     pub(super) spacing: f64,
-    /// Whether the local limit is wanted too.
-    pub(super) bounds: bool,
     /// For the sure bound.
     pub(super) limits: Option<&'a Limits>,
 }
@@ -201,12 +199,11 @@ pub struct Examined {
     pub(super) rendering: Rendering,
     pub(super) regressors: Vec<Regressors>,
     pub(super) sure_bound: Vec<f32>,
-    pub(super) local_limit: Vec<f32>,
 }
 
 /// Expected error, estimate and causes from the regressors and their weights.
-pub(super) fn judge(examined: Examined, calibration: Calibration) -> ViewError {
-    let Examined { rendering, regressors, sure_bound, local_limit } = examined;
+pub(super) fn judge(examined: Examined, local_limit: Vec<f32>, calibration: Calibration) -> ViewError {
+    let Examined { rendering, regressors, sure_bound } = examined;
     let (width, height) = rendering.image.size();
     let mut causes_of_rows = vec![[0.0; 5]; height];
     let (mut expected, mut estimate) = (Vec::new(), Vec::new());
@@ -238,7 +235,7 @@ impl Calibration {
             let mut others = views.to_vec();
             let truth = others.remove(k * views.len() / used);
             let spacing = truth.camera.spacing(views);
-            let study = Study { settings, known, spacing, bounds: false, limits: None };
+            let study = Study { settings, known, spacing, limits: None };
             let examined = truth.camera.examine(&others, truth.image.size(), &study)?;
             let errors = difference(&examined.rendering.image.quantised(), truth.image);
             for (x, error) in examined.regressors.iter().zip(errors) {

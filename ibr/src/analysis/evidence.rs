@@ -1,6 +1,7 @@
 //! What the samples of a rendering say about its error, pixel by pixel: how much each sample counts in the
 //! fit that is really used, and how well the samples agree.
 
+use super::lookup::UNSEEN;
 use super::sure::{self, Limits};
 use crate::depth::Measure;
 use crate::interpolate::rows::{self, ORDER, RowWork};
@@ -14,52 +15,49 @@ use hybank::sampling::fit::Response;
 use rayon::prelude::*;
 
 /// One pixel of a virtual view. h_s is the influence of sample s on the pixel at x.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Evidence {
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Evidence {
     /// sum over the views of (sum of the h_s of the view)^2: 1 for one view, 1/2 for two equal ones.
-    pub views: f32,
+    pub(super) views: f32,
     /// sum over the views of (sum of the h_s of the view)^2 (distance to the view)^2.
-    pub disparity_gain: f32,
+    pub(super) disparity_gain: f32,
     /// Change of the pixel when the fit is fitted once more: its bias.
-    pub bias: f32,
+    pub(super) bias: f32,
     /// Influence of samples whose depth or colour is doubtful.
-    pub doubtful: f32,
+    pub(super) doubtful: f32,
+    /// The height of a depth edge beside the pixel, weighted by its distance; 0 elsewhere.
+    pub(super) edge: f32,
 }
 
-/// A rendering with the evidence for each of its pixels.
-pub struct PixelEvidence {
-    /// The rendering.
-    pub rendering: Rendering,
-    /// Row by row.
-    pub evidence: Vec<Evidence>,
-    /// Depth edges: row by row, the height of the jump beside the pixel, weighted by its distance; 0
-    /// elsewhere.
-    pub edges: Vec<f32>,
+/// What is found of a rendering, row by row.
+pub(super) struct Collected {
+    pub(super) evidence: Vec<Evidence>,
     /// The sure bound of each pixel, in grey levels; empty without limits.
-    pub sure: Vec<f32>,
+    pub(super) sure_bound: Vec<f32>,
 }
 
-/// Renders a view of a rectified rig and collects the evidence; with limits also the sure bound.
+/// Collects the evidence for a view of a rectified rig; with limits also the sure bound.
 ///
 /// # Errors
 /// Those of [`rectified::render`].
-pub fn collect_evidence(
+pub(super) fn collect(
     views: &[RectifiedView<'_>],
     position: f64,
     settings: &RenderSettings,
+    rendering: &Rendering,
     limits: Option<&Limits>,
-) -> Result<PixelEvidence, RenderError> {
-    let rendering = rectified::render(views, position, settings)?;
+) -> Result<Collected, RenderError> {
     let view_weights = ViewWeights::of(views, &position).with_noise(&rendering.agreement);
     let settings = &settings.suited_to(&rendering.agreement, &view_weights, Measure::Disparity);
     let view_weights = view_weights.with_gains(&rendering.agreement.gains);
     let (camera, (width, height)) = (RigCamera::new(views, position), rendering.image.size());
-    let colour = rendering.image.channels() == 3;
     let frame = Frame::whole(width, height, rows::MARGIN, settings.offset);
     let rows = rectified::Job { views, camera, view_weights, frame, settings, watch: &|_| () };
-    let job = Job { rows, rendering: &rendering, limits };
-    let (evidence, edges, sure) = if colour { collect::<3>(&job)? } else { collect::<1>(&job)? };
-    Ok(PixelEvidence { rendering, evidence, edges, sure })
+    let job = Job { rows, rendering, limits };
+    match rendering.image.channels() {
+        3 => collect_with::<3>(&job),
+        _ => collect_with::<1>(&job),
+    }
 }
 
 /// What all rows share.
@@ -75,31 +73,25 @@ impl Job<'_> {
     }
 }
 
-/// The bound of a pixel that no view sees.
-const UNSEEN: f32 = 255.0;
-
-type Collected = (Vec<Evidence>, Vec<f32>, Vec<f32>);
-
-fn collect<const C: usize>(job: &Job<'_>) -> Result<Collected, RenderError> {
+fn collect_with<const C: usize>(job: &Job<'_>) -> Result<Collected, RenderError> {
     let (width, height) = job.rendering.image.size();
     let mut evidence = vec![Evidence::default(); width * height];
-    let mut edges = vec![0.0; width * height];
-    let mut sure = vec![UNSEEN; width * height];
-    let numbers = edges.par_chunks_mut(width).zip(sure.par_chunks_mut(width));
-    evidence.par_chunks_mut(width).zip(numbers).enumerate().try_for_each_init(
+    let mut sure_bound = vec![UNSEEN; width * height];
+    let rows = evidence.par_chunks_mut(width).zip(sure_bound.par_chunks_mut(width));
+    rows.enumerate().try_for_each_init(
         || RowEvidence::<C>::new(job),
-        |work, (y, (evidence, (edges, sure)))| {
+        |work, (y, (evidence, sure_bound))| {
             if work.row(job, y, evidence)? {
-                work.edges(job, y, edges);
-                work.sure(job, y, sure);
+                work.edges(job, y, evidence);
+                work.sure(job, y, sure_bound);
             }
             Ok::<(), RenderError>(())
         },
     )?;
     if job.limits.is_none() {
-        sure.clear();
+        sure_bound.clear();
     }
-    Ok((evidence, edges, sure))
+    Ok(Collected { evidence, sure_bound })
 }
 
 /// Pixels to each side beyond which no sample has an influence that counts: it falls by four per pixel.
@@ -202,7 +194,7 @@ impl<const C: usize> RowEvidence<C> {
     }
 
     /// The height of every jump of depth between neighbouring samples, on the pixels within 1.5 of it.
-    fn edges(&self, job: &Job<'_>, y: usize, edges: &mut [f32]) {
+    fn edges(&self, job: &Job<'_>, y: usize, evidence: &mut [Evidence]) {
         let row = job.rendering.image.row(y).chunks_exact(C).collect::<Vec<_>>();
         let value = |x: f64| row[(x.round().max(0.0) as usize).min(row.len() - 1)];
         let test = job.rows.settings.depth_test();
@@ -215,9 +207,10 @@ impl<const C: usize> RowEvidence<C> {
             let height = left.iter().zip(right).map(|(a, b)| (a - b).abs()).sum::<f32>() / left.len() as f32;
             let (low, high) = (pair[0].x, pair[1].x);
             let first = (low - 1.5).ceil().max(0.0) as usize;
-            for x in (first..edges.len()).take_while(|x| *x as f64 <= high + 1.5) {
+            let near = evidence.iter_mut().enumerate().skip(first);
+            for (x, pixel) in near.take_while(|(x, _)| *x as f64 <= high + 1.5) {
                 let away = (low - x as f64).max(x as f64 - high).max(0.0) as f32;
-                edges[x] = edges[x].max(height * (1.0 - away / 1.5));
+                pixel.edge = pixel.edge.max(height * (1.0 - away / 1.5));
             }
         }
     }
@@ -229,12 +222,14 @@ mod tests {
     use crate::depth::{DepthMap, Measure};
     use crate::image::Image;
 
-    fn examined(positions: &[f64], at: f64, paint: impl Fn(usize) -> f32) -> PixelEvidence {
+    fn examined(positions: &[f64], at: f64, paint: impl Fn(usize) -> f32) -> Vec<Evidence> {
         let image = Image::new(60, 8, 1, (0..480).map(|i| paint(i % 60)).collect()).unwrap();
         let disparity = DepthMap::new((60, 8), vec![4.0; 480], 1.0, Measure::Disparity).unwrap();
         let view = |position: &f64| RectifiedView { image: &image, map: &disparity, camera: *position };
         let views: Vec<RectifiedView<'_>> = positions.iter().map(view).collect();
-        collect_evidence(&views, at, &RenderSettings::default(), None).unwrap()
+        let settings = RenderSettings::default();
+        let rendering = rectified::render(&views, at, &settings).unwrap();
+        collect(&views, at, &settings, &rendering, None).unwrap().evidence
     }
 
     fn near(value: f32, want: f32) -> bool {
@@ -247,18 +242,18 @@ mod tests {
         let two = examined(&[0.0, 1.0], 0.5, |_| 90.0);
         let one = examined(&[0.0], 0.5, |_| 90.0);
         for (s, views, disparity_gain) in [(&two, 0.5, 0.125), (&one, 1.0, 0.25)] {
-            let e = s.evidence[4 * 60 + 30];
+            let e = s[4 * 60 + 30];
             assert!(near(e.views, views) && near(e.disparity_gain, disparity_gain), "{e:?}");
             assert!(near(e.bias, 0.0), "{e:?}");
         }
-        assert!(two.edges.iter().all(|e| *e == 0.0));
+        assert!(two.iter().all(|e| e.edge == 0.0));
     }
 
     /// The bias of a smoothing fit is large where the texture is fine.
     #[test]
     fn fine_texture_has_a_bias() {
         let wave = |rate: f32| move |x: usize| 120.0 + 50.0 * (rate * x as f32).sin();
-        let mean = |s: &PixelEvidence| s.evidence[250..290].iter().map(|e| e.bias).sum::<f32>() / 40.0;
+        let mean = |s: &[Evidence]| s[250..290].iter().map(|e| e.bias).sum::<f32>() / 40.0;
         let (fine, coarse) = (examined(&[0.0, 1.0], 0.5, wave(1.8)), examined(&[0.0, 1.0], 0.5, wave(0.3)));
         assert!(mean(&fine) > 10.0 * mean(&coarse), "{} {}", mean(&fine), mean(&coarse));
     }

@@ -3,8 +3,7 @@
 
 use super::estimate::{Examined, Predicted, Study};
 use super::jitter::depth_jitter;
-use super::lookup::{TAIL, local_limits};
-use super::regressors::{hole_distances, slopes};
+use super::regressors::{regressors, slopes};
 use crate::camera::Camera;
 use crate::depth::DepthMap;
 use crate::image::Image;
@@ -28,7 +27,7 @@ impl Predicted for Camera {
         size: (usize, usize),
         study: &Study<'_>,
     ) -> Result<Examined, RenderError> {
-        let Study { settings, known, spacing, bounds, .. } = *study;
+        let Study { settings, known, spacing, .. } = *study;
         let rendering = self.render(views, size, settings)?;
         let jitter = depth_jitter(views, self, settings, &rendering.image, known.noise)?;
         let view_weights = ViewWeights::of(views, self).with_noise(&rendering.agreement);
@@ -37,11 +36,7 @@ impl Predicted for Camera {
         let image = &rendering.image;
         let (slopes, bends) = (slopes(image), bends(image));
         let edges = edges(image, &rendering.depth, settings);
-        let distances = hole_distances(&rendering.mask, size.0);
-        let of_pixel = |p: usize| {
-            if distances[p] > 0 {
-                return [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, known.variogram.at(distances[p])];
-            }
+        let of_seen = |p: usize| {
             // At most as many views share in a pixel as samples lie on it.
             let shares = f64::max(shares, 1.0 / f64::from(rendering.counts[p].max(1)));
             let displacement = ((shares + gain) / 2.0).sqrt();
@@ -49,10 +44,8 @@ impl Predicted for Camera {
             let (bend, noise) = (f64::from(bends[p]), (1.0 + shares).sqrt());
             [bend, noise, slope, f64::from(jitter[p]), f64::from(edges[p]), 0.0, 0.0]
         };
-        let regressors = (0..size.0 * size.1).map(of_pixel).collect();
-        let limits = || local_limits(views, self, &rendering, TAIL * known.noise);
-        let local_limit = if bounds { limits() } else { Vec::new() };
-        Ok(Examined { rendering, regressors, sure_bound: Vec::new(), local_limit })
+        let regressors = regressors(&rendering, &known.variogram, of_seen);
+        Ok(Examined { rendering, regressors, sure_bound: Vec::new() })
     }
 
     fn check_memory(

@@ -22,10 +22,10 @@ use rayon::prelude::*;
 const NEAR: usize = 3;
 
 /// Errors of depth reach this many standard deviations.
-pub(super) const TAIL: f64 = 3.0;
+const TAIL: f64 = 3.0;
 
-/// The limit of a pixel that no view shows.
-const UNSEEN: f32 = 255.0;
+/// The limit and the bound of a pixel that no view shows.
+pub(super) const UNSEEN: f32 = 255.0;
 
 /// What the photographs show at a pixel: the largest over views and channels, in grey levels per virtual
 /// pixel.
@@ -51,15 +51,15 @@ impl Shown {
     }
 }
 
-/// The local limit of every pixel, in grey levels; `deviation` is the largest error of a disparity, or of a
-/// depth as a share of it.
+/// The local limit of every pixel, in grey levels; `noise` is the standard deviation of the errors of
+/// disparities, or of depths as shares of them.
 pub(super) fn local_limits<P: Viewpoint>(
     views: &[View<'_, P>],
     camera: &P,
     rendering: &Rendering,
-    deviation: f64,
+    noise: f64,
 ) -> Vec<f32> {
-    let (width, height) = rendering.image.size();
+    let ((width, height), deviation) = (rendering.image.size(), TAIL * noise);
     let at = |p: usize| {
         let all = views.iter().filter_map(|view| Lookup { view, camera, rendering, deviation }.at(p));
         all.fold(Shown::NOTHING, Shown::largest)

@@ -14,15 +14,15 @@
 //! The local limit has the form of that of linear interpolation, (1/8) |f''| D^2 + E_T + E_D B |f'|, with
 //! residuals, slopes and second differences of the photographs nearby (`lookup.rs`).
 //!
-//! The other two are sums over causes. The size of each cause is computed ([`collect_evidence()`]): the
-//! bias of the fit, by fitting the fit once more; the views that share in a pixel; the slope; the change
-//! under errors of depth as large as the maps' disagreement; depth edges nearby; doubtful depths; holes,
-//! by the variogram of the photographs. The weights of the causes are calibrated on the inputs themselves:
+//! The other two are sums over causes. The size of each cause is computed: the bias of the fit, by
+//! fitting the fit once more (`evidence.rs`); the views that share in a pixel; the slope; the change under
+//! errors of depth as large as the maps' disagreement; depth edges nearby; doubtful depths; holes, by the
+//! variogram of the photographs. The weights of the causes are calibrated on the inputs themselves:
 //! each view is left out in turn and rendered from the others, and its photograph is the truth. A single
 //! view cannot be left out; it takes the weights of typical photographs.
 //!
 //! ```
-//! use hybank_ibr::analysis::{Advice, Limits, Predictor, collect_evidence};
+//! use hybank_ibr::analysis::{Advice, Limits, Predictor};
 //! use hybank_ibr::camera::Camera;
 //! use hybank_ibr::pipeline::RenderSettings;
 //! use hybank_ibr::propagate::RectifiedView;
@@ -40,10 +40,9 @@
 //! assert!((0.1..20.0).contains(&view.totals().estimate));
 //! let advice = Advice::on(&predictor, &0.5, size, &view)?;
 //! assert_eq!(advice.cause, view.dominant());
-//! // The samples of each pixel, and the sure bound for surfaces of known curvature.
+//! // The sure bound for surfaces of known curvature.
 //! let limits = Limits { curvature: 30.0, intensity: 3.0, disparity: 0.25 };
-//! let found = collect_evidence(&views, 0.5, &settings, Some(&limits))?;
-//! assert!(found.evidence.iter().all(|pixel| pixel.views >= 0.0) && found.sure[0] > 3.0);
+//! assert!(predictor.at(&0.5, size, Some(&limits))?.sure_bound[0] > 3.0);
 //! # Ok::<(), hybank_ibr::pipeline::RenderError>(())
 //! ```
 
@@ -65,7 +64,6 @@ mod variogram;
 pub use advice::{Advice, AnotherView};
 pub use choice::Choice;
 pub use estimate::{Calibration, Predicted, Totals, ViewError};
-pub use evidence::{Evidence, PixelEvidence, collect_evidence};
 pub use jitter::{depth_jitter, with_noise};
 pub use predictor::Predictor;
 #[cfg(feature = "cli")]

@@ -2,6 +2,7 @@
 
 use super::estimate::{Calibration, Known, Predicted, Study, ViewError, equalised, judge};
 use super::jitter::map_noise;
+use super::lookup::local_limits;
 use super::regressors::{difference, local_mean};
 use super::sure::Limits;
 use super::variogram::Variogram;
@@ -60,7 +61,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
 
     fn study(&self, camera: &P) -> Study<'_> {
         let spacing = camera.spacing(&self.views());
-        Study { settings: &self.settings, known: &self.known, spacing, bounds: false, limits: None }
+        Study { settings: &self.settings, known: &self.known, spacing, limits: None }
     }
 
     /// The error of the view of `camera`; with limits also its sure bound, of rectified rigs.
@@ -73,9 +74,11 @@ impl<'a, P: Predicted> Predictor<'a, P> {
         size: (usize, usize),
         limits: Option<&Limits>,
     ) -> Result<ViewError, RenderError> {
-        camera.check_memory(&self.views(), size, &self.settings)?;
-        let study = Study { bounds: true, limits, ..self.study(camera) };
-        Ok(judge(camera.examine(&self.views(), size, &study)?, self.calibration))
+        let views = self.views();
+        camera.check_memory(&views, size, &self.settings)?;
+        let examined = camera.examine(&views, size, &Study { limits, ..self.study(camera) })?;
+        let local_limit = local_limits(&views, camera, &examined.rendering, self.known.noise);
+        Ok(judge(examined, local_limit, self.calibration))
     }
 
     /// The view of `camera`, as it is rendered from the views.

@@ -1,10 +1,10 @@
 //! What the error of a pixel is proportional to, cause by cause, in grey levels.
 
 use super::Cause;
-use super::evidence::PixelEvidence;
 use super::variogram::Variogram;
 use crate::image::Image;
 use crate::interpolate::Cover;
+use crate::pipeline::Rendering;
 
 /// Number of regressors.
 pub(super) const REGRESSORS: usize = 7;
@@ -16,43 +16,18 @@ pub(super) type Regressors = [f64; REGRESSORS];
 pub(super) const CAUSE_OF: [Cause; REGRESSORS] =
     [Cause::Density, Cause::Texture, Cause::Depth, Cause::Depth, Cause::Edges, Cause::Edges, Cause::Holes];
 
-/// Distance in pixels over which a colour of doubtful depth is wrong, for the variogram.
-const DOUBT: usize = 4;
-
-/// The regressors of every pixel; `jitter` is the local change of the view under errors of
-/// depth.
-///
-/// `spacing` is the distance between neighbouring views.
+/// The regressors of every pixel of a rendering; `of_seen` gives those of a pixel that is in no hole.
 pub(super) fn regressors(
-    found: &PixelEvidence,
-    jitter: &[f32],
+    rendering: &Rendering,
     variogram: &Variogram,
-    spacing: f64,
+    of_seen: impl Fn(usize) -> Regressors,
 ) -> Vec<Regressors> {
-    let image = &found.rendering.image;
-    let distances = hole_distances(&found.rendering.mask, image.width());
-    let slopes = slopes(image);
-    let of_pixel = |p: usize| {
-        if distances[p] > 0 {
-            return [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, variogram.at(distances[p])];
-        }
-        let e = &found.evidence[p];
-        // The noise of the photograph that a view is compared with adds to that of the views.
-        let noise = (1.0 + f64::from(e.views)).sqrt();
-        // Displacements of the samples: one part grows with the distance to the views, and one does not.
-        let disparity_gain = f64::from(e.disparity_gain) / (spacing * spacing);
-        let displacement = ((f64::from(e.views) + disparity_gain) / 2.0).sqrt();
-        [
-            f64::from(e.bias),
-            noise,
-            f64::from(slopes[p]) * displacement,
-            f64::from(jitter[p]),
-            f64::from(found.edges[p]),
-            f64::from(e.doubtful) * variogram.at(DOUBT),
-            0.0,
-        ]
+    let distances = hole_distances(&rendering.mask, rendering.image.width());
+    let of_pixel = |(p, away): (usize, &usize)| match away {
+        0 => of_seen(p),
+        away => [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, variogram.at(*away)],
     };
-    (0..found.evidence.len()).map(of_pixel).collect()
+    distances.iter().enumerate().map(of_pixel).collect()
 }
 
 /// Slope of the image along the rows and columns in grey levels per pixel, mean over the channels.
@@ -75,7 +50,7 @@ pub(super) fn slopes(image: &Image) -> Vec<f32> {
 }
 
 /// Distance of every pixel of a hole to the nearest seen pixel of its row, 0 for seen pixels.
-pub(super) fn hole_distances(mask: &[Cover], width: usize) -> Vec<usize> {
+fn hole_distances(mask: &[Cover], width: usize) -> Vec<usize> {
     let mut distances = vec![usize::MAX; mask.len()];
     for (row, mask) in distances.chunks_mut(width).zip(mask.chunks(width)) {
         let mut away = width;

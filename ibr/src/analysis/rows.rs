@@ -1,12 +1,14 @@
 //! The error of a view of a rectified rig, rendered by rows.
 
 use super::estimate::{Examined, Predicted, Study};
-use super::evidence::collect_evidence;
+use super::evidence::{Collected, collect};
 use super::jitter::depth_jitter;
-use super::lookup::{TAIL, local_limits};
-use super::regressors::regressors;
+use super::regressors::{regressors, slopes};
 use crate::pipeline::{RenderError, RenderSettings, Rendering, rectified as pipeline};
 use crate::propagate::RectifiedView;
+
+/// Distance in pixels over which a colour of doubtful depth is wrong, for the variogram.
+const DOUBT: usize = 4;
 
 impl Predicted for f64 {
     fn render(
@@ -21,16 +23,33 @@ impl Predicted for f64 {
     fn examine(
         &self,
         views: &[RectifiedView<'_>],
-        _: (usize, usize),
+        size: (usize, usize),
         study: &Study<'_>,
     ) -> Result<Examined, RenderError> {
-        let Study { settings, known, spacing, bounds, limits } = *study;
-        let found = collect_evidence(views, *self, settings, limits)?;
-        let jitter = depth_jitter(views, self, settings, &found.rendering.image, known.noise)?;
-        let regressors = regressors(&found, &jitter, &known.variogram, spacing);
-        let limits = || local_limits(views, self, &found.rendering, TAIL * known.noise);
-        let local_limit = if bounds { limits() } else { Vec::new() };
-        Ok(Examined { rendering: found.rendering, regressors, sure_bound: found.sure, local_limit })
+        let Study { settings, known, spacing, limits } = *study;
+        let rendering = self.render(views, size, settings)?;
+        let Collected { evidence, sure_bound } = collect(views, *self, settings, &rendering, limits)?;
+        let jitter = depth_jitter(views, self, settings, &rendering.image, known.noise)?;
+        let slopes = slopes(&rendering.image);
+        let of_seen = |p: usize| {
+            let e = &evidence[p];
+            // The noise of the photograph that a view is compared with adds to that of the views.
+            let noise = (1.0 + f64::from(e.views)).sqrt();
+            // Displacements of the samples: one part grows with the distance to the views, and one does not.
+            let disparity_gain = f64::from(e.disparity_gain) / (spacing * spacing);
+            let displacement = ((f64::from(e.views) + disparity_gain) / 2.0).sqrt();
+            [
+                f64::from(e.bias),
+                noise,
+                f64::from(slopes[p]) * displacement,
+                f64::from(jitter[p]),
+                f64::from(e.edge),
+                f64::from(e.doubtful) * known.variogram.at(DOUBT),
+                0.0,
+            ]
+        };
+        let regressors = regressors(&rendering, &known.variogram, of_seen);
+        Ok(Examined { rendering, regressors, sure_bound })
     }
 
     fn check_memory(

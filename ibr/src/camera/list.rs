@@ -96,7 +96,6 @@ impl CameraList {
         let all = || (0..self.frames.len()).collect();
         let numbers = fitting.map_or_else(all, <[usize]>::to_vec);
         let images: Vec<_> = numbers.iter().map(|k| self.frames[*k].image.to_string_lossy()).collect();
-        let images: Vec<&str> = images.iter().map(AsRef::as_ref).collect();
         let found = names::find(&images, image)?;
         let index = numbers[found.index];
         Ok((&self.frames[index], Found { index, ..found }))

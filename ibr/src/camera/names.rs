@@ -44,9 +44,9 @@ pub enum NameError {
 ///
 /// # Errors
 /// [`NameError::Unknown`] if no file name fits, [`NameError::Ambiguous`] if several names fit equally well.
-pub fn find(names: &[&str], wanted: &str) -> Result<Found, NameError> {
+pub fn find(names: &[impl AsRef<str>], wanted: &str) -> Result<Found, NameError> {
     let path = parts(wanted);
-    let fits: Vec<Option<Fit>> = names.iter().map(|name| Fit::of(&parts(name), &path)).collect();
+    let fits: Vec<Option<Fit>> = names.iter().map(|name| Fit::of(&parts(name.as_ref()), &path)).collect();
     let Some(best) = fits.iter().flatten().max().copied() else {
         return Err(NameError::Unknown { wanted: wanted.into(), known: most_like(names, wanted) });
     };
@@ -54,7 +54,7 @@ pub fn find(names: &[&str], wanted: &str) -> Result<Found, NameError> {
     match equal[..] {
         [index] => Ok(Found { index, whole: best.whole }),
         _ => {
-            let candidates: Vec<&str> = equal.iter().map(|i| names[*i]).collect();
+            let candidates: Vec<&str> = equal.iter().map(|i| names[*i].as_ref()).collect();
             Err(NameError::Ambiguous { wanted: wanted.into(), candidates: list(&candidates, " or ") })
         }
     }
@@ -104,8 +104,8 @@ fn stem(file: &str) -> &str {
 }
 
 /// The names that are most like `wanted`, in the order of the list if it is short.
-fn most_like(names: &[&str], wanted: &str) -> String {
-    let mut order = names.to_vec();
+fn most_like(names: &[impl AsRef<str>], wanted: &str) -> String {
+    let mut order: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
     if order.len() > MOST_NAMES {
         let last = |path: &str| parts(path).last().copied().unwrap_or("").to_string();
         let likeness = |name: &&str| (1e6 * strsim::jaro_winkler(&last(name), &last(wanted))) as u64;
@@ -115,8 +115,9 @@ fn most_like(names: &[&str], wanted: &str) -> String {
 }
 
 /// At most eight names, and how many more there are.
-pub(crate) fn list(names: &[&str], between: &str) -> String {
-    let shown: Vec<String> = names.iter().take(MOST_NAMES).map(|name| Quoted(name).to_string()).collect();
+pub(crate) fn list(names: &[impl AsRef<str>], between: &str) -> String {
+    let shown: Vec<String> =
+        names.iter().take(MOST_NAMES).map(|name| Quoted(name.as_ref()).to_string()).collect();
     let shown = shown.join(between);
     match names.len().saturating_sub(MOST_NAMES) {
         0 => shown,

@@ -5,9 +5,9 @@ use super::failure::{self, Failure};
 use super::inputs;
 use super::output;
 use crate::files;
-use crate::image::{Image, read_image_within};
+use crate::image::{Image, read_image};
 use crate::pipeline::{RenderSettings, Watch};
-use crate::scene::{self, Kind, LoadOptions, Scene, SceneSpec, TargetSpec};
+use crate::scene::{self, Kind, LoadOptions, Scene, SceneSpec};
 use hybank::files::StandardStream;
 use hybank::messages::Quoted;
 use std::path::{Path, PathBuf};
@@ -40,7 +40,7 @@ impl SceneArguments {
 
     /// The photograph to compare with.
     pub(super) fn truth(&self) -> Result<Option<Image>, Failure> {
-        let read = |path| read_image_within(path, self.max_pixels);
+        let read = |path| read_image(path, self.max_pixels);
         self.truth.as_deref().map(read).transpose().map_err(Failure::input)
     }
 
@@ -84,9 +84,7 @@ impl SceneArguments {
 impl Source {
     /// The virtual views that the scene has.
     pub(super) fn frames(&self, arguments: &SceneArguments) -> usize {
-        let of_table = |table: &TargetSpec| table.frames.unwrap_or(1).min(scene::MOST_FRAMES);
-        let all: usize = self.spec.targets.iter().map(of_table).sum();
-        if arguments.view.is_some() { 1 } else { all.clamp(1, scene::MOST_FRAMES) }
+        if arguments.view.is_some() { 1 } else { self.spec.frames().clamp(1, scene::MOST_FRAMES) }
     }
 
     /// Refuses outputs that are one file, or an input of the scene, and names what killed runs left beside

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 /// Everything `--json` prints. Figures of merit are null without a truth; an infinite PSNR (equal images)
 /// is null too, with mae 0.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub(super) struct Summary {
     pub(super) psnr: Option<f64>,
     pub(super) ssim: Option<f64>,
@@ -50,25 +50,17 @@ impl Summary {
         let r = &rendering.report;
         let (width, height) = rendering.image.size();
         Self {
-            psnr: None,
-            ssim: None,
-            mae: None,
             coverage: rendering.coverage(),
             seconds,
-            preparation_seconds: 0.0,
             views: rendering.views.clone(),
-            error_white: None,
             samples: *r,
             holes: r.holes,
             filled_depths,
             size: [width, height],
             compared_on: "image",
-            compared_share: None,
-            whole_image: None,
             convergence: r.convergence,
             agreement: rendering.agreement.clone(),
-            geometry: None,
-            depths: None,
+            ..Self::default()
         }
     }
 

@@ -25,7 +25,7 @@ pub fn fill_unknown(map: &mut DepthMap) -> usize {
         let side = |q: u32| map.data.get(q as usize).copied();
         let value = match map.measure {
             Measure::Disparity => match (side(around[0]), side(around[1])) {
-                (Some(a), Some(b)) => Some(map.measure.farther(a, b)),
+                (Some(a), Some(b)) => Some(a.min(b)),
                 (a, b) => a.or(b),
             },
             Measure::Depth => of_one_surface(around, side),

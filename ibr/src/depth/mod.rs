@@ -35,14 +35,6 @@ impl Measure {
             or_far(f64::from(1.0 / parallax.max(1.0 / FAR))) as f32
         }
     }
-
-    /// The farther of two values.
-    pub fn farther(self, a: f32, b: f32) -> f32 {
-        match self {
-            Self::Disparity => a.min(b),
-            Self::Depth => a.max(b),
-        }
-    }
 }
 
 /// Errors of depth maps.

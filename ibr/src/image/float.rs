@@ -140,7 +140,7 @@ fn floats<'a, T: Deserialize>(
 
 #[cfg(test)]
 mod tests {
-    use crate::image::{read_image, read_map};
+    use crate::image::{MOST_PIXELS, read_image, read_map};
     use exr::prelude::{WritableImage, *};
     use npyz::WriterBuilder;
     use std::path::Path;
@@ -172,7 +172,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
         let is_read = |name: &str| {
-            assert_eq!(read_map(&at(name)).unwrap(), (3, 2, VALUES.to_vec()), "{name}");
+            assert_eq!(read_map(&at(name), MOST_PIXELS).unwrap(), (3, 2, VALUES.to_vec()), "{name}");
         };
         for names in [&["Z", "R", "G"][..], &["Y"]] {
             write_exr(&at("a.exr"), names);
@@ -197,7 +197,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.exr");
         write_exr(&path, &["R", "G", "B"]);
-        let image = read_image(&path).unwrap();
+        let image = read_image(&path, MOST_PIXELS).unwrap();
         assert_eq!((image.channels(), image.data()[3]), (3, 2.0 * 255.0));
     }
 
@@ -205,7 +205,7 @@ mod tests {
     fn what_is_no_map_is_named() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
-        let message = |name: &str| read_map(&at(name)).unwrap_err().to_string();
+        let message = |name: &str| read_map(&at(name), MOST_PIXELS).unwrap_err().to_string();
         write_exr(&at("a.exr"), &["U", "V"]);
         assert!(message("a.exr").contains("the channels are U, V"), "{}", message("a.exr"));
         write_npy(&at("a.npy"), &[6], npyz::Order::C, &VALUES);

@@ -15,7 +15,7 @@ pub mod y4m;
 pub use dynamic::Levels;
 pub use frame_rate::FrameRate;
 pub(crate) use read::image_size;
-pub use read::{MOST_PIXELS, read_image, read_image_within, read_map, read_map_within};
+pub use read::{MOST_PIXELS, read_image, read_map};
 pub use texture::Texture;
 pub use write::{begin, encode, encode_levels, encode_with_alpha, save};
 

@@ -10,22 +10,14 @@ use std::path::Path;
 /// Default of the most pixels of an image or map: 5792 x 5792, whose rendering takes 2 to 4 gigabytes.
 pub const MOST_PIXELS: usize = 1 << 25;
 
-/// Reads a grey or RGB image of at most [`MOST_PIXELS`] pixels; 16-bit values are scaled to 0..255, PFM
-/// values (white = 1) times 255.
+/// Reads a grey or RGB image of at most `most` pixels; 16-bit values are scaled to 0..255, PFM values
+/// (white = 1) times 255.
 ///
 /// An alpha channel is ignored.
 ///
 /// # Errors
 /// [`InputError`], naming the file.
-pub fn read_image(path: &Path) -> Result<Image, InputError> {
-    read_image_within(path, MOST_PIXELS)
-}
-
-/// As [`read_image`], for at most `most` pixels.
-///
-/// # Errors
-/// As [`read_image`].
-pub fn read_image_within(path: &Path, most: usize) -> Result<Image, InputError> {
+pub fn read_image(path: &Path, most: usize) -> Result<Image, InputError> {
     match load(path, most)? {
         Loaded::Float(mut image) => {
             image.data_mut().iter_mut().for_each(|v| *v *= 255.0);
@@ -43,25 +35,17 @@ pub(crate) fn image_size(path: &Path) -> Result<(usize, usize), InputError> {
     let header = ImageReader::open(path).and_then(ImageReader::with_guessed_format).ok();
     match header.and_then(|reader| reader.into_dimensions().ok()) {
         Some((width, height)) => Ok((width as usize, height as usize)),
-        None => Ok(read_image(path)?.size()),
+        None => Ok(read_image(path, MOST_PIXELS)?.size()),
     }
 }
 
-/// Reads a map of one value per pixel, as stored: 0..255, 0..65535 or floats.
+/// Reads a map of one value per pixel and of at most `most` pixels, as stored: 0..255, 0..65535 or floats.
 ///
 /// Returns width, height and the values, rows from the top.
 ///
 /// # Errors
 /// As [`read_image`], and for an RGB file whose channels differ.
-pub fn read_map(path: &Path) -> Result<(usize, usize, Vec<f32>), InputError> {
-    read_map_within(path, MOST_PIXELS)
-}
-
-/// As [`read_map`], for at most `most` pixels.
-///
-/// # Errors
-/// As [`read_map`].
-pub fn read_map_within(path: &Path, most: usize) -> Result<(usize, usize, Vec<f32>), InputError> {
+pub fn read_map(path: &Path, most: usize) -> Result<(usize, usize, Vec<f32>), InputError> {
     let image = match load(path, most)? {
         Loaded::Float(map) => map,
         Loaded::Whole(picture) => {
@@ -166,8 +150,8 @@ mod tests {
     #[test]
     fn sixteen_bits_read_as_stored_and_as_intensity() {
         let (_dir, path) = temporary("d.pgm", b"P5 2 1 65535\n\x01\x00\xff\xff");
-        assert_eq!(read_map(&path).unwrap(), (2, 1, vec![256.0, 65535.0]));
-        let image = read_image(&path).unwrap();
+        assert_eq!(read_map(&path, MOST_PIXELS).unwrap(), (2, 1, vec![256.0, 65535.0]));
+        let image = read_image(&path, MOST_PIXELS).unwrap();
         assert_eq!(image.data()[1], 255.0);
         assert!((image.data()[0] - 256.0 / 257.0).abs() < 1e-6);
     }
@@ -175,10 +159,10 @@ mod tests {
     #[test]
     fn colour_is_no_depth() {
         let (_dir, path) = temporary("d.ppm", b"P6 2 1 255\n\x05\x05\x05\x07\x08\x09");
-        let message = read_map(&path).unwrap_err().to_string();
+        let message = read_map(&path, MOST_PIXELS).unwrap_err().to_string();
         assert!(message.contains("pixel (1, 0)") && message.contains("d.ppm"), "{message}");
         let (_dir, path) = temporary("d.ppm", b"P6 2 1 255\n\x05\x05\x05\x07\x07\x07");
-        assert_eq!(read_map(&path).unwrap().2, [5.0, 7.0]);
+        assert_eq!(read_map(&path, MOST_PIXELS).unwrap().2, [5.0, 7.0]);
     }
 
     #[test]
@@ -186,22 +170,24 @@ mod tests {
         let mut bytes = b"P5 33554433 1 255\n".to_vec();
         bytes.resize(bytes.len() + MOST_PIXELS + 1, 7);
         let (_dir, path) = temporary("wide.pgm", &bytes);
-        for message in [read_image(&path).unwrap_err().to_string(), read_map(&path).unwrap_err().to_string()]
-        {
+        for message in [
+            read_image(&path, MOST_PIXELS).unwrap_err().to_string(),
+            read_map(&path, MOST_PIXELS).unwrap_err().to_string(),
+        ] {
             let parts = ["33554433 x 1", "the limit of 33554432", "--max-pixels"];
             assert!(parts.iter().all(|part| message.contains(part)), "{message}");
         }
         let (_dir, small) = temporary("small.pgm", b"P5 3 1 255\n\x01\x02\x03");
-        assert!(read_image_within(&small, 2).unwrap_err().to_string().contains("the limit of 2;"));
-        assert_eq!(read_image_within(&small, 3).unwrap().width(), 3);
+        assert!(read_image(&small, 2).unwrap_err().to_string().contains("the limit of 2;"));
+        assert_eq!(read_image(&small, 3).unwrap().width(), 3);
     }
 
     #[test]
     fn missing_and_damaged_files_are_named() {
-        let missing = read_image(Path::new("/nowhere/at all.png")).unwrap_err().to_string();
+        let missing = read_image(Path::new("/nowhere/at all.png"), MOST_PIXELS).unwrap_err().to_string();
         assert!(missing.contains("/nowhere/at all.png"), "{missing}");
         let (_dir, path) = temporary("x.png", b"not an image");
-        let damaged = read_image(&path).unwrap_err().to_string();
+        let damaged = read_image(&path, MOST_PIXELS).unwrap_err().to_string();
         assert!(damaged.contains("x.png: ") && damaged.contains("the readable formats are PNG"), "{damaged}");
     }
 }

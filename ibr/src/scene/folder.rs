@@ -7,7 +7,7 @@ use crate::camera::transforms::read_transforms;
 use crate::camera::{Camera, CameraList, Frame};
 use crate::depth::{DepthMap, Measure};
 use crate::files::InputError;
-use crate::image::{image_size, read_image, read_map};
+use crate::image::{MOST_PIXELS, image_size, read_image, read_map};
 use crate::pipeline::Agreement;
 use crate::propagate::RectifiedView;
 use hybank::messages::Quoted;
@@ -330,8 +330,8 @@ fn same_size([left, right]: [&Path; 2]) -> Found<()> {
 fn scale_of(left: (&Path, &Path), right: (&Path, &Path)) -> Found<Option<(f64, f64)>> {
     let mut views = Vec::new();
     for (image, map) in [left, right] {
-        let (width, height, stored) = read_map(map)?;
-        views.push((read_image(image)?, (width, height), stored, map));
+        let (width, height, stored) = read_map(map, MOST_PIXELS)?;
+        views.push((read_image(image, MOST_PIXELS)?, (width, height), stored, map));
     }
     if views.iter().any(|view| view.3.extension().is_some_and(|ending| ending == "pfm")) {
         return Ok(None);

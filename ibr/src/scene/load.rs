@@ -13,11 +13,11 @@ mod uncalibrated;
 pub use complete::complete;
 pub use goals::MOST_FRAMES;
 
-use super::spec::{Key, SceneSpec, ViewSpec};
+use super::spec::{KEYS, SceneSpec, ViewSpec};
 use super::{Kind, Scene, SourceView};
 use crate::camera::middlebury::Calibration;
 use crate::files::{InputError, Location};
-use crate::image::{Image, MOST_PIXELS, read_image_within};
+use crate::image::{Image, MOST_PIXELS, read_image};
 use crate::pipeline::Watch;
 use crate::propagate::Viewpoint;
 use crate::restore::{coloured, restore};
@@ -28,6 +28,7 @@ use left_out::LeftOut;
 use maps::LOADING_BYTES;
 use models::Models;
 use rayon::prelude::*;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -161,13 +162,14 @@ impl Loader<'_> {
         }
     }
 
-    /// Refuses keys of another kind of scene instead of ignoring them.
-    fn no_other_kind(&self, named: &str, kind: &str, keys: &[Key]) -> Loaded<()> {
-        match keys.iter().find(|key| key.is_given && !key.kinds.contains(kind)) {
-            Some(Key { name: key, .. }) => Err(self.incomplete(format!(
+    /// The keys that a table has; those of another kind of scene are refused instead of ignored.
+    fn keys_of_table(&self, named: &str, kind: &str, table: &impl Serialize) -> Loaded<toml::Table> {
+        let given = toml::Table::try_from(table).map_err(|e| self.incomplete(e))?;
+        match KEYS.iter().find(|(key, kinds)| given.contains_key(*key) && !kinds.contains(kind)) {
+            Some((key, _)) => Err(self.incomplete(format!(
                 "{named} has `{key}`, which has no meaning in a {kind} scene; remove it, or give all views the keys of one kind"
             ))),
-            None => Ok(()),
+            None => Ok(given),
         }
     }
 
@@ -183,7 +185,7 @@ impl Loader<'_> {
     }
 
     fn image(&self, path: &Path) -> Loaded<Image> {
-        read_image_within(&self.file(path), self.options.max_pixels)
+        read_image(&self.file(path), self.options.max_pixels)
     }
 
     fn need<T>(&self, value: Option<T>, view: &ViewSpec, key: &str, kind: &str) -> Loaded<T> {

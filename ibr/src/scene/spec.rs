@@ -138,54 +138,42 @@ impl SceneSpec {
         let files = images.chain(maps).chain(lists).cloned().chain(models);
         files.map(|file| folder.join(file)).collect()
     }
-}
 
-/// A key that not all kinds of scenes have.
-pub(super) struct Key {
-    pub(super) name: &'static str,
-    /// The kinds that have it.
-    pub(super) kinds: &'static str,
-    pub(super) is_given: bool,
-}
-
-fn key<T>(name: &'static str, kinds: &'static str, value: &Option<T>) -> Key {
-    Key { name, kinds, is_given: value.is_some() }
-}
-
-impl SceneSpec {
-    /// Keys of the top that not all kinds of scenes have.
-    pub(super) fn keys(&self) -> [Key; 7] {
-        [
-            key("matches", "matches-only", &self.matches),
-            key("colmap", "calibrated", &self.colmap),
-            key("transforms", "calibrated", &self.transforms),
-            key("calib", "rectified", &self.calib),
-            key("mirrored", "calibrated", &self.mirrored.then_some(())),
-            key("disparity_scale", "rectified", &self.disparity_scale),
-            key("depth_scale", "calibrated", &self.depth_scale),
-        ]
+    /// The virtual views of all tables.
+    pub(crate) fn frames(&self) -> usize {
+        self.targets.iter().map(|table| table.frames.unwrap_or(1)).fold(0, usize::saturating_add)
     }
 }
+
+/// Keys that not all kinds of scenes have, whichever table they are in, with the kinds that have them.
+pub(super) const KEYS: [(&str, &str); 21] = [
+    ("matches", "matches-only"),
+    ("transforms", "calibrated"),
+    ("calib", "rectified"),
+    ("mirrored", "calibrated"),
+    ("disparity", "rectified"),
+    ("disparity_scale", "rectified"),
+    ("disparity_offset", "rectified"),
+    ("position", "rectified"),
+    ("to_position", "rectified"),
+    ("camera", "calibrated"),
+    ("camera_of", "calibrated"),
+    ("to_camera", "calibrated"),
+    ("to_camera_of", "calibrated"),
+    ("depth", "calibrated"),
+    ("depth_scale", "calibrated"),
+    ("colmap", "calibrated"),
+    ("step", "rectified, calibrated"),
+    ("column", "matches-only"),
+    ("from_tracks", "matches-only"),
+    ("between", "matches-only"),
+    ("to_between", "matches-only"),
+];
 
 impl TargetSpec {
     /// Keys of which a virtual view has one at most.
     pub(super) const EITHER: [[&'static str; 2]; 3] =
         [["camera", "camera_of"], ["to_camera", "to_camera_of"], ["from_tracks", "between"]];
-
-    /// Keys that not all kinds of scenes have.
-    pub(super) fn keys(&self) -> [Key; 9] {
-        [
-            key("position", "rectified", &self.position),
-            key("to_position", "rectified", &self.to_position),
-            key("camera", "calibrated", &self.camera),
-            key("camera_of", "calibrated", &self.camera_of),
-            key("to_camera", "calibrated", &self.to_camera),
-            key("to_camera_of", "calibrated", &self.to_camera_of),
-            key("from_tracks", "matches-only", &self.from_tracks),
-            key("between", "matches-only", &self.between),
-            key("to_between", "matches-only", &self.to_between),
-        ]
-    }
 
     /// Whether the end of a path is given.
     pub(super) fn has_end(&self) -> bool {
@@ -195,21 +183,6 @@ impl TargetSpec {
 }
 
 impl ViewSpec {
-    /// Keys that not all kinds of scenes have.
-    pub(super) fn keys(&self) -> [Key; 9] {
-        [
-            key("disparity", "rectified", &self.disparity),
-            key("disparity_scale", "rectified", &self.disparity_scale),
-            key("disparity_offset", "rectified", &self.disparity_offset),
-            key("camera", "calibrated", &self.camera),
-            key("depth", "calibrated", &self.depth),
-            key("depth_scale", "calibrated", &self.depth_scale),
-            key("colmap", "calibrated", &self.colmap),
-            key("step", "rectified, calibrated", &self.step),
-            key("column", "matches-only", &self.column),
-        ]
-    }
-
     /// Stored numbers per unit of depth in a map with whole numbers, if nothing else is said: thousandths,
     /// as nerfstudio writes them.
     pub(super) fn usual_scale(map: &Path) -> Option<f64> {

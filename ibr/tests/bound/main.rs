@@ -19,7 +19,7 @@ mod sure;
 use hybank_ibr::analysis::{Predictor, ViewError};
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
-use hybank_ibr::image::{Image, read_image, read_map};
+use hybank_ibr::image::{Image, MOST_PIXELS, read_image, read_map};
 use hybank_ibr::pipeline::RenderSettings;
 use hybank_ibr::propagate::{CalibratedView, RectifiedView};
 use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
@@ -166,12 +166,12 @@ fn predict(name: &str, rig: &Rig, which: &[usize], position: f64, truth: &Image,
 fn photographs(folder: &str) -> Option<(Rig, Option<Image>)> {
     let path = trials::data(&format!("ibr/{folder}"))?;
     let map = |name: &str| {
-        let (width, height, stored) = read_map(&path.join(name)).unwrap();
+        let (width, height, stored) = read_map(&path.join(name), MOST_PIXELS).unwrap();
         let mut map = DepthMap::new((width, height), stored, 4.0, Measure::Disparity).unwrap();
         fill_unknown(&mut map);
         map
     };
-    let image = |name: &str| read_image(&path.join(name)).unwrap();
+    let image = |name: &str| read_image(&path.join(name), MOST_PIXELS).unwrap();
     let truth = path.join("im4.png").is_file().then(|| image("im4.png"));
     let rig = Rig {
         images: vec![image("im2.png"), image("im6.png")],

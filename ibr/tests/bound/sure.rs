@@ -1,7 +1,7 @@
 //! The sure bound against the errors of random scenes whose second derivatives are known.
 
 use super::*;
-use hybank_ibr::analysis::{Limits, Predictor, collect_evidence};
+use hybank_ibr::analysis::{Limits, Predictor};
 
 /// A board whose disparity is c + s X, with the texture level + height sin(rate X + phase). X is the column
 /// in the view at position 0.
@@ -86,12 +86,13 @@ fn trial(seed: u64, understated: f64) -> Vec<(f64, f64)> {
         intensity: limits.intensity * understated,
         disparity: limits.disparity * understated,
     };
-    let found = collect_evidence(&[view(0), view(1)], position, &settings, Some(&limits)).unwrap();
+    let predictor = Predictor::new(&[view(0), view(1)], &settings).unwrap();
+    let found = predictor.at(&position, SIZE, Some(&limits)).unwrap();
     let error = |p: usize| {
         let truth = look(&layers, (p % SIZE.0) as f64, position).1;
         (f64::from(found.rendering.image.data()[p]) - truth).abs()
     };
-    found.sure.iter().enumerate().map(|(p, bound)| (error(p), f64::from(*bound))).collect()
+    found.sure_bound.iter().enumerate().map(|(p, bound)| (error(p), f64::from(*bound))).collect()
 }
 
 /// No pixel of 200 random scenes (`HYBANK_TRIALS=4000` for more) exceeds its bound. The bound is not idle:

@@ -1,7 +1,7 @@
 //! The predicted error on the command line.
 
 use super::*;
-use hybank_ibr::image::read_image;
+use hybank_ibr::image::{MOST_PIXELS, read_image};
 
 #[test]
 fn an_error_is_predicted_mapped_and_compared() {
@@ -16,7 +16,7 @@ fn an_error_is_predicted_mapped_and_compared() {
     assert!((parts / estimate - 1.0).abs() < 1e-4, "{figures}");
     assert!((number("/measured/ratio") - estimate / number("/measured/mae")).abs() < 1e-9);
     assert_eq!((number("/calibrated_on"), figures["rows"].as_array().unwrap().len()), (2.0, SIZE.1));
-    assert_eq!(read_image(&dir.path().join("map.png")).unwrap().size(), SIZE);
+    assert_eq!(read_image(&dir.path().join("map.png"), MOST_PIXELS).unwrap().size(), SIZE);
     let again = run(dir.path(), &arguments);
     assert!(code(&again) == 1 && stderr(&again).contains("--force"), "{}", stderr(&again));
 }
@@ -110,7 +110,7 @@ fn the_rows_are_plotted() {
         &svg[..200]
     );
     assert_eq!(code(&run(dir.path(), &["bound", "scene.toml", "--plot", "rows.png"])), 0);
-    assert_eq!(read_image(&dir.path().join("rows.png")).unwrap().size(), (1920, 1800));
+    assert_eq!(read_image(&dir.path().join("rows.png"), MOST_PIXELS).unwrap().size(), (1920, 1800));
     for (path, said) in [("-", "standard output"), ("rows.pdf", ".svg or .png")] {
         let refused = run(dir.path(), &["bound", "scene.toml", "--plot", path]);
         assert!(code(&refused) == 2 && stderr(&refused).contains(said), "{}", stderr(&refused));

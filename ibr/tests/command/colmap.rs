@@ -2,7 +2,7 @@
 
 use super::*;
 use hybank_ibr::camera::colmap::parse_model;
-use hybank_ibr::image::Image;
+use hybank_ibr::image::{Image, MOST_PIXELS, read_image};
 
 /// Columns of the three cameras, along x.
 const PLACES: [f64; 3] = [-0.2, 0.2, 0.0];
@@ -208,7 +208,7 @@ fn a_size_of_the_same_shape_scales_the_virtual_camera() {
     target("size = [60, 45]\n");
     let found = psnr(dir.path(), &["--truth", "small.png"]);
     assert!(found > 28.0, "{found}");
-    let picture = |name: &str| hybank_ibr::image::read_image(&at(name)).unwrap();
+    let picture = |name: &str| read_image(&at(name), MOST_PIXELS).unwrap();
     target("");
     good(dir.path(), &["render", "s.toml", "-o", "whole.png"]);
     target("size = [120, 50]\n");

@@ -1,7 +1,7 @@
 //! What other programs write and read: lists and films of virtual views, maps beside them, camera files.
 
 use super::*;
-use hybank_ibr::image::read_image;
+use hybank_ibr::image::{MOST_PIXELS, read_image};
 use image::DynamicImage;
 use nalgebra::{Matrix3x4, Rotation3, Vector3};
 
@@ -39,7 +39,7 @@ fn lists_and_films_hold_the_views() {
         assert!(std::fs::read(at(&number)).unwrap() == std::fs::read(at("one.png")).unwrap(), "{number}");
         assert!(at(&format!("n-000{}.png", k + 1)).exists());
         // Luma of the picture, rounded twice.
-        let picture = read_image(&at("one.png")).unwrap();
+        let picture = read_image(&at("one.png"), MOST_PIXELS).unwrap();
         for (pixel, luma) in picture.data().chunks_exact(3).zip(&shown[k]) {
             let want = 16.0 + 219.0 / 255.0 * (0.299 * pixel[0] + 0.587 * pixel[1] + 0.114 * pixel[2]);
             assert!((want - f32::from(*luma)).abs() <= 1.5, "{want} {luma}");
@@ -77,7 +77,7 @@ fn alpha_counts_and_errors_are_written() {
     let outputs = ["--mask", "m.png", "--count", "n.png", "--error", "e.pfm", "--alpha", "--json"];
     let arguments = [&["render", scene, "-o", "a.png", "--truth", "middle.png"][..], &outputs].concat();
     let figures = json(&run(dir.path(), &arguments));
-    let mask = read_image(&at("m.png")).unwrap();
+    let mask = read_image(&at("m.png"), MOST_PIXELS).unwrap();
     // Beyond the right view there are regions that no view shows.
     let beyond = std::fs::read_to_string(at(scene)).unwrap().replace("position = 0.5", "position = 2.0");
     std::fs::write(at("beyond.toml"), beyond).unwrap();
@@ -87,7 +87,7 @@ fn alpha_counts_and_errors_are_written() {
     );
     let picture = image::open(at("c.png")).unwrap();
     let DynamicImage::ImageRgba16(pixels) = &picture else { panic!("{:?}", picture.color()) };
-    let holes = read_image(&at("cm.png")).unwrap();
+    let holes = read_image(&at("cm.png"), MOST_PIXELS).unwrap();
     assert!(holes.data().contains(&0.0) && holes.data().contains(&255.0));
     assert!(pixels.pixels().zip(holes.data()).all(|(p, m)| p.0[3] == if *m == 0.0 { 0 } else { 65535 }));
     assert!(matches!(image::open(at("a.png")).unwrap(), DynamicImage::ImageRgba8(_)));
@@ -105,7 +105,7 @@ fn alpha_counts_and_errors_are_written() {
     let shown = ["render", scene, "-o", "b.png", "--truth", "middle.png", "--error", "e.png"];
     let text = String::from_utf8(good(dir.path(), &shown).stdout).unwrap();
     assert!(text.contains("error     white is "), "{text}");
-    assert_eq!(read_image(&at("e.png")).unwrap().size(), SIZE);
+    assert_eq!(read_image(&at("e.png"), MOST_PIXELS).unwrap().size(), SIZE);
     for (arguments, exit, words) in [
         (&["-o", "x.png", "--error", "e2.png"][..], 2, "--truth"),
         (&["-o", "x.jpg", "--alpha"], 2, "no alpha channel"),

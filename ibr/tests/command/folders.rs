@@ -2,6 +2,7 @@
 
 use super::*;
 use hybank_ibr::camera::colmap::parse_model;
+use hybank_ibr::image::{MOST_PIXELS, read_map};
 
 /// The photographs of the synthetic rig under some names in a folder of their own.
 fn photographs(names: &[(&str, &str)]) -> tempfile::TempDir {
@@ -47,7 +48,7 @@ fn a_set_of_middlebury_has_its_scale() {
     let dir = photographs(&[("left.png", "im2.png"), ("middle.png", "im4.png"), ("right.png", "im6.png")]);
     let exact = rig();
     for (name, map) in [("left.pfm", "disp2.png"), ("right.pfm", "disp6.png")] {
-        let (width, height, values) = hybank_ibr::image::read_map(&exact.path().join(name)).unwrap();
+        let (width, height, values) = read_map(&exact.path().join(name), MOST_PIXELS).unwrap();
         let stored =
             Image::new(width, height, 1, values.iter().map(|v| (8.0 * v).round()).collect()).unwrap();
         assert!(stored.data().iter().all(|v| *v < 255.0));

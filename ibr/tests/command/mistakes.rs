@@ -1,7 +1,7 @@
 //! What users get wrong: each mistake is mended or named, none passes in silence.
 
 use super::*;
-use hybank_ibr::image::{Image, read_image};
+use hybank_ibr::image::{Image, MOST_PIXELS, read_image};
 use image::DynamicImage;
 
 fn scene(dir: &Path) -> String {
@@ -246,7 +246,7 @@ fn transforms_without_a_virtual_view_say_which_key_is_missing() {
     save(&Image::filled(60, 90, 3, 9.0), &dir.path().join("0.png")).unwrap();
     let target = ["render", "s.toml", "--view", "2.png", "-o", "x.png"];
     refused(dir.path(), &target, 1, &["d0.png", "120 x 90", "60 x 90"]);
-    assert_eq!(read_image(&dir.path().join("o.png")).unwrap().size(), SIZE);
+    assert_eq!(read_image(&dir.path().join("o.png"), MOST_PIXELS).unwrap().size(), SIZE);
 }
 
 /// A negative number was taken for an option, with the advice to write `-- -1`.

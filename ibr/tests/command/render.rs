@@ -1,7 +1,7 @@
 //! Renderings of each kind of scene, and the demo.
 
 use super::*;
-use hybank_ibr::image::{Image, read_image};
+use hybank_ibr::image::{Image, MOST_PIXELS, read_image};
 use nalgebra::Matrix3x4;
 
 #[test]
@@ -14,7 +14,7 @@ fn a_rig_is_rendered_and_compared() {
     assert!(number("psnr") > 33.0 && number("ssim") > 0.93 && number("mae") < 3.0, "{figures}");
     assert!(number("coverage") > 0.95 && number("seconds") > 0.0, "{figures}");
     assert_adds_up(&figures, 2 * 120 * 90);
-    assert_eq!(read_image(&dir.path().join("out.png")).unwrap().size(), SIZE);
+    assert_eq!(read_image(&dir.path().join("out.png"), MOST_PIXELS).unwrap().size(), SIZE);
 }
 
 /// Swapped positions and a missing scale render without an error; the warning names what to check.
@@ -61,7 +61,7 @@ fn converged_rigs_have_negative_disparities() {
     };
     let shift_image = |name: &str, columns: usize| {
         let path = dir.path().join(format!("{name}.png"));
-        let image = read_image(&path).unwrap();
+        let image = read_image(&path, MOST_PIXELS).unwrap();
         let pixel = |i: usize| {
             let from = i - i % SIZE.0 + (i % SIZE.0).saturating_sub(columns);
             image.data()[3 * from..3 * from + 3].to_vec()
@@ -119,7 +119,7 @@ fn depth_and_sixteen_bits_are_written() {
         unknown as u64,
         figures["holes"]["crack"].as_u64().unwrap() + figures["holes"]["disocclusion"].as_u64().unwrap()
     );
-    let deep = read_image(&dir.path().join("deep.png")).unwrap();
+    let deep = read_image(&dir.path().join("deep.png"), MOST_PIXELS).unwrap();
     assert!(deep.data().iter().any(|v| (v - v.round()).abs() > 0.1), "more than 256 levels");
     for (name, value, words) in [
         ("--depth", "d.png", "depth is written as .pfm"),
@@ -265,7 +265,7 @@ fn general_cameras_are_rendered() {
     assert!(figures["psnr"].as_f64().unwrap() > 31.0, "{figures}");
     assert_adds_up(&figures, 2 * 120 * 90);
     assert_eq!(figures["convergence"]["reached"], true);
-    assert_eq!(read_image(&dir.path().join("m.png")).unwrap().channels(), 1);
+    assert_eq!(read_image(&dir.path().join("m.png"), MOST_PIXELS).unwrap().channels(), 1);
 }
 
 /// Tracks of points on the scene's surfaces over the three turned cameras, without any camera in the scene
@@ -359,7 +359,7 @@ fn odd_images_are_fine() {
         write("s.toml", text.as_bytes());
         let figures = json(&run(dir.path(), &["render", "s.toml", "-o", "o.png", "--force", "--json"]));
         assert_eq!(figures["coverage"], 1.0, "{a} {b}: {figures}");
-        let image = read_image(&dir.path().join("o.png")).unwrap();
+        let image = read_image(&dir.path().join("o.png"), MOST_PIXELS).unwrap();
         let first = image.data()[0];
         // The fit smooths the step of 16 grey levels between two pixels by two of them if both views count.
         // All maps say a disparity of one: a view with nearer samples would hide the other, and one sample
@@ -411,7 +411,10 @@ fn the_demo_needs_no_data() {
     let figures = json(&run(dir.path(), &["demo", "-o", "sheet.png", "--size", "160x120", "--json"]));
     let psnr = |kind: &str| figures[kind]["psnr"].as_f64().unwrap();
     assert!(psnr("full_depth") > 34.0 && psnr("partial_depth") > 27.0, "{figures}");
-    assert_eq!(read_image(&dir.path().join("sheet.png")).unwrap().size(), (3 * 166 + 6, 2 * 126 + 6));
+    assert_eq!(
+        read_image(&dir.path().join("sheet.png"), MOST_PIXELS).unwrap().size(),
+        (3 * 166 + 6, 2 * 126 + 6)
+    );
     let again = run(dir.path(), &["demo", "-o", "sheet.png"]);
     assert_eq!(code(&again), 1);
 }

@@ -21,8 +21,7 @@ pub(super) struct Goal {
 impl Loader<'_> {
     /// The tables, at least one.
     pub(super) fn goals(&self) -> Loaded<Vec<Goal>> {
-        let given = &self.spec.targets;
-        let goals: Vec<Goal> = match given.as_slice() {
+        let goals: Vec<Goal> = match self.spec.targets.as_slice() {
             [] => vec![Goal { target: TargetSpec::default(), name: "[virtual]".into() }],
             [one] => vec![Goal { target: one.clone(), name: "[virtual]".into() }],
             many => {
@@ -33,8 +32,7 @@ impl Loader<'_> {
                 many.iter().enumerate().map(numbered).collect()
             }
         };
-        let frames: usize = given.iter().map(|t| t.frames.unwrap_or(1).min(MOST_FRAMES + 1)).sum();
-        if frames > MOST_FRAMES {
+        if self.spec.frames() > MOST_FRAMES {
             return Err(self.incomplete(format!(
                 "the scene has more than {MOST_FRAMES} virtual views; render them in parts"
             )));
@@ -44,13 +42,13 @@ impl Loader<'_> {
 
     /// Refuses keys of another kind of scene than this, and two keys for one thing, instead of ignoring one.
     pub(super) fn keys_of(&self, views: &[&ViewSpec], goals: &[Goal], kind: &str) -> Loaded<()> {
-        self.no_other_kind("the top of the file", kind, &self.spec.keys())?;
-        views.iter().try_for_each(|view| self.no_other_kind(&view.named(), kind, &view.keys()))?;
+        self.keys_of_table("the top of the file", kind, self.spec)?;
+        for view in views {
+            self.keys_of_table(&view.named(), kind, view)?;
+        }
         goals.iter().try_for_each(|Goal { target, name }| {
-            let keys = target.keys();
-            self.no_other_kind(name, kind, &keys)?;
-            let given = |wanted: &str| keys.iter().any(|key| key.is_given && key.name == wanted);
-            match TargetSpec::EITHER.iter().find(|pair| pair.iter().all(|key| given(key))) {
+            let given = self.keys_of_table(name, kind, target)?;
+            match TargetSpec::EITHER.iter().find(|pair| pair.iter().all(|key| given.contains_key(*key))) {
                 Some([one, other]) => Err(self.incomplete(format!(
                     "{name} has both `{one}` and `{other}`; remove the one that is not meant"
                 ))),

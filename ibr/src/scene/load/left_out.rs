@@ -26,7 +26,6 @@ impl Loader<'_> {
         let labels: Vec<String> = views.iter().map(ViewSpec::label).collect();
         let images: Vec<String> = views.iter().map(|view| view.image.display().to_string()).collect();
         for list in [labels, images] {
-            let list: Vec<&str> = list.iter().map(String::as_str).collect();
             match names::find(&list, name) {
                 Ok(found) if found.whole => return Ok(Some(LeftOut::View(found.index))),
                 Err(e @ NameError::Ambiguous { .. }) => return Err(self.incomplete(format!("--view: {e}"))),
@@ -42,7 +41,7 @@ impl Loader<'_> {
 
     pub(super) fn no_such_view(&self, name: &str) -> InputError {
         let labels: Vec<String> = self.spec.view.iter().map(ViewSpec::label).collect();
-        let known = names::list(&labels.iter().map(String::as_str).collect::<Vec<_>>(), ", ");
+        let known = names::list(&labels, ", ");
         self.incomplete(format!("there is no view \"{}\"; the views are {known}", Quoted(name)))
     }
 }

@@ -4,7 +4,7 @@ use super::{Loaded, Loader};
 use crate::camera::Camera;
 use crate::depth::{DepthMap, Measure, fill_unknown};
 use crate::files::{InputError, refuse_pixels_without_memory};
-use crate::image::{Image, read_map_within};
+use crate::image::{Image, read_map};
 use crate::matching::{Photograph, depths};
 use crate::partial::densify;
 use crate::propagate::Viewpoint;
@@ -50,7 +50,7 @@ impl Loader<'_> {
             };
         };
         let path = self.file(file);
-        let (width, height, stored) = read_map_within(&path, self.options.max_pixels)?;
+        let (width, height, stored) = read_map(&path, self.options.max_pixels)?;
         let bad = |e| InputError::file(&path, format!("{}: {e}", view.named()));
         let map = DepthMap::new((width, height), stored, given.scale.unwrap_or(1.0), given.measure);
         let map = map.and_then(|map| match view.disparity_offset {

@@ -97,8 +97,7 @@ impl Loader<'_> {
     pub(super) fn some_names(&self, source: &Source) -> Loaded<String> {
         let list = self.models.get(source)?;
         let images: Vec<_> = list.frames.iter().map(|frame| frame.image.to_string_lossy()).collect();
-        let listed = names::list(&images.iter().map(AsRef::as_ref).collect::<Vec<_>>(), ", ");
-        Ok(format!("{} lists {listed}", Quoted(list.path())))
+        Ok(format!("{} lists {}", Quoted(list.path()), names::list(&images, ", ")))
     }
 
     /// Whether the scene's file of cameras lists an image.
