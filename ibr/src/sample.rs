@@ -30,8 +30,9 @@ pub struct Sample<const C: usize> {
     pub guessed: bool,
 }
 
+#[cfg(test)]
 impl<const C: usize> Sample<C> {
-    /// A sample at the origin with unit spacing and weight and all other fields 0, for work memory.
+    /// A sample at the origin with unit spacing and weight and all other fields 0.
     pub(crate) const BLANK: Self = Self {
         x: 0.0,
         y: 0.0,
