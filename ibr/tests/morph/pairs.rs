@@ -3,7 +3,7 @@
 use crate::normal::normal;
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::DepthMap;
-use hybank_ibr::image::{Image, read_image, read_map};
+use hybank_ibr::image::{Image, MOST_PIXELS, read_image, read_map};
 use hybank_ibr::scene::{self, Kind, LoadOptions};
 use hybank_ibr::synthetic::SyntheticScene;
 use hybank_ibr::uncalibrated::Point;
@@ -53,7 +53,7 @@ fn house_pair(path: &Path, from: [usize; 2], wanted: usize) -> Pair {
         all.lines().map(|line| Some(corners[k][number(line)?])).collect::<Vec<_>>()
     };
     let tracks = column(0).into_iter().zip(column(1)).map(|(a, b)| vec![a, b]).collect();
-    let image = |v: usize| read_image(&path.join(format!("house.{v:03}.png"))).unwrap();
+    let image = |v: usize| read_image(&path.join(format!("house.{v:03}.png")), MOST_PIXELS).unwrap();
     let images = from.map(image).to_vec();
     Pair { name: format!("house {from:?} {wanted}"), images, tracks, target: column(2), truth: image(wanted) }
 }
@@ -65,8 +65,8 @@ fn scattered((width, height): (usize, usize)) -> impl Iterator<Item = (usize, us
 
 /// A rectified rig of Middlebury: 500 tracks where both maps agree.
 fn rig(path: &Path, scale: f32) -> Pair {
-    let (width, height, left) = read_map(&path.join("disp2.png")).unwrap();
-    let (_, _, right) = read_map(&path.join("disp6.png")).unwrap();
+    let (width, height, left) = read_map(&path.join("disp2.png"), MOST_PIXELS).unwrap();
+    let (_, _, right) = read_map(&path.join("disp6.png"), MOST_PIXELS).unwrap();
     let seen = |(x, y): (usize, usize)| {
         let d = left[y * width + x] / scale;
         let there = x as f32 - d;
@@ -75,7 +75,7 @@ fn rig(path: &Path, scale: f32) -> Pair {
         let at = |shift: f32| Point::new(f64::from(x as f32 - shift), y as f64);
         (agrees && (d - other).abs() <= 0.6).then(|| [at(0.0), at(d), at(d / 2.0)])
     };
-    let image = |name: &str| read_image(&path.join(name)).unwrap();
+    let image = |name: &str| read_image(&path.join(name), MOST_PIXELS).unwrap();
     let points = scattered((width, height)).filter_map(seen).take(500).collect();
     noisy(&name(path), vec![image("im2.png"), image("im6.png")], points, image("im4.png"))
 }
@@ -87,7 +87,7 @@ fn traced(path: &Path) -> Pair {
     let loaded = scene::load(&spec, &file, &LoadOptions::default(), &|_| ()).unwrap();
     let Kind::Calibrated { views, cameras, .. } = loaded.kind else { panic!("{}", file.display()) };
     let shots = views.into_iter().map(|v| Shot { image: v.image, map: v.map, camera: v.camera }).collect();
-    of_shots(&name(path), shots, &cameras[0], read_image(&path.join("truth.png")).unwrap(), 400)
+    of_shots(&name(path), shots, &cameras[0], read_image(&path.join("truth.png"), MOST_PIXELS).unwrap(), 400)
 }
 
 /// Photographs of a synthetic scene: 250 tracks.
