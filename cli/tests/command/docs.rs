@@ -104,10 +104,10 @@ impl Folder {
         assert!(bank.is_ok(), "{}: {bank:?}", self.place(snippet));
     }
 
-    /// Runs the lines that call `hybank`, the C compiler and what it made; `cargo` lines are the business
-    /// of a fresh clone.
+    /// Runs the lines that call `hybank`, the C compiler, what it made and `sed`; `cargo` lines are the
+    /// business of a fresh clone.
     fn run(&self, snippet: &Snippet) {
-        let programs = ["hybank ", "cc ", "./"];
+        let programs = ["hybank ", "cc ", "./", "sed "];
         let runs = |line: &&str| programs.iter().any(|program| line.starts_with(program));
         for line in snippet.text.replace("\\\n", "").lines().filter(runs) {
             let binary = Path::new(env!("CARGO_BIN_EXE_hybank")).parent().expect("the folder of the binary");
