@@ -1,9 +1,9 @@
 //! The virtual view from the photographs, triangle by triangle: each photograph is mapped as the plane of
 //! the triangle maps it.
 //!
-//! A triangle that joins two surfaces lies on neither of them. Where the photographs contradict each other on
-//! its plane and agree on that of a triangle beside it, the pixel lies on that one. A photograph that shows
-//! another surface before the point, by the order of depth, counts less there.
+//! A triangle that joins two surfaces lies on neither of them. Where the photographs contradict each other
+//! on its plane and agree on that of a triangle beside it, the pixel lies on that one. A photograph that
+//! shows another surface before the point, by the order of depth, counts less there.
 
 use super::base_pair::{matches, parallax};
 use super::reconstruction::Reconstruction;
