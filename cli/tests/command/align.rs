@@ -239,6 +239,19 @@ fn a_slow_sweep_is_refused() {
     desk.refused(1, &[&ALIGN[..], &["--within", "100.1ms"]].concat(), &parts);
 }
 
+/// Of a sweep past half the recorders' rate each piece shows one lag, but another one than those beside it:
+/// the drift was -22.1 +- 3.5 ppm where 1.5 is true.
+#[test]
+fn a_sweep_that_folds_is_refused() {
+    let desk = Desk::with_spec(include_str!("../../../examples/recorders/spec.toml"));
+    let source = "chirp:200Hz..34kHz@0.2s+step@0.31+step@0.46+step@0.58+tones:440Hz";
+    let simulated = ["simulate", "spec.toml", "-o", "c", "--samples", "153600", "--gain", "0.08"];
+    let errors = ["--noise", "1e-4", "--delay-error", "0,-50.4ms", "--drift", "0,1.5", "--source", source];
+    desk.good(&[&simulated[..], &errors].concat());
+    let parts = ["channels 1 and 2", "narrow band", "broad sound"];
+    desk.refused(1, &["align", "spec.toml", "c/ch1.wav", "c/ch2.wav", "-o", "aligned.toml"], &parts);
+}
+
 #[test]
 fn recordings_that_do_not_fit_are_refused_with_the_reason() {
     let mut dice = Random(93);

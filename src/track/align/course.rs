@@ -131,7 +131,8 @@ impl<'a> Course<'a> {
     }
 
     /// By how much the clock is fast: the slope of the line that is closest to the delays. Their first and
-    /// last ones alone would say it with the errors of few pieces.
+    /// last ones alone would say it with the errors of few pieces. The deviation is that of the scatter around
+    /// the line where it is larger.
     pub(super) fn drift(&self, i: usize) -> Estimate<f64> {
         let Some(line) = &self.timelines[i] else { return Estimate { value: 0.0, sigma: 0.0 } };
         let taken = self.readings.iter().filter(|reading| !line.refuses(reading.frame));
@@ -145,7 +146,13 @@ impl<'a> Course<'a> {
         let middle = all.iter().map(|(time, _, weight)| weight * time).sum::<f64>() / weights;
         let squares: f64 = all.iter().map(|(time, _, weight)| weight * (time - middle).powi(2)).sum();
         let product: f64 = all.iter().map(|(time, delay, weight)| weight * (time - middle) * delay).sum();
-        Estimate { value: product / squares, sigma: squares.powf(-0.5) }
+        let value = product / squares;
+        let mean = all.iter().map(|(_, delay, weight)| weight * delay).sum::<f64>() / weights;
+        let miss = |(time, delay, weight): &(f64, f64, f64)| {
+            weight * (delay - mean - value * (time - middle)).powi(2)
+        };
+        let misfit = all.iter().map(miss).sum::<f64>() / all.len().saturating_sub(2).max(1) as f64;
+        Estimate { value, sigma: (misfit.max(1.0) / squares).sqrt() }
     }
 
     /// The spec, and the fast periods that all delays were raised by.

@@ -55,6 +55,13 @@ struct LocalLag {
     is_alone: bool,
 }
 
+impl LocalLag {
+    /// Whether it is the only lag that the correlation shows, and the one that the pieces beside it show.
+    fn says(&self, beyond: f64) -> bool {
+        self.is_alone && (self.beyond - beyond).abs() <= NEAR_LAG
+    }
+}
+
 impl<'a> Pieces<'a> {
     pub(super) fn new(
         spec: &Spec,
@@ -74,13 +81,14 @@ impl<'a> Pieces<'a> {
             let Some(line) = line else { continue };
             let local: Vec<LocalLag> = firsts.iter().map(|first| self.local_lag(*first, i, line)).collect();
             self.expect_gain(i, local.iter().map(|lag| lag.height).sum());
-            let weight = |is_alone: bool| -> f64 {
-                local.iter().filter(|lag| lag.is_alone == is_alone).map(|lag| lag.height.powi(2)).sum()
+            let beyond: Vec<f64> = (0..local.len()).map(|number| likely(&local, number)).collect();
+            let weight = |agrees: bool| -> f64 {
+                let of_kind = |(lag, beyond): &(&LocalLag, &f64)| lag.says(**beyond) == agrees;
+                local.iter().zip(&beyond).filter(of_kind).map(|(lag, _)| lag.height.powi(2)).sum()
             };
             if weight(false) > weight(true) {
                 return Err(AlignError::Narrow { reference: self.settings.reference + 1, channel: i + 1 });
             }
-            let beyond: Vec<f64> = (0..local.len()).map(|number| likely(&local, number)).collect();
             self.rates[i] = line.rate + slope(&firsts, &beyond);
             for ((first, beyond), lags) in firsts.iter().zip(&beyond).zip(&mut lags) {
                 lags[i] = line.lag_at(self.centre(*first)) + beyond;
