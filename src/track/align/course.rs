@@ -131,8 +131,8 @@ impl<'a> Course<'a> {
     }
 
     /// By how much the clock is fast: the slope of the line that is closest to the delays. Their first and
-    /// last ones alone would say it with the errors of few pieces. The deviation is that of the scatter around
-    /// the line where it is larger.
+    /// last ones alone would say it with the errors of few pieces. The deviation is that of the scatter
+    /// around the line where it is larger.
     pub(super) fn drift(&self, i: usize) -> Estimate<f64> {
         let Some(line) = &self.timelines[i] else { return Estimate { value: 0.0, sigma: 0.0 } };
         let taken = self.readings.iter().filter(|reading| !line.refuses(reading.frame));
