@@ -44,8 +44,8 @@ pub(crate) fn render_uncalibrated<'py>(
             py,
             &py.get_type::<PyUserWarning>(),
             c"the order of depth is undecided: guessed calibrations contradict each other, and colours do not \
-              show it; photographs are blended where surfaces overlap. reverse_order=True hides what lies behind \
-              by the less likely order",
+              show it, so no surface hides another. reverse_order=True takes the less likely order, and then \
+              they do",
             2,
         )?;
     }

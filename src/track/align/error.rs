@@ -49,11 +49,12 @@ pub enum AlignError {
         /// Samples by which the channel may have begun before the reference.
         lags: Vec<i64>,
     },
-    /// At each instant the signal is narrow: a sweep, a tone that glides.
+    /// At each instant the signal is narrow: a sweep, a tone that glides. Most pieces show several lags, or
+    /// another one than those beside them.
     #[error(
-        "the recordings of channels {reference} and {channel} agree at several lags in most pieces: at each instant the \
-         signal has a narrow band, as a slow sweep has, and its frequency moves as a delay would; record a broad sound \
-         (noise, speech, claps), or follow the delay by a tone that sounds all the time"
+        "most pieces of the recordings of channels {reference} and {channel} agree at several lags, or at another lag than \
+         the pieces beside them: at each instant the signal has a narrow band, as a sweep has, and its frequency moves as \
+         a delay would; record a broad sound (noise, speech, claps), or follow the delay by a tone that sounds all the time"
     )]
     Narrow {
         /// From 1.

@@ -61,7 +61,7 @@ impl Concerns {
         }
         if self.undecided > 0 {
             texts.push(
-                "the order of depth is undecided: guessed calibrations contradict each other, and colours do not show it; photographs are blended where surfaces overlap. --reverse-order hides what lies behind by the less likely order".into(),
+                "the order of depth is undecided: guessed calibrations contradict each other, and colours do not show it; so no surface hides another. --reverse-order takes the less likely order, and then they do".into(),
             );
         }
         texts
