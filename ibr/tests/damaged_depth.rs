@@ -8,6 +8,9 @@ mod case;
 #[path = "../examples/damaged_depth/damage.rs"]
 #[allow(dead_code)]
 mod damage;
+#[path = "../examples/damaged_depth/peers/mod.rs"]
+#[allow(dead_code)]
+mod peers;
 #[path = "../examples/damaged_depth/sky.rs"]
 mod sky;
 

@@ -7,10 +7,13 @@
 //!
 //! The scenes poster1, spheres and grid are those of the data folder (`HYBANK_DATA`); the scene sky is made
 //! here. Each line is a scene with a damage: the PSNR of the rendered view against the true one, the share
-//! of the pixels that the mask shows as seen, and the share of the depths that were found to be outliers.
+//! of the pixels that the mask shows as seen, and the share of the depths that were found to be outliers. Then
+//! follows the PSNR of plain ways to the view (`peers`): the mean of the photographs, forward splats with a
+//! hard and a soft depth test, warped meshes, and colours fetched backwards.
 
 mod case;
 mod damage;
+mod peers;
 mod sky;
 
 use case::Case;
@@ -33,14 +36,18 @@ fn main() -> Result<(), Box<dyn Error>> {
         for damage in damages {
             if is_chosen(&format!("{} {}", case.name, damage.name())) {
                 let found = case.rendered(*damage, folder.path())?;
-                println!(
-                    "{:9} {:15} {:6.2} dB   seen {:5.1} %   outliers {:5.2} %",
+                print!(
+                    "{:9} {:15} {:6.2} dB   seen {:5.1} %   outliers {:5.2} %  ",
                     case.name,
                     damage.name(),
                     found.psnr,
                     100.0 * found.coverage,
                     100.0 * found.outliers
                 );
+                for peer in case.peers(*damage, &found)? {
+                    print!("   {} {:.2}", peer.name, peer.psnr);
+                }
+                println!();
             }
         }
     }
