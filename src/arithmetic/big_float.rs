@@ -112,22 +112,30 @@ impl<const WORDS: usize> BigFloat<WORDS> {
     }
 
     /// |self| + |other| for |self| >= |other| > 0, or the difference, with the sign of `self`.
+    #[inline]
     fn combined(&self, other: &Self, subtract: bool) -> Self {
         let distance = self.exponent - other.exponent;
-        if distance >= Self::BITS + 64 {
-            return *self;
-        }
-        // One word below the mantissas keeps 64 more bits of the smaller number.
-        let mut padded = [0; 2 * MOST_WORDS + 3];
-        padded[1..=WORDS].copy_from_slice(&other.words);
         let (whole, shift) = ((distance / 64) as usize, (distance % 64) as u32);
-        let smaller = &padded[whole..whole + WORDS + 2];
+        match distance {
+            // Most pairs. The loop is compiled for it, so that the words stay in registers.
+            0..64 => self.combined_after(0, shift, other, subtract),
+            _ if distance >= Self::BITS + 64 => *self,
+            _ => self.combined_after(whole, shift, other, subtract),
+        }
+    }
+
+    /// The same, with `other` shifted to the right by `whole` words and by `shift` bits, less than a word. One
+    /// word below the mantissas keeps 64 more bits of it.
+    #[inline(always)]
+    fn combined_after(&self, whole: usize, shift: u32, other: &Self, subtract: bool) -> Self {
+        let word =
+            |k: usize| (k + whole).checked_sub(1).and_then(|k| other.words.get(k)).copied().unwrap_or(0);
         let mut sum = [0; MOST_WORDS + 1];
         let sum = &mut sum[..=WORDS];
         sum[1..].copy_from_slice(&self.words);
         let mut carry = false;
-        for (entry, pair) in sum.iter_mut().zip(smaller.windows(2)) {
-            let part = pair[0] >> shift | pair[1] << 1 << (63 - shift);
+        for (k, entry) in sum.iter_mut().enumerate() {
+            let part = word(k) >> shift | word(k + 1) << 1 << (63 - shift);
             let step = u64::from(carry);
             let (first, over) =
                 if subtract { entry.overflowing_sub(part) } else { entry.overflowing_add(part) };
@@ -135,11 +143,15 @@ impl<const WORDS: usize> BigFloat<WORDS> {
                 if subtract { first.overflowing_sub(step) } else { first.overflowing_add(step) };
             (*entry, carry) = (second, over | again);
         }
-        if subtract {
-            return normalised(sum, self.exponent, self.negative);
-        }
         let (mut words, mut exponent) = (upper(sum, 0), self.exponent);
-        if carry {
+        if subtract {
+            let shift = sum[WORDS].leading_zeros();
+            if shift == 64 {
+                return normalised(sum, self.exponent, self.negative);
+            }
+            words = upper(sum, shift);
+            exponent -= i64::from(shift);
+        } else if carry {
             words = std::array::from_fn(|k| joined(sum.get(k + 2).copied().unwrap_or(1), sum[k + 1], 63));
             exponent += 1;
         }
