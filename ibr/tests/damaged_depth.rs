@@ -34,7 +34,7 @@ fn a_rig_with_damaged_disparities() {
     let least = [
         (Damage::Clean, 34.18),
         (Damage::Outliers(0.05), 33.8),
-        (Damage::Noise(0.5), 33.7),
+        (Damage::Noise(0.5), 33.9),
         (Damage::Noise(1.0), 33.4),
         (Damage::Scattered(0.03), 33.2),
         (Damage::Lattice, 33.0),
@@ -50,7 +50,9 @@ fn general_cameras_with_damaged_depths() {
     let least = [
         (Damage::Clean, 39.35),
         (Damage::Outliers(0.05), 38.7),
-        (Damage::Noise(1.0), 36.7),
+        // Meshes that are warped: 37.9 and 36.4.
+        (Damage::Noise(0.5), 39.6),
+        (Damage::Noise(1.0), 39.1),
         (Damage::Scattered(0.03), 32.9),
     ];
     check("spheres", "truth.png", &least);
@@ -59,7 +61,13 @@ fn general_cameras_with_damaged_depths() {
 /// Bars of a pixel and a half are not taken for outliers.
 #[test]
 fn a_thin_grid_is_kept() {
-    check("grid", "truth.png", &[(Damage::Clean, 34.05), (Damage::Outliers(0.05), 33.0)]);
+    let least = [
+        (Damage::Clean, 34.05),
+        (Damage::Outliers(0.05), 33.0),
+        (Damage::Noise(0.5), 32.5),
+        (Damage::Noise(1.0), 31.8),
+    ];
+    check("grid", "truth.png", &least);
 }
 
 /// A sky at infinity is drawn behind everything. Where nothing says that it is far away, what is not seen is
@@ -73,5 +81,7 @@ fn a_sky_is_far_away() {
     let (far, number, unknown, zero) = (of(f32::INFINITY), of(1e10), of(f32::NAN), of(0.0));
     assert!(far.psnr > 34.5 && far.coverage > 0.97, "{} {}", far.psnr, far.coverage);
     assert!((far.psnr - number.psnr).abs() < 1e-9, "{}", number.psnr);
-    assert!(unknown.coverage < 0.6 && unknown.coverage == zero.coverage, "{}", unknown.coverage);
+    // Before unknown depths took the farthest around them it was 15.8 dB.
+    assert!(unknown.psnr > 23.0 && unknown.coverage < 0.6, "{} {}", unknown.psnr, unknown.coverage);
+    assert_eq!((unknown.psnr, unknown.coverage), (zero.psnr, zero.coverage));
 }

@@ -1,34 +1,30 @@
 //! Filling unknown depths before propagation.
 //!
-//! Disparity is mostly unknown where the second camera of a rig had no view, which is background: the
-//! farther of the neighbours along the row. A depth map says nothing of a second camera, and programs leave
-//! out what they could not match, in the foreground too. There a hole is filled only within one surface.
+//! What no camera or matcher found is mostly background: the farther of the neighbours. So a guess hides
+//! nothing that is known, and it shows only where nothing else does.
 
-use super::relief::JUMP;
 use super::{DepthMap, Measure};
 
-/// Gives unknown pixels of disparity the farther of the nearest known values to their left and right, and
-/// unknown depths the farther of those on both sides, in the row and in the column, if all of these lie on
-/// one surface. A side whose opposite one is beyond the border says nothing: it may be far away.
+/// Gives unknown pixels of disparity the farther of the nearest known values to their left and right, since a
+/// rig says nothing across its rows, and unknown depths the farthest of the nearest ones in the row and in the
+/// column, or of the map where there are none.
 ///
 /// A row of disparities without any known value takes those of the nearest row that has one (the upper of
-/// two). The map remembers which values are guesses; renderings weigh them less. Returns the number of
-/// pixels filled.
+/// two). The map remembers which values are guesses; renderings weigh them less, and masks show them. Returns
+/// the number of pixels filled.
 pub fn fill_unknown(map: &mut DepthMap) -> usize {
     let unknown = map.unknown();
     if unknown == 0 {
         return 0;
     }
     let was_unknown: Vec<bool> = map.data.iter().map(|v| v.is_nan()).collect();
+    let farthest = map.data.iter().copied().reduce(f32::max);
     let mut found = Vec::new();
     for_holes(&map.data, map.width, |p, around| {
-        let side = |q: u32| map.data.get(q as usize).copied();
+        let known = |q: &u32| map.data.get(*q as usize).copied();
         let value = match map.measure {
-            Measure::Disparity => match (side(around[0]), side(around[1])) {
-                (Some(a), Some(b)) => Some(a.min(b)),
-                (a, b) => a.or(b),
-            },
-            Measure::Depth => of_one_surface(around, side),
+            Measure::Disparity => around[..2].iter().filter_map(known).reduce(f32::min),
+            Measure::Depth => around.iter().filter_map(known).reduce(f32::max).or(farthest),
         };
         found.extend(value.map(|value| (p as u32, value)));
     });
@@ -40,13 +36,6 @@ pub fn fill_unknown(map: &mut DepthMap) -> usize {
     let filled = |(was_unknown, v): (bool, &f32)| was_unknown && !v.is_nan();
     map.guessed = was_unknown.into_iter().zip(&map.data).map(filled).collect();
     unknown - map.unknown()
-}
-
-/// The farther depth of the sides of a hole that has one surface around it.
-fn of_one_surface(around: [u32; 4], side: impl Fn(u32) -> Option<f32>) -> Option<f32> {
-    let pairs = around.as_chunks().0.iter().filter_map(|[a, b]| Some([side(*a)?, side(*b)?]));
-    let (near, far) = pairs.flatten().fold((f32::MAX, 0.0), |(near, far), v| (v.min(near), v.max(far)));
-    (far > 0.0 && far - near < JUMP * near).then_some(far)
 }
 
 /// Copies rows of nothing from the nearest row of something (the upper of two); `filled` marks those.
@@ -122,16 +111,16 @@ mod tests {
         assert_eq!(filled(&row, (6, 1), Measure::Disparity), (vec![3.0, 3.0, 3.0, 3.0, 5.0, 5.0], 4));
     }
 
-    /// Depths are filled within one surface, not between two and not at the border.
+    /// The farthest of the sides, of those in the column too; where there is none, of the map.
     #[test]
-    fn depths_are_filled_within_a_surface() {
+    fn depths_take_the_farthest_around() {
         let (data, count) = filled(&[U, 3.0, U, U, 3.05, U, 5.0], (7, 1), Measure::Depth);
-        assert_eq!((&data[1..5], count), (&[3.0, 3.05, 3.05, 3.05][..], 2));
-        assert!(data[0].is_nan() && data[5].is_nan());
-        // A slanted wall: left of the hole in the second row it is much nearer, and to the right is nothing.
+        assert_eq!((data, count), (vec![3.0, 3.0, 3.05, 3.05, 3.05, 5.0, 5.0], 4));
         let wall = [8.0, 9.0, 9.5, 7.0, U, U, 8.1, 9.1, 9.6];
         let (data, count) = filled(&wall, (3, 3), Measure::Depth);
         assert_eq!((&data[3..6], count), (&[7.0, 9.1, 9.6][..], 2));
+        let (data, _) = filled(&[U, U, U, U, U, U, U, U, 4.0, 2.0, 6.0, U], (4, 3), Measure::Depth);
+        assert_eq!(data[..4], [4.0, 2.0, 6.0, 6.0]);
     }
 
     #[test]

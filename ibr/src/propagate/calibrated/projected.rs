@@ -5,7 +5,7 @@ use super::{CalibratedView, Frame, Tile};
 use crate::camera::Relative;
 use crate::depth::{Reliefs, TILE, or_far};
 use crate::occlusion::{Points, RUN};
-use crate::propagate::{spacing, weight};
+use crate::propagate::{DOUBTFUL_WEIGHT, GUESSED_WEIGHT, spacing, weight};
 use crate::sample::Sample;
 
 /// The pixels of some tiles at their places in the virtual image, view by view and row by row. Its arrays
@@ -62,7 +62,12 @@ impl Projected {
             doubtful[i] |= *is_guessed;
         }
         let spacings: [f32; TILE] = std::array::from_fn(|i| spacing(places.distance[i], reliefs.outline[i]));
-        let weights: [f32; TILE] = std::array::from_fn(|i| weight(places.area[i], doubtful[i]));
+        let trust = |i: usize| match (guessed[i], doubtful[i]) {
+            (true, _) => GUESSED_WEIGHT,
+            (_, true) => DOUBTFUL_WEIGHT,
+            _ => 1.0,
+        };
+        let weights: [f32; TILE] = std::array::from_fn(|i| weight(places.area[i], trust(i)));
         let (points, first_pixel) = (&mut self.points, first_pixel as u32);
         self.tiles.push(ProjectedTile { view: tile.view, first_pixel, first_place: points.len() });
         points.x.extend_from_slice(&places.x[..count]);
