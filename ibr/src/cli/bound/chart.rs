@@ -1,7 +1,7 @@
 //! The plot of a prediction: the numbers of every image row, and below them what the estimate comes from.
 
 use crate::analysis::{Cause, Totals, ViewError};
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, failed};
 use crate::cli::outputs::ends_with;
 use crate::image::Image;
 use hybank::plot::{Chart, Series};
@@ -15,7 +15,7 @@ pub(super) fn file(predicted: &ViewError, truth: Option<&Image>, path: &Path) ->
     if ends_with(path, "png") {
         return stacked_pixels(&charts);
     }
-    let [above, below] = charts.map(|chart| chart.to_svg().map_err(Failure::input));
+    let [above, below] = charts.map(|chart| chart.to_svg().map_err(failed));
     Ok(stacked_svg(&above?, &below?).into_bytes())
 }
 
@@ -93,14 +93,14 @@ fn stacked_pixels(charts: &[Chart; 2]) -> Result<Vec<u8>, Failure> {
     let mut data = Vec::new();
     let (mut width, mut height) = (0, 0);
     for chart in charts {
-        let png = chart.to_png().map_err(Failure::input)?;
-        let pixels = image::load_from_memory_with_format(&png, ImageFormat::Png).map_err(Failure::input)?;
+        let png = chart.to_png().map_err(failed)?;
+        let pixels = image::load_from_memory_with_format(&png, ImageFormat::Png).map_err(failed)?;
         let pixels = pixels.to_rgb8();
         (width, height) = (pixels.width(), height + pixels.height());
         data.extend(pixels.into_raw());
     }
     let whole = RgbImage::from_raw(width, height, data).unwrap_or_default();
     let mut bytes = Cursor::new(Vec::new());
-    whole.write_to(&mut bytes, ImageFormat::Png).map_err(Failure::input)?;
+    whole.write_to(&mut bytes, ImageFormat::Png).map_err(failed)?;
     Ok(bytes.into_inner())
 }

@@ -3,7 +3,7 @@
 use super::chart;
 use crate::analysis::ViewError;
 use crate::cli::arguments::BoundArguments;
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, failed};
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded};
 use crate::cli::outputs::{Outputs, Part, ends_with};
@@ -32,7 +32,7 @@ pub(super) fn encoded<'a>(
         }
         // A picture or three numbers per pixel, and the file.
         let size = predicted.rendering.image.size();
-        refuse_pixels_without_memory(path, size, 36.0).map_err(Failure::input)?;
+        refuse_pixels_without_memory(path, size, 36.0).map_err(failed)?;
         let (map, largest) = map(predicted, path)?;
         white = largest;
         all.push(map);

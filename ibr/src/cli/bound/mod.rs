@@ -5,12 +5,12 @@ mod files;
 mod report;
 
 use super::arguments::BoundArguments;
-use super::failure::Failure;
 use super::inputs;
 use super::output;
 use super::outputs::{Outputs, check_files};
 use super::progress::Progress;
 use crate::analysis::{Advice, Limits, Predicted, Predictor, ViewError};
+use crate::cli::failure::{Failure, failed};
 use crate::image::{Image, Levels};
 use crate::pipeline::{RenderError, Watch};
 use crate::scene::{Kind, Scene, SourceView};
@@ -27,7 +27,7 @@ pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
     match &scene.kind {
         Kind::Rectified { views, positions } => job.predict(views, positions, views[0].image.size()),
         Kind::Calibrated { views, cameras, size } => job.predict(views, cameras, *size),
-        Kind::Uncalibrated { .. } => Err(Failure::input(RenderError::NoViews)),
+        Kind::Uncalibrated { .. } => Err(failed(RenderError::NoViews)),
     }
 }
 
@@ -51,7 +51,7 @@ impl Job<'_> {
         size: (usize, usize),
     ) -> Result<(), Failure> {
         let Self { arguments, scene, files, limits, truth, progress } = self;
-        let named = |e: RenderError| Failure::input(e).in_file(&arguments.scene.file);
+        let named = |e: RenderError| failed(e).in_file(&arguments.scene.file);
         let views: Vec<_> = views.iter().map(SourceView::view).collect();
         let predictor = Predictor::new(&views, &arguments.scene.settings(scene.offset)).map_err(named)?;
         progress.step("predicting");
@@ -71,7 +71,7 @@ impl Job<'_> {
             }
             progress.within((frame + 1) as f64 / (cameras.len() + 1) as f64);
         }
-        let Some((worst, _, now)) = worst else { return Err(Failure::input(RenderError::NoViews)) };
+        let Some((worst, _, now)) = worst else { return Err(failed(RenderError::NoViews)) };
         summaries[worst].advice = Some(Advice::on(&predictor, &cameras[worst], size, &now).map_err(named)?);
         output::commit(written)?;
         drop(progress);
