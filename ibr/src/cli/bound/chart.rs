@@ -30,15 +30,9 @@ fn numbers(predicted: &ViewError, truth: Option<&Image>) -> Chart {
     let mut series = vec![
         Series { label: format!("estimate, mean {:.2}", totals.estimate), points: of(&|t| t.estimate) },
         Series { label: format!("expected, {:.2}", totals.expected), points: of(&|t| t.expected) },
-        match totals.sure_bound {
-            Some(mean) => Series {
-                label: format!("sure bound, mean {mean:.2}"),
-                points: of(&|t| t.sure_bound.unwrap_or(f64::NAN)),
-            },
-            None => Series {
-                label: format!("local limit, mean {:.2}", totals.local_limit),
-                points: of(&|t| t.local_limit),
-            },
+        Series {
+            label: format!("local limit, mean {:.2}", totals.local_limit),
+            points: of(&|t| t.local_limit),
         },
     ];
     if let Some(truth) = truth {

@@ -44,9 +44,7 @@ pub(super) fn encoded<'a>(
 fn map<'a>(predicted: &ViewError, path: &'a Path) -> Result<(Encoded<'a>, Option<f32>), Failure> {
     let size = predicted.rendering.image.size();
     if ends_with(path, "pfm") {
-        let first =
-            if predicted.sure_bound.is_empty() { &predicted.local_limit } else { &predicted.sure_bound };
-        let pixels = first.iter().zip(&predicted.expected).zip(&predicted.estimate);
+        let pixels = predicted.local_limit.iter().zip(&predicted.expected).zip(&predicted.estimate);
         let data = pixels.flat_map(|((limit, expected), estimate)| [*limit, *expected, *estimate]).collect();
         let bytes = pfm::encode(&Image::from_values(size, 3, data));
         return Ok((Encoded { bytes, path }, None));
