@@ -7,6 +7,8 @@
 pub mod files;
 pub mod memory;
 pub mod messages;
+#[cfg(feature = "program")]
+pub mod program;
 pub mod quantity;
 pub mod sampling;
 pub mod units;

@@ -7,7 +7,7 @@ use super::capture_args::{CaptureArgs, check_stdin};
 use super::capture_file::start;
 use super::file_kind::FileKind;
 use super::interrupt::interrupts;
-use super::print::{Failure, check_json, is_dash, say_understood, show, warn};
+use super::print::{Failure, check_json, failed, failed_at, is_dash, say_understood, show, warn};
 use super::written::{Mono, begin_file, begin_recording, check_outputs, write_text, write_together};
 use hybank::calibrate::{CalibrateError, Record};
 use hybank::figures::Alone;
@@ -92,18 +92,18 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check_outputs(&others)?;
     if !spec.layout().is_plain() {
         // Before the rates of the recordings, which are rightly not that of the frames.
-        return Err(Failure::of(&args.spec, AlignError::Rates));
+        return Err(failed_at(&args.spec, AlignError::Rates));
     }
     say_understood(Some(&spec));
     let mut warnings = Vec::new();
     let read = args.read(&spec, &mut warnings);
     let found = read.and_then(|recordings| {
         let settings = args.settings(&spec, recordings.rate)?;
-        Ok((align(&spec, &recordings.records, settings).map_err(Failure::input)?, recordings))
+        Ok((align(&spec, &recordings.records, settings).map_err(failed)?, recordings))
     });
     // What the recordings have may explain why they do not fit; a report has these warnings.
     let (found, recordings) = found.inspect_err(|_| warnings.iter().for_each(|text| warn(text)))?;
-    let alone = Alone::new(&found.spec).map_err(Failure::input)?;
+    let alone = Alone::new(&found.spec).map_err(failed)?;
     let written = file.with_values(&text, &found.spec, &args.output).map_err(|problem| {
         Failure::Input(format!("the values found make no spec: {problem}; nothing was written"))
     })?;
@@ -138,7 +138,7 @@ impl Args {
         // Before they are read, which takes long; one may hold several channels.
         let (captures, channels) = (self.captures.len(), spec.channels.len());
         if captures > channels {
-            return Err(Failure::input(CalibrateError::ChannelCount { channels, records: captures }));
+            return Err(failed(CalibrateError::ChannelCount { channels, records: captures }));
         }
         let options = self.reading.options(captures, channels);
         let options = ReadOptions { full_scale: options.full_scale.or(spec.full_scale), ..options };

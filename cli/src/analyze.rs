@@ -4,7 +4,7 @@ use super::bank_file::load;
 use super::design_report::{against, figure_text};
 use super::design_studies::number;
 use super::plot::PictureFormat;
-use super::print::{Failure, InFile, is_dash, show};
+use super::print::{Failure, InFile, failed, is_dash, show};
 use super::written::{check_output, write_bytes};
 use hybank::design::uncertainty::{
     Affordable, BoxRule, BoxStudy, BoxWidths, ErrorStudy, JitterStudy, Questions, RefusedBox, Sensitivity,
@@ -330,7 +330,7 @@ fn rounded(x: f64) -> f64 {
 /// Writes the file that `path` names: SVG or PNG if its extension says so, else CSV.
 fn write_sweep(sweep: &Sweep, path: &Path, force: bool) -> Result<(), Failure> {
     let bytes = match PictureFormat::of(path) {
-        Some(format) => format.file(&chart(sweep)).map_err(Failure::input)?,
+        Some(format) => format.file(&chart(sweep)).map_err(failed)?,
         None => csv(sweep).into_bytes(),
     };
     write_bytes(path, &bytes, force)

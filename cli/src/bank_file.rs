@@ -1,7 +1,7 @@
 //! Reads specs, with the measurements that they name, and banks.
 
 use super::file_kind::{FileKind, refuse_other};
-use super::print::{Failure, InFile, is_dash, name, say_line};
+use super::print::{Failure, InFile, failed, failed_at, is_dash, name, say_line};
 use hybank::analog::fit::Measurements;
 use hybank::bank::Bank;
 use hybank::design::filters;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Reads a bank file; `-` is standard input.
 pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
     let text = read_kind(path, FileKind::Bank)?;
-    let bank = Bank::from_json(&text, &name(path)).map_err(Failure::input)?;
+    let bank = Bank::from_json(&text, &name(path)).map_err(failed)?;
     filters::check_stable(&bank).in_file(path)?;
     Ok(bank)
 }
@@ -25,7 +25,7 @@ pub(super) fn plan(bank: &Bank, options: Options, streams: usize, path: &Path) -
     let bytes = bank.plan_bytes(options, streams).in_file(path)?;
     check_memory(bytes).map_err(|shortage| {
         let remedy = "use shorter filters, or --algorithm direct";
-        Failure::of(path, format!("to filter with it takes {shortage}; {remedy}"))
+        failed_at(path, format!("to filter with it takes {shortage}; {remedy}"))
     })?;
     bank.plan(options).in_file(path)
 }
@@ -42,7 +42,7 @@ impl SpecFile {
         let inputs = self.measurements.files();
         let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
         let outputs: Vec<&Path> = outputs.iter().copied().filter(|path| !is_dash(path)).collect();
-        files::refuse_overlaps(&outputs, &inputs).map_err(Failure::input)?;
+        files::refuse_overlaps(&outputs, &inputs).map_err(failed)?;
         Ok(self.spec.clone())
     }
 
@@ -86,7 +86,7 @@ pub(super) fn parse_spec(text: &str, path: &Path, overrides: DesignOverrides) ->
     let read = Spec::from_toml_and_files(text, &name(path), overrides, &|wanted| measurements.model(wanted));
     let spec = read.map_err(|error| match error.overridden() {
         Some(key) => bad_flag(key, error.problem()),
-        None => Failure::input(error),
+        None => failed(error),
     })?;
     measurements.echo().iter().for_each(|line| say_line(line));
     Ok(SpecFile { spec, measurements })
@@ -106,30 +106,30 @@ pub(super) fn load_spec_or_bank(path: &Path) -> Result<SpecFile, Failure> {
     let bank = load(path)?;
     let latency = Some(bank.latency);
     let spec = bank.spec.ok_or_else(|| {
-        Failure::of(path, "this bank carries no spec, so its front ends are unknown; give the spec file")
+        failed_at(path, "this bank carries no spec, so its front ends are unknown; give the spec file")
     })?;
     Ok(SpecFile { spec: Spec { latency, ..spec }, measurements: beside(path) })
 }
 
 /// The text of a file; `-` is standard input.
 pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
-    files::text_in(read_file(path)?, &name(path)).map_err(Failure::input)
+    files::text_in(read_file(path)?, &name(path)).map_err(failed)
 }
 
 fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
     let bytes = if is_dash(path) {
         let check = StandardStream::Input.check();
-        check.map_err(FileError::system(&name(path), "read it")).map_err(Failure::input)?;
+        check.map_err(FileError::system(&name(path), "read it")).map_err(failed)?;
         files::bytes_of(std::io::stdin().lock(), &name(path), SPEC_OR_BANK)
     } else {
         files::read_bytes(path, SPEC_OR_BANK)
     };
-    bytes.map_err(Failure::input)
+    bytes.map_err(failed)
 }
 
 /// The text of a bank or a spec, whichever is wanted.
 pub(super) fn read_kind(path: &Path, wanted: FileKind) -> Result<String, Failure> {
     let bytes = read_file(path)?;
     refuse_other(&name(path), FileKind::of(&bytes), wanted)?;
-    files::text_in(bytes, &name(path)).map_err(Failure::input)
+    files::text_in(bytes, &name(path)).map_err(failed)
 }

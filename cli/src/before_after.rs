@@ -3,7 +3,7 @@
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, check_files_on_disk, unread};
 use super::measure::{ToneArg, tone, tones};
 use super::plot::write_picture;
-use super::print::{Failure, is_dash};
+use super::print::{Failure, failed, is_dash};
 use hybank::bank::Bank;
 use hybank::files::{FileError, refuse_overlaps};
 use hybank::io::{MultiReader, OfflineSamples, is_pipe};
@@ -50,9 +50,9 @@ impl BeforeAfterArgs {
             return Err(Failure::Usage(message.into()));
         }
         let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
-        refuse_overlaps(&[plot.as_path(), output], &inputs).map_err(Failure::input)?;
+        refuse_overlaps(&[plot.as_path(), output], &inputs).map_err(failed)?;
         if plot.exists() && !force {
-            return Err(Failure::input(FileError::Exists { file: plot.display().to_string() }));
+            return Err(failed(FileError::Exists { file: plot.display().to_string() }));
         }
         Ok(())
     }

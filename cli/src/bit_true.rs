@@ -2,7 +2,7 @@
 
 use super::before_after;
 use super::output::begin_samples;
-use super::print::{Failure, check_strict, name, print, print_report, warn};
+use super::print::{Failure, check_strict, failed, name, print, print_report, stopped, warn};
 use super::run::{Job, each_block, interrupted};
 use hybank::bank::Bank;
 use hybank::files::commit_all;
@@ -65,7 +65,7 @@ impl BitTrueArgs {
         let model = BitTrue::new(job.bank, words)
             .map_err(|error| Failure::Input(format!("{}: {error}", name(job.bank_path))))?;
         let header = OutputHeader { container: Container::Wav, format, is_complex: false, rate };
-        let output = begin_samples(job.output, header, job.args.force).map_err(Failure::running)?;
+        let output = begin_samples(job.output, header, job.args.force).map_err(stopped)?;
         let skip = if job.dropped == DroppedLatency::All { job.bank.output_delay() } else { 0 };
         let mut run = Run::new(model, output, format, skip, job.bank);
         let is_stopped = each_block(reader, |recordings| run.process(recordings))?;
@@ -89,7 +89,7 @@ impl BitTrueArgs {
         let warnings: Vec<String> =
             reader.warnings().iter().map(ToString::to_string).chain(run.model.warnings()).collect();
         check_strict(&warnings, job.args.strict)?;
-        commit_all(run.output.finish().map_err(Failure::running)?).map_err(Failure::input)?;
+        commit_all(run.output.finish().map_err(stopped)?).map_err(failed)?;
         warnings.iter().for_each(|warning| warn(warning));
         report.measure = measured()?;
         match &report.measure {
@@ -105,7 +105,7 @@ fn integer_format(reader: &MultiReader) -> Result<PcmFormat, Failure> {
     let mut formats =
         reader.headers().map(|(input, header)| (input, header.layout.format, header.is_complex));
     let Some((first, format, is_complex)) = formats.next() else {
-        return Err(Failure::input("--bit-true: there is no input"));
+        return Err(failed("--bit-true: there is no input"));
     };
     let written = match format {
         _ if is_complex => None,
@@ -194,6 +194,6 @@ impl Run {
             self.format.encode(f64::from(*y) / full_scale, slot);
         }
         self.samples += fast.len() as u64;
-        self.output.write(&bytes).map_err(Failure::running)
+        self.output.write(&bytes).map_err(stopped)
     }
 }

@@ -7,7 +7,7 @@ use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, rails_of, start, 
 use super::file_kind::FileKind;
 use super::interrupt::interrupts;
 use super::measure::{ToneArg, tone, tones};
-use super::print::{Failure, check_json, explained, say_understood, warn};
+use super::print::{Failure, check_json, explained, failed, say_understood, warn};
 use super::written::{check_output, write_text};
 use hybank::calibrate::{
     Acquisition, CalibrateError, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning,
@@ -108,7 +108,7 @@ struct Captures {
 fn of_captures(captures: &[Captures], error: CalibrateError) -> Failure {
     match (captures, &error) {
         ([one], CalibrateError::Tones(_)) => Failure::Input(format!("{}: {error}", Quoted(&one.name))),
-        _ => Failure::input(error),
+        _ => failed(error),
     }
 }
 

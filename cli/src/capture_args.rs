@@ -2,7 +2,7 @@
 //! whether captures fit the bank.
 
 use super::output::WAV;
-use super::print::{Failure, is_dash};
+use super::print::{Failure, failed, failed_at, is_dash};
 use hybank::bank::{Bank, FrameLayout};
 use hybank::io::{Coding, MultiReader, ReadOptions, TimeInterleaving};
 use hybank::messages::Quoted;
@@ -196,7 +196,7 @@ impl InterleavedArgs {
         let Some(converters) = self.interleaved else { return Ok(None) };
         let found = matching::interleaving(converters.into(), delays, layout);
         found.map(Some).map_err(|problem| match problem {
-            NotInTurn::Apart { .. } => Failure::of(path, problem),
+            NotInTurn::Apart { .. } => failed_at(path, problem),
             _ => Failure::Usage(format!("--interleaved {converters}: {}: {problem}", Quoted(path))),
         })
     }
@@ -212,6 +212,6 @@ pub(super) fn check_stdin<'a>(inputs: impl Iterator<Item = &'a Path>) -> Result<
 
 /// The inputs together have the channels of the bank in the file `path`; the rate of the output in hertz.
 pub(super) fn output_rate(bank: &Bank, path: &Path, reader: &MultiReader) -> Result<f64, Failure> {
-    matching::check_channels(bank, &path.display().to_string(), reader).map_err(Failure::input)?;
-    matching::output_rate(bank, reader).map_err(Failure::input)
+    matching::check_channels(bank, &path.display().to_string(), reader).map_err(failed)?;
+    matching::output_rate(bank, reader).map_err(failed)
 }

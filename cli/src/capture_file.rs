@@ -2,7 +2,7 @@
 
 use super::capture_args::check_scale;
 use super::file_kind::unreadable;
-use super::print::{Failure, is_dash, name, warn};
+use super::print::{Failure, failed, failed_at, is_dash, name, warn};
 use crossbeam_channel::Receiver;
 use hybank::io::{MultiReader, OfflineError, OfflineSamples, ReadOptions};
 use hybank::measure::{Spectrum, Window};
@@ -73,7 +73,7 @@ impl CaptureFile {
         let stated = header.and_then(|header| header.rate).filter(|rate| *rate > 0.0).map(Hertz);
         let rate = stated.or(reading.rate).ok_or_else(|| {
             let message = "it states no sample rate; record or convert it with its rate, or give --rate where there is one";
-            Failure::of(path, message)
+            failed_at(path, message)
         })?;
         let rails = header.and_then(|header| header.rails);
         let OfflineSamples { channels, is_cut } = whole(&mut reader, reading.most).map_err(unread)?;
@@ -81,7 +81,7 @@ impl CaptureFile {
         let mut parts = channels.into_iter();
         let (samples, imaginary) = (parts.next().unwrap_or_default(), parts.next());
         if samples.is_empty() {
-            return Err(Failure::of(path, "no samples (the length is zero)"));
+            return Err(failed_at(path, "no samples (the length is zero)"));
         }
         if is_cut {
             warn(&format!("{}: only the first {} samples are used", Quoted(name(path)), samples.len()));
@@ -102,7 +102,7 @@ impl CaptureFile {
                 let value = self.samples[n];
                 let problem =
                     format!("sample {n} is {value}; a source must be finite, repair the recording first");
-                Err(Failure::of(path, problem))
+                Err(failed_at(path, problem))
             }
             None => Ok(self),
         }
@@ -156,14 +156,14 @@ pub(super) fn start(
 /// Why samples could not be read.
 pub(super) fn unread(error: OfflineError) -> Failure {
     match error {
-        OfflineError::Io(error) => Failure::input(error),
+        OfflineError::Io(error) => failed(error),
         OfflineError::Stopped => interrupted(),
-        error => Failure::input(error),
+        error => failed(error),
     }
 }
 
 fn interrupted() -> Failure {
-    Failure::input("interrupted; nothing was written")
+    failed("interrupted; nothing was written")
 }
 
 /// Refuses what cannot be read twice.

@@ -1,7 +1,7 @@
 //! The methods that the demo compares, one of them the cubic spline through all slow samples in the order of
 //! their instants.
 
-use super::print::Failure;
+use super::print::{Failure, failed, stopped};
 use hybank::bank::Bank;
 use hybank::design::{self, Problem};
 use hybank::pipeline::{DroppedLatency, Settings, fused};
@@ -89,9 +89,8 @@ pub(super) fn contend(spec: &Spec, problem: &Problem, parts: &Parts) -> Result<V
         let bank = designed(spec, method, knows_the_band)?;
         // The target is as late as the bank.
         let causal = Settings { dropped: DroppedLatency::Added, ..Settings::default() };
-        let contender = Contender::judge(name, file, parts, |channels| {
-            fused(&bank, channels, causal).map_err(Failure::running)
-        })?;
+        let contender =
+            Contender::judge(name, file, parts, |channels| fused(&bank, channels, causal).map_err(stopped))?;
         contenders.push(Contender { gamma: bank.gamma.norm, ..contender });
     }
     let (delays, ratio, latency) = (problem.delays(), problem.ratio, problem.latency);
@@ -108,9 +107,9 @@ pub(super) fn contend(spec: &Spec, problem: &Problem, parts: &Parts) -> Result<V
 
 fn designed(spec: &Spec, method: Method, knows_the_band: bool) -> Result<Bank, Failure> {
     let mut variant = spec.clone();
-    variant.design = spec.design.with_method(method, &spec.layout()).map_err(Failure::input)?;
+    variant.design = spec.design.with_method(method, &spec.layout()).map_err(failed)?;
     variant.signal = variant.signal.filter(|_| knows_the_band);
-    Ok(design::design(&variant, &design::Options::without_proof()).map_err(Failure::input)?.bank)
+    Ok(design::design(&variant, &design::Options::without_proof()).map_err(failed)?.bank)
 }
 
 impl Contender {

@@ -1,7 +1,7 @@
 //! `hybank demo`: designs, captures and fuses one example, and compares the error with other methods.
 
 use super::contenders::{Contender, Parts, SETTLING, contend};
-use super::print::{Failure, show};
+use super::print::{Failure, failed, failed_at, show};
 use super::written::{Mono, create_folder, write_recordings, write_text};
 use hybank::design::{self, Problem};
 use hybank::messages::Quoted;
@@ -42,9 +42,8 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let folder = args.folder()?;
-    let spec = Spec::from_toml(SPEC, "filters/speech-2x.toml").map_err(Failure::input)?;
-    let problem =
-        Problem::new(&spec, design::latency(&spec).map_err(Failure::input)?).map_err(Failure::input)?;
+    let spec = Spec::from_toml(SPEC, "filters/speech-2x.toml").map_err(failed)?;
+    let problem = Problem::new(&spec, design::latency(&spec).map_err(failed)?).map_err(failed)?;
     let frames = (DURATION / (spec.fast_period * spec.ratio as f64)) as usize;
     let captured =
         |source: Source| capture(&problem, &Analog::Known(source.normalised(spec.fast_period)), frames);
@@ -74,7 +73,7 @@ impl Args {
     fn folder(&self) -> Result<PathBuf, Failure> {
         let folder = self.output.clone().unwrap_or_else(unused_folder);
         if folder.exists() && !self.force {
-            return Err(Failure::of(&folder, "exists already; use --force to replace the files in it"));
+            return Err(failed_at(&folder, "exists already; use --force to replace the files in it"));
         }
         create_folder(&folder)?;
         Ok(folder)
@@ -95,7 +94,7 @@ impl Args {
         files.extend(contenders.iter().map(|c| (fused(c), Mono::wav(&c.samples, f64::from(fast)))));
         let files: Vec<_> = files.iter().map(|(path, mono)| (path.as_path(), *mono)).collect();
         write_recordings(&files, self.force)?;
-        for (name, svg) in pictures.all().map_err(Failure::input)? {
+        for (name, svg) in pictures.all().map_err(failed)? {
             write_text(&folder.join(name), &svg, self.force)?;
         }
         Ok(())

@@ -5,7 +5,8 @@ use super::design_report::{Judged, Report};
 use super::design_studies::BandHint;
 use super::interrupt::{end_at_interrupt, end_with};
 use super::print::{
-    Failure, InFile, check_json, check_strict, is_dash, say, say_line, say_understood, show, warn,
+    Failure, InFile, check_json, check_strict, failed, failed_at, is_dash, say, say_line, say_understood,
+    show, warn,
 };
 use super::written::{check_output, write_text};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
@@ -144,7 +145,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         judged.check_useful(&found.bank).in_file(&args.spec)?;
     }
     warn_or_refuse(&judged.warnings(&found.bank), args.strict)?;
-    write_text(&args.output, &found.bank.to_json().map_err(Failure::input)?, args.force)?;
+    write_text(&args.output, &found.bank.to_json().map_err(failed)?, args.force)?;
     judged.hint = BandHint::new(&found, seconds).in_file(&args.spec)?;
     let report = Report::new(args.output.display().to_string(), &found, judged, seconds);
     if is_dash(&args.output) {
@@ -157,7 +158,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 /// Ends a design that its time limit cannot end, because one step of it takes too long.
 fn give_up(path: &Path, spec: &Spec) {
     let error = DesignError::StoppedWithoutBank { remedy: design::remedy(spec) };
-    let Failure::Input(message) = Failure::of(path, error) else { return };
+    let Failure::Input(message) = failed_at(path, error) else { return };
     end_with(&message);
 }
 

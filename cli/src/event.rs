@@ -1,6 +1,6 @@
 //! What happens during a run, as lines of text and as JSON lines.
 
-use super::print::{Failure, is_dash};
+use super::print::{Failure, failed, is_dash};
 use crossbeam_channel::Sender;
 use hybank::files::FileError;
 use hybank::io::{Stall, Stdout, is_pipe};
@@ -280,14 +280,14 @@ impl ReportFile {
     /// report is read while it grows. A FIFO waits for its reader.
     pub(super) fn create(path: &Path, force: bool) -> Result<Self, Failure> {
         let name = if is_dash(path) { "standard output".to_owned() } else { path.display().to_string() };
-        let refused = |error| Failure::input(FileError::system(&name, "create it")(error));
+        let refused = |error| failed(FileError::system(&name, "create it")(error));
         let file: Box<dyn Write + Send> = if is_dash(path) {
             Box::new(Stdout::for_samples().map_err(refused)?.for_reports())
         } else if is_pipe(path) {
             Box::new(Stdout::fifo(path).map_err(refused)?.for_reports())
         } else {
             if !force && path.is_file() {
-                return Err(Failure::input(FileError::Exists { file: name }));
+                return Err(failed(FileError::Exists { file: name }));
             }
             let file = OpenOptions::new().write(true).create(true).truncate(true).open(path);
             Box::new(file.map_err(refused)?)

@@ -1,7 +1,7 @@
 //! `hybank export`: a bank for other tools.
 
 use super::bank_file::load;
-use super::print::{Failure, InFile, check_json, is_dash, print_json, warn};
+use super::print::{Failure, InFile, check_json, failed, is_dash, print_json, warn};
 use super::written::{begin_file, check_output, check_outputs, write_bytes, write_together};
 use clap::ValueEnum;
 use hybank::bank::{Bank, SynthesisFilters};
@@ -184,7 +184,7 @@ fn write_verilog(args: &Args, bank: &Bank) -> Result<Circuit, Failure> {
         write_bytes(&args.output, verilog.text.as_bytes(), args.force)?;
         return Ok(verilog.circuit);
     };
-    let bench = verilog.testbench(args.verilog.random_frames.unwrap_or(1000)).map_err(Failure::input)?;
+    let bench = verilog.testbench(args.verilog.random_frames.unwrap_or(1000)).map_err(failed)?;
     let mut files: Vec<_> = bench.into_iter().map(|(name, text)| (folder.join(name), text)).collect();
     let circuit = verilog.circuit;
     files.push((args.output.clone(), verilog.text));

@@ -1,6 +1,6 @@
 //! Tells from its first bytes what a file is that was given in place of another.
 
-use super::print::Failure;
+use super::print::{Failure, failed};
 use FileKind::{Foreign, Recording};
 use hybank::bank::FORMAT;
 use hybank::io::IoError;
@@ -118,10 +118,10 @@ pub(super) fn refuse_other(file: &str, found: FileKind, wanted: FileKind) -> Res
 
 /// Why captures cannot be read; a file that is something else is named for what it is.
 pub(super) fn unreadable(error: IoError) -> Failure {
-    let IoError::NotWav { file, .. } = &error else { return Failure::input(error) };
+    let IoError::NotWav { file, .. } = &error else { return failed(error) };
     match FileKind::of_file(Path::new(file)) {
         // A WAV header that the reader refused has its own error.
-        FileKind::Unknown | WAV => Failure::input(error),
+        FileKind::Unknown | WAV => failed(error),
         found @ (FileKind::Bank | FileKind::Spec) => Failure::Input(format!(
             "{}: this is {found}, and a recording is needed; give the captures after the bank or the spec",
             Quoted(file)

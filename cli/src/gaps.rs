@@ -1,7 +1,7 @@
 //! Missing samples on the command line: their replacement, the report, the mask file.
 
-use super::print::Failure;
 use super::print::say_line;
+use super::print::{Failure, failed};
 use super::written::begin_beside;
 use hybank::files::AtomicFile;
 use hybank::io::{LiveLost, LostSamples, MAX_LOST, ReadOptions, Until, is_pipe};
@@ -84,11 +84,9 @@ impl GapArgs {
         match self.lost() {
             None => Ok(Lost { read: None, live: None }),
             Some(path) if live && is_pipe(path) => {
-                Ok(Lost { read: None, live: Some(LiveLost::begin(path).map_err(Failure::input)?) })
+                Ok(Lost { read: None, live: Some(LiveLost::begin(path).map_err(failed)?) })
             }
-            Some(path) => {
-                Ok(Lost { read: Some(LostSamples::read(path).map_err(Failure::input)?), live: None })
-            }
+            Some(path) => Ok(Lost { read: Some(LostSamples::read(path).map_err(failed)?), live: None }),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::bank_file::load_spec_or_bank;
 use super::design_report::{Judged, Report};
-use super::print::{Failure, InFile, show, warn};
+use super::print::{Failure, InFile, failed, failed_at, show, warn};
 use super::written::{check_output, write_text};
 use hybank::design::{self, ProofSearch};
 use hybank::files::{Bound, read_bytes};
@@ -54,14 +54,14 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     spec.latency = args.latency.or(spec.latency);
     if spec.latency.is_none() {
         let problem = "it gives no latency, which taps from elsewhere have; give --latency, the delay of their output in fast samples";
-        return Err(Failure::of(&args.spec, problem));
+        return Err(failed_at(&args.spec, problem));
     }
     let taps = read(&args.taps)?;
     let begin = Instant::now();
     let found = design::judge_taps(&spec, taps, ProofSearch::Run).in_file(&args.taps)?;
     let judged = Judged::new(&found.bank).in_file(&args.taps)?;
     judged.warnings(&found.bank).iter().for_each(|warning| warn(warning));
-    write_text(&args.output, &found.bank.to_json().map_err(Failure::input)?, args.force)?;
+    write_text(&args.output, &found.bank.to_json().map_err(failed)?, args.force)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
     let report = Report::new(args.output.display().to_string(), &found, judged, seconds);
     show(&report, args.json, |report| report.text(args.verbose))
@@ -85,8 +85,8 @@ fn read(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
             return Err(Failure::Usage(format!("{path}: taps are read from .csv and .npy files")));
         }
     };
-    let bytes = read_bytes(path, TAPS_FILE).map_err(Failure::input)?;
+    let bytes = read_bytes(path, TAPS_FILE).map_err(failed)?;
     let shortage = check_memory(TAP_BYTES * bytes.len() as f64);
-    shortage.map_err(|shortage| Failure::of(path, format!("to read its taps takes {shortage}")))?;
+    shortage.map_err(|shortage| failed_at(path, format!("to read its taps takes {shortage}")))?;
     parse(&bytes).in_file(path)
 }

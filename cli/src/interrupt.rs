@@ -10,8 +10,8 @@ use hybank::files::remove_unfinished as remove_unfinished_files;
 mod watch {
     use super::end_with;
     use crossbeam_channel::{Receiver, Sender, bounded, never};
+    use hybank::files::is_output_stalled;
     use hybank::files::signals::{end, watch};
-    use hybank::io::is_output_stalled;
     use signal_hook::consts::{SIGHUP, SIGXCPU};
     use signal_hook::iterator::Signals;
     use std::time::Duration;

@@ -41,10 +41,9 @@ mod virtual_signal;
 mod written;
 
 use clap::{Parser, Subcommand};
-use hybank::files::StandardStream;
 use hybank::memory::check_memory;
-use hybank::messages::{arguments, quoted_usage};
-use print::Failure;
+use hybank::messages::arguments;
+use print::{Failure, PROGRAM};
 use std::process::ExitCode;
 
 // Before `main`: the standard library then opens /dev/null in the place of a closed stream, and what a
@@ -114,11 +113,8 @@ fn main() -> ExitCode {
     #[cfg(unix)]
     hybank::files::fail_at_file_size_limit();
     match arguments::<Cli>() {
-        Ok(cli) => match check_base().and_then(|()| dispatch(cli.command)) {
-            Ok(()) => ExitCode::SUCCESS,
-            Err(failure) => failure.report(),
-        },
-        Err(message) => show(&message),
+        Ok(cli) => PROGRAM.end(check_base().and_then(|()| dispatch(cli.command))),
+        Err(message) => PROGRAM.show(&message),
     }
 }
 
@@ -129,22 +125,6 @@ const BASE_BYTES: f64 = 24e6;
 fn check_base() -> Result<(), Failure> {
     check_memory(BASE_BYTES)
         .map_err(|shortage| Failure::Input(format!("a run takes {shortage}; raise the limit of its memory")))
-}
-
-/// Shows help, version, or what is wrong with the usage.
-fn show(message: &clap::Error) -> ExitCode {
-    let open = if message.use_stderr() { Ok(()) } else { StandardStream::Output.check() };
-    let print = || match quoted_usage(message) {
-        None => message.print(),
-        Some(text) => {
-            print::say(&text);
-            Ok(())
-        }
-    };
-    match open.and_then(|()| print()) {
-        Err(error) if !message.use_stderr() => print::print_failure(&error).report(),
-        _ => ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2)),
-    }
 }
 
 fn dispatch(command: Command) -> Result<(), Failure> {

@@ -3,7 +3,7 @@
 use super::capture_args::{CaptureArgs, check_stdin};
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, rails_of};
 use super::plot::write_picture;
-use super::print::{Failure, InFile, is_dash, name, show, warn};
+use super::print::{Failure, InFile, failed_at, is_dash, name, show, warn};
 use super::written::check_output;
 use hybank::io::is_same_rate;
 use hybank::measure::{
@@ -115,7 +115,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let capture = CaptureFile::read_any(&args.file, args.reading())?.trimmed(&args.file, args.skip)?;
     if capture.imaginary.is_some() && args.reference.is_some() {
         let problem = "complex samples, and --ref compares real ones; extract a part of both recordings";
-        return Err(Failure::of(&args.file, problem));
+        return Err(failed_at(&args.file, problem));
     }
     let settings = args.settings(&capture)?;
     let is_measured = args.reference.is_none() || !args.tone.is_empty();
@@ -180,7 +180,7 @@ impl Args {
         let file = Quoted(name(&self.file));
         let (own, other) = (capture.rate, reference.rate);
         if !is_same_rate(other.0, own.0, 0.0) {
-            return Err(Failure::of(
+            return Err(failed_at(
                 path,
                 format!(
                     "the sample rate is {other}, but {file} has {own}; a comparison needs one rate, resample one of them"

@@ -4,8 +4,8 @@
 
 use super::capture_check::{CaptureCheck, Checked};
 use super::event::{Event, EventWriter, Events, ReportFile, Span};
-use super::print::say_line;
 use super::print::{Failure, is_dash};
+use super::print::{failed, say_line};
 use crossbeam_channel::{Receiver, RecvTimeoutError, bounded};
 use hybank::bank::Bank;
 use hybank::io::{PcmFrames, StallWatch};
@@ -174,7 +174,7 @@ impl RunObserver {
     /// Ends the report with the summary of the run.
     pub(super) fn end(&mut self, summary: &impl serde::Serialize) -> Result<(), Failure> {
         let mut last = serde_json::json!({ "event": "summary" });
-        let summary = serde_json::to_value(summary).map_err(Failure::input)?;
+        let summary = serde_json::to_value(summary).map_err(failed)?;
         if let (Some(last), serde_json::Value::Object(summary)) = (last.as_object_mut(), summary) {
             last.extend(summary);
         }
@@ -194,7 +194,7 @@ impl RunObserver {
         if let Some(last) = last.as_object_mut().filter(|_| dropped > 0) {
             last.insert("events_dropped".into(), dropped.into());
         }
-        let died = || Failure::input("the thread that reports events has died, so reports are incomplete");
+        let died = || failed("the thread that reports events has died, so reports are incomplete");
         self.writer().ok_or_else(died)?.end(&last, Instant::now()).map_err(Failure::Input)
     }
 

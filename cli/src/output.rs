@@ -1,7 +1,6 @@
 //! The format of output samples, and the files that a run writes.
 
-use super::print::{Failure, is_dash};
-use super::print::{name_leftovers, warn};
+use super::print::{Failure, PROGRAM, failed, is_dash, warn};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hybank::files::refuse_overlaps;
 use hybank::io::{
@@ -96,8 +95,8 @@ pub(super) fn check_files(
     let arrays: Vec<_> = inputs.iter().filter_map(|path| mat_variable(path)).map(|(file, _)| file).collect();
     let more = pairs.iter().chain(&arrays).map(|path| path.as_path());
     let inputs: Vec<_> = inputs.iter().copied().chain(more).collect();
-    refuse_overlaps(&outputs, &inputs).map_err(Failure::input)?;
+    refuse_overlaps(&outputs, &inputs).map_err(failed)?;
     check_extension(output, container)?;
-    name_leftovers(&outputs);
+    PROGRAM.name_leftovers(&outputs);
     Ok(())
 }

@@ -4,81 +4,61 @@
 
 use hybank::calibrate::{CalibrateError, Warning};
 use hybank::design::DesignError;
-use hybank::files::{FileError, StandardStream, leftovers, unprinted};
+use hybank::files::FileError;
 use hybank::interchange::ExportError;
 use hybank::io::IoError;
-use hybank::messages::{Quoted, printable, shown};
+use hybank::messages::printable;
 use hybank::overview::understood;
 use hybank::pipeline::PipelineError;
+pub(super) use hybank::program::{Failure, is_dash, print, print_bytes, say};
+use hybank::program::{Program, put};
 use hybank::spec::Spec;
 use hybank::track::{AlignError, TrackError};
 use hybank::verify::VerifyError;
 use std::any::Any;
 use std::fmt::Display;
-use std::io::{ErrorKind, IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
-/// A failure with the one message that the user sees.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Failure {
-    /// The input or the design failed: exit code 1.
-    Input(String),
-    /// Wrong usage: exit code 2.
-    Usage(String),
-    /// The reader of the output closed the pipe: end without a message.
-    ClosedPipe,
+/// This program in its messages.
+pub(crate) const PROGRAM: Program = Program { name: "hybank", has_bar: false };
+
+/// A failure of the input or the design.
+pub(crate) fn failed(problem: impl Display + 'static) -> Failure {
+    Failure::Input(explained(&problem))
 }
 
-impl Failure {
-    /// A failure of the input with `message`.
-    pub(crate) fn input(message: impl Display + 'static) -> Self {
-        Self::Input(explained(&message))
-    }
+/// A failure of the file at `path`.
+pub(super) fn failed_at(path: &Path, problem: impl Display + 'static) -> Failure {
+    failed(problem).in_file(name(path).as_ref())
+}
 
-    /// A failure of the file at `path`.
-    pub(super) fn of(path: &Path, problem: impl Display + 'static) -> Self {
-        Self::Input(format!("{}: {}", Quoted(name(path)), explained(&problem)))
+/// A failure of a run. A closed output pipe is not reported as an error.
+pub(super) fn stopped(error: impl Into<PipelineError>) -> Failure {
+    match error.into() {
+        error if error.is_closed_pipe() => Failure::ClosedPipe,
+        error => failed(error),
     }
+}
 
-    /// A failure of a run. A closed output pipe is not reported as an error.
-    pub(super) fn running(error: impl Into<PipelineError>) -> Self {
-        match error.into() {
-            error if error.is_closed_pipe() => Self::ClosedPipe,
-            error => Self::input(error),
+/// Names what a failed run has left of what cannot be recorded again.
+pub(super) fn with_remains(failure: Failure, files: &[PathBuf]) -> Failure {
+    let is_something = |file: &&PathBuf| {
+        // A link in its place is not what was recorded.
+        file.symlink_metadata().is_ok_and(|found| found.is_file() && found.len() > 0)
+    };
+    let names: Vec<String> =
+        files.iter().filter(is_something).map(|file| file.display().to_string()).collect();
+    match failure {
+        Failure::Input(message) if !names.is_empty() => {
+            Failure::Input(format!("{message}; what was recorded is in {}", names.join(" and ")))
         }
-    }
-
-    /// Names what a failed run has left of what cannot be recorded again.
-    pub(super) fn with_remains(self, files: &[PathBuf]) -> Self {
-        let is_something = |file: &&PathBuf| {
-            // A link in its place is not what was recorded.
-            file.symlink_metadata().is_ok_and(|found| found.is_file() && found.len() > 0)
-        };
-        let names: Vec<String> =
-            files.iter().filter(is_something).map(|file| file.display().to_string()).collect();
-        match self {
-            Self::Input(message) if !names.is_empty() => {
-                Self::Input(format!("{message}; what was recorded is in {}", names.join(" and ")))
-            }
-            Self::ClosedPipe if !names.is_empty() => {
-                let files = names.join(" and ");
-                warn(&format!("the output was closed before the end; what was recorded is in {files}"));
-                Self::ClosedPipe
-            }
-            other => other,
+        Failure::ClosedPipe if !names.is_empty() => {
+            let files = names.join(" and ");
+            warn(&format!("the output was closed before the end; what was recorded is in {files}"));
+            Failure::ClosedPipe
         }
-    }
-
-    /// Prints the message and gives the exit code.
-    pub(crate) fn report(&self) -> ExitCode {
-        let (message, code) = match self {
-            Self::Input(message) => (message, 1),
-            Self::Usage(message) => (message, 2),
-            Self::ClosedPipe => return ExitCode::SUCCESS,
-        };
-        say_line(message);
-        ExitCode::from(code)
+        other => other,
     }
 }
 
@@ -90,25 +70,13 @@ pub(super) trait InFile<T> {
 
 impl<T, E: Display + 'static> InFile<T> for Result<T, E> {
     fn in_file(self, path: &Path) -> Result<T, Failure> {
-        self.map_err(|error| Failure::of(path, error))
+        self.map_err(|error| failed_at(path, error))
     }
-}
-
-/// Results on standard output; a closed pipe ends the run without a message.
-pub(super) fn print(text: &str) -> Result<(), Failure> {
-    print_bytes(text.as_bytes())
-}
-
-/// As [`print`], for any bytes.
-pub(super) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
-    let mut stdout = hybank::io::stdout();
-    let written = StandardStream::Output.check().and_then(|()| stdout.write_all(bytes));
-    written.and_then(|()| stdout.flush()).map_err(|error| print_failure(&error))
 }
 
 /// One JSON object on standard output.
 pub(super) fn print_json(report: &impl serde::Serialize) -> Result<(), Failure> {
-    print(&(serde_json::to_string(report).map_err(Failure::input)? + "\n"))
+    print(&(serde_json::to_string(report).map_err(failed)? + "\n"))
 }
 
 /// Refuses a report and an output of `what` that both go to standard output.
@@ -129,38 +97,20 @@ pub(super) fn show<R: serde::Serialize>(
     if json { print_json(report) } else { print(&printable(&text(report))) }
 }
 
-/// Why standard output could not be written.
-pub(super) fn print_failure(error: &std::io::Error) -> Failure {
-    match error.kind() {
-        ErrorKind::BrokenPipe => Failure::ClosedPipe,
-        _ => Failure::Input(unprinted(error)),
-    }
-}
-
-/// Prints text to standard error. Errors are ignored, so that no result is lost.
-pub(super) fn say(text: &str) {
-    put(&printable(text));
-}
-
 /// A line on standard error with the program's name before it.
 pub(super) fn say_line(line: &str) {
-    put(&format!("hybank: {}\n", shown(line)));
+    PROGRAM.say_line(line);
 }
 
 /// One JSON object on standard error.
 pub(super) fn say_json(report: &impl serde::Serialize) -> Result<(), Failure> {
-    put(&(serde_json::to_string(report).map_err(Failure::input)? + "\n"));
+    put(&(serde_json::to_string(report).map_err(failed)? + "\n"));
     Ok(())
-}
-
-/// Every word on standard error comes this way, and nothing foreign is left in it.
-fn put(text: &str) {
-    let _ = hybank::io::stderr().write_all(text.as_bytes());
 }
 
 /// A warning on standard error.
 pub(super) fn warn(warning: &str) {
-    say_line(&format!("warning: {warning}"));
+    PROGRAM.warn(warning);
 }
 
 /// With `strict` the first warning is an error.
@@ -176,16 +126,6 @@ pub(super) fn say_understood(spec: Option<&Spec>) {
     if std::io::stderr().is_terminal() {
         spec.iter().for_each(|spec| say(&format!("{}\n", understood(spec))));
     }
-}
-
-/// Names the unfinished files that killed runs left beside `outputs`.
-pub(super) fn name_leftovers(outputs: &[&Path]) {
-    leftovers(outputs).iter().for_each(|left| warn(&left.to_string()));
-}
-
-/// Whether a path stands for standard input or output.
-pub(super) fn is_dash(path: &Path) -> bool {
-    path.as_os_str() == "-"
 }
 
 /// The name of a file in messages.

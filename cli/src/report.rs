@@ -3,7 +3,7 @@
 use super::bank_file::load;
 use super::capture_args::{CaptureArgs, InterleavedArgs, output_rate};
 use super::capture_file::{start, unread};
-use super::print::{Failure, is_dash, name, warn};
+use super::print::{Failure, failed_at, is_dash, name, stopped, warn};
 use super::written::{check_output, write_text};
 use hybank::bank::Bank;
 use hybank::design::DesignError;
@@ -54,7 +54,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     }
     let bank = load(&args.bank)?;
     if bank.spec.is_none() {
-        return Err(Failure::of(&args.bank, DesignError::NoSpec));
+        return Err(failed_at(&args.bank, DesignError::NoSpec));
     }
     let captures = if args.inputs.is_empty() { None } else { Some(args.captures(&bank)?) };
     let page = Page::new(&bank, captures).map_err(|error| of_page(&args.bank, error))?;
@@ -64,9 +64,9 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 /// A failure of the bank in the file `path`.
 fn of_page(path: &Path, error: PageError) -> Failure {
     match error {
-        PageError::Design(error) => Failure::of(path, error),
-        PageError::Fuse(error) => Failure::running(error),
-        error => Failure::of(path, error),
+        PageError::Design(error) => failed_at(path, error),
+        PageError::Fuse(error) => stopped(error),
+        error => failed_at(path, error),
     }
 }
 

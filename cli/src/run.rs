@@ -7,7 +7,7 @@ use super::gaps::{GapArgs, say_gaps};
 use super::interrupt::interrupts;
 use super::observer::{ObserverArgs, RunObserver};
 use super::output::{begin_samples, check_files};
-use super::print::{Failure, check_strict, warn};
+use super::print::{Failure, check_strict, failed, stopped, warn, with_remains};
 use super::track::{TrackArgs, TrackRecord, Tracked};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hybank::bank::Bank;
@@ -203,15 +203,15 @@ impl Job<'_> {
         let mut pipeline = Pipeline::new(self.bank, plan, settings, self.format, is_complex);
         let tracked = self.args.track.begin(self.args.force, observer.events())?;
         if let Some(follower) = self.args.track.follower(self.bank, self.bank_path, rate)? {
-            let retuner = tracked.retuner(follower, self.bank, self.options()).map_err(Failure::running)?;
-            pipeline = pipeline.retuned_by(retuner).map_err(Failure::running)?;
+            let retuner = tracked.retuner(follower, self.bank, self.options()).map_err(stopped)?;
+            pipeline = pipeline.retuned_by(retuner).map_err(stopped)?;
         }
         let mut outputs = self.outputs(rate, is_complex)?;
         // What is recorded live cannot be recorded again.
         let kept = if self.is_live { outputs.keep() } else { Vec::new() };
         observer.check_captures(self.bank, !is_complex && !self.args.track.is_wanted(), self.is_live);
         let finished = self.record(pipeline, reader, outputs, tracked, observer, each);
-        finished.map_err(|failure| failure.with_remains(&kept))
+        finished.map_err(|failure| with_remains(failure, &kept))
     }
 
     /// From the first frame to the names of the outputs.
@@ -249,7 +249,7 @@ impl Job<'_> {
         let Self { args, container, format, .. } = *self;
         let mask = args.gaps.begin_mask(args.force)?;
         let header = OutputHeader { container, format, is_complex, rate };
-        let samples = begin_samples(self.output, header, args.force).map_err(Failure::running)?;
+        let samples = begin_samples(self.output, header, args.force).map_err(stopped)?;
         Ok(FileOutputs::new(samples, mask, format))
     }
 
@@ -263,7 +263,7 @@ impl Job<'_> {
         each: &dyn Fn(u64),
     ) -> Result<bool, Failure> {
         let is_stopped = each_block(reader, |recordings| {
-            pipeline.push(recordings, &mut |block| outputs.write(block)).map_err(Failure::running)?;
+            pipeline.push(recordings, &mut |block| outputs.write(block)).map_err(stopped)?;
             observer.step(recordings, pipeline);
             each(recordings.frames() as u64);
             Ok(())
@@ -286,9 +286,9 @@ impl Job<'_> {
             false => frames * self.bank.ratio as u64,
         };
         if self.flush {
-            pipeline.flush(samples, &mut |block| outputs.write(block)).map_err(Failure::running)?;
+            pipeline.flush(samples, &mut |block| outputs.write(block)).map_err(stopped)?;
         }
-        pipeline.finish().map_err(Failure::running)
+        pipeline.finish().map_err(stopped)
     }
 
     fn tolerated(&self, reader: &MultiReader) -> Vec<Warning> {
@@ -308,7 +308,7 @@ impl Job<'_> {
         let mut notes = reader.notes(placement);
         // Only this kind of output holds the rest.
         if is_sigmf(self.output) {
-            notes.record_bank(&self.bank.digest().map_err(Failure::input)?);
+            notes.record_bank(&self.bank.digest().map_err(failed)?);
             for gap in report.outcome.gaps.iter().flat_map(|gaps| &gaps.list) {
                 let comment = format!("channel {}: {} samples missing", gap.channel, gap.length);
                 let per_frame = self.bank.samples.get(gap.channel - 1).map_or(1, |&samples| samples as u64);
@@ -329,7 +329,7 @@ impl Job<'_> {
     ) -> Result<(), Failure> {
         let judged = check_strict(&report.warnings, self.args.strict);
         if judged.is_ok() {
-            outputs.finish().map_err(Failure::running)?;
+            outputs.finish().map_err(stopped)?;
         }
         let are_said = observer.quiet();
         report.outcome.gaps.iter().for_each(|gaps| say_gaps(gaps, are_said));
@@ -345,7 +345,7 @@ pub(super) fn each_block(
     mut take: impl FnMut(&[PcmFrames<'_>]) -> Result<(), Failure>,
 ) -> Result<bool, Failure> {
     loop {
-        match reader.wait().map_err(Failure::running)? {
+        match reader.wait().map_err(stopped)? {
             Arrival::Frames(count) => {
                 take(&reader.frames())?;
                 reader.consume(count);

@@ -1,6 +1,6 @@
 //! The commands that hand out texts: `init`, `help`, `schema`, `completions` and `man`.
 
-use super::print::print;
+use super::print::{failed, print};
 use super::written::{begin_file, check_outputs, write_text, write_together};
 use super::{Cli, Failure};
 use clap::CommandFactory;
@@ -135,9 +135,9 @@ pub(super) fn schema(args: &SchemaArgs) -> Result<(), Failure> {
 
 /// The schema of banks with that of their specs in its definitions, so that it stands alone.
 fn with_spec() -> Result<String, Failure> {
-    let mut bank: serde_json::Value = serde_json::from_str(BANK_SCHEMA).map_err(Failure::input)?;
-    bank["$defs"]["spec"] = serde_json::from_str(SPEC_SCHEMA).map_err(Failure::input)?;
-    Ok(serde_json::to_string_pretty(&bank).map_err(Failure::input)? + "\n")
+    let mut bank: serde_json::Value = serde_json::from_str(BANK_SCHEMA).map_err(failed)?;
+    bank["$defs"]["spec"] = serde_json::from_str(SPEC_SCHEMA).map_err(failed)?;
+    Ok(serde_json::to_string_pretty(&bank).map_err(failed)? + "\n")
 }
 
 /// Prints completions for a shell
@@ -189,6 +189,6 @@ pub(super) fn man(args: &ManArgs) -> Result<(), Failure> {
 fn page(command: clap::Command, folder: &Path) -> Result<(PathBuf, Vec<u8>), Failure> {
     let mut text = Vec::new();
     let man = clap_mangen::Man::new(command.version(env!("CARGO_PKG_VERSION")));
-    man.render(&mut text).map_err(Failure::input)?;
+    man.render(&mut text).map_err(failed)?;
     Ok((folder.join(man.get_filename()), text))
 }

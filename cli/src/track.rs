@@ -3,7 +3,7 @@
 
 use super::bank_file::read_text;
 use super::event::{Event, Events};
-use super::print::Failure;
+use super::print::{Failure, failed};
 use super::written::begin_beside;
 use hybank::bank::Bank;
 use hybank::files::AtomicFile;
@@ -84,7 +84,7 @@ impl TrackArgs {
             Some(file) => {
                 let name = file.display().to_string();
                 let readings = Reading::parse(&read_text(file)?, &name, bank.channel_count());
-                DelaySource::Readings(readings.map_err(Failure::input)?)
+                DelaySource::Readings(readings.map_err(failed)?)
             }
         };
         let follower = self.tracking().follower(bank, source, rate);

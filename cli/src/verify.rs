@@ -2,7 +2,7 @@
 
 use super::bank_file::read_kind;
 use super::file_kind::FileKind;
-use super::print::{Failure, InFile, name, show};
+use super::print::{Failure, InFile, failed, name, show};
 use hybank::bank::{Bank, FixedPoint, SynthesisFilters, check_digest};
 use hybank::design;
 use hybank::messages::{Quoted, counted};
@@ -67,8 +67,8 @@ struct Report {
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let file = name(&args.bank);
     let text = read_kind(&args.bank, FileKind::Bank)?;
-    let bank = Bank::from_json(&text, &file).map_err(Failure::input)?;
-    let digest = check_digest(&text, &file).map_err(Failure::input)?;
+    let bank = Bank::from_json(&text, &file).map_err(failed)?;
+    let digest = check_digest(&text, &file).map_err(failed)?;
     let certificate_in_file = bank.has_certificate();
     let verified = if args.search && !certificate_in_file {
         design::prove(&bank).in_file(&args.bank)?.1

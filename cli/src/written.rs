@@ -1,7 +1,7 @@
 //! Writes files that appear when they are whole: texts, pictures, recordings, and folders of them.
 
 use super::interrupt::remove_unfinished;
-use super::print::{Failure, is_dash, name_leftovers, print_bytes};
+use super::print::{Failure, PROGRAM, failed, failed_at, is_dash, print_bytes};
 use hybank::files::{self, AtomicFile, FileError, commit_all, refuse_overlaps};
 use hybank::io::{Container, OutputHeader, PcmFormat, SampleWriter, is_pipe, is_sigmf};
 use std::io::{BufWriter, Write};
@@ -10,15 +10,15 @@ use std::path::Path;
 /// Refuses outputs that are also inputs or other outputs, and names what killed runs left beside them.
 pub(super) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), Failure> {
     let outputs: Vec<&Path> = outputs.iter().copied().filter(|path| !is_dash(path)).collect();
-    refuse_overlaps(&outputs, inputs).map_err(Failure::input)?;
-    name_leftovers(&outputs);
+    refuse_overlaps(&outputs, inputs).map_err(failed)?;
+    PROGRAM.name_leftovers(&outputs);
     Ok(())
 }
 
 /// As [`check_outputs`], for one file that may be begun when the work is done.
 pub(super) fn check_output(output: &Path, inputs: &[&Path], force: bool) -> Result<(), Failure> {
     check_outputs(&[output], inputs)?;
-    if is_dash(output) { Ok(()) } else { files::check_output(output, force).map_err(Failure::input) }
+    if is_dash(output) { Ok(()) } else { files::check_output(output, force).map_err(failed) }
 }
 
 /// Writes a text file that appears when it is whole; `-` is standard output.
@@ -31,14 +31,14 @@ pub(super) fn write_bytes(path: &Path, bytes: &[u8], force: bool) -> Result<(), 
     if is_dash(path) {
         return print_bytes(bytes);
     }
-    begin_file(path, bytes, force)?.commit().map_err(Failure::input)
+    begin_file(path, bytes, force)?.commit().map_err(failed)
 }
 
 /// A file that is whole but has no name yet.
 pub(super) fn begin_file(path: &Path, bytes: &[u8], force: bool) -> Result<AtomicFile, Failure> {
     remove_unfinished();
-    let mut file = AtomicFile::create(path, force).map_err(Failure::input)?;
-    file.write_all(bytes).map_err(|error| Failure::of(path, format!("cannot write it: {error}")))?;
+    let mut file = AtomicFile::create(path, force).map_err(failed)?;
+    file.write_all(bytes).map_err(|error| failed_at(path, format!("cannot write it: {error}")))?;
     Ok(file)
 }
 
@@ -46,7 +46,7 @@ pub(super) fn begin_file(path: &Path, bytes: &[u8], force: bool) -> Result<Atomi
 pub(super) fn begin_beside(path: &Path, force: bool) -> Result<AtomicFile, Failure> {
     AtomicFile::create(path, force).map_err(|error| match error {
         FileError::Special { .. } => Failure::Input(error.to_string()),
-        other => Failure::input(other),
+        other => failed(other),
     })
 }
 
@@ -64,8 +64,7 @@ pub(super) fn write_together<T>(
         begin(item)
     };
     let begun = items.map(begin).collect::<Result<Vec<_>, _>>();
-    let written =
-        begun.and_then(|files| commit_all(files.into_iter().flatten().collect()).map_err(Failure::input));
+    let written = begun.and_then(|files| commit_all(files.into_iter().flatten().collect()).map_err(failed));
     if written.is_err() && is_new {
         // It is empty, or another program has put files there.
         let _ = std::fs::remove_dir(folder);
@@ -76,7 +75,7 @@ pub(super) fn write_together<T>(
 /// Makes a folder, if it is not there.
 pub(super) fn create_folder(folder: &Path) -> Result<(), Failure> {
     check_folder(folder)?;
-    let refused = |error| Failure::of(folder, format!("cannot create the folder: {error}"));
+    let refused = |error| failed_at(folder, format!("cannot create the folder: {error}"));
     std::fs::create_dir_all(folder).map_err(refused)
 }
 
@@ -84,7 +83,7 @@ pub(super) fn create_folder(folder: &Path) -> Result<(), Failure> {
 pub(super) fn check_folder(folder: &Path) -> Result<(), Failure> {
     if folder.ancestors().any(|part| part.symlink_metadata().is_ok() && !part.is_dir()) {
         let problem = "a file has this name, or that of a folder above; give the name of a folder";
-        return Err(Failure::of(folder, problem));
+        return Err(failed_at(folder, problem));
     }
     Ok(())
 }
@@ -136,7 +135,7 @@ impl<'a> Mono<'a> {
     fn write(&self, path: &Path, force: bool) -> Result<Vec<AtomicFile>, Failure> {
         let Self { container, format, rate, imaginary, .. } = *self;
         let header = OutputHeader { container, format, is_complex: imaginary.is_some(), rate };
-        let mut writer = SampleWriter::create(path, header, force).map_err(Failure::input)?;
+        let mut writer = SampleWriter::create(path, header, force).map_err(failed)?;
         for from in (0..self.samples.len()).step_by(CHUNK) {
             let to = (from + CHUNK).min(self.samples.len());
             let parts = |k: usize| [Some(self.samples[k]), imaginary.map(|imaginary| imaginary[k])];
@@ -145,9 +144,9 @@ impl<'a> Mono<'a> {
             for (slot, x) in bytes.chunks_exact_mut(format.bytes()).zip(numbers) {
                 format.encode(x, slot);
             }
-            writer.write(&bytes).map_err(Failure::input)?;
+            writer.write(&bytes).map_err(failed)?;
         }
-        writer.finish().map_err(Failure::input)
+        writer.finish().map_err(failed)
     }
 }
 
@@ -155,7 +154,7 @@ impl<'a> Mono<'a> {
 pub(super) fn write_recordings(files: &[(&Path, Mono<'_>)], force: bool) -> Result<(), Failure> {
     let begin = |(path, mono): &(&Path, Mono<'_>)| begin_recording(path, *mono, force);
     let files = files.iter().map(begin).collect::<Result<Vec<_>, _>>()?;
-    commit_all(files.into_iter().flatten().collect()).map_err(Failure::input)
+    commit_all(files.into_iter().flatten().collect()).map_err(failed)
 }
 
 /// The files of a recording, which are whole but have no names yet: two of a SigMF recording.
@@ -163,15 +162,15 @@ pub(super) fn begin_recording(path: &Path, mono: Mono<'_>, force: bool) -> Resul
     remove_unfinished();
     let mut files = match mono.ordinary_wav(path) {
         Some(spec) => {
-            let mut file = AtomicFile::create(path, force).map_err(Failure::input)?;
+            let mut file = AtomicFile::create(path, force).map_err(failed)?;
             write_wav(&mut file, mono.samples, spec)
-                .map_err(|error| Failure::of(path, format!("cannot write it: {error}")))?;
+                .map_err(|error| failed_at(path, format!("cannot write it: {error}")))?;
             vec![file]
         }
         None => mono.write(path, force)?,
     };
     // One open file at a time, however many there are.
-    files.iter_mut().try_for_each(AtomicFile::seal).map_err(Failure::input)?;
+    files.iter_mut().try_for_each(AtomicFile::seal).map_err(failed)?;
     Ok(files)
 }
 

@@ -230,7 +230,7 @@ fn predictions_take_what_is_estimated() {
         let estimate = pool.install(|| Extent::new(size, &[&image, &image], None).of_rig_prediction());
         let work = || {
             let predictor = Predictor::new(&views, &settings).unwrap();
-            let now = predictor.at(&0.5, views[0].image.size(), None).unwrap();
+            let now = predictor.at(&0.5, views[0].image.size()).unwrap();
             drop(Advice::on(&predictor, &0.5, views[0].image.size(), &now).unwrap());
         };
         estimates.compare(&format!("prediction of a rig, {size:?}"), size, estimate, peak(&pool, work));
@@ -246,7 +246,7 @@ fn predictions_take_what_is_estimated() {
         let estimate = pool.install(|| extent.of_camera_prediction(&settings));
         let work = || {
             let predictor = Predictor::new(&views, &settings).unwrap();
-            let now = predictor.at(&target, size, None).unwrap();
+            let now = predictor.at(&target, size).unwrap();
             drop(Advice::on(&predictor, &target, size, &now).unwrap());
         };
         estimates.compare(&format!("prediction of cameras, {size:?}"), size, estimate, peak(&pool, work));

@@ -46,6 +46,7 @@ mod rename;
 #[cfg(all(unix, feature = "signals"))]
 pub mod signals;
 mod streams;
+mod watched;
 
 pub use atomic::{AtomicFile, check_output, commit_all, remove_unfinished};
 #[cfg(feature = "runtime")]
@@ -57,3 +58,6 @@ pub use identity::{is_same_file, refuse_overlaps};
 #[cfg(all(unix, feature = "signals"))]
 pub use signals::{fail_at_file_size_limit, remove_unfinished_on_signals};
 pub use streams::{StandardStream, note_closed_streams, unprinted};
+#[cfg(feature = "runtime")]
+pub(crate) use watched::{REPORT_WRITE_BEGAN, STDOUT_WRITE_BEGAN};
+pub use watched::{Watched, is_output_stalled, stderr, stdout};

@@ -71,7 +71,7 @@ pub use notes::{OutputNotes, Placement};
 pub use npy::npy_header;
 pub use offline::{OfflineError, OfflineSamples, WORK_BYTES};
 pub use open::is_self_describing;
-pub use pipe::{Stdout, Watched, is_output_stalled, is_pipe, stderr, stdout};
+pub use pipe::{Stdout, is_pipe};
 pub use read_options::{BLOCK_BYTES, ReadOptions, TimeInterleaving, Until};
 pub use sample_writer::{Container, OutputHeader, SampleWriter};
 pub use sigmf::{SigmfAnnotation, SigmfCapture, SigmfGlobal, SigmfMeta, is_sigmf, sigmf_files};

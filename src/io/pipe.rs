@@ -1,14 +1,11 @@
 //! Standard input and output as files, and pipes with buffers large enough for two processes.
 
 use super::IoError;
-use crate::files::{StandardStream, is_same_file};
+use crate::files::{REPORT_WRITE_BEGAN, STDOUT_WRITE_BEGAN, StandardStream, Watched, is_same_file};
 use crate::messages::Quoted;
 use std::fs::File;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
 
 /// Pipes are widened to this where the system allows it; 64 KiB would halve the throughput
 /// between two processors.
@@ -45,30 +42,6 @@ fn stdout_file() -> io::Result<File> {
 fn stdout_file() -> io::Result<io::Stdout> {
     StandardStream::Output.check()?;
     Ok(io::stdout())
-}
-
-/// When the write to a stream that is under way began, in milliseconds since [`CLOCK`]; 0 for none.
-static STDOUT_WRITE_BEGAN: AtomicU64 = AtomicU64::new(0);
-static REPORT_WRITE_BEGAN: AtomicU64 = AtomicU64::new(0);
-static STDERR_WRITE_BEGAN: AtomicU64 = AtomicU64::new(0);
-static CLOCK: LazyLock<Instant> = LazyLock::new(Instant::now);
-
-/// Bytes of one write. During a longer one it would be unknown whether it makes progress.
-const WRITE_BYTES: usize = 64 << 10;
-
-/// A standard stream; [`is_output_stalled`] knows how long its writes wait.
-///
-/// ```
-/// use hybank::io::{Stdout, is_output_stalled};
-/// use std::{io::Write, time::Duration};
-/// let mut output = Stdout::for_samples()?;
-/// output.write_all(b"0.5,-0.5\n")?;
-/// assert!(!is_output_stalled(Duration::from_secs(1)));
-/// # Ok::<(), std::io::Error>(())
-/// ```
-pub struct Watched<W> {
-    stream: W,
-    began: &'static AtomicU64,
 }
 
 /// Standard output for samples, without a buffer.
@@ -118,50 +91,6 @@ impl Stdout {
     pub fn fifo(_: &Path) -> io::Result<Self> {
         Err(io::ErrorKind::Unsupported.into())
     }
-}
-
-/// Standard output for text.
-pub fn stdout() -> Watched<impl Write> {
-    Watched::new(io::stdout().lock(), &STDOUT_WRITE_BEGAN)
-}
-
-/// Standard error.
-pub fn stderr() -> Watched<impl Write> {
-    Watched::new(io::stderr().lock(), &STDERR_WRITE_BEGAN)
-}
-
-impl<W> Watched<W> {
-    fn new(stream: W, began: &'static AtomicU64) -> Self {
-        LazyLock::force(&CLOCK);
-        Self { stream, began }
-    }
-
-    fn timed<R>(&mut self, act: impl FnOnce(&mut W) -> R) -> R {
-        let now = CLOCK.elapsed().as_millis() as u64;
-        self.began.store(now.max(1), Ordering::Relaxed);
-        let result = act(&mut self.stream);
-        self.began.store(0, Ordering::Relaxed);
-        result
-    }
-}
-
-impl<W: Write> Write for Watched<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.timed(|stream| stream.write(&bytes[..bytes.len().min(WRITE_BYTES)]))
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.timed(Write::flush)
-    }
-}
-
-/// True if a write of this process to standard output, standard error or a report has waited for so long:
-/// its reader takes no more data.
-pub fn is_output_stalled(patience: Duration) -> bool {
-    [&STDOUT_WRITE_BEGAN, &REPORT_WRITE_BEGAN, &STDERR_WRITE_BEGAN].into_iter().any(|began| {
-        let began = began.load(Ordering::Relaxed);
-        began > 0 && CLOCK.elapsed() >= Duration::from_millis(began) + patience
-    })
 }
 
 /// Other files are not changed, nor are pipes whose buffer the system refuses to enlarge.

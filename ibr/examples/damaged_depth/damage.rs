@@ -1,7 +1,7 @@
-//! Damages of depth maps, as cameras, matchers and lidar make them.
+//! Damages of depth maps, as cameras, matchers and lidar make them, and of the exposure.
 
 use hybank_ibr::camera::Camera;
-use hybank_ibr::image::{Image, MOST_PIXELS, pfm, read_map};
+use hybank_ibr::image::{Image, MOST_PIXELS, pfm, read_image, read_map, save};
 use hybank_ibr::propagate::Viewpoint;
 use hybank_ibr::scene::SceneSpec;
 use nalgebra::Matrix3x4;
@@ -10,7 +10,7 @@ use rand_pcg::Pcg64;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// What is done to the maps of a scene.
+/// What is done to a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Damage {
     Clean,
@@ -26,10 +26,12 @@ pub(crate) enum Damage {
     Matched,
     /// What is infinitely far away has this value.
     Sky(f32),
+    /// Red, green and blue of the second photograph have these factors.
+    Exposure([f64; 3]),
 }
 
 impl Damage {
-    pub(crate) const ALL: [Self; 7] = [
+    pub(crate) const ALL: [Self; 11] = [
         Self::Clean,
         Self::Outliers(0.05),
         Self::Noise(0.5),
@@ -37,6 +39,10 @@ impl Damage {
         Self::Scattered(0.03),
         Self::Lattice,
         Self::Matched,
+        Self::Exposure([0.95; 3]),
+        Self::Exposure([0.965; 3]),
+        Self::Exposure([0.98; 3]),
+        Self::Exposure([0.9, 1.0, 1.1]),
     ];
     pub(crate) const OF_SKY: [Self; 4] =
         [Self::Sky(f32::INFINITY), Self::Sky(1e10), Self::Sky(f32::NAN), Self::Sky(0.0)];
@@ -50,6 +56,7 @@ impl Damage {
             Self::Lattice => "lattice 2.8 %".into(),
             Self::Matched => "matched".into(),
             Self::Sky(value) => format!("sky as {value:e}"),
+            Self::Exposure(gains) => format!("exposure {gains:?}"),
         }
     }
 
@@ -69,6 +76,9 @@ impl Damage {
         for (k, view) in damaged.view.iter_mut().enumerate() {
             let view_path = view.image.clone();
             view.image = beside.join(view_path);
+            if let (Self::Exposure(gains), 1) = (self, k) {
+                view.image = exposed(&view.image, gains, folder)?;
+            }
             let is_depth = view.depth.is_some();
             let Some(map) = view.depth.as_mut().or(view.disparity.as_mut()) else { continue };
             if self == Self::Matched {
@@ -103,7 +113,7 @@ impl Damage {
         for value in values {
             let is_known = value.is_finite() && *value > 0.0;
             match self {
-                Self::Clean | Self::Lattice | Self::Matched => {}
+                Self::Clean | Self::Lattice | Self::Matched | Self::Exposure(_) => {}
                 Self::Outliers(share) if uniform(random) < share => {
                     *value = low + (high - low) * uniform(random) as f32;
                 }
@@ -117,6 +127,18 @@ impl Damage {
             }
         }
     }
+}
+
+/// A photograph with other factors for its colours, in 8 bits; its file.
+fn exposed(photograph: &Path, gains: [f64; 3], folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
+    let mut image = read_image(photograph, MOST_PIXELS)?;
+    let channels = image.channels();
+    for pixel in image.data_mut().chunks_mut(channels) {
+        pixel.iter_mut().zip(gains).for_each(|(value, gain)| *value *= gain as f32);
+    }
+    let file = folder.join("exposed.png");
+    save(&image, &file)?;
+    Ok(file)
 }
 
 fn uniform(random: &mut Pcg64) -> f64 {

@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         RectifiedView { image, map: disparity, camera: *position }
     };
     let (views, settings) = ([view(0), view(4)], RenderSettings::default());
-    let now = Predictor::new(&views, &settings)?.at(&0.5, views[0].image.size(), None)?;
+    let now = Predictor::new(&views, &settings)?.at(&0.5, views[0].image.size())?;
     println!("estimate with exact depth: {:.2} grey levels", now.totals().estimate);
     for deviation in [0.5, 1.0, 2.0] {
         let price = price_of_depth_errors(&views, 0.5, &settings, &now, deviation)?;

@@ -27,7 +27,7 @@ pub(crate) fn rows(effort: Effort) -> Outcome<Figure> {
     };
     let view = |i: usize| RectifiedView { image: &pair.images[i], map: &pair.maps[i], camera: i as f64 };
     let predictor = Predictor::new(&[view(0), view(1)], &RenderSettings::default())?;
-    let predicted = predictor.at(&0.5, pair.truth.size(), None)?;
+    let predicted = predictor.at(&0.5, pair.truth.size())?;
     let rendered = predicted.rendering.image.quantised();
     let stride = rendered.width() * rendered.channels();
     let pairs = rendered.data().chunks(stride).zip(pair.truth.data().chunks(stride));

@@ -3,7 +3,6 @@
 use super::Cause;
 use super::calibrate::LeastSquares;
 use super::regressors::{CAUSE_OF, REGRESSORS, Regressors, difference};
-use super::sure::Limits;
 use super::variogram::Variogram;
 use crate::image::Image;
 use crate::pipeline::{Exposure, RenderError, RenderSettings, Rendering};
@@ -44,9 +43,7 @@ pub struct Calibration {
 pub struct ViewError {
     /// The rendering.
     pub rendering: Rendering,
-    /// Sure bound of each pixel, in grey levels, row by row; empty without [`Limits`](super::Limits).
-    pub sure_bound: Vec<f32>,
-    /// Local limit of each pixel: not sure, see [the module](super).
+    /// Local limit of each pixel, in grey levels, row by row: not sure, see [the module](super).
     pub local_limit: Vec<f32>,
     /// Expected bound: the root mean square.
     pub expected: Vec<f32>,
@@ -63,8 +60,6 @@ pub struct ViewError {
 /// Figures of a whole view, in grey levels unless named.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Totals {
-    /// Mean of the sure bounds; none without limits that are known for sure.
-    pub sure_bound: Option<f64>,
     /// Mean of the local limits.
     pub local_limit: f64,
     /// Root mean square: the expected bound of the mean absolute error.
@@ -93,7 +88,6 @@ impl ViewError {
         };
         let square = mean(&self.expected[pixels.clone()], 2);
         Totals {
-            sure_bound: self.sure_bound.get(pixels.clone()).filter(|b| !b.is_empty()).map(|b| mean(b, 1)),
             local_limit: mean(&self.local_limit[pixels.clone()], 1),
             expected: square.sqrt(),
             estimate: mean(&self.estimate[pixels], 1),
@@ -104,18 +98,9 @@ impl ViewError {
     /// Share of the pixels whose error against a photograph of the same size is within the local limit,
     /// after rounding to 8 bits.
     pub fn within_local_limit(&self, truth: &Image) -> f64 {
-        self.share_within(&self.local_limit, truth)
-    }
-
-    /// The same of the sure bound, if there is one.
-    pub fn within_sure_bound(&self, truth: &Image) -> Option<f64> {
-        (!self.sure_bound.is_empty()).then(|| self.share_within(&self.sure_bound, truth))
-    }
-
-    fn share_within(&self, limits: &[f32], truth: &Image) -> f64 {
         let errors = difference(&self.rendering.image.quantised(), truth);
-        let within = errors.iter().zip(limits).filter(|(error, limit)| **error <= **limit + ROUNDING);
-        within.count() as f64 / limits.len() as f64
+        let pairs = errors.iter().zip(&self.local_limit);
+        pairs.filter(|(error, limit)| **error <= **limit + ROUNDING).count() as f64 / errors.len() as f64
     }
 
     /// Mean absolute error of each row against a photograph of the same size, after rounding to 8 bits.
@@ -179,8 +164,6 @@ pub struct Study<'a> {
     pub(super) known: &'a Known,
     /// Distance between neighbouring views.
     pub(super) spacing: f64,
-    /// For the sure bound.
-    pub(super) limits: Option<&'a Limits>,
 }
 
 /// Photographs with one exposure.
@@ -198,12 +181,11 @@ pub(super) fn equalised<'a>(images: impl Iterator<Item = &'a Image>, gains: &[Ex
 pub struct Examined {
     pub(super) rendering: Rendering,
     pub(super) regressors: Vec<Regressors>,
-    pub(super) sure_bound: Vec<f32>,
 }
 
 /// Expected error, estimate and causes from the regressors and their weights.
 pub(super) fn judge(examined: Examined, local_limit: Vec<f32>, calibration: Calibration) -> ViewError {
-    let Examined { rendering, regressors, sure_bound } = examined;
+    let Examined { rendering, regressors } = examined;
     let (width, height) = rendering.image.size();
     let mut causes_of_rows = vec![[0.0; 5]; height];
     let (mut expected, mut estimate) = (Vec::new(), Vec::new());
@@ -219,7 +201,7 @@ pub(super) fn judge(examined: Examined, local_limit: Vec<f32>, calibration: Cali
     }
     let cause = |k: usize| causes_of_rows.iter().map(|row| row[k]).sum::<f64>() / height as f64;
     let causes = std::array::from_fn(cause);
-    ViewError { rendering, sure_bound, local_limit, expected, estimate, causes, causes_of_rows, calibration }
+    ViewError { rendering, local_limit, expected, estimate, causes, causes_of_rows, calibration }
 }
 
 impl Calibration {
@@ -235,7 +217,7 @@ impl Calibration {
             let mut others = views.to_vec();
             let truth = others.remove(k * views.len() / used);
             let spacing = truth.camera.spacing(views);
-            let study = Study { settings, known, spacing, limits: None };
+            let study = Study { settings, known, spacing };
             let examined = truth.camera.examine(&others, truth.image.size(), &study)?;
             let errors = difference(&examined.rendering.image.quantised(), truth.image);
             for (x, error) in examined.regressors.iter().zip(errors) {

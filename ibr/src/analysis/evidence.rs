@@ -1,15 +1,12 @@
 //! What the samples of a rendering say about its error, pixel by pixel: how much each sample counts in the
 //! fit that is really used, and how well the samples agree.
 
-use super::lookup::UNSEEN;
-use super::sure::{self, Limits};
 use crate::depth::Measure;
 use crate::interpolate::rows::{self, ORDER, RowWork};
 use crate::interpolate::{Cover, InterpolationError, Settings};
 use crate::pipeline::rectified::{self, Strip};
 use crate::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights};
 use crate::propagate::{Frame, RectifiedView, RigCamera};
-use crate::sample::Sample;
 use hybank::sampling::SamplingError;
 use hybank::sampling::fit::Response;
 use rayon::prelude::*;
@@ -29,14 +26,7 @@ pub(super) struct Evidence {
     pub(super) edge: f32,
 }
 
-/// What is found of a rendering, row by row.
-pub(super) struct Collected {
-    pub(super) evidence: Vec<Evidence>,
-    /// The sure bound of each pixel, in grey levels; empty without limits.
-    pub(super) sure_bound: Vec<f32>,
-}
-
-/// Collects the evidence for a view of a rectified rig; with limits also the sure bound.
+/// Collects the evidence for a view of a rectified rig.
 ///
 /// # Errors
 /// Those of [`rectified::render`].
@@ -45,15 +35,14 @@ pub(super) fn collect(
     position: f64,
     settings: &RenderSettings,
     rendering: &Rendering,
-    limits: Option<&Limits>,
-) -> Result<Collected, RenderError> {
+) -> Result<Vec<Evidence>, RenderError> {
     let view_weights = ViewWeights::of(views, &position).with_noise(&rendering.agreement);
     let settings = &settings.suited_to(&rendering.agreement, &view_weights, Measure::Disparity);
     let view_weights = view_weights.with_gains(&rendering.agreement.gains);
     let (camera, (width, height)) = (RigCamera::new(views, position), rendering.image.size());
     let frame = Frame::whole(width, height, rows::MARGIN, settings.offset);
     let rows = rectified::Job { views, camera, view_weights, frame, settings, watch: &|_| () };
-    let job = Job { rows, rendering, limits };
+    let job = Job { rows, rendering };
     match rendering.image.channels() {
         3 => collect_with::<3>(&job),
         _ => collect_with::<1>(&job),
@@ -64,7 +53,6 @@ pub(super) fn collect(
 struct Job<'a> {
     rows: rectified::Job<'a>,
     rendering: &'a Rendering,
-    limits: Option<&'a Limits>,
 }
 
 impl Job<'_> {
@@ -73,25 +61,19 @@ impl Job<'_> {
     }
 }
 
-fn collect_with<const C: usize>(job: &Job<'_>) -> Result<Collected, RenderError> {
+fn collect_with<const C: usize>(job: &Job<'_>) -> Result<Vec<Evidence>, RenderError> {
     let (width, height) = job.rendering.image.size();
     let mut evidence = vec![Evidence::default(); width * height];
-    let mut sure_bound = vec![UNSEEN; width * height];
-    let rows = evidence.par_chunks_mut(width).zip(sure_bound.par_chunks_mut(width));
-    rows.enumerate().try_for_each_init(
+    evidence.par_chunks_mut(width).enumerate().try_for_each_init(
         || RowEvidence::<C>::new(job),
-        |work, (y, (evidence, sure_bound))| {
+        |work, (y, evidence)| {
             if work.row(job, y, evidence)? {
                 work.edges(job, y, evidence);
-                work.sure(job, y, sure_bound);
             }
             Ok::<(), RenderError>(())
         },
     )?;
-    if job.limits.is_none() {
-        sure_bound.clear();
-    }
-    Ok(Collected { evidence, sure_bound })
+    Ok(evidence)
 }
 
 /// Pixels to each side beyond which no sample has an influence that counts: it falls by four per pixel.
@@ -137,27 +119,6 @@ impl<const C: usize> RowEvidence<C> {
         }
         self.bias(settings, evidence).map_err(failed)?;
         Ok(true)
-    }
-
-    /// The sure bound of every pixel that is seen.
-    fn sure(&mut self, job: &Job<'_>, y: usize, sure: &mut [f32]) {
-        let Some(limits) = job.limits else { return };
-        let test = job.rows.settings.depth_test();
-        let parts = |a: &Sample<C>, b: &Sample<C>| {
-            test.hides(f64::from(a.depth.min(b.depth)), f64::from(a.depth.max(b.depth)))
-        };
-        let row = sure::Row::new(&self.strip.samples, limits, |view| job.distance(view), parts);
-        let seen = &job.rendering.mask[y * sure.len()..];
-        for (column, bound) in sure.iter_mut().enumerate().filter(|(x, _)| seen[*x] == Cover::Seen) {
-            let x = column as f64;
-            self.fit.respond(x, &mut self.response);
-            let response = |x: f64| self.response.at::<ORDER>(x);
-            let influence =
-                |k: usize| f64::from(self.strip.samples[k].weight) * response(self.strip.samples[k].x);
-            let near = self.fit.fillers().iter().filter(|f| (**f - x).abs() <= sure::REACH);
-            let filled = near.map(|f| response(*f)).fold((0.0, 0.0), |(s, m), h| (s + h, m + h.abs()));
-            *bound = row.bound(x, limits, influence, filled) as f32;
-        }
     }
 
     /// Fits the fit again, at the samples.
@@ -229,7 +190,7 @@ mod tests {
         let views: Vec<RectifiedView<'_>> = positions.iter().map(view).collect();
         let settings = RenderSettings::default();
         let rendering = rectified::render(&views, at, &settings).unwrap();
-        collect(&views, at, &settings, &rendering, None).unwrap().evidence
+        collect(&views, at, &settings, &rendering).unwrap()
     }
 
     fn near(value: f32, want: f32) -> bool {

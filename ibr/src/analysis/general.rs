@@ -45,7 +45,7 @@ impl Predicted for Camera {
             [bend, noise, slope, f64::from(jitter[p]), f64::from(edges[p]), 0.0, 0.0]
         };
         let regressors = regressors(&rendering, &known.variogram, of_seen);
-        Ok(Examined { rendering, regressors, sure_bound: Vec::new() })
+        Ok(Examined { rendering, regressors })
     }
 
     fn check_memory(

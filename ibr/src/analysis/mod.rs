@@ -2,12 +2,10 @@
 //!
 //! Numbers for each pixel, in grey levels:
 //!
-//! * **sure bound**: what the error does not exceed, for given [`Limits`] of the second derivative of the
-//!   virtual rows, of the errors of intensities and of those of disparities; for rectified rigs, rendered by
-//!   rows, and nothing where no limits are known (`sure.rs`);
-//! * **local limit**: the same with slopes, second differences and residuals of the photographs nearby in
-//!   the place of such limits. It is not sure: photographs break it where surfaces reflect, where depth is
-//!   wrong in all views, and where something lies between the samples;
+//! * **local limit**: what the error does not exceed where slopes, second differences and residuals are at
+//!   most those of the photographs nearby. It is not sure: photographs break it where surfaces reflect, where
+//!   depth is wrong in all views, and where something lies between the samples. The example `sure_bound` has
+//!   a bound within limits that are known for sure;
 //! * **expected**: the root of the expected square. By Jensen's inequality the expected error is not larger;
 //! * **estimate**: the expected absolute error against a photograph from the place of the virtual camera.
 //!
@@ -22,7 +20,7 @@
 //! view cannot be left out; it takes the weights of typical photographs.
 //!
 //! ```
-//! use hybank_ibr::analysis::{Advice, Limits, Predictor};
+//! use hybank_ibr::analysis::{Advice, Predictor};
 //! use hybank_ibr::camera::Camera;
 //! use hybank_ibr::pipeline::RenderSettings;
 //! use hybank_ibr::propagate::RectifiedView;
@@ -36,13 +34,10 @@
 //! let views = shots.each_ref().map(|(image, map, camera)| RectifiedView { image, map, camera: *camera });
 //! // The view half-way, its error, and what to spend on next.
 //! let predictor = Predictor::new(&views, &settings)?;
-//! let view = predictor.at(&0.5, size, None)?;
+//! let view = predictor.at(&0.5, size)?;
 //! assert!((0.1..20.0).contains(&view.totals().estimate));
 //! let advice = Advice::on(&predictor, &0.5, size, &view)?;
 //! assert_eq!(advice.cause, view.dominant());
-//! // The sure bound for surfaces of known curvature.
-//! let limits = Limits { curvature: 30.0, intensity: 3.0, disparity: 0.25 };
-//! assert!(predictor.at(&0.5, size, Some(&limits))?.sure_bound[0] > 3.0);
 //! # Ok::<(), hybank_ibr::pipeline::RenderError>(())
 //! ```
 
@@ -58,7 +53,6 @@ mod predictor;
 mod random;
 mod regressors;
 mod rows;
-mod sure;
 mod variogram;
 
 pub use advice::{Advice, AnotherView};
@@ -68,7 +62,6 @@ pub use jitter::{depth_jitter, with_noise};
 pub use predictor::Predictor;
 #[cfg(feature = "cli")]
 pub(crate) use regressors::difference;
-pub use sure::Limits;
 
 /// What an error comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

@@ -4,7 +4,6 @@ use super::estimate::{Calibration, Known, Predicted, Study, ViewError, equalised
 use super::jitter::map_noise;
 use super::lookup::local_limits;
 use super::regressors::{difference, local_mean};
-use super::sure::Limits;
 use super::variogram::Variogram;
 use crate::depth::DepthMap;
 use crate::image::Image;
@@ -61,22 +60,17 @@ impl<'a, P: Predicted> Predictor<'a, P> {
 
     fn study(&self, camera: &P) -> Study<'_> {
         let spacing = camera.spacing(&self.views());
-        Study { settings: &self.settings, known: &self.known, spacing, limits: None }
+        Study { settings: &self.settings, known: &self.known, spacing }
     }
 
-    /// The error of the view of `camera`; with limits also its sure bound, of rectified rigs.
+    /// The error of the view of `camera`.
     ///
     /// # Errors
     /// Those of [`crate::pipeline`].
-    pub fn at(
-        &self,
-        camera: &P,
-        size: (usize, usize),
-        limits: Option<&Limits>,
-    ) -> Result<ViewError, RenderError> {
+    pub fn at(&self, camera: &P, size: (usize, usize)) -> Result<ViewError, RenderError> {
         let views = self.views();
         camera.check_memory(&views, size, &self.settings)?;
-        let examined = camera.examine(&views, size, &Study { limits, ..self.study(camera) })?;
+        let examined = camera.examine(&views, size, &self.study(camera))?;
         let local_limit = local_limits(&views, camera, &examined.rendering, self.known.noise);
         Ok(judge(examined, local_limit, self.calibration))
     }

@@ -1,7 +1,7 @@
 //! The error of a view of a rectified rig, rendered by rows.
 
 use super::estimate::{Examined, Predicted, Study};
-use super::evidence::{Collected, collect};
+use super::evidence::collect;
 use super::jitter::depth_jitter;
 use super::regressors::{regressors, slopes};
 use crate::pipeline::{RenderError, RenderSettings, Rendering, rectified as pipeline};
@@ -26,9 +26,9 @@ impl Predicted for f64 {
         size: (usize, usize),
         study: &Study<'_>,
     ) -> Result<Examined, RenderError> {
-        let Study { settings, known, spacing, limits } = *study;
+        let Study { settings, known, spacing } = *study;
         let rendering = self.render(views, size, settings)?;
-        let Collected { evidence, sure_bound } = collect(views, *self, settings, &rendering, limits)?;
+        let evidence = collect(views, *self, settings, &rendering)?;
         let jitter = depth_jitter(views, self, settings, &rendering.image, known.noise)?;
         let slopes = slopes(&rendering.image);
         let of_seen = |p: usize| {
@@ -49,7 +49,7 @@ impl Predicted for f64 {
             ]
         };
         let regressors = regressors(&rendering, &known.variogram, of_seen);
-        Ok(Examined { rendering, regressors, sure_bound })
+        Ok(Examined { rendering, regressors })
     }
 
     fn check_memory(

@@ -85,17 +85,13 @@ const BOUND_EXAMPLES: &str = "Examples:
   hybank-ibr bound scene.toml --map error.png --plot rows.svg --truth photo.png
       also writes where the error is, plots it by rows, and compares the prediction with a photograph
   hybank-ibr bound scene.toml --map error.pfm
-      writes numbers in grey levels, three channels: limit (or sure bound), expected, estimate
-  hybank-ibr bound scene.toml --curvature 4 --intensity-error 1 --disparity-error 0.25
-      also gives a sure bound
+      writes numbers in grey levels, three channels: limit, expected, estimate
 
 Figures, in grey levels:
   estimate   mean absolute error, calibrated by leaving out each view in turn
   expected   root mean square error, a bound of the expected mean error
   limit      not exceeded where slopes, second differences and residuals are at most those of the samples
              nearby; not sure, as photographs break that
-  sure       with --curvature: not exceeded by surfaces that some view samples, within the limits that are
-             given; of rectified rigs
 The view of a rectified rig is the one that `render --method rows` gives. Of several virtual views each is
 predicted, and files are numbered. Scenes without cameras are refused.";
 
@@ -105,23 +101,13 @@ pub(super) struct BoundArguments {
     #[command(flatten)]
     pub(super) scene: SceneArguments,
     /// Write the error of every pixel: as a picture of the estimate, where black is no error and white the
-    /// largest, or as numbers (.pfm): limit or sure bound, expected error and estimate in grey levels.
+    /// largest, or as numbers (.pfm): limit, expected error and estimate in grey levels.
     #[arg(long, value_name = "FILE")]
     pub(super) map: Option<PathBuf>,
     /// Plot the figures of every image row, with the measured error of --truth, and below them the part of
     /// each cause (.svg or .png).
     #[arg(long, value_name = "FILE")]
     pub(super) plot: Option<PathBuf>,
-    /// Largest second derivative of the rows of the virtual view within one surface, grey levels per pixel
-    /// squared: gives a sure bound (rectified rigs).
-    #[arg(long, value_name = "K")]
-    pub(super) curvature: Option<f64>,
-    /// Largest error of an intensity, for the sure bound: noise, rounding, reflections.
-    #[arg(long, value_name = "E", default_value_t = 0.5, requires = "curvature")]
-    pub(super) intensity_error: f64,
-    /// Largest error of a disparity for a baseline of one, in pixels, for the sure bound.
-    #[arg(long, value_name = "PX", default_value_t = 0.0, requires = "curvature")]
-    pub(super) disparity_error: f64,
     /// Overwrite existing files.
     #[arg(long)]
     pub(super) force: bool,

@@ -1,7 +1,7 @@
 //! `hybank-ibr demo`: a synthetic scene, rendered and compared with its exact view.
 
 use super::arguments::DemoArguments;
-use super::failure::Failure;
+use super::failure::{Failure, PROGRAM, failed};
 use super::output;
 use super::progress::Progress;
 use super::summary::Summary;
@@ -14,6 +14,7 @@ use crate::pipeline::{RenderSettings, Rendering, rectified};
 use crate::propagate::RectifiedView;
 use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use hybank::messages::Quoted;
+use hybank::program::is_dash;
 use image::{DynamicImage, Rgb, RgbImage, imageops};
 use serde::Serialize;
 use std::time::Instant;
@@ -41,13 +42,13 @@ struct DemoSummary {
 pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
     output::refuse_existing(&arguments.output, arguments.force)?;
     output::refuse_format(&arguments.output, Levels::Eight)?;
-    if output::is_standard(&arguments.output) && arguments.json {
+    if is_dash(&arguments.output) && arguments.json {
         return Err(Failure::Usage(
             "-o - and --json both write to standard output; write the sheet to a file".into(),
         ));
     }
-    output::name_leftovers(&[&arguments.output]);
-    refuse_pixels_without_memory(&arguments.output, arguments.size, SHEET).map_err(Failure::input)?;
+    PROGRAM.name_leftovers(&[&arguments.output]);
+    refuse_pixels_without_memory(&arguments.output, arguments.size, SHEET).map_err(failed)?;
     let progress = Progress::new(4);
     progress.step("drawing the scene");
     let (left, left_map) = view(0.0, arguments.size)?;
@@ -73,7 +74,7 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
 }
 
 fn view(position: f64, size: (usize, usize)) -> Result<(Image, DepthMap), Failure> {
-    let camera = Camera::metric(rig_camera(position, size), false).map_err(Failure::input)?;
+    let camera = Camera::metric(rig_camera(position, size), false).map_err(failed)?;
     let (image, depth) = SyntheticScene::default().view(&camera, size);
     let disparity = rig_disparity(&depth, size.0);
     // Rounded to 8 bits, as in a file.
@@ -81,8 +82,8 @@ fn view(position: f64, size: (usize, usize)) -> Result<(Image, DepthMap), Failur
 }
 
 fn coarse(map: &DepthMap, image: &Image) -> Result<DepthMap, Failure> {
-    let sparse = map.decimated(STEP).map_err(Failure::input)?;
-    densify(&sparse, STEP, image).map_err(Failure::input)
+    let sparse = map.decimated(STEP).map_err(failed)?;
+    densify(&sparse, STEP, image).map_err(failed)
 }
 
 fn rig<'a>(image: &'a Image, map: &'a DepthMap, camera: f64) -> RectifiedView<'a> {
@@ -91,9 +92,9 @@ fn rig<'a>(image: &'a Image, map: &'a DepthMap, camera: f64) -> RectifiedView<'a
 
 fn render(views: &[RectifiedView<'_>], exact: &Image) -> Result<(Rendering, Summary), Failure> {
     let start = Instant::now();
-    let rendering = rectified::render(views, 0.5, &RenderSettings::default()).map_err(Failure::input)?;
+    let rendering = rectified::render(views, 0.5, &RenderSettings::default()).map_err(failed)?;
     let mut summary = Summary::new(&rendering, start.elapsed().as_secs_f64(), 0);
-    let quality = quality::compare(&rendering.image, exact, None).map_err(Failure::input)?;
+    let quality = quality::compare(&rendering.image, exact, None).map_err(failed)?;
     quality.iter().for_each(|q| summary.compare(q));
     Ok((rendering, summary))
 }
@@ -107,7 +108,7 @@ fn sheet(pictures: [&Image; 6]) -> Result<Image, Failure> {
         let [left, top] = [k % 3 * (width + GAP), k / 3 * (height + GAP)].map(|before| (GAP + before) as i64);
         imageops::replace(&mut sheet, &picture.to_dynamic(Levels::Eight).to_rgb8(), left, top);
     }
-    Image::try_from(&DynamicImage::from(sheet)).map_err(Failure::input)
+    Image::try_from(&DynamicImage::from(sheet)).map_err(failed)
 }
 
 /// Mid-grey plus the difference of two images of one size, enlarged.

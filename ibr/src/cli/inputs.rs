@@ -1,17 +1,12 @@
 //! What a command says of inputs that contradict each other, or that nothing was compared with.
 
-use super::failure;
+use super::failure::PROGRAM;
 use crate::pipeline::Agreement;
 use crate::scene::{Kind, Scene};
 
-/// Prints a warning on standard error.
-pub(super) fn warn(text: &str) {
-    failure::say_line(&format!("warning: {text}"));
-}
-
 /// Prints what was decided on reading a scene and the user may not expect.
 pub(super) fn notes(scene: &Scene) {
-    scene.notes.iter().for_each(|note| failure::say_line(&format!("note: {note}")));
+    scene.notes.iter().for_each(|note| PROGRAM.say_line(&format!("note: {note}")));
 }
 
 /// Warns of every pair of views that agrees in too few points, and names the keys to check.
@@ -21,7 +16,7 @@ pub(super) fn warn_of_contradictions(agreement: &Agreement, kind: &Kind) {
         _ => "cameras and depth_scale",
     };
     for pair in agreement.pairs.iter().filter(|p| p.is_poor()) {
-        warn(&format!(
+        PROGRAM.warn(&format!(
             "views {} and {} agree in depth and colour at only {:.0} % of {} points; check their {suspects}",
             pair.views[0] + 1,
             pair.views[1] + 1,

@@ -16,10 +16,8 @@ mod source;
 mod summary;
 
 use arguments::{Arguments, Command};
-use failure::Failure;
-use hybank::files::StandardStream;
+use failure::{Failure, PROGRAM, failed};
 use hybank::memory::{affordable_threads, check_memory};
-use hybank::messages::quoted_usage;
 use std::process::ExitCode;
 
 /// More threads than cores would only use memory for stacks.
@@ -35,7 +33,7 @@ pub fn run() -> ExitCode {
     hybank::files::fail_at_file_size_limit();
     let arguments = match hybank::messages::arguments::<Arguments>() {
         Ok(arguments) => arguments,
-        Err(message) => return show(&message),
+        Err(message) => return PROGRAM.show(&message),
     };
     let outcome = match arguments.command {
         Command::Render(arguments) => in_pool(arguments.scene.threads, || render::run(&arguments)),
@@ -44,26 +42,7 @@ pub fn run() -> ExitCode {
         Command::Init(arguments) => in_pool(arguments.threads, || init::run(&arguments)),
         Command::Demo(arguments) => in_pool(arguments.threads, || demo::run(&arguments)),
     };
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(),
-    }
-}
-
-/// Shows help, version or what is wrong with the usage.
-fn show(message: &clap::Error) -> ExitCode {
-    let open = if message.use_stderr() { Ok(()) } else { StandardStream::Output.check() };
-    let print = || match quoted_usage(message) {
-        None => message.print(),
-        Some(text) => {
-            failure::say(&text);
-            Ok(())
-        }
-    };
-    match open.and_then(|()| print()) {
-        Err(error) if !message.use_stderr() => Failure::printing(&error).report(),
-        _ => ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2)),
-    }
+    PROGRAM.end(outcome)
 }
 
 /// Runs the work on the given number of threads, by default on all cores; on fewer where addresses are
@@ -74,7 +53,7 @@ fn in_pool(threads: Option<usize>, work: impl FnOnce() -> Result<(), Failure> + 
         return Err(Failure::Usage(format!("--threads {threads}: it must be 1 to {MOST_THREADS}")));
     }
     let builder = rayon::ThreadPoolBuilder::new;
-    let alone = || builder().num_threads(1).use_current_thread().build().map_err(Failure::input);
+    let alone = || builder().num_threads(1).use_current_thread().build().map_err(failed);
     let several = |count| builder().num_threads(count).build();
     let pool = match (affordable_threads(threads), threads) {
         (1, _) => alone(),

@@ -1,41 +1,29 @@
 //! Writing results: files that are not overwritten by accident, and standard output.
 
-use super::failure::{self, Failure};
+use super::failure::{Failure, failed};
 use crate::image::{self, Image, Levels};
-use hybank::files::{AtomicFile, FileError, StandardStream, check_output, commit_all};
+use hybank::files::{AtomicFile, FileError, check_output, commit_all};
 use hybank::messages::{Quoted, printable};
+use hybank::program::{is_dash, print, print_bytes, say};
 use serde::Serialize;
-use std::io::Write;
 use std::path::{Path, PathBuf};
-
-/// Whether a path stands for standard output.
-pub(super) fn is_standard(path: &Path) -> bool {
-    path.as_os_str() == "-"
-}
 
 /// Outputs are different files, and none of them is an input.
 pub(super) fn refuse_overlaps(outputs: &[&Path], inputs: &[&Path]) -> Result<(), Failure> {
-    hybank::files::refuse_overlaps(outputs, inputs).map_err(Failure::input)
+    hybank::files::refuse_overlaps(outputs, inputs).map_err(failed)
 }
 
 /// Refuses a file that exists, or cannot be begun, before any work is done.
 pub(super) fn refuse_existing(path: &Path, force: bool) -> Result<(), Failure> {
-    if is_standard(path) {
+    if is_dash(path) {
         return Ok(());
     }
     check_output(path, force).map_err(|error| match error {
         FileError::Exists { .. } => {
             Failure::Input(format!("{} exists; use --force to overwrite it", Quoted(path)))
         }
-        other => Failure::input(other),
+        other => failed(other),
     })
-}
-
-/// Names the unfinished files that killed runs left beside `outputs`.
-pub(super) fn name_leftovers(outputs: &[&Path]) {
-    for left in hybank::files::leftovers(outputs) {
-        failure::say_line(&format!("warning: {left}"));
-    }
 }
 
 /// Refuses a file name whose extension is not an image format, before any work is done: wrong usage.
@@ -54,8 +42,8 @@ pub(super) struct Encoded<'a> {
 
 /// An image in the format of its path, as PNG for standard output.
 pub(super) fn encoded<'a>(image: &Image, path: &'a Path, levels: Levels) -> Result<Encoded<'a>, Failure> {
-    let format = if is_standard(path) { Path::new("standard output.png") } else { path };
-    Ok(Encoded { bytes: image::encode(image, format, levels).map_err(Failure::input)?, path })
+    let format = if is_dash(path) { Path::new("standard output.png") } else { path };
+    Ok(Encoded { bytes: image::encode(image, format, levels).map_err(failed)?, path })
 }
 
 /// Writes files, which appear together, and prints what goes to standard output.
@@ -66,19 +54,19 @@ pub(super) fn write(outputs: &[Encoded<'_>], force: bool) -> Result<(), Failure>
 /// Writes files without giving them their names yet, and prints what goes to standard output. The files are
 /// closed: a long path has more than a process may have open.
 pub(super) fn begin(outputs: &[Encoded<'_>], force: bool) -> Result<Vec<AtomicFile>, Failure> {
-    let (to_output, to_files): (Vec<_>, Vec<_>) = outputs.iter().partition(|e| is_standard(e.path));
+    let (to_output, to_files): (Vec<_>, Vec<_>) = outputs.iter().partition(|e| is_dash(e.path));
     #[cfg(unix)]
     hybank::files::remove_unfinished_on_signals();
     let files = to_files.iter().map(|e| image::begin(&e.bytes, e.path, force));
-    let mut files = files.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
-    files.iter_mut().try_for_each(AtomicFile::seal).map_err(Failure::input)?;
+    let mut files = files.collect::<Result<Vec<_>, _>>().map_err(failed)?;
+    files.iter_mut().try_for_each(AtomicFile::seal).map_err(failed)?;
     to_output.iter().try_for_each(|e| print_bytes(&e.bytes))?;
     Ok(files)
 }
 
 /// Gives the files their names, all or none.
 pub(super) fn commit(files: Vec<AtomicFile>) -> Result<(), Failure> {
-    commit_all(files).map_err(Failure::input)
+    commit_all(files).map_err(failed)
 }
 
 /// The name of view `frame` of a path, from 0: its number from 1, of four digits, before the extension.
@@ -91,12 +79,6 @@ pub(super) fn numbered(path: &Path, frame: usize) -> PathBuf {
     path.with_file_name(name)
 }
 
-pub(super) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
-    let mut out = std::io::stdout().lock();
-    let written = StandardStream::Output.check().and_then(|()| out.write_all(bytes));
-    written.and_then(|()| out.flush()).map_err(|e| Failure::printing(&e))
-}
-
 /// Prints a report to standard output, as one JSON object or as text. Text goes to standard error where
 /// standard output has the image.
 pub(super) fn report(
@@ -106,12 +88,11 @@ pub(super) fn report(
     image: Option<&Path>,
 ) -> Result<(), Failure> {
     if json {
-        let json = serde_json::to_string(value).map_err(Failure::input)?;
-        return print_bytes((json + "\n").as_bytes());
+        return print(&(serde_json::to_string(value).map_err(failed)? + "\n"));
     }
-    if image.is_some_and(is_standard) {
-        failure::say(&text());
+    if image.is_some_and(is_dash) {
+        say(&text());
         return Ok(());
     }
-    print_bytes(printable(&text()).as_bytes())
+    print(&printable(&text()))
 }

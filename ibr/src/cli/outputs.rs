@@ -6,6 +6,7 @@ use super::output;
 use super::source::Source;
 use crate::image::Levels;
 use hybank::messages::Quoted;
+use hybank::program::is_dash;
 use std::path::{Path, PathBuf};
 
 /// What a file shows of a virtual view.
@@ -106,7 +107,7 @@ impl Outputs {
 
     /// The files, without standard output.
     pub(super) fn files(&self) -> impl Iterator<Item = &Path> {
-        self.parts.iter().map(|(_, path)| path.as_path()).filter(|path| !output::is_standard(path))
+        self.parts.iter().map(|(_, path)| path.as_path()).filter(|path| !is_dash(path))
     }
 
     /// Checks before the scene is read: names, formats, inputs that were typed, and files that exist.
@@ -114,7 +115,7 @@ impl Outputs {
         for (k, (part, path)) in self.parts.iter().enumerate() {
             let (option, shown) = (part.option(), Quoted(path));
             let name = option.trim_start_matches('-');
-            if *part != Part::View && output::is_standard(path) {
+            if *part != Part::View && is_dash(path) {
                 return Err(Failure::Usage(format!(
                     "{option} -: the {name} cannot go to standard output; give it a file"
                 )));

@@ -1,7 +1,7 @@
 //! `hybank-ibr place`: the views of a scene from which the virtual view has the least predicted error.
 
 use super::arguments::PlaceArguments;
-use super::failure::Failure;
+use super::failure::{Failure, failed};
 use super::progress::Progress;
 use super::{inputs, output};
 use crate::analysis::{Choice, Predicted, Predictor};
@@ -35,7 +35,7 @@ pub(super) fn run(arguments: &PlaceArguments) -> Result<(), Failure> {
     match &scene.kind {
         Kind::Rectified { views, positions } => job.choose(views, positions, views[0].image.size()),
         Kind::Calibrated { views, cameras, size } => job.choose(views, cameras, *size),
-        Kind::Uncalibrated { .. } => Err(Failure::input(RenderError::NoViews)),
+        Kind::Uncalibrated { .. } => Err(failed(RenderError::NoViews)),
     }
 }
 
@@ -81,7 +81,7 @@ impl Job<'_> {
         cameras: &[P],
         size: (usize, usize),
     ) -> Result<(), Failure> {
-        let named = |e: RenderError| Failure::input(e).in_file(&self.arguments.scene.file);
+        let named = |e: RenderError| failed(e).in_file(&self.arguments.scene.file);
         let settings = self.arguments.scene.settings(self.scene.offset);
         let sources: Vec<_> = sources.iter().map(SourceView::view).collect();
         self.progress.step("calibrating");
@@ -104,7 +104,7 @@ impl Job<'_> {
         let count = self.arguments.choose;
         let watch = |share| self.progress.within(share);
         let choice = Choice::least(views.len(), count, mean, &watch).map_err(named)?;
-        let Some(choice) = choice else { return Err(Failure::input(RenderError::NoViews)) };
+        let Some(choice) = choice else { return Err(failed(RenderError::NoViews)) };
         let set = |chosen: Vec<usize>, estimate: f64| {
             let some = selected(&sources, &chosen);
             let render = || cameras[0].render(&some, size, &settings).map_err(named);

@@ -1,7 +1,7 @@
 //! How far a command is: a bar with the time that is left on a terminal, else a line every half minute.
 
-use super::failure::say;
 use hybank::memory::affordable_threads;
+use hybank::program::say;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -6,7 +6,7 @@ mod outputs;
 mod path;
 
 use super::arguments::RenderArguments;
-use super::failure::Failure;
+use super::failure::{Failure, PROGRAM, failed, of_view};
 use super::inputs;
 use super::output;
 use super::outputs::{Outputs, check_files};
@@ -19,6 +19,7 @@ use crate::pipeline::{Method, Rendering, Watch, calibrated, rectified, uncalibra
 use crate::scene::{Kind, Scene, SourceView};
 use concerns::Concerns;
 use hybank::messages::Quoted;
+use hybank::program::is_dash;
 use path::Film;
 use std::path::Path;
 use std::time::Instant;
@@ -76,7 +77,7 @@ fn timed(
     watch: Watch<'_>,
 ) -> Result<(Rendered, Summary), Failure> {
     let start = Instant::now();
-    let named = |e: Failure| e.of_view(frame, scene.kind.frames()).in_file(&arguments.scene.file);
+    let named = |e: Failure| of_view(e, frame, scene.kind.frames()).in_file(&arguments.scene.file);
     let done = render(scene, frame, arguments, watch).map_err(named)?;
     let mut summary = Summary::new(&done.rendering, start.elapsed().as_secs_f64(), scene.filled);
     summary.preparation_seconds = preparation;
@@ -87,7 +88,7 @@ fn timed(
 
 /// Checks that need no file.
 fn check(arguments: &RenderArguments) -> Result<(), Failure> {
-    if output::is_standard(&arguments.output) && arguments.scene.json {
+    if is_dash(&arguments.output) && arguments.scene.json {
         return Err(Failure::Usage(
             "-o - and --json both want standard output; give the image a file".into(),
         ));
@@ -132,7 +133,7 @@ fn check_nearest(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure
     }
     let views = kind.images().len();
     if count > views {
-        inputs::warn(&format!("--nearest {count}: there are {views} views to render from, and all are used"));
+        PROGRAM.warn(&format!("--nearest {count}: there are {views} views to render from, and all are used"));
     }
     Ok(())
 }
@@ -144,7 +145,7 @@ fn read(arguments: &RenderArguments, watch: Watch<'_>) -> Result<(Scene, Vec<Out
     path::check(arguments, frames)?;
     let files = path::outputs(arguments, frames);
     let film = Some(arguments.output.as_path()).filter(|path| path::is_film(path, frames));
-    check_files(&files, film.filter(|path| !output::is_standard(path)), &source, arguments.force)?;
+    check_files(&files, film.filter(|path| !is_dash(path)), &source, arguments.force)?;
     Ok((arguments.scene.load(&source, !arguments.drop_unknown, watch)?, files))
 }
 
@@ -161,12 +162,12 @@ fn render(
         Kind::Rectified { views, positions } => {
             let views: Vec<_> = views.iter().map(SourceView::view).collect();
             let done = rectified::render_watched(&views, positions[frame], &settings, watch);
-            done.map(|rendering| whole(metric::in_millimetres(rendering, scene))).map_err(Failure::input)
+            done.map(|rendering| whole(metric::in_millimetres(rendering, scene))).map_err(failed)
         }
         Kind::Calibrated { views, cameras, size } => {
             let views: Vec<_> = views.iter().map(SourceView::view).collect();
             let done = calibrated::render_watched(&views, &cameras[frame], *size, &settings, watch);
-            done.map(whole).map_err(Failure::input)
+            done.map(whole).map_err(failed)
         }
         Kind::Uncalibrated { images, tracks, targets, size } => {
             let images: Vec<&Image> = images.iter().collect();
@@ -174,7 +175,7 @@ fn render(
             let special = UncalibratedSettings { seed, reverse_order: arguments.reverse_order };
             let done =
                 uncalibrated::render(&images, tracks, &targets[frame], *size, &settings, &special, watch)
-                    .map_err(Failure::input)?;
+                    .map_err(failed)?;
             let geometry = Some(done.geometry);
             Ok(Rendered { rendering: done.rendering, hull: Some(done.region), geometry })
         }
@@ -186,7 +187,7 @@ fn compare(summary: &mut Summary, done: &Rendered, truth: &Image, path: &Path) -
     let named = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", Quoted(path)));
     let image = &done.rendering.image;
     // Both are rounded.
-    refuse_pixels_without_memory(path, image.size(), 24.0).map_err(Failure::input)?;
+    refuse_pixels_without_memory(path, image.size(), 24.0).map_err(failed)?;
     let whole = quality::compare(image, truth, None).map_err(|e| named(&e))?;
     let Some(hull) = &done.hull else {
         whole.iter().for_each(|q| summary.compare(q));

@@ -1,7 +1,7 @@
 //! The scene of a command: its file, what was typed with it, and the photograph to compare with.
 
 use super::arguments::SceneArguments;
-use super::failure::{self, Failure};
+use super::failure::{Failure, PROGRAM, failed};
 use super::inputs;
 use super::output;
 use crate::files;
@@ -10,6 +10,7 @@ use crate::pipeline::{RenderSettings, Watch};
 use crate::scene::{self, Kind, LoadOptions, Scene, SceneSpec};
 use hybank::files::StandardStream;
 use hybank::messages::Quoted;
+use hybank::program::is_dash;
 use std::path::{Path, PathBuf};
 
 /// A scene file, read but not loaded.
@@ -41,13 +42,13 @@ impl SceneArguments {
     /// The photograph to compare with.
     pub(super) fn truth(&self) -> Result<Option<Image>, Failure> {
         let read = |path| read_image(path, self.max_pixels);
-        self.truth.as_deref().map(read).transpose().map_err(Failure::input)
+        self.truth.as_deref().map(read).transpose().map_err(failed)
     }
 
     /// Reads the scene file, with the views that other files list.
     pub(super) fn source(&self) -> Result<Source, Failure> {
         let (path, spec) = spec(&self.file)?;
-        let spec = scene::complete(&spec, &path).map_err(Failure::input)?;
+        let spec = scene::complete(&spec, &path).map_err(failed)?;
         Ok(Source { path, spec })
     }
 
@@ -59,7 +60,7 @@ impl SceneArguments {
             fill,
             max_pixels: self.max_pixels,
         };
-        let scene = scene::load(&source.spec, &source.path, &options, watch).map_err(Failure::input)?;
+        let scene = scene::load(&source.spec, &source.path, &options, watch).map_err(failed)?;
         inputs::notes(&scene);
         Ok(scene)
     }
@@ -92,7 +93,7 @@ impl Source {
     pub(super) fn check_outputs(&self, outputs: &[&Path]) -> Result<(), Failure> {
         let files = self.spec.files(self.path.parent().unwrap_or(Path::new("")));
         output::refuse_overlaps(outputs, &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
-        output::name_leftovers(outputs);
+        PROGRAM.name_leftovers(outputs);
         Ok(())
     }
 }
@@ -101,27 +102,27 @@ impl Source {
 fn spec(path: &Path) -> Result<(PathBuf, SceneSpec), Failure> {
     let parsed = |text: &str, path: PathBuf| match scene::parse(text, &path) {
         Ok(spec) => Ok((path, spec)),
-        Err(error) => Err(Failure::input(error)),
+        Err(error) => Err(failed(error)),
     };
-    if output::is_standard(path) {
+    if is_dash(path) {
         let name = "standard input";
         StandardStream::Input.check().map_err(|error| Failure::Input(format!("{name}: {error}")))?;
-        let text = files::text(std::io::stdin().lock(), name).map_err(Failure::input)?;
+        let text = files::text(std::io::stdin().lock(), name).map_err(failed)?;
         let name = PathBuf::from("<stdin>");
-        files::refuse_without_memory(&name, scene::room_to_parse(&text)).map_err(Failure::input)?;
+        files::refuse_without_memory(&name, scene::room_to_parse(&text)).map_err(failed)?;
         return parsed(&text, name);
     }
     let folder = if path.is_dir() { Some(path) } else { path.parent().filter(|_| is_list(path)) };
     if let Some(folder) = folder {
         let own = folder.join("scene.toml");
         if !(path.is_dir() && own.is_file()) {
-            let scene = scene::describe(&[path.to_owned()], folder).map_err(Failure::input)?;
+            let scene = scene::describe(&[path.to_owned()], folder).map_err(failed)?;
             return Ok((folder.join("<scene>"), scene.spec));
         }
-        failure::say_line(&format!("note: the scene of this folder is {}", Quoted(&own)));
+        PROGRAM.say_line(&format!("note: the scene of this folder is {}", Quoted(&own)));
         return spec(&own);
     }
-    let text = files::read_text(path, "check the path", scene::room_to_parse).map_err(Failure::input)?;
+    let text = files::read_text(path, "check the path", scene::room_to_parse).map_err(failed)?;
     parsed(&text, path.to_owned())
 }
 

@@ -32,7 +32,7 @@ const PLACE: f64 = 45.0;
 
 /// Bytes per pixel of a prediction: of the evidence of a row fit, of the regressors with slopes, distances
 /// and jitter, of the search for local limits, and of the errors that are its result.
-const ROW_EVIDENCE: f64 = 28.0;
+const ROW_EVIDENCE: f64 = 24.0;
 const REGRESSORS: f64 = 76.0;
 const LIMITS: f64 = 52.0;
 const ERRORS: f64 = 16.0;

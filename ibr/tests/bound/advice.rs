@@ -19,7 +19,7 @@ fn gains_are_found_again() {
         let rig = degraded(&exact, noise, step);
         let views = rig.views(&[0, 1]);
         let predictor = Predictor::new(&views, &RenderSettings::default()).unwrap();
-        let now = predictor.at(&0.5, views[0].image.size(), None).unwrap();
+        let now = predictor.at(&0.5, views[0].image.size()).unwrap();
         let advice = Advice::on(&predictor, &0.5, views[0].image.size(), &now).unwrap();
         let (truth, before) = (&rig.images[2], now.totals().estimate);
         let view = advice.view.clone().unwrap();

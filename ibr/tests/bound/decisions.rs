@@ -27,7 +27,7 @@ fn the_price_of_errors_of_depth() {
 
 fn price_of_errors_in(name: &str, exact: &Rig) {
     let (views, settings) = (exact.views(&[0, 1]), RenderSettings::default());
-    let now = Predictor::new(&views, &settings).unwrap().at(&0.5, views[0].image.size(), None).unwrap();
+    let now = Predictor::new(&views, &settings).unwrap().at(&0.5, views[0].image.size()).unwrap();
     for deviation in [0.0, 0.5, 1.0, 2.0] {
         let mut random = Random(8);
         let mut error = || deviation * (2.0 * (random.part() + random.part() + random.part()) - 3.0) as f32;

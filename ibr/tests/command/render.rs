@@ -368,6 +368,32 @@ fn odd_images_are_fine() {
     }
 }
 
+/// A grey photograph beside a coloured one: the note says what each gives, and the view is nearly that of two
+/// coloured ones. With three equal channels it counts as coloured, and its grey is mixed in.
+#[test]
+fn a_grey_photograph_takes_the_colours_of_the_other() {
+    let dir = rig();
+    let photograph = read_image(&dir.path().join("right.png"), MOST_PIXELS).unwrap();
+    let luminance = |pixel: &[f32]| 0.299 * pixel[0] + 0.587 * pixel[1] + 0.114 * pixel[2];
+    let rendered = || {
+        let arguments = ["render", "scene.toml", "-o", "o.png", "--force", "--truth", "middle.png", "--json"];
+        let done = run(dir.path(), &arguments);
+        (json(&done)["psnr"].as_f64().unwrap(), stderr(&done))
+    };
+    let mut with = |channels: usize| {
+        let values = photograph.data().chunks(3).flat_map(|pixel| vec![luminance(pixel); channels]);
+        let grey = Image::new(SIZE.0, SIZE.1, channels, values.collect()).unwrap();
+        save(&grey, &dir.path().join("right.png")).unwrap();
+        rendered()
+    };
+    let (coloured, silent) = rendered();
+    let ((grey, said), (mixed, _)) = (with(1), with(3));
+    println!("two coloured {coloured:.2} dB, one grey {grey:.2} dB, its grey as colour {mixed:.2} dB");
+    let note = "view 2 is grey beside coloured ones: what the others show gives the colour, the grey photographs the luminance";
+    assert!(said.contains(note) && !silent.contains("grey"), "{said}{silent}");
+    assert!(grey > coloured - 1.5 && grey > mixed + 3.0, "{coloured} {grey} {mixed}");
+}
+
 /// A COLMAP model whose lenses bend: the photograph of the view that is left out is met through its own
 /// lens.
 #[test]

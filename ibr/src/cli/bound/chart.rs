@@ -1,7 +1,7 @@
 //! The plot of a prediction: the numbers of every image row, and below them what the estimate comes from.
 
 use crate::analysis::{Cause, Totals, ViewError};
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, failed};
 use crate::cli::outputs::ends_with;
 use crate::image::Image;
 use hybank::plot::{Chart, Series};
@@ -15,7 +15,7 @@ pub(super) fn file(predicted: &ViewError, truth: Option<&Image>, path: &Path) ->
     if ends_with(path, "png") {
         return stacked_pixels(&charts);
     }
-    let [above, below] = charts.map(|chart| chart.to_svg().map_err(Failure::input));
+    let [above, below] = charts.map(|chart| chart.to_svg().map_err(failed));
     Ok(stacked_svg(&above?, &below?).into_bytes())
 }
 
@@ -30,15 +30,9 @@ fn numbers(predicted: &ViewError, truth: Option<&Image>) -> Chart {
     let mut series = vec![
         Series { label: format!("estimate, mean {:.2}", totals.estimate), points: of(&|t| t.estimate) },
         Series { label: format!("expected, {:.2}", totals.expected), points: of(&|t| t.expected) },
-        match totals.sure_bound {
-            Some(mean) => Series {
-                label: format!("sure bound, mean {mean:.2}"),
-                points: of(&|t| t.sure_bound.unwrap_or(f64::NAN)),
-            },
-            None => Series {
-                label: format!("local limit, mean {:.2}", totals.local_limit),
-                points: of(&|t| t.local_limit),
-            },
+        Series {
+            label: format!("local limit, mean {:.2}", totals.local_limit),
+            points: of(&|t| t.local_limit),
         },
     ];
     if let Some(truth) = truth {
@@ -93,14 +87,14 @@ fn stacked_pixels(charts: &[Chart; 2]) -> Result<Vec<u8>, Failure> {
     let mut data = Vec::new();
     let (mut width, mut height) = (0, 0);
     for chart in charts {
-        let png = chart.to_png().map_err(Failure::input)?;
-        let pixels = image::load_from_memory_with_format(&png, ImageFormat::Png).map_err(Failure::input)?;
+        let png = chart.to_png().map_err(failed)?;
+        let pixels = image::load_from_memory_with_format(&png, ImageFormat::Png).map_err(failed)?;
         let pixels = pixels.to_rgb8();
         (width, height) = (pixels.width(), height + pixels.height());
         data.extend(pixels.into_raw());
     }
     let whole = RgbImage::from_raw(width, height, data).unwrap_or_default();
     let mut bytes = Cursor::new(Vec::new());
-    whole.write_to(&mut bytes, ImageFormat::Png).map_err(Failure::input)?;
+    whole.write_to(&mut bytes, ImageFormat::Png).map_err(failed)?;
     Ok(bytes.into_inner())
 }

@@ -3,7 +3,7 @@
 use super::chart;
 use crate::analysis::ViewError;
 use crate::cli::arguments::BoundArguments;
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, failed};
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded};
 use crate::cli::outputs::{Outputs, Part, ends_with};
@@ -32,7 +32,7 @@ pub(super) fn encoded<'a>(
         }
         // A picture or three numbers per pixel, and the file.
         let size = predicted.rendering.image.size();
-        refuse_pixels_without_memory(path, size, 36.0).map_err(Failure::input)?;
+        refuse_pixels_without_memory(path, size, 36.0).map_err(failed)?;
         let (map, largest) = map(predicted, path)?;
         white = largest;
         all.push(map);
@@ -44,9 +44,7 @@ pub(super) fn encoded<'a>(
 fn map<'a>(predicted: &ViewError, path: &'a Path) -> Result<(Encoded<'a>, Option<f32>), Failure> {
     let size = predicted.rendering.image.size();
     if ends_with(path, "pfm") {
-        let first =
-            if predicted.sure_bound.is_empty() { &predicted.local_limit } else { &predicted.sure_bound };
-        let pixels = first.iter().zip(&predicted.expected).zip(&predicted.estimate);
+        let pixels = predicted.local_limit.iter().zip(&predicted.expected).zip(&predicted.estimate);
         let data = pixels.flat_map(|((limit, expected), estimate)| [*limit, *expected, *estimate]).collect();
         let bytes = pfm::encode(&Image::from_values(size, 3, data));
         return Ok((Encoded { bytes, path }, None));

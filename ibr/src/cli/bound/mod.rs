@@ -5,29 +5,29 @@ mod files;
 mod report;
 
 use super::arguments::BoundArguments;
-use super::failure::Failure;
 use super::inputs;
 use super::output;
 use super::outputs::{Outputs, check_files};
 use super::progress::Progress;
-use crate::analysis::{Advice, Limits, Predicted, Predictor, ViewError};
+use crate::analysis::{Advice, Predicted, Predictor, ViewError};
+use crate::cli::failure::{Failure, failed};
 use crate::image::{Image, Levels};
 use crate::pipeline::{RenderError, Watch};
 use crate::scene::{Kind, Scene, SourceView};
 use report::{Frames, Summary};
 
 pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
-    let limits = check(arguments)?;
+    check(arguments)?;
     let progress = Progress::new(3);
     progress.step("reading");
     let (scene, files) = read(arguments, &|share| progress.within(share))?;
     let truth = arguments.scene.truth()?;
     progress.step("calibrating");
-    let job = Job { arguments, scene: &scene, files, limits, truth, progress };
+    let job = Job { arguments, scene: &scene, files, truth, progress };
     match &scene.kind {
         Kind::Rectified { views, positions } => job.predict(views, positions, views[0].image.size()),
         Kind::Calibrated { views, cameras, size } => job.predict(views, cameras, *size),
-        Kind::Uncalibrated { .. } => Err(Failure::input(RenderError::NoViews)),
+        Kind::Uncalibrated { .. } => Err(failed(RenderError::NoViews)),
     }
 }
 
@@ -37,7 +37,6 @@ struct Job<'a> {
     scene: &'a Scene,
     /// Those of each virtual view.
     files: Vec<Outputs>,
-    limits: Option<Limits>,
     truth: Option<Image>,
     progress: Progress,
 }
@@ -50,15 +49,15 @@ impl Job<'_> {
         cameras: &[P],
         size: (usize, usize),
     ) -> Result<(), Failure> {
-        let Self { arguments, scene, files, limits, truth, progress } = self;
-        let named = |e: RenderError| Failure::input(e).in_file(&arguments.scene.file);
+        let Self { arguments, scene, files, truth, progress } = self;
+        let named = |e: RenderError| failed(e).in_file(&arguments.scene.file);
         let views: Vec<_> = views.iter().map(SourceView::view).collect();
         let predictor = Predictor::new(&views, &arguments.scene.settings(scene.offset)).map_err(named)?;
         progress.step("predicting");
         let (mut summaries, mut written) = (Vec::new(), Vec::new());
         let mut worst: Option<(usize, f64, ViewError)> = None;
         for (frame, (camera, outputs)) in cameras.iter().zip(&files).enumerate() {
-            let predicted = predictor.at(camera, size, limits.as_ref()).map_err(named)?;
+            let predicted = predictor.at(camera, size).map_err(named)?;
             let mut summary = Summary::new(&predicted, predictor.agreement(), &scene.outliers);
             summary.measure(&predicted, truth.as_ref(), arguments.scene.truth.as_deref())?;
             let (encoded, white) = files::encoded(outputs, &predicted, truth.as_ref())?;
@@ -71,7 +70,7 @@ impl Job<'_> {
             }
             progress.within((frame + 1) as f64 / (cameras.len() + 1) as f64);
         }
-        let Some((worst, _, now)) = worst else { return Err(Failure::input(RenderError::NoViews)) };
+        let Some((worst, _, now)) = worst else { return Err(failed(RenderError::NoViews)) };
         summaries[worst].advice = Some(Advice::on(&predictor, &cameras[worst], size, &now).map_err(named)?);
         output::commit(written)?;
         drop(progress);
@@ -80,20 +79,10 @@ impl Job<'_> {
     }
 }
 
-/// Checks that need no file, and the limits for a sure bound.
-fn check(arguments: &BoundArguments) -> Result<Option<Limits>, Failure> {
+/// Checks that need no file.
+fn check(arguments: &BoundArguments) -> Result<(), Failure> {
     arguments.scene.check()?;
-    arguments.outputs().check(Levels::Eight, &arguments.scene, arguments.force)?;
-    let limit = |name: &str, value: f64| match value.is_finite() && value >= 0.0 {
-        true => Ok(value),
-        false => Err(Failure::Usage(format!("{name} {value}: it must be a number that is not negative"))),
-    };
-    let Some(curvature) = arguments.curvature else { return Ok(None) };
-    Ok(Some(Limits {
-        curvature: limit("--curvature", curvature)?,
-        intensity: limit("--intensity-error", arguments.intensity_error)?,
-        disparity: limit("--disparity-error", arguments.disparity_error)?,
-    }))
+    arguments.outputs().check(Levels::Eight, &arguments.scene, arguments.force)
 }
 
 /// The scene, and the files of each of its virtual views.
@@ -103,12 +92,5 @@ fn read(arguments: &BoundArguments, watch: Watch<'_>) -> Result<(Scene, Vec<Outp
     check_files(&files, None, &source, arguments.force)?;
     let scene = arguments.scene.load(&source, true, watch)?;
     arguments.scene.refuse_what_has_no_prediction(&scene)?;
-    if matches!(scene.kind, Kind::Calibrated { .. }) && arguments.curvature.is_some() {
-        return Err(Failure::Usage(
-            "--curvature: the sure bound is that of the fit by rows, for rectified rigs; leave it out for \
-             general cameras"
-                .into(),
-        ));
-    }
     Ok((scene, files))
 }

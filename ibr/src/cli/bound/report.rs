@@ -51,8 +51,6 @@ struct Measured {
     ratio: f64,
     /// Share of the pixels whose error is within the local limit.
     within_local_limit: f64,
-    /// Share of the pixels whose error is within the sure bound, if there is one.
-    within_sure_bound: Option<f64>,
 }
 
 /// What to do first where the inputs contradict each other.
@@ -107,7 +105,6 @@ impl Summary {
             psnr: found.psnr,
             ratio: self.totals.estimate / found.mae,
             within_local_limit: predicted.within_local_limit(truth),
-            within_sure_bound: predicted.within_sure_bound(truth),
         });
         Ok(())
     }
@@ -122,7 +119,6 @@ impl Summary {
                 t.local_limit
             ),
         ];
-        lines.extend(t.sure_bound.map(|b| format!("sure      {b:.2} in the mean, within the limits given")));
         let part = |c: &CauseShare| format!("{:?} {:.2}", c.cause, c.error).to_lowercase();
         lines.push(format!("causes    {}", self.causes.iter().map(part).collect::<Vec<_>>().join(", ")));
         if self.outliers >= MANY_OUTLIERS {
@@ -152,14 +148,12 @@ fn advice(advice: &Advice) -> String {
 }
 
 fn measured(m: &Measured) -> String {
-    let sure = m.within_sure_bound.map(|share| format!(", {:.1} % within the sure bound", 100.0 * share));
     format!(
-        "measured  MAE {:.2} (estimate / measured {:.2}), PSNR {:.2} dB; {:.1} % of the pixels within the limit{}",
+        "measured  MAE {:.2} (estimate / measured {:.2}), PSNR {:.2} dB; {:.1} % of the pixels within the limit",
         m.mae,
         m.ratio,
         m.psnr,
-        100.0 * m.within_local_limit,
-        sure.unwrap_or_default()
+        100.0 * m.within_local_limit
     )
 }
 

@@ -1,7 +1,8 @@
 //! Warnings about what the figures of merit alone do not show, gathered over all virtual views.
 
 use super::Rendered;
-use crate::cli::inputs::{self, warn};
+use crate::cli::failure::PROGRAM;
+use crate::cli::inputs;
 use crate::pipeline::Agreement;
 use crate::pipeline::uncalibrated::OrderBy;
 use crate::scene::Kind;
@@ -44,7 +45,7 @@ impl Concerns {
         if let Some(agreement) = &self.agreement {
             inputs::warn_of_contradictions(agreement, kind);
         }
-        self.texts().iter().for_each(|text| warn(text));
+        self.texts().iter().for_each(|text| PROGRAM.warn(text));
     }
 
     fn texts(&self) -> Vec<String> {

@@ -2,7 +2,7 @@
 
 use crate::analysis::difference;
 use crate::cli::arguments::RenderArguments;
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, failed};
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded};
 use crate::cli::outputs::{Outputs, Part, ends_with, is_film};
@@ -12,6 +12,7 @@ use crate::image::{Image, Levels, encode_levels, encode_with_alpha, pfm};
 use crate::interpolate::Cover;
 use crate::pipeline::Rendering;
 use hybank::messages::Quoted;
+use hybank::program::is_dash;
 use std::path::Path;
 
 impl RenderArguments {
@@ -29,7 +30,7 @@ impl RenderArguments {
     /// Checks of the files that need no other file.
     pub(super) fn check_outputs(&self) -> Result<(), Failure> {
         let view = &self.output;
-        if self.alpha && !(output::is_standard(view) || ends_with(view, "png")) {
+        if self.alpha && !(is_dash(view) || ends_with(view, "png")) {
             let view = Quoted(view);
             return Err(Failure::Usage(format!("--alpha: {view} has no alpha channel; write a .png")));
         }
@@ -49,7 +50,7 @@ impl RenderArguments {
         let (mut all, mut white) = (Vec::new(), None);
         for (part, path) in &outputs.parts {
             // Numbers or a picture, and the file.
-            refuse_pixels_without_memory(path, rendering.image.size(), 20.0).map_err(Failure::input)?;
+            refuse_pixels_without_memory(path, rendering.image.size(), 20.0).map_err(failed)?;
             all.push(match part {
                 Part::View => self.view(rendering, path)?,
                 Part::Mask => output::encoded(&mask_image(rendering), path, Levels::Eight)?,
@@ -70,7 +71,7 @@ impl RenderArguments {
         let image = &rendering.image;
         if self.alpha {
             let bytes = encode_with_alpha(image, &rendering.alpha(), path, self.bits);
-            return Ok(Encoded { bytes: bytes.map_err(Failure::input)?, path });
+            return Ok(Encoded { bytes: bytes.map_err(failed)?, path });
         }
         output::encoded(image, path, self.bits)
     }
@@ -109,7 +110,7 @@ fn counts<'a>(rendering: &Rendering, path: &'a Path) -> Result<Encoded<'a>, Fail
     if ends_with(path, "pfm") {
         return Ok(numbers(rendering.counts.iter().map(|n| f32::from(*n)).collect(), size, path));
     }
-    let bytes = encode_levels(&rendering.counts, size, path).map_err(Failure::input)?;
+    let bytes = encode_levels(&rendering.counts, size, path).map_err(failed)?;
     Ok(Encoded { bytes, path })
 }
 

@@ -2,12 +2,13 @@
 
 use super::Summary;
 use crate::cli::arguments::RenderArguments;
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, failed};
 use crate::cli::output;
 use crate::cli::outputs::{self, Outputs, Part};
 use crate::files::refuse_pixels_without_memory;
 use crate::image::{FrameRate, Image, Levels, y4m};
 use hybank::files::AtomicFile;
+use hybank::program::{is_dash, print_bytes};
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
@@ -33,7 +34,7 @@ pub(super) fn report(
 
 /// Whether so many views go into one film.
 pub(super) fn is_film(path: &Path, frames: usize) -> bool {
-    outputs::is_film(path) || frames > 1 && output::is_standard(path)
+    outputs::is_film(path) || frames > 1 && is_dash(path)
 }
 
 /// The files of every view, without the film.
@@ -82,18 +83,18 @@ pub(super) struct Film {
 impl Film {
     pub(super) fn new(arguments: &RenderArguments) -> Result<Self, Failure> {
         let (path, fps) = (&arguments.output, arguments.fps.unwrap_or(FrameRate { frames: 25, seconds: 1 }));
-        if output::is_standard(path) {
+        if is_dash(path) {
             return Ok(Self { file: None, fps, begun: false });
         }
         #[cfg(unix)]
         hybank::files::remove_unfinished_on_signals();
-        let file = AtomicFile::create(path, arguments.force).map_err(Failure::input)?;
+        let file = AtomicFile::create(path, arguments.force).map_err(failed)?;
         Ok(Self { file: Some(file), fps, begun: false })
     }
 
     pub(super) fn append(&mut self, image: &Image) -> Result<(), Failure> {
         let path = self.file.as_ref().map_or("standard output".into(), |file| file.name().to_string());
-        refuse_pixels_without_memory(Path::new(&path), image.size(), 6.0).map_err(Failure::input)?;
+        refuse_pixels_without_memory(Path::new(&path), image.size(), 6.0).map_err(failed)?;
         let mut bytes = Vec::new();
         if !self.begun {
             bytes = y4m::header(image.size(), image.channels(), self.fps);
@@ -102,7 +103,7 @@ impl Film {
         y4m::append_frame(image, &mut bytes);
         match &mut self.file {
             Some(file) => file.write_all(&bytes).map_err(|e| Failure::Input(format!("{path}: {e}"))),
-            None => output::print_bytes(&bytes),
+            None => print_bytes(&bytes),
         }
     }
 }

@@ -99,6 +99,23 @@ fn keys_of_the_top_that_another_kind_has_are_refused() {
     }
 }
 
+/// A rectified virtual view has no camera, and the size of its views.
+#[test]
+fn keys_of_a_virtual_camera_are_refused_in_a_rectified_scene() {
+    let with = |key: &str| read(&(RIG.to_string() + key), &LoadOptions::default());
+    assert!(with("size = [4, 2]").is_ok());
+    for (key, words) in [
+        (
+            "size = [2, 1]",
+            "has `size` = [2, 1], but that of a rectified scene has the size of its views, 4 x 2 pixels; remove `size`",
+        ),
+        ("camera_of = \"left\"", "has `camera_of`, which has no meaning in a rectified scene"),
+    ] {
+        let message = with(key).unwrap_err();
+        assert!(message.contains(words), "{message}");
+    }
+}
+
 #[test]
 fn coarse_maps_are_made_dense() {
     let coarse = LoadOptions { depth_step: 2, ..LoadOptions::default() };

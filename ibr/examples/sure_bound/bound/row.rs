@@ -20,10 +20,10 @@
 //! for any two samples a and b of the surface on both sides of x, d being the distance of x from the farther
 //! one, and |f'| <= 255 / w + K w for a piece of w columns. The least of these counts.
 
-use crate::sample::Sample;
+use hybank_ibr::sample::Sample;
 
 /// The range of intensities.
-const RANGE: f64 = 255.0;
+pub(super) const RANGE: f64 = 255.0;
 
 /// Pixels to each side of x at which two samples are looked for, to bound the slope.
 const SPANS: [f64; 5] = [0.75, 1.5, 3.0, 6.0, 12.0];
