@@ -15,6 +15,12 @@ version=$(sed -n '/^\[workspace.package\]/,/^\[/s/^version = "\(.*\)"/\1/p' Carg
 # In the order of dependence.
 crates=(hybank-linalg hybank-runtime hybank hybank-ibr hybank-cli)
 
+# crates.io takes five keywords of 20 characters.
+if grep -nE '^keywords = ([^]]*$|.*"[^",]{21,}"|(.*,){5})' {.,linalg,runtime,ibr,cli}/Cargo.toml; then
+    echo "release: crates.io takes at most five keywords, each of at most 20 characters; give them in one line" >&2
+    exit 1
+fi
+
 rm -rf "$folder"
 mkdir -p "$folder"
 git ls-files -z --cached --others --exclude-standard | xargs -0 cp --parents --no-dereference -t "$folder"
