@@ -16,15 +16,15 @@ include_patterns = [
     "CONTRIBUTING.md",
     "docs/*.md",
     "docs/tutorials/*.md",
-    "benches/README.md",
+    "benches/*.md",
+    "examples/README.md",
     "filters/README.md",
     "ibr/README.md",
     "playground/README.md",
 ]
 
 myst_heading_anchors = 3
-# Links to programs, folders and sources lead to the repository and not to pages.
-suppress_warnings = ["myst.xref_missing", "myst.header", "misc.highlighting_failure"]
+suppress_warnings = ["myst.header", "misc.highlighting_failure"]
 
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False

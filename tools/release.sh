@@ -12,8 +12,16 @@ address=${1:?tools/release.sh ADDRESS [FOLDER]}
 build=${CARGO_TARGET_DIR:-$PWD/target}
 folder=${2:-$build/release-candidate}
 version=$(sed -n '/^\[workspace.package\]/,/^\[/s/^version = "\(.*\)"/\1/p' Cargo.toml)
+# Bytes of a packed crate; crates.io takes 10 MiB. CONTRIBUTING.md has the sizes.
+most=1500000
 # In the order of dependence.
 crates=(hybank-linalg hybank-runtime hybank hybank-ibr hybank-cli)
+
+# crates.io takes five keywords of 20 characters.
+if grep -nE '^keywords = ([^]]*$|.*"[^",]{21,}"|(.*,){5})' {.,linalg,runtime,ibr,cli}/Cargo.toml; then
+    echo "release: crates.io takes at most five keywords, each of at most 20 characters; give them in one line" >&2
+    exit 1
+fi
 
 rm -rf "$folder"
 mkdir -p "$folder"
@@ -47,6 +55,10 @@ for crate in "${crates[@]}"; do
     for file in LICENSE-MIT LICENSE-APACHE README.md; do
         [ -s "$packed/$crate-$version/$file" ] || { echo "release: $crate has no $file" >&2; exit 1; }
     done
+    if [ "$(stat -c %s "$build/package/$crate-$version.crate")" -gt "$most" ]; then
+        echo "release: $crate has more than $most bytes; see \`cargo package --list -p $crate\`, or raise the limit" >&2
+        exit 1
+    fi
     members+=("$crate-$version")
     printf '%s: %s packed, %s unpacked\n' "$crate $version" "$(du -h --apparent-size "$build/package/$crate-$version.crate" | cut -f1)" \
         "$(du -sh --apparent-size "$packed/$crate-$version" | cut -f1)"

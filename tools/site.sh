@@ -10,7 +10,8 @@ environment=$CARGO_TARGET_DIR/site-python
 
 # One choice of packages, as it decides features of the crates that they share.
 PYO3_NO_PYTHON=1 cargo build --quiet --workspace --lib --bins
-cargo doc --quiet --no-deps -p hybank -p hybank-runtime -p hybank-linalg -p hybank-ibr --lib
+cargo doc --quiet --no-deps -p hybank -p hybank-runtime -p hybank-linalg -p hybank-ibr --lib \
+    --features hybank/interchange,hybank/flac,hybank/page
 install -m 755 "$CARGO_TARGET_DIR/debug/lib_hybank.so" python/hybank/_hybank.abi3.so
 
 "${HYBANK_PYTHON:-python3}" -m venv "$environment"
@@ -28,7 +29,20 @@ cp "$gallery"/pictures/* docs/pictures/
 
 # A page that cannot be read, a link without an end or a missing picture fails.
 PYTHONPATH=python "$environment/bin/sphinx-build" --quiet --fail-on-warning --keep-going -c docs . "$site"
+# Text with an @ that was taken for an address.
+if grep -rlE --include='*.html' 'href="mailto:' "$site"; then
+    echo "site: these pages link to an address of mail; write such text between double backquotes" >&2
+    exit 1
+fi
 rm -rf "$site/rust"
 cp -r "$CARGO_TARGET_DIR/doc" "$site/rust"
-echo '<meta http-equiv="refresh" content="0; url=docs/index.html">' >"$site/index.html"
+cat >"$site/index.html" <<'END'
+<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<title>hybank</title>
+<meta http-equiv="refresh" content="0; url=docs/index.html">
+<a href="docs/index.html">The documents of hybank</a>
+</html>
+END
 echo "$site/index.html"

@@ -6,6 +6,8 @@
 #
 # maturin refuses a wheel whose symbols are newer than the manylinux tag that it gives it; auditwheel shows the tag.
 set -euo pipefail
+# The newest tag is manylinux_2_34: the glibc of Ubuntu 22.04, Debian 12 and RHEL 9.
+newest=34
 python=${1:?tools/wheel.sh PYTHON [FOLDER]}
 cd "$(dirname "$0")/.."
 root=$PWD
@@ -22,7 +24,12 @@ trap 'rm -rf "$work"' EXIT
 rm -rf "$folder/dist"
 (cd "$folder" && "$work/tools/bin/maturin" sdist --out dist >/dev/null)
 (cd "$folder" && "$work/tools/bin/maturin" build --quiet --profile dist --out dist)
-"$work/tools/bin/auditwheel" show "$folder"/dist/*.whl
+"$work/tools/bin/auditwheel" show "$folder"/dist/*.whl | tee "$work/audit"
+tag=$(tr '\n' ' ' <"$work/audit" | sed -n 's/.*following platform tag: *"manylinux_2_\([0-9]*\)_.*/\1/p')
+if [ -z "$tag" ] || [ "$tag" -gt "$newest" ]; then
+    echo "wheel: newer than manylinux_2_$newest; build it on an older Linux" >&2
+    exit 1
+fi
 for package in "$folder"/dist/*.tar.gz "$folder"/dist/*.whl; do
     "$python" -m zipfile -l "$package" >"$work/list" 2>/dev/null || tar -tzf "$package" >"$work/list"
     for file in LICENSE-MIT LICENSE-APACHE hybank/py.typed hybank/__init__.pyi; do

@@ -72,7 +72,8 @@ impl CaptureFile {
         let header = reader.headers().next().map(|(_, header)| *header);
         let stated = header.and_then(|header| header.rate).filter(|rate| *rate > 0.0).map(Hertz);
         let rate = stated.or(reading.rate).ok_or_else(|| {
-            let message = "it states no sample rate; record or convert it with its rate, or give --rate where there is one";
+            let message = "it states no sample rate; `measure` takes it from --rate 48kHz, else give a recording that states it: \
+                           WAV, or a table whose first column is `time`";
             failed_at(path, message)
         })?;
         let rails = header.and_then(|header| header.rails);

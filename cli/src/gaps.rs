@@ -23,7 +23,8 @@ pub(super) struct GapArgs {
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
     /// File of JSON lines that name lost samples. {"channel": 1, "sample_start": 5, "global_index": 8}:
-    /// sample 5 of the input was number 8 at the converter. {"channel": 2, "first": 40, "length": 3}:
+    /// sample 5 of the input was number 8 at the converter; the first such line of a channel is about its
+    /// sample 0. {"channel": 2, "first": 40, "length": 3}:
     /// samples 40 to 42 are invalid. From a FIFO `stream` takes lines as they come, each before its samples,
     /// and waits for none
     #[arg(long, value_name = "FILE")]

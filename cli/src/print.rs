@@ -158,6 +158,7 @@ fn option(error: &dyn Any) -> Option<&'static str> {
         .or_else(|| of_calibration(error.downcast_ref()?))
         .or_else(|| match error.downcast_ref()? {
             Warning::CutoffExplains { .. } => Some("--fit takes that list"),
+            Warning::OffsetBinary => Some("--full-scale u8bits does the same"),
             _ => None,
         })
         .or_else(|| match error.downcast_ref()? {

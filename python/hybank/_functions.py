@@ -93,8 +93,8 @@ def simulate(
     source : Bank or str or os.PathLike or mapping
         A bank or a spec.
     signal : str or array_like
-        "step@0.3", "tones:440Hz,1kHz", "chirp:50Hz..8kHz@2s", "ctones:-2kHz" or a sum of them with "+"; the name of a
-        recording (.wav); or samples of a periodic, band-limited signal.
+        ``step@0.3``, ``tones:440Hz,1kHz``, ``chirp:50Hz..8kHz@2s``, ``ctones:-2kHz`` or a sum of them with ``+``; the
+        name of a recording (.wav); or samples of a periodic, band-limited signal.
     imaginary : str or array_like, optional
         The imaginary part of a complex signal.
     channel : int, optional

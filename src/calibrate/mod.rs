@@ -64,9 +64,13 @@ pub use warning::Warning;
 
 pub use crate::spec::{Cutoff, Fitting, UnknownFitting};
 
+use crate::sine_fit::Estimate;
 use crate::spec::Spec;
 use crate::units::{FastPeriods, Hertz};
 use estimates::Fitted;
+
+/// No converter that is in order has a larger offset, relative to full scale.
+const MOST_OFFSET: f64 = 0.1;
 
 /// The kind of signal that was captured.
 #[derive(Debug, Clone, PartialEq)]
@@ -156,6 +160,10 @@ pub fn calibrate_pooled(
         fitted.warnings.push(Warning::Clipped { counts: clipped.clone() });
     }
     let channels = fitted.channels(&model);
+    let is_near_one = |offset: Estimate<f64>| (offset.value - 1.0).abs() < MOST_OFFSET;
+    if channels.iter().all(|channel| channel.offset.is_some_and(is_near_one)) {
+        fitted.warnings.push(Warning::OffsetBinary);
+    }
     let Fitted { tones, modulus, misfit, frames, warnings, .. } = fitted;
     let cutoff = settings.fit.cutoff;
     Ok(Calibration { reference, channels, cutoff, tones, modulus, frames, clipped, misfit, warnings })

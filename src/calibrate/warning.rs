@@ -15,6 +15,12 @@ pub enum Warning {
         /// One per channel.
         counts: Vec<usize>,
     },
+    /// All offsets are near full scale.
+    #[error(
+        "every channel has an offset near full scale, as offset-binary codes have (0 to 2^B - 1) that are read as signed \
+         ones; state their full scale, in the spec of 8 bits as `full_scale = \"u8bits\"`"
+    )]
+    OffsetBinary,
     /// Offsets of complex captures, which a spec cannot hold.
     #[error(
         "the parts of complex samples have offsets of their own, of which a spec holds one per channel, so they were \

@@ -43,14 +43,16 @@ pub(super) struct Dropout {
 /// mixed:
 ///
 /// ```text
+/// {"channel": 1, "sample_start": 0, "global_index": 100}
 /// {"channel": 1, "sample_start": 5, "global_index": 108}
 /// {"channel": 2, "first": 40, "length": 3}
 /// ```
 ///
 /// The first kind is that of SigMF's captures: sample 5 (from 0) in the input of channel 1 was number 108
 /// at the converter. Samples between two such lines are consecutive. If the numbers increase by more than
-/// the samples between two lines, samples were *left out* of the input. Time begins at the earliest number
-/// of any input; an input without such lines begins there too.
+/// the samples between two lines, samples were *left out* of the input. So the first line of a channel is
+/// about its sample 0. Time begins at the earliest number of any input; an input without such lines begins
+/// there too.
 ///
 /// The second kind is that of the gap report: from frame 40 on, 3 samples of channel 2 are present in the
 /// input but *invalid*.
@@ -209,7 +211,23 @@ impl LostSamples {
             )));
         }
         let timestamps = Timestamps::new(timestamps).map_err(|problem| self.fault(problem))?;
+        self.check_first(channel, &timestamps)?;
         Ok(LostInInput { timestamps, dropouts: self.dropouts_of(&channels) })
+    }
+
+    /// Only a number of sample 0 says what was lost before the next line.
+    fn check_first(&self, channel: usize, timestamps: &Timestamps) -> Result<(), IoError> {
+        let Some(first) = timestamps.first().filter(|first| first.frame > 0) else { return Ok(()) };
+        let is_it = |line: &&LostLine| {
+            line.entry.timestamp() == Some(first) && line.channel.is_none_or(|named| named == channel)
+        };
+        let number = self.lines.iter().find(is_it).map_or(0, |line| line.number);
+        Err(self.fault(format!(
+            "line {number}: the first line of channel {} with sample_start is about sample {}, so what was lost before it is unknown; \
+             put a line with sample_start 0 and the number of that sample before it",
+            channel + 1,
+            first.frame
+        )))
     }
 
     fn dropouts_of(&self, channels: &Range<usize>) -> Vec<Dropout> {
@@ -306,7 +324,8 @@ mod tests {
     use super::*;
 
     const TEXT: &str = r#"
-        {"channel": 1, "sample_start": 0, "global_index": 10}
+        {"sample_start": 0, "global_index": 10}
+        {"channel": 1, "sample_start": 2, "global_index": 13}
         {"sample_start": 5, "global_index": 18}
 
         {"channel": 3, "first": 40, "length": 3}
@@ -324,8 +343,11 @@ mod tests {
         let lost = LostSamples::parse(TEXT, "lost").unwrap();
         let inputs = lost.of_inputs(&[1, 2]).unwrap();
         let timestamp = |frame, index| Timestamp { frame, index };
-        assert_eq!(inputs[0].timestamps, Timestamps::new(vec![timestamp(0, 10), timestamp(5, 18)]).unwrap());
-        assert_eq!(inputs[1].timestamps, Timestamps::new(vec![timestamp(5, 18)]).unwrap());
+        assert_eq!(
+            inputs[0].timestamps,
+            Timestamps::new(vec![timestamp(0, 10), timestamp(2, 13), timestamp(5, 18)]).unwrap()
+        );
+        assert_eq!(inputs[1].timestamps, Timestamps::new(vec![timestamp(0, 10), timestamp(5, 18)]).unwrap());
         assert_eq!(inputs[0].dropouts, [dropout(None, 20..21), dropout(Some(0), 30..32)]);
         assert_eq!(inputs[1].dropouts, [dropout(None, 20..21), dropout(Some(1), 40..43)]);
     }
@@ -335,11 +357,23 @@ mod tests {
         let lost = LostSamples::parse(TEXT, "lost").unwrap();
         let error = lost.of_inputs(&[3]).unwrap_err().to_string();
         assert!(error.contains("channels 1 and 2 are interleaved"), "{error}");
-        let both = r#"{"channel":1,"sample_start":5,"global_index":7}
-            {"channel":2,"sample_start":5,"global_index":7}"#;
+        let both = r#"{"channel":1,"sample_start":0,"global_index":7}
+            {"channel":2,"sample_start":0,"global_index":7}"#;
         assert!(LostSamples::parse(both, "lost").unwrap().of_inputs(&[2]).is_ok());
         let error = lost.of_inputs(&[2]).unwrap_err().to_string();
         assert!(error.contains("channel 3 is named, but there are 2"), "{error}");
+    }
+
+    #[test]
+    fn the_first_line_of_a_channel_is_about_its_first_sample() {
+        let parse = |text: &str| LostSamples::parse(text, "lost").unwrap();
+        let begun = "{\"channel\": 1, \"sample_start\": 0, \"global_index\": 0}\n\n";
+        let later = begun.to_owned() + r#"{"channel": 2, "sample_start": 48, "global_index": 60}"#;
+        let error = parse(&later).of_inputs(&[1, 1]).unwrap_err().to_string();
+        assert!(error.contains("line 3: the first line of channel 2"), "{error}");
+        assert!(error.contains("sample 48") && error.contains("sample_start 0"), "{error}");
+        let begun = r#"{"sample_start": 0, "global_index": 0}"#.to_owned() + "\n" + &later;
+        assert!(parse(&begun).of_inputs(&[1, 1]).is_ok());
     }
 
     #[test]

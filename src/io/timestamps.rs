@@ -75,9 +75,14 @@ impl Timestamps {
         self.0.is_empty()
     }
 
+    /// The first one.
+    pub(super) fn first(&self) -> Option<Timestamp> {
+        self.0.first().copied()
+    }
+
     /// Index of the input's first frame, if there are timestamps.
     pub(super) fn beginning(&self) -> Option<u64> {
-        self.0.first().and_then(|first| first.beginning())
+        self.first().and_then(Timestamp::beginning)
     }
 
     /// When a frame of the input was taken, counted from `origin`.

@@ -303,6 +303,23 @@ fn bits_of_codes_and_what_the_spec_fits() {
     refused(&["--sample-bits", "12", "--tone", "62.3MHz"], 1, &missing);
 }
 
+/// Codes from 0 on that are read as signed ones look like offsets of full scale, which a warning says.
+#[test]
+fn offset_binary_codes_are_named() {
+    let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(9));
+    let mut codes = captured(&[61.3e6], 0.9, 4096, &mut dice);
+    codes.iter_mut().flatten().for_each(|x| *x += 1.0);
+    write_codes(&desk, "z.txt", &codes);
+    let run = |scale: &[&str]| {
+        let how = ["calibrate", "spec.toml", "z.txt", "--interleaved", "4", "-o", "m.toml", "--force"];
+        let done = desk.run(&[&how[..], scale].concat(), b"");
+        (done.status.code(), text(&done.stderr))
+    };
+    let (_, shown) = run(&["--sample-bits", "12"]);
+    assert!(shown.contains("offset-binary") && shown.contains("--full-scale u8bits"), "{shown}");
+    assert_eq!(run(&["--full-scale", "u12bits"]), (Some(0), String::new()));
+}
+
 /// What the captures contradict is not written unless asked for.
 #[test]
 fn values_that_the_captures_contradict_are_not_written() {

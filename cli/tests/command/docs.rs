@@ -1,4 +1,4 @@
-//! The snippets of README.md and docs/ work as they stand: specs and banks can be read, and command lines
+//! The snippets of the pages work as they stand: specs and banks can be read, and command lines
 //! run in the order of the text.
 
 use crate::support::Desk;
@@ -39,11 +39,11 @@ fn snippets(markdown: &str) -> Vec<Snippet> {
     found
 }
 
-/// README.md and every page of docs/.
+/// README.md and the pages of these folders; hybank-ibr has tests of its own.
 fn pages() -> Vec<PathBuf> {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
     let mut pages = vec![root.join("README.md")];
-    for folder in ["docs", "docs/tutorials"] {
+    for folder in ["docs", "docs/tutorials", "filters", "benches", "examples"] {
         let folder = fs::read_dir(root.join(folder)).expect("a folder of pages");
         pages.extend(folder.map(|entry| entry.expect("an entry").path()));
     }
@@ -52,7 +52,7 @@ fn pages() -> Vec<PathBuf> {
     pages
 }
 
-/// A folder in which the snippets of one page run, with the spec of the README in it.
+/// A folder in which the snippets of one page run, with the spec of the README and the ready specs in it.
 struct Folder {
     page: PathBuf,
     desk: Desk,
@@ -64,6 +64,7 @@ impl Folder {
         let readme = fs::read_to_string(readme).expect("README.md");
         let spec = snippets(&readme).into_iter().find(|snippet| snippet.language == "toml");
         let desk = Desk::with_spec(&spec.expect("a spec in README.md").text);
+        desk.write("speech-2x.toml", include_str!("../../../filters/speech-2x.toml"));
         Self { page: page.to_owned(), desk }
     }
 
@@ -72,9 +73,10 @@ impl Folder {
             "toml" => self.check_spec(snippet),
             "json" => self.check_bank(snippet),
             "sh" => self.run(snippet),
-            // Python has tests of its own; Rust is a documentation test; lines of lost samples run with the
-            // stream that reads them.
-            "rust" | "text" | "jsonl" | "python" => {}
+            "text" => self.check_text(snippet),
+            "jsonl" => self.desk.write("lost.jsonl", &snippet.text),
+            // Python has tests of its own; Rust is a documentation test.
+            "rust" | "python" | "text illustration" => {}
             "c" => self.desk.write(self.name(snippet, "// "), &snippet.text),
             // Directives of the site.
             directive if directive.starts_with('{') => {}
@@ -97,6 +99,20 @@ impl Folder {
         let spec = Spec::from_toml(&snippet.text, name);
         assert!(spec.is_ok(), "{}: {spec:?}", self.place(snippet));
         self.desk.write(name, &snippet.text);
+    }
+
+    /// A command in a block that runs nowhere goes wrong unseen.
+    fn check_text(&self, snippet: &Snippet) {
+        let is_command = |line: &&str| {
+            let program = line.trim_start_matches("$ ").split_whitespace().next();
+            matches!(program, Some("hybank" | "hybank-ibr"))
+        };
+        let command = snippet.text.lines().find(is_command);
+        assert!(
+            command.is_none(),
+            "{}: make this block `sh`, or `text illustration` if it cannot run: {command:?}",
+            self.place(snippet)
+        );
     }
 
     fn check_bank(&self, snippet: &Snippet) {

@@ -274,6 +274,10 @@ fn faults_are_reported_with_their_place() {
         ("\n{\"channel\": 3, \"first\": 0, \"length\": 1}", &["lost: channel 3", "there are 2"]),
         ("{\"sample_start\": 4, \"global_index\": 3}", &["before 0"]),
         (
+            "\n{\"channel\": 2, \"sample_start\": 4, \"global_index\": 9}",
+            &["lost: line 2", "channel 2", "sample 4"],
+        ),
+        (
             r#"{"channel": 1, "sample_start": 0, "global_index": 999999999999}
             {"channel": 2, "sample_start": 0, "global_index": 0}"#,
             &["a: ", "mistake"],
@@ -283,7 +287,9 @@ fn faults_are_reported_with_their_place() {
         desk.refused(1, &lost, parts);
     }
     // Numbers beyond the end are reported, and are an error only where asked for.
-    desk.write("lost", r#"{"channel": 1, "sample_start": 30, "global_index": 31}"#);
+    let beyond = r#"{"sample_start": 0, "global_index": 0}
+        {"channel": 1, "sample_start": 30, "global_index": 31}"#;
+    desk.write("lost", beyond);
     let report = desk.report(&lost);
     assert!(report["warnings"][0].as_str().unwrap().contains("ends before the last"), "{report}");
 }

@@ -215,6 +215,8 @@ fn what_cannot_be_measured_is_refused() {
     desk.refused(2, &["measure", "x.wav", "--full-scale", "128"], &["--full-scale 128", "by its format"]);
     desk.refused(2, &["measure", "x.wav", "--interleaved", "0"], &["0"]);
     desk.refused(1, &["measure", "none.wav"], &["none.wav"]);
+    desk.write("x.csv", "0.1\n0.2\n0.3\n");
+    desk.refused(1, &["measure", "x.wav", "--ref", "x.csv"], &["x.csv", "--rate 48kHz", "column is `time`"]);
 }
 
 /// Raw recordings have raw references, unless the name of one says its format.

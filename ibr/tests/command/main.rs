@@ -17,6 +17,7 @@ mod foreign;
 mod mistakes;
 mod path;
 mod place;
+mod readme;
 mod refuse;
 mod render;
 #[cfg(unix)]
