@@ -64,7 +64,6 @@ pub use warning::Warning;
 
 pub use crate::spec::{Cutoff, Fitting, UnknownFitting};
 
-use crate::sine_fit::Estimate;
 use crate::spec::Spec;
 use crate::units::{FastPeriods, Hertz};
 use estimates::Fitted;
@@ -160,8 +159,8 @@ pub fn calibrate_pooled(
         fitted.warnings.push(Warning::Clipped { counts: clipped.clone() });
     }
     let channels = fitted.channels(&model);
-    let is_near_one = |offset: Estimate<f64>| (offset.value - 1.0).abs() < MOST_OFFSET;
-    if channels.iter().all(|channel| channel.offset.is_some_and(is_near_one)) {
+    let is_near_one = |value: f64| (value - 1.0).abs() < MOST_OFFSET;
+    if channels.iter().all(|channel| channel.offset.is_some_and(|offset| is_near_one(offset.value))) {
         fitted.warnings.push(Warning::OffsetBinary);
     }
     let Fitted { tones, modulus, misfit, frames, warnings, .. } = fitted;
