@@ -7,7 +7,6 @@ mod path;
 
 use super::arguments::RenderArguments;
 use super::failure::{Failure, PROGRAM, failed, of_view};
-use super::inputs;
 use super::output;
 use super::outputs::{Outputs, check_files};
 use super::progress::Progress;

@@ -380,7 +380,7 @@ fn a_grey_photograph_takes_the_colours_of_the_other() {
         let done = run(dir.path(), &arguments);
         (json(&done)["psnr"].as_f64().unwrap(), stderr(&done))
     };
-    let mut with = |channels: usize| {
+    let with = |channels: usize| {
         let values = photograph.data().chunks(3).flat_map(|pixel| vec![luminance(pixel); channels]);
         let grey = Image::new(SIZE.0, SIZE.1, channels, values.collect()).unwrap();
         save(&grey, &dir.path().join("right.png")).unwrap();
