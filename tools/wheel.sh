@@ -6,8 +6,8 @@
 #
 # maturin refuses a wheel whose symbols are newer than the manylinux tag that it gives it; auditwheel shows the tag.
 set -euo pipefail
-# The newest tag is manylinux_2_34: the glibc of Ubuntu 22.04, Debian 12 and RHEL 9.
-newest=34
+# The newest tag is manylinux_2_35: the glibc of Ubuntu 22.04.
+newest=35
 python=${1:?tools/wheel.sh PYTHON [FOLDER]}
 cd "$(dirname "$0")/.."
 root=$PWD
