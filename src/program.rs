@@ -1,5 +1,5 @@
-//! What every program here says, and how it ends: results on standard output, messages on standard error, and
-//! the one message of a failure.
+//! What every program here says, and how it ends: results on standard output, messages on standard error,
+//! and the one message of a failure.
 //!
 //! ```
 //! use hybank::program::{Failure, Program, print};

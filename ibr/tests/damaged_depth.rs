@@ -44,8 +44,8 @@ fn a_rig_with_damaged_disparities() {
     check("poster1", "im4.png", &least);
 }
 
-/// One photograph darker by a uniform factor, or of another white balance, which its true view does not have.
-/// When drift ended at 4 % by a jump, a factor of 0.95 gave 32.7 dB and 0.965 gave 33.4.
+/// One photograph darker by a uniform factor, or of another white balance, which its true view does not
+/// have. When drift ended at 4 % by a jump, a factor of 0.95 gave 32.7 dB and 0.965 gave 33.4.
 #[test]
 fn a_photograph_of_another_exposure() {
     let least = [

@@ -124,8 +124,8 @@ impl<const WORDS: usize> BigFloat<WORDS> {
         }
     }
 
-    /// The same, with `other` shifted to the right by `whole` words and by `shift` bits, less than a word. One
-    /// word below the mantissas keeps 64 more bits of it.
+    /// The same, with `other` shifted to the right by `whole` words and by `shift` bits, less than a word.
+    /// One word below the mantissas keeps 64 more bits of it.
     #[inline(always)]
     fn combined_after(&self, whole: usize, shift: u32, other: &Self, subtract: bool) -> Self {
         let word =

@@ -7,9 +7,9 @@
 //!
 //! The scenes poster1, spheres and grid are those of the data folder (`HYBANK_DATA`); the scene sky is made
 //! here. Each line is a scene with a damage: the PSNR of the rendered view against the true one, the share
-//! of the pixels that the mask shows as seen, and the share of the depths that were found to be outliers. Then
-//! follows the PSNR of plain ways to the view (`peers`): the mean of the photographs, forward splats with a
-//! hard and a soft depth test, warped meshes, and colours fetched backwards.
+//! of the pixels that the mask shows as seen, and the share of the depths that were found to be outliers.
+//! Then follows the PSNR of plain ways to the view (`peers`): the mean of the photographs, forward splats
+//! with a hard and a soft depth test, warped meshes, and colours fetched backwards.
 
 mod case;
 mod damage;

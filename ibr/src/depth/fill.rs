@@ -5,13 +5,13 @@
 
 use super::{DepthMap, Measure};
 
-/// Gives unknown pixels of disparity the farther of the nearest known values to their left and right, since a
-/// rig says nothing across its rows, and unknown depths the farthest of the nearest ones in the row and in the
-/// column, or of the map where there are none.
+/// Gives unknown pixels of disparity the farther of the nearest known values to their left and right, since
+/// a rig says nothing across its rows, and unknown depths the farthest of the nearest ones in the row and in
+/// the column, or of the map where there are none.
 ///
 /// A row of disparities without any known value takes those of the nearest row that has one (the upper of
-/// two). The map remembers which values are guesses; renderings weigh them less, and masks show them. Returns
-/// the number of pixels filled.
+/// two). The map remembers which values are guesses; renderings weigh them less, and masks show them.
+/// Returns the number of pixels filled.
 pub fn fill_unknown(map: &mut DepthMap) -> usize {
     let unknown = map.unknown();
     if unknown == 0 {

@@ -6,15 +6,15 @@ pub type Exposure = [f64; 3];
 /// From this difference of logarithms on nothing drifts.
 ///
 /// Where the brightness or a colour drifts, the exposure between the views is taken to lie between, and
-/// otherwise to be that of the first view. Two photographs do not show which: on "Cones" red and green of im6
-/// are 3 % brighter than those of im2, evenly, and those of the photographs between lie between. Without drift
-/// its view has 28.76 dB, with this one 29.24, and 29.27 if all of the difference is drift. On "poster1",
-/// with a factor of 0.95, 0.965 or 0.98 on one photograph and the exposure of the other one, the views have
-/// 34.1, 33.6 and 33.9 dB, and 34.2 without drift.
+/// otherwise to be that of the first view. Two photographs do not show which: on "Cones" red and green of
+/// im6 are 3 % brighter than those of im2, evenly, and those of the photographs between lie between. Without
+/// drift its view has 28.76 dB, with this one 29.24, and 29.27 if all of the difference is drift. On
+/// "poster1", with a factor of 0.95, 0.965 or 0.98 on one photograph and the exposure of the other one, the
+/// views have 34.1, 33.6 and 33.9 dB, and 34.2 without drift.
 const DRIFT: f64 = 0.035;
 
-/// The share of a part of the factors that drifts: 1 - (d / [`DRIFT`])^4, with d the largest of the logarithms.
-/// So nearly all of a small difference drifts, and no difference changes the view by a jump.
+/// The share of a part of the factors that drifts: 1 - (d / [`DRIFT`])^4, with d the largest of the
+/// logarithms. So nearly all of a small difference drifts, and no difference changes the view by a jump.
 fn share(gains: &[Exposure], part: impl Fn(&Exposure) -> f64) -> f64 {
     let largest = gains.iter().map(|gain| part(gain).abs()).fold(0.0, f64::max);
     (1.0 - (largest / DRIFT).powi(4)).max(0.0)

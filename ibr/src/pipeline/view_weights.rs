@@ -154,8 +154,8 @@ impl ViewWeights {
     }
 
     /// The same with factors for the colours of the views, with which all have those of the first. As far as
-    /// the brightness or a colour beside it drifts from view to view, the virtual view has that of its place:
-    /// the mean by weights.
+    /// the brightness or a colour beside it drifts from view to view, the virtual view has that of its
+    /// place: the mean by weights.
     pub fn with_gains(self, gains: &[Exposure]) -> Self {
         let weight = |view: usize| f64::from(self.weight(view as u16));
         let total: f64 = (0..gains.len()).map(weight).sum();

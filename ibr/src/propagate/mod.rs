@@ -79,15 +79,17 @@ impl RigCamera {
 /// whose disparity was filled in. Where another view shows the same point, that view decides.
 pub const DOUBTFUL_WEIGHT: f32 = 0.1;
 
-/// Weight of a sample of a general camera whose depth was filled in: not along a row, where it is background,
-/// but from all around. With 0.1, maps of spheres of which holes take two fifths lost 0.8 dB more.
+/// Weight of a sample of a general camera whose depth was filled in: not along a row, where it is
+/// background, but from all around. With 0.1, maps of spheres of which holes take two fifths lost 0.8 dB
+/// more.
 pub const GUESSED_WEIGHT: f32 = 0.01;
 
 /// Largest area that a sample stands for, in virtual pixels.
 const LARGEST_AREA: f64 = (LARGEST_SPACING * LARGEST_SPACING) as f64;
 
-/// Weight of a sample that is trusted so much and stands for `area` virtual pixels. Where the view magnifies, samples are few and
-/// each counts for its area, so that the smoothing of the fit does not grow with the magnification.
+/// Weight of a sample that is trusted so much and stands for `area` virtual pixels. Where the view
+/// magnifies, samples are few and each counts for its area, so that the smoothing of the fit does not grow
+/// with the magnification.
 #[inline]
 fn weight(area: f64, trust: f32) -> f32 {
     trust * area.clamp(1.0, LARGEST_AREA) as f32

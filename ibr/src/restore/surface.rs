@@ -38,8 +38,8 @@ const SLOPE: f64 = 0.01;
 const STIFFNESS: f64 = 0.02;
 
 impl Parallax {
-    /// Removes the noise. Medians begin, by which the edges of surfaces are found. They do not end it: on slopes
-    /// they are biased to the pixels of like colour, which took 3 dB from views of spheres.
+    /// Removes the noise. Medians begin, by which the edges of surfaces are found. They do not end it: on
+    /// slopes they are biased to the pixels of like colour, which took 3 dB from views of spheres.
     pub(super) fn smooth(&mut self, image: &Image) {
         let bending = self.bending();
         let mut shape = self.medians(image);

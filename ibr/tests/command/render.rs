@@ -368,8 +368,8 @@ fn odd_images_are_fine() {
     }
 }
 
-/// A grey photograph beside a coloured one: the note says what each gives, and the view is nearly that of two
-/// coloured ones. With three equal channels it counts as coloured, and its grey is mixed in.
+/// A grey photograph beside a coloured one: the note says what each gives, and the view is nearly that of
+/// two coloured ones. With three equal channels it counts as coloured, and its grey is mixed in.
 #[test]
 fn a_grey_photograph_takes_the_colours_of_the_other() {
     let dir = rig();

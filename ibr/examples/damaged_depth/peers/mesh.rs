@@ -1,6 +1,6 @@
-//! Warped meshes: each photograph is a mesh of triangles between its pixels. Triangles that stretch count less,
-//! as in view synthesis for immersive video (MPEG's RVS). The front of the meshes is the depth of the virtual
-//! view by which colours are fetched backwards.
+//! Warped meshes: each photograph is a mesh of triangles between its pixels. Triangles that stretch count
+//! less, as in view synthesis for immersive video (MPEG's RVS). The front of the meshes is the depth of the
+//! virtual view by which colours are fetched backwards.
 
 use super::{Canvas, Photograph, Virtual, colour};
 use hybank_ibr::image::Image;

@@ -1,5 +1,5 @@
-//! What the rendering is compared with: the plain ways to a virtual view from photographs and depth, which take
-//! the damaged maps as they are.
+//! What the rendering is compared with: the plain ways to a virtual view from photographs and depth, which
+//! take the damaged maps as they are.
 
 mod mesh;
 mod splat;
@@ -39,8 +39,8 @@ impl<P> Virtual<P> {
     }
 }
 
-/// The views of a scene with its maps as they stand. `cameras` are those of the views; every `step`-th value of
-/// the maps is known.
+/// The views of a scene with its maps as they stand. `cameras` are those of the views; every `step`-th value
+/// of the maps is known.
 pub(crate) fn photographs<P: Copy>(
     spec: &SceneSpec,
     path: &Path,
