@@ -21,8 +21,8 @@ pub fn densify(sparse: &DepthMap, step: usize, image: &Image) -> Result<DepthMap
     })
 }
 
-/// The samples at their pixels of the image, all others unknown.
-fn placed(sparse: &DepthMap, step: usize, image: &Image) -> DepthMap {
+/// The samples at their pixels of an image, all others unknown.
+pub(crate) fn placed(sparse: &DepthMap, step: usize, image: &Image) -> DepthMap {
     let (width, height) = image.size();
     let mut data = vec![f32::NAN; width * height];
     for (k, value) in sparse.data().iter().enumerate() {

@@ -16,10 +16,17 @@ pub(crate) enum Damage {
     Clean,
     /// This share of the values is anything between the least and the largest of the map.
     Outliers(f64),
+    /// This share of the values lies in discs of a radius of 3 pixels, each with one such value.
+    Blobs(f64),
+    /// Within two pixels of another surface a value lies anywhere between both, as that of a camera that
+    /// measures the time of flight.
+    Flying,
     /// White errors of this many pixels in the virtual view for a rig, or to the next view.
     Noise(f64),
     /// This share of the values is known, the rest is 0.
     Scattered(f64),
+    /// The same, and of what is known this share is anything between the least and the largest of the map.
+    ScatteredOutliers(f64, f64),
     /// Every sixth value in rows and columns is used.
     Lattice,
     /// There are no maps: the depths are found from the photographs.
@@ -31,12 +38,15 @@ pub(crate) enum Damage {
 }
 
 impl Damage {
-    pub(crate) const ALL: [Self; 11] = [
+    pub(crate) const ALL: [Self; 14] = [
         Self::Clean,
         Self::Outliers(0.05),
+        Self::Blobs(0.05),
+        Self::Flying,
         Self::Noise(0.5),
         Self::Noise(1.0),
         Self::Scattered(0.03),
+        Self::ScatteredOutliers(0.03, 0.05),
         Self::Lattice,
         Self::Matched,
         Self::Exposure([0.95; 3]),
@@ -51,8 +61,13 @@ impl Damage {
         match self {
             Self::Clean => "clean".into(),
             Self::Outliers(share) => format!("outliers {} %", 100.0 * share),
+            Self::Blobs(share) => format!("blobs {} %", 100.0 * share),
+            Self::Flying => "flying pixels".into(),
             Self::Noise(pixels) => format!("noise {pixels} px"),
             Self::Scattered(share) => format!("scattered {} %", 100.0 * share),
+            Self::ScatteredOutliers(share, wrong) => {
+                format!("scattered {} %, of which {} % outliers", 100.0 * share, 100.0 * wrong)
+            }
             Self::Lattice => "lattice 2.8 %".into(),
             Self::Matched => "matched".into(),
             Self::Sky(value) => format!("sky as {value:e}"),
@@ -92,11 +107,11 @@ impl Damage {
                 // Errors in pixels are errors of the reciprocal depth.
                 true => {
                     let unit = reciprocal_per_pixel(spec, k);
-                    self.change(&mut values, seed, |v, e| (1.0 / (1.0 / v + e * unit)).max(0.1 * v));
+                    self.change(&mut values, width, seed, |v, e| (1.0 / (1.0 / v + e * unit)).max(0.1 * v));
                 }
                 false => {
                     let scale = view.disparity_scale.or(spec.disparity_scale).unwrap_or(1.0);
-                    self.change(&mut values, seed, |v, e| (v + e * scale).max(0.1 * v));
+                    self.change(&mut values, width, seed, |v, e| (v + e * scale).max(0.1 * v));
                 }
             }
             let file: PathBuf = folder.join(format!("damaged{k}.pfm"));
@@ -107,9 +122,14 @@ impl Damage {
     }
 
     /// Changes the values; `moved` adds an error in pixels to a value.
-    fn change(self, values: &mut [f32], random: &mut Pcg64, moved: impl Fn(f64, f64) -> f64) {
+    fn change(self, values: &mut [f32], width: usize, random: &mut Pcg64, moved: impl Fn(f64, f64) -> f64) {
         let known = values.iter().copied().filter(|v| v.is_finite() && *v > 0.0);
         let (low, high) = known.fold((f32::MAX, f32::MIN), |(low, high), v| (low.min(v), high.max(v)));
+        match self {
+            Self::Blobs(share) => blobs(values, width, share, random, |share| low + (high - low) * share),
+            Self::Flying => flying(values, width, random),
+            _ => {}
+        }
         for value in values {
             let is_known = value.is_finite() && *value > 0.0;
             match self {
@@ -121,7 +141,12 @@ impl Damage {
                     let normal = (0..12).map(|_| uniform(random)).sum::<f64>() - 6.0;
                     *value = moved(f64::from(*value), pixels * normal) as f32;
                 }
-                Self::Scattered(share) if uniform(random) >= share => *value = 0.0,
+                Self::Scattered(share) | Self::ScatteredOutliers(share, _) if uniform(random) >= share => {
+                    *value = 0.0;
+                }
+                Self::ScatteredOutliers(_, wrong) if uniform(random) < wrong => {
+                    *value = low + (high - low) * uniform(random) as f32;
+                }
                 Self::Sky(far) if value.is_infinite() => *value = far,
                 _ => {}
             }
@@ -139,6 +164,42 @@ fn exposed(photograph: &Path, gains: [f64; 3], folder: &Path) -> Result<PathBuf,
     let file = folder.join("exposed.png");
     save(&image, &file)?;
     Ok(file)
+}
+
+/// Radius of a blob in pixels.
+const BLOB: isize = 3;
+
+/// Discs of one value each, which is a random share of the range.
+fn blobs(values: &mut [f32], width: usize, share: f64, random: &mut Pcg64, value: impl Fn(f32) -> f32) {
+    let inside: Vec<(isize, isize)> = (-BLOB..=BLOB)
+        .flat_map(|dy| (-BLOB..=BLOB).map(move |dx| (dx, dy)))
+        .filter(|(dx, dy)| dx * dx + dy * dy <= BLOB * BLOB)
+        .collect();
+    for _ in 0..(share * values.len() as f64 / inside.len() as f64) as usize {
+        let middle = (uniform(random) * values.len() as f64) as usize;
+        let (x, y) = ((middle % width) as isize, (middle / width) as isize);
+        let wrong = value(uniform(random) as f32);
+        for (dx, dy) in inside.iter().filter(|(dx, _)| (0..width as isize).contains(&(x + dx))) {
+            let pixel = (y + dy) * width as isize + x + dx;
+            if let Some(value) = usize::try_from(pixel).ok().and_then(|pixel| values.get_mut(pixel)) {
+                *value = wrong;
+            }
+        }
+    }
+}
+
+/// Values beside a jump of a tenth lie between both sides.
+fn flying(values: &mut [f32], width: usize, random: &mut Pcg64) {
+    let clean = values.to_vec();
+    for (p, value) in values.iter_mut().enumerate().filter(|(_, value)| value.is_finite() && **value > 0.0) {
+        let beside = [1, 2, width, 2 * width].into_iter();
+        let beside = beside.flat_map(|step| [p.checked_sub(step), Some(p + step)]).flatten();
+        let others = beside.filter_map(|q| clean.get(q)).filter(|other| other.is_finite() && **other > 0.0);
+        let apart = |other: &f32| (*other / *value).max(*value / *other);
+        if let Some(other) = others.max_by(|a, b| apart(a).total_cmp(&apart(b))).filter(|o| apart(o) > 1.1) {
+            *value += (other - *value) * uniform(random) as f32;
+        }
+    }
 }
 
 fn uniform(random: &mut Pcg64) -> f64 {

@@ -180,6 +180,11 @@ impl DepthMap {
         self.guessed.get(pixel..).unwrap_or_default()
     }
 
+    /// Number of values that were filled from their neighbours.
+    pub(crate) fn guesses(&self) -> usize {
+        self.guessed.iter().filter(|guessed| **guessed).count()
+    }
+
     /// Width in values.
     pub fn width(&self) -> usize {
         self.width
@@ -240,18 +245,15 @@ impl DepthMap {
     }
 
     /// Whether the known values lie apart, as points of a lidar do: fewer than half of them have neighbours
-    /// to the right and below.
+    /// to the right and below, where the map goes on.
     pub(crate) fn is_scattered(&self) -> bool {
-        let rows = self.data.chunks_exact(self.width).zip(self.data.chunks_exact(self.width).skip(1));
-        let (mut known, mut joined) = (0, 0);
-        for (row, below) in rows {
-            let pairs = row.windows(2).zip(below).filter(|(pair, _)| !pair[0].is_nan());
-            pairs.for_each(|(pair, below)| {
-                known += 1;
-                joined += usize::from(!pair[1].is_nan() && !below.is_nan());
-            });
-        }
-        2 * joined < known
+        let is_known = |p: usize| self.data.get(p).is_none_or(|v| !v.is_nan());
+        let is_joined = |p: &usize| {
+            let is_last = (p + 1).is_multiple_of(self.width);
+            (is_last || is_known(p + 1)) && is_known(p + self.width)
+        };
+        let known = || (0..self.data.len()).filter(|p| is_known(*p));
+        2 * known().filter(is_joined).count() < known().count()
     }
 
     /// Refuses a map whose size does not fit an image of `size` with one value every `step` pixels.

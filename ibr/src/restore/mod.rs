@@ -22,7 +22,7 @@ use crate::interpolate::plane::surface_memory;
 use crate::pipeline::Agreement;
 use crate::propagate::{View, Viewpoint, nearest};
 use hybank::memory::{MemoryShortage, check_memory};
-use outliers::Parallax;
+use outliers::{Parallax, RING};
 
 /// A map that was restored.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,7 +94,7 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, Mem
     let voters = outliers::voters(&agreement.groups());
     let one = |i: usize| {
         let view = &views[i];
-        let rejected = outliers::rejected(views, &planes, &agreement.gains, &voters[i], i);
+        let rejected = outliers::rejected(views, &planes, &agreement.gains, &voters[i], i, RING);
         let count = rejected.iter().filter(|r| **r).count();
         let mut plane = planes[i].clone();
         let mut guessed = Vec::new();

@@ -1,4 +1,8 @@
-//! Values of a map that contradict their neighbours, where the other views do not outvote these.
+//! Values of a map that contradict those around them, where the other views do not outvote these.
+//!
+//! A single wrong value disagrees with its neighbours. One in a cluster agrees with some of them, and
+//! disagrees with what lies farther away, as a value on a thin thing does. It is rejected if no other view
+//! confirms it and one confirms what lies around it.
 
 use crate::depth::{DepthMap, JUMP, Measure};
 use crate::image::Image;
@@ -11,6 +15,12 @@ const DEVIATIONS: f32 = 3.0;
 
 /// Neighbours, of eight, that a value on a surface has at least: those along a line one pixel wide.
 const SUPPORTERS: usize = 2;
+
+/// Neighbours, of eight on a ring, that a value has beyond a cluster of outliers at least: a corner has three.
+const RING_SUPPORTERS: usize = 3;
+
+/// Radius of the ring in pixels: a cluster may be as large.
+pub(super) const RING: usize = 8;
 
 /// Other views that vote on a value, at most: evenly chosen ones of more.
 const VOTERS: usize = 8;
@@ -76,11 +86,24 @@ impl Parallax {
         rows.flat_map(move |row| columns.clone().map(move |column| row * width + column))
     }
 
-    /// Whether enough neighbours lie on the surface of a pixel.
-    fn is_supported(&self, pixel: usize) -> bool {
+    /// The pixels in eight directions at a distance from one.
+    fn ring(&self, pixel: usize, distance: usize) -> impl Iterator<Item = usize> + use<> {
+        let (x, y, width, height) = (pixel % self.width, pixel / self.width, self.width, self.height);
+        let steps = move |at: usize, side: usize| {
+            [at.checked_sub(distance), Some(at), Some(at + distance).filter(|at| *at < side)]
+        };
+        let columns = steps(x, width);
+        let pixels = steps(y, height)
+            .into_iter()
+            .flatten()
+            .flat_map(move |row| columns.into_iter().flatten().map(move |column| row * width + column));
+        pixels.filter(move |q| *q != pixel)
+    }
+
+    /// Whether so many pixels at a distance lie on the surface of a pixel.
+    fn is_supported(&self, pixel: usize, distance: usize, least: usize) -> bool {
         let here = self.values[pixel];
-        let neighbours = self.around(pixel, 1).filter(|q| *q != pixel && self.agree(here, self.values[*q]));
-        neighbours.take(SUPPORTERS).count() == SUPPORTERS
+        self.ring(pixel, distance).filter(|q| self.agree(here, self.values[*q])).take(least).count() == least
     }
 
     /// The pixel at a position whose surface has this parallax.
@@ -105,14 +128,27 @@ impl Parallax {
     /// Gives pixels the median of those around them that are not rejected, weighed by the likeness of their
     /// colours; what has none is unknown.
     pub(super) fn replace(&mut self, image: &Image, rejected: &[bool]) {
-        let place = |p: usize| rejected[p].then(|| (p, self.median(image, p, |q| !rejected[q])));
-        let found: Vec<_> = (0..self.values.len()).into_par_iter().filter_map(place).collect();
-        found.iter().for_each(|(p, value)| self.values[*p] = *value);
+        let mut left: Vec<usize> = (0..rejected.len()).filter(|p| rejected[*p]).collect();
+        left.iter().for_each(|p| self.values[*p] = f32::NAN);
+        // From the rim of a cluster inwards.
+        loop {
+            let before = left.len();
+            let found: Vec<f32> = left.par_iter().map(|p| self.median(image, *p)).collect();
+            left.iter().zip(&found).for_each(|(p, value)| self.values[*p] = *value);
+            left.retain(|p| self.values[*p].is_nan());
+            if left.is_empty() || left.len() == before {
+                return;
+            }
+        }
     }
 
-    /// The median of the known values around a pixel that are `allowed`, weighed by the likeness of colours.
-    pub(super) fn median(&self, image: &Image, pixel: usize, allowed: impl Fn(usize) -> bool) -> f32 {
-        let near = self.around(pixel, RADIUS).filter(|q| allowed(*q) && !self.values[*q].is_nan());
+    /// The median of the known values around a pixel, weighed by the likeness of colours.
+    pub(super) fn median(&self, image: &Image, pixel: usize) -> f32 {
+        self.median_of(image, pixel, self.around(pixel, RADIUS))
+    }
+
+    fn median_of(&self, image: &Image, pixel: usize, pixels: impl Iterator<Item = usize>) -> f32 {
+        let near = pixels.filter(|q| !self.values[*q].is_nan());
         let likeness = |q: usize| {
             let difference = difference(image.pixel(pixel), image.pixel(q)) / GREY_LEVELS;
             (-difference * difference).exp().max(LEAST_LIKENESS)
@@ -134,32 +170,46 @@ pub(super) fn difference(a: [f32; 3], b: [f32; 3]) -> f32 {
 }
 
 /// Which values of a view are outliers: few neighbours agree with them, and not more of the other views
-/// confirm them than see through them.
+/// confirm them than see through them; or few values on the ring agree with them, no other view confirms
+/// them, and one confirms the median of the ring.
 pub(super) fn rejected<P: Viewpoint>(
     views: &[View<'_, P>],
     planes: &[Parallax],
     gains: &[Exposure],
     voters: &[usize],
     index: usize,
+    ring: usize,
 ) -> Vec<bool> {
     let (view, plane) = (&views[index], &planes[index]);
+    let measure = view.map.measure();
     let colour = |view: usize, p: usize| -> [f32; 3] {
         let colour = views[view].image.pixel::<3>(p);
         std::array::from_fn(|c| colour[c] * gains[view][c] as f32)
     };
     let maps: Vec<_> = voters.iter().map(|other| view.camera.map_to(&views[*other].camera)).collect();
-    let is_outlier = |p: usize| {
-        let value = view.map.data()[p];
-        if value.is_nan() || view.map.is_guessed(p) || plane.is_supported(p) {
-            return false;
-        }
-        let votes = voters.iter().zip(&maps).map(|(other, map)| {
+    let votes = |p: usize, value: f32| {
+        voters.iter().zip(&maps).map(move |(other, map)| {
             let (x, y) = ((p % plane.width) as f64, (p / plane.width) as f64);
             let (u, v, depth) = map(x, y, f64::from(value));
-            let there = view.map.measure().parallax(depth as f32);
+            let there = measure.parallax(depth as f32);
             vote(&planes[*other], [u, v], there, |q| difference(colour(index, p), colour(*other, q)))
-        });
-        votes.sum::<i32>() <= 0
+        })
+    };
+    let is_confirmed = |p: usize, value: f32| votes(p, value).any(|vote| vote == 1);
+    let is_in_cluster = |p: usize, value: f32| {
+        let around = plane.median_of(view.image, p, plane.ring(p, ring));
+        let is_other = !around.is_nan() && !plane.agree(around, plane.values[p]);
+        is_other && !is_confirmed(p, value) && is_confirmed(p, measure.of_parallax(around))
+    };
+    let is_outlier = |p: usize| {
+        let value = view.map.data()[p];
+        if value.is_nan() || view.map.is_guessed(p) {
+            return false;
+        }
+        match plane.is_supported(p, 1, SUPPORTERS) {
+            false => votes(p, value).sum::<i32>() <= 0,
+            true => !plane.is_supported(p, ring, RING_SUPPORTERS) && is_in_cluster(p, value),
+        }
     };
     (0..plane.values.len()).into_par_iter().with_min_len(1024).map(is_outlier).collect()
 }

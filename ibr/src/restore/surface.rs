@@ -58,7 +58,7 @@ impl Parallax {
     fn medians(&self, image: &Image) -> Vec<f32> {
         let median = |p: usize| match self.values[p].is_nan() {
             true => f32::NAN,
-            false => self.median(image, p, |_| true),
+            false => self.median(image, p),
         };
         (0..self.values.len()).into_par_iter().with_min_len(256).map(median).collect()
     }

@@ -1,4 +1,4 @@
-//! Reading a scene: determine its kind, read its files in parallel, make maps dense.
+//! Reading a scene: determine its kind, read its files in parallel, prepare its views.
 
 mod calibrated;
 mod complete;
@@ -13,19 +13,17 @@ mod uncalibrated;
 pub use complete::complete;
 pub use goals::MOST_FRAMES;
 
+use super::prepare::{Preparation, WORK_BYTES, prepare};
 use super::spec::{KEYS, SceneSpec, ViewSpec};
-use super::{Kind, Scene, SourceView};
+use super::{Kind, Scene};
 use crate::camera::middlebury::Calibration;
 use crate::files::{InputError, Location};
 use crate::image::{Image, MOST_PIXELS, read_image};
 use crate::pipeline::Watch;
-use crate::propagate::Viewpoint;
-use crate::restore::{coloured, restore};
 use goals::Goal;
-use hybank::memory::{MemoryShortage, check_memory};
+use hybank::memory::check_memory;
 use hybank::messages::{self, Number, Quoted, of_document};
 use left_out::LeftOut;
-use maps::LOADING_BYTES;
 use models::Models;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -78,8 +76,7 @@ pub fn load(
 ) -> Result<Scene, InputError> {
     let spec = &complete(spec, path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    Loader { spec, path, folder, options, watch, models: Models::default(), filled: AtomicUsize::new(0) }
-        .load()
+    Loader { spec, path, folder, options, watch, models: Models::default() }.load()
 }
 
 struct Loader<'a> {
@@ -89,8 +86,6 @@ struct Loader<'a> {
     options: &'a LoadOptions,
     watch: Watch<'a>,
     models: Models,
-    /// Unknown depths that were filled.
-    filled: AtomicUsize,
 }
 
 type Loaded<T> = Result<T, InputError>;
@@ -124,25 +119,16 @@ impl Loader<'_> {
         };
         notes.extend(self.spec.notes.iter().cloned());
         notes.extend(note_of_dark(&kind.images()));
-        let outliers = self.restored(&mut kind, &mut notes)?;
-        let filled = self.filled.load(Ordering::Relaxed);
+        let Preparation { filled, outliers, coloured } = match &mut kind {
+            Kind::Rectified { views, .. } => prepare(views, self.options.fill),
+            Kind::Calibrated { views, .. } => prepare(views, self.options.fill),
+            Kind::Uncalibrated { .. } => Ok(Preparation::default()),
+        }
+        .map_err(|shortage| self.incomplete(shortage))?;
+        notes.extend(note_of_outliers(&outliers));
+        notes.extend(note_of_grey(&coloured));
         let names = views.iter().map(|view| view.label()).collect();
         Ok(Scene { kind, names, offset: self.offset(&goals)?, filled, outliers, calibration, notes })
-    }
-
-    /// Restores the maps and colours of a scene; the share of outliers in each map.
-    fn restored(&self, kind: &mut Kind, notes: &mut Vec<String>) -> Loaded<Vec<f64>> {
-        let count = kind.images().len();
-        let done = match kind {
-            Kind::Rectified { views, .. } => restore_views(views, notes),
-            Kind::Calibrated { views, .. } => restore_views(views, notes),
-            Kind::Uncalibrated { .. } => Ok(Vec::new()),
-        };
-        done.map_err(|shortage| {
-            self.incomplete(format!(
-                "to restore depth and colours from {count} views takes {shortage}; shrink the images or use fewer views"
-            ))
-        })
     }
 
     /// That the scene file contradicts itself, or what it lacks.
@@ -235,29 +221,16 @@ fn note_of_outliers(shares: &[f64]) -> Option<String> {
     })
 }
 
-fn restore_views<P: Viewpoint>(
-    views: &mut [SourceView<P>],
-    notes: &mut Vec<String>,
-) -> Result<Vec<f64>, MemoryShortage> {
-    let restored = restore(&views.iter().map(SourceView::view).collect::<Vec<_>>())?;
-    let outliers: Vec<f64> = restored.iter().map(|restored| restored.outliers).collect();
-    views.iter_mut().zip(restored).for_each(|(view, restored)| view.map = restored.map);
-    notes.extend(note_of_outliers(&outliers));
-    let coloured = coloured(&views.iter().map(SourceView::view).collect::<Vec<_>>())?;
-    let grey: Vec<String> =
-        (1..).zip(&coloured).filter(|(_, c)| c.is_some()).map(|(k, _)| k.to_string()).collect();
-    for (view, image) in views.iter_mut().zip(coloured) {
-        if let Some(image) = image {
-            view.image = image;
-        }
-    }
-    if !grey.is_empty() {
-        notes.push(format!(
-            "view {} grey beside coloured ones: what the others show gives the colour, the grey photographs the luminance",
-            if let [one] = &grey[..] { format!("{one} is") } else { format!("{} are", grey.join(", ")) }
-        ));
-    }
-    Ok(outliers)
+/// That grey photographs took colours; `views` are their numbers.
+fn note_of_grey(views: &[usize]) -> Option<String> {
+    let numbers: Vec<String> = views.iter().map(|view| (view + 1).to_string()).collect();
+    let are = if views.len() == 1 { "is" } else { "are" };
+    (!views.is_empty()).then(|| {
+        format!(
+            "view {} {are} grey beside coloured ones: what the others show gives the colour, the grey photographs the luminance",
+            numbers.join(", ")
+        )
+    })
 }
 
 /// Bytes per pixel of a view that is there.
@@ -287,7 +260,7 @@ fn each<V: Sync, T: Send>(
     };
     let first = read(first)?;
     let at_a_time = rayon::current_num_threads().min(others.len()) as f64;
-    let bytes = pixels(&first) as f64 * (VIEW_BYTES * others.len() as f64 + LOADING_BYTES * at_a_time);
+    let bytes = pixels(&first) as f64 * (VIEW_BYTES * others.len() as f64 + WORK_BYTES * at_a_time);
     let read: Vec<Loaded<T>> = match check_memory(bytes) {
         Ok(()) => others.par_iter().map(read).collect(),
         Err(_) => others.iter().map(read).collect(),

@@ -2,12 +2,14 @@
 
 mod folder;
 mod load;
+mod prepare;
 mod spec;
 
 pub use folder::{Described, describe};
 #[cfg(feature = "cli")]
 pub(crate) use load::room_to_parse;
 pub use load::{LoadOptions, MOST_FRAMES, complete, load, parse};
+pub use prepare::{Preparation, PreparationError, prepare};
 pub use spec::{SceneSpec, TargetSpec, ViewSpec};
 
 use crate::camera::Camera;
@@ -95,7 +97,7 @@ impl Kind {
 pub struct SourceView<P> {
     /// The image.
     pub image: Image,
-    /// Its disparities or depths, dense.
+    /// Its disparities or depths: of a scene that was read, or after [`prepare`], dense and restored.
     pub map: DepthMap,
     /// Its camera.
     pub camera: P,

@@ -9,13 +9,14 @@ use crate::results::Made;
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::Measure;
 use hybank_ibr::interpolate::Cover;
-use hybank_ibr::pipeline::{Method, RenderSettings, Rendering, calibrated, rectified};
-use hybank_ibr::propagate::{CalibratedView, RectifiedView};
+use hybank_ibr::pipeline::{Method, RenderError, RenderSettings, Rendering, calibrated, rectified};
+use hybank_ibr::propagate::{View, Viewpoint};
+use hybank_ibr::scene::{SourceView, prepare};
 use nalgebra::Matrix3x4;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 pub(crate) use uncalibrated::render_uncalibrated;
-use views::Views;
+use views::views;
 
 /// The view from `at` on the line of rectified cameras, from images (H, W, C) and maps (H, W).
 #[pyfunction]
@@ -29,17 +30,9 @@ pub(crate) fn render_rectified<'py>(
     method: &str,
     fill: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (views, settings) = (Views::new(&images, &maps, Measure::Disparity, fill)?, settings(method)?);
-    let rendering = background::run(py, None, move |_| {
-        let view = |((image, disparity), &position): (_, &f64)| RectifiedView {
-            image,
-            map: disparity,
-            camera: position,
-        };
-        let views: Vec<_> = views.both().zip(&positions).map(view).collect();
-        rectified::render(&views, at, &settings)
-    })?;
-    made(py, &rendering.map_err(refused)?, None, None)
+    let views = views(&images, &maps, positions, Measure::Disparity)?;
+    let settings = settings(method)?;
+    rendered(py, views, fill, move |views| rectified::render(views, at, &settings))
 }
 
 /// The view of `camera` with `size` (H, W), from images, depths and cameras (3, 4).
@@ -56,15 +49,27 @@ pub(crate) fn render_calibrated<'py>(
     method: &str,
     fill: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (views, settings) = (Views::new(&images, &maps, Measure::Depth, fill)?, settings(method)?);
     let cameras = cameras.iter().map(metric).collect::<PyResult<Vec<_>>>()?;
-    let camera = metric(&camera)?;
-    let rendering = background::run(py, None, move |_| {
-        let view = |((image, depth), &camera): (_, &Camera)| CalibratedView { image, map: depth, camera };
-        let views: Vec<_> = views.both().zip(&cameras).map(view).collect();
-        calibrated::render(&views, &camera, (size.1, size.0), &settings)
-    })?;
-    made(py, &rendering.map_err(refused)?, None, None)
+    let views = views(&images, &maps, cameras, Measure::Depth)?;
+    let (camera, settings) = (metric(&camera)?, settings(method)?);
+    rendered(py, views, fill, move |views| calibrated::render(views, &camera, (size.1, size.0), &settings))
+}
+
+/// The view that `render` makes of views once their depth and colours are restored.
+fn rendered<'py, P: Viewpoint + 'static>(
+    py: Python<'py>,
+    mut views: Vec<SourceView<P>>,
+    fill: bool,
+    render: impl FnOnce(&[View<'_, P>]) -> Result<Rendering, RenderError> + Send + 'static,
+) -> PyResult<Bound<'py, PyAny>> {
+    let run = move |_: &_| match prepare(&mut views, fill) {
+        Ok(_) => {
+            let views: Vec<_> = views.iter().map(SourceView::view).collect();
+            render(&views).map_err(|e| e.to_string())
+        }
+        Err(shortage) => Err(shortage.to_string()),
+    };
+    made(py, &background::run(py, None, run)?.map_err(refused)?, None, None)
 }
 
 fn settings(method: &str) -> PyResult<RenderSettings> {

@@ -1,44 +1,26 @@
 //! Images and maps of arrays.
 
 use crate::errors::refused;
-use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
+use hybank_ibr::depth::{DepthMap, Measure};
 use hybank_ibr::image::Image;
+use hybank_ibr::scene::SourceView;
 use numpy::{PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 
-/// Images with their maps.
-pub(super) struct Views {
-    images: Vec<Image>,
-    maps: Vec<DepthMap>,
-}
-
-impl Views {
-    /// From images (H, W, C) and maps (H, W); with `fill` unknown depth is that of the farther neighbour.
-    pub(super) fn new(
-        images: &[PyReadonlyArray3<'_, f32>],
-        maps: &[PyReadonlyArray2<'_, f32>],
-        measure: Measure,
-        fill: bool,
-    ) -> PyResult<Self> {
-        let map = |array: &PyReadonlyArray2<'_, f32>| {
-            let array = array.as_array();
-            let (height, width) = array.dim();
-            let stored = array.iter().copied().collect();
-            let mut map = DepthMap::new((width, height), stored, 1.0, measure).map_err(refused)?;
-            if fill {
-                fill_unknown(&mut map);
-            }
-            Ok(map)
-        };
-        Ok(Self {
-            images: images.iter().map(image).collect::<PyResult<_>>()?,
-            maps: maps.iter().map(map).collect::<PyResult<_>>()?,
-        })
-    }
-
-    pub(super) fn both(&self) -> impl Iterator<Item = (&Image, &DepthMap)> {
-        self.images.iter().zip(&self.maps)
-    }
+/// Views from images (H, W, C), maps (H, W) and cameras.
+pub(super) fn views<P>(
+    images: &[PyReadonlyArray3<'_, f32>],
+    maps: &[PyReadonlyArray2<'_, f32>],
+    cameras: Vec<P>,
+    measure: Measure,
+) -> PyResult<Vec<SourceView<P>>> {
+    let view = |((array, stored), camera): ((_, &PyReadonlyArray2<'_, f32>), P)| {
+        let stored = stored.as_array();
+        let (height, width) = stored.dim();
+        let map = DepthMap::new((width, height), stored.iter().copied().collect(), 1.0, measure);
+        Ok(SourceView { image: image(array)?, map: map.map_err(refused)?, camera })
+    };
+    images.iter().zip(maps).zip(cameras).map(view).collect()
 }
 
 /// The image of an array (H, W, C).

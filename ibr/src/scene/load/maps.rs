@@ -2,19 +2,15 @@
 
 use super::{Loaded, Loader};
 use crate::camera::Camera;
-use crate::depth::{DepthMap, Measure, fill_unknown};
-use crate::files::{InputError, refuse_pixels_without_memory};
+use crate::depth::{DepthMap, Measure};
+use crate::files::InputError;
 use crate::image::{Image, read_map};
 use crate::matching::{Photograph, depths};
-use crate::partial::densify;
+use crate::partial::placed;
 use crate::propagate::Viewpoint;
 use crate::scene::spec::MapSource;
 use crate::scene::{SourceView, ViewSpec};
 use std::path::Path;
-use std::sync::atomic::Ordering;
-
-/// Bytes per pixel of a view that is being read and made dense.
-pub(super) const LOADING_BYTES: f64 = 110.0;
 
 /// A view whose map, if it is to be found from the photographs, waits for the others.
 pub(super) struct Read<P> {
@@ -62,7 +58,7 @@ impl Loader<'_> {
         Ok(Some(map))
     }
 
-    /// A view with its map made dense; `points` gives that of the points of a model.
+    /// A view with the samples of its map at their pixels; `points` gives that of the points of a model.
     pub(super) fn read<P>(
         &self,
         view: &ViewSpec,
@@ -73,27 +69,18 @@ impl Loader<'_> {
         if MapSource::of(given.map) == MapSource::Points {
             read.map = Some(points(&read.image, &read.camera)?);
         }
-        let dense = read.map.map(|map| self.dense(view, map, &read.image, given.map)).transpose()?;
-        Ok(Read { map: dense, ..read })
+        let map = read.map.map(|map| self.sampled(view, map, &read.image, given.map)).transpose()?;
+        Ok(Read { map, ..read })
     }
 
-    /// A map with a value for every pixel of its image that is wanted.
-    fn dense(&self, view: &ViewSpec, map: DepthMap, image: &Image, file: &Path) -> Loaded<DepthMap> {
-        let path = self.file(file);
-        let bad = |e| InputError::file(&path, format!("{}: {e}", view.named()));
-        let given = view.step.unwrap_or(1);
-        let step = if given == 1 { self.options.depth_step } else { given };
-        if step == 1 && !map.is_scattered() {
-            let mut map = map;
-            if self.options.fill {
-                self.filled.fetch_add(fill_unknown(&mut map), Ordering::Relaxed);
-            }
-            return Ok(map);
-        }
-        refuse_pixels_without_memory(&path, image.size(), LOADING_BYTES)?;
-        let coarse = if given == 1 { map.decimated(step).map_err(bad)? } else { map };
-        self.filled.fetch_add(coarse.unknown(), Ordering::Relaxed);
-        densify(&coarse, step, image).map_err(bad)
+    /// A map of the size of its image, with the samples that are wanted.
+    fn sampled(&self, view: &ViewSpec, map: DepthMap, image: &Image, file: &Path) -> Loaded<DepthMap> {
+        let bad = |e| InputError::file(&self.file(file), format!("{}: {e}", view.named()));
+        Ok(match (view.step.unwrap_or(1), self.options.depth_step) {
+            (1, 1) => map,
+            (1, step) => placed(&map.decimated(step).map_err(bad)?, step, image),
+            (step, _) => placed(&map, step, image),
+        })
     }
 
     /// The views with the maps that are found from the photographs.
@@ -118,7 +105,7 @@ impl Loader<'_> {
                         Some(offset) => map.with_offset(offset).map_err(|e| self.incomplete(e))?,
                         None => map,
                     };
-                    self.dense(view, map, &image, Path::new("matched"))?
+                    self.sampled(view, map, &image, Path::new("matched"))?
                 }
                 (None, None) => return Err(self.incomplete("a view without a map")),
             };

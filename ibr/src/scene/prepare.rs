@@ -1,0 +1,93 @@
+//! What is done to the views of a scene once, before any virtual view is rendered from them.
+
+use super::SourceView;
+use crate::depth::fill_unknown;
+use crate::propagate::Viewpoint;
+use crate::restore::{coloured, from_scattered, restore};
+use hybank::memory::{MemoryShortage, check_memory};
+use rayon::prelude::*;
+
+/// Bytes per pixel of a view that is being read or made dense, at most.
+pub(super) const WORK_BYTES: f64 = 110.0;
+
+/// What was done to views.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Preparation {
+    /// Unknown depths that were filled from their neighbours.
+    pub filled: usize,
+    /// Share of the values of each map that were outliers.
+    pub outliers: Vec<f64>,
+    /// Numbers of the grey views that took the colours of others.
+    pub coloured: Vec<usize>,
+}
+
+/// There is too little memory to prepare views.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "to restore depth and colours from {views} views takes {shortage}; shrink the images or use fewer views"
+)]
+pub struct PreparationError {
+    views: usize,
+    shortage: MemoryShortage,
+}
+
+/// Makes the maps of views dense, restores them ([`restore`]), and gives grey photographs beside coloured
+/// ones their colours ([`coloured`]). With `fill` unknown values of maps most of whose values are known are
+/// filled from their neighbours ([`fill_unknown`]).
+///
+/// # Errors
+/// [`PreparationError`].
+///
+/// ```
+/// use hybank_ibr::depth::{DepthMap, Measure};
+/// use hybank_ibr::image::Image;
+/// use hybank_ibr::scene::{SourceView, prepare};
+/// let mut disparities = vec![4.0; 32 * 24];
+/// disparities[100] = 0.0;
+/// let map = DepthMap::new((32, 24), disparities, 1.0, Measure::Disparity)?;
+/// let mut views = [SourceView { image: Image::filled(32, 24, 1, 9.0), map, camera: 0.0 }];
+/// assert_eq!(prepare(&mut views, true)?.filled, 1);
+/// assert_eq!(views[0].map.data()[100], 4.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn prepare<P: Viewpoint>(
+    views: &mut [SourceView<P>],
+    fill: bool,
+) -> Result<Preparation, PreparationError> {
+    let count = views.len();
+    prepared(views, fill).map_err(|shortage| PreparationError { views: count, shortage })
+}
+
+fn prepared<P: Viewpoint>(views: &mut [SourceView<P>], fill: bool) -> Result<Preparation, MemoryShortage> {
+    make_dense(views, fill)?;
+    let filled = views.iter().map(|view| view.map.guesses()).sum();
+    let restored = restore(&views.iter().map(SourceView::view).collect::<Vec<_>>())?;
+    let outliers = restored.iter().map(|restored| restored.outliers).collect();
+    views.iter_mut().zip(restored).for_each(|(view, restored)| view.map = restored.map);
+    let images = coloured(&views.iter().map(SourceView::view).collect::<Vec<_>>())?;
+    let coloured = (0..views.len()).filter(|view| images[*view].is_some()).collect();
+    let replaced = views.iter_mut().zip(images).filter_map(|(view, image)| Some((view, image?)));
+    replaced.for_each(|(view, image)| view.image = image);
+    Ok(Preparation { filled, outliers, coloured })
+}
+
+/// Gives every pixel of the maps a value where that is wanted; at the same time if there is memory for that.
+fn make_dense<P: Viewpoint>(views: &mut [SourceView<P>], fill: bool) -> Result<(), MemoryShortage> {
+    let dense = |view: &mut SourceView<P>| {
+        if view.map.is_scattered() {
+            let (width, height) = view.map.size();
+            check_memory(WORK_BYTES * width as f64 * height as f64)?;
+            view.map = from_scattered(&view.map, &view.image);
+        } else if fill {
+            fill_unknown(&mut view.map);
+        }
+        Ok(())
+    };
+    let pixels = |view: &SourceView<P>| view.map.data().len() as f64;
+    let most = views.iter().map(pixels).fold(0.0, f64::max);
+    let at_a_time = rayon::current_num_threads().min(views.len()) as f64;
+    match check_memory(WORK_BYTES * most * at_a_time) {
+        Ok(()) => views.par_iter_mut().try_for_each(dense),
+        Err(_) => views.iter_mut().try_for_each(dense),
+    }
+}
