@@ -33,6 +33,8 @@ pub(crate) enum Damage {
     Matched,
     /// What is infinitely far away has this value.
     Sky(f32),
+    /// What is infinitely far away is unknown, and of the rest this share is known.
+    ScatteredSky(f64),
 }
 
 impl Damage {
@@ -48,8 +50,14 @@ impl Damage {
         Self::Lattice,
         Self::Matched,
     ];
-    pub(crate) const OF_SKY: [Self; 4] =
-        [Self::Sky(f32::INFINITY), Self::Sky(1e10), Self::Sky(f32::NAN), Self::Sky(0.0)];
+    pub(crate) const OF_SKY: [Self; 6] = [
+        Self::Sky(f32::INFINITY),
+        Self::Sky(1e10),
+        Self::Sky(f32::NAN),
+        Self::Sky(0.0),
+        Self::Scattered(0.03),
+        Self::ScatteredSky(0.03),
+    ];
 
     pub(crate) fn name(self) -> String {
         match self {
@@ -64,6 +72,7 @@ impl Damage {
             }
             Self::Lattice => "lattice 2.8 %".into(),
             Self::Matched => "matched".into(),
+            Self::ScatteredSky(share) => format!("scattered {} %, nothing in the sky", 100.0 * share),
             Self::Sky(value) => format!("sky as {value:e}"),
         }
     }
@@ -137,6 +146,7 @@ impl Damage {
                 Self::ScatteredOutliers(_, wrong) if uniform(random) < wrong => {
                     *value = low + (high - low) * uniform(random) as f32;
                 }
+                Self::ScatteredSky(share) if value.is_infinite() || uniform(random) >= share => *value = 0.0,
                 Self::Sky(far) if value.is_infinite() => *value = far,
                 _ => {}
             }
