@@ -28,6 +28,8 @@ def render(
 ):
     """Render the view of a virtual camera from views with depth.
 
+    Maps may have outliers, noise and few known values: they are restored as by ``hybank-ibr render``.
+
     A rectified rig has `disparity`, `positions` and `at`; other cameras have `depth`, `cameras` and `camera`; views
     without cameras have `tracks`, and `points` or `at`.
 

@@ -1,5 +1,7 @@
 """Views as arrays: scenes whose every view is known, for rectified, general and unknown cameras."""
 
+import subprocess
+
 import numpy as np
 import pytest
 
@@ -72,6 +74,16 @@ class Square:
         y, x = np.mgrid[: SIZE[0], : SIZE[1]].astype(float)
         return self.seen(x, y)[0]
 
+    def matrix(self):
+        return self.intrinsic @ self.rotation @ np.hstack([np.eye(3), -self.centre[:, None]])
+
+    def depth(self):
+        """Depths along the axis: rays of depth one reach the planes after that many of their own lengths."""
+        y, x = np.mgrid[: SIZE[0], : SIZE[1]].astype(float)
+        ray = np.linalg.solve(self.intrinsic @ self.rotation, np.stack([x, y, np.ones_like(x)]).reshape(3, -1))
+        plane = np.where(self.seen(x, y)[1].ravel(), NEAR, FAR)
+        return ((plane - self.centre[2]) / ray[2]).reshape(x.shape)
+
     def positions(self, points):
         """Positions of points (P, 3), NaN where they are hidden or outside."""
         p = (points - self.centre) @ (self.intrinsic @ self.rotation).T
@@ -124,6 +136,62 @@ def test_an_undecided_order_of_depth_is_a_warning():
     with pytest.warns(UserWarning, match="reverse_order=True") as caught:
         view = hb.ibr.render([np.full(SIZE, 9.0)] * 2, tracks=tracks, points=tracks[:, 0])
     assert caught[0].filename == __file__ and view.geometry.order_by == "nothing"
+
+
+@pytest.fixture(scope="module")
+def ibr(binary):
+    """The program hybank-ibr, beside the other one."""
+    found = binary.with_name(f"hybank-ibr{binary.suffix}")
+    if not found.exists():
+        pytest.skip("no hybank-ibr binary: cargo build")
+    return found
+
+
+def by_the_program(ibr, folder, images, name, maps, keys, virtual):
+    """The view that the program renders of the same arrays."""
+    scene = ""
+    for k, (image, map_, key) in enumerate(zip(images, maps, keys, strict=True)):
+        header = f"P5 {image.shape[1]} {image.shape[0]} 255\n".encode()
+        (folder / f"{k}.pgm").write_bytes(header + image.astype(np.uint8).tobytes())
+        np.save(folder / f"{k}.npy", map_.astype(np.float32))
+        scene += f'[[view]]\nimage = "{k}.pgm"\n{name} = "{k}.npy"\n{key}\n'
+    (folder / "scene.toml").write_text(f"{scene}[virtual]\n{virtual}\n")
+    view = folder / "view.pfm"
+    subprocess.run([ibr, "render", folder / "scene.toml", "-o", view], check=True, capture_output=True)
+    _, size, _, values = view.read_bytes().split(b"\n", 3)
+    width, height = map(int, size.split())
+    return 255 * np.frombuffer(values, "<f4").reshape(height, width)[::-1]
+
+
+@pytest.mark.parametrize("damage", ["outliers", "scattered"])
+def test_damaged_depth_is_restored_as_by_the_program(ibr, tmp_path, damage):
+    """5 % outliers, or 3 % of the depths: what the program makes of them, within a millionth of white."""
+    random = np.random.default_rng(4)
+    cameras = [Square(-0.5, 0.02), Square(0.5, -0.03)]
+    images = [np.round(camera.image()) for camera in cameras]
+    truth = Square(0.05, 0.0)
+
+    def damaged(map_):
+        chosen = random.uniform(size=map_.shape)
+        wild = random.uniform(map_.min(), map_.max(), map_.shape)
+        return np.where(chosen < 0.05, wild, map_) if damage == "outliers" else np.where(chosen < 0.03, map_, 0)
+
+    depth = [damaged(camera.depth()).astype(np.float32) for camera in cameras]
+    key = lambda camera: f"camera = {camera.matrix().tolist()}"  # noqa: E731
+    program = by_the_program(ibr, tmp_path, images, "depth", depth, map(key, cameras), key(truth))
+    matrices = [camera.matrix() for camera in cameras]
+    view = hb.ibr.render(images, depth=depth, cameras=matrices, camera=truth.matrix())
+    np.testing.assert_allclose(view.image, program, atol=255e-6)
+    assert np.sqrt(np.mean((view.image - truth.image())[view.mask == 0] ** 2)) < 12
+    # A rig of the same pattern: disparities on two planes.
+    y, x = np.mgrid[:H, :W]
+    disparity = [damaged(np.where((x > 12 - shift) & (x < 26 - shift) & (y > 6), 8.0, 3.0)) for shift in (0, 8)]
+    images = [np.round(seen(0.0)), np.round(seen(3.0))]
+    keys, folder = ["position = 0.0", "position = 1.0"], tmp_path / "rig"
+    folder.mkdir()
+    program = by_the_program(ibr, folder, images, "disparity", disparity, keys, "position = 0.5")
+    view = hb.ibr.render(images, disparity=disparity, positions=[0, 1], at=0.5)
+    np.testing.assert_allclose(view.image, program, atol=255e-6)
 
 
 def test_what_does_not_fit_is_refused():

@@ -35,6 +35,8 @@ pub(crate) enum Damage {
     Sky(f32),
     /// Red, green and blue of the second photograph have these factors.
     Exposure([f64; 3]),
+    /// What is infinitely far away is unknown, and of the rest this share is known.
+    ScatteredSky(f64),
 }
 
 impl Damage {
@@ -54,8 +56,14 @@ impl Damage {
         Self::Exposure([0.98; 3]),
         Self::Exposure([0.9, 1.0, 1.1]),
     ];
-    pub(crate) const OF_SKY: [Self; 4] =
-        [Self::Sky(f32::INFINITY), Self::Sky(1e10), Self::Sky(f32::NAN), Self::Sky(0.0)];
+    pub(crate) const OF_SKY: [Self; 6] = [
+        Self::Sky(f32::INFINITY),
+        Self::Sky(1e10),
+        Self::Sky(f32::NAN),
+        Self::Sky(0.0),
+        Self::Scattered(0.03),
+        Self::ScatteredSky(0.03),
+    ];
 
     pub(crate) fn name(self) -> String {
         match self {
@@ -70,6 +78,7 @@ impl Damage {
             }
             Self::Lattice => "lattice 2.8 %".into(),
             Self::Matched => "matched".into(),
+            Self::ScatteredSky(share) => format!("scattered {} %, nothing in the sky", 100.0 * share),
             Self::Sky(value) => format!("sky as {value:e}"),
             Self::Exposure(gains) => format!("exposure {gains:?}"),
         }
@@ -147,6 +156,7 @@ impl Damage {
                 Self::ScatteredOutliers(_, wrong) if uniform(random) < wrong => {
                     *value = low + (high - low) * uniform(random) as f32;
                 }
+                Self::ScatteredSky(share) if value.is_infinite() || uniform(random) >= share => *value = 0.0,
                 Self::Sky(far) if value.is_infinite() => *value = far,
                 _ => {}
             }

@@ -12,9 +12,11 @@
 
 mod colour;
 mod outliers;
+mod scattered;
 mod surface;
 
 pub use colour::coloured;
+pub(crate) use scattered::dense;
 pub(crate) use surface::from_scattered;
 
 use crate::depth::{DepthMap, Measure};
@@ -22,7 +24,7 @@ use crate::interpolate::plane::surface_memory;
 use crate::pipeline::Agreement;
 use crate::propagate::{View, Viewpoint, nearest};
 use hybank::memory::{MemoryShortage, check_memory};
-use outliers::{Parallax, RING};
+use outliers::Parallax;
 
 /// A map that was restored.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,7 +96,7 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, Mem
     let voters = outliers::voters(&agreement.groups());
     let one = |i: usize| {
         let view = &views[i];
-        let rejected = outliers::rejected(views, &planes, &agreement.gains, &voters[i], i, RING);
+        let rejected = outliers::rejected(views, &planes, &agreement.gains, &voters[i], i);
         let count = rejected.iter().filter(|r| **r).count();
         let mut plane = planes[i].clone();
         let mut guessed = Vec::new();

@@ -20,7 +20,7 @@ const SUPPORTERS: usize = 2;
 const RING_SUPPORTERS: usize = 3;
 
 /// Radius of the ring in pixels: a cluster may be as large.
-pub(super) const RING: usize = 8;
+const RING: usize = 8;
 
 /// Other views that vote on a value, at most: evenly chosen ones of more.
 const VOTERS: usize = 8;
@@ -30,6 +30,28 @@ const LEAST_LIKENESS: f32 = 1e-6;
 
 /// Radius of the medians.
 const RADIUS: usize = 2;
+
+/// What a view says of a point of another one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Vote {
+    /// It is there, on a surface.
+    Surface,
+    /// It is there, where a surface ends.
+    Outline,
+    Nothing,
+    /// What is seen there lies behind it.
+    Through,
+}
+
+impl Vote {
+    fn is_confirming(self) -> bool {
+        matches!(self, Self::Surface | Self::Outline)
+    }
+
+    fn count(self) -> i32 {
+        i32::from(self.is_confirming()) - i32::from(self == Self::Through)
+    }
+}
 
 /// A map in parallax.
 #[derive(Debug, Clone)]
@@ -106,6 +128,25 @@ impl Parallax {
         self.ring(pixel, distance).filter(|q| self.agree(here, self.values[*q])).take(least).count() == least
     }
 
+    /// Whether few values on the ring agree with one that no other view confirms, and one shows a surface there
+    /// at the median of the ring.
+    pub(super) fn is_in_cluster<P>(
+        &self,
+        view: &View<'_, P>,
+        pixel: usize,
+        ring: usize,
+        votes: impl Fn(usize, f32) -> Vec<Vote>,
+    ) -> bool {
+        if self.is_supported(pixel, ring, RING_SUPPORTERS) {
+            return false;
+        }
+        let around = self.median_of(view.image, pixel, self.ring(pixel, ring));
+        !around.is_nan()
+            && !self.agree(around, self.values[pixel])
+            && !votes(pixel, view.map.data()[pixel]).into_iter().any(Vote::is_confirming)
+            && votes(pixel, view.map.measure().of_parallax(around)).contains(&Vote::Surface)
+    }
+
     /// The pixel at a position whose surface has this parallax.
     pub(super) fn showing(&self, at: [f64; 2], there: f32) -> Option<usize> {
         self.pixels_at(at).find(|q| self.agree(there, self.values[*q]))
@@ -170,48 +211,52 @@ pub(super) fn difference(a: [f32; 3], b: [f32; 3]) -> f32 {
 }
 
 /// Which values of a view are outliers: few neighbours agree with them, and not more of the other views
-/// confirm them than see through them; or few values on the ring agree with them, no other view confirms
-/// them, and one confirms the median of the ring.
+/// confirm them than see through them; or they lie in a cluster of outliers.
 pub(super) fn rejected<P: Viewpoint>(
     views: &[View<'_, P>],
     planes: &[Parallax],
     gains: &[Exposure],
     voters: &[usize],
     index: usize,
-    ring: usize,
 ) -> Vec<bool> {
     let (view, plane) = (&views[index], &planes[index]);
-    let measure = view.map.measure();
-    let colour = |view: usize, p: usize| -> [f32; 3] {
-        let colour = views[view].image.pixel::<3>(p);
-        std::array::from_fn(|c| colour[c] * gains[view][c] as f32)
-    };
-    let maps: Vec<_> = voters.iter().map(|other| view.camera.map_to(&views[*other].camera)).collect();
-    let votes = |p: usize, value: f32| {
-        voters.iter().zip(&maps).map(move |(other, map)| {
-            let (x, y) = ((p % plane.width) as f64, (p / plane.width) as f64);
-            let (u, v, depth) = map(x, y, f64::from(value));
-            let there = measure.parallax(depth as f32);
-            vote(&planes[*other], [u, v], there, |q| difference(colour(index, p), colour(*other, q)))
-        })
-    };
-    let is_confirmed = |p: usize, value: f32| votes(p, value).any(|vote| vote == 1);
-    let is_in_cluster = |p: usize, value: f32| {
-        let around = plane.median_of(view.image, p, plane.ring(p, ring));
-        let is_other = !around.is_nan() && !plane.agree(around, plane.values[p]);
-        is_other && !is_confirmed(p, value) && is_confirmed(p, measure.of_parallax(around))
-    };
+    let votes = ballot(views, planes, gains, voters, index);
     let is_outlier = |p: usize| {
         let value = view.map.data()[p];
         if value.is_nan() || view.map.is_guessed(p) {
             return false;
         }
         match plane.is_supported(p, 1, SUPPORTERS) {
-            false => votes(p, value).sum::<i32>() <= 0,
-            true => !plane.is_supported(p, ring, RING_SUPPORTERS) && is_in_cluster(p, value),
+            true => plane.is_in_cluster(view, p, RING, &votes),
+            false => votes(p, value).into_iter().map(Vote::count).sum::<i32>() <= 0,
         }
     };
     (0..plane.values.len()).into_par_iter().with_min_len(1024).map(is_outlier).collect()
+}
+
+/// The votes of views on values of another one.
+pub(super) fn ballot<P: Viewpoint>(
+    views: &[View<'_, P>],
+    planes: &[Parallax],
+    gains: &[Exposure],
+    voters: &[usize],
+    index: usize,
+) -> impl Fn(usize, f32) -> Vec<Vote> + Sync {
+    let view = &views[index];
+    let (width, measure) = (view.map.width(), view.map.measure());
+    let colour = move |view: usize, p: usize| -> [f32; 3] {
+        let colour = views[view].image.pixel::<3>(p);
+        std::array::from_fn(|c| colour[c] * gains[view][c] as f32)
+    };
+    let maps: Vec<_> = voters.iter().map(|other| view.camera.map_to(&views[*other].camera)).collect();
+    move |p, value| {
+        let votes = voters.iter().zip(&maps).map(|(other, map)| {
+            let (u, v, depth) = map((p % width) as f64, (p / width) as f64, f64::from(value));
+            let there = measure.parallax(depth as f32);
+            vote(&planes[*other], [u, v], there, |q| difference(colour(index, p), colour(*other, q)))
+        });
+        votes.collect()
+    }
 }
 
 /// The views that vote on values of each: those that agree with it, or all if none does; evenly chosen ones
@@ -230,19 +275,21 @@ pub(super) fn voters(groups: &[usize]) -> Vec<Vec<usize>> {
     all.iter().map(of).collect()
 }
 
-/// 1 if a view confirms a point at a position with a parallax, by a pixel of a surface there that has nearly
-/// its colour; -1 if it sees through the point; 0 if something hides it, or it falls outside.
-fn vote(plane: &Parallax, at: [f64; 2], there: f32, colour: impl Fn(usize) -> f32) -> i32 {
-    let (mut is_inside, mut is_seen_through) = (false, true);
+/// What a view says of a point at a position with a parallax: it confirms it by a pixel of a surface there
+/// that has nearly its colour, or sees through it; nothing if something hides it, or it falls outside.
+fn vote(plane: &Parallax, at: [f64; 2], there: f32, colour: impl Fn(usize) -> f32) -> Vote {
+    let (mut is_inside, mut is_on_surface, mut is_alike, mut is_seen_through) = (false, true, false, true);
     for q in plane.pixels_at(at) {
+        let agrees = plane.agree(there, plane.values[q]);
         is_inside = true;
-        if plane.agree(there, plane.values[q]) {
-            if colour(q) <= GREY_LEVELS {
-                return 1;
-            }
-            is_seen_through = false;
-        }
-        is_seen_through &= plane.values[q] < there;
+        is_on_surface &= agrees;
+        is_alike |= agrees && colour(q) <= GREY_LEVELS;
+        is_seen_through &= !agrees && plane.values[q] < there;
     }
-    -i32::from(is_inside && is_seen_through)
+    match (is_alike, is_on_surface, is_inside && is_seen_through) {
+        (true, true, _) => Vote::Surface,
+        (true, false, _) => Vote::Outline,
+        (false, _, true) => Vote::Through,
+        _ => Vote::Nothing,
+    }
 }

@@ -96,6 +96,12 @@ const SCATTERED: PlaneSettings =
 /// The share of its parallax by which a value may differ from its neighbour on the same surface.
 const SCATTERED_SLOPE: f64 = 0.015;
 
+/// Lengths of paths from which on a value is a guess, in lower quartiles of these lengths: a quarter of the
+/// image has samples about it even where a sky has none. In a photograph of one colour with samples at random
+/// these are three mean distances of samples, and one pixel in 10^12 is farther away. On the scenes of the
+/// example `damaged_depth` it is one in 500.
+const FAR: f32 = 10.0;
+
 /// Depths for all pixels from those of a few.
 ///
 /// At first each pixel takes the value of the nearest sample, by the length of a path on which differences
@@ -103,19 +109,30 @@ const SCATTERED_SLOPE: f64 = 0.015;
 pub(crate) fn from_scattered(map: &DepthMap, image: &Image) -> DepthMap {
     let (width, measure) = (image.width(), map.measure());
     let values: Vec<f32> = map.data().iter().map(|v| measure.parallax(*v)).collect();
-    let mut shape = nearest(&values, image);
+    let (found, lengths) = nearest(&values, image);
+    let mut shape: Vec<f32> = found.iter().map(|q| values[*q as usize]).collect();
     let depth_test = DepthTest { relative: SCATTERED_SLOPE, ..DepthTest::default() };
     let settings = Settings { plane: SCATTERED, depth_test, ..Settings::default() };
     for _ in 0..2 {
         shape = fit_surface(&values, &shape, width, &settings);
     }
-    map.with_values(map.size(), shape.into_iter().map(|v| measure.of_parallax(v)).collect())
+    let dense = map.with_values(map.size(), shape.into_iter().map(|v| measure.of_parallax(v)).collect());
+    dense.with_guessed(map, &far_away(&lengths))
 }
 
-/// The value of the nearest sample of each pixel.
-fn nearest(values: &[f32], image: &Image) -> Vec<f32> {
+/// Which pixels are so far from all samples, by the lengths of their paths, that their values are guesses.
+fn far_away(lengths: &[f32]) -> Vec<bool> {
+    let mut sorted = lengths.to_vec();
+    let quartile = *sorted.select_nth_unstable_by(lengths.len() / 4, f32::total_cmp).1;
+    // Where every pixel is a sample, nothing is far.
+    let limit = FAR * quartile.max(1.0);
+    lengths.iter().map(|length| *length > limit).collect()
+}
+
+/// The nearest sample of each pixel, and the length of the path to it.
+pub(super) fn nearest(values: &[f32], image: &Image) -> (Vec<u32>, Vec<f32>) {
     let (width, height) = image.size();
-    let mut found = values.to_vec();
+    let mut found: Vec<u32> = (0..values.len() as u32).collect();
     let mut length: Vec<f32> = values.iter().map(|v| if v.is_nan() { f32::INFINITY } else { 0.0 }).collect();
     let steps: [(isize, isize); 4] = [(-1, 0), (-1, -1), (0, -1), (1, -1)];
     for sweep in 0..SWEEPS {
@@ -137,5 +154,5 @@ fn nearest(values: &[f32], image: &Image) -> Vec<f32> {
             }
         }
     }
-    found
+    (found, length)
 }

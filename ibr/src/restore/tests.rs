@@ -70,6 +70,79 @@ fn outliers_are_found_and_replaced() {
     }
 }
 
+/// Discs of wrong values, nearer and farther than what is there. Each value has neighbours that agree with it.
+#[test]
+fn clusters_of_outliers_are_found() {
+    let shots = shots();
+    let maps = [0, 1].map(|i| {
+        let dice = &mut Dice::new(31 + i as u64);
+        let mut data = shots[i].disparity.data().to_vec();
+        for _ in 0..40 {
+            let (x, y) = (dice.within(4.0, 236.0) as usize, dice.within(4.0, 176.0) as usize);
+            let wrong = dice.within(6.0, 28.0) as f32;
+            let inside = |dx: usize, dy: usize| dx.abs_diff(3).pow(2) + dy.abs_diff(3).pow(2) <= 9;
+            for (dx, dy) in (0..49).map(|k| (k % 7, k / 7)).filter(|(dx, dy)| inside(*dx, *dy)) {
+                data[(y + dy - 3) * SIZE.0 + x + dx - 3] = wrong;
+            }
+        }
+        DepthMap::new(SIZE, data, 1.0, Measure::Disparity).unwrap()
+    });
+    for (i, restored) in restored(&shots, &maps).iter().enumerate() {
+        let [before, left] = [&maps[i], &restored.map].map(|map| error(map, &shots[i].disparity));
+        println!("{before:.3}, left {left:.3}, {:.3} rejected", restored.outliers);
+        assert!(left < before / 4.0, "{before} {left}");
+    }
+}
+
+/// Of 3 % of the disparities a twentieth is wrong.
+#[test]
+fn wrong_samples_are_left_out_of_dense_maps() {
+    let shots = shots();
+    let sampled = |share: f64| {
+        let maps = [0, 1].map(|i| {
+            changed(&shots[i].disparity, 40 + i as u64, |v, dice| {
+                let (chosen, is_wrong) = (dice.within(0.0, 1.0) < 0.03, dice.within(0.0, 1.0) < share);
+                let wrong = dice.within(6.0, 28.0) as f32;
+                if !chosen {
+                    f32::NAN
+                } else if is_wrong {
+                    wrong
+                } else {
+                    v
+                }
+            })
+        });
+        let view = |i: usize| View { image: &shots[i].image, map: &maps[i], camera: i as f64 };
+        let dense = dense(&[view(0), view(1)]).unwrap().into_iter().flatten().collect::<Vec<_>>();
+        [0, 1].map(|i| error(&dense[i], &shots[i].disparity))
+    };
+    let (right, some_wrong) = (sampled(0.0), sampled(0.05));
+    println!("{right:.3?} {some_wrong:.3?}");
+    assert!(
+        right.iter().zip(some_wrong).all(|(right, wrong)| wrong < 1.5 * right),
+        "{right:?} {some_wrong:?}"
+    );
+}
+
+/// Samples in the left half only: what lies farther to the right is a guess.
+#[test]
+fn depths_far_from_samples_are_guesses() {
+    let shots = shots();
+    let map =
+        changed(&shots[0].disparity, 50, |v, dice| if dice.within(0.0, 1.0) < 0.04 { v } else { f32::NAN });
+    let is_left = |p: usize| p % SIZE.0 < 120;
+    let data = map.data().iter().enumerate().map(|(p, v)| if is_left(p) { *v } else { f32::NAN });
+    let half = DepthMap::new(SIZE, data.collect(), 1.0, Measure::Disparity).unwrap();
+    let guessed = |map: &DepthMap, from: usize, to: usize| {
+        let view = View { image: &shots[0].image, map, camera: 0.0 };
+        let dense = dense(&[view]).unwrap().remove(0).unwrap();
+        let pixels = || (0..SIZE.0 * SIZE.1).filter(|p| (from..to).contains(&(p % SIZE.0)));
+        pixels().filter(|p| dense.is_guessed(*p)).count() as f64 / pixels().count() as f64
+    };
+    let found = [guessed(&half, 0, 115), guessed(&half, 160, 240), guessed(&map, 0, 240)];
+    assert!(found[0] < 0.01 && found[1] > 0.99 && found[2] < 0.01, "{found:?}");
+}
+
 /// The same by reciprocal depths of general cameras.
 #[test]
 fn outliers_of_depths_are_found() {

@@ -13,7 +13,7 @@ mod uncalibrated;
 pub use complete::complete;
 pub use goals::MOST_FRAMES;
 
-use super::prepare::{Preparation, WORK_BYTES, prepare};
+use super::prepare::{LOADING_BYTES, Preparation, prepare};
 use super::spec::{KEYS, SceneSpec, ViewSpec};
 use super::{Kind, Scene};
 use crate::camera::middlebury::Calibration;
@@ -233,6 +233,9 @@ fn note_of_grey(views: &[usize]) -> Option<String> {
     })
 }
 
+/// Bytes per pixel of a view that is being read, at most.
+const LOADING_BYTES: f64 = 110.0;
+
 /// Bytes per pixel of a view that is there.
 const VIEW_BYTES: f64 = 20.0;
 
@@ -260,7 +263,7 @@ fn each<V: Sync, T: Send>(
     };
     let first = read(first)?;
     let at_a_time = rayon::current_num_threads().min(others.len()) as f64;
-    let bytes = pixels(&first) as f64 * (VIEW_BYTES * others.len() as f64 + WORK_BYTES * at_a_time);
+    let bytes = pixels(&first) as f64 * (VIEW_BYTES * others.len() as f64 + LOADING_BYTES * at_a_time);
     let read: Vec<Loaded<T>> = match check_memory(bytes) {
         Ok(()) => others.par_iter().map(read).collect(),
         Err(_) => others.iter().map(read).collect(),

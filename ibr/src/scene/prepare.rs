@@ -3,12 +3,9 @@
 use super::SourceView;
 use crate::depth::fill_unknown;
 use crate::propagate::Viewpoint;
-use crate::restore::{coloured, from_scattered, restore};
-use hybank::memory::{MemoryShortage, check_memory};
+use crate::restore::{coloured, dense, restore};
+use hybank::memory::MemoryShortage;
 use rayon::prelude::*;
-
-/// Bytes per pixel of a view that is being read or made dense, at most.
-pub(super) const WORK_BYTES: f64 = 110.0;
 
 /// What was done to views.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -71,23 +68,14 @@ fn prepared<P: Viewpoint>(views: &mut [SourceView<P>], fill: bool) -> Result<Pre
     Ok(Preparation { filled, outliers, coloured })
 }
 
-/// Gives every pixel of the maps a value where that is wanted; at the same time if there is memory for that.
+/// Gives every pixel of the maps a value where that is wanted.
 fn make_dense<P: Viewpoint>(views: &mut [SourceView<P>], fill: bool) -> Result<(), MemoryShortage> {
-    let dense = |view: &mut SourceView<P>| {
-        if view.map.is_scattered() {
-            let (width, height) = view.map.size();
-            check_memory(WORK_BYTES * width as f64 * height as f64)?;
-            view.map = from_scattered(&view.map, &view.image);
-        } else if fill {
-            fill_unknown(&mut view.map);
-        }
-        Ok(())
-    };
-    let pixels = |view: &SourceView<P>| view.map.data().len() as f64;
-    let most = views.iter().map(pixels).fold(0.0, f64::max);
-    let at_a_time = rayon::current_num_threads().min(views.len()) as f64;
-    match check_memory(WORK_BYTES * most * at_a_time) {
-        Ok(()) => views.par_iter_mut().try_for_each(dense),
-        Err(_) => views.iter_mut().try_for_each(dense),
+    if fill {
+        let full = views.par_iter_mut().filter(|view| !view.map.is_scattered());
+        full.for_each(|view| _ = fill_unknown(&mut view.map));
     }
+    let found = dense(&views.iter().map(SourceView::view).collect::<Vec<_>>())?;
+    let scattered = views.iter_mut().zip(found).filter_map(|(view, map)| Some((view, map?)));
+    scattered.for_each(|(view, map)| view.map = map);
+    Ok(())
 }
