@@ -255,7 +255,8 @@ def _fuse_frame(bank, frame, keywords):
     """A DataFrame with a column for each channel becomes a Series with its index at the fast rate."""
     pandas = sys.modules["pandas"]
     full_output = keywords.pop("full_output")
-    y, report = bank.fuse(frame.to_numpy(), axis=0, full_output=True, **keywords)
+    found = bank.fuse(frame.to_numpy(), axis=0, full_output=full_output, **keywords)
+    y, report = found if full_output else (found, None)
     if isinstance(frame.index, pandas.PeriodIndex):
         raise HybankError("an index of periods cannot be divided; convert it with to_timestamp()")
     name = frame.name if isinstance(frame, pandas.Series) else None
