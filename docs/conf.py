@@ -27,6 +27,8 @@ myst_heading_anchors = 3
 suppress_warnings = ["myst.header", "misc.highlighting_failure"]
 
 autodoc_member_order = "bysource"
+# It belongs to the Python of its own package manager.
+autodoc_mock_imports = ["gnuradio"]
 numpydoc_show_class_members = False
 
 html_theme = "furo"

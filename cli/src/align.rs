@@ -1,7 +1,7 @@
 //! `hybank align`: when recordings began, how their clocks drift, their polarities and gains.
 
 use super::bank_file::{parse_spec, read_kind};
-use super::calibrate::{check_rate, records, reference};
+use super::calibrate::{records, reference};
 use super::calibrate_report::{Interval, interval, periods, shown};
 use super::capture_args::{CaptureArgs, check_stdin};
 use super::capture_file::start;
@@ -13,6 +13,7 @@ use hybank::calibrate::{CalibrateError, Record};
 use hybank::figures::Alone;
 use hybank::io::{Container, PcmFormat, ReadOptions, StreamHeader, is_same_rate};
 use hybank::messages::{Number, Quoted};
+use hybank::pipeline::matching::check_rate;
 use hybank::quantity::{self, Time};
 use hybank::sine_fit::Estimate;
 use hybank::spec::{DesignOverrides, Spec};
@@ -146,7 +147,7 @@ impl Args {
         for path in &self.captures {
             let mut reader = start(std::slice::from_ref(path), options, interrupts())?;
             self.reading.scale.check(&reader)?;
-            check_rate(spec, &reader)?;
+            check_rate(spec, &reader).map_err(Failure::input)?;
             let Some((_, header)) = reader.headers().next() else { continue };
             let (rate, error) = (rate_of(header, spec), header.rate_error);
             let first: f64 = *common.get_or_insert(rate);

@@ -3,7 +3,7 @@
 use super::bank_file::{bad_flag, parse_spec, read_kind};
 use super::calibrate_report::Report;
 use super::capture_args::{CaptureArgs, InterleavedArgs, check_stdin};
-use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, rails_of, start, unread};
+use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, start, unread};
 use super::file_kind::FileKind;
 use super::interrupt::interrupts;
 use super::measure::{ToneArg, tone, tones};
@@ -13,8 +13,9 @@ use hybank::calibrate::{
     Acquisition, CalibrateError, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning,
     applied, calibrate_pooled,
 };
-use hybank::io::{MultiReader, OfflineSamples, WORK_BYTES};
-use hybank::messages::{Number, Quoted};
+use hybank::io::{MultiReader, OfflineSamples, WORK_BYTES, rails_of};
+use hybank::messages::Quoted;
+use hybank::pipeline::matching::check_rate;
 use hybank::spec::{DesignOverrides, Spec};
 use hybank::units::FastPeriods;
 use std::path::{Path, PathBuf};
@@ -232,7 +233,7 @@ impl Args {
         let mut reader = start(paths, captures, interrupts())?;
         self.reading.scale.check(&reader)?;
         check_channels(spec, &reader)?;
-        check_rate(spec, &reader)?;
+        check_rate(spec, &reader).map_err(Failure::input)?;
         let name = reader.headers().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
         let mut records = records(&mut reader, most, WORK_BYTES, self.clip, warnings)?;
         if !layout.is_plain() {
@@ -290,24 +291,6 @@ fn check_channels(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
          one of {wanted} channels, or one in which the converters take turns and --interleaved {wanted}",
         Quoted(names.join(", "))
     )))
-}
-
-/// The captures have the slow rate of the spec, as far as they state it; any for a spec in normalised time.
-pub(super) fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
-    let frames = (spec.fast_period * spec.ratio as f64).rate().0;
-    let wrong = reader.headers().zip(reader.samples_per_frame()).find_map(|((name, header), samples)| {
-        let wanted = frames * samples as f64;
-        Some((name, header.other_rate(wanted)?, wanted))
-    });
-    match wrong {
-        Some((name, rate, wanted)) if !spec.is_normalised() => Err(Failure::Input(format!(
-            "{}: the sample rate is {} Hz, but the spec says {} Hz; record at that rate or correct the spec",
-            Quoted(name),
-            Number(rate),
-            Number(wanted)
-        ))),
-        _ => Ok(()),
-    }
 }
 
 /// The reference channel, from 0: the `given` one, from 1, or that of the spec, or the first.

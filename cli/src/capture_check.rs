@@ -2,7 +2,7 @@
 
 use super::event::{Event, Events};
 use hybank::bank::Bank;
-use hybank::calibrate::{Agreement, ENOUGH_FRAMES, Record, agreement, frames_for_agreement};
+use hybank::calibrate::{ENOUGH_FRAMES, Record, agreement, comparable, frames_for_agreement};
 use hybank::io::PcmFrames;
 use hybank::runtime::{Frames, Input, Isa};
 use hybank::spec::Spec;
@@ -28,7 +28,7 @@ pub(super) struct CaptureCheck {
 
 enum State {
     /// Nothing to compare with, for this reason, or done.
-    Idle(&'static str),
+    Idle(String),
     Collecting {
         spec: Box<Spec>,
         samples: Vec<Vec<f64>>,
@@ -40,19 +40,15 @@ enum State {
 const UNJUDGED: &str = "the captures were not compared with the spec";
 
 impl CaptureCheck {
-    /// For the spec that `bank` carries, if it does, and if the samples are `comparable`. With `events`
+    /// For the spec that `bank` carries, if it does, and if the samples are steady. With `events`
     /// warnings are reported as soon as they are known, after fewer frames, else at the end of the run.
-    pub(super) fn new(bank: &Bank, comparable: bool, events: Option<Events>) -> Self {
+    pub(super) fn new(bank: &Bank, is_steady: bool, events: Option<Events>) -> Self {
         let channels = bank.channel_count();
-        let state = match bank.spec.clone() {
-            _ if !comparable => State::Idle(
-                "captures are not compared with the spec where they are complex or their delays are followed",
-            ),
-            _ if !bank.layout().is_plain() => {
-                State::Idle("captures of converters with rates of their own are not compared with the spec")
+        let state = match comparable(bank.spec.as_ref(), is_steady) {
+            Err(reason) => State::Idle(reason.to_string()),
+            Ok(spec) => {
+                State::Collecting { spec: Box::new(spec.clone()), samples: vec![Vec::new(); channels] }
             }
-            None => State::Idle("the bank carries no spec with which the captures could be compared"),
-            Some(spec) => State::Collecting { spec: Box::new(spec), samples: vec![Vec::new(); channels] },
         };
         let frames = frames_for_agreement(channels);
         let frames = if events.is_some() { frames.min(ENOUGH_FRAMES) } else { frames };
@@ -75,7 +71,7 @@ impl CaptureCheck {
     }
 
     fn judge(&mut self) {
-        let (spec, samples) = match std::mem::replace(&mut self.state, State::Idle(UNJUDGED)) {
+        let (spec, samples) = match std::mem::replace(&mut self.state, State::Idle(UNJUDGED.to_owned())) {
             State::Collecting { spec, samples } => (spec, samples),
             other => {
                 self.state = other;
@@ -99,23 +95,18 @@ impl CaptureCheck {
     /// What was found, in short runs too.
     pub(super) fn finish(mut self) -> Checked {
         self.judge();
-        let idle = |reason: &str| Checked { verdict: reason.to_owned(), ..Checked::default() };
+        let idle = |verdict| Checked { verdict, ..Checked::default() };
         match self.state {
-            State::Judging(thread) => thread.join().unwrap_or_else(|_| idle(UNJUDGED)),
+            State::Judging(thread) => thread.join().unwrap_or_else(|_| idle(UNJUDGED.to_owned())),
             State::Idle(reason) => idle(reason),
-            State::Collecting { .. } => idle(UNJUDGED),
+            State::Collecting { .. } => idle(UNJUDGED.to_owned()),
         }
     }
 }
 
 fn judged(spec: &Spec, samples: Vec<Vec<f64>>) -> Checked {
     let records: Vec<Record> = samples.into_iter().map(Record::new).collect();
-    let Agreement { contradictions, verdict } = agreement(spec, &records);
-    let warnings: Vec<String> = contradictions.iter().map(ToString::to_string).collect();
-    let verdict = match warnings.len() {
-        0 => verdict.to_string(),
-        1 => "the captures do not agree with the spec of the bank, see the warning".to_owned(),
-        count => format!("the captures do not agree with the spec of the bank, see the {count} warnings"),
-    };
-    Checked { warnings, verdict }
+    let found = agreement(spec, &records);
+    let warnings = found.contradictions.iter().map(ToString::to_string).collect();
+    Checked { warnings, verdict: found.summary() }
 }

@@ -1,14 +1,14 @@
 //! `hybank measure`: the quality of a recording.
 
 use super::capture_args::{CaptureArgs, check_stdin};
-use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, rails_of};
+use super::capture_file::{CaptureFile, MOST_MEASURED, Reading};
 use super::plot::write_picture;
 use super::print::{Failure, InFile, failed_at, is_dash, name, show, warn};
 use super::written::check_output;
-use hybank::io::is_same_rate;
+use hybank::io::{is_same_rate, rails_of};
 use hybank::measure::{
-    Comparison, Imbalance, MeasureError, Measurement, Quadrature, Settings, Spur, Window, compare, measure,
-    measure_complex,
+    Comparison, Imbalance, MeasureError, Measurement, Quadrature, Settings, Spur, Warning, Window, compare,
+    measure, measure_complex,
 };
 use hybank::messages::Quoted;
 use hybank::overview::{Drawn, Figure, causes, column, spur_chart};
@@ -218,33 +218,11 @@ struct ReferenceReport {
 
 /// What the user should know beside the figures.
 fn warnings(measured: &Measurement) -> Vec<String> {
-    let mut warnings = Vec::new();
-    if measured.clipped > 0 {
-        warnings.push(format!(
-            "{} of {} samples are at the limits of the range; SINAD and THD contain their distortion, so lower the level if it is not meant",
-            measured.clipped, measured.samples
-        ));
-    }
-    if measured.left_out > 0 {
-        warnings.push(format!(
-            "{} of {} samples are NaN or infinite and were left out",
-            measured.left_out, measured.samples
-        ));
-    }
-    if !measured.hidden.is_empty() {
-        let names: Vec<String> = measured.hidden.iter().map(ToString::to_string).collect();
-        warnings.push(format!(
-            "these spurs fall on the tone, on the constant or on half the rate and cannot be seen: {}; choose another frequency to see them",
-            names.join("; ")
-        ));
-    }
-    if let Some(ends) = measured.unsettled_ends {
-        warnings.push(format!(
-            "the first and the last {} samples raise the noise by {:.1} dB or more: a filter may not have settled there; --skip {} leaves them out",
-            ends.samples, ends.raise.0, ends.samples
-        ));
-    }
-    warnings
+    let text = |warning: Warning| match &warning {
+        Warning::Unsettled(ends) => format!("{warning}; --skip {} leaves them out", ends.samples),
+        _ => warning.to_string(),
+    };
+    measured.warnings().into_iter().map(text).collect()
 }
 
 impl Report {

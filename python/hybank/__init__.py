@@ -6,9 +6,10 @@
 
 import importlib
 
-from hybank._functions import analyze, calibrate, import_taps, measure, simulate, verify
-from hybank._hybank import Bank, HybankError, Recording, SpecError, Stream, __version__, align, load
+from hybank._functions import align, analyze, calibrate, import_taps, load, measure, simulate, verify
+from hybank._hybank import Bank, HybankError, Recording, SpecError, Stream, __version__
 from hybank._inputs import Captures, read
+from hybank._keywords import check_methods
 from hybank._results import (
     Alignment,
     Analysis,
@@ -80,6 +81,9 @@ __all__ = [
     "verify",
     "zpk",
 ]
+
+for _kind in (Bank, Stream, Recording):
+    check_methods(_kind)
 
 # The parts that need more than NumPy, or that few programs need, are imported when they are used.
 _PARTS = ("dask", "gnuradio", "ibr")

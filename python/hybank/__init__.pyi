@@ -362,11 +362,12 @@ def analyze(
     sweep: bool = False,
 ) -> Analysis: ...
 def align(
-    x: Sequence[ArrayLike] | NDArray[Any],
+    x: Sequence[ArrayLike] | ArrayLike | _Files | Captures,
     spec: Bank | _Spec,
     *,
     reference: int | None = None,
     within: float | None = None,
+    axis: int = -1,
 ) -> Alignment: ...
 def calibrate(
     x: ArrayLike | _Files | Captures,

@@ -6,6 +6,28 @@ from hybank._results import Comparison
 
 
 @checked
+def load(path):
+    """Reads a bank file.
+
+    Parameters
+    ----------
+    path : str or os.PathLike
+        The bank file, as `hybank design` and `Bank.save` write it.
+
+    Returns
+    -------
+    Bank
+
+    Examples
+    --------
+    >>> bank = hb.load("thesis-fir.json")
+    >>> bank.ratio, bank.latency
+    (2, 10)
+    """
+    return _hybank.load(path)
+
+
+@checked
 def verify(bank, *, search=False):
     """Prove the gammas of a bank, from its spec and its coefficients alone.
 
@@ -153,6 +175,40 @@ def _is_hertz(source):
 
 
 @checked
+def align(x, spec, *, reference=None, within=None, axis=-1):
+    """When recordings began, how their clocks drift, their polarities, gains and offsets.
+
+    Parameters
+    ----------
+    x : list of array_like, or array_like, shape (N, T), or list of files
+        One recording per channel, in a list of any lengths, of a broad sound (noise, speech, music).
+    spec : Bank or str or os.PathLike or mapping
+        The nominal values.
+    reference : int, optional
+        The channel whose clock is the time, from 1.
+    within : float, optional
+        How far apart the recordings began at most, in seconds.
+    axis : int
+        The axis of time of an array.
+
+    Returns
+    -------
+    Alignment
+        The spec with these values, and the samples to leave out.
+
+    Examples
+    --------
+    >>> sound = "tones:" + ",".join(f"{100 * 1.07**k:.1f}Hz" for k in range(65))
+    >>> spec = {"fast_rate": 48e3, "ratio": 2, "target": {"filter": hb.butterworth(4, 9e3)},
+    ...         "channel": [hb.Channel(delay=25e-6), hb.Channel(delay=12.5e-6)]}
+    >>> recorded = hb.simulate(spec, sound, samples=48_000).channels
+    >>> hb.align([recorded[0][500:], recorded[1]], spec).skip
+    [0, 500]
+    """
+    return _hybank.align(_inputs.recordings(x, axis, spec), spec, reference, within)
+
+
+@checked
 def calibrate(
     x, spec, *, tones=None, waveform=None, rate=None, blind=False, fit=("delay", "gain", "offset"), reference=None,
     clip=None, interleaved=None, axis=-1
@@ -162,7 +218,7 @@ def calibrate(
     Parameters
     ----------
     x : array_like, shape (N, T), or list of files
-        The captures.
+        The captures. Dimensions with names, and columns of a DataFrame, may stand in any order.
     spec : Bank or str or os.PathLike or mapping
         The nominal values.
     tones : list of float or str, optional
@@ -178,7 +234,8 @@ def calibrate(
     reference : int, optional
         The channel, from 1, to which the others are relative.
     clip : float, optional
-        Samples of this size and more are left out; the ends of the range for integers.
+        Samples of this size and more are left out. Otherwise those at the ends of their range are: that of integers, and
+        1 for floats none of which is beyond.
     interleaved : int, optional
         x is one recording in which so many converters take turns.
     axis : int
@@ -221,7 +278,7 @@ def measure(
     harmonics : int
         Highest order of the harmonics in THD.
     full_scale : float
-        Amplitude of full scale.
+        Amplitude of full scale of floats.
     window : {"bh7", "bh4", "hann", "none"}
         Window of the spectrum.
     skip : int
@@ -236,7 +293,7 @@ def measure(
     >>> import numpy as np
     >>> n = np.arange(4096)
     >>> m = hb.measure(0.9 * np.cos(0.3 * n) + 1e-3 * np.cos(0.6 * n), 48e3)
-    >>> round(m.thd, 1)
+    >>> round(m.thd_db, 1)
     -59.1
     >>> c = hb.measure(np.cos(0.3 * n), 48e3, ref=0.5 * np.cos(0.3 * n))
     >>> round(c.gain.value, 6)

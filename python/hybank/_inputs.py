@@ -26,6 +26,7 @@ class Captures:
     def __len__(self):
         return len(self.channels)
 
+    @checked
     def mono(self):
         """The only channel."""
         if len(self.channels) != 1:
@@ -100,12 +101,17 @@ def read(
         "full_scale": None if full_scale is None else str(full_scale), "interleaved": interleaved,
         "lost": lost, "max_lost": max_lost, "longest": longest,
     }
+    return _read(files, bank, options)
+
+
+def _read(files, source, options):
+    """Recordings for a bank, for a spec, or for nothing in particular."""
     names = [files] if isinstance(files, (str, os.PathLike)) else list(files)
-    found = _hybank.read(names, options, bank)
+    usual = dict.fromkeys(("channels", "channel", "full_scale", "interleaved", "lost", "max_lost"))
+    found = _hybank.read(names, {"format": "wav", "longest": False, **usual, **options}, source)
     parts = found["channels"]
     is_even = all(len(part) == len(parts[0]) for part in parts)
-    rate, output_rate = (found["rate"], None) if bank is None else (None, found["rate"])
-    return Captures(np.stack(parts) if is_even and parts else parts, rate, output_rate)
+    return Captures(np.stack(parts) if is_even and parts else parts, found["rate"], found["output_rate"])
 
 
 def fuse(bank, x, interleaved, *, axis, full_output, rate, **keywords):
@@ -145,30 +151,43 @@ def in_turn(source, x, interleaved):
 
 
 def plain(x, axis, source, interleaved):
-    """Captures as arrays of NumPy, with their axis of time."""
+    """Captures for a bank or a spec as arrays of NumPy, with their axis of time."""
     if _are_files(x):
-        bank = source if isinstance(source, _hybank.Bank) else None
-        if interleaved is not None and bank is None:
-            x = read(x)
-        else:
-            x, interleaved = read(x, bank=bank, interleaved=interleaved), None
+        x, interleaved = _read(x, source, {"interleaved": interleaved}), None
     if isinstance(x, Captures):
         x, axis = x.channels, -1
     if interleaved is not None:
         return in_turn(source, x, interleaved), -1
-    if type(x).__module__.startswith("pandas"):
+    package = type(x).__module__.split(".")[0]
+    if package == "pandas":
         return x.to_numpy(), 0
-    return x, axis
+    if package == "xarray":
+        time, channel = _dimensions(_hybank.frame_samples(source), x, axis)
+        if x.ndim > 2:
+            raise HybankError(f"dimensions {x.dims}: give one signal, of the dimensions of channel and time")
+        return x.transpose(*([channel] if channel else []), time).to_numpy(), -1
+    return (np.asarray(x) if package == "dask" else x), axis
+
+
+def recordings(x, axis, source):
+    """A list with an array for each channel, of any lengths."""
+    if _are_files(x):
+        source = source.spec if isinstance(source, _hybank.Bank) else source
+        files = [x] if isinstance(x, (str, os.PathLike)) else x
+        # One by one: together they would end with the shortest.
+        return [channel for file in files for channel in _read(file, source, {}).channels]
+    if isinstance(x, (list, tuple)):
+        return [np.asarray(one) for one in x]
+    x, axis = plain(x, axis, source, None)
+    return list(np.asarray(x).T if axis in (0, -2) else x)
 
 
 def channels(bank, x, axis):
     """A list of samples for each channel, in double precision, and the rate of the bank's output."""
-    rate = bank.fast_rate
     if _are_files(x):
         x = read(x, bank=bank)
-    if isinstance(x, Captures):
-        rate = x.output_rate if x.output_rate is not None else rate
-        x, axis = x.channels, -1
+    rate = getattr(x, "output_rate", None) or bank.fast_rate
+    x, axis = plain(x, axis, bank, None)
     if isinstance(x, (list, tuple)) and max(bank.samples) > 1:
         rows = [np.asarray(row, float) for row in x]
         frames = min(len(row) // samples for row, samples in zip(rows, bank.samples))
@@ -236,7 +255,8 @@ def _fuse_frame(bank, frame, keywords):
     """A DataFrame with a column for each channel becomes a Series with its index at the fast rate."""
     pandas = sys.modules["pandas"]
     full_output = keywords.pop("full_output")
-    y, report = bank.fuse(frame.to_numpy(), axis=0, full_output=True, **keywords)
+    found = bank.fuse(frame.to_numpy(), axis=0, full_output=full_output, **keywords)
+    y, report = found if full_output else (found, None)
     if isinstance(frame.index, pandas.PeriodIndex):
         raise HybankError("an index of periods cannot be divided; convert it with to_timestamp()")
     name = frame.name if isinstance(frame, pandas.Series) else None
@@ -254,7 +274,7 @@ def _fuse_named(bank, x, axis, keywords):
     xarray = sys.modules["xarray"]
     if not isinstance(x, xarray.DataArray):
         raise HybankError("give a DataArray; of a Dataset choose a variable: dataset[name]")
-    time, channel = _dimensions(bank, x, axis)
+    time, channel = _dimensions(sum(bank.samples), x, axis)
     others = [name for name in x.dims if name not in (time, channel)]
     order = others + ([channel] if channel else []) + [time]
     data = x.transpose(*order).data
@@ -281,19 +301,19 @@ def _fuse_named(bank, x, axis, keywords):
     return (fused, report) if full_output else fused
 
 
-def _dimensions(bank, x, axis):
+def _dimensions(count, x, axis):
     """The names of the dimensions of time and of the channels."""
     time = "time" if "time" in x.dims and axis == -1 else x.dims[axis]
     left = [name for name in x.dims if name != time]
     if "channel" in left:
         return time, "channel"
-    fitting = [name for name in left if x.sizes[name] == sum(bank.samples)]
+    fitting = [name for name in left if x.sizes[name] == count]
     if len(fitting) == 1 or len(left) == 1:
         return time, (fitting or left)[0]
-    if not left and sum(bank.samples) == 1:
+    if not left and count == 1:
         return time, None
     raise HybankError(
-        f"dimensions {x.dims} with sizes {x.shape}: which holds the {sum(bank.samples)} channels? call it \"channel\""
+        f"dimensions {x.dims} with sizes {x.shape}: which holds the {count} channels? call it \"channel\""
     )
 
 

@@ -9,20 +9,20 @@ def refuse(function, unknown, known):
     """Raise the ``TypeError`` for keywords that a function does not have."""
     name = next(iter(unknown))
     near = difflib.get_close_matches(name, known, 1)
-    advice = f"did you mean {near[0]!r}?" if near else f"it takes {', '.join(known)}"
+    advice = f"did you mean {near[0]!r}?" if near else f"it takes {', '.join(known) or 'none'}"
     raise TypeError(f"{function}() got an unexpected keyword argument {ascii(name)[:200]}; {advice}")
 
 
-def refuse_of(kind, method, unknown):
-    """The same for a method of a class."""
-    known = [name for name in inspect.signature(getattr(kind, method)).parameters if name != "self"]
-    refuse(f"{kind.__name__}.{method}", unknown, known)
+def keywords_of(*functions):
+    """The names of the keywords of functions."""
+    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.VAR_KEYWORD)
+    parameters = [one for each in functions for one in inspect.signature(each).parameters.values()]
+    return [one.name for one in parameters if one.kind not in kinds and one.name != "self"]
 
 
-def checked(function):
-    """The same function, which names the nearest keyword for one that it does not have."""
-    parameters = inspect.signature(function).parameters.values()
-    known = [one.name for one in parameters if one.kind != one.POSITIONAL_ONLY and one.name != "self"]
+def checked(function, others=()):
+    """The same function, which names the nearest keyword for one that neither it nor the others have."""
+    known = keywords_of(function, *others)
     shown = function.__qualname__.removesuffix(".__init__")
 
     @functools.wraps(function)
@@ -33,3 +33,15 @@ def checked(function):
         return function(*arguments, **keywords)
 
     return call
+
+
+def check_methods(kind):
+    """Let the public methods of a class of the extension module do the same, but for those that do it themselves."""
+    for name, method in list(vars(kind).items()):
+        if name.startswith("_") or name == "process" or not inspect.isroutine(method):
+            continue
+        is_static = isinstance(method, (staticmethod, type(len)))
+        call = checked(getattr(kind, name))
+        # Pickles of methods name it.
+        call.__module__ = kind.__module__
+        setattr(kind, name, staticmethod(call) if is_static else call)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Literal, final
 
+from hybank._keywords import checked
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, KeysView
 
@@ -42,7 +44,10 @@ def record(text):
 
 def result(name, text):
     """The result of a class from the JSON text of a report with its fields."""
-    return globals()[name](**record(text))
+    fields = dict(record(text))
+    if fields.get("figures"):
+        fields["figures"] = Figures(**fields["figures"])
+    return globals()[name](**fields)
 
 
 def lines(readings):
@@ -59,14 +64,32 @@ def _plain(value):
 class Comparison(Record):
     """A record against a reference: ``record[n] = gain * reference(n - lag) + offset + error``.
 
-    ``lag_samples``, ``gain`` and ``offset`` have a ``value`` and its standard deviation ``sigma``; ``snr_db`` is that
-    after they are taken out, ``snr_unaligned_db`` that sample by sample. ``spectrum`` is that of the error: hertz, dB of
-    full scale.
+    Attributes
+    ----------
+    lag_samples, gain, offset
+        A ``value`` and its standard deviation ``sigma`` each. The offset is added to the record.
+    lag_seconds
+        The lag.
+    snr_db
+        Reference over error, after lag, gain and offset are taken out.
+    snr_unaligned_db
+        The same sample by sample.
+    error_rms, largest_error, largest_error_at
+        Root mean square and largest value of the error, and the sample where that is.
+    compared
+        Samples that were compared.
+    unsettled_ends
+        ``samples`` at either end that are left out too, and the ``raise_db`` of the error by them; only if there are any.
+    error_bands
+        Rms of the error in equal bands.
+    spectrum
+        That of the error: hertz, dB of full scale.
     """
 
     def __repr__(self):
         return f"Comparison(snr_db={self.snr_db:.2f}, lag_samples={self.lag_samples.value:.6f}, gain={self.gain.value:.8f})"
 
+    @checked
     def plot(self, ax: Any = None) -> Any:
         """Draw the spectrum of the error with matplotlib.
 
@@ -93,19 +116,29 @@ class Comparison(Record):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Gamma:
-    """The worst-case error gamma with its bounds, in normalised time; None where a bound is not known."""
+    """The worst-case error gamma with its bounds, in normalised time; None where a bound is not known.
 
-    # Norm computed from the coefficients.
+    Attributes
+    ----------
+    norm
+        Norm computed from the coefficients.
+    upper
+        An upper bound of the true norm.
+    lower
+        A lower bound for all banks of this method and size.
+    noncausal
+        A lower bound for all banks.
+    worst_case
+        An upper bound over all errors that the spec allows for.
+    tracked
+        The same while the taps follow the delays; None for a bank whose taps do not.
+    """
+
     norm: float | None
-    # An upper bound of the true norm.
     upper: float | None
-    # A lower bound for all banks of this method and size.
     lower: float | None
-    # A lower bound for all banks.
     noncausal: float | None
-    # An upper bound over all errors that the spec allows for.
     worst_case: float | None = None
-    # The same while the taps follow the delays; None for a bank whose taps do not.
     tracked: float | None = None
 
     def __repr__(self):
@@ -113,89 +146,157 @@ class Gamma:
 
 
 @final
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Figures:
-    """A bank in the user's terms: ratios in decibels, frequencies in hertz."""
+    """A bank in the user's terms.
 
-    # The band of the figures: low and high end.
-    band: tuple[float, float]
-    # Signal-to-noise ratio with all parts that the spec states.
-    snr: float
-    # Its parts: from the signal, from the converters' noise, from uncertain delays; None without.
-    snr_signal: float
-    snr_noise: float | None
-    snr_delays: float | None
-    # With 16-bit converters; None where the spec states noise.
-    snr_16_bits: float | None
-    # The largest image of a tone in the band and the frequency of the tone; None where a tone is lost.
-    image: float | None
-    image_frequency: float | None
-    # The largest error of gain and phase of a tone, relative to it, and the frequency of the tone.
-    gain_error: float | None
-    gain_error_frequency: float | None
-    # The simple ways, the best one first: name, channel (from 1) and signal-to-noise ratio.
-    simple: list[tuple[Literal["one-channel", "interleaving", "cubic-spline"], int | None, float]]
-    # The gain over the best of them, for the same converters.
-    gain_over_simple: float | None
-    # gamma for inputs of any spectrum; None for a spec without signal.
+    Attributes
+    ----------
+    band
+        The band of the figures, ``low_hertz`` to ``high_hertz``, and the ``source`` that says so.
+    snr
+        Signal-to-noise ratio: ``total_db`` with all parts that the spec states, and the parts ``signal_db``, ``noise_db``
+        of the converters and ``delays_db`` of uncertain delays, None without.
+    snr_16_bits_db
+        With 16-bit converters; None where the spec states noise.
+    image
+        The largest image of a tone in the band, ``db`` relative to it, and the ``hertz`` of the tone; None where a tone is
+        lost.
+    gain_error
+        The same for the largest error of gain and phase.
+    target_vanishes
+        The target is zero somewhere in the band; the tones there are left out.
+    simple
+        The simple ways, the best one first: ``way`` ("one-channel", "interleaving", "cubic-spline"), ``channel`` (from 1)
+        of the first one, and ``snr_db``.
+    gain_over_simple_db
+        The gain over the best of them, for the same converters.
+    any_input
+        gamma for inputs of any spectrum; None for a spec without signal.
+    """
+
+    band: Record
+    snr: Record
+    snr_16_bits_db: float | None
+    image: Record | None
+    gain_error: Record | None
+    target_vanishes: bool
+    simple: list[Record]
+    gain_over_simple_db: float | None
     any_input: float | None
 
     def __repr__(self):
-        return f"Figures(snr={self.snr}, image={self.image}, gain_error={self.gain_error})"
+        levels = {name: found and found.db for name, found in (("image", self.image), ("gain_error", self.gain_error))}
+        return f"Figures(snr={self.snr.total_db}, image={levels['image']}, gain_error={levels['gain_error']})"
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class FuseReport:
-    """What happened while a bank was run on an array."""
+    """What happened while a bank was run on an array.
 
-    # `direct`, `overlap-save`, `parallel-form` or `dense`.
-    algorithm: str
-    # Number type of the sums: `f32` or `f64`.
-    numbers: str
-    # Instruction set of the kernels.
-    isa: str
-    # Output samples dropped at the beginning.
+    Attributes
+    ----------
+    plan
+        The ``algorithm`` ("direct", "overlap-save", "parallel-form" or "dense"), the number type ``numbers`` of the sums
+        ("f32" or "f64"), the instruction set ``isa`` of the kernels, and ``extra_latency``, the output samples by which
+        the algorithm is later than the bank; for FIR banks the ``multiply_adds`` per output sample, for transforms
+        ``transform`` and ``block``, their frames.
+    channels, ratio
+        N and M.
+    frames, samples
+        Input frames and output samples.
+    rate
+        Output samples per second.
+    latency_dropped
+        Output samples dropped at the beginning.
+    captures
+        Whether the captures agree with the spec of the bank.
+    peak
+        Largest magnitude of the output, of full scale.
+    clipped
+        Output samples that saturated.
+    replaced
+        Input samples that were NaN or infinite and became 0.
+    state_resets
+        Times that the state of a recursion was not finite and became 0.
+    seconds
+        How long it took.
+    warnings
+        What was tolerated. Each is a ``UserWarning``, too.
+    missing, gaps
+        Missing samples, and the gaps (channel from 1, first frame, length); None unless gaps were filled.
+    mask
+        True where a missing sample affects the output; None unless gaps were filled.
+    track
+        What was known of the delays, a record per measurement; None unless they were followed.
+    """
+
+    plan: Record
+    channels: int
+    ratio: int
+    frames: int
+    samples: int
+    rate: float
     latency_dropped: int
-    # Output samples that saturated.
+    captures: str
+    peak: float
     clipped: int
-    # Input samples that were NaN or infinite and became 0.
     replaced: int
-    # Times that the state of a recursion was not finite and became 0.
     state_resets: int
-    # Missing samples, and the gaps (channel from 1, first frame, length); None unless gaps were filled.
+    seconds: float
+    warnings: list[str]
     missing: int | None
     gaps: list[tuple[int, int, int]] | None
-    # True where a missing sample affects the output; None unless gaps were filled.
     mask: NDArray[np.bool_] | None
-    # What was known of the delays, a record per measurement; None unless they were followed.
     track: list[Record] | None = None
 
     def __repr__(self):
-        names = ("algorithm", "numbers", "isa", "latency_dropped", "clipped", "replaced")
-        return f"FuseReport({', '.join(f'{name}={getattr(self, name)!r}' for name in names)})"
+        names = ("latency_dropped", "peak", "clipped", "replaced")
+        shown = ", ".join(f"{name}={getattr(self, name)!r}" for name in names)
+        return f"FuseReport(algorithm={self.plan.algorithm!r}, {shown})"
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Verified:
-    """Proven bounds of gamma."""
+    """Proven bounds of gamma.
 
-    # No bank of the class `lower_banks` has a smaller gamma.
+    Attributes
+    ----------
+    lower, lower_banks
+        No bank of the class `lower_banks` has a smaller gamma.
+    upper
+        Gamma of this bank is at most this.
+    attained
+        Gamma of this bank is at least this.
+    noncausal
+        No bank has a smaller gamma.
+    states
+        Order of the certificate.
+    digest
+        The file has a digest, and it matches; None for a bank in memory.
+    certificate_in_file
+        The certificate came with the bank; otherwise it was found now.
+    worst_case
+        No errors within the uncertainty of the spec make gamma larger; None if the bank states nothing of them.
+    tracked
+        No delays within it make gamma larger while the taps follow them; None if the bank states nothing of them.
+    unproven_slopes
+        The bank has tap slopes and states nothing that could be proven of them.
+    """
+
     lower: float
     lower_banks: Literal["any", "causal", "fir_of_this_length"]
-    # Gamma of this bank is at most this.
     upper: float
-    # Gamma of this bank is at least this.
     attained: float
-    # No bank has a smaller gamma.
     noncausal: float
-    # Order of the certificate.
     states: int
-    # The file has a digest, and it matches; None for a bank in memory.
     digest: bool | None
-    # The certificate came with the bank; otherwise it was found now.
-    certificate_in_bank: bool
+    certificate_in_file: bool
+    worst_case: float | None = None
+    tracked: float | None = None
+    unproven_slopes: bool = False
 
     def __repr__(self):
         return f"Verified(lower={self.lower}, upper={self.upper}, lower_banks={self.lower_banks!r})"
@@ -204,31 +305,50 @@ class Verified:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Analysis:
-    """The error of a bank with given delays."""
+    """The error of a bank with given delays.
 
-    # The worst-case gain, in normalised time.
+    Attributes
+    ----------
+    gamma
+        The worst-case gain, in normalised time.
+    peak_hertz
+        Frequency of the worst case, modulo the slow rate.
+    noncausal
+        No bank has a smaller gamma with these front ends and delays; None where that is not known.
+    rms_error
+        Rms of the error for white noise of unit density at the analog input.
+    noise_gain
+        Rms of the output noise for independent noise of unit rms on all slow samples.
+    output_noise
+        Rms of the output noise for the noise of the converters in the spec.
+    scale
+        gamma of zero output and of plain interleaving, and the rms of the reference.
+    figures
+        The figures of the bank; None with other delays than its own.
+    certified
+        A proven upper bound of gamma; None unless asked for, as all below.
+    worst_case
+        The worst case over the box of errors, proven from both sides.
+    sensitivity
+        The derivatives of gamma with respect to the delays.
+    jitter
+        What jitter adds to gamma at most.
+    sweep
+        gamma along the delays of the box.
+    """
+
     gamma: float
-    # Frequency of the worst case, modulo the slow rate.
     peak_hertz: float
-    # No bank has a smaller gamma with these front ends and delays; None where that is not known.
     noncausal: float | None
-    # Rms of the error for white noise of unit density at the analog input.
     rms_error: float
-    # Rms of the output noise for independent noise of unit rms on all slow samples.
     noise_gain: float
-    # Rms of the output noise for the noise of the converters in the spec.
     output_noise: float
-    # gamma of zero output and of plain interleaving, and the rms of the reference.
     scale: Record
-    # A proven upper bound of gamma; None unless asked for, as all below.
+    figures: Figures | None = None
     certified: Record | None = None
-    # The worst case over the box of errors, proven from both sides.
     worst_case: Record | None = None
-    # The derivatives of gamma with respect to the delays.
     sensitivity: Record | None = None
-    # What jitter adds to gamma at most.
     jitter: Record | None = None
-    # gamma along the delays of the box.
     sweep: Record | None = None
 
     def __repr__(self):
@@ -239,39 +359,67 @@ class Analysis:
 @final
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Capture:
-    """What virtual converters capture."""
+    """What virtual converters capture.
 
-    # Slow samples, (N, T); complex for a complex signal. A list of arrays for converters with rates of their own.
+    Attributes
+    ----------
+    channels
+        Slow samples, (N, T); complex for a complex signal. A list of arrays for converters with rates of their own.
+    target
+        Samples of the ideal fast converter, M T of them, in line with the output of `Bank.fuse`.
+    clipped
+        Samples of each converter that were clipped at full scale.
+    """
+
     channels: Any
-    # Samples of the ideal fast converter, M T of them, in line with the output of `Bank.fuse`.
     target: NDArray[Any]
-    # Samples of each converter that were clipped at full scale.
     clipped: list[int]
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Alignment:
-    """How recordings lie in time. Arrays have one value per channel; half-widths are in the spec."""
+    """How recordings lie in time. Arrays have one value per channel; half-widths are in the spec.
 
-    # The spec with these values, as TOML.
+    Attributes
+    ----------
+    spec
+        The spec with these values, as TOML.
+    reference
+        The reference channel, from 1.
+    skip, frames
+        Samples to leave out at the beginning of each recording, and samples of each that remain.
+    pieces, measured
+        Pieces that were compared, and those of them that gave delays.
+    delay
+        Seconds, at the first frame.
+    drift_ppm
+        By how many ppm each clock is fast.
+    gain, offset
+        Gain and offset of each channel.
+    track
+        The delays over time as JSON lines: what `hybank fuse --track` reads.
+    alone
+        The best ``channel`` alone, its ``snr_db``, and ``together_db`` of all, whatever the filters are.
+    one_suffices
+        Whether that channel suffices.
+    warnings
+        What a reader of the values must know. Each is a ``UserWarning``, too.
+    """
+
     spec: str
-    # Samples to leave out at the beginning of each recording, and samples of each that remain.
+    reference: int
     skip: list[int]
     frames: int
-    # Seconds, at the first frame.
+    pieces: int
+    measured: int
     delay: NDArray[np.float64]
-    # By how many ppm each clock is fast.
     drift_ppm: NDArray[np.float64]
     gain: NDArray[np.float64]
     offset: NDArray[np.float64]
-    # The delays over time as JSON lines: what `hybank fuse --track` reads.
     track: str
-    # The best channel alone and all together in dB, whatever the filters are, and whether one suffices.
-    alone_db: float
-    together_db: float
+    alone: Record
     one_suffices: bool
-    # What a reader of the values must know.
     warnings: list[str]
 
     def __repr__(self):
@@ -283,32 +431,53 @@ class Alignment:
 class Calibration:
     """What a calibration found. Arrays have one value per channel; it is NaN where the spec's value stands.
 
-    ``.._sigma`` are standard deviations.
+    Attributes
+    ----------
+    spec
+        The spec with these values and their intervals, as TOML.
+    delay, delay_sigma
+        Seconds, and their standard deviations.
+    gain, gain_sigma
+        Gains, and their standard deviations.
+    offset, offset_sigma
+        Offsets, and their standard deviations.
+    cutoff, cutoff_sigma
+        Factors of the cut-off frequencies, and their standard deviations.
+    reference
+        The reference channel, from 1.
+    tones
+        Tones that were used: ``frequency`` in hertz with a ``value`` and its standard deviation ``sigma``, the Nyquist
+        ``zone`` of the slow rate, from 1, and ``amplitude`` in the reference channel.
+    modulus_samples
+        Delays are known modulo this many fast periods; None if tones do not leave such a second value.
+    frames
+        Frames that took part.
+    clipped
+        Clipped samples of each channel, which were left out.
+    misfit
+        1 where the model fits to the noise; None if there are no degrees of freedom left.
+    notes
+        What the values mean.
+    warnings
+        Why they are doubtful. Each is a ``UserWarning``, too.
     """
 
-    # The spec with these values and their intervals, as TOML.
     spec: str
-    # Seconds.
     delay: NDArray[np.float64]
     delay_sigma: NDArray[np.float64]
     gain: NDArray[np.float64]
     gain_sigma: NDArray[np.float64]
     offset: NDArray[np.float64]
     offset_sigma: NDArray[np.float64]
-    # Factors of the cut-off frequencies.
     cutoff: NDArray[np.float64]
     cutoff_sigma: NDArray[np.float64]
-    # The reference channel, from 1.
     reference: int
-    # Tones that were used, in hertz.
-    tones: list[float]
-    # Frames that took part.
+    tones: list[Record]
+    modulus_samples: float | None
     frames: int
-    # Clipped samples of each channel, which were left out.
     clipped: list[int]
-    # 1 where the model fits to the noise; None if there are no degrees of freedom left.
     misfit: float | None
-    # What a reader of the values must know.
+    notes: list[str]
     warnings: list[str]
 
     def __repr__(self):
@@ -319,41 +488,90 @@ class Calibration:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
-    """The figures of a converter from the record of a tone."""
+    """The figures of a converter from the record of a tone. What was estimated has a ``value`` and its ``sigma``.
 
-    # Signal over everything else but the constant, in dB.
-    sinad: float
-    # Effective number of bits, of this tone and of one of full scale.
-    enob: float
-    enob_full_scale: float
-    # Signal over what no line explains, harmonics over signal, interleaving spurs over signal, in dB.
-    snr: float
-    thd: float
-    # None for a single converter.
-    interleaving: float | None
-    # Largest tone over largest line, in dB.
-    sfdr: float
-    # Noise per hertz relative to a sine of full scale, in dB.
-    noise_density: float
-    # The constant part; of complex samples that of the real and of the imaginary parts.
-    offset: float | complex
-    # Tones: frequency in hertz, amplitude, phase in radians at the first sample.
-    tones: list[tuple[float, float, float]]
-    # Lines beside the tones, largest first: frequency in hertz, level in dB relative to the largest tone, causes.
-    spurs: list[tuple[float, float, str]]
-    # Of complex samples, per tone: gain of the imaginary part relative to the real one, error of their quadrature in
-    # radians, and image rejection in dB. None for real samples.
-    imbalances: list[tuple[float, float, float]] | None
-    # Samples at the rails, and samples that are not finite.
-    clipped: int
+    Attributes
+    ----------
+    samples, left_out, clipped
+        Samples of the record, those that are not finite, and those at the rails.
+    rate_hertz
+        Samples per second.
+    converters
+        Those that take turns; 1 for a single one.
+    full_scale
+        Amplitude of full scale.
+    offset
+        The constant part; of complex samples that of the real parts.
+    quadrature
+        Of complex samples: the ``offset`` of the imaginary parts, and ``imbalances``, one per tone: the ``gain`` of the
+        imaginary part relative to the real one, the error of their quadrature ``phase_radians``, and
+        ``image_rejection_db``. None for real samples.
+    tones
+        ``frequency_hertz`` in its own Nyquist zone, ``alias_hertz`` where the spectrum shows it, ``amplitude``,
+        ``level_dbfs``, and ``phase_radians`` at the first sample.
+    sinad_db
+        Signal over everything else but the constant.
+    enob_from_sinad, enob_full_scale
+        Effective number of bits, of this tone and of one of full scale.
+    snr_db
+        Signal over what no line explains.
+    thd_db, harmonics
+        Harmonics over signal, up to this order.
+    interleaving_db
+        Interleaving spurs over signal; None for a single converter.
+    sfdr_db
+        Largest tone over largest line.
+    sfdr_without_interleaving_db
+        The same without lines that only interleaving explains; None for a single converter.
+    noise_density_dbfs_per_hertz
+        Noise per hertz relative to a sine of full scale.
+    window, noise_bandwidth_bins
+        The window of the spectrum, and its equivalent noise bandwidth.
+    spurs
+        Lines beside the tones, largest first: ``frequency_hertz``, ``amplitude``, ``level_dbc`` relative to the largest
+        tone, ``above_noise``, ``causes``, and these as the text ``cause``.
+    hidden
+        Causes of spurs that cannot be seen, because they coincide with a tone or with the constant.
+    unsettled_ends
+        ``samples`` at either end that raise the noise by ``raise_db``; None if the ends are as the rest.
+    warnings
+        What a reader of the figures must know. Each is a ``UserWarning``, too.
+    figures
+        The figures as a report shows them: name, value, unit, meaning.
+    spectrum
+        Hertz, and dB relative to full scale.
+    """
+
+    samples: int
     left_out: int
-    # The figures as a report shows them: name, value, unit, meaning.
+    clipped: int
+    rate_hertz: float
+    converters: int
+    full_scale: float
+    offset: Record
+    tones: list[Record]
+    sinad_db: float
+    enob_from_sinad: float
+    enob_full_scale: float
+    snr_db: float
+    thd_db: float
+    harmonics: int
+    interleaving_db: float | None
+    sfdr_db: float
+    sfdr_without_interleaving_db: float | None
+    noise_density_dbfs_per_hertz: float
+    window: str
+    noise_bandwidth_bins: float
+    spurs: list[Record]
+    hidden: list[Record]
+    unsettled_ends: Record | None
+    warnings: list[str]
     figures: list[tuple[str, str, str, str]]
-    # The spectrum: hertz, and dB relative to full scale.
     spectrum: tuple[NDArray[np.float64], NDArray[np.float64]]
+    quadrature: Record | None = None
 
     def __repr__(self):
-        names = ("sinad", "enob", "snr", "thd", "sfdr")
+        names = ("sinad_db", "enob_from_sinad", "snr_db", "thd_db", "sfdr_db")
         return f"Measurement({', '.join(f'{name}={getattr(self, name):.2f}' for name in names)})"
 
     def _repr_html_(self):
@@ -361,8 +579,9 @@ class Measurement:
 
         return _show.measured(self)
 
+    @checked
     def plot(self, ax: Any = None) -> Any:
-        """Draws the spectrum with its spurs by matplotlib.
+        """Draw the spectrum with its spurs by matplotlib.
 
         Parameters
         ----------
@@ -376,7 +595,7 @@ class Measurement:
         Examples
         --------
         >>> import numpy as np
-        >>> m = hb.measure(np.cos(0.3 * np.arange(4096)), 48e3)
+        >>> m = hb.measure(0.9 * np.cos(0.3 * np.arange(4096)), 48e3)
         >>> ax = m.plot()  # doctest: +SKIP
         """
         from hybank import _show
@@ -387,38 +606,58 @@ class Measurement:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Geometry:
-    """The geometry that was estimated from tracks."""
+    """The geometry that was estimated from tracks.
 
-    # Points that both of the first two views see, and those of them within the threshold of the fundamental matrix.
+    Attributes
+    ----------
+    matches, inliers
+        Points that both of the first two views see, and those of them within the threshold of the fundamental matrix.
+    sampson_rms
+        Root mean square Sampson distance of the inliers, pixels.
+    sightings, resection_inliers
+        Points from which the virtual camera was estimated, and those of them within the threshold of the camera.
+    resection_rms
+        Root mean square reprojection error of these, pixels.
+    order_agreement
+        Share of the guessed calibrations that agree on the order of depth.
+    order_by
+        What decided the order of depth.
+    """
+
     matches: int
     inliers: int
-    # Root mean square Sampson distance of the inliers, pixels.
     sampson_rms: float
-    # Points from which the virtual camera was estimated, and those of them within the threshold of the camera.
     sightings: int
     resection_inliers: int
-    # Root mean square reprojection error of these, pixels.
     resection_rms: float
-    # Share of the guessed calibrations that agree on the order of depth.
     order_agreement: float
-    # What decided the order of depth.
     order_by: Literal["given", "calibrations", "colours", "both", "nothing"]
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class View:
-    """A rendered view."""
+    """A rendered view.
 
-    # Intensities 0 to 255: (H, W), or (H, W, 3) if an image has colours.
+    Attributes
+    ----------
+    image
+        Intensities 0 to 255: (H, W), or (H, W, 3) if an image has colours.
+    depth
+        Depth at the virtual camera, NaN in holes: (H, W). Without cameras only its order has a meaning.
+    mask
+        0 where a view saw the pixel, 1 in cracks, 2 where no view saw it, 3 where only guessed depth shows it: (H, W).
+    coverage
+        Share of the pixels that samples cover.
+    region
+        True where the view was rendered: (H, W). Without cameras that is the convex hull of the points.
+    geometry
+        The estimated geometry of views without cameras; None for others.
+    """
+
     image: NDArray[np.float32]
-    # Depth at the virtual camera, NaN in holes: (H, W). Without cameras only its order has a meaning.
     depth: NDArray[np.float32]
-    # 0 where a view saw the pixel, 1 in cracks, 2 where no view saw it, 3 where only guessed depth shows it: (H, W).
     mask: NDArray[np.uint8]
-    # Share of the pixels that samples cover.
     coverage: float
-    # True where the view was rendered: (H, W). Without cameras that is the convex hull of the points.
     region: NDArray[np.bool_]
-    # The estimated geometry of views without cameras; None for others.
     geometry: Geometry | None

@@ -56,21 +56,17 @@ def spectrum(found, ax=None):
     ax.plot(frequency, level, linewidth=0.8, label="spectrum")
     # A colour per cause: a text beside each spur would cover others.
     shown = {}
-    for hertz, below, cause in getattr(found, "spurs", [])[:12]:
-        shown.setdefault(cause, []).append((hertz, below))
-    top = 20 * _log10(max((tone[1] for tone in getattr(found, "tones", [])), default=1.0))
+    for spur in getattr(found, "spurs", [])[:12]:
+        # None is nothing at all.
+        if spur.level_dbc is not None:
+            shown.setdefault(spur.cause, []).append((spur.frequency_hertz, spur.level_dbc))
+    top = max((tone.level_dbfs for tone in getattr(found, "tones", [])), default=0.0)
     for cause, spurs in shown.items():
         ax.plot([one[0] for one in spurs], [one[1] + top for one in spurs], "o", fillstyle="none", label=cause)
     ax.set_xlabel("frequency, Hz")
     ax.set_ylabel("level, dB of full scale")
     ax.legend(fontsize="small")
     return ax
-
-
-def _log10(value):
-    import math
-
-    return math.log10(value) if value > 0 else -10.0
 
 
 def _table(caption, rows):
@@ -96,6 +92,11 @@ def html(bank):
 
 def measured(found):
     """The figures of a measurement as a table for notebooks."""
-    tones = [("tone", f"{hertz:.6g}", "Hz", f"amplitude {amplitude:.6g}") for hertz, amplitude, _ in found.tones]
-    spurs = [("spur", f"{level:.2f}", "dBc", f"{hertz:.6g} Hz: {cause}") for hertz, level, cause in found.spurs[:8]]
+    tones = [
+        ("tone", f"{tone.frequency_hertz.value:.6g}", "Hz", f"amplitude {tone.amplitude.value:.6g}") for tone in found.tones
+    ]
+    spurs = [
+        ("spur", "none" if spur.level_dbc is None else f"{spur.level_dbc:.2f}", "dBc", f"{spur.frequency_hertz:.6g} Hz: {spur.cause}")
+        for spur in found.spurs[:8]
+    ]
     return _table("hybank measurement", [*tones, *found.figures, *spurs])

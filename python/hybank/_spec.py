@@ -352,6 +352,7 @@ def ss(a, b, c):
     return _given(a=a, b=b, c=c)
 
 
+@checked
 def cascade(*stages):
     """Filters one after the other.
 

@@ -13,11 +13,12 @@ import os
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
 from hybank._hybank import Bank, HybankError, Recording, encode
+from hybank._keywords import checked
 from hybank._spec import design as _design
 
 # Shorter tasks would cost the scheduler more than the workers.
@@ -31,7 +32,21 @@ _BLOCK_BYTES = 120 << 10
 
 @dataclass
 class Report:
-    """What a fusion did: its spans, those run again because their seam differed, and counts of samples."""
+    """What a fusion did.
+
+    Attributes
+    ----------
+    algorithm
+        As in the plan of a ``FuseReport``.
+    frames, spans
+        Frames of the input, and the spans into which they were divided.
+    warm_up
+        Frames before each span that it reads, too.
+    replaced, clipped
+        Input samples that were NaN or infinite and became 0, and output samples that saturated.
+    reruns
+        Spans that were run again because the states at their seams differed.
+    """
 
     algorithm: str
     frames: int
@@ -42,6 +57,7 @@ class Report:
     reruns: list = field(default_factory=list)
 
 
+@checked
 def fuse(bank, source, sink, *, client=None, axis=-1, dtype=None, algorithm="auto", span=None, progress=None):
     """Fuse an archive into a new one; the output has the bits of ``bank.fuse`` over all of it.
 
@@ -100,6 +116,7 @@ def fuse(bank, source, sink, *, client=None, axis=-1, dtype=None, algorithm="aut
     return report
 
 
+@partial(checked, others=(_design,))
 def sweep(specs, *, map=map, client=None, progress=None, **keywords):  # noqa: A002
     """Design every spec.
 
@@ -181,13 +198,13 @@ def _plan(bank, given, dtype, algorithm):
     """The plan that ``bank.fuse`` would choose."""
     shape = (sum(bank.samples), 0)
     y, info = bank.fuse(np.zeros(shape, given), dtype=dtype, algorithm=algorithm, full_output=True)
-    asked = info.algorithm if bank.taps is not None else "auto"
+    asked = info.plan.algorithm if bank.taps is not None else "auto"
     # Integers are made of the floats that the sums are in, so that what saturates is counted where it is written.
-    stream = y.dtype.str[1:] if y.dtype.kind in "fc" else {"f32": "f4", "f64": "f8"}[info.numbers]
+    stream = y.dtype.str[1:] if y.dtype.kind in "fc" else {"f32": "f4", "f64": "f8"}[info.plan.numbers]
     if np.dtype(given).kind == "c" and np.dtype(stream).kind != "c":
         stream = {"f4": "c8", "f8": "c16"}[stream]
     s = bank.stream(axis=0, dtype=stream, algorithm=asked)
-    return _Plan(info.algorithm, asked, stream, y.dtype.str[1:], s.latency, s.memory, s.alignment)
+    return _Plan(info.plan.algorithm, asked, stream, y.dtype.str[1:], s.latency, s.memory, s.alignment)
 
 
 def _job(bank, source, sink, axis, plan, frames, span):
@@ -210,6 +227,7 @@ def _threads(client):
     return max(sum(client.nthreads().values()), 1)
 
 
+@checked
 def warm_up(bank):
     """Frames after which two states of a recursion hardly differ: W = 2 ln eps / ln rho, rho its largest pole.
 

@@ -6,10 +6,38 @@ Imported as ``hybank.gnuradio`` by the Python that GNU Radio is installed for.
 import numpy as np
 from gnuradio import gr
 
+from hybank._keywords import checked
+
 
 class fuse(gr.interp_block):  # noqa: N801
-    """Runs a bank. Samples are ``float32`` or, with ``dtype="c8"``, ``complex64``."""
+    """A block with an input for each converter and one output, that of ``Bank.stream``.
 
+    Its output is late by the latency of the stream, which it declares. A flow graph that starts again begins with
+    silence.
+
+    Parameters
+    ----------
+    bank : Bank
+        A bank whose converters have one rate.
+    dtype : {"f4", "c8"}
+        Samples are ``float32`` or ``complex64``, inputs and output alike.
+    algorithm : str
+        As in ``Bank.stream``.
+
+    Raises
+    ------
+    ValueError
+        The converters have rates of their own.
+
+    Examples
+    --------
+    >>> block = hb.gnuradio.fuse(bank, "c8")  # doctest: +SKIP
+    >>> for i, source in enumerate(sources):  # doctest: +SKIP
+    ...     graph.connect(source, (block, i))
+    >>> graph.connect(block, sink)  # doctest: +SKIP
+    """
+
+    @checked
     def __init__(self, bank, dtype="f4", algorithm="auto"):
         kind = np.dtype(dtype)
         if max(bank.samples) > 1:

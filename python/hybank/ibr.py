@@ -5,11 +5,13 @@ import operator
 import numpy as np
 
 from hybank._hybank import MOST_PIXELS, HybankError, render_calibrated, render_rectified, render_uncalibrated
+from hybank._keywords import checked
 from hybank._results import Geometry, View
 
 __all__ = ["Geometry", "View", "render"]
 
 
+@checked
 def render(
     images,
     *,
@@ -22,8 +24,16 @@ def render(
     tracks=None,
     points=None,
     size=None,
+    max_pixels=MOST_PIXELS,
+    offset=0.0,
+    nearest=None,
     method="auto",
-    fill=True,
+    degree=None,
+    lambda_=None,
+    fill="background",
+    drop_unknown=False,
+    keep_exposure=False,
+    seed=None,
     reverse_order=False,
 ):
     """Render the view of a virtual camera from views with depth.
@@ -53,10 +63,27 @@ def render(
         The same points in the virtual camera.
     size : pair of int, optional
         (H, W) of the view; that of the first image if left out. A rectified rig has that of its images.
+    max_pixels : int
+        The most pixels that the view may have.
+    offset : float
+        Added to every column of the view, in pixels.
+    nearest : int, optional
+        Use only so many views, those nearest to the virtual camera.
     method : {"auto", "rows", "plane"}
-        For rectified rigs; "auto" takes rows.
-    fill : bool
-        Fill pixels whose depth is unknown.
+        How samples are interpolated: by a spline for each row of a rectified rig, or by one for the whole image; "auto"
+        takes rows where it can.
+    degree : {"cubic", "linear"}, optional
+        Degree of the splines of the plane; cubic if left out.
+    lambda_ : float, optional
+        Weight of the slope penalty of the row fit, px^2; from the noise of the images if left out.
+    fill : {"background", "bridge", "leave"}
+        Continue the farther side into holes, bridge them by the spline, or leave them black.
+    drop_unknown : bool
+        Drop pixels of unknown depth instead of filling it from the farther neighbour.
+    keep_exposure : bool
+        Use the brightness of every image as it is, instead of giving all the exposure of the first.
+    seed : int, optional
+        Seed of the robust estimators for views without cameras; 1 if left out.
     reverse_order : bool
         Take the other order of depth, where a ``UserWarning`` says that it is undecided.
 
@@ -81,24 +108,39 @@ def render(
             "give disparity, positions and at of a rectified rig, or depth, cameras and camera of another one, or tracks"
             " and either points or at of views without cameras"
         )
+    in_rows = rectified and method != "plane"
+    for name, value, needs, has_use in [
+        ("seed", seed, "views without cameras", uncalibrated),
+        ("reverse_order", reverse_order or None, "views without cameras", uncalibrated),
+        ("degree", degree, "views with cameras", not uncalibrated),
+        ("nearest", nearest, "views with cameras", not uncalibrated),
+        ("lambda_", lambda_, "the row fit, so a rectified rig and the method rows", in_rows),
+    ]:
+        if value is not None and not has_use:
+            raise HybankError(f"{name}: it is for {needs}; leave it out of this rendering")
+    options = {
+        "method": method, "fill": fill, "degree": degree, "lambda": lambda_, "offset": float(offset), "nearest": nearest,
+        "keep_exposure": bool(keep_exposure),
+    }
+    size = _size(images, None if rectified else size, max_pixels)
     if rectified:
         maps = _maps(images, disparity, "disparity", positions, "positions")
-        return render_rectified(images, maps, [float(p) for p in positions], float(at), method, fill)
-    size = _size(images, size)
+        return render_rectified(images, maps, [float(p) for p in positions], float(at), options, not drop_unknown)
     if calibrated:
         maps = _maps(images, depth, "depth", cameras, "cameras")
         matrices = [_camera(matrix) for matrix in cameras]
-        return render_calibrated(images, maps, matrices, _camera(camera), size, method, fill)
+        return render_calibrated(images, maps, matrices, _camera(camera), size, options, not drop_unknown)
     tracks, points = _tracks(tracks, points, len(images))
-    return render_uncalibrated(images, tracks, points, 0.0 if at is None else float(at), size, bool(reverse_order))
+    at = 0.0 if at is None else float(at)
+    return render_uncalibrated(images, tracks, points, at, size, options, seed, bool(reverse_order))
 
 
-def _size(images, size):
-    if size is None:
-        return images[0].shape[:2] if images else (0, 0)
-    height, width = map(operator.index, size)
-    if height < 1 or width < 1 or height * width > MOST_PIXELS:
-        raise HybankError(f"size ({height}, {width}): a view has a pixel or more in each direction, {MOST_PIXELS} at most")
+def _size(images, size, most):
+    if size is None and not images:
+        return 0, 0
+    height, width = images[0].shape[:2] if size is None else map(operator.index, size)
+    if height < 1 or width < 1 or height * width > most:
+        raise HybankError(f"size ({height}, {width}): a view has a pixel or more in each direction, {most} at most")
     return height, width
 
 

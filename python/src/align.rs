@@ -3,8 +3,8 @@
 use crate::arrays::{Held, Shape};
 use crate::background;
 use crate::calibrate::{records, reference_of};
-use crate::errors::refused;
-use crate::results::Made;
+use crate::errors::{refused, warn};
+use crate::results::{Made, record};
 use crate::sources;
 use hybank::figures::Alone;
 use hybank::track::{self, AlignSettings, AlignedChannel, Alignment};
@@ -12,34 +12,9 @@ use hybank::units::Seconds;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
-/// When recordings began, how their clocks drift, their polarities, gains and offsets.
-///
-/// Parameters
-/// ----------
-/// x : sequence of array_like
-///     One recording per channel, of any length, of a broad sound (noise, speech, music).
-/// spec : Bank, Spec, dict, str or path
-///     The nominal values.
-/// reference : int, optional
-///     The channel whose clock is the time, from 1.
-/// within : float, optional
-///     How far apart the recordings began at most, in seconds.
-///
-/// Returns
-/// -------
-/// Alignment
-///     The spec with these values, and the samples to leave out.
-///
-/// Examples
-/// --------
-/// >>> sound = "tones:" + ",".join(f"{100 * 1.07**k:.1f}Hz" for k in range(65))
-/// >>> spec = {"fast_rate": 48e3, "ratio": 2, "target": {"filter": hb.butterworth(4, 9e3)},
-/// ...         "channel": [hb.Channel(delay=25e-6), hb.Channel(delay=12.5e-6)]}
-/// >>> recorded = hb.simulate(spec, sound, samples=48_000).channels
-/// >>> hb.align([recorded[0][500:], recorded[1]], spec).skip
-/// [0, 500]
+/// When recordings began, one per channel: how their clocks drift, their polarities, gains and offsets.
 #[pyfunction]
-#[pyo3(signature = (x, spec, *, reference = None, within = None))]
+#[pyo3(signature = (x, spec, reference, within))]
 pub(crate) fn align<'py>(
     x: Vec<Bound<'py, PyAny>>,
     spec: &Bound<'py, PyAny>,
@@ -72,17 +47,20 @@ pub(crate) fn align<'py>(
 fn result<'py>(py: Python<'py>, found: &Alignment, alone: Alone) -> PyResult<Bound<'py, PyAny>> {
     let column = |of: fn(&AlignedChannel) -> f64| PyArray1::from_iter(py, found.channels.iter().map(of));
     let lines = found.readings.iter().map(|reading| reading.line() + "\n");
+    found.warnings.iter().try_for_each(|warning| warn(py, warning))?;
     Made::new(py, "Alignment")?
         .with("spec", found.spec.to_toml().map_err(refused)?)?
         .with("skip", found.channels.iter().map(|channel| channel.skip).collect::<Vec<_>>())?
+        .with("reference", found.reference + 1)?
         .with("frames", found.frames)?
+        .with("pieces", found.pieces)?
+        .with("measured", found.measured)?
         .with("delay", column(|channel| channel.delay.value.0))?
         .with("drift_ppm", column(|channel| 1e6 * channel.drift.value))?
         .with("gain", column(|channel| channel.gain.value))?
         .with("offset", column(|channel| channel.offset.value))?
         .with("track", lines.collect::<String>())?
-        .with("alone_db", alone.snr_db.0)?
-        .with("together_db", alone.together_db.0)?
+        .with("alone", record(py, &alone)?)?
         .with("one_suffices", alone.suffices())?
         .with("warnings", found.warnings.iter().map(ToString::to_string).collect::<Vec<_>>())?
         .object()

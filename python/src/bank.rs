@@ -2,13 +2,13 @@
 
 use crate::arrays::{framed, matrix, read_only};
 use crate::background;
-use crate::errors::{choose, no_others, refused};
+use crate::errors::{choose, refused};
 use crate::fuse::{self, Request, parse_algorithm, parse_gaps};
 use crate::hardware::{self, CircuitKeywords};
 use crate::outputs::write_file;
 use crate::pictures;
 use crate::responses::{self, Matrices, Row, Rows};
-use crate::results::{figures, of_report, record};
+use crate::results::{FiguresReport, of_report, record};
 use crate::running::{Extras, Follow};
 use crate::sources;
 use crate::stream::Stream;
@@ -21,7 +21,7 @@ use pyo3::types::PyDict;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-#[doc = include_str!("docs/load.rst")]
+/// The bank of a file.
 #[pyfunction]
 pub(crate) fn load(path: PathBuf) -> PyResult<Bank> {
     let text = sources::read(&path)?;
@@ -64,9 +64,8 @@ impl Bank {
         signature = (
             path, *, format, name = "bank", input_bits = None, output_bits = None, accumulator = None,
             clocks_per_frame = None, pipeline = None, multipliers = None, testbench = None, random_frames = None,
-            overwrite = true, **unknown
-        ),
-        text_signature = "($self, path, *, format, name='bank', input_bits=None, output_bits=None, accumulator=None, clocks_per_frame=None, pipeline=None, multipliers=None, testbench=None, random_frames=None, overwrite=True)"
+            overwrite = true
+        )
     )]
     #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
     fn export(
@@ -83,9 +82,7 @@ impl Bank {
         testbench: Option<PathBuf>,
         random_frames: Option<u32>,
         overwrite: bool,
-        unknown: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Option<Py<PyAny>>> {
-        no_others(slf.as_any(), "export", unknown)?;
         let format = choose("format", format, &FORMATS)?;
         let keywords = CircuitKeywords {
             output_bits,
@@ -226,8 +223,8 @@ impl Bank {
     #[doc = include_str!("docs/Bank.figures.rst")]
     fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let bank = Arc::clone(&self.bank);
-        let found = background::run(py, None, move |_| hybank::figures::Figures::new(&bank))?;
-        figures(py, found.map_err(refused)?)
+        let found = background::run(py, None, move |_| FiguresReport::new(&bank))?;
+        of_report(py, "Figures", &found.map_err(refused)?)
     }
 
     #[doc = include_str!("docs/Bank.pictures.rst")]
@@ -266,7 +263,7 @@ impl Bank {
         signature = (
             x, *, axis = -1, dtype = None, threads = 1, gaps = None, algorithm = "auto", keep_latency = false,
             interleaved = None, track = None, track_frames = 2048, track_wander = 1.0, rate = None,
-            full_output = false, **unknown
+            full_output = false
         ),
         text_signature = "($self, x, *, axis=-1, dtype=None, threads=1, gaps=None, algorithm='auto', keep_latency=False, interleaved=None, track=None, track_frames=2048, track_wander=1.0, rate=None, full_output=False)"
     )]
@@ -286,10 +283,8 @@ impl Bank {
         track_wander: f64,
         rate: Option<f64>,
         full_output: bool,
-        unknown: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let py = x.py();
-        no_others(slf.as_any(), "fuse", unknown)?;
         if interleaved.is_some() || sources::is_foreign(x)? {
             let keywords = PyDict::new(py);
             keywords.set_item("axis", axis)?;
@@ -313,14 +308,19 @@ impl Bank {
             extras: Extras { gaps: parse_gaps(gaps)?, follow },
             algorithm: parse_algorithm(algorithm)?,
             keep_latency,
+            is_reported: full_output,
         };
-        let [y, report] = fuse::fuse(bank, &frames, shape, dtype.as_ref(), &request)?;
-        if full_output { Ok((y, report).into_pyobject(py)?.into_any()) } else { Ok(y) }
+        let fused = fuse::fuse(bank, &frames, shape, dtype.as_ref(), &request)?;
+        if !full_output {
+            return Ok(fused.y);
+        }
+        let report = fused.report(py, rate.unwrap_or(1.0 / bank.fast_period.0))?;
+        Ok((fused.y, report).into_pyobject(py)?.into_any())
     }
 
     #[doc = include_str!("docs/Bank.fuse_as_hardware.rst")]
     #[pyo3(
-        signature = (x, *, accumulator = 64, axis = -1, keep_latency = false, **unknown),
+        signature = (x, *, accumulator = 64, axis = -1, keep_latency = false),
         text_signature = "($self, x, *, accumulator=64, axis=-1, keep_latency=False)"
     )]
     fn fuse_as_hardware<'py>(
@@ -329,9 +329,7 @@ impl Bank {
         accumulator: u32,
         axis: isize,
         keep_latency: bool,
-        unknown: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        no_others(slf.as_any(), "fuse_as_hardware", unknown)?;
         let bank = &slf.get().bank;
         let (frames, shape) = framed(x, &bank.layout(), axis, false)?;
         hardware::fuse(bank, &frames, shape, accumulator, keep_latency)
@@ -341,7 +339,7 @@ impl Bank {
     #[pyo3(
         signature = (
             *, axis = -1, dtype = None, algorithm = "auto", state = None, gaps = None, track = None,
-            track_frames = 2048, track_wander = 1.0, rate = None, **unknown
+            track_frames = 2048, track_wander = 1.0, rate = None
         ),
         text_signature = "($self, *, axis=-1, dtype=None, algorithm='auto', state=None, gaps=None, track=None, track_frames=2048, track_wander=1.0, rate=None)"
     )]
@@ -357,9 +355,7 @@ impl Bank {
         track_frames: usize,
         track_wander: f64,
         rate: Option<f64>,
-        unknown: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Stream> {
-        no_others(slf.as_any(), "stream", unknown)?;
         let bank = &slf.get().bank;
         let follow = Follow::new(bank, track, track_frames, track_wander, rate)?;
         let extras = Extras { gaps: parse_gaps(gaps)?, follow };

@@ -2,14 +2,15 @@
 
 use crate::arrays::{Held, framed};
 use crate::background;
-use crate::errors::refused;
-use crate::results::Made;
+use crate::errors::{refused, warn};
+use crate::results::{Made, record};
 use crate::sources;
 use crate::values::frequencies;
 use hybank::calibrate::{
     self as calibration, Calibration, CalibrationSignal, ChannelEstimate, Fit, Fitting, Record, Settings,
-    applied,
+    Tone, Warning, applied,
 };
+use hybank::io::rails_of;
 use hybank::sine_fit::Estimate;
 use hybank::spec::Spec;
 use hybank::units::{FastPeriods, Hertz};
@@ -95,17 +96,22 @@ fn check(signal: &CalibrationSignal, is_complex: bool) -> PyResult<()> {
     }
 }
 
-/// One record per channel. Integers clip at the ends of their range, floats where `clip` says.
+/// One record per channel. Samples clip at the ends of their range, or where `clip` says.
 pub(crate) fn records(held: &Held<'_>, channels: usize, clip: Option<f64>) -> PyResult<Vec<Record>> {
     if clip.is_some_and(|level| level.is_nan() || level <= 0.0) {
         return Err(refused("clip: give a positive level"));
     }
-    let unbounded = (f64::NEG_INFINITY, f64::INFINITY);
-    let (lowest, highest) = clip.map(|level| (-level, level)).or(held.rails()).unwrap_or(unbounded);
+    let record = |samples: Vec<f64>| {
+        let rails = clip.map(|level| (-level, level));
+        match rails.or_else(|| rails_of(samples.iter().copied(), held.rails())) {
+            Some((lowest, highest)) => Record::within(samples, lowest, highest),
+            None => Record::new(samples),
+        }
+    };
     let part = |part| -> PyResult<Vec<Record>> {
         let frames = held.doubles(part)?;
         let channel = |i| frames.iter().skip(i).step_by(channels).copied().collect();
-        Ok((0..channels).map(|i| Record::within(channel(i), lowest, highest)).collect())
+        Ok((0..channels).map(|i| record(channel(i))).collect())
     };
     if !held.format.complex {
         return part(0);
@@ -127,6 +133,14 @@ pub(crate) fn reference_of(spec: &Spec, given: Option<usize>) -> PyResult<usize>
         Some(channel) => Ok(channel - 1),
         None => Ok(spec.uncertainty.as_ref().and_then(|table| table.reference_channel()).unwrap_or(0)),
     }
+}
+
+/// A tone that was used.
+#[derive(serde::Serialize)]
+struct ToneReport {
+    frequency: Estimate<Hertz>,
+    zone: usize,
+    amplitude: f64,
 }
 
 /// An estimate of a channel, if it was fitted.
@@ -152,14 +166,24 @@ fn result<'py>(py: Python<'py>, spec: &Spec, found: &Calibration) -> PyResult<Bo
         made = made.with(name, column(|found| found.value))?;
         made = made.with(&format!("{name}_sigma"), column(|found| found.sigma))?;
     }
-    let tones = found.tones.iter().map(|tone| tone.frequency.value.0);
-    let warnings = found.warnings.iter().chain(&more).map(ToString::to_string);
+    let tone = |tone: &Tone| ToneReport {
+        frequency: tone.frequency,
+        zone: tone.zone,
+        amplitude: tone.amplitude.value,
+    };
+    let tones: Vec<ToneReport> = found.tones.iter().map(tone).collect();
+    let (notes, warnings): (Vec<&Warning>, _) =
+        found.warnings.iter().chain(&more).partition(|warning| warning.is_note());
+    warnings.iter().try_for_each(|warning| warn(py, warning))?;
+    let texts = |list: Vec<&Warning>| list.iter().map(ToString::to_string).collect::<Vec<_>>();
     made.with("spec", calibrated.to_toml().map_err(refused)?)?
         .with("reference", found.reference + 1)?
-        .with("tones", tones.collect::<Vec<_>>())?
+        .with("tones", record(py, &tones)?)?
+        .with("modulus_samples", found.modulus.map(|modulus| modulus.0))?
         .with("frames", found.frames)?
         .with("clipped", &found.clipped)?
         .with("misfit", found.misfit)?
-        .with("warnings", warnings.collect::<Vec<_>>())?
+        .with("notes", texts(notes))?
+        .with("warnings", texts(warnings))?
         .object()
 }

@@ -23,7 +23,7 @@ pub(crate) fn design(
     let mut spec = sources::spec_with(source, keys.map_err(|error| spec_error(py, &error))?)?;
     spec.latency = latency.or(spec.latency);
     for warning in warnings(&spec).unwrap_or_default() {
-        warn(py, &warning, 3)?;
+        warn(py, &warning)?;
     }
     let proof = if proof { ProofSearch::Run } else { ProofSearch::Skip };
     let limits = if limits { Limits::Enforced } else { Limits::Off };
@@ -62,7 +62,7 @@ fn finished(py: Python<'_>, found: Result<Design, DesignError>, proof: ProofSear
     if let Err(reason) = proven
         && proof == ProofSearch::Run
     {
-        warn(py, &format!("gamma is computed, not proven: {reason}"), 3)?;
+        warn(py, &format!("gamma is computed, not proven: {reason}"))?;
     }
     Ok(Bank::from(bank))
 }

@@ -4,10 +4,9 @@ use hybank::files::FileError;
 use hybank::messages::{Quoted, shown};
 use hybank::spec;
 use pyo3::create_exception;
-use pyo3::exceptions::{PyFileExistsError, PyOSError, PyUserWarning, PyValueError};
+use pyo3::exceptions::{PyFileExistsError, PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::ffi::CString;
 use std::fmt::Display;
 
 create_exception!(
@@ -85,19 +84,15 @@ pub(crate) fn file_error(error: FileError) -> PyErr {
     }
 }
 
-/// Refuses keywords that a method of a class does not have, with the nearest one that it has.
-pub(crate) fn no_others<'py>(
-    of: &Bound<'py, PyAny>,
-    method: &str,
-    unknown: Option<&Bound<'py, PyDict>>,
-) -> PyResult<()> {
+/// Refuses keywords beside the one that `function` has. Only for what is called so often that the wrapper of
+/// `hybank._keywords`, which does it for all others, would take time.
+pub(crate) fn no_others(function: &str, known: &str, unknown: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
     let Some(unknown) = unknown else { return Ok(()) };
-    let refuse = of.py().import("hybank._keywords")?.getattr("refuse_of")?;
-    refuse.call1((of.get_type(), method, unknown)).map(drop)
+    let refuse = unknown.py().import("hybank._keywords")?.getattr("refuse")?;
+    refuse.call1((function, unknown, [known])).map(drop)
 }
 
-/// A warning at the line of the caller, so many calls of Python above this module.
-pub(crate) fn warn(py: Python<'_>, message: &impl Display, level: i32) -> PyResult<()> {
-    let text = CString::new(shown(&message.to_string()))?;
-    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, level)
+/// A warning at the line that called the package.
+pub(crate) fn warn(py: Python<'_>, message: &impl Display) -> PyResult<()> {
+    py.import("hybank._warnings")?.call_method1("warn", (shown(&message.to_string()),)).map(drop)
 }

@@ -3,13 +3,19 @@
 use crate::bank::Bank;
 use crate::errors::{refused, warn};
 use crate::sources;
-use hybank::io::{Coding, LostSamples, MAX_LOST, MultiReader, OfflineSamples, ReadOptions, Until};
-use hybank::pipeline::matching;
+use hybank::bank::{self, FrameLayout};
+use hybank::io::{
+    Coding, LostSamples, MAX_LOST, MultiReader, OfflineSamples, ReadOptions, TimeInterleaving, Until,
+};
+use hybank::pipeline::matching::{self, InputMismatch};
 use hybank::quantity::{self, FullScale};
+use hybank::spec::Spec;
+use hybank::units::FastPeriods;
 use numpy::{Complex64, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Samples of a channel that are read at most: an array of more is 32 GiB.
 const MOST: usize = 1 << 32;
@@ -28,35 +34,72 @@ pub(crate) struct Options {
     longest: bool,
 }
 
+/// What recordings are for: a bank, or a spec.
+struct Wanted {
+    bank: Option<Arc<bank::Bank>>,
+    /// Of anything but a bank.
+    spec: Option<Spec>,
+    delays: Vec<FastPeriods>,
+    layout: FrameLayout,
+}
+
+impl Wanted {
+    fn new(source: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if let Ok(bank) = source.cast::<Bank>() {
+            let bank = Arc::clone(&bank.get().bank);
+            let (delays, layout) = (bank.delays_in_fast_periods(), bank.layout());
+            return Ok(Self { bank: Some(bank), spec: None, delays, layout });
+        }
+        let spec = sources::spec(source)?;
+        let (delays, layout) = (spec.delays_in_fast_periods(), spec.layout());
+        Ok(Self { bank: None, spec: Some(spec), delays, layout })
+    }
+
+    fn turns(&self, converters: usize) -> PyResult<TimeInterleaving> {
+        let turns = matching::interleaving(converters, &self.delays, &self.layout);
+        turns.map_err(|problem| refused(format!("interleaved: {problem}")))
+    }
+
+    fn full_scale(&self) -> Option<FullScale> {
+        let of_bank = self.bank.as_ref().and_then(|bank| bank.spec.as_ref());
+        of_bank.or(self.spec.as_ref()).and_then(|spec| spec.full_scale)
+    }
+
+    /// The rate of the output of a bank, in hertz, if the recordings fit.
+    fn check(&self, reader: &MultiReader) -> Result<Option<f64>, InputMismatch> {
+        if let Some(spec) = &self.spec {
+            matching::check_rate(spec, reader)?;
+        }
+        let Some(bank) = &self.bank else { return Ok(None) };
+        matching::check_channels(bank, "the bank", reader)?;
+        matching::output_rate(bank, reader).map(Some)
+    }
+}
+
 /// The channels of recordings, a list of arrays, with what the files say: the rate of the recordings in
-/// hertz, or with a bank that of its output; lowest and highest value of each file.
+/// hertz, and that of the output of a bank. They are for a bank or a spec if one is given.
 #[pyfunction]
 pub(crate) fn read<'py>(
     py: Python<'py>,
     files: Vec<PathBuf>,
     options: Options,
-    bank: Option<&Bound<'py, Bank>>,
+    source: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let bank = bank.map(|bank| &*bank.get().bank);
-    let layout = bank.map(hybank::bank::Bank::layout);
-    let turns = match (options.interleaved, bank, &layout) {
-        (Some(converters), Some(bank), Some(layout)) => {
-            let turns = matching::interleaving(converters, &bank.delays_in_fast_periods(), layout);
-            Some(turns.map_err(|problem| refused(format!("interleaved: {problem}")))?)
-        }
-        _ => None,
-    };
+    let wanted = source.map(Wanted::new).transpose()?;
+    let turns = options.interleaved.zip(wanted.as_ref());
+    let turns = turns.map(|(converters, wanted)| wanted.turns(converters)).transpose()?;
     let coding: Coding = options.format.parse().map_err(|error| refused(format!("format: {error}")))?;
     let lost = options.lost.as_deref().map(LostSamples::read).transpose().map_err(refused)?;
-    let usual = layout.as_ref().map_or(1, |layout| matching::channels_of_raw(layout, files.len()));
-    let stated = bank.and_then(|bank| bank.spec.as_ref()).and_then(|spec| spec.full_scale);
+    let layout = wanted.as_ref().map(|wanted| &wanted.layout);
+    let usual = layout.map_or(1, |layout| matching::channels_of_raw(layout, files.len()));
     let read_options = ReadOptions {
         coding,
         channels: options.channels.unwrap_or(usual),
         only: options.channel.map(|channel| channel.saturating_sub(1)),
-        full_scale: full_scale(options.full_scale.as_deref())?.or(stated),
+        full_scale: full_scale(options.full_scale.as_deref())?
+            .or(wanted.as_ref().and_then(Wanted::full_scale)),
         interleaving: turns.as_ref(),
-        samples_per_frame: layout.as_ref().map_or(&[], |of| matching::samples_per_frame(of, files.len())),
+        samples_per_frame: layout.map_or(&[], |of| matching::samples_per_frame(of, files.len())),
         lost: lost.as_ref(),
         max_lost: options.max_lost.unwrap_or(MAX_LOST),
         until: if options.longest { Until::Longest } else { Until::Shortest },
@@ -65,24 +108,18 @@ pub(crate) fn read<'py>(
     let read = py.detach(|| -> Result<_, String> {
         let started = MultiReader::start(&files, read_options, crossbeam_channel::never());
         let mut reader = started.map_err(|error| error.to_string())?.ok_or("interrupted")?;
-        let rate = match bank {
-            None => reader.headers().find_map(|(_, header)| header.rate),
-            Some(bank) => {
-                let fits = matching::check_channels(bank, "the bank", &reader);
-                let rate = fits.and_then(|()| matching::output_rate(bank, &reader));
-                Some(rate.map_err(|error| error.to_string())?)
-            }
-        };
-        let rails: Vec<_> = reader.headers().map(|(_, header)| header.rails).collect();
+        let rate = reader.headers().find_map(|(_, header)| header.rate);
+        let output_rate = wanted.as_ref().map(|wanted| wanted.check(&reader)).transpose();
+        let output_rate = output_rate.map_err(|error| error.to_string())?.flatten();
         let whole = OfflineSamples::read_parts(&mut reader, MOST).map_err(|error| error.to_string())?;
-        Ok((whole, reader.is_complex(), rate, rails, reader.warnings()))
+        Ok((whole, reader.is_complex(), rate, output_rate, reader.warnings()))
     });
-    let (whole, is_complex, rate, rails, warnings) = read.map_err(refused)?;
-    warnings.iter().try_for_each(|warning| warn(py, warning, 3))?;
+    let (whole, is_complex, rate, output_rate, warnings) = read.map_err(refused)?;
+    warnings.iter().try_for_each(|warning| warn(py, warning))?;
     let found = PyDict::new(py);
     found.set_item("channels", arrays(py, whole.channels, is_complex))?;
     found.set_item("rate", rate)?;
-    found.set_item("rails", rails)?;
+    found.set_item("output_rate", output_rate)?;
     Ok(found)
 }
 
@@ -107,11 +144,11 @@ fn arrays(py: Python<'_>, channels: Vec<Vec<f64>>, is_complex: bool) -> Vec<Boun
 /// converter in turn.
 #[pyfunction]
 pub(crate) fn turns(source: &Bound<'_, PyAny>, interleaved: usize) -> PyResult<Vec<usize>> {
-    let (delays, layout) = match source.cast::<Bank>() {
-        Ok(bank) => (bank.get().bank.delays_in_fast_periods(), bank.get().bank.layout()),
-        Err(_) => sources::spec(source).map(|spec| (spec.delays_in_fast_periods(), spec.layout()))?,
-    };
-    let turns = matching::interleaving(interleaved, &delays, &layout);
-    let turns = turns.map_err(|problem| refused(format!("interleaved: {problem}")))?;
-    Ok(turns.channels().to_vec())
+    Ok(Wanted::new(source)?.turns(interleaved)?.channels().to_vec())
+}
+
+/// The samples of a frame of a bank or a spec.
+#[pyfunction]
+pub(crate) fn frame_samples(source: &Bound<'_, PyAny>) -> PyResult<usize> {
+    Wanted::new(source).map(|wanted| wanted.layout.count())
 }

@@ -1,17 +1,21 @@
 //! Fuses arrays.
 
 use crate::arrays::{Held, Shape};
-use crate::background::Signals;
-use crate::errors::{choose, refused};
+use crate::background::{self, Signals};
+use crate::errors::{choose, refused, warn};
 use crate::formats::Format;
 use crate::outputs::NewArray;
 use crate::results::Made;
 use crate::running::{Extras, Running};
 use hybank::bank::Bank;
-use hybank::pipeline::{self, DroppedLatency, GapPolicy, GapSummary, Outcome, PipelineError, Settings};
-use hybank::runtime::{Algorithm, Frames, Options, Plan, Precision, ThreadPool};
-use numpy::PyArray1;
+use hybank::calibrate::{Record, agreement, comparable, frames_for_agreement};
+use hybank::pipeline::{
+    self, DroppedLatency, GapPolicy, GapSummary, Outcome, PipelineError, Settings, Warning,
+};
+use hybank::runtime::{Algorithm, Frames, Input, Isa, Options, PcmFormat, Plan, Precision, ThreadPool};
+use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
+use std::time::Instant;
 
 /// Most threads: more than any processor has, and as many as start at once.
 const MOST_THREADS: i64 = 1024;
@@ -25,6 +29,8 @@ pub(crate) struct Request {
     pub(crate) extras: Extras,
     pub(crate) algorithm: Algorithm,
     pub(crate) keep_latency: bool,
+    /// A report is wanted, and so is what the captures say of the spec of the bank.
+    pub(crate) is_reported: bool,
 }
 
 impl Request {
@@ -67,42 +73,102 @@ pub(crate) fn plan(
     bank.plan(settings.options(options)).map_err(refused)
 }
 
-/// The output samples of an array, with the report.
+/// What captures say of the spec of a bank.
+#[derive(Default)]
+struct Captures {
+    verdict: String,
+    /// In what they contradict it.
+    warnings: Vec<String>,
+}
+
+impl Captures {
+    fn new(bank: &Bank, held: &Held<'_>, is_followed: bool) -> PyResult<Self> {
+        let spec = match comparable(bank.spec.as_ref(), !held.format.complex && !is_followed) {
+            Ok(spec) => spec.clone(),
+            Err(reason) => return Ok(Self { verdict: reason.to_string(), ..Self::default() }),
+        };
+        let channels = spec.channels.len();
+        let frames = held.frames().min(frames_for_agreement(channels));
+        let mut numbers = vec![0.0; frames * channels];
+        // There is nothing to load from no frames.
+        for part in held.parts()?.iter().filter(|_| frames > 0) {
+            Frames::new(&part[..], 0..frames).load(Isa::detect(), 0, &mut numbers);
+        }
+        let channel = |i| Record::new(numbers.iter().skip(i).step_by(channels).copied().collect());
+        let records: Vec<Record> = (0..channels).map(channel).collect();
+        let found = background::run(held.py(), None, move |_| agreement(&spec, &records))?;
+        let warnings = found.contradictions.iter().map(ToString::to_string).collect();
+        Ok(Self { verdict: found.summary(), warnings })
+    }
+}
+
+/// Output samples, and how they came about.
+pub(crate) struct Fused<'py> {
+    pub(crate) y: Bound<'py, PyAny>,
+    outcome: Outcome,
+    captures: Captures,
+    frames: usize,
+    latency_dropped: usize,
+    seconds: f64,
+    /// The number type of the outputs.
+    number: PcmFormat,
+    /// What is known of the delays, if they were followed.
+    track: Option<Py<PyAny>>,
+}
+
+/// The output samples of an array.
 pub(crate) fn fuse<'py>(
     bank: &Bank,
     x: &Bound<'py, PyAny>,
     shape: Shape,
     dtype: Option<&Bound<'py, PyAny>>,
     request: &Request,
-) -> PyResult<[Bound<'py, PyAny>; 2]> {
-    let py = x.py();
+) -> PyResult<Fused<'py>> {
+    let (py, begin) = (x.py(), Instant::now());
     let held = Held::new(x, shape)?;
     let format = Format::of_output(held.format, dtype)?;
-    let settings = request.settings();
-    if request.extras.follow.is_some() {
-        return followed(bank, &held, format, request);
-    }
+    let fused = match request.extras.follow {
+        Some(_) => followed(bank, &held, format, request)?,
+        None => filtered(bank, &held, format, request)?,
+    };
+    // A frame may hold several samples of a converter.
+    let outcome = Outcome { channels: bank.channel_count(), ..fused.outcome };
+    let seconds = begin.elapsed().as_secs_f64();
+    let captures = match request.is_reported {
+        true => Captures::new(bank, &held, request.extras.follow.is_some())?,
+        false => Captures::default(),
+    };
+    let fused = Fused { outcome, captures, seconds, ..fused };
+    fused.warnings().iter().try_for_each(|text| warn(py, text))?;
+    Ok(fused)
+}
+
+fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Request) -> PyResult<Fused<'py>> {
+    let (py, settings, frames) = (held.py(), request.settings(), held.frames());
     let plan = plan(bank, format, request.algorithm, settings)?;
-    let mut array = NewArray::new(py, held.frames() * bank.ratio, format)?;
+    let mut array = NewArray::new(py, frames * bank.ratio, format)?;
     let (parts, mut room) = (held.parts()?, array.room()?);
-    let parts: Vec<_> = parts.iter().map(|part| Frames::new(&part[..], 0..held.frames())).collect();
+    let parts: Vec<_> = parts.iter().map(|part| Frames::new(&part[..], 0..frames)).collect();
     let signals = Signals::new();
     let stop = || signals.raised();
     let outcome = py.detach(|| pipeline::fuse(bank, &plan, &parts, &mut room, settings, &stop));
     let outcome = outcome.map_err(|error| signals.into_error().unwrap_or_else(|| refused(error)))?;
-    let clipped = room.clipped;
-    let y = array.finish()?;
-    let outcome = Outcome { clipped, ..outcome };
-    Ok([y, report(py, outcome, settings.dropped.samples(&plan))?.object()?])
+    let outcome = Outcome { clipped: room.clipped, ..outcome };
+    let (y, latency_dropped) = (array.finish()?, settings.dropped.samples(&plan));
+    Ok(Fused {
+        y,
+        outcome,
+        captures: Captures::default(),
+        frames,
+        latency_dropped,
+        seconds: 0.0,
+        number: format.number,
+        track: None,
+    })
 }
 
-/// As [`fuse`], with filters that follow the delays.
-fn followed<'py>(
-    bank: &Bank,
-    held: &Held<'py>,
-    format: Format,
-    request: &Request,
-) -> PyResult<[Bound<'py, PyAny>; 2]> {
+/// As [`filtered`], with filters that follow the delays.
+fn followed<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Request) -> PyResult<Fused<'py>> {
     let py = held.py();
     let settings = request.settings();
     let mut running = Running::new(bank, format, request.algorithm, &request.extras, settings)?;
@@ -125,26 +191,51 @@ fn followed<'py>(
     tracks.warn(py)?;
     let y = PyArray1::from_vec(py, outputs.samples).call_method1("view", (format.name(),))?;
     let mask = outcome.gaps.is_some().then_some(outputs.mask);
-    let report = report(py, Outcome { mask, ..outcome }, latency_dropped)?;
-    Ok([y, report.with("track", tracks.log(py)?)?.object()?])
+    let (outcome, track) = (Outcome { mask, ..outcome }, Some(tracks.log(py)?));
+    Ok(Fused {
+        y,
+        outcome,
+        captures: Captures::default(),
+        frames,
+        latency_dropped,
+        seconds: 0.0,
+        number: format.number,
+        track,
+    })
 }
 
-fn report(py: Python<'_>, outcome: Outcome, latency_dropped: usize) -> PyResult<Made<'_>> {
-    let Outcome { plan, gaps, mask, .. } = outcome;
-    let list = |gaps: GapSummary| -> Vec<_> {
-        gaps.list.iter().map(|gap| (gap.channel, gap.first, gap.length)).collect()
-    };
-    Made::new(py, "FuseReport")?
-        .with("algorithm", plan.algorithm)?
-        .with("numbers", plan.numbers)?
-        .with("isa", plan.isa)?
-        .with("latency_dropped", latency_dropped)?
-        .with("clipped", outcome.clipped)?
-        .with("replaced", outcome.replaced)?
-        .with("state_resets", outcome.state_resets)?
-        .with("missing", gaps.as_ref().map(|gaps| gaps.missing))?
-        .with("gaps", gaps.map(list))?
-        .with("mask", mask.map(|mask| marks(py, &mask)))
+impl Fused<'_> {
+    /// What was tolerated.
+    fn warnings(&self) -> Vec<String> {
+        let text = |warning| match warning {
+            Warning::Clipped(_) => format!("{warning}; a dtype of floats keeps them"),
+            _ => warning.to_string(),
+        };
+        self.outcome.warnings().map(text).chain(self.captures.warnings.iter().cloned()).collect()
+    }
+
+    /// The report of a run with so many output samples per second, as that of the command line.
+    pub(crate) fn report<'py>(&self, py: Python<'py>, rate: f64) -> PyResult<Bound<'py, PyAny>> {
+        let Self { y, outcome, captures, frames, latency_dropped, seconds, number, track } = self;
+        let bytes = y.call_method1("view", ("u1",))?;
+        let bytes = bytes.cast::<PyArray1<u8>>()?.try_readonly().map_err(refused)?;
+        let list = |gaps: &GapSummary| -> Vec<_> {
+            gaps.list.iter().map(|gap| (gap.channel, gap.first, gap.length)).collect()
+        };
+        Made::of(py, "FuseReport", outcome)?
+            .with("frames", *frames)?
+            .with("rate", rate)?
+            .with("captures", &captures.verdict)?
+            .with("latency_dropped", *latency_dropped)?
+            .with("peak", pipeline::peak(*number, bytes.as_slice().map_err(refused)?))?
+            .with("seconds", *seconds)?
+            .with("warnings", self.warnings())?
+            .with("missing", outcome.gaps.as_ref().map(|gaps| gaps.missing))?
+            .with("gaps", outcome.gaps.as_ref().map(list))?
+            .with("mask", outcome.mask.as_ref().map(|mask| marks(py, mask)))?
+            .with("track", track.as_ref().map(|track| track.clone_ref(py)))?
+            .object()
+    }
 }
 
 /// True where a byte is not 0.

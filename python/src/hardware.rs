@@ -119,7 +119,7 @@ pub(crate) fn fuse<'py>(
         frames.chunks_exact(shape.channels).zip(outputs).for_each(|(frame, fast)| model.process(frame, fast));
         fast
     });
-    model.warnings().iter().try_for_each(|warning| warn(x.py(), warning, 1))?;
+    model.warnings().iter().try_for_each(|warning| warn(x.py(), warning))?;
     let y = PyArray1::from_slice(x.py(), &fast[skip..skip + wanted]);
     y.call_method1("astype", (held.format.name(),))
 }

@@ -2,15 +2,15 @@
 
 use crate::arrays::{Held, Shape};
 use crate::background;
-use crate::errors::{choose, refused};
+use crate::errors::{choose, refused, warn};
 use crate::results::{Made, record};
 use crate::values::frequencies;
-use hybank::measure::{self as quality, Imbalance, Measurement, Settings, Spur, Window};
-use hybank::overview::{Figure, column};
+use hybank::io::rails_of;
+use hybank::measure::{self as quality, Measurement, Settings, Warning, Window};
+use hybank::overview::{Figure, causes, column};
 use hybank::units::{Decibels, Hertz};
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::PyComplex;
 
 /// How a record is measured.
 struct Request {
@@ -47,8 +47,8 @@ impl Request {
 /// The quality of a record of one or several tones.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
-pub(crate) fn measure<'py>(
-    y: &Bound<'py, PyAny>,
+pub(crate) fn measure(
+    y: &Bound<'_, PyAny>,
     rate: f64,
     tones: Option<&Bound<'_, PyAny>>,
     interleaved: usize,
@@ -56,25 +56,28 @@ pub(crate) fn measure<'py>(
     full_scale: f64,
     window: &str,
     skip: usize,
-) -> PyResult<Bound<'py, PyAny>> {
+) -> PyResult<Py<PyAny>> {
     let request = Request::new(rate, window, skip)?;
     let settings = Settings {
         tones: frequencies("tones", tones)?.into_iter().map(Hertz).collect(),
         converters: interleaved,
         harmonics,
         full_scale,
-        rails: (-full_scale, full_scale),
         window: request.window,
+        ..Settings::default()
     };
     let held = Held::new(y, Shape { axis: -1, channels: 1 })?;
-    let settings = Settings { rails: held.rails().unwrap_or(settings.rails), ..settings };
     let (real, rate) = (request.samples(&held, 0)?, request.rate);
     let imaginary = if held.format.complex { Some(request.samples(&held, 1)?) } else { None };
+    let full_scale = if held.format.number.is_float() { full_scale } else { 1.0 };
+    let all = real.iter().chain(imaginary.iter().flatten()).map(|x| x / full_scale);
+    let (low, high) = rails_of(all, held.rails()).unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+    let settings = Settings { rails: (low * full_scale, high * full_scale), ..settings };
     let found = background::run(y.py(), None, move |_| match imaginary {
         Some(imaginary) => quality::measure_complex(&real, &imaginary, rate, &settings),
         None => quality::measure(&real, rate, &settings),
     })?;
-    result(y.py(), found.map_err(refused)?)
+    result(y.py(), &found.map_err(refused)?)
 }
 
 /// A record against a reference, and the spectrum of their difference: hertz and amplitudes.
@@ -117,40 +120,37 @@ fn spectrum(py: Python<'_>, of: &quality::Spectrum, full_scale: f64) -> Spectrum
 const WINDOWS: [(&str, Window); 4] =
     [("none", Window::None), ("hann", Window::Hann), ("bh4", Window::Bh4), ("bh7", Window::Bh7)];
 
-fn result(py: Python<'_>, found: Measurement) -> PyResult<Bound<'_, PyAny>> {
-    let tone = |tone: &quality::Tone| (tone.frequency.value.0, tone.amplitude.value, tone.phase.value.0);
-    let spur = |spur: &Spur| {
-        let causes: Vec<String> = spur.causes.iter().map(ToString::to_string).collect();
-        (spur.frequency.0, spur.level.0, causes.join("; "))
+/// As the report of the command line. Figures may be infinite, which JSON cannot say.
+fn result(py: Python<'_>, found: &Measurement) -> PyResult<Py<PyAny>> {
+    let text = |warning: Warning| match &warning {
+        Warning::Unsettled(ends) => format!("{warning}; skip={} leaves them out", ends.samples),
+        _ => warning.to_string(),
     };
-    let imbalance = |found: &Imbalance| (found.gain.value, found.phase.value.0, found.image_rejection.0);
-    let imbalances = found.quadrature.as_ref().map(|parts| parts.imbalances.iter().map(imbalance));
+    let warnings: Vec<String> = found.warnings().into_iter().map(text).collect();
+    warnings.iter().try_for_each(|text| warn(py, text))?;
+    let spurs: Vec<_> = found.spurs.iter().map(|spur| Spur { spur, cause: causes(spur) }).collect();
     let figure = |of: Figure| (of.name, of.value, of.unit, of.meaning);
-    Made::new(py, "Measurement")?
-        .with("sinad", found.sinad.0)?
-        .with("enob", found.enob)?
+    let made = Made::of(py, "Measurement", found)?
+        .with("sinad_db", found.sinad.0)?
+        .with("enob_from_sinad", found.enob)?
         .with("enob_full_scale", found.enob_full_scale)?
-        .with("snr", found.snr.0)?
-        .with("thd", found.thd.0)?
-        .with("interleaving", found.interleaving.map(|level| level.0))?
-        .with("sfdr", found.sfdr.0)?
-        .with("noise_density", found.noise_density.0)?
-        .with("offset", offset(py, &found)?)?
-        .with("tones", found.tones.iter().map(tone).collect::<Vec<_>>())?
-        .with("spurs", found.spurs.iter().map(spur).collect::<Vec<_>>())?
-        .with("imbalances", imbalances.map(Iterator::collect::<Vec<_>>))?
-        .with("clipped", found.clipped)?
-        .with("left_out", found.left_out)?
-        .with("figures", column(&found).into_iter().map(figure).collect::<Vec<_>>())?
-        .with("spectrum", spectrum(py, &found.spectrum, found.full_scale))?
-        .object()
+        .with("snr_db", found.snr.0)?
+        .with("thd_db", found.thd.0)?
+        .with("interleaving_db", found.interleaving.map(|level| level.0))?
+        .with("sfdr_db", found.sfdr.0)?
+        .with("sfdr_without_interleaving_db", found.sfdr_without_interleaving.map(|level| level.0))?
+        .with("noise_density_dbfs_per_hertz", found.noise_density.0)?
+        .with("spurs", record(py, &spurs)?)?
+        .with("warnings", warnings)?
+        .with("figures", column(found).into_iter().map(figure).collect::<Vec<_>>())?
+        .with("spectrum", spectrum(py, &found.spectrum, found.full_scale))?;
+    made.object().map(Bound::unbind)
 }
 
-/// A float, or a complex number for complex samples.
-fn offset(py: Python<'_>, found: &Measurement) -> PyResult<Py<PyAny>> {
-    let real = found.offset.value;
-    Ok(match &found.quadrature {
-        Some(parts) => PyComplex::from_doubles(py, real, parts.offset.value).into_any().unbind(),
-        None => real.into_pyobject(py)?.into_any().unbind(),
-    })
+/// A spur with its causes as a text.
+#[derive(serde::Serialize)]
+struct Spur<'a> {
+    #[serde(flatten)]
+    spur: &'a quality::Spur,
+    cause: String,
 }

@@ -59,7 +59,7 @@ pub(crate) fn page(
         (channels, rate)
     });
     if is_cut {
-        warn(py, &format!("only the first {MOST_FRAMES} frames are on the page"), 1)?;
+        warn(py, &format!("only the first {MOST_FRAMES} frames are on the page"))?;
     }
     let mut commands = vec![
         "bank = hybank.design(\"spec.toml\")  # the spec above, saved as spec.toml".to_owned(),

@@ -3,7 +3,7 @@
 use crate::background;
 use crate::bank::Bank;
 use crate::errors::{refused, refused_in};
-use crate::results::of_report;
+use crate::results::{FiguresReport, of_report};
 use crate::sources;
 use crate::values::{shares, times};
 use hybank::bank::{self, check_digest};
@@ -18,11 +18,19 @@ use std::sync::Arc;
 #[pyfunction]
 pub(crate) fn verify<'py>(bank: &Bound<'py, PyAny>, search: bool) -> PyResult<Bound<'py, PyAny>> {
     let given = Given::new(bank)?;
-    let certificate_in_bank = given.bank.has_certificate();
-    let (bank_in, search) = (Arc::clone(&given.bank), search && !certificate_in_bank);
+    let certificate_in_file = given.bank.has_certificate();
+    let (bank_in, search) = (Arc::clone(&given.bank), search && !certificate_in_file);
     let verified = background::run(bank.py(), None, move |_| proven(&bank_in, search))?;
     let verified = verified.map_err(|error| refused_in(&given.name, error))?;
-    let report = Report { verified, digest: given.digest, certificate_in_bank };
+    let bank_in = &given.bank;
+    let report = Report {
+        verified,
+        digest: given.digest,
+        certificate_in_file,
+        worst_case: bank_in.gamma.worst_case,
+        tracked: bank_in.gamma.tracked,
+        unproven_slopes: bank_in.tap_slopes.is_some() && bank_in.gamma.tracked.is_none(),
+    };
     of_report(bank.py(), "Verified", &report)
 }
 
@@ -32,7 +40,10 @@ struct Report {
     #[serde(flatten)]
     verified: checker::Verified,
     digest: Option<bool>,
-    certificate_in_bank: bool,
+    certificate_in_file: bool,
+    worst_case: Option<f64>,
+    tracked: Option<f64>,
+    unproven_slopes: bool,
 }
 
 fn proven(bank: &bank::Bank, search: bool) -> Result<checker::Verified, String> {
@@ -111,6 +122,7 @@ struct Studied {
     #[serde(flatten)]
     analysis: design::Analysis,
     scale: design::GammaScale,
+    figures: Option<FiguresReport>,
     certified: Option<design::Certified>,
     #[serde(flatten)]
     study: ErrorStudy,
@@ -131,6 +143,7 @@ impl Studied {
         Ok(Self {
             analysis: design::analyze(bank, delay_errors)?,
             scale: design::GammaScale::new(bank, delay_errors)?,
+            figures: delay_errors.is_empty().then(|| FiguresReport::new(bank)).transpose()?,
             certified: certify.then(|| design::certify(bank)).transpose()?,
             study,
             sweep,

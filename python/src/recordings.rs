@@ -1,6 +1,6 @@
 //! `hybank.Recording`: frames of a WAV or SigMF file from any place, for workers that read spans of it.
 
-use crate::errors::{file_error, refused};
+use crate::errors::{file_error, no_others, refused};
 use crate::formats::Format;
 use hybank::files::FileError;
 use hybank::io::wav::WavReader;
@@ -8,6 +8,7 @@ use hybank::io::{SigmfMeta, StreamHeader, is_sigmf, sigmf_files};
 use hybank::runtime::{Input, Isa, PcmFrames, Precision, Sample};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -31,7 +32,9 @@ pub(crate) struct Recording {
 impl Recording {
     /// Reads the header of a WAV file, or the metadata of a SigMF recording.
     #[new]
-    fn new(path: PathBuf) -> PyResult<Self> {
+    #[pyo3(signature = (path, **unknown), text_signature = "(path)")]
+    fn new(path: PathBuf, unknown: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        no_others("Recording", "path", unknown)?;
         if is_sigmf(&path) { Self::sigmf(&path) } else { Self::wav(path) }
     }
 

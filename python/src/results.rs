@@ -2,7 +2,10 @@
 //! what `--json` of the command line prints, with the same names.
 
 use crate::errors::refused;
-use hybank::figures::{Figures, SimpleFigure};
+use hybank::bank::Bank;
+use hybank::design::DesignError;
+use hybank::figures::Figures;
+use hybank::units::Decibels;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -33,6 +36,13 @@ impl<'py> Made<'py> {
         Ok(Self { class: py.import("hybank._results")?.getattr(class)?, fields: PyDict::new(py) })
     }
 
+    /// With the fields of a report.
+    pub(crate) fn of(py: Python<'py>, class: &str, report: &impl serde::Serialize) -> PyResult<Self> {
+        let made = Self::new(py, class)?;
+        made.fields.call_method1("update", (record(py, report)?,))?;
+        Ok(made)
+    }
+
     pub(crate) fn with(self, name: &str, value: impl IntoPyObject<'py>) -> PyResult<Self> {
         self.fields.set_item(name, value)?;
         Ok(self)
@@ -44,21 +54,16 @@ impl<'py> Made<'py> {
 }
 
 /// A bank in the user's terms.
-pub(crate) fn figures(py: Python<'_>, found: Figures) -> PyResult<Bound<'_, PyAny>> {
-    let simple = |way: &SimpleFigure| (way.way.name(), way.channel, way.snr_db.0);
-    Made::new(py, "Figures")?
-        .with("band", (found.band.low_hertz.0, found.band.high_hertz.0))?
-        .with("snr", found.snr.total_db.0)?
-        .with("snr_signal", found.snr.signal_db.0)?
-        .with("snr_noise", found.snr.noise_db.map(|db| db.0))?
-        .with("snr_delays", found.snr.delays_db.map(|db| db.0))?
-        .with("snr_16_bits", found.snr_16_bits_db.map(|db| db.0))?
-        .with("image", found.image.map(|image| image.db.0))?
-        .with("image_frequency", found.image.map(|image| image.hertz.0))?
-        .with("gain_error", found.gain_error.map(|error| error.db.0))?
-        .with("gain_error_frequency", found.gain_error.map(|error| error.hertz.0))?
-        .with("simple", found.simple.iter().map(simple).collect::<Vec<_>>())?
-        .with("gain_over_simple", found.gain_over_simple().map(|db| db.0))?
-        .with("any_input", found.any_input)?
-        .object()
+#[derive(serde::Serialize)]
+pub(crate) struct FiguresReport {
+    #[serde(flatten)]
+    figures: Figures,
+    gain_over_simple_db: Option<Decibels>,
+}
+
+impl FiguresReport {
+    pub(crate) fn new(bank: &Bank) -> Result<Self, DesignError> {
+        let figures = Figures::new(bank)?;
+        Ok(Self { gain_over_simple_db: figures.gain_over_simple(), figures })
+    }
 }

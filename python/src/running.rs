@@ -178,7 +178,7 @@ impl Tracks {
     /// Says what was not said yet.
     pub(crate) fn warn(&self, py: Python<'_>) -> PyResult<()> {
         let warnings = py.detach(|| std::mem::take(&mut locked(&self.0).warnings));
-        warnings.iter().try_for_each(|text| warn(py, text, 1))
+        warnings.iter().try_for_each(|text| warn(py, text))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::arrays::{Held, Shape, framed};
 use crate::bank::Bank as PyBank;
-use crate::errors::refused;
+use crate::errors::{no_others, refused};
 use crate::formats::Format;
 use crate::fuse::{marks, parse_algorithm, plan};
 use crate::outputs::NewArray;
@@ -12,7 +12,7 @@ use hybank::bank::Bank;
 use hybank::runtime::{self, Plan};
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyTuple};
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A stream through a bank: blocks of frames in, M samples per frame out, late by the latency.
@@ -82,7 +82,13 @@ impl Stream {
 #[pymethods]
 impl Stream {
     #[doc = include_str!("docs/Stream.process.rst")]
-    fn process<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    #[pyo3(signature = (x, **unknown), text_signature = "($self, x)")]
+    fn process<'py>(
+        &self,
+        x: &Bound<'py, PyAny>,
+        unknown: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        no_others("Stream.process", "x", unknown)?;
         let (frames, shape) = framed(x, &self.bank.layout(), self.shape.axis, true)?;
         let held = Held::new(&frames, shape)?;
         self.check_parts(held.format)?;

@@ -65,18 +65,18 @@ def test_figures_are_those_of_the_error_and_beat_a_spline(fir):
     figures = fir.figures()
     found = hb.analyze(fir)
     # The target 0.25 / (s + 0.5)^2 passes white noise with the variance 1/8.
-    assert figures.snr == pytest.approx(20 * np.log10(np.sqrt(0.125) / found.rms_error), abs=0.01)
-    assert figures.snr_signal == figures.snr and figures.snr_noise is None and figures.any_input is None
-    low, high = figures.band
-    assert low == 0 and high > 0 and low <= figures.image_frequency <= high
-    assert figures.image < 0 and figures.gain_error < 0
-    assert {way for way, _, _ in figures.simple} == {"one-channel", "interleaving", "cubic-spline"}
-    assert figures.gain_over_simple == pytest.approx(figures.snr_16_bits - figures.simple[0][2])
+    assert figures.snr.total_db == pytest.approx(20 * np.log10(np.sqrt(0.125) / found.rms_error), abs=0.01)
+    assert figures.snr.signal_db == figures.snr.total_db and figures.snr.noise_db is figures.any_input is None
+    low, high = figures.band.low_hertz, figures.band.high_hertz
+    assert low == 0 and high > 0 and low <= figures.image.hertz <= high
+    assert figures.image.db < 0 and figures.gain_error.db < 0
+    assert {one.way for one in figures.simple} == {"one-channel", "interleaving", "cubic-spline"}
+    assert figures.gain_over_simple_db == pytest.approx(figures.snr_16_bits_db - figures.simple[0].snr_db)
 
 
 def test_verify_and_analyze_agree_with_the_bank(fir, filters, tmp_path):
     proof = hb.verify(filters / "thesis-fir.json")
-    assert proof.digest and proof.certificate_in_bank and proof.lower_banks == "any"
+    assert proof.digest and proof.certificate_in_file and proof.lower_banks == "any"
     assert fir.proven and proof.lower <= fir.gamma.norm <= proof.upper == fir.gamma.upper
     assert hb.verify(fir).digest is None
     found = hb.analyze(fir)

@@ -1,5 +1,6 @@
 """Spans of an archive have the bits of one run, whatever the algorithm, the signal, the files and the workers that die."""
 
+import contextlib
 import json
 import os
 import signal
@@ -96,7 +97,9 @@ def test_samples_are_counted_once(fir, tmp_path, dtype, output):
         # At a seam, in the warm-up of the span after it, and at both ends.
         x[0, [0, 2999, 3000, 2995, FRAMES - 1]] = np.nan
     y, report = fused(tmp_path, fir, x, span=3000, dtype=output)
-    want, info = fir.fuse(x, dtype=output, full_output=True)
+    tolerated = np.dtype(dtype).kind != "i" or output == "i2"
+    with pytest.warns(UserWarning) if tolerated else contextlib.nullcontext():
+        want, info = fir.fuse(x, dtype=output, full_output=True)
     assert y.dtype == want.dtype and y.tobytes() == want.tobytes()
     assert (report.clipped, report.replaced) == (info.clipped, info.replaced)
     assert (info.clipped > 0) == (output in ("i2", "i4")) and (info.replaced > 0) == (dtype != "i2")

@@ -103,9 +103,10 @@ def test_figures_hold_what_a_wanted_snr_and_the_converters_say():
     keywords = {**KEYWORDS, "channels": channels, "signal": "8 kHz", "latency": 8, "method": "h2"}
     wanted = hb.design(**{**keywords, "taps": None}, target_snr_db=55)
     figures = wanted.figures()
-    assert figures.snr_noise is not None and figures.snr < figures.snr_signal and figures.snr_16_bits is None
+    assert figures.snr.noise_db is not None and figures.snr_16_bits_db is None
+    assert figures.snr.total_db < figures.snr.signal_db
     fewer = hb.design(**{**keywords, "taps": wanted.taps.shape[1] - 1})
-    assert figures.snr >= 55 > fewer.figures().snr
+    assert figures.snr.total_db >= 55 > fewer.figures().snr.total_db
 
 
 @pytest.mark.parametrize(

@@ -194,6 +194,46 @@ def test_damaged_depth_is_restored_as_by_the_program(ibr, tmp_path, damage):
     np.testing.assert_allclose(view.image, program, atol=255e-6)
 
 
+def test_every_option_of_a_rendering_changes_it():
+    random = np.random.default_rng(6)
+    images = [seen(shift) + 3 * random.standard_normal((H, W)) for shift in (0.0, 4.0, 8.0)]
+    images[1] = 0.8 * images[1]
+    disparity = [np.full((H, W), 4.0) for _ in images]
+    for map_ in disparity:
+        # Two surfaces, and an unknown part of both.
+        map_[:, 20:] = 7.0
+        map_[4:18, 14:27] = np.nan
+    rig = {"disparity": disparity, "positions": [0.0, 1.0, 2.0], "at": 0.4}
+    dropped = hb.ibr.render(images, **rig, drop_unknown=True)
+    usual = hb.ibr.render(images, **rig)
+    plane = hb.ibr.render(images, **rig, method="plane")
+    for base, options in [
+        (usual, {"offset": 1.5}), (usual, {"nearest": 1}), (usual, {"lambda_": 50.0}), (usual, {"keep_exposure": True}),
+        (usual, {"drop_unknown": True}), (dropped, {"drop_unknown": True, "fill": "leave"}),
+        (dropped, {"drop_unknown": True, "fill": "bridge"}), (plane, {"method": "plane", "degree": "linear"}),
+    ]:  # fmt: skip
+        other = hb.ibr.render(images, **rig, **options)
+        assert (other.image != base.image).any(), options
+    same = hb.ibr.render(images, **rig, method="plane", degree="cubic", max_pixels=H * W)
+    np.testing.assert_array_equal(same.image, plane.image)
+    # Pixels without a sample stay black.
+    assert (hb.ibr.render(images, **rig, fill="leave", drop_unknown=True).image == 0).any()
+
+
+@pytest.mark.filterwarnings("ignore:the order of depth is undecided")
+def test_the_seed_of_the_robust_estimators(square):
+    images, tracks, _, points = square
+    random = np.random.default_rng(8)
+    noisy = tracks + 0.3 * random.standard_normal(tracks.shape)
+    wrong = random.random(len(noisy)) < 0.3
+    noisy[wrong] = random.uniform(0, 100, noisy[wrong].shape)
+    views = [hb.ibr.render(images, tracks=noisy, points=points, seed=seed) for seed in (1, 1, 2)]
+    first = hb.ibr.render(images, tracks=noisy, points=points)
+    np.testing.assert_array_equal(views[0].image, first.image)
+    np.testing.assert_array_equal(views[1].image, first.image)
+    assert (views[2].image != first.image).any()
+
+
 def test_what_does_not_fit_is_refused():
     image, map_ = np.zeros((H, W)), np.ones((H, W))
     rig = {"disparity": [map_], "positions": [0.0], "at": 0.0}
@@ -205,6 +245,14 @@ def test_what_does_not_fit_is_refused():
         ([np.zeros(3)], rig, "shape"),
         ([image], {**rig, "disparity": [np.ones((3, 3))]}, "pixels"),
         ([image], {**rig, "method": "best"}, "choose"),
+        ([image], {**rig, "fill": "all"}, "choose background, bridge or leave"),
+        ([image], {**rig, "degree": "square"}, "choose cubic or linear"),
+        ([image], {**rig, "nearest": 0}, "nearest"),
+        ([image], {**rig, "max_pixels": 10}, "10 at most"),
+        ([image], {**rig, "seed": 2}, "^seed: it is for views without cameras"),
+        ([image], {**rig, "method": "plane", "lambda_": 0.1}, "^lambda_: it is for the row fit"),
+        ([image], {**calibrated, "reverse_order": True}, "^reverse_order: it is for"),
+        ([image] * 2, {"tracks": tracks, "at": 0.5, "degree": "cubic"}, "^degree: it is for views with cameras"),
         ([image], {"depth": [map_], "cameras": [np.eye(3)], "camera": np.eye(3)}, r"\(3, 4\)"),
         ([image], {**calibrated, "size": (10**6, 10**6)}, "33554432 at most"),
         ([image], {**calibrated, "size": (0, 5)}, "a pixel or more"),

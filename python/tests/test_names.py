@@ -69,6 +69,42 @@ def test_a_wrong_keyword_is_answered_with_the_right_one(fir):
             call()
 
 
+@pytest.mark.parametrize("thing", [*FUNCTIONS, *METHODS, hb.Channel, hb.Signal, hb.Recording, hb.Captures.mono], ids=named)
+def test_every_function_answers_a_keyword_that_it_does_not_have(thing, fir):
+    # What Python itself looks for first.
+    first = {hb.dask.sweep: ([],), hb.Stream.process: (fir.stream(), np.zeros((2, 1))), hb.Recording: ("x.wav",)}
+    given = first.get(thing, ())
+    with pytest.raises(TypeError, match=r"unexpected keyword argument 'zzz'; (did you mean|it takes) ") as caught:
+        thing(*given, zzz=1)
+    # The name that a user wrote.
+    assert str(caught.value).startswith(f"{thing.__qualname__}()")
+
+
+def test_methods_of_the_extension_module_stay_what_they_are(fir):
+    import copy
+    import pickle
+
+    assert pickle.loads(pickle.dumps(fir.fuse))(np.zeros((2, 3))).shape == (6,)
+    assert copy.copy(fir) is fir and pickle.loads(pickle.dumps(fir)) == fir
+    assert hb.Bank.from_json(fir.to_json()) == fir == fir.from_json(fir.to_json())
+    for method in METHODS:
+        assert inspect.getdoc(method) and getattr(method, "__module__", "hybank").split(".")[0] == "hybank", method
+
+
+def test_the_block_of_gnu_radio_is_documented():
+    """By its source: GNU Radio is not there."""
+    import ast
+
+    tree = ast.parse((ROOT / "python" / "hybank" / "gnuradio.py").read_text())
+    (block,) = [node for node in tree.body if isinstance(node, ast.ClassDef)]
+    (init,) = [node for node in block.body if getattr(node, "name", "") == "__init__"]
+    text = ast.get_docstring(block)
+    section = text[text.index("Parameters\n----------") :]
+    for name in [one.arg for one in init.args.args if one.arg != "self"]:
+        assert re.search(rf"^{name} : ", section, re.M), name
+    assert "Examples\n--------" in text and [mark.id for mark in init.decorator_list] == ["checked"]
+
+
 def test_the_signature_of_design_has_the_keys_of_a_spec():
     from hybank import _spec
 
@@ -126,7 +162,7 @@ def test_a_measurement_shows_itself():
     n = np.arange(8192)
     m = hb.measure(0.5 * np.cos(0.3 * n) + 1e-3 * np.cos(0.6 * n) + 1e-4 * np.cos(2.2 * n), 48e3)
     page = m._repr_html_()
-    for words in ("<table>", "SINAD", f"{m.sinad:.2f}", "ENOB", "THD", "dBc"):
+    for words in ("<table>", "SINAD", f"{m.sinad_db:.2f}", "ENOB", "THD", "dBc"):
         assert words in page
     plt = pytest.importorskip("matplotlib.pyplot")
     plt.switch_backend("Agg")

@@ -63,6 +63,7 @@ def test_wrong_lists_are_refused(bank, capture):
         bank.fuse([x1.reshape(-1, 3), x2])
 
 
+@pytest.mark.filterwarnings("ignore:the tones contradict each other")
 def test_converters_are_calibrated(bank):
     found = hb.calibrate(
         hb.simulate(bank, "tones:1.1kHz,2.3kHz,9.7kHz", samples=24000, gain=0.2).channels,

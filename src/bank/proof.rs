@@ -21,6 +21,7 @@ pub struct Proof {
 /// The witnesses of a lower bound.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
+#[non_exhaustive]
 pub enum LowerProof {
     /// For all FIR banks of this length: witnesses whose combination does not depend on the taps.
     Fir(Vec<DualWitness>),

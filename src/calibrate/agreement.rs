@@ -56,6 +56,7 @@ pub struct Agreement {
 
 /// What captures say beside contradictions.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Verdict {
     /// One alias per band, at the delays and gains of the spec, has this share of their power.
     #[error(
@@ -75,6 +76,48 @@ pub enum Verdict {
     /// There is one channel, or there are too many.
     #[error("captures are compared with the spec for 2 to {MOST_CHANNELS} channels")]
     Channels,
+}
+
+impl Agreement {
+    /// Whether the captures agree with the spec of a bank, in a line.
+    pub fn summary(&self) -> String {
+        match self.contradictions.len() {
+            0 => self.verdict.to_string(),
+            1 => "the captures do not agree with the spec of the bank, see the warning".to_owned(),
+            count => {
+                format!("the captures do not agree with the spec of the bank, see the {count} warnings")
+            }
+        }
+    }
+}
+
+/// Why captures are not compared with a spec.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Incomparable {
+    /// Complex samples, or delays that are followed.
+    #[error("captures are not compared with the spec where they are complex or their delays are followed")]
+    Unsteady,
+    /// Converters have rates of their own.
+    #[error("captures of converters with rates of their own are not compared with the spec")]
+    OwnRates,
+    /// There is no spec.
+    #[error("the bank carries no spec with which the captures could be compared")]
+    NoSpec,
+}
+
+/// The spec of a bank with which captures can be compared. They are steady if they are real and their delays
+/// are not followed.
+///
+/// # Errors
+/// [`Incomparable`].
+pub fn comparable(spec: Option<&Spec>, is_steady: bool) -> Result<&Spec, Incomparable> {
+    match spec {
+        _ if !is_steady => Err(Incomparable::Unsteady),
+        None => Err(Incomparable::NoSpec),
+        Some(spec) if !spec.layout().is_plain() => Err(Incomparable::OwnRates),
+        Some(spec) => Ok(spec),
+    }
 }
 
 /// Frames of captures of so many channels that [`agreement`] needs at most; 0 if it cannot compare them.

@@ -51,7 +51,9 @@ mod tones;
 mod warning;
 mod waveform;
 
-pub use agreement::{Agreement, ENOUGH_FRAMES, Verdict, agreement, frames_for_agreement};
+pub use agreement::{
+    Agreement, ENOUGH_FRAMES, Incomparable, Verdict, agreement, comparable, frames_for_agreement,
+};
 pub use contradiction::Contradiction;
 pub use error::CalibrateError;
 pub use estimates::{Calibration, ChannelEstimate, Tone, applied};

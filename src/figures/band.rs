@@ -10,6 +10,7 @@ use std::f64::consts::TAU;
 /// Where a band comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum BandSource {
     /// The spec's `[signal]`.
     Signal,

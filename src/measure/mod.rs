@@ -47,12 +47,14 @@ mod record;
 mod spectrum;
 #[cfg(test)]
 mod tests;
+mod warning;
 
 pub use compare::{Band, Comparison, compare};
 pub use expected::Cause;
 pub use measurement::{Measurement, Spur, Tone, measure, measure_complex};
 pub use record::{Imbalance, Quadrature, UnsettledEnds};
 pub use spectrum::{Spectrum, Window};
+pub use warning::Warning;
 
 use crate::sine_fit::SineFitError;
 use crate::units::Hertz;

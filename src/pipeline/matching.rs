@@ -18,6 +18,7 @@
 use crate::bank::{Bank, FrameLayout};
 use crate::io::{MultiReader, StreamHeader, TimeInterleaving, is_same_rate};
 use crate::messages::{Number, Quoted, counted};
+use crate::spec::Spec;
 use crate::units::FastPeriods;
 
 /// Recordings that do not fit a bank.
@@ -84,6 +85,19 @@ pub enum InputMismatch {
         /// Its rate in hertz.
         rate: f64,
         /// That of the bank in hertz.
+        wanted: f64,
+    },
+    /// A rate that is not that of the spec.
+    #[error(
+        "{}: the sample rate is {} Hz, but the spec says {} Hz; record at that rate or correct the spec",
+        Quoted(.input), Number(*.rate), Number(*.wanted)
+    )]
+    SpecRate {
+        /// The input.
+        input: String,
+        /// Its rate in hertz.
+        rate: f64,
+        /// That of the spec in hertz.
         wanted: f64,
     },
     /// A rate that is not that of the converter.
@@ -195,6 +209,24 @@ pub fn output_rate(bank: &Bank, reader: &MultiReader) -> Result<f64, InputMismat
     match input_rate(bank, reader.headers(), &reader.samples_per_frame())? {
         Some(rate) if bank.is_normalised() => Ok(rate * bank.ratio as f64),
         _ => Ok(1.0 / bank.fast_period.0),
+    }
+}
+
+/// The inputs have the slow rates of the spec, as far as they state them; any for a spec in normalised time.
+///
+/// # Errors
+/// [`InputMismatch::SpecRate`].
+pub fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), InputMismatch> {
+    let frames = (spec.fast_period * spec.ratio as f64).rate().0;
+    let wrong = reader.headers().zip(reader.samples_per_frame()).find_map(|((name, header), samples)| {
+        let wanted = frames * samples as f64;
+        Some((name, header.other_rate(wanted)?, wanted))
+    });
+    match wrong {
+        Some((name, rate, wanted)) if !spec.is_normalised() => {
+            Err(InputMismatch::SpecRate { input: name.to_owned(), rate, wanted })
+        }
+        _ => Ok(()),
     }
 }
 

@@ -42,6 +42,6 @@ pub use fusion::{DroppedLatency, Settings};
 pub use gaps::{Gap, GapPolicy, GapSummary, LISTED_GAPS};
 pub use offline::{fuse, fused};
 pub use outcome::{Outcome, PipelineError, Warning};
-pub use outputs::FileOutputs;
+pub use outputs::{FileOutputs, peak};
 pub use retune::{Change, Retuner};
 pub use streaming::{Block, Pipeline};

@@ -95,7 +95,7 @@ const MAGNITUDE_64: u64 = u64::MAX >> 1;
 
 /// The largest magnitude in `samples`, of full scale; 0 for none. The usual formats take one pass of whole
 /// vectors.
-fn peak(format: PcmFormat, samples: &[u8]) -> f64 {
+pub fn peak(format: PcmFormat, samples: &[u8]) -> f64 {
     match format {
         PcmFormat::F32Le => {
             let (values, _) = samples.as_chunks();

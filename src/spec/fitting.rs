@@ -16,6 +16,7 @@ use super::{Fault, FilterSpec, SpecProblem};
 /// assert_eq!("phase".parse::<Fitting>(), Err(UnknownFitting));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Fitting {
     /// The delay.
     Delay,

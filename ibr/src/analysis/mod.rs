@@ -66,6 +66,7 @@ pub(crate) use regressors::difference;
 /// What an error comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Cause {
     /// Samples too far apart for the texture, and the smoothing of the fit.
     Density,

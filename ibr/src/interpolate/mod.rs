@@ -20,6 +20,7 @@ pub type Watch<'a> = &'a (dyn Fn(f64) + Sync);
 /// Degree of the splines of the plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[non_exhaustive]
 pub enum Degree {
     /// Linear B-splines.
     Linear,

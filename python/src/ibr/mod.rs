@@ -8,7 +8,8 @@ use crate::errors::{choose, refused};
 use crate::results::Made;
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::Measure;
-use hybank_ibr::interpolate::Cover;
+use hybank_ibr::interpolate::plane::PlaneSettings;
+use hybank_ibr::interpolate::{Cover, HoleFill};
 use hybank_ibr::pipeline::{Method, RenderError, RenderSettings, Rendering, calibrated, rectified};
 use hybank_ibr::propagate::{View, Viewpoint};
 use hybank_ibr::scene::{SourceView, prepare};
@@ -20,24 +21,24 @@ use views::views;
 
 /// The view from `at` on the line of rectified cameras, from images (H, W, C) and maps (H, W).
 #[pyfunction]
-#[pyo3(signature = (images, maps, positions, at, method, fill))]
+#[pyo3(signature = (images, maps, positions, at, options, fill))]
 pub(crate) fn render_rectified<'py>(
     py: Python<'py>,
     images: Vec<PyReadonlyArray3<'_, f32>>,
     maps: Vec<PyReadonlyArray2<'_, f32>>,
     positions: Vec<f64>,
     at: f64,
-    method: &str,
+    options: Options,
     fill: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let views = views(&images, &maps, positions, Measure::Disparity)?;
-    let settings = settings(method)?;
+    let settings = options.settings()?;
     rendered(py, views, fill, move |views| rectified::render(views, at, &settings))
 }
 
 /// The view of `camera` with `size` (H, W), from images, depths and cameras (3, 4).
 #[pyfunction]
-#[pyo3(signature = (images, maps, cameras, camera, size, method, fill))]
+#[pyo3(signature = (images, maps, cameras, camera, size, options, fill))]
 #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
 pub(crate) fn render_calibrated<'py>(
     py: Python<'py>,
@@ -46,12 +47,12 @@ pub(crate) fn render_calibrated<'py>(
     cameras: Vec<PyReadonlyArray2<'_, f64>>,
     camera: PyReadonlyArray2<'_, f64>,
     size: (usize, usize),
-    method: &str,
+    options: Options,
     fill: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let cameras = cameras.iter().map(metric).collect::<PyResult<Vec<_>>>()?;
     let views = views(&images, &maps, cameras, Measure::Depth)?;
-    let (camera, settings) = (metric(&camera)?, settings(method)?);
+    let (camera, settings) = (metric(&camera)?, options.settings()?);
     rendered(py, views, fill, move |views| calibrated::render(views, &camera, (size.1, size.0), &settings))
 }
 
@@ -72,10 +73,42 @@ fn rendered<'py, P: Viewpoint + 'static>(
     made(py, &background::run(py, None, run)?.map_err(refused)?, None, None)
 }
 
-fn settings(method: &str) -> PyResult<RenderSettings> {
-    let known = [("auto", Method::Auto), ("rows", Method::Rows), ("plane", Method::Plane)];
-    let method = choose("method", method, &known)?;
-    Ok(RenderSettings { method, ..RenderSettings::default() })
+/// How views are rendered, by the names of the command line.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct Options {
+    method: String,
+    fill: String,
+    degree: Option<String>,
+    lambda: Option<f64>,
+    offset: f64,
+    nearest: Option<usize>,
+    keep_exposure: bool,
+}
+
+impl Options {
+    fn settings(&self) -> PyResult<RenderSettings> {
+        let Self { offset, nearest, keep_exposure, .. } = *self;
+        let methods = [("auto", Method::Auto), ("rows", Method::Rows), ("plane", Method::Plane)];
+        let fills =
+            [("background", HoleFill::Background), ("bridge", HoleFill::Bridge), ("leave", HoleFill::Leave)];
+        let planes = [("cubic", PlaneSettings::default()), ("linear", PlaneSettings::LINEAR)];
+        let method = choose("method", &self.method, &methods)?;
+        let keep_smoothing = self.lambda.is_some();
+        let mut settings = RenderSettings {
+            method,
+            offset,
+            nearest,
+            keep_exposure,
+            keep_smoothing,
+            ..RenderSettings::default()
+        };
+        let stage = &mut settings.interpolation;
+        stage.fill = choose("fill", &self.fill, &fills)?;
+        stage.plane = choose("degree", self.degree.as_deref().unwrap_or("cubic"), &planes)?;
+        stage.fit.lambda = self.lambda.unwrap_or(stage.fit.lambda);
+        Ok(settings)
+    }
 }
 
 /// The camera of a matrix (3, 4).

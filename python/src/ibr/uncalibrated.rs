@@ -1,16 +1,14 @@
 //! Views without cameras: images and tracks.
 
-use super::made;
 use super::views::image;
+use super::{Options, made};
 use crate::background;
-use crate::errors::refused;
+use crate::errors::{refused, warn};
 use crate::results::of_report;
 use hybank_ibr::image::Image;
-use hybank_ibr::pipeline::RenderSettings;
 use hybank_ibr::pipeline::uncalibrated::{OrderBy, Target, UncalibratedSettings, render};
 use hybank_ibr::uncalibrated::Point;
 use numpy::{PyReadonlyArray2, PyReadonlyArray3};
-use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 
 /// One position for each track and view.
@@ -19,7 +17,8 @@ type Tracks = Vec<Vec<Option<Point>>>;
 /// The view from images (H, W, C) and tracks (P, V, 2), NaN where a point is not seen. The virtual camera is
 /// given by the positions (P, 2) of the points in it, or lies between the first two views.
 #[pyfunction]
-#[pyo3(signature = (images, tracks, points, between, size, reverse_order))]
+#[pyo3(signature = (images, tracks, points, between, size, options, seed, reverse_order))]
+#[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
 pub(crate) fn render_uncalibrated<'py>(
     py: Python<'py>,
     images: Vec<PyReadonlyArray3<'_, f32>>,
@@ -27,26 +26,27 @@ pub(crate) fn render_uncalibrated<'py>(
     points: Option<PyReadonlyArray2<'_, f64>>,
     between: f64,
     size: (usize, usize),
+    options: Options,
+    seed: Option<u64>,
     reverse_order: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let images = images.iter().map(image).collect::<PyResult<Vec<_>>>()?;
     let tracks = positions(&tracks);
     let target = points.map_or(Target::Between(between), |points| Target::Tracks(column(&points)));
     let size = (size.1, size.0);
-    let special = UncalibratedSettings { reverse_order, ..UncalibratedSettings::default() };
+    let special = UncalibratedSettings::default();
+    let special = UncalibratedSettings { reverse_order, seed: seed.unwrap_or(special.seed) };
+    let settings = options.settings()?;
     let run = move |_: &_| {
         let images: Vec<&Image> = images.iter().collect();
-        render(&images, &tracks, &target, size, &RenderSettings::default(), &special, &|_| ())
+        render(&images, &tracks, &target, size, &settings, &special, &|_| ())
     };
     let done = background::run(py, None, run)?.map_err(refused)?;
     if done.geometry.order_by == OrderBy::Nothing {
-        PyErr::warn(
+        warn(
             py,
-            &py.get_type::<PyUserWarning>(),
-            c"the order of depth is undecided: guessed calibrations contradict each other, and colours do not \
-              show it, so no surface hides another. reverse_order=True takes the less likely order, and then \
-              they do",
-            2,
+            &"the order of depth is undecided: guessed calibrations contradict each other, and colours do not show \
+              it, so no surface hides another. reverse_order=True takes the less likely order, and then they do",
         )?;
     }
     let geometry = of_report(py, "Geometry", &done.geometry)?;

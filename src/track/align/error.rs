@@ -5,6 +5,7 @@ use crate::units::FastPeriods;
 
 /// Why recordings cannot be aligned.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum AlignError {
     /// The spec and its reference do not fit the recordings, or a front end cannot be realised.
     #[error(transparent)]
@@ -87,6 +88,7 @@ pub enum AlignError {
 
 /// What a reader of an alignment must know.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum AlignWarning {
     /// A delay moves, and the taps are fixed.
     #[error(

@@ -13,6 +13,9 @@ use std::process::{Command, Stdio};
 use syn::visit_mut::{self, VisitMut};
 use syn::{Attribute, Fields, Item, ItemImpl, Meta, Type, Visibility, parse_quote};
 
+/// The mark of an enum that may get more variants.
+const OPEN: &str = "#[non_exhaustive]";
+
 /// The lists of the libraries among these files, each with the interface as it is now.
 fn interfaces(root: &Path, files: &[File]) -> Result<Vec<(PathBuf, String)>, String> {
     let libraries = files.iter().filter(|file| file.module.len() == 1 && file.path.ends_with("lib.rs"));
@@ -43,7 +46,23 @@ pub(crate) fn faults(root: &Path, files: &[File]) -> Result<Vec<String>, String>
         let fault = format!("{name}: its public interface is not the listed one; {remedy}\n- {was}\n+ {is}");
         (listed != found).then_some(fault)
     };
-    Ok(interfaces(root, files)?.into_iter().filter_map(fault).collect())
+    let interfaces = interfaces(root, files)?;
+    let closed: Vec<String> = interfaces.iter().flat_map(|(_, found)| closed(found)).collect();
+    Ok(interfaces.into_iter().filter_map(fault).chain(closed).collect())
+}
+
+/// Errors, warnings and faults of a list that users could match without a last arm.
+fn closed(list: &str) -> Vec<String> {
+    let reasons = ["Error", "Warning", "Fault"];
+    let lines: Vec<&str> = list.lines().map(str::trim).collect();
+    let fault = |(i, line): (usize, &&str)| {
+        let name = line.strip_prefix("pub enum ")?.split([' ', '<']).next()?;
+        let is_open =
+            lines[..i].iter().rev().take_while(|line| line.starts_with("#[")).any(|line| *line == OPEN);
+        let is_fault = !is_open && reasons.iter().any(|reason| name.ends_with(reason));
+        is_fault.then(|| format!("{name} may get more variants: it needs {OPEN}"))
+    };
+    lines.iter().enumerate().filter_map(fault).collect()
 }
 
 /// The public items of these files, as rustfmt writes them.

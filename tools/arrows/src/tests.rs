@@ -113,6 +113,21 @@ m! { M , \"s\" }
 }
 
 #[test]
+fn errors_that_are_closed_are_found() {
+    let marked = "#[derive(Debug)] #[non_exhaustive] pub enum OneError { A } pub enum Error2 { A } pub struct NoError;";
+    let list = "// hybank\npub mod a;\n\n// hybank::a\n";
+    let found = |source: &str| {
+        let found = faults(&[("src/a.rs", source), ("src/b.rs", ""), ("tools/arrows/api/hybank.txt", list)]);
+        found.into_iter().filter(|fault| fault.contains("non_exhaustive")).collect::<Vec<_>>()
+    };
+    assert_eq!(found(marked), [""; 0]);
+    for name in ["AError", "Warning", "InputFault"] {
+        let fault = format!("{name} may get more variants: it needs #[non_exhaustive]");
+        assert_eq!(found(&format!("{marked} #[derive(Debug)] pub enum {name} {{ A }}")), [fault]);
+    }
+}
+
+#[test]
 fn this_workspace_keeps_its_arrows() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let faults = super::faults(&root).unwrap();

@@ -75,6 +75,7 @@ pub struct GeometryReport {
 /// What decides which of two points on a ray is nearer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum OrderBy {
     /// The settings.
     Given,

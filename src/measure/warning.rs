@@ -1,0 +1,56 @@
+//! What a reader of a measurement must know beside its figures.
+
+use super::{Cause, Measurement, UnsettledEnds};
+
+/// Why figures may not say what they seem to say.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Warning {
+    /// Samples at the rails.
+    #[error(
+        "{clipped} of {samples} samples are at the limits of the range; SINAD and THD contain their distortion, so lower \
+         the level if it is not meant"
+    )]
+    Clipped {
+        /// Samples at the rails.
+        clipped: usize,
+        /// Samples of the record.
+        samples: usize,
+    },
+    /// Samples that are not finite.
+    #[error("{left_out} of {samples} samples are NaN or infinite and were left out")]
+    LeftOut {
+        /// Samples that are not finite.
+        left_out: usize,
+        /// Samples of the record.
+        samples: usize,
+    },
+    /// Spurs that coincide with a tone, with the constant or with half the rate.
+    #[error(
+        "these spurs fall on the tone, on the constant or on half the rate and cannot be seen: {}; choose another \
+         frequency to see them",
+        .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+    )]
+    Hidden(Vec<Cause>),
+    /// The ends of the record hold most of the noise.
+    #[error(
+        "the first and the last {} samples raise the noise by {:.1} dB or more: a filter may not have settled there",
+        .0.samples, .0.raise.0
+    )]
+    Unsettled(UnsettledEnds),
+}
+
+impl Measurement {
+    /// What a reader must know beside the figures.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let Self { samples, clipped, left_out, .. } = *self;
+        let hidden = (!self.hidden.is_empty()).then(|| Warning::Hidden(self.hidden.clone()));
+        let all = [
+            (clipped > 0).then_some(Warning::Clipped { clipped, samples }),
+            (left_out > 0).then_some(Warning::LeftOut { left_out, samples }),
+            hidden,
+            self.unsettled_ends.map(Warning::Unsettled),
+        ];
+        all.into_iter().flatten().collect()
+    }
+}
