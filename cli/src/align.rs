@@ -147,7 +147,7 @@ impl Args {
         for path in &self.captures {
             let mut reader = start(std::slice::from_ref(path), options, interrupts())?;
             self.reading.scale.check(&reader)?;
-            check_rate(spec, &reader).map_err(Failure::input)?;
+            check_rate(spec, &reader).map_err(failed)?;
             let Some((_, header)) = reader.headers().next() else { continue };
             let (rate, error) = (rate_of(header, spec), header.rate_error);
             let first: f64 = *common.get_or_insert(rate);

@@ -233,7 +233,7 @@ impl Args {
         let mut reader = start(paths, captures, interrupts())?;
         self.reading.scale.check(&reader)?;
         check_channels(spec, &reader)?;
-        check_rate(spec, &reader).map_err(Failure::input)?;
+        check_rate(spec, &reader).map_err(failed)?;
         let name = reader.headers().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
         let mut records = records(&mut reader, most, WORK_BYTES, self.clip, warnings)?;
         if !layout.is_plain() {

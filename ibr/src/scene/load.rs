@@ -13,7 +13,7 @@ mod uncalibrated;
 pub use complete::complete;
 pub use goals::MOST_FRAMES;
 
-use super::prepare::{LOADING_BYTES, Preparation, prepare};
+use super::prepare::{Preparation, prepare};
 use super::spec::{KEYS, SceneSpec, ViewSpec};
 use super::{Kind, Scene};
 use crate::camera::middlebury::Calibration;
