@@ -16,7 +16,8 @@ const DEVIATIONS: f32 = 3.0;
 /// Neighbours, of eight, that a value on a surface has at least: those along a line one pixel wide.
 const SUPPORTERS: usize = 2;
 
-/// Neighbours, of eight on a ring, that a value has beyond a cluster of outliers at least: a corner has three.
+/// Neighbours, of eight on a ring, that a value has beyond a cluster of outliers at least: a corner has
+/// three.
 const RING_SUPPORTERS: usize = 3;
 
 /// Radius of the ring in pixels: a cluster may be as large.
@@ -128,8 +129,8 @@ impl Parallax {
         self.ring(pixel, distance).filter(|q| self.agree(here, self.values[*q])).take(least).count() == least
     }
 
-    /// Whether few values on the ring agree with one that no other view confirms, and one shows a surface there
-    /// at the median of the ring.
+    /// Whether few values on the ring agree with one that no other view confirms, and one shows a surface
+    /// there at the median of the ring.
     pub(super) fn is_in_cluster<P>(
         &self,
         view: &View<'_, P>,

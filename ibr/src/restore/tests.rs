@@ -70,7 +70,8 @@ fn outliers_are_found_and_replaced() {
     }
 }
 
-/// Discs of wrong values, nearer and farther than what is there. Each value has neighbours that agree with it.
+/// Discs of wrong values, nearer and farther than what is there. Each value has neighbours that agree with
+/// it.
 #[test]
 fn clusters_of_outliers_are_found() {
     let shots = shots();
