@@ -4,7 +4,7 @@
 use super::Exposure;
 use super::depth_errors::{self, FEWEST_POINTS, Lookups};
 use crate::depth::{DepthMap, JUMP, Measure};
-use crate::image::{Image, Texture};
+use crate::image::Texture;
 use crate::propagate::{View, Viewpoint, nearest};
 use rayon::prelude::*;
 
@@ -140,7 +140,7 @@ fn deviations(variances: &[Vec<f64>]) -> Option<Vec<f64>> {
 }
 
 /// Points of one view found in another one.
-pub(super) struct Comparison {
+struct Comparison {
     points: usize,
     /// Colours in both views of the points at which the depths agree.
     matched: Vec<[[f32; 3]; 2]>,
@@ -148,12 +148,6 @@ pub(super) struct Comparison {
 }
 
 impl Comparison {
-    /// Of colours of the same points in two photographs.
-    pub(super) fn of_colours(matched: Vec<[[f32; 3]; 2]>, images: [&Image; 2]) -> Self {
-        let is_grey = images.iter().any(|image| image.channels() != 3);
-        Self { points: matched.len(), matched, is_grey }
-    }
-
     fn new<P: Viewpoint>(first: &View<'_, P>, second: &View<'_, P>) -> Self {
         let (image, other, other_map) = (first.image, second.image, second.map);
         let to_second = first.camera.map_to(&second.camera);
@@ -201,8 +195,7 @@ impl Comparison {
         (self.matched.iter().map(square).sum::<f64>() / self.matched.len().max(1) as f64).sqrt()
     }
 
-    /// The factors that the colours of the second view have beside those of the first.
-    pub(super) fn gain(&self) -> Exposure {
+    fn gain(&self) -> Exposure {
         match self.is_grey {
             true => [self.ratio(|colour| brightness(colour, [1.0; 3])); 3],
             false => std::array::from_fn(|c| self.ratio(|colour| colour[c])),
@@ -260,6 +253,7 @@ fn brightness(colour: &[f32; 3], gain: Exposure) -> f32 {
 mod tests {
     use super::*;
     use crate::camera::Camera;
+    use crate::image::Image;
     use crate::propagate::{CalibratedView, RectifiedView};
     use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 

@@ -127,11 +127,6 @@ impl Extent {
         BASE + decided.max(rendered)
     }
 
-    /// Bytes of copies of all photographs.
-    pub(crate) fn copies(&self) -> f64 {
-        4.0 * self.channels as f64 * self.pixels as f64
-    }
-
     /// Bytes of the prediction of a view of a rectified rig, with what is known of views before it.
     pub fn of_rig_prediction(&self) -> f64 {
         let strips = 2.0 * rayon::current_num_threads().min(self.size.1) as f64 * self.strip();
@@ -142,7 +137,8 @@ impl Extent {
     /// Bytes of the prediction of a view of general cameras, with what is known of views before it.
     pub fn of_camera_prediction(&self, settings: &RenderSettings) -> f64 {
         let pixels = self.virtual_pixels();
-        let limited = self.copies() + (REGRESSORS + LIMITS) * pixels;
+        let equalised = 4.0 * self.channels as f64 * self.pixels as f64;
+        let limited = equalised + (REGRESSORS + LIMITS) * pixels;
         let another = self.size.0 * self.size.1;
         let (all, samples) = (self.pixels + another, self.samples + another);
         let with_another = Self { views: self.views + 1, pixels: all, samples, ..*self };

@@ -106,7 +106,7 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, Mem
         }
         if is_noticeable(views, i, error(i)) {
             check_memory(surface_memory(view.map.width(), view.map.height()))?;
-            plane.smooth(view.image);
+            plane.smooth(view.image, view.map.measure());
         }
         let known = (plane.values.len() - view.map.unknown()).max(1);
         Ok(Restored {

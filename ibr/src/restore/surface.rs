@@ -12,7 +12,7 @@
 //! are is what the last fit shows.
 
 use super::outliers::{Parallax, difference};
-use crate::depth::DepthMap;
+use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::interpolate::Settings;
 use crate::interpolate::plane::{PlaneSettings, fit_surface};
@@ -38,9 +38,11 @@ const SLOPE: f64 = 0.01;
 const STIFFNESS: f64 = 0.02;
 
 impl Parallax {
-    /// Removes the noise. Medians begin, by which the edges of surfaces are found. They do not end it: on
-    /// slopes they are biased to the pixels of like colour, which took 3 dB from views of spheres.
-    pub(super) fn smooth(&mut self, image: &Image) {
+    /// Removes the noise. Medians begin, by which the edges of surfaces are found. Maps of disparity, from
+    /// which rows are rendered, also end with them: they take pixels between two surfaces to one of them. To
+    /// the plane these do less harm than outlines that the medians move: 37.0 in place of 39.9 dB on
+    /// spheres.
+    pub(super) fn smooth(&mut self, image: &Image, measure: Measure) {
         let bending = self.bending();
         let mut shape = self.medians(image);
         for tolerance in TOLERANCES {
@@ -52,6 +54,9 @@ impl Parallax {
         }
         let known = |(value, shape): (&f32, f32)| if value.is_nan() { f32::NAN } else { shape };
         self.values = self.values.iter().zip(shape).map(known).collect();
+        if measure == Measure::Disparity {
+            self.values = self.medians(image);
+        }
     }
 
     /// The medians around the known values.

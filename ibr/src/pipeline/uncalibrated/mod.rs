@@ -3,7 +3,6 @@
 mod all_views;
 mod base_pair;
 mod colours;
-mod exposures;
 mod morph;
 mod reconstruction;
 mod surface;
@@ -130,13 +129,7 @@ pub fn render(
         Target::Tracks(_) if images.len() > 2 => base_pair::order(tracks, columns, uncalibrated.seed),
         _ => (0..columns).collect(),
     };
-    let factors = if settings.keep_exposure { vec![] } else { exposures::factors(images, tracks) };
-    if factors.iter().any(|factors| *factors != [1.0; 3]) {
-        extent.check(extent.of_tracks() + extent.copies())?;
-    }
-    let alike = exposures::applied(images, &factors);
-    let shown = |i: &usize| alike.get(*i).and_then(Option::as_ref).unwrap_or(images[*i]);
-    let images: &[&Image] = &numbers.iter().map(shown).collect::<Vec<_>>();
+    let images: &[&Image] = &numbers.iter().map(|i| images[*i]).collect::<Vec<_>>();
     // A row of another length was refused when the tracks were read.
     let reordered = |t: &Vec<Option<Point>>| numbers.iter().map(|i| t.get(*i).copied().flatten()).collect();
     let tracks: Vec<Vec<Option<Point>>> = tracks.iter().map(reordered).collect();
