@@ -122,7 +122,9 @@ pub(crate) fn from_scattered(map: &DepthMap, image: &Image) -> DepthMap {
         shape = fit_surface(&values, &shape, width, &settings);
     }
     let dense = map.with_values(map.size(), shape.into_iter().map(|v| measure.of_parallax(v)).collect());
-    dense.with_guessed(map, &far_away(&lengths))
+    // Rows go on where samples of guessed depth count little: on poster1 that would cost a decibel.
+    let guessed = if measure == Measure::Depth { far_away(&lengths) } else { Vec::new() };
+    dense.with_guessed(map, &guessed)
 }
 
 /// Which pixels are so far from all samples, by the lengths of their paths, that their values are guesses.
