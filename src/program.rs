@@ -109,7 +109,7 @@ pub fn print(text: &str) -> Result<(), Failure> {
     print_bytes(text.as_bytes())
 }
 
-/// As [`print`], for any bytes.
+/// As [`print()`], for any bytes.
 ///
 /// # Errors
 /// [`Failure::printing`].
