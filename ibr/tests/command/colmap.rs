@@ -99,8 +99,8 @@ fn binary_models_and_their_depth_maps_are_rendered() {
     replace(dir.path(), "\"model\"", "\"dense/sparse\"");
     assert!(want > 31.0 && (psnr(dir.path(), &truth) - want).abs() < 1e-9, "{want}");
     assert!(std::fs::read(at("o.png")).unwrap() == picture);
-    // Depths that the reconstruction does not know are 0: here 1000 in the upper rows. They take the farthest
-    // depths around them, and the other view decides.
+    // Depths that the reconstruction does not know are 0: here 1000 in the upper rows. They take the
+    // farthest depths around them, and the other view decides.
     let hole = 500..1500;
     let path = workspace.join("a.png.geometric.bin");
     let mut bytes = std::fs::read(&path).unwrap();

@@ -368,9 +368,9 @@ fn odd_images_are_fine() {
     }
 }
 
-/// A grey photograph beside a coloured one: the note says what each gives, and the view has 34.0 dB (43.9 from
-/// two coloured ones). With three equal channels it counts as coloured, its grey is mixed in, and the view
-/// has 27.2 dB.
+/// A grey photograph beside a coloured one: the note says what each gives, and the view has 34.0 dB (43.9
+/// from two coloured ones). With three equal channels it counts as coloured, its grey is mixed in, and the
+/// view has 27.2 dB.
 #[test]
 fn a_grey_photograph_takes_the_colours_of_the_other() {
     let dir = rig();
