@@ -116,6 +116,14 @@ pub(crate) struct Fused<'py> {
     track: Option<Py<PyAny>>,
 }
 
+/// Output samples of a run, and what it tells.
+struct Run<'py> {
+    y: Bound<'py, PyAny>,
+    outcome: Outcome,
+    latency_dropped: usize,
+    track: Option<Py<PyAny>>,
+}
+
 /// The output samples of an array.
 pub(crate) fn fuse<'py>(
     bank: &Bank,
@@ -127,23 +135,24 @@ pub(crate) fn fuse<'py>(
     let (py, begin) = (x.py(), Instant::now());
     let held = Held::new(x, shape)?;
     let format = Format::of_output(held.format, dtype)?;
-    let fused = match request.extras.follow {
+    let Run { y, outcome, latency_dropped, track } = match request.extras.follow {
         Some(_) => followed(bank, &held, format, request)?,
         None => filtered(bank, &held, format, request)?,
     };
     // A frame may hold several samples of a converter.
-    let outcome = Outcome { channels: bank.channel_count(), ..fused.outcome };
+    let outcome = Outcome { channels: bank.channel_count(), ..outcome };
     let seconds = begin.elapsed().as_secs_f64();
     let captures = match request.is_reported {
         true => Captures::new(bank, &held, request.extras.follow.is_some())?,
         false => Captures::default(),
     };
-    let fused = Fused { outcome, captures, seconds, ..fused };
+    let (frames, number) = (held.frames(), format.number);
+    let fused = Fused { y, outcome, captures, frames, latency_dropped, seconds, number, track };
     fused.warnings().iter().try_for_each(|text| warn(py, text))?;
     Ok(fused)
 }
 
-fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Request) -> PyResult<Fused<'py>> {
+fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Request) -> PyResult<Run<'py>> {
     let (py, settings, frames) = (held.py(), request.settings(), held.frames());
     let plan = plan(bank, format, request.algorithm, settings)?;
     let mut array = NewArray::new(py, frames * bank.ratio, format)?;
@@ -155,20 +164,11 @@ fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Reques
     let outcome = outcome.map_err(|error| signals.into_error().unwrap_or_else(|| refused(error)))?;
     let outcome = Outcome { clipped: room.clipped, ..outcome };
     let (y, latency_dropped) = (array.finish()?, settings.dropped.samples(&plan));
-    Ok(Fused {
-        y,
-        outcome,
-        captures: Captures::default(),
-        frames,
-        latency_dropped,
-        seconds: 0.0,
-        number: format.number,
-        track: None,
-    })
+    Ok(Run { y, outcome, latency_dropped, track: None })
 }
 
 /// As [`filtered`], with filters that follow the delays.
-fn followed<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Request) -> PyResult<Fused<'py>> {
+fn followed<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Request) -> PyResult<Run<'py>> {
     let py = held.py();
     let settings = request.settings();
     let mut running = Running::new(bank, format, request.algorithm, &request.extras, settings)?;
@@ -192,16 +192,7 @@ fn followed<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Reques
     let y = PyArray1::from_vec(py, outputs.samples).call_method1("view", (format.name(),))?;
     let mask = outcome.gaps.is_some().then_some(outputs.mask);
     let (outcome, track) = (Outcome { mask, ..outcome }, Some(tracks.log(py)?));
-    Ok(Fused {
-        y,
-        outcome,
-        captures: Captures::default(),
-        frames,
-        latency_dropped,
-        seconds: 0.0,
-        number: format.number,
-        track,
-    })
+    Ok(Run { y, outcome, latency_dropped, track })
 }
 
 impl Fused<'_> {

@@ -387,11 +387,11 @@ fn a_grey_photograph_takes_the_colours_of_the_other() {
         save(&grey, &dir.path().join("right.png")).unwrap();
         rendered()
     };
-    let (coloured, silent) = rendered();
+    let (coloured, of_coloured) = rendered();
     let ((grey, said), (mixed, _)) = (with(1), with(3));
     println!("two coloured {coloured:.2} dB, one grey {grey:.2} dB, its grey as colour {mixed:.2} dB");
     let note = "view 2 is grey beside coloured ones: what the others show gives the colour, the grey photographs the luminance";
-    assert!(said.contains(note) && !silent.contains("grey"), "{said}{silent}");
+    assert!(said.contains(note) && !of_coloured.contains("grey"), "{said}{of_coloured}");
     assert!(coloured > 43.0 && grey > 33.5 && grey > mixed + 5.0, "{coloured} {grey} {mixed}");
 }
 

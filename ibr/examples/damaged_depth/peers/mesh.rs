@@ -83,11 +83,11 @@ impl Mesh {
                     continue;
                 }
                 let shown = photograph.numbers[y.round() as usize * size.0 + x.round() as usize];
-                let behind = (to.parallax(shown) - to.parallax(there)).max(0.0);
+                let hidden_by = (to.parallax(shown) - to.parallax(there)).max(0.0);
                 canvas.add(
                     pixel,
                     bicubic(&photograph.image, x, y),
-                    weight * (-behind / same).exp().max(1e-9),
+                    weight * (-hidden_by / same).exp().max(1e-9),
                 );
             }
         }
@@ -126,7 +126,7 @@ fn triangle(corners: [Corner; 3], (width, height): (usize, usize), fronts: &mut 
     let cross =
         |p: [f64; 2], q: [f64; 2], r: [f64; 2]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
     let area = cross(a, b, c);
-    // A triangle that is seen from behind lies on no surface.
+    // A triangle that turns its back lies on no surface.
     if !(area > 1e-9 && area.is_finite()) {
         return;
     }

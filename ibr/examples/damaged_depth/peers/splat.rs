@@ -73,8 +73,8 @@ pub(super) fn soft<P: Viewpoint>(
     let mut canvas = Canvas::new(to.size);
     for splat in &splats {
         for (pixel, part) in footprint(splat.at, to.size) {
-            let behind = ((splat.parallax - front[pixel]) / same).exp();
-            canvas.add(pixel, splat.colour, part * behind * weights[splat.view]);
+            let nearness = ((splat.parallax - front[pixel]) / same).exp();
+            canvas.add(pixel, splat.colour, part * nearness * weights[splat.view]);
         }
     }
     canvas.image()
