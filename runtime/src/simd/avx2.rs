@@ -67,6 +67,12 @@ macro_rules! register {
 }
 pub(super) use register;
 
+/// `of` of each of four sums. Compilers leave `array::map` a call, before which all registers go to memory.
+#[inline(always)]
+pub(super) fn each<V, R>([a, b, c, d]: [V; 4], of: impl Fn(V) -> R) -> [R; 4] {
+    [of(a), of(b), of(c), of(d)]
+}
+
 impl Vector for Avx2F32 {
     type Sample = f32;
     const LANES: usize = 8;
@@ -99,7 +105,7 @@ impl Vector for Avx2F32 {
     #[inline(always)]
     fn diagonal_quads(sums: [Self; 4]) -> Self {
         // SAFETY: a vector exists only where its instructions do.
-        Self(unsafe { diagonal_quads_f32(sums.map(|sum| sum.0)) })
+        Self(unsafe { diagonal_quads_f32(each(sums, |sum| sum.0)) })
     }
 
     #[inline(always)]
@@ -119,7 +125,7 @@ impl Vector for Avx2F32 {
 
     #[inline(always)]
     unsafe fn store_frames<const P: usize, const D: usize>(sums: [Self; 4], out: *mut f32, hop: usize) {
-        store_frames_f32::<P, D>(sums.map(|sum| sum.0), out, hop)
+        store_frames_f32::<P, D>(each(sums, |sum| sum.0), out, hop)
     }
 
     #[inline(always)]
@@ -199,7 +205,7 @@ impl Avx2F32 {
     #[inline(always)]
     pub(super) unsafe fn store_two_halves(self, out: [*mut f32; 2], hop: usize) {
         store_pairs(low(self.0), out);
-        store_pairs(high(self.0), out.map(|out| out.add(hop)));
+        store_pairs(high(self.0), [out[0].add(hop), out[1].add(hop)]);
     }
 }
 
@@ -238,7 +244,7 @@ impl Vector for Avx2F64 {
 
     #[inline(always)]
     unsafe fn store_frames<const P: usize, const D: usize>(sums: [Self; 4], out: *mut f64, hop: usize) {
-        store_frames_f64::<P, D>(sums.map(|sum| sum.0), out, hop)
+        store_frames_f64::<P, D>(each(sums, |sum| sum.0), out, hop)
     }
 
     #[inline(always)]

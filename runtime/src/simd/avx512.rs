@@ -1,7 +1,7 @@
 //! AVX-512: two lane groups are one register, and outputs are stored as whole registers where frames follow
 //! each other.
 
-use super::avx2::{Avx2F32, Avx2F64, register};
+use super::avx2::{Avx2F32, Avx2F64, each, register};
 use super::vector::Vector;
 use std::arch::x86_64::*;
 
@@ -62,7 +62,8 @@ fn zip_pairs_f64(a: __m512d, b: __m512d) -> [__m512d; 2] {
 #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma")]
 #[inline]
 fn zip_pairs_f32(a: __m512, b: __m512) -> [__m512; 2] {
-    zip_f64(_mm512_castps_pd(a), _mm512_castps_pd(b)).map(|x| _mm512_castpd_ps(x))
+    let [first, second] = zip_f64(_mm512_castps_pd(a), _mm512_castps_pd(b));
+    [_mm512_castpd_ps(first), _mm512_castpd_ps(second)]
 }
 
 /// [`Vector::store_frames`] for the shapes whose outputs fill registers; false, with nothing done, for the
@@ -171,7 +172,7 @@ macro_rules! store_groups {
     ($group:ty, $sums:ident, $out:ident, $hop:ident) => {
         for g in 0..2 {
             let frames = <$group>::LANES / D;
-            let groups = $sums.map(|sum| sum.group(g));
+            let groups = each($sums, |sum| sum.group(g));
             <$group>::store_frames::<P, D>(groups, $out.add(g * frames * $hop), $hop);
         }
     };
@@ -229,18 +230,18 @@ impl Vector for Avx512F32 {
     #[inline(always)]
     fn diagonal_quads(sums: [Self; 4]) -> Self {
         // SAFETY: a vector exists only where its instructions do.
-        Self(unsafe { diagonal_quads_f32(sums.map(|sum| sum.0)) })
+        Self(unsafe { diagonal_quads_f32(each(sums, |sum| sum.0)) })
     }
 
     #[inline(always)]
     fn diagonal_halves(sums: [Self; 4]) -> Self {
         // SAFETY: a vector exists only where its instructions do.
-        Self(unsafe { diagonal_halves_f32(sums.map(|sum| sum.0)) })
+        Self(unsafe { diagonal_halves_f32(each(sums, |sum| sum.0)) })
     }
 
     #[inline(always)]
     unsafe fn store_frames<const P: usize, const D: usize>(sums: [Self; 4], out: *mut f32, hop: usize) {
-        if !store_frames_f32::<P, D>(sums.map(|sum| sum.0), out, hop) {
+        if !store_frames_f32::<P, D>(each(sums, |sum| sum.0), out, hop) {
             store_groups!(Avx2F32, sums, out, hop);
         }
     }
@@ -256,7 +257,7 @@ impl Vector for Avx512F32 {
         }
         for g in 0..2 {
             let pairs = halves.group(g);
-            pairs.store_two_halves(out.map(|out| out.add(2 * g * hop)), hop);
+            pairs.store_two_halves([out[0].add(2 * g * hop), out[1].add(2 * g * hop)], hop);
         }
     }
 
@@ -350,7 +351,7 @@ impl Vector for Avx512F64 {
 
     #[inline(always)]
     unsafe fn store_frames<const P: usize, const D: usize>(sums: [Self; 4], out: *mut f64, hop: usize) {
-        if !store_frames_f64::<P, D>(sums.map(|sum| sum.0), out, hop) {
+        if !store_frames_f64::<P, D>(each(sums, |sum| sum.0), out, hop) {
             store_groups!(Avx2F64, sums, out, hop);
         }
     }
@@ -358,7 +359,11 @@ impl Vector for Avx512F64 {
     #[inline(always)]
     unsafe fn store_halves(sums: [Self; 4], out: [*mut f64; 2], hop: usize) {
         for g in 0..2 {
-            Avx2F64::store_halves(sums.map(|sum| sum.group(g)), out.map(|out| out.add(g * hop)), hop);
+            Avx2F64::store_halves(
+                each(sums, |sum| sum.group(g)),
+                [out[0].add(g * hop), out[1].add(g * hop)],
+                hop,
+            );
         }
     }
 }
