@@ -6,6 +6,7 @@
 
 import importlib
 
+from hybank import _functions
 from hybank._functions import align, analyze, calibrate, import_taps, load, measure, simulate, verify
 from hybank._hybank import Bank, HybankError, Recording, SpecError, Stream, __version__
 from hybank._inputs import Captures, read
@@ -84,6 +85,7 @@ __all__ = [
 
 for _kind in (Bank, Stream, Recording):
     check_methods(_kind)
+Bank.export = _functions.format_by_name(Bank.export)
 
 # The parts that need more than NumPy, or that few programs need, are imported when they are used.
 _PARTS = ("dask", "gnuradio", "ibr")

@@ -1,7 +1,11 @@
 """What is done with banks and captures beside fusing them."""
 
+import functools
+import inspect
+import os
+
 from hybank import _hybank, _inputs
-from hybank._keywords import checked
+from hybank._keywords import checked, need_numbers
 from hybank._results import Comparison
 
 
@@ -156,6 +160,7 @@ def simulate(
     >>> ideal.channels.shape, bool((real.channels[0] != ideal.channels[0]).any())
     ((2, 200), True)
     """
+    need_numbers(drift=drift, offset=offset, rate=rate)
     if _inputs.is_file(signal):
         captures = _inputs.read(signal, channel=channel)
         signal, rate = captures.mono(), captures.rate if rate is None else rate
@@ -252,6 +257,7 @@ def calibrate(
     >>> float(found.delay[1].round(4)), found.reference
     (0.61, 1)
     """
+    need_numbers(rate=rate)
     # A spec may be a mapping or a path; the order of its converters is that of their delays.
     x, axis = _inputs.plain(x, axis, spec, interleaved)
     return _hybank.calibrate(x, spec, tones, waveform, rate, blind, list(fit), reference, clip, axis)
@@ -299,6 +305,7 @@ def measure(
     >>> round(c.gain.value, 6)
     2.0
     """
+    need_numbers(rate=rate)
     y, rate = _inputs.record(y, rate)
     if ref is None:
         return _hybank.measure(y, rate, tones, interleaved, harmonics, full_scale, window, skip)
@@ -337,3 +344,28 @@ def import_taps(spec, taps, *, latency=None, proof=True):
     import numpy as np
 
     return _hybank.import_taps(spec, np.asarray(taps, float).tolist(), latency, proof)
+
+
+# What the ending of a name says that is to be written.
+_BY_ENDING = {"h": "c", "v": "verilog", **{name: name for name in ("csv", "npz", "mat", "coe", "mem")}}
+
+
+def format_by_name(export):
+    """``Bank.export`` that takes the format from the name of the file if none is given, as the command line does."""
+
+    @functools.wraps(export)
+    def call(self, path, *, format=None, **keywords):
+        if format is None:
+            ending = os.path.splitext(os.fspath(path))[1][1:].lower()
+            if ending not in _BY_ENDING:
+                raise _hybank.HybankError(
+                    f"{os.fspath(path)}: the name does not say which format it is to have; give format=\"c\", \"verilog\", "
+                    '"csv", "npz", "mat", "coe", "mem" or "sos"'
+                )
+            format = _BY_ENDING[ending]
+        return export(self, path, format=format, **keywords)
+
+    shown = inspect.signature(export)
+    parameters = [one.replace(default=None) if one.name == "format" else one for one in shown.parameters.values()]
+    call.__signature__ = shown.replace(parameters=parameters)
+    return checked(call)

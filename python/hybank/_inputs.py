@@ -1,6 +1,8 @@
 """Captures that are no arrays of NumPy: files, one recording of several converters, xarray, pandas, dask."""
 
+import errno
 import os
+import re
 import sys
 from dataclasses import dataclass
 
@@ -9,6 +11,7 @@ import numpy as np
 from hybank import _hybank
 from hybank._hybank import HybankError
 from hybank._keywords import checked
+from hybank._times import check, check_rate, finer, seconds
 
 
 @dataclass(eq=False)
@@ -108,10 +111,24 @@ def _read(files, source, options):
     """Recordings for a bank, for a spec, or for nothing in particular."""
     names = [files] if isinstance(files, (str, os.PathLike)) else list(files)
     usual = dict.fromkeys(("channels", "channel", "full_scale", "interleaved", "lost", "max_lost"))
-    found = _hybank.read(names, {"format": "wav", "longest": False, **usual, **options}, source)
+    options = {"format": "wav", "longest": False, **usual, **options}
+    try:
+        found = _hybank.read(names, options, source)
+    except HybankError:
+        _need([*names, options["lost"]])
+        raise
     parts = found["channels"]
     is_even = all(len(part) == len(parts[0]) for part in parts)
     return Captures(np.stack(parts) if is_even and parts else parts, found["rate"], found["output_rate"])
+
+
+def _need(files):
+    """Raise the ``FileNotFoundError`` of the first of these files that is missing; None names no file."""
+    for file in filter(None, files):
+        # A variable of a MATLAB file: x.mat:name.
+        file = re.sub(r"(\.mat):[^:/\\]*$", r"\1", os.fspath(file))
+        if file != "-" and not os.path.exists(file):
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), file) from None
 
 
 def fuse(bank, x, interleaved, *, axis, full_output, rate, **keywords):
@@ -122,6 +139,7 @@ def fuse(bank, x, interleaved, *, axis, full_output, rate, **keywords):
         keywords["dtype"] = "f4" if keywords["dtype"] is None else keywords["dtype"]
         rate = x.output_rate if rate is None else rate
     if isinstance(x, Captures):
+        check_rate(bank, x, interleaved)
         rate = x.output_rate if rate is None else rate
         x, axis = x.channels, -1
     keywords = {**keywords, "full_output": full_output, "rate": rate}
@@ -160,6 +178,7 @@ def plain(x, axis, source, interleaved):
         return in_turn(source, x, interleaved), -1
     package = type(x).__module__.split(".")[0]
     if package == "pandas":
+        _check_columns(_hybank.frame_samples(source), x)
         return x.to_numpy(), 0
     if package == "xarray":
         time, channel = _dimensions(_hybank.frame_samples(source), x, axis)
@@ -227,41 +246,39 @@ def _step(y):
         return None
     if len(times) < 2:
         return None
-    step = (times[-1] - times[0]) / (len(times) - 1)
-    return step / np.timedelta64(1, "s") if times.dtype.kind in "mM" else float(step)
+    since, _ = seconds(times)
+    return float(since[-1]) / (len(times) - 1)
 
 
 # Axes with names.
 
 
-def finer(times, ratio):
-    """The times of M samples for each frame: each frame's period is divided evenly."""
-    times = np.asarray(times)
-    if len(times) < 2:
-        raise HybankError("a time axis of fewer than two frames says no rate; give an array of NumPy")
-    if times.dtype.kind not in "mMiuf":
-        raise HybankError(f"a time axis of {times.dtype} cannot be divided; give numbers or times")
-    start = times[0]
-    since = times - start
-    is_time = since.dtype.kind == "m"
-    since = since.astype(np.int64 if is_time else float)
-    periods = np.diff(since, append=2 * since[-1] - since[-2])
-    parts = since[:, None] + periods[:, None] * np.arange(ratio) / ratio
-    parts = np.round(parts).astype(np.int64).astype((times - start).dtype) if is_time else parts
-    return (start + parts).reshape(-1)
+def _check_columns(count, frame):
+    """Refuse a frame whose columns are not those of so many channels."""
+    columns = list(getattr(frame, "columns", ["the series"]))
+    time = next((name for name in columns if str(name).lower() in ("time", "t")), None)
+    if time is not None:
+        raise HybankError(f"the column {time!r} is no channel; make it the index: set_index({time!r})")
+    if len(columns) != count:
+        raise HybankError(
+            f"there are {len(columns)} columns of pandas for {count} channels; give a column for each, or with "
+            f"interleaved={count} one recording in which {count} converters take turns"
+        )
 
 
 def _fuse_frame(bank, frame, keywords):
     """A DataFrame with a column for each channel becomes a Series with its index at the fast rate."""
     pandas = sys.modules["pandas"]
     full_output = keywords.pop("full_output")
-    found = bank.fuse(frame.to_numpy(), axis=0, full_output=full_output, **keywords)
-    y, report = found if full_output else (found, None)
+    _check_columns(sum(bank.samples), frame)
     if isinstance(frame.index, pandas.PeriodIndex):
         raise HybankError("an index of periods cannot be divided; convert it with to_timestamp()")
-    name = frame.name if isinstance(frame, pandas.Series) else None
     zone = getattr(frame.index, "tz", None)
     times = frame.index if zone is None else frame.index.tz_convert("UTC").tz_localize(None)
+    check(bank, times.to_numpy(), "the index")
+    found = bank.fuse(frame.to_numpy(), axis=0, full_output=full_output, **keywords)
+    y, report = found if full_output else (found, None)
+    name = frame.name if isinstance(frame, pandas.Series) else None
     index = pandas.Index(finer(times.to_numpy(), bank.ratio), name=frame.index.name)
     if zone is not None:
         index = index.tz_localize("UTC").tz_convert(zone)
@@ -275,6 +292,8 @@ def _fuse_named(bank, x, axis, keywords):
     if not isinstance(x, xarray.DataArray):
         raise HybankError("give a DataArray; of a Dataset choose a variable: dataset[name]")
     time, channel = _dimensions(sum(bank.samples), x, axis)
+    if time in x.coords:
+        check(bank, x.coords[time].to_numpy(), f"the coordinate {time!r}")
     others = [name for name in x.dims if name not in (time, channel)]
     order = others + ([channel] if channel else []) + [time]
     data = x.transpose(*order).data
@@ -312,6 +331,11 @@ def _dimensions(count, x, axis):
         return time, (fitting or left)[0]
     if not left and count == 1:
         return time, None
+    if not left:
+        raise HybankError(
+            f"one dimension {time!r} for {count} channels; give a dimension \"channel\", or with interleaved={count} one "
+            f"recording in which {count} converters take turns"
+        )
     raise HybankError(
         f"dimensions {x.dims} with sizes {x.shape}: which holds the {count} channels? call it \"channel\""
     )

@@ -4,6 +4,11 @@ import difflib
 import functools
 import inspect
 
+from hybank._hybank import HybankError
+
+# What a keyword of plain numbers counts.
+_UNITS = {"drift": "parts per million", "offset": "full scale", "rate": "hertz"}
+
 
 def refuse(function, unknown, known):
     """Raise the ``TypeError`` for keywords that a function does not have."""
@@ -33,6 +38,14 @@ def checked(function, others=()):
         return function(*arguments, **keywords)
 
     return call
+
+
+def need_numbers(**given):
+    """Refuse texts where plain numbers are meant."""
+    for keyword, values in given.items():
+        for value in values if isinstance(values, (list, tuple)) else [values]:
+            if isinstance(value, str):
+                raise HybankError(f"{keyword}: {ascii(value)[:200]} is a text; give a number, in {_UNITS[keyword]}")
 
 
 def check_methods(kind):

@@ -63,6 +63,99 @@ def test_uneven_times_are_divided_period_by_period(fir):
         finer([0.0], 2)
 
 
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
+@pytest.mark.parametrize("kind", ["M", "m"])
+def test_dates_are_divided_exactly_whatever_their_unit(kind, unit):
+    from hybank._inputs import finer
+
+    times = np.arange(4).astype(f"{kind}8[{unit}]")
+    if unit != "ns":
+        for ratio in (2, 3, 4):
+            y = finer(times, ratio)
+            periods = (y - y[0]) / np.timedelta64(1, unit)
+            np.testing.assert_allclose(periods, np.arange(4 * ratio) / ratio, atol=1e-3)
+            assert len(set(y.tolist())) == 4 * ratio
+    # Without need for another unit there is none, far from 1970 neither.
+    far = np.array(["2926-01-01", "2926-01-03"], f"M8[{unit if unit != 'ns' else 'us'}]")
+    assert finer(far, 2).dtype == far.dtype and str(finer(far, 2)[1]).startswith("2926-01-02")
+
+
+def test_the_times_of_pandas_and_xarray_become_those_of_the_output(stereo):
+    pandas, xarray = pytest.importorskip("pandas"), pytest.importorskip("xarray")
+    x = np.zeros((2, 4))
+    times = np.datetime64("2026-01-01", "us") + np.arange(4) * np.timedelta64(25, "us")
+    want = times[0] + np.arange(8) * np.timedelta64(12_500, "ns")
+    y = stereo.fuse(xarray.DataArray(x, dims=("channel", "time"), coords={"time": times}))
+    np.testing.assert_array_equal(y.coords["time"].to_numpy(), want)
+    y = stereo.fuse(pandas.DataFrame(x.T, index=pandas.DatetimeIndex(times)))
+    np.testing.assert_array_equal(y.index.to_numpy(), want)
+
+
+@pytest.fixture(scope="module")
+def stereo():
+    channels = [hb.Channel(delay="12 us"), hb.Channel(delay="2 us")]
+    return hb.design(
+        fast_rate=80e3, ratio=2, target=hb.butterworth(2, 9e3), channels=channels, latency=4, method="fir", taps=8, proof=False
+    )
+
+
+def _frames(stereo, times):
+    pandas, xarray = pytest.importorskip("pandas"), pytest.importorskip("xarray")
+    x = np.zeros((2, len(times)))
+    yield "the coordinate 'time'", lambda: stereo.fuse(xarray.DataArray(x, dims=("c", "time"), coords={"time": times}))
+    yield "the index", lambda: stereo.fuse(pandas.DataFrame(x.T, index=pandas.Index(times)))
+
+
+@pytest.mark.parametrize("share", [1.5, 0.5, 1 + 1e-5])
+@pytest.mark.parametrize("as_dates", [False, True])
+def test_times_of_another_rate_are_refused(stereo, share, as_dates):
+    seconds = np.arange(4000) * 25e-6 * share
+    times = np.datetime64("2026-01-01", "ns") + np.round(seconds * 1e9).astype("m8[ns]") if as_dates else seconds
+    for place, fuse in _frames(stereo, times):
+        with pytest.raises(hb.HybankError, match=f"^{place}: the times are those of .* frames of 40000 Hz; give times in s"):
+            fuse()
+
+
+def test_times_with_a_hole_are_refused_where_it_is(stereo):
+    seconds = np.delete(np.arange(400) * 25e-6, [100, 101])
+    for place, fuse in _frames(stereo, seconds):
+        with pytest.raises(hb.HybankError, match=f"^{place}: 7.5e-05 s lie between samples 99 and 100, and 2.5e-05 s"):
+            fuse()
+    for times in (seconds[::-1], np.full(400, 3.0), np.full(400, np.nan)):
+        for _, fuse in _frames(stereo, times):
+            with pytest.raises(hb.HybankError, match="lie between samples"):
+                fuse()
+
+
+def test_times_of_the_rate_are_taken_as_exactly_as_they_are_stated(stereo):
+    seconds = np.arange(400) * 25e-6
+    for times in (
+        seconds, seconds * (1 + 5e-7), seconds + 1e6, np.round(seconds, 5), np.arange(400), 7 * np.arange(400),
+        np.round(seconds * 1e5).astype("m8[us]") * 10, seconds[:1].repeat(2) + [0, 25e-6],
+    ):  # fmt: skip
+        for _, fuse in _frames(stereo, times):
+            assert len(fuse()) == 2 * len(times)
+
+
+def test_columns_that_are_no_channels_are_refused_with_the_remedy(stereo):
+    pandas, xarray = pytest.importorskip("pandas"), pytest.importorskip("xarray")
+    x = np.zeros((400, 2))
+    frame = pandas.DataFrame(x, columns=["a", "b"])
+    frame.insert(0, "Time", np.arange(400) * 25e-6)
+    spec = stereo.spec
+    for given, words in [
+        (frame, r"the column 'Time' is no channel; make it the index: set_index\('Time'\)"),
+        (frame[["a"]], "1 columns of pandas for 2 channels; .* interleaved=2"),
+        (frame["a"], "1 columns of pandas for 2 channels; .* interleaved=2"),
+        (xarray.DataArray(x[:, 0], dims="time"), "one dimension 'time' for 2 channels; .* interleaved=2"),
+    ]:
+        for call in (stereo.fuse, lambda given: hb.calibrate(given, stereo)):
+            with pytest.raises(hb.HybankError, match=words):
+                call(given)
+    assert spec and len(stereo.fuse(frame.set_index("Time"))) == 800
+    assert len(stereo.fuse(frame["a"], interleaved=2)) == 400
+
+
 @pytest.mark.parametrize("dtype", ["f4", "f8", "i2"])
 @pytest.mark.parametrize("chunks", [(100,) * 4, (400,), (1, 398, 1), (17, 300, 83)])
 @pytest.mark.parametrize("which", ["fir", "iir"])

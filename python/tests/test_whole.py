@@ -87,6 +87,10 @@ def test_wrong_errors_name_their_keyword():
         ({"cutoff_error": np.nan}, "^cutoff_error: NaN is not a finite number"),
         ({"imaginary": "ctones:1kHz"}, "^imaginary: "),
         ({"channel": 2}, "^channel: the signal is no recording"),
+        ({"drift": "2ppm"}, "^drift: '2ppm' is a text; give a number, in parts per million"),
+        ({"drift": [0, "2"]}, "^drift: '2' is a text"),
+        ({"offset": "1%"}, "^offset: '1%' is a text"),
+        ({"rate": "48 kHz"}, "^rate: '48 kHz' is a text; give a number, in hertz"),
     ]:
         with pytest.raises(hb.HybankError, match=words):
             hb.simulate(SPEC, "tones:1kHz", **given)
@@ -185,8 +189,30 @@ def test_files_are_fused_to_the_bits_of_the_command_line(folder, binary, bank, r
     soundfile.write(folder / "slow.wav", x.T, 22050, subtype="FLOAT")
     with pytest.raises(hb.HybankError, match="22050 Hz, but the bank is designed for slow channels of 24000 Hz"):
         bank.fuse(folder / "slow.wav")
-    with pytest.raises(hb.HybankError, match="a9.wav"):
-        bank.fuse([folder / "a9.wav", files[1]])
+    # Recordings that were read without the bank are of another rate as files are.
+    both = hb.read(folder / "slow.wav")
+    with pytest.raises(hb.HybankError, match="is 22050 Hz, but the bank is designed for 24000 Hz"):
+        bank.fuse(both)
+    assert bank.fuse(both.channels).shape == (6002,)
+
+
+@pytest.mark.parametrize("name", ["nix.wav", "nix.npy", "nix.csv", "nix.mat:x", "nix.sigmf-meta"])
+def test_a_missing_file_is_a_file_not_found_error(folder, bank, name):
+    soundfile = pytest.importorskip("soundfile")
+    soundfile.write(folder / "is.wav", np.zeros(400), 24000, subtype="FLOAT")
+    files = [folder / "is.wav", folder / name]
+    for call in (bank.fuse, hb.read, lambda x: hb.calibrate(x, SPEC), lambda x: hb.align(x, SPEC), lambda x: hb.measure(x[1])):
+        with pytest.raises(FileNotFoundError) as caught:
+            call(files)
+        assert caught.value.filename == str(folder / name.split(":")[0]) and caught.value.__suppress_context__
+    with pytest.raises(FileNotFoundError):
+        hb.simulate(bank, str(folder / "nix.wav"))
+    with pytest.raises(FileNotFoundError):
+        hb.read(folder / "is.wav", lost=folder / "nix.jsonl")
+    # A file that is there and is none of its kind stays a refusal.
+    (folder / "bad.wav").write_text("bad")
+    with pytest.raises(hb.HybankError, match="bad.wav"):
+        bank.fuse([folder / "is.wav", folder / "bad.wav"])
 
 
 def test_converters_take_turns_in_one_recording(folder, binary, bank, random):

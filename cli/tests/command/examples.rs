@@ -51,7 +51,7 @@ fn two_inertial_sensors_become_one() {
 }
 
 /// Two recordings that began apart, with clocks of their own, become one: better than one of them alone at
-/// best (15.8 dB), than one resampled (31.8 dB), and than fixed taps.
+/// best (15.8 dB), than one resampled (25 to 27 dB), and than fixed taps.
 #[test]
 #[cfg(unix)]
 fn two_recorders_become_one() {
