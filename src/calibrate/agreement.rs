@@ -1,17 +1,11 @@
 //! Whether captures agree with a spec: levels, starts, polarities, gains, order and delays.
 
-use super::Settings;
-use super::blind::{Blind, unexplained_in_order};
 use super::contradiction::Contradiction;
-use super::estimates::ChannelEstimate;
-use super::fit::Fit;
+use super::delays::{Delays, delays_told};
 use super::model::Model;
-use super::order::{from_one, order_of_delays};
 use super::record::{Record, repeated};
 use super::starts::{Starts, starts};
-use crate::sine_fit::Estimate;
 use crate::spec::Spec;
-use crate::units::FastPeriods;
 
 /// Least frames of captures that are judged.
 const LEAST_FRAMES: usize = 1024;
@@ -30,20 +24,6 @@ const LEAST_LEVEL: f64 = 1e-3;
 const GAIN_ERROR: f64 = 0.05;
 /// The spec explains captures that leave this share of their power unexplained.
 const UNEXPLAINED_SHARE: f64 = 0.1;
-/// Share of the unexplained power that other delays or another order may leave to count.
-const CLEARLY_LESS: f64 = 0.1;
-/// Another order is looked for where the given one leaves more than this share of the power unexplained;
-/// delays within a tenth of a fast period leave less.
-const ORDER_DOUBTFUL: f64 = 0.05;
-/// The next best order leaves this many times as much.
-const DISTINCT_ORDER: f64 = 3.0;
-/// A delay contradicts when it is this many standard deviations beyond its interval. The interval and its
-/// own error are then both exhausted.
-const CLEAR_SIGMAS: f64 = 6.0;
-/// The interval of a delay of which the spec says nothing, in fast periods.
-const UNSTATED_HALF_WIDTH: f64 = 0.02;
-/// Low and high frequencies that disagree by more than this (in units of their noise) do not see a delay.
-const WORST_MISFIT: f64 = 3.0;
 
 /// What captures say of a spec.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,6 +44,13 @@ pub enum Verdict {
         (1e4 * .0).floor().min(9999.0) / 100.0
     )]
     Explained(f64),
+    /// The same, and the signal does not tell its delays.
+    #[error(
+        "the captures agree with the spec in starts, polarities, gains and order, but this signal does not tell its \
+         delays; it explains at least {} % of their power",
+        (1e4 * .0).floor().min(9999.0) / 100.0
+    )]
+    DelaysUntold(f64),
     /// Aliases overlap, or the signal fits other starts as well.
     #[error("this signal does not tell whether the captures agree with the spec")]
     Undecided,
@@ -154,25 +141,29 @@ pub fn agreement(spec: &Spec, records: &[Record]) -> Agreement {
     }
     let Ok(model) = Model::new(spec) else { return nothing(Verdict::Undecided) };
     let beginning: Vec<Record> = records.iter().map(|record| record.part(0..ENOUGH_FRAMES)).collect();
-    let by_delays = by_delays(spec, &model, &beginning).unwrap_or_default();
-    if by_delays.iter().any(|found| matches!(found, Contradiction::WrongOrder { .. })) {
-        return contradicted(by_delays);
+    let delays = delays_told(spec, &model, &beginning);
+    if delays.contradictions.iter().any(|found| matches!(found, Contradiction::WrongOrder { .. })) {
+        return contradicted(delays.contradictions);
     }
     match starts(&model, records) {
-        None => contradicted(by_delays),
-        Some(found) => judged(spec, &found, by_delays),
+        None => contradicted(delays.contradictions),
+        Some(found) => judged(spec, &found, delays),
     }
 }
 
 /// With wrong starts or polarities delays mean nothing.
-fn judged(spec: &Spec, found: &Starts, by_delays: Vec<Contradiction>) -> Agreement {
+fn judged(spec: &Spec, found: &Starts, delays: Delays) -> Agreement {
     let mut contradictions = shifted(spec, found);
     if contradictions.is_empty() {
-        contradictions = by_delays;
+        contradictions = delays.contradictions;
     }
     contradictions.extend(gains(spec, found));
-    let is_explained = found.implausible <= UNEXPLAINED_SHARE;
-    let verdict = if is_explained { Verdict::Explained(1.0 - found.implausible) } else { Verdict::Undecided };
+    let share = 1.0 - found.implausible;
+    let verdict = match found.implausible <= UNEXPLAINED_SHARE {
+        true if delays.are_told => Verdict::Explained(share),
+        true => Verdict::DelaysUntold(share),
+        false => Verdict::Undecided,
+    };
     Agreement { contradictions, verdict }
 }
 
@@ -218,82 +209,6 @@ fn gains(spec: &Spec, found: &Starts) -> Vec<Contradiction> {
         is_wrong.then_some(Contradiction::Gain { channel: i + 1, ratio, gain: ratio * spec.channels[i].gain })
     };
     found.gains.iter().enumerate().filter_map(contradiction).collect()
-}
-
-/// Another order, or delays outside of their intervals, from the bands that hold one alias each; `None`
-/// where the captures do not tell. Something is reported only if the signal then leaves at most a tenth of
-/// the power unexplained that it leaves with the spec, whatever Nyquist zone each band may belong to.
-fn by_delays(spec: &Spec, model: &Model, records: &[Record]) -> Option<Vec<Contradiction>> {
-    let uncertainty = spec.uncertainty.clone().unwrap_or_default();
-    let reference = uncertainty.reference_channel().unwrap_or(0);
-    let blind = Blind::new(model, records, 1).ok()?;
-    if let Some(order) = other_order(&blind, records.len()) {
-        return Some(vec![Contradiction::WrongOrder { order }]);
-    }
-    let fit = Fit { delay: true, gain: true, offset: false, cutoff: None };
-    let fitted = blind.fit(Settings { fit, reference }).ok()?;
-    let (nominal, found) = blind.unexplained(&fitted.point);
-    let is_clear = found <= CLEARLY_LESS * nominal;
-    if !is_clear || fitted.misfit.is_some_and(|misfit| misfit > WORST_MISFIT) {
-        return None;
-    }
-    if let Some(order) = order_of_delays(&model.delays, &fitted.point.delays, reference) {
-        return Some(vec![Contradiction::WrongOrder { order }]);
-    }
-    let half_widths = uncertainty.delays(records.len());
-    let channel = |(i, estimate): (usize, ChannelEstimate)| {
-        let delay = estimate.delay?;
-        let deviation = Estimate { value: FastPeriods(delay.value.0 - model.delays[i]), sigma: delay.sigma };
-        let half_width = match uncertainty.delay {
-            Some(_) => half_widths[i].in_fast_periods(spec.fast_period),
-            None => FastPeriods(UNSTATED_HALF_WIDTH),
-        };
-        let is_clear = deviation.value.0.abs() > half_width.0 + CLEAR_SIGMAS * delay.sigma.0;
-        let (channel, reference) = (i + 1, reference + 1);
-        is_clear.then_some(Contradiction::Delay { channel, reference, deviation, half_width })
-    };
-    Some(fitted.channels(model).into_iter().enumerate().filter_map(channel).collect())
-}
-
-/// An order of the channels, from 1, that explains bands of one alias, in whatever zone, at least ten times
-/// as well as the given one and clearly better than any other: two channels swapped, all rotated, or
-/// reversed.
-fn other_order(blind: &Blind<'_>, channels: usize) -> Option<Vec<usize>> {
-    let given: Vec<usize> = (0..channels).collect();
-    let others = other_orders(&given);
-    let bands = blind.single_bands(others.len());
-    let left = unexplained_in_order(&bands, &given);
-    // NaN, without bands, says nothing.
-    let is_doubtful = left > ORDER_DOUBTFUL;
-    if !is_doubtful {
-        return None;
-    }
-    let weigh = |order: Vec<usize>| (unexplained_in_order(&bands, &order), order);
-    let mut weighed: Vec<_> = others.into_iter().map(weigh).collect();
-    weighed.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let second = weighed.get(1).map_or(f64::INFINITY, |(left, _)| *left);
-    let (best, order) = weighed.into_iter().next()?;
-    (best <= CLEARLY_LESS * left && DISTINCT_ORDER * best <= second).then(|| from_one(order))
-}
-
-/// `given` with two channels swapped, all rotated, or reversed.
-fn other_orders(given: &[usize]) -> Vec<Vec<usize>> {
-    let channels = given.len();
-    let mut orders: Vec<Vec<usize>> = Vec::new();
-    for i in 0..channels {
-        let rotated: Vec<usize> = (0..channels).map(|j| given[(i + j) % channels]).collect();
-        orders.push(rotated.iter().rev().copied().collect());
-        orders.push(rotated);
-        orders.extend((0..i).map(|j| {
-            let mut swapped = given.to_vec();
-            swapped.swap(i, j);
-            swapped
-        }));
-    }
-    orders.sort();
-    orders.dedup();
-    orders.retain(|order| order != given);
-    orders
 }
 
 #[cfg(test)]
@@ -350,6 +265,20 @@ mod tests {
         let apart = [recorded(20_000, 0.0, &mut dice).remove(0), recorded(20_000, 0.0, &mut dice).remove(1)];
         let found = found(&apart);
         assert_eq!((found.contradictions, found.verdict), (vec![], Verdict::Undecided));
+    }
+
+    /// A chirp leaves no band with one alias whose phase could be compared.
+    #[test]
+    fn a_chirp_with_a_wrong_delay_is_not_said_to_agree() {
+        let chirp = |late: f64| {
+            let phase = |t: f64| std::f64::consts::TAU * (50.0 * t + 0.5 * 12_950.0 * t * t);
+            (1..24_000).map(|k| phase((2.0 * f64::from(k) - late) / 48e3).sin()).collect::<Vec<f64>>()
+        };
+        for late in [0.98, 0.3] {
+            let Agreement { contradictions, verdict } = found(&[chirp(1.2), chirp(late)]);
+            assert!(matches!(verdict, Verdict::DelaysUntold(share) if share > 0.9), "{late}: {verdict}");
+            assert_eq!(contradictions, []);
+        }
     }
 
     #[test]

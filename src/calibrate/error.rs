@@ -75,7 +75,8 @@ pub enum CalibrateError {
     OwnRates,
     /// Not one record per channel.
     #[error(
-        "captures: {records}, but channels in the spec: {channels}; give one capture per channel, in the order of the spec"
+        "captures: {records}, but channels in the spec: {channels}; give one capture per channel, in the order of the spec; \
+         of files with several channels, `--channel` takes some"
     )]
     ChannelCount {
         /// Channels of the spec.
@@ -141,6 +142,18 @@ pub enum CalibrateError {
          of them, or use a signal of more bandwidth"
     )]
     NotIdentifiable,
+    /// A delay that the captures do not determine.
+    #[error(
+        "channel {channel}: the captures determine its delay to {:.1e} fast periods only, so they hold no tones that all \
+         channels share, or hardly any; name the tones, calibrate by a known waveform or blind, or record more",
+        sigma.0
+    )]
+    DelayUndetermined {
+        /// From 1.
+        channel: usize,
+        /// Standard deviation of the delay.
+        sigma: FastPeriods,
+    },
     /// A cut-off that the tones do not determine.
     #[error(
         "channel {channel}: the tones determine the cut-off to {sigma:.1e} of itself only, because a change of the cut-off looks like \

@@ -36,6 +36,7 @@
 mod agreement;
 mod blind;
 mod contradiction;
+mod delays;
 mod error;
 mod estimates;
 mod fit;
@@ -72,6 +73,8 @@ use estimates::Fitted;
 
 /// No converter that is in order has a larger offset, relative to full scale.
 const MOST_OFFSET: f64 = 0.1;
+/// A delay with a larger standard deviation, in fast periods, is not determined.
+const MOST_DELAY_SIGMA: f64 = 0.5;
 
 /// The kind of signal that was captured.
 #[derive(Debug, Clone, PartialEq)]
@@ -161,6 +164,9 @@ pub fn calibrate_pooled(
         fitted.warnings.push(Warning::Clipped { counts: clipped.clone() });
     }
     let channels = fitted.channels(&model);
+    if let Some((channel, sigma)) = undetermined(&channels) {
+        return Err(CalibrateError::DelayUndetermined { channel, sigma });
+    }
     let is_near_one = |value: f64| (value - 1.0).abs() < MOST_OFFSET;
     if channels.iter().all(|channel| channel.offset.is_some_and(|offset| is_near_one(offset.value))) {
         fitted.warnings.push(Warning::OffsetBinary);
@@ -168,6 +174,12 @@ pub fn calibrate_pooled(
     let Fitted { tones, modulus, misfit, frames, warnings, .. } = fitted;
     let cutoff = settings.fit.cutoff;
     Ok(Calibration { reference, channels, cutoff, tones, modulus, frames, clipped, misfit, warnings })
+}
+
+/// The first channel, from 1, whose delay is not determined, with its standard deviation.
+fn undetermined(channels: &[ChannelEstimate]) -> Option<(usize, FastPeriods)> {
+    let sigma = |(i, channel): (usize, &ChannelEstimate)| Some((i + 1, channel.delay?.sigma));
+    channels.iter().enumerate().filter_map(sigma).find(|(_, sigma)| sigma.0 > MOST_DELAY_SIGMA)
 }
 
 /// All records are real, or all are complex and hold tones.

@@ -5,7 +5,7 @@ mod pooled;
 mod stages;
 
 use crate::calibrate::testbench::{
-    assert_covers, errors, interleaved, random_errors, tones, trials, with_errors,
+    assert_covers, errors, gaussian, interleaved, random_errors, tones, trials, with_errors,
 };
 use crate::calibrate::{
     CalibrateError, Calibration, CalibrationSignal, Cutoff, Fit, Record, Settings, Warning, calibrate,
@@ -218,6 +218,27 @@ fn a_delay_beyond_the_period_of_a_tone_is_found_by_a_lower_one() {
     let two = tones(&truth, &hertz(&[1.06e6, 101e3]), 2048, 1e-4, &mut dice);
     let found = by_tones(&spec, &two, &[1.06e6, 101e3]).unwrap();
     assert!((delay(&found) - 1.7).abs() < 1e-3, "{}", delay(&found));
+}
+
+/// Noise has a largest line somewhere, and it says nothing of a delay: red noise on a grid of a tenth of a
+/// fast period.
+#[test]
+fn captures_without_tones_are_refused() {
+    let spec = interleaved();
+    for seed in 0..6 {
+        let mut dice = Random(seed);
+        let mut level = 0.0;
+        let wave: Vec<f64> = (0..41 * 4096)
+            .map(|_| {
+                level = 0.995 * level + gaussian(&mut dice);
+                level
+            })
+            .collect();
+        let of_channel = |i: usize| (1..4096).map(|k| wave[40 * k - 10 * i]).collect::<Vec<_>>();
+        let records: Vec<Record> = (0..4).map(|i| Record::new(of_channel(i))).collect();
+        let found = by_tones(&spec, &records, &[]);
+        assert!(found.is_err(), "{seed}: {:?}", found.map(|found| found.channels));
+    }
 }
 
 #[test]
