@@ -1,6 +1,6 @@
 //! What a reader of a measurement must know beside its figures.
 
-use super::{Cause, Measurement, UnsettledEnds};
+use super::{Cause, Measurement, Spur, UnsettledEnds};
 
 /// Why figures may not say what they seem to say.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -32,6 +32,13 @@ pub enum Warning {
         .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
     )]
     Hidden(Vec<Cause>),
+    /// Lines of interleaving that coincide with harmonics or products of tones, above the noise.
+    #[error(
+        "lines of interleaving fall on others, so that their power counts as distortion and may be that of interleaving: {}; \
+         choose another frequency to tell them apart",
+        .0.iter().map(shared).collect::<Vec<_>>().join("; ")
+    )]
+    Shared(Vec<Spur>),
     /// The ends of the record hold most of the noise.
     #[error(
         "the first and the last {} samples raise the noise by {:.1} dB or more: a filter may not have settled there",
@@ -45,12 +52,26 @@ impl Measurement {
     pub fn warnings(&self) -> Vec<Warning> {
         let Self { samples, clipped, left_out, .. } = *self;
         let hidden = (!self.hidden.is_empty()).then(|| Warning::Hidden(self.hidden.clone()));
+        let shared: Vec<Spur> = self.spurs.iter().filter(|spur| is_shared(spur)).cloned().collect();
         let all = [
             (clipped > 0).then_some(Warning::Clipped { clipped, samples }),
             (left_out > 0).then_some(Warning::LeftOut { left_out, samples }),
             hidden,
+            (!shared.is_empty()).then_some(Warning::Shared(shared)),
             self.unsettled_ends.map(Warning::Unsettled),
         ];
         all.into_iter().flatten().collect()
     }
+}
+
+/// Whether interleaving may have part in a line that counts as something else.
+fn is_shared(spur: &Spur) -> bool {
+    spur.above_noise
+        && !spur.causes.first().is_some_and(|cause| cause.is_interleaving())
+        && spur.causes.iter().any(|cause| cause.is_interleaving())
+}
+
+fn shared(spur: &Spur) -> String {
+    let causes: Vec<String> = spur.causes.iter().map(ToString::to_string).collect();
+    format!("{} of {:.1} dBc ({})", spur.frequency, spur.level.0, causes.join(" and "))
 }

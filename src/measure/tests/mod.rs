@@ -125,6 +125,23 @@ fn interleaving_spurs_are_those_of_the_closed_forms() {
     }
 }
 
+/// Of two converters the image of fs / 16 is its seventh harmonic.
+#[test]
+fn interleaving_that_falls_on_a_harmonic_is_named() {
+    let turns = Turns { offsets: vec![0.0; 2], gains: vec![1.0, 1.02], skews: vec![0.0; 2] };
+    let shared = |cycles| {
+        let settings = Settings { converters: 2, harmonics: 7, ..Settings::default() };
+        let measured = measure(&turns.record(8192, cycles), RATE, &settings).unwrap();
+        let warnings = measured.warnings().into_iter().map(|warning| warning.to_string());
+        warnings
+            .filter(|warning| warning.starts_with("lines of interleaving fall on others"))
+            .collect::<Vec<_>>()
+    };
+    let [warning] = &shared(1.0 / 16.0)[..] else { panic!("no warning") };
+    assert!(warning.contains("-40.1 dBc (harmonic, 7 f and gain or skew, 1/2 fs - f)"), "{warning}");
+    assert_eq!(shared(0.0637), Vec::<String>::new());
+}
+
 /// The leakage of a large tone beside the measured one is not taken for its harmonics.
 #[test]
 fn a_large_second_tone_is_no_distortion() {
