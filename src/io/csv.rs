@@ -108,13 +108,15 @@ impl<R: Read> CsvReader<R> {
 
     /// Reads ahead, and computes the rate from equal steps of time, with its error from their last digits.
     fn read_times(&mut self, begin: f64, text: &str, unit: f64, ahead: &mut Vec<u8>) -> Result<(), IoError> {
-        let (mut times, mut digits) = (vec![begin], vec![last_digit(text)]);
+        let (mut times, mut digits, mut lines) = (vec![begin], vec![last_digit(text)], vec![self.table.line]);
         while times.len() < TIMED_LINES && (times.len() < 2 || self.table.is_more_at_hand()) {
             let Some((text, frame)) = self.frame()? else { break };
             times.push(frame[0]);
             digits.push(last_digit(&text));
+            lines.push(self.table.line);
             self.encode(&frame, ahead);
         }
+        self.header.begin = Some(begin * unit);
         let steps = (times.len() - 1) as f64;
         if steps < 1.0 {
             return Ok(());
@@ -124,9 +126,9 @@ impl<R: Read> CsvReader<R> {
         // Times are rounded, but a line that is left out makes a step of two.
         let is_even = |pair: &[f64]| (pair[1] - pair[0] - step).abs() <= 0.75 * step;
         if !(step > 0.0 && times.windows(2).all(is_even)) {
-            return Err(self
-                .table
-                .fault("the times before are not evenly spaced; leave out the column, or repair it"));
+            let (line, problem) = uneven(&times, &lines);
+            self.table.line = line;
+            return Err(self.table.fault(&problem));
         }
         let rate = 1.0 / (step * unit);
         // Both ends are rounded by half of the last digit. Some writers leave out zeros at the end, and some
@@ -159,6 +161,26 @@ impl<R: Read> Read for CsvReader<R> {
         self.blocks = blocks;
         count
     }
+}
+
+/// The line whose time is least one usual step after that before it, and what is wrong with it.
+fn uneven(times: &[f64], lines: &[u64]) -> (u64, String) {
+    let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let mut sorted = steps.clone();
+    sorted.sort_by(f64::total_cmp);
+    let usual = sorted[sorted.len() / 2];
+    let off = |at: &usize| (steps[*at] - usual).abs();
+    let at = (0..steps.len()).max_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0);
+    let missing = (steps[at] / usual).round() - 1.0;
+    let remedy = if usual > 0.0 && missing >= 1.0 {
+        format!(
+            "{missing} lines are missing: put in a line of empty cells for each, or leave out the column and name the lost \
+             samples with --lost"
+        )
+    } else {
+        "they are not evenly spaced: repair them, or leave out the column if the samples are".to_owned()
+    };
+    (lines[at + 1], format!("the times step by {:.6} here and by {usual:.6} elsewhere; {remedy}", steps[at]))
 }
 
 /// The value of a unit of the last digit of a decimal number: 0.001 for `2.125`, 1e-6 for `4.2e-5`.
@@ -222,8 +244,15 @@ mod tests {
         for (heading, step) in [("Time (s)", 1.0 / 64.0), ("t", 1.0 / 64.0), ("time_ms", 1000.0 / 64.0)] {
             assert_eq!(read(&table(heading, step)).unwrap(), (1, Some(64.0), samples.clone()), "{heading}");
         }
-        let uneven = "t,x\n0,1\n1,1\n2,1\n3,1\n4,1\n6,1\n7,1\n8,1\n9,1\n";
-        assert!(read(uneven).unwrap_err().contains("not evenly spaced"));
+        let gap = "t,x\n0,1\n1,1\n2,1\n3,1\n4,1\n7,1\n8,1\n9,1\n10,1\n";
+        let message = read(gap).unwrap_err();
+        assert!(
+            message.contains("line 7: the times step by 3.0") && message.contains("2 lines are missing"),
+            "{message}"
+        );
+        for uneven in ["t,x\n0,1\n1,1\n1,1\n2,1\n3,1\n", "t,x\n3,1\n2,1\n1,1\n", "t,x\n0,1\n0,1\n"] {
+            assert!(read(uneven).unwrap_err().contains("not evenly spaced"));
+        }
     }
 
     #[test]

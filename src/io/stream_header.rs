@@ -86,6 +86,8 @@ pub struct StreamHeader {
     pub rate: Option<f64>,
     /// Hertz by which the stated rate may differ from the true one, as WAV headers hold whole hertz.
     pub rate_error: f64,
+    /// Seconds at which the first frame was taken by the input's own clock, if it states times.
+    pub begin: Option<f64>,
     /// Number of frames according to the header.
     pub promised: Option<u64>,
     /// Full scale is 1 by the format: of integers, of WAV and FLAC files.
@@ -104,6 +106,7 @@ impl StreamHeader {
             is_complex: false,
             rate: None,
             rate_error: 0.0,
+            begin: None,
             promised: None,
             is_scaled,
             rails: is_scaled.then(|| rails(layout.format)),

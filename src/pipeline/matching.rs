@@ -21,14 +21,17 @@ use crate::messages::{Number, Quoted, counted};
 use crate::spec::Spec;
 use crate::units::FastPeriods;
 
+/// The clocks of instruments differ by less.
+const MOST_CLOCK_ERROR: f64 = 1e-3;
+
 /// Recordings that do not fit a bank.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InputMismatch {
     /// Another number of channels.
     #[error(
-        "{} has {there}, but the input has {given} ({files}); give one mono recording per channel or one of {there}",
-        Quoted(.bank), there = counted(.wanted, "channel")
+        "{} has {there}, but the input has {given} ({files}); give one mono recording per channel or one of {there}{}",
+        Quoted(.bank), in_turn(*.given, *.wanted), there = counted(.wanted, "channel")
     )]
     Channels {
         /// The name of the bank.
@@ -73,11 +76,25 @@ pub enum InputMismatch {
         /// Its rate in hertz.
         other_rate: f64,
     },
+    /// Two inputs whose times begin more than a sample apart.
+    #[error(
+        "{}: its times begin {} s {} those of {}; cut the recordings to a common start, or leave out the columns of time if \
+         their clocks have no common zero",
+        Quoted(.input), Number(.apart.abs()), if *.apart > 0.0 { "after" } else { "before" }, Quoted(.other)
+    )]
+    Begins {
+        /// One input.
+        input: String,
+        /// The first input with times.
+        other: String,
+        /// Seconds from the beginning of the other one to that of this one.
+        apart: f64,
+    },
     /// A rate that is not the bank's.
     #[error(
         "{}: the sample rate of each channel is {} Hz, but the bank is designed for slow channels of {} Hz; record at that \
-         rate or design a bank for this one",
-        Quoted(.input), Number(*.rate), Number(*.wanted)
+         rate or design a bank for this one{}",
+        Quoted(.input), Number(*.rate), Number(*.wanted), clocks(*.rate / *.wanted)
     )]
     Rate {
         /// The input.
@@ -103,8 +120,8 @@ pub enum InputMismatch {
     /// A rate that is not that of the converter.
     #[error(
         "{}: the sample rate is {} Hz, but the bank takes {} Hz there, {samples} samples per frame; give the recordings \
-         in the order of the converters, record at that rate, or design a bank for this one",
-        Quoted(.input), Number(*.rate), Number(*.wanted)
+         in the order of the converters, record at that rate, or design a bank for this one{}",
+        Quoted(.input), Number(*.rate), Number(*.wanted), clocks(*.rate / *.wanted)
     )]
     OwnRate {
         /// The input.
@@ -116,6 +133,25 @@ pub enum InputMismatch {
         /// Samples of the converter per frame.
         samples: usize,
     },
+}
+
+/// What a single recording of one channel may be instead.
+fn in_turn(given: usize, wanted: usize) -> String {
+    match given {
+        1 => format!(", or --interleaved {wanted} if the converters take turns in this one"),
+        _ => String::new(),
+    }
+}
+
+/// What helps where rates differ by no more than clocks do.
+fn clocks(ratio: f64) -> String {
+    let error = (ratio - 1.0).abs();
+    if error > MOST_CLOCK_ERROR {
+        return String::new();
+    }
+    format!(
+        ". If it is only the clock that differs, leave out the column of time: the delays then drift by {error:.1e} s per second"
+    )
 }
 
 /// Converters that do not take turns.
@@ -204,8 +240,9 @@ pub fn check_channels(bank: &Bank, name: &str, reader: &MultiReader) -> Result<(
 /// The rate of the output in hertz: the bank's own, or that of the inputs for a bank in normalised time.
 ///
 /// # Errors
-/// [`InputMismatch`]: rates that differ, or are not the bank's 1 / (M h).
+/// [`InputMismatch`]: rates that differ, or are not the bank's 1 / (M h), or times that begin apart.
 pub fn output_rate(bank: &Bank, reader: &MultiReader) -> Result<f64, InputMismatch> {
+    check_begins(reader.headers())?;
     match input_rate(bank, reader.headers(), &reader.samples_per_frame())? {
         Some(rate) if bank.is_normalised() => Ok(rate * bank.ratio as f64),
         _ => Ok(1.0 / bank.fast_period.0),
@@ -227,6 +264,19 @@ pub fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), InputMismatch
             Err(InputMismatch::SpecRate { input: name.to_owned(), rate, wanted })
         }
         _ => Ok(()),
+    }
+}
+
+/// Frames of one index belong together, so inputs that state their times begin within a sample of each other.
+fn check_begins<'a>(inputs: impl Iterator<Item = (&'a str, &'a StreamHeader)>) -> Result<(), InputMismatch> {
+    let mut timed = inputs.filter_map(|(name, header)| Some((name, header.begin?, header.rate?)));
+    let Some((other, begin, rate)) = timed.next() else { return Ok(()) };
+    let mut apart = timed.map(|(name, at, own_rate)| (name, at - begin, own_rate.min(rate)));
+    match apart.find(|(_, apart, rate)| apart.abs() * rate > 1.0) {
+        Some((input, apart, _)) => {
+            Err(InputMismatch::Begins { input: input.to_owned(), other: other.to_owned(), apart })
+        }
+        None => Ok(()),
     }
 }
 
@@ -298,5 +348,23 @@ mod tests {
         for (a, b) in [(10.4, 10.4), (10.0, 10.4), (10.4, 10.0)] {
             assert_eq!(rate(a, b), None, "{a} {b}");
         }
+        let header = header(10.0002);
+        let error = input_rate(&bank, [("a", &header)].into_iter(), &[1, 1]).unwrap_err().to_string();
+        assert!(error.ends_with("the delays then drift by 2.0e-5 s per second"), "{error}");
+    }
+
+    #[test]
+    fn recordings_whose_times_begin_a_second_apart_are_refused() {
+        let header = |begin| StreamHeader {
+            rate: Some(10.0),
+            begin,
+            ..StreamHeader::real(SampleLayout::packed(PcmFormat::F64Le), 1)
+        };
+        let check = |a, b| check_begins([("a", &header(a)), ("b", &header(b))].into_iter());
+        for (a, b) in [(None, Some(5.0)), (Some(5.0), Some(5.0)), (Some(5.05), Some(5.0))] {
+            assert_eq!(check(a, b), Ok(()));
+        }
+        let error = check(Some(5.0), Some(4.0)).unwrap_err().to_string();
+        assert!(error.starts_with("b: its times begin 1 s before those of a;"), "{error}");
     }
 }
