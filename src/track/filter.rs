@@ -1,5 +1,6 @@
 //! The Kalman filter of one delay and its rate of change, and delays that come together.
 
+use crate::spec::Spec;
 use crate::units::Seconds;
 
 /// A delay, its rate of change, and what is known of them: the entries of the symmetric covariance matrix.
@@ -142,6 +143,9 @@ impl DelayFilter {
     }
 }
 
+/// Delays closer than this share of a fast period are together.
+const TOGETHER_DELAY: f64 = 0.05;
+
 /// Two channels that will sample at one instant of the slow period. There they carry one measurement, and no
 /// bank recovers what the other one carried: the noncausal bound rises as they come closer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -153,9 +157,15 @@ pub(super) struct Coincidence {
 }
 
 impl Coincidence {
-    /// The first pair whose delays come within `distance` of each other modulo `slow_period`, at their
-    /// present rates; `None` if there is none within `horizon`.
-    pub(super) fn ahead(
+    /// The first pair whose delays come together modulo the slow period of a spec, at their present rates;
+    /// `None` if there is none within `horizon`.
+    pub(super) fn ahead(states: &[DelayState], spec: &Spec, horizon: Seconds) -> Option<Self> {
+        let slow_period = spec.fast_period * spec.ratio as f64;
+        Self::within(states, slow_period, spec.fast_period * TOGETHER_DELAY, horizon)
+    }
+
+    /// As [`Coincidence::ahead`], where delays within `distance` of each other are together.
+    fn within(
         states: &[DelayState],
         slow_period: Seconds,
         distance: Seconds,
@@ -306,7 +316,7 @@ mod tests {
     }
 
     fn ahead(list: &[(f64, f64)], horizon: f64) -> Option<([usize; 2], f64)> {
-        let found = Coincidence::ahead(&states(list), Seconds(4.0), Seconds(0.25), Seconds(horizon));
+        let found = Coincidence::within(&states(list), Seconds(4.0), Seconds(0.25), Seconds(horizon));
         found.map(|found| (found.channels, found.after.0))
     }
 

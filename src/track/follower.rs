@@ -23,9 +23,7 @@ const KNOWN_SHARE: f64 = 0.02;
 /// [`LEAST_FRAMES`] frames suffices for that.
 const LARGEST_STEP: f64 = 2e-4;
 const LEAST_FRAMES: usize = 16;
-/// Delays closer than this share of a fast period come together, and how far ahead that is reported, in
-/// blocks.
-const TOGETHER_DELAY: f64 = 0.05;
+/// How far ahead it is reported that delays come together, in blocks.
 const HORIZON_BLOCKS: f64 = 60.0;
 
 /// Delays at which the taps are to be from some frame on.
@@ -395,9 +393,8 @@ impl Follower {
         let mut states: Vec<DelayState> = self.spec.channels.iter().map(known).collect();
         self.trackers.iter().for_each(|tracker| states[tracker.channel] = tracker.state());
         let horizon = self.frame_time() * (HORIZON_BLOCKS * self.settings.block_frames as f64);
-        let distance = self.spec.fast_period * TOGETHER_DELAY;
-        let found = Coincidence::ahead(&states, self.frame_time(), distance, horizon)?;
+        let found = Coincidence::ahead(&states, &self.spec, horizon)?;
         let [a, b] = found.channels.map(|i| i + 1);
-        Some(TrackWarning::Coincidence { channels: [a, b], after: found.after })
+        Some(TrackWarning::Coincidence { channels: [a, b], at: self.frame_time() * self.time + found.after })
     }
 }

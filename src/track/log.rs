@@ -117,14 +117,14 @@ pub enum TrackWarning {
     },
     /// Two channels will sample at one instant.
     #[error(
-        "the channels {} and {} will sample at one instant in {:.3e} s: no bank recovers the signal there",
-        channels[0], channels[1], after.0
+        "{at:.3} after the beginning the channels {} and {} will sample at one instant: no bank recovers the signal there",
+        channels[0], channels[1]
     )]
     Coincidence {
         /// From 1.
         channels: [usize; 2],
-        /// Time until then.
-        after: Seconds,
+        /// Time from the first frame on.
+        at: Seconds,
     },
 }
 

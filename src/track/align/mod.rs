@@ -14,6 +14,7 @@ mod tests;
 pub use error::{AlignError, AlignWarning};
 
 use super::Reading;
+use super::filter::{Coincidence, DelayState};
 use super::source::LEAST_LEVEL;
 use crate::calibrate::{
     CalibrationSignal, ChannelEstimate, Fit, LagLine, Record, Settings, Warning, check, check_parts, line,
@@ -198,6 +199,23 @@ fn alignment(
     let measured = estimates.len();
     let (spec, raised) = course.spec(&channels, &mut warnings);
     channels.iter_mut().for_each(|channel| channel.delay.value += spec.fast_period * raised as f64);
+    warnings.extend(coincidence(&spec, &channels, frames));
     let readings = course.readings(&skips, raised);
     Alignment { reference, channels, frames, pieces, measured, readings, spec, warnings }
+}
+
+/// Two channels that sample at one instant while the recordings last; with more channels than needed nothing
+/// is lost by that.
+fn coincidence(spec: &Spec, channels: &[AlignedChannel], frames: usize) -> Option<AlignWarning> {
+    if channels.len() > spec.ratio {
+        return None;
+    }
+    let state = |channel: &AlignedChannel| DelayState {
+        rate: channel.drift.value,
+        ..DelayState::known(channel.delay.value, channel.delay.sigma.0, channel.drift.sigma)
+    };
+    let states: Vec<DelayState> = channels.iter().map(state).collect();
+    let lasts = spec.fast_period * (spec.ratio * frames) as f64;
+    let Coincidence { channels, after } = Coincidence::ahead(&states, spec, lasts)?;
+    Some(AlignWarning::Coincidence { channels: channels.map(|i| i + 1), at: after })
 }
