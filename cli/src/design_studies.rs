@@ -111,18 +111,29 @@ pub(super) fn tracking_text(study: &TrackingStudy, proven: Option<f64>, unproven
     let TrackingStudy { tracked, fixed, redesigned, ratio, least_ratio, .. } = study;
     let [worst, of_fixed, redesigned_worst] =
         [tracked.largest_found, fixed.largest_found, *redesigned].map(number);
-    let percent = |ratio: f64| 100.0 * (ratio - 1.0);
+    let bound = match *least_ratio > 1.0 {
+        true => format!("; no affine taps: below {}", above(*least_ratio)),
+        false => String::new(),
+    };
     format!(
         "tracked    {worst} is the largest gain found over the spec's uncertainty ({}), {} without errors\n\
-         redesigned {redesigned_worst} for the delays where that was found: {:.3} % less\n\
-         \x20          at all delays at most {:.3} % above what is within reach there; no affine taps: below {:.3} %\n\
+         redesigned {redesigned_worst} for the delays where that was found: tracked is {} above it\n\
+         \x20          at all delays at most {} above what is within reach there{bound}\n\
          fixed      {of_fixed} is the largest found for the best fixed taps\n",
         at_most(proven, unproven),
         number(tracked.nominal),
-        100.0 * study.excess(),
-        percent(*ratio),
-        percent(*least_ratio),
+        above(1.0 + study.excess()),
+        above(*ratio),
     )
+}
+
+/// How far a ratio is above 1: in per cent, or in decibels where it is far.
+fn above(ratio: f64) -> String {
+    if ratio < 2.0 {
+        format!("{:.3} %", 100.0 * (ratio - 1.0))
+    } else {
+        format!("{:.1} dB", 20.0 * ratio.log10())
+    }
 }
 
 /// What is proven of the box, or why nothing is.

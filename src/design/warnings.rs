@@ -88,6 +88,16 @@ fn band(spec: &Spec, problem: &Problem, channel: Option<usize>) -> Option<String
 fn signal_band(spec: &Spec) -> Option<String> {
     let Band { low, high } = spec.signal.as_ref()?.band()?;
     let (width, resolved) = (high - low, resolved_band(spec));
+    let nyquist = Hertz(0.5 / spec.fast_period.0);
+    if high.0 < NARROW_BAND * nyquist.0 {
+        return Some(format!(
+            "the band of the signal ends at {}, {:.2e} of the output's Nyquist frequency {}; a number without a unit is in \
+             hertz, so write the unit if another one is meant",
+            text(high),
+            high.0 / nyquist.0,
+            text(nyquist)
+        ));
+    }
     if let Some(multiple) =
         folding_multiple([low, high].map(|f| f.angular().per_fast_period(spec.fast_period)))
     {

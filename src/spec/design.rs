@@ -16,7 +16,7 @@ pub enum Method {
     Fir,
     /// State-space filters, least gamma.
     Iir,
-    /// State-space filters, least mean-square error.
+    /// State-space filters, or finite impulse responses with `taps`, least mean-square error.
     H2,
     /// Papoulis/Yen interpolation of recurrent nonuniform samples, truncated (for comparison).
     Sinc,
