@@ -191,10 +191,14 @@ impl Shape {
         if channels == wanted {
             return Ok([channels, frames]);
         }
-        let remedy = match (frames == wanted, self.time_first()) {
-            (true, true) => "; leave axis=0 out if the rows are channels",
-            (true, false) => "; give axis=0 if the columns are channels",
-            (false, _) => "",
+        let remedy = match (sizes, frames == wanted, self.time_first()) {
+            ([_], ..) => format!(
+                "; give a row for each channel; fuse and calibrate take one recording in which the converters take turns \
+                 with interleaved={wanted}"
+            ),
+            (_, true, true) => "; leave axis=0 out if the rows are channels".into(),
+            (_, true, false) => "; give axis=0 if the columns are channels".into(),
+            (_, false, _) => String::new(),
         };
         Err(refused(format!(
             "the samples {sizes:?} have {channels} channels (time along axis {}) instead of {wanted}{remedy}",

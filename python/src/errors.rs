@@ -1,6 +1,7 @@
 //! Errors of the library as Python exceptions.
 
 use hybank::files::FileError;
+use hybank::io::IoError;
 use hybank::messages::{Quoted, shown};
 use hybank::spec;
 use pyo3::create_exception;
@@ -81,6 +82,14 @@ pub(crate) fn file_error(error: FileError) -> PyErr {
             Quoted(file)
         )),
         _ => refused(error),
+    }
+}
+
+/// A fault of an input: what the system refuses is an `OSError` of its kind.
+pub(crate) fn io_error(error: IoError) -> PyErr {
+    match error {
+        IoError::File(error) => file_error(error),
+        other => refused(other),
     }
 }
 

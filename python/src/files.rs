@@ -5,8 +5,10 @@ use crate::errors::{refused, warn};
 use crate::sources;
 use hybank::bank::{self, FrameLayout};
 use hybank::io::{
-    Coding, LostSamples, MAX_LOST, MultiReader, OfflineSamples, ReadOptions, TimeInterleaving, Until,
+    Coding, LostSamples, MAX_LOST, MultiReader, OfflineSamples, ReadOptions, StreamHeader, TimeInterleaving,
+    Until, is_same_rate,
 };
+use hybank::messages::{Number, Quoted};
 use hybank::pipeline::matching::{self, InputMismatch};
 use hybank::quantity::{self, FullScale};
 use hybank::spec::Spec;
@@ -109,18 +111,36 @@ pub(crate) fn read<'py>(
         let started = MultiReader::start(&files, read_options, crossbeam_channel::never());
         let mut reader = started.map_err(|error| error.to_string())?.ok_or("interrupted")?;
         let rate = reader.headers().find_map(|(_, header)| header.rate);
+        let other = wanted.is_none().then(|| other_rate(&reader)).flatten();
         let output_rate = wanted.as_ref().map(|wanted| wanted.check(&reader)).transpose();
         let output_rate = output_rate.map_err(|error| error.to_string())?.flatten();
         let whole = OfflineSamples::read_parts(&mut reader, MOST).map_err(|error| error.to_string())?;
-        Ok((whole, reader.is_complex(), rate, output_rate, reader.warnings()))
+        Ok((whole, reader.is_complex(), rate, output_rate, reader.warnings(), other))
     });
-    let (whole, is_complex, rate, output_rate, warnings) = read.map_err(refused)?;
+    let (whole, is_complex, rate, output_rate, warnings, other) = read.map_err(refused)?;
+    other.iter().try_for_each(|text| warn(py, text))?;
     warnings.iter().try_for_each(|warning| warn(py, warning))?;
     let found = PyDict::new(py);
     found.set_item("channels", arrays(py, whole.channels, is_complex))?;
     found.set_item("rate", rate)?;
     found.set_item("output_rate", output_rate)?;
     Ok(found)
+}
+
+/// Names the first input of another rate than that of the inputs before it; no bank is there to say whether it
+/// takes both.
+fn other_rate(reader: &MultiReader) -> Option<String> {
+    let mut rated = reader.headers().filter_map(|(name, header)| Some((name, header, header.rate?)));
+    let (first, of_first, wanted): (_, &StreamHeader, _) = rated.next()?;
+    let error = |header: &StreamHeader| header.rate_error.max(of_first.rate_error);
+    let (name, _, rate) = rated.find(|&(_, header, rate)| !is_same_rate(rate, wanted, error(header)))?;
+    Some(format!(
+        "{}: the sample rate is {} Hz, but {} has {} Hz; give bank=, which says whether the bank takes both",
+        Quoted(name),
+        Number(rate),
+        Quoted(first),
+        Number(wanted)
+    ))
 }
 
 fn full_scale(given: Option<&str>) -> PyResult<Option<FullScale>> {

@@ -1,6 +1,6 @@
 //! `hybank.Recording`: frames of a WAV or SigMF file from any place, for workers that read spans of it.
 
-use crate::errors::{file_error, no_others, refused};
+use crate::errors::{file_error, io_error, no_others, refused};
 use crate::formats::Format;
 use hybank::files::FileError;
 use hybank::io::wav::WavReader;
@@ -94,7 +94,7 @@ impl Recording {
     fn sigmf(path: &Path) -> PyResult<Self> {
         let [meta_path, data] = sigmf_files(path);
         let name = meta_path.display().to_string();
-        let meta = SigmfMeta::read(&meta_path).map_err(refused)?;
+        let meta = SigmfMeta::read(&meta_path).map_err(io_error)?;
         if lost(&meta) {
             return Err(refused(format!(
                 "{name}: frames were lost (core:global_index jumps); fuse the recording with `hybank fuse`, which fills them"

@@ -152,6 +152,9 @@ def test_columns_that_are_no_channels_are_refused_with_the_remedy(stereo):
         for call in (stereo.fuse, lambda given: hb.calibrate(given, stereo)):
             with pytest.raises(hb.HybankError, match=words):
                 call(given)
+    for call in (stereo.fuse, lambda given: hb.calibrate(given, stereo), stereo.stream().process):
+        with pytest.raises(hb.HybankError, match="give a row for each channel; .* interleaved=2"):
+            call(x[:, 0])
     assert spec and len(stereo.fuse(frame.set_index("Time"))) == 800
     assert len(stereo.fuse(frame["a"], interleaved=2)) == 400
 

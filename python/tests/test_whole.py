@@ -189,6 +189,8 @@ def test_files_are_fused_to_the_bits_of_the_command_line(folder, binary, bank, r
     soundfile.write(folder / "slow.wav", x.T, 22050, subtype="FLOAT")
     with pytest.raises(hb.HybankError, match="22050 Hz, but the bank is designed for slow channels of 24000 Hz"):
         bank.fuse(folder / "slow.wav")
+    with pytest.warns(UserWarning, match="slow.wav: the sample rate is 22050 Hz, but .*a0.wav has 24000 Hz; give bank="):
+        hb.read([files[0], folder / "slow.wav"])
     # Recordings that were read without the bank are of another rate as files are.
     both = hb.read(folder / "slow.wav")
     with pytest.raises(hb.HybankError, match="is 22050 Hz, but the bank is designed for 24000 Hz"):
@@ -205,6 +207,8 @@ def test_a_missing_file_is_a_file_not_found_error(folder, bank, name):
         with pytest.raises(FileNotFoundError) as caught:
             call(files)
         assert caught.value.filename == str(folder / name.split(":")[0]) and caught.value.__suppress_context__
+    with pytest.raises(FileNotFoundError):
+        hb.Recording(folder / "nix.sigmf-meta")
     with pytest.raises(FileNotFoundError):
         hb.simulate(bank, str(folder / "nix.wav"))
     with pytest.raises(FileNotFoundError):
