@@ -3,7 +3,7 @@
 
 use crate::depth::Measure;
 use crate::interpolate::rows::{self, ORDER, RowWork};
-use crate::interpolate::{Cover, InterpolationError, Settings};
+use crate::interpolate::{Cover, Settings};
 use crate::pipeline::rectified::{self, Strip};
 use crate::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights};
 use crate::propagate::{Frame, RectifiedView, RigCamera};
@@ -107,7 +107,7 @@ impl<const C: usize> RowEvidence<C> {
 
     /// The evidence of one row; false if it has no samples.
     fn row(&mut self, job: &Job<'_>, y: usize, evidence: &mut [Evidence]) -> Result<bool, RenderError> {
-        let failed = |source| RenderError::from(InterpolationError::Fit { row: y, source });
+        let failed = |source| RenderError::Fit { row: y, source };
         let settings = &job.rows.settings.interpolation;
         self.strip.survivors_of_row(&job.rows, y);
         let fitted = self.fit.interpolate(&self.strip.samples, settings, &mut self.values, &mut self.mask);

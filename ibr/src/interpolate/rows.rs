@@ -7,7 +7,7 @@
 
 use super::extend::{Level, mean};
 use super::holes::{GAP, reach};
-use super::{Cover, HoleFill, InterpolationError, Settings};
+use super::{Cover, HoleFill, Settings};
 use crate::depth::{fill_empty_rows, for_holes};
 use crate::sample::Sample;
 use hybank::sampling::fit::Response;
@@ -281,44 +281,6 @@ pub(super) fn blacken(mask: &[Cover], values: &mut [f32], channels: usize) {
     }
 }
 
-/// The whole third stage for samples on whole rows, in any order: a value for every pixel and the mask.
-///
-/// # Errors
-/// [`InterpolationError`]: settings, samples that are not finite or lie between rows, and no sample at all.
-pub fn interpolate<const C: usize>(
-    samples: &[Sample<C>],
-    (width, height): (usize, usize),
-    settings: &Settings,
-) -> Result<(Vec<f32>, Vec<Cover>), InterpolationError> {
-    settings.check()?;
-    super::check_samples(samples)?;
-    if let Some(index) = samples.iter().position(|s| s.y.fract() != 0.0) {
-        return Err(InterpolationError::BetweenRows { index, row: samples[index].y });
-    }
-    let mut rows: Vec<Vec<Sample<C>>> = vec![Vec::new(); height];
-    for s in samples.iter().filter(|s| s.y >= 0.0 && s.y < height as f64) {
-        rows[s.y as usize].push(*s);
-    }
-    let mut values = vec![0.0; width * height * C];
-    let mut mask = vec![Cover::Disocclusion; width * height];
-    let mut work = RowWork::<C>::new(width);
-    let mut filled = vec![false; height];
-    let outputs = values.chunks_exact_mut(width * C).zip(mask.chunks_exact_mut(width));
-    for (y, (row, (out, mask))) in rows.iter_mut().zip(outputs).enumerate() {
-        row.sort_by(|a, b| a.x.total_cmp(&b.x));
-        filled[y] = work
-            .interpolate(row, settings, out, mask)
-            .map_err(|source| InterpolationError::Fit { row: y, source })?;
-    }
-    if !filled.contains(&true) {
-        return Err(InterpolationError::NoSamples { width, height });
-    }
-    let mut depths = vec![f32::NAN; width * height];
-    rows.iter().zip(depths.chunks_exact_mut(width)).for_each(|(row, out)| nearest_depths(row, out));
-    finish::<C>(&filled, &mask, &depths, settings, &mut values);
-    Ok((values, mask))
-}
-
 /// What rows do together when each is fitted: rows without samples are copied from the nearest one that is
 /// `filled`, and the surfaces around disocclusions are continued into them.
 pub(crate) fn finish<const C: usize>(
@@ -371,14 +333,18 @@ fn continue_surfaces<const C: usize>(mask: &[Cover], depths: &[f32], width: usiz
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::setting::SettingError;
 
     fn sample(x: f64, depth: f32, value: f32) -> Sample<1> {
         Sample { x, depth, value: [value], ..Sample::BLANK }
     }
 
     fn run(samples: &[Sample<1>], width: usize, settings: &Settings) -> (Vec<f32>, Vec<Cover>) {
-        interpolate(samples, (width, 1), settings).unwrap()
+        let (mut values, mut mask) = (vec![0.0; width], vec![Cover::Crack; width]);
+        let mut depths = vec![f32::NAN; width];
+        assert!(RowWork::new(width).interpolate(samples, settings, &mut values, &mut mask).unwrap());
+        nearest_depths(samples, &mut depths);
+        finish::<1>(&[true], &mask, &depths, settings, &mut values);
+        (values, mask)
     }
 
     fn filling(fill: HoleFill) -> Settings {
@@ -444,37 +410,6 @@ mod tests {
         };
         let (soft, sharp) = (edge(1e9), edge(0.02));
         assert!(sharp > soft + 10.0, "{sharp} {soft}");
-    }
-
-    #[test]
-    fn rows_without_samples_are_copied_and_masked() {
-        let samples: Vec<_> = (0..8).map(|i| Sample { y: 1.0, ..sample(i as f64, 1.0, 50.0) }).collect();
-        let (values, mask) = interpolate(&samples, (8, 3), &Settings::default()).unwrap();
-        assert!(values.iter().all(|v| (v - 50.0).abs() < 1e-4));
-        assert_eq!(mask.iter().filter(|c| **c == Cover::Seen).count(), 8);
-    }
-
-    #[test]
-    fn what_cannot_be_fitted_is_refused() {
-        let settings = Settings::default();
-        let none = interpolate::<1>(&[], (4, 4), &settings);
-        assert_eq!(none, Err(InterpolationError::NoSamples { width: 4, height: 4 }));
-        let between = Sample { y: 0.5, ..sample(1.0, 1.0, 1.0) };
-        assert!(matches!(
-            interpolate(&[between], (4, 4), &settings),
-            Err(InterpolationError::BetweenRows { index: 0, row: 0.5 })
-        ));
-        let broken = sample(f64::NAN, 1.0, 1.0);
-        assert!(matches!(
-            interpolate(&[broken], (4, 4), &settings),
-            Err(InterpolationError::NotFinite { .. })
-        ));
-        let mut bad = settings;
-        bad.fit.lambda = -1.0;
-        assert!(matches!(
-            interpolate(&[sample(1.0, 1.0, 1.0)], (4, 4), &bad),
-            Err(InterpolationError::Setting(SettingError { name: "lambda", .. }))
-        ));
     }
 
     #[test]

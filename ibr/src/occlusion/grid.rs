@@ -4,40 +4,15 @@
 use super::DepthTest;
 use super::cells::Cells;
 use super::points::{Extent, Points};
-use crate::sample::Sample;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Removes the hidden samples and keeps the order of the others; returns how many were removed.
+/// Finds hidden samples; work memory that is used again.
 ///
 /// Most samples are visible, and the least depth around some of them shows it; only the others are compared
 /// with what may hide them. O(n) where few samples share a pixel. Of many, those of a cell are a k-d tree:
 /// O(n log n) to build it, and a search looks at the boxes that the border of a ball cuts. Parallel, with
 /// the same bits for any number of threads.
-pub fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) -> usize {
-    let hidden = hidden(samples.iter().copied(), test);
-    let before = samples.len();
-    let mut flags = hidden.iter();
-    samples.retain(|_| !flags.next().copied().unwrap_or(false));
-    before - samples.len()
-}
-
-/// Which samples are hidden.
-fn hidden<const C: usize>(
-    samples: impl ExactSizeIterator<Item = Sample<C>> + Clone,
-    test: &DepthTest,
-) -> Vec<bool> {
-    let count = samples.len();
-    let points = Points::of(samples);
-    let mut search = PlaneSearch::default();
-    search.clear(&points.extent(), points.len());
-    search.enter(&points, test);
-    let mut flags = vec![false; count];
-    search.hidden(&points, test).iter().for_each(|i| flags[*i as usize] = true);
-    flags
-}
-
-/// Finds hidden samples; work memory that is used again.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PlaneSearch {
     cells: Cells,
@@ -206,17 +181,37 @@ impl Search<'_> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::super::points::RUN;
     use super::*;
+    use crate::sample::Sample;
     use proptest::prelude::*;
+
+    /// Which samples are hidden.
+    fn hidden<const C: usize>(samples: &[Sample<C>], test: &DepthTest) -> Vec<bool> {
+        let points = Points::of(samples.iter().copied());
+        let mut search = PlaneSearch::default();
+        search.clear(&points.extent(), points.len());
+        search.enter(&points, test);
+        let mut flags = vec![false; samples.len()];
+        search.hidden(&points, test).iter().for_each(|i| flags[*i as usize] = true);
+        flags
+    }
+
+    /// Removes the hidden samples and keeps the order of the others; returns how many were removed.
+    pub(crate) fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) -> usize {
+        let (before, hidden) = (samples.len(), hidden(samples, test));
+        let mut hidden = hidden.iter();
+        samples.retain(|_| !hidden.next().unwrap());
+        before - samples.len()
+    }
 
     fn sample(x: f64, y: f64, depth: f32) -> Sample<1> {
         Sample { x, y, depth, ..Sample::BLANK }
     }
 
     fn check(samples: &[Sample<1>], test: &DepthTest) {
-        assert_eq!(hidden(samples.iter().copied(), test), test.hidden_by_definition(samples), "{test:?}");
+        assert_eq!(hidden(samples, test), test.hidden_by_definition(samples), "{test:?}");
     }
 
     #[test]

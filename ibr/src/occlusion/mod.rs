@@ -23,7 +23,8 @@ mod points;
 mod row;
 
 pub(crate) use grid::PlaneSearch;
-pub use grid::remove;
+#[cfg(test)]
+pub(crate) use grid::tests::remove;
 pub(crate) use points::{Extent, Points, RUN};
 pub use row::{RowScratch, remove_in_row};
 

@@ -21,6 +21,7 @@ pub(crate) struct Points {
 }
 
 impl Points {
+    #[cfg(test)]
     pub(crate) fn of<const C: usize>(samples: impl Iterator<Item = Sample<C>> + Clone) -> Self {
         let mut points = Self::default();
         points.set(samples);

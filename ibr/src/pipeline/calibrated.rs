@@ -108,7 +108,7 @@ fn render_with<const ORDER: usize, const C: usize>(
     let settings = &settings.suited_to(&agreement, &view_weights, Measure::Depth);
     let chosen = view_weights.views();
     let pixels: usize = chosen.iter().map(|v| views[*v].image.width() * views[*v].image.height()).sum();
-    let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &settings.interpolation)?;
+    let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &settings.interpolation);
     let footprint = Footprint::of(views, &chosen, camera, &Frame::whole(width, height, 0.5, settings.offset));
     let view_weights =
         if settings.keep_exposure { view_weights } else { view_weights.with_gains(&agreement.gains) };
@@ -128,7 +128,7 @@ fn render_with<const ORDER: usize, const C: usize>(
         propagated.fetch_add(all, Ordering::Relaxed);
         watch(GATHERING * (ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count as f64);
         samples
-    })?;
+    });
     let propagated = propagated.into_inner();
     let (used, dropped) = (problem.samples(), footprint.dropped(propagated));
     drop((pool, footprint));
@@ -136,7 +136,7 @@ fn render_with<const ORDER: usize, const C: usize>(
         return Err(RenderError::NoOverlap { pixels, dropped });
     }
     let report = Report { propagated, occluded: propagated - used, used, dropped, ..Report::default() };
-    let fit = problem.stiffened_by_area().solve(&|share| watch(GATHERING + (1.0 - GATHERING) * share))?;
+    let fit = problem.stiffened_by_area().solve(&|share| watch(GATHERING + (1.0 - GATHERING) * share));
     Ok(Rendering::of_plane::<C>(fit, report, chosen, agreement))
 }
 
@@ -207,21 +207,21 @@ mod tests {
         assert_eq!(got.report.occluded, occlusion::remove(&mut samples, settings.depth_test()));
         assert!(got.report.occluded > 0);
         ViewWeights::of(&views, &target).apply(&mut samples);
-        let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation).unwrap();
-        problem.add(&samples).unwrap();
-        let fit = problem.stiffened_by_area().solve(&|_| ()).unwrap();
+        let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation);
+        problem.add(&samples);
+        let fit = problem.stiffened_by_area().solve(&|_| ());
         assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
         // In bands only the order of summation differs.
         let footprint = Footprint::of(&views, &(0..views.len()).collect::<Vec<_>>(), &target, &frame);
-        let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation).unwrap();
+        let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation);
         let mut work = Work::default();
         for rows in [0..7, 7..8, 8..30] {
             let (mut band, _) = visible_in(rows, 30, &footprint, &views, settings.depth_test(), &mut work);
             ViewWeights::of(&views, &target).apply(&mut band);
-            problem.add(&band).unwrap();
+            problem.add(&band);
         }
         assert_eq!(problem.samples(), samples.len());
-        let banded = problem.stiffened_by_area().solve(&|_| ()).unwrap();
+        let banded = problem.stiffened_by_area().solve(&|_| ());
         assert_eq!(banded.mask, fit.mask);
         let worst = banded.values.iter().zip(&fit.values).fold(0.0, |w: f32, (a, b)| w.max((a - b).abs()));
         assert!(worst < 1e-2, "{worst}");

@@ -5,7 +5,6 @@
 
 use super::{Method, RenderError, RenderSettings};
 use crate::interpolate::Degree;
-use crate::interpolate::plane::PlaneProblem;
 use crate::interpolate::rows::ORDER;
 use crate::sample::Sample;
 use hybank::memory::check_memory;
@@ -157,10 +156,10 @@ impl Extent {
     fn plane(&self, degree: Degree, gathering: f64) -> f64 {
         let Self { size, .. } = *self;
         let memory = match (degree, self.channels) {
-            (Degree::Linear, 3) => plane_memory::<2, 3>(size),
-            (Degree::Linear, _) => plane_memory::<2, 1>(size),
-            (Degree::Cubic, 3) => plane_memory::<4, 3>(size),
-            (Degree::Cubic, _) => plane_memory::<4, 1>(size),
+            (Degree::Linear, 3) => Fit2::<2, 3>::memory(size.0, size.1),
+            (Degree::Linear, _) => Fit2::<2, 1>::memory(size.0, size.1),
+            (Degree::Cubic, 3) => Fit2::<4, 3>::memory(size.0, size.1),
+            (Degree::Cubic, _) => Fit2::<4, 1>::memory(size.0, size.1),
         };
         let pixels = self.virtual_pixels();
         // Depths, their distances, and counts; then the mask instead of the distances.
@@ -184,13 +183,4 @@ impl Extent {
 /// Bands of rows for views of so many pixels in all.
 pub(super) fn bands_of(pixels: usize, height: usize) -> usize {
     pixels.div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS)).max(1)
-}
-
-fn plane_memory<const O: usize, const C: usize>(
-    (width, height): (usize, usize),
-) -> hybank::sampling::fit2::Memory {
-    match PlaneProblem::<O, C>::is_turned((width, height)) {
-        true => Fit2::<O, C>::memory(height, width),
-        false => Fit2::<O, C>::memory(width, height),
-    }
 }

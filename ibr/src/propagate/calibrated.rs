@@ -9,7 +9,7 @@ use super::{CalibratedView, Frame};
 use crate::camera::{Camera, Relative};
 use crate::depth::TILE;
 use crate::occlusion::{DepthTest, LARGEST_SPACING, Points};
-use crate::sample::{Dropped, Sample};
+use crate::sample::Dropped;
 use rayon::prelude::*;
 use row_map::RowMap;
 
@@ -76,22 +76,6 @@ impl Footprint {
         Dropped { unknown, behind, outside: self.pixels.saturating_sub(unknown + behind + samples) }
     }
 
-    /// The samples between two rows of the frame, both included: view by view and row by row (eq. 2.2 and
-    /// 2.3).
-    pub(crate) fn samples_between<const C: usize>(
-        &self,
-        views: &[CalibratedView<'_>],
-        top: f64,
-        bottom: f64,
-    ) -> Vec<Sample<C>> {
-        let mut projected = Projected::default();
-        let band = self.frame.band(top, bottom);
-        for tile in self.reaching(band.rows, |_| 0.0) {
-            self.project(views, tile, &band, (f64::MIN, f64::MAX), &mut projected);
-        }
-        projected.samples(views)
-    }
-
     /// The samples between two rows of the frame, the second excluded, and those that may hide them. Calls
     /// `with` after each tile.
     pub(crate) fn project_between(
@@ -147,19 +131,6 @@ impl Footprint {
     }
 }
 
-/// All samples of calibrated views, view by view and row by row (eq. 2.2 and 2.3).
-pub fn calibrated<const C: usize>(
-    views: &[CalibratedView<'_>],
-    camera: &Camera,
-    frame: &Frame,
-) -> (Vec<Sample<C>>, Dropped) {
-    let all: Vec<usize> = (0..views.len()).collect();
-    let footprint = Footprint::of(views, &all, camera, frame);
-    let samples = footprint.samples_between(views, f64::MIN, f64::MAX);
-    let dropped = footprint.dropped(samples.len());
-    (samples, dropped)
-}
-
 /// The tiles of one row of a view, and its pixels that cannot be samples.
 struct RowFootprint {
     tiles: Vec<Tile>,
@@ -196,4 +167,4 @@ impl RowFootprint {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -3,7 +3,8 @@
 mod calibrated;
 mod view;
 
-pub use calibrated::calibrated;
+#[cfg(test)]
+pub(crate) use calibrated::tests::calibrated;
 pub(crate) use calibrated::{Footprint, Projected};
 pub(crate) use view::nearest;
 pub use view::{CalibratedView, RectifiedView, View, Viewpoint};
@@ -201,23 +202,6 @@ impl ShiftedTile {
     }
 }
 
-/// All samples of a rectified rig, row by row and view by view within a row.
-pub fn rectified<const C: usize>(
-    views: &[RectifiedView<'_>],
-    position: f64,
-    frame: &Frame,
-) -> (Vec<Sample<C>>, Dropped) {
-    let camera = RigCamera::new(views, position);
-    let mut samples = Vec::with_capacity(views.len() * frame.width * frame.height);
-    let mut dropped = Dropped::default();
-    for y in 0..frame.height {
-        for (index, view) in views.iter().enumerate() {
-            dropped += rectified_row(view, index as u16, y, &camera, frame, &mut samples);
-        }
-    }
-    (samples, dropped)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -244,9 +228,6 @@ mod tests {
         let positions: Vec<(f64, f32, u32)> = samples.iter().map(|s| (s.x, s.depth, s.pixel)).collect();
         assert_eq!(positions, [(-0.75, 0.5, 4), (1.25, 0.25, 7)]);
         assert!(samples.iter().all(|s| s.view == 3 && s.y == 1.0 && s.value[0] == s.pixel as f32));
-        let (all, _) = rectified::<1>(&[view], 0.5, &frame);
-        let row: Vec<_> = all[4..].iter().map(|s| Sample { view: 3, ..*s }).collect();
-        assert_eq!(row, samples);
     }
 
     /// A rectified rig written as 3 x 4 cameras gives the same samples, up to the scale of depth.
@@ -265,7 +246,10 @@ mod tests {
         let frame = Frame::whole(width, height, 0.5, 0.0);
         let rig = RectifiedView { image: &image, map: &disparity, camera: 1.0 };
         let free = CalibratedView { image: &image, map: &depth, camera: camera(1.0) };
-        let (a, dropped_a) = rectified::<1>(&[rig], 0.4, &frame);
+        let (mut a, mut dropped_a) = (Vec::<Sample<1>>::new(), Dropped::default());
+        for y in 0..height {
+            dropped_a += rectified_row(&rig, 0, y, &RigCamera::new(&[rig], 0.4), &frame, &mut a);
+        }
         let (b, dropped_b) = calibrated::<1>(&[free], &camera(0.4), &frame);
         assert_eq!(dropped_a, dropped_b);
         assert!(dropped_a.outside > 0 && a.len() == b.len());

@@ -2,15 +2,11 @@
 
 use super::{Fit2Sample, GUESSED, PlaneProblem};
 use crate::interpolate::holes::reach;
-use crate::interpolate::{InterpolationError, check_samples};
 use crate::occlusion::LARGEST_SPACING;
 use crate::sample::Sample;
 use hybank::sampling::fit2::Fit2Rows;
 use rayon::prelude::*;
 use std::ops::Range;
-
-/// Samples whose rows and columns are exchanged at a time.
-const TURNED_AT_A_TIME: usize = 4096;
 
 /// Some rows of the image with all that samples change there.
 struct Part<'a, const ORDER: usize, const C: usize> {
@@ -109,41 +105,25 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         }
     }
 
-    /// Adds visible samples. Samples more than half a pixel outside the image are ignored; samples less far
-    /// outside are moved to its border.
-    ///
-    /// # Errors
-    /// [`InterpolationError::NotFinite`].
-    pub(crate) fn add(&mut self, samples: &[Sample<C>]) -> Result<(), InterpolationError> {
-        check_samples(samples)?;
-        if !self.turned {
-            let added = self.whole().add(samples);
-            self.added += added;
-            return Ok(());
-        }
-        for part in samples.chunks(TURNED_AT_A_TIME) {
-            let turned: Vec<Sample<C>> = part.iter().map(|s| Sample { x: s.y, y: s.x, ..*s }).collect();
-            let added = self.whole().add(&turned);
-            self.added += added;
-        }
-        Ok(())
+    /// Adds visible samples, all of whose numbers are finite. Samples more than half a pixel outside the image
+    /// are ignored; samples less far outside are moved to its border.
+    pub(crate) fn add(&mut self, samples: &[Sample<C>]) {
+        let added = self.whole().add(samples);
+        self.added += added;
     }
 
     /// Adds the samples of bands of rows, which `make` returns: those whose row, cut to the image, lies in
     /// the band. The bands follow each other and cover the image. Bands that do not touch are made and added
     /// at the same time; the result does not depend on the number of threads.
-    ///
-    /// # Errors
-    /// As [`PlaneProblem::add`].
     pub(crate) fn add_bands(
         &mut self,
         bands: &[Range<usize>],
         make: impl Fn(&Range<usize>) -> Vec<Sample<C>> + Sync,
-    ) -> Result<(), InterpolationError> {
+    ) {
         // A sample changes the rows of its splines and those within its reach.
         let margin = reach(LARGEST_SPACING).ceil() as usize + ORDER - 1;
-        if self.turned || bands.iter().any(|band| band.len() < 2 * margin) {
-            return bands.iter().try_for_each(|band| self.add(&make(band)));
+        if bands.iter().any(|band| band.len() < 2 * margin) {
+            return bands.iter().for_each(|band| self.add(&make(band)));
         }
         for parity in 0..2 {
             let height = self.height;
@@ -155,14 +135,10 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
                 parts.push((band, part));
                 rest = after;
             }
-            let add = |(band, mut part): (&Range<usize>, Part<'_, ORDER, C>)| {
-                let samples = make(band);
-                check_samples(&samples).map(|()| part.add(&samples))
-            };
-            let added: Result<Vec<Added>, _> = parts.into_par_iter().with_max_len(1).map(add).collect();
-            added?.into_iter().for_each(|added| self.added += added);
+            let add = |(band, mut part): (&Range<usize>, Part<'_, ORDER, C>)| part.add(&make(band));
+            let added: Vec<Added> = parts.into_par_iter().with_max_len(1).map(add).collect();
+            added.into_iter().for_each(|added| self.added += added);
         }
-        Ok(())
     }
 
     /// Multiplies the stiffness of bicubic splines by the mean area of the samples so far. That of bilinear

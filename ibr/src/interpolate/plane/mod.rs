@@ -20,9 +20,8 @@ mod grid;
 mod springs;
 
 use super::extend::{Level, mean};
-use super::{Cover, Degree, HoleFill, InterpolationError, Settings, Watch};
+use super::{Cover, Degree, HoleFill, Settings, Watch};
 use crate::depth::{DepthMap, Measure, NONE};
-use crate::sample::Sample;
 use gather::Added;
 use grid::Grid;
 use hybank::sampling::Fit2;
@@ -86,17 +85,15 @@ pub struct Convergence {
 
 /// The result of the plane fit.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PlaneFit {
+pub(crate) struct PlaneFit {
     /// Values 0..255, `width * height * C`.
-    pub values: Vec<f32>,
-    /// Origin of each pixel's value.
-    pub mask: Vec<Cover>,
+    pub(crate) values: Vec<f32>,
+    pub(crate) mask: Vec<Cover>,
     /// Depth of the sample nearest to each pixel, NaN in holes.
-    pub depth: DepthMap,
+    pub(crate) depth: DepthMap,
     /// Visible samples that are nearest to each pixel.
-    pub counts: Vec<u16>,
-    /// Convergence of the solver.
-    pub convergence: Convergence,
+    pub(crate) counts: Vec<u16>,
+    pub(crate) convergence: Convergence,
 }
 
 /// Least weight of the samples on a pixel that is continued into holes; below it they are doubtful, or lie
@@ -111,9 +108,6 @@ const GUESSED: f32 = 1e4;
 pub(crate) struct PlaneProblem<const ORDER: usize, const C: usize> {
     width: usize,
     height: usize,
-    /// Whether rows and columns are exchanged in all fields: the equations of a narrow image would be mostly
-    /// the zeros beside its rows.
-    turned: bool,
     fit: Fit2<ORDER, C>,
     /// Depth of the sample nearest to each pixel centre, NaN where none lies within half a gap.
     depth: Vec<f32>,
@@ -125,32 +119,22 @@ pub(crate) struct PlaneProblem<const ORDER: usize, const C: usize> {
 }
 
 impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
-    /// An empty problem.
-    ///
-    /// # Errors
-    /// [`InterpolationError::Setting`].
-    pub(crate) fn new(
-        (width, height): (usize, usize),
-        settings: &Settings,
-    ) -> Result<Self, InterpolationError> {
-        settings.check()?;
-        let turned = Self::is_turned((width, height));
-        let (width, height) = if turned { (height, width) } else { (width, height) };
+    /// An empty problem with settings that were checked.
+    pub(crate) fn new((width, height): (usize, usize), settings: &Settings) -> Self {
         let pixels = width * height;
         // Written at once: pages that are read first and written later take the system twice the time.
         let mut counts = vec![0; pixels];
         counts.par_chunks_mut(width.max(1)).for_each(|row| row.fill(0));
-        Ok(Self {
+        Self {
             width,
             height,
-            turned,
             fit: Fit2::new(width, height),
             depth: vec![f32::NAN; pixels],
             distance: vec![f32::INFINITY; pixels],
             counts,
             settings: *settings,
             added: Added::default(),
-        })
+        }
     }
 
     /// Samples that have been added.
@@ -158,22 +142,9 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         self.added.count
     }
 
-    /// Whether an image takes a third less memory with rows and columns exchanged.
-    pub(crate) fn is_turned((width, height): (usize, usize)) -> bool {
-        let bytes = |width, height| Fit2::<ORDER, C>::memory(width, height).with_multigrid;
-        bytes(width, height) > 1.5 * bytes(height, width)
-    }
-
     /// Fits the image. `watch` is called with the share of the fit that is done.
-    ///
-    /// # Errors
-    /// [`InterpolationError::NoSamples`] when no sample was added.
-    pub(crate) fn solve(mut self, watch: Watch<'_>) -> Result<PlaneFit, InterpolationError> {
-        let (width, height, turned) = (self.width, self.height, self.turned);
-        if self.added.count == 0 {
-            let (width, height) = if turned { (height, width) } else { (width, height) };
-            return Err(InterpolationError::NoSamples { width, height });
-        }
+    pub(crate) fn solve(mut self, watch: Watch<'_>) -> PlaneFit {
+        let (width, height) = (self.width, self.height);
         let mut mask = background::classify(&self.depth, width, &self.settings.depth_test);
         let guessed = mask.iter_mut().zip(std::mem::take(&mut self.distance));
         let guessed = guessed.filter(|(cover, distance)| **cover == Cover::Seen && *distance >= GUESSED);
@@ -193,13 +164,8 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
             super::rows::blacken(&mask, &mut values, C);
         }
         values.iter_mut().for_each(|v| *v = v.clamp(0.0, 255.0));
-        if !turned {
-            let depth = DepthMap::from_known((width, height), depth, Measure::Depth);
-            return Ok(PlaneFit { values, mask, depth, counts, convergence });
-        }
-        let depth = DepthMap::from_known((height, width), by_columns(depth, width, 1), Measure::Depth);
-        let (values, mask) = (by_columns(values, width, C), by_columns(mask, width, 1));
-        Ok(PlaneFit { values, mask, depth, counts: by_columns(counts, width, 1), convergence })
+        let depth = DepthMap::from_known((width, height), depth, Measure::Depth);
+        PlaneFit { values, mask, depth, counts, convergence }
     }
 
     /// Gives every disoccluded pixel a sample with value and depth of the surface that continues into it.
@@ -275,63 +241,6 @@ pub(crate) fn fit_surface(values: &[f32], shape: &[f32], width: usize, settings:
 pub(crate) fn surface_memory(width: usize, height: usize) -> f64 {
     let memory = Fit2::<2, 1>::memory(width, height);
     memory.equations.max(memory.solving) + 8.0 * width as f64 * height as f64
-}
-
-/// The pixels of an image by columns, from those by rows of `width`.
-fn by_columns<T: Copy>(pixels: Vec<T>, width: usize, channels: usize) -> Vec<T> {
-    let height = pixels.len() / (width * channels);
-    if width == 1 || height == 1 {
-        return pixels;
-    }
-    let mut columns = Vec::with_capacity(pixels.len());
-    for (x, y) in (0..width).flat_map(|x| (0..height).map(move |y| (x, y))) {
-        let first = (y * width + x) * channels;
-        columns.extend_from_slice(&pixels[first..first + channels]);
-    }
-    columns
-}
-
-/// The complete third stage for samples at any position: a value for every pixel, and the mask.
-///
-/// ```
-/// use hybank_ibr::depth::{DepthMap, Measure};
-/// use hybank_ibr::interpolate::{Settings, plane};
-/// use hybank_ibr::propagate::{Frame, RectifiedView, rectified};
-/// use hybank_ibr::{image::Image, occlusion::remove};
-/// let (size, settings) = ((32, 8), Settings::default());
-/// let image = Image::filled(32, 8, 1, 100.0);
-/// let map = DepthMap::new(size, vec![4.0; 256], 1.0, Measure::Disparity)?;
-/// let views = [0.0, 1.0].map(|camera| RectifiedView { image: &image, map: &map, camera });
-/// let (mut samples, _) = rectified::<1>(&views, 0.5, &Frame::whole(32, 8, 0.5, 0.0));
-/// remove(&mut samples, &settings.depth_test);
-/// let fit = plane::interpolate(&samples, size, &settings)?;
-/// assert!(fit.convergence.reached && fit.values.iter().all(|v| (v - 100.0).abs() < 0.1));
-/// // Both views show this pixel.
-/// assert_eq!(fit.counts[100], 2);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
-/// # Errors
-/// [`InterpolationError`]: settings, samples that are not finite, and no sample at all.
-pub fn interpolate<const C: usize>(
-    samples: &[Sample<C>],
-    size: (usize, usize),
-    settings: &Settings,
-) -> Result<PlaneFit, InterpolationError> {
-    match settings.plane.degree {
-        Degree::Linear => interpolate_with::<2, C>(samples, size, settings),
-        Degree::Cubic => interpolate_with::<4, C>(samples, size, settings),
-    }
-}
-
-fn interpolate_with<const ORDER: usize, const C: usize>(
-    samples: &[Sample<C>],
-    size: (usize, usize),
-    settings: &Settings,
-) -> Result<PlaneFit, InterpolationError> {
-    let mut problem = PlaneProblem::<ORDER, C>::new(size, settings)?;
-    problem.add(samples)?;
-    problem.solve(&|_| ())
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use super::*;
 use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::occlusion::PlaneSearch;
+use crate::sample::Sample;
 use nalgebra::{Matrix3, Matrix3x4, Rotation3, Vector3};
 
 const SIZE: (usize, usize) = (150, 90);
@@ -27,6 +28,35 @@ fn scene() -> (Image, DepthMap) {
     };
     let data = (0..SIZE.0 * SIZE.1).map(depth).collect();
     (image, DepthMap::new(SIZE, data, 1.0, Measure::Depth).unwrap())
+}
+
+impl Footprint {
+    /// The samples between two rows of the frame, both included: view by view and row by row.
+    fn samples_between<const C: usize>(
+        &self,
+        views: &[CalibratedView<'_>],
+        top: f64,
+        bottom: f64,
+    ) -> Vec<Sample<C>> {
+        let (mut projected, band) = (Projected::default(), self.frame.band(top, bottom));
+        for tile in self.reaching(band.rows, |_| 0.0) {
+            self.project(views, tile, &band, (f64::MIN, f64::MAX), &mut projected);
+        }
+        projected.samples(views)
+    }
+}
+
+/// All samples of views, view by view and row by row.
+pub(crate) fn calibrated<const C: usize>(
+    views: &[CalibratedView<'_>],
+    camera: &Camera,
+    frame: &Frame,
+) -> (Vec<Sample<C>>, Dropped) {
+    let all: Vec<usize> = (0..views.len()).collect();
+    let footprint = Footprint::of(views, &all, camera, frame);
+    let samples = footprint.samples_between(views, f64::MIN, f64::MAX);
+    let dropped = footprint.dropped(samples.len());
+    (samples, dropped)
 }
 
 #[test]
