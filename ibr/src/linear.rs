@@ -1,7 +1,7 @@
 //! Small linear problems of vectors of fixed size, by the decompositions of `hybank-linalg`.
 
-use hybank_linalg::{Mat, Svd, solve_positive, svd};
-use nalgebra::{Matrix3, SMatrix, SVector};
+use hybank_linalg::{Mat, Svd, svd};
+use nalgebra::{Matrix3, SVector};
 
 /// The thin decomposition of rows, padded with zero rows up to `least`; `None` when an entry is not finite
 /// or the iteration does not converge.
@@ -35,23 +35,6 @@ pub(crate) fn least_squares<const N: usize>(rows: &[[f64; N]], rhs: &[f64]) -> O
     let along: [f64; N] = std::array::from_fn(along);
     let solution = SVector::from_fn(|j, _| (0..N).map(|k| v[(j, k)] * along[k]).sum());
     (s[N - 1] > 1e-12 * s[0]).then_some(solution)
-}
-
-/// One step of Gauss-Newton: solves J^T J dx = J^T r by Cholesky (N is at most 12).
-pub(crate) fn normal_step<const N: usize>(
-    jtj: &SMatrix<f64, N, N>,
-    jtr: &SVector<f64, N>,
-) -> Option<SVector<f64, N>> {
-    positive_solution(jtj.as_slice(), jtr.as_slice()).map(|step| SVector::from_column_slice(&step))
-}
-
-/// The solution of a positive definite system, its matrix row by row; `None` if it is not positive definite
-/// or not finite.
-pub(crate) fn positive_solution(matrix: &[f64], rhs: &[f64]) -> Option<Vec<f64>> {
-    let side = rhs.len();
-    let matrix = Mat::from_fn(side, side, |i, j| matrix[i * side + j]);
-    let found = solve_positive(&matrix, &Mat::from_column_slice(side, 1, rhs)).ok()?;
-    found.iter().all(|v| v.is_finite()).then(|| found.as_slice().to_vec())
 }
 
 #[cfg(test)]
@@ -91,21 +74,5 @@ mod tests {
             assert!(dot.abs() < 1e-13);
         }
         assert!(least_squares(&[[1.0, 1.0], [2.0, 2.0]], &[1.0, 2.0]).is_none());
-    }
-
-    #[test]
-    fn positive_systems_are_solved_and_others_refused() {
-        let x = positive_solution(&[4.0, 1.0, 1.0, 3.0], &[6.0, 7.0]).unwrap();
-        assert!((x[0] - 1.0).abs() < 1e-14 && (x[1] - 2.0).abs() < 1e-14, "{x:?}");
-        assert_eq!(positive_solution(&[1.0, 2.0, 2.0, 1.0], &[1.0, 1.0]), None);
-        assert_eq!(positive_solution(&[f64::NAN], &[1.0]), None);
-    }
-
-    #[test]
-    fn a_step_solves_the_normal_equations() {
-        let jtj = SMatrix::<f64, 2, 2>::new(4.0, 1.0, 1.0, 3.0);
-        let step = normal_step(&jtj, &SVector::<f64, 2>::new(1.0, 2.0)).unwrap();
-        assert!((jtj * step - SVector::<f64, 2>::new(1.0, 2.0)).norm() < 1e-14);
-        assert!(normal_step(&SMatrix::<f64, 2, 2>::zeros(), &SVector::zeros()).is_none());
     }
 }

@@ -7,7 +7,7 @@
 //! 1. *Outliers.* A value is rejected if it contradicts its neighbours and the other views do not outvote
 //!    them (`outliers`). It takes the median of its neighbours, weighed by the likeness of their colours.
 //! 2. *Noise.* With the standard deviation delta of the errors, which
-//!    [`Agreement`] finds from the lookups of one map in another, and the bends
+//!    [`Agreement`](crate::pipeline::Agreement) finds from the lookups of one map in another, and the bends
 //!    kappa of the surfaces, the map is the most probable one of a random walk of slopes (`surface`).
 
 mod colour;
@@ -21,10 +21,9 @@ pub(crate) use surface::from_scattered;
 
 use crate::depth::{DepthMap, Measure};
 use crate::interpolate::plane::surface_memory;
-use crate::pipeline::Agreement;
 use crate::propagate::{View, Viewpoint, nearest};
 use hybank::memory::{MemoryShortage, check_memory};
-use outliers::Parallax;
+use outliers::Known;
 
 /// A map that was restored.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,31 +88,21 @@ pub fn memory(sizes: &[(usize, usize)], is_noisy: bool) -> f64 {
 pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, MemoryShortage> {
     let sizes: Vec<(usize, usize)> = views.iter().map(|view| view.map.size()).collect();
     check_memory(memory(&sizes, false))?;
-    let agreement = Agreement::of(views);
-    let error = |view: usize| agreement.depth_error(view);
-    let planes: Vec<Parallax> =
-        views.iter().enumerate().map(|(i, v)| Parallax::of(v.map, error(i))).collect();
-    let voters = outliers::voters(&agreement.groups());
+    let all = Known::of(views);
     let one = |i: usize| {
-        let view = &views[i];
-        let rejected = outliers::rejected(views, &planes, &agreement.gains, &voters[i], i);
-        let count = rejected.iter().filter(|r| **r).count();
-        let mut plane = planes[i].clone();
-        let mut guessed = Vec::new();
+        let (view, error, rejected) = (&views[i], all.agreement.depth_error(i), all.rejected(i));
+        let (mut plane, count) = (all.planes[i].clone(), rejected.iter().filter(|r| **r).count());
         if count > 0 {
             plane.replace(view.image, &rejected);
-            guessed = rejected;
         }
-        if is_noticeable(views, i, error(i)) {
+        if is_noticeable(views, i, error) {
             check_memory(surface_memory(view.map.width(), view.map.height()))?;
             plane.smooth(view.image, view.map.measure());
         }
         let known = (plane.values.len() - view.map.unknown()).max(1);
-        Ok(Restored {
-            map: plane.into_map(view.map, guessed),
-            outliers: count as f64 / known as f64,
-            error: error(i),
-        })
+        let guessed = if count > 0 { rejected } else { Vec::new() };
+        let map = plane.into_map(view.map, guessed);
+        Ok(Restored { map, outliers: count as f64 / known as f64, error })
     };
     (0..views.len()).map(one).collect()
 }

@@ -6,7 +6,7 @@
 
 use crate::depth::{DepthMap, JUMP, Measure};
 use crate::image::Image;
-use crate::pipeline::{Exposure, GREY_LEVELS};
+use crate::pipeline::{Agreement, GREY_LEVELS};
 use crate::propagate::{View, Viewpoint};
 use rayon::prelude::*;
 
@@ -129,25 +129,6 @@ impl Parallax {
         self.ring(pixel, distance).filter(|q| self.agree(here, self.values[*q])).take(least).count() == least
     }
 
-    /// Whether few values on the ring agree with one that no other view confirms, and one shows a surface
-    /// there at the median of the ring.
-    pub(super) fn is_in_cluster<P>(
-        &self,
-        view: &View<'_, P>,
-        pixel: usize,
-        ring: usize,
-        votes: impl Fn(usize, f32) -> Vec<Vote>,
-    ) -> bool {
-        if self.is_supported(pixel, ring, RING_SUPPORTERS) {
-            return false;
-        }
-        let around = self.median_of(view.image, pixel, self.ring(pixel, ring));
-        !around.is_nan()
-            && !self.agree(around, self.values[pixel])
-            && !votes(pixel, view.map.data()[pixel]).into_iter().any(Vote::is_confirming)
-            && votes(pixel, view.map.measure().of_parallax(around)).contains(&Vote::Surface)
-    }
-
     /// The pixel at a position whose surface has this parallax.
     pub(super) fn showing(&self, at: [f64; 2], there: f32) -> Option<usize> {
         self.pixels_at(at).find(|q| self.agree(there, self.values[*q]))
@@ -211,52 +192,84 @@ pub(super) fn difference(a: [f32; 3], b: [f32; 3]) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>() / 3.0
 }
 
-/// Which values of a view are outliers: few neighbours agree with them, and not more of the other views
-/// confirm them than see through them; or they lie in a cluster of outliers.
-pub(super) fn rejected<P: Viewpoint>(
-    views: &[View<'_, P>],
-    planes: &[Parallax],
-    gains: &[Exposure],
-    voters: &[usize],
-    index: usize,
-) -> Vec<bool> {
-    let (view, plane) = (&views[index], &planes[index]);
-    let votes = ballot(views, planes, gains, voters, index);
-    let is_outlier = |p: usize| {
-        let value = view.map.data()[p];
-        if value.is_nan() || view.map.is_guessed(p) {
-            return false;
-        }
-        match plane.is_supported(p, 1, SUPPORTERS) {
-            true => plane.is_in_cluster(view, p, RING, &votes),
-            false => votes(p, value).into_iter().map(Vote::count).sum::<i32>() <= 0,
-        }
-    };
-    (0..plane.values.len()).into_par_iter().with_min_len(1024).map(is_outlier).collect()
+/// Views with their maps in parallax, and how well they agree.
+pub(super) struct Known<'a, P> {
+    views: &'a [View<'a, P>],
+    pub(super) planes: Vec<Parallax>,
+    pub(super) agreement: Agreement,
+    /// The views that vote on values of each.
+    pub(super) voters: Vec<Vec<usize>>,
 }
 
-/// The votes of views on values of another one.
-pub(super) fn ballot<P: Viewpoint>(
-    views: &[View<'_, P>],
-    planes: &[Parallax],
-    gains: &[Exposure],
-    voters: &[usize],
-    index: usize,
-) -> impl Fn(usize, f32) -> Vec<Vote> + Sync {
-    let view = &views[index];
-    let (width, measure) = (view.map.width(), view.map.measure());
-    let colour = move |view: usize, p: usize| -> [f32; 3] {
-        let colour = views[view].image.pixel::<3>(p);
-        std::array::from_fn(|c| colour[c] * gains[view][c] as f32)
-    };
-    let maps: Vec<_> = voters.iter().map(|other| view.camera.map_to(&views[*other].camera)).collect();
-    move |p, value| {
-        let votes = voters.iter().zip(&maps).map(|(other, map)| {
-            let (u, v, depth) = map((p % width) as f64, (p / width) as f64, f64::from(value));
-            let there = measure.parallax(depth as f32);
-            vote(&planes[*other], [u, v], there, |q| difference(colour(index, p), colour(*other, q)))
+impl<'a, P: Viewpoint> Known<'a, P> {
+    pub(super) fn of(views: &'a [View<'a, P>]) -> Self {
+        let agreement = Agreement::of(views);
+        let plane = |(i, view): (usize, &View<'_, P>)| Parallax::of(view.map, agreement.depth_error(i));
+        let planes = views.iter().enumerate().map(plane).collect();
+        Self { views, planes, voters: voters(&agreement.groups()), agreement }
+    }
+
+    /// Which values of a view are outliers: few neighbours agree with them, and not more of the other views
+    /// confirm them than see through them; or they lie in a cluster of outliers.
+    pub(super) fn rejected(&self, index: usize) -> Vec<bool> {
+        let (map, plane, votes) = (self.views[index].map, &self.planes[index], self.ballot(index));
+        let is_outlier = |p: usize| {
+            let value = map.data()[p];
+            if value.is_nan() || map.is_guessed(p) {
+                return false;
+            }
+            match plane.is_supported(p, 1, SUPPORTERS) {
+                true => self.is_in_cluster(index, p, RING, &votes),
+                false => votes(p, value).into_iter().map(Vote::count).sum::<i32>() <= 0,
+            }
+        };
+        (0..plane.values.len()).into_par_iter().with_min_len(1024).map(is_outlier).collect()
+    }
+
+    /// Whether few values on the ring around a pixel agree with its own, no other view confirms that, and one
+    /// shows a surface there at the median of the ring.
+    pub(super) fn is_in_cluster(
+        &self,
+        index: usize,
+        pixel: usize,
+        ring: usize,
+        votes: impl Fn(usize, f32) -> Vec<Vote>,
+    ) -> bool {
+        let (View { image, map, .. }, plane) = (self.views[index], &self.planes[index]);
+        if plane.is_supported(pixel, ring, RING_SUPPORTERS) {
+            return false;
+        }
+        let around = plane.median_of(image, pixel, plane.ring(pixel, ring));
+        !around.is_nan()
+            && !plane.agree(around, plane.values[pixel])
+            && !votes(pixel, map.data()[pixel]).into_iter().any(Vote::is_confirming)
+            && votes(pixel, map.measure().of_parallax(around)).contains(&Vote::Surface)
+    }
+
+    /// The votes of the others on values at pixels of a view.
+    pub(super) fn ballot(&self, index: usize) -> impl Fn(usize, f32) -> Vec<Vote> + Sync {
+        let (view, voters) = (&self.views[index], &self.voters[index]);
+        let (width, measure) = (view.map.width(), view.map.measure());
+        let maps: Vec<_> =
+            voters.iter().map(|other| view.camera.map_to(&self.views[*other].camera)).collect();
+        move |p, value| {
+            let votes = voters.iter().zip(&maps).map(|(other, map)| {
+                let (u, v, depth) = map((p % width) as f64, (p / width) as f64, f64::from(value));
+                let there = measure.parallax(depth as f32);
+                vote(&self.planes[*other], [u, v], there, |q| self.are_alike([index, *other], [p, q]))
+            });
+            votes.collect()
+        }
+    }
+
+    /// Whether pixels of two views have nearly one colour.
+    pub(super) fn are_alike(&self, views: [usize; 2], pixels: [usize; 2]) -> bool {
+        let [a, b] = [0, 1].map(|k| -> [f32; 3] {
+            let (colour, gain) =
+                (self.views[views[k]].image.pixel::<3>(pixels[k]), self.agreement.gains[views[k]]);
+            std::array::from_fn(|c| colour[c] * gain[c] as f32)
         });
-        votes.collect()
+        difference(a, b) <= GREY_LEVELS
     }
 }
 
@@ -278,13 +291,13 @@ pub(super) fn voters(groups: &[usize]) -> Vec<Vec<usize>> {
 
 /// What a view says of a point at a position with a parallax: it confirms it by a pixel of a surface there
 /// that has nearly its colour, or sees through it; nothing if something hides it, or it falls outside.
-fn vote(plane: &Parallax, at: [f64; 2], there: f32, colour: impl Fn(usize) -> f32) -> Vote {
+fn vote(plane: &Parallax, at: [f64; 2], there: f32, has_colour: impl Fn(usize) -> bool) -> Vote {
     let (mut is_inside, mut is_on_surface, mut is_alike, mut is_seen_through) = (false, true, false, true);
     for q in plane.pixels_at(at) {
         let agrees = plane.agree(there, plane.values[q]);
         is_inside = true;
         is_on_surface &= agrees;
-        is_alike |= agrees && colour(q) <= GREY_LEVELS;
+        is_alike |= agrees && has_colour(q);
         is_seen_through &= !agrees && plane.values[q] < there;
     }
     match (is_alike, is_on_surface, is_inside && is_seen_through) {

@@ -4,7 +4,7 @@
 //! interpolation on triangles is exact on planar facets; that of the projective depth itself would not be.
 
 use super::Point;
-use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
+use spade::{DelaunayTriangulation, Point2, Triangulation};
 use std::collections::BTreeMap;
 
 /// Of features closer than this, in pixels, only the first is used.
@@ -35,41 +35,26 @@ pub struct Mesh {
     pub(crate) triangles: Vec<[usize; 3]>,
 }
 
-struct Vertex {
-    position: Point2<f64>,
-    number: usize,
-}
-
-impl HasPosition for Vertex {
-    type Scalar = f64;
-    fn position(&self) -> Point2<f64> {
-        self.position
-    }
-}
-
 impl Mesh {
     /// The Delaunay triangulation of some positions.
     ///
     /// Positions that are not finite, or too far out for the triangulation's exact predicates, and those
     /// next to others are no corners of triangles.
     pub fn delaunay(corners: Vec<Point>) -> Self {
-        let mut triangulation: DelaunayTriangulation<Vertex> = DelaunayTriangulation::new();
+        let mut triangulation: DelaunayTriangulation<Point2<f64>> = DelaunayTriangulation::new();
+        // The numbers of the corners in the order of the vertices.
+        let mut numbers = Vec::new();
         for (number, corner) in corners.iter().enumerate() {
             let position = Point2::new(corner.x, corner.y);
-            let apart = triangulation.nearest_neighbor(position).is_none_or(
-                |near: spade::handles::VertexHandle<'_, Vertex, _, _, _>| {
-                    near.position().distance_2(position) >= CLOSEST * CLOSEST
-                },
-            );
-            if apart {
-                // The library refuses coordinates beyond the range of its exact predicates.
-                let _ = triangulation.insert(Vertex { position, number });
+            let near = triangulation.nearest_neighbor(position).map(|near| near.position());
+            let is_apart = near.is_none_or(|near| near.distance_2(position) >= CLOSEST * CLOSEST);
+            // The library refuses coordinates beyond the range of its exact predicates.
+            if is_apart && triangulation.insert(position).is_ok() {
+                numbers.push(number);
             }
         }
-        let numbers = |face: spade::handles::FaceHandle<'_, spade::handles::InnerTag, Vertex, _, _, _>| {
-            face.vertices().map(|v| v.data().number)
-        };
-        let triangles = triangulation.inner_faces().map(numbers).collect();
+        let triangles =
+            triangulation.inner_faces().map(|face| face.vertices().map(|v| numbers[v.index()])).collect();
         Self { corners, triangles }
     }
 

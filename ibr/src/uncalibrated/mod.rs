@@ -52,6 +52,7 @@ pub mod metric;
 pub mod normalise;
 pub mod order;
 pub(crate) mod random;
+mod refine;
 pub mod resection;
 pub mod tracks;
 pub mod triangulate;

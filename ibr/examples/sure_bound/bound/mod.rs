@@ -6,8 +6,8 @@ pub use row::Limits;
 
 use hybank::sampling::fit::Response;
 use hybank_ibr::depth::Measure;
-use hybank_ibr::interpolate::rows::{MARGIN, RowWork};
 use hybank_ibr::interpolate::Cover;
+use hybank_ibr::interpolate::rows::{MARGIN, RowWork};
 use hybank_ibr::occlusion::{RowScratch, remove_in_row};
 use hybank_ibr::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights, rectified};
 use hybank_ibr::propagate::{Frame, RectifiedView, RigCamera, rectified_row};

@@ -6,7 +6,7 @@ use crate::uncalibrated::canonical::canonical_pair;
 use crate::uncalibrated::fundamental::eight_point;
 use crate::uncalibrated::random::dice::Dice;
 use crate::uncalibrated::triangulate::triangulate;
-use nalgebra::Rotation3;
+use nalgebra::{Rotation3, Vector3};
 
 const SIZE: (usize, usize) = (640, 480);
 
