@@ -44,7 +44,7 @@ impl<const C: usize> RowScratch<C> {
     }
 
     /// Sorts the keys by column, equal columns in the order given. Expected O(n): a counting sort into as
-    /// many cells as there are keys, then insertion, which meets few keys per cell.
+    /// many cells as there are keys, and then of the few keys in each.
     fn sort(&mut self) {
         let n = self.keys.len();
         if n < 2 {
@@ -79,25 +79,13 @@ impl<const C: usize> RowScratch<C> {
         let mut begin = 0;
         for end in &self.starts[..n] {
             let end = *end as usize;
-            sort_cell(&mut self.sorted[begin..end]);
+            if end > begin + 1 {
+                let order = |a: &Key, b: &Key| a.x.total_cmp(&b.x).then(a.index.cmp(&b.index));
+                self.sorted[begin..end].sort_unstable_by(order);
+            }
             begin = end;
         }
         std::mem::swap(&mut self.sorted, &mut self.keys);
-    }
-}
-
-/// Insertion sort for few samples, the library's stable sort for many.
-fn sort_cell(cell: &mut [Key]) {
-    if cell.len() > 24 {
-        cell.sort_by(|a, b| a.x.total_cmp(&b.x));
-        return;
-    }
-    for i in 1..cell.len() {
-        let mut j = i;
-        while j > 0 && cell[j - 1].x > cell[j].x {
-            cell.swap(j - 1, j);
-            j -= 1;
-        }
     }
 }
 

@@ -1,7 +1,6 @@
-//! The memory that a rendering takes beside its views, before it begins.
-//!
-//! The largest arrays are counted: those of the equations and of the pixels, and the samples that are held
-//! at a time. Whether multigrid takes over is not known before; the estimate lies between.
+//! The memory that a rendering takes beside its views, before it begins: the arrays of the equations and of
+//! the pixels, and the samples that are held at a time. Whether multigrid takes over is not known before;
+//! the estimate lies between.
 
 use super::{Method, RenderError, RenderSettings};
 use crate::interpolate::Degree;
@@ -16,19 +15,14 @@ const SAMPLES_AT_A_TIME: usize = 1 << 16;
 /// are made twice.
 const FEWEST_ROWS: usize = 40;
 
-/// What a rendering of any kind takes: threads, points that are compared, and whatever is small.
+/// Bytes of a rendering of any kind: threads, points that are compared, and whatever is small.
 const BASE: f64 = 5e5;
-
-/// Bytes of a row of a rectified rig: its counts.
+/// Bytes of a row of a rectified rig, its counts, and of each of its samples while it is sorted, tested and
+/// fitted: keys, cells, the survivors' weights and sums.
 const ROW: f64 = 41.0;
-
-/// Bytes of a sample beside itself while a row of samples is sorted, tested and fitted: keys, cells, the
-/// survivors' weights and sums.
 const ROW_SAMPLE: f64 = 67.0;
-
 /// Bytes of a place in a band beside its sample: positions, depths, weights, cells.
 const PLACE: f64 = 45.0;
-
 /// Bytes per pixel of a prediction: of the evidence of a row fit, of the regressors with slopes, distances
 /// and jitter, of the search for local limits, and of the errors that are its result.
 const ROW_EVIDENCE: f64 = 24.0;

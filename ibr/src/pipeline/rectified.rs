@@ -141,8 +141,7 @@ fn render_rows<const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> 
                 .map_err(|source| RenderError::Fit { row, source })
         })
     })?;
-    let report = total(counts.iter(), HoleCount::of(&mask));
-    enough(job, &report)?;
+    let report = report(job, &counts, &mask)?;
     let filled: Vec<bool> = counts.iter().map(|c| c.used > 0).collect();
     rows::finish::<C>(&filled, &mask, &keys, &job.settings.interpolation, &mut values);
     job.disparities(&mut keys);
@@ -162,8 +161,7 @@ fn render_plane<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Ren
         counts.push(strip.survivors_of_row(job, row));
         problem.add(&strip.samples);
     }
-    let report = total(counts.iter(), HoleCount::default());
-    enough(job, &report)?;
+    let report = report(job, &counts, &[])?;
     let fit = problem.solve(job.watch);
     let mut keys = fit.depth.data().to_vec();
     job.disparities(&mut keys);
@@ -187,24 +185,20 @@ pub(crate) struct RowCount {
     dropped: Dropped,
 }
 
-fn total<'a>(counts: impl Iterator<Item = &'a RowCount>, holes: HoleCount) -> Report {
-    let mut report = Report { holes, ..Report::default() };
+/// The report on all rows.
+///
+/// # Errors
+/// [`RenderError::NoOverlap`].
+fn report(job: &Job<'_>, counts: &[RowCount], mask: &[Cover]) -> Result<Report, RenderError> {
+    let mut report = Report { holes: HoleCount::of(mask), ..Report::default() };
     for c in counts {
         report.propagated += c.propagated;
         report.used += c.used;
         report.dropped += c.dropped;
     }
     report.occluded = report.propagated - report.used;
-    report
-}
-
-/// Refuses a rendering without samples.
-fn enough(job: &Job<'_>, report: &Report) -> Result<(), RenderError> {
-    if report.used > 0 {
-        return Ok(());
-    }
-    let pixels = job.views.len() * job.frame.width * job.frame.height;
-    Err(RenderError::NoOverlap { pixels, dropped: report.dropped })
+    let (pixels, dropped) = (job.views.len() * job.frame.width * job.frame.height, report.dropped);
+    if report.used > 0 { Ok(report) } else { Err(RenderError::NoOverlap { pixels, dropped }) }
 }
 
 /// The samples of one row and their work memory.

@@ -10,15 +10,10 @@
 //! so chi orders depth correctly on the whole image or reverses it on the whole image, while d_p passes
 //! through infinity.
 //!
-//! No change of frame is needed. A linear program could move the plane at infinity off the scene, which
-//! would make all chi negative and all det M positive. But the sign of [`order_sign`] holds in every frame,
-//! and the position to which a pixel with given chi propagates does not depend on the frame. Only a camera
-//! centre on the plane t = 0 (det M = 0) has no order of depth and is refused.
-//!
-//! For the canonical pair this does not happen: its plane t = 0 is the best fit to the matches, so it lies
-//! within the scene, far from any camera that sees the scene from the front. With this plane chi is also
-//! small on the whole image, so that a share of its range is a depth threshold; in other frames chi would
-//! mostly vary with the pixel.
+//! The sign of [`order_sign`] holds in every frame, and so does the position to which a pixel with given chi
+//! propagates. Only a camera centre on the plane t = 0 (det M = 0) has no order of depth and is refused. That
+//! of the canonical pair is the best fit to the matches, so it lies within the scene, far from the cameras,
+//! and a share of the range of chi is a depth threshold.
 
 use nalgebra::{Matrix3, Matrix3x4, Vector4};
 

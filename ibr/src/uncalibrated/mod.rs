@@ -8,7 +8,6 @@
 //! inverse depth.
 //!
 //! ```
-//! use hybank_ibr::uncalibrated::bundle::{Bundle, Observation};
 //! use hybank_ibr::uncalibrated::{Match, Point, canonical, fundamental, resection, triangulate};
 //!
 //! // Points of a scene, and where cameras that look along z from (x, 0, 0) see them.
@@ -32,13 +31,6 @@
 //!     .collect();
 //! let third = resection::resect(&sightings, 1)?;
 //! assert!(third.rms < 1e-6);
-//! // All of them adjusted together stay where they are: the images are exact.
-//! let seen_by = |point, camera, image| Observation { camera, point, image };
-//! let images = matches.iter().enumerate();
-//! let images = images.flat_map(|(point, m)| [seen_by(point, 0, m.first), seen_by(point, 1, m.second)]);
-//! let cameras = vec![pair.first.inverse() * first, pair.second.inverse() * second];
-//! let mut bundle = Bundle { cameras, points, observations: images.collect() };
-//! assert_eq!(bundle.adjust(1.0), Some(true));
 //! # Ok::<(), hybank_ibr::uncalibrated::GeometryError>(())
 //! ```
 

@@ -6,9 +6,6 @@
 //! and the frame is free: its 15 directions change no image, so the damping alone decides along them. The
 //! points are eliminated from the normal equations (Schur complement), which leaves 12 unknowns for each
 //! camera.
-//!
-//! Crates for such problems (apex-solver, tiny-solver, factrs) know rotations and poses, and residuals of
-//! one's own. A projective camera would be such a residual; what they would add is the file `normal.rs`.
 
 mod normal;
 #[cfg(test)]
