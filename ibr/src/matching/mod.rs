@@ -65,7 +65,6 @@ const LEAD: usize = 24;
 /// Bytes per hypothesis of a pixel: a cost and a sum.
 const BYTES: f64 = 3.0;
 
-/// The work on one photograph.
 struct Sweep<P> {
     camera: P,
     measure: Measure,
@@ -155,7 +154,6 @@ impl<P: Viewpoint> Sweep<P> {
         shifts.iter().sum::<f64>() / 3.0
     }
 
-    /// Takes the range of the parallaxes that were found.
     fn narrow(&mut self, found: &[f32]) {
         let mut known: Vec<f32> = found.iter().map(|v| v / self.unit).filter(|v| !v.is_nan()).collect();
         known.sort_by(f32::total_cmp);
@@ -173,7 +171,6 @@ impl<P: Viewpoint> Sweep<P> {
         }
     }
 
-    /// The parallaxes of all pixels, in bands of rows at the same time.
     fn parallaxes(&self, sweeps: &[Self]) -> Vec<f32> {
         let height = self.grey.height();
         let starts: Vec<usize> = (0..height).step_by(ROWS).collect();

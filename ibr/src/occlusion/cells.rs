@@ -19,13 +19,11 @@ const USUAL_COLUMNS: usize = 5;
 /// Factor of the radius: the distance test rounds.
 const ROUNDING: f64 = 1.0001;
 
-/// Some neighbouring samples.
 #[derive(Debug, Clone, Copy)]
 struct Run {
     /// Bounds of the cells within the largest radius of a sample of the run, inclusive.
     columns: [u32; 2],
     rows: [u32; 2],
-    /// Least depth.
     near: f32,
     /// Largest depth of the samples on which the test decides.
     far: f32,
@@ -59,7 +57,6 @@ impl Cells {
         self.far.resize(cells, f32::NEG_INFINITY);
     }
 
-    /// Enters the samples that have been appended since the last call.
     pub(super) fn enter(&mut self, points: &Points, test: &DepthTest) {
         for start in (self.runs.len() * RUN..points.len()).step_by(RUN) {
             let run = self.run(points, start..start + RUN, test);
@@ -103,12 +100,10 @@ impl Cells {
         Run { columns, rows: cells(down, self.raster.top, self.raster.rows), ..Run::EMPTY }
     }
 
-    /// The number of cells.
     pub(super) fn count(&self) -> usize {
         self.far.len()
     }
 
-    /// The cell of a sample.
     #[inline]
     pub(super) fn cell(&self, points: &Points, i: usize) -> usize {
         let (column, row) = self.raster.cell(points.x[i], points.y[i]);

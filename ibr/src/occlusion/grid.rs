@@ -28,12 +28,10 @@ pub(crate) struct PlaneSearch {
 }
 
 impl PlaneSearch {
-    /// Begins a search among at most `count` samples in a rectangle.
     pub(crate) fn clear(&mut self, extent: &Extent, count: usize) {
         self.cells.clear(extent, count);
     }
 
-    /// Looks at the samples that have been appended since the last call.
     pub(crate) fn enter(&mut self, points: &Points, test: &DepthTest) {
         self.cells.enter(points, test);
     }
@@ -121,7 +119,6 @@ impl Bounds {
     }
 }
 
-/// Column, row and radius of a sample.
 fn ball(points: &Points, test: &DepthTest, i: u32) -> [f64; 3] {
     let i = i as usize;
     [points.x[i], points.y[i], test.radius(points.spacing[i])]
@@ -145,7 +142,6 @@ fn plant(points: &Points, test: &DepthTest, members: &mut [u32], bounds: &mut [B
     plant(points, test, members, bounds, middle..range.end);
 }
 
-/// The trees, while suspects are looked for.
 struct Search<'a> {
     points: &'a Points,
     test: &'a DepthTest,

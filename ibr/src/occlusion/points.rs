@@ -28,7 +28,6 @@ impl Points {
         points
     }
 
-    /// Takes these samples in place of what there was.
     pub(super) fn set<const C: usize>(&mut self, samples: impl Iterator<Item = Sample<C>> + Clone) {
         self.resize(0);
         self.x.extend(samples.clone().map(|s| s.x));
@@ -39,7 +38,6 @@ impl Points {
         self.resize(self.x.len().next_multiple_of(RUN));
     }
 
-    /// Number of places.
     pub(crate) fn len(&self) -> usize {
         self.x.len()
     }
@@ -53,7 +51,6 @@ impl Points {
         self.own.resize(count, false);
     }
 
-    /// The rectangle that holds all samples.
     pub(crate) fn extent(&self) -> Extent {
         let none = (f64::MAX, f64::MIN);
         let ((left, right), (top, bottom)) = (bounds::<_, 2>(&self.x, none), bounds::<_, 2>(&self.y, none));
@@ -61,7 +58,6 @@ impl Points {
     }
 }
 
-/// A rectangle of the virtual image.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Extent {
     pub(crate) left: f64,
@@ -96,7 +92,6 @@ impl Raster {
         Self { left, top, scale, columns: count(left, right), rows: count(top, bottom) }
     }
 
-    /// Column and row of the cell of a position.
     #[inline]
     pub(super) fn cell(&self, x: f64, y: f64) -> (usize, usize) {
         (((x - self.left) * self.scale) as usize, ((y - self.top) * self.scale) as usize)

@@ -14,7 +14,6 @@ const WHOLE: f64 = (1_u64 << 52) as f64;
 #[derive(Debug, Clone, Copy, Default)]
 struct Key {
     x: f64,
-    /// Index of the sample in the order given.
     index: u32,
 }
 
@@ -30,7 +29,6 @@ pub struct RowScratch<const C: usize> {
 }
 
 impl<const C: usize> RowScratch<C> {
-    /// Takes the keys of the samples that are visible.
     fn find_visible(&mut self, samples: &[Sample<C>], test: &DepthTest) {
         let Self { points, search, keys, .. } = self;
         points.set(samples.iter().map(|s| Sample { y: 0.0, ..*s }));

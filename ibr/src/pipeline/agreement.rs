@@ -139,7 +139,6 @@ fn deviations(variances: &[Vec<f64>]) -> Option<Vec<f64>> {
     variances.iter().map(mean).collect()
 }
 
-/// Points of one view found in another one.
 struct Comparison {
     points: usize,
     /// Colours in both views of the points at which the depths agree.
@@ -244,7 +243,6 @@ pub(crate) fn same_depth(a: f32, b: f32, map: &DepthMap) -> bool {
     (a - b).abs() <= tolerance
 }
 
-/// The mean of the three values with these factors.
 fn brightness(colour: &[f32; 3], gain: Exposure) -> f32 {
     colour.iter().zip(gain).map(|(v, g)| v * g as f32).sum::<f32>() / 3.0
 }

@@ -140,7 +140,6 @@ fn render_with<const ORDER: usize, const C: usize>(
     Ok(Rendering::of_plane::<C>(fit, report, chosen, agreement))
 }
 
-/// Work memory of the first two stages.
 #[derive(Default)]
 struct Work {
     projected: Projected,

@@ -34,7 +34,6 @@ pub(crate) fn without_drift(gains: &[Exposure]) -> Vec<Exposure> {
     gains.iter().zip(drifts(gains)).map(factors).collect()
 }
 
-/// Logarithm of the common factor of the colours.
 fn ln_brightness(gain: &Exposure) -> f64 {
     gain.map(f64::ln).iter().sum::<f64>() / 3.0
 }

@@ -31,15 +31,6 @@ const LIMITS: f64 = 52.0;
 const ERRORS: f64 = 16.0;
 
 /// The sizes on which the memory depends.
-///
-/// ```
-/// use hybank_ibr::image::Image;
-/// use hybank_ibr::pipeline::{RenderSettings, memory::Extent};
-/// let (image, settings) = (Image::filled(400, 300, 3, 0.0), RenderSettings::default());
-/// let of = |size| Extent::new(size, &[&image, &image], None).of_cameras(&settings);
-/// // Bytes; a larger virtual view takes more.
-/// assert!(of((400, 300)) > 4e6 && of((800, 600)) > 2.0 * of((400, 300)));
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
     /// Width and height of the virtual view.
@@ -81,12 +72,10 @@ impl Extent {
         (4.0 * self.channels as f64 + 7.0) * self.virtual_pixels()
     }
 
-    /// What the comparison of two views takes: every seventh difference of both.
     fn agreement(&self) -> f64 {
         16.0 / 7.0 * self.largest as f64
     }
 
-    /// A row of samples, its equations, and work memory.
     fn strip(&self) -> f64 {
         let knot = 8.0 * (ORDER + self.channels) as f64;
         self.size.0 as f64 * (knot + self.views as f64 * (2.0 * self.sample() + ROW_SAMPLE))

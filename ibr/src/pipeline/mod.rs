@@ -232,7 +232,6 @@ impl Rendering {
     }
 }
 
-/// Refuses an image or map of another size than expected.
 fn check_size(
     view: usize,
     what: &'static str,
@@ -242,7 +241,6 @@ fn check_size(
     if size == expected { Ok(()) } else { Err(RenderError::Size { view, what, size, expected }) }
 }
 
-/// Refuses more views or pixels than the indices of samples can hold.
 fn check_counts(views: usize, pixels: usize) -> Result<(), RenderError> {
     if views == 0 {
         return Err(RenderError::NoViews);

@@ -65,14 +65,12 @@ fn check(views: &[RectifiedView<'_>], position: f64) -> Result<(), RenderError> 
     positions.into_iter().try_for_each(|position| Ok(FINITE.check("position", position)?))
 }
 
-/// The sizes of a view between others.
 pub(crate) fn extent(views: &[RectifiedView<'_>], settings: &RenderSettings) -> Extent {
     let images: Vec<&Image> = views.iter().map(|view| view.image).collect();
     let size = images.first().map_or((0, 0), |image| image.size());
     Extent::new(size, &images, settings.nearest)
 }
 
-/// The inputs that all rows share.
 pub(crate) struct Job<'a> {
     pub(crate) views: &'a [RectifiedView<'a>],
     pub(crate) camera: RigCamera,
@@ -170,14 +168,12 @@ fn render_plane<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Ren
 }
 
 impl Job<'_> {
-    /// Turns depth keys of pixels into disparities.
     fn disparities(&self, keys: &mut [f32]) {
         let offset = self.camera.disparity_offset;
         keys.iter_mut().for_each(|k| *k = (1.0 / f64::from(*k) - offset) as f32);
     }
 }
 
-/// Counts of the samples of one row.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct RowCount {
     propagated: usize,
@@ -201,7 +197,6 @@ fn report(job: &Job<'_>, counts: &[RowCount], mask: &[Cover]) -> Result<Report, 
     if report.used > 0 { Ok(report) } else { Err(RenderError::NoOverlap { pixels, dropped }) }
 }
 
-/// The samples of one row and their work memory.
 pub(crate) struct Strip<const C: usize> {
     pub(crate) samples: Vec<Sample<C>>,
     scratch: RowScratch<C>,

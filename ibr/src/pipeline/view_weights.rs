@@ -165,7 +165,6 @@ impl ViewWeights {
         Self { gains: gains.iter().map(factors).collect(), ..self }
     }
 
-    /// The sum of the weights.
     pub(super) fn total(&self) -> f64 {
         self.weights.iter().copied().map(f64::from).sum()
     }

@@ -38,9 +38,7 @@ struct Tile {
     view: u16,
     row: u32,
     column: u32,
-    /// Bounds of the virtual rows of its samples.
     rows: (f64, f64),
-    /// Bound of their spacing.
     spacing: f32,
 }
 

@@ -40,7 +40,6 @@ impl Frame {
         Self { rows: (top.max(self.rows.0), bottom.min(self.rows.1)), ..*self }
     }
 
-    /// The rectangle in which samples are kept.
     pub(crate) fn extent(&self) -> Extent {
         let (left, right) = (-self.margin, self.width as f64 - 1.0 + self.margin);
         Extent { left, right, top: self.rows.0, bottom: self.rows.1 }
@@ -102,7 +101,6 @@ fn weight(area: f64, trust: f32) -> f32 {
 /// ray-traced scene: 36.9 and 36.8 dB with 1, 36.3 and 37.8 with 0.85, 35.2 and 38.8 with 0.7.
 const OUTLINE_SHARE: f64 = 0.85;
 
-/// Spacing of a sample, from the distance to its neighbours.
 #[inline]
 fn spacing(distance: f64, outline: bool) -> f32 {
     (distance * if outline { OUTLINE_SHARE } else { 1.0 }) as f32
@@ -161,7 +159,6 @@ impl ShiftedTile {
         Self { start, columns, depths, stretches, spacings, reliefs }
     }
 
-    /// Appends the samples that lie in the frame.
     fn append<const C: usize>(
         &self,
         view: &RectifiedView<'_>,

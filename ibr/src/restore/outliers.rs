@@ -54,7 +54,6 @@ impl Vote {
     }
 }
 
-/// A map in parallax.
 #[derive(Debug, Clone)]
 pub(super) struct Parallax {
     pub(super) width: usize,
@@ -63,7 +62,6 @@ pub(super) struct Parallax {
     pub(super) values: Vec<f32>,
     /// Added to a value, it is in proportion to the reciprocal depth.
     pub(super) offset: f32,
-    /// Standard deviation of the errors.
     pub(super) error: f32,
 }
 
@@ -94,14 +92,12 @@ impl Parallax {
         before.with_values(before.size(), data).with_guessed(before, &guessed)
     }
 
-    /// Whether two values may lie on one surface.
     #[inline]
     pub(super) fn agree(&self, a: f32, b: f32) -> bool {
         let spread = DEVIATIONS * std::f32::consts::SQRT_2 * self.error;
         (a - b).abs() <= (JUMP * (a.min(b) + self.offset)).max(spread)
     }
 
-    /// The pixels within a radius of one, itself included.
     fn around(&self, pixel: usize, radius: usize) -> impl Iterator<Item = usize> + use<> {
         let (x, y, width) = (pixel % self.width, pixel / self.width, self.width);
         let columns = x.saturating_sub(radius)..(x + radius + 1).min(width);
@@ -187,7 +183,6 @@ impl Parallax {
     }
 }
 
-/// Mean difference of two colours.
 pub(super) fn difference(a: [f32; 3], b: [f32; 3]) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>() / 3.0
 }

@@ -65,18 +65,12 @@ pub enum Handedness {
 impl Handedness {
     /// +1 or -1.
     pub fn sign(self) -> f64 {
-        match self {
-            Self::Kept => 1.0,
-            Self::Reversed => -1.0,
-        }
+        if self == Self::Kept { 1.0 } else { -1.0 }
     }
 
     /// The other order.
     pub fn reversed(self) -> Self {
-        match self {
-            Self::Kept => Self::Reversed,
-            Self::Reversed => Self::Kept,
-        }
+        if self == Self::Kept { Self::Reversed } else { Self::Kept }
     }
 
     /// The bit for which chi of this oriented camera grows (`slope` > 0) or falls with 1 / d.
@@ -96,8 +90,8 @@ pub fn order_sign(camera: &Matrix3x4<f64>, hand: Handedness) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear;
     use crate::uncalibrated::fundamental::tests::Synthetic;
+    use hybank_linalg::small;
     use nalgebra::Matrix4;
     use proptest::prelude::*;
 
@@ -143,7 +137,7 @@ mod tests {
             })
             .collect();
         let values: Vec<f64> = f.points.iter().map(|p| chi(&f.cameras[i], p)).collect();
-        let fit = linear::least_squares(&rows, &values).unwrap();
+        let fit = small::least_squares(&rows, &values).unwrap();
         let miss = |(r, v): (&[f64; 4], &f64)| (0..4).map(|k| r[k] * fit[k]).sum::<f64>() - v;
         let residual = rows.iter().zip(&values).map(miss).map(f64::abs).fold(0.0, f64::max);
         (fit[0], residual / values.iter().map(|v| v.abs()).fold(0.0, f64::max))

@@ -65,7 +65,6 @@ impl Quad {
         quad.is_convex(&mesh.corners).then_some(quad)
     }
 
-    /// Corners in the sense of the triangles.
     fn around(&self) -> [usize; 4] {
         [self.a, self.d, self.b, self.c]
     }
@@ -86,7 +85,6 @@ impl Quad {
         turns.iter().all(|t| *t > 1e-3) || turns.iter().all(|t| *t < -1e-3)
     }
 
-    /// Compares the colours of its pixels under both diagonals.
     fn is_better_exchanged(
         &self,
         corners: &[Point],
@@ -128,7 +126,6 @@ impl Quad {
             .filter(inside)
     }
 
-    /// Puts the diagonal c d in the place of a b.
     fn exchange(&self, mesh: &mut Mesh, sides: &mut BTreeMap<Edge, Vec<usize>>) {
         let Self { a, b, c, d, triangles: [left, right] } = *self;
         mesh.triangles[left] = [c, d, b];

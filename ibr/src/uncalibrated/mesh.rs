@@ -14,20 +14,6 @@ const CLOSEST: f64 = 0.5;
 pub type Shares = [f64; 3];
 
 /// Triangles between features, which cover their convex hull.
-///
-/// ```
-/// use hybank_ibr::uncalibrated::Point;
-/// use hybank_ibr::uncalibrated::mesh::Mesh;
-///
-/// let corners = [(0.0, 0.0), (4.0, 0.0), (0.0, 2.0), (4.0, 2.0)].map(|(x, y)| Point::new(x, y));
-/// let mesh = Mesh::delaunay(corners.to_vec());
-/// // On a plane chi is an affine function of the pixel, here x / 4.
-/// let mut chi = [f64::NAN; 5 * 3];
-/// mesh.visit(&corners, (5, 3), |pixel, corner, shares| {
-///     chi[pixel] = (0..3).map(|k| shares[k] * 0.25 * corners[corner[k]].x).sum();
-/// });
-/// assert_eq!(chi[5 + 2], 0.5);
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
     pub(crate) corners: Vec<Point>,
@@ -88,7 +74,6 @@ pub(super) fn edge(a: usize, b: usize) -> Edge {
     (a.min(b), a.max(b))
 }
 
-/// The edges of a triangle.
 pub(crate) fn edges([a, b, c]: &[usize; 3]) -> [Edge; 3] {
     [edge(*a, *b), edge(*b, *c), edge(*c, *a)]
 }
@@ -115,6 +100,9 @@ impl Facet {
     }
 }
 
+/// Share to which a pixel lies on an edge: shares round.
+const ON_EDGE: f64 = 1e-9;
+
 /// Calls `visit` with pixel and shares for every pixel centre of a triangle, row by row.
 pub(crate) fn visit_triangle(
     corners: &[Point; 3],
@@ -123,32 +111,18 @@ pub(crate) fn visit_triangle(
 ) {
     let Some(facet) = Facet::new(corners) else { return };
     let [a, b, c] = corners;
-    let top = a.y.min(b.y).min(c.y).ceil().max(0.0) as usize;
-    let bottom = a.y.max(b.y).max(c.y).floor().min(height as f64 - 1.0);
-    for y in top..(bottom + 1.0).max(0.0) as usize {
-        let Some((left, right)) = span(corners, y as f64) else { continue };
-        let end = (right.floor().min(width as f64 - 1.0) + 1.0).max(0.0) as usize;
-        for x in left.ceil().max(0.0) as usize..end {
-            visit(y * width + x, facet.shares(&Point::new(x as f64, y as f64)));
+    let range = |low: f64, high: f64, side: usize| {
+        low.ceil().max(0.0) as usize..(high.floor() + 1.0).clamp(0.0, side as f64) as usize
+    };
+    let (low, high) = (a.inf(b).inf(c), a.sup(b).sup(c));
+    for y in range(low.y, high.y, height) {
+        for x in range(low.x, high.x, width) {
+            let shares = facet.shares(&Point::new(x as f64, y as f64));
+            if shares.iter().all(|share| *share >= -ON_EDGE) {
+                visit(y * width + x, shares);
+            }
         }
     }
-}
-
-/// The columns between which a row meets a triangle.
-fn span(corners: &[Point; 3], y: f64) -> Option<(f64, f64)> {
-    let mut ends: Option<(f64, f64)> = None;
-    for (p, q) in [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (corners[i], corners[j])) {
-        if (p.y <= y) == (q.y <= y) && p.y != y && q.y != y {
-            continue;
-        }
-        let crossings =
-            if p.y == q.y { [p.x, q.x] } else { [p.x + (q.x - p.x) * (y - p.y) / (q.y - p.y); 2] };
-        let on_edge = (p.y.min(q.y)..=p.y.max(q.y)).contains(&y);
-        for x in crossings.into_iter().filter(|_| on_edge) {
-            ends = Some(ends.map_or((x, x), |(l, r)| (l.min(x), r.max(x))));
-        }
-    }
-    ends
 }
 
 #[cfg(test)]

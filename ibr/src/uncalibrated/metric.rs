@@ -3,7 +3,7 @@
 //! It is too coarse for measurements, but sufficient to place a virtual camera between two views.
 
 use super::{Match, Point, homogeneous};
-use crate::linear;
+use hybank_linalg::small;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// Focal lengths that are tried, in units of the longer side of the image.
@@ -45,7 +45,7 @@ pub(super) struct Placed {
 
 impl Placed {
     pub(super) fn of(f: &Matrix3<f64>, matches: &[Match], k: &[Matrix3<f64>; 2]) -> Option<Self> {
-        let (u, s, v) = linear::svd3(&(k[1].transpose() * f * k[0]))?;
+        let (u, s, v) = small::svd3(&(k[1].transpose() * f * k[0]))?;
         let (u, v) = (u * u.determinant().signum(), v * v.determinant().signum());
         let w = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
         let (first, second) = (k[0].try_inverse()?, k[1].try_inverse()?);

@@ -3,7 +3,6 @@
 use super::Point;
 use nalgebra::{Matrix3x4, SMatrix, Vector4};
 
-/// Steps, at most.
 const STEPS: usize = 100;
 /// The cost has converged when a step lowers it by less than this share.
 const CONVERGED: f64 = 1e-10;

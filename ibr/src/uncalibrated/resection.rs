@@ -4,7 +4,7 @@ use super::normalise::Normalisation;
 use super::random::consensus;
 use super::refine::{descend, reprojection};
 use super::{GeometryError, Point};
-use crate::linear;
+use hybank_linalg::small;
 use nalgebra::{Matrix3x4, SVector, Vector4};
 
 /// A homogeneous point and its image in the camera to be found, in pixels.
@@ -67,7 +67,6 @@ pub fn resect(sightings: &[Sighting], seed: u64) -> Result<Resection, GeometryEr
     Ok(Resection { camera: camera / camera.norm(), inliers: set, rms })
 }
 
-/// Square of the reprojection error in square pixels.
 fn error(camera: &Matrix3x4<f64>, s: &Sighting) -> f64 {
     let p = camera * s.point;
     let square = (p.xy() / p.z - s.image).norm_squared();
@@ -96,7 +95,7 @@ fn direct(sightings: &[Sighting]) -> Result<Matrix3x4<f64>, GeometryError> {
             [row(0, p.x), row(1, p.y)]
         })
         .collect();
-    let (p, values) = linear::least_vector(&rows).ok_or(GeometryError::Numerical { what })?;
+    let (p, values) = small::least_vector(&rows).ok_or(GeometryError::Numerical { what })?;
     let ratio = values[10] / values[0];
     if ratio < DEGENERATE {
         return Err(GeometryError::Degenerate { what, ratio });

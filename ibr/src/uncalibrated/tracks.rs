@@ -67,7 +67,6 @@ fn room(text: &str) -> f64 {
     WORD * text.split_whitespace().count() as f64 + LINE * text.lines().count() as f64
 }
 
-/// The columns of a line.
 fn columns(line: &str) -> Result<Vec<Option<Point>>, String> {
     let mut words = line.split_whitespace();
     let mut row = Vec::new();

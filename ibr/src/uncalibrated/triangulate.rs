@@ -2,10 +2,9 @@
 
 use super::Point;
 use super::refine::reprojection;
-use crate::linear;
+use hybank_linalg::small;
 use nalgebra::{Matrix3x4, Vector4};
 
-/// Steps of the refinement.
 const STEPS: usize = 2;
 
 /// The homogeneous point, of unit norm, seen at `images` by `cameras`; `None` if it is not determined.
@@ -21,7 +20,7 @@ pub fn triangulate(observed: &[(&Matrix3x4<f64>, Point)]) -> Option<Vector4<f64>
         };
         [row(0, p.x), row(1, p.y)]
     });
-    let (mut point, values) = linear::least_vector(&rows.collect::<Vec<_>>())?;
+    let (mut point, values) = small::least_vector(&rows.collect::<Vec<_>>())?;
     if values[2] <= 1e-12 * values[0] {
         return None;
     }

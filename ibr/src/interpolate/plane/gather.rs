@@ -8,10 +8,8 @@ use hybank::sampling::fit2::Fit2Rows;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Some rows of the image with all that samples change there.
 struct Part<'a, const ORDER: usize, const C: usize> {
     size: (usize, usize),
-    /// Index of the first pixel.
     first: usize,
     fit: Fit2Rows<'a, ORDER, C>,
     depth: &'a mut [f32],
@@ -20,7 +18,6 @@ struct Part<'a, const ORDER: usize, const C: usize> {
 }
 
 impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
-    /// The part before a row of the image, and the rest.
     fn split(self, row: usize) -> (Self, Self) {
         let (size, pixel) = (self.size, row * self.size.0);
         let (fit, at) = (self.fit.split_at(row), pixel - self.first);
@@ -33,20 +30,21 @@ impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
         )
     }
 
-    /// Adds samples that touch this part only; returns those that lie in the image.
-    fn add(&mut self, samples: &[Sample<C>]) -> Added {
+    /// Adds samples that touch this part only; returns how many lie in the image, and the sum of the areas
+    /// that they stand for, at least a pixel each.
+    fn add(&mut self, samples: &[Sample<C>]) -> (usize, f64) {
         let (right, bottom) = (self.size.0 as f64 - 1.0, self.size.1 as f64 - 1.0);
-        let mut added = Added::default();
+        let (mut count, mut area) = (0, 0.0);
         for s in samples {
             let inside = s.x >= -0.5 && s.x <= right + 0.5 && s.y >= -0.5 && s.y <= bottom + 0.5;
             if inside {
                 self.register(s);
                 self.fit.add(&Fit2Sample { x: s.x, y: s.y, values: s.value, weight: s.weight });
-                added.count += 1;
-                added.area += f64::from(s.spacing).powi(2).max(1.0);
+                count += 1;
+                area += f64::from(s.spacing).powi(2).max(1.0);
             }
         }
-        added
+        (count, area)
     }
 
     /// Records the depth of the sample at the pixels within its reach, half a gap, unless another sample is
@@ -78,21 +76,6 @@ impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
     }
 }
 
-/// Samples in the image.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Added {
-    pub(super) count: usize,
-    /// The sum of the areas that they stand for, at least a pixel each.
-    pub(super) area: f64,
-}
-
-impl std::ops::AddAssign for Added {
-    fn add_assign(&mut self, other: Self) {
-        self.count += other.count;
-        self.area += other.area;
-    }
-}
-
 impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     fn whole(&mut self) -> Part<'_, ORDER, C> {
         Part {
@@ -109,7 +92,12 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     /// are ignored; samples less far outside are moved to its border.
     pub(crate) fn add(&mut self, samples: &[Sample<C>]) {
         let added = self.whole().add(samples);
-        self.added += added;
+        self.count_in(added);
+    }
+
+    fn count_in(&mut self, (count, area): (usize, f64)) {
+        self.count += count;
+        self.area += area;
     }
 
     /// Adds the samples of bands of rows, which `make` returns: those whose row, cut to the image, lies in
@@ -136,21 +124,20 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
                 rest = after;
             }
             let add = |(band, mut part): (&Range<usize>, Part<'_, ORDER, C>)| part.add(&make(band));
-            let added: Vec<Added> = parts.into_par_iter().with_max_len(1).map(add).collect();
-            added.into_iter().for_each(|added| self.added += added);
+            let added: Vec<(usize, f64)> = parts.into_par_iter().with_max_len(1).map(add).collect();
+            added.into_iter().for_each(|added| self.count_in(added));
         }
     }
 
     /// Multiplies the stiffness of bicubic splines by the mean area of the samples so far. That of bilinear
     /// ones, which bending smooths, stays: they lose 0.2 to 0.6 dB by it where a view is magnified by two.
     pub(crate) fn stiffened_by_area(mut self) -> Self {
-        if ORDER == 4 && self.added.count > 0 {
-            self.settings.plane.stiffness *= self.added.area / self.added.count as f64;
+        if ORDER == 4 && self.count > 0 {
+            self.settings.plane.stiffness *= self.area / self.count as f64;
         }
         self
     }
 
-    /// Adds a sample of weight one on a pixel.
     pub(super) fn add_on_pixel(&mut self, pixel: usize, values: [f32; C]) {
         let (x, y) = ((pixel % self.width) as f64, (pixel / self.width) as f64);
         self.fit.rows().add(&Fit2Sample { x, y, values, weight: 1.0 });

@@ -3,9 +3,7 @@
 /// Pixels and coefficients: a bicubic spline has one coefficient more than there are pixels on each side.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grid {
-    /// Width and height of the image.
     pub(super) image: (usize, usize),
-    /// Width and height of the grid of coefficients.
     pub(super) coefficients: (usize, usize),
 }
 
@@ -21,7 +19,6 @@ impl Grid {
         (y + self.margin()) * self.coefficients.0 + x + self.margin()
     }
 
-    /// The pixel nearest to a coefficient.
     #[inline]
     pub(super) fn pixel(self, coefficient: usize) -> usize {
         self.pixel_at(coefficient % self.coefficients.0, coefficient / self.coefficients.0)

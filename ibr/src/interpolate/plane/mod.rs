@@ -22,7 +22,6 @@ mod springs;
 use super::extend::{Level, mean};
 use super::{Cover, Degree, HoleFill, Settings, Watch};
 use crate::depth::{DepthMap, Measure, NONE};
-use gather::Added;
 use grid::Grid;
 use hybank::sampling::Fit2;
 use hybank::sampling::fit2::{Fit2Sample, Iteration};
@@ -83,7 +82,6 @@ pub struct Convergence {
     pub reached: bool,
 }
 
-/// The result of the plane fit.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PlaneFit {
     /// Values 0..255, `width * height * C`.
@@ -91,7 +89,6 @@ pub(crate) struct PlaneFit {
     pub(crate) mask: Vec<Cover>,
     /// Depth of the sample nearest to each pixel, NaN in holes.
     pub(crate) depth: DepthMap,
-    /// Visible samples that are nearest to each pixel.
     pub(crate) counts: Vec<u16>,
     pub(crate) convergence: Convergence,
 }
@@ -115,11 +112,12 @@ pub(crate) struct PlaneProblem<const ORDER: usize, const C: usize> {
     distance: Vec<f32>,
     counts: Vec<u16>,
     settings: Settings,
-    added: Added,
+    /// Samples that have been added, and the sum of the areas that they stand for.
+    count: usize,
+    area: f64,
 }
 
 impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
-    /// An empty problem with settings that were checked.
     pub(crate) fn new((width, height): (usize, usize), settings: &Settings) -> Self {
         let pixels = width * height;
         // Written at once: pages that are read first and written later take the system twice the time.
@@ -133,13 +131,13 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
             distance: vec![f32::INFINITY; pixels],
             counts,
             settings: *settings,
-            added: Added::default(),
+            count: 0,
+            area: 0.0,
         }
     }
 
-    /// Samples that have been added.
     pub(crate) fn samples(&self) -> usize {
-        self.added.count
+        self.count
     }
 
     /// Fits the image. `watch` is called with the share of the fit that is done.
@@ -201,7 +199,6 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         Grid { image: (self.width, self.height), coefficients: self.fit.coefficients() }
     }
 
-    /// The values of the pixels where `inside` is true, all fitted together.
     fn fitted(
         self,
         depth: &[f32],

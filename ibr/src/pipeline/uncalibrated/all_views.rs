@@ -10,10 +10,8 @@ use nalgebra::{Matrix3x4, Vector4};
 /// Adjustments, at most: after each the positions that fit are chosen again.
 const ROUNDS: usize = 8;
 
-/// Photographs that must show a point.
 const FEWEST_PHOTOGRAPHS: usize = 2;
 
-/// Fewest positions of a camera that is adjusted.
 const FEWEST_POSITIONS: usize = 12;
 
 /// Points of tracks with their positions in each image, those that do not fit left out.

@@ -39,7 +39,6 @@ const SIGMA_SHARE: f64 = 0.2;
 /// outlines, as in `tests/two_planes.rs`, a fifth is nearly as good as nothing.
 const HIDDEN_WEIGHT: f32 = 0.2;
 
-/// The meshes of the virtual view and of each photograph.
 pub(super) struct Meshes<'a> {
     pub(super) virtually: &'a Surface,
     pub(super) shown: &'a [Surface],
@@ -104,13 +103,11 @@ pub(super) fn render<const C: usize>(
     Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone() })
 }
 
-/// The plane of a triangle of the virtual view, wherever a pixel lies.
 struct Plane {
     corner: [usize; 3],
     facet: Facet,
 }
 
-/// What the colour of a pixel follows from.
 struct Painter<'a> {
     images: &'a [&'a Image],
     surface: &'a Surface,
@@ -136,7 +133,6 @@ impl<'a> Painter<'a> {
         Self { images, surface: meshes.virtually, view_weights, signs, fronts }
     }
 
-    /// Where corners lie in the virtual view.
     fn places(&self, corner: &[usize; 3]) -> [Point; 3] {
         corner.map(|k| self.surface.places[self.images.len()][k])
     }
@@ -179,7 +175,6 @@ impl<'a> Painter<'a> {
         best.filter(|(least, _)| TIMES_BETTER * least + CONTRADICTION < now).map_or(own, |(_, plane)| plane)
     }
 
-    /// The mean of the photographs that show the point of a plane.
     fn blend<const C: usize>(&self, plane: &Plane, position: &Point) -> Blend<C> {
         let mut blend = Blend::default();
         for (i, image) in self.images.iter().enumerate() {
@@ -192,14 +187,12 @@ impl<'a> Painter<'a> {
         blend
     }
 
-    /// The depth in the virtual view.
     fn depth(&self, plane: &Plane, position: &Point) -> f64 {
         let target = self.images.len();
         self.signs[target] * self.surface.chi_at(target, &plane.corner, plane.facet.shares(position))
     }
 }
 
-/// A weighted mean of colours.
 struct Blend<const C: usize> {
     sum: [f32; C],
     weight: f32,
@@ -229,7 +222,6 @@ impl<const C: usize> Blend<C> {
     }
 }
 
-/// The depths of the surfaces that a photograph shows.
 struct Front {
     width: usize,
     depth: Vec<f32>,

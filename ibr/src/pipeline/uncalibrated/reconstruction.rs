@@ -27,7 +27,6 @@ const FARTHEST: f64 = 3.0;
 pub(super) struct Reconstruction {
     pub(super) cameras: Vec<Matrix3x4<f64>>,
     pub(super) points: Vec<Vector4<f64>>,
-    /// Positions of the points in each image.
     pub(super) seen: Vec<Vec<Option<Point>>>,
     pub(super) hand: Handedness,
     pub(super) geometry: GeometryReport,
@@ -36,7 +35,6 @@ pub(super) struct Reconstruction {
 }
 
 impl Reconstruction {
-    /// Refuses singular cameras.
     fn check(&self) -> Result<(), GeometryError> {
         self.cameras.iter().enumerate().try_for_each(|(view, camera)| match Camera::projective(*camera) {
             Ok(_) => Ok(()),
@@ -114,7 +112,6 @@ pub(super) fn reconstruct(
     Ok(scene)
 }
 
-/// Tracks with their positions in the virtual view as last column.
 fn with_target<'a>(
     tracks: impl Iterator<Item = &'a Vec<Option<Point>>>,
     target: &[Option<Point>],
@@ -124,7 +121,6 @@ fn with_target<'a>(
 
 /// The reconstruction of the first two views.
 struct Base {
-    /// Matches given.
     given: usize,
     f: Fundamental,
     sizes: [(usize, usize); 2],
@@ -152,7 +148,6 @@ impl Base {
         Ok(Self { given: all.len(), f, sizes, cameras, tracks, matches, points })
     }
 
-    /// Positions of the points in the virtual view.
     fn points_in(&self, target: &Target) -> Result<Vec<Option<Point>>, RenderError> {
         match target {
             Target::Tracks(positions) => {

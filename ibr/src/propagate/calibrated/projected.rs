@@ -19,7 +19,6 @@ pub(crate) struct Projected {
     tiles: Vec<ProjectedTile>,
 }
 
-/// Where the pixels of a tile lie in the arrays.
 #[derive(Debug, Clone, Copy)]
 struct ProjectedTile {
     view: u16,
@@ -28,7 +27,6 @@ struct ProjectedTile {
 }
 
 impl Projected {
-    /// Removes all samples.
     pub(super) fn clear(&mut self) {
         self.points.resize(0);
         self.weights.clear();
@@ -80,22 +78,18 @@ impl Projected {
         self.guessed.extend_from_slice(&guessed[..count]);
     }
 
-    /// What the depth test needs.
     pub(crate) fn points(&self) -> &Points {
         &self.points
     }
 
-    /// Own samples of the band.
     pub(crate) fn count(&self) -> usize {
         self.points.own.iter().filter(|own| **own).count()
     }
 
-    /// Takes the samples at these places out of the band's own ones.
     pub(crate) fn remove(&mut self, places: &[u32]) {
         places.iter().for_each(|i| self.points.own[*i as usize] = false);
     }
 
-    /// The band's own samples.
     pub(crate) fn samples<const C: usize>(&self, views: &[CalibratedView<'_>]) -> Vec<Sample<C>> {
         let Self { points, weights, doubtful, guessed, tiles } = self;
         let mut samples = Vec::with_capacity(self.count());
@@ -131,30 +125,19 @@ struct Places {
     depth: [f64; TILE],
     /// Distance of neighbouring pixels, root mean square over the two directions.
     distance: [f64; TILE],
-    /// Area of a pixel.
     area: [f64; TILE],
     own: [bool; TILE],
 }
-
-/// Columns from the first one of a tile.
-const STEPS: [f64; TILE] = {
-    let mut steps = [0.0; TILE];
-    let mut i = 1;
-    while i < TILE {
-        steps[i] = steps[i - 1] + 1.0;
-        i += 1;
-    }
-    steps
-};
 
 impl Places {
     fn new(row: &RowMap<'_>, column: usize, depths: &[f32; TILE], reliefs: &Reliefs, count: usize) -> Self {
         let [x, y, depth, distance, area] = [[f64::NAN; TILE]; 5];
         let mut places = Self { x, y, depth, distance, area, own: [false; TILE] };
-        let column = column as f64;
+        // Of 32 bits, which the compiler converts several at a time.
+        let at = |i: usize| f64::from(column as i32 + i as i32);
         for i in 0..count.min(TILE) {
             let depth = f64::from(depths[i]);
-            let projection = row.project(column + STEPS[i], depth);
+            let projection = row.project(at(i), depth);
             let slopes = [f64::from(reliefs.across[i]), f64::from(reliefs.down[i])];
             let [a, b] = row.steps(&projection, depth, slopes);
             (places.x[i], places.y[i], places.depth[i]) = projection.at;
@@ -163,7 +146,7 @@ impl Places {
         }
         if row.is_bent() {
             for i in 0..count.min(TILE) {
-                (places.x[i], places.y[i], places.depth[i]) = row.bend(column + STEPS[i], depths[i]);
+                (places.x[i], places.y[i], places.depth[i]) = row.bend(at(i), depths[i]);
             }
         }
         places

@@ -15,7 +15,6 @@ const SLOPE: f64 = 1.0001 * JUMP as f64;
 /// Factor of bounds of distances, which round.
 const ROUNDING: f64 = 1.01;
 
-/// Bounds of the positions of some samples in the virtual image.
 pub(super) struct Reach {
     columns: (f64, f64),
     pub(super) rows: (f64, f64),
@@ -45,11 +44,9 @@ pub(super) struct RowMap<'a> {
 
 /// A pixel with depth at the virtual camera, without lenses.
 pub(super) struct Projection {
-    /// Position and depth.
     pub(super) at: (f64, f64, f64),
     /// A x~.
     ray: [f64; 3],
-    /// 1 / depth.
     inverse: f64,
 }
 
@@ -61,7 +58,6 @@ impl<'a> RowMap<'a> {
         Self { map, y, start, step, down, shift: [b.x, b.y, b.z], linear: map.is_linear() }
     }
 
-    /// Whether a lens bends the map.
     pub(super) fn is_bent(&self) -> bool {
         !self.linear
     }

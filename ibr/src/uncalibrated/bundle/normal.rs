@@ -5,12 +5,10 @@ use crate::uncalibrated::refine::reprojection;
 use hybank_linalg::{Mat, solve_positive};
 use nalgebra::{Matrix3x4, Matrix4, SMatrix, SVector, Vector4};
 
-/// Numbers of a camera.
 const CAMERA: usize = 12;
 
 type CameraMatrix = SMatrix<f64, CAMERA, CAMERA>;
 type CameraVector = SVector<f64, CAMERA>;
-/// Cross terms of a camera and a point.
 type Cross = SMatrix<f64, CAMERA, 4>;
 
 /// J' W J and J' W r, in the blocks of cameras and points.
@@ -21,7 +19,6 @@ pub(super) struct NormalEquations {
     crosses: Vec<Vec<(usize, Cross)>>,
 }
 
-/// A step of all cameras and points.
 pub(super) struct Step {
     pub(super) cameras: Vec<CameraVector>,
     pub(super) points: Vec<Vector4<f64>>,

@@ -10,7 +10,7 @@
 use super::Match;
 use super::chirality::{self, Handedness};
 use super::metric::{FOCAL_LENGTHS, Placed, calibration};
-use crate::linear;
+use hybank_linalg::small;
 use nalgebra::{Matrix3, Matrix3x4, Vector4};
 
 /// Focal lengths of the second camera that are tried, in units of that of the first one per side.
@@ -20,7 +20,6 @@ const RATIOS: [f64; 7] = [0.5, 0.63, 0.79, 1.0, 1.26, 1.59, 2.0];
 /// units of its longer side: cropped images have such.
 const SHIFTS: [f64; 5] = [-0.16, -0.08, 0.0, 0.08, 0.16];
 
-/// What one guess says.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Vote {
     /// The sign of the slope of chi of the first camera against 1 / d.
@@ -29,7 +28,6 @@ struct Vote {
     fit: f64,
     /// Share of the points that lie in front of both cameras.
     share: f64,
-    /// The shift of the principal point.
     shift: f64,
 }
 
@@ -71,7 +69,7 @@ fn slope(placed: &Placed, chi: &[f64]) -> Option<f64> {
             values.push(*chi);
         }
     }
-    linear::least_squares(&rows, &values).map(|fit| fit[0]).filter(|slope| *slope != 0.0)
+    small::least_squares(&rows, &values).map(|fit| fit[0]).filter(|slope| *slope != 0.0)
 }
 
 /// Width of the distribution of the shifts, in units of the longer side.

@@ -85,7 +85,7 @@ fn pair(kind: Kind, seed: u64) -> Option<(Vec<Vote>, f64)> {
         .map(|(m, d)| [depth / d, m.first.x / 500.0, m.first.y / 500.0, 1.0])
         .collect();
     let chi: Vec<f64> = points.iter().map(|p| chirality::chi(&projective[0], p)).collect();
-    let sign = linear::least_squares(&rows, &chi)?[0].signum();
+    let sign = hybank_linalg::small::least_squares(&rows, &chi)?[0].signum();
     Some((votes(&f, &matches, &points, &projective[0], [SIZE; 2]), sign))
 }
 
