@@ -173,12 +173,6 @@ impl DepthMap {
         self.guessed.get(pixel).copied().unwrap_or(false)
     }
 
-    /// Which values from this pixel on were filled from their neighbours; empty if none of the map was.
-    #[inline]
-    pub(crate) fn guessed_from(&self, pixel: usize) -> &[bool] {
-        self.guessed.get(pixel..).unwrap_or_default()
-    }
-
     pub(crate) fn guesses(&self) -> usize {
         self.guessed.iter().filter(|guessed| **guessed).count()
     }

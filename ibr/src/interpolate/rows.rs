@@ -21,31 +21,8 @@ pub(crate) const ORDER: usize = 4;
 /// Distance outside the image up to which samples are used, in pixels.
 pub const MARGIN: f64 = (ORDER - 2) as f64;
 
-/// Work memory of the row fit, reused from row to row.
-///
-/// ```
-/// use hybank_ibr::depth::{DepthMap, Measure};
-/// use hybank_ibr::image::Image;
-/// use hybank_ibr::interpolate::rows::{MARGIN, RowWork};
-/// use hybank_ibr::interpolate::{Cover, Settings};
-/// use hybank_ibr::occlusion::{RowScratch, remove_in_row};
-/// use hybank_ibr::propagate::{Frame, RectifiedView, RigCamera, rectified_row};
-/// let image = Image::filled(32, 1, 1, 100.0);
-/// let map = DepthMap::new((32, 1), vec![4.0; 32], 1.0, Measure::Disparity)?;
-/// let views = [0.0, 1.0].map(|camera| RectifiedView { image: &image, map: &map, camera });
-/// // The three stages of a row of the view half-way; on the next row nothing is allocated any more.
-/// let (camera, frame) = (RigCamera::new(&views, 0.5), Frame::whole(32, 1, MARGIN, 0.0));
-/// let mut samples = Vec::new();
-/// for (index, view) in (0..).zip(&views) {
-///     rectified_row(view, index, 0, &camera, &frame, &mut samples);
-/// }
-/// let settings = Settings::default();
-/// remove_in_row(&mut samples, &settings.depth_test, &mut RowScratch::default());
-/// let (mut values, mut mask) = ([0.0; 32], [Cover::Crack; 32]);
-/// RowWork::<1>::new(32).interpolate(&samples, &settings, &mut values, &mut mask)?;
-/// assert!(mask[16] == Cover::Seen && (values[16] - 100.0).abs() < 0.1);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
+/// Work memory of the row fit, reused from row to row. The test `rows_allocate_nothing` runs the three stages
+/// of rows one after the other.
 #[derive(Debug, Clone)]
 pub struct RowWork<const C: usize> {
     fit: Fit<ORDER, C>,

@@ -3,7 +3,7 @@
 
 use super::DepthTest;
 use super::cells::Cells;
-use super::points::{Extent, Points};
+use super::points::Points;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -28,16 +28,9 @@ pub(crate) struct PlaneSearch {
 }
 
 impl PlaneSearch {
-    pub(crate) fn clear(&mut self, extent: &Extent, count: usize) {
-        self.cells.clear(extent, count);
-    }
-
-    pub(crate) fn enter(&mut self, points: &Points, test: &DepthTest) {
-        self.cells.enter(points, test);
-    }
-
-    /// The places of the hidden ones among the samples that have been entered, in increasing order.
+    /// The places of the hidden samples, in increasing order.
     pub(crate) fn hidden(&mut self, points: &Points, test: &DepthTest) -> &[u32] {
+        self.cells.enter(points, test);
         self.cells.suspects(points, test, &mut self.suspects);
         self.hidden.clear();
         if !self.suspects.is_empty() {
@@ -178,7 +171,6 @@ impl Search<'_> {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use super::super::points::RUN;
     use super::*;
     use crate::sample::Sample;
     use proptest::prelude::*;
@@ -186,11 +178,8 @@ pub(crate) mod tests {
     /// Which samples are hidden.
     fn hidden<const C: usize>(samples: &[Sample<C>], test: &DepthTest) -> Vec<bool> {
         let points = Points::of(samples.iter().copied());
-        let mut search = PlaneSearch::default();
-        search.clear(&points.extent(), points.len());
-        search.enter(&points, test);
         let mut flags = vec![false; samples.len()];
-        search.hidden(&points, test).iter().for_each(|i| flags[*i as usize] = true);
+        PlaneSearch::default().hidden(&points, test).iter().for_each(|i| flags[*i as usize] = true);
         flags
     }
 
@@ -271,11 +260,11 @@ pub(crate) mod tests {
             check(&signed, &DepthTest { epsilon, relative: 0.0, absolute: 0.5, parallax: 0.0 });
         }
 
-        /// Samples that only hide others, places without a sample, several calls, and memory used before.
+        /// Samples that only hide others, places without a sample, and memory used before.
         #[test]
-        fn a_search_in_parts_decides_on_its_own_samples(
+        fn a_search_decides_on_its_own_samples(
             raw in prop::collection::vec((0.0..30.0_f64, 0.0..9.0_f64, 0.5..9.0_f32, 0.2..12.0_f32, 0..4), 1..300),
-            cut in 0..300_usize, epsilon in 0.1..4.0_f64, relative in 0.0..0.3_f64
+            epsilon in 0.1..4.0_f64, relative in 0.0..0.3_f64
         ) {
             let samples: Vec<Sample<1>> = raw
                 .iter()
@@ -290,14 +279,8 @@ pub(crate) mod tests {
             let own = |i: &usize| points.own[*i];
             let hidden = test.hidden_by_definition(&samples);
             let want: Vec<u32> = (0..raw.len()).filter(|i| hidden[*i]).filter(own).map(|i| i as u32).collect();
-            let mut part = points.clone();
-            part.resize((cut.min(raw.len()) / RUN) * RUN);
-            let extent = Extent { left: -1.0, right: 31.0, top: 0.0, bottom: 9.0 };
             let mut search = PlaneSearch::default();
             for _ in 0..2 {
-                search.clear(&extent, points.len());
-                search.enter(&part, &test);
-                search.enter(&points, &test);
                 prop_assert_eq!(search.hidden(&points, &test), &want);
             }
         }

@@ -25,7 +25,7 @@ mod row;
 pub(crate) use grid::PlaneSearch;
 #[cfg(test)]
 pub(crate) use grid::tests::remove;
-pub(crate) use points::{Extent, Points, RUN};
+pub(crate) use points::{Points, RUN};
 pub use row::{RowScratch, remove_in_row};
 
 use crate::setting::{NOT_NEGATIVE, POSITIVE, SettingError};

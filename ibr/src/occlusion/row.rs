@@ -7,9 +7,6 @@ use super::points::Points;
 use crate::lanes::{largest, least};
 use crate::sample::Sample;
 
-/// Added to a number below it, it rounds to a whole one, which is the lower part of the bits of the sum.
-const WHOLE: f64 = (1_u64 << 52) as f64;
-
 /// The part of a sample that sorting needs: 16 bytes to move instead of 48.
 #[derive(Debug, Clone, Copy, Default)]
 struct Key {
@@ -32,8 +29,6 @@ impl<const C: usize> RowScratch<C> {
     fn find_visible(&mut self, samples: &[Sample<C>], test: &DepthTest) {
         let Self { points, search, keys, .. } = self;
         points.set(samples.iter().map(|s| Sample { y: 0.0, ..*s }));
-        search.clear(&points.extent(), points.len());
-        search.enter(points, test);
         let mut hidden = search.hidden(points, test).iter().peekable();
         let all = samples.iter().zip(0_u32..);
         let visible = all.filter(|(_, index)| hidden.next_if_eq(&index).is_none());
@@ -55,9 +50,7 @@ impl<const C: usize> RowScratch<C> {
             self.keys.sort_by(|a, b| a.x.total_cmp(&b.x));
             return;
         }
-        // The cast of a sum that has no fraction left: a cast of the number itself tests for its range. The
-        // limit is for positions that are not numbers.
-        let cell = |k: &Key| (((k.x - low) * scale + WHOLE).to_bits() as u32 as usize).min(n - 1);
+        let cell = |k: &Key| (((k.x - low) * scale) as usize).min(n - 1);
         self.starts.clear();
         self.starts.resize(n + 1, 0);
         self.keys.iter().for_each(|k| self.starts[cell(k) + 1] += 1);

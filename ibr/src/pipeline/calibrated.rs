@@ -10,10 +10,9 @@ use crate::depth::Measure;
 use crate::interpolate::Degree;
 use crate::interpolate::plane::PlaneProblem;
 use crate::occlusion::{DepthTest, PlaneSearch};
-use crate::propagate::{CalibratedView, Footprint, Frame, Projected};
+use crate::propagate::{CalibratedView, Footprint, Frame};
 use crate::sample::Sample;
 use std::ops::Range;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Share of the first two stages in the work, about.
@@ -116,14 +115,8 @@ fn render_with<const ORDER: usize, const C: usize>(
     let bands: Vec<Range<usize>> =
         (0..count).map(|band| band * height / count..(band + 1) * height / count).collect();
     let (ready, propagated) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let pool: Mutex<Vec<Work>> = Mutex::default();
     problem.add_bands(&bands, |rows| {
-        let mut work = pool.lock().ok().and_then(|mut pool| pool.pop()).unwrap_or_default();
-        let test = settings.depth_test();
-        let (mut samples, all) = visible_in(rows.clone(), height, &footprint, views, test, &mut work);
-        if let Ok(mut pool) = pool.lock() {
-            pool.push(work);
-        }
+        let (mut samples, all) = visible_in(rows, height, &footprint, views, settings.depth_test());
         view_weights.apply(&mut samples);
         propagated.fetch_add(all, Ordering::Relaxed);
         watch(GATHERING * (ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count as f64);
@@ -131,7 +124,7 @@ fn render_with<const ORDER: usize, const C: usize>(
     });
     let propagated = propagated.into_inner();
     let (used, dropped) = (problem.samples(), footprint.dropped(propagated));
-    drop((pool, footprint));
+    drop(footprint);
     if propagated == 0 {
         return Err(RenderError::NoOverlap { pixels, dropped });
     }
@@ -140,31 +133,22 @@ fn render_with<const ORDER: usize, const C: usize>(
     Ok(Rendering::of_plane::<C>(fit, report, chosen, agreement))
 }
 
-#[derive(Default)]
-struct Work {
-    projected: Projected,
-    search: PlaneSearch,
-}
-
 /// The first two stages for some rows of the virtual image: the visible samples of these rows, and the
 /// number of all of their samples. The band is widened by the largest radius of the depth test on both
 /// sides, so that it contains every sample that can hide one of the band.
 fn visible_in<const C: usize>(
-    rows: Range<usize>,
+    rows: &Range<usize>,
     height: usize,
     footprint: &Footprint,
     views: &[CalibratedView<'_>],
     test: &DepthTest,
-    work: &mut Work,
 ) -> (Vec<Sample<C>>, usize) {
     let last = rows.end == height;
     let top = if rows.start == 0 { f64::MIN } else { rows.start as f64 };
     let bottom = if last { f64::MAX } else { rows.end as f64 };
-    let (own, Work { projected, search }) = ((top, bottom), work);
-    search.clear(&footprint.band_around(own, test).extent(), footprint.most_between(own, test));
-    footprint.project_between(views, own, test, projected, |points| search.enter(points, test));
+    let mut projected = footprint.project_between(views, (top, bottom), test);
     let all = projected.count();
-    projected.remove(search.hidden(projected.points(), test));
+    projected.remove(PlaneSearch::default().hidden(projected.points(), test));
     (projected.samples(views), all)
 }
 
@@ -213,9 +197,8 @@ mod tests {
         // In bands only the order of summation differs.
         let footprint = Footprint::of(&views, &(0..views.len()).collect::<Vec<_>>(), &target, &frame);
         let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation);
-        let mut work = Work::default();
         for rows in [0..7, 7..8, 8..30] {
-            let (mut band, _) = visible_in(rows, 30, &footprint, &views, settings.depth_test(), &mut work);
+            let (mut band, _) = visible_in(&rows, 30, &footprint, &views, settings.depth_test());
             ViewWeights::of(&views, &target).apply(&mut band);
             problem.add(&band);
         }

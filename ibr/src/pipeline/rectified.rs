@@ -5,7 +5,7 @@ use super::{
     Agreement, Method, RenderError, RenderSettings, Rendering, Report, ViewWeights, Watch, check_counts,
     check_size,
 };
-use crate::depth::{DepthMap, Measure, TILE};
+use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::interpolate::plane::PlaneProblem;
 use crate::interpolate::rows::{self, RowWork, nearest_depths};
@@ -205,8 +205,7 @@ pub(crate) struct Strip<const C: usize> {
 impl<const C: usize> Strip<C> {
     pub(crate) fn new(job: &Job<'_>) -> Self {
         let used = (0..job.views.len()).filter(|view| job.view_weights.uses(*view)).count();
-        // The last tile of a row asks for the place of a whole one.
-        let samples = Vec::with_capacity(job.frame.width * used + TILE);
+        let samples = Vec::with_capacity(job.frame.width * used);
         Self { samples, scratch: RowScratch::default() }
     }
 

@@ -3,14 +3,14 @@
 mod calibrated;
 mod view;
 
+pub(crate) use calibrated::Footprint;
 #[cfg(test)]
 pub(crate) use calibrated::tests::calibrated;
-pub(crate) use calibrated::{Footprint, Projected};
 pub(crate) use view::nearest;
 pub use view::{CalibratedView, RectifiedView, View, Viewpoint};
 
-use crate::depth::{Reliefs, TILE};
-use crate::occlusion::{Extent, LARGEST_SPACING};
+use crate::depth::TILE;
+use crate::occlusion::LARGEST_SPACING;
 use crate::sample::{Dropped, Sample};
 
 /// The part of the virtual image plane in which samples are kept.
@@ -38,11 +38,6 @@ impl Frame {
     /// The part of this frame between two rows.
     pub fn band(&self, top: f64, bottom: f64) -> Self {
         Self { rows: (top.max(self.rows.0), bottom.min(self.rows.1)), ..*self }
-    }
-
-    pub(crate) fn extent(&self) -> Extent {
-        let (left, right) = (-self.margin, self.width as f64 - 1.0 + self.margin);
-        Extent { left, right, top: self.rows.0, bottom: self.rows.1 }
     }
 
     /// Whether a position lies in the frame.
@@ -118,84 +113,39 @@ pub fn rectified_row<const C: usize>(
     frame: &Frame,
     samples: &mut Vec<Sample<C>>,
 ) -> Dropped {
+    let (width, shift) = (view.image.width(), view.camera - camera.position);
     let mut dropped = Dropped::default();
-    for start in (0..view.image.width()).step_by(TILE) {
-        let shifted = ShiftedTile::new(view, (start, y), camera, frame);
-        dropped += shifted.append(view, index, frame, samples);
-    }
-    dropped
-}
-
-/// Some neighbouring pixels of a rectified view, moved to the virtual camera.
-struct ShiftedTile {
-    /// Column and row of the first pixel.
-    start: (usize, usize),
-    columns: [f64; TILE],
-    depths: [f32; TILE],
-    stretches: [f64; TILE],
-    spacings: [f32; TILE],
-    reliefs: Reliefs,
-}
-
-impl ShiftedTile {
-    /// Computes the tile in loops over arrays; what belongs to unknown pixels is not used.
-    fn new(view: &RectifiedView<'_>, start: (usize, usize), camera: &RigCamera, frame: &Frame) -> Self {
-        let shift = view.camera - camera.position;
-        let reliefs = view.map.reliefs(start.0, start.1);
-        let (mut columns, mut depths) = ([0.0; TILE], [0.0; TILE]);
-        let known = &view.map.row(start.1)[start.0..];
-        let placed = columns.iter_mut().zip(&mut depths).zip(known);
-        for (i, ((column, depth), disparity)) in placed.enumerate() {
-            let disparity = f64::from(*disparity);
-            *column = (start.0 + i) as f64 + shift * disparity + frame.offset;
-            *depth = (1.0 / (disparity + camera.disparity_offset)) as f32;
-        }
-        let (mut stretches, mut spacings) = ([0.0; TILE], [0.0; TILE]);
-        for i in 0..TILE {
-            let stretch = (1.0 + shift * f64::from(reliefs.across[i])).abs();
-            stretches[i] = stretch;
-            spacings[i] = spacing(((stretch * stretch + 1.0) / 2.0).sqrt(), reliefs.outline[i]);
-        }
-        Self { start, columns, depths, stretches, spacings, reliefs }
-    }
-
-    fn append<const C: usize>(
-        &self,
-        view: &RectifiedView<'_>,
-        index: u16,
-        frame: &Frame,
-        samples: &mut Vec<Sample<C>>,
-    ) -> Dropped {
-        let (mut dropped, (start, y)) = (Dropped::default(), self.start);
-        let first = y * view.image.width() + start;
-        samples.reserve(TILE);
+    for start in (0..width).step_by(TILE) {
+        let reliefs = view.map.reliefs(start, y);
         for (i, disparity) in view.map.row(y)[start..].iter().take(TILE).enumerate() {
-            let (x, pixel) = (self.columns[i], first + i);
+            let (pixel, disparity) = (y * width + start + i, f64::from(*disparity));
             if disparity.is_nan() {
                 dropped.unknown += 1;
                 continue;
             }
+            let x = (start + i) as f64 + shift * disparity + frame.offset;
             if !frame.holds_column(x) {
                 dropped.outside += 1;
                 continue;
             }
+            let stretch = (1.0 + shift * f64::from(reliefs.across[i])).abs();
             let guessed = view.map.is_guessed(pixel);
-            let doubtful = self.reliefs.behind_edge[i] || guessed;
+            let doubtful = reliefs.behind_edge[i] || guessed;
             samples.push(Sample {
                 x,
                 y: y as f64,
-                depth: self.depths[i],
+                depth: (1.0 / (disparity + camera.disparity_offset)) as f32,
                 value: view.image.pixel::<C>(pixel),
-                spacing: self.spacings[i],
-                weight: weight(self.stretches[i], if doubtful { DOUBTFUL_WEIGHT } else { 1.0 }),
+                spacing: spacing(((stretch * stretch + 1.0) / 2.0).sqrt(), reliefs.outline[i]),
+                weight: weight(stretch, if doubtful { DOUBTFUL_WEIGHT } else { 1.0 }),
                 pixel: pixel as u32,
                 view: index,
                 doubtful,
                 guessed,
             });
         }
-        dropped
     }
+    dropped
 }
 
 #[cfg(test)]

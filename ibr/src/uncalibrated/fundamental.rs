@@ -66,8 +66,8 @@ fn normalisations(matches: &[Match]) -> (Normalisation, Normalisation) {
     (first, Normalisation::of(matches.iter().map(|m| &m.second)))
 }
 
-fn inliers(f: &Matrix3<f64>, matches: &[Match], threshold: f64) -> Vec<usize> {
-    (0..matches.len()).filter(|i| sampson(f, &matches[*i]) < threshold * threshold).collect()
+fn inliers(f: &Matrix3<f64>, matches: &[Match]) -> Vec<usize> {
+    (0..matches.len()).filter(|i| sampson(f, &matches[*i]) < EPIPOLAR * EPIPOLAR).collect()
 }
 
 fn chosen(matches: &[Match], indices: &[usize]) -> Vec<Match> {
@@ -75,7 +75,7 @@ fn chosen(matches: &[Match], indices: &[usize]) -> Vec<Match> {
 }
 
 /// Sampson distance below which a match is an inlier of F, in pixels.
-const EPIPOLAR: f64 = 1.0;
+pub(super) const EPIPOLAR: f64 = 1.0;
 
 /// F by RANSAC over samples of eight, refitted on the inliers until their set is stable; the same seed gives
 /// the same bits.
@@ -87,22 +87,21 @@ pub fn robust(matches: &[Match], seed: u64) -> Result<Fundamental, GeometryError
         return Err(GeometryError::TooFew { what: "matches", found: matches.len(), needed: 8 });
     }
     let best = consensus::<8>(matches.len(), seed, |sample| {
-        Some(inliers(&eight_point(&chosen(matches, &sample)).ok()?, matches, EPIPOLAR))
+        Some(inliers(&eight_point(&chosen(matches, &sample)).ok()?, matches))
     });
-    let (threshold, total) = (EPIPOLAR, matches.len());
     if best.len() < 8 {
-        refuse_planes(matches, threshold)?;
-        let (what, inliers) = ("fundamental matrix", best.len());
-        return Err(GeometryError::NoConsensus { what, inliers, matches: total, threshold });
+        refuse_planes(matches)?;
+        let (what, inliers, matches) = ("fundamental matrix", best.len(), matches.len());
+        return Err(GeometryError::NoConsensus { what, inliers, matches, threshold: EPIPOLAR });
     }
-    refuse_planes(&chosen(matches, &best), threshold)?;
-    refit(matches, best, threshold)
+    refuse_planes(&chosen(matches, &best))?;
+    refit(matches, best)
 }
 
-fn refit(matches: &[Match], mut set: Vec<usize>, threshold: f64) -> Result<Fundamental, GeometryError> {
+fn refit(matches: &[Match], mut set: Vec<usize>) -> Result<Fundamental, GeometryError> {
     let mut matrix = eight_point(&chosen(matches, &set))?;
     for _ in 0..ROUNDS {
-        let next = inliers(&matrix, matches, threshold);
+        let next = inliers(&matrix, matches);
         if next == set || next.len() < 8 {
             break;
         }
@@ -115,11 +114,11 @@ fn refit(matches: &[Match], mut set: Vec<usize>, threshold: f64) -> Result<Funda
 }
 
 /// Refuses matches that one homography explains: a planar scene, or a camera that only rotated.
-fn refuse_planes(matches: &[Match], threshold: f64) -> Result<(), GeometryError> {
+fn refuse_planes(matches: &[Match]) -> Result<(), GeometryError> {
     let Some(h) = homography(matches) else { return Ok(()) };
-    let explained = matches.iter().filter(|m| transfer(&h, m) < threshold * threshold).count();
+    let explained = matches.iter().filter(|m| transfer(&h, m) < EPIPOLAR * EPIPOLAR).count();
     if explained as f64 >= PLANAR_SHARE * matches.len() as f64 {
-        return Err(GeometryError::Planar { explained, matches: matches.len(), threshold });
+        return Err(GeometryError::Planar { explained, matches: matches.len() });
     }
     Ok(())
 }

@@ -52,15 +52,14 @@ pub enum GeometryError {
     },
     /// All matches lie on one plane, or the camera only rotated.
     #[error(
-        "the matches are planar: one homography explains {explained} of {matches} of them within {threshold} px, so the fundamental matrix is not determined; add matches off the plane, or views with a baseline"
+        "the matches are planar: one homography explains {explained} of {matches} of them within {} px, so the fundamental matrix is not determined; add matches off the plane, or views with a baseline",
+        fundamental::EPIPOLAR
     )]
     Planar {
         /// Matches that the homography explains.
         explained: usize,
         /// Matches considered.
         matches: usize,
-        /// Threshold in pixels.
-        threshold: f64,
     },
     /// The matches do not determine the geometry.
     #[error(

@@ -11,7 +11,6 @@ const FORMAT: &str = "a track is \"x y\" for each view in order and \"-\" where 
 /// Tracks over a number of columns (views).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracks {
-    columns: usize,
     rows: Vec<Vec<Option<Point>>>,
 }
 
@@ -29,18 +28,16 @@ impl Tracks {
     /// # Errors
     /// [`InputError`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, InputError> {
-        let mut tracks = Self { columns: 0, rows: Vec::new() };
+        let mut tracks = Self { rows: Vec::new() };
         for (i, line) in text.lines().enumerate() {
             let fault = |reason| InputError::content(path, Location::Line(i + 1), reason);
             let row = columns(line.split('#').next().unwrap_or("")).map_err(fault)?;
             if row.is_empty() {
                 continue;
             }
-            if tracks.rows.is_empty() {
-                tracks.columns = row.len();
-            }
-            if row.len() != tracks.columns {
-                let reason = format!("{} columns where the file has {}; {FORMAT}", row.len(), tracks.columns);
+            let columns = tracks.rows.first().map_or(row.len(), Vec::len);
+            if row.len() != columns {
+                let reason = format!("{} columns where the file has {columns}; {FORMAT}", row.len());
                 return Err(fault(reason));
             }
             tracks.rows.push(row);
@@ -51,7 +48,7 @@ impl Tracks {
 
     /// Number of views that the tracks run over.
     pub fn columns(&self) -> usize {
-        self.columns
+        self.rows[0].len()
     }
 
     /// The tracks.

@@ -8,8 +8,10 @@ use hybank::sampling::fit2::Fit2Rows;
 use rayon::prelude::*;
 use std::ops::Range;
 
+/// Some rows of the image, with all that samples change there.
 struct Part<'a, const ORDER: usize, const C: usize> {
     size: (usize, usize),
+    /// Index of the first pixel.
     first: usize,
     fit: Fit2Rows<'a, ORDER, C>,
     depth: &'a mut [f32],

@@ -1,5 +1,7 @@
 //! The coefficients of the splines beside the pixels of the image.
 
+use hybank::sampling::Fit2;
+
 /// Pixels and coefficients: a bicubic spline has one coefficient more than there are pixels on each side.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grid {
@@ -8,6 +10,13 @@ pub(super) struct Grid {
 }
 
 impl Grid {
+    pub(super) fn new<const ORDER: usize, const C: usize>(
+        image: (usize, usize),
+        fit: &Fit2<ORDER, C>,
+    ) -> Self {
+        Self { image, coefficients: fit.coefficients() }
+    }
+
     fn margin(self) -> usize {
         (self.coefficients.0 - self.image.0) / 2
     }

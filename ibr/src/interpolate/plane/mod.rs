@@ -24,7 +24,7 @@ use super::{Cover, Degree, HoleFill, Settings, Watch};
 use crate::depth::{DepthMap, Measure, NONE};
 use grid::Grid;
 use hybank::sampling::Fit2;
-use hybank::sampling::fit2::{Fit2Sample, Iteration};
+use hybank::sampling::fit2::Fit2Sample;
 use rayon::prelude::*;
 
 /// Settings of the plane fit.
@@ -154,7 +154,11 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         let left_out = self.settings.fill == HoleFill::Leave;
         let fitted = |p: usize| !(left_out && mask[p].is_hole());
         let (counts, mut depth) = (std::mem::take(&mut self.counts), std::mem::take(&mut self.depth));
-        let (mut values, convergence) = self.fitted(&depth, &fitted, watch);
+        let plane = &mut self.settings.plane;
+        plane.stiffness = plane.stiffness.max(plane.noise_stiffness);
+        let (mut values, ended) =
+            springs::solve(self.fit, (width, height), &depth, &fitted, &self.settings, watch);
+        let hybank::sampling::fit2::Convergence { steps, residual, reached } = ended;
         // The depths that were continued into holes are those of the springs only.
         let holes = depth.iter_mut().zip(&mask).filter(|(_, cover)| **cover != Cover::Seen);
         holes.for_each(|(depth, _)| *depth = f32::NAN);
@@ -163,12 +167,12 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         }
         values.iter_mut().for_each(|v| *v = v.clamp(0.0, 255.0));
         let depth = DepthMap::from_known((width, height), depth, Measure::Depth);
-        PlaneFit { values, mask, depth, counts, convergence }
+        PlaneFit { values, mask, depth, counts, convergence: Convergence { steps, residual, reached } }
     }
 
     /// Gives every disoccluded pixel a sample with value and depth of the surface that continues into it.
     fn fill_background(&mut self, mask: &[Cover]) {
-        let grid = self.grid();
+        let grid = Grid::new((self.width, self.height), &self.fit);
         let sound = |(p, depth): (usize, &f32)| {
             let weight = if depth.is_nan() { 0.0 } else { self.fit.local_sums(grid.coefficient(p)).0 };
             if weight < LEAST_SOURCE_WEIGHT { f32::NAN } else { *depth }
@@ -194,31 +198,10 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
             self.add_on_pixel(p, mean(continued.values[sources[p] as usize], continued.values[p]));
         }
     }
-
-    fn grid(&self) -> Grid {
-        Grid { image: (self.width, self.height), coefficients: self.fit.coefficients() }
-    }
-
-    fn fitted(
-        self,
-        depth: &[f32],
-        inside: &(impl Fn(usize) -> bool + Sync),
-        watch: Watch<'_>,
-    ) -> (Vec<f32>, Convergence) {
-        let (mut settings, grid) = (self.settings, self.grid());
-        let plane = &mut settings.plane;
-        plane.stiffness = plane.stiffness.max(plane.noise_stiffness);
-        let iteration = Iteration { tolerance: plane.tolerance, steps: plane.iterations };
-        let springs = |direction, y| springs::of_row(depth, grid, inside, &settings, direction, y);
-        let connected = self.fit.connect(springs, |coefficient| !inside(grid.pixel(coefficient)));
-        let (values, ended) = connected.solve(&iteration, watch);
-        let hybank::sampling::fit2::Convergence { steps, residual, reached } = ended;
-        (values, Convergence { steps, residual, reached })
-    }
 }
 
 /// The bilinear spline through values on pixels, NaN where there are none, with the springs of the surfaces
-/// that a `shape` shows. Of the settings those of the springs and of the solver are used.
+/// that a `shape` shows.
 pub(crate) fn fit_surface(values: &[f32], shape: &[f32], width: usize, settings: &Settings) -> Vec<f32> {
     let size = (width, values.len() / width.max(1));
     let mut fit = Fit2::<2, 1>::new(size.0, size.1);
@@ -227,11 +210,7 @@ pub(crate) fn fit_surface(values: &[f32], shape: &[f32], width: usize, settings:
         let (x, y) = ((p % width) as f64, (p / width) as f64);
         rows.add(&Fit2Sample { x, y, values: [*value], weight: 1.0 });
     }
-    let grid = Grid { image: size, coefficients: fit.coefficients() };
-    let springs = |direction, y| springs::of_row(shape, grid, &|_| true, settings, direction, y);
-    let PlaneSettings { tolerance, iterations, .. } = settings.plane;
-    let iteration = Iteration { tolerance, steps: iterations };
-    fit.connect(springs, |_| false).solve(&iteration, &|_| ()).0
+    springs::solve(fit, size, shape, &|_| true, settings, &|_| ()).0
 }
 
 /// Bytes that [`fit_surface`] takes beside its values, with its result and a shape.

@@ -25,11 +25,8 @@ pub(super) struct Cloud {
 /// the virtual view. Positions farther than `threshold` pixels from their point are taken as mistakes of the
 /// tracker.
 pub(super) fn adjust(cameras: &mut [Matrix3x4<f64>], tracks: &[Vec<Option<Point>>], threshold: f64) -> Cloud {
-    let scales: Vec<Normalisation> = (0..cameras.len())
-        .map(|i| {
-            Normalisation::of(tracks.iter().filter_map(|t| t[i].as_ref()).collect::<Vec<_>>().into_iter())
-        })
-        .collect();
+    let scales: Vec<Normalisation> =
+        (0..cameras.len()).map(|i| Normalisation::of(tracks.iter().filter_map(|t| t[i].as_ref()))).collect();
     let mut cloud = intersect(cameras, &scales, tracks, threshold);
     for _ in 0..ROUNDS {
         let is_seen =

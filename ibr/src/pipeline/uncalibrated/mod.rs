@@ -14,7 +14,6 @@ use crate::interpolate::HoleFill;
 use crate::uncalibrated::Point;
 use crate::uncalibrated::order::Order;
 use colours::Advantage;
-use morph::Meshes;
 use rayon::prelude::*;
 use reconstruction::Reconstruction;
 use surface::Surface;
@@ -146,8 +145,7 @@ pub fn render(
     let render =
         if images.iter().any(|i| i.channels() == 3) { morph::render::<3> } else { morph::render::<1> };
     let leaves = settings.interpolation.fill == HoleFill::Leave;
-    let meshes = Meshes { virtually: &surface, shown: &surfaces };
-    let done = render(images, &meshes, &scene, &view_weights, size, leaves)?;
+    let done = render(images, &surface, &surfaces, &scene, &view_weights, size, leaves)?;
     watch(1.0);
     Ok(done)
 }

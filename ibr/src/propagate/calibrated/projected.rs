@@ -8,8 +8,7 @@ use crate::occlusion::{Points, RUN};
 use crate::propagate::{DOUBTFUL_WEIGHT, GUESSED_WEIGHT, spacing, weight};
 use crate::sample::Sample;
 
-/// The pixels of some tiles at their places in the virtual image, view by view and row by row. Its arrays
-/// are used again from band to band.
+/// The pixels of some tiles at their places in the virtual image, view by view and row by row.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Projected {
     points: Points,
@@ -27,14 +26,6 @@ struct ProjectedTile {
 }
 
 impl Projected {
-    pub(super) fn clear(&mut self) {
-        self.points.resize(0);
-        self.weights.clear();
-        self.doubtful.clear();
-        self.guessed.clear();
-        self.tiles.clear();
-    }
-
     /// Appends the pixels of a tile; those between the rows `own` are the band's own.
     pub(super) fn push(
         &mut self,
@@ -55,9 +46,9 @@ impl Projected {
         let mut places = Places::new(&RowMap::new(map, row), column, &depths, &reliefs, count);
         places.keep(frame, own, count);
         let (mut doubtful, mut guessed) = (reliefs.behind_edge, [false; TILE]);
-        for (i, is_guessed) in view.map.guessed_from(first_pixel).iter().take(count.min(TILE)).enumerate() {
-            guessed[i] = *is_guessed;
-            doubtful[i] |= *is_guessed;
+        for i in 0..count.min(TILE) {
+            guessed[i] = view.map.is_guessed(first_pixel + i);
+            doubtful[i] |= guessed[i];
         }
         let spacings: [f32; TILE] = std::array::from_fn(|i| spacing(places.distance[i], reliefs.outline[i]));
         let trust = |i: usize| match (guessed[i], doubtful[i]) {
@@ -144,7 +135,7 @@ impl Places {
             places.distance[i] = ((a[0] * a[0] + a[1] * a[1] + b[0] * b[0] + b[1] * b[1]) / 2.0).sqrt();
             places.area[i] = (a[0] * b[1] - a[1] * b[0]).abs();
         }
-        if row.is_bent() {
+        if !row.linear {
             for i in 0..count.min(TILE) {
                 (places.x[i], places.y[i], places.depth[i]) = row.bend(at(i), depths[i]);
             }

@@ -39,7 +39,8 @@ pub(super) struct RowMap<'a> {
     step: [f64; 3],
     down: [f64; 3],
     shift: [f64; 3],
-    linear: bool,
+    /// Whether no lens bends the map.
+    pub(super) linear: bool,
 }
 
 /// A pixel with depth at the virtual camera, without lenses.
@@ -56,10 +57,6 @@ impl<'a> RowMap<'a> {
         let start = std::array::from_fn(|k| a[(k, 1)] * y + a[(k, 2)]);
         let [step, down] = [0, 1].map(|column| std::array::from_fn(|k| a[(k, column)]));
         Self { map, y, start, step, down, shift: [b.x, b.y, b.z], linear: map.is_linear() }
-    }
-
-    pub(super) fn is_bent(&self) -> bool {
-        !self.linear
     }
 
     /// Position and depth of a pixel, with lenses.

@@ -40,7 +40,8 @@ impl Footprint {
     ) -> Vec<Sample<C>> {
         let (mut projected, band) = (Projected::default(), self.frame.band(top, bottom));
         for tile in self.reaching(band.rows, |_| 0.0) {
-            self.project(views, tile, &band, (f64::MIN, f64::MAX), &mut projected);
+            let view = usize::from(tile.view);
+            projected.push(&views[view], &self.maps[view], tile, &band, (f64::MIN, f64::MAX));
         }
         projected.samples(views)
     }
@@ -91,7 +92,8 @@ fn the_spacing_of_a_tile_is_bounded() {
     let (mut found, mut near) = (0, 0);
     for tile in &footprint.tiles {
         let mut projected = Projected::default();
-        footprint.project(&views, tile, &frame, (f64::MIN, f64::MAX), &mut projected);
+        let view = usize::from(tile.view);
+        projected.push(&views[view], &footprint.maps[view], tile, &frame, (f64::MIN, f64::MAX));
         for s in projected.samples::<1>(&views) {
             assert!(s.spacing <= tile.spacing, "{s:?} in {tile:?}");
             near += usize::from(tile.spacing < 2.0 * s.spacing);
@@ -114,13 +116,10 @@ fn bands_hide_what_the_whole_hides() {
         let (mut want, _) = calibrated::<1>(&views, &target, &frame);
         assert!(crate::occlusion::remove(&mut want, &test) > 100);
         let footprint = Footprint::of(&views, &[0, 1], &target, &frame);
-        let (mut projected, mut search, mut got) = (Projected::default(), PlaneSearch::default(), Vec::new());
+        let (mut search, mut got) = (PlaneSearch::default(), Vec::new());
         for own in [(f64::MIN, 1.0), (1.0, 23.5), (23.5, 24.0), (24.0, 70.0), (70.0, f64::MAX)] {
-            search.clear(&footprint.band_around(own, &test).extent(), footprint.most_between(own, &test));
-            footprint
-                .project_between(&views, own, &test, &mut projected, |points| search.enter(points, &test));
+            let mut projected = footprint.project_between(&views, own, &test);
             projected.remove(search.hidden(projected.points(), &test));
-            assert!(projected.points().len() <= footprint.most_between(own, &test));
             got.extend(projected.samples::<1>(&views));
         }
         let order = |s: &Sample<1>| (s.view, s.pixel);

@@ -48,12 +48,10 @@ impl Bundle {
     /// start is not finite.
     pub fn adjust(&mut self, scale: f64) -> Option<bool> {
         let frame = Frame::of(self)?;
-        let mut problem = frame.normalised(self, scale);
-        let start = (problem.cameras.clone(), problem.points.clone());
+        let (problem, start) = frame.normalised(self, scale);
         let (found, converged) =
             descend(start, |found| problem.cost(found), |found, damping| problem.moved(found, damping))?;
-        (problem.cameras, problem.points) = found;
-        frame.restore(&problem, self);
+        frame.restore(&found, self);
         Some(converged)
     }
 }
@@ -63,8 +61,6 @@ type Unknowns = (Vec<Matrix3x4<f64>>, Vec<Vector4<f64>>);
 
 /// The problem in coordinates near one.
 struct Problem {
-    cameras: Vec<Matrix3x4<f64>>,
-    points: Vec<Vector4<f64>>,
     observations: Vec<Sight>,
     /// Of the robust cost, in pixels.
     scale: f64,
@@ -139,7 +135,7 @@ impl Frame {
         Some(Self { images: (0..bundle.cameras.len()).map(of_camera).collect(), space, inverse })
     }
 
-    fn normalised(&self, bundle: &Bundle, scale: f64) -> Problem {
+    fn normalised(&self, bundle: &Bundle, scale: f64) -> (Problem, Unknowns) {
         let camera = |(camera, image): (&Matrix3x4<f64>, &Normalisation)| {
             let camera = image.matrix() * camera * self.space;
             camera / camera.norm()
@@ -154,15 +150,15 @@ impl Frame {
             sign: (cameras[o.camera] * points[o.point]).z.signum(),
         };
         let observations = bundle.observations.iter().map(sight).collect();
-        Problem { observations, cameras, points, scale }
+        (Problem { observations, scale }, (cameras, points))
     }
 
-    fn restore(&self, problem: &Problem, bundle: &mut Bundle) {
-        for ((camera, found), image) in bundle.cameras.iter_mut().zip(&problem.cameras).zip(&self.images) {
+    fn restore(&self, (cameras, points): &Unknowns, bundle: &mut Bundle) {
+        for ((camera, found), image) in bundle.cameras.iter_mut().zip(cameras).zip(&self.images) {
             let found = image.inverse() * found * self.inverse;
             *camera = found * (camera.norm() / found.norm());
         }
-        for (point, found) in bundle.points.iter_mut().zip(&problem.points) {
+        for (point, found) in bundle.points.iter_mut().zip(points) {
             let found = self.space * found;
             *point = found * (point.norm() / found.norm());
         }

@@ -99,10 +99,10 @@ fn mistakes_hardly_count() {
 #[test]
 fn the_derivatives_are_those_of_differences() {
     let (bundle, mut dice) = (exact(5), Dice::new(6));
-    let problem = Frame::of(&bundle).unwrap().normalised(&bundle, 1.0);
+    let (problem, (cameras, points)) = Frame::of(&bundle).unwrap().normalised(&bundle, 1.0);
     let h = 1e-6;
     for sight in &problem.observations {
-        let (camera, point) = (problem.cameras[sight.camera], problem.points[sight.point]);
+        let (camera, point) = (cameras[sight.camera], points[sight.point]);
         let (_, by_camera, by_point) = reprojection(&camera, &point, &sight.image);
         let step = Matrix3x4::from_fn(|_, _| dice.normal());
         let ahead = Vector4::from_fn(|_, _| dice.normal());
