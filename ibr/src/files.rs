@@ -105,24 +105,14 @@ impl InputError {
     }
 }
 
-/// The bytes of a file, if there is `room` for what is made of them, in bytes.
-pub(crate) fn read_bytes(
-    path: &Path,
-    remedy: &'static str,
-    room: impl Fn(&[u8]) -> f64,
-) -> Result<Vec<u8>, InputError> {
-    let bytes = files::read_bytes(path, IMAGE).map_err(|source| unread(source, remedy))?;
-    refuse_without_memory(path, room(&bytes)).map(|()| bytes)
+/// The bytes of a file.
+pub(crate) fn read_bytes(path: &Path, remedy: &'static str) -> Result<Vec<u8>, InputError> {
+    files::read_bytes(path, IMAGE).map_err(|source| unread(source, remedy))
 }
 
-/// The text of a file, if there is `room` for what is made of it, in bytes.
-pub(crate) fn read_text(
-    path: &Path,
-    remedy: &'static str,
-    room: impl Fn(&str) -> f64,
-) -> Result<String, InputError> {
-    let text = files::read_text(path, TEXT).map_err(|source| unread(source, remedy))?;
-    refuse_without_memory(path, room(&text)).map(|()| text)
+/// The text of a file, if there is memory for parsing it.
+pub(crate) fn read_text(path: &Path, remedy: &'static str) -> Result<String, InputError> {
+    files::read_text(path, TEXT).map_err(|source| unread(source, remedy))
 }
 
 /// Why a file cannot be read; the remedy is for what the system refuses.

@@ -20,7 +20,7 @@
 //! view cannot be left out; it takes the weights of typical photographs.
 //!
 //! ```
-//! use hybank_ibr::analysis::{Advice, Predictor};
+//! use hybank_ibr::analysis::Predictor;
 //! use hybank_ibr::camera::Camera;
 //! use hybank_ibr::pipeline::RenderSettings;
 //! use hybank_ibr::propagate::RectifiedView;
@@ -32,16 +32,14 @@
 //!     (image, rig_disparity(&depth, size.0), position)
 //! });
 //! let views = shots.each_ref().map(|(image, map, camera)| RectifiedView { image, map, camera: *camera });
-//! // The view half-way, its error, and what to spend on next.
+//! // The view half-way, its error, and what makes it smaller.
 //! let predictor = Predictor::new(&views, &settings)?;
 //! let view = predictor.at(&0.5, size)?;
 //! assert!((0.1..20.0).contains(&view.totals().estimate));
-//! let advice = Advice::on(&predictor, &0.5, size, &view)?;
-//! assert_eq!(advice.cause, view.dominant());
+//! println!("{}", view.dominant().remedy());
 //! # Ok::<(), hybank_ibr::pipeline::RenderError>(())
 //! ```
 
-mod advice;
 mod calibrate;
 mod choice;
 mod estimate;
@@ -50,12 +48,10 @@ mod general;
 mod jitter;
 mod lookup;
 mod predictor;
-mod random;
 mod regressors;
 mod rows;
 mod variogram;
 
-pub use advice::{Advice, AnotherView};
 pub use choice::Choice;
 pub use estimate::{Calibration, Predicted, Totals, ViewError};
 pub use jitter::{depth_jitter, with_noise};

@@ -28,7 +28,7 @@ pub struct Calibration {
 /// # Errors
 /// [`InputError`], with the line.
 pub fn read_calibration(path: &Path) -> Result<Calibration, InputError> {
-    parse_calibration(&files::read_text(path, CHECK_THE_PATH, |text| 16.0 * text.len() as f64)?, path)
+    parse_calibration(&files::read_text(path, CHECK_THE_PATH)?, path)
 }
 
 /// The same from the text of the file; `path` appears in messages.

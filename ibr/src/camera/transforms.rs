@@ -14,9 +14,6 @@ use std::path::{Path, PathBuf};
 /// Most columns or rows of an image, and the largest focal length in pixels.
 const LARGEST: f64 = 1e6;
 
-/// Bytes of memory per byte of a file while it is parsed: a number of two bytes takes 64.
-const PARSED: f64 = 40.0;
-
 #[derive(Deserialize)]
 struct FileSpec {
     #[serde(flatten)]
@@ -39,7 +36,7 @@ struct FrameSpec {
 /// # Errors
 /// [`InputError`], with the line or the frame.
 pub fn read_transforms(path: &Path) -> Result<CameraList, InputError> {
-    parse_transforms(&files::read_text(path, CHECK_THE_PATH, |text| PARSED * text.len() as f64)?, path)
+    parse_transforms(&files::read_text(path, CHECK_THE_PATH)?, path)
 }
 
 /// The same from the text of the file; `path` appears in messages.

@@ -33,7 +33,7 @@ Exit codes: 0 done, 1 the input failed, 2 wrong usage.";
 pub(super) enum Command {
     /// Render the virtual view of a scene.
     Render(Box<RenderArguments>),
-    /// Predict the error of the virtual view without a photograph of it, and what to spend on next.
+    /// Predict the error of the virtual view without a photograph of it, and what makes it smaller.
     Bound(BoundArguments),
     /// Choose the views of a scene from which the virtual view has the least predicted error.
     Place(PlaceArguments),
@@ -82,8 +82,8 @@ pub(super) struct SceneArguments {
 const BOUND_EXAMPLES: &str = "Examples:
   hybank-ibr bound scene.toml
       prints how large the error of the virtual view will be, its causes, and what would make it smaller
-  hybank-ibr bound scene.toml --map error.png --plot rows.svg --truth photo.png
-      also writes where the error is, plots it by rows, and compares the prediction with a photograph
+  hybank-ibr bound scene.toml --map error.png --truth photo.png
+      also writes where the error is, and compares the prediction with a photograph
   hybank-ibr bound scene.toml --map error.pfm
       writes numbers in grey levels, three channels: limit, expected, estimate
 
@@ -104,10 +104,6 @@ pub(super) struct BoundArguments {
     /// largest, or as numbers (.pfm): limit, expected error and estimate in grey levels.
     #[arg(long, value_name = "FILE")]
     pub(super) map: Option<PathBuf>,
-    /// Plot the figures of every image row, with the measured error of --truth, and below them the part of
-    /// each cause (.svg or .png).
-    #[arg(long, value_name = "FILE")]
-    pub(super) plot: Option<PathBuf>,
     /// Overwrite existing files.
     #[arg(long)]
     pub(super) force: bool,

@@ -1,7 +1,7 @@
 //! The files that a command writes of one virtual view.
 
 use super::arguments::SceneArguments;
-use super::failure::Failure;
+use super::failure::{Failure, PROGRAM};
 use super::output;
 use super::source::Source;
 use crate::image::Levels;
@@ -17,9 +17,8 @@ pub(super) enum Part {
     Depth,
     Count,
     Error,
-    /// The predicted error of every pixel, and of every row.
+    /// The predicted error of every pixel.
     Map,
-    Plot,
 }
 
 impl Part {
@@ -31,7 +30,6 @@ impl Part {
             Self::Count => "--count",
             Self::Error => "--error",
             Self::Map => "--map",
-            Self::Plot => "--plot",
         }
     }
 
@@ -40,7 +38,6 @@ impl Part {
         let allowed: &[&str] = match self {
             Self::Depth => &["pfm"],
             Self::Count => &["png", "pfm"],
-            Self::Plot => &["svg", "png"],
             Self::View if is_film(path) => return Ok(()),
             Self::View if is_packed_film(path) => return Err(packed_film(path)),
             Self::View => return output::refuse_format(path, levels),
@@ -110,8 +107,8 @@ impl Outputs {
         self.parts.iter().map(|(_, path)| path.as_path()).filter(|path| !is_dash(path))
     }
 
-    /// Checks before the scene is read: names, formats, inputs that were typed, and files that exist.
-    pub(super) fn check(&self, levels: Levels, scene: &SceneArguments, force: bool) -> Result<(), Failure> {
+    /// Checks of names and formats, before the scene is read.
+    pub(super) fn check(&self, levels: Levels) -> Result<(), Failure> {
         for (k, (part, path)) in self.parts.iter().enumerate() {
             let (option, shown) = (part.option(), Quoted(path));
             let name = option.trim_start_matches('-');
@@ -127,20 +124,23 @@ impl Outputs {
                 )));
             }
         }
-        self.parts.iter().try_for_each(|(part, path)| part.check(path, levels))?;
-        output::refuse_overlaps(&self.files().collect::<Vec<_>>(), &scene.inputs())?;
-        self.files().try_for_each(|file| output::refuse_existing(file, force))
+        self.parts.iter().try_for_each(|(part, path)| part.check(path, levels))
     }
 }
 
-/// Refuses files that exist, or are an input of the scene, before its views are read.
+/// Refuses files that exist, are one, or are an input, before the views of the scene are read; names what
+/// killed runs left beside them.
 pub(super) fn check_files(
     all: &[Outputs],
     film: Option<&Path>,
     source: &Source,
+    scene: &SceneArguments,
     force: bool,
 ) -> Result<(), Failure> {
     let files: Vec<&Path> = all.iter().flat_map(Outputs::files).chain(film).collect();
-    source.check_outputs(&files)?;
+    let of_scene = source.files();
+    let inputs: Vec<&Path> = of_scene.iter().chain(&scene.truth).map(PathBuf::as_path).collect();
+    output::refuse_overlaps(&files, &inputs)?;
+    PROGRAM.name_leftovers(&files);
     files.iter().try_for_each(|file| output::refuse_existing(file, force))
 }

@@ -144,7 +144,7 @@ fn read(arguments: &RenderArguments, watch: Watch<'_>) -> Result<(Scene, Vec<Out
     path::check(arguments, frames)?;
     let files = path::outputs(arguments, frames);
     let film = Some(arguments.output.as_path()).filter(|path| path::is_film(path, frames));
-    check_files(&files, film.filter(|path| !is_dash(path)), &source, arguments.force)?;
+    check_files(&files, film.filter(|path| !is_dash(path)), &source, &arguments.scene, arguments.force)?;
     Ok((arguments.scene.load(&source, !arguments.drop_unknown, watch)?, files))
 }
 

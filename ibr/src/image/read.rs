@@ -92,8 +92,9 @@ fn float_map(file: &Source<'_>) -> Result<Option<Image>, InputError> {
 }
 
 fn load(path: &Path, most: usize) -> Result<Loaded, InputError> {
+    let bytes = files::read_bytes(path, CHECK_THE_PATH)?;
     // The numbers of a float map are as many bytes again.
-    let bytes = files::read_bytes(path, CHECK_THE_PATH, |bytes| bytes.len() as f64)?;
+    files::refuse_without_memory(path, bytes.len() as f64)?;
     let source = Source { path, bytes: &bytes, most };
     if let Some(map) = float_map(&source)? {
         return Ok(Loaded::Float(map));

@@ -239,13 +239,6 @@ const LOADING_BYTES: f64 = 110.0;
 /// Bytes per pixel of a view that is there.
 const VIEW_BYTES: f64 = 20.0;
 
-/// Bytes of memory in which the text of a scene file can be parsed.
-#[cfg(feature = "cli")]
-pub(crate) fn room_to_parse(text: &str) -> f64 {
-    const PARSED: f64 = 60.0;
-    PARSED * text.len() as f64
-}
-
 /// What `read` makes of each view, or the first error in the order of the views, so that every run reports
 /// the same error. Views are read at the same time if there is memory for that, judged by the first one.
 fn each<V: Sync, T: Send>(

@@ -21,7 +21,7 @@ impl Tracks {
     /// # Errors
     /// [`InputError`], with file and line.
     pub fn read(path: &Path) -> Result<Self, InputError> {
-        Self::parse(&files::read_text(path, CHECK_THE_PATH, room)?, path)
+        Self::parse(&files::read_text(path, CHECK_THE_PATH)?, path)
     }
 
     /// The same from text; `path` appears in messages.
@@ -58,13 +58,6 @@ impl Tracks {
     pub fn rows(&self) -> &[Vec<Option<Point>>] {
         &self.rows
     }
-}
-
-/// Bytes that the tracks of a text take while they are read.
-fn room(text: &str) -> f64 {
-    const WORD: f64 = 50.0;
-    const LINE: f64 = 100.0;
-    WORD * text.split_whitespace().count() as f64 + LINE * text.lines().count() as f64
 }
 
 /// The columns of a line.

@@ -37,14 +37,14 @@ pub fn read_model(folder: &Path) -> Result<CameraList, InputError> {
         return Err(no_model(folder));
     }
     if !folder.join("cameras.txt").exists() && folder.join("cameras.bin").exists() {
-        let room = |bytes: &[u8]| LISTED * binary::most_records(bytes) as f64;
-        let load = |name: &str| files::read_bytes(&folder.join(name), FILES, room);
+        let load = |name: &str| {
+            let bytes = files::read_bytes(&folder.join(name), FILES)?;
+            files::refuse_without_memory(folder, LISTED * binary::most_records(&bytes) as f64).map(|()| bytes)
+        };
         let (cameras, images) = (load("cameras.bin")?, load("images.bin")?);
         return join(folder, "bin", Location::Record, binary::cameras(&cameras), binary::images(&images));
     }
-    // Two lines per image.
-    let room = |text: &str| LISTED / 2.0 * text.lines().count() as f64;
-    let load = |name: &str| files::read_text(&folder.join(name), FILES, room);
+    let load = |name: &str| files::read_text(&folder.join(name), FILES);
     parse_model(&load("cameras.txt")?, &load("images.txt")?, folder)
 }
 

@@ -1,26 +1,28 @@
 //! `hybank-ibr bound`: the error of the virtual views, predicted from the inputs alone.
 
-mod chart;
-mod files;
 mod report;
 
 use super::arguments::BoundArguments;
-use super::inputs;
-use super::output;
-use super::outputs::{Outputs, check_files};
+use super::output::{self, Encoded};
+use super::outputs::{Outputs, Part, check_files};
 use super::progress::Progress;
-use crate::analysis::{Advice, Predicted, Predictor, ViewError};
+use super::{heat, inputs};
+use crate::analysis::{Predicted, Predictor, ViewError};
 use crate::cli::failure::{Failure, failed};
+use crate::files::refuse_pixels_without_memory;
 use crate::image::{Image, Levels};
 use crate::pipeline::{RenderError, Watch};
 use crate::scene::{Kind, Scene, SourceView};
-use report::{Frames, Summary};
+use report::Summary;
+use std::path::Path;
 
 pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
-    check(arguments)?;
+    arguments.scene.check()?;
+    let outputs = Outputs::of(&[(Part::Map, arguments.map.as_ref())]);
+    outputs.check(Levels::Eight)?;
     let progress = Progress::new(3);
     progress.step("reading");
-    let (scene, files) = read(arguments, &|share| progress.within(share))?;
+    let (scene, files) = read(arguments, outputs, &|share| progress.within(share))?;
     let truth = arguments.scene.truth()?;
     progress.step("calibrating");
     let job = Job { arguments, scene: &scene, files, truth, progress };
@@ -55,42 +57,48 @@ impl Job<'_> {
         let predictor = Predictor::new(&views, &arguments.scene.settings(scene.offset)).map_err(named)?;
         progress.step("predicting");
         let (mut summaries, mut written) = (Vec::new(), Vec::new());
-        let mut worst: Option<(usize, f64, ViewError)> = None;
         for (frame, (camera, outputs)) in cameras.iter().zip(&files).enumerate() {
             let predicted = predictor.at(camera, size).map_err(named)?;
             let mut summary = Summary::new(&predicted, predictor.agreement(), &scene.outliers);
             summary.measure(&predicted, truth.as_ref(), arguments.scene.truth.as_deref())?;
-            let (encoded, white) = files::encoded(outputs, &predicted, truth.as_ref())?;
-            summary.white = white;
-            written.extend(output::begin(&encoded, arguments.force)?);
-            summaries.push(summary);
-            let estimate = predicted.totals().estimate;
-            if worst.as_ref().is_none_or(|(_, largest, _)| estimate > *largest) {
-                worst = Some((frame, estimate, predicted));
+            for (_, path) in &outputs.parts {
+                let (encoded, white) = map(&predicted, path)?;
+                summary.white = white;
+                written.extend(output::begin(&[encoded], arguments.force)?);
             }
-            progress.within((frame + 1) as f64 / (cameras.len() + 1) as f64);
+            summaries.push(summary);
+            progress.within((frame + 1) as f64 / cameras.len() as f64);
         }
-        let Some((worst, _, now)) = worst else { return Err(failed(RenderError::NoViews)) };
-        summaries[worst].advice = Some(Advice::on(&predictor, &cameras[worst], size, &now).map_err(named)?);
         output::commit(written)?;
         drop(progress);
         inputs::warn_of_contradictions(predictor.agreement(), &scene.kind);
-        Frames { summaries, worst }.print(predictor.agreement(), arguments.scene.json)
+        report::print(summaries, predictor.agreement(), arguments.scene.json)
     }
 }
 
-/// Checks that need no file.
-fn check(arguments: &BoundArguments) -> Result<(), Failure> {
-    arguments.scene.check()?;
-    arguments.outputs().check(Levels::Eight, &arguments.scene, arguments.force)
-}
-
 /// The scene, and the files of each of its virtual views.
-fn read(arguments: &BoundArguments, watch: Watch<'_>) -> Result<(Scene, Vec<Outputs>), Failure> {
+fn read(
+    arguments: &BoundArguments,
+    outputs: Outputs,
+    watch: Watch<'_>,
+) -> Result<(Scene, Vec<Outputs>), Failure> {
     let source = arguments.scene.source()?;
-    let files = arguments.outputs().of_frames(source.frames(&arguments.scene));
-    check_files(&files, None, &source, arguments.force)?;
+    let files = outputs.of_frames(source.frames(&arguments.scene));
+    check_files(&files, None, &source, &arguments.scene, arguments.force)?;
     let scene = arguments.scene.load(&source, true, watch)?;
     arguments.scene.refuse_what_has_no_prediction(&scene)?;
     Ok((scene, files))
+}
+
+/// A picture of the estimate and the estimate that is white in it, or the three numbers of every pixel as a
+/// float map.
+fn map<'a>(predicted: &ViewError, path: &'a Path) -> Result<(Encoded<'a>, Option<f32>), Failure> {
+    let size = predicted.rendering.image.size();
+    // A picture or three numbers per pixel, and the file.
+    refuse_pixels_without_memory(path, size, 36.0).map_err(failed)?;
+    heat::encoded(&predicted.estimate, size, path, || {
+        let pixels = predicted.local_limit.iter().zip(&predicted.expected).zip(&predicted.estimate);
+        let data = pixels.flat_map(|((limit, expected), estimate)| [*limit, *expected, *estimate]).collect();
+        Image::from_values(size, 3, data)
+    })
 }

@@ -1,6 +1,5 @@
 //! What `bound` prints.
 
-use crate::analysis::{Advice, AnotherView};
 use crate::analysis::{Cause, Totals, ViewError};
 use crate::cli::failure::Failure;
 use crate::cli::{inputs, output};
@@ -30,8 +29,6 @@ pub(super) struct Summary {
     /// Estimate that is white in the picture of --map.
     pub(super) white: Option<f32>,
     measured: Option<Measured>,
-    /// What would make the estimate smaller; of several views that of the largest estimate has it.
-    pub(super) advice: Option<Advice>,
     rows: Vec<Totals>,
 }
 
@@ -84,7 +81,6 @@ impl Summary {
             disparity_noise: predicted.calibration.disparity_noise,
             white: None,
             measured: None,
-            advice: None,
             rows: predicted.rows(),
         }
     }
@@ -125,26 +121,11 @@ impl Summary {
             lines.push(format!("outliers  {:.1} % of the depths", 100.0 * self.outliers));
         }
         lines.push(format!("next      {}", self.remedy));
-        lines.extend(self.advice.as_ref().filter(|_| self.inputs_agree != Some(false)).map(advice));
         lines.push(inputs::weights_line(self.calibrated_on));
         lines.extend(inputs::line(agreement));
         lines.extend(self.measured.as_ref().map(measured));
         lines.join("\n") + "\n"
     }
-}
-
-/// How much the estimate falls.
-fn advice(advice: &Advice) -> String {
-    let mut parts = vec![format!("{:?} errors halved {:.2}", advice.cause, advice.halved).to_lowercase()];
-    parts.extend(advice.depth_bit.map(|falls| format!("one more bit of depth {falls:.2}")));
-    parts.push(match &advice.view {
-        Some(AnotherView { place, falls }) => {
-            let place: Vec<String> = place.iter().map(|x| format!("{x:.3}")).collect();
-            format!("one more view at {} {falls:.2}", place.join(", "))
-        }
-        None => "one more view 0".into(),
-    });
-    format!("gains     the estimate falls by: {}", parts.join("; "))
 }
 
 fn measured(m: &Measured) -> String {
@@ -159,22 +140,26 @@ fn measured(m: &Measured) -> String {
 
 /// The predictions for all virtual views of a scene.
 #[derive(Debug, Serialize)]
-pub(super) struct Frames {
+struct Frames {
     #[serde(rename = "frames")]
-    pub(super) summaries: Vec<Summary>,
+    summaries: Vec<Summary>,
     /// The view with the largest estimate, by number from 0.
-    pub(super) worst: usize,
+    worst: usize,
+}
+
+/// Prints one view, or a line for each of several and the worst of them.
+pub(super) fn print(summaries: Vec<Summary>, agreement: &Agreement, json: bool) -> Result<(), Failure> {
+    if let [one] = summaries.as_slice() {
+        return output::report(json, one, || one.text(agreement), None);
+    }
+    let estimates = summaries.iter().map(|summary| summary.totals.estimate).enumerate();
+    // The first of equal ones.
+    let worst = estimates.rev().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(worst, _)| worst);
+    let frames = Frames { summaries, worst };
+    output::report(json, &frames, || frames.text(agreement), None)
 }
 
 impl Frames {
-    /// Prints one view, or a line for each of several and the worst of them.
-    pub(super) fn print(&self, agreement: &Agreement, json: bool) -> Result<(), Failure> {
-        match self.summaries.as_slice() {
-            [one] => output::report(json, one, || one.text(agreement), None),
-            _ => output::report(json, self, || self.text(agreement), None),
-        }
-    }
-
     fn text(&self, agreement: &Agreement) -> String {
         let line =
             |(k, s): (usize, &Summary)| format!("view {:4}  estimate {:.2}\n", k + 1, s.totals.estimate);
