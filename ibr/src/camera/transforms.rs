@@ -5,7 +5,7 @@
 //! principal point is shifted by half a pixel on reading.
 
 use super::list::{CameraList, Frame, Inner};
-use crate::files::{self, CHECK_THE_PATH, InputError, Location};
+use crate::files::{self, CHECK_THE_PATH, InputError};
 use hybank::messages::{Quoted, of_json};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4};
 use serde::Deserialize;
@@ -70,8 +70,8 @@ pub fn parse_transforms(text: &str, path: &Path) -> Result<CameraList, InputErro
     }
     let one = |(index, spec): (usize, FrameSpec)| {
         let number = index + 1;
-        let at = Location::Frame(number, spec.file_path.clone());
-        let fault = |reason: String| InputError::content(path, at.clone(), reason);
+        let at = || format!(": frame {number} (\"{}\")", Quoted(&spec.file_path));
+        let fault = |reason: String| InputError::content(path, at(), reason);
         let inner = spec.inner.or(&file.inner).checked().map_err(fault)?;
         let pose = world_to_camera(&spec.transform_matrix).map_err(fault)?;
         Ok(Frame {

@@ -17,7 +17,7 @@ use super::prepare::{Preparation, prepare};
 use super::spec::{KEYS, SceneSpec, ViewSpec};
 use super::{Kind, Scene};
 use crate::camera::middlebury::Calibration;
-use crate::files::{InputError, Location};
+use crate::files::InputError;
 use crate::image::{Image, MOST_PIXELS, read_image};
 use crate::pipeline::Watch;
 use goals::Goal;
@@ -59,7 +59,7 @@ pub fn parse(text: &str, path: &Path) -> Result<SceneSpec, InputError> {
         let Some(place) = e.span().map(|span| messages::Location::find(text, span)) else {
             return InputError::file(path, reason);
         };
-        InputError::content(path, Location::Column(place.line, place.column), format!("{reason}\n{place}"))
+        InputError::content(path, format!(":{}:{}", place.line, place.column), format!("{reason}\n{place}"))
     })
 }
 

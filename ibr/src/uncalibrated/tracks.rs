@@ -1,7 +1,7 @@
 //! Tracks: image positions of scene points, one line per point, one pair "x y" per view, "-" where not seen.
 
 use super::Point;
-use crate::files::{self, CHECK_THE_PATH, InputError, Location};
+use crate::files::{self, CHECK_THE_PATH, InputError};
 use hybank::messages::Quoted;
 use std::path::Path;
 
@@ -31,7 +31,7 @@ impl Tracks {
     pub fn parse(text: &str, path: &Path) -> Result<Self, InputError> {
         let mut tracks = Self { columns: 0, rows: Vec::new() };
         for (i, line) in text.lines().enumerate() {
-            let fault = |reason| InputError::content(path, Location::Line(i + 1), reason);
+            let fault = |reason| InputError::content(path, format!(":{}", i + 1), reason);
             let row = columns(line.split('#').next().unwrap_or("")).map_err(fault)?;
             if row.is_empty() {
                 continue;

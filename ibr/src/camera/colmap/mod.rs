@@ -8,7 +8,7 @@ mod points;
 pub(crate) use points::{ScenePoint, read_points};
 
 use super::list::{CameraList, Frame, Inner};
-use crate::files::{self, CHECK_THE_PATH, InputError, Location};
+use crate::files::{self, CHECK_THE_PATH, InputError};
 use hybank::messages::{Number, Quoted};
 use nalgebra::{Matrix3x4, Quaternion, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
@@ -42,7 +42,7 @@ pub fn read_model(folder: &Path) -> Result<CameraList, InputError> {
             files::refuse_without_memory(folder, LISTED * binary::most_records(&bytes) as f64).map(|()| bytes)
         };
         let (cameras, images) = (load("cameras.bin")?, load("images.bin")?);
-        return join(folder, "bin", Location::Record, binary::cameras(&cameras), binary::images(&images));
+        return join(folder, "bin", ": record ", binary::cameras(&cameras), binary::images(&images));
     }
     let load = |name: &str| files::read_text(&folder.join(name), FILES);
     parse_model(&load("cameras.txt")?, &load("images.txt")?, folder)
@@ -78,19 +78,21 @@ fn no_model(folder: &Path) -> InputError {
 /// # Errors
 /// [`InputError`].
 pub fn parse_model(cameras: &str, images: &str, folder: &Path) -> Result<CameraList, InputError> {
-    join(folder, "txt", Location::Line, parse_cameras(cameras), parse_images(images))
+    join(folder, "txt", ":", parse_cameras(cameras), parse_images(images))
 }
 
-/// The images with their cameras, from what the two files in a folder say; `at` is where a fault is.
+/// The images with their cameras, from what the two files in a folder say; `at` is before the
+/// number of a line or a record in messages.
 fn join(
     folder: &Path,
     ending: &str,
-    at: fn(usize) -> Location,
+    at: &str,
     cameras: Result<BTreeMap<u64, Inner>, Fault>,
     images: Result<Vec<Pose>, Fault>,
 ) -> Result<CameraList, InputError> {
     let path = |name: &str| folder.join(format!("{name}.{ending}"));
-    let fault = |name: &str, (place, reason): Fault| InputError::content(&path(name), at(place), reason);
+    let fault =
+        |name: &str, (place, reason): Fault| InputError::content(&path(name), format!("{at}{place}"), reason);
     let cameras = cameras.map_err(|e| fault("cameras", e))?;
     let images = images.map_err(|e| fault("images", e))?;
     let mut frames = BTreeMap::new();

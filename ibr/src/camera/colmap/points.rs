@@ -7,7 +7,7 @@
 //! ```
 
 use super::{Fault, binary, content, is_model, no_model, number};
-use crate::files::{self, InputError, Location};
+use crate::files::{self, InputError};
 use nalgebra::Vector3;
 use std::path::Path;
 
@@ -38,12 +38,12 @@ pub(crate) fn read_points(folder: &Path) -> Result<Vec<ScenePoint>, InputError> 
     if !text.exists() && bytes.exists() {
         let file = files::read_bytes(&bytes, FILES)?;
         files::refuse_without_memory(&bytes, PARSED * file.len() as f64)?;
-        let fault = |(record, reason)| InputError::content(&bytes, Location::Record(record), reason);
+        let fault = |(record, reason)| InputError::content(&bytes, format!(": record {record}"), reason);
         return binary_points(&file).map_err(fault);
     }
     let file = files::read_text(&text, FILES)?;
     let point = |(line, words): (usize, &str)| {
-        parse_point(words).map_err(|reason| InputError::content(&text, Location::Line(line), reason))
+        parse_point(words).map_err(|reason| InputError::content(&text, format!(":{line}"), reason))
     };
     content(&file).filter(|(_, line)| !line.is_empty()).map(point).collect()
 }
