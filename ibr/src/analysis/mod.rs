@@ -13,7 +13,7 @@
 //! residuals, slopes and second differences of the photographs nearby (`lookup.rs`).
 //!
 //! The other two are sums over causes. The size of each cause is computed: the bias of the fit, by
-//! fitting the fit once more (`evidence.rs`); the views that share in a pixel; the slope; the change under
+//! fitting the fit once more (`rows.rs`); the views that share in a pixel; the slope; the change under
 //! errors of depth as large as the maps' disagreement; depth edges nearby; doubtful depths; holes, by the
 //! variogram of the photographs. The weights of the causes are calibrated on the inputs themselves:
 //! each view is left out in turn and rendered from the others, and its photograph is the truth. A single
@@ -43,7 +43,6 @@
 mod calibrate;
 mod choice;
 mod estimate;
-mod evidence;
 mod general;
 mod jitter;
 mod lookup;

@@ -148,21 +148,19 @@ impl Inner {
             return Err("there is neither `fl_x` nor `camera_angle_x`, which give the focal length".into());
         }
         let whole = |v: f64| (1.0..=LARGEST).contains(&v) && v.fract() == 0.0;
-        for (name, side) in [("w", self.w), ("h", self.h)] {
-            if let Some(side) = side.filter(|v| !whole(*v)) {
-                return Err(format!("{name} = {side}: it must be a whole number of pixels"));
-            }
-        }
-        for (name, focal) in [("fl_x", self.fl_x), ("fl_y", self.fl_y)] {
-            if let Some(focal) = focal.filter(|v| !(*v > 0.0 && *v <= LARGEST)) {
-                return Err(format!("{name} = {focal}: it must be a positive number of pixels"));
-            }
-        }
-        for (name, angle) in
-            [("camera_angle_x", self.camera_angle_x), ("camera_angle_y", self.camera_angle_y)]
-        {
-            if let Some(angle) = angle.filter(|v| !(*v > 1e-6 && *v < std::f64::consts::PI)) {
-                return Err(format!("{name} = {angle}: it must be between 0 and pi (radians)"));
+        let positive = |v: f64| v > 0.0 && v <= LARGEST;
+        let angle = |v: f64| v > 1e-6 && v < std::f64::consts::PI;
+        let checks: [(&str, Option<f64>, &dyn Fn(f64) -> bool, &str); 6] = [
+            ("w", self.w, &whole, "a whole number of pixels"),
+            ("h", self.h, &whole, "a whole number of pixels"),
+            ("fl_x", self.fl_x, &positive, "a positive number of pixels"),
+            ("fl_y", self.fl_y, &positive, "a positive number of pixels"),
+            ("camera_angle_x", self.camera_angle_x, &angle, "between 0 and pi (radians)"),
+            ("camera_angle_y", self.camera_angle_y, &angle, "between 0 and pi (radians)"),
+        ];
+        for (name, given, holds, rule) in checks {
+            if let Some(value) = given.filter(|value| !holds(*value)) {
+                return Err(format!("{name} = {value}: it must be {rule}"));
             }
         }
         Ok(self)

@@ -1,8 +1,7 @@
 //! Maps of a quantity as pictures: black is zero, then violet, red and yellow, and white is the largest.
 
 use super::failure::Failure;
-use super::output::{self, Encoded};
-use super::outputs::ends_with;
+use super::output::{self, Encoded, ends_with};
 use crate::image::{Image, Levels, pfm};
 use std::path::Path;
 

@@ -8,7 +8,6 @@ mod heat;
 mod init;
 mod inputs;
 mod output;
-mod outputs;
 mod place;
 mod progress;
 mod render;

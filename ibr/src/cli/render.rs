@@ -1,14 +1,12 @@
 //! `hybank-ibr render`: a scene file in, images and their figures out.
 
 mod concerns;
-mod metric;
 mod outputs;
 mod path;
 
 use super::arguments::RenderArguments;
 use super::failure::{Failure, PROGRAM, failed, of_view};
-use super::output;
-use super::outputs::{Outputs, check_files};
+use super::output::{self, Outputs, check_files};
 use super::progress::Progress;
 use super::summary::Summary;
 use crate::files::refuse_pixels_without_memory;
@@ -81,7 +79,7 @@ fn timed(
     let mut summary = Summary::new(&done.rendering, start.elapsed().as_secs_f64(), scene.filled);
     summary.preparation_seconds = preparation;
     summary.geometry = done.geometry.clone();
-    summary.depths = metric::depths(scene, arguments.depth.is_some());
+    summary.depths = outputs::unit_of_depths(scene, arguments.depth.is_some());
     Ok((done, summary))
 }
 
@@ -161,7 +159,7 @@ fn render(
         Kind::Rectified { views, positions } => {
             let views: Vec<_> = views.iter().map(SourceView::view).collect();
             let done = rectified::render_watched(&views, positions[frame], &settings, watch);
-            done.map(|rendering| whole(metric::in_millimetres(rendering, scene))).map_err(failed)
+            done.map(|rendering| whole(outputs::in_millimetres(rendering, scene))).map_err(failed)
         }
         Kind::Calibrated { views, cameras, size } => {
             let views: Vec<_> = views.iter().map(SourceView::view).collect();

@@ -1,16 +1,17 @@
 //! The files of one rendered view, and what is in them.
 
 use crate::analysis::difference;
+use crate::camera::middlebury::Calibration;
 use crate::cli::arguments::RenderArguments;
 use crate::cli::failure::{Failure, failed};
 use crate::cli::heat;
-use crate::cli::output::{self, Encoded};
-use crate::cli::outputs::{Outputs, Part, ends_with, is_film};
-use crate::depth::{FAR, Measure};
+use crate::cli::output::{self, Encoded, Outputs, Part, ends_with, is_film};
+use crate::depth::{DepthMap, FAR, Measure};
 use crate::files::refuse_pixels_without_memory;
 use crate::image::{Image, Levels, encode_with_alpha, pfm};
 use crate::interpolate::Cover;
 use crate::pipeline::Rendering;
+use crate::scene::{Kind, Scene};
 use hybank::messages::Quoted;
 use hybank::program::is_dash;
 use std::path::Path;
@@ -114,4 +115,34 @@ fn counts<'a>(rendering: &Rendering, path: &'a Path) -> Result<Encoded<'a>, Fail
 fn errors<'a>(image: &Image, truth: &Image, path: &'a Path) -> Result<(Encoded<'a>, Option<f32>), Failure> {
     let values = difference(image, truth);
     heat::encoded(&values, image.size(), path, || Image::from_values(image.size(), 1, values.clone()))
+}
+
+/// The rendering with depths in millimetres, if the scene has the calibration of a rectified rig.
+pub(super) fn in_millimetres(mut rendering: Rendering, scene: &Scene) -> Rendering {
+    if let Some(calibration) = &scene.calibration
+        && let Some(depth) = metric_depth(&rendering.depth, calibration)
+    {
+        rendering.depth = depth;
+    }
+    rendering
+}
+
+/// Depths f B / (d + offset) from disparities d for a baseline of one; `None` if all are unknown.
+fn metric_depth(map: &DepthMap, calibration: &Calibration) -> Option<DepthMap> {
+    let Calibration { focal, offset, baseline, .. } = calibration;
+    let of = |d: &f32| (focal * baseline / (f64::from(*d) + offset)) as f32;
+    DepthMap::new(map.size(), map.data().iter().map(of).collect(), 1.0, Measure::Depth).ok()
+}
+
+/// What the numbers in the file of `--depth` are, if one is written.
+pub(super) fn unit_of_depths(scene: &Scene, written: bool) -> Option<String> {
+    let text = match (&scene.kind, &scene.calibration) {
+        (_, Some(Calibration { focal, baseline, .. })) => {
+            format!("in millimetres, from focal length {focal} px and baseline {baseline} mm")
+        }
+        (Kind::Rectified { .. }, None) => "as disparities in pixels for a baseline of one".into(),
+        (Kind::Calibrated { .. }, _) => "in the unit of the cameras".into(),
+        (Kind::Uncalibrated { .. }, _) => "as an order without a unit: larger is farther".into(),
+    };
+    written.then_some(text)
 }

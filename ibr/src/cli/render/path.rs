@@ -3,8 +3,7 @@
 use super::Summary;
 use crate::cli::arguments::RenderArguments;
 use crate::cli::failure::{Failure, failed};
-use crate::cli::output;
-use crate::cli::outputs::{self, Outputs, Part};
+use crate::cli::output::{self, Outputs, Part};
 use crate::files::refuse_pixels_without_memory;
 use crate::image::{FrameRate, Image, Levels, y4m};
 use hybank::files::AtomicFile;
@@ -34,7 +33,7 @@ pub(super) fn report(
 
 /// Whether so many views go into one film.
 pub(super) fn is_film(path: &Path, frames: usize) -> bool {
-    outputs::is_film(path) || frames > 1 && is_dash(path)
+    output::is_film(path) || frames > 1 && is_dash(path)
 }
 
 /// The files of every view, without the film.
