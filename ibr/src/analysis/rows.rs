@@ -5,9 +5,11 @@ use super::estimate::{Examined, Predicted, Study};
 use super::jitter::depth_jitter;
 use super::regressors::{regressors, slopes};
 use crate::depth::Measure;
+use crate::image::Image;
 use crate::interpolate::rows::{self, ORDER, RowWork};
 use crate::interpolate::{Cover, InterpolationError, Settings};
-use crate::pipeline::rectified::{self, Strip};
+use crate::occlusion::DepthTest;
+use crate::pipeline::rectified::{self, Job, Strip};
 use crate::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights};
 use crate::propagate::{Frame, RectifiedView, RigCamera};
 use hybank::sampling::SamplingError;
@@ -109,34 +111,21 @@ fn collect(
     let view_weights = view_weights.with_gains(&rendering.agreement.gains);
     let (camera, (width, height)) = (RigCamera::new(views, position), rendering.image.size());
     let frame = Frame::whole(width, height, rows::MARGIN, settings.offset);
-    let rows = rectified::Job { views, camera, view_weights, frame, settings, watch: &|_| () };
-    let job = Job { rows, rendering };
+    let rows = Job { views, camera, view_weights, frame, settings, watch: &|_| () };
     match rendering.image.channels() {
-        3 => collect_with::<3>(&job),
-        _ => collect_with::<1>(&job),
+        3 => collect_with::<3>(&rows, &rendering.image),
+        _ => collect_with::<1>(&rows, &rendering.image),
     }
 }
 
-/// What all rows share.
-struct Job<'a> {
-    rows: rectified::Job<'a>,
-    rendering: &'a Rendering,
-}
-
-impl Job<'_> {
-    fn distance(&self, view: u16) -> f64 {
-        (self.rows.views[usize::from(view)].camera - self.rows.camera.position).abs()
-    }
-}
-
-fn collect_with<const C: usize>(job: &Job<'_>) -> Result<Vec<Evidence>, RenderError> {
-    let (width, height) = job.rendering.image.size();
+fn collect_with<const C: usize>(job: &Job<'_>, image: &Image) -> Result<Vec<Evidence>, RenderError> {
+    let (width, height) = image.size();
     let mut evidence = vec![Evidence::default(); width * height];
     evidence.par_chunks_mut(width).enumerate().try_for_each_init(
         || RowEvidence::<C>::new(job),
         |work, (y, evidence)| {
             if work.row(job, y, evidence)? {
-                work.edges(job, y, evidence);
+                work.edges(job.settings.depth_test(), image.row(y), evidence);
             }
             Ok::<(), RenderError>(())
         },
@@ -161,9 +150,9 @@ struct RowEvidence<const C: usize> {
 
 impl<const C: usize> RowEvidence<C> {
     fn new(job: &Job<'_>) -> Self {
-        let width = job.rows.frame.width;
+        let width = job.frame.width;
         Self {
-            strip: Strip::new(&job.rows),
+            strip: Strip::new(job),
             fit: RowWork::new(width),
             again: RowWork::new(width),
             response: Response::default(),
@@ -176,8 +165,8 @@ impl<const C: usize> RowEvidence<C> {
     /// The evidence of one row; false if it has no samples.
     fn row(&mut self, job: &Job<'_>, y: usize, evidence: &mut [Evidence]) -> Result<bool, RenderError> {
         let failed = |source| RenderError::from(InterpolationError::Fit { row: y, source });
-        let settings = &job.rows.settings.interpolation;
-        self.strip.survivors_of_row(&job.rows, y);
+        let settings = &job.settings.interpolation;
+        self.strip.survivors_of_row(job, y);
         let fitted = self.fit.interpolate(&self.strip.samples, settings, &mut self.values, &mut self.mask);
         if !fitted.map_err(failed)? {
             return Ok(false);
@@ -206,7 +195,7 @@ impl<const C: usize> RowEvidence<C> {
     fn pixel(&mut self, job: &Job<'_>, x: f64) -> Evidence {
         self.fit.respond(x, &mut self.response);
         self.of_views.clear();
-        self.of_views.resize(job.rows.views.len(), 0.0);
+        self.of_views.resize(job.views.len(), 0.0);
         let mut e = Evidence::default();
         let from = self.strip.samples.partition_point(|s| s.x < x - INFLUENCE);
         for s in self.strip.samples[from..].iter().take_while(|s| s.x <= x + INFLUENCE) {
@@ -215,7 +204,7 @@ impl<const C: usize> RowEvidence<C> {
             self.of_views[usize::from(s.view)] += h;
         }
         for (view, influence) in self.of_views.iter().enumerate() {
-            let (g2, distance) = (influence.powi(2), job.distance(view as u16));
+            let (g2, distance) = (influence.powi(2), job.views[view].camera - job.camera.position);
             e.views += g2 as f32;
             e.disparity_gain += (g2 * distance * distance) as f32;
         }
@@ -223,10 +212,9 @@ impl<const C: usize> RowEvidence<C> {
     }
 
     /// The height of every jump of depth between neighbouring samples, on the pixels within 1.5 of it.
-    fn edges(&self, job: &Job<'_>, y: usize, evidence: &mut [Evidence]) {
-        let row = job.rendering.image.row(y).chunks_exact(C).collect::<Vec<_>>();
+    fn edges(&self, test: &DepthTest, row: &[f32], evidence: &mut [Evidence]) {
+        let row = row.chunks_exact(C).collect::<Vec<_>>();
         let value = |x: f64| row[(x.round().max(0.0) as usize).min(row.len() - 1)];
-        let test = job.rows.settings.depth_test();
         for pair in self.strip.samples.windows(2) {
             let (near, far) = (pair[0].depth.min(pair[1].depth), pair[0].depth.max(pair[1].depth));
             if !test.hides(f64::from(near), f64::from(far)) {

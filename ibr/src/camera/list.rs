@@ -26,9 +26,7 @@ pub struct Frame {
     pub image: PathBuf,
     /// Its depth map, if the list has one.
     pub depth: Option<PathBuf>,
-    /// Its number in the list, from 1.
-    pub(super) number: usize,
-    /// The number by which a COLMAP model calls it.
+    /// Its number in the list, from 1; the one by which a COLMAP model calls it.
     pub(crate) id: u64,
     /// World to camera, with x to the right, y down and z forwards.
     pub(super) pose: Matrix3x4<f64>,
@@ -129,7 +127,7 @@ impl CameraList {
 
     /// A frame that has no depth.
     pub fn without_depth(&self, frame: &Frame) -> InputError {
-        let at = format!(": frame {} (\"{}\")", frame.number, Quoted(&frame.image));
+        let at = format!(": frame {} (\"{}\")", frame.id, Quoted(&frame.image));
         let reason = "it has no `depth_file_path`, and views are rendered from images with depth; give the scene \
                       [[view]] tables with `image` and `depth`";
         InputError::content(&self.path, at, reason)

@@ -68,22 +68,14 @@ pub fn parse_transforms(text: &str, path: &Path) -> Result<CameraList, InputErro
     if file.frames.is_empty() {
         return Err(json("`frames` is empty: there is no image".into()));
     }
-    let one = |(index, spec): (usize, FrameSpec)| {
-        let number = index + 1;
-        let at = || format!(": frame {number} (\"{}\")", Quoted(&spec.file_path));
+    let one = |(id, spec): (u64, FrameSpec)| {
+        let at = || format!(": frame {id} (\"{}\")", Quoted(&spec.file_path));
         let fault = |reason: String| InputError::content(path, at(), reason);
         let inner = spec.inner.or(&file.inner).checked().map_err(fault)?;
         let pose = world_to_camera(&spec.transform_matrix).map_err(fault)?;
-        Ok(Frame {
-            image: image_path(&spec.file_path),
-            depth: spec.depth_file_path,
-            number,
-            id: number as u64,
-            pose,
-            inner,
-        })
+        Ok(Frame { image: image_path(&spec.file_path), depth: spec.depth_file_path, id, pose, inner })
     };
-    let frames = file.frames.into_iter().enumerate().map(one).collect::<Result<_, InputError>>()?;
+    let frames = (1..).zip(file.frames).map(one).collect::<Result<_, InputError>>()?;
     Ok(CameraList::new(path.into(), frames))
 }
 
@@ -120,23 +112,26 @@ fn world_to_camera(rows: &[[f64; 4]]) -> Result<Matrix3x4<f64>, String> {
 impl Inner {
     /// The parameters of the frame, and those of the file where it has none.
     fn or(self, file: &Self) -> Self {
-        Self {
-            camera_angle_x: self.camera_angle_x.or(file.camera_angle_x),
-            camera_angle_y: self.camera_angle_y.or(file.camera_angle_y),
-            fl_x: self.fl_x.or(file.fl_x),
-            fl_y: self.fl_y.or(file.fl_y),
-            cx: self.cx.or(file.cx),
-            cy: self.cy.or(file.cy),
-            w: self.w.or(file.w),
-            h: self.h.or(file.h),
-            k1: self.k1.or(file.k1),
-            k2: self.k2.or(file.k2),
-            k3: self.k3.or(file.k3),
-            k4: self.k4.or(file.k4),
-            p1: self.p1.or(file.p1),
-            p2: self.p2.or(file.p2),
-            is_fisheye: self.is_fisheye.or(file.is_fisheye),
+        macro_rules! first_of {
+            ($($key:ident),*) => { Self { $($key: self.$key.or(file.$key)),* } };
         }
+        first_of!(
+            camera_angle_x,
+            camera_angle_y,
+            fl_x,
+            fl_y,
+            cx,
+            cy,
+            w,
+            h,
+            k1,
+            k2,
+            k3,
+            k4,
+            p1,
+            p2,
+            is_fisheye
+        )
     }
 
     fn checked(self) -> Result<Self, String> {

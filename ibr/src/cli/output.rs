@@ -1,7 +1,7 @@
 //! Results: the files that a command writes, which are not overwritten by accident, and standard output.
 
 use super::arguments::SceneArguments;
-use super::failure::{Failure, PROGRAM, failed};
+use super::failure::{Failure, PROGRAM, failed, usage};
 use super::source::Source;
 use crate::image::{self, Image, Levels};
 use hybank::files::{AtomicFile, FileError, check_output, commit_all};
@@ -111,6 +111,9 @@ pub(super) enum Part {
     Map,
 }
 
+/// Endings of films of formats that only encoders write.
+const PACKED_FILMS: [&str; 10] = ["mp4", "m4v", "mov", "mkv", "webm", "avi", "mpg", "mpeg", "ogv", "wmv"];
+
 impl Part {
     fn option(self) -> &'static str {
         match self {
@@ -129,7 +132,14 @@ impl Part {
             Self::Depth => &["pfm"],
             Self::Count => &["png", "pfm"],
             Self::View if is_film(path) => return Ok(()),
-            Self::View if is_packed_film(path) => return Err(packed_film(path)),
+            Self::View if PACKED_FILMS.iter().any(|ending| ends_with(path, ending)) => {
+                let (shown, film) = (Quoted(path), path.with_extension("y4m"));
+                return usage(format!(
+                    "-o {shown}: films are written uncompressed, as .y4m; write `-o {}`, or give an encoder the \
+                     frames: `-o - | ffmpeg -i - {shown}`",
+                    Quoted(&film)
+                ));
+            }
             Self::View => return refuse_format(path, levels),
             Self::Mask | Self::Error | Self::Map => return refuse_format(path, Levels::Eight),
         };
@@ -139,7 +149,7 @@ impl Part {
         let (option, path) = (self.option(), Quoted(path));
         let name = option.trim_start_matches('-');
         let endings: Vec<String> = allowed.iter().map(|ending| format!(".{ending}")).collect();
-        Err(Failure::Usage(format!("{option} {path}: {name} is written as {}", endings.join(" or "))))
+        usage(format!("{option} {path}: {name} is written as {}", endings.join(" or ")))
     }
 }
 
@@ -151,21 +161,6 @@ pub(super) fn ends_with(path: &Path, ending: &str) -> bool {
 /// Whether a path is a film of several views.
 pub(super) fn is_film(path: &Path) -> bool {
     ends_with(path, "y4m")
-}
-
-/// Whether a path is a film of a format that only encoders write.
-fn is_packed_film(path: &Path) -> bool {
-    let packed = ["mp4", "m4v", "mov", "mkv", "webm", "avi", "mpg", "mpeg", "ogv", "wmv"];
-    packed.iter().any(|ending| ends_with(path, ending))
-}
-
-fn packed_film(path: &Path) -> Failure {
-    let (shown, film) = (Quoted(path), path.with_extension("y4m"));
-    Failure::Usage(format!(
-        "-o {shown}: films are written uncompressed, as .y4m; write `-o {}`, or give an encoder the frames: \
-         `-o - | ffmpeg -i - {shown}`",
-        Quoted(&film)
-    ))
 }
 
 /// The files of one virtual view.
@@ -203,15 +198,13 @@ impl Outputs {
             let (option, shown) = (part.option(), Quoted(path));
             let name = option.trim_start_matches('-');
             if *part != Part::View && is_dash(path) {
-                return Err(Failure::Usage(format!(
-                    "{option} -: the {name} cannot go to standard output; give it a file"
-                )));
+                return usage(format!("{option} -: the {name} cannot go to standard output; give it a file"));
             }
             if k > 0 && *path == self.parts[0].1 {
                 let first = self.parts[0].0.option();
-                return Err(Failure::Usage(format!(
+                return usage(format!(
                     "{first} and {option} both name {shown}; give the {name} a file of its own"
-                )));
+                ));
             }
         }
         self.parts.iter().try_for_each(|(part, path)| part.check(path, levels))

@@ -5,7 +5,7 @@ mod outputs;
 mod path;
 
 use super::arguments::RenderArguments;
-use super::failure::{Failure, PROGRAM, failed, of_view};
+use super::failure::{Failure, PROGRAM, failed, of_view, usage};
 use super::output::{self, Outputs, check_files};
 use super::progress::Progress;
 use super::summary::Summary;
@@ -86,12 +86,10 @@ fn timed(
 /// Checks that need no file.
 fn check(arguments: &RenderArguments) -> Result<(), Failure> {
     if is_dash(&arguments.output) && arguments.scene.json {
-        return Err(Failure::Usage(
-            "-o - and --json both want standard output; give the image a file".into(),
-        ));
+        return usage("-o - and --json both want standard output; give the image a file");
     }
     if arguments.nearest == Some(0) {
-        return Err(Failure::Usage("--nearest 0: at least one view must be used".into()));
+        return usage("--nearest 0: at least one view must be used");
     }
     arguments.scene.check()?;
     arguments.check_outputs()
@@ -113,7 +111,7 @@ fn check_kind(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure> {
     ];
     match unused.iter().find(|(.., is_unused)| *is_unused) {
         Some((option, needs, _)) => {
-            Err(Failure::Usage(format!("{option}: it is for {needs}; leave it out of this rendering")))
+            usage(format!("{option}: it is for {needs}; leave it out of this rendering"))
         }
         None => Ok(()),
     }
@@ -123,10 +121,10 @@ fn check_kind(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure> {
 fn check_nearest(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure> {
     let Some(count) = arguments.nearest else { return Ok(()) };
     if let Kind::Uncalibrated { .. } = kind {
-        return Err(Failure::Usage(format!(
+        return usage(format!(
             "--nearest {count}: the cameras of this scene are unknown, so no view is known to be nearer; name \
              fewer views in the scene instead"
-        )));
+        ));
     }
     let views = kind.images().len();
     if count > views {

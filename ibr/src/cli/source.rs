@@ -1,7 +1,7 @@
 //! The scene of a command: its file, what was typed with it, and the photograph to compare with.
 
 use super::arguments::SceneArguments;
-use super::failure::{Failure, PROGRAM, failed};
+use super::failure::{Failure, PROGRAM, failed, usage};
 use super::inputs;
 use crate::files;
 use crate::image::{Image, read_image};
@@ -22,7 +22,7 @@ impl SceneArguments {
     /// Checks that need no file.
     pub(super) fn check(&self) -> Result<(), Failure> {
         match self.depth_step {
-            0 => Err(Failure::Usage("--depth-step 0: the step must be at least 1".into())),
+            0 => usage("--depth-step 0: the step must be at least 1"),
             _ => Ok(()),
         }
     }
@@ -66,11 +66,10 @@ impl SceneArguments {
                 "{}: errors are predicted for views with depth; the cameras of this scene are unknown",
                 Quoted(&self.file)
             ))),
-            kind if kind.frames() > 1 && self.truth.is_some() => Err(Failure::Usage(
+            kind if kind.frames() > 1 && self.truth.is_some() => usage(
                 "--truth: there is one photograph, but the scene has several virtual views; give it with --view \
-                 NAME, which predicts the place of one view"
-                    .into(),
-            )),
+                 NAME, which predicts the place of one view",
+            ),
             _ => Ok(()),
         }
     }

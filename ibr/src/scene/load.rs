@@ -102,16 +102,17 @@ impl Loader<'_> {
     fn load(&self) -> Loaded<Scene> {
         self.different_names()?;
         let left_out = self.left_out()?;
-        let index = left_out.as_ref().and_then(LeftOut::index);
-        let views: Vec<&ViewSpec> =
-            self.spec.view.iter().enumerate().filter(|(i, _)| Some(*i) != index).map(|(_, v)| v).collect();
+        let mut views: Vec<&ViewSpec> = self.spec.view.iter().collect();
+        let own = match left_out {
+            Some(LeftOut::View(index)) => Some((index, views.remove(index))),
+            _ => None,
+        };
         if views.is_empty() {
             return Err(self.incomplete("there is no view to render from; add [[view]] tables"));
         }
         let goals = self.goals()?;
-        let own = index.map(|i| &self.spec.view[i]);
         let Inputs { mut kind, calibration, mut notes } = if views.iter().any(|v| v.position.is_some()) {
-            self.rectified(&views, own, &goals)?
+            self.rectified(&views, own.map(|(_, view)| view), &goals)?
         } else if views.iter().any(|v| v.camera.is_some() || self.source_of(v).is_some()) {
             self.calibrated(&views, left_out.as_ref(), &goals)?
         } else {

@@ -10,7 +10,7 @@ pub(crate) use points::{ScenePoint, read_points};
 use super::list::{CameraList, Frame, Inner};
 use crate::files::{self, CHECK_THE_PATH, InputError};
 use hybank::messages::{Number, Quoted};
-use nalgebra::{Matrix3x4, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3x4, Quaternion, UnitQuaternion};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -96,11 +96,11 @@ fn join(
     let cameras = cameras.map_err(|e| fault("cameras", e))?;
     let images = images.map_err(|e| fault("images", e))?;
     let mut frames = BTreeMap::new();
-    for (number, Pose { at, id, camera, pose, name }) in (1..).zip(images) {
+    for Pose { at, id, camera, pose, name } in images {
         let unlisted =
             || format!("image \"{}\" has camera {camera}, which the cameras do not list", Quoted(&name));
         let inner = *cameras.get(&camera).ok_or_else(|| fault("images", (at, unlisted())))?;
-        frames.insert(name.clone(), Frame { image: name.into(), depth: None, number, id, pose, inner });
+        frames.insert(name.clone(), Frame { image: name.into(), depth: None, id, pose, inner });
     }
     Ok(CameraList::new(path("images"), frames.into_values().collect()))
 }
@@ -227,17 +227,15 @@ fn pose([w, x, y, z, t @ ..]: [f64; 7]) -> Result<Matrix3x4<f64>, String> {
     if q.norm() < 1e-9 {
         return Err("the rotation quaternion is 0".into());
     }
-    let mut pose = Matrix3x4::zeros();
-    let rotation = UnitQuaternion::from_quaternion(q).to_rotation_matrix();
-    pose.fixed_columns_mut::<3>(0).copy_from(rotation.matrix());
-    pose.set_column(3, &Vector3::from(t));
-    Ok(pose)
+    let pose = Isometry3::from_parts(t.into(), UnitQuaternion::from_quaternion(q));
+    Ok(pose.to_matrix().fixed_rows::<3>(0).into_owned())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::camera::Lens;
+    use nalgebra::Vector3;
 
     fn folder(cameras: &str, images: &str) -> tempfile::TempDir {
         let dir = tempfile::tempdir().unwrap();

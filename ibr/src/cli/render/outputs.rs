@@ -3,7 +3,7 @@
 use crate::analysis::difference;
 use crate::camera::middlebury::Calibration;
 use crate::cli::arguments::RenderArguments;
-use crate::cli::failure::{Failure, failed};
+use crate::cli::failure::{Failure, failed, usage};
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded, Outputs, Part, ends_with, is_film};
 use crate::depth::{DepthMap, FAR, Measure};
@@ -33,10 +33,10 @@ impl RenderArguments {
         let view = &self.output;
         if self.alpha && !(is_dash(view) || ends_with(view, "png")) {
             let view = Quoted(view);
-            return Err(Failure::Usage(format!("--alpha: {view} has no alpha channel; write a .png")));
+            return usage(format!("--alpha: {view} has no alpha channel; write a .png"));
         }
         if is_film(view) && self.bits == Levels::Sixteen {
-            return Err(Failure::Usage("--bits 16: a film has 8 bits per value".into()));
+            return usage("--bits 16: a film has 8 bits per value");
         }
         self.outputs().check(self.bits)
     }
