@@ -24,11 +24,10 @@ const ROW_SAMPLE: f64 = 67.0;
 /// Bytes of a place in a band beside its sample: positions, depths, weights, cells.
 const PLACE: f64 = 45.0;
 /// Bytes per pixel of a prediction: of the evidence of a row fit, of the regressors with slopes, distances
-/// and jitter, of the search for local limits, and of the errors that are its result.
+/// and jitter, and of the search for local limits.
 const ROW_EVIDENCE: f64 = 24.0;
 const REGRESSORS: f64 = 76.0;
 const LIMITS: f64 = 52.0;
-const ERRORS: f64 = 16.0;
 
 /// The sizes on which the memory depends.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,27 +111,20 @@ impl Extent {
     /// Bytes of the prediction of a view of a rectified rig, with what is known of views before it.
     pub fn of_rig_prediction(&self) -> f64 {
         let strips = 2.0 * rayon::current_num_threads().min(self.size.1) as f64 * self.strip();
-        let found = (ROW_EVIDENCE + REGRESSORS) * self.virtual_pixels();
-        BASE + self.predicted() + self.rendering() + found + strips
+        BASE + self.predicted(ROW_EVIDENCE * self.virtual_pixels() + strips)
     }
 
     /// Bytes of the prediction of a view of general cameras, with what is known of views before it.
     pub fn of_camera_prediction(&self, settings: &RenderSettings) -> f64 {
-        let pixels = self.virtual_pixels();
-        let equalised = 4.0 * self.channels as f64 * self.pixels as f64;
-        let limited = equalised + (REGRESSORS + LIMITS) * pixels;
-        let another = self.size.0 * self.size.1;
-        let (all, samples) = (self.pixels + another, self.samples + another);
-        let with_another = Self { views: self.views + 1, pixels: all, samples, ..*self };
-        let imagined = self.predicted() + with_another.of_cameras(settings).max(REGRESSORS * pixels);
-        self.rendering() + limited.max(imagined)
+        self.predicted(self.of_cameras(settings))
     }
 
-    /// Photographs with one exposure and maps with errors, a view that is predicted, and another one that is
-    /// imagined.
-    fn predicted(&self) -> f64 {
-        let view = 4.0 * self.channels as f64 + 5.0;
-        view * self.pixels as f64 + self.rendering() + (view + ERRORS) * self.virtual_pixels()
+    /// Photographs with one exposure and the rendered view, and the larger of two: maps with errors and what
+    /// `rendering` from these takes, or what the errors are computed from.
+    fn predicted(&self, rendering: f64) -> f64 {
+        let equalised = 4.0 * self.channels as f64 * self.pixels as f64;
+        let judged = (REGRESSORS + LIMITS) * self.virtual_pixels();
+        equalised + self.rendering() + judged.max(5.0 * self.pixels as f64 + rendering)
     }
 
     /// The plane fit, with other memory while samples are added.

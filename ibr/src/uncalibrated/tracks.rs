@@ -1,7 +1,7 @@
 //! Tracks: image positions of scene points, one line per point, one pair "x y" per view, "-" where not seen.
 
 use super::Point;
-use crate::files::{self, CHECK_THE_PATH, InputError, Location};
+use crate::files::{self, CHECK_THE_PATH, InputError};
 use hybank::messages::Quoted;
 use std::path::Path;
 
@@ -20,7 +20,7 @@ impl Tracks {
     /// # Errors
     /// [`InputError`], with file and line.
     pub fn read(path: &Path) -> Result<Self, InputError> {
-        Self::parse(&files::read_text(path, CHECK_THE_PATH, room)?, path)
+        Self::parse(&files::read_text(path, CHECK_THE_PATH)?, path)
     }
 
     /// The same from text; `path` appears in messages.
@@ -30,7 +30,7 @@ impl Tracks {
     pub fn parse(text: &str, path: &Path) -> Result<Self, InputError> {
         let mut tracks = Self { rows: Vec::new() };
         for (i, line) in text.lines().enumerate() {
-            let fault = |reason| InputError::content(path, Location::Line(i + 1), reason);
+            let fault = |reason| InputError::content(path, format!(":{}", i + 1), reason);
             let row = columns(line.split('#').next().unwrap_or("")).map_err(fault)?;
             if row.is_empty() {
                 continue;
@@ -57,13 +57,7 @@ impl Tracks {
     }
 }
 
-/// Bytes that the tracks of a text take while they are read.
-fn room(text: &str) -> f64 {
-    const WORD: f64 = 50.0;
-    const LINE: f64 = 100.0;
-    WORD * text.split_whitespace().count() as f64 + LINE * text.lines().count() as f64
-}
-
+/// The columns of a line.
 fn columns(line: &str) -> Result<Vec<Option<Point>>, String> {
     let mut words = line.split_whitespace();
     let mut row = Vec::new();
