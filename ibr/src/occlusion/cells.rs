@@ -181,7 +181,8 @@ impl Cells {
             let mut far = f32::NEG_INFINITY;
             self.each_cell(run, |cell| far = largest(far, self.far[cell]));
             if hides(run.near, far) {
-                (k * RUN..(k + 1) * RUN).filter(|i| hides(points.depth[*i], far)).for_each(&mut with);
+                let may_hide = |i: &usize| !points.guessed[*i] && hides(points.depth[*i], far);
+                (k * RUN..(k + 1) * RUN).filter(may_hide).for_each(&mut with);
             }
         }
     }

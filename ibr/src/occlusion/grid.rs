@@ -250,7 +250,8 @@ pub(crate) mod tests {
                 .iter()
                 .map(|(x, y, d, spacing)| {
                     let depth = if coarse { d.round() } else { *d };
-                    Sample { spacing: if wide { *spacing } else { 1.0 }, ..sample(position(*x), position(*y), depth) }
+                    let (spacing, guessed) = (if wide { *spacing } else { 1.0 }, *spacing > 9.0);
+                    Sample { spacing, guessed, ..sample(position(*x), position(*y), depth) }
                 })
                 .collect();
             check(&samples, &DepthTest { epsilon: position(epsilon).max(0.5), relative, absolute: 0.1, parallax });

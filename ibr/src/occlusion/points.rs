@@ -17,6 +17,8 @@ pub(crate) struct Points {
     pub(crate) spacing: Vec<f32>,
     /// Whether the depth test decides on the sample. The others may hide it and are not looked at.
     pub(crate) own: Vec<bool>,
+    /// Whether the depth is a guess, by which the sample hides no other.
+    pub(crate) guessed: Vec<bool>,
 }
 
 impl Points {
@@ -32,7 +34,8 @@ impl Points {
         self.x.extend(samples.clone().map(|s| s.x));
         self.y.extend(samples.clone().map(|s| s.y));
         self.depth.extend(samples.clone().map(|s| s.depth));
-        self.spacing.extend(samples.map(|s| s.spacing));
+        self.spacing.extend(samples.clone().map(|s| s.spacing));
+        self.guessed.extend(samples.map(|s| s.guessed));
         self.own.resize(self.x.len(), true);
         self.resize(self.x.len().next_multiple_of(RUN));
     }
@@ -48,5 +51,6 @@ impl Points {
         self.depth.resize(count, f32::NAN);
         self.spacing.resize(count, f32::NAN);
         self.own.resize(count, false);
+        self.guessed.resize(count, false);
     }
 }

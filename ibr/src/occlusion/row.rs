@@ -185,6 +185,7 @@ mod tests {
                 .enumerate()
                 .map(|(i, (x, d, spacing))| Sample {
                     spacing: if wide { *spacing } else { 1.0 },
+                    guessed: *spacing > 9.0,
                     ..sample(position(*x), depth(*d), i as u32)
                 })
                 .collect();

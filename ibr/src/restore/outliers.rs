@@ -1,8 +1,8 @@
 //! Values of a map that contradict those around them, where the other views do not outvote these.
 //!
-//! A single wrong value disagrees with its neighbours. One in a cluster agrees with some of them, and
-//! disagrees with what lies farther away, as a value on a thin thing does. It is rejected if no other view
-//! confirms it and one confirms what lies around it.
+//! A single wrong value disagrees with its neighbours, and one that is mixed of two surfaces lies between
+//! them. One in a cluster agrees with some of them, and disagrees with what lies farther away, as a value on
+//! a thin thing does. It is rejected if no other view confirms it and one confirms what lies around it.
 
 use crate::depth::{DepthMap, JUMP, Measure};
 use crate::image::Image;
@@ -19,6 +19,13 @@ const SUPPORTERS: usize = 2;
 /// Neighbours, of eight on a ring, that a value has beyond a cluster of outliers at least: a corner has
 /// three.
 const RING_SUPPORTERS: usize = 3;
+
+/// Largest distance in pixels to the sides of an edge: maps that were reduced or filtered mix the depths of
+/// pixels that near.
+const MIXED: isize = 3;
+
+/// Step of a side of an edge, as a share of the edge, from which on it is no side but part of a slope.
+const FLAT: f32 = 1.0 / 16.0;
 
 /// Radius of the ring in pixels: a cluster may be as large.
 const RING: usize = 8;
@@ -125,6 +132,34 @@ impl Parallax {
         self.ring(pixel, distance).filter(|q| self.agree(here, self.values[*q])).take(least).count() == least
     }
 
+    /// Whether a pixel lies between the sides of an edge: a nearer surface begins on one side and a farther
+    /// one on the opposite side. A slanted surface goes on as steeply on both sides.
+    fn is_between(&self, pixel: usize) -> bool {
+        let here = self.values[pixel];
+        let side = |value: f32| match self.agree(here, value) {
+            true => 0,
+            false => i32::from(value > here) - i32::from(value < here),
+        };
+        let parts = |[dx, dy]: [isize; 2], distance: isize| {
+            let at = |steps: isize| self.beside(pixel, [steps * dx, steps * dy]);
+            let [Some(before), Some(begins)] = [at(-distance), at(distance)] else { return false };
+            let [Some(farther), Some(goes_on)] = [at(-distance - 1), at(distance + 1)] else { return false };
+            let flat = FLAT * (begins - before).abs();
+            side(before) * side(begins) < 0
+                && (farther - before).abs() <= flat
+                && (goes_on - begins).abs() <= flat
+        };
+        let directions = [[1, 0], [0, 1], [1, 1], [1, -1]];
+        (1..=MIXED).any(|distance| directions.into_iter().any(|direction| parts(direction, distance)))
+    }
+
+    /// The known value so many columns and rows from a pixel.
+    fn beside(&self, pixel: usize, [dx, dy]: [isize; 2]) -> Option<f32> {
+        let x = (pixel % self.width).checked_add_signed(dx).filter(|x| *x < self.width)?;
+        let y = (pixel / self.width).checked_add_signed(dy).filter(|y| *y < self.height)?;
+        Some(self.values[y * self.width + x]).filter(|value| !value.is_nan())
+    }
+
     /// The pixel at a position whose surface has this parallax.
     pub(super) fn showing(&self, at: [f64; 2], there: f32) -> Option<usize> {
         self.pixels_at(at).find(|q| self.agree(there, self.values[*q]))
@@ -204,8 +239,9 @@ impl<'a, P: Viewpoint> Known<'a, P> {
         Self { views, planes, voters: voters(&agreement.groups()), agreement }
     }
 
-    /// Which values of a view are outliers: few neighbours agree with them, and not more of the other views
-    /// confirm them than see through them; or they lie in a cluster of outliers.
+    /// Which values of a view are outliers: few neighbours agree with them, or they lie between the sides of
+    /// an edge, and not more of the other views confirm them than see through them; or they lie in a cluster
+    /// of outliers.
     pub(super) fn rejected(&self, index: usize) -> Vec<bool> {
         let (map, plane, votes) = (self.views[index].map, &self.planes[index], self.ballot(index));
         let is_outlier = |p: usize| {
@@ -213,7 +249,7 @@ impl<'a, P: Viewpoint> Known<'a, P> {
             if value.is_nan() || map.is_guessed(p) {
                 return false;
             }
-            match plane.is_supported(p, 1, SUPPORTERS) {
+            match plane.is_supported(p, 1, SUPPORTERS) && !plane.is_between(p) {
                 true => self.is_in_cluster(index, p, RING, &votes),
                 false => votes(p, value).into_iter().map(Vote::count).sum::<i32>() <= 0,
             }

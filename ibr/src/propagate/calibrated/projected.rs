@@ -14,7 +14,6 @@ pub(crate) struct Projected {
     points: Points,
     weights: Vec<f32>,
     doubtful: Vec<bool>,
-    guessed: Vec<bool>,
     tiles: Vec<ProjectedTile>,
 }
 
@@ -66,7 +65,7 @@ impl Projected {
         points.spacing.extend_from_slice(&spacings[..count]);
         self.weights.extend_from_slice(&weights[..count]);
         self.doubtful.extend_from_slice(&doubtful[..count]);
-        self.guessed.extend_from_slice(&guessed[..count]);
+        points.guessed.extend_from_slice(&guessed[..count]);
     }
 
     pub(crate) fn points(&self) -> &Points {
@@ -82,7 +81,7 @@ impl Projected {
     }
 
     pub(crate) fn samples<const C: usize>(&self, views: &[CalibratedView<'_>]) -> Vec<Sample<C>> {
-        let Self { points, weights, doubtful, guessed, tiles } = self;
+        let Self { points, weights, doubtful, tiles } = self;
         let mut samples = Vec::with_capacity(self.count());
         let ends = tiles.iter().skip(1).map(|next| next.first_place).chain([points.len()]);
         for (tile, end) in tiles.iter().zip(ends) {
@@ -99,7 +98,7 @@ impl Projected {
                     pixel,
                     view: tile.view,
                     doubtful: doubtful[i],
-                    guessed: guessed[i],
+                    guessed: points.guessed[i],
                 }
             };
             samples.extend((tile.first_place..end).filter(|i| points.own[*i]).map(sample));
