@@ -10,8 +10,8 @@ use rayon::prelude::*;
 /// Below this mean value a pixel has no colour to take.
 const DARK: f32 = 4.0;
 
-/// Bytes per pixel of all views: the three values of a photograph that was grey; the parallaxes of another one
-/// are fewer.
+/// Bytes per pixel of all views: the three values of a photograph that was grey; the parallaxes of another
+/// one are fewer.
 const BYTES: f64 = 12.0;
 
 /// The grey photographs of views in colour, `None` for coloured ones and where all are grey. A pixel has the

@@ -257,8 +257,8 @@ impl<'a, P: Viewpoint> Known<'a, P> {
         (0..plane.values.len()).into_par_iter().with_min_len(1024).map(is_outlier).collect()
     }
 
-    /// Whether few values on the ring around a pixel agree with its own, no other view confirms that, and one
-    /// shows a surface there at the median of the ring.
+    /// Whether few values on the ring around a pixel agree with its own, no other view confirms that, and
+    /// one shows a surface there at the median of the ring.
     pub(super) fn is_in_cluster(
         &self,
         index: usize,

@@ -11,9 +11,9 @@
 //! through infinity.
 //!
 //! The sign of [`order_sign`] holds in every frame, and so does the position to which a pixel with given chi
-//! propagates. Only a camera centre on the plane t = 0 (det M = 0) has no order of depth and is refused. That
-//! of the canonical pair is the best fit to the matches, so it lies within the scene, far from the cameras,
-//! and a share of the range of chi is a depth threshold.
+//! propagates. Only a camera centre on the plane t = 0 (det M = 0) has no order of depth and is refused.
+//! That plane of the canonical pair is the best fit to the matches, so it lies within the scene, far from
+//! the cameras, and a share of the range of chi is a depth threshold.
 
 use nalgebra::{Matrix3, Matrix3x4, Vector4};
 

@@ -4,7 +4,7 @@
 
 use super::normalise::Normalisation;
 use super::random::consensus;
-use super::{GeometryError, Match, homogeneous};
+use super::{EPIPOLAR, GeometryError, Match, homogeneous};
 use hybank_linalg::small;
 use nalgebra::Matrix3;
 
@@ -73,9 +73,6 @@ fn inliers(f: &Matrix3<f64>, matches: &[Match]) -> Vec<usize> {
 fn chosen(matches: &[Match], indices: &[usize]) -> Vec<Match> {
     indices.iter().map(|i| matches[*i]).collect()
 }
-
-/// Sampson distance below which a match is an inlier of F, in pixels.
-pub(super) const EPIPOLAR: f64 = 1.0;
 
 /// F by RANSAC over samples of eight, refitted on the inliers until their set is stable; the same seed gives
 /// the same bits.

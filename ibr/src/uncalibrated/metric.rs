@@ -30,8 +30,8 @@ pub(super) fn calibration(focal: f64, (width, height): (usize, usize)) -> Matrix
     Matrix3::new(focal, 0.0, cx, 0.0, focal, cy, 0.0, 0.0, 1.0)
 }
 
-/// The second camera beside the first one, by E = K2^T F K1 = \[t\]_x R: of its two R and the signs of t those
-/// with which most points lie in front of both cameras.
+/// The second camera beside the first one, by E = K2^T F K1 = \[t\]_x R: of its two R and the signs of t
+/// those with which most points lie in front of both cameras.
 pub(super) struct Placed {
     r: Matrix3<f64>,
     t: Vector3<f64>,

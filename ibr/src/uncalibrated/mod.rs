@@ -24,6 +24,9 @@ pub mod triangulate;
 
 use crate::camera::CameraError;
 
+/// Sampson distance below which a match is an inlier of F, in pixels.
+const EPIPOLAR: f64 = 1.0;
+
 /// A position in an image, in pixels.
 pub type Point = nalgebra::Vector2<f64>;
 
@@ -53,7 +56,7 @@ pub enum GeometryError {
     /// All matches lie on one plane, or the camera only rotated.
     #[error(
         "the matches are planar: one homography explains {explained} of {matches} of them within {} px, so the fundamental matrix is not determined; add matches off the plane, or views with a baseline",
-        fundamental::EPIPOLAR
+        EPIPOLAR
     )]
     Planar {
         /// Matches that the homography explains.

@@ -90,8 +90,8 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         }
     }
 
-    /// Adds visible samples, all of whose numbers are finite. Samples more than half a pixel outside the image
-    /// are ignored; samples less far outside are moved to its border.
+    /// Adds visible samples, all of whose numbers are finite. Samples more than half a pixel outside the
+    /// image are ignored; samples less far outside are moved to its border.
     pub(crate) fn add(&mut self, samples: &[Sample<C>]) {
         let added = self.whole().add(samples);
         self.count_in(added);

@@ -6,8 +6,8 @@ use crate::occlusion::DepthTest;
 use hybank::sampling::Fit2;
 use hybank::sampling::fit2::{Convergence, Direction, Iteration, Springs};
 
-/// Fits the pixels that lie `inside`, with the springs of the surfaces that these depths show. Of the settings
-/// those of the springs and of the solver are used.
+/// Fits the pixels that lie `inside`, with the springs of the surfaces that these depths show. Of the
+/// settings those of the springs and of the solver are used.
 pub(super) fn solve<const ORDER: usize, const C: usize>(
     fit: Fit2<ORDER, C>,
     size: (usize, usize),

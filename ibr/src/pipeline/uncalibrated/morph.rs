@@ -39,8 +39,8 @@ const SIGMA_SHARE: f64 = 0.2;
 /// outlines, as in `tests/two_planes.rs`, a fifth is nearly as good as nothing.
 const HIDDEN_WEIGHT: f32 = 0.2;
 
-/// Renders the virtual view of `size` from the surfaces of that view and of each photograph. If `leaves`, pixels
-/// stay black that all photographs show hidden.
+/// Renders the virtual view of `size` from the surfaces of that view and of each photograph. If `leaves`,
+/// pixels stay black that all photographs show hidden.
 pub(super) fn render<const C: usize>(
     images: &[&Image],
     surface: &Surface,
