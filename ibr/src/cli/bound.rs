@@ -17,7 +17,7 @@ use std::path::Path;
 pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
     arguments.scene.check()?;
     let outputs = Outputs::of(&[(Part::Map, arguments.map.as_ref())]);
-    outputs.check(Levels::Eight)?;
+    outputs.check(Levels::Eight, arguments.force)?;
     let progress = Progress::new(3);
     progress.step("reading");
     let (scene, files) = read(arguments, outputs, &|share| progress.within(share))?;

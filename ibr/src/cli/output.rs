@@ -192,8 +192,8 @@ impl Outputs {
         self.parts.iter().map(|(_, path)| path.as_path()).filter(|path| !is_dash(path))
     }
 
-    /// Checks of names and formats, before the scene is read.
-    pub(super) fn check(&self, levels: Levels) -> Result<(), Failure> {
+    /// Checks of names, formats and files that exist, before the scene is read.
+    pub(super) fn check(&self, levels: Levels, force: bool) -> Result<(), Failure> {
         for (k, (part, path)) in self.parts.iter().enumerate() {
             let (option, shown) = (part.option(), Quoted(path));
             let name = option.trim_start_matches('-');
@@ -207,7 +207,8 @@ impl Outputs {
                 ));
             }
         }
-        self.parts.iter().try_for_each(|(part, path)| part.check(path, levels))
+        self.parts.iter().try_for_each(|(part, path)| part.check(path, levels))?;
+        self.files().try_for_each(|file| refuse_existing(file, force))
     }
 }
 

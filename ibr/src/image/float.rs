@@ -1,7 +1,7 @@
 //! Maps of numbers as other programs write them: OpenEXR, TIFF with floats or wide integers, NumPy arrays.
 
 use super::Image;
-use super::read::Source;
+use super::source::Source;
 use crate::files::InputError;
 use exr::meta::MetaData;
 use exr::prelude::{ReadChannels, ReadLayers, read};

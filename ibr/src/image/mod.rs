@@ -7,6 +7,7 @@ mod frame_rate;
 pub mod pfm;
 pub mod quality;
 mod read;
+mod source;
 mod texture;
 mod write;
 pub mod y4m;

@@ -1,8 +1,8 @@
 //! Reading images and depth maps from files.
 
+use super::source::Source;
 use super::{Image, colmap_map, float, pfm};
-use crate::files::{self, CHECK_THE_PATH, InputError, refuse_pixels_without_memory};
-use hybank::messages::Quoted;
+use crate::files::{self, CHECK_THE_PATH, InputError};
 use image::{DynamicImage, ImageReader};
 use std::io::Cursor;
 use std::path::Path;
@@ -68,8 +68,8 @@ pub(super) struct Stored {
 
 impl Stored {
     pub(super) fn of(picture: &DynamicImage) -> Result<Self, InputError> {
-        let (width, height) = (picture.width() as usize, picture.height() as usize);
         use DynamicImage::{ImageLuma16, ImageLumaA16, ImageRgb16, ImageRgb32F, ImageRgba16, ImageRgba32F};
+        let (width, height) = (picture.width() as usize, picture.height() as usize);
         let is_float = matches!(picture, ImageRgb32F(_) | ImageRgba32F(_));
         let is_deep = matches!(picture, ImageLuma16(_) | ImageLumaA16(_) | ImageRgb16(_) | ImageRgba16(_));
         let numbers = |bytes: Vec<u8>| bytes.into_iter().map(f32::from).collect();
@@ -125,39 +125,6 @@ fn load(path: &Path, most: usize) -> Result<Stored, InputError> {
     // The size was checked; the decoders have limits of their own, without a way to allow more.
     reader.no_limits();
     Stored::of(&reader.decode().map_err(wrong)?)
-}
-
-/// Bytes per pixel while an image is unpacked and converted: four channels of 16 bits, three as they are
-/// needed, and three numbers.
-const READING: f64 = 30.0;
-
-/// A file whose format is not known yet.
-pub(super) struct Source<'a> {
-    pub(super) path: &'a Path,
-    pub(super) bytes: &'a [u8],
-    /// The most pixels that it may have.
-    pub(super) most: usize,
-}
-
-impl Source<'_> {
-    /// That the content cannot be used.
-    pub(super) fn wrong(&self, reason: String) -> InputError {
-        let reason = Quoted(reason);
-        let formats = "PNG, JPEG, TIFF, PPM, PGM, PFM, OpenEXR and NPY";
-        InputError::file(self.path, format!("{reason}; the readable formats are {formats}"))
-    }
-
-    /// Refuses too many pixels, and such that the system has no memory for.
-    pub(super) fn check_size(&self, width: usize, height: usize) -> Result<(), InputError> {
-        let most = self.most;
-        if width.saturating_mul(height) > most {
-            let reason = format!(
-                "{width} x {height} pixels are more than the limit of {most}; crop or shrink the image, or allow so many with --max-pixels"
-            );
-            return Err(InputError::file(self.path, reason));
-        }
-        refuse_pixels_without_memory(self.path, (width, height), READING)
-    }
 }
 
 #[cfg(test)]

@@ -38,7 +38,7 @@ impl RenderArguments {
         if is_film(view) && self.bits == Levels::Sixteen {
             return usage("--bits 16: a film has 8 bits per value");
         }
-        self.outputs().check(self.bits)
+        self.outputs().check(self.bits, self.force)
     }
 
     /// The contents of some files of a view, and the error that is white in its picture.
