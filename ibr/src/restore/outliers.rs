@@ -22,10 +22,11 @@ const RING_SUPPORTERS: usize = 3;
 
 /// Largest distance in pixels to the sides of an edge: maps that were reduced or filtered mix the depths of
 /// pixels that near.
-const MIXED: isize = 3;
+const MIXED: isize = 2;
 
-/// Step of a side of an edge, as a share of the edge, from which on it is no side but part of a slope.
-const FLAT: f32 = 1.0 / 16.0;
+/// Pixels over which a slanted surface goes on in a line, and what it may miss of it, as a share of its step.
+const SLOPE: isize = 4;
+const STRAIGHT: f32 = 0.5;
 
 /// Radius of the ring in pixels: a cluster may be as large.
 const RING: usize = 8;
@@ -132,25 +133,30 @@ impl Parallax {
         self.ring(pixel, distance).filter(|q| self.agree(here, self.values[*q])).take(least).count() == least
     }
 
-    /// Whether a pixel lies between the sides of an edge: a nearer surface begins on one side and a farther
-    /// one on the opposite side. A slanted surface goes on as steeply on both sides.
+    /// Whether a pixel lies between the sides of an edge: on one side of it a surface is nearer, and on the
+    /// opposite side one is farther.
     fn is_between(&self, pixel: usize) -> bool {
         let here = self.values[pixel];
-        let side = |value: f32| match self.agree(here, value) {
-            true => 0,
-            false => i32::from(value > here) - i32::from(value < here),
+        let side = |step: [isize; 2]| match self.beside(pixel, step) {
+            Some(value) if !self.agree(here, value) => i32::from(value > here) - i32::from(value < here),
+            _ => 0,
         };
-        let parts = |[dx, dy]: [isize; 2], distance: isize| {
-            let at = |steps: isize| self.beside(pixel, [steps * dx, steps * dy]);
-            let [Some(before), Some(begins)] = [at(-distance), at(distance)] else { return false };
-            let [Some(farther), Some(goes_on)] = [at(-distance - 1), at(distance + 1)] else { return false };
-            let flat = FLAT * (begins - before).abs();
-            side(before) * side(begins) < 0
-                && (farther - before).abs() <= flat
-                && (goes_on - begins).abs() <= flat
+        let parts = |[dx, dy]: [isize; 2]| {
+            let parts_at = |k: isize| side([k * dx, k * dy]) * side([-k * dx, -k * dy]) < 0;
+            (1..=MIXED).any(parts_at) && !self.is_slope(pixel, [dx, dy])
         };
-        let directions = [[1, 0], [0, 1], [1, 1], [1, -1]];
-        (1..=MIXED).any(|distance| directions.into_iter().any(|direction| parts(direction, distance)))
+        [[1, 0], [0, 1], [1, 1], [1, -1]].into_iter().any(parts)
+    }
+
+    /// Whether the surface of a pixel is slanted: on one side at least the values go on in a line.
+    fn is_slope(&self, pixel: usize, [dx, dy]: [isize; 2]) -> bool {
+        let at = |k: isize| self.beside(pixel, [k * dx, k * dy]);
+        let (here, [Some(before), Some(after)]) = (self.values[pixel], [at(-1), at(1)]) else { return false };
+        let step = (after - before) / 2.0;
+        let is_in_line = |k: isize| {
+            at(k).is_some_and(|value| (value - here - k as f32 * step).abs() <= STRAIGHT * step.abs())
+        };
+        (1..=SLOPE).all(is_in_line) || (-SLOPE..=-1).all(is_in_line)
     }
 
     /// The known value so many columns and rows from a pixel.
@@ -249,9 +255,13 @@ impl<'a, P: Viewpoint> Known<'a, P> {
             if value.is_nan() || map.is_guessed(p) {
                 return false;
             }
-            match plane.is_supported(p, 1, SUPPORTERS) && !plane.is_between(p) {
+            let outvoted_by =
+                |least: i32| votes(p, value).into_iter().map(Vote::count).sum::<i32>() <= -least;
+            match plane.is_supported(p, 1, SUPPORTERS) {
+                // Steep surfaces have such values too, which no view sees through.
+                true if plane.is_between(p) => outvoted_by(1),
                 true => self.is_in_cluster(index, p, RING, &votes),
-                false => votes(p, value).into_iter().map(Vote::count).sum::<i32>() <= 0,
+                false => outvoted_by(0),
             }
         };
         (0..plane.values.len()).into_par_iter().with_min_len(1024).map(is_outlier).collect()
