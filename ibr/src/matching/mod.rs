@@ -48,8 +48,10 @@ const OTHERS: usize = 2;
 /// The part of their sides that the photographs have when the range is looked for.
 const REDUCTION: usize = 4;
 
-/// Largest displacement between two photographs, as a share of the width.
+/// Largest displacement between two photographs, as a share of the width: of a rig, and of general cameras,
+/// which may turn towards the scene, so that it counts from the far away.
 const WIDEST: f64 = 0.3;
+const WIDEST_FROM_FAR: f64 = 0.6;
 
 /// Share of the parallaxes at either end that the range leaves out, and pixels that it is longer there.
 const STRAY: f64 = 0.005;
@@ -133,8 +135,11 @@ impl<P: Viewpoint> Sweep<P> {
         let sweep = &sweeps[index];
         let others = nearest(sweeps.iter().map(|other| sweep.camera.distance(&other.camera)));
         let shift = others.iter().map(|k| sweep.shift(&sweeps[*k].camera)).fold(0.0, f64::max);
-        let widest = (WIDEST * sweep.grey.width() as f64) as i32;
-        let low = if sweep.measure == Measure::Disparity { -widest } else { 0 };
+        let pixels = |share: f64| (share * sweep.grey.width() as f64) as i32;
+        let (low, widest) = match sweep.measure {
+            Measure::Disparity => (-pixels(WIDEST), pixels(WIDEST)),
+            Measure::Depth => (0, pixels(WIDEST_FROM_FAR)),
+        };
         let sweep = &mut sweeps[index];
         (sweep.others, sweep.unit, sweep.range) = (others, (1.0 / shift) as f32, low..widest + 1);
         if shift > 0.0 { Ok(()) } else { Err(MatchError::Alone(index)) }
