@@ -4,7 +4,6 @@
 use hybank::files::{self, Bound, FileError};
 use hybank::memory::check_memory;
 use hybank::messages::Quoted;
-use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// What to do about a path in a scene that cannot be opened.
@@ -30,8 +29,8 @@ pub enum InputError {
     Content {
         /// The file.
         path: PathBuf,
-        /// Where in the file.
-        at: Location,
+        /// Where in the file, from 1: `:7` (a line), `:7:3` (with its column), `: record 7`, or an image.
+        at: String,
         /// What is wrong, and the remedy.
         reason: String,
     },
@@ -64,65 +63,25 @@ pub enum InputError {
     },
 }
 
-/// Where in a file something is wrong; lines, records and frames are counted from 1.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Location {
-    /// In all of it.
-    File,
-    /// In a line.
-    Line(usize),
-    /// In a line and a column of it.
-    Column(usize, usize),
-    /// In a record of a binary file.
-    Record(usize),
-    /// In a frame of transforms.json, with the name of its image.
-    Frame(usize, String),
-    /// In the camera of an image.
-    Image(String),
-}
-
-impl fmt::Display for Location {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::File => Ok(()),
-            Self::Line(line) => write!(f, ":{line}"),
-            Self::Column(line, column) => write!(f, ":{line}:{column}"),
-            Self::Record(record) => write!(f, ": record {record}"),
-            Self::Frame(frame, image) => write!(f, ": frame {frame} (\"{}\")", Quoted(image)),
-            Self::Image(image) => write!(f, ": image \"{}\"", Quoted(image)),
-        }
-    }
-}
-
 impl InputError {
-    pub(crate) fn content(path: &Path, at: Location, reason: impl ToString) -> Self {
+    pub(crate) fn content(path: &Path, at: String, reason: impl ToString) -> Self {
         Self::Content { path: path.into(), at, reason: reason.to_string() }
     }
 
     /// That all of a file cannot be used, or not be written.
     pub(crate) fn file(path: &Path, reason: impl ToString) -> Self {
-        Self::content(path, Location::File, reason)
+        Self::content(path, String::new(), reason)
     }
 }
 
-/// The bytes of a file, if there is `room` for what is made of them, in bytes.
-pub(crate) fn read_bytes(
-    path: &Path,
-    remedy: &'static str,
-    room: impl Fn(&[u8]) -> f64,
-) -> Result<Vec<u8>, InputError> {
-    let bytes = files::read_bytes(path, IMAGE).map_err(|source| unread(source, remedy))?;
-    refuse_without_memory(path, room(&bytes)).map(|()| bytes)
+/// The bytes of a file.
+pub(crate) fn read_bytes(path: &Path, remedy: &'static str) -> Result<Vec<u8>, InputError> {
+    files::read_bytes(path, IMAGE).map_err(|source| unread(source, remedy))
 }
 
-/// The text of a file, if there is `room` for what is made of it, in bytes.
-pub(crate) fn read_text(
-    path: &Path,
-    remedy: &'static str,
-    room: impl Fn(&str) -> f64,
-) -> Result<String, InputError> {
-    let text = files::read_text(path, TEXT).map_err(|source| unread(source, remedy))?;
-    refuse_without_memory(path, room(&text)).map(|()| text)
+/// The text of a file, if there is memory for parsing it.
+pub(crate) fn read_text(path: &Path, remedy: &'static str) -> Result<String, InputError> {
+    files::read_text(path, TEXT).map_err(|source| unread(source, remedy))
 }
 
 /// Why a file cannot be read; the remedy is for what the system refuses.

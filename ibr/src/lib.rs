@@ -10,7 +10,6 @@ pub mod files;
 pub mod image;
 pub mod interpolate;
 mod lanes;
-mod linear;
 pub mod matching;
 pub mod occlusion;
 pub mod partial;

@@ -1,6 +1,6 @@
 //! What renderings allocate at most, beside what they are estimated to take: sizes, shapes, views, methods.
 
-use hybank_ibr::analysis::{Advice, Predictor};
+use hybank_ibr::analysis::Predictor;
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::{DepthMap, Measure};
 use hybank_ibr::image::Image;
@@ -230,8 +230,7 @@ fn predictions_take_what_is_estimated() {
         let estimate = pool.install(|| Extent::new(size, &[&image, &image], None).of_rig_prediction());
         let work = || {
             let predictor = Predictor::new(&views, &settings).unwrap();
-            let now = predictor.at(&0.5, views[0].image.size()).unwrap();
-            drop(Advice::on(&predictor, &0.5, views[0].image.size(), &now).unwrap());
+            drop(predictor.at(&0.5, views[0].image.size()).unwrap());
         };
         estimates.compare(&format!("prediction of a rig, {size:?}"), size, estimate, peak(&pool, work));
         let maps = [1, 2].map(|seed| noisy_map(size, 5.0, Measure::Depth, seed));
@@ -246,8 +245,7 @@ fn predictions_take_what_is_estimated() {
         let estimate = pool.install(|| extent.of_camera_prediction(&settings));
         let work = || {
             let predictor = Predictor::new(&views, &settings).unwrap();
-            let now = predictor.at(&target, size).unwrap();
-            drop(Advice::on(&predictor, &target, size, &now).unwrap());
+            drop(predictor.at(&target, size).unwrap());
         };
         estimates.compare(&format!("prediction of cameras, {size:?}"), size, estimate, peak(&pool, work));
     }

@@ -7,6 +7,7 @@ mod eigen;
 pub mod fourier;
 pub mod least_squares;
 mod scalar;
+pub mod small;
 mod solve;
 
 pub use balance::{power_of_two, state_scales};

@@ -5,7 +5,7 @@ use super::calibrate::LeastSquares;
 use super::regressors::{CAUSE_OF, REGRESSORS, Regressors, difference};
 use super::variogram::Variogram;
 use crate::image::Image;
-use crate::pipeline::{Exposure, RenderError, RenderSettings, Rendering};
+use crate::pipeline::{RenderError, RenderSettings, Rendering};
 use crate::propagate::{View, Viewpoint};
 use std::ops::Range;
 
@@ -51,8 +51,6 @@ pub struct ViewError {
     pub estimate: Vec<f32>,
     /// Mean over the view of the part of the estimate that each cause has, in the order of [`Cause::ALL`].
     pub causes: [f64; 5],
-    /// The same of each row.
-    pub causes_of_rows: Vec<[f64; 5]>,
     /// The weights.
     pub calibration: Calibration,
 }
@@ -103,26 +101,11 @@ impl ViewError {
         pairs.filter(|(error, limit)| **error <= **limit + ROUNDING).count() as f64 / errors.len() as f64
     }
 
-    /// Mean absolute error of each row against a photograph of the same size, after rounding to 8 bits.
-    pub fn measured_rows(&self, truth: &Image) -> Vec<f64> {
-        let errors = difference(&self.rendering.image.quantised(), truth);
-        let mean = |row: &[f32]| row.iter().map(|e| f64::from(*e)).sum::<f64>() / row.len() as f64;
-        errors.chunks(truth.width()).map(mean).collect()
-    }
-
     /// The cause of the largest part of the estimate.
     pub fn dominant(&self) -> Cause {
         let parts = Cause::ALL.into_iter().zip(self.causes);
         parts.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(Cause::Density, |(cause, _)| cause)
     }
-}
-
-/// What is known of the views together.
-#[derive(Clone)]
-pub(super) struct Known {
-    pub(super) variogram: Variogram,
-    /// Standard deviation of the errors of disparity, or of the relative errors of depth.
-    pub(super) noise: f64,
 }
 
 /// What differs between the predictions for rectified rigs and for general cameras.
@@ -135,12 +118,13 @@ pub trait Predicted: Viewpoint {
         settings: &RenderSettings,
     ) -> Result<Rendering, RenderError>;
 
-    /// The view of this camera with the regressors of its pixels.
+    /// The view of this camera with the regressors of its pixels; neighbouring views are `spacing` apart.
     fn examine(
         &self,
         views: &[View<'_, Self>],
         size: (usize, usize),
-        study: &Study<'_>,
+        study: &Study,
+        spacing: f64,
     ) -> Result<Examined, RenderError>;
 
     /// Refuses a prediction of a view for which there is too little memory.
@@ -153,28 +137,14 @@ pub trait Predicted: Viewpoint {
 
     /// Mean distance between neighbouring views; of views at one point that from this camera, or one.
     fn spacing(&self, views: &[View<'_, Self>]) -> f64;
-
-    /// Cameras that might help this one, with their coordinates.
-    fn further(&self, views: &[View<'_, Self>]) -> Vec<(Vec<f64>, Self)>;
 }
 
-/// What a rendering is examined with.
-pub struct Study<'a> {
-    pub(super) settings: &'a RenderSettings,
-    pub(super) known: &'a Known,
-    /// Distance between neighbouring views.
-    pub(super) spacing: f64,
-}
-
-/// Photographs with one exposure.
-pub(super) fn equalised<'a>(images: impl Iterator<Item = &'a Image>, gains: &[Exposure]) -> Vec<Image> {
-    let scaled = |(i, image): (usize, &Image)| {
-        let (mut image, gain) = (image.clone(), gains.get(i).map_or([1.0; 3], |gain| gain.map(|g| g as f32)));
-        let channels = image.channels();
-        image.data_mut().iter_mut().enumerate().for_each(|(k, v)| *v *= gain[k % channels]);
-        image
-    };
-    images.enumerate().map(scaled).collect()
+/// What renderings are examined with.
+pub struct Study {
+    pub(super) settings: RenderSettings,
+    pub(super) variogram: Variogram,
+    /// Standard deviation of the errors of disparity, or of the relative errors of depth.
+    pub(super) noise: f64,
 }
 
 /// What is found of a rendering before its causes are weighed.
@@ -186,39 +156,31 @@ pub struct Examined {
 /// Expected error, estimate and causes from the regressors and their weights.
 pub(super) fn judge(examined: Examined, local_limit: Vec<f32>, calibration: Calibration) -> ViewError {
     let Examined { rendering, regressors } = examined;
-    let (width, height) = rendering.image.size();
-    let mut causes_of_rows = vec![[0.0; 5]; height];
+    let mut causes = [0.0; 5];
     let (mut expected, mut estimate) = (Vec::new(), Vec::new());
-    for (p, x) in regressors.iter().enumerate() {
+    for x in &regressors {
         let parts = calibration.parts(x);
         let squares: f64 = (0..REGRESSORS).map(|k| calibration.square[k] * x[k] * x[k]).sum();
         for (part, cause) in parts.iter().zip(CAUSE_OF) {
-            causes_of_rows[p / width][cause as usize] += part / width as f64;
+            causes[cause as usize] += part / regressors.len() as f64;
         }
         let mean: f64 = parts.iter().sum();
         estimate.push(mean as f32);
         expected.push(squares.sqrt().max(mean) as f32);
     }
-    let cause = |k: usize| causes_of_rows.iter().map(|row| row[k]).sum::<f64>() / height as f64;
-    let causes = std::array::from_fn(cause);
-    ViewError { rendering, local_limit, expected, estimate, causes, causes_of_rows, calibration }
+    ViewError { rendering, local_limit, expected, estimate, causes, calibration }
 }
 
 impl Calibration {
     /// Leaves views out in turn, renders them from the others and explains the errors by the causes.
-    pub(super) fn of<P: Predicted>(
-        views: &[View<'_, P>],
-        settings: &RenderSettings,
-        known: &Known,
-    ) -> Result<Self, RenderError> {
+    pub(super) fn of<P: Predicted>(views: &[View<'_, P>], study: &Study) -> Result<Self, RenderError> {
         let (mut absolute, mut square) = (LeastSquares::default(), LeastSquares::default());
         let used = if views.len() < 2 { 0 } else { views.len().min(LEFT_OUT) };
         for k in 0..used {
             let mut others = views.to_vec();
             let truth = others.remove(k * views.len() / used);
             let spacing = truth.camera.spacing(views);
-            let study = Study { settings, known, spacing };
-            let examined = truth.camera.examine(&others, truth.image.size(), &study)?;
+            let examined = truth.camera.examine(&others, truth.image.size(), study, spacing)?;
             let errors = difference(&examined.rendering.image.quantised(), truth.image);
             for (x, error) in examined.regressors.iter().zip(errors) {
                 absolute.add(x, f64::from(error));
@@ -229,7 +191,7 @@ impl Calibration {
             absolute: absolute.solve(&TYPICAL, PRIOR),
             square: square.solve(&TYPICAL_SQUARE, PRIOR),
             views: used,
-            disparity_noise: known.noise,
+            disparity_noise: study.noise,
         })
     }
 

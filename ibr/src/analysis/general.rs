@@ -9,7 +9,6 @@ use crate::depth::DepthMap;
 use crate::image::Image;
 use crate::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights, calibrated as pipeline};
 use crate::propagate::{CalibratedView, Viewpoint, nearest};
-use nalgebra::{Matrix3x4, Vector3};
 
 impl Predicted for Camera {
     fn render(
@@ -25,11 +24,12 @@ impl Predicted for Camera {
         &self,
         views: &[CalibratedView<'_>],
         size: (usize, usize),
-        study: &Study<'_>,
+        study: &Study,
+        spacing: f64,
     ) -> Result<Examined, RenderError> {
-        let Study { settings, known, spacing, .. } = *study;
+        let settings = &study.settings;
         let rendering = self.render(views, size, settings)?;
-        let jitter = depth_jitter(views, self, settings, &rendering.image, known.noise)?;
+        let jitter = depth_jitter(views, self, settings, &rendering.image, study.noise)?;
         let view_weights = ViewWeights::of(views, self).with_noise(&rendering.agreement);
         let (shares, gain) = shares(views, self, &view_weights);
         let gain = gain / (spacing * spacing);
@@ -44,7 +44,7 @@ impl Predicted for Camera {
             let (bend, noise) = (f64::from(bends[p]), (1.0 + shares).sqrt());
             [bend, noise, slope, f64::from(jitter[p]), f64::from(edges[p]), 0.0, 0.0]
         };
-        let regressors = regressors(&rendering, &known.variogram, of_seen);
+        let regressors = regressors(&rendering, &study.variogram, of_seen);
         Ok(Examined { rendering, regressors })
     }
 
@@ -68,25 +68,6 @@ impl Predicted for Camera {
         let away = views.iter().map(|v| v.camera.distance(self)).fold(f64::INFINITY, f64::min);
         [mean, away].into_iter().find(|s| *s > 0.0 && s.is_finite()).unwrap_or(1.0)
     }
-
-    /// Half-way to the nearest view, or as far away on the other side; without a lens.
-    fn further(&self, views: &[CalibratedView<'_>]) -> Vec<(Vec<f64>, Camera)> {
-        let centre = self.centre();
-        let away = views.iter().map(|v| v.camera.centre() - centre).filter(|d| d.norm() > 0.0);
-        let nearest = away.min_by(|a, b| a.norm().total_cmp(&b.norm()));
-        let centres = nearest.map_or(Vec::new(), |d| vec![centre + d / 2.0, centre - d]);
-        let camera = |centre: Vector3<f64>| Some((centre.as_slice().to_vec(), moved(self, centre)?));
-        centres.into_iter().filter_map(camera).collect()
-    }
-}
-
-/// The camera with another centre, without its lens.
-fn moved(camera: &Camera, centre: Vector3<f64>) -> Option<Camera> {
-    let m = camera.m();
-    let mut matrix = Matrix3x4::zeros();
-    matrix.fixed_columns_mut::<3>(0).copy_from(&m);
-    matrix.set_column(3, &(-m * centre));
-    Camera::metric(matrix, camera.determinant() < 0.0).ok()
 }
 
 /// Sum of the squared shares of the views in a pixel that all of them see, and the same times their squared

@@ -1,13 +1,14 @@
 //! What errors of depth change in a view: it is rendered once more from depths with such errors.
 
 use super::estimate::Predicted;
-use super::random::{bounded_normal, seeded};
 use super::regressors::{difference, local_mean};
 use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::pipeline::depth_errors::Lookups;
 use crate::pipeline::{RenderError, RenderSettings};
 use crate::propagate::{View, Viewpoint, nearest};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
 
 /// Errors of disparity below this many pixels change nothing that can be seen.
 const LEAST_DISPARITY: f64 = 0.02;
@@ -34,8 +35,10 @@ pub(super) fn map_noise<P: Viewpoint>(views: &[View<'_, P>]) -> f64 {
 /// The views' maps with independent errors of this standard deviation, from a fixed seed: pixels of
 /// disparity for a baseline of one, or shares of the depth.
 pub fn with_noise<P>(views: &[View<'_, P>], deviation: f64, seed: u64) -> Vec<DepthMap> {
-    let random = &mut seeded(seed);
-    let mut error = || deviation * bounded_normal(random);
+    let mut random = Pcg64::seed_from_u64(seed);
+    // Nearly normal with the variance one, and bounded: the sum of three uniform numbers in [-1, 1).
+    let mut part = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    let mut error = || deviation * (2.0 * (part() + part() + part()) - 3.0);
     let mut noisy = |map: &DepthMap| match map.measure() {
         Measure::Disparity => map.changed(|d| d + error() as f32),
         Measure::Depth => map.changed(|d| d * (1.0 + error()) as f32),

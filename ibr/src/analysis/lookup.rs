@@ -104,11 +104,9 @@ impl<P: Viewpoint> Lookup<'_, P> {
         let depth = f64::from(self.rendering.depth.data()[p]);
         let there = self.camera.map_to(&self.view.camera);
         let (u, v, d) = there(x, y, depth);
-        self.shows(u, v, d)?;
-        let beside = |dx: f64, dy: f64| {
-            let (u, v, _) = there(x + dx, y + dy, depth);
-            (u, v)
-        };
+        if !self.shows(u, v, d) {
+            return None;
+        }
         let moved = match self.view.map.measure() {
             Measure::Disparity => d + self.deviation,
             Measure::Depth => d * (1.0 + self.deviation),
@@ -116,29 +114,29 @@ impl<P: Viewpoint> Lookup<'_, P> {
         let (a, b, _) = self.view.camera.map_to(self.camera)(u, v, moved);
         let mut shown = Shown { moved: (a - x).hypot(b - y) as f32, ..Shown::default() };
         let image = self.view.image;
-        let sides = [beside(-1.0, 0.0), beside(1.0, 0.0), beside(0.0, -1.0), beside(0.0, 1.0)];
+        let steps = [(0.0, 0.0), (-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)];
+        let places = steps.map(|(dx, dy)| there(x + dx, y + dy, depth));
         for channel in 0..image.channels() {
-            let value =
-                |(u, v): (f64, f64)| Some(image.value_at(u, v, channel)).filter(|value| !value.is_nan());
-            let here = value((u, v))?;
-            let [left, right, up, down] =
-                [value(sides[0])?, value(sides[1])?, value(sides[2])?, value(sides[3])?];
+            let values = places.map(|(u, v, _)| image.value_at(u, v, channel));
+            if values.iter().any(|value| value.is_nan()) {
+                return None;
+            }
+            let [here, left, right, up, down] = values;
             let rendered = self.rendering.image.data()[p * image.channels() + channel];
             let steps = [here - left, right - here, here - up, down - here].map(f32::abs);
-            let bends = (left - 2.0 * here + right).abs() + (up - 2.0 * here + down).abs();
+            let curvature = (left - 2.0 * here + right).abs() + (up - 2.0 * here + down).abs();
             let slope = steps[0].max(steps[1]).hypot(steps[2].max(steps[3]));
-            let found = Shown { residual: (rendered - here).abs(), slope, curvature: bends, moved: 0.0 };
-            shown = shown.largest(found);
+            shown = shown.largest(Shown { residual: (rendered - here).abs(), slope, curvature, moved: 0.0 });
         }
         Some(shown)
     }
 
     /// Whether the map has this depth around a place.
-    fn shows(&self, u: f64, v: f64, d: f64) -> Option<()> {
+    fn shows(&self, u: f64, v: f64, d: f64) -> bool {
         let map = self.view.map;
         let (width, height) = map.size();
         let inside = u >= 0.0 && v >= 0.0 && u <= width as f64 - 1.0 && v <= height as f64 - 1.0;
         // Also false for unknown depths.
-        (inside && same_depth(d as f32, map.row(v.round() as usize)[u.round() as usize], map)).then_some(())
+        inside && same_depth(d as f32, map.row(v.round() as usize)[u.round() as usize], map)
     }
 }

@@ -13,14 +13,14 @@
 //! residuals, slopes and second differences of the photographs nearby (`lookup.rs`).
 //!
 //! The other two are sums over causes. The size of each cause is computed: the bias of the fit, by
-//! fitting the fit once more (`evidence.rs`); the views that share in a pixel; the slope; the change under
+//! fitting the fit once more (`rows.rs`); the views that share in a pixel; the slope; the change under
 //! errors of depth as large as the maps' disagreement; depth edges nearby; doubtful depths; holes, by the
 //! variogram of the photographs. The weights of the causes are calibrated on the inputs themselves:
 //! each view is left out in turn and rendered from the others, and its photograph is the truth. A single
 //! view cannot be left out; it takes the weights of typical photographs.
 //!
 //! ```
-//! use hybank_ibr::analysis::{Advice, Predictor};
+//! use hybank_ibr::analysis::Predictor;
 //! use hybank_ibr::camera::Camera;
 //! use hybank_ibr::pipeline::RenderSettings;
 //! use hybank_ibr::propagate::RectifiedView;
@@ -32,30 +32,25 @@
 //!     (image, rig_disparity(&depth, size.0), position)
 //! });
 //! let views = shots.each_ref().map(|(image, map, camera)| RectifiedView { image, map, camera: *camera });
-//! // The view half-way, its error, and what to spend on next.
+//! // The view half-way, its error, and what makes it smaller.
 //! let predictor = Predictor::new(&views, &settings)?;
 //! let view = predictor.at(&0.5, size)?;
 //! assert!((0.1..20.0).contains(&view.totals().estimate));
-//! let advice = Advice::on(&predictor, &0.5, size, &view)?;
-//! assert_eq!(advice.cause, view.dominant());
+//! println!("{}", view.dominant().remedy());
 //! # Ok::<(), hybank_ibr::pipeline::RenderError>(())
 //! ```
 
-mod advice;
 mod calibrate;
 mod choice;
 mod estimate;
-mod evidence;
 mod general;
 mod jitter;
 mod lookup;
 mod predictor;
-mod random;
 mod regressors;
 mod rows;
 mod variogram;
 
-pub use advice::{Advice, AnotherView};
 pub use choice::Choice;
 pub use estimate::{Calibration, Predicted, Totals, ViewError};
 pub use jitter::{depth_jitter, with_noise};

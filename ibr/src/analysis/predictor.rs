@@ -1,13 +1,12 @@
 //! The error of any number of views, with weights that are calibrated once.
 
-use super::estimate::{Calibration, Known, Predicted, Study, ViewError, equalised, judge};
+use super::estimate::{Calibration, Predicted, Study, ViewError, judge};
 use super::jitter::map_noise;
 use super::lookup::local_limits;
-use super::regressors::{difference, local_mean};
 use super::variogram::Variogram;
 use crate::depth::DepthMap;
 use crate::image::Image;
-use crate::pipeline::{Agreement, RenderError, RenderSettings, Rendering, without_drift};
+use crate::pipeline::{Agreement, Exposure, RenderError, RenderSettings, without_drift};
 use crate::propagate::View;
 
 /// Views with the weights that are calibrated on them, for any number of predictions.
@@ -15,8 +14,7 @@ pub struct Predictor<'a, P> {
     /// Photographs with one exposure.
     images: Vec<Image>,
     maps: Vec<(&'a DepthMap, P)>,
-    settings: RenderSettings,
-    known: Known,
+    study: Study,
     calibration: Calibration,
     agreement: Agreement,
 }
@@ -32,15 +30,16 @@ impl<'a, P: Predicted> Predictor<'a, P> {
         }
         let agreement = Agreement::of(views);
         let gains = if settings.keep_exposure { Vec::new() } else { without_drift(&agreement.gains) };
-        let images = equalised(views.iter().map(|v| v.image), &gains);
+        let images = equalised(views, &gains);
         let maps: Vec<_> = views.iter().map(|v| (v.map, v.camera)).collect();
         let views = joined(&images, &maps);
-        let settings = RenderSettings { keep_exposure: true, ..*settings };
-        let known = Known { variogram: Variogram::of(images.iter()), noise: map_noise(&views) };
         // A registration offset belongs to the virtual view only.
-        let unmoved = RenderSettings { offset: 0.0, ..settings };
-        let calibration = Calibration::of(&views, &unmoved, &known)?;
-        Ok(Self { images, maps, settings, known, calibration, agreement })
+        let unmoved = RenderSettings { keep_exposure: true, offset: 0.0, ..*settings };
+        let mut study =
+            Study { settings: unmoved, variogram: Variogram::of(&images), noise: map_noise(&views) };
+        let calibration = Calibration::of(&views, &study)?;
+        study.settings.offset = settings.offset;
+        Ok(Self { images, maps, study, calibration, agreement })
     }
 
     /// How well the views agree, as they were given.
@@ -58,42 +57,19 @@ impl<'a, P: Predicted> Predictor<'a, P> {
         joined(&self.images, &self.maps)
     }
 
-    fn study(&self, camera: &P) -> Study<'_> {
-        let spacing = camera.spacing(&self.views());
-        Study { settings: &self.settings, known: &self.known, spacing }
-    }
-
     /// The error of the view of `camera`.
     ///
     /// # Errors
     /// Those of [`crate::pipeline`].
     pub fn at(&self, camera: &P, size: (usize, usize)) -> Result<ViewError, RenderError> {
         let views = self.views();
-        camera.check_memory(&views, size, &self.settings)?;
-        let examined = camera.examine(&views, size, &self.study(camera))?;
-        let local_limit = local_limits(&views, camera, &examined.rendering, self.known.noise);
+        camera.check_memory(&views, size, &self.study.settings)?;
+        let examined = camera.examine(&views, size, &self.study, camera.spacing(&views))?;
+        let local_limit = local_limits(&views, camera, &examined.rendering, self.study.noise);
         Ok(judge(examined, local_limit, self.calibration))
     }
 
-    /// The view of `camera`, as it is rendered from the views.
-    pub(super) fn render(&self, camera: &P, size: (usize, usize)) -> Result<Rendering, RenderError> {
-        camera.render(&self.views(), size, &RenderSettings { offset: 0.0, ..self.settings })
-    }
-
-    /// The local mean of the change of a rendered view if its maps were `changed`, in grey levels.
-    pub(super) fn change(
-        &self,
-        camera: &P,
-        rendered: &Image,
-        changed: impl Fn(&DepthMap) -> DepthMap,
-    ) -> Result<Vec<f32>, RenderError> {
-        let maps: Vec<DepthMap> = self.maps.iter().map(|(map, _)| changed(map)).collect();
-        let views: Vec<_> = self.views().into_iter().zip(&maps).map(|(v, map)| View { map, ..v }).collect();
-        let image = camera.render(&views, rendered.size(), &self.settings)?.image;
-        Ok(local_mean(&difference(&image, rendered), image.size()))
-    }
-
-    /// The mean estimate of the view of `camera` from other views: some of those of the predictor, or more.
+    /// The mean estimate of the view of `camera` from some of the views, or from others.
     /// The weights and the distance between views stay as they are.
     ///
     /// # Errors
@@ -104,9 +80,21 @@ impl<'a, P: Predicted> Predictor<'a, P> {
         camera: &P,
         size: (usize, usize),
     ) -> Result<f64, RenderError> {
-        let examined = camera.examine(views, size, &self.study(camera))?;
+        let examined = camera.examine(views, size, &self.study, camera.spacing(&self.views()))?;
         Ok(self.calibration.mean(&examined.regressors))
     }
+}
+
+/// Photographs with one exposure.
+fn equalised<P>(views: &[View<'_, P>], gains: &[Exposure]) -> Vec<Image> {
+    let scaled = |(i, view): (usize, &View<'_, P>)| {
+        let (mut image, gain) =
+            (view.image.clone(), gains.get(i).map_or([1.0; 3], |gain| gain.map(|g| g as f32)));
+        let channels = image.channels();
+        image.data_mut().iter_mut().enumerate().for_each(|(k, v)| *v *= gain[k % channels]);
+        image
+    };
+    views.iter().enumerate().map(scaled).collect()
 }
 
 fn joined<'a, P: Copy>(images: &'a [Image], maps: &[(&'a DepthMap, P)]) -> Vec<View<'a, P>> {

@@ -2,7 +2,8 @@
 
 use super::names::{self, Found, NameError};
 use super::{Camera, Lens};
-use crate::files::{InputError, Location};
+use crate::files::InputError;
+use hybank::messages::Quoted;
 use nalgebra::{Matrix3, Matrix3x4};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -25,9 +26,7 @@ pub struct Frame {
     pub image: PathBuf,
     /// Its depth map, if the list has one.
     pub depth: Option<PathBuf>,
-    /// Its number in the list, from 1.
-    pub(super) number: usize,
-    /// The number by which a COLMAP model calls it.
+    /// Its number in the list, from 1; the one by which a COLMAP model calls it.
     pub(crate) id: u64,
     /// World to camera, with x to the right, y down and z forwards.
     pub(super) pose: Matrix3x4<f64>,
@@ -116,8 +115,7 @@ impl CameraList {
         let (cx, cy) = (inner.cx.unwrap_or(0.5 * w) - 0.5, inner.cy.unwrap_or(0.5 * h) - 0.5);
         let k = Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);
         let camera = Camera::metric(k * frame.pose, false).map_err(|source| {
-            let image = frame.image.display().to_string();
-            InputError::content(&self.path, Location::Image(image), source)
+            InputError::content(&self.path, format!(": image \"{}\"", Quoted(&frame.image)), source)
         })?;
         let bend = |v: Option<f64>| v.unwrap_or(0.0);
         let radial = [bend(inner.k1), bend(inner.k2)];
@@ -129,7 +127,7 @@ impl CameraList {
 
     /// A frame that has no depth.
     pub fn without_depth(&self, frame: &Frame) -> InputError {
-        let at = Location::Frame(frame.number, frame.image.display().to_string());
+        let at = format!(": frame {} (\"{}\")", frame.id, Quoted(&frame.image));
         let reason = "it has no `depth_file_path`, and views are rendered from images with depth; give the scene \
                       [[view]] tables with `image` and `depth`";
         InputError::content(&self.path, at, reason)

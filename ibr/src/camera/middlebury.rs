@@ -1,7 +1,7 @@
 //! `calib.txt` of the Middlebury stereo benchmark (2014 and later): inner parameters of both cameras,
 //! baseline and the difference of the principal points.
 
-use crate::files::{self, CHECK_THE_PATH, InputError, Location};
+use crate::files::{self, CHECK_THE_PATH, InputError};
 use hybank::messages::Quoted;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -28,7 +28,7 @@ pub struct Calibration {
 /// # Errors
 /// [`InputError`], with the line.
 pub fn read_calibration(path: &Path) -> Result<Calibration, InputError> {
-    parse_calibration(&files::read_text(path, CHECK_THE_PATH, |text| 16.0 * text.len() as f64)?, path)
+    parse_calibration(&files::read_text(path, CHECK_THE_PATH)?, path)
 }
 
 /// The same from the text of the file; `path` appears in messages.
@@ -70,7 +70,7 @@ impl<'a> Keys<'a> {
     fn new(text: &'a str, path: &'a Path) -> Result<Self, InputError> {
         let mut values = BTreeMap::new();
         for (line, content) in (1..).zip(text.lines()).filter(|(_, content)| !content.trim().is_empty()) {
-            let fault = |reason: String| InputError::content(path, Location::Line(line), reason);
+            let fault = |reason: String| InputError::content(path, format!(":{line}"), reason);
             let (key, value) =
                 content.split_once('=').ok_or_else(|| fault("a line is `key=value`".into()))?;
             if values.insert(key.trim(), (line, value.trim())).is_some() {
@@ -87,7 +87,7 @@ impl<'a> Keys<'a> {
         };
         read(value).ok_or_else(|| {
             let reason = format!("{key} is \"{}\": it must be {rule}", Quoted(value));
-            InputError::content(self.path, Location::Line(*line), reason)
+            InputError::content(self.path, format!(":{line}"), reason)
         })
     }
 

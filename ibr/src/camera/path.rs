@@ -11,32 +11,18 @@ struct Parts {
 }
 
 impl Parts {
-    /// Orthogonalises the rows of M from the last to the first. In a left-handed world K_11 is negative.
+    /// With the matrix E that exchanges the first and the last row, (E M)' = Q R gives M = (E R' E) (E Q'). The
+    /// signs are those of a rotation and of positive K_22 and K_33; in a left-handed world K_11 is negative.
     fn of(camera: &Camera) -> Self {
-        let m = camera.m() / camera.m().row(2).norm();
-        let row = |i: usize| m.row(i).transpose();
-        let r3 = row(2);
-        let k23 = row(1).dot(&r3);
-        let second = row(1) - r3 * k23;
-        let r2 = second.normalize();
-        let r1 = r2.cross(&r3);
-        let k = Matrix3::new(
-            row(0).dot(&r1),
-            row(0).dot(&r2),
-            row(0).dot(&r3),
-            0.0,
-            second.norm(),
-            k23,
-            0.0,
-            0.0,
-            1.0,
-        );
-        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_rows(&[
-            r1.transpose(),
-            r2.transpose(),
-            r3.transpose(),
-        ]));
-        Self { k, rotation: UnitQuaternion::from_rotation_matrix(&rotation), centre: camera.centre() }
+        let exchange = Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
+        let (q, r) = (exchange * camera.m()).transpose().qr().unpack();
+        let (k, rotation) = (exchange * r.transpose() * exchange, exchange * q.transpose());
+        let (second, third) = (k[(1, 1)].signum(), k[(2, 2)].signum());
+        let signs =
+            Matrix3::from_diagonal(&Vector3::new(second * third * rotation.determinant(), second, third));
+        let (k, rotation) = (k * signs, Rotation3::from_matrix_unchecked(signs * rotation));
+        let rotation = UnitQuaternion::from_rotation_matrix(&rotation);
+        Self { k: k / k[(2, 2)], rotation, centre: camera.centre() }
     }
 }
 

@@ -5,7 +5,7 @@
 //! principal point is shifted by half a pixel on reading.
 
 use super::list::{CameraList, Frame, Inner};
-use crate::files::{self, CHECK_THE_PATH, InputError, Location};
+use crate::files::{self, CHECK_THE_PATH, InputError};
 use hybank::messages::{Quoted, of_json};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4};
 use serde::Deserialize;
@@ -13,9 +13,6 @@ use std::path::{Path, PathBuf};
 
 /// Most columns or rows of an image, and the largest focal length in pixels.
 const LARGEST: f64 = 1e6;
-
-/// Bytes of memory per byte of a file while it is parsed: a number of two bytes takes 64.
-const PARSED: f64 = 40.0;
 
 #[derive(Deserialize)]
 struct FileSpec {
@@ -39,7 +36,7 @@ struct FrameSpec {
 /// # Errors
 /// [`InputError`], with the line or the frame.
 pub fn read_transforms(path: &Path) -> Result<CameraList, InputError> {
-    parse_transforms(&files::read_text(path, CHECK_THE_PATH, |text| PARSED * text.len() as f64)?, path)
+    parse_transforms(&files::read_text(path, CHECK_THE_PATH)?, path)
 }
 
 /// The same from the text of the file; `path` appears in messages.
@@ -71,22 +68,14 @@ pub fn parse_transforms(text: &str, path: &Path) -> Result<CameraList, InputErro
     if file.frames.is_empty() {
         return Err(json("`frames` is empty: there is no image".into()));
     }
-    let one = |(index, spec): (usize, FrameSpec)| {
-        let number = index + 1;
-        let at = Location::Frame(number, spec.file_path.clone());
-        let fault = |reason: String| InputError::content(path, at.clone(), reason);
+    let one = |(id, spec): (u64, FrameSpec)| {
+        let at = || format!(": frame {id} (\"{}\")", Quoted(&spec.file_path));
+        let fault = |reason: String| InputError::content(path, at(), reason);
         let inner = spec.inner.or(&file.inner).checked().map_err(fault)?;
         let pose = world_to_camera(&spec.transform_matrix).map_err(fault)?;
-        Ok(Frame {
-            image: image_path(&spec.file_path),
-            depth: spec.depth_file_path,
-            number,
-            id: number as u64,
-            pose,
-            inner,
-        })
+        Ok(Frame { image: image_path(&spec.file_path), depth: spec.depth_file_path, id, pose, inner })
     };
-    let frames = file.frames.into_iter().enumerate().map(one).collect::<Result<_, InputError>>()?;
+    let frames = (1..).zip(file.frames).map(one).collect::<Result<_, InputError>>()?;
     Ok(CameraList::new(path.into(), frames))
 }
 
@@ -123,23 +112,26 @@ fn world_to_camera(rows: &[[f64; 4]]) -> Result<Matrix3x4<f64>, String> {
 impl Inner {
     /// The parameters of the frame, and those of the file where it has none.
     fn or(self, file: &Self) -> Self {
-        Self {
-            camera_angle_x: self.camera_angle_x.or(file.camera_angle_x),
-            camera_angle_y: self.camera_angle_y.or(file.camera_angle_y),
-            fl_x: self.fl_x.or(file.fl_x),
-            fl_y: self.fl_y.or(file.fl_y),
-            cx: self.cx.or(file.cx),
-            cy: self.cy.or(file.cy),
-            w: self.w.or(file.w),
-            h: self.h.or(file.h),
-            k1: self.k1.or(file.k1),
-            k2: self.k2.or(file.k2),
-            k3: self.k3.or(file.k3),
-            k4: self.k4.or(file.k4),
-            p1: self.p1.or(file.p1),
-            p2: self.p2.or(file.p2),
-            is_fisheye: self.is_fisheye.or(file.is_fisheye),
+        macro_rules! first_of {
+            ($($key:ident),*) => { Self { $($key: self.$key.or(file.$key)),* } };
         }
+        first_of!(
+            camera_angle_x,
+            camera_angle_y,
+            fl_x,
+            fl_y,
+            cx,
+            cy,
+            w,
+            h,
+            k1,
+            k2,
+            k3,
+            k4,
+            p1,
+            p2,
+            is_fisheye
+        )
     }
 
     fn checked(self) -> Result<Self, String> {
@@ -151,21 +143,19 @@ impl Inner {
             return Err("there is neither `fl_x` nor `camera_angle_x`, which give the focal length".into());
         }
         let whole = |v: f64| (1.0..=LARGEST).contains(&v) && v.fract() == 0.0;
-        for (name, side) in [("w", self.w), ("h", self.h)] {
-            if let Some(side) = side.filter(|v| !whole(*v)) {
-                return Err(format!("{name} = {side}: it must be a whole number of pixels"));
-            }
-        }
-        for (name, focal) in [("fl_x", self.fl_x), ("fl_y", self.fl_y)] {
-            if let Some(focal) = focal.filter(|v| !(*v > 0.0 && *v <= LARGEST)) {
-                return Err(format!("{name} = {focal}: it must be a positive number of pixels"));
-            }
-        }
-        for (name, angle) in
-            [("camera_angle_x", self.camera_angle_x), ("camera_angle_y", self.camera_angle_y)]
-        {
-            if let Some(angle) = angle.filter(|v| !(*v > 1e-6 && *v < std::f64::consts::PI)) {
-                return Err(format!("{name} = {angle}: it must be between 0 and pi (radians)"));
+        let positive = |v: f64| v > 0.0 && v <= LARGEST;
+        let angle = |v: f64| v > 1e-6 && v < std::f64::consts::PI;
+        let checks: [(&str, Option<f64>, &dyn Fn(f64) -> bool, &str); 6] = [
+            ("w", self.w, &whole, "a whole number of pixels"),
+            ("h", self.h, &whole, "a whole number of pixels"),
+            ("fl_x", self.fl_x, &positive, "a positive number of pixels"),
+            ("fl_y", self.fl_y, &positive, "a positive number of pixels"),
+            ("camera_angle_x", self.camera_angle_x, &angle, "between 0 and pi (radians)"),
+            ("camera_angle_y", self.camera_angle_y, &angle, "between 0 and pi (radians)"),
+        ];
+        for (name, given, holds, rule) in checks {
+            if let Some(value) = given.filter(|value| !holds(*value)) {
+                return Err(format!("{name} = {value}: it must be {rule}"));
             }
         }
         Ok(self)

@@ -1,9 +1,9 @@
 //! Command-line arguments.
 
-mod render;
-
-pub(super) use render::RenderArguments;
-
+use crate::image::{FrameRate, Levels};
+use crate::interpolate::plane::PlaneSettings;
+use crate::interpolate::{Degree, HoleFill};
+use crate::pipeline::{Method, RenderSettings};
 use clap::{Args, Parser, Subcommand};
 use hybank::messages::Quoted;
 use std::path::PathBuf;
@@ -33,7 +33,7 @@ Exit codes: 0 done, 1 the input failed, 2 wrong usage.";
 pub(super) enum Command {
     /// Render the virtual view of a scene.
     Render(Box<RenderArguments>),
-    /// Predict the error of the virtual view without a photograph of it, and what to spend on next.
+    /// Predict the error of the virtual view without a photograph of it, and what makes it smaller.
     Bound(BoundArguments),
     /// Choose the views of a scene from which the virtual view has the least predicted error.
     Place(PlaceArguments),
@@ -79,11 +79,127 @@ pub(super) struct SceneArguments {
     pub(super) threads: Option<usize>,
 }
 
+const RENDER_EXAMPLES: &str = "Examples:
+  hybank-ibr render scene.toml -o middle.png --truth photo.png
+      renders the view that [virtual] asks for and prints PSNR, SSIM, mean absolute error and coverage
+  hybank-ibr render scene.toml --view left -o left.png
+      leaves out the view \"left\" and renders it from the other views
+  hybank-ibr render - -o - < scene.toml > middle.png
+      reads the scene from standard input (paths are relative to the working directory) and writes a PNG to
+      standard output
+  hybank-ibr render path.toml -o - | ffmpeg -i - film.mp4
+      renders the views on a path as one film; path.toml has several [[virtual]] tables, or an end and frames
+
+A scene of a rectified rig:
+  [[view]]
+  name = \"left\"
+  image = \"im2.png\"
+  position = 0.0
+  disparity = \"disp2.png\"
+  disparity_scale = 4.0
+  [[view]]
+  name = \"right\"
+  image = \"im6.png\"
+  position = 1.0
+  disparity = \"disp6.png\"
+  disparity_scale = 4.0
+  [virtual]
+  position = 0.5
+
+A scene of general cameras has camera = [[..4..],[..],[..]] and depth = \"d.pfm\" in place of position and
+disparity, or colmap = \"folder\" or transforms = \"transforms.json\" at the top; [virtual] has camera = ..
+and size = [w, h], or camera_of = \"image.png\". A scene without cameras has
+views with images only, and matches = \"tracks.txt\"; [virtual] has from_tracks = 3 (a column, counted
+from 1) or between = 0.5.";
+
+#[derive(Debug, Args)]
+#[command(after_help = RENDER_EXAMPLES)]
+pub(super) struct RenderArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
+    /// Image to write (.png, .jpg, .ppm, .pgm, .pfm) or film (.y4m); `-` is standard output: PNG, and Y4M of
+    /// several views.
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: PathBuf,
+    /// Also write a mask: white for seen pixels, grey for cracks, dark grey where only samples of guessed
+    /// depth lie, black for disocclusions.
+    #[arg(long, value_name = "FILE")]
+    pub(super) mask: Option<PathBuf>,
+    /// Also write the depth of the virtual view (.pfm), NaN in holes: millimetres of a rig with calib.txt,
+    /// disparities in pixels for a baseline of one of other rectified rigs, depths in the unit of general
+    /// cameras, and an order without a unit of scenes without cameras.
+    #[arg(long, value_name = "FILE")]
+    pub(super) depth: Option<PathBuf>,
+    /// Also write how many visible samples fall on each pixel (.png of 16 bits or .pfm).
+    #[arg(long, value_name = "FILE")]
+    pub(super) count: Option<PathBuf>,
+    /// Also write where the view differs from --truth: as a picture, black is no error and white the
+    /// largest, or as numbers in grey levels (.pfm).
+    #[arg(long, value_name = "FILE", requires = "truth")]
+    pub(super) error: Option<PathBuf>,
+    /// Write a PNG with an alpha channel: transparent where no view shows what is there.
+    #[arg(long)]
+    pub(super) alpha: bool,
+    /// Frames per second that a film says it has: 25, 29.97 or 30000/1001 [default: 25].
+    #[arg(long, value_name = "RATE")]
+    pub(super) fps: Option<FrameRate>,
+    /// Use only the K views nearest to the virtual camera, by angle and distance; not in scenes without
+    /// cameras.
+    #[arg(long, value_name = "K")]
+    pub(super) nearest: Option<usize>,
+    /// Bits per value of a PNG, 8 or 16.
+    #[arg(long, value_name = "N", value_enum, default_value_t = Levels::Eight, hide_possible_values = true)]
+    pub(super) bits: Levels,
+    /// How samples are interpolated.
+    #[arg(long, value_enum, default_value_t = Method::Auto)]
+    pub(super) method: Method,
+    /// How holes are filled.
+    #[arg(long, value_enum, default_value_t = HoleFill::Background)]
+    pub(super) fill: HoleFill,
+    /// Drop pixels of unknown depth instead of filling it from the farther neighbour.
+    #[arg(long)]
+    pub(super) drop_unknown: bool,
+    /// Degree of the splines of the plane; rows are cubic, and scenes without cameras have none
+    /// [default: cubic]. A linear plane takes less time and is less sharp.
+    #[arg(long, value_enum)]
+    pub(super) degree: Option<Degree>,
+    /// Weight of the slope penalty of the row fit (rectified rigs), px^2 [default: from the noise of the
+    /// photographs, 0.01 to 4].
+    #[arg(long, value_name = "L")]
+    pub(super) lambda: Option<f64>,
+    /// Seed of the robust estimators (scenes without cameras) [default: 1].
+    #[arg(long)]
+    pub(super) seed: Option<u64>,
+    /// Exchange near and far (scenes without cameras).
+    #[arg(long)]
+    pub(super) reverse_order: bool,
+    /// Overwrite existing files.
+    #[arg(long)]
+    pub(super) force: bool,
+}
+
+impl RenderArguments {
+    /// The settings that were typed over the defaults; `offset` is that of the scene.
+    pub(super) fn settings(&self, offset: f64) -> RenderSettings {
+        let keep_smoothing = self.lambda.is_some();
+        let nearest = self.nearest;
+        let mut settings = RenderSettings { nearest, keep_smoothing, ..self.scene.settings(offset) };
+        settings.method = self.method;
+        let stage = &mut settings.interpolation;
+        stage.fill = self.fill;
+        if self.degree == Some(Degree::Linear) {
+            stage.plane = PlaneSettings::LINEAR;
+        }
+        stage.fit.lambda = self.lambda.unwrap_or(stage.fit.lambda);
+        settings
+    }
+}
+
 const BOUND_EXAMPLES: &str = "Examples:
   hybank-ibr bound scene.toml
       prints how large the error of the virtual view will be, its causes, and what would make it smaller
-  hybank-ibr bound scene.toml --map error.png --plot rows.svg --truth photo.png
-      also writes where the error is, plots it by rows, and compares the prediction with a photograph
+  hybank-ibr bound scene.toml --map error.png --truth photo.png
+      also writes where the error is, and compares the prediction with a photograph
   hybank-ibr bound scene.toml --map error.pfm
       writes numbers in grey levels, three channels: limit, expected, estimate
 
@@ -104,10 +220,6 @@ pub(super) struct BoundArguments {
     /// largest, or as numbers (.pfm): limit, expected error and estimate in grey levels.
     #[arg(long, value_name = "FILE")]
     pub(super) map: Option<PathBuf>,
-    /// Plot the figures of every image row, with the measured error of --truth, and below them the part of
-    /// each cause (.svg or .png).
-    #[arg(long, value_name = "FILE")]
-    pub(super) plot: Option<PathBuf>,
     /// Overwrite existing files.
     #[arg(long)]
     pub(super) force: bool,

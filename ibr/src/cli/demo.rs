@@ -1,7 +1,7 @@
 //! `hybank-ibr demo`: a synthetic scene, rendered and compared with its exact view.
 
 use super::arguments::DemoArguments;
-use super::failure::{Failure, PROGRAM, failed};
+use super::failure::{Failure, PROGRAM, failed, usage};
 use super::output;
 use super::progress::Progress;
 use super::summary::Summary;
@@ -43,9 +43,7 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
     output::refuse_existing(&arguments.output, arguments.force)?;
     output::refuse_format(&arguments.output, Levels::Eight)?;
     if is_dash(&arguments.output) && arguments.json {
-        return Err(Failure::Usage(
-            "-o - and --json both write to standard output; write the sheet to a file".into(),
-        ));
+        return usage("-o - and --json both write to standard output; write the sheet to a file");
     }
     PROGRAM.name_leftovers(&[&arguments.output]);
     refuse_pixels_without_memory(&arguments.output, arguments.size, SHEET).map_err(failed)?;

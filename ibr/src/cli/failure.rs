@@ -10,6 +10,11 @@ pub(super) fn failed(message: impl ToString) -> Failure {
     Failure::Input(message.to_string())
 }
 
+/// That the program was not used as it can be.
+pub(super) fn usage<T>(message: impl Into<String>) -> Result<T, Failure> {
+    Err(Failure::Usage(message.into()))
+}
+
 /// The same failure, said of a virtual view, from 0, of several.
 pub(super) fn of_view(failure: Failure, view: usize, all: usize) -> Failure {
     match failure {

@@ -1,14 +1,31 @@
 //! Maps of a quantity as pictures: black is zero, then violet, red and yellow, and white is the largest.
 
-use crate::image::Image;
+use super::failure::Failure;
+use super::output::{self, Encoded, ends_with};
+use crate::image::{Image, Levels, pfm};
+use std::path::Path;
 
 /// The colours from zero to one, evenly spaced.
 const COLOURS: [[f32; 3]; 5] =
     [[0.0, 0.0, 0.0], [80.0, 10.0, 110.0], [210.0, 50.0, 50.0], [250.0, 190.0, 40.0], [255.0, 255.0, 255.0]];
 
+/// The file of a quantity: its `numbers` (.pfm), or the picture of its `values` and the value that is white.
+pub(super) fn encoded<'a>(
+    values: &[f32],
+    size: (usize, usize),
+    path: &'a Path,
+    numbers: impl FnOnce() -> Image,
+) -> Result<(Encoded<'a>, Option<f32>), Failure> {
+    if ends_with(path, "pfm") {
+        return Ok((Encoded { bytes: pfm::encode(&numbers()), path }, None));
+    }
+    let (map, white) = map(values, size);
+    Ok((output::encoded(&map, path, Levels::Eight)?, Some(white)))
+}
+
 /// A picture of values that are not negative, and the value that is white: all but one in a hundred are not
 /// larger.
-pub(super) fn map(values: &[f32], (width, height): (usize, usize)) -> (Image, f32) {
+fn map(values: &[f32], (width, height): (usize, usize)) -> (Image, f32) {
     let mut sorted = values.to_vec();
     sorted.sort_by(f32::total_cmp);
     let white = sorted[(sorted.len() - 1) * 99 / 100].max(f32::MIN_POSITIVE);

@@ -28,7 +28,17 @@ pub(super) fn warn_of_contradictions(agreement: &Agreement, kind: &Kind) {
 
 /// The line of a report about the inputs; none for views without depth.
 pub(super) fn line(agreement: &Agreement) -> Option<String> {
-    let Some(worst) = agreement.worst() else { return unchecked(agreement) };
+    let unchecked = |why: String| Some(format!("inputs    unchecked: {why}"));
+    let Some(worst) = agreement.worst() else {
+        return match agreement.gains.len() {
+            0 => None,
+            1 => unchecked(
+                "a single view has no other to compare with, so a wrong depth scale or position would not show"
+                    .into(),
+            ),
+            views => unchecked(format!("the {views} views share too few points to compare")),
+        };
+    };
     // What a viewer notices; smaller differences are matched too.
     let exposures = agreement.gains.iter().flatten().any(|g| g.ln().abs() > 0.02);
     Some(format!(
@@ -43,19 +53,6 @@ pub(super) fn weights_line(calibrated_on: usize) -> String {
     match calibrated_on {
         0 => "weights   those of typical photographs: a single view cannot be left out".into(),
         views => format!("weights   calibrated on {views} views, each left out in turn"),
-    }
-}
-
-/// Why no two views were compared.
-fn unchecked(agreement: &Agreement) -> Option<String> {
-    match agreement.gains.len() {
-        0 => None,
-        1 => Some(
-            "inputs    unchecked: a single view has no other to compare with, so a wrong depth scale or \
-             position would not show"
-                .into(),
-        ),
-        views => Some(format!("inputs    unchecked: the {views} views share too few points to compare")),
     }
 }
 

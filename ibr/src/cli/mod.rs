@@ -8,7 +8,6 @@ mod heat;
 mod init;
 mod inputs;
 mod output;
-mod outputs;
 mod place;
 mod progress;
 mod render;
@@ -16,7 +15,7 @@ mod source;
 mod summary;
 
 use arguments::{Arguments, Command};
-use failure::{Failure, PROGRAM, failed};
+use failure::{Failure, PROGRAM, failed, usage};
 use hybank::memory::{affordable_threads, check_memory};
 use std::process::ExitCode;
 
@@ -50,7 +49,7 @@ pub fn run() -> ExitCode {
 fn in_pool(threads: Option<usize>, work: impl FnOnce() -> Result<(), Failure> + Send) -> Result<(), Failure> {
     if threads.is_some_and(|threads| !(1..=MOST_THREADS).contains(&threads)) {
         let threads = threads.unwrap_or_default();
-        return Err(Failure::Usage(format!("--threads {threads}: it must be 1 to {MOST_THREADS}")));
+        return usage(format!("--threads {threads}: it must be 1 to {MOST_THREADS}"));
     }
     let builder = rayon::ThreadPoolBuilder::new;
     let alone = || builder().num_threads(1).use_current_thread().build().map_err(failed);
@@ -61,14 +60,9 @@ fn in_pool(threads: Option<usize>, work: impl FnOnce() -> Result<(), Failure> + 
             .map_err(|error| Failure::Input(format!("--threads {threads}: {error}; ask for fewer"))),
         (count, None) => several(count).or_else(|_| alone()),
     }?;
-    // With the stacks of the threads, which are in use now.
-    refuse_without_memory()?;
-    pool.install(work)
-}
-
-/// Refuses to begin with less memory than text, small tables and the stacks of threads take: an allocation
-/// that fails there would end the process.
-fn refuse_without_memory() -> Result<(), Failure> {
+    // With the stacks of the threads, which are in use now. An allocation of text or a small table that fails
+    // would end the process.
     let refused = |shortage| format!("every command takes {shortage}; allow more, or use --threads 1");
-    check_memory(LEAST_MEMORY).map_err(|shortage| Failure::Input(refused(shortage)))
+    check_memory(LEAST_MEMORY).map_err(|shortage| failed(refused(shortage)))?;
+    pool.install(work)
 }

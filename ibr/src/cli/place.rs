@@ -1,7 +1,7 @@
 //! `hybank-ibr place`: the views of a scene from which the virtual view has the least predicted error.
 
 use super::arguments::PlaceArguments;
-use super::failure::{Failure, failed};
+use super::failure::{Failure, failed, usage};
 use super::progress::Progress;
 use super::{inputs, output};
 use crate::analysis::{Choice, Predicted, Predictor};
@@ -18,7 +18,7 @@ const NOTHING_SHOWN: f64 = 255.0;
 pub(super) fn run(arguments: &PlaceArguments) -> Result<(), Failure> {
     arguments.scene.check()?;
     if arguments.choose == 0 {
-        return Err(Failure::Usage("--choose 0: at least one view must be chosen".into()));
+        return usage("--choose 0: at least one view must be chosen");
     }
     let progress = Progress::new(3);
     progress.step("reading");
@@ -28,7 +28,7 @@ pub(super) fn run(arguments: &PlaceArguments) -> Result<(), Failure> {
     if arguments.choose > scene.names.len() {
         let (choose, views) = (arguments.choose, scene.names.len());
         let views = counted(views, "view");
-        return Err(Failure::Usage(format!("--choose {choose}: the scene has {views} to choose from")));
+        return usage(format!("--choose {choose}: the scene has {views} to choose from"));
     }
     let truth = arguments.scene.truth()?;
     let job = Job { arguments, scene: &scene, truth, progress };

@@ -1,14 +1,12 @@
 //! `hybank-ibr render`: a scene file in, images and their figures out.
 
 mod concerns;
-mod metric;
 mod outputs;
 mod path;
 
 use super::arguments::RenderArguments;
-use super::failure::{Failure, PROGRAM, failed, of_view};
-use super::output;
-use super::outputs::{Outputs, check_files};
+use super::failure::{Failure, PROGRAM, failed, of_view, usage};
+use super::output::{self, Outputs, check_files};
 use super::progress::Progress;
 use super::summary::Summary;
 use crate::files::refuse_pixels_without_memory;
@@ -81,19 +79,17 @@ fn timed(
     let mut summary = Summary::new(&done.rendering, start.elapsed().as_secs_f64(), scene.filled);
     summary.preparation_seconds = preparation;
     summary.geometry = done.geometry.clone();
-    summary.depths = metric::depths(scene, arguments.depth.is_some());
+    summary.depths = outputs::unit_of_depths(scene, arguments.depth.is_some());
     Ok((done, summary))
 }
 
 /// Checks that need no file.
 fn check(arguments: &RenderArguments) -> Result<(), Failure> {
     if is_dash(&arguments.output) && arguments.scene.json {
-        return Err(Failure::Usage(
-            "-o - and --json both want standard output; give the image a file".into(),
-        ));
+        return usage("-o - and --json both want standard output; give the image a file");
     }
     if arguments.nearest == Some(0) {
-        return Err(Failure::Usage("--nearest 0: at least one view must be used".into()));
+        return usage("--nearest 0: at least one view must be used");
     }
     arguments.scene.check()?;
     arguments.check_outputs()
@@ -115,7 +111,7 @@ fn check_kind(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure> {
     ];
     match unused.iter().find(|(.., is_unused)| *is_unused) {
         Some((option, needs, _)) => {
-            Err(Failure::Usage(format!("{option}: it is for {needs}; leave it out of this rendering")))
+            usage(format!("{option}: it is for {needs}; leave it out of this rendering"))
         }
         None => Ok(()),
     }
@@ -125,10 +121,10 @@ fn check_kind(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure> {
 fn check_nearest(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure> {
     let Some(count) = arguments.nearest else { return Ok(()) };
     if let Kind::Uncalibrated { .. } = kind {
-        return Err(Failure::Usage(format!(
+        return usage(format!(
             "--nearest {count}: the cameras of this scene are unknown, so no view is known to be nearer; name \
              fewer views in the scene instead"
-        )));
+        ));
     }
     let views = kind.images().len();
     if count > views {
@@ -144,7 +140,7 @@ fn read(arguments: &RenderArguments, watch: Watch<'_>) -> Result<(Scene, Vec<Out
     path::check(arguments, frames)?;
     let files = path::outputs(arguments, frames);
     let film = Some(arguments.output.as_path()).filter(|path| path::is_film(path, frames));
-    check_files(&files, film.filter(|path| !is_dash(path)), &source, arguments.force)?;
+    check_files(&files, film.filter(|path| !is_dash(path)), &source, &arguments.scene, arguments.force)?;
     Ok((arguments.scene.load(&source, !arguments.drop_unknown, watch)?, files))
 }
 
@@ -161,7 +157,7 @@ fn render(
         Kind::Rectified { views, positions } => {
             let views: Vec<_> = views.iter().map(SourceView::view).collect();
             let done = rectified::render_watched(&views, positions[frame], &settings, watch);
-            done.map(|rendering| whole(metric::in_millimetres(rendering, scene))).map_err(failed)
+            done.map(|rendering| whole(outputs::in_millimetres(rendering, scene))).map_err(failed)
         }
         Kind::Calibrated { views, cameras, size } => {
             let views: Vec<_> = views.iter().map(SourceView::view).collect();

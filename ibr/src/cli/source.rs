@@ -1,9 +1,8 @@
 //! The scene of a command: its file, what was typed with it, and the photograph to compare with.
 
 use super::arguments::SceneArguments;
-use super::failure::{Failure, PROGRAM, failed};
+use super::failure::{Failure, PROGRAM, failed, usage};
 use super::inputs;
-use super::output;
 use crate::files;
 use crate::image::{Image, read_image};
 use crate::pipeline::{RenderSettings, Watch};
@@ -23,7 +22,7 @@ impl SceneArguments {
     /// Checks that need no file.
     pub(super) fn check(&self) -> Result<(), Failure> {
         match self.depth_step {
-            0 => Err(Failure::Usage("--depth-step 0: the step must be at least 1".into())),
+            0 => usage("--depth-step 0: the step must be at least 1"),
             _ => Ok(()),
         }
     }
@@ -32,11 +31,6 @@ impl SceneArguments {
     pub(super) fn settings(&self, offset: f64) -> RenderSettings {
         let offset = self.offset.unwrap_or(offset);
         RenderSettings { offset, keep_exposure: self.keep_exposure, ..RenderSettings::default() }
-    }
-
-    /// The input files that were typed.
-    pub(super) fn inputs(&self) -> Vec<&Path> {
-        [Some(self.file.as_path()), self.truth.as_deref()].into_iter().flatten().collect()
     }
 
     /// The photograph to compare with.
@@ -72,11 +66,10 @@ impl SceneArguments {
                 "{}: errors are predicted for views with depth; the cameras of this scene are unknown",
                 Quoted(&self.file)
             ))),
-            kind if kind.frames() > 1 && self.truth.is_some() => Err(Failure::Usage(
+            kind if kind.frames() > 1 && self.truth.is_some() => usage(
                 "--truth: there is one photograph, but the scene has several virtual views; give it with --view \
-                 NAME, which predicts the place of one view"
-                    .into(),
-            )),
+                 NAME, which predicts the place of one view",
+            ),
             _ => Ok(()),
         }
     }
@@ -88,13 +81,11 @@ impl Source {
         if arguments.view.is_some() { 1 } else { self.spec.frames().clamp(1, scene::MOST_FRAMES) }
     }
 
-    /// Refuses outputs that are one file, or an input of the scene, and names what killed runs left beside
-    /// them.
-    pub(super) fn check_outputs(&self, outputs: &[&Path]) -> Result<(), Failure> {
-        let files = self.spec.files(self.path.parent().unwrap_or(Path::new("")));
-        output::refuse_overlaps(outputs, &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
-        PROGRAM.name_leftovers(outputs);
-        Ok(())
+    /// The scene file, and every file that it names.
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        let mut files = self.spec.files(self.path.parent().unwrap_or(Path::new("")));
+        files.push(self.path.clone());
+        files
     }
 }
 
@@ -108,9 +99,7 @@ fn spec(path: &Path) -> Result<(PathBuf, SceneSpec), Failure> {
         let name = "standard input";
         StandardStream::Input.check().map_err(|error| Failure::Input(format!("{name}: {error}")))?;
         let text = files::text(std::io::stdin().lock(), name).map_err(failed)?;
-        let name = PathBuf::from("<stdin>");
-        files::refuse_without_memory(&name, scene::room_to_parse(&text)).map_err(failed)?;
-        return parsed(&text, name);
+        return parsed(&text, PathBuf::from("<stdin>"));
     }
     let folder = if path.is_dir() { Some(path) } else { path.parent().filter(|_| is_list(path)) };
     if let Some(folder) = folder {
@@ -122,7 +111,7 @@ fn spec(path: &Path) -> Result<(PathBuf, SceneSpec), Failure> {
         PROGRAM.say_line(&format!("note: the scene of this folder is {}", Quoted(&own)));
         return spec(&own);
     }
-    let text = files::read_text(path, "check the path", scene::room_to_parse).map_err(failed)?;
+    let text = files::read_text(path, "check the path").map_err(failed)?;
     parsed(&text, path.to_owned())
 }
 

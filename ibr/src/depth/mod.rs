@@ -26,7 +26,6 @@ impl Measure {
         if self == Self::Disparity { value } else { 1.0 / value }
     }
 
-    /// The value of a parallax.
     #[inline]
     pub(crate) fn of_parallax(self, parallax: f32) -> f32 {
         if self == Self::Disparity {
@@ -174,13 +173,6 @@ impl DepthMap {
         self.guessed.get(pixel).copied().unwrap_or(false)
     }
 
-    /// Which values from this pixel on were filled from their neighbours; empty if none of the map was.
-    #[inline]
-    pub(crate) fn guessed_from(&self, pixel: usize) -> &[bool] {
-        self.guessed.get(pixel..).unwrap_or_default()
-    }
-
-    /// Number of values that were filled from their neighbours.
     pub(crate) fn guesses(&self) -> usize {
         self.guessed.iter().filter(|guessed| **guessed).count()
     }

@@ -32,15 +32,6 @@ pub(crate) struct Reliefs {
     pub(crate) outline: [bool; TILE],
 }
 
-/// A tile and its neighbours, NaN outside the map.
-struct Surroundings {
-    left: [f32; TILE],
-    here: [f32; TILE],
-    right: [f32; TILE],
-    above: [f32; TILE],
-    below: [f32; TILE],
-}
-
 impl DepthMap {
     /// Whether one of the four neighbours of a pixel lies on a nearer surface.
     pub fn is_behind_edge(&self, x: usize, y: usize) -> bool {
@@ -49,20 +40,7 @@ impl DepthMap {
 
     /// The surroundings of the pixels of a row from this column on, up to the end of the row or a tile.
     pub(crate) fn reliefs(&self, start: usize, y: usize) -> Reliefs {
-        let around = self.surroundings(start, y);
-        let Surroundings { left, here, right, above, below } = &around;
-        let (across, down) = ([0.0; TILE], [0.0; TILE]);
-        let mut reliefs = Reliefs { across, down, behind_edge: [false; TILE], outline: [false; TILE] };
-        let scale = Scale::of(self);
-        for i in 0..TILE {
-            let (slopes, edges) = scale.relief(here[i], [left[i], right[i], above[i], below[i]]);
-            [reliefs.across[i], reliefs.down[i]] = slopes;
-            [reliefs.behind_edge[i], reliefs.outline[i]] = edges;
-        }
-        reliefs
-    }
-
-    fn surroundings(&self, start: usize, y: usize) -> Surroundings {
+        // NaN outside the map.
         let tile = |row: Option<usize>, start: usize| {
             let mut values = [f32::NAN; TILE];
             let row = row.filter(|y| *y < self.height).map_or(&[][..], |y| self.row(y));
@@ -71,14 +49,26 @@ impl DepthMap {
             values[..count].copy_from_slice(&rest[..count]);
             values
         };
-        let here = tile(Some(y), start);
+        let (here, right) = (tile(Some(y), start), tile(Some(y), start + 1));
+        let (above, below) = (tile(y.checked_sub(1), start), tile(Some(y + 1), start));
         let mut left = [f32::NAN; TILE];
         left[1..].copy_from_slice(&here[..TILE - 1]);
         if let Some(before) = start.checked_sub(1) {
             left[0] = self.row(y)[before];
         }
-        let (above, below) = (tile(y.checked_sub(1), start), tile(Some(y + 1), start));
-        Surroundings { left, here, right: tile(Some(y), start + 1), above, below }
+        let (across, down) = ([0.0; TILE], [0.0; TILE]);
+        let mut reliefs = Reliefs { across, down, behind_edge: [false; TILE], outline: [false; TILE] };
+        let scale = Scale::of(self);
+        for i in 0..TILE {
+            reliefs.across[i] = scale.slope(left[i], here[i], right[i]);
+            reliefs.down[i] = scale.slope(above[i], here[i], below[i]);
+            for neighbour in [left[i], right[i], above[i], below[i]] {
+                let (nearer, jump) = (scale.nearer * (neighbour - here[i]), scale.jump(here[i], neighbour));
+                reliefs.behind_edge[i] |= nearer >= jump;
+                reliefs.outline[i] |= -nearer >= jump;
+            }
+        }
+        reliefs
     }
 }
 
@@ -86,18 +76,6 @@ impl Scale {
     fn of(map: &DepthMap) -> Self {
         let nearer = if map.measure == Measure::Disparity { 1.0 } else { -1.0 };
         Self { nearer, offset: map.offset as f32 }
-    }
-
-    /// Slopes across and down, and whether the pixel lies behind an edge and on an outline, from its
-    /// neighbours to the left, right, above and below.
-    #[inline(always)]
-    fn relief(self, here: f32, around: [f32; 4]) -> ([f32; 2], [bool; 2]) {
-        let [left, right, above, below] = around;
-        let slopes = [self.slope(left, here, right), self.slope(above, here, below)];
-        let steps = around.map(|neighbour| self.step(here, neighbour));
-        let behind_edge = steps.iter().fold(false, |any, (step, jump)| any | (*step >= *jump));
-        let outline = steps.iter().fold(false, |any, (step, jump)| any | (-*step >= *jump));
-        (slopes, [behind_edge, outline])
     }
 
     /// The least difference of two values that separates their surfaces.
@@ -119,12 +97,6 @@ impl Scale {
             (false, true) => after - here,
             (false, false) => 0.0,
         }
-    }
-
-    /// How much nearer a neighbour is, and from which difference on it lies on another surface.
-    #[inline(always)]
-    fn step(self, here: f32, neighbour: f32) -> (f32, f32) {
-        (self.nearer * (neighbour - here), self.jump(here, neighbour))
     }
 }
 

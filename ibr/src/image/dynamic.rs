@@ -32,7 +32,7 @@ impl TryFrom<&DynamicImage> for Image {
     type Error = InputError;
 
     fn try_from(picture: &DynamicImage) -> Result<Self, InputError> {
-        super::read::whole_image(picture, 1.0)
+        Ok(super::read::Stored::of(picture)?.intensities())
     }
 }
 

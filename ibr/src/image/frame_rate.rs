@@ -4,8 +4,6 @@ use std::str::FromStr;
 
 /// Most frames per second, and most seconds per frame.
 const MOST: u64 = 1000;
-/// Most digits after the point.
-const MOST_DIGITS: usize = 6;
 
 /// Frames per second: 25, 2997/100 or 30000/1001, in lowest terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,9 +17,11 @@ pub struct FrameRate {
 impl FrameRate {
     /// A ratio in lowest terms; `None` outside 1/1000 to 1000 frames per second.
     pub fn new(frames: u64, seconds: u64) -> Option<Self> {
-        let inside = frames > 0 && seconds > 0;
-        let inside = inside && frames <= seconds.checked_mul(MOST)? && seconds <= frames.checked_mul(MOST)?;
-        let divisor = if inside { common_divisor(frames, seconds) } else { return None };
+        let (most, longest) = (seconds.checked_mul(MOST)?, frames.checked_mul(MOST)?);
+        if frames == 0 || frames > most || seconds > longest {
+            return None;
+        }
+        let divisor = common_divisor(frames, seconds);
         let term = |n: u64| u32::try_from(n / divisor).ok();
         Some(Self { frames: term(frames)?, seconds: term(seconds)? })
     }
@@ -38,29 +38,16 @@ impl FromStr for FrameRate {
     /// Reads `25`, `29.97` or `30000/1001`. A decimal number is taken as it is written, so that 29.97 is
     /// 2997/100.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let whole = |digits: &str| digits.bytes().all(|b| b.is_ascii_digit()).then(|| digits.parse().ok())?;
+        let (before, after) = text.split_once('.').unwrap_or((text, ""));
         let rate = match text.split_once('/') {
             Some((frames, seconds)) => whole(frames).zip(whole(seconds)),
-            None => decimal(text),
+            None if before.is_empty() => None,
+            None => whole(&[before, after].concat()).zip(10_u64.checked_pow(after.len() as u32)),
         };
         rate.and_then(|(frames, seconds)| Self::new(frames, seconds))
             .ok_or_else(|| format!("write it as 25, 29.97 or 30000/1001, from 1/{MOST} to {MOST}"))
     }
-}
-
-/// A number of digits only.
-fn whole(digits: &str) -> Option<u64> {
-    digits.bytes().all(|b| b.is_ascii_digit()).then(|| digits.parse().ok())?
-}
-
-/// A decimal number as numerator and power of ten.
-fn decimal(text: &str) -> Option<(u64, u64)> {
-    let (before, after) = text.split_once('.').unwrap_or((text, ""));
-    if after.len() > MOST_DIGITS {
-        return None;
-    }
-    let power = 10_u64.pow(after.len() as u32);
-    let fraction = if after.is_empty() { 0 } else { whole(after)? };
-    Some((whole(before)?.checked_mul(power)?.checked_add(fraction)?, power))
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ pub use frame_rate::FrameRate;
 pub(crate) use read::image_size;
 pub use read::{MOST_PIXELS, read_image, read_map};
 pub use texture::Texture;
-pub use write::{begin, encode, encode_levels, encode_with_alpha, save};
+pub use write::{begin, encode, encode_with_alpha, save};
 
 use crate::files::InputError;
 

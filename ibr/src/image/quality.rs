@@ -62,16 +62,18 @@ fn structural(a: &Image, b: &Image, channel: usize, inside: &dyn Fn(usize) -> bo
     let (width, height) = a.size();
     let (across, down) = (window(width), window(height));
     let (mut sum, mut count) = (0.0, 0.0);
-    let mut columns = vec![Moments::default(); width];
+    let mut columns = vec![[0.0; 5]; width];
     for top in 0..=height - down.len() {
-        columns
-            .iter_mut()
-            .enumerate()
-            .for_each(|(x, m)| *m = column_moments(a, b, top * width + x, channel, &down));
+        for (x, column) in columns.iter_mut().enumerate() {
+            let at = |image: &Image, y: usize| f64::from(image.row(y)[x * image.channels + channel]);
+            *column = weighted(&down, |k| {
+                let (p, q) = (at(a, top + k), at(b, top + k));
+                [p, q, p * p, q * q, p * q]
+            });
+        }
         for left in 0..=width - across.len() {
             if inside((top + down.len() / 2) * width + left + across.len() / 2) {
-                let weighted = across.iter().zip(&columns[left..]);
-                sum += weighted.fold(Moments::default(), |t, (w, m)| t.plus(m, *w)).similarity();
+                sum += similarity(weighted(&across, |k| columns[left + k]));
                 count += 1.0;
             }
         }
@@ -88,43 +90,21 @@ fn window(side: usize) -> Vec<f64> {
     (-reach..=reach).map(|k| bell(k) / sum).collect()
 }
 
-/// The moments of a column of pixels, the first of which has this number.
-fn column_moments(a: &Image, b: &Image, first: usize, channel: usize, window: &[f64]) -> Moments {
-    window.iter().enumerate().fold(Moments::default(), |total, (k, w)| {
-        let at = |image: &Image| f64::from(image.data[(first + k * image.width) * image.channels + channel]);
-        let (p, q) = (at(a), at(b));
-        total.plus(&Moments { a: p, b: q, aa: p * p, bb: q * q, ab: p * q }, *w)
-    })
+/// Weighted means over a window of two signals, their squares and their product.
+type Moments = [f64; 5];
+
+fn weighted(window: &[f64], moments: impl Fn(usize) -> Moments) -> Moments {
+    let add = |sum: Moments, (k, w): (usize, &f64)| {
+        let more = moments(k);
+        std::array::from_fn(|i| sum[i] + w * more[i])
+    };
+    window.iter().enumerate().fold([0.0; 5], add)
 }
 
-/// Weighted means of two signals, their squares and their product.
-#[derive(Debug, Clone, Copy, Default)]
-struct Moments {
-    a: f64,
-    b: f64,
-    aa: f64,
-    bb: f64,
-    ab: f64,
-}
-
-impl Moments {
-    /// This and `w` times the other.
-    fn plus(&self, o: &Self, w: f64) -> Self {
-        Self {
-            a: self.a + w * o.a,
-            b: self.b + w * o.b,
-            aa: self.aa + w * o.aa,
-            bb: self.bb + w * o.bb,
-            ab: self.ab + w * o.ab,
-        }
-    }
-
-    fn similarity(&self) -> f64 {
-        let (c1, c2) = ((0.01_f64 * 255.0).powi(2), (0.03_f64 * 255.0).powi(2));
-        let Self { a, b, .. } = *self;
-        let (va, vb, covariance) = (self.aa - a * a, self.bb - b * b, self.ab - a * b);
-        (2.0 * a * b + c1) * (2.0 * covariance + c2) / ((a * a + b * b + c1) * (va + vb + c2))
-    }
+fn similarity([a, b, aa, bb, ab]: Moments) -> f64 {
+    let (c1, c2) = ((0.01_f64 * 255.0).powi(2), (0.03_f64 * 255.0).powi(2));
+    let (va, vb, covariance) = (aa - a * a, bb - b * b, ab - a * b);
+    (2.0 * a * b + c1) * (2.0 * covariance + c2) / ((a * a + b * b + c1) * (va + vb + c2))
 }
 
 #[cfg(test)]

@@ -18,13 +18,7 @@ pub const MOST_PIXELS: usize = 1 << 25;
 /// # Errors
 /// [`InputError`], naming the file.
 pub fn read_image(path: &Path, most: usize) -> Result<Image, InputError> {
-    match load(path, most)? {
-        Loaded::Float(mut image) => {
-            image.data_mut().iter_mut().for_each(|v| *v *= 255.0);
-            Ok(image)
-        }
-        Loaded::Whole(picture) => whole_image(&picture, 1.0),
-    }
+    Ok(load(path, most)?.intensities())
 }
 
 /// Width and height of an image; its pixels are not unpacked where the format allows that.
@@ -46,15 +40,7 @@ pub(crate) fn image_size(path: &Path) -> Result<(usize, usize), InputError> {
 /// # Errors
 /// As [`read_image`], and for an RGB file whose channels differ.
 pub fn read_map(path: &Path, most: usize) -> Result<(usize, usize, Vec<f32>), InputError> {
-    let image = match load(path, most)? {
-        Loaded::Float(map) => map,
-        Loaded::Whole(picture) => {
-            // Back from 0..255 to the stored numbers: 65535 / 255 = 257 exactly.
-            let stored = if is_deep(&picture) { 257.0 } else { 1.0 };
-            whole_image(&picture, stored)?
-        }
-    };
-    single_channel(path, image)
+    single_channel(path, load(path, most)?.numbers)
 }
 
 fn single_channel(path: &Path, image: Image) -> Result<(usize, usize, Vec<f32>), InputError> {
@@ -73,9 +59,37 @@ fn single_channel(path: &Path, image: Image) -> Result<(usize, usize, Vec<f32>),
     Ok((width, height, image.data.iter().copied().step_by(3).collect()))
 }
 
-enum Loaded {
-    Float(Image),
-    Whole(DynamicImage),
+/// The numbers of a file as they are stored.
+pub(super) struct Stored {
+    numbers: Image,
+    /// The number that is white: 1 of floats.
+    white: f32,
+}
+
+impl Stored {
+    pub(super) fn of(picture: &DynamicImage) -> Result<Self, InputError> {
+        use DynamicImage::{ImageLuma16, ImageLumaA16, ImageRgb16, ImageRgb32F, ImageRgba16, ImageRgba32F};
+        let (width, height) = (picture.width() as usize, picture.height() as usize);
+        let is_float = matches!(picture, ImageRgb32F(_) | ImageRgba32F(_));
+        let is_deep = matches!(picture, ImageLuma16(_) | ImageLumaA16(_) | ImageRgb16(_) | ImageRgba16(_));
+        let numbers = |bytes: Vec<u8>| bytes.into_iter().map(f32::from).collect();
+        let deep = |words: Vec<u16>| words.into_iter().map(f32::from).collect();
+        let (white, channels, data) = match (is_float, is_deep, picture.color().has_color()) {
+            (true, ..) => (1.0, 3, picture.to_rgb32f().into_raw()),
+            (_, true, false) => (65535.0, 1, deep(picture.to_luma16().into_raw())),
+            (_, true, true) => (65535.0, 3, deep(picture.to_rgb16().into_raw())),
+            (_, false, false) => (255.0, 1, numbers(picture.to_luma8().into_raw())),
+            (_, false, true) => (255.0, 3, numbers(picture.to_rgb8().into_raw())),
+        };
+        Ok(Self { numbers: Image::new(width, height, channels, data)?, white })
+    }
+
+    /// The image on the scale 0..255.
+    pub(super) fn intensities(mut self) -> Image {
+        let scaled = |v: f32| if self.white == 1.0 { v * 255.0 } else { v / (self.white / 255.0) };
+        self.numbers.data.iter_mut().for_each(|v| *v = scaled(*v));
+        self.numbers
+    }
 }
 
 /// The numbers of a format that only maps have.
@@ -91,12 +105,13 @@ fn float_map(file: &Source<'_>) -> Result<Option<Image>, InputError> {
     file.check_size(map.width(), map.height()).map(|()| Some(map))
 }
 
-fn load(path: &Path, most: usize) -> Result<Loaded, InputError> {
+fn load(path: &Path, most: usize) -> Result<Stored, InputError> {
+    let bytes = files::read_bytes(path, CHECK_THE_PATH)?;
     // The numbers of a float map are as many bytes again.
-    let bytes = files::read_bytes(path, CHECK_THE_PATH, |bytes| bytes.len() as f64)?;
+    files::refuse_without_memory(path, bytes.len() as f64)?;
     let source = Source { path, bytes: &bytes, most };
-    if let Some(map) = float_map(&source)? {
-        return Ok(Loaded::Float(map));
+    if let Some(numbers) = float_map(&source)? {
+        return Ok(Stored { numbers, white: 1.0 });
     }
     let wrong = |e: image::ImageError| source.wrong(e.to_string());
     let open = || {
@@ -109,31 +124,7 @@ fn load(path: &Path, most: usize) -> Result<Loaded, InputError> {
     let mut reader = open()?;
     // The size was checked; the decoders have limits of their own, without a way to allow more.
     reader.no_limits();
-    Ok(Loaded::Whole(reader.decode().map_err(wrong)?))
-}
-
-fn is_deep(picture: &DynamicImage) -> bool {
-    use DynamicImage::{ImageLuma16, ImageLumaA16, ImageRgb16, ImageRgba16};
-    matches!(picture, ImageLuma16(_) | ImageLumaA16(_) | ImageRgb16(_) | ImageRgba16(_))
-}
-
-/// Values on the scale 0..255, times `factor`; white is 1 in floats.
-pub(super) fn whole_image(picture: &DynamicImage, factor: f32) -> Result<Image, InputError> {
-    let (width, height) = (picture.width() as usize, picture.height() as usize);
-    if matches!(picture, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)) {
-        let data = picture.to_rgb32f().as_raw().iter().map(|v| v * 255.0 * factor).collect();
-        return Image::new(width, height, 3, data);
-    }
-    let shallow = |v: &u8| f32::from(*v) * factor;
-    // 257 / factor divides exactly for maps (factor 257) and rounds once for images.
-    let deep = |v: &u16| f32::from(*v) / (257.0 / factor);
-    let (channels, data) = match (picture.color().has_color(), is_deep(picture)) {
-        (false, false) => (1, picture.to_luma8().as_raw().iter().map(shallow).collect()),
-        (true, false) => (3, picture.to_rgb8().as_raw().iter().map(shallow).collect()),
-        (false, true) => (1, picture.to_luma16().as_raw().iter().map(deep).collect()),
-        (true, true) => (3, picture.to_rgb16().as_raw().iter().map(deep).collect()),
-    };
-    Image::new(width, height, channels, data)
+    Stored::of(&reader.decode().map_err(wrong)?)
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::dynamic::{Levels, picture};
 use super::{Image, pfm};
 use crate::files::{InputError, refuse_pixels_without_memory};
 use hybank::files::AtomicFile;
-use image::{DynamicImage, ImageBuffer, ImageFormat};
+use image::{DynamicImage, ImageFormat};
 use std::io::{Cursor, Write};
 use std::path::Path;
 
@@ -22,7 +22,9 @@ pub fn encode(image: &Image, path: &Path, levels: Levels) -> Result<Vec<u8>, Inp
         "ppm" | "pgm" | "pnm" => ImageFormat::Pnm,
         "pfm" => {
             let room = 12.0 * image.channels() as f64;
-            return refuse_pixels_without_memory(path, image.size(), room).map(|()| encode_float(image));
+            refuse_pixels_without_memory(path, image.size(), room)?;
+            let values = image.data().iter().map(|v| v / 255.0).collect();
+            return Ok(pfm::encode(&Image { data: values, ..*image }));
         }
         _ => {
             let remedy = "use .png, .jpg, .ppm, .pgm or .pfm";
@@ -68,53 +70,27 @@ pub fn begin(bytes: &[u8], path: &Path, replace: bool) -> Result<AtomicFile, Inp
     Ok(file)
 }
 
-fn encode_float(image: &Image) -> Vec<u8> {
-    let mut map = image.clone();
-    map.data_mut().iter_mut().for_each(|v| *v /= 255.0);
-    pfm::encode(&map)
-}
-
-/// The bytes of a PNG file of whole numbers, one per pixel; `path` appears in messages.
-///
-/// # Errors
-/// [`InputError`] if the encoder fails, or the numbers do not fill the size.
-pub fn encode_levels(
-    numbers: &[u16],
-    (width, height): (usize, usize),
-    path: &Path,
-) -> Result<Vec<u8>, InputError> {
-    fills(numbers, width, height)?;
-    refuse_pixels_without_memory(path, (width, height), packing(1, Levels::Sixteen))?;
-    let grey = ImageBuffer::from_raw(width as u32, height as u32, numbers.to_vec());
-    write_picture(&grey.map(DynamicImage::ImageLuma16).unwrap_or_default(), ImageFormat::Png, path)
-}
-
 /// The bytes of a PNG file with an alpha channel, 0 to 1; colours are not multiplied by it. `path` appears
 /// in messages.
 ///
 /// # Errors
-/// As [`encode_levels`].
+/// [`InputError::Buffer`] unless there is one alpha for each pixel, and [`InputError`] if the encoder fails.
 pub fn encode_with_alpha(
     image: &Image,
     alpha: &[f32],
     path: &Path,
     levels: Levels,
 ) -> Result<Vec<u8>, InputError> {
-    fills(alpha, image.width(), image.height())?;
+    let Image { width, height, .. } = *image;
+    if alpha.len() != width * height {
+        let (expected, given) = (width * height, alpha.len());
+        return Err(InputError::Buffer { width, height, channels: 1, expected, given });
+    }
     refuse_pixels_without_memory(path, image.size(), packing(image.channels() + 1, levels))?;
     let pixels = image.data().chunks_exact(image.channels()).zip(alpha);
     let values = pixels.flat_map(|(pixel, alpha)| pixel.iter().copied().chain([255.0 * alpha]));
     let picture = picture(values, image.size(), image.channels() + 1, levels);
     write_picture(&picture, ImageFormat::Png, path)
-}
-
-/// Refuses numbers that are not one per pixel.
-fn fills<T>(numbers: &[T], width: usize, height: usize) -> Result<(), InputError> {
-    let (expected, given) = (width.saturating_mul(height), numbers.len());
-    if given == expected {
-        return Ok(());
-    }
-    Err(InputError::Buffer { width, height, channels: 1, expected, given })
 }
 
 fn write_picture(picture: &DynamicImage, format: ImageFormat, path: &Path) -> Result<Vec<u8>, InputError> {

@@ -61,55 +61,6 @@ pub struct Settings {
     pub depth_test: DepthTest,
 }
 
-/// Invalid settings or samples of the third stage.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum InterpolationError {
-    /// A weight or length outside its range.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
-    /// A sample between two rows was given to the row fit.
-    #[error(
-        "sample {index} lies in row {row}: the row fit takes samples on whole rows only; use the plane fit"
-    )]
-    BetweenRows {
-        /// Index of the sample.
-        index: usize,
-        /// Its row.
-        row: f64,
-    },
-    /// A sample that is not finite.
-    #[error("sample {index} has position ({x}, {y}) and depth {depth}; all must be finite numbers")]
-    NotFinite {
-        /// Index of the sample.
-        index: usize,
-        /// Its column.
-        x: f64,
-        /// Its row.
-        y: f64,
-        /// Its depth.
-        depth: f32,
-    },
-    /// There is nothing to interpolate.
-    #[error(
-        "no sample falls on the virtual image of {width} x {height} pixels: the views and the virtual camera do not overlap"
-    )]
-    NoSamples {
-        /// Width of the virtual image.
-        width: usize,
-        /// Height of the virtual image.
-        height: usize,
-    },
-    /// The normal equations could not be solved.
-    #[error("row {row}: {source}")]
-    Fit {
-        /// The row.
-        row: usize,
-        /// The solver's error.
-        source: hybank::sampling::SamplingError,
-    },
-}
-
 impl Settings {
     /// Refuses settings outside their range.
     ///
@@ -124,19 +75,5 @@ impl Settings {
         POSITIVE.check("edge stiffness", self.plane.edge_stiffness)?;
         POSITIVE.check("tolerance", self.plane.tolerance)?;
         self.depth_test.check()
-    }
-}
-
-/// Refuses samples that are not finite.
-pub(crate) fn check_samples<const C: usize>(
-    samples: &[crate::sample::Sample<C>],
-) -> Result<(), InterpolationError> {
-    let broken = |s: &crate::sample::Sample<C>| !(s.x.is_finite() && s.y.is_finite() && s.depth.is_finite());
-    match samples.iter().position(broken) {
-        Some(index) => {
-            let s = &samples[index];
-            Err(InterpolationError::NotFinite { index, x: s.x, y: s.y, depth: s.depth })
-        }
-        None => Ok(()),
     }
 }

@@ -7,7 +7,7 @@
 
 use super::extend::{Level, mean};
 use super::holes::{GAP, reach};
-use super::{Cover, HoleFill, InterpolationError, Settings};
+use super::{Cover, HoleFill, Settings};
 use crate::depth::{fill_empty_rows, for_holes};
 use crate::sample::Sample;
 use hybank::sampling::fit::Response;
@@ -16,37 +16,13 @@ use hybank::sampling::{Fit, FitSample};
 /// Keeps the normal equations definite if lambda and tau are 0; negligible beside any other weight.
 const RIDGE: f64 = 1e-9;
 
-/// Order of the splines of rows: cubic.
 pub(crate) const ORDER: usize = 4;
 
 /// Distance outside the image up to which samples are used, in pixels.
 pub const MARGIN: f64 = (ORDER - 2) as f64;
 
-/// Work memory of the row fit, reused from row to row.
-///
-/// ```
-/// use hybank_ibr::depth::{DepthMap, Measure};
-/// use hybank_ibr::image::Image;
-/// use hybank_ibr::interpolate::rows::{MARGIN, RowWork};
-/// use hybank_ibr::interpolate::{Cover, Settings};
-/// use hybank_ibr::occlusion::{RowScratch, remove_in_row};
-/// use hybank_ibr::propagate::{Frame, RectifiedView, RigCamera, rectified_row};
-/// let image = Image::filled(32, 1, 1, 100.0);
-/// let map = DepthMap::new((32, 1), vec![4.0; 32], 1.0, Measure::Disparity)?;
-/// let views = [0.0, 1.0].map(|camera| RectifiedView { image: &image, map: &map, camera });
-/// // The three stages of a row of the view half-way; on the next row nothing is allocated any more.
-/// let (camera, frame) = (RigCamera::new(&views, 0.5), Frame::whole(32, 1, MARGIN, 0.0));
-/// let mut samples = Vec::new();
-/// for (index, view) in (0..).zip(&views) {
-///     rectified_row(view, index, 0, &camera, &frame, &mut samples);
-/// }
-/// let settings = Settings::default();
-/// remove_in_row(&mut samples, &settings.depth_test, &mut RowScratch::default());
-/// let (mut values, mut mask) = ([0.0; 32], [Cover::Crack; 32]);
-/// RowWork::<1>::new(32).interpolate(&samples, &settings, &mut values, &mut mask)?;
-/// assert!(mask[16] == Cover::Seen && (values[16] - 100.0).abs() < 0.1);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
+/// Work memory of the row fit, reused from row to row. `ibr/tests/allocation.rs` runs the three stages of
+/// rows one after the other.
 #[derive(Debug, Clone)]
 pub struct RowWork<const C: usize> {
     fit: Fit<ORDER, C>,
@@ -176,7 +152,6 @@ impl<const C: usize> RowWork<C> {
         }
     }
 
-    /// Puts copies of a sample between two positions, ends excluded.
     fn replicate(&mut self, sample: &Sample<C>, from: f64, to: f64, settings: &Settings) {
         let parts = (to - from).round().max(1.0);
         let value = sample.value.map(f64::from);
@@ -188,7 +163,6 @@ impl<const C: usize> RowWork<C> {
     }
 }
 
-/// Whether two samples lie on one surface.
 fn one_surface<const C: usize>(a: &Sample<C>, b: &Sample<C>, settings: &Settings) -> bool {
     let (near, far) = (a.depth.min(b.depth), a.depth.max(b.depth));
     !settings.depth_test.hides(f64::from(near), f64::from(far))
@@ -217,7 +191,9 @@ fn mark<const C: usize>(samples: &[Sample<C>], settings: &Settings, mask: &mut [
             let near = gap <= 2.0 * reach(&pair[0]).max(reach(&pair[1]));
             let seen = if pair[0].guessed || pair[1].guessed { Cover::Guessed } else { Cover::Seen };
             let cover = if near { seen } else { Cover::Crack };
-            pixels(pair[0].x, pair[1].x, mask.len()).for_each(|j| mask[j] = cover);
+            let end = ((pair[1].x + 1.0) as usize).min(mask.len());
+            let start = (pair[0].x.max(0.0).ceil() as usize).min(end);
+            mask[start..end].fill(cover);
         }
     }
     for (is_guess, cover) in [(true, Cover::Guessed), (false, Cover::Seen)] {
@@ -263,60 +239,10 @@ pub fn count<const C: usize>(samples: &[Sample<C>], counts: &mut [u16]) {
     }
 }
 
-/// The pixels from `low` to `high`, both included.
-fn pixels(low: f64, high: f64, width: usize) -> std::ops::Range<usize> {
-    // Casts saturate and cut toward zero: positions outside the image are cut off, and above -1 the
-    // floor of high + 1 is its integer part (rounding functions are library calls on baseline x86-64).
-    let end = ((high + 1.0) as usize).min(width);
-    let start = low.max(0.0);
-    let whole = start as usize;
-    let start = whole + usize::from((whole as f64) < start);
-    start.min(end)..end
-}
-
-/// Leaves holes black.
 pub(super) fn blacken(mask: &[Cover], values: &mut [f32], channels: usize) {
     for (pixel, _) in values.chunks_exact_mut(channels).zip(mask).filter(|(_, c)| c.is_hole()) {
         pixel.fill(0.0);
     }
-}
-
-/// The whole third stage for samples on whole rows, in any order: a value for every pixel and the mask.
-///
-/// # Errors
-/// [`InterpolationError`]: settings, samples that are not finite or lie between rows, and no sample at all.
-pub fn interpolate<const C: usize>(
-    samples: &[Sample<C>],
-    (width, height): (usize, usize),
-    settings: &Settings,
-) -> Result<(Vec<f32>, Vec<Cover>), InterpolationError> {
-    settings.check()?;
-    super::check_samples(samples)?;
-    if let Some(index) = samples.iter().position(|s| s.y.fract() != 0.0) {
-        return Err(InterpolationError::BetweenRows { index, row: samples[index].y });
-    }
-    let mut rows: Vec<Vec<Sample<C>>> = vec![Vec::new(); height];
-    for s in samples.iter().filter(|s| s.y >= 0.0 && s.y < height as f64) {
-        rows[s.y as usize].push(*s);
-    }
-    let mut values = vec![0.0; width * height * C];
-    let mut mask = vec![Cover::Disocclusion; width * height];
-    let mut work = RowWork::<C>::new(width);
-    let mut filled = vec![false; height];
-    let outputs = values.chunks_exact_mut(width * C).zip(mask.chunks_exact_mut(width));
-    for (y, (row, (out, mask))) in rows.iter_mut().zip(outputs).enumerate() {
-        row.sort_by(|a, b| a.x.total_cmp(&b.x));
-        filled[y] = work
-            .interpolate(row, settings, out, mask)
-            .map_err(|source| InterpolationError::Fit { row: y, source })?;
-    }
-    if !filled.contains(&true) {
-        return Err(InterpolationError::NoSamples { width, height });
-    }
-    let mut depths = vec![f32::NAN; width * height];
-    rows.iter().zip(depths.chunks_exact_mut(width)).for_each(|(row, out)| nearest_depths(row, out));
-    finish::<C>(&filled, &mask, &depths, settings, &mut values);
-    Ok((values, mask))
 }
 
 /// What rows do together when each is fitted: rows without samples are copied from the nearest one that is
@@ -371,14 +297,18 @@ fn continue_surfaces<const C: usize>(mask: &[Cover], depths: &[f32], width: usiz
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::setting::SettingError;
 
     fn sample(x: f64, depth: f32, value: f32) -> Sample<1> {
         Sample { x, depth, value: [value], ..Sample::BLANK }
     }
 
     fn run(samples: &[Sample<1>], width: usize, settings: &Settings) -> (Vec<f32>, Vec<Cover>) {
-        interpolate(samples, (width, 1), settings).unwrap()
+        let (mut values, mut mask) = (vec![0.0; width], vec![Cover::Crack; width]);
+        let mut depths = vec![f32::NAN; width];
+        assert!(RowWork::new(width).interpolate(samples, settings, &mut values, &mut mask).unwrap());
+        nearest_depths(samples, &mut depths);
+        finish::<1>(&[true], &mask, &depths, settings, &mut values);
+        (values, mask)
     }
 
     fn filling(fill: HoleFill) -> Settings {
@@ -444,52 +374,6 @@ mod tests {
         };
         let (soft, sharp) = (edge(1e9), edge(0.02));
         assert!(sharp > soft + 10.0, "{sharp} {soft}");
-    }
-
-    #[test]
-    fn rows_without_samples_are_copied_and_masked() {
-        let samples: Vec<_> = (0..8).map(|i| Sample { y: 1.0, ..sample(i as f64, 1.0, 50.0) }).collect();
-        let (values, mask) = interpolate(&samples, (8, 3), &Settings::default()).unwrap();
-        assert!(values.iter().all(|v| (v - 50.0).abs() < 1e-4));
-        assert_eq!(mask.iter().filter(|c| **c == Cover::Seen).count(), 8);
-    }
-
-    #[test]
-    fn what_cannot_be_fitted_is_refused() {
-        let settings = Settings::default();
-        let none = interpolate::<1>(&[], (4, 4), &settings);
-        assert_eq!(none, Err(InterpolationError::NoSamples { width: 4, height: 4 }));
-        let between = Sample { y: 0.5, ..sample(1.0, 1.0, 1.0) };
-        assert!(matches!(
-            interpolate(&[between], (4, 4), &settings),
-            Err(InterpolationError::BetweenRows { index: 0, row: 0.5 })
-        ));
-        let broken = sample(f64::NAN, 1.0, 1.0);
-        assert!(matches!(
-            interpolate(&[broken], (4, 4), &settings),
-            Err(InterpolationError::NotFinite { .. })
-        ));
-        let mut bad = settings;
-        bad.fit.lambda = -1.0;
-        assert!(matches!(
-            interpolate(&[sample(1.0, 1.0, 1.0)], (4, 4), &bad),
-            Err(InterpolationError::Setting(SettingError { name: "lambda", .. }))
-        ));
-    }
-
-    #[test]
-    fn pixel_ranges_are_closed_and_cut_off() {
-        for (low, high, want) in [
-            (0.2, 2.7, 1..3),
-            (1.0, 2.0, 1..3),
-            (-5.0, -1.0, 0..0),
-            (-5.0, 0.0, 0..1),
-            (-0.5, -0.2, 0..0),
-            (3.2, 9.0, 4..5),
-            (7.0, 9.0, 5..5),
-        ] {
-            assert_eq!(pixels(low, high, 5), want, "{low} {high}");
-        }
     }
 
     #[test]

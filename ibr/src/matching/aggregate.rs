@@ -28,13 +28,11 @@ pub(super) fn aggregated(costs: &Costs, greys: &[f32]) -> Vec<i16> {
     sums
 }
 
-/// The way from one pixel of a path to the next.
 struct Step {
     dx: isize,
     dy: isize,
 }
 
-/// Adds the paths of one direction.
 fn add_paths(costs: &Costs, greys: &[f32], &Step { dx, dy }: &Step, sums: &mut [i16]) {
     let (width, count) = (costs.width, costs.hypotheses);
     // The paths to the pixels of a row, each between two that are never taken, and the least of each pixel.

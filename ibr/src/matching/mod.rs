@@ -48,8 +48,10 @@ const OTHERS: usize = 2;
 /// The part of their sides that the photographs have when the range is looked for.
 const REDUCTION: usize = 4;
 
-/// Largest displacement between two photographs, as a share of the width.
+/// Largest displacement between two photographs, as a share of the width: of a rig, and of general cameras,
+/// which may turn towards the scene, so that it counts from the far away.
 const WIDEST: f64 = 0.3;
+const WIDEST_FROM_FAR: f64 = 0.6;
 
 /// Share of the parallaxes at either end that the range leaves out, and pixels that it is longer there.
 const STRAY: f64 = 0.005;
@@ -65,7 +67,6 @@ const LEAD: usize = 24;
 /// Bytes per hypothesis of a pixel: a cost and a sum.
 const BYTES: f64 = 3.0;
 
-/// The work on one photograph.
 struct Sweep<P> {
     camera: P,
     measure: Measure,
@@ -134,8 +135,11 @@ impl<P: Viewpoint> Sweep<P> {
         let sweep = &sweeps[index];
         let others = nearest(sweeps.iter().map(|other| sweep.camera.distance(&other.camera)));
         let shift = others.iter().map(|k| sweep.shift(&sweeps[*k].camera)).fold(0.0, f64::max);
-        let widest = (WIDEST * sweep.grey.width() as f64) as i32;
-        let low = if sweep.measure == Measure::Disparity { -widest } else { 0 };
+        let pixels = |share: f64| (share * sweep.grey.width() as f64) as i32;
+        let (low, widest) = match sweep.measure {
+            Measure::Disparity => (-pixels(WIDEST), pixels(WIDEST)),
+            Measure::Depth => (0, pixels(WIDEST_FROM_FAR)),
+        };
         let sweep = &mut sweeps[index];
         (sweep.others, sweep.unit, sweep.range) = (others, (1.0 / shift) as f32, low..widest + 1);
         if shift > 0.0 { Ok(()) } else { Err(MatchError::Alone(index)) }
@@ -155,7 +159,6 @@ impl<P: Viewpoint> Sweep<P> {
         shifts.iter().sum::<f64>() / 3.0
     }
 
-    /// Takes the range of the parallaxes that were found.
     fn narrow(&mut self, found: &[f32]) {
         let mut known: Vec<f32> = found.iter().map(|v| v / self.unit).filter(|v| !v.is_nan()).collect();
         known.sort_by(f32::total_cmp);
@@ -173,7 +176,6 @@ impl<P: Viewpoint> Sweep<P> {
         }
     }
 
-    /// The parallaxes of all pixels, in bands of rows at the same time.
     fn parallaxes(&self, sweeps: &[Self]) -> Vec<f32> {
         let height = self.grey.height();
         let starts: Vec<usize> = (0..height).step_by(ROWS).collect();

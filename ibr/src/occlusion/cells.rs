@@ -5,7 +5,7 @@
 //! is left for the search.
 
 use super::DepthTest;
-use super::points::{Extent, Points, RUN, Raster};
+use super::points::{Points, RUN};
 use crate::lanes::{bounds, largest, least};
 use std::ops::Range;
 
@@ -19,13 +19,11 @@ const USUAL_COLUMNS: usize = 5;
 /// Factor of the radius: the distance test rounds.
 const ROUNDING: f64 = 1.0001;
 
-/// Some neighbouring samples.
 #[derive(Debug, Clone, Copy)]
 struct Run {
     /// Bounds of the cells within the largest radius of a sample of the run, inclusive.
     columns: [u32; 2],
     rows: [u32; 2],
-    /// Least depth.
     near: f32,
     /// Largest depth of the samples on which the test decides.
     far: f32,
@@ -39,7 +37,12 @@ impl Run {
 /// Runs of samples, and the depths in the cells that they reach; work memory that is used again.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Cells {
-    raster: Raster,
+    left: f64,
+    top: f64,
+    /// Cells per pixel.
+    scale: f64,
+    columns: usize,
+    rows: usize,
     runs: Vec<Run>,
     /// Least depth of all samples whose radius reaches into a cell.
     near: Vec<f32>,
@@ -48,20 +51,11 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Removes all runs and places the grid over the rectangle of at most `count` samples to come.
-    pub(super) fn clear(&mut self, extent: &Extent, count: usize) {
-        self.runs.clear();
-        self.raster = Raster::over(extent, EDGE, count + 16);
-        let cells = self.raster.columns * self.raster.rows;
-        self.near.clear();
-        self.near.resize(cells, f32::INFINITY);
-        self.far.clear();
-        self.far.resize(cells, f32::NEG_INFINITY);
-    }
-
-    /// Enters the samples that have been appended since the last call.
+    /// Places the grid over the samples, and enters them.
     pub(super) fn enter(&mut self, points: &Points, test: &DepthTest) {
-        for start in (self.runs.len() * RUN..points.len()).step_by(RUN) {
+        self.place(points);
+        self.runs.clear();
+        for start in (0..points.len()).step_by(RUN) {
             let run = self.run(points, start..start + RUN, test);
             self.runs.push(run);
             if run.near < f32::INFINITY {
@@ -70,6 +64,27 @@ impl Cells {
                 self.near = cells;
             }
         }
+    }
+
+    fn place(&mut self, points: &Points) {
+        let none = (f64::MAX, f64::MIN);
+        let (left, right) = bounds::<_, 2>(&points.x, none);
+        let (top, bottom) = bounds::<_, 2>(&points.y, none);
+        let cells = |edge: f64| ((right - left) / edge + 1.0) * ((bottom - top) / edge + 1.0);
+        let mut edge = EDGE;
+        // Until there are few; this ends at the latest when one cell holds all samples. Positions may be
+        // infinite.
+        while cells(edge) > (points.len() + 16) as f64 && edge.is_finite() {
+            edge *= 2.0;
+        }
+        (self.left, self.top, self.scale) = (left, top, 1.0 / edge);
+        let side = |low: f64, high: f64| ((high - low) * self.scale) as usize + 1;
+        (self.columns, self.rows) = (side(left, right), side(top, bottom));
+        let cells = self.columns * self.rows;
+        self.near.clear();
+        self.near.resize(cells, f32::INFINITY);
+        self.far.clear();
+        self.far.resize(cells, f32::NEG_INFINITY);
     }
 
     fn run(&self, points: &Points, places: Range<usize>, test: &DepthTest) -> Run {
@@ -96,23 +111,21 @@ impl Cells {
     fn around(&self, across: (f64, f64), down: (f64, f64), radius: f64) -> Run {
         let reach = ROUNDING * radius;
         let cells = |(low, high): (f64, f64), origin: f64, count: usize| {
-            let cell = |v: f64| (((v - origin) * self.raster.scale) as u32).min(count as u32 - 1);
+            let cell = |v: f64| (((v - origin) * self.scale) as u32).min(count as u32 - 1);
             [cell(low - reach), cell(high + reach)]
         };
-        let columns = cells(across, self.raster.left, self.raster.columns);
-        Run { columns, rows: cells(down, self.raster.top, self.raster.rows), ..Run::EMPTY }
+        let columns = cells(across, self.left, self.columns);
+        Run { columns, rows: cells(down, self.top, self.rows), ..Run::EMPTY }
     }
 
-    /// The number of cells.
     pub(super) fn count(&self) -> usize {
         self.far.len()
     }
 
-    /// The cell of a sample.
     #[inline]
     pub(super) fn cell(&self, points: &Points, i: usize) -> usize {
-        let (column, row) = self.raster.cell(points.x[i], points.y[i]);
-        row * self.raster.columns + column
+        let at = |v: f64, origin: f64| ((v - origin) * self.scale) as usize;
+        at(points.y[i], self.top) * self.columns + at(points.x[i], self.left)
     }
 
     /// Calls `with` for each cell in which a sample may hide a suspect.
@@ -120,8 +133,7 @@ impl Cells {
         let (x, y, depth) = (points.x[i], points.y[i], f64::from(points.depth[i]));
         let Run { columns, rows, .. } = self.around((x, x), (y, y), test.radius(points.spacing[i]));
         for row in rows[0]..=rows[1] {
-            let cells =
-                (columns[0]..=columns[1]).map(|column| row as usize * self.raster.columns + column as usize);
+            let cells = (columns[0]..=columns[1]).map(|column| row as usize * self.columns + column as usize);
             cells.filter(|cell| test.hides(depth, f64::from(self.far[*cell]))).for_each(&mut with);
         }
     }
@@ -132,12 +144,12 @@ impl Cells {
         let ([left, right], [top, bottom]) = (run.columns.map(|c| c as usize), run.rows.map(|r| r as usize));
         if right < left + USUAL_COLUMNS && bottom < top + 2 {
             // Always as many cells: the processor cannot foresee how often a loop would run.
-            for row in [top * self.raster.columns, bottom * self.raster.columns] {
+            for row in [top * self.columns, bottom * self.columns] {
                 (0..USUAL_COLUMNS).for_each(|k| with(row + (left + k).min(right)));
             }
         } else {
             for row in top..=bottom {
-                (left..=right).for_each(|column| with(row * self.raster.columns + column));
+                (left..=right).for_each(|column| with(row * self.columns + column));
             }
         }
     }
@@ -169,7 +181,8 @@ impl Cells {
             let mut far = f32::NEG_INFINITY;
             self.each_cell(run, |cell| far = largest(far, self.far[cell]));
             if hides(run.near, far) {
-                (k * RUN..(k + 1) * RUN).filter(|i| hides(points.depth[*i], far)).for_each(&mut with);
+                let may_hide = |i: &usize| !points.guessed[*i] && hides(points.depth[*i], far);
+                (k * RUN..(k + 1) * RUN).filter(may_hide).for_each(&mut with);
             }
         }
     }

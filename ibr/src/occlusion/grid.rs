@@ -3,41 +3,16 @@
 
 use super::DepthTest;
 use super::cells::Cells;
-use super::points::{Extent, Points};
-use crate::sample::Sample;
+use super::points::Points;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Removes the hidden samples and keeps the order of the others; returns how many were removed.
+/// Finds hidden samples; work memory that is used again.
 ///
 /// Most samples are visible, and the least depth around some of them shows it; only the others are compared
 /// with what may hide them. O(n) where few samples share a pixel. Of many, those of a cell are a k-d tree:
 /// O(n log n) to build it, and a search looks at the boxes that the border of a ball cuts. Parallel, with
 /// the same bits for any number of threads.
-pub fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) -> usize {
-    let hidden = hidden(samples.iter().copied(), test);
-    let before = samples.len();
-    let mut flags = hidden.iter();
-    samples.retain(|_| !flags.next().copied().unwrap_or(false));
-    before - samples.len()
-}
-
-/// Which samples are hidden.
-fn hidden<const C: usize>(
-    samples: impl ExactSizeIterator<Item = Sample<C>> + Clone,
-    test: &DepthTest,
-) -> Vec<bool> {
-    let count = samples.len();
-    let points = Points::of(samples);
-    let mut search = PlaneSearch::default();
-    search.clear(&points.extent(), points.len());
-    search.enter(&points, test);
-    let mut flags = vec![false; count];
-    search.hidden(&points, test).iter().for_each(|i| flags[*i as usize] = true);
-    flags
-}
-
-/// Finds hidden samples; work memory that is used again.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PlaneSearch {
     cells: Cells,
@@ -53,18 +28,9 @@ pub(crate) struct PlaneSearch {
 }
 
 impl PlaneSearch {
-    /// Begins a search among at most `count` samples in a rectangle.
-    pub(crate) fn clear(&mut self, extent: &Extent, count: usize) {
-        self.cells.clear(extent, count);
-    }
-
-    /// Looks at the samples that have been appended since the last call.
-    pub(crate) fn enter(&mut self, points: &Points, test: &DepthTest) {
-        self.cells.enter(points, test);
-    }
-
-    /// The places of the hidden ones among the samples that have been entered, in increasing order.
+    /// The places of the hidden samples, in increasing order.
     pub(crate) fn hidden(&mut self, points: &Points, test: &DepthTest) -> &[u32] {
+        self.cells.enter(points, test);
         self.cells.suspects(points, test, &mut self.suspects);
         self.hidden.clear();
         if !self.suspects.is_empty() {
@@ -146,7 +112,6 @@ impl Bounds {
     }
 }
 
-/// Column, row and radius of a sample.
 fn ball(points: &Points, test: &DepthTest, i: u32) -> [f64; 3] {
     let i = i as usize;
     [points.x[i], points.y[i], test.radius(points.spacing[i])]
@@ -170,7 +135,6 @@ fn plant(points: &Points, test: &DepthTest, members: &mut [u32], bounds: &mut [B
     plant(points, test, members, bounds, middle..range.end);
 }
 
-/// The trees, while suspects are looked for.
 struct Search<'a> {
     points: &'a Points,
     test: &'a DepthTest,
@@ -206,17 +170,33 @@ impl Search<'_> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::points::RUN;
+pub(crate) mod tests {
     use super::*;
+    use crate::sample::Sample;
     use proptest::prelude::*;
+
+    /// Which samples are hidden.
+    fn hidden<const C: usize>(samples: &[Sample<C>], test: &DepthTest) -> Vec<bool> {
+        let points = Points::of(samples.iter().copied());
+        let mut flags = vec![false; samples.len()];
+        PlaneSearch::default().hidden(&points, test).iter().for_each(|i| flags[*i as usize] = true);
+        flags
+    }
+
+    /// Removes the hidden samples and keeps the order of the others; returns how many were removed.
+    pub(crate) fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) -> usize {
+        let (before, hidden) = (samples.len(), hidden(samples, test));
+        let mut hidden = hidden.iter();
+        samples.retain(|_| !hidden.next().unwrap());
+        before - samples.len()
+    }
 
     fn sample(x: f64, y: f64, depth: f32) -> Sample<1> {
         Sample { x, y, depth, ..Sample::BLANK }
     }
 
     fn check(samples: &[Sample<1>], test: &DepthTest) {
-        assert_eq!(hidden(samples.iter().copied(), test), test.hidden_by_definition(samples), "{test:?}");
+        assert_eq!(hidden(samples, test), test.hidden_by_definition(samples), "{test:?}");
     }
 
     #[test]
@@ -270,7 +250,8 @@ mod tests {
                 .iter()
                 .map(|(x, y, d, spacing)| {
                     let depth = if coarse { d.round() } else { *d };
-                    Sample { spacing: if wide { *spacing } else { 1.0 }, ..sample(position(*x), position(*y), depth) }
+                    let (spacing, guessed) = (if wide { *spacing } else { 1.0 }, *spacing > 9.0);
+                    Sample { spacing, guessed, ..sample(position(*x), position(*y), depth) }
                 })
                 .collect();
             check(&samples, &DepthTest { epsilon: position(epsilon).max(0.5), relative, absolute: 0.1, parallax });
@@ -280,11 +261,11 @@ mod tests {
             check(&signed, &DepthTest { epsilon, relative: 0.0, absolute: 0.5, parallax: 0.0 });
         }
 
-        /// Samples that only hide others, places without a sample, several calls, and memory used before.
+        /// Samples that only hide others, places without a sample, and memory used before.
         #[test]
-        fn a_search_in_parts_decides_on_its_own_samples(
+        fn a_search_decides_on_its_own_samples(
             raw in prop::collection::vec((0.0..30.0_f64, 0.0..9.0_f64, 0.5..9.0_f32, 0.2..12.0_f32, 0..4), 1..300),
-            cut in 0..300_usize, epsilon in 0.1..4.0_f64, relative in 0.0..0.3_f64
+            epsilon in 0.1..4.0_f64, relative in 0.0..0.3_f64
         ) {
             let samples: Vec<Sample<1>> = raw
                 .iter()
@@ -299,14 +280,8 @@ mod tests {
             let own = |i: &usize| points.own[*i];
             let hidden = test.hidden_by_definition(&samples);
             let want: Vec<u32> = (0..raw.len()).filter(|i| hidden[*i]).filter(own).map(|i| i as u32).collect();
-            let mut part = points.clone();
-            part.resize((cut.min(raw.len()) / RUN) * RUN);
-            let extent = Extent { left: -1.0, right: 31.0, top: 0.0, bottom: 9.0 };
             let mut search = PlaneSearch::default();
             for _ in 0..2 {
-                search.clear(&extent, points.len());
-                search.enter(&part, &test);
-                search.enter(&points, &test);
                 prop_assert_eq!(search.hidden(&points, &test), &want);
             }
         }

@@ -1,7 +1,8 @@
 //! Stage two, occlusion removal: a sample behind another one at nearly the same position is removed (thesis
 //! 2.3.2).
 //!
-//! With P the set of propagated samples, x in P is removed if and only if there is a y in P with
+//! With P the set of propagated samples, x in P is removed if and only if there is a y in P, whose depth is
+//! no guess, with
 //!
 //! ```text
 //! ||x - y||_2 <= epsilon(y)   and   d(x) - d(y) >= sigma(y),   sigma(y) = relative d(y) + absolute
@@ -23,8 +24,9 @@ mod points;
 mod row;
 
 pub(crate) use grid::PlaneSearch;
-pub use grid::remove;
-pub(crate) use points::{Extent, Points, RUN};
+#[cfg(test)]
+pub(crate) use grid::tests::remove;
+pub(crate) use points::{Points, RUN};
 pub use row::{RowScratch, remove_in_row};
 
 use crate::setting::{NOT_NEGATIVE, POSITIVE, SettingError};
@@ -103,7 +105,8 @@ mod tests {
         pub(crate) fn hidden_by_definition<const C: usize>(&self, samples: &[Sample<C>]) -> Vec<bool> {
             let hidden = |x: &Sample<C>| {
                 samples.iter().any(|y| {
-                    Self::close(x.x - y.x, x.y - y.y, self.radius(y.spacing))
+                    !y.guessed
+                        && Self::close(x.x - y.x, x.y - y.y, self.radius(y.spacing))
                         && self.hides(f64::from(y.depth), f64::from(x.depth))
                 })
             };

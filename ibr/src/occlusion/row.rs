@@ -7,14 +7,10 @@ use super::points::Points;
 use crate::lanes::{largest, least};
 use crate::sample::Sample;
 
-/// Added to a number below it, it rounds to a whole one, which is the lower part of the bits of the sum.
-const WHOLE: f64 = (1_u64 << 52) as f64;
-
 /// The part of a sample that sorting needs: 16 bytes to move instead of 48.
 #[derive(Debug, Clone, Copy, Default)]
 struct Key {
     x: f64,
-    /// Index of the sample in the order given.
     index: u32,
 }
 
@@ -30,12 +26,9 @@ pub struct RowScratch<const C: usize> {
 }
 
 impl<const C: usize> RowScratch<C> {
-    /// Takes the keys of the samples that are visible.
     fn find_visible(&mut self, samples: &[Sample<C>], test: &DepthTest) {
         let Self { points, search, keys, .. } = self;
         points.set(samples.iter().map(|s| Sample { y: 0.0, ..*s }));
-        search.clear(&points.extent(), points.len());
-        search.enter(points, test);
         let mut hidden = search.hidden(points, test).iter().peekable();
         let all = samples.iter().zip(0_u32..);
         let visible = all.filter(|(_, index)| hidden.next_if_eq(&index).is_none());
@@ -44,7 +37,7 @@ impl<const C: usize> RowScratch<C> {
     }
 
     /// Sorts the keys by column, equal columns in the order given. Expected O(n): a counting sort into as
-    /// many cells as there are keys, then insertion, which meets few keys per cell.
+    /// many cells as there are keys, and then of the few keys in each.
     fn sort(&mut self) {
         let n = self.keys.len();
         if n < 2 {
@@ -57,9 +50,7 @@ impl<const C: usize> RowScratch<C> {
             self.keys.sort_by(|a, b| a.x.total_cmp(&b.x));
             return;
         }
-        // The cast of a sum that has no fraction left: a cast of the number itself tests for its range. The
-        // limit is for positions that are not numbers.
-        let cell = |k: &Key| (((k.x - low) * scale + WHOLE).to_bits() as u32 as usize).min(n - 1);
+        let cell = |k: &Key| (((k.x - low) * scale) as usize).min(n - 1);
         self.starts.clear();
         self.starts.resize(n + 1, 0);
         self.keys.iter().for_each(|k| self.starts[cell(k) + 1] += 1);
@@ -79,25 +70,13 @@ impl<const C: usize> RowScratch<C> {
         let mut begin = 0;
         for end in &self.starts[..n] {
             let end = *end as usize;
-            sort_cell(&mut self.sorted[begin..end]);
+            if end > begin + 1 {
+                let order = |a: &Key, b: &Key| a.x.total_cmp(&b.x).then(a.index.cmp(&b.index));
+                self.sorted[begin..end].sort_unstable_by(order);
+            }
             begin = end;
         }
         std::mem::swap(&mut self.sorted, &mut self.keys);
-    }
-}
-
-/// Insertion sort for few samples, the library's stable sort for many.
-fn sort_cell(cell: &mut [Key]) {
-    if cell.len() > 24 {
-        cell.sort_by(|a, b| a.x.total_cmp(&b.x));
-        return;
-    }
-    for i in 1..cell.len() {
-        let mut j = i;
-        while j > 0 && cell[j - 1].x > cell[j].x {
-            cell.swap(j - 1, j);
-            j -= 1;
-        }
     }
 }
 
@@ -206,6 +185,7 @@ mod tests {
                 .enumerate()
                 .map(|(i, (x, d, spacing))| Sample {
                     spacing: if wide { *spacing } else { 1.0 },
+                    guessed: *spacing > 9.0,
                     ..sample(position(*x), depth(*d), i as u32)
                 })
                 .collect();

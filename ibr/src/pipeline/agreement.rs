@@ -68,8 +68,8 @@ impl Agreement {
     pub fn of<P: Viewpoint>(views: &[View<'_, P>]) -> Self {
         let textures = views.par_iter().map(|view| Texture::of(view.image)).collect();
         let mut agreement = Self { gains: vec![[1.0; 3]; views.len()], textures, ..Self::default() };
-        // Those of good pairs, and of poor ones.
-        let mut errors = [vec![Vec::new(); views.len()], vec![Vec::new(); views.len()]];
+        // Of each view those of good pairs, and of poor ones.
+        let mut errors = vec![[Vec::new(), Vec::new()]; views.len()];
         for j in 1..views.len() {
             let Some(i) = nearest(views, j, 0..j) else { continue };
             let found = Comparison::new(&views[i], &views[j]).verdict([i, j]);
@@ -82,14 +82,15 @@ impl Agreement {
                 |a: &View<'_, P>, b: &View<'_, P>| Lookups::of(a.map, b.map, a.camera.map_to(&b.camera));
             let lookups = [look(&views[i], &views[j]), look(&views[j], &views[i])];
             if let Some(found) = depth_errors::of_each(lookups) {
-                let errors = &mut errors[usize::from(pair.is_poor())];
-                [i, j].iter().zip(found).for_each(|(view, variance)| errors[*view].push(variance));
+                let is_poor = usize::from(pair.is_poor());
+                [i, j].iter().zip(found).for_each(|(view, variance)| errors[*view][is_poor].push(variance));
             }
         }
-        let [good, poor] = errors;
-        let of_view = |(good, poor): (Vec<f64>, Vec<f64>)| if good.is_empty() { poor } else { good };
-        let errors: Vec<Vec<f64>> = good.into_iter().zip(poor).map(of_view).collect();
-        agreement.depth_errors = deviations(&errors).unwrap_or_default();
+        let deviation = |[good, poor]: &[Vec<f64>; 2]| {
+            let found = if good.is_empty() { poor } else { good };
+            (!found.is_empty()).then(|| (found.iter().sum::<f64>() / found.len() as f64).sqrt())
+        };
+        agreement.depth_errors = errors.iter().map(deviation).collect::<Option<_>>().unwrap_or_default();
         agreement
     }
 
@@ -131,15 +132,6 @@ impl Agreement {
     }
 }
 
-/// Roots of the mean variances found for each map; `None` if one has none.
-fn deviations(variances: &[Vec<f64>]) -> Option<Vec<f64>> {
-    let mean = |found: &Vec<f64>| {
-        (!found.is_empty()).then(|| (found.iter().sum::<f64>() / found.len() as f64).sqrt())
-    };
-    variances.iter().map(mean).collect()
-}
-
-/// Points of one view found in another one.
 struct Comparison {
     points: usize,
     /// Colours in both views of the points at which the depths agree.
@@ -244,7 +236,6 @@ pub(crate) fn same_depth(a: f32, b: f32, map: &DepthMap) -> bool {
     (a - b).abs() <= tolerance
 }
 
-/// The mean of the three values with these factors.
 fn brightness(colour: &[f32; 3], gain: Exposure) -> f32 {
     colour.iter().zip(gain).map(|(v, g)| v * g as f32).sum::<f32>() / 3.0
 }

@@ -10,10 +10,9 @@ use crate::depth::Measure;
 use crate::interpolate::Degree;
 use crate::interpolate::plane::PlaneProblem;
 use crate::occlusion::{DepthTest, PlaneSearch};
-use crate::propagate::{CalibratedView, Footprint, Frame, Projected};
+use crate::propagate::{CalibratedView, Footprint, Frame};
 use crate::sample::Sample;
 use std::ops::Range;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Share of the first two stages in the work, about.
@@ -108,7 +107,7 @@ fn render_with<const ORDER: usize, const C: usize>(
     let settings = &settings.suited_to(&agreement, &view_weights, Measure::Depth);
     let chosen = view_weights.views();
     let pixels: usize = chosen.iter().map(|v| views[*v].image.width() * views[*v].image.height()).sum();
-    let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &settings.interpolation)?;
+    let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &settings.interpolation);
     let footprint = Footprint::of(views, &chosen, camera, &Frame::whole(width, height, 0.5, settings.offset));
     let view_weights =
         if settings.keep_exposure { view_weights } else { view_weights.with_gains(&agreement.gains) };
@@ -116,56 +115,40 @@ fn render_with<const ORDER: usize, const C: usize>(
     let bands: Vec<Range<usize>> =
         (0..count).map(|band| band * height / count..(band + 1) * height / count).collect();
     let (ready, propagated) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let pool: Mutex<Vec<Work>> = Mutex::default();
     problem.add_bands(&bands, |rows| {
-        let mut work = pool.lock().ok().and_then(|mut pool| pool.pop()).unwrap_or_default();
-        let test = settings.depth_test();
-        let (mut samples, all) = visible_in(rows.clone(), height, &footprint, views, test, &mut work);
-        if let Ok(mut pool) = pool.lock() {
-            pool.push(work);
-        }
+        let (mut samples, all) = visible_in(rows, height, &footprint, views, settings.depth_test());
         view_weights.apply(&mut samples);
         propagated.fetch_add(all, Ordering::Relaxed);
         watch(GATHERING * (ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count as f64);
         samples
-    })?;
+    });
     let propagated = propagated.into_inner();
     let (used, dropped) = (problem.samples(), footprint.dropped(propagated));
-    drop((pool, footprint));
+    drop(footprint);
     if propagated == 0 {
         return Err(RenderError::NoOverlap { pixels, dropped });
     }
     let report = Report { propagated, occluded: propagated - used, used, dropped, ..Report::default() };
-    let fit = problem.stiffened_by_area().solve(&|share| watch(GATHERING + (1.0 - GATHERING) * share))?;
+    let fit = problem.stiffened_by_area().solve(&|share| watch(GATHERING + (1.0 - GATHERING) * share));
     Ok(Rendering::of_plane::<C>(fit, report, chosen, agreement))
-}
-
-/// Work memory of the first two stages.
-#[derive(Default)]
-struct Work {
-    projected: Projected,
-    search: PlaneSearch,
 }
 
 /// The first two stages for some rows of the virtual image: the visible samples of these rows, and the
 /// number of all of their samples. The band is widened by the largest radius of the depth test on both
 /// sides, so that it contains every sample that can hide one of the band.
 fn visible_in<const C: usize>(
-    rows: Range<usize>,
+    rows: &Range<usize>,
     height: usize,
     footprint: &Footprint,
     views: &[CalibratedView<'_>],
     test: &DepthTest,
-    work: &mut Work,
 ) -> (Vec<Sample<C>>, usize) {
     let last = rows.end == height;
     let top = if rows.start == 0 { f64::MIN } else { rows.start as f64 };
     let bottom = if last { f64::MAX } else { rows.end as f64 };
-    let (own, Work { projected, search }) = ((top, bottom), work);
-    search.clear(&footprint.band_around(own, test).extent(), footprint.most_between(own, test));
-    footprint.project_between(views, own, test, projected, |points| search.enter(points, test));
+    let mut projected = footprint.project_between(views, (top, bottom), test);
     let all = projected.count();
-    projected.remove(search.hidden(projected.points(), test));
+    projected.remove(PlaneSearch::default().hidden(projected.points(), test));
     (projected.samples(views), all)
 }
 
@@ -207,21 +190,20 @@ mod tests {
         assert_eq!(got.report.occluded, occlusion::remove(&mut samples, settings.depth_test()));
         assert!(got.report.occluded > 0);
         ViewWeights::of(&views, &target).apply(&mut samples);
-        let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation).unwrap();
-        problem.add(&samples).unwrap();
-        let fit = problem.stiffened_by_area().solve(&|_| ()).unwrap();
+        let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation);
+        problem.add(&samples);
+        let fit = problem.stiffened_by_area().solve(&|_| ());
         assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
         // In bands only the order of summation differs.
         let footprint = Footprint::of(&views, &(0..views.len()).collect::<Vec<_>>(), &target, &frame);
-        let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation).unwrap();
-        let mut work = Work::default();
+        let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation);
         for rows in [0..7, 7..8, 8..30] {
-            let (mut band, _) = visible_in(rows, 30, &footprint, &views, settings.depth_test(), &mut work);
+            let (mut band, _) = visible_in(&rows, 30, &footprint, &views, settings.depth_test());
             ViewWeights::of(&views, &target).apply(&mut band);
-            problem.add(&band).unwrap();
+            problem.add(&band);
         }
         assert_eq!(problem.samples(), samples.len());
-        let banded = problem.stiffened_by_area().solve(&|_| ()).unwrap();
+        let banded = problem.stiffened_by_area().solve(&|_| ());
         assert_eq!(banded.mask, fit.mask);
         let worst = banded.values.iter().zip(&fit.values).fold(0.0, |w: f32, (a, b)| w.max((a - b).abs()));
         assert!(worst < 1e-2, "{worst}");

@@ -21,7 +21,6 @@ const HIDDEN_BEYOND: f64 = 3.0;
 /// Least value of 1 - k1 k2, see [`of_each`]; 5/9 at random places in a row.
 const LEAST_AVERAGED: f64 = 0.3;
 
-/// Rounds in which hidden points are left out.
 const ROUNDS: usize = 4;
 
 /// What the lookups of one map in another found.
@@ -57,7 +56,6 @@ impl Lookups {
         all
     }
 
-    /// With those of other maps.
     pub(crate) fn and(mut self, other: Self) -> Self {
         self.differences.extend(other.differences);
         self.kept += other.kept;
@@ -104,7 +102,6 @@ fn interpolated(map: &DepthMap, u: f64, v: f64) -> Option<(f64, f64)> {
     Some((value, kept(s) * kept(t)))
 }
 
-/// The middle one of some numbers.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)

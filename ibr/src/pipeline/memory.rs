@@ -1,11 +1,9 @@
-//! The memory that a rendering takes beside its views, before it begins.
-//!
-//! The largest arrays are counted: those of the equations and of the pixels, and the samples that are held
-//! at a time. Whether multigrid takes over is not known before; the estimate lies between.
+//! The memory that a rendering takes beside its views, before it begins: the arrays of the equations and of
+//! the pixels, and the samples that are held at a time. Whether multigrid takes over is not known before;
+//! the estimate lies between.
 
 use super::{Method, RenderError, RenderSettings};
 use crate::interpolate::Degree;
-use crate::interpolate::plane::PlaneProblem;
 use crate::interpolate::rows::ORDER;
 use crate::sample::Sample;
 use hybank::memory::check_memory;
@@ -17,36 +15,21 @@ const SAMPLES_AT_A_TIME: usize = 1 << 16;
 /// are made twice.
 const FEWEST_ROWS: usize = 40;
 
-/// What a rendering of any kind takes: threads, points that are compared, and whatever is small.
+/// Bytes of a rendering of any kind: threads, points that are compared, and whatever is small.
 const BASE: f64 = 5e5;
-
-/// Bytes of a row of a rectified rig: its counts.
+/// Bytes of a row of a rectified rig, its counts, and of each of its samples while it is sorted, tested and
+/// fitted: keys, cells, the survivors' weights and sums.
 const ROW: f64 = 41.0;
-
-/// Bytes of a sample beside itself while a row of samples is sorted, tested and fitted: keys, cells, the
-/// survivors' weights and sums.
 const ROW_SAMPLE: f64 = 67.0;
-
 /// Bytes of a place in a band beside its sample: positions, depths, weights, cells.
 const PLACE: f64 = 45.0;
-
 /// Bytes per pixel of a prediction: of the evidence of a row fit, of the regressors with slopes, distances
-/// and jitter, of the search for local limits, and of the errors that are its result.
+/// and jitter, and of the search for local limits.
 const ROW_EVIDENCE: f64 = 24.0;
 const REGRESSORS: f64 = 76.0;
 const LIMITS: f64 = 52.0;
-const ERRORS: f64 = 16.0;
 
 /// The sizes on which the memory depends.
-///
-/// ```
-/// use hybank_ibr::image::Image;
-/// use hybank_ibr::pipeline::{RenderSettings, memory::Extent};
-/// let (image, settings) = (Image::filled(400, 300, 3, 0.0), RenderSettings::default());
-/// let of = |size| Extent::new(size, &[&image, &image], None).of_cameras(&settings);
-/// // Bytes; a larger virtual view takes more.
-/// assert!(of((400, 300)) > 4e6 && of((800, 600)) > 2.0 * of((400, 300)));
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
     /// Width and height of the virtual view.
@@ -88,12 +71,10 @@ impl Extent {
         (4.0 * self.channels as f64 + 7.0) * self.virtual_pixels()
     }
 
-    /// What the comparison of two views takes: every seventh difference of both.
     fn agreement(&self) -> f64 {
         16.0 / 7.0 * self.largest as f64
     }
 
-    /// A row of samples, its equations, and work memory.
     fn strip(&self) -> f64 {
         let knot = 8.0 * (ORDER + self.channels) as f64;
         self.size.0 as f64 * (knot + self.views as f64 * (2.0 * self.sample() + ROW_SAMPLE))
@@ -130,37 +111,30 @@ impl Extent {
     /// Bytes of the prediction of a view of a rectified rig, with what is known of views before it.
     pub fn of_rig_prediction(&self) -> f64 {
         let strips = 2.0 * rayon::current_num_threads().min(self.size.1) as f64 * self.strip();
-        let found = (ROW_EVIDENCE + REGRESSORS) * self.virtual_pixels();
-        BASE + self.predicted() + self.rendering() + found + strips
+        BASE + self.predicted(ROW_EVIDENCE * self.virtual_pixels() + strips)
     }
 
     /// Bytes of the prediction of a view of general cameras, with what is known of views before it.
     pub fn of_camera_prediction(&self, settings: &RenderSettings) -> f64 {
-        let pixels = self.virtual_pixels();
-        let equalised = 4.0 * self.channels as f64 * self.pixels as f64;
-        let limited = equalised + (REGRESSORS + LIMITS) * pixels;
-        let another = self.size.0 * self.size.1;
-        let (all, samples) = (self.pixels + another, self.samples + another);
-        let with_another = Self { views: self.views + 1, pixels: all, samples, ..*self };
-        let imagined = self.predicted() + with_another.of_cameras(settings).max(REGRESSORS * pixels);
-        self.rendering() + limited.max(imagined)
+        self.predicted(self.of_cameras(settings))
     }
 
-    /// Photographs with one exposure and maps with errors, a view that is predicted, and another one that is
-    /// imagined.
-    fn predicted(&self) -> f64 {
-        let view = 4.0 * self.channels as f64 + 5.0;
-        view * self.pixels as f64 + self.rendering() + (view + ERRORS) * self.virtual_pixels()
+    /// Photographs with one exposure and the rendered view, and the larger of two: maps with errors and what
+    /// `rendering` from these takes, or what the errors are computed from.
+    fn predicted(&self, rendering: f64) -> f64 {
+        let equalised = 4.0 * self.channels as f64 * self.pixels as f64;
+        let judged = (REGRESSORS + LIMITS) * self.virtual_pixels();
+        equalised + self.rendering() + judged.max(5.0 * self.pixels as f64 + rendering)
     }
 
     /// The plane fit, with other memory while samples are added.
     fn plane(&self, degree: Degree, gathering: f64) -> f64 {
         let Self { size, .. } = *self;
         let memory = match (degree, self.channels) {
-            (Degree::Linear, 3) => plane_memory::<2, 3>(size),
-            (Degree::Linear, _) => plane_memory::<2, 1>(size),
-            (Degree::Cubic, 3) => plane_memory::<4, 3>(size),
-            (Degree::Cubic, _) => plane_memory::<4, 1>(size),
+            (Degree::Linear, 3) => Fit2::<2, 3>::memory(size.0, size.1),
+            (Degree::Linear, _) => Fit2::<2, 1>::memory(size.0, size.1),
+            (Degree::Cubic, 3) => Fit2::<4, 3>::memory(size.0, size.1),
+            (Degree::Cubic, _) => Fit2::<4, 1>::memory(size.0, size.1),
         };
         let pixels = self.virtual_pixels();
         // Depths, their distances, and counts; then the mask instead of the distances.
@@ -184,13 +158,4 @@ impl Extent {
 /// Bands of rows for views of so many pixels in all.
 pub(super) fn bands_of(pixels: usize, height: usize) -> usize {
     pixels.div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS)).max(1)
-}
-
-fn plane_memory<const O: usize, const C: usize>(
-    (width, height): (usize, usize),
-) -> hybank::sampling::fit2::Memory {
-    match PlaneProblem::<O, C>::is_turned((width, height)) {
-        true => Fit2::<O, C>::memory(height, width),
-        false => Fit2::<O, C>::memory(width, height),
-    }
 }

@@ -21,7 +21,7 @@ use crate::depth::DepthMap;
 use crate::image::Image;
 pub use crate::interpolate::Watch;
 use crate::interpolate::plane::{Convergence, PlaneFit};
-use crate::interpolate::{Cover, HoleCount, InterpolationError, Settings};
+use crate::interpolate::{Cover, HoleCount, Settings};
 use crate::occlusion::DepthTest;
 use crate::sample::Dropped;
 use crate::setting::{FINITE, POSITIVE, SettingError};
@@ -139,9 +139,14 @@ pub enum RenderError {
     /// The geometry of views without cameras could not be estimated.
     #[error(transparent)]
     Geometry(#[from] crate::uncalibrated::GeometryError),
-    /// The interpolation failed.
-    #[error(transparent)]
-    Interpolation(#[from] InterpolationError),
+    /// The equations of a row could not be solved.
+    #[error("row {row}: {source}")]
+    Fit {
+        /// The row.
+        row: usize,
+        /// The solver's error.
+        source: hybank::sampling::SamplingError,
+    },
     /// No sample lies in the virtual image.
     #[error(
         "no sample lies in the virtual image: of {pixels} pixels {} have no depth, {} lie behind the virtual camera and {} fall outside its image; check positions, cameras and the depth scale",
@@ -227,7 +232,6 @@ impl Rendering {
     }
 }
 
-/// Refuses an image or map of another size than expected.
 fn check_size(
     view: usize,
     what: &'static str,
@@ -237,7 +241,6 @@ fn check_size(
     if size == expected { Ok(()) } else { Err(RenderError::Size { view, what, size, expected }) }
 }
 
-/// Refuses more views or pixels than the indices of samples can hold.
 fn check_counts(views: usize, pixels: usize) -> Result<(), RenderError> {
     if views == 0 {
         return Err(RenderError::NoViews);

@@ -5,11 +5,11 @@ use super::{
     Agreement, Method, RenderError, RenderSettings, Rendering, Report, ViewWeights, Watch, check_counts,
     check_size,
 };
-use crate::depth::{DepthMap, Measure, TILE};
+use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::interpolate::plane::PlaneProblem;
 use crate::interpolate::rows::{self, RowWork, nearest_depths};
-use crate::interpolate::{Cover, Degree, HoleCount, InterpolationError};
+use crate::interpolate::{Cover, Degree, HoleCount};
 use crate::occlusion::{self, RowScratch};
 use crate::propagate::{self, Frame, RectifiedView, RigCamera};
 use crate::sample::{Dropped, Sample};
@@ -65,14 +65,12 @@ fn check(views: &[RectifiedView<'_>], position: f64) -> Result<(), RenderError> 
     positions.into_iter().try_for_each(|position| Ok(FINITE.check("position", position)?))
 }
 
-/// The sizes of a view between others.
 pub(crate) fn extent(views: &[RectifiedView<'_>], settings: &RenderSettings) -> Extent {
     let images: Vec<&Image> = views.iter().map(|view| view.image).collect();
     let size = images.first().map_or((0, 0), |image| image.size());
     Extent::new(size, &images, settings.nearest)
 }
 
-/// The inputs that all rows share.
 pub(crate) struct Job<'a> {
     pub(crate) views: &'a [RectifiedView<'a>],
     pub(crate) camera: RigCamera,
@@ -138,11 +136,10 @@ fn render_rows<const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> 
             (job.watch)((ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / height as f64);
             fit.interpolate(&strip.samples, &job.settings.interpolation, values, mask)
                 .map(|_| ())
-                .map_err(|source| InterpolationError::Fit { row, source })
+                .map_err(|source| RenderError::Fit { row, source })
         })
     })?;
-    let report = total(counts.iter(), HoleCount::of(&mask));
-    enough(job, &report)?;
+    let report = report(job, &counts, &mask)?;
     let filled: Vec<bool> = counts.iter().map(|c| c.used > 0).collect();
     rows::finish::<C>(&filled, &mask, &keys, &job.settings.interpolation, &mut values);
     job.disparities(&mut keys);
@@ -155,16 +152,15 @@ fn render_rows<const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> 
 /// The same with the plane fit as third stage; the second stage still runs row by row.
 fn render_plane<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> {
     let Frame { width, height, .. } = job.frame;
-    let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &job.settings.interpolation)?;
+    let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &job.settings.interpolation);
     let mut strip = Strip::<C>::new(job);
     let mut counts = Vec::with_capacity(height);
     for row in 0..height {
         counts.push(strip.survivors_of_row(job, row));
-        problem.add(&strip.samples)?;
+        problem.add(&strip.samples);
     }
-    let report = total(counts.iter(), HoleCount::default());
-    enough(job, &report)?;
-    let fit = problem.solve(job.watch)?;
+    let report = report(job, &counts, &[])?;
+    let fit = problem.solve(job.watch);
     let mut keys = fit.depth.data().to_vec();
     job.disparities(&mut keys);
     let depth = DepthMap::from_known((width, height), keys, Measure::Disparity);
@@ -172,14 +168,12 @@ fn render_plane<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Ren
 }
 
 impl Job<'_> {
-    /// Turns depth keys of pixels into disparities.
     fn disparities(&self, keys: &mut [f32]) {
         let offset = self.camera.disparity_offset;
         keys.iter_mut().for_each(|k| *k = (1.0 / f64::from(*k) - offset) as f32);
     }
 }
 
-/// Counts of the samples of one row.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct RowCount {
     propagated: usize,
@@ -187,27 +181,22 @@ pub(crate) struct RowCount {
     dropped: Dropped,
 }
 
-fn total<'a>(counts: impl Iterator<Item = &'a RowCount>, holes: HoleCount) -> Report {
-    let mut report = Report { holes, ..Report::default() };
+/// The report on all rows.
+///
+/// # Errors
+/// [`RenderError::NoOverlap`].
+fn report(job: &Job<'_>, counts: &[RowCount], mask: &[Cover]) -> Result<Report, RenderError> {
+    let mut report = Report { holes: HoleCount::of(mask), ..Report::default() };
     for c in counts {
         report.propagated += c.propagated;
         report.used += c.used;
         report.dropped += c.dropped;
     }
     report.occluded = report.propagated - report.used;
-    report
+    let (pixels, dropped) = (job.views.len() * job.frame.width * job.frame.height, report.dropped);
+    if report.used > 0 { Ok(report) } else { Err(RenderError::NoOverlap { pixels, dropped }) }
 }
 
-/// Refuses a rendering without samples.
-fn enough(job: &Job<'_>, report: &Report) -> Result<(), RenderError> {
-    if report.used > 0 {
-        return Ok(());
-    }
-    let pixels = job.views.len() * job.frame.width * job.frame.height;
-    Err(RenderError::NoOverlap { pixels, dropped: report.dropped })
-}
-
-/// The samples of one row and their work memory.
 pub(crate) struct Strip<const C: usize> {
     pub(crate) samples: Vec<Sample<C>>,
     scratch: RowScratch<C>,
@@ -216,8 +205,7 @@ pub(crate) struct Strip<const C: usize> {
 impl<const C: usize> Strip<C> {
     pub(crate) fn new(job: &Job<'_>) -> Self {
         let used = (0..job.views.len()).filter(|view| job.view_weights.uses(*view)).count();
-        // The last tile of a row asks for the place of a whole one.
-        let samples = Vec::with_capacity(job.frame.width * used + TILE);
+        let samples = Vec::with_capacity(job.frame.width * used);
         Self { samples, scratch: RowScratch::default() }
     }
 
@@ -264,23 +252,12 @@ mod tests {
         parts.iter().enumerate().map(view).collect()
     }
 
-    /// The row pipeline gives the result of the three public stages in sequence.
     #[test]
-    fn equal_to_the_three_stages() {
+    fn the_report_counts_every_pixel() {
         let parts = [scene(40, 9, 3), scene(40, 9, 3)];
-        let settings = RenderSettings::default();
-        let got = render(&views(&parts), 0.4, &settings).unwrap();
-        let frame = Frame::whole(40, 9, 2.0, 0.0);
-        let (mut samples, dropped) = propagate::rectified::<3>(&views(&parts), 0.4, &frame);
-        let propagated = samples.len();
-        let occluded = occlusion::remove(&mut samples, settings.depth_test());
-        ViewWeights::of(&views(&parts), &0.4).apply(&mut samples);
-        let (values, mask) = rows::interpolate(&samples, (40, 9), &settings.interpolation).unwrap();
-        assert_eq!(got.image.data(), values);
-        assert_eq!(got.mask, mask);
-        let report = got.report;
-        assert_eq!((report.propagated, report.occluded, report.dropped), (propagated, occluded, dropped));
+        let report = render(&views(&parts), 0.4, &RenderSettings::default()).unwrap().report;
         assert_eq!(report.propagated + report.dropped.total(), 2 * 40 * 9);
+        assert_eq!(report.propagated, report.occluded + report.used);
         assert!(report.occluded > 0 && report.dropped.unknown == 18 && report.holes.total() > 0);
     }
 

@@ -27,11 +27,10 @@ impl RenderSettings {
     /// With W = sum of the weights of the samples per pixel, about that of the views, the second term is
     /// sum_k w_k J'(x_k)^2 / (W s^2). So lambda = sigma^2 / (W s^2) in the row fit. The plane fit counts
     /// edges of pixels instead of samples, so its stiffness is sigma^2 / s^2. Samples of general cameras are
-    /// also displaced, so there it is never less than the stiffness of the settings times the mean area a of
-    /// the samples: an error of the position adds to a sample a variance v in proportion to s^2. The
-    /// integral of |grad J|^2 over the image is the same for any magnification, since the squared slopes
-    /// fall as the area grows over which they are summed. A sample that stands for a pixels has the weight a
-    /// in the fit, and the two terms keep their ratio if the stiffness is a v / s^2.
+    /// also displaced, which adds to them a variance v in proportion to s^2, so there it is never less than
+    /// the stiffness of the settings times the mean area a of the samples: a sample that stands for a pixels
+    /// has the weight a in the fit, the integral of |grad J|^2 over the image is the same for any
+    /// magnification, and the two terms keep their ratio if the stiffness is a v / s^2.
     pub fn suited_to(&self, agreement: &Agreement, view_weights: &ViewWeights, measure: Measure) -> Self {
         let mut settings = Self { keep_smoothing: true, ..*self };
         let test = &mut settings.interpolation.depth_test;

@@ -3,13 +3,13 @@
 mod projected;
 mod row_map;
 
-pub(crate) use projected::Projected;
+use projected::Projected;
 
 use super::{CalibratedView, Frame};
 use crate::camera::{Camera, Relative};
 use crate::depth::TILE;
-use crate::occlusion::{DepthTest, LARGEST_SPACING, Points};
-use crate::sample::{Dropped, Sample};
+use crate::occlusion::{DepthTest, LARGEST_SPACING};
+use crate::sample::Dropped;
 use rayon::prelude::*;
 use row_map::RowMap;
 
@@ -38,9 +38,7 @@ struct Tile {
     view: u16,
     row: u32,
     column: u32,
-    /// Bounds of the virtual rows of its samples.
     rows: (f64, f64),
-    /// Bound of their spacing.
     spacing: f32,
 }
 
@@ -76,61 +74,20 @@ impl Footprint {
         Dropped { unknown, behind, outside: self.pixels.saturating_sub(unknown + behind + samples) }
     }
 
-    /// The samples between two rows of the frame, both included: view by view and row by row (eq. 2.2 and
-    /// 2.3).
-    pub(crate) fn samples_between<const C: usize>(
-        &self,
-        views: &[CalibratedView<'_>],
-        top: f64,
-        bottom: f64,
-    ) -> Vec<Sample<C>> {
-        let mut projected = Projected::default();
-        let band = self.frame.band(top, bottom);
-        for tile in self.reaching(band.rows, |_| 0.0) {
-            self.project(views, tile, &band, (f64::MIN, f64::MAX), &mut projected);
-        }
-        projected.samples(views)
-    }
-
-    /// The samples between two rows of the frame, the second excluded, and those that may hide them. Calls
-    /// `with` after each tile.
+    /// The samples between two rows of the frame, the second excluded, and those that may hide them.
     pub(crate) fn project_between(
         &self,
         views: &[CalibratedView<'_>],
         own: (f64, f64),
         test: &DepthTest,
-        projected: &mut Projected,
-        mut with: impl FnMut(&Points),
-    ) {
-        projected.clear();
-        let band = self.band_around(own, test);
+    ) -> Projected {
+        let (mut projected, reach) = (Projected::default(), REACH * test.radius(LARGEST_SPACING));
+        let band = self.frame.band(own.0 - reach, own.1 + reach);
         for tile in self.reaching(own, |spacing| REACH * test.radius(spacing)) {
-            self.project(views, tile, &band, own, projected);
-            with(projected.points());
+            let view = usize::from(tile.view);
+            projected.push(&views[view], &self.maps[view], tile, &band, own);
         }
-    }
-
-    fn project(
-        &self,
-        views: &[CalibratedView<'_>],
-        tile: &Tile,
-        band: &Frame,
-        own: (f64, f64),
-        projected: &mut Projected,
-    ) {
-        let view = usize::from(tile.view);
-        projected.push(&views[view], &self.maps[view], tile, band, own);
-    }
-
-    /// The part of the frame that holds all samples between two rows and those that may hide them.
-    pub(crate) fn band_around(&self, (top, bottom): (f64, f64), test: &DepthTest) -> Frame {
-        let reach = REACH * test.radius(LARGEST_SPACING);
-        self.frame.band(top - reach, bottom + reach)
-    }
-
-    /// Places that [`Footprint::project_between`] takes, at most.
-    pub(crate) fn most_between(&self, own: (f64, f64), test: &DepthTest) -> usize {
-        self.reaching(own, |spacing| REACH * test.radius(spacing)).count() * TILE
+        projected
     }
 
     /// The tiles that may have samples between two rows, or as far from these as `reach` says of their
@@ -145,19 +102,6 @@ impl Footprint {
             t.rows.0 - reach <= bottom && t.rows.1 + reach >= top
         })
     }
-}
-
-/// All samples of calibrated views, view by view and row by row (eq. 2.2 and 2.3).
-pub fn calibrated<const C: usize>(
-    views: &[CalibratedView<'_>],
-    camera: &Camera,
-    frame: &Frame,
-) -> (Vec<Sample<C>>, Dropped) {
-    let all: Vec<usize> = (0..views.len()).collect();
-    let footprint = Footprint::of(views, &all, camera, frame);
-    let samples = footprint.samples_between(views, f64::MIN, f64::MAX);
-    let dropped = footprint.dropped(samples.len());
-    (samples, dropped)
 }
 
 /// The tiles of one row of a view, and its pixels that cannot be samples.
@@ -196,4 +140,4 @@ impl RowFootprint {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

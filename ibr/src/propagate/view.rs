@@ -47,18 +47,13 @@ pub(crate) fn nearest<P: Viewpoint>(
     view: usize,
     among: impl Iterator<Item = usize>,
 ) -> Option<usize> {
-    let centre = views[view].camera.centre();
-    let away = among.map(|other| (other, (views[other].camera.centre() - centre).norm()));
+    let away = among.map(|other| (other, views[other].camera.distance(&views[view].camera)));
     away.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(other, _)| other)
 }
 
 impl Viewpoint for f64 {
     fn centre(&self) -> Vector3<f64> {
         Vector3::new(*self, 0.0, 0.0)
-    }
-
-    fn distance(&self, other: &Self) -> f64 {
-        (self - other).abs()
     }
 
     fn map_to(&self, other: &Self) -> impl Fn(f64, f64, f64) -> (f64, f64, f64) + Sync {

@@ -10,9 +10,9 @@ use rayon::prelude::*;
 /// Below this mean value a pixel has no colour to take.
 const DARK: f32 = 4.0;
 
-/// Bytes per pixel: the three values of a photograph that was grey, and the parallaxes of another one.
-const GREY_BYTES: f64 = 12.0;
-const COLOURED_BYTES: f64 = 4.0;
+/// Bytes per pixel of all views: the three values of a photograph that was grey; the parallaxes of another
+/// one are fewer.
+const BYTES: f64 = 12.0;
 
 /// The grey photographs of views in colour, `None` for coloured ones and where all are grey. A pixel has the
 /// ratio of red, green and blue that the first of the coloured views shows at the point of its depth, and
@@ -23,9 +23,8 @@ const COLOURED_BYTES: f64 = 4.0;
 pub fn coloured<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Option<Image>>, MemoryShortage> {
     let coloured: Vec<usize> = (0..views.len()).filter(|i| views[*i].image.channels() == 3).collect();
     let is_grey = |view: &View<'_, P>| view.image.channels() != 3 && !coloured.is_empty();
-    let bytes = |view: &View<'_, P>| if is_grey(view) { GREY_BYTES } else { COLOURED_BYTES };
     if views.iter().any(is_grey) {
-        check_memory(views.iter().map(|view| bytes(view) * view.map.data().len() as f64).sum())?;
+        check_memory(BYTES * views.iter().map(|view| view.map.data().len() as f64).sum::<f64>())?;
     }
     let planes: Vec<Option<Parallax>> =
         views.iter().map(|view| (!is_grey(view)).then(|| Parallax::of(view.map, 0.0))).collect();

@@ -7,7 +7,7 @@
 //! 1. *Outliers.* A value is rejected if it contradicts its neighbours and the other views do not outvote
 //!    them (`outliers`). It takes the median of its neighbours, weighed by the likeness of their colours.
 //! 2. *Noise.* With the standard deviation delta of the errors, which
-//!    [`Agreement`] finds from the lookups of one map in another, and the bends
+//!    [`Agreement`](crate::pipeline::Agreement) finds from the lookups of one map in another, and the bends
 //!    kappa of the surfaces, the map is the most probable one of a random walk of slopes (`surface`).
 
 mod colour;
@@ -21,10 +21,9 @@ pub(crate) use surface::from_scattered;
 
 use crate::depth::{DepthMap, Measure};
 use crate::interpolate::plane::surface_memory;
-use crate::pipeline::Agreement;
 use crate::propagate::{View, Viewpoint, nearest};
 use hybank::memory::{MemoryShortage, check_memory};
-use outliers::Parallax;
+use outliers::Known;
 
 /// A map that was restored.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,18 +37,9 @@ pub struct Restored {
     pub error: f64,
 }
 
-/// Bytes of all that is not in proportion to the pixels, about: points that are compared.
-const BASE: f64 = 5e5;
-
 /// Mean square displacement in pixels from which on errors are smoothed: a fiftieth of the variance of a
 /// position within a pixel.
 const NOTICEABLE: f64 = 0.02 / 12.0;
-
-/// Bytes per pixel of all views: parallaxes and restored maps.
-const HELD: f64 = 8.0;
-
-/// Bytes per pixel of one view: the parallaxes that change, and marks of outliers.
-const CHANGED: f64 = 5.0;
 
 /// Bytes that maps of these widths and heights take while they are restored, with noise that is smoothed or
 /// without.
@@ -57,63 +47,32 @@ pub fn memory(sizes: &[(usize, usize)], is_noisy: bool) -> f64 {
     let pixels = |size: &(usize, usize)| size.0 as f64 * size.1 as f64;
     let largest = sizes.iter().copied().max_by(|a, b| pixels(a).total_cmp(&pixels(b))).unwrap_or((0, 0));
     let smoothed = if is_noisy { surface_memory(largest.0, largest.1) } else { 0.0 };
-    BASE + HELD * sizes.iter().map(pixels).sum::<f64>() + CHANGED * pixels(&largest) + smoothed
+    // Points that are compared; parallaxes and restored maps of all views; parallaxes and marks of one.
+    5e5 + 8.0 * sizes.iter().map(pixels).sum::<f64>() + 5.0 * pixels(&largest) + smoothed
 }
 
 /// Restores the maps of views that see one scene.
 ///
 /// # Errors
 /// [`MemoryShortage`]; maps without noise take much less than others.
-///
-/// ```
-/// use hybank_ibr::camera::Camera;
-/// use hybank_ibr::depth::{DepthMap, Measure};
-/// use hybank_ibr::{propagate::RectifiedView, restore::restore};
-/// use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
-/// let size = (64, 32);
-/// let mut shots = [0.0, 1.0].map(|position| {
-///     let camera = Camera::metric(rig_camera(position, size), false).expect("a pinhole camera");
-///     let (image, depth) = SyntheticScene::default().view(&camera, size);
-///     (image, rig_disparity(&depth, size.0), position)
-/// });
-/// // A value that contradicts all those around it.
-/// let (exact, wrong) = (shots[0].1.data()[1000], 40.0);
-/// let mut disparities = shots[0].1.data().to_vec();
-/// disparities[1000] = wrong;
-/// shots[0].1 = DepthMap::new(size, disparities, 1.0, Measure::Disparity)?;
-/// let views = shots.each_ref().map(|(image, map, camera)| RectifiedView { image, map, camera: *camera });
-/// let restored = &restore(&views)?[0];
-/// assert!(restored.outliers > 0.0 && (restored.map.data()[1000] - exact).abs() < 1.0);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, MemoryShortage> {
     let sizes: Vec<(usize, usize)> = views.iter().map(|view| view.map.size()).collect();
     check_memory(memory(&sizes, false))?;
-    let agreement = Agreement::of(views);
-    let error = |view: usize| agreement.depth_error(view);
-    let planes: Vec<Parallax> =
-        views.iter().enumerate().map(|(i, v)| Parallax::of(v.map, error(i))).collect();
-    let voters = outliers::voters(&agreement.groups());
+    let all = Known::of(views);
     let one = |i: usize| {
-        let view = &views[i];
-        let rejected = outliers::rejected(views, &planes, &agreement.gains, &voters[i], i);
-        let count = rejected.iter().filter(|r| **r).count();
-        let mut plane = planes[i].clone();
-        let mut guessed = Vec::new();
+        let (view, error, rejected) = (&views[i], all.agreement.depth_error(i), all.rejected(i));
+        let (mut plane, count) = (all.planes[i].clone(), rejected.iter().filter(|r| **r).count());
         if count > 0 {
             plane.replace(view.image, &rejected);
-            guessed = rejected;
         }
-        if is_noticeable(views, i, error(i)) {
+        if is_noticeable(views, i, error) {
             check_memory(surface_memory(view.map.width(), view.map.height()))?;
             plane.smooth(view.image, view.map.measure());
         }
         let known = (plane.values.len() - view.map.unknown()).max(1);
-        Ok(Restored {
-            map: plane.into_map(view.map, guessed),
-            outliers: count as f64 / known as f64,
-            error: error(i),
-        })
+        let guessed = if count > 0 { rejected } else { Vec::new() };
+        let map = plane.into_map(view.map, guessed);
+        Ok(Restored { map, outliers: count as f64 / known as f64, error })
     };
     (0..views.len()).map(one).collect()
 }

@@ -1,12 +1,12 @@
 //! Values of a map that contradict those around them, where the other views do not outvote these.
 //!
-//! A single wrong value disagrees with its neighbours. One in a cluster agrees with some of them, and
-//! disagrees with what lies farther away, as a value on a thin thing does. It is rejected if no other view
-//! confirms it and one confirms what lies around it.
+//! A single wrong value disagrees with its neighbours, and one that is mixed of two surfaces lies between
+//! them. One in a cluster agrees with some of them, and disagrees with what lies farther away, as a value on
+//! a thin thing does. It is rejected if no other view confirms it and one confirms what lies around it.
 
 use crate::depth::{DepthMap, JUMP, Measure};
 use crate::image::Image;
-use crate::pipeline::{Exposure, GREY_LEVELS};
+use crate::pipeline::{Agreement, GREY_LEVELS};
 use crate::propagate::{View, Viewpoint};
 use rayon::prelude::*;
 
@@ -19,6 +19,14 @@ const SUPPORTERS: usize = 2;
 /// Neighbours, of eight on a ring, that a value has beyond a cluster of outliers at least: a corner has
 /// three.
 const RING_SUPPORTERS: usize = 3;
+
+/// Largest distance in pixels to the sides of an edge: maps that were reduced or filtered mix the depths of
+/// pixels that near.
+const MIXED: isize = 2;
+
+/// Pixels over which a slanted surface goes on in a line, and what it may miss of it, as a share of its step.
+const SLOPE: isize = 4;
+const STRAIGHT: f32 = 0.5;
 
 /// Radius of the ring in pixels: a cluster may be as large.
 const RING: usize = 8;
@@ -54,7 +62,6 @@ impl Vote {
     }
 }
 
-/// A map in parallax.
 #[derive(Debug, Clone)]
 pub(super) struct Parallax {
     pub(super) width: usize,
@@ -63,7 +70,6 @@ pub(super) struct Parallax {
     pub(super) values: Vec<f32>,
     /// Added to a value, it is in proportion to the reciprocal depth.
     pub(super) offset: f32,
-    /// Standard deviation of the errors.
     pub(super) error: f32,
 }
 
@@ -94,14 +100,12 @@ impl Parallax {
         before.with_values(before.size(), data).with_guessed(before, &guessed)
     }
 
-    /// Whether two values may lie on one surface.
     #[inline]
     pub(super) fn agree(&self, a: f32, b: f32) -> bool {
         let spread = DEVIATIONS * std::f32::consts::SQRT_2 * self.error;
         (a - b).abs() <= (JUMP * (a.min(b) + self.offset)).max(spread)
     }
 
-    /// The pixels within a radius of one, itself included.
     fn around(&self, pixel: usize, radius: usize) -> impl Iterator<Item = usize> + use<> {
         let (x, y, width) = (pixel % self.width, pixel / self.width, self.width);
         let columns = x.saturating_sub(radius)..(x + radius + 1).min(width);
@@ -129,23 +133,37 @@ impl Parallax {
         self.ring(pixel, distance).filter(|q| self.agree(here, self.values[*q])).take(least).count() == least
     }
 
-    /// Whether few values on the ring agree with one that no other view confirms, and one shows a surface
-    /// there at the median of the ring.
-    pub(super) fn is_in_cluster<P>(
-        &self,
-        view: &View<'_, P>,
-        pixel: usize,
-        ring: usize,
-        votes: impl Fn(usize, f32) -> Vec<Vote>,
-    ) -> bool {
-        if self.is_supported(pixel, ring, RING_SUPPORTERS) {
-            return false;
-        }
-        let around = self.median_of(view.image, pixel, self.ring(pixel, ring));
-        !around.is_nan()
-            && !self.agree(around, self.values[pixel])
-            && !votes(pixel, view.map.data()[pixel]).into_iter().any(Vote::is_confirming)
-            && votes(pixel, view.map.measure().of_parallax(around)).contains(&Vote::Surface)
+    /// Whether a pixel lies between the sides of an edge: on one side of it a surface is nearer, and on the
+    /// opposite side one is farther.
+    fn is_between(&self, pixel: usize) -> bool {
+        let here = self.values[pixel];
+        let side = |step: [isize; 2]| match self.beside(pixel, step) {
+            Some(value) if !self.agree(here, value) => i32::from(value > here) - i32::from(value < here),
+            _ => 0,
+        };
+        let parts = |[dx, dy]: [isize; 2]| {
+            let parts_at = |k: isize| side([k * dx, k * dy]) * side([-k * dx, -k * dy]) < 0;
+            (1..=MIXED).any(parts_at) && !self.is_slope(pixel, [dx, dy])
+        };
+        [[1, 0], [0, 1], [1, 1], [1, -1]].into_iter().any(parts)
+    }
+
+    /// Whether the surface of a pixel is slanted: on one side at least the values go on in a line.
+    fn is_slope(&self, pixel: usize, [dx, dy]: [isize; 2]) -> bool {
+        let at = |k: isize| self.beside(pixel, [k * dx, k * dy]);
+        let (here, [Some(before), Some(after)]) = (self.values[pixel], [at(-1), at(1)]) else { return false };
+        let step = (after - before) / 2.0;
+        let is_in_line = |k: isize| {
+            at(k).is_some_and(|value| (value - here - k as f32 * step).abs() <= STRAIGHT * step.abs())
+        };
+        (1..=SLOPE).all(is_in_line) || (-SLOPE..=-1).all(is_in_line)
+    }
+
+    /// The known value so many columns and rows from a pixel.
+    fn beside(&self, pixel: usize, [dx, dy]: [isize; 2]) -> Option<f32> {
+        let x = (pixel % self.width).checked_add_signed(dx).filter(|x| *x < self.width)?;
+        let y = (pixel / self.width).checked_add_signed(dy).filter(|y| *y < self.height)?;
+        Some(self.values[y * self.width + x]).filter(|value| !value.is_nan())
     }
 
     /// The pixel at a position whose surface has this parallax.
@@ -206,57 +224,93 @@ impl Parallax {
     }
 }
 
-/// Mean difference of two colours.
 pub(super) fn difference(a: [f32; 3], b: [f32; 3]) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>() / 3.0
 }
 
-/// Which values of a view are outliers: few neighbours agree with them, and not more of the other views
-/// confirm them than see through them; or they lie in a cluster of outliers.
-pub(super) fn rejected<P: Viewpoint>(
-    views: &[View<'_, P>],
-    planes: &[Parallax],
-    gains: &[Exposure],
-    voters: &[usize],
-    index: usize,
-) -> Vec<bool> {
-    let (view, plane) = (&views[index], &planes[index]);
-    let votes = ballot(views, planes, gains, voters, index);
-    let is_outlier = |p: usize| {
-        let value = view.map.data()[p];
-        if value.is_nan() || view.map.is_guessed(p) {
-            return false;
-        }
-        match plane.is_supported(p, 1, SUPPORTERS) {
-            true => plane.is_in_cluster(view, p, RING, &votes),
-            false => votes(p, value).into_iter().map(Vote::count).sum::<i32>() <= 0,
-        }
-    };
-    (0..plane.values.len()).into_par_iter().with_min_len(1024).map(is_outlier).collect()
+/// Views with their maps in parallax, and how well they agree.
+pub(super) struct Known<'a, P> {
+    views: &'a [View<'a, P>],
+    pub(super) planes: Vec<Parallax>,
+    pub(super) agreement: Agreement,
+    /// The views that vote on values of each.
+    pub(super) voters: Vec<Vec<usize>>,
 }
 
-/// The votes of views on values of another one.
-pub(super) fn ballot<P: Viewpoint>(
-    views: &[View<'_, P>],
-    planes: &[Parallax],
-    gains: &[Exposure],
-    voters: &[usize],
-    index: usize,
-) -> impl Fn(usize, f32) -> Vec<Vote> + Sync {
-    let view = &views[index];
-    let (width, measure) = (view.map.width(), view.map.measure());
-    let colour = move |view: usize, p: usize| -> [f32; 3] {
-        let colour = views[view].image.pixel::<3>(p);
-        std::array::from_fn(|c| colour[c] * gains[view][c] as f32)
-    };
-    let maps: Vec<_> = voters.iter().map(|other| view.camera.map_to(&views[*other].camera)).collect();
-    move |p, value| {
-        let votes = voters.iter().zip(&maps).map(|(other, map)| {
-            let (u, v, depth) = map((p % width) as f64, (p / width) as f64, f64::from(value));
-            let there = measure.parallax(depth as f32);
-            vote(&planes[*other], [u, v], there, |q| difference(colour(index, p), colour(*other, q)))
+impl<'a, P: Viewpoint> Known<'a, P> {
+    pub(super) fn of(views: &'a [View<'a, P>]) -> Self {
+        let agreement = Agreement::of(views);
+        let plane = |(i, view): (usize, &View<'_, P>)| Parallax::of(view.map, agreement.depth_error(i));
+        let planes = views.iter().enumerate().map(plane).collect();
+        Self { views, planes, voters: voters(&agreement.groups()), agreement }
+    }
+
+    /// Which values of a view are outliers: few neighbours agree with them, or they lie between the sides of
+    /// an edge, and not more of the other views confirm them than see through them; or they lie in a cluster
+    /// of outliers.
+    pub(super) fn rejected(&self, index: usize) -> Vec<bool> {
+        let (map, plane, votes) = (self.views[index].map, &self.planes[index], self.ballot(index));
+        let is_outlier = |p: usize| {
+            let value = map.data()[p];
+            if value.is_nan() || map.is_guessed(p) {
+                return false;
+            }
+            let outvoted_by =
+                |least: i32| votes(p, value).into_iter().map(Vote::count).sum::<i32>() <= -least;
+            match plane.is_supported(p, 1, SUPPORTERS) {
+                // Steep surfaces have such values too, which no view sees through.
+                true if plane.is_between(p) => outvoted_by(1),
+                true => self.is_in_cluster(index, p, RING, &votes),
+                false => outvoted_by(0),
+            }
+        };
+        (0..plane.values.len()).into_par_iter().with_min_len(1024).map(is_outlier).collect()
+    }
+
+    /// Whether few values on the ring around a pixel agree with its own, no other view confirms that, and
+    /// one shows a surface there at the median of the ring.
+    pub(super) fn is_in_cluster(
+        &self,
+        index: usize,
+        pixel: usize,
+        ring: usize,
+        votes: impl Fn(usize, f32) -> Vec<Vote>,
+    ) -> bool {
+        let (View { image, map, .. }, plane) = (self.views[index], &self.planes[index]);
+        if plane.is_supported(pixel, ring, RING_SUPPORTERS) {
+            return false;
+        }
+        let around = plane.median_of(image, pixel, plane.ring(pixel, ring));
+        !around.is_nan()
+            && !plane.agree(around, plane.values[pixel])
+            && !votes(pixel, map.data()[pixel]).into_iter().any(Vote::is_confirming)
+            && votes(pixel, map.measure().of_parallax(around)).contains(&Vote::Surface)
+    }
+
+    /// The votes of the others on values at pixels of a view.
+    pub(super) fn ballot(&self, index: usize) -> impl Fn(usize, f32) -> Vec<Vote> + Sync {
+        let (view, voters) = (&self.views[index], &self.voters[index]);
+        let (width, measure) = (view.map.width(), view.map.measure());
+        let maps: Vec<_> =
+            voters.iter().map(|other| view.camera.map_to(&self.views[*other].camera)).collect();
+        move |p, value| {
+            let votes = voters.iter().zip(&maps).map(|(other, map)| {
+                let (u, v, depth) = map((p % width) as f64, (p / width) as f64, f64::from(value));
+                let there = measure.parallax(depth as f32);
+                vote(&self.planes[*other], [u, v], there, |q| self.are_alike([index, *other], [p, q]))
+            });
+            votes.collect()
+        }
+    }
+
+    /// Whether pixels of two views have nearly one colour.
+    pub(super) fn are_alike(&self, views: [usize; 2], pixels: [usize; 2]) -> bool {
+        let [a, b] = [0, 1].map(|k| -> [f32; 3] {
+            let (colour, gain) =
+                (self.views[views[k]].image.pixel::<3>(pixels[k]), self.agreement.gains[views[k]]);
+            std::array::from_fn(|c| colour[c] * gain[c] as f32)
         });
-        votes.collect()
+        difference(a, b) <= GREY_LEVELS
     }
 }
 
@@ -278,13 +332,13 @@ pub(super) fn voters(groups: &[usize]) -> Vec<Vec<usize>> {
 
 /// What a view says of a point at a position with a parallax: it confirms it by a pixel of a surface there
 /// that has nearly its colour, or sees through it; nothing if something hides it, or it falls outside.
-fn vote(plane: &Parallax, at: [f64; 2], there: f32, colour: impl Fn(usize) -> f32) -> Vote {
+fn vote(plane: &Parallax, at: [f64; 2], there: f32, has_colour: impl Fn(usize) -> bool) -> Vote {
     let (mut is_inside, mut is_on_surface, mut is_alike, mut is_seen_through) = (false, true, false, true);
     for q in plane.pixels_at(at) {
         let agrees = plane.agree(there, plane.values[q]);
         is_inside = true;
         is_on_surface &= agrees;
-        is_alike |= agrees && colour(q) <= GREY_LEVELS;
+        is_alike |= agrees && has_colour(q);
         is_seen_through &= !agrees && plane.values[q] < there;
     }
     match (is_alike, is_on_surface, is_inside && is_seen_through) {

@@ -1,9 +1,8 @@
 //! Scattered depths of several views: which of them are wrong, and what the views show of each other.
 
-use super::outliers::{Parallax, ballot, difference, voters};
+use super::outliers::Known;
 use super::surface::{from_scattered, nearest};
 use crate::depth::DepthMap;
-use crate::pipeline::{Agreement, Exposure, GREY_LEVELS};
 use crate::propagate::{View, Viewpoint};
 use hybank::memory::{MemoryShortage, check_memory};
 use rayon::prelude::*;
@@ -34,12 +33,12 @@ pub(crate) fn dense<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Option<De
     let known = Known::of(&shown);
     let samples: Vec<DepthMap> = (0..views.len())
         .into_par_iter()
-        .map(|i| if is_scattered[i] { known.samples(views[i].map, i) } else { views[i].map.clone() })
+        .map(|i| if is_scattered[i] { sound(&known, views[i].map, i) } else { views[i].map.clone() })
         .collect();
     let surface = |i: usize| {
         let image = views[i].image;
         check_memory(DENSE * image.width() as f64 * image.height() as f64)?;
-        Ok(is_scattered[i].then(|| from_scattered(&known.shared(&samples, i), image)))
+        Ok(is_scattered[i].then(|| from_scattered(&shared(&known, &shown, &samples, i), image)))
     };
     let most = views.iter().map(|view| view.map.data().len()).max().unwrap_or(0) as f64;
     match check_memory(DENSE * most * rayon::current_num_threads().min(views.len()) as f64) {
@@ -54,60 +53,40 @@ fn rough<P>(view: &View<'_, P>) -> DepthMap {
     map.with_values(map.size(), found.iter().map(|q| map.data()[*q as usize]).collect())
 }
 
-/// What is known of views with rough maps.
-struct Known<'a, P> {
-    views: &'a [View<'a, P>],
-    planes: Vec<Parallax>,
-    gains: Vec<Exposure>,
-    voters: Vec<Vec<usize>>,
+/// The samples of a map without those that are wrong.
+fn sound<P: Viewpoint>(known: &Known<'_, P>, map: &DepthMap, index: usize) -> DepthMap {
+    let (votes, count) = (known.ballot(index), map.data().len() - map.unknown());
+    let ring = (RING * (map.data().len() as f64 / count as f64).sqrt()).ceil() as usize;
+    let is_right = |p: usize| !known.is_in_cluster(index, p, ring, &votes);
+    let kept = |(p, v): (usize, &f32)| if v.is_nan() || is_right(p) { *v } else { f32::NAN };
+    map.with_values(map.size(), map.data().par_iter().enumerate().map(kept).collect())
 }
 
-impl<'a, P: Viewpoint> Known<'a, P> {
-    fn of(views: &'a [View<'a, P>]) -> Self {
-        let agreement = Agreement::of(views);
-        let plane = |(i, view): (usize, &View<'_, P>)| Parallax::of(view.map, agreement.depth_error(i));
-        let planes = views.iter().enumerate().map(plane).collect();
-        Self { views, planes, voters: voters(&agreement.groups()), gains: agreement.gains }
-    }
-
-    /// The samples of a map without those that are wrong.
-    fn samples(&self, map: &DepthMap, index: usize) -> DepthMap {
-        let (view, plane) = (&self.views[index], &self.planes[index]);
-        let votes = ballot(self.views, &self.planes, &self.gains, &self.voters[index], index);
-        let count = map.data().len() - map.unknown();
-        let ring = (RING * (map.data().len() as f64 / count as f64).sqrt()).ceil() as usize;
-        let is_right = |p: usize| !plane.is_in_cluster(view, p, ring, &votes);
-        let kept = |(p, v): (usize, &f32)| if v.is_nan() || is_right(p) { *v } else { f32::NAN };
-        map.with_values(map.size(), map.data().par_iter().enumerate().map(kept).collect())
-    }
-
-    /// The samples of a view, and those of the others that it shows: nothing hides them, and the colours are
-    /// alike. Of several on one pixel the nearest counts.
-    fn shared(&self, samples: &[DepthMap], index: usize) -> DepthMap {
-        let (own, view, plane) = (&samples[index], &self.views[index], &self.planes[index]);
-        let measure = own.measure();
-        let mut data = own.data().to_vec();
-        for other in &self.voters[index] {
-            let (map, from) = (self.views[*other].camera.map_to(&view.camera), &samples[*other]);
-            let is_known = |(q, value): &(usize, &f32)| !value.is_nan() && !from.is_guessed(*q);
-            for (q, value) in from.data().iter().enumerate().filter(is_known) {
-                let (x, y) = ((q % from.width()) as f64, (q / from.width()) as f64);
-                let (u, v, depth) = map(x, y, f64::from(*value));
-                let Some(p) = view.image.pixel_at(u, v).filter(|p| own.data()[*p].is_nan()) else { continue };
-                let there = measure.parallax(depth as f32);
-                let is_hidden = plane.values[p] > there && !plane.agree(there, plane.values[p]);
-                let is_alike = || difference(self.colour(index, p), self.colour(*other, q)) <= GREY_LEVELS;
-                let is_nearest = data[p].is_nan() || measure.parallax(data[p]) < there;
-                if is_nearest && !is_hidden && is_alike() {
-                    data[p] = depth as f32;
-                }
+/// The samples of a view, and those of the others that it shows: nothing hides them, and the colours are
+/// alike. Of several on one pixel the nearest counts.
+fn shared<P: Viewpoint>(
+    known: &Known<'_, P>,
+    views: &[View<'_, P>],
+    samples: &[DepthMap],
+    index: usize,
+) -> DepthMap {
+    let (own, view, plane) = (&samples[index], &views[index], &known.planes[index]);
+    let measure = own.measure();
+    let mut data = own.data().to_vec();
+    for other in &known.voters[index] {
+        let (map, from) = (views[*other].camera.map_to(&view.camera), &samples[*other]);
+        let is_known = |(q, value): &(usize, &f32)| !value.is_nan() && !from.is_guessed(*q);
+        for (q, value) in from.data().iter().enumerate().filter(is_known) {
+            let (x, y) = ((q % from.width()) as f64, (q / from.width()) as f64);
+            let (u, v, depth) = map(x, y, f64::from(*value));
+            let Some(p) = view.image.pixel_at(u, v).filter(|p| own.data()[*p].is_nan()) else { continue };
+            let there = measure.parallax(depth as f32);
+            let is_hidden = plane.values[p] > there && !plane.agree(there, plane.values[p]);
+            let is_nearest = data[p].is_nan() || measure.parallax(data[p]) < there;
+            if is_nearest && !is_hidden && known.are_alike([index, *other], [p, q]) {
+                data[p] = depth as f32;
             }
         }
-        own.with_values(own.size(), data)
     }
-
-    fn colour(&self, view: usize, pixel: usize) -> [f32; 3] {
-        let (colour, gain) = (self.views[view].image.pixel::<3>(pixel), self.gains[view]);
-        std::array::from_fn(|c| colour[c] * gain[c] as f32)
-    }
+    own.with_values(own.size(), data)
 }

@@ -59,7 +59,6 @@ impl Parallax {
         }
     }
 
-    /// The medians around the known values.
     fn medians(&self, image: &Image) -> Vec<f32> {
         let median = |p: usize| match self.values[p].is_nan() {
             true => f32::NAN,

@@ -251,26 +251,24 @@ impl Writer<'_> {
             let reason = format!("none of the {} photographs that it lists is there", list.frames.len());
             return Err(InputError::file(list.path(), reason));
         };
-        let apart = |a: &Placed<'_>, b: &Placed<'_>| (a.camera.centre() - b.camera.centre()).norm();
-        let others = there.iter().filter(|other| apart(other, first) > 0.0);
-        let second = others.min_by(|a, b| apart(a, first).total_cmp(&apart(b, first))).unwrap_or(first);
+        let apart = |placed: &&Placed<'_>, camera: &Camera| (placed.camera.centre() - camera.centre()).norm();
+        let others = there.iter().filter(|other| apart(other, &first.camera) > 0.0);
+        let by_distance =
+            |a: &&Placed<'_>, b: &&Placed<'_>, camera: &Camera| apart(a, camera).total_cmp(&apart(b, camera));
+        let second = others.min_by(|a, b| by_distance(a, b, &first.camera)).unwrap_or(first);
         let camera = first
             .camera
             .towards(&second.camera, 0.5)
             .map_err(|source| InputError::file(list.path(), format!("the virtual camera: {source}")))?;
-        let names = [first, second].map(|placed| Quoted(&placed.frame.image).to_string());
+        let [one, other] = [first, second].map(|placed| Quoted(&placed.frame.image).to_string());
         let count = there.len();
-        there.sort_by(|a, b| {
-            let distance = |placed: &Placed<'_>| (placed.camera.centre() - camera.centre()).norm();
-            distance(a).total_cmp(&distance(b))
-        });
+        there.sort_by(|a, b| by_distance(&a, &b, &camera));
         there.truncate(MOST_VIEWS);
         let mut comments = vec![comment.to_owned()];
-        if count > there.len() {
-            let said = format!("The {MOST_VIEWS} of {count} views that are nearest to the virtual camera.");
-            comments.push(said);
+        if count > MOST_VIEWS {
+            comments
+                .push(format!("The {MOST_VIEWS} of {count} views that are nearest to the virtual camera."));
         }
-        let [one, other] = names;
         comments.push(format!(
             "The virtual camera is half-way between {one} and {other}; camera_of = \"..\" takes that of an image instead."
         ));
@@ -328,25 +326,22 @@ fn same_size([left, right]: [&Path; 2]) -> Found<()> {
 /// The scale of two maps of whole numbers with which most points agree, and the share of these; `None` for
 /// floats, which are pixels.
 fn scale_of(left: (&Path, &Path), right: (&Path, &Path)) -> Found<Option<(f64, f64)>> {
-    let mut views = Vec::new();
-    for (image, map) in [left, right] {
-        let (width, height, stored) = read_map(map, MOST_PIXELS)?;
-        views.push((read_image(image, MOST_PIXELS)?, (width, height), stored, map));
-    }
-    if views.iter().any(|view| view.3.extension().is_some_and(|ending| ending == "pfm")) {
+    let is_float = |map: &Path| map.extension().is_some_and(|ending| ending == "pfm");
+    if is_float(left.1) || is_float(right.1) {
         return Ok(None);
     }
+    let images = [read_image(left.0, MOST_PIXELS)?, read_image(right.0, MOST_PIXELS)?];
+    let stored = [read_map(left.1, MOST_PIXELS)?, read_map(right.1, MOST_PIXELS)?];
     let mut best: Option<(f64, f64)> = None;
     for scale in SCALES {
-        let maps: Vec<DepthMap> = views
-            .iter()
-            .map(|(image, size, stored, path)| {
-                let map = DepthMap::new(*size, stored.clone(), scale, Measure::Disparity);
-                let fitting = map.and_then(|map| map.fits(image.size(), 1).map(|()| map));
-                fitting.map_err(|e| InputError::file(path, e))
-            })
-            .collect::<Result<_, _>>()?;
-        let view = |k: usize| RectifiedView { image: &views[k].0, map: &maps[k], camera: k as f64 };
+        let map = |k: usize, path: &Path| {
+            let (width, height, values) = stored[k].clone();
+            let map = DepthMap::new((width, height), values, scale, Measure::Disparity);
+            let fitting = map.and_then(|map| map.fits(images[k].size(), 1).map(|()| map));
+            fitting.map_err(|e| InputError::file(path, e))
+        };
+        let maps = [map(0, left.1)?, map(1, right.1)?];
+        let view = |k: usize| RectifiedView { image: &images[k], map: &maps[k], camera: k as f64 };
         let share = Agreement::of(&[view(0), view(1)]).worst().map_or(0.0, |pair| pair.share);
         if best.is_none_or(|(_, most)| share > most) {
             best = Some((scale, share));

@@ -17,7 +17,7 @@ use super::prepare::{Preparation, prepare};
 use super::spec::{KEYS, SceneSpec, ViewSpec};
 use super::{Kind, Scene};
 use crate::camera::middlebury::Calibration;
-use crate::files::{InputError, Location};
+use crate::files::InputError;
 use crate::image::{Image, MOST_PIXELS, read_image};
 use crate::pipeline::Watch;
 use goals::Goal;
@@ -59,7 +59,7 @@ pub fn parse(text: &str, path: &Path) -> Result<SceneSpec, InputError> {
         let Some(place) = e.span().map(|span| messages::Location::find(text, span)) else {
             return InputError::file(path, reason);
         };
-        InputError::content(path, Location::Column(place.line, place.column), format!("{reason}\n{place}"))
+        InputError::content(path, format!(":{}:{}", place.line, place.column), format!("{reason}\n{place}"))
     })
 }
 
@@ -102,16 +102,17 @@ impl Loader<'_> {
     fn load(&self) -> Loaded<Scene> {
         self.different_names()?;
         let left_out = self.left_out()?;
-        let index = left_out.as_ref().and_then(LeftOut::index);
-        let views: Vec<&ViewSpec> =
-            self.spec.view.iter().enumerate().filter(|(i, _)| Some(*i) != index).map(|(_, v)| v).collect();
+        let mut views: Vec<&ViewSpec> = self.spec.view.iter().collect();
+        let own = match left_out {
+            Some(LeftOut::View(index)) => Some((index, views.remove(index))),
+            _ => None,
+        };
         if views.is_empty() {
             return Err(self.incomplete("there is no view to render from; add [[view]] tables"));
         }
         let goals = self.goals()?;
-        let own = index.map(|i| &self.spec.view[i]);
         let Inputs { mut kind, calibration, mut notes } = if views.iter().any(|v| v.position.is_some()) {
-            self.rectified(&views, own, &goals)?
+            self.rectified(&views, own.map(|(_, view)| view), &goals)?
         } else if views.iter().any(|v| v.camera.is_some() || self.source_of(v).is_some()) {
             self.calibrated(&views, left_out.as_ref(), &goals)?
         } else {
@@ -238,13 +239,6 @@ const LOADING_BYTES: f64 = 110.0;
 
 /// Bytes per pixel of a view that is there.
 const VIEW_BYTES: f64 = 20.0;
-
-/// Bytes of memory in which the text of a scene file can be parsed.
-#[cfg(feature = "cli")]
-pub(crate) fn room_to_parse(text: &str) -> f64 {
-    const PARSED: f64 = 60.0;
-    PARSED * text.len() as f64
-}
 
 /// What `read` makes of each view, or the first error in the order of the views, so that every run reports
 /// the same error. Views are read at the same time if there is memory for that, judged by the first one.

@@ -6,8 +6,6 @@ mod prepare;
 mod spec;
 
 pub use folder::{Described, describe};
-#[cfg(feature = "cli")]
-pub(crate) use load::room_to_parse;
 pub use load::{LoadOptions, MOST_FRAMES, complete, load, parse};
 pub use prepare::{Preparation, PreparationError, prepare};
 pub use spec::{SceneSpec, TargetSpec, ViewSpec};

@@ -52,16 +52,13 @@ pub fn prepare<P: Viewpoint>(
     fill: bool,
 ) -> Result<Preparation, PreparationError> {
     let count = views.len();
-    prepared(views, fill).map_err(|shortage| PreparationError { views: count, shortage })
-}
-
-fn prepared<P: Viewpoint>(views: &mut [SourceView<P>], fill: bool) -> Result<Preparation, MemoryShortage> {
-    make_dense(views, fill)?;
+    let refused = |shortage| PreparationError { views: count, shortage };
+    make_dense(views, fill).map_err(refused)?;
     let filled = views.iter().map(|view| view.map.guesses()).sum();
-    let restored = restore(&views.iter().map(SourceView::view).collect::<Vec<_>>())?;
+    let restored = restore(&views.iter().map(SourceView::view).collect::<Vec<_>>()).map_err(refused)?;
     let outliers = restored.iter().map(|restored| restored.outliers).collect();
     views.iter_mut().zip(restored).for_each(|(view, restored)| view.map = restored.map);
-    let images = coloured(&views.iter().map(SourceView::view).collect::<Vec<_>>())?;
+    let images = coloured(&views.iter().map(SourceView::view).collect::<Vec<_>>()).map_err(refused)?;
     let coloured = (0..views.len()).filter(|view| images[*view].is_some()).collect();
     let replaced = views.iter_mut().zip(images).filter_map(|(view, image)| Some((view, image?)));
     replaced.for_each(|(view, image)| view.image = image);

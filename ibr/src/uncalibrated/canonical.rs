@@ -2,7 +2,7 @@
 
 use super::normalise::Normalisation;
 use super::{GeometryError, Match, homogeneous};
-use crate::linear;
+use hybank_linalg::small;
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
 
 /// Pi_1 = \[I | 0\] and Pi_2 = \[\[e'\]_x F + e' a^T | e'\] in normalised image coordinates.
@@ -28,7 +28,7 @@ pub fn canonical_pair(f: &Matrix3<f64>, matches: &[Match]) -> Result<CanonicalPa
     let second = Normalisation::of(matches.iter().map(|m| &m.second));
     let f = second.inverse().transpose() * f * first.inverse();
     let f = f / f.norm();
-    let (u, _, _) = linear::svd3(&f).ok_or(GeometryError::Numerical { what: "epipole" })?;
+    let (u, _, _) = small::svd3(&f).ok_or(GeometryError::Numerical { what: "epipole" })?;
     let epipole: Vector3<f64> = u.column(2).into_owned();
     let base = epipole.cross_matrix() * f;
     let a = best_plane(&base, &epipole, matches, &first, &second)
@@ -58,7 +58,7 @@ fn best_plane(
             rhs.push(-fixed[k]);
         }
     }
-    linear::least_squares(&rows, &rhs)
+    small::least_squares(&rows, &rhs)
 }
 
 #[cfg(test)]

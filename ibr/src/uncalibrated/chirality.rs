@@ -10,15 +10,10 @@
 //! so chi orders depth correctly on the whole image or reverses it on the whole image, while d_p passes
 //! through infinity.
 //!
-//! No change of frame is needed. A linear program could move the plane at infinity off the scene, which
-//! would make all chi negative and all det M positive. But the sign of [`order_sign`] holds in every frame,
-//! and the position to which a pixel with given chi propagates does not depend on the frame. Only a camera
-//! centre on the plane t = 0 (det M = 0) has no order of depth and is refused.
-//!
-//! For the canonical pair this does not happen: its plane t = 0 is the best fit to the matches, so it lies
-//! within the scene, far from any camera that sees the scene from the front. With this plane chi is also
-//! small on the whole image, so that a share of its range is a depth threshold; in other frames chi would
-//! mostly vary with the pixel.
+//! The sign of [`order_sign`] holds in every frame, and so does the position to which a pixel with given chi
+//! propagates. Only a camera centre on the plane t = 0 (det M = 0) has no order of depth and is refused.
+//! That plane of the canonical pair is the best fit to the matches, so it lies within the scene, far from
+//! the cameras, and a share of the range of chi is a depth threshold.
 
 use nalgebra::{Matrix3, Matrix3x4, Vector4};
 
@@ -70,18 +65,12 @@ pub enum Handedness {
 impl Handedness {
     /// +1 or -1.
     pub fn sign(self) -> f64 {
-        match self {
-            Self::Kept => 1.0,
-            Self::Reversed => -1.0,
-        }
+        if self == Self::Kept { 1.0 } else { -1.0 }
     }
 
     /// The other order.
     pub fn reversed(self) -> Self {
-        match self {
-            Self::Kept => Self::Reversed,
-            Self::Reversed => Self::Kept,
-        }
+        if self == Self::Kept { Self::Reversed } else { Self::Kept }
     }
 
     /// The bit for which chi of this oriented camera grows (`slope` > 0) or falls with 1 / d.
@@ -101,8 +90,8 @@ pub fn order_sign(camera: &Matrix3x4<f64>, hand: Handedness) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear;
     use crate::uncalibrated::fundamental::tests::Synthetic;
+    use hybank_linalg::small;
     use nalgebra::Matrix4;
     use proptest::prelude::*;
 
@@ -148,7 +137,7 @@ mod tests {
             })
             .collect();
         let values: Vec<f64> = f.points.iter().map(|p| chi(&f.cameras[i], p)).collect();
-        let fit = linear::least_squares(&rows, &values).unwrap();
+        let fit = small::least_squares(&rows, &values).unwrap();
         let miss = |(r, v): (&[f64; 4], &f64)| (0..4).map(|k| r[k] * fit[k]).sum::<f64>() - v;
         let residual = rows.iter().zip(&values).map(miss).map(f64::abs).fold(0.0, f64::max);
         (fit[0], residual / values.iter().map(|v| v.abs()).fold(0.0, f64::max))

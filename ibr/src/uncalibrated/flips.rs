@@ -25,20 +25,17 @@ const MOST_LOOKS: usize = 20;
 /// Exchanges diagonals of the mesh while the colours of the views improve. `miss` returns by how much the
 /// views differ, in grey levels, where the corners of a triangle have some shares, and `None` where no two
 /// of them show it.
-pub fn exchange(mesh: &mut Mesh, miss: impl Fn(&[usize; 3], Shares) -> Option<f64>) -> usize {
+pub fn exchange(mesh: &mut Mesh, miss: impl Fn(&[usize; 3], Shares) -> Option<f64>) {
     let mut sides = mesh.sides();
     let mut queue: VecDeque<Edge> = sides.keys().copied().collect();
-    let mut exchanged = 0;
     for _ in 0..MOST_LOOKS * sides.len() {
         let Some(next) = queue.pop_front() else { break };
         let Some(quad) = Quad::new(mesh, &sides, next) else { continue };
         if quad.is_better_exchanged(&mesh.corners, &miss) {
             quad.exchange(mesh, &mut sides);
             queue.extend(quad.border());
-            exchanged += 1;
         }
     }
-    exchanged
 }
 
 /// The two triangles a b c and b a d on both sides of the edge a b.
@@ -65,7 +62,6 @@ impl Quad {
         quad.is_convex(&mesh.corners).then_some(quad)
     }
 
-    /// Corners in the sense of the triangles.
     fn around(&self) -> [usize; 4] {
         [self.a, self.d, self.b, self.c]
     }
@@ -86,7 +82,6 @@ impl Quad {
         turns.iter().all(|t| *t > 1e-3) || turns.iter().all(|t| *t < -1e-3)
     }
 
-    /// Compares the colours of its pixels under both diagonals.
     fn is_better_exchanged(
         &self,
         corners: &[Point],
@@ -128,7 +123,6 @@ impl Quad {
             .filter(inside)
     }
 
-    /// Puts the diagonal c d in the place of a b.
     fn exchange(&self, mesh: &mut Mesh, sides: &mut BTreeMap<Edge, Vec<usize>>) {
         let Self { a, b, c, d, triangles: [left, right] } = *self;
         mesh.triangles[left] = [c, d, b];
@@ -172,7 +166,7 @@ mod tests {
     }
 
     /// Exchanges edges until the interpolant of `chi` fits `shown`.
-    fn fit(mesh: &mut Mesh, chi: impl Fn(&Point) -> f64, shown: impl Fn(&Point) -> f64) -> usize {
+    fn fit(mesh: &mut Mesh, chi: impl Fn(&Point) -> f64, shown: impl Fn(&Point) -> f64) {
         let corners = mesh.corners.clone();
         exchange(mesh, |corner, shares| {
             let (p, chi) = interpolated(&corners, corner, shares, &chi);
@@ -214,8 +208,8 @@ mod tests {
         let plane = |p: &Point| 0.3 * p.x - 0.1 * p.y;
         let mut found = mesh(3.0);
         let before = found.clone();
-        assert_eq!(fit(&mut found, plane, plane), 0);
-        assert_eq!(exchange(&mut found, |_, _| None), 0);
+        fit(&mut found, plane, plane);
+        exchange(&mut found, |_, _| None);
         assert_eq!(found, before);
     }
 
@@ -227,7 +221,7 @@ mod tests {
         let noise = |corner: &[usize; 3], shares: Shares| {
             Some(50.0 * (1e4 * (shares[0] + corner[0] as f64 * shares[1])).sin().abs())
         };
-        assert!(exchange(&mut found, noise) > 0);
+        exchange(&mut found, noise);
         let after = areas(&found);
         assert!(after.iter().all(|a| a * before > 0.0), "{after:?}");
         assert!((after.iter().sum::<f64>() - before).abs() < 1e-9 * before.abs());

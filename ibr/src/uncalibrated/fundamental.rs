@@ -4,8 +4,8 @@
 
 use super::normalise::Normalisation;
 use super::random::consensus;
-use super::{GeometryError, Match, homogeneous};
-use crate::linear;
+use super::{EPIPOLAR, GeometryError, Match, homogeneous};
+use hybank_linalg::small;
 use nalgebra::Matrix3;
 
 /// Below this ratio of the second smallest to the largest singular value the matches do not determine F.
@@ -49,13 +49,13 @@ pub fn eight_point(matches: &[Match]) -> Result<Matrix3<f64>, GeometryError> {
     };
     let rows: Vec<[f64; 9]> = matches.iter().map(row).collect();
     let failed = || GeometryError::Numerical { what: "fundamental matrix" };
-    let (f, values) = linear::least_vector(&rows).ok_or_else(failed)?;
+    let (f, values) = small::least_vector(&rows).ok_or_else(failed)?;
     let ratio = values[7] / values[0];
     if ratio < DEGENERATE {
         return Err(GeometryError::Degenerate { what: "fundamental matrix", ratio });
     }
     let f = Matrix3::from_row_slice(f.as_slice());
-    let (u, mut sigma, v) = linear::svd3(&f).ok_or_else(failed)?;
+    let (u, mut sigma, v) = small::svd3(&f).ok_or_else(failed)?;
     sigma[2] = 0.0;
     let f = t.matrix().transpose() * u * Matrix3::from_diagonal(&sigma.into()) * v.transpose() * s.matrix();
     Ok(f / f.norm())
@@ -66,47 +66,39 @@ fn normalisations(matches: &[Match]) -> (Normalisation, Normalisation) {
     (first, Normalisation::of(matches.iter().map(|m| &m.second)))
 }
 
-fn inliers(f: &Matrix3<f64>, matches: &[Match], threshold: f64) -> Vec<usize> {
-    (0..matches.len()).filter(|i| sampson(f, &matches[*i]) < threshold * threshold).collect()
+fn inliers(f: &Matrix3<f64>, matches: &[Match]) -> Vec<usize> {
+    (0..matches.len()).filter(|i| sampson(f, &matches[*i]) < EPIPOLAR * EPIPOLAR).collect()
 }
 
 fn chosen(matches: &[Match], indices: &[usize]) -> Vec<Match> {
     indices.iter().map(|i| matches[*i]).collect()
 }
 
-/// Sampson distance below which a match is an inlier of F, in pixels.
-const EPIPOLAR: f64 = 1.0;
-
 /// F by RANSAC over samples of eight, refitted on the inliers until their set is stable; the same seed gives
 /// the same bits.
 ///
 /// # Errors
-/// [`GeometryError`]: fewer than 8 matches or inliers, coordinates that are not finite, planar matches.
+/// [`GeometryError`]: fewer than 8 matches or inliers, planar matches.
 pub fn robust(matches: &[Match], seed: u64) -> Result<Fundamental, GeometryError> {
     if matches.len() < 8 {
         return Err(GeometryError::TooFew { what: "matches", found: matches.len(), needed: 8 });
     }
-    let finite = |m: &Match| m.first.iter().chain(m.second.iter()).all(|v| v.is_finite());
-    if let Some(index) = matches.iter().position(|m| !finite(m)) {
-        return Err(GeometryError::NotFinite { index });
-    }
     let best = consensus::<8>(matches.len(), seed, |sample| {
-        Some(inliers(&eight_point(&chosen(matches, &sample)).ok()?, matches, EPIPOLAR))
+        Some(inliers(&eight_point(&chosen(matches, &sample)).ok()?, matches))
     });
-    let (threshold, total) = (EPIPOLAR, matches.len());
     if best.len() < 8 {
-        refuse_planes(matches, threshold)?;
-        let (what, inliers) = ("fundamental matrix", best.len());
-        return Err(GeometryError::NoConsensus { what, inliers, matches: total, threshold });
+        refuse_planes(matches)?;
+        let (what, inliers, matches) = ("fundamental matrix", best.len(), matches.len());
+        return Err(GeometryError::NoConsensus { what, inliers, matches, threshold: EPIPOLAR });
     }
-    refuse_planes(&chosen(matches, &best), threshold)?;
-    refit(matches, best, threshold)
+    refuse_planes(&chosen(matches, &best))?;
+    refit(matches, best)
 }
 
-fn refit(matches: &[Match], mut set: Vec<usize>, threshold: f64) -> Result<Fundamental, GeometryError> {
+fn refit(matches: &[Match], mut set: Vec<usize>) -> Result<Fundamental, GeometryError> {
     let mut matrix = eight_point(&chosen(matches, &set))?;
     for _ in 0..ROUNDS {
-        let next = inliers(&matrix, matches, threshold);
+        let next = inliers(&matrix, matches);
         if next == set || next.len() < 8 {
             break;
         }
@@ -119,16 +111,15 @@ fn refit(matches: &[Match], mut set: Vec<usize>, threshold: f64) -> Result<Funda
 }
 
 /// Refuses matches that one homography explains: a planar scene, or a camera that only rotated.
-fn refuse_planes(matches: &[Match], threshold: f64) -> Result<(), GeometryError> {
+fn refuse_planes(matches: &[Match]) -> Result<(), GeometryError> {
     let Some(h) = homography(matches) else { return Ok(()) };
-    let explained = matches.iter().filter(|m| transfer(&h, m) < threshold * threshold).count();
+    let explained = matches.iter().filter(|m| transfer(&h, m) < EPIPOLAR * EPIPOLAR).count();
     if explained as f64 >= PLANAR_SHARE * matches.len() as f64 {
-        return Err(GeometryError::Planar { explained, matches: matches.len(), threshold });
+        return Err(GeometryError::Planar { explained, matches: matches.len() });
     }
     Ok(())
 }
 
-/// Square of the distance between H x and x', in square pixels.
 fn transfer(h: &Matrix3<f64>, m: &Match) -> f64 {
     let p = h * homogeneous(&m.first);
     (p.xy() / p.z - m.second).norm_squared()
@@ -144,7 +135,7 @@ fn homography(matches: &[Match]) -> Option<Matrix3<f64>> {
             [0.0, 0.0, 0.0, a.x, a.y, 1.0, -b.y * a.x, -b.y * a.y, -b.y],
         ]
     });
-    let (h, _) = linear::least_vector(&rows.collect::<Vec<_>>())?;
+    let (h, _) = small::least_vector(&rows.collect::<Vec<_>>())?;
     Some(t.inverse() * Matrix3::from_row_slice(h.as_slice()) * s.matrix())
 }
 
@@ -229,7 +220,7 @@ pub(crate) mod tests {
         assert_eq!(robust(few, 1), Err(GeometryError::TooFew { what: "matches", found: 7, needed: 8 }));
         let mut broken = Synthetic::new(20, false).matches();
         broken[4].first.x = f64::NAN;
-        assert_eq!(robust(&broken, 1), Err(GeometryError::NotFinite { index: 4 }));
+        assert!(!robust(&broken, 1).unwrap().inliers.contains(&4));
         let same = vec![Match { first: Point::new(1.0, 2.0), second: Point::new(3.0, 4.0) }; 30];
         assert!(robust(&same, 1).is_err());
     }

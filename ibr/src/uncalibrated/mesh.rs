@@ -4,7 +4,7 @@
 //! interpolation on triangles is exact on planar facets; that of the projective depth itself would not be.
 
 use super::Point;
-use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
+use spade::{DelaunayTriangulation, Point2, Triangulation};
 use std::collections::BTreeMap;
 
 /// Of features closer than this, in pixels, only the first is used.
@@ -14,37 +14,11 @@ const CLOSEST: f64 = 0.5;
 pub type Shares = [f64; 3];
 
 /// Triangles between features, which cover their convex hull.
-///
-/// ```
-/// use hybank_ibr::uncalibrated::Point;
-/// use hybank_ibr::uncalibrated::mesh::Mesh;
-///
-/// let corners = [(0.0, 0.0), (4.0, 0.0), (0.0, 2.0), (4.0, 2.0)].map(|(x, y)| Point::new(x, y));
-/// let mesh = Mesh::delaunay(corners.to_vec());
-/// // On a plane chi is an affine function of the pixel, here x / 4.
-/// let mut chi = [f64::NAN; 5 * 3];
-/// mesh.visit(&corners, (5, 3), |pixel, corner, shares| {
-///     chi[pixel] = (0..3).map(|k| shares[k] * 0.25 * corners[corner[k]].x).sum();
-/// });
-/// assert_eq!(chi[5 + 2], 0.5);
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
     pub(crate) corners: Vec<Point>,
     /// Corners of each triangle by number, all in the same sense of rotation.
     pub(crate) triangles: Vec<[usize; 3]>,
-}
-
-struct Vertex {
-    position: Point2<f64>,
-    number: usize,
-}
-
-impl HasPosition for Vertex {
-    type Scalar = f64;
-    fn position(&self) -> Point2<f64> {
-        self.position
-    }
 }
 
 impl Mesh {
@@ -53,23 +27,20 @@ impl Mesh {
     /// Positions that are not finite, or too far out for the triangulation's exact predicates, and those
     /// next to others are no corners of triangles.
     pub fn delaunay(corners: Vec<Point>) -> Self {
-        let mut triangulation: DelaunayTriangulation<Vertex> = DelaunayTriangulation::new();
+        let mut triangulation: DelaunayTriangulation<Point2<f64>> = DelaunayTriangulation::new();
+        // The numbers of the corners in the order of the vertices.
+        let mut numbers = Vec::new();
         for (number, corner) in corners.iter().enumerate() {
             let position = Point2::new(corner.x, corner.y);
-            let apart = triangulation.nearest_neighbor(position).is_none_or(
-                |near: spade::handles::VertexHandle<'_, Vertex, _, _, _>| {
-                    near.position().distance_2(position) >= CLOSEST * CLOSEST
-                },
-            );
-            if apart {
-                // The library refuses coordinates beyond the range of its exact predicates.
-                let _ = triangulation.insert(Vertex { position, number });
+            let near = triangulation.nearest_neighbor(position).map(|near| near.position());
+            let is_apart = near.is_none_or(|near| near.distance_2(position) >= CLOSEST * CLOSEST);
+            // The library refuses coordinates beyond the range of its exact predicates.
+            if is_apart && triangulation.insert(position).is_ok() {
+                numbers.push(number);
             }
         }
-        let numbers = |face: spade::handles::FaceHandle<'_, spade::handles::InnerTag, Vertex, _, _, _>| {
-            face.vertices().map(|v| v.data().number)
-        };
-        let triangles = triangulation.inner_faces().map(numbers).collect();
+        let triangles =
+            triangulation.inner_faces().map(|face| face.vertices().map(|v| numbers[v.index()])).collect();
         Self { corners, triangles }
     }
 
@@ -103,7 +74,6 @@ pub(super) fn edge(a: usize, b: usize) -> Edge {
     (a.min(b), a.max(b))
 }
 
-/// The edges of a triangle.
 pub(crate) fn edges([a, b, c]: &[usize; 3]) -> [Edge; 3] {
     [edge(*a, *b), edge(*b, *c), edge(*c, *a)]
 }
@@ -130,6 +100,9 @@ impl Facet {
     }
 }
 
+/// Share to which a pixel lies on an edge: shares round.
+const ON_EDGE: f64 = 1e-9;
+
 /// Calls `visit` with pixel and shares for every pixel centre of a triangle, row by row.
 pub(crate) fn visit_triangle(
     corners: &[Point; 3],
@@ -138,32 +111,18 @@ pub(crate) fn visit_triangle(
 ) {
     let Some(facet) = Facet::new(corners) else { return };
     let [a, b, c] = corners;
-    let top = a.y.min(b.y).min(c.y).ceil().max(0.0) as usize;
-    let bottom = a.y.max(b.y).max(c.y).floor().min(height as f64 - 1.0);
-    for y in top..(bottom + 1.0).max(0.0) as usize {
-        let Some((left, right)) = span(corners, y as f64) else { continue };
-        let end = (right.floor().min(width as f64 - 1.0) + 1.0).max(0.0) as usize;
-        for x in left.ceil().max(0.0) as usize..end {
-            visit(y * width + x, facet.shares(&Point::new(x as f64, y as f64)));
+    let range = |low: f64, high: f64, side: usize| {
+        low.ceil().max(0.0) as usize..(high.floor() + 1.0).clamp(0.0, side as f64) as usize
+    };
+    let (low, high) = (a.inf(b).inf(c), a.sup(b).sup(c));
+    for y in range(low.y, high.y, height) {
+        for x in range(low.x, high.x, width) {
+            let shares = facet.shares(&Point::new(x as f64, y as f64));
+            if shares.iter().all(|share| *share >= -ON_EDGE) {
+                visit(y * width + x, shares);
+            }
         }
     }
-}
-
-/// The columns between which a row meets a triangle.
-fn span(corners: &[Point; 3], y: f64) -> Option<(f64, f64)> {
-    let mut ends: Option<(f64, f64)> = None;
-    for (p, q) in [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (corners[i], corners[j])) {
-        if (p.y <= y) == (q.y <= y) && p.y != y && q.y != y {
-            continue;
-        }
-        let crossings =
-            if p.y == q.y { [p.x, q.x] } else { [p.x + (q.x - p.x) * (y - p.y) / (q.y - p.y); 2] };
-        let on_edge = (p.y.min(q.y)..=p.y.max(q.y)).contains(&y);
-        for x in crossings.into_iter().filter(|_| on_edge) {
-            ends = Some(ends.map_or((x, x), |(l, r)| (l.min(x), r.max(x))));
-        }
-    }
-    ends
 }
 
 #[cfg(test)]

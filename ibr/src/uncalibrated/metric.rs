@@ -2,10 +2,9 @@
 //!
 //! It is too coarse for measurements, but sufficient to place a virtual camera between two views.
 
-use super::triangulate::triangulate;
 use super::{Match, Point, homogeneous};
-use crate::linear;
-use nalgebra::{Matrix3, Matrix3x4, Rotation3, UnitQuaternion, Vector3};
+use hybank_linalg::small;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// Focal lengths that are tried, in units of the longer side of the image.
 pub(super) const FOCAL_LENGTHS: [f64; 9] = [0.5, 0.62, 0.76, 0.93, 1.14, 1.39, 1.7, 2.08, 2.5];
@@ -13,8 +12,6 @@ pub(super) const FOCAL_LENGTHS: [f64; 9] = [0.5, 0.62, 0.76, 0.93, 1.14, 1.39, 1
 /// A guessed metric pair: camera 1 at the origin, camera 2 turned by R and moved by t of length one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MetricGuess {
-    /// Focal length in pixels, the same for both cameras.
-    pub focal: f64,
     /// Calibrations of the two cameras.
     pub k: [Matrix3<f64>; 2],
     /// Rotation of camera 2.
@@ -33,26 +30,57 @@ pub(super) fn calibration(focal: f64, (width, height): (usize, usize)) -> Matrix
     Matrix3::new(focal, 0.0, cx, 0.0, focal, cy, 0.0, 0.0, 1.0)
 }
 
-/// What E = K2^T F K1 says of the second camera, up to the sign of t and the choice of the rotation.
-pub(super) struct Essential {
-    pub(super) rotations: [Matrix3<f64>; 2],
-    pub(super) t: Vector3<f64>,
-    /// Second over first singular value.
+/// The second camera beside the first one, by E = K2^T F K1 = \[t\]_x R: of its two R and the signs of t
+/// those with which most points lie in front of both cameras.
+pub(super) struct Placed {
+    r: Matrix3<f64>,
+    t: Vector3<f64>,
+    /// Second over first singular value of E.
     pub(super) fit: f64,
+    /// Rays of the points in the first camera, of depth one.
+    pub(super) rays: Vec<Vector3<f64>>,
+    /// 1 / depth in the first camera, `None` for points that do not lie in front of both.
+    pub(super) near: Vec<Option<f64>>,
 }
 
-impl Essential {
-    pub(super) fn of(f: &Matrix3<f64>, k: &[Matrix3<f64>; 2]) -> Option<Self> {
-        let (u, s, v) = linear::svd3(&(k[1].transpose() * f * k[0]))?;
+impl Placed {
+    pub(super) fn of(f: &Matrix3<f64>, matches: &[Match], k: &[Matrix3<f64>; 2]) -> Option<Self> {
+        let (u, s, v) = small::svd3(&(k[1].transpose() * f * k[0]))?;
         let (u, v) = (u * u.determinant().signum(), v * v.determinant().signum());
         let w = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
-        let rotations = [u * w * v.transpose(), u * w.transpose() * v.transpose()];
-        Some(Self { rotations, t: u.column(2).into_owned(), fit: s[1] / s[0] })
+        let (first, second) = (k[0].try_inverse()?, k[1].try_inverse()?);
+        let ray = |m: &Match| [first * homogeneous(&m.first), second * homogeneous(&m.second)];
+        let rays: Vec<[Vector3<f64>; 2]> = matches.iter().map(ray).collect();
+        let t = u.column(2).into_owned();
+        let placed = |w: Matrix3<f64>| {
+            let r = u * w * v.transpose();
+            let (side, near) = in_front(&rays, &r, &t);
+            (near.iter().flatten().count(), r, side, near)
+        };
+        let (one, other) = (placed(w), placed(w.transpose()));
+        let (_, r, side, near) = if one.0 >= other.0 { one } else { other };
+        let rays = rays.iter().map(|[ray, _]| *ray).collect();
+        Some(Self { r, t: t * side, fit: s[1] / s[0], rays, near })
     }
 }
 
-/// The guess for one focal length: E = K2^T F K1, the decomposition with most points in front of both
-/// cameras.
+/// The sign of t with which most points lie in front of both cameras, and their 1 / depth in the first.
+///
+/// z2 b = z1 R a + t for the rays a and b gives z1 = -(b x t) . (b x R a) / |b x R a|^2, and z2 likewise.
+fn in_front(rays: &[[Vector3<f64>; 2]], r: &Matrix3<f64>, t: &Vector3<f64>) -> (f64, Vec<Option<f64>>) {
+    let depths = |[a, b]: &[Vector3<f64>; 2]| {
+        let turned = r * a;
+        let across = b.cross(&turned);
+        [-b.cross(t), -turned.cross(t)].map(|side| side.dot(&across) / across.norm_squared())
+    };
+    let all: Vec<[f64; 2]> = rays.iter().map(depths).collect();
+    let is_in_front = |z: &[f64; 2], side: f64| z.iter().all(|z| z * side > 0.0 && z.is_finite());
+    let count = |side| all.iter().filter(|z| is_in_front(z, side)).count();
+    let side = if count(1.0) >= count(-1.0) { 1.0 } else { -1.0 };
+    (side, all.iter().map(|z| is_in_front(z, side).then(|| side / z[0])).collect())
+}
+
+/// The guess for one focal length.
 pub fn guess(
     f: &Matrix3<f64>,
     matches: &[Match],
@@ -60,46 +88,16 @@ pub fn guess(
     focal: f64,
 ) -> Option<MetricGuess> {
     let k = sizes.map(|size| calibration(focal, size));
-    let Essential { rotations, t, fit } = Essential::of(f, &k)?;
-    let inverse = [k[0].try_inverse()?, k[1].try_inverse()?];
-    let rays: Vec<[Point; 2]> = matches
-        .iter()
-        .map(|m| {
-            let ray = |k: &Matrix3<f64>, p: &Point| (k * homogeneous(p)).xy();
-            [ray(&inverse[0], &m.first), ray(&inverse[1], &m.second)]
-        })
-        .collect();
-    let candidates = rotations.iter().flat_map(|r| [(r, t), (r, -t)]);
-    let best = candidates
-        .map(|(r, t)| (r, t, in_front(&rays, r, &t)))
-        .max_by_key(|(_, _, points)| points.iter().flatten().count())?;
-    let r = Rotation3::from_matrix_unchecked(*best.0);
-    Some(MetricGuess { focal, k, r, t: best.1, fit, points: best.2 })
-}
-
-/// The points in camera 1 coordinates, where they lie in front of both cameras.
-fn in_front(rays: &[[Point; 2]], r: &Matrix3<f64>, t: &Vector3<f64>) -> Vec<Option<Vector3<f64>>> {
-    let one = Matrix3x4::identity();
-    let mut two = Matrix3x4::zeros();
-    two.fixed_columns_mut::<3>(0).copy_from(r);
-    two.set_column(3, t);
-    let point = |rays: &[Point; 2]| {
-        let p = triangulate(&[(&one, rays[0]), (&two, rays[1])])?;
-        let p = p.xyz() / p.w;
-        (p.z > 0.0 && (r * p + t).z > 0.0 && p.z.is_finite()).then_some(p)
-    };
-    rays.iter().map(point).collect()
+    let Placed { r, t, fit, rays, near } = Placed::of(f, matches, &k)?;
+    let points = rays.iter().zip(near).map(|(ray, near)| Some(ray / near?)).collect();
+    Some(MetricGuess { k, r: Rotation3::from_matrix_unchecked(r), t, fit, points })
 }
 
 /// The guess with the focal length that fits F best.
 pub fn best(f: &Matrix3<f64>, matches: &[Match], sizes: [(usize, usize); 2]) -> Option<MetricGuess> {
     let side = sizes.iter().map(|s| s.0.max(s.1)).max().unwrap_or(1) as f64;
-    let fits = FOCAL_LENGTHS.iter().filter_map(|factor| {
-        let focal = factor * side;
-        Some((focal, Essential::of(f, &sizes.map(|size| calibration(focal, size)))?.fit))
-    });
-    let (focal, _) = fits.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    guess(f, matches, sizes, focal)
+    let guesses = FOCAL_LENGTHS.iter().filter_map(|factor| guess(f, matches, sizes, factor * side));
+    guesses.max_by(|a, b| a.fit.total_cmp(&b.fit))
 }
 
 /// The image points of the matches behind `guess` in a camera between the two views. Rotation and centre

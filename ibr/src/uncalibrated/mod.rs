@@ -6,41 +6,6 @@
 //! All geometry happens in a projective frame X_p = H X with an unknown 4 x 4 matrix H. Depth is replaced
 //! by chi = -(X_p)_4 / (pi3_p . X_p), which along every viewing ray is an affine function of the true
 //! inverse depth.
-//!
-//! ```
-//! use hybank_ibr::uncalibrated::bundle::{Bundle, Observation};
-//! use hybank_ibr::uncalibrated::{Match, Point, canonical, fundamental, resection, triangulate};
-//!
-//! // Points of a scene, and where cameras that look along z from (x, 0, 0) see them.
-//! let place = |k: u32| [1.618, 2.414, 0.732].map(|step| (step * f64::from(k)) % 4.0);
-//! let scene: Vec<[f64; 3]> = (0..60).map(place).collect();
-//! let seen = |x: f64, p: &[f64; 3]| Point::new(p[0] - x, p[1]) * (200.0 / (p[2] + 5.0));
-//! let matches: Vec<Match> =
-//!     scene.iter().map(|p| Match { first: seen(-1.0, p), second: seen(1.0, p) }).collect();
-//! let f = fundamental::robust(&matches, 1)?;
-//! assert_eq!(f.inliers.len(), matches.len());
-//! // Cameras up to a map of space are enough to place the points, and with them a third camera.
-//! let pair = canonical::canonical_pair(&f.matrix, &matches)?;
-//! let [first, second] = &pair.cameras;
-//! let point = |m: &Match| {
-//!     let [a, b] = [pair.first.apply(&m.first), pair.second.apply(&m.second)];
-//!     triangulate::triangulate(&[(first, a), (second, b)]).expect("two rays that meet")
-//! };
-//! let points: Vec<_> = matches.iter().map(point).collect();
-//! let sightings: Vec<_> = std::iter::zip(&points, &scene)
-//!     .map(|(point, p)| resection::Sighting { point: *point, image: seen(0.3, p) })
-//!     .collect();
-//! let third = resection::resect(&sightings, 1)?;
-//! assert!(third.rms < 1e-6);
-//! // All of them adjusted together stay where they are: the images are exact.
-//! let seen_by = |point, camera, image| Observation { camera, point, image };
-//! let images = matches.iter().enumerate();
-//! let images = images.flat_map(|(point, m)| [seen_by(point, 0, m.first), seen_by(point, 1, m.second)]);
-//! let cameras = vec![pair.first.inverse() * first, pair.second.inverse() * second];
-//! let mut bundle = Bundle { cameras, points, observations: images.collect() };
-//! assert_eq!(bundle.adjust(1.0), Some(true));
-//! # Ok::<(), hybank_ibr::uncalibrated::GeometryError>(())
-//! ```
 
 pub mod bundle;
 pub mod canonical;
@@ -52,11 +17,15 @@ pub mod metric;
 pub mod normalise;
 pub mod order;
 pub(crate) mod random;
+mod refine;
 pub mod resection;
 pub mod tracks;
 pub mod triangulate;
 
 use crate::camera::CameraError;
+
+/// Sampson distance below which a match is an inlier of F, in pixels.
+const EPIPOLAR: f64 = 1.0;
 
 /// A position in an image, in pixels.
 pub type Point = nalgebra::Vector2<f64>;
@@ -84,23 +53,16 @@ pub enum GeometryError {
         /// How many are needed.
         needed: usize,
     },
-    /// A coordinate that is not finite.
-    #[error("match {index} has a coordinate that is not a finite number")]
-    NotFinite {
-        /// Index of the match.
-        index: usize,
-    },
     /// All matches lie on one plane, or the camera only rotated.
     #[error(
-        "the matches are planar: one homography explains {explained} of {matches} of them within {threshold} px, so the fundamental matrix is not determined; add matches off the plane, or views with a baseline"
+        "the matches are planar: one homography explains {explained} of {matches} of them within {} px, so the fundamental matrix is not determined; add matches off the plane, or views with a baseline",
+        EPIPOLAR
     )]
     Planar {
         /// Matches that the homography explains.
         explained: usize,
         /// Matches considered.
         matches: usize,
-        /// Threshold in pixels.
-        threshold: f64,
     },
     /// The matches do not determine the geometry.
     #[error(

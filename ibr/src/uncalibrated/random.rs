@@ -6,7 +6,6 @@ use rand_pcg::Pcg64;
 /// Probability of drawing at least one sample without outliers.
 const CONFIDENCE: f64 = 0.999;
 
-/// Greatest number of samples drawn.
 const MOST_TRIALS: usize = 5000;
 
 /// K different indices below n >= K; the same seed gives the same ones on every platform.

@@ -2,9 +2,10 @@
 
 use super::normalise::Normalisation;
 use super::random::consensus;
+use super::refine::{descend, reprojection};
 use super::{GeometryError, Point};
-use crate::linear;
-use nalgebra::{Matrix3x4, SMatrix, SVector, Vector4};
+use hybank_linalg::small;
+use nalgebra::{Matrix3x4, SVector, Vector4};
 
 /// A homogeneous point and its image in the camera to be found, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,8 +31,6 @@ const NEEDED: usize = 6;
 /// Below this ratio of singular values the sightings do not determine the camera, for example points on a
 /// plane.
 const DEGENERATE: f64 = 1e-9;
-/// Steps of the refinement.
-const STEPS: usize = 10;
 
 /// Reprojection error below which a sighting is an inlier, in pixels.
 pub(crate) const REPROJECTION: f64 = 2.0;
@@ -68,7 +67,6 @@ pub fn resect(sightings: &[Sighting], seed: u64) -> Result<Resection, GeometryEr
     Ok(Resection { camera: camera / camera.norm(), inliers: set, rms })
 }
 
-/// Square of the reprojection error in square pixels.
 fn error(camera: &Matrix3x4<f64>, s: &Sighting) -> f64 {
     let p = camera * s.point;
     let square = (p.xy() / p.z - s.image).norm_squared();
@@ -97,7 +95,7 @@ fn direct(sightings: &[Sighting]) -> Result<Matrix3x4<f64>, GeometryError> {
             [row(0, p.x), row(1, p.y)]
         })
         .collect();
-    let (p, values) = linear::least_vector(&rows).ok_or(GeometryError::Numerical { what })?;
+    let (p, values) = small::least_vector(&rows).ok_or(GeometryError::Numerical { what })?;
     let ratio = values[10] / values[0];
     if ratio < DEGENERATE {
         return Err(GeometryError::Degenerate { what, ratio });
@@ -105,50 +103,34 @@ fn direct(sightings: &[Sighting]) -> Result<Matrix3x4<f64>, GeometryError> {
     Ok(t.inverse() * Matrix3x4::from_row_slice(p.as_slice()))
 }
 
-/// Levenberg-Marquardt on the reprojection error in normalised images; never worse than the start.
+/// The camera of least reprojection error in the normalised image; never worse than the start.
 fn refined(start: &Matrix3x4<f64>, sightings: &[Sighting]) -> Matrix3x4<f64> {
     let t = Normalisation::of(sightings.iter().map(|s| &s.image));
     let normal: Vec<Sighting> = sightings
         .iter()
         .map(|s| Sighting { point: s.point / s.point.norm(), image: t.apply(&s.image) })
         .collect();
-    let total = |c: &Matrix3x4<f64>| normal.iter().map(|s| error(c, s)).sum::<f64>();
-    let start = t.matrix() * start;
-    let mut camera = start / start.norm();
-    let (mut damping, mut least) = (1e-6, total(&camera));
-    for _ in 0..STEPS {
-        let Some(step) = step(&camera, &normal, damping) else { break };
-        let moved = camera + Matrix3x4::from_row_slice(step.as_slice());
-        let moved = moved / moved.norm();
-        let next = total(&moved);
-        if next < least {
-            (camera, least, damping) = (moved, next, damping * 0.1);
-        } else {
-            damping *= 10.0;
-        }
-    }
-    t.inverse() * camera
+    let mean = |c: &Matrix3x4<f64>| normal.iter().map(|s| error(c, s)).sum::<f64>() / normal.len() as f64;
+    let moved = |c: &Matrix3x4<f64>, damping| {
+        let moved = c + Matrix3x4::from_row_slice(step(c, &normal, damping)?.as_slice());
+        Some(moved / moved.norm())
+    };
+    let found = descend((t.matrix() * start).normalize(), |c| Some(mean(c)), moved);
+    found.map_or(*start, |(camera, _)| t.inverse() * camera)
 }
 
 /// One damped step; the camera's own direction, a gauge, is pinned.
 fn step(camera: &Matrix3x4<f64>, sightings: &[Sighting], damping: f64) -> Option<SVector<f64, 12>> {
     let own = SVector::<f64, 12>::from_fn(|k, _| camera[(k / 4, k % 4)]);
-    let mut jtj = own * own.transpose();
-    let mut jtr = SVector::<f64, 12>::zeros();
+    let (mut jtj, mut jtr) = (own * own.transpose(), SVector::<f64, 12>::zeros());
     for s in sightings {
-        let p = camera * s.point;
-        let at = p.xy() / p.z;
-        let jacobian = SMatrix::<f64, 2, 12>::from_fn(|r, k| match k {
-            8.. => -at[r] * s.point[k - 8] / p.z,
-            _ if k / 4 == r => s.point[k % 4] / p.z,
-            _ => 0.0,
-        });
+        let (residual, jacobian, _) = reprojection(camera, &s.point, &s.image);
         jtj += jacobian.transpose() * jacobian;
-        jtr += jacobian.transpose() * (s.image - at);
+        jtr += jacobian.transpose() * residual;
     }
     let diagonal = jtj.diagonal();
     (0..12).for_each(|k| jtj[(k, k)] += damping * diagonal[k]);
-    linear::normal_step::<12>(&jtj, &jtr)
+    Some(jtj.cholesky()?.solve(&jtr))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Tracks: image positions of scene points, one line per point, one pair "x y" per view, "-" where not seen.
 
 use super::Point;
-use crate::files::{self, CHECK_THE_PATH, InputError, Location};
+use crate::files::{self, CHECK_THE_PATH, InputError};
 use hybank::messages::Quoted;
 use std::path::Path;
 
@@ -11,7 +11,6 @@ const FORMAT: &str = "a track is \"x y\" for each view in order and \"-\" where 
 /// Tracks over a number of columns (views).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracks {
-    columns: usize,
     rows: Vec<Vec<Option<Point>>>,
 }
 
@@ -21,7 +20,7 @@ impl Tracks {
     /// # Errors
     /// [`InputError`], with file and line.
     pub fn read(path: &Path) -> Result<Self, InputError> {
-        Self::parse(&files::read_text(path, CHECK_THE_PATH, room)?, path)
+        Self::parse(&files::read_text(path, CHECK_THE_PATH)?, path)
     }
 
     /// The same from text; `path` appears in messages.
@@ -29,18 +28,16 @@ impl Tracks {
     /// # Errors
     /// [`InputError`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, InputError> {
-        let mut tracks = Self { columns: 0, rows: Vec::new() };
+        let mut tracks = Self { rows: Vec::new() };
         for (i, line) in text.lines().enumerate() {
-            let fault = |reason| InputError::content(path, Location::Line(i + 1), reason);
+            let fault = |reason| InputError::content(path, format!(":{}", i + 1), reason);
             let row = columns(line.split('#').next().unwrap_or("")).map_err(fault)?;
             if row.is_empty() {
                 continue;
             }
-            if tracks.rows.is_empty() {
-                tracks.columns = row.len();
-            }
-            if row.len() != tracks.columns {
-                let reason = format!("{} columns where the file has {}; {FORMAT}", row.len(), tracks.columns);
+            let columns = tracks.rows.first().map_or(row.len(), Vec::len);
+            if row.len() != columns {
+                let reason = format!("{} columns where the file has {columns}; {FORMAT}", row.len());
                 return Err(fault(reason));
             }
             tracks.rows.push(row);
@@ -51,20 +48,13 @@ impl Tracks {
 
     /// Number of views that the tracks run over.
     pub fn columns(&self) -> usize {
-        self.columns
+        self.rows[0].len()
     }
 
     /// The tracks.
     pub fn rows(&self) -> &[Vec<Option<Point>>] {
         &self.rows
     }
-}
-
-/// Bytes that the tracks of a text take while they are read.
-fn room(text: &str) -> f64 {
-    const WORD: f64 = 50.0;
-    const LINE: f64 = 100.0;
-    WORD * text.split_whitespace().count() as f64 + LINE * text.lines().count() as f64
 }
 
 /// The columns of a line.

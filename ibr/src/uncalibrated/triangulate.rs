@@ -1,10 +1,10 @@
 //! Points from their images in several cameras: linear, then Gauss-Newton on the reprojection error.
 
 use super::Point;
-use crate::linear;
-use nalgebra::{Matrix3x4, SMatrix, SVector, Vector4};
+use super::refine::reprojection;
+use hybank_linalg::small;
+use nalgebra::{Matrix3x4, Vector4};
 
-/// Steps of the refinement.
 const STEPS: usize = 2;
 
 /// The homogeneous point, of unit norm, seen at `images` by `cameras`; `None` if it is not determined.
@@ -20,7 +20,7 @@ pub fn triangulate(observed: &[(&Matrix3x4<f64>, Point)]) -> Option<Vector4<f64>
         };
         [row(0, p.x), row(1, p.y)]
     });
-    let (mut point, values) = linear::least_vector(&rows.collect::<Vec<_>>())?;
+    let (mut point, values) = small::least_vector(&rows.collect::<Vec<_>>())?;
     if values[2] <= 1e-12 * values[0] {
         return None;
     }
@@ -36,35 +36,19 @@ fn refine(observed: &[(&Matrix3x4<f64>, Point)], point: &Vector4<f64>) -> Option
     let mut jtj = point * point.transpose();
     let mut jtr = Vector4::zeros();
     for (camera, p) in observed {
-        let (residual, jacobian) = reprojection(camera, p, point)?;
+        let (residual, _, jacobian) = reprojection(camera, point, p);
         jtj += jacobian.transpose() * jacobian;
         jtr += jacobian.transpose() * residual;
     }
-    let step: SVector<f64, 4> = linear::normal_step::<4>(&jtj, &jtr)?;
-    let moved = point + step;
-    let better = total(observed, &moved)? <= total(observed, point)?;
-    better.then(|| moved / moved.norm())
+    let moved = point + jtj.cholesky()?.solve(&jtr);
+    (total(observed, &moved) <= total(observed, point)).then(|| moved / moved.norm())
 }
 
-/// Residual image - projection and the derivative of the projection by the point.
-fn reprojection(
-    camera: &Matrix3x4<f64>,
-    image: &Point,
-    point: &Vector4<f64>,
-) -> Option<(Point, SMatrix<f64, 2, 4>)> {
-    let p = camera * point;
-    if p.z == 0.0 {
-        return None;
-    }
-    let at = p.xy() / p.z;
-    let jacobian = SMatrix::<f64, 2, 4>::from_fn(|r, c| (camera[(r, c)] - at[r] * camera[(2, c)]) / p.z);
-    Some((image - at, jacobian))
-}
-
-fn total(observed: &[(&Matrix3x4<f64>, Point)], point: &Vector4<f64>) -> Option<f64> {
+/// Sum of the squared errors; not a number for a point in a focal plane.
+fn total(observed: &[(&Matrix3x4<f64>, Point)], point: &Vector4<f64>) -> f64 {
     let square = |(camera, p): &(&Matrix3x4<f64>, Point)| {
         let q = *camera * point;
-        (q.z != 0.0).then(|| (q.xy() / q.z - p).norm_squared())
+        (q.xy() / q.z - p).norm_squared()
     };
     observed.iter().map(square).sum()
 }
@@ -92,7 +76,7 @@ mod tests {
             let seen = [(&scene.cameras[0], scene.image(0, j) + off), (&scene.cameras[1], scene.image(1, j))];
             let x = triangulate(&seen).unwrap();
             // The undisturbed point itself misses by the displacement.
-            assert!(total(&seen, &x).unwrap() <= off.norm_squared() + 1e-6, "{j}");
+            assert!(total(&seen, &x) <= off.norm_squared() + 1e-6, "{j}");
         }
     }
 

@@ -1,7 +1,6 @@
 //! The predicted error of views against the measured one: on photographs, which are skipped with a note
 //! where the data are not there, and on scenes with exact references.
 
-mod advice;
 #[path = "../support/bilinear.rs"]
 mod bilinear;
 mod decisions;

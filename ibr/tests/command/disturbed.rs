@@ -323,7 +323,7 @@ fn every_limit_of_memory_ends_in_a_result_or_a_message() {
         "render frames.toml -o out.png",
         "render large.toml -o out.jpg --threads 2",
         "render large.toml -o out.png --method plane",
-        "bound scene.toml --map map.png --plot rows.svg",
+        "bound scene.toml --map map.png",
         "bound large.toml --map map.pfm --threads 1",
         "demo -o demo.png",
     ];

@@ -9,6 +9,7 @@ mod cholesky;
 mod eigen;
 mod fourier;
 mod lq;
+mod small;
 mod svd;
 
 /// Sums of small integers are exact in any order.

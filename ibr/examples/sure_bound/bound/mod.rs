@@ -6,8 +6,8 @@ pub use row::Limits;
 
 use hybank::sampling::fit::Response;
 use hybank_ibr::depth::Measure;
+use hybank_ibr::interpolate::Cover;
 use hybank_ibr::interpolate::rows::{MARGIN, RowWork};
-use hybank_ibr::interpolate::{Cover, InterpolationError};
 use hybank_ibr::occlusion::{RowScratch, remove_in_row};
 use hybank_ibr::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights, rectified};
 use hybank_ibr::propagate::{Frame, RectifiedView, RigCamera, rectified_row};
@@ -61,7 +61,7 @@ impl Job<'_> {
         for (y, bounds) in bounds.chunks_mut(width).enumerate() {
             let samples = self.samples::<C>(y);
             let fitted = fit.interpolate(&samples, &self.settings.interpolation, &mut values, &mut mask);
-            if fitted.map_err(|source| InterpolationError::Fit { row: y, source })? {
+            if fitted.map_err(|source| RenderError::Fit { row: y, source })? {
                 self.of_row(&samples, &fit, &self.mask[y * width..], bounds);
             }
         }

@@ -8,9 +8,9 @@ mod points;
 pub(crate) use points::{ScenePoint, read_points};
 
 use super::list::{CameraList, Frame, Inner};
-use crate::files::{self, CHECK_THE_PATH, InputError, Location};
+use crate::files::{self, CHECK_THE_PATH, InputError};
 use hybank::messages::{Number, Quoted};
-use nalgebra::{Matrix3x4, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3x4, Quaternion, UnitQuaternion};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -37,14 +37,14 @@ pub fn read_model(folder: &Path) -> Result<CameraList, InputError> {
         return Err(no_model(folder));
     }
     if !folder.join("cameras.txt").exists() && folder.join("cameras.bin").exists() {
-        let room = |bytes: &[u8]| LISTED * binary::most_records(bytes) as f64;
-        let load = |name: &str| files::read_bytes(&folder.join(name), FILES, room);
+        let load = |name: &str| {
+            let bytes = files::read_bytes(&folder.join(name), FILES)?;
+            files::refuse_without_memory(folder, LISTED * binary::most_records(&bytes) as f64).map(|()| bytes)
+        };
         let (cameras, images) = (load("cameras.bin")?, load("images.bin")?);
-        return join(folder, "bin", Location::Record, binary::cameras(&cameras), binary::images(&images));
+        return join(folder, "bin", ": record ", binary::cameras(&cameras), binary::images(&images));
     }
-    // Two lines per image.
-    let room = |text: &str| LISTED / 2.0 * text.lines().count() as f64;
-    let load = |name: &str| files::read_text(&folder.join(name), FILES, room);
+    let load = |name: &str| files::read_text(&folder.join(name), FILES);
     parse_model(&load("cameras.txt")?, &load("images.txt")?, folder)
 }
 
@@ -78,27 +78,29 @@ fn no_model(folder: &Path) -> InputError {
 /// # Errors
 /// [`InputError`].
 pub fn parse_model(cameras: &str, images: &str, folder: &Path) -> Result<CameraList, InputError> {
-    join(folder, "txt", Location::Line, parse_cameras(cameras), parse_images(images))
+    join(folder, "txt", ":", parse_cameras(cameras), parse_images(images))
 }
 
-/// The images with their cameras, from what the two files in a folder say; `at` is where a fault is.
+/// The images with their cameras, from what the two files in a folder say; `at` is before the
+/// number of a line or a record in messages.
 fn join(
     folder: &Path,
     ending: &str,
-    at: fn(usize) -> Location,
+    at: &str,
     cameras: Result<BTreeMap<u64, Inner>, Fault>,
     images: Result<Vec<Pose>, Fault>,
 ) -> Result<CameraList, InputError> {
     let path = |name: &str| folder.join(format!("{name}.{ending}"));
-    let fault = |name: &str, (place, reason): Fault| InputError::content(&path(name), at(place), reason);
+    let fault =
+        |name: &str, (place, reason): Fault| InputError::content(&path(name), format!("{at}{place}"), reason);
     let cameras = cameras.map_err(|e| fault("cameras", e))?;
     let images = images.map_err(|e| fault("images", e))?;
     let mut frames = BTreeMap::new();
-    for (number, Pose { at, id, camera, pose, name }) in (1..).zip(images) {
+    for Pose { at, id, camera, pose, name } in images {
         let unlisted =
             || format!("image \"{}\" has camera {camera}, which the cameras do not list", Quoted(&name));
         let inner = *cameras.get(&camera).ok_or_else(|| fault("images", (at, unlisted())))?;
-        frames.insert(name.clone(), Frame { image: name.into(), depth: None, number, id, pose, inner });
+        frames.insert(name.clone(), Frame { image: name.into(), depth: None, id, pose, inner });
     }
     Ok(CameraList::new(path("images"), frames.into_values().collect()))
 }
@@ -225,17 +227,15 @@ fn pose([w, x, y, z, t @ ..]: [f64; 7]) -> Result<Matrix3x4<f64>, String> {
     if q.norm() < 1e-9 {
         return Err("the rotation quaternion is 0".into());
     }
-    let mut pose = Matrix3x4::zeros();
-    let rotation = UnitQuaternion::from_quaternion(q).to_rotation_matrix();
-    pose.fixed_columns_mut::<3>(0).copy_from(rotation.matrix());
-    pose.set_column(3, &Vector3::from(t));
-    Ok(pose)
+    let pose = Isometry3::from_parts(t.into(), UnitQuaternion::from_quaternion(q));
+    Ok(pose.to_matrix().fixed_rows::<3>(0).into_owned())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::camera::Lens;
+    use nalgebra::Vector3;
 
     fn folder(cameras: &str, images: &str) -> tempfile::TempDir {
         let dir = tempfile::tempdir().unwrap();

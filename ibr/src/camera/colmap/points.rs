@@ -7,7 +7,7 @@
 //! ```
 
 use super::{Fault, binary, content, is_model, no_model, number};
-use crate::files::{self, InputError, Location};
+use crate::files::{self, InputError};
 use nalgebra::Vector3;
 use std::path::Path;
 
@@ -23,7 +23,7 @@ pub(crate) struct ScenePoint {
 /// What to do if the file cannot be opened.
 const FILES: &str = "depth = \"points\" needs points3D.txt or points3D.bin beside the cameras of the model";
 
-/// Bytes of memory per byte of a file.
+/// Bytes of memory per byte of a binary file.
 const PARSED: f64 = 4.0;
 
 /// Reads the points of the model in `folder`: the text file if it is there, else the binary one.
@@ -36,13 +36,14 @@ pub(crate) fn read_points(folder: &Path) -> Result<Vec<ScenePoint>, InputError> 
     }
     let (text, bytes) = (folder.join("points3D.txt"), folder.join("points3D.bin"));
     if !text.exists() && bytes.exists() {
-        let file = files::read_bytes(&bytes, FILES, |bytes| PARSED * bytes.len() as f64)?;
-        let fault = |(record, reason)| InputError::content(&bytes, Location::Record(record), reason);
+        let file = files::read_bytes(&bytes, FILES)?;
+        files::refuse_without_memory(&bytes, PARSED * file.len() as f64)?;
+        let fault = |(record, reason)| InputError::content(&bytes, format!(": record {record}"), reason);
         return binary_points(&file).map_err(fault);
     }
-    let file = files::read_text(&text, FILES, |text| PARSED * text.len() as f64)?;
+    let file = files::read_text(&text, FILES)?;
     let point = |(line, words): (usize, &str)| {
-        parse_point(words).map_err(|reason| InputError::content(&text, Location::Line(line), reason))
+        parse_point(words).map_err(|reason| InputError::content(&text, format!(":{line}"), reason))
     };
     content(&file).filter(|(_, line)| !line.is_empty()).map(point).collect()
 }

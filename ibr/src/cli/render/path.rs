@@ -2,9 +2,8 @@
 
 use super::Summary;
 use crate::cli::arguments::RenderArguments;
-use crate::cli::failure::{Failure, failed};
-use crate::cli::output;
-use crate::cli::outputs::{self, Outputs, Part};
+use crate::cli::failure::{Failure, failed, usage};
+use crate::cli::output::{self, Outputs, Part};
 use crate::files::refuse_pixels_without_memory;
 use crate::image::{FrameRate, Image, Levels, y4m};
 use hybank::files::AtomicFile;
@@ -34,7 +33,7 @@ pub(super) fn report(
 
 /// Whether so many views go into one film.
 pub(super) fn is_film(path: &Path, frames: usize) -> bool {
-    outputs::is_film(path) || frames > 1 && is_dash(path)
+    output::is_film(path) || frames > 1 && is_dash(path)
 }
 
 /// The files of every view, without the film.
@@ -49,26 +48,21 @@ pub(super) fn outputs(arguments: &RenderArguments, frames: usize) -> Vec<Outputs
 /// What several views, or files that are no film, have no use for.
 pub(super) fn check(arguments: &RenderArguments, frames: usize) -> Result<(), Failure> {
     if arguments.fps.is_some() && !is_film(&arguments.output, frames) {
-        return Err(Failure::Usage(
-            "--fps: only a film has a frame rate; write a .y4m file, or leave out --fps".into(),
-        ));
+        return usage("--fps: only a film has a frame rate; write a .y4m file, or leave out --fps");
     }
     if frames < 2 {
         return Ok(());
     }
     if arguments.scene.truth.is_some() {
-        return Err(Failure::Usage(
-            "--truth: there is one photograph, but the scene has several virtual views".into(),
-        ));
+        return usage("--truth: there is one photograph, but the scene has several virtual views");
     }
     if !is_film(&arguments.output, frames) {
         return Ok(());
     }
     if arguments.alpha || arguments.bits == Levels::Sixteen {
-        return Err(Failure::Usage(
-            "--alpha and --bits 16: a film has 8 bits per value and no alpha channel; write .png files"
-                .into(),
-        ));
+        return usage(
+            "--alpha and --bits 16: a film has 8 bits per value and no alpha channel; write .png files",
+        );
     }
     Ok(())
 }

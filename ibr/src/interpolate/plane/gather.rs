@@ -2,17 +2,13 @@
 
 use super::{Fit2Sample, GUESSED, PlaneProblem};
 use crate::interpolate::holes::reach;
-use crate::interpolate::{InterpolationError, check_samples};
 use crate::occlusion::LARGEST_SPACING;
 use crate::sample::Sample;
 use hybank::sampling::fit2::Fit2Rows;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Samples whose rows and columns are exchanged at a time.
-const TURNED_AT_A_TIME: usize = 4096;
-
-/// Some rows of the image with all that samples change there.
+/// Some rows of the image, with all that samples change there.
 struct Part<'a, const ORDER: usize, const C: usize> {
     size: (usize, usize),
     /// Index of the first pixel.
@@ -24,7 +20,6 @@ struct Part<'a, const ORDER: usize, const C: usize> {
 }
 
 impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
-    /// The part before a row of the image, and the rest.
     fn split(self, row: usize) -> (Self, Self) {
         let (size, pixel) = (self.size, row * self.size.0);
         let (fit, at) = (self.fit.split_at(row), pixel - self.first);
@@ -37,20 +32,21 @@ impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
         )
     }
 
-    /// Adds samples that touch this part only; returns those that lie in the image.
-    fn add(&mut self, samples: &[Sample<C>]) -> Added {
+    /// Adds samples that touch this part only; returns how many lie in the image, and the sum of the areas
+    /// that they stand for, at least a pixel each.
+    fn add(&mut self, samples: &[Sample<C>]) -> (usize, f64) {
         let (right, bottom) = (self.size.0 as f64 - 1.0, self.size.1 as f64 - 1.0);
-        let mut added = Added::default();
+        let (mut count, mut area) = (0, 0.0);
         for s in samples {
             let inside = s.x >= -0.5 && s.x <= right + 0.5 && s.y >= -0.5 && s.y <= bottom + 0.5;
             if inside {
                 self.register(s);
                 self.fit.add(&Fit2Sample { x: s.x, y: s.y, values: s.value, weight: s.weight });
-                added.count += 1;
-                added.area += f64::from(s.spacing).powi(2).max(1.0);
+                count += 1;
+                area += f64::from(s.spacing).powi(2).max(1.0);
             }
         }
-        added
+        (count, area)
     }
 
     /// Records the depth of the sample at the pixels within its reach, half a gap, unless another sample is
@@ -82,21 +78,6 @@ impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
     }
 }
 
-/// Samples in the image.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Added {
-    pub(super) count: usize,
-    /// The sum of the areas that they stand for, at least a pixel each.
-    pub(super) area: f64,
-}
-
-impl std::ops::AddAssign for Added {
-    fn add_assign(&mut self, other: Self) {
-        self.count += other.count;
-        self.area += other.area;
-    }
-}
-
 impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     fn whole(&mut self) -> Part<'_, ORDER, C> {
         Part {
@@ -109,41 +90,30 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         }
     }
 
-    /// Adds visible samples. Samples more than half a pixel outside the image are ignored; samples less far
-    /// outside are moved to its border.
-    ///
-    /// # Errors
-    /// [`InterpolationError::NotFinite`].
-    pub(crate) fn add(&mut self, samples: &[Sample<C>]) -> Result<(), InterpolationError> {
-        check_samples(samples)?;
-        if !self.turned {
-            let added = self.whole().add(samples);
-            self.added += added;
-            return Ok(());
-        }
-        for part in samples.chunks(TURNED_AT_A_TIME) {
-            let turned: Vec<Sample<C>> = part.iter().map(|s| Sample { x: s.y, y: s.x, ..*s }).collect();
-            let added = self.whole().add(&turned);
-            self.added += added;
-        }
-        Ok(())
+    /// Adds visible samples, all of whose numbers are finite. Samples more than half a pixel outside the
+    /// image are ignored; samples less far outside are moved to its border.
+    pub(crate) fn add(&mut self, samples: &[Sample<C>]) {
+        let added = self.whole().add(samples);
+        self.count_in(added);
+    }
+
+    fn count_in(&mut self, (count, area): (usize, f64)) {
+        self.count += count;
+        self.area += area;
     }
 
     /// Adds the samples of bands of rows, which `make` returns: those whose row, cut to the image, lies in
     /// the band. The bands follow each other and cover the image. Bands that do not touch are made and added
     /// at the same time; the result does not depend on the number of threads.
-    ///
-    /// # Errors
-    /// As [`PlaneProblem::add`].
     pub(crate) fn add_bands(
         &mut self,
         bands: &[Range<usize>],
         make: impl Fn(&Range<usize>) -> Vec<Sample<C>> + Sync,
-    ) -> Result<(), InterpolationError> {
+    ) {
         // A sample changes the rows of its splines and those within its reach.
         let margin = reach(LARGEST_SPACING).ceil() as usize + ORDER - 1;
-        if self.turned || bands.iter().any(|band| band.len() < 2 * margin) {
-            return bands.iter().try_for_each(|band| self.add(&make(band)));
+        if bands.iter().any(|band| band.len() < 2 * margin) {
+            return bands.iter().for_each(|band| self.add(&make(band)));
         }
         for parity in 0..2 {
             let height = self.height;
@@ -155,26 +125,21 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
                 parts.push((band, part));
                 rest = after;
             }
-            let add = |(band, mut part): (&Range<usize>, Part<'_, ORDER, C>)| {
-                let samples = make(band);
-                check_samples(&samples).map(|()| part.add(&samples))
-            };
-            let added: Result<Vec<Added>, _> = parts.into_par_iter().with_max_len(1).map(add).collect();
-            added?.into_iter().for_each(|added| self.added += added);
+            let add = |(band, mut part): (&Range<usize>, Part<'_, ORDER, C>)| part.add(&make(band));
+            let added: Vec<(usize, f64)> = parts.into_par_iter().with_max_len(1).map(add).collect();
+            added.into_iter().for_each(|added| self.count_in(added));
         }
-        Ok(())
     }
 
     /// Multiplies the stiffness of bicubic splines by the mean area of the samples so far. That of bilinear
     /// ones, which bending smooths, stays: they lose 0.2 to 0.6 dB by it where a view is magnified by two.
     pub(crate) fn stiffened_by_area(mut self) -> Self {
-        if ORDER == 4 && self.added.count > 0 {
-            self.settings.plane.stiffness *= self.added.area / self.added.count as f64;
+        if ORDER == 4 && self.count > 0 {
+            self.settings.plane.stiffness *= self.area / self.count as f64;
         }
         self
     }
 
-    /// Adds a sample of weight one on a pixel.
     pub(super) fn add_on_pixel(&mut self, pixel: usize, values: [f32; C]) {
         let (x, y) = ((pixel % self.width) as f64, (pixel / self.width) as f64);
         self.fit.rows().add(&Fit2Sample { x, y, values, weight: 1.0 });

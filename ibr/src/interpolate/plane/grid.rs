@@ -1,15 +1,22 @@
 //! The coefficients of the splines beside the pixels of the image.
 
+use hybank::sampling::Fit2;
+
 /// Pixels and coefficients: a bicubic spline has one coefficient more than there are pixels on each side.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grid {
-    /// Width and height of the image.
     pub(super) image: (usize, usize),
-    /// Width and height of the grid of coefficients.
     pub(super) coefficients: (usize, usize),
 }
 
 impl Grid {
+    pub(super) fn new<const ORDER: usize, const C: usize>(
+        image: (usize, usize),
+        fit: &Fit2<ORDER, C>,
+    ) -> Self {
+        Self { image, coefficients: fit.coefficients() }
+    }
+
     fn margin(self) -> usize {
         (self.coefficients.0 - self.image.0) / 2
     }
@@ -21,7 +28,6 @@ impl Grid {
         (y + self.margin()) * self.coefficients.0 + x + self.margin()
     }
 
-    /// The pixel nearest to a coefficient.
     #[inline]
     pub(super) fn pixel(self, coefficient: usize) -> usize {
         self.pixel_at(coefficient % self.coefficients.0, coefficient / self.coefficients.0)

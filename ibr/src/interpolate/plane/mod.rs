@@ -20,13 +20,11 @@ mod grid;
 mod springs;
 
 use super::extend::{Level, mean};
-use super::{Cover, Degree, HoleFill, InterpolationError, Settings, Watch};
+use super::{Cover, Degree, HoleFill, Settings, Watch};
 use crate::depth::{DepthMap, Measure, NONE};
-use crate::sample::Sample;
-use gather::Added;
 use grid::Grid;
 use hybank::sampling::Fit2;
-use hybank::sampling::fit2::{Fit2Sample, Iteration};
+use hybank::sampling::fit2::Fit2Sample;
 use rayon::prelude::*;
 
 /// Settings of the plane fit.
@@ -84,19 +82,15 @@ pub struct Convergence {
     pub reached: bool,
 }
 
-/// The result of the plane fit.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PlaneFit {
+pub(crate) struct PlaneFit {
     /// Values 0..255, `width * height * C`.
-    pub values: Vec<f32>,
-    /// Origin of each pixel's value.
-    pub mask: Vec<Cover>,
+    pub(crate) values: Vec<f32>,
+    pub(crate) mask: Vec<Cover>,
     /// Depth of the sample nearest to each pixel, NaN in holes.
-    pub depth: DepthMap,
-    /// Visible samples that are nearest to each pixel.
-    pub counts: Vec<u16>,
-    /// Convergence of the solver.
-    pub convergence: Convergence,
+    pub(crate) depth: DepthMap,
+    pub(crate) counts: Vec<u16>,
+    pub(crate) convergence: Convergence,
 }
 
 /// Least weight of the samples on a pixel that is continued into holes; below it they are doubtful, or lie
@@ -111,9 +105,6 @@ const GUESSED: f32 = 1e4;
 pub(crate) struct PlaneProblem<const ORDER: usize, const C: usize> {
     width: usize,
     height: usize,
-    /// Whether rows and columns are exchanged in all fields: the equations of a narrow image would be mostly
-    /// the zeros beside its rows.
-    turned: bool,
     fit: Fit2<ORDER, C>,
     /// Depth of the sample nearest to each pixel centre, NaN where none lies within half a gap.
     depth: Vec<f32>,
@@ -121,59 +112,37 @@ pub(crate) struct PlaneProblem<const ORDER: usize, const C: usize> {
     distance: Vec<f32>,
     counts: Vec<u16>,
     settings: Settings,
-    added: Added,
+    /// Samples that have been added, and the sum of the areas that they stand for.
+    count: usize,
+    area: f64,
 }
 
 impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
-    /// An empty problem.
-    ///
-    /// # Errors
-    /// [`InterpolationError::Setting`].
-    pub(crate) fn new(
-        (width, height): (usize, usize),
-        settings: &Settings,
-    ) -> Result<Self, InterpolationError> {
-        settings.check()?;
-        let turned = Self::is_turned((width, height));
-        let (width, height) = if turned { (height, width) } else { (width, height) };
+    pub(crate) fn new((width, height): (usize, usize), settings: &Settings) -> Self {
         let pixels = width * height;
         // Written at once: pages that are read first and written later take the system twice the time.
         let mut counts = vec![0; pixels];
         counts.par_chunks_mut(width.max(1)).for_each(|row| row.fill(0));
-        Ok(Self {
+        Self {
             width,
             height,
-            turned,
             fit: Fit2::new(width, height),
             depth: vec![f32::NAN; pixels],
             distance: vec![f32::INFINITY; pixels],
             counts,
             settings: *settings,
-            added: Added::default(),
-        })
+            count: 0,
+            area: 0.0,
+        }
     }
 
-    /// Samples that have been added.
     pub(crate) fn samples(&self) -> usize {
-        self.added.count
-    }
-
-    /// Whether an image takes a third less memory with rows and columns exchanged.
-    pub(crate) fn is_turned((width, height): (usize, usize)) -> bool {
-        let bytes = |width, height| Fit2::<ORDER, C>::memory(width, height).with_multigrid;
-        bytes(width, height) > 1.5 * bytes(height, width)
+        self.count
     }
 
     /// Fits the image. `watch` is called with the share of the fit that is done.
-    ///
-    /// # Errors
-    /// [`InterpolationError::NoSamples`] when no sample was added.
-    pub(crate) fn solve(mut self, watch: Watch<'_>) -> Result<PlaneFit, InterpolationError> {
-        let (width, height, turned) = (self.width, self.height, self.turned);
-        if self.added.count == 0 {
-            let (width, height) = if turned { (height, width) } else { (width, height) };
-            return Err(InterpolationError::NoSamples { width, height });
-        }
+    pub(crate) fn solve(mut self, watch: Watch<'_>) -> PlaneFit {
+        let (width, height) = (self.width, self.height);
         let mut mask = background::classify(&self.depth, width, &self.settings.depth_test);
         let guessed = mask.iter_mut().zip(std::mem::take(&mut self.distance));
         let guessed = guessed.filter(|(cover, distance)| **cover == Cover::Seen && *distance >= GUESSED);
@@ -185,7 +154,11 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         let left_out = self.settings.fill == HoleFill::Leave;
         let fitted = |p: usize| !(left_out && mask[p].is_hole());
         let (counts, mut depth) = (std::mem::take(&mut self.counts), std::mem::take(&mut self.depth));
-        let (mut values, convergence) = self.fitted(&depth, &fitted, watch);
+        let plane = &mut self.settings.plane;
+        plane.stiffness = plane.stiffness.max(plane.noise_stiffness);
+        let (mut values, ended) =
+            springs::solve(self.fit, (width, height), &depth, &fitted, &self.settings, watch);
+        let hybank::sampling::fit2::Convergence { steps, residual, reached } = ended;
         // The depths that were continued into holes are those of the springs only.
         let holes = depth.iter_mut().zip(&mask).filter(|(_, cover)| **cover != Cover::Seen);
         holes.for_each(|(depth, _)| *depth = f32::NAN);
@@ -193,18 +166,13 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
             super::rows::blacken(&mask, &mut values, C);
         }
         values.iter_mut().for_each(|v| *v = v.clamp(0.0, 255.0));
-        if !turned {
-            let depth = DepthMap::from_known((width, height), depth, Measure::Depth);
-            return Ok(PlaneFit { values, mask, depth, counts, convergence });
-        }
-        let depth = DepthMap::from_known((height, width), by_columns(depth, width, 1), Measure::Depth);
-        let (values, mask) = (by_columns(values, width, C), by_columns(mask, width, 1));
-        Ok(PlaneFit { values, mask, depth, counts: by_columns(counts, width, 1), convergence })
+        let depth = DepthMap::from_known((width, height), depth, Measure::Depth);
+        PlaneFit { values, mask, depth, counts, convergence: Convergence { steps, residual, reached } }
     }
 
     /// Gives every disoccluded pixel a sample with value and depth of the surface that continues into it.
     fn fill_background(&mut self, mask: &[Cover]) {
-        let grid = self.grid();
+        let grid = Grid::new((self.width, self.height), &self.fit);
         let sound = |(p, depth): (usize, &f32)| {
             let weight = if depth.is_nan() { 0.0 } else { self.fit.local_sums(grid.coefficient(p)).0 };
             if weight < LEAST_SOURCE_WEIGHT { f32::NAN } else { *depth }
@@ -230,32 +198,10 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
             self.add_on_pixel(p, mean(continued.values[sources[p] as usize], continued.values[p]));
         }
     }
-
-    fn grid(&self) -> Grid {
-        Grid { image: (self.width, self.height), coefficients: self.fit.coefficients() }
-    }
-
-    /// The values of the pixels where `inside` is true, all fitted together.
-    fn fitted(
-        self,
-        depth: &[f32],
-        inside: &(impl Fn(usize) -> bool + Sync),
-        watch: Watch<'_>,
-    ) -> (Vec<f32>, Convergence) {
-        let (mut settings, grid) = (self.settings, self.grid());
-        let plane = &mut settings.plane;
-        plane.stiffness = plane.stiffness.max(plane.noise_stiffness);
-        let iteration = Iteration { tolerance: plane.tolerance, steps: plane.iterations };
-        let springs = |direction, y| springs::of_row(depth, grid, inside, &settings, direction, y);
-        let connected = self.fit.connect(springs, |coefficient| !inside(grid.pixel(coefficient)));
-        let (values, ended) = connected.solve(&iteration, watch);
-        let hybank::sampling::fit2::Convergence { steps, residual, reached } = ended;
-        (values, Convergence { steps, residual, reached })
-    }
 }
 
 /// The bilinear spline through values on pixels, NaN where there are none, with the springs of the surfaces
-/// that a `shape` shows. Of the settings those of the springs and of the solver are used.
+/// that a `shape` shows.
 pub(crate) fn fit_surface(values: &[f32], shape: &[f32], width: usize, settings: &Settings) -> Vec<f32> {
     let size = (width, values.len() / width.max(1));
     let mut fit = Fit2::<2, 1>::new(size.0, size.1);
@@ -264,74 +210,13 @@ pub(crate) fn fit_surface(values: &[f32], shape: &[f32], width: usize, settings:
         let (x, y) = ((p % width) as f64, (p / width) as f64);
         rows.add(&Fit2Sample { x, y, values: [*value], weight: 1.0 });
     }
-    let grid = Grid { image: size, coefficients: fit.coefficients() };
-    let springs = |direction, y| springs::of_row(shape, grid, &|_| true, settings, direction, y);
-    let PlaneSettings { tolerance, iterations, .. } = settings.plane;
-    let iteration = Iteration { tolerance, steps: iterations };
-    fit.connect(springs, |_| false).solve(&iteration, &|_| ()).0
+    springs::solve(fit, size, shape, &|_| true, settings, &|_| ()).0
 }
 
 /// Bytes that [`fit_surface`] takes beside its values, with its result and a shape.
 pub(crate) fn surface_memory(width: usize, height: usize) -> f64 {
     let memory = Fit2::<2, 1>::memory(width, height);
     memory.equations.max(memory.solving) + 8.0 * width as f64 * height as f64
-}
-
-/// The pixels of an image by columns, from those by rows of `width`.
-fn by_columns<T: Copy>(pixels: Vec<T>, width: usize, channels: usize) -> Vec<T> {
-    let height = pixels.len() / (width * channels);
-    if width == 1 || height == 1 {
-        return pixels;
-    }
-    let mut columns = Vec::with_capacity(pixels.len());
-    for (x, y) in (0..width).flat_map(|x| (0..height).map(move |y| (x, y))) {
-        let first = (y * width + x) * channels;
-        columns.extend_from_slice(&pixels[first..first + channels]);
-    }
-    columns
-}
-
-/// The complete third stage for samples at any position: a value for every pixel, and the mask.
-///
-/// ```
-/// use hybank_ibr::depth::{DepthMap, Measure};
-/// use hybank_ibr::interpolate::{Settings, plane};
-/// use hybank_ibr::propagate::{Frame, RectifiedView, rectified};
-/// use hybank_ibr::{image::Image, occlusion::remove};
-/// let (size, settings) = ((32, 8), Settings::default());
-/// let image = Image::filled(32, 8, 1, 100.0);
-/// let map = DepthMap::new(size, vec![4.0; 256], 1.0, Measure::Disparity)?;
-/// let views = [0.0, 1.0].map(|camera| RectifiedView { image: &image, map: &map, camera });
-/// let (mut samples, _) = rectified::<1>(&views, 0.5, &Frame::whole(32, 8, 0.5, 0.0));
-/// remove(&mut samples, &settings.depth_test);
-/// let fit = plane::interpolate(&samples, size, &settings)?;
-/// assert!(fit.convergence.reached && fit.values.iter().all(|v| (v - 100.0).abs() < 0.1));
-/// // Both views show this pixel.
-/// assert_eq!(fit.counts[100], 2);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
-/// # Errors
-/// [`InterpolationError`]: settings, samples that are not finite, and no sample at all.
-pub fn interpolate<const C: usize>(
-    samples: &[Sample<C>],
-    size: (usize, usize),
-    settings: &Settings,
-) -> Result<PlaneFit, InterpolationError> {
-    match settings.plane.degree {
-        Degree::Linear => interpolate_with::<2, C>(samples, size, settings),
-        Degree::Cubic => interpolate_with::<4, C>(samples, size, settings),
-    }
-}
-
-fn interpolate_with<const ORDER: usize, const C: usize>(
-    samples: &[Sample<C>],
-    size: (usize, usize),
-    settings: &Settings,
-) -> Result<PlaneFit, InterpolationError> {
-    let mut problem = PlaneProblem::<ORDER, C>::new(size, settings)?;
-    problem.add(samples)?;
-    problem.solve(&|_| ())
 }
 
 #[cfg(test)]

@@ -1,14 +1,31 @@
 //! The stiffness between neighbouring pixels, which falls with the difference of their depths.
 
 use super::grid::Grid;
-use crate::interpolate::Settings;
+use crate::interpolate::{Settings, Watch};
 use crate::occlusion::DepthTest;
-use hybank::sampling::fit2::{Direction, Springs};
+use hybank::sampling::Fit2;
+use hybank::sampling::fit2::{Convergence, Direction, Iteration, Springs};
+
+/// Fits the pixels that lie `inside`, with the springs of the surfaces that these depths show. Of the
+/// settings those of the springs and of the solver are used.
+pub(super) fn solve<const ORDER: usize, const C: usize>(
+    fit: Fit2<ORDER, C>,
+    size: (usize, usize),
+    depth: &[f32],
+    inside: &(impl Fn(usize) -> bool + Sync),
+    settings: &Settings,
+    watch: Watch<'_>,
+) -> (Vec<f32>, Convergence) {
+    let grid = Grid::new(size, &fit);
+    let iteration = Iteration { tolerance: settings.plane.tolerance, steps: settings.plane.iterations };
+    let springs = |direction, y| of_row(depth, grid, inside, settings, direction, y);
+    fit.connect(springs, |coefficient| !inside(grid.pixel(coefficient))).solve(&iteration, watch)
+}
 
 /// The springs of one direction that begin in row y of the coefficients, from the depths of the pixels, NaN
 /// where unknown: bridged holes count as lying on the surface of the others. Only what lies `inside` is
 /// connected.
-pub(super) fn of_row(
+fn of_row(
     depth: &[f32],
     grid: Grid,
     inside: &(impl Fn(usize) -> bool + Sync),
@@ -36,17 +53,13 @@ pub(super) fn of_row(
 #[inline]
 fn spring(depths: &[f32; 3], joined: usize, settings: &Settings) -> (f32, f32) {
     let (plane, test) = (&settings.plane, &settings.depth_test);
+    // An unknown depth equals the other one.
+    let near_and_far = |a: f32, b: f32| (a.min(b), a.max(b));
     let pair = near_and_far(depths[0], depths[1]);
     let edge = || plane.stiffness as f32 * share(pair.0, pair.1, test) + plane.edge_stiffness as f32;
     let next = near_and_far(depths[1], depths[2]);
     let bend = || plane.bending as f32 * share(pair.0.min(next.0), pair.1.max(next.1), test);
     (if joined > 1 { edge() } else { 0.0 }, if joined > 2 { bend() } else { 0.0 })
-}
-
-/// The lesser and the greater of two depths; an unknown one equals the other.
-#[inline]
-fn near_and_far(a: f32, b: f32) -> (f32, f32) {
-    (a.min(b), a.max(b))
 }
 
 /// 1 / (1 + (D / sigma)^2) for the range D of some depths and the sigma of the depth test.

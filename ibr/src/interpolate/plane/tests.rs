@@ -1,6 +1,7 @@
 //! The plane fit against the dense solution of its normal equations, and hole filling.
 
 use super::*;
+use crate::sample::Sample;
 
 fn sample(x: f64, y: f64, depth: f32, value: f32) -> Sample<1> {
     Sample { x, y, depth, value: [value], ..Sample::BLANK }
@@ -21,11 +22,27 @@ fn with(plane: PlaneSettings) -> Settings {
     Settings { plane, ..Settings::default() }
 }
 
+fn interpolate(samples: &[Sample<1>], size: (usize, usize), settings: &Settings) -> PlaneFit {
+    fn of_order<const ORDER: usize>(
+        samples: &[Sample<1>],
+        size: (usize, usize),
+        settings: &Settings,
+    ) -> PlaneFit {
+        let mut problem = PlaneProblem::<ORDER, 1>::new(size, settings);
+        problem.add(samples);
+        problem.solve(&|_| ())
+    }
+    match settings.plane.degree {
+        Degree::Linear => of_order::<2>(samples, size, settings),
+        Degree::Cubic => of_order::<4>(samples, size, settings),
+    }
+}
+
 #[test]
 fn a_constant_stays_constant() {
     // Corners without samples hang on the coefficients beyond the image.
     for (plane, error) in [(PlaneSettings::LINEAR, 0.02), (PlaneSettings::CUBIC, 0.1)] {
-        let fit = interpolate(&scattered(12, |_, _| 91.0), (12, 12), &with(plane)).unwrap();
+        let fit = interpolate(&scattered(12, |_, _| 91.0), (12, 12), &with(plane));
         assert!(fit.values.iter().all(|v| (v - 91.0).abs() < error), "{:?}", fit.values);
         assert!(fit.convergence.reached, "{:?}", fit.convergence);
     }
@@ -36,7 +53,7 @@ fn a_constant_stays_constant() {
 fn bicubic_splines_follow_curves() {
     let tone = |x: f64, y: f64| 128.0 + 60.0 * (x * 0.6).sin() * (y * 0.6).cos();
     let worst = |plane: PlaneSettings| {
-        let fit = interpolate(&scattered(24, tone), (24, 24), &with(plane)).unwrap();
+        let fit = interpolate(&scattered(24, tone), (24, 24), &with(plane));
         let inner = (0..24 * 24).filter(|p| (3..21).contains(&(p % 24)) && (3..21).contains(&(p / 24)));
         let error = |p: usize| (f64::from(fit.values[p]) - tone((p % 24) as f64, (p / 24) as f64)).abs();
         inner.map(error).fold(0.0, f64::max)
@@ -53,7 +70,7 @@ fn equal_to_the_dense_solution() {
     let mut settings = with(PlaneSettings::LINEAR);
     settings.plane.tolerance = 1e-9;
     settings.fill = HoleFill::Bridge;
-    let fit = interpolate(&samples, (size, size), &settings).unwrap();
+    let fit = interpolate(&samples, (size, size), &settings);
     let n = size * size;
     let mut a = vec![vec![0.0; n + 1]; n];
     for s in &samples {
@@ -112,28 +129,26 @@ fn disocclusions_take_the_farther_side() {
         }
     }
     for plane in [PlaneSettings::LINEAR, PlaneSettings::CUBIC] {
-        let fit = interpolate(&samples, (30, 12), &with(plane)).unwrap();
+        let fit = interpolate(&samples, (30, 12), &with(plane));
         let row = &fit.values[150..180];
         assert!(row[11..20].iter().all(|v| (v - 40.0).abs() < 5.0), "{row:?}");
         assert!(row[9] > 190.0, "{row:?}");
         assert!(fit.mask[160..170].iter().all(|c| *c == Cover::Disocclusion));
         let fill = HoleFill::Leave;
-        let left = interpolate(&samples, (30, 12), &Settings { fill, ..with(plane) }).unwrap();
+        let left = interpolate(&samples, (30, 12), &Settings { fill, ..with(plane) });
         assert!(left.values[160..170].iter().all(|v| *v == 0.0));
     }
 }
 
 #[test]
-fn bands_add_up_and_empty_problems_fail() {
+fn bands_add_up() {
     let samples = scattered(9, |x, y| 10.0 * x + y);
-    let whole = interpolate(&samples, (9, 9), &Settings::default()).unwrap();
-    let mut problem = PlaneProblem::<4, 1>::new((9, 9), &Settings::default()).unwrap();
+    let whole = interpolate(&samples, (9, 9), &Settings::default());
+    let mut problem = PlaneProblem::<4, 1>::new((9, 9), &Settings::default());
     let (a, b) = samples.split_at(50);
-    problem.add(a).unwrap();
-    problem.add(b).unwrap();
-    assert_eq!(problem.solve(&|_| ()).unwrap(), whole);
-    let empty = PlaneProblem::<4, 1>::new((4, 3), &Settings::default()).unwrap();
-    assert_eq!(empty.solve(&|_| ()), Err(InterpolationError::NoSamples { width: 4, height: 3 }));
+    problem.add(a);
+    problem.add(b);
+    assert_eq!(problem.solve(&|_| ()), whole);
 }
 
 /// A hole of 200 x 200 pixels that only the smoothing spans: the diagonal preconditioner needs hundreds of
@@ -149,47 +164,10 @@ fn large_holes_converge_and_are_harmonic_inside() {
         .map(|(x, y)| sample(x, y, 1.0, tone(x, y) as f32))
         .collect();
     let fill = HoleFill::Bridge;
-    let fit = interpolate(&samples, (side, side), &Settings { fill, ..Settings::default() }).unwrap();
+    let fit = interpolate(&samples, (side, side), &Settings { fill, ..Settings::default() });
     assert!(fit.convergence.reached && fit.convergence.steps < 120, "{:?}", fit.convergence);
     // A plane has no second differences, so the smoothing keeps it.
     let (x, y) = (120, 100);
     let got = f64::from(fit.values[y * side + x]);
     assert!((got - tone(x as f64, y as f64)).abs() < 0.5, "{got}");
-}
-
-/// A narrow image is fitted with rows and columns exchanged: the same as a flat one of exchanged samples,
-/// with holes.
-#[test]
-fn narrow_images_are_flat_ones_turned() {
-    fn check<const ORDER: usize>(plane: PlaneSettings, width: usize) {
-        let length = 70;
-        let settings = with(plane);
-        assert!(PlaneProblem::<ORDER, 1>::is_turned((width, length)));
-        assert!(!PlaneProblem::<ORDER, 1>::is_turned((length, width)));
-        let samples: Vec<_> = scattered(length, |_, _| 0.0)
-            .into_iter()
-            .map(|s| Sample { x: s.x * (width as f64 - 1.0) / (length as f64 - 1.0), depth: 3.0, ..s })
-            // The values of one picture: where neighbours differ as much as noise of 20 grey levels, bicubic
-            // splines go on into the hole beyond all of them.
-            .map(|s| Sample { value: [(100.0 + s.x - 0.5 * s.y) as f32], ..s })
-            .filter(|s| !(20.0..30.0).contains(&s.y))
-            .collect();
-        let exchanged: Vec<_> = samples.iter().map(|s| Sample { x: s.y, y: s.x, ..*s }).collect();
-        let turned = |p: usize| p % width * length + p / width;
-        let narrow = interpolate(&samples, (width, length), &settings).unwrap();
-        let flat = interpolate(&exchanged, (length, width), &settings).unwrap();
-        assert_eq!((narrow.depth.size(), narrow.convergence), ((width, length), flat.convergence));
-        for p in 0..width * length {
-            let q = turned(p);
-            assert_eq!((narrow.values[p], narrow.mask[p]), (flat.values[q], flat.mask[q]), "{p}");
-            assert_eq!(narrow.counts[p], flat.counts[q], "{p}");
-            let depths = [narrow.depth.data()[p], flat.depth.data()[q]].map(f32::to_bits);
-            assert_eq!(depths[0], depths[1], "{p}");
-        }
-        assert!(narrow.values.iter().all(|v| *v > 40.0), "{ORDER} {width} {:?}", narrow.values);
-    }
-    for width in [1, 2, 5] {
-        check::<2>(PlaneSettings::LINEAR, width);
-        check::<4>(PlaneSettings::CUBIC, width);
-    }
 }

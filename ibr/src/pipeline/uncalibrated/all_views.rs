@@ -10,10 +10,8 @@ use nalgebra::{Matrix3x4, Vector4};
 /// Adjustments, at most: after each the positions that fit are chosen again.
 const ROUNDS: usize = 8;
 
-/// Photographs that must show a point.
 const FEWEST_PHOTOGRAPHS: usize = 2;
 
-/// Fewest positions of a camera that is adjusted.
 const FEWEST_POSITIONS: usize = 12;
 
 /// Points of tracks with their positions in each image, those that do not fit left out.
@@ -27,11 +25,8 @@ pub(super) struct Cloud {
 /// the virtual view. Positions farther than `threshold` pixels from their point are taken as mistakes of the
 /// tracker.
 pub(super) fn adjust(cameras: &mut [Matrix3x4<f64>], tracks: &[Vec<Option<Point>>], threshold: f64) -> Cloud {
-    let scales: Vec<Normalisation> = (0..cameras.len())
-        .map(|i| {
-            Normalisation::of(tracks.iter().filter_map(|t| t[i].as_ref()).collect::<Vec<_>>().into_iter())
-        })
-        .collect();
+    let scales: Vec<Normalisation> =
+        (0..cameras.len()).map(|i| Normalisation::of(tracks.iter().filter_map(|t| t[i].as_ref()))).collect();
     let mut cloud = intersect(cameras, &scales, tracks, threshold);
     for _ in 0..ROUNDS {
         let is_seen =

@@ -1,8 +1,8 @@
 //! The two views from which a scene is reconstructed first, chosen among all of them.
 
-use crate::linear;
 use crate::uncalibrated::fundamental;
 use crate::uncalibrated::{Match, Point};
+use hybank_linalg::small;
 
 /// Parallax in pixels from which on more of it does not make a pair better than more matches would.
 const PARALLAX: f64 = 4.0;
@@ -42,7 +42,7 @@ pub(super) fn parallax(matches: &[Match]) -> Option<f64> {
     let mut sum = 0.0;
     for k in 0..2 {
         let values: Vec<f64> = matches.iter().map(|m| m.second[k]).collect();
-        let fit = linear::least_squares(&rows, &values)?;
+        let fit = small::least_squares(&rows, &values)?;
         let miss = |(row, v): (&[f64; 3], &f64)| (0..3).map(|i| row[i] * fit[i]).sum::<f64>() - v;
         sum += rows.iter().zip(&values).map(miss).map(|r| r * r).sum::<f64>();
     }

@@ -13,7 +13,6 @@ const SURFACES_APART: f64 = 0.2;
 /// Largest difference of colours that counts, in grey levels.
 const LARGEST_DIFFERENCE: f32 = 60.0;
 
-/// Fewest pixels for a verdict.
 const FEWEST_PIXELS: usize = 40;
 
 /// Standard deviations of a verdict against guessed calibrations. Neighbouring pixels err together, so
@@ -31,12 +30,10 @@ const LEAST_ADVANTAGE: f64 = 10.0;
 pub(super) struct Advantage {
     sum: f64,
     squares: f64,
-    /// Pixels.
     pub(super) count: usize,
 }
 
 impl Advantage {
-    /// From both photographs of the base pair and the surfaces that they show.
     pub(super) fn of(images: &[&Image], surfaces: &[Surface], scene: &Reconstruction) -> Self {
         let mut all = Self::default();
         for (from, to) in [(0, 1), (1, 0)] {

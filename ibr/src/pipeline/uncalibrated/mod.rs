@@ -14,17 +14,9 @@ use crate::interpolate::HoleFill;
 use crate::uncalibrated::Point;
 use crate::uncalibrated::order::Order;
 use colours::Advantage;
-use morph::Meshes;
 use rayon::prelude::*;
 use reconstruction::Reconstruction;
 use surface::Surface;
-
-/// Shares of the work, about, that are done when the scene is reconstructed, when its surfaces are meshed,
-/// when the order of depth is decided, and when the virtual view has its triangles.
-const RECONSTRUCTED: f64 = 0.4;
-const SURFACES: f64 = 0.5;
-const DECIDED: f64 = 0.6;
-const MESHED: f64 = 0.8;
 
 /// The virtual camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -135,26 +127,25 @@ pub fn render(
     let tracks: Vec<Vec<Option<Point>>> = tracks.iter().map(reordered).collect();
     let mut scene = reconstruction::reconstruct(images, &tracks, target, &numbers, uncalibrated.seed)?;
     scene.register(settings.offset);
-    watch(RECONSTRUCTED);
+    watch(0.4);
     let grey: Vec<Image> = images.par_iter().map(|image| image.to_grey()).collect();
     let of_view = |view: usize| Surface::of(view, images[view].size(), view, &grey, &scene);
     let surfaces: Vec<Surface> = (0..images.len()).into_par_iter().map(of_view).collect();
-    watch(SURFACES);
+    watch(0.5);
     decide(images, &surfaces, &mut scene);
     if uncalibrated.reverse_order {
         scene.hand = scene.hand.reversed();
         (scene.geometry.order_by, scene.geometry.order_agreement) = (OrderBy::Given, 1.0);
     }
-    watch(DECIDED);
+    watch(0.6);
     let view_weights = morph::view_weights(&surfaces[0].places);
     let surface = Surface::of(images.len(), size, view_weights.first_two()[0], &grey, &scene);
     drop(grey);
-    watch(MESHED);
+    watch(0.8);
     let render =
         if images.iter().any(|i| i.channels() == 3) { morph::render::<3> } else { morph::render::<1> };
     let leaves = settings.interpolation.fill == HoleFill::Leave;
-    let meshes = Meshes { virtually: &surface, shown: &surfaces };
-    let done = render(images, &meshes, &scene, &view_weights, size, leaves)?;
+    let done = render(images, &surface, &surfaces, &scene, &view_weights, size, leaves)?;
     watch(1.0);
     Ok(done)
 }

@@ -39,28 +39,24 @@ const SIGMA_SHARE: f64 = 0.2;
 /// outlines, as in `tests/two_planes.rs`, a fifth is nearly as good as nothing.
 const HIDDEN_WEIGHT: f32 = 0.2;
 
-/// The meshes of the virtual view and of each photograph.
-pub(super) struct Meshes<'a> {
-    pub(super) virtually: &'a Surface,
-    pub(super) shown: &'a [Surface],
-}
-
-/// Renders the virtual view of `size`. If `leaves`, pixels stay black that all photographs show hidden.
+/// Renders the virtual view of `size` from the surfaces of that view and of each photograph. If `leaves`,
+/// pixels stay black that all photographs show hidden.
 pub(super) fn render<const C: usize>(
     images: &[&Image],
-    meshes: &Meshes<'_>,
+    surface: &Surface,
+    shown: &[Surface],
     scene: &Reconstruction,
     view_weights: &ViewWeights,
     size: (usize, usize),
     leaves: bool,
 ) -> Result<UncalibratedRendering, RenderError> {
-    let painter = Painter::new(images, meshes, scene, view_weights);
+    let painter = Painter::new(images, surface, shown, scene, view_weights);
     let (target, pixels) = (images.len(), size.0 * size.1);
     let (mut values, mut mask) = (vec![0.0; pixels * C], vec![Cover::Disocclusion; pixels]);
     let (mut region, mut depth) = (vec![false; pixels], vec![f32::NAN; pixels]);
     let (mut visited, mut visible, mut propagated) = (vec![false; pixels], vec![0_u16; pixels], 0);
-    let sides = meshes.virtually.mesh.sides();
-    for triangle in 0..meshes.virtually.mesh.triangles.len() {
+    let sides = surface.mesh.sides();
+    for triangle in 0..surface.mesh.triangles.len() {
         let planes = painter.planes(triangle, &sides);
         let Some(own) = planes.first() else { continue };
         visit_triangle(&painter.places(&own.corner), size, |pixel, _| {
@@ -104,13 +100,11 @@ pub(super) fn render<const C: usize>(
     Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone() })
 }
 
-/// The plane of a triangle of the virtual view, wherever a pixel lies.
 struct Plane {
     corner: [usize; 3],
     facet: Facet,
 }
 
-/// What the colour of a pixel follows from.
 struct Painter<'a> {
     images: &'a [&'a Image],
     surface: &'a Surface,
@@ -124,19 +118,19 @@ struct Painter<'a> {
 impl<'a> Painter<'a> {
     fn new(
         images: &'a [&'a Image],
-        meshes: &Meshes<'a>,
+        surface: &'a Surface,
+        shown: &[Surface],
         scene: &Reconstruction,
         view_weights: &'a ViewWeights,
     ) -> Self {
         let signs: Vec<f64> =
             scene.cameras.iter().map(|camera| chirality::order_sign(camera, scene.hand)).collect();
         let hides = scene.geometry.order_by != OrderBy::Nothing;
-        let front = |i: usize| Front::of(&meshes.shown[i], i, images[i].size(), signs[i]);
+        let front = |i: usize| Front::of(&shown[i], i, images[i].size(), signs[i]);
         let fronts = if hides { (0..images.len()).into_par_iter().map(front).collect() } else { vec![] };
-        Self { images, surface: meshes.virtually, view_weights, signs, fronts }
+        Self { images, surface, view_weights, signs, fronts }
     }
 
-    /// Where corners lie in the virtual view.
     fn places(&self, corner: &[usize; 3]) -> [Point; 3] {
         corner.map(|k| self.surface.places[self.images.len()][k])
     }
@@ -179,9 +173,8 @@ impl<'a> Painter<'a> {
         best.filter(|(least, _)| TIMES_BETTER * least + CONTRADICTION < now).map_or(own, |(_, plane)| plane)
     }
 
-    /// The mean of the photographs that show the point of a plane.
     fn blend<const C: usize>(&self, plane: &Plane, position: &Point) -> Blend<C> {
-        let mut blend = Blend::default();
+        let mut blend = Blend { sum: [0.0; C], weight: 0.0, shown: 0, visible: 0 };
         for (i, image) in self.images.iter().enumerate() {
             let (shares, place) = self.shown(plane, position, i);
             let Some(colour) = colour_at(image, &place) else { continue };
@@ -192,26 +185,18 @@ impl<'a> Painter<'a> {
         blend
     }
 
-    /// The depth in the virtual view.
     fn depth(&self, plane: &Plane, position: &Point) -> f64 {
         let target = self.images.len();
         self.signs[target] * self.surface.chi_at(target, &plane.corner, plane.facet.shares(position))
     }
 }
 
-/// A weighted mean of colours.
 struct Blend<const C: usize> {
     sum: [f32; C],
     weight: f32,
     /// Photographs that show the place of the point, and those in which nothing hides it.
     shown: u16,
     visible: u16,
-}
-
-impl<const C: usize> Default for Blend<C> {
-    fn default() -> Self {
-        Self { sum: [0.0; C], weight: 0.0, shown: 0, visible: 0 }
-    }
 }
 
 impl<const C: usize> Blend<C> {
@@ -229,7 +214,6 @@ impl<const C: usize> Blend<C> {
     }
 }
 
-/// The depths of the surfaces that a photograph shows.
 struct Front {
     width: usize,
     depth: Vec<f32>,

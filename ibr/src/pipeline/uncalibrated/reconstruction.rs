@@ -6,7 +6,7 @@ use crate::camera::Camera;
 use crate::image::Image;
 use crate::pipeline::RenderError;
 use crate::setting::SHARE;
-use crate::uncalibrated::canonical::{CanonicalPair, canonical_pair};
+use crate::uncalibrated::canonical::canonical_pair;
 use crate::uncalibrated::chirality::{self, Handedness};
 use crate::uncalibrated::fundamental::{self, Fundamental};
 use crate::uncalibrated::metric;
@@ -27,7 +27,6 @@ const FARTHEST: f64 = 3.0;
 pub(super) struct Reconstruction {
     pub(super) cameras: Vec<Matrix3x4<f64>>,
     pub(super) points: Vec<Vector4<f64>>,
-    /// Positions of the points in each image.
     pub(super) seen: Vec<Vec<Option<Point>>>,
     pub(super) hand: Handedness,
     pub(super) geometry: GeometryReport,
@@ -36,20 +35,15 @@ pub(super) struct Reconstruction {
 }
 
 impl Reconstruction {
-    /// Refuses singular cameras.
     fn check(&self) -> Result<(), GeometryError> {
-        self.cameras.iter().enumerate().try_for_each(|(view, camera)| match Camera::projective(*camera) {
-            Ok(_) => Ok(()),
-            Err(source) => Err(GeometryError::Camera { which: self.name(view), source }),
+        self.cameras.iter().enumerate().try_for_each(|(view, camera)| {
+            let which = match self.numbers.get(view) {
+                Some(number) => format!("the camera of view {}", number + 1),
+                None => "the virtual camera".into(),
+            };
+            let checked = Camera::projective(*camera).map(|_| ());
+            checked.map_err(|source| GeometryError::Camera { which, source })
         })
-    }
-
-    /// A view by its name for messages.
-    fn name(&self, view: usize) -> String {
-        if view + 1 == self.cameras.len() {
-            return "the virtual camera".into();
-        }
-        format!("the camera of view {}", self.numbers[view] + 1)
     }
 
     /// Moves the virtual view by some columns.
@@ -90,7 +84,8 @@ pub(super) fn reconstruct(
     let found = resections.last().ok_or(GeometryError::Numerical { what: "virtual camera" })?;
     let mut points = base.points.clone();
     chirality::orient(&mut cameras, &mut points, |i, j| seen[j][i].is_some());
-    let order = base.order(&points, &cameras[0])?;
+    let order = Order::of(&base.f.matrix, &some(&base.matches), &some(&points), &cameras[0], base.sizes)
+        .ok_or(GeometryError::Numerical { what: "order of depth" })?;
     if let (Target::Tracks(positions), 3..) = (target, images.len()) {
         let all = with_target(tracks.iter(), positions);
         let cloud = all_views::adjust(&mut cameras, &all, REPROJECTION);
@@ -114,7 +109,6 @@ pub(super) fn reconstruct(
     Ok(scene)
 }
 
-/// Tracks with their positions in the virtual view as last column.
 fn with_target<'a>(
     tracks: impl Iterator<Item = &'a Vec<Option<Point>>>,
     target: &[Option<Point>],
@@ -124,7 +118,6 @@ fn with_target<'a>(
 
 /// The reconstruction of the first two views.
 struct Base {
-    /// Matches given.
     given: usize,
     f: Fundamental,
     sizes: [(usize, usize); 2],
@@ -146,13 +139,18 @@ impl Base {
         let f = fundamental::robust(&all, seed)?;
         let agreeing: Vec<Match> = f.inliers.iter().map(|i| all[*i]).collect();
         let pair = canonical_pair(&f.matrix, &agreeing)?;
-        let (tracks, matches, points) = triangulated(&pair, &numbered, &f);
+        let near = |(_, m): &(usize, Match)| fundamental::sampson(&f.matrix, m) < FARTHEST * FARTHEST;
+        let triangulated = |(track, m): (usize, Match)| {
+            let (first, second) = (pair.first.apply(&m.first), pair.second.apply(&m.second));
+            Some((track, m, triangulate(&[(&pair.cameras[0], first), (&pair.cameras[1], second)])?))
+        };
+        let (tracks, matches, points) =
+            numbered.into_iter().filter(near).filter_map(triangulated).collect::<(Vec<_>, Vec<_>, Vec<_>)>();
         let cameras = [pair.first.inverse() * pair.cameras[0], pair.second.inverse() * pair.cameras[1]];
         let sizes = [images[0].size(), images[1].size()];
         Ok(Self { given: all.len(), f, sizes, cameras, tracks, matches, points })
     }
 
-    /// Positions of the points in the virtual view.
     fn points_in(&self, target: &Target) -> Result<Vec<Option<Point>>, RenderError> {
         match target {
             Target::Tracks(positions) => {
@@ -166,36 +164,11 @@ impl Base {
             }
         }
     }
-
-    /// The order of depth by the guesses, and the share of the guesses that agree.
-    fn order(&self, points: &[Vector4<f64>], camera: &Matrix3x4<f64>) -> Result<Order, GeometryError> {
-        Order::of(&self.f.matrix, &some(&self.matches), &some(points), camera, self.sizes)
-            .ok_or(GeometryError::Numerical { what: "order of depth" })
-    }
 }
 
 /// Evenly spaced elements, as many as a metric guess needs.
 fn some<T: Copy>(all: &[T]) -> Vec<T> {
     all.iter().copied().step_by(all.len().div_ceil(GUESS_MATCHES).max(1)).collect()
-}
-
-/// Points of the matches near F that can be triangulated, with their track numbers and matches.
-fn triangulated(
-    pair: &CanonicalPair,
-    numbered: &[(usize, Match)],
-    f: &Fundamental,
-) -> (Vec<usize>, Vec<Match>, Vec<Vector4<f64>>) {
-    let mut all = (Vec::new(), Vec::new(), Vec::new());
-    let near = |(_, m): &&(usize, Match)| fundamental::sampson(&f.matrix, m) < FARTHEST * FARTHEST;
-    for (track, m) in numbered.iter().filter(near).copied() {
-        let (first, second) = (pair.first.apply(&m.first), pair.second.apply(&m.second));
-        if let Some(x) = triangulate(&[(&pair.cameras[0], first), (&pair.cameras[1], second)]) {
-            all.0.push(track);
-            all.1.push(m);
-            all.2.push(x);
-        }
-    }
-    all
 }
 
 fn resected(

@@ -67,12 +67,10 @@ impl Surface {
         parts.map(|part| part / parts.iter().sum::<f64>())
     }
 
-    /// chi in an image at a position in a triangle.
     pub(super) fn chi_at(&self, image: usize, corner: &[usize; 3], shares: Shares) -> f64 {
         (0..3).map(|k| shares[k] * self.chi[image][corner[k]]).sum()
     }
 
-    /// The place in an image of a position in a triangle.
     pub(super) fn place_at(&self, image: usize, corner: &[usize; 3], shares: Shares) -> Point {
         (0..3).map(|k| self.places[image][corner[k]] * shares[k]).sum()
     }

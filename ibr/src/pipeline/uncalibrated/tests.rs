@@ -3,10 +3,10 @@
 
 use super::*;
 use crate::camera::Camera;
-use crate::linear;
 use crate::synthetic::SyntheticScene;
 use crate::uncalibrated::chirality::{self, Handedness};
 use crate::uncalibrated::random::dice::Dice;
+use hybank_linalg::small;
 use nalgebra::{Matrix3, Matrix3x4, Rotation3, Vector3};
 
 const SIZE: (usize, usize) = (240, 180);
@@ -79,7 +79,7 @@ fn outcome(kind: Kind, seed: u64) -> Option<(OrderBy, bool)> {
         rows.push([6.0 / depths[j], p.x / 200.0, p.y / 200.0, 1.0]);
         chi.push(chirality::chi(&found.cameras[0], point));
     }
-    let slope = linear::least_squares(&rows, &chi)?[0];
+    let slope = small::least_squares(&rows, &chi)?[0];
     let truth = Handedness::from_slope(&found.cameras[0], slope);
     println!(
         "{kind:?} {seed}: calibrations {:.3} {}, colours {:.2} grey levels, {:.1} deviations, {} pixels {}",

@@ -8,18 +8,15 @@ use crate::occlusion::{Points, RUN};
 use crate::propagate::{DOUBTFUL_WEIGHT, GUESSED_WEIGHT, spacing, weight};
 use crate::sample::Sample;
 
-/// The pixels of some tiles at their places in the virtual image, view by view and row by row. Its arrays
-/// are used again from band to band.
+/// The pixels of some tiles at their places in the virtual image, view by view and row by row.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Projected {
     points: Points,
     weights: Vec<f32>,
     doubtful: Vec<bool>,
-    guessed: Vec<bool>,
     tiles: Vec<ProjectedTile>,
 }
 
-/// Where the pixels of a tile lie in the arrays.
 #[derive(Debug, Clone, Copy)]
 struct ProjectedTile {
     view: u16,
@@ -28,15 +25,6 @@ struct ProjectedTile {
 }
 
 impl Projected {
-    /// Removes all samples.
-    pub(super) fn clear(&mut self) {
-        self.points.resize(0);
-        self.weights.clear();
-        self.doubtful.clear();
-        self.guessed.clear();
-        self.tiles.clear();
-    }
-
     /// Appends the pixels of a tile; those between the rows `own` are the band's own.
     pub(super) fn push(
         &mut self,
@@ -57,9 +45,9 @@ impl Projected {
         let mut places = Places::new(&RowMap::new(map, row), column, &depths, &reliefs, count);
         places.keep(frame, own, count);
         let (mut doubtful, mut guessed) = (reliefs.behind_edge, [false; TILE]);
-        for (i, is_guessed) in view.map.guessed_from(first_pixel).iter().take(count.min(TILE)).enumerate() {
-            guessed[i] = *is_guessed;
-            doubtful[i] |= *is_guessed;
+        for i in 0..count.min(TILE) {
+            guessed[i] = view.map.is_guessed(first_pixel + i);
+            doubtful[i] |= guessed[i];
         }
         let spacings: [f32; TILE] = std::array::from_fn(|i| spacing(places.distance[i], reliefs.outline[i]));
         let trust = |i: usize| match (guessed[i], doubtful[i]) {
@@ -77,27 +65,23 @@ impl Projected {
         points.spacing.extend_from_slice(&spacings[..count]);
         self.weights.extend_from_slice(&weights[..count]);
         self.doubtful.extend_from_slice(&doubtful[..count]);
-        self.guessed.extend_from_slice(&guessed[..count]);
+        points.guessed.extend_from_slice(&guessed[..count]);
     }
 
-    /// What the depth test needs.
     pub(crate) fn points(&self) -> &Points {
         &self.points
     }
 
-    /// Own samples of the band.
     pub(crate) fn count(&self) -> usize {
         self.points.own.iter().filter(|own| **own).count()
     }
 
-    /// Takes the samples at these places out of the band's own ones.
     pub(crate) fn remove(&mut self, places: &[u32]) {
         places.iter().for_each(|i| self.points.own[*i as usize] = false);
     }
 
-    /// The band's own samples.
     pub(crate) fn samples<const C: usize>(&self, views: &[CalibratedView<'_>]) -> Vec<Sample<C>> {
-        let Self { points, weights, doubtful, guessed, tiles } = self;
+        let Self { points, weights, doubtful, tiles } = self;
         let mut samples = Vec::with_capacity(self.count());
         let ends = tiles.iter().skip(1).map(|next| next.first_place).chain([points.len()]);
         for (tile, end) in tiles.iter().zip(ends) {
@@ -114,7 +98,7 @@ impl Projected {
                     pixel,
                     view: tile.view,
                     doubtful: doubtful[i],
-                    guessed: guessed[i],
+                    guessed: points.guessed[i],
                 }
             };
             samples.extend((tile.first_place..end).filter(|i| points.own[*i]).map(sample));
@@ -131,39 +115,28 @@ struct Places {
     depth: [f64; TILE],
     /// Distance of neighbouring pixels, root mean square over the two directions.
     distance: [f64; TILE],
-    /// Area of a pixel.
     area: [f64; TILE],
     own: [bool; TILE],
 }
-
-/// Columns from the first one of a tile.
-const STEPS: [f64; TILE] = {
-    let mut steps = [0.0; TILE];
-    let mut i = 1;
-    while i < TILE {
-        steps[i] = steps[i - 1] + 1.0;
-        i += 1;
-    }
-    steps
-};
 
 impl Places {
     fn new(row: &RowMap<'_>, column: usize, depths: &[f32; TILE], reliefs: &Reliefs, count: usize) -> Self {
         let [x, y, depth, distance, area] = [[f64::NAN; TILE]; 5];
         let mut places = Self { x, y, depth, distance, area, own: [false; TILE] };
-        let column = column as f64;
+        // Of 32 bits, which the compiler converts several at a time.
+        let at = |i: usize| f64::from(column as i32 + i as i32);
         for i in 0..count.min(TILE) {
             let depth = f64::from(depths[i]);
-            let projection = row.project(column + STEPS[i], depth);
+            let projection = row.project(at(i), depth);
             let slopes = [f64::from(reliefs.across[i]), f64::from(reliefs.down[i])];
             let [a, b] = row.steps(&projection, depth, slopes);
             (places.x[i], places.y[i], places.depth[i]) = projection.at;
             places.distance[i] = ((a[0] * a[0] + a[1] * a[1] + b[0] * b[0] + b[1] * b[1]) / 2.0).sqrt();
             places.area[i] = (a[0] * b[1] - a[1] * b[0]).abs();
         }
-        if row.is_bent() {
+        if !row.linear {
             for i in 0..count.min(TILE) {
-                (places.x[i], places.y[i], places.depth[i]) = row.bend(column + STEPS[i], depths[i]);
+                (places.x[i], places.y[i], places.depth[i]) = row.bend(at(i), depths[i]);
             }
         }
         places

@@ -15,7 +15,6 @@ const SLOPE: f64 = 1.0001 * JUMP as f64;
 /// Factor of bounds of distances, which round.
 const ROUNDING: f64 = 1.01;
 
-/// Bounds of the positions of some samples in the virtual image.
 pub(super) struct Reach {
     columns: (f64, f64),
     pub(super) rows: (f64, f64),
@@ -40,16 +39,15 @@ pub(super) struct RowMap<'a> {
     step: [f64; 3],
     down: [f64; 3],
     shift: [f64; 3],
-    linear: bool,
+    /// Whether no lens bends the map.
+    pub(super) linear: bool,
 }
 
 /// A pixel with depth at the virtual camera, without lenses.
 pub(super) struct Projection {
-    /// Position and depth.
     pub(super) at: (f64, f64, f64),
     /// A x~.
     ray: [f64; 3],
-    /// 1 / depth.
     inverse: f64,
 }
 
@@ -59,11 +57,6 @@ impl<'a> RowMap<'a> {
         let start = std::array::from_fn(|k| a[(k, 1)] * y + a[(k, 2)]);
         let [step, down] = [0, 1].map(|column| std::array::from_fn(|k| a[(k, column)]));
         Self { map, y, start, step, down, shift: [b.x, b.y, b.z], linear: map.is_linear() }
-    }
-
-    /// Whether a lens bends the map.
-    pub(super) fn is_bent(&self) -> bool {
-        !self.linear
     }
 
     /// Position and depth of a pixel, with lenses.

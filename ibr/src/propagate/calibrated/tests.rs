@@ -4,6 +4,7 @@ use super::*;
 use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::occlusion::PlaneSearch;
+use crate::sample::Sample;
 use nalgebra::{Matrix3, Matrix3x4, Rotation3, Vector3};
 
 const SIZE: (usize, usize) = (150, 90);
@@ -27,6 +28,36 @@ fn scene() -> (Image, DepthMap) {
     };
     let data = (0..SIZE.0 * SIZE.1).map(depth).collect();
     (image, DepthMap::new(SIZE, data, 1.0, Measure::Depth).unwrap())
+}
+
+impl Footprint {
+    /// The samples between two rows of the frame, both included: view by view and row by row.
+    fn samples_between<const C: usize>(
+        &self,
+        views: &[CalibratedView<'_>],
+        top: f64,
+        bottom: f64,
+    ) -> Vec<Sample<C>> {
+        let (mut projected, band) = (Projected::default(), self.frame.band(top, bottom));
+        for tile in self.reaching(band.rows, |_| 0.0) {
+            let view = usize::from(tile.view);
+            projected.push(&views[view], &self.maps[view], tile, &band, (f64::MIN, f64::MAX));
+        }
+        projected.samples(views)
+    }
+}
+
+/// All samples of views, view by view and row by row.
+pub(crate) fn calibrated<const C: usize>(
+    views: &[CalibratedView<'_>],
+    camera: &Camera,
+    frame: &Frame,
+) -> (Vec<Sample<C>>, Dropped) {
+    let all: Vec<usize> = (0..views.len()).collect();
+    let footprint = Footprint::of(views, &all, camera, frame);
+    let samples = footprint.samples_between(views, f64::MIN, f64::MAX);
+    let dropped = footprint.dropped(samples.len());
+    (samples, dropped)
 }
 
 #[test]
@@ -61,7 +92,8 @@ fn the_spacing_of_a_tile_is_bounded() {
     let (mut found, mut near) = (0, 0);
     for tile in &footprint.tiles {
         let mut projected = Projected::default();
-        footprint.project(&views, tile, &frame, (f64::MIN, f64::MAX), &mut projected);
+        let view = usize::from(tile.view);
+        projected.push(&views[view], &footprint.maps[view], tile, &frame, (f64::MIN, f64::MAX));
         for s in projected.samples::<1>(&views) {
             assert!(s.spacing <= tile.spacing, "{s:?} in {tile:?}");
             near += usize::from(tile.spacing < 2.0 * s.spacing);
@@ -84,13 +116,10 @@ fn bands_hide_what_the_whole_hides() {
         let (mut want, _) = calibrated::<1>(&views, &target, &frame);
         assert!(crate::occlusion::remove(&mut want, &test) > 100);
         let footprint = Footprint::of(&views, &[0, 1], &target, &frame);
-        let (mut projected, mut search, mut got) = (Projected::default(), PlaneSearch::default(), Vec::new());
+        let (mut search, mut got) = (PlaneSearch::default(), Vec::new());
         for own in [(f64::MIN, 1.0), (1.0, 23.5), (23.5, 24.0), (24.0, 70.0), (70.0, f64::MAX)] {
-            search.clear(&footprint.band_around(own, &test).extent(), footprint.most_between(own, &test));
-            footprint
-                .project_between(&views, own, &test, &mut projected, |points| search.enter(points, &test));
+            let mut projected = footprint.project_between(&views, own, &test);
             projected.remove(search.hidden(projected.points(), &test));
-            assert!(projected.points().len() <= footprint.most_between(own, &test));
             got.extend(projected.samples::<1>(&views));
         }
         let order = |s: &Sample<1>| (s.view, s.pixel);

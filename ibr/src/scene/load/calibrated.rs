@@ -1,15 +1,12 @@
 //! Scenes of general cameras: 3 x 4 matrices, COLMAP models or transforms files, and depths.
 
 use super::left_out::LeftOut;
-use super::maps::{Given, Read};
-use super::models::Source;
 use super::{Goal, Inputs, Loaded, Loader, each, pixels};
 use crate::camera::Camera;
 use crate::camera::ListedCamera;
 use crate::camera::resize::{Size, factors};
 use crate::depth::Measure;
 use crate::files::InputError;
-use crate::image::Image;
 use crate::scene::{Kind, ViewSpec};
 use hybank::messages::Quoted;
 use nalgebra::Matrix3x4;
@@ -40,6 +37,16 @@ struct First {
     resized: Option<Resized>,
 }
 
+impl First {
+    /// The size of another image of the same collection, resized alike.
+    fn alike(self, listed: Size) -> Size {
+        self.resized.map_or(listed, |resized| resized.applied(listed))
+    }
+}
+
+/// A camera with the size of the image that a file says it is for.
+type Sized = (Camera, Option<Size>);
+
 impl Loader<'_> {
     pub(super) fn calibrated(
         &self,
@@ -49,27 +56,22 @@ impl Loader<'_> {
     ) -> Loaded<Inputs> {
         self.a_camera_each()?;
         self.keys_of(views, goals, "calibrated")?;
-        let sources = each(views, |view| self.source(view), |source| pixels(&source.0.image), self.watch)?;
-        let first = First { size: sources[0].0.image.size(), resized: sources[0].1 };
+        let one = |view: &&ViewSpec| {
+            let camera = |size| Ok(self.camera_of(view, size)?.0);
+            self.read(view, Measure::Depth, camera, |image, camera| self.of_points(view, image, camera))
+        };
+        let read = each(views, one, |read| pixels(&read.image), self.watch)?;
+        let resized =
+            views.iter().zip(&read).map(|(view, read)| Ok(self.camera_of(view, read.image.size())?.1));
+        let resized = resized.collect::<Loaded<Vec<_>>>()?;
+        let first = First { size: read[0].image.size(), resized: resized[0] };
         let (cameras, size) = match left_out {
             Some(place) => self.at_place(place, first, goals)?,
             None => self.cameras(goals, first)?,
         };
-        let notes = notes(sources.iter().filter_map(|s| s.1));
-        let read = sources.into_iter().map(|s| s.0).collect();
+        let notes = notes(resized.into_iter().flatten());
         let views = self.matched(views, read, Measure::Depth)?;
         Ok(Inputs { kind: Kind::Calibrated { views, cameras, size }, calibration: None, notes })
-    }
-
-    /// A view, and how its camera was resized.
-    fn source(&self, view: &ViewSpec) -> Loaded<(Read<Camera>, Option<Resized>)> {
-        let map = self.need(view.depth.as_deref(), view, "depth", "calibrated")?;
-        let image = self.image(&view.image)?;
-        let given = Given { map, scale: view.depth_scale, measure: Measure::Depth };
-        let map = self.stored(view, &image, &given)?;
-        let (camera, resized) = self.camera_of(view, image.size())?;
-        let points = |image: &Image, camera: &Camera| self.of_points(view, image, camera);
-        Ok((self.read(view, &given, Read { image, camera, map }, points)?, resized))
     }
 
     /// The camera of the view that is left out, or of an image that the file of cameras lists, and the size
@@ -82,11 +84,11 @@ impl Loader<'_> {
                 (self.camera_of(view, own)?.0, own)
             }
             LeftOut::Listed(image) => {
-                let source = self.common_source();
-                let source = source.ok_or_else(|| self.no_such_view(image))?;
-                let found = self.listed_camera(&source, image, first.size, "--view")?;
-                let own = first.resized.map_or(found.size, |resized| resized.applied(found.size));
-                (self.scaled(found, own, "--view")?, own)
+                let source = self.common_source().ok_or_else(|| self.no_such_view(image))?;
+                let ListedCamera { camera, size } =
+                    self.listed_camera(&source, image, first.size, "--view")?;
+                let own = first.alike(size);
+                (self.scaled((camera, Some(size)), own, "--view")?, own)
             }
         };
         Ok((vec![camera], self.size(goals, own)?))
@@ -94,22 +96,13 @@ impl Loader<'_> {
 
     /// The virtual cameras and their size.
     fn cameras(&self, goals: &[Goal], first: First) -> Loaded<(Vec<Camera>, Size)> {
-        let own = match goals.first().map(|goal| self.start_of(goal, first)).transpose()? {
-            Some(Wanted::Listed(found)) => {
-                first.resized.map_or(found.size, |resized| resized.applied(found.size))
-            }
-            _ => first.size,
-        };
-        let size = self.size(goals, own)?;
-        let camera = |wanted: Wanted, goal: &Goal| match wanted {
-            Wanted::Given(camera) => Ok(camera),
-            Wanted::Listed(found) => self.scaled(found, size, &goal.name),
-        };
+        let (_, listed) = self.start_of(&goals[0], first)?;
+        let size = self.size(goals, listed.map_or(first.size, |size| first.alike(size)))?;
         let cameras = self.along(
             goals,
-            |goal| camera(self.start_of(goal, first)?, goal),
+            |goal| self.scaled(self.start_of(goal, first)?, size, &goal.name),
             |goal, from, share| {
-                let to = camera(self.end_of_path(goal, first)?, goal)?;
+                let to = self.scaled(self.end_of_path(goal, first)?, size, &goal.name)?;
                 let path = || format!("the path of {}", goal.name);
                 from.towards(&to, share).map_err(|source| self.bad_camera(&path(), source))
             },
@@ -117,11 +110,11 @@ impl Loader<'_> {
         Ok((cameras, size))
     }
 
-    fn start_of(&self, goal: &Goal, first: First) -> Loaded<Wanted> {
+    fn start_of(&self, goal: &Goal, first: First) -> Loaded<Sized> {
         self.wanted(goal.target.camera.as_ref(), goal.target.camera_of.as_deref(), goal, first)
     }
 
-    fn end_of_path(&self, goal: &Goal, first: First) -> Loaded<Wanted> {
+    fn end_of_path(&self, goal: &Goal, first: First) -> Loaded<Sized> {
         let (rows, image) = (goal.target.to_camera.as_ref(), goal.target.to_camera_of.as_deref());
         if rows.is_none() && image.is_none() {
             let name = &goal.name;
@@ -141,68 +134,48 @@ impl Loader<'_> {
         self.incomplete(format!("{which}: {source}"))
     }
 
-    /// The camera of a view whose image has this size.
+    /// The camera of a view whose image has this size: resized with it where a file has the camera for
+    /// another size, or refused.
     fn camera_of(&self, view: &ViewSpec, size: Size) -> Loaded<(Camera, Option<Resized>)> {
         let which = view.named();
-        match (&view.camera, self.source_of(view)) {
-            (Some(rows), _) => Ok((self.matrix(rows, &which)?, None)),
-            (None, Some(source)) => {
-                let found = self.listed_camera(&source, &view.image.to_string_lossy(), size, &which)?;
-                self.fitted(found, size, &source, &which)
-            }
-            (None, None) => self.need(None, view, "camera", "calibrated"),
+        let source = match (&view.camera, self.source_of(view)) {
+            (Some(rows), _) => return Ok((self.matrix(rows, &which)?, None)),
+            (None, Some(source)) => source,
+            (None, None) => return self.need(None, view, "camera", "calibrated"),
+        };
+        let image = view.image.to_string_lossy();
+        let ListedCamera { camera, size: from } = self.listed_camera(&source, &image, size, &which)?;
+        if factors(from, size).is_none() {
+            return Err(self.incomplete(format!(
+                "{which}: the image has {} x {} pixels, but {} lists its camera for {} x {}; use the image that was calibrated, or one that was resized by the same factor in both directions",
+                size.0,
+                size.1,
+                Quoted(&source.path),
+                from.0,
+                from.1
+            )));
         }
-    }
-
-    /// A camera from a file for an image of another size than the file says: resized with it, or refused.
-    fn fitted(
-        &self,
-        found: ListedCamera,
-        size: Size,
-        source: &Source,
-        which: &str,
-    ) -> Loaded<(Camera, Option<Resized>)> {
-        if found.size == size {
-            return Ok((found.camera, None));
-        }
-        if factors(found.size, size).is_some() {
-            let resized = Resized { from: found.size, to: size };
-            return Ok((self.scaled(found, size, which)?, Some(resized)));
-        }
-        Err(self.incomplete(format!(
-            "{which}: the image has {} x {} pixels, but {} lists its camera for {} x {}; use the image that was calibrated, or one that was resized by the same factor in both directions",
-            size.0,
-            size.1,
-            Quoted(&source.path),
-            found.size.0,
-            found.size.1
-        )))
+        let resized = (from != size).then_some(Resized { from, to: size });
+        Ok((self.scaled((camera, Some(from)), size, &which)?, resized))
     }
 
     /// A camera from a file, scaled with its image; as it is, for a window of another shape.
-    fn scaled(&self, found: ListedCamera, size: Size, which: &str) -> Loaded<Camera> {
-        match factors(found.size, size) {
-            Some(factors) if found.size != size => {
-                found.camera.resized(factors).map_err(|source| self.bad_camera(which, source))
-            }
-            _ => Ok(found.camera),
+    fn scaled(&self, (camera, from): Sized, size: Size, which: &str) -> Loaded<Camera> {
+        match from.filter(|from| *from != size).and_then(|from| factors(from, size)) {
+            Some(factors) => camera.resized(factors).map_err(|source| self.bad_camera(which, source)),
+            None => Ok(camera),
         }
     }
 
     /// A virtual camera: a matrix, or the camera of a listed image.
-    fn wanted(
-        &self,
-        rows: Option<&Matrix>,
-        image: Option<&str>,
-        goal: &Goal,
-        first: First,
-    ) -> Loaded<Wanted> {
+    fn wanted(&self, rows: Option<&Matrix>, image: Option<&str>, goal: &Goal, first: First) -> Loaded<Sized> {
         if let Some(rows) = rows {
-            return Ok(Wanted::Given(self.matrix(rows, &goal.name)?));
+            return Ok((self.matrix(rows, &goal.name)?, None));
         }
         match (image, self.common_source()) {
             (Some(image), Some(source)) => {
-                Ok(Wanted::Listed(self.listed_camera(&source, image, first.size, &goal.name)?))
+                let found = self.listed_camera(&source, image, first.size, &goal.name)?;
+                Ok((found.camera, Some(found.size)))
             }
             (Some(_), None) => Err(self.incomplete(format!(
                 "{} has `camera_of`, which needs a `colmap` folder or a `transforms` file at the top; give it a `camera` (3 x 4), or name that file",
@@ -218,12 +191,6 @@ impl Loader<'_> {
     }
 }
 
-/// A virtual camera that a table asks for.
-enum Wanted {
-    Given(Camera),
-    Listed(ListedCamera),
-}
-
 /// What to say of cameras that were resized, each change once.
 fn notes(all: impl Iterator<Item = Resized>) -> Vec<String> {
     let mut counts: Vec<(Resized, usize)> = Vec::new();
@@ -234,10 +201,9 @@ fn notes(all: impl Iterator<Item = Resized>) -> Vec<String> {
         }
     }
     let note = |(Resized { from, to }, count): (Resized, usize)| {
-        let views = if count == 1 {
-            "the camera of 1 view is".into()
-        } else {
-            format!("the cameras of {count} views are")
+        let views = match count {
+            1 => "the camera of 1 view is".into(),
+            _ => format!("the cameras of {count} views are"),
         };
         format!(
             "{views} scaled from images of {} x {} to {} x {} pixels, the size of the photographs",

@@ -21,23 +21,21 @@ pub(super) struct Goal {
 impl Loader<'_> {
     /// The tables, at least one.
     pub(super) fn goals(&self) -> Loaded<Vec<Goal>> {
-        let goals: Vec<Goal> = match self.spec.targets.as_slice() {
-            [] => vec![Goal { target: TargetSpec::default(), name: "[virtual]".into() }],
-            [one] => vec![Goal { target: one.clone(), name: "[virtual]".into() }],
-            many => {
-                let numbered = |(k, target): (usize, &TargetSpec)| Goal {
-                    target: target.clone(),
-                    name: format!("[[virtual]] number {}", k + 1),
-                };
-                many.iter().enumerate().map(numbered).collect()
-            }
-        };
         if self.spec.frames() > MOST_FRAMES {
             return Err(self.incomplete(format!(
                 "the scene has more than {MOST_FRAMES} virtual views; render them in parts"
             )));
         }
-        Ok(goals)
+        let none = [TargetSpec::default()];
+        let targets = if self.spec.targets.is_empty() { &none } else { self.spec.targets.as_slice() };
+        let goal = |(k, target): (usize, &TargetSpec)| {
+            let name = match targets.len() {
+                1 => "[virtual]".into(),
+                _ => format!("[[virtual]] number {}", k + 1),
+            };
+            Goal { target: target.clone(), name }
+        };
+        Ok(targets.iter().enumerate().map(goal).collect())
     }
 
     /// Refuses keys of another kind of scene than this, and two keys for one thing, instead of ignoring one.

@@ -32,8 +32,9 @@ impl Loader<'_> {
                 _ => (),
             }
         }
-        let general = views.iter().all(|view| view.position.is_none());
-        match general && self.is_listed(name)? {
+        let source = self.common_source().filter(|_| views.iter().all(|view| view.position.is_none()));
+        let listed = source.map(|source| self.listed_name(&source, name)).transpose()?.flatten();
+        match listed.is_some_and(|(_, whole)| whole) {
             true => Ok(Some(LeftOut::Listed(name.clone()))),
             false => Err(self.no_such_view(name)),
         }
@@ -43,15 +44,5 @@ impl Loader<'_> {
         let labels: Vec<String> = self.spec.view.iter().map(ViewSpec::label).collect();
         let known = names::list(&labels, ", ");
         self.incomplete(format!("there is no view \"{}\"; the views are {known}", Quoted(name)))
-    }
-}
-
-impl LeftOut {
-    /// The number of the view.
-    pub(super) fn index(&self) -> Option<usize> {
-        match self {
-            Self::View(index) => Some(*index),
-            Self::Listed(_) => None,
-        }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Loaded, Loader};
 use crate::camera::Camera;
-use crate::depth::{DepthMap, Measure};
+use crate::depth::{DepthError, DepthMap, Measure};
 use crate::files::InputError;
 use crate::image::{Image, read_map};
 use crate::matching::{Photograph, depths};
@@ -19,58 +19,60 @@ pub(super) struct Read<P> {
     pub(super) camera: P,
 }
 
-/// What a view says of its map.
-pub(super) struct Given<'a> {
-    pub(super) map: &'a Path,
-    pub(super) scale: Option<f64>,
-    pub(super) measure: Measure,
-}
-
 impl Loader<'_> {
-    /// The map of a view, if a file has it.
-    pub(super) fn stored(
-        &self,
-        view: &ViewSpec,
-        image: &Image,
-        given: &Given<'_>,
-    ) -> Loaded<Option<DepthMap>> {
-        let MapSource::File(file) = MapSource::of(given.map) else {
-            let scale = if given.measure == Measure::Depth { "depth_scale" } else { "disparity_scale" };
-            let others = [(scale, given.scale.is_some()), ("step", view.step.is_some())];
-            return match others.iter().find(|(_, given)| *given) {
-                None => Ok(None),
-                Some((key, _)) => Err(self.incomplete(format!(
-                    "{} has `{key}`, which is for the numbers of a file, but no file has its map; remove it",
-                    view.named()
-                ))),
-            };
-        };
-        let path = self.file(file);
-        let (width, height, stored) = read_map(&path, self.options.max_pixels)?;
-        let bad = |e| InputError::file(&path, format!("{}: {e}", view.named()));
-        let map = DepthMap::new((width, height), stored, given.scale.unwrap_or(1.0), given.measure);
-        let map = map.and_then(|map| match view.disparity_offset {
-            Some(offset) => map.with_offset(offset),
-            None => Ok(map),
-        });
-        let map = map.map_err(bad)?;
-        map.fits(image.size(), view.step.unwrap_or(1)).map_err(bad)?;
-        Ok(Some(map))
-    }
-
-    /// A view with the samples of its map at their pixels; `points` gives that of the points of a model.
+    /// A view with its image, the camera that `camera` gives for the size of that, and its map unless the
+    /// photographs have to give it; `points` makes that of the points of a model.
     pub(super) fn read<P>(
         &self,
         view: &ViewSpec,
-        given: &Given<'_>,
-        mut read: Read<P>,
+        measure: Measure,
+        camera: impl Fn((usize, usize)) -> Loaded<P>,
         points: impl Fn(&Image, &P) -> Loaded<DepthMap>,
     ) -> Loaded<Read<P>> {
-        if MapSource::of(given.map) == MapSource::Points {
-            read.map = Some(points(&read.image, &read.camera)?);
-        }
-        let map = read.map.map(|map| self.sampled(view, map, &read.image, given.map)).transpose()?;
-        Ok(Read { map, ..read })
+        let (key, kind, map, scale) = match measure {
+            Measure::Depth => ("depth", "calibrated", &view.depth, view.depth_scale),
+            Measure::Disparity => ("disparity", "rectified", &view.disparity, view.disparity_scale),
+        };
+        let file = self.need(map.as_deref(), view, key, kind)?;
+        let (image, source) = (self.image(&view.image)?, MapSource::of(file));
+        let stored = match source {
+            MapSource::File(file) => Some(self.stored(view, file, scale.unwrap_or(1.0), measure, &image)?),
+            _ => self.no_numbers(view, key, scale)?,
+        };
+        let camera = camera(image.size())?;
+        let map = if source == MapSource::Points { Some(points(&image, &camera)?) } else { stored };
+        let map = map.map(|map| self.sampled(view, map, &image, file)).transpose()?;
+        Ok(Read { image, map, camera })
+    }
+
+    /// The map that a file has.
+    fn stored(
+        &self,
+        view: &ViewSpec,
+        file: &Path,
+        scale: f64,
+        measure: Measure,
+        image: &Image,
+    ) -> Loaded<DepthMap> {
+        let path = self.file(file);
+        let (width, height, stored) = read_map(&path, self.options.max_pixels)?;
+        let map =
+            DepthMap::new((width, height), stored, scale, measure).and_then(|map| with_offset(view, map));
+        let fitting = map.and_then(|map| map.fits(image.size(), view.step.unwrap_or(1)).map(|()| map));
+        fitting.map_err(|e| InputError::file(&path, format!("{}: {e}", view.named())))
+    }
+
+    /// Refuses what is said of the numbers of a file where no file has the map.
+    fn no_numbers<T>(&self, view: &ViewSpec, key: &str, scale: Option<f64>) -> Loaded<Option<T>> {
+        let key = match (scale, view.step) {
+            (Some(_), _) => format!("{key}_scale"),
+            (None, Some(_)) => "step".into(),
+            (None, None) => return Ok(None),
+        };
+        Err(self.incomplete(format!(
+            "{} has `{key}`, which is for the numbers of a file, but no file has its map; remove it",
+            view.named()
+        )))
     }
 
     /// A map of the size of its image, with the samples that are wanted.
@@ -96,22 +98,20 @@ impl Loader<'_> {
             true => Vec::new(),
             false => depths(&photographs, measure).map_err(|e| self.incomplete(e))?,
         };
-        let mut found = found.into_iter();
-        let whole = |(view, Read { image, map, camera }): (&&ViewSpec, Read<P>)| {
-            let map = match (map, found.next()) {
-                (Some(map), _) => map,
-                (None, Some(map)) => {
-                    let map = match view.disparity_offset {
-                        Some(offset) => map.with_offset(offset).map_err(|e| self.incomplete(e))?,
-                        None => map,
-                    };
-                    self.sampled(view, map, &image, Path::new("matched"))?
+        let found = found.into_iter().map(Some).chain(std::iter::repeat(None));
+        let whole = |((view, read), found): ((&&ViewSpec, Read<P>), Option<DepthMap>)| {
+            let Read { image, map, camera } = read;
+            let map = match map {
+                Some(map) => map,
+                None => {
+                    let found = found.ok_or_else(|| self.incomplete("a view without a map"))?;
+                    let found = with_offset(view, found).map_err(|e| self.incomplete(e))?;
+                    self.sampled(view, found, &image, Path::new("matched"))?
                 }
-                (None, None) => return Err(self.incomplete("a view without a map")),
             };
             Ok(SourceView { image, map, camera })
         };
-        views.iter().zip(read).map(whole).collect()
+        views.iter().zip(read).zip(found).map(whole).collect()
     }
 
     /// The depths of the points of a model that this view shows, unknown elsewhere.
@@ -134,5 +134,12 @@ impl Loader<'_> {
         DepthMap::new((width, height), data, 1.0, Measure::Depth).map_err(|_| {
             self.incomplete(format!("{} shows no point of the model; give it a depth map", view.named()))
         })
+    }
+}
+
+fn with_offset(view: &ViewSpec, map: DepthMap) -> Result<DepthMap, DepthError> {
+    match view.disparity_offset {
+        Some(offset) => map.with_offset(offset),
+        None => Ok(map),
     }
 }

@@ -87,7 +87,7 @@ impl Loader<'_> {
     }
 
     /// The name of an image in a file of cameras, and whether its folders agree with it.
-    fn listed_name(&self, source: &Source, image: &str) -> Loaded<Option<(String, bool)>> {
+    pub(super) fn listed_name(&self, source: &Source, image: &str) -> Loaded<Option<(String, bool)>> {
         let list = self.models.get(source)?;
         let found = list.find(image).ok();
         Ok(found.map(|(frame, found)| (frame.image.display().to_string(), found.whole)))
@@ -98,12 +98,6 @@ impl Loader<'_> {
         let list = self.models.get(source)?;
         let images: Vec<_> = list.frames.iter().map(|frame| frame.image.to_string_lossy()).collect();
         Ok(format!("{} lists {}", Quoted(list.path()), names::list(&images, ", ")))
-    }
-
-    /// Whether the scene's file of cameras lists an image.
-    pub(super) fn is_listed(&self, image: &str) -> Loaded<bool> {
-        let Some(source) = self.common_source() else { return Ok(false) };
-        Ok(self.listed_name(&source, image)?.is_some_and(|(_, whole)| whole))
     }
 
     /// Refuses two photographs with the camera of one image, where a folder says that it is not theirs; the

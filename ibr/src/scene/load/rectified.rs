@@ -1,6 +1,5 @@
 //! Scenes of a rectified rig: positions and disparities.
 
-use super::maps::{Given, Read};
 use super::{Goal, Inputs, Loaded, Loader, each, pixels};
 use crate::camera::middlebury::{Calibration, read_calibration};
 use crate::depth::Measure;
@@ -22,16 +21,13 @@ impl Loader<'_> {
         let one = |view: &&ViewSpec| {
             let position = self.need(view.position, view, "position", "rectified")?;
             let position = self.finite(position, &view.named())?;
-            let map = self.need(view.disparity.as_deref(), view, "disparity", "rectified")?;
-            let given = Given { map, scale: view.disparity_scale, measure: Measure::Disparity };
-            let image = self.image(&view.image)?;
-            let map = self.stored(view, &image, &given)?;
-            self.read(view, &given, Read { image, camera: position, map }, |_, _| {
-                Err(self.incomplete(format!(
+            let no_points = || {
+                self.incomplete(format!(
                     "{} has disparity = \"points\", which a rectified rig does not have; give it a map or \"matched\"",
                     view.named()
-                )))
-            })
+                ))
+            };
+            self.read(view, Measure::Disparity, |_| Ok(position), |_, _| Err(no_points()))
         };
         let sources = each(views, one, |source| pixels(&source.image), self.watch)?;
         let first = sources[0].image.size();

@@ -12,14 +12,14 @@ impl Loader<'_> {
     pub(super) fn uncalibrated(
         &self,
         views: &[&ViewSpec],
-        left_out: Option<&ViewSpec>,
+        left_out: Option<(usize, &ViewSpec)>,
         goals: &[Goal],
     ) -> Loaded<Inputs> {
         let file = self.matches_file(views)?;
         self.keys_of(views, goals, "matches-only")?;
         let tracks = Tracks::read(&self.file(file))?;
         let virtual_columns = match left_out {
-            Some(view) => vec![self.column_in_order(view)?],
+            Some((index, view)) => vec![view.column.unwrap_or(index + 1)],
             None => goals.iter().filter_map(|goal| goal.target.from_tracks).collect(),
         };
         let columns = self.columns(views, &virtual_columns, tracks.columns())?;
@@ -32,7 +32,7 @@ impl Loader<'_> {
             None => self.targets(goals, in_column)?,
         };
         let own = match left_out {
-            Some(view) => self.image(&view.image)?.size(),
+            Some((_, view)) => self.image(&view.image)?.size(),
             None => images[0].size(),
         };
         let size = self.size(goals, own)?;
@@ -73,12 +73,6 @@ impl Loader<'_> {
             }
             _ => Ok(file),
         }
-    }
-
-    /// Column of the view that is left out: its `column`, or its index among all views.
-    fn column_in_order(&self, view: &ViewSpec) -> Loaded<usize> {
-        let index = self.spec.view.iter().position(|v| v.label() == view.label());
-        view.column.or(index.map(|i| i + 1)).ok_or_else(|| self.incomplete("a view without a column"))
     }
 
     /// Columns of the views: their `column`, or the remaining columns in order.

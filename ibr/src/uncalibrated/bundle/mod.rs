@@ -6,9 +6,6 @@
 //! and the frame is free: its 15 directions change no image, so the damping alone decides along them. The
 //! points are eliminated from the normal equations (Schur complement), which leaves 12 unknowns for each
 //! camera.
-//!
-//! Crates for such problems (apex-solver, tiny-solver, factrs) know rotations and poses, and residuals of
-//! one's own. A projective camera would be such a residual; what they would add is the file `normal.rs`.
 
 mod normal;
 #[cfg(test)]
@@ -16,17 +13,9 @@ mod tests;
 
 use super::Point;
 use super::normalise::Normalisation;
+use super::refine::descend;
 use nalgebra::{Matrix3x4, Matrix4, Vector4};
 use normal::NormalEquations;
-
-/// Steps, at most.
-const STEPS: usize = 100;
-/// The cost has converged when a step lowers it by less than this share.
-const CONVERGED: f64 = 1e-10;
-/// Cost per sighting that rounding leaves, square pixels.
-const EXACT: f64 = 1e-22;
-/// First, least and largest damping, as a share of the diagonal.
-const DAMPING: (f64, f64, f64) = (1e-4, 1e-12, 1e8);
 
 /// A point seen by a camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,26 +48,10 @@ impl Bundle {
     /// start is not finite.
     pub fn adjust(&mut self, scale: f64) -> Option<bool> {
         let frame = Frame::of(self)?;
-        let mut problem = frame.normalised(self, scale);
-        let mut least = problem.cost(&problem.cameras, &problem.points)?;
-        let (mut damping, mut converged) = (DAMPING.0, false);
-        for _ in 0..STEPS {
-            let moved = problem.moved(damping);
-            let next = moved.as_ref().and_then(|(cameras, points)| problem.cost(cameras, points));
-            match (moved, next) {
-                (Some((cameras, points)), Some(cost)) if cost < least => {
-                    converged = least - cost < CONVERGED * least || cost < EXACT;
-                    (problem.cameras, problem.points) = (cameras, points);
-                    (least, damping) = (cost, (0.1 * damping).max(DAMPING.1));
-                }
-                _ => damping *= 10.0,
-            }
-            converged |= damping > DAMPING.2;
-            if converged {
-                break;
-            }
-        }
-        frame.restore(&problem, self);
+        let (problem, start) = frame.normalised(self, scale);
+        let (found, converged) =
+            descend(start, |found| problem.cost(found), |found, damping| problem.moved(found, damping))?;
+        frame.restore(&found, self);
         Some(converged)
     }
 }
@@ -88,8 +61,6 @@ type Unknowns = (Vec<Matrix3x4<f64>>, Vec<Vector4<f64>>);
 
 /// The problem in coordinates near one.
 struct Problem {
-    cameras: Vec<Matrix3x4<f64>>,
-    points: Vec<Vector4<f64>>,
     observations: Vec<Sight>,
     /// Of the robust cost, in pixels.
     scale: f64,
@@ -108,7 +79,7 @@ struct Sight {
 
 impl Problem {
     /// Mean cost per observation; `None` if a point crosses a focal plane or a number is not finite.
-    fn cost(&self, cameras: &[Matrix3x4<f64>], points: &[Vector4<f64>]) -> Option<f64> {
+    fn cost(&self, (cameras, points): &Unknowns) -> Option<f64> {
         let square = self.scale * self.scale;
         let mut sum = 0.0;
         for o in &self.observations {
@@ -123,8 +94,8 @@ impl Problem {
     }
 
     /// Cameras and points after one damped step, all of unit norm.
-    fn moved(&self, damping: f64) -> Option<Unknowns> {
-        let step = NormalEquations::of(self).solve(damping)?;
+    fn moved(&self, (cameras, points): &Unknowns, damping: f64) -> Option<Unknowns> {
+        let step = NormalEquations::of(self, cameras, points).solve(damping)?;
         let camera = |(camera, step): (&Matrix3x4<f64>, &nalgebra::SVector<f64, 12>)| {
             let moved = camera + Matrix3x4::from_row_slice(step.as_slice());
             moved / moved.norm()
@@ -133,8 +104,8 @@ impl Problem {
             let moved = point + step;
             moved / moved.norm()
         };
-        let cameras = self.cameras.iter().zip(&step.cameras).map(camera).collect();
-        Some((cameras, self.points.iter().zip(&step.points).map(point).collect()))
+        let moved = cameras.iter().zip(&step.cameras).map(camera).collect();
+        Some((moved, points.iter().zip(&step.points).map(point).collect()))
     }
 }
 
@@ -164,7 +135,7 @@ impl Frame {
         Some(Self { images: (0..bundle.cameras.len()).map(of_camera).collect(), space, inverse })
     }
 
-    fn normalised(&self, bundle: &Bundle, scale: f64) -> Problem {
+    fn normalised(&self, bundle: &Bundle, scale: f64) -> (Problem, Unknowns) {
         let camera = |(camera, image): (&Matrix3x4<f64>, &Normalisation)| {
             let camera = image.matrix() * camera * self.space;
             camera / camera.norm()
@@ -179,15 +150,15 @@ impl Frame {
             sign: (cameras[o.camera] * points[o.point]).z.signum(),
         };
         let observations = bundle.observations.iter().map(sight).collect();
-        Problem { observations, cameras, points, scale }
+        (Problem { observations, scale }, (cameras, points))
     }
 
-    fn restore(&self, problem: &Problem, bundle: &mut Bundle) {
-        for ((camera, found), image) in bundle.cameras.iter_mut().zip(&problem.cameras).zip(&self.images) {
+    fn restore(&self, (cameras, points): &Unknowns, bundle: &mut Bundle) {
+        for ((camera, found), image) in bundle.cameras.iter_mut().zip(cameras).zip(&self.images) {
             let found = image.inverse() * found * self.inverse;
             *camera = found * (camera.norm() / found.norm());
         }
-        for (point, found) in bundle.points.iter_mut().zip(&problem.points) {
+        for (point, found) in bundle.points.iter_mut().zip(points) {
             let found = self.space * found;
             *point = found * (point.norm() / found.norm());
         }

@@ -1,15 +1,14 @@
 //! The normal equations of a bundle, from which the points are eliminated.
 
-use super::{Problem, Sight};
-use crate::linear;
-use nalgebra::{Matrix3x4, Matrix4, SMatrix, SVector, Vector2, Vector4};
+use super::Problem;
+use crate::uncalibrated::refine::reprojection;
+use hybank_linalg::{Mat, solve_positive};
+use nalgebra::{Matrix3x4, Matrix4, SMatrix, SVector, Vector4};
 
-/// Numbers of a camera.
 const CAMERA: usize = 12;
 
 type CameraMatrix = SMatrix<f64, CAMERA, CAMERA>;
 type CameraVector = SVector<f64, CAMERA>;
-/// Cross terms of a camera and a point.
 type Cross = SMatrix<f64, CAMERA, 4>;
 
 /// J' W J and J' W r, in the blocks of cameras and points.
@@ -20,41 +19,23 @@ pub(super) struct NormalEquations {
     crosses: Vec<Vec<(usize, Cross)>>,
 }
 
-/// A step of all cameras and points.
 pub(super) struct Step {
     pub(super) cameras: Vec<CameraVector>,
     pub(super) points: Vec<Vector4<f64>>,
 }
 
-/// The residual in pixels and its derivatives by the camera (row by row) and by the point.
-pub(super) fn residual(
-    camera: &Matrix3x4<f64>,
-    point: &Vector4<f64>,
-    sight: &Sight,
-) -> (Vector2<f64>, SMatrix<f64, 2, CAMERA>, SMatrix<f64, 2, 4>) {
-    let p = camera * point;
-    let at = p.xy() / p.z;
-    let unit = sight.pixels / p.z;
-    let by_camera = SMatrix::<f64, 2, CAMERA>::from_fn(|r, k| match k {
-        8.. => -at[r] * point[k - 8] * unit,
-        _ if k / 4 == r => point[k % 4] * unit,
-        _ => 0.0,
-    });
-    let by_point = SMatrix::<f64, 2, 4>::from_fn(|r, c| (camera[(r, c)] - at[r] * camera[(2, c)]) * unit);
-    ((sight.image - at) * sight.pixels, by_camera, by_point)
-}
-
 impl NormalEquations {
-    pub(super) fn of(problem: &Problem) -> Self {
+    pub(super) fn of(problem: &Problem, cameras: &[Matrix3x4<f64>], points: &[Vector4<f64>]) -> Self {
         let mut all = Self {
-            cameras: vec![(CameraMatrix::zeros(), CameraVector::zeros()); problem.cameras.len()],
-            points: vec![(Matrix4::zeros(), Vector4::zeros()); problem.points.len()],
-            crosses: vec![Vec::new(); problem.points.len()],
+            cameras: vec![(CameraMatrix::zeros(), CameraVector::zeros()); cameras.len()],
+            points: vec![(Matrix4::zeros(), Vector4::zeros()); points.len()],
+            crosses: vec![Vec::new(); points.len()],
         };
         for sight in &problem.observations {
             let (i, j) = (sight.camera, sight.point);
-            let (r, by_camera, by_point) = residual(&problem.cameras[i], &problem.points[j], sight);
-            let weight = 1.0 / (1.0 + r.norm_squared() / (problem.scale * problem.scale));
+            let (r, by_camera, by_point) = reprojection(&cameras[i], &points[j], &sight.image);
+            let square = sight.pixels * sight.pixels;
+            let weight = square / (1.0 + square * r.norm_squared() / (problem.scale * problem.scale));
             let weighted = weight * by_camera.transpose();
             all.cameras[i].0 += weighted * by_camera;
             all.cameras[i].1 += weighted * r;
@@ -62,17 +43,17 @@ impl NormalEquations {
             all.points[j].1 += weight * by_point.transpose() * r;
             all.crosses[j].push((i, weighted * by_point));
         }
-        all.pin_scales(problem);
+        all.pin_scales(cameras, points);
         all
     }
 
     /// The norms of cameras and points are free; a weight like that of their other directions keeps them.
-    fn pin_scales(&mut self, problem: &Problem) {
-        for ((matrix, _), camera) in self.cameras.iter_mut().zip(&problem.cameras) {
+    fn pin_scales(&mut self, cameras: &[Matrix3x4<f64>], points: &[Vector4<f64>]) {
+        for ((matrix, _), camera) in self.cameras.iter_mut().zip(cameras) {
             let own = CameraVector::from_fn(|k, _| camera[(k / 4, k % 4)]);
             *matrix += own * own.transpose() * (matrix.trace() / CAMERA as f64);
         }
-        for ((matrix, _), point) in self.points.iter_mut().zip(&problem.points) {
+        for ((matrix, _), point) in self.points.iter_mut().zip(points) {
             *matrix += point * point.transpose() * (matrix.trace() / 4.0);
         }
     }
@@ -102,25 +83,24 @@ impl NormalEquations {
     /// The steps of the cameras: (U - W V^{-1} W') a = b - W V^{-1} c.
     fn reduced(&self, inverses: &[Matrix4<f64>]) -> Option<Vec<CameraVector>> {
         let side = CAMERA * self.cameras.len();
-        let mut matrix = vec![0.0; side * side];
-        let mut rhs: Vec<f64> = self.cameras.iter().flat_map(|(_, b)| b.iter().copied()).collect();
-        let mut add = |i: usize, k: usize, block: &CameraMatrix, sign: f64| {
-            for (row, column) in (0..CAMERA).flat_map(|r| (0..CAMERA).map(move |c| (r, c))) {
-                matrix[(i * CAMERA + row) * side + k * CAMERA + column] += sign * block[(row, column)];
-            }
-        };
-        for (i, (block, _)) in self.cameras.iter().enumerate() {
-            add(i, i, block, 1.0);
+        let (mut matrix, mut rhs) = (Mat::zeros(side, side), Mat::zeros(side, 1));
+        for (i, (block, b)) in self.cameras.iter().enumerate() {
+            let at = i * CAMERA;
+            matrix.fixed_view_mut::<CAMERA, CAMERA>(at, at).copy_from(block);
+            rhs.fixed_view_mut::<CAMERA, 1>(at, 0).copy_from(b);
         }
         for ((seen, inverse), (_, c)) in self.crosses.iter().zip(inverses).zip(&self.points) {
             for (i, w) in seen {
                 let eliminated = w * inverse;
-                seen.iter().for_each(|(k, other)| add(*i, *k, &(eliminated * other.transpose()), -1.0));
-                let change = eliminated * c;
-                (0..CAMERA).for_each(|row| rhs[i * CAMERA + row] -= change[row]);
+                for (k, other) in seen {
+                    let mut block = matrix.fixed_view_mut::<CAMERA, CAMERA>(i * CAMERA, k * CAMERA);
+                    block -= eliminated * other.transpose();
+                }
+                let mut change = rhs.fixed_view_mut::<CAMERA, 1>(i * CAMERA, 0);
+                change -= eliminated * c;
             }
         }
-        let steps = linear::positive_solution(&matrix, &rhs)?;
-        Some(steps.chunks_exact(CAMERA).map(CameraVector::from_column_slice).collect())
+        let steps = solve_positive(&matrix, &rhs).ok()?;
+        Some(steps.as_slice().chunks_exact(CAMERA).map(CameraVector::from_column_slice).collect())
     }
 }

@@ -1,9 +1,9 @@
 //! Bundle adjustment against exact data, differences, and the number of free directions.
 
-use super::normal::residual;
 use super::*;
 use crate::uncalibrated::fundamental::tests::Synthetic;
 use crate::uncalibrated::random::dice::Dice;
+use crate::uncalibrated::refine::reprojection;
 
 const NOISE: f64 = 0.5;
 
@@ -99,14 +99,14 @@ fn mistakes_hardly_count() {
 #[test]
 fn the_derivatives_are_those_of_differences() {
     let (bundle, mut dice) = (exact(5), Dice::new(6));
-    let problem = Frame::of(&bundle).unwrap().normalised(&bundle, 1.0);
+    let (problem, (cameras, points)) = Frame::of(&bundle).unwrap().normalised(&bundle, 1.0);
     let h = 1e-6;
     for sight in &problem.observations {
-        let (camera, point) = (problem.cameras[sight.camera], problem.points[sight.point]);
-        let (_, by_camera, by_point) = residual(&camera, &point, sight);
+        let (camera, point) = (cameras[sight.camera], points[sight.point]);
+        let (_, by_camera, by_point) = reprojection(&camera, &point, &sight.image);
         let step = Matrix3x4::from_fn(|_, _| dice.normal());
         let ahead = Vector4::from_fn(|_, _| dice.normal());
-        let change = |t: f64| residual(&(camera + step * t), &(point + ahead * t), sight).0;
+        let change = |t: f64| reprojection(&(camera + step * t), &(point + ahead * t), &sight.image).0;
         // The residual falls when the image moves.
         let found = (change(-h) - change(h)) / (2.0 * h);
         let rows = nalgebra::SVector::<f64, 12>::from_fn(|k, _| step[(k / 4, k % 4)]);

@@ -6,7 +6,7 @@ use crate::uncalibrated::canonical::canonical_pair;
 use crate::uncalibrated::fundamental::eight_point;
 use crate::uncalibrated::random::dice::Dice;
 use crate::uncalibrated::triangulate::triangulate;
-use nalgebra::Rotation3;
+use nalgebra::{Rotation3, Vector3};
 
 const SIZE: (usize, usize) = (640, 480);
 
@@ -85,7 +85,7 @@ fn pair(kind: Kind, seed: u64) -> Option<(Vec<Vote>, f64)> {
         .map(|(m, d)| [depth / d, m.first.x / 500.0, m.first.y / 500.0, 1.0])
         .collect();
     let chi: Vec<f64> = points.iter().map(|p| chirality::chi(&projective[0], p)).collect();
-    let sign = linear::least_squares(&rows, &chi)?[0].signum();
+    let sign = hybank_linalg::small::least_squares(&rows, &chi)?[0].signum();
     Some((votes(&f, &matches, &points, &projective[0], [SIZE; 2]), sign))
 }
 

@@ -1,18 +1,109 @@
-//! What `bound` prints.
+//! `hybank-ibr bound`: the error of the virtual views, predicted from the inputs alone.
 
-use crate::analysis::{Advice, AnotherView};
-use crate::analysis::{Cause, Totals, ViewError};
-use crate::cli::failure::Failure;
-use crate::cli::{inputs, output};
-use crate::image::{Image, quality};
-use crate::pipeline::Agreement;
+use super::arguments::BoundArguments;
+use super::failure::{Failure, failed};
+use super::output::{self, Encoded, Outputs, Part, check_files};
+use super::progress::Progress;
+use super::{heat, inputs};
+use crate::analysis::{Cause, Predicted, Predictor, Totals, ViewError};
+use crate::files::refuse_pixels_without_memory;
+use crate::image::{Image, Levels, quality};
+use crate::pipeline::{Agreement, RenderError, Watch};
+use crate::scene::{Kind, Scene, SourceView};
 use hybank::messages::Quoted;
 use serde::Serialize;
 use std::path::Path;
 
+pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
+    arguments.scene.check()?;
+    let outputs = Outputs::of(&[(Part::Map, arguments.map.as_ref())]);
+    outputs.check(Levels::Eight, arguments.force)?;
+    let progress = Progress::new(3);
+    progress.step("reading");
+    let (scene, files) = read(arguments, outputs, &|share| progress.within(share))?;
+    let truth = arguments.scene.truth()?;
+    progress.step("calibrating");
+    let job = Job { arguments, scene: &scene, files, truth, progress };
+    match &scene.kind {
+        Kind::Rectified { views, positions } => job.predict(views, positions, views[0].image.size()),
+        Kind::Calibrated { views, cameras, size } => job.predict(views, cameras, *size),
+        Kind::Uncalibrated { .. } => Err(failed(RenderError::NoViews)),
+    }
+}
+
+/// What was asked for and read.
+struct Job<'a> {
+    arguments: &'a BoundArguments,
+    scene: &'a Scene,
+    /// Those of each virtual view.
+    files: Vec<Outputs>,
+    truth: Option<Image>,
+    progress: Progress,
+}
+
+impl Job<'_> {
+    /// Predicts the views of `cameras`, writes their files and prints the report.
+    fn predict<P: Predicted>(
+        self,
+        views: &[SourceView<P>],
+        cameras: &[P],
+        size: (usize, usize),
+    ) -> Result<(), Failure> {
+        let Self { arguments, scene, files, truth, progress } = self;
+        let named = |e: RenderError| failed(e).in_file(&arguments.scene.file);
+        let views: Vec<_> = views.iter().map(SourceView::view).collect();
+        let predictor = Predictor::new(&views, &arguments.scene.settings(scene.offset)).map_err(named)?;
+        progress.step("predicting");
+        let (mut summaries, mut written) = (Vec::new(), Vec::new());
+        for (frame, (camera, outputs)) in cameras.iter().zip(&files).enumerate() {
+            let predicted = predictor.at(camera, size).map_err(named)?;
+            let mut summary = Summary::new(&predicted, predictor.agreement(), &scene.outliers);
+            summary.measure(&predicted, truth.as_ref(), arguments.scene.truth.as_deref())?;
+            for (_, path) in &outputs.parts {
+                let (encoded, white) = map(&predicted, path)?;
+                summary.white = white;
+                written.extend(output::begin(&[encoded], arguments.force)?);
+            }
+            summaries.push(summary);
+            progress.within((frame + 1) as f64 / cameras.len() as f64);
+        }
+        output::commit(written)?;
+        drop(progress);
+        inputs::warn_of_contradictions(predictor.agreement(), &scene.kind);
+        print(summaries, predictor.agreement(), arguments.scene.json)
+    }
+}
+
+/// The scene, and the files of each of its virtual views.
+fn read(
+    arguments: &BoundArguments,
+    outputs: Outputs,
+    watch: Watch<'_>,
+) -> Result<(Scene, Vec<Outputs>), Failure> {
+    let source = arguments.scene.source()?;
+    let files = outputs.of_frames(source.frames(&arguments.scene));
+    check_files(&files, None, &source, &arguments.scene, arguments.force)?;
+    let scene = arguments.scene.load(&source, true, watch)?;
+    arguments.scene.refuse_what_has_no_prediction(&scene)?;
+    Ok((scene, files))
+}
+
+/// A picture of the estimate and the estimate that is white in it, or the three numbers of every pixel as a
+/// float map.
+fn map<'a>(predicted: &ViewError, path: &'a Path) -> Result<(Encoded<'a>, Option<f32>), Failure> {
+    let size = predicted.rendering.image.size();
+    // A picture or three numbers per pixel, and the file.
+    refuse_pixels_without_memory(path, size, 36.0).map_err(failed)?;
+    heat::encoded(&predicted.estimate, size, path, || {
+        let pixels = predicted.local_limit.iter().zip(&predicted.expected).zip(&predicted.estimate);
+        let data = pixels.flat_map(|((limit, expected), estimate)| [*limit, *expected, *estimate]).collect();
+        Image::from_values(size, 3, data)
+    })
+}
+
 /// The prediction for one virtual view, in grey levels unless named.
 #[derive(Debug, Serialize)]
-pub(super) struct Summary {
+struct Summary {
     totals: Totals,
     causes: Vec<CauseShare>,
     dominant: Cause,
@@ -28,10 +119,8 @@ pub(super) struct Summary {
     /// that of the relative errors of depth.
     disparity_noise: f64,
     /// Estimate that is white in the picture of --map.
-    pub(super) white: Option<f32>,
+    white: Option<f32>,
     measured: Option<Measured>,
-    /// What would make the estimate smaller; of several views that of the largest estimate has it.
-    pub(super) advice: Option<Advice>,
     rows: Vec<Totals>,
 }
 
@@ -64,7 +153,7 @@ const MEND_DEPTH_FIRST: &str = "depth without outliers: those were replaced by g
 const MANY_OUTLIERS: f64 = 0.01;
 
 impl Summary {
-    pub(super) fn new(predicted: &ViewError, agreement: &Agreement, outliers: &[f64]) -> Self {
+    fn new(predicted: &ViewError, agreement: &Agreement, outliers: &[f64]) -> Self {
         let outliers = outliers.iter().sum::<f64>() / outliers.len().max(1) as f64;
         let share = |(cause, error)| CauseShare { cause, error };
         let dominant = predicted.dominant();
@@ -84,13 +173,12 @@ impl Summary {
             disparity_noise: predicted.calibration.disparity_noise,
             white: None,
             measured: None,
-            advice: None,
             rows: predicted.rows(),
         }
     }
 
     /// Compares the prediction with a photograph, if there is one.
-    pub(super) fn measure(
+    fn measure(
         &mut self,
         predicted: &ViewError,
         truth: Option<&Image>,
@@ -125,26 +213,11 @@ impl Summary {
             lines.push(format!("outliers  {:.1} % of the depths", 100.0 * self.outliers));
         }
         lines.push(format!("next      {}", self.remedy));
-        lines.extend(self.advice.as_ref().filter(|_| self.inputs_agree != Some(false)).map(advice));
         lines.push(inputs::weights_line(self.calibrated_on));
         lines.extend(inputs::line(agreement));
         lines.extend(self.measured.as_ref().map(measured));
         lines.join("\n") + "\n"
     }
-}
-
-/// How much the estimate falls.
-fn advice(advice: &Advice) -> String {
-    let mut parts = vec![format!("{:?} errors halved {:.2}", advice.cause, advice.halved).to_lowercase()];
-    parts.extend(advice.depth_bit.map(|falls| format!("one more bit of depth {falls:.2}")));
-    parts.push(match &advice.view {
-        Some(AnotherView { place, falls }) => {
-            let place: Vec<String> = place.iter().map(|x| format!("{x:.3}")).collect();
-            format!("one more view at {} {falls:.2}", place.join(", "))
-        }
-        None => "one more view 0".into(),
-    });
-    format!("gains     the estimate falls by: {}", parts.join("; "))
 }
 
 fn measured(m: &Measured) -> String {
@@ -159,22 +232,26 @@ fn measured(m: &Measured) -> String {
 
 /// The predictions for all virtual views of a scene.
 #[derive(Debug, Serialize)]
-pub(super) struct Frames {
+struct Frames {
     #[serde(rename = "frames")]
-    pub(super) summaries: Vec<Summary>,
+    summaries: Vec<Summary>,
     /// The view with the largest estimate, by number from 0.
-    pub(super) worst: usize,
+    worst: usize,
+}
+
+/// Prints one view, or a line for each of several and the worst of them.
+fn print(summaries: Vec<Summary>, agreement: &Agreement, json: bool) -> Result<(), Failure> {
+    if let [one] = summaries.as_slice() {
+        return output::report(json, one, || one.text(agreement), None);
+    }
+    let estimates = summaries.iter().map(|summary| summary.totals.estimate).enumerate();
+    // The first of equal ones.
+    let worst = estimates.rev().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(worst, _)| worst);
+    let frames = Frames { summaries, worst };
+    output::report(json, &frames, || frames.text(agreement), None)
 }
 
 impl Frames {
-    /// Prints one view, or a line for each of several and the worst of them.
-    pub(super) fn print(&self, agreement: &Agreement, json: bool) -> Result<(), Failure> {
-        match self.summaries.as_slice() {
-            [one] => output::report(json, one, || one.text(agreement), None),
-            _ => output::report(json, self, || self.text(agreement), None),
-        }
-    }
-
     fn text(&self, agreement: &Agreement) -> String {
         let line =
             |(k, s): (usize, &Summary)| format!("view {:4}  estimate {:.2}\n", k + 1, s.totals.estimate);
