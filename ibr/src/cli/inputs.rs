@@ -12,7 +12,9 @@ pub(super) fn notes(scene: &Scene) {
 /// Warns of every pair of views that agrees in too few points, and names the keys to check.
 pub(super) fn warn_of_contradictions(agreement: &Agreement, kind: &Kind) {
     let suspects = match kind {
-        Kind::Rectified { .. } => "positions (swapped?), disparity_scale and disparity_offset",
+        Kind::Rectified { .. } => {
+            "positions (swapped?), disparity_scale and disparity_offset, and whether they are rectified"
+        }
         _ => "cameras and depth_scale",
     };
     for pair in agreement.pairs.iter().filter(|p| p.is_poor()) {
