@@ -1,5 +1,7 @@
 //! The list of propagated samples, which connects the three stages.
 
+use crate::depth::Origin;
+
 /// One pixel of an actual view, seen from the virtual camera; C = 1 (grey) or 3 (RGB).
 ///
 /// Positions are f64; the rest is f32, which keeps the list at 48 bytes per sample.
@@ -26,8 +28,8 @@ pub struct Sample<const C: usize> {
     pub view: u16,
     /// Whether the depth is a guess, or the colour may be mixed with that of a nearer surface.
     pub doubtful: bool,
-    /// Whether the depth is a guess: it was filled from its neighbours.
-    pub guessed: bool,
+    /// Where the depth comes from.
+    pub origin: Origin,
 }
 
 #[cfg(test)]
@@ -43,7 +45,7 @@ impl<const C: usize> Sample<C> {
         pixel: 0,
         view: 0,
         doubtful: false,
-        guessed: false,
+        origin: Origin::Known,
     };
 }
 

@@ -145,19 +145,18 @@ impl Inner {
         let whole = |v: f64| (1.0..=LARGEST).contains(&v) && v.fract() == 0.0;
         let positive = |v: f64| v > 0.0 && v <= LARGEST;
         let angle = |v: f64| v > 1e-6 && v < std::f64::consts::PI;
-        let checks: [(&str, Option<f64>, &dyn Fn(f64) -> bool, &str); 6] = [
-            ("w", self.w, &whole, "a whole number of pixels"),
-            ("h", self.h, &whole, "a whole number of pixels"),
-            ("fl_x", self.fl_x, &positive, "a positive number of pixels"),
-            ("fl_y", self.fl_y, &positive, "a positive number of pixels"),
-            ("camera_angle_x", self.camera_angle_x, &angle, "between 0 and pi (radians)"),
-            ("camera_angle_y", self.camera_angle_y, &angle, "between 0 and pi (radians)"),
-        ];
-        for (name, given, holds, rule) in checks {
-            if let Some(value) = given.filter(|value| !holds(*value)) {
-                return Err(format!("{name} = {value}: it must be {rule}"));
-            }
-        }
+        let check = |name: &str, given: Option<f64>, holds: fn(f64) -> bool, rule: &str| match given
+            .filter(|value| !holds(*value))
+        {
+            Some(value) => Err(format!("{name} = {value}: it must be {rule}")),
+            None => Ok(()),
+        };
+        check("w", self.w, whole, "a whole number of pixels")?;
+        check("h", self.h, whole, "a whole number of pixels")?;
+        check("fl_x", self.fl_x, positive, "a positive number of pixels")?;
+        check("fl_y", self.fl_y, positive, "a positive number of pixels")?;
+        check("camera_angle_x", self.camera_angle_x, angle, "between 0 and pi (radians)")?;
+        check("camera_angle_y", self.camera_angle_y, angle, "between 0 and pi (radians)")?;
         Ok(self)
     }
 }

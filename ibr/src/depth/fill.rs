@@ -3,7 +3,7 @@
 //! What no camera or matcher found is mostly background: the farther of the neighbours. So a guess hides
 //! nothing that is known, and it shows only where nothing else does.
 
-use super::{DepthMap, Measure};
+use super::{DepthMap, Measure, Origin};
 
 /// Gives unknown pixels of disparity the farther of the nearest known values to their left and right, since
 /// a rig says nothing across its rows, and unknown depths the farthest of the nearest ones in the row and in
@@ -33,8 +33,11 @@ pub fn fill_unknown(map: &mut DepthMap) -> usize {
         let filled: Vec<bool> = map.data.chunks_exact(map.width).map(|row| !row[0].is_nan()).collect();
         fill_empty_rows(&filled, &mut map.data);
     }
-    let filled = |(was_unknown, v): (bool, &f32)| was_unknown && !v.is_nan();
-    map.guessed = was_unknown.into_iter().zip(&map.data).map(filled).collect();
+    let origin = |(was_unknown, v): (bool, &f32)| match was_unknown && !v.is_nan() {
+        true => Origin::Filled,
+        false => Origin::Known,
+    };
+    map.origins = was_unknown.into_iter().zip(&map.data).map(origin).collect();
     unknown - map.unknown()
 }
 

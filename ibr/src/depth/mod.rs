@@ -92,6 +92,25 @@ pub(crate) fn or_far(depth: f64) -> f64 {
     if depth >= f64::from(FAR_FROM) { f64::from(FAR) } else { depth }
 }
 
+/// Where a depth comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Origin {
+    /// The map has it.
+    #[default]
+    Known,
+    /// The map has an outlier there; its neighbours gave this value.
+    Replaced,
+    /// It was unknown, and its neighbours gave it. It hides nothing.
+    Filled,
+}
+
+impl Origin {
+    /// Whether its neighbours gave it.
+    pub fn is_guess(self) -> bool {
+        self != Self::Known
+    }
+}
+
 /// A map of depths or disparities with NaN for unknown. Known depths are positive, and [`FAR`] at most;
 /// known disparities are finite, and negative behind the point at which converged cameras look.
 #[derive(Debug, Clone)]
@@ -102,8 +121,8 @@ pub struct DepthMap {
     data: Vec<f32>,
     /// Added to a disparity, it gives a positive number in inverse proportion to depth; 0 for depths.
     offset: f64,
-    /// Which values were filled from their neighbours; empty if none was.
-    guessed: Vec<bool>,
+    /// Where the values come from; empty if the map has all of them.
+    origins: Vec<Origin>,
 }
 
 impl DepthMap {
@@ -167,14 +186,20 @@ impl DepthMap {
         self.offset
     }
 
-    /// Whether a value was filled from its neighbours.
+    /// Where a value comes from.
+    #[inline]
+    pub fn origin(&self, pixel: usize) -> Origin {
+        self.origins.get(pixel).copied().unwrap_or_default()
+    }
+
+    /// Whether a value was taken from its neighbours.
     #[inline]
     pub fn is_guessed(&self, pixel: usize) -> bool {
-        self.guessed.get(pixel).copied().unwrap_or(false)
+        self.origin(pixel).is_guess()
     }
 
     pub(crate) fn guesses(&self) -> usize {
-        self.guessed.iter().filter(|guessed| **guessed).count()
+        self.origins.iter().filter(|origin| origin.is_guess()).count()
     }
 
     /// Width in values.
@@ -264,7 +289,7 @@ impl DepthMap {
     pub(crate) fn from_known((width, height): (usize, usize), data: Vec<f32>, measure: Measure) -> Self {
         assert_eq!(data.len(), width * height);
         let offset = if measure == Measure::Disparity { guessed_offset(&data) } else { 0.0 };
-        Self { width, height, measure, data, offset, guessed: Vec::new() }
+        Self { width, height, measure, data, offset, origins: Vec::new() }
     }
 
     /// The same map with changed values, all of which stay before the camera: a tenth of their disparity or
@@ -275,11 +300,14 @@ impl DepthMap {
         map
     }
 
-    /// The same map, in which the guesses of another one and some more values are guesses.
-    pub(crate) fn with_guessed(mut self, before: &Self, also: &[bool]) -> Self {
-        let is_guessed = |p: usize| before.is_guessed(p) || also.get(p).copied().unwrap_or(false);
-        if !(before.guessed.is_empty() && also.is_empty()) {
-            self.guessed = (0..self.data.len()).map(is_guessed).collect();
+    /// The same map, in which values have the origin that they have in another one, and some more this one.
+    pub(crate) fn with_origins(mut self, before: &Self, also: &[bool], origin: Origin) -> Self {
+        let of = |p: usize| match also.get(p) {
+            Some(true) if !before.is_guessed(p) => origin,
+            _ => before.origin(p),
+        };
+        if !(before.origins.is_empty() && also.is_empty()) {
+            self.origins = (0..self.data.len()).map(of).collect();
         }
         self
     }
@@ -295,7 +323,7 @@ impl PartialEq for DepthMap {
     fn eq(&self, other: &Self) -> bool {
         let bits = |map: &Self| (map.width, map.height, map.measure, map.offset.to_bits());
         let values = |map: &Self| map.data.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
-        bits(self) == bits(other) && values(self) == values(other) && self.guessed == other.guessed
+        bits(self) == bits(other) && values(self) == values(other) && self.origins == other.origins
     }
 }
 

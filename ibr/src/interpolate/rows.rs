@@ -189,7 +189,7 @@ fn mark<const C: usize>(samples: &[Sample<C>], settings: &Settings, mask: &mut [
         let gap = pair[1].x - pair[0].x;
         if gap > GAP && one_surface(&pair[0], &pair[1], settings) {
             let near = gap <= 2.0 * reach(&pair[0]).max(reach(&pair[1]));
-            let seen = if pair[0].guessed || pair[1].guessed { Cover::Guessed } else { Cover::Seen };
+            let seen = if pair.iter().any(|s| s.origin.is_guess()) { Cover::Guessed } else { Cover::Seen };
             let cover = if near { seen } else { Cover::Crack };
             let end = ((pair[1].x + 1.0) as usize).min(mask.len());
             let start = (pair[0].x.max(0.0).ceil() as usize).min(end);
@@ -197,7 +197,7 @@ fn mark<const C: usize>(samples: &[Sample<C>], settings: &Settings, mask: &mut [
         }
     }
     for (is_guess, cover) in [(true, Cover::Guessed), (false, Cover::Seen)] {
-        let mut ahead = samples.iter().filter(|s| s.guessed == is_guess).peekable();
+        let mut ahead = samples.iter().filter(|s| s.origin.is_guess() == is_guess).peekable();
         let mut behind = None;
         for (j, pixel) in mask.iter_mut().enumerate() {
             let x = j as f64;
@@ -224,7 +224,7 @@ pub fn nearest_depths<const C: usize>(samples: &[Sample<C>], depths: &mut [f32])
             next += 1;
         }
         let sides = [next.checked_sub(1), Some(next)].into_iter().flatten().filter_map(|i| samples.get(i));
-        let within = sides.filter(|s| !s.guessed && (s.x - x).abs() <= reach(s.spacing));
+        let within = sides.filter(|s| !s.origin.is_guess() && (s.x - x).abs() <= reach(s.spacing));
         let nearest = within.min_by(|a, b| (a.x - x).abs().total_cmp(&(b.x - x).abs()));
         *depth = nearest.map_or(f32::NAN, |s| s.depth);
     }

@@ -172,6 +172,7 @@ impl Search<'_> {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::depth::Origin;
     use crate::sample::Sample;
     use proptest::prelude::*;
 
@@ -250,8 +251,9 @@ pub(crate) mod tests {
                 .iter()
                 .map(|(x, y, d, spacing)| {
                     let depth = if coarse { d.round() } else { *d };
-                    let (spacing, guessed) = (if wide { *spacing } else { 1.0 }, *spacing > 9.0);
-                    Sample { spacing, guessed, ..sample(position(*x), position(*y), depth) }
+                    let origin = if *spacing > 9.0 { Origin::Filled } else { Origin::Known };
+                    let spacing = if wide { *spacing } else { 1.0 };
+                    Sample { spacing, origin, ..sample(position(*x), position(*y), depth) }
                 })
                 .collect();
             check(&samples, &DepthTest { epsilon: position(epsilon).max(0.5), relative, absolute: 0.1, parallax });

@@ -1,8 +1,8 @@
 //! Stage two, occlusion removal: a sample behind another one at nearly the same position is removed (thesis
 //! 2.3.2).
 //!
-//! With P the set of propagated samples, x in P is removed if and only if there is a y in P, whose depth is
-//! no guess, with
+//! With P the set of propagated samples, x in P is removed if and only if there is a y in P, whose depth was
+//! not unknown, with
 //!
 //! ```text
 //! ||x - y||_2 <= epsilon(y)   and   d(x) - d(y) >= sigma(y),   sigma(y) = relative d(y) + absolute
@@ -98,6 +98,7 @@ impl DepthTest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::depth::Origin;
     use crate::sample::Sample;
 
     impl DepthTest {
@@ -105,7 +106,7 @@ mod tests {
         pub(crate) fn hidden_by_definition<const C: usize>(&self, samples: &[Sample<C>]) -> Vec<bool> {
             let hidden = |x: &Sample<C>| {
                 samples.iter().any(|y| {
-                    !y.guessed
+                    y.origin != Origin::Filled
                         && Self::close(x.x - y.x, x.y - y.y, self.radius(y.spacing))
                         && self.hides(f64::from(y.depth), f64::from(x.depth))
                 })

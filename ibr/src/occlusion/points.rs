@@ -1,5 +1,6 @@
 //! What the depth test needs of samples, as arrays.
 
+use crate::depth::Origin;
 use crate::sample::Sample;
 
 /// Points whose bounds are found together.
@@ -17,8 +18,8 @@ pub(crate) struct Points {
     pub(crate) spacing: Vec<f32>,
     /// Whether the depth test decides on the sample. The others may hide it and are not looked at.
     pub(crate) own: Vec<bool>,
-    /// Whether the depth is a guess, by which the sample hides no other.
-    pub(crate) guessed: Vec<bool>,
+    /// Where the depth comes from.
+    pub(crate) origin: Vec<Origin>,
 }
 
 impl Points {
@@ -35,7 +36,7 @@ impl Points {
         self.y.extend(samples.clone().map(|s| s.y));
         self.depth.extend(samples.clone().map(|s| s.depth));
         self.spacing.extend(samples.clone().map(|s| s.spacing));
-        self.guessed.extend(samples.map(|s| s.guessed));
+        self.origin.extend(samples.map(|s| s.origin));
         self.own.resize(self.x.len(), true);
         self.resize(self.x.len().next_multiple_of(RUN));
     }
@@ -51,6 +52,6 @@ impl Points {
         self.depth.resize(count, f32::NAN);
         self.spacing.resize(count, f32::NAN);
         self.own.resize(count, false);
-        self.guessed.resize(count, false);
+        self.origin.resize(count, Origin::Known);
     }
 }

@@ -104,6 +104,7 @@ pub fn remove_in_row<const C: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::depth::Origin;
     use proptest::prelude::*;
 
     fn sample(x: f64, depth: f32, pixel: u32) -> Sample<1> {
@@ -185,7 +186,7 @@ mod tests {
                 .enumerate()
                 .map(|(i, (x, d, spacing))| Sample {
                     spacing: if wide { *spacing } else { 1.0 },
-                    guessed: *spacing > 9.0,
+                    origin: if *spacing > 9.0 { Origin::Filled } else { Origin::Known },
                     ..sample(position(*x), depth(*d), i as u32)
                 })
                 .collect();

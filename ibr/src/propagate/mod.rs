@@ -129,8 +129,8 @@ pub fn rectified_row<const C: usize>(
                 continue;
             }
             let stretch = (1.0 + shift * f64::from(reliefs.across[i])).abs();
-            let guessed = view.map.is_guessed(pixel);
-            let doubtful = reliefs.behind_edge[i] || guessed;
+            let origin = view.map.origin(pixel);
+            let doubtful = reliefs.behind_edge[i] || origin.is_guess();
             samples.push(Sample {
                 x,
                 y: y as f64,
@@ -141,7 +141,7 @@ pub fn rectified_row<const C: usize>(
                 pixel: pixel as u32,
                 view: index,
                 doubtful,
-                guessed,
+                origin,
             });
         }
     }

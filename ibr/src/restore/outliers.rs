@@ -4,7 +4,7 @@
 //! them. One in a cluster agrees with some of them, and disagrees with what lies farther away, as a value on
 //! a thin thing does. It is rejected if no other view confirms it and one confirms what lies around it.
 
-use crate::depth::{DepthMap, JUMP, Measure};
+use crate::depth::{DepthMap, JUMP, Measure, Origin};
 use crate::image::Image;
 use crate::pipeline::{Agreement, GREY_LEVELS};
 use crate::propagate::{View, Viewpoint};
@@ -89,7 +89,7 @@ impl Parallax {
     }
 
     /// The map with these values. Where nothing changed it has the bits that it had.
-    pub(super) fn into_map(self, before: &DepthMap, guessed: Vec<bool>) -> DepthMap {
+    pub(super) fn into_map(self, before: &DepthMap, replaced: Vec<bool>) -> DepthMap {
         let measure = before.measure();
         let value = |(now, was): (&f32, &f32)| match measure.parallax(*was).to_bits() == now.to_bits() {
             true => *was,
@@ -97,7 +97,7 @@ impl Parallax {
             false => measure.of_parallax(*now),
         };
         let data = self.values.iter().zip(before.data()).map(value).collect();
-        before.with_values(before.size(), data).with_guessed(before, &guessed)
+        before.with_values(before.size(), data).with_origins(before, &replaced, Origin::Replaced)
     }
 
     #[inline]
@@ -245,9 +245,9 @@ impl<'a, P: Viewpoint> Known<'a, P> {
         Self { views, planes, voters: voters(&agreement.groups()), agreement }
     }
 
-    /// Which values of a view are outliers: few neighbours agree with them, or they lie between the sides of
-    /// an edge, and not more of the other views confirm them than see through them; or they lie in a cluster
-    /// of outliers.
+    /// Which values of a view are outliers: few neighbours agree with them, and not more of the other views
+    /// confirm them than see through them; or they lie between the sides of an edge, and more of the other
+    /// views see through them; or they lie in a cluster of outliers.
     pub(super) fn rejected(&self, index: usize) -> Vec<bool> {
         let (map, plane, votes) = (self.views[index].map, &self.planes[index], self.ballot(index));
         let is_outlier = |p: usize| {
@@ -255,13 +255,13 @@ impl<'a, P: Viewpoint> Known<'a, P> {
             if value.is_nan() || map.is_guessed(p) {
                 return false;
             }
-            let outvoted_by =
-                |least: i32| votes(p, value).into_iter().map(Vote::count).sum::<i32>() <= -least;
+            let balance = || votes(p, value).into_iter().map(Vote::count).sum::<i32>();
             match plane.is_supported(p, 1, SUPPORTERS) {
-                // Steep surfaces have such values too, which no view sees through.
-                true if plane.is_between(p) => outvoted_by(1),
+                false => balance() <= 0,
+                // Rigs have few such values, and their medians take them to one side. Steep surfaces have
+                // some too, which no view sees through.
+                true if map.measure() == Measure::Depth && plane.is_between(p) => balance() < 0,
                 true => self.is_in_cluster(index, p, RING, &votes),
-                false => outvoted_by(0),
             }
         };
         (0..plane.values.len()).into_par_iter().with_min_len(1024).map(is_outlier).collect()

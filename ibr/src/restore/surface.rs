@@ -12,7 +12,7 @@
 //! are is what the last fit shows.
 
 use super::outliers::{Parallax, difference};
-use crate::depth::{DepthMap, Measure};
+use crate::depth::{DepthMap, Measure, Origin};
 use crate::image::Image;
 use crate::interpolate::Settings;
 use crate::interpolate::plane::{PlaneSettings, fit_surface};
@@ -123,7 +123,7 @@ pub(crate) fn from_scattered(map: &DepthMap, image: &Image) -> DepthMap {
     let dense = map.with_values(map.size(), shape.into_iter().map(|v| measure.of_parallax(v)).collect());
     // Rows go on where samples of guessed depth count little: on poster1 that would cost a decibel.
     let guessed = if measure == Measure::Depth { far_away(&lengths) } else { Vec::new() };
-    dense.with_guessed(map, &guessed)
+    dense.with_origins(map, &guessed, Origin::Filled)
 }
 
 /// Which pixels are so far from all samples, by the lengths of their paths, that their values are guesses.

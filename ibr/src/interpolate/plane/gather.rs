@@ -66,7 +66,7 @@ impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
                 let (dx, dy) = (s.x - column as f64, s.y - row as f64);
                 let squared = dx * dx + dy * dy;
                 let p = row * width + column - self.first;
-                let distance = squared as f32 + if s.guessed { GUESSED } else { 0.0 };
+                let distance = squared as f32 + if s.origin.is_guess() { GUESSED } else { 0.0 };
                 if squared <= half * half && distance < self.distance[p] {
                     (self.distance[p], self.depth[p]) = (distance, s.depth);
                 }

@@ -3,7 +3,7 @@
 use super::row_map::RowMap;
 use super::{CalibratedView, Frame, Tile};
 use crate::camera::Relative;
-use crate::depth::{Reliefs, TILE, or_far};
+use crate::depth::{Origin, Reliefs, TILE, or_far};
 use crate::occlusion::{Points, RUN};
 use crate::propagate::{DOUBTFUL_WEIGHT, GUESSED_WEIGHT, spacing, weight};
 use crate::sample::Sample;
@@ -44,13 +44,13 @@ impl Projected {
         let reliefs = view.map.reliefs(column, row);
         let mut places = Places::new(&RowMap::new(map, row), column, &depths, &reliefs, count);
         places.keep(frame, own, count);
-        let (mut doubtful, mut guessed) = (reliefs.behind_edge, [false; TILE]);
+        let (mut doubtful, mut origins) = (reliefs.behind_edge, [Origin::Known; TILE]);
         for i in 0..count.min(TILE) {
-            guessed[i] = view.map.is_guessed(first_pixel + i);
-            doubtful[i] |= guessed[i];
+            origins[i] = view.map.origin(first_pixel + i);
+            doubtful[i] |= origins[i].is_guess();
         }
         let spacings: [f32; TILE] = std::array::from_fn(|i| spacing(places.distance[i], reliefs.outline[i]));
-        let trust = |i: usize| match (guessed[i], doubtful[i]) {
+        let trust = |i: usize| match (origins[i].is_guess(), doubtful[i]) {
             (true, _) => GUESSED_WEIGHT,
             (_, true) => DOUBTFUL_WEIGHT,
             _ => 1.0,
@@ -65,7 +65,7 @@ impl Projected {
         points.spacing.extend_from_slice(&spacings[..count]);
         self.weights.extend_from_slice(&weights[..count]);
         self.doubtful.extend_from_slice(&doubtful[..count]);
-        points.guessed.extend_from_slice(&guessed[..count]);
+        points.origin.extend_from_slice(&origins[..count]);
     }
 
     pub(crate) fn points(&self) -> &Points {
@@ -98,7 +98,7 @@ impl Projected {
                     pixel,
                     view: tile.view,
                     doubtful: doubtful[i],
-                    guessed: points.guessed[i],
+                    origin: points.origin[i],
                 }
             };
             samples.extend((tile.first_place..end).filter(|i| points.own[*i]).map(sample));
@@ -120,6 +120,8 @@ struct Places {
 }
 
 impl Places {
+    // Indices, because these loops become vector instructions over all arrays.
+    #[allow(clippy::needless_range_loop)]
     fn new(row: &RowMap<'_>, column: usize, depths: &[f32; TILE], reliefs: &Reliefs, count: usize) -> Self {
         let [x, y, depth, distance, area] = [[f64::NAN; TILE]; 5];
         let mut places = Self { x, y, depth, distance, area, own: [false; TILE] };
