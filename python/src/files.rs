@@ -127,8 +127,8 @@ pub(crate) fn read<'py>(
     Ok(found)
 }
 
-/// Names the first input of another rate than that of the inputs before it; no bank is there to say whether it
-/// takes both.
+/// Names the first input of another rate than that of the inputs before it; no bank is there to say whether
+/// it takes both.
 fn other_rate(reader: &MultiReader) -> Option<String> {
     let mut rated = reader.headers().filter_map(|(name, header)| Some((name, header, header.rate?)));
     let (first, of_first, wanted): (_, &StreamHeader, _) = rated.next()?;

@@ -267,7 +267,8 @@ pub fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), InputMismatch
     }
 }
 
-/// Frames of one index belong together, so inputs that state their times begin within a sample of each other.
+/// Frames of one index belong together, so inputs that state their times begin within a sample of each
+/// other.
 fn check_begins<'a>(inputs: impl Iterator<Item = (&'a str, &'a StreamHeader)>) -> Result<(), InputMismatch> {
     let mut timed = inputs.filter_map(|(name, header)| Some((name, header.begin?, header.rate?)));
     let Some((other, begin, rate)) = timed.next() else { return Ok(()) };

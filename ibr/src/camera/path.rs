@@ -11,8 +11,9 @@ struct Parts {
 }
 
 impl Parts {
-    /// With the matrix E that exchanges the first and the last row, (E M)' = Q R gives M = (E R' E) (E Q'). The
-    /// signs are those of a rotation and of positive K_22 and K_33; in a left-handed world K_11 is negative.
+    /// With the matrix E that exchanges the first and the last row, (E M)' = Q R gives M = (E R' E) (E Q').
+    /// The signs are those of a rotation and of positive K_22 and K_33; in a left-handed world K_11 is
+    /// negative.
     fn of(camera: &Camera) -> Self {
         let exchange = Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
         let (q, r) = (exchange * camera.m()).transpose().qr().unpack();

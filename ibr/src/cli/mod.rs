@@ -60,8 +60,8 @@ fn in_pool(threads: Option<usize>, work: impl FnOnce() -> Result<(), Failure> + 
             .map_err(|error| Failure::Input(format!("--threads {threads}: {error}; ask for fewer"))),
         (count, None) => several(count).or_else(|_| alone()),
     }?;
-    // With the stacks of the threads, which are in use now. An allocation of text or a small table that fails
-    // would end the process.
+    // With the stacks of the threads, which are in use now. An allocation of text or a small table that
+    // fails would end the process.
     let refused = |shortage| format!("every command takes {shortage}; allow more, or use --threads 1");
     check_memory(LEAST_MEMORY).map_err(|shortage| failed(refused(shortage)))?;
     pool.install(work)

@@ -24,7 +24,8 @@ const RING_SUPPORTERS: usize = 3;
 /// pixels that near.
 const MIXED: isize = 2;
 
-/// Pixels over which a slanted surface goes on in a line, and what it may miss of it, as a share of its step.
+/// Pixels over which a slanted surface goes on in a line, and what it may miss of it, as a share of its
+/// step.
 const SLOPE: isize = 4;
 const STRAIGHT: f32 = 0.5;
 

@@ -29,8 +29,8 @@ pub(super) struct Phases<'a, V: Vector, const D: usize, const P: usize> {
 impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     /// Frames of a vector.
     const FRAMES: usize = V::LANES / D;
-    /// Vectors of the largest tile: as many as registers hold, and at most 6, as compilers spill more. Where each
-    /// frame has one lane the end of a tile needs registers too.
+    /// Vectors of the largest tile: as many as registers hold, and at most 6, as compilers spill more. Where
+    /// each frame has one lane the end of a tile needs registers too.
     const MOST: usize = {
         let (fit, most) = (V::SUMS / P, if P == 4 && D == 1 { 4 } else { 6 });
         if fit < most { fit } else { most }
