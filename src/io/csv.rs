@@ -163,7 +163,7 @@ impl<R: Read> Read for CsvReader<R> {
     }
 }
 
-/// The line whose time is least one usual step after that before it, and what is wrong with it.
+/// The line at the step that differs most from the usual one, and what is wrong with it.
 fn uneven(times: &[f64], lines: &[u64]) -> (u64, String) {
     let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let mut sorted = steps.clone();

@@ -150,7 +150,8 @@ fn clocks(ratio: f64) -> String {
         return String::new();
     }
     format!(
-        ". If it is only the clock that differs, leave out the column of time: the delays then drift by {error:.1e} s per second"
+        ". If it is only the clock that differs, give the recording without its rate (of a table, without the column of \
+         time): the delays then drift by {error:.1e} s per second"
     )
 }
 

@@ -2,7 +2,7 @@
 //! 2.3.2).
 //!
 //! With P the set of propagated samples, x in P is removed if and only if there is a y in P, whose depth was
-//! not unknown, with
+//! not filled in, with
 //!
 //! ```text
 //! ||x - y||_2 <= epsilon(y)   and   d(x) - d(y) >= sigma(y),   sigma(y) = relative d(y) + absolute

@@ -70,8 +70,8 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, Mem
             plane.smooth(view.image, view.map.measure());
         }
         let known = (plane.values.len() - view.map.unknown()).max(1);
-        let guessed = if count > 0 { rejected } else { Vec::new() };
-        let map = plane.into_map(view.map, guessed);
+        let replaced = if count > 0 { rejected } else { Vec::new() };
+        let map = plane.into_map(view.map, replaced);
         Ok(Restored { map, outliers: count as f64 / known as f64, error })
     };
     (0..views.len()).map(one).collect()

@@ -105,7 +105,7 @@ fn assert_is(found: &Alignment, recorders: &[Recorder], i: usize) {
     );
 }
 
-/// Delays 0.5 and 1.5 of ratio 2 meet after half a fast period at 10 ppm, as near as counts.
+/// Delays of 0.5 and 1.0 fast periods are together when the second has moved by 0.45.
 #[test]
 fn recorders_that_come_to_sample_at_one_instant_are_named() {
     let text = "fast_rate = 8000.0\nratio = 2\nlatency = 16\ntarget = { filter = { family = \"rc\", cutoff = 1500.0 } }\n\
