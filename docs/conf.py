@@ -20,7 +20,6 @@ include_patterns = [
     "examples/README.md",
     "filters/README.md",
     "ibr/README.md",
-    "playground/README.md",
 ]
 
 myst_heading_anchors = 3

@@ -1,5 +1,5 @@
 //! What reports show of a bank: its figures with their meaning, pictures, and what is doubtful about it.
-//! The commands `design`, `plot` and `report` and the page of `playground/` show it.
+//! The commands `design`, `plot` and `report` show it.
 //!
 //! ```
 //! use hybank::bank::Bank;
