@@ -7,6 +7,8 @@
 pub mod files;
 pub mod memory;
 pub mod messages;
+#[cfg(feature = "files")]
+pub mod npy;
 #[cfg(feature = "program")]
 pub mod program;
 pub mod quantity;
@@ -15,7 +17,7 @@ pub mod units;
 
 #[cfg(feature = "runtime")]
 pub mod bank;
-#[cfg(feature = "interchange")]
+#[cfg(feature = "runtime")]
 pub mod interchange;
 #[cfg(feature = "runtime")]
 pub mod io;
@@ -39,6 +41,8 @@ pub mod analog;
 pub(crate) mod arithmetic;
 #[cfg(feature = "design")]
 pub mod calibrate;
+#[cfg(feature = "design")]
+pub mod captures;
 #[cfg(feature = "design")]
 pub mod design;
 #[cfg(feature = "design")]

@@ -1,19 +1,19 @@
 //! `hybank align`: when recordings began, how their clocks drift, their polarities and gains.
 
 use super::bank_file::{parse_spec, read_kind};
-use super::calibrate::{records, reference};
+use super::calibrate::reference;
 use super::calibrate_report::{Interval, interval, periods, shown};
 use super::capture_args::{CaptureArgs, check_stdin};
-use super::capture_file::start;
+use super::capture_file::{start, unread};
 use super::file_kind::FileKind;
 use super::interrupt::interrupts;
 use super::print::{Failure, check_json, failed, failed_at, is_dash, say_understood, show, warn};
 use super::written::{Mono, begin_file, begin_recording, check_outputs, write_text, write_together};
 use hybank::calibrate::{CalibrateError, Record};
+use hybank::captures::Captures;
 use hybank::figures::Alone;
-use hybank::io::{Container, PcmFormat, ReadOptions, StreamHeader, is_same_rate};
-use hybank::messages::{Number, Quoted};
-use hybank::pipeline::matching::check_rate;
+use hybank::io::{Container, PcmFormat, ReadOptions};
+use hybank::pipeline::matching::{check_rate, common_rate};
 use hybank::quantity::{self, Time};
 use hybank::sine_fit::Estimate;
 use hybank::spec::{DesignOverrides, Spec};
@@ -23,8 +23,6 @@ use std::fmt::Write as _;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Bytes of memory for each sample: the sample, whether it is kept, and room to grow.
-const BYTES_PER_SAMPLE: f64 = 20.0;
 /// Hertz of recordings that state no rate, for a spec in normalised time.
 const NORMALISED_RATE: f64 = 48_000.0;
 
@@ -141,31 +139,24 @@ impl Args {
         if captures > channels {
             return Err(failed(CalibrateError::ChannelCount { channels, records: captures }));
         }
-        let options = self.reading.options(captures, channels);
-        let options = ReadOptions { full_scale: options.full_scale.or(spec.full_scale), ..options };
-        let (mut all, mut formats, mut common) = (Vec::new(), Vec::new(), None);
+        let own = self.reading.format().options(captures, channels);
+        let options = ReadOptions { full_scale: own.full_scale.or(spec.full_scale), ..own };
+        let (mut records, mut formats, mut headers) = (Vec::new(), Vec::new(), Vec::new());
         for path in &self.captures {
             let mut reader = start(std::slice::from_ref(path), options, interrupts())?;
             self.reading.scale.check(&reader)?;
             check_rate(spec, &reader).map_err(failed)?;
-            let Some((_, header)) = reader.headers().next() else { continue };
-            let (rate, error) = (rate_of(header, spec), header.rate_error);
-            let first: f64 = *common.get_or_insert(rate);
-            if !is_same_rate(rate, first, error) {
-                return Err(Failure::Input(format!(
-                    "{}: the sample rate is {} Hz, but {} has {} Hz; all recordings need the same rate",
-                    Quoted(path),
-                    Number(rate),
-                    Quoted(&self.captures[0]),
-                    Number(first)
-                )));
-            }
-            let format = header.layout.format;
-            let records = records(&mut reader, usize::MAX, BYTES_PER_SAMPLE, None, warnings)?;
-            formats.resize(formats.len() + records.len(), format);
-            all.extend(records);
+            let Some(header) = reader.headers().next().map(|(_, header)| *header) else { continue };
+            headers.push((path.display().to_string(), header));
+            let captures = Captures::read(&mut reader, usize::MAX).map_err(unread)?;
+            warnings.extend(reader.warnings().iter().map(ToString::to_string));
+            records.extend(captures.channels.iter().map(|channel| channel.record(None)));
+            formats.resize(records.len(), header.layout.format);
         }
-        Ok(Recordings { records: all, formats, rate: common.unwrap_or(NORMALISED_RATE) })
+        let stated = common_rate(headers.iter().map(|(name, header)| (name.as_str(), header)));
+        let slow = (spec.fast_period * spec.ratio as f64).rate().0;
+        let usual = if spec.is_normalised() { NORMALISED_RATE } else { slow };
+        Ok(Recordings { records, formats, rate: stated.map_err(failed)?.unwrap_or(usual) })
     }
 
     fn settings(&self, spec: &Spec, rate: f64) -> Result<AlignSettings, Failure> {
@@ -201,12 +192,6 @@ impl Args {
         write_together(folder, (0..trimmed.len()).map(Some).chain([None]).map(Ok), begin)?;
         if is_file { Ok(()) } else { write_text(&self.output, spec, self.force) }
     }
-}
-
-/// Hertz: as stated, or that of the spec.
-fn rate_of(header: &StreamHeader, spec: &Spec) -> f64 {
-    let slow = (spec.fast_period * spec.ratio as f64).rate().0;
-    header.rate.unwrap_or(if spec.is_normalised() { NORMALISED_RATE } else { slow })
 }
 
 impl Recordings {

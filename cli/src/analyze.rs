@@ -3,7 +3,7 @@
 use super::bank_file::load;
 use super::design_report::{against, figure_text};
 use super::design_studies::number;
-use super::plot::PictureFormat;
+use super::plot::is_svg;
 use super::print::{Failure, InFile, failed, is_dash, show};
 use super::written::{check_output, write_bytes};
 use hybank::design::uncertainty::{
@@ -327,13 +327,10 @@ fn rounded(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
 }
 
-/// Writes the file that `path` names: SVG or PNG if its extension says so, else CSV.
+/// Writes the file that `path` names: SVG if its extension says so, else CSV.
 fn write_sweep(sweep: &Sweep, path: &Path, force: bool) -> Result<(), Failure> {
-    let bytes = match PictureFormat::of(path) {
-        Some(format) => format.file(&chart(sweep)).map_err(failed)?,
-        None => csv(sweep).into_bytes(),
-    };
-    write_bytes(path, &bytes, force)
+    let text = if is_svg(path) { chart(sweep).to_svg().map_err(failed)? } else { csv(sweep) };
+    write_bytes(path, text.as_bytes(), force)
 }
 
 fn csv(sweep: &Sweep) -> String {

@@ -2,11 +2,12 @@
 
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, check_files_on_disk, unread};
 use super::measure::{ToneArg, tone, tones};
-use super::plot::write_picture;
+use super::plot::{check_picture, write_picture};
 use super::print::{Failure, failed, is_dash};
 use hybank::bank::Bank;
+use hybank::captures::Captures;
 use hybank::files::{FileError, refuse_overlaps};
-use hybank::io::{MultiReader, OfflineSamples, is_pipe};
+use hybank::io::{MultiReader, check_real, is_pipe};
 use hybank::messages::Quoted;
 use hybank::overview::{BeforeAfter, Unmeasured, before_after, column};
 use std::fmt::Write as _;
@@ -22,8 +23,8 @@ pub(super) struct BeforeAfterArgs {
     /// Tones to measure (9kHz, 1.2GHz, or hertz); auto: the largest one
     #[arg(long, value_name = "F,..", value_delimiter = ',', value_parser = tone, requires = "measure")]
     tone: Vec<ToneArg>,
-    /// Write the spectra before and after with their spurs: PNG if the name ends in .png, else SVG
-    #[arg(long, value_name = "OUT.svg|.png", requires = "measure")]
+    /// Write the spectra before and after with their spurs, as SVG
+    #[arg(long, value_name = "OUT.svg", requires = "measure")]
     plot: Option<PathBuf>,
 }
 
@@ -49,6 +50,7 @@ impl BeforeAfterArgs {
             let message = "--plot -: the figures go to standard output; write the plot to a file";
             return Err(Failure::Usage(message.into()));
         }
+        check_picture(plot)?;
         let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
         refuse_overlaps(&[plot.as_path(), output], &inputs).map_err(failed)?;
         if plot.exists() && !force {
@@ -71,8 +73,11 @@ impl BeforeAfterArgs {
         force: bool,
     ) -> Result<BeforeAfter, Failure> {
         let fused = CaptureFile::read(output, Reading::channel(None, MOST_MEASURED))?;
-        let channels = OfflineSamples::read(&mut reader, MOST_MEASURED).map_err(unread)?.channels;
-        let found = BeforeAfter::of(bank, fused.rate, &channels, &fused.samples, tones(&self.tone)?);
+        check_real(&reader).map_err(failed)?;
+        let captures = Captures::read(&mut reader, MOST_MEASURED).map_err(unread)?;
+        let channels: Vec<_> = captures.channels.into_iter().map(|channel| channel.samples).collect();
+        let fused_samples = &fused.channel.samples;
+        let found = BeforeAfter::of(bank, fused.rate, &channels, fused_samples, tones(&self.tone)?);
         let found = found.map_err(|Unmeasured { which, error }| {
             let output = Quoted(output);
             Failure::Input(format!("{output} is written, but --measure cannot measure {which}: {error}"))

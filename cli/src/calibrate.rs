@@ -11,11 +11,11 @@ use super::print::{Failure, check_json, explained, failed, say_understood, warn}
 use super::written::{check_output, write_text};
 use hybank::calibrate::{
     Acquisition, CalibrateError, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning,
-    applied, calibrate_pooled,
+    applied, calibrate_pooled, usual_reference,
 };
-use hybank::io::{MultiReader, OfflineSamples, WORK_BYTES, rails_of};
+use hybank::captures::{Captures, Converters};
 use hybank::messages::Quoted;
-use hybank::pipeline::matching::check_rate;
+use hybank::pipeline::matching::{check_channels, check_rate};
 use hybank::spec::{DesignOverrides, Spec};
 use hybank::units::FastPeriods;
 use std::path::{Path, PathBuf};
@@ -99,14 +99,14 @@ pub(super) struct Args {
 }
 
 /// The captures of one acquisition.
-struct Captures {
+struct Acquired {
     name: String,
     /// One per channel.
     records: Vec<Record>,
 }
 
 /// A failed calibration; what is wrong with the tones of one acquisition is said of its files.
-fn of_captures(captures: &[Captures], error: CalibrateError) -> Failure {
+fn of_captures(captures: &[Acquired], error: CalibrateError) -> Failure {
     match (captures, &error) {
         ([one], CalibrateError::Tones(_)) => Failure::Input(format!("{}: {error}", Quoted(&one.name))),
         _ => failed(error),
@@ -114,7 +114,7 @@ fn of_captures(captures: &[Captures], error: CalibrateError) -> Failure {
 }
 
 /// As the library takes them.
-fn borrowed(all: &[Captures]) -> Vec<Acquisition<'_>> {
+fn borrowed(all: &[Acquired]) -> Vec<Acquisition<'_>> {
     all.iter().map(|one| Acquisition { name: &one.name, records: &one.records }).collect()
 }
 
@@ -197,7 +197,7 @@ impl Args {
         paths: &[PathBuf],
         spec: &Spec,
         warnings: &mut Vec<String>,
-    ) -> Result<Vec<Captures>, Failure> {
+    ) -> Result<Vec<Acquired>, Failure> {
         let files = self.files_of_one(paths, spec)?;
         let most = MOST_SAMPLES / paths.len().div_ceil(files);
         paths.chunks(files).map(|files| self.read_one(files, spec, most, warnings)).collect()
@@ -213,7 +213,7 @@ impl Args {
         if !first.is_file() {
             return Ok(paths.len());
         }
-        let reader = start(std::slice::from_ref(first), self.reading.options(2, 1), interrupts())?;
+        let reader = start(std::slice::from_ref(first), self.reading.format().options(2, 1), interrupts())?;
         let files = spec.channels.len() / reader.channels().max(1);
         Ok(if files > 0 && paths.len().is_multiple_of(files) { files } else { paths.len() })
     }
@@ -225,22 +225,22 @@ impl Args {
         spec: &Spec,
         most: usize,
         warnings: &mut Vec<String>,
-    ) -> Result<Captures, Failure> {
-        let layout = spec.layout();
-        let interleaving = self.interleaved.by_delay(&spec.delays_in_fast_periods(), &layout, &self.spec)?;
-        let captures =
-            self.reading.of_converters(paths.len(), &layout, interleaving.as_ref(), spec.full_scale);
-        let mut reader = start(paths, captures, interrupts())?;
+    ) -> Result<Acquired, Failure> {
+        let converters = Converters::from(spec);
+        let interleaving = self.interleaved.interleaving(&converters, &self.spec)?;
+        let options = converters.options(self.reading.format(), paths.len(), interleaving.as_ref());
+        let mut reader = start(paths, options, interrupts())?;
         self.reading.scale.check(&reader)?;
-        check_channels(spec, &reader)?;
+        check_channels(converters.layout(), "the spec", &reader).map_err(failed)?;
         check_rate(spec, &reader).map_err(failed)?;
-        let name = reader.headers().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
-        let mut records = records(&mut reader, most, WORK_BYTES, self.clip, warnings)?;
-        if !layout.is_plain() {
-            records =
-                layout.ranges().into_iter().map(|samples| Record::in_a_row(&records[samples])).collect();
+        let parts = if reader.is_complex() { 2 } else { 1 };
+        let most = most / (parts * reader.channels()).max(1);
+        let captures = Captures::read(&mut reader, most).map_err(unread)?;
+        warnings.extend(reader.warnings().iter().map(ToString::to_string));
+        if captures.is_cut {
+            warnings.push(format!("{}: only the first {most} frames are used", Quoted(&captures.name)));
         }
-        Ok(Captures { name, records })
+        Ok(Acquired { records: captures.records(converters.layout(), self.clip), name: captures.name })
     }
 
     fn settings(&self, spec: &Spec) -> Result<Settings, Failure> {
@@ -259,7 +259,8 @@ impl Args {
         }
         if let Some(path) = &self.training {
             let reading = Reading::channel(None, MOST_MEASURED);
-            let CaptureFile { samples, rate, .. } = CaptureFile::read(path, reading)?.finite(path)?;
+            let training = CaptureFile::read(path, reading)?;
+            let (rate, samples) = (training.rate, training.finite(path)?);
             // In normalised time the recording's own rate is the fast rate.
             let spacing = if spec.is_normalised() {
                 FastPeriods(1.0)
@@ -272,97 +273,11 @@ impl Args {
     }
 }
 
-fn check_channels(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
-    let (wanted, given) = (spec.layout().count(), reader.channels());
-    if given == wanted {
-        return Ok(());
-    }
-    let names: Vec<&str> = reader.headers().map(|(name, _)| name).collect();
-    if !spec.layout().is_plain() {
-        return Err(Failure::Input(format!(
-            "the spec has {} converters with rates of their own and {wanted} samples per frame, but the captures have \
-             {given} ({}); give one mono recording per converter",
-            spec.channels.len(),
-            Quoted(names.join(", "))
-        )));
-    }
-    Err(Failure::Input(format!(
-        "the spec has {wanted} channels, but the captures have {given} ({}); give one mono recording per channel, \
-         one of {wanted} channels, or one in which the converters take turns and --interleaved {wanted}",
-        Quoted(names.join(", "))
-    )))
-}
-
-/// The reference channel, from 0: the `given` one, from 1, or that of the spec, or the first.
+/// The reference channel, from 0: the `given` one, from 1, or that of the spec.
 pub(super) fn reference(given: Option<usize>, spec: &Spec) -> Result<usize, Failure> {
-    let known = spec.uncertainty.as_ref().and_then(|table| table.reference_channel());
     match given {
         Some(0) => Err(Failure::Usage("--reference 0: channels count from 1".into())),
         Some(channel) => Ok(channel - 1),
-        None => Ok(known.unwrap_or(0)),
-    }
-}
-
-/// All channels of a reader, each within its rails or `clip`, for work that takes so many bytes for each
-/// sample; what was tolerated joins the `warnings`.
-pub(super) fn records(
-    reader: &mut MultiReader,
-    most: usize,
-    bytes_per_sample: f64,
-    clip: Option<f64>,
-    warnings: &mut Vec<String>,
-) -> Result<Vec<Record>, Failure> {
-    let parts = if reader.is_complex() { 2 } else { 1 };
-    let most = most / (parts * reader.channels()).max(1);
-    let headers = reader.headers().zip(reader.samples_per_frame());
-    let rails = headers.flat_map(|((_, header), samples)| {
-        std::iter::repeat_n(header.rails, parts * header.channels * samples)
-    });
-    let rails: Vec<_> = rails.collect();
-    let name = reader.headers().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
-    let OfflineSamples { channels, is_cut } =
-        OfflineSamples::read_parts_with(reader, most, bytes_per_sample).map_err(unread)?;
-    warnings.extend(reader.warnings().iter().map(ToString::to_string));
-    if is_cut {
-        warnings.push(format!("{}: only the first {most} frames are used", Quoted(&name)));
-    }
-    let all = channels.into_iter().zip(rails).map(|(samples, rails)| record(samples, rails, clip));
-    let mut all = all.collect::<Vec<_>>().into_iter();
-    let mut records = Vec::new();
-    while let Some(real) = all.next() {
-        let imaginary = if parts == 2 { all.next() } else { None };
-        records.push(match imaginary {
-            Some(imaginary) => Record::complex(real, imaginary),
-            None => real,
-        });
-    }
-    Ok(records)
-}
-
-/// Samples beyond the rails, or of this size if a level is given, are clipped.
-fn record(samples: Vec<f64>, of_format: Option<(f64, f64)>, clip: Option<f64>) -> Record {
-    let rails = clip.map(|level| (-level, level));
-    match rails.or_else(|| rails_of(samples.iter().copied(), of_format)) {
-        Some((lowest, highest)) => Record::within(samples, lowest, highest),
-        None => Record::new(samples),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn integers_clip_at_the_ends_of_their_range_and_floats_at_one() {
-        let clipped = |samples: &[f64], rails, clip| record(samples.to_vec(), rails, clip).clipped;
-        let s16 = Some((-1.0, 32767.0 / 32768.0));
-        assert_eq!(clipped(&[-1.0, 0.0, 32767.0 / 32768.0, 0.99], s16, None), 2);
-        // A converter of 12 bits in words of 16.
-        assert_eq!(clipped(&[-1.0, 0.0, 2047.0 / 2048.0, 0.5], s16, None), 2);
-        assert_eq!(clipped(&[-1.0, 0.0, 1.0, 0.99], None, None), 2);
-        assert_eq!(clipped(&[-1.0, 0.0, 2047.0 / 2048.0, 0.5], None, None), 2);
-        assert_eq!(clipped(&[-1.0, 0.0, 0.9375, 0.9], None, None), 1);
-        assert_eq!(clipped(&[-1.0, 0.0, 1.5, 0.99], None, None), 0);
-        assert_eq!(clipped(&[-1.0, 0.0, 1.5, 0.99], None, Some(0.99)), 3);
+        None => Ok(usual_reference(spec)),
     }
 }

@@ -3,12 +3,12 @@
 
 use super::output::WAV;
 use super::print::{Failure, failed, failed_at, is_dash};
-use hybank::bank::{Bank, FrameLayout};
+use hybank::bank::Bank;
+use hybank::captures::{Converters, FileFormat};
 use hybank::io::{Coding, MultiReader, ReadOptions, TimeInterleaving};
 use hybank::messages::Quoted;
 use hybank::pipeline::matching::{self, NotInTurn};
 use hybank::quantity::{self, FullScale};
-use hybank::units::FastPeriods;
 use std::path::Path;
 
 /// Options of the commands that read captures.
@@ -59,7 +59,7 @@ impl CaptureArgs {
     /// for both, unless its name says that it is WAV.
     pub(super) fn of_reference(self, file: &Path, reference: &Path) -> ReadOptions<'static> {
         let ending = |path: &Path| path.extension().unwrap_or_default().to_ascii_lowercase();
-        let own = self.options(1, 1);
+        let own = self.format().options(1, 1);
         match (ending(file), ending(reference)) {
             (own_ending, ending) if own_ending == ending => own,
             (_, ending) if WAV.iter().any(|known| ending == *known) => ReadOptions::files(),
@@ -67,27 +67,14 @@ impl CaptureArgs {
         }
     }
 
-    /// For `inputs` captures of `wanted` channels in all.
-    pub(super) fn options(self, inputs: usize, wanted: usize) -> ReadOptions<'static> {
-        let single = if inputs == 1 && self.channel.is_none() { wanted } else { 1 };
-        let channels = self.channels.map_or(single, usize::from);
-        let only = self.channel.map(|channel| usize::from(channel) - 1);
-        let full_scale = self.scale.given();
-        ReadOptions { coding: self.format, channels, only, full_scale, ..ReadOptions::files() }
-    }
-
-    /// For `inputs` captures of the converters of a spec, which states `full_scale` if they do not.
-    pub(super) fn of_converters<'a>(
-        self,
-        inputs: usize,
-        layout: &'a FrameLayout,
-        interleaving: Option<&'a TimeInterleaving>,
-        full_scale: Option<FullScale>,
-    ) -> ReadOptions<'a> {
-        let own = self.options(inputs, matching::channels_of_raw(layout, inputs));
-        let samples_per_frame = matching::samples_per_frame(layout, inputs);
-        let full_scale = own.full_scale.or(full_scale);
-        ReadOptions { interleaving, samples_per_frame, full_scale, ..own }
+    /// What is said of captures that do not state their format.
+    pub(super) fn format(self) -> FileFormat {
+        FileFormat {
+            coding: self.format,
+            channels: self.channels.map(usize::from),
+            only: self.channel.map(|channel| usize::from(channel) - 1),
+            full_scale: self.scale.given(),
+        }
     }
 }
 
@@ -180,22 +167,15 @@ impl InterleavedArgs {
         }
     }
 
-    /// The channels of `bank` in the order in which they sample, if they take turns.
-    pub(super) fn interleaving(self, bank: &Bank, path: &Path) -> Result<Option<TimeInterleaving>, Failure> {
-        self.by_delay(&bank.delays_in_fast_periods(), &bank.layout(), path)
-    }
-
-    /// Channels of the given delays in the order in which they sample, if they take turns. `path` is the
-    /// file that says so.
-    pub(super) fn by_delay(
+    /// The order in which the converters of the bank or the spec in the file `path` sample, if they take
+    /// turns.
+    pub(super) fn interleaving(
         self,
-        delays: &[FastPeriods],
-        layout: &FrameLayout,
+        of: &Converters<'_>,
         path: &Path,
     ) -> Result<Option<TimeInterleaving>, Failure> {
         let Some(converters) = self.interleaved else { return Ok(None) };
-        let found = matching::interleaving(converters.into(), delays, layout);
-        found.map(Some).map_err(|problem| match problem {
+        of.interleaving(converters.into()).map(Some).map_err(|problem| match problem {
             NotInTurn::Apart { .. } => failed_at(path, problem),
             _ => Failure::Usage(format!("--interleaved {converters}: {}: {problem}", Quoted(path))),
         })
@@ -212,6 +192,6 @@ pub(super) fn check_stdin<'a>(inputs: impl Iterator<Item = &'a Path>) -> Result<
 
 /// The inputs together have the channels of the bank in the file `path`; the rate of the output in hertz.
 pub(super) fn output_rate(bank: &Bank, path: &Path, reader: &MultiReader) -> Result<f64, Failure> {
-    matching::check_channels(bank, &path.display().to_string(), reader).map_err(failed)?;
+    matching::check_channels(&bank.layout(), &path.display().to_string(), reader).map_err(failed)?;
     matching::output_rate(bank, reader).map_err(failed)
 }

@@ -4,8 +4,8 @@ use super::capture_args::check_scale;
 use super::file_kind::unreadable;
 use super::print::{Failure, failed, failed_at, is_dash, name, warn};
 use crossbeam_channel::Receiver;
-use hybank::io::{MultiReader, OfflineError, OfflineSamples, ReadOptions};
-use hybank::measure::{Spectrum, Window};
+use hybank::captures::{CaptureError, Captures, ChannelSamples};
+use hybank::io::{MultiReader, OfflineError, ReadOptions, check_real};
 use hybank::messages::Quoted;
 use hybank::units::Hertz;
 use std::path::{Path, PathBuf};
@@ -13,15 +13,11 @@ use std::path::{Path, PathBuf};
 /// Samples that a measurement reads at most: the spectra of more take several gigabytes.
 pub(super) const MOST_MEASURED: usize = 1 << 26;
 
-/// One channel of a recording.
+/// A recording of one channel, whose rate is known.
 #[derive(Debug, Clone)]
 pub(super) struct CaptureFile {
-    pub(super) samples: Vec<f64>,
-    /// The imaginary parts of complex samples, as many; only of [`CaptureFile::read_any`].
-    pub(super) imaginary: Option<Vec<f64>>,
+    pub(super) channel: ChannelSamples,
     pub(super) rate: Hertz,
-    /// Lowest and highest value of integers and codes; `None` for floats.
-    pub(super) rails: Option<(f64, f64)>,
 }
 
 /// How a recording is read.
@@ -33,6 +29,7 @@ pub(super) struct Reading {
     pub(super) rate: Option<Hertz>,
     /// Samples that are read at most.
     pub(super) most: usize,
+    pub(super) takes_complex: bool,
 }
 
 impl Reading {
@@ -40,90 +37,50 @@ impl Reading {
     pub(super) fn channel(channel: Option<usize>, most: usize) -> Self {
         let only = channel.map(|channel| channel.saturating_sub(1));
         let options = ReadOptions { only, ..ReadOptions::files() };
-        Self { options, rate: None, most }
+        Self { options, rate: None, most, takes_complex: false }
     }
 }
 
 impl CaptureFile {
-    /// Reads a recording of real samples; `-` is standard input.
+    /// Reads a recording; `-` is standard input.
     pub(super) fn read(path: &Path, reading: Reading) -> Result<Self, Failure> {
-        Self::read_with(path, reading, OfflineSamples::read)
-    }
-
-    /// Reads a recording of real or complex samples; `-` is standard input.
-    pub(super) fn read_any(path: &Path, reading: Reading) -> Result<Self, Failure> {
-        Self::read_with(path, reading, OfflineSamples::read_parts)
-    }
-
-    fn read_with(
-        path: &Path,
-        reading: Reading,
-        whole: fn(&mut MultiReader, usize) -> Result<OfflineSamples, OfflineError>,
-    ) -> Result<Self, Failure> {
         let mut reader = start(&[path.to_owned()], reading.options, crossbeam_channel::never())?;
         check_scale(reading.options.full_scale, &reader)?;
-        let channels = reader.channels();
-        if channels != 1 {
-            let file = Quoted(name(path));
-            return Err(Failure::Input(format!(
-                "{file} has {channels} channels, and one is needed; give its number, --channel 1 to {channels}"
-            )));
+        Captures::check_mono(&reader).map_err(unread)?;
+        if !reading.takes_complex {
+            check_real(&reader).map_err(failed)?;
         }
-        let header = reader.headers().next().map(|(_, header)| *header);
-        let stated = header.and_then(|header| header.rate).filter(|rate| *rate > 0.0).map(Hertz);
-        let rate = stated.or(reading.rate).ok_or_else(|| {
+        let Captures { channels, rate, is_cut, .. } =
+            Captures::read(&mut reader, reading.most).map_err(unread)?;
+        let rate = rate.or(reading.rate).ok_or_else(|| {
             let message = "it states no sample rate; `measure` takes it from --rate 48kHz, else give a recording that states it: \
                            WAV, or a table whose first column is `time`";
             failed_at(path, message)
         })?;
-        let rails = header.and_then(|header| header.rails);
-        let OfflineSamples { channels, is_cut } = whole(&mut reader, reading.most).map_err(unread)?;
         reader.warnings().iter().for_each(|warning| warn(&warning.to_string()));
-        let mut parts = channels.into_iter();
-        let (samples, imaginary) = (parts.next().unwrap_or_default(), parts.next());
-        if samples.is_empty() {
+        let channel = channels.into_iter().next().unwrap_or_default();
+        let count = channel.samples.len();
+        if count == 0 {
             return Err(failed_at(path, "no samples (the length is zero)"));
         }
         if is_cut {
-            warn(&format!("{}: only the first {} samples are used", Quoted(name(path)), samples.len()));
+            warn(&format!("{}: only the first {count} samples are used", Quoted(name(path))));
         }
-        Ok(Self { samples, imaginary, rate, rails })
+        Ok(Self { channel, rate })
     }
 
-    /// The spectrum; what is not finite counts as 0.
-    pub(super) fn spectrum(&self, window: Window) -> Spectrum {
-        let finite: Vec<f64> = self.samples.iter().map(|x| if x.is_finite() { *x } else { 0.0 }).collect();
-        Spectrum::new(&finite, self.rate, window)
-    }
-
-    /// Refuses samples that are not finite.
-    pub(super) fn finite(self, path: &Path) -> Result<Self, Failure> {
-        match self.samples.iter().position(|x| !x.is_finite()) {
-            Some(n) => {
-                let value = self.samples[n];
-                let problem =
-                    format!("sample {n} is {value}; a source must be finite, repair the recording first");
-                Err(failed_at(path, problem))
-            }
-            None => Ok(self),
-        }
+    /// The real samples, which are finite, for a signal of a simulation or a calibration.
+    pub(super) fn finite(self, path: &Path) -> Result<Vec<f64>, Failure> {
+        let finite = self.channel.finite().map_err(|error| failed_at(path, error))?;
+        Ok(finite.samples)
     }
 
     /// Leaves out `skip` samples at either end.
-    pub(super) fn trimmed(mut self, path: &Path, skip: usize) -> Result<Self, Failure> {
-        let count = self.samples.len();
-        if 2 * skip >= count {
-            return Err(Failure::Usage(format!(
-                "--skip {skip} leaves nothing of {} with {count} samples; skip fewer than {}",
-                Quoted(name(path)),
-                count.div_ceil(2)
-            )));
-        }
-        for part in [Some(&mut self.samples), self.imaginary.as_mut()].into_iter().flatten() {
-            part.truncate(count - skip);
-            part.drain(..skip);
-        }
-        Ok(self)
+    pub(super) fn trimmed(self, path: &Path, skip: usize) -> Result<Self, Failure> {
+        let trimmed = self.channel.trimmed(skip);
+        let channel =
+            trimmed.map_err(|error| Failure::Usage(format!("--skip: {}: {error}", Quoted(name(path)))))?;
+        Ok(Self { channel, ..self })
     }
 }
 
@@ -137,10 +94,12 @@ pub(super) fn start(
 }
 
 /// Why samples could not be read.
-pub(super) fn unread(error: OfflineError) -> Failure {
+pub(super) fn unread(error: CaptureError) -> Failure {
     match error {
-        OfflineError::Io(error) => failed(error),
-        OfflineError::Stopped => interrupted(),
+        CaptureError::Samples(OfflineError::Stopped) => interrupted(),
+        CaptureError::NotMono { channels, .. } => {
+            Failure::Input(format!("{error}: --channel 1 to {channels}"))
+        }
         error => failed(error),
     }
 }

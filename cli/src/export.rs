@@ -28,7 +28,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 Examples:
   hybank export bank.json --format c -o bank.h
-  hybank export bank.json -o bank.npz
+  hybank export bank.json -o bank.mat
   hybank export fixed.json -o taps.coe
   hybank export fixed.json -o bank.h --input-bits 12
   hybank export fixed.json -o core.v --input-bits 12 --output-bits 14 --testbench test
@@ -38,7 +38,7 @@ Examples:
 pub(super) struct Args {
     /// The bank (JSON); `-` is standard input
     bank: PathBuf,
-    /// The format [default: that of the output's extension: h, v, csv, npz, mat, coe or mem]
+    /// The format [default: that of the output's extension: h, v, csv, mat, coe or mem]
     #[arg(long, value_enum)]
     format: Option<Format>,
     /// The file to write; `-` is standard output
@@ -74,7 +74,7 @@ impl Args {
                 .filter(|format| !matches!(format, Format::C99 | Format::Sos)),
         };
         self.format.or(meant).ok_or_else(|| {
-            let message = "the name does not say which format it is to have; give --format c, verilog, csv, npz, mat, coe, mem or sos";
+            let message = "the name does not say which format it is to have; give --format c, verilog, csv, mat, coe, mem or sos";
             Failure::Usage(format!("{}: {message}", Quoted(&self.output)))
         })
     }

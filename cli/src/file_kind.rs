@@ -47,7 +47,7 @@ const MAGIC: [(usize, &[u8], FileKind); 12] = [
     (0, b"MATLAB 5", Recording("a MATLAB file")),
     (0, b"PK\x03\x04", Foreign("a ZIP or npz archive", "save each array alone, with numpy.save")),
     (0, b"\x89PNG", Foreign("a picture", NO_RECORDING)),
-    (257, b"ustar", Recording("an archive (tar)")),
+    (257, b"ustar", Foreign("an archive (tar)", "extract it with tar -xf")),
     (1, b"ELF", Foreign("a program", NO_RECORDING)),
 ];
 

@@ -169,11 +169,7 @@ impl Args {
     }
 
     fn start_reader(&self, job: &Job<'_>, observer: Option<&RunObserver>) -> Result<MultiReader, Failure> {
-        let captures = self.reading.options(
-            self.inputs.len(),
-            hybank::pipeline::matching::channels_of_raw(&job.bank.layout(), self.inputs.len()),
-        );
-        job.start_reader(&self.inputs, captures, observer)
+        job.start_reader(&self.inputs, self.reading.format(), observer)
     }
 
     /// Reads the inputs once more, and the output.

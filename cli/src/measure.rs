@@ -2,13 +2,12 @@
 
 use super::capture_args::{CaptureArgs, check_stdin};
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading};
-use super::plot::write_picture;
+use super::plot::{check_picture, write_picture};
 use super::print::{Failure, InFile, failed_at, is_dash, name, show, warn};
 use super::written::check_output;
-use hybank::io::{is_same_rate, rails_of};
+use hybank::io::is_same_rate;
 use hybank::measure::{
-    Comparison, Imbalance, MeasureError, Measurement, Quadrature, Settings, Spur, Warning, Window, compare,
-    measure, measure_complex,
+    Comparison, Imbalance, Measurement, Quadrature, Settings, Spectrum, Spur, Warning, Window, compare,
 };
 use hybank::messages::Quoted;
 use hybank::overview::{Drawn, Figure, causes, column, spur_chart};
@@ -57,8 +56,8 @@ pub(super) struct Args {
     /// Samples at either end that are not measured, such as those before a filter has settled
     #[arg(long, value_name = "SAMPLES", default_value_t = 0)]
     skip: usize,
-    /// Write the spectrum with its spurs: PNG if the name ends in .png, else SVG
-    #[arg(long, value_name = "OUT.svg|.png")]
+    /// Write the spectrum with its spurs, as SVG
+    #[arg(long, value_name = "OUT.svg")]
     plot: Option<PathBuf>,
     /// Replace an existing plot
     #[arg(long)]
@@ -112,32 +111,33 @@ pub(super) fn tones(given: &[ToneArg]) -> Result<Vec<Hertz>, Failure> {
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check()?;
-    let capture = CaptureFile::read_any(&args.file, args.reading())?.trimmed(&args.file, args.skip)?;
-    if capture.imaginary.is_some() && args.reference.is_some() {
+    let capture = CaptureFile::read(&args.file, args.reading())?.trimmed(&args.file, args.skip)?;
+    if capture.channel.imaginary.is_some() && args.reference.is_some() {
         let problem = "complex samples, and --ref compares real ones; extract a part of both recordings";
         return Err(failed_at(&args.file, problem));
     }
-    let settings = args.settings(&capture)?;
+    let settings = args.settings()?;
     let is_measured = args.reference.is_none() || !args.tone.is_empty();
-    let measurement = is_measured.then(|| measured(&capture, &settings)).transpose().in_file(&args.file)?;
+    let measurement = is_measured.then(|| capture.channel.measured(capture.rate, &settings));
+    let measurement = measurement.transpose().in_file(&args.file)?;
     let reference = args.reference.as_ref().map(|path| args.compared(&capture, path)).transpose()?;
     let warnings = measurement.as_ref().map(warnings).unwrap_or_default();
     let report = Report { file: name(&args.file), measurement, reference, warnings };
     if let Some(path) = &args.plot {
         let comparison = report.reference.as_ref().map(|of| (of.file.as_str(), &of.comparison));
         let drawn = Drawn { label: &report.file, measurement: report.measurement.as_ref(), comparison };
-        let chart = spur_chart(drawn, &settings, || capture.spectrum(settings.window));
+        let chart = spur_chart(drawn, &settings, || spectrum(&capture, settings.window));
         write_picture(path, &chart, args.force)?;
     }
     report.warnings.iter().for_each(|warning| warn(&format!("{}: {warning}", Quoted(&report.file))));
     show(&report, args.json, Report::text)
 }
 
-fn measured(capture: &CaptureFile, settings: &Settings) -> Result<Measurement, MeasureError> {
-    match &capture.imaginary {
-        None => measure(&capture.samples, capture.rate, settings),
-        Some(imaginary) => measure_complex(&capture.samples, imaginary, capture.rate, settings),
-    }
+/// What is not finite counts as 0.
+fn spectrum(capture: &CaptureFile, window: Window) -> Spectrum {
+    let samples = capture.channel.samples.iter();
+    let finite: Vec<f64> = samples.map(|x| if x.is_finite() { *x } else { 0.0 }).collect();
+    Spectrum::new(&finite, capture.rate, window)
 }
 
 impl Args {
@@ -151,23 +151,22 @@ impl Args {
                 let message = "the figures go to standard output; write the plot to a file";
                 return Err(Failure::Usage(format!("--plot -: {message}")));
             }
+            check_picture(plot)?;
             check_output(plot, &inputs, self.force)?;
         }
         check_stdin(inputs.into_iter())
     }
 
     fn reading(&self) -> Reading {
-        let options = self.reading.options(1, 1);
-        Reading { options, rate: self.rate, most: MOST_MEASURED }
+        let options = self.reading.format().options(1, 1);
+        Reading { options, rate: self.rate, most: MOST_MEASURED, takes_complex: true }
     }
 
-    fn settings(&self, capture: &CaptureFile) -> Result<Settings, Failure> {
-        let all = capture.samples.iter().chain(capture.imaginary.iter().flatten()).copied();
+    fn settings(&self) -> Result<Settings, Failure> {
         Ok(Settings {
             tones: tones(&self.tone)?,
             converters: self.interleaved.into(),
             harmonics: self.harmonics.into(),
-            rails: rails_of(all, capture.rails).unwrap_or((f64::NEG_INFINITY, f64::INFINITY)),
             window: self.window,
             ..Settings::default()
         })
@@ -175,7 +174,7 @@ impl Args {
 
     fn compared(&self, capture: &CaptureFile, path: &Path) -> Result<ReferenceReport, Failure> {
         let options = self.reading.of_reference(&self.file, path);
-        let reading = Reading { options, ..self.reading() };
+        let reading = Reading { options, takes_complex: false, ..self.reading() };
         let reference = CaptureFile::read(path, reading)?.trimmed(path, self.skip)?;
         let file = Quoted(name(&self.file));
         let (own, other) = (capture.rate, reference.rate);
@@ -187,7 +186,7 @@ impl Args {
                 ),
             ));
         }
-        let comparison = compare(&capture.samples, &reference.samples, own, self.window);
+        let comparison = compare(&capture.channel.samples, &reference.channel.samples, own, self.window);
         let comparison = comparison
             .map_err(|error| Failure::Input(format!("{file} against {}: {error}", Quoted(name(path)))))?;
         Ok(ReferenceReport { file: name(path), comparison })

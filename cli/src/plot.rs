@@ -1,12 +1,13 @@
-//! `hybank plot`: a bank as pictures, and the formats of pictures.
+//! `hybank plot`: a bank as pictures, and the files of pictures.
 
 use super::bank_file::load;
 use super::print::{Failure, InFile, print};
 use super::written::{begin_file, check_folder, check_outputs, write_bytes, write_together};
 use hybank::bank::Bank;
 use hybank::design::{DesignError, Options, design};
+use hybank::messages::Quoted;
 use hybank::overview::{Picture, pictures};
-use hybank::plot::{Chart, PlotError, Series};
+use hybank::plot::{Chart, Series};
 use hybank::spec::{DesignSpec, Spec};
 use std::path::{Path, PathBuf};
 
@@ -20,17 +21,13 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 Examples:
   hybank plot bank.json -o pictures
-  hybank plot bank.json -o pictures --sweeps --force
-  hybank plot bank.json -o pictures --format png")]
+  hybank plot bank.json -o pictures --sweeps --force")]
 pub(super) struct Args {
     /// The bank (JSON)
     bank: PathBuf,
     /// The folder for the pictures; created if missing
     #[arg(short, long)]
     output: PathBuf,
-    /// Format of the pictures
-    #[arg(long, value_enum, default_value_t = PictureFormat::Svg)]
-    format: PictureFormat,
     /// Draw gamma against latency too, and for FIR banks against taps. This designs some twenty further
     /// banks
     #[arg(long)]
@@ -49,8 +46,8 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     }
     let mut files = Vec::new();
     for Picture { name, chart, .. } in all {
-        let picture = args.format.file(&chart).in_file(&args.bank)?;
-        files.push((args.output.join(format!("{name}.{}", args.format.extension())), picture));
+        let picture = chart.to_svg().in_file(&args.bank)?.into_bytes();
+        files.push((args.output.join(format!("{name}.svg")), picture));
     }
     let paths: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
     check_outputs(&paths, &[&args.bank])?;
@@ -61,43 +58,22 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     print(&lines)
 }
 
-/// The format of a picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(super) enum PictureFormat {
-    /// Lines and letters, sharp at any size
-    Svg,
-    /// 1920 by 900 pixels
-    Png,
+pub(super) fn is_svg(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"))
 }
 
-impl PictureFormat {
-    /// The format that the extension of a file names, if it is one.
-    pub(super) fn of(path: &Path) -> Option<Self> {
-        let formats = [Self::Svg, Self::Png];
-        let extension = path.extension()?;
-        formats.into_iter().find(|format| extension.eq_ignore_ascii_case(format.extension()))
+/// Refuses the name of a picture that promises another format than SVG.
+pub(super) fn check_picture(path: &Path) -> Result<(), Failure> {
+    if path.extension().is_none() || is_svg(path) {
+        return Ok(());
     }
-
-    pub(super) fn extension(self) -> &'static str {
-        match self {
-            Self::Svg => "svg",
-            Self::Png => "png",
-        }
-    }
-
-    /// The bytes of the file of a chart.
-    pub(super) fn file(self, chart: &Chart) -> Result<Vec<u8>, PlotError> {
-        match self {
-            Self::Svg => chart.to_svg().map(String::into_bytes),
-            Self::Png => chart.to_png(),
-        }
-    }
+    let (name, svg) = (Quoted(path), Quoted(path.with_extension("svg")));
+    Err(Failure::Usage(format!("{name}: pictures are written as SVG; name it {svg}")))
 }
 
-/// Writes a picture: PNG if the name ends in .png, else SVG.
+/// Writes a picture as SVG.
 pub(super) fn write_picture(path: &Path, chart: &Chart, force: bool) -> Result<(), Failure> {
-    let format = PictureFormat::of(path).unwrap_or(PictureFormat::Svg);
-    write_bytes(path, &format.file(chart).in_file(path)?, force)
+    write_bytes(path, chart.to_svg().in_file(path)?.as_bytes(), force)
 }
 
 /// Points of a curve.

@@ -3,11 +3,12 @@
 use super::bank_file::load;
 use super::capture_args::{CaptureArgs, InterleavedArgs, output_rate};
 use super::capture_file::{start, unread};
-use super::print::{Failure, failed_at, is_dash, name, stopped, warn};
+use super::print::{Failure, failed, failed_at, is_dash, name, stopped, warn};
 use super::written::{check_output, write_text};
 use hybank::bank::Bank;
+use hybank::captures::{Captures, Converters};
 use hybank::design::DesignError;
-use hybank::io::OfflineSamples;
+use hybank::io::check_real;
 use hybank::messages::Quoted;
 use hybank::overview::page::{CapturesOnPage, MOST_FRAMES, Page, PageError};
 use hybank::units::Hertz;
@@ -91,16 +92,16 @@ impl Args {
 
     /// The captures, fused by `bank`.
     fn captures(&self, bank: &Bank) -> Result<CapturesOnPage, Failure> {
-        let full_scale = bank.spec.as_ref().and_then(|spec| spec.full_scale);
-        let interleaving = self.interleaved.interleaving(bank, &self.bank)?;
-        let layout = bank.layout();
-        let captures =
-            self.reading.of_converters(self.inputs.len(), &layout, interleaving.as_ref(), full_scale);
-        let mut reader = start(&self.inputs, captures, crossbeam_channel::never())?;
+        let converters = Converters::from(bank);
+        let interleaving = self.interleaved.interleaving(&converters, &self.bank)?;
+        let options = converters.options(self.reading.format(), self.inputs.len(), interleaving.as_ref());
+        let mut reader = start(&self.inputs, options, crossbeam_channel::never())?;
         self.reading.scale.check(&reader)?;
         let rate = Hertz(output_rate(bank, &self.bank, &reader)?);
-        let OfflineSamples { channels, is_cut } =
-            OfflineSamples::read(&mut reader, MOST_FRAMES).map_err(unread)?;
+        check_real(&reader).map_err(failed)?;
+        let captures = Captures::read(&mut reader, MOST_FRAMES).map_err(unread)?;
+        let is_cut = captures.is_cut;
+        let channels: Vec<_> = captures.channels.into_iter().map(|channel| channel.samples).collect();
         reader.warnings().iter().for_each(|warning| warn(&warning.to_string()));
         let names = self.inputs.iter().map(|input| name(input)).collect::<Vec<_>>().join(", ");
         let frames = channels.iter().map(Vec::len).min().unwrap_or(0);

@@ -11,12 +11,12 @@ use super::print::{Failure, check_strict, failed, stopped, warn, with_remains};
 use super::track::{TrackArgs, TrackRecord, Tracked};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hybank::bank::Bank;
+use hybank::captures::{Converters, FileFormat};
 use hybank::io::{
     Arrival, BLOCK_BYTES, Container, MultiReader, OutputHeader, OutputNotes, PcmFormat, PcmFrames, Placement,
     ReadOptions, is_sigmf,
 };
 use hybank::memory::affordable_threads;
-use hybank::pipeline::matching;
 use hybank::pipeline::{DroppedLatency, FileOutputs, Outcome, Pipeline, Settings, Warning};
 use hybank::runtime::{Algorithm, Input, Options, Plan, Precision, ThreadPool};
 use std::path::{Path, PathBuf};
@@ -135,32 +135,25 @@ pub(super) struct Finished {
 }
 
 impl Job<'_> {
-    /// Begins to read as `captures` says.
+    /// Begins to read inputs of this format.
     ///
     /// # Errors
     /// [`Failure`], also for an interrupt that came first: no output has been begun.
     pub(super) fn start_reader(
         &self,
         inputs: &[PathBuf],
-        captures: ReadOptions<'_>,
+        format: FileFormat,
         observer: Option<&RunObserver>,
     ) -> Result<MultiReader, Failure> {
         let args = self.args;
         let lost = args.gaps.lost_samples(self.is_live)?;
-        let interleaving = args.interleaved.interleaving(self.bank, self.bank_path)?;
+        let converters = Converters::from(self.bank);
+        let interleaving = args.interleaved.interleaving(&converters, self.bank_path)?;
         let stalls = observer.map(RunObserver::stall_watch);
         // Each thread takes about a block at a time, and more threads gain little.
         let block_bytes = if args.threads == 1 { BLOCK_BYTES } else { 8 * BLOCK_BYTES };
-        let stated = self.bank.spec.as_ref().and_then(|spec| spec.full_scale);
-        let layout = self.bank.layout();
-        let files = ReadOptions {
-            block_bytes,
-            interleaving: interleaving.as_ref(),
-            samples_per_frame: matching::samples_per_frame(&layout, inputs.len()),
-            stalls: stalls.as_ref(),
-            full_scale: self.scale.given().or(stated),
-            ..captures
-        };
+        let own = converters.options(format, inputs.len(), interleaving.as_ref());
+        let files = ReadOptions { block_bytes, stalls: stalls.as_ref(), ..own };
         let started = MultiReader::start(inputs, args.gaps.read_options(&lost, files), interrupts());
         let reader = started.map_err(unreadable)?.ok_or_else(|| interrupted(0))?;
         self.scale.check(&reader)?;

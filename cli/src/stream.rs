@@ -7,7 +7,8 @@ use super::print::{print_report, say_line, say_understood};
 use super::run::{Finished, Job, RunArgs, RunReport};
 use super::{Failure, bank_file};
 use hybank::bank::Bank;
-use hybank::io::{Coding, Container, PcmFormat, ReadOptions, is_self_describing};
+use hybank::captures::FileFormat;
+use hybank::io::{Coding, Container, PcmFormat, is_self_describing};
 use hybank::messages::Quoted;
 use hybank::pipeline::DroppedLatency;
 use std::path::PathBuf;
@@ -126,9 +127,9 @@ impl Args {
     fn stream(&self, job: &Job<'_>, inputs: &[PathBuf], observer: &mut RunObserver) -> Result<(), Failure> {
         // Before the inputs come; their headers may say complex samples.
         let plan = job.plan(true)?;
-        let channels = self.channels_of_each(inputs, job.bank);
-        let raw = ReadOptions { coding: self.format, channels, ..ReadOptions::files() };
-        let mut reader = job.start_reader(inputs, raw, Some(observer))?;
+        let channels = self.channels.map(usize::from);
+        let format = FileFormat { coding: self.format, channels, only: None, full_scale: self.scale.given() };
+        let mut reader = job.start_reader(inputs, format, Some(observer))?;
         self.check_output(reader.is_complex())?;
         let finished = job.run(&plan, &mut reader, observer, &|_| {})?;
         let Finished { report: run, frames, is_interrupted, .. } = &finished;
@@ -143,12 +144,6 @@ impl Args {
 
     fn inputs(&self) -> Vec<PathBuf> {
         if self.input.is_empty() { vec!["-".into()] } else { self.input.clone() }
-    }
-
-    /// Channels of each raw input.
-    fn channels_of_each(&self, inputs: &[PathBuf], bank: &Bank) -> usize {
-        let usual = hybank::pipeline::matching::channels_of_raw(&bank.layout(), inputs.len());
-        self.channels.map_or(usual, usize::from)
     }
 
     /// Raw inputs are one interleaved or one per channel, or have --channels each; other formats state

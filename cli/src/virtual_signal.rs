@@ -126,7 +126,8 @@ impl Reader<'_> {
     fn recording(&self, text: &str) -> Result<Analog, Failure> {
         let path = Path::new(text);
         let reading = Reading::channel(self.args.channel.map(usize::from), MOST_SAMPLES);
-        let CaptureFile { samples, rate, .. } = CaptureFile::read(path, reading)?.finite(path)?;
+        let recording = CaptureFile::read(path, reading)?;
+        let (rate, samples) = (recording.rate, recording.finite(path)?);
         // In normalised time the recording's own rate is the fast rate.
         let fast = if self.spec.is_normalised() { rate } else { self.spec.fast_period.rate() };
         Ok(Analog::Recorded(Recording::new(&samples, FastPeriods(fast / rate))))

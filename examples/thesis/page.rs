@@ -1,7 +1,6 @@
 //! The page: each figure beside what is known of the thesis's own.
 
 use crate::{Figure, Outcome};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -73,53 +72,46 @@ impl Page {
 
     fn html(&self, shown: &[(&Figure, Vec<String>)]) -> String {
         let title = "Hybrid filter banks: figures 5.8 to 5.17 and table 5.1 of the thesis";
-        let page = html! {
-            (DOCTYPE)
-            html lang="en" {
-                head {
-                    meta charset="utf-8";
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    link rel="icon" href="data:,";
-                    title { (title) }
-                    style { (PreEscaped(STYLE)) }
-                }
-                body {
-                    h1 { (title) }
-                    p { (WHAT_IS_KNOWN) }
-                    @for (figure, charts) in shown { (figure_html(figure, charts)) }
-                    h2 { "Table 5.1: errors over fast samples 41 to 199" }
-                    (self.table_html())
-                }
-            }
-        };
-        page.into_string() + "\n"
+        let charts: String = shown.iter().map(|(figure, charts)| figure_html(figure, charts)).collect();
+        format!(
+            "<!DOCTYPE html>
+<html lang=\"en\">
+<head>
+<meta charset=\"utf-8\">
+<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">
+<link rel=\"icon\" href=\"data:,\">
+<title>{title}</title>
+<style>{STYLE}</style>
+</head>
+<body>
+<h1>{title}</h1>
+<p>{WHAT_IS_KNOWN}</p>
+{charts}<h2>Table 5.1: errors over fast samples 41 to 199</h2>
+{}</body>
+</html>
+",
+            self.table_html()
+        )
     }
 
-    fn table_html(&self) -> Markup {
-        html! {
-            div { table {
-                tr { th { "method" } th { "step: RMSE" } th { "largest" } th { "cosines: RMSE" } th { "largest" } }
-                @for row in &self.table {
-                    tr {
-                        td { (row.method) }
-                        @for (rmse, most) in &row.errors {
-                            td { (format!("{rmse:.3e}")) }
-                            td { (format!("{most:.3e}")) }
-                        }
-                    }
-                }
-            } }
-        }
+    fn table_html(&self) -> String {
+        let error = |(rmse, most): &(f64, f64)| format!("<td>{rmse:.3e}</td><td>{most:.3e}</td>");
+        let row = |row: &Row| {
+            let errors: String = row.errors.iter().map(error).collect();
+            format!("<tr><td>{}</td>{errors}</tr>\n", row.method)
+        };
+        let rows: String = self.table.iter().map(row).collect();
+        format!(
+            "<div><table>\n<tr><th>method</th><th>step: RMSE</th><th>largest</th><th>cosines: RMSE</th>\
+             <th>largest</th></tr>\n{rows}</table></div>\n"
+        )
     }
 }
 
-fn figure_html(figure: &Figure, charts: &[String]) -> Markup {
-    html! {
-        h2 { "Figure " (figure.number) ": " (figure.title) }
-        dl {
-            dt { "thesis" } dd { (figure.thesis) }
-            dt { "here" } dd { (figure.found) }
-        }
-        @for chart in charts { figure { (PreEscaped(chart)) } }
-    }
+fn figure_html(Figure { number, title, thesis, found, .. }: &Figure, charts: &[String]) -> String {
+    let charts: String = charts.iter().map(|chart| format!("<figure>{chart}</figure>\n")).collect();
+    format!(
+        "<h2>Figure {number}: {title}</h2>\n<dl><dt>thesis</dt><dd>{thesis}</dd>\n\
+         <dt>here</dt><dd>{found}</dd></dl>\n{charts}"
+    )
 }

@@ -115,7 +115,7 @@ class Bank:
         self,
         path: _Path,
         *,
-        format: Literal["c", "c99", "csv", "npz", "mat", "coe", "mem", "sos", "verilog"] | None = None,
+        format: Literal["c", "c99", "csv", "mat", "coe", "mem", "sos", "verilog"] | None = None,
         name: str = "bank",
         input_bits: int | None = None,
         output_bits: int | None = None,

@@ -347,7 +347,7 @@ def import_taps(spec, taps, *, latency=None, proof=True):
 
 
 # What the ending of a name says that is to be written.
-_BY_ENDING = {"h": "c", "v": "verilog", **{name: name for name in ("csv", "npz", "mat", "coe", "mem")}}
+_BY_ENDING = {"h": "c", "v": "verilog", **{name: name for name in ("csv", "mat", "coe", "mem")}}
 
 
 def format_by_name(export):
@@ -360,7 +360,7 @@ def format_by_name(export):
             if ending not in _BY_ENDING:
                 raise _hybank.HybankError(
                     f"{os.fspath(path)}: the name does not say which format it is to have; give format=\"c\", \"verilog\", "
-                    '"csv", "npz", "mat", "coe", "mem" or "sos"'
+                    '"csv", "mat", "coe", "mem" or "sos"'
                 )
             format = _BY_ENDING[ending]
         return export(self, path, format=format, **keywords)

@@ -1,8 +1,6 @@
 """Captures that are no arrays of NumPy: files, one recording of several converters, xarray, pandas, dask."""
 
-import errno
 import os
-import re
 import sys
 from dataclasses import dataclass
 
@@ -112,23 +110,10 @@ def _read(files, source, options):
     names = [files] if isinstance(files, (str, os.PathLike)) else list(files)
     usual = dict.fromkeys(("channels", "channel", "full_scale", "interleaved", "lost", "max_lost"))
     options = {"format": "wav", "longest": False, **usual, **options}
-    try:
-        found = _hybank.read(names, options, source)
-    except HybankError:
-        _need([*names, options["lost"]])
-        raise
+    found = _hybank.read(names, options, source)
     parts = found["channels"]
     is_even = all(len(part) == len(parts[0]) for part in parts)
     return Captures(np.stack(parts) if is_even and parts else parts, found["rate"], found["output_rate"])
-
-
-def _need(files):
-    """Raise the ``FileNotFoundError`` of the first of these files that is missing; None names no file."""
-    for file in filter(None, files):
-        # A variable of a MATLAB file: x.mat:name.
-        file = re.sub(r"(\.mat):[^:/\\]*$", r"\1", os.fspath(file))
-        if file != "-" and not os.path.exists(file):
-            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), file) from None
 
 
 def fuse(bank, x, interleaved, *, axis, full_output, rate, **keywords):
@@ -142,6 +127,8 @@ def fuse(bank, x, interleaved, *, axis, full_output, rate, **keywords):
         check_rate(bank, x, interleaved)
         rate = x.output_rate if rate is None else rate
         x, axis = x.channels, -1
+    if isinstance(x, (list, tuple)):
+        x = [np.asarray(one) for one in x]
     keywords = {**keywords, "full_output": full_output, "rate": rate}
     if interleaved is not None:
         return bank.fuse(in_turn(bank, x, interleaved), axis=-1, **keywords)

@@ -156,12 +156,12 @@ class Figures:
         The band of the figures, ``low_hertz`` to ``high_hertz``, and the ``source`` that says so.
     snr
         Signal-to-noise ratio: ``total_db`` with all parts that the spec states, and the parts ``signal_db``, ``noise_db``
-        of the converters and ``delays_db`` of uncertain delays, None without.
+        of the converters, and ``delays_db``, ``gains_db`` and ``offsets_db`` of uncertain values, None without.
     snr_16_bits_db
         With 16-bit converters; None where the spec states noise.
     image
         The largest image of a tone in the band, ``db`` relative to it, and the ``hertz`` of the tone; None where a tone is
-        lost.
+        lost. Of uncertain delays and gains the rms.
     gain_error
         The same for the largest error of gain and phase.
     target_vanishes

@@ -2,10 +2,11 @@
 
 use crate::arrays::{Held, Shape};
 use crate::background;
-use crate::calibrate::{records, reference_of};
+use crate::calibrate::reference_of;
 use crate::errors::{refused, warn};
 use crate::results::{Made, record};
 use crate::sources;
+use hybank::calibrate::Record;
 use hybank::figures::Alone;
 use hybank::track::{self, AlignSettings, AlignedChannel, Alignment};
 use hybank::units::Seconds;
@@ -26,10 +27,7 @@ pub(crate) fn align<'py>(
     if within.is_some_and(|time| time.is_nan() || time < 0.0) {
         return Err(refused("within: give a time in seconds, not negative"));
     }
-    let mut all = Vec::new();
-    for array in &x {
-        all.extend(records(&Held::new(array, Shape { axis: -1, channels: 1 })?, 1, None)?);
-    }
+    let all = x.iter().map(record_of).collect::<PyResult<Vec<_>>>()?;
     let settings = AlignSettings {
         reference: reference_of(&spec, reference)?,
         within: within.map(Seconds),
@@ -42,6 +40,11 @@ pub(crate) fn align<'py>(
     })?;
     let (found, alone) = found.map_err(refused)?;
     result(py, &found, alone)
+}
+
+fn record_of(x: &Bound<'_, PyAny>) -> PyResult<Record> {
+    let captures = Held::new(x, Shape { axis: -1, channels: 1 })?.captures()?;
+    Ok(captures.channels.first().map_or_else(|| Record::new(Vec::new()), |channel| channel.record(None)))
 }
 
 fn result<'py>(py: Python<'py>, found: &Alignment, alone: Alone) -> PyResult<Bound<'py, PyAny>> {

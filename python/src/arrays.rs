@@ -3,20 +3,15 @@
 use crate::errors::refused;
 use crate::formats::Format;
 use hybank::bank::FrameLayout;
-use hybank::memory::available_memory;
-use hybank::runtime::{Input, Isa, PcmFrames, SampleLayout};
+use hybank::captures::Captures;
+use hybank::runtime::{PcmFrames, SampleLayout};
 use numpy::ndarray::Axis;
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods,
 };
-use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PySlice, PyTuple};
-
-/// Lists of doubles that a computation on samples holds at once, about: the samples, those of each channel,
-/// transforms and spectra.
-const WORK: usize = 8;
 
 /// What an array of samples must look like.
 #[derive(Debug, Clone, Copy)]
@@ -137,26 +132,9 @@ impl<'py> Held<'py> {
         (0..channels).map(row).collect()
     }
 
-    /// Frame after frame as doubles: the samples, or the real (0) or imaginary (1) parts of complex ones.
-    ///
-    /// Raises `MemoryError` if there is no memory for [`WORK`] such lists.
-    pub(crate) fn doubles(&self, part: usize) -> PyResult<Vec<f64>> {
-        let count = self.layout.frames.saturating_mul(self.layout.channels);
-        let bytes = count.saturating_mul(WORK * size_of::<f64>());
-        if available_memory().is_some_and(|memory| bytes as f64 > memory) {
-            let text =
-                format!("{count} samples need about {:.0} GB of memory; give fewer", bytes as f64 / 1e9);
-            return Err(PyMemoryError::new_err(text));
-        }
-        let mut frames = vec![0.0; count];
-        self.part(part)?[..].load(Isa::detect(), 0, &mut frames);
-        Ok(frames)
-    }
-
-    /// Lowest and highest value of a sample of integers; `None` for floats.
-    pub(crate) fn rails(&self) -> Option<(f64, f64)> {
-        let format = self.format.number;
-        (!format.is_float()).then(|| (-1.0, 1.0 - 2f64.powi(1 - 8 * format.bytes() as i32)))
+    /// The samples as numbers, each channel by itself.
+    pub(crate) fn captures(&self) -> PyResult<Captures> {
+        Ok(Captures::of_frames(&self.recordings()?, self.format.complex))
     }
 }
 

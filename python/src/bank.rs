@@ -396,11 +396,10 @@ impl Bank {
 }
 
 /// The formats by name.
-const FORMATS: [(&str, Exported); 9] = [
+const FORMATS: [(&str, Exported); 8] = [
     ("c99", Exported::C99),
     ("c", Exported::C99),
     ("csv", Exported::Csv),
-    ("npz", Exported::Npz),
     ("mat", Exported::Mat),
     ("coe", Exported::Coe),
     ("mem", Exported::Mem),

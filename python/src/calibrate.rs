@@ -7,10 +7,9 @@ use crate::results::{Made, record};
 use crate::sources;
 use crate::values::frequencies;
 use hybank::calibrate::{
-    self as calibration, Calibration, CalibrationSignal, ChannelEstimate, Fit, Fitting, Record, Settings,
-    Tone, Warning, applied,
+    self as calibration, Calibration, CalibrationSignal, ChannelEstimate, Fit, Fitting, Settings, Tone,
+    Warning, applied,
 };
-use hybank::io::rails_of;
 use hybank::sine_fit::Estimate;
 use hybank::spec::Spec;
 use hybank::units::{FastPeriods, Hertz};
@@ -39,11 +38,10 @@ pub(crate) fn calibrate<'py>(
     let held = Held::new(&frames, shape)?;
     let tones = tones.map(|_| frequencies("tones", tones)).transpose()?;
     let signal = signal(&spec, tones, waveform, rate, blind)?;
-    check(&signal, held.format.complex)?;
-    let mut records = records(&held, layout.count(), clip)?;
-    if !layout.is_plain() {
-        records = layout.ranges().into_iter().map(|samples| Record::in_a_row(&records[samples])).collect();
+    if clip.is_some_and(|level| level.is_nan() || level <= 0.0) {
+        return Err(refused("clip: give a positive level"));
     }
+    let records = held.captures()?.records(&layout, clip);
     let settings = Settings { fit: fitted(&fit)?, reference: reference_of(&spec, reference)? };
     let nominal = spec.clone();
     let found =
@@ -77,48 +75,6 @@ fn signal(
     }
 }
 
-/// Refuses what real samples, or complex ones, cannot hold.
-fn check(signal: &CalibrationSignal, is_complex: bool) -> PyResult<()> {
-    let refuse = |message| Err(refused(message));
-    let is_frequency = |tone: &Hertz| tone.0.is_finite() && (tone.0 > 0.0 || is_complex && tone.0 < 0.0);
-    match signal {
-        CalibrationSignal::Tones(tones) if tones.iter().all(is_frequency) => Ok(()),
-        CalibrationSignal::Tones(_) if is_complex => {
-            refuse("tones: frequencies are finite and not 0, in hertz")
-        }
-        CalibrationSignal::Tones(_) => {
-            refuse("tones: frequencies of real samples are positive numbers, in hertz")
-        }
-        _ if is_complex => refuse(
-            "complex samples are calibrated by tones; for waveform and blind give the real or the imaginary parts",
-        ),
-        _ => Ok(()),
-    }
-}
-
-/// One record per channel. Samples clip at the ends of their range, or where `clip` says.
-pub(crate) fn records(held: &Held<'_>, channels: usize, clip: Option<f64>) -> PyResult<Vec<Record>> {
-    if clip.is_some_and(|level| level.is_nan() || level <= 0.0) {
-        return Err(refused("clip: give a positive level"));
-    }
-    let record = |samples: Vec<f64>| {
-        let rails = clip.map(|level| (-level, level));
-        match rails.or_else(|| rails_of(samples.iter().copied(), held.rails())) {
-            Some((lowest, highest)) => Record::within(samples, lowest, highest),
-            None => Record::new(samples),
-        }
-    };
-    let part = |part| -> PyResult<Vec<Record>> {
-        let frames = held.doubles(part)?;
-        let channel = |i| frames.iter().skip(i).step_by(channels).copied().collect();
-        Ok((0..channels).map(|i| record(channel(i))).collect())
-    };
-    if !held.format.complex {
-        return part(0);
-    }
-    Ok(part(0)?.into_iter().zip(part(1)?).map(|(real, imaginary)| Record::complex(real, imaginary)).collect())
-}
-
 fn fitted(names: &[String]) -> PyResult<Fit> {
     let value = |name: &String| {
         name.parse::<Fitting>().map_err(|error| refused(format!("fit: \"{name}\" is unknown; {error}")))
@@ -131,7 +87,7 @@ pub(crate) fn reference_of(spec: &Spec, given: Option<usize>) -> PyResult<usize>
     match given {
         Some(0) => Err(refused("reference: channels count from 1")),
         Some(channel) => Ok(channel - 1),
-        None => Ok(spec.uncertainty.as_ref().and_then(|table| table.reference_channel()).unwrap_or(0)),
+        None => Ok(calibration::usual_reference(spec)),
     }
 }
 

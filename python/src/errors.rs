@@ -1,7 +1,8 @@
 //! Errors of the library as Python exceptions.
 
+use hybank::captures::CaptureError;
 use hybank::files::FileError;
-use hybank::io::IoError;
+use hybank::io::{IoError, OfflineError};
 use hybank::messages::{Quoted, shown};
 use hybank::spec;
 use pyo3::create_exception;
@@ -89,6 +90,14 @@ pub(crate) fn file_error(error: FileError) -> PyErr {
 pub(crate) fn io_error(error: IoError) -> PyErr {
     match error {
         IoError::File(error) => file_error(error),
+        other => refused(other),
+    }
+}
+
+/// A fault of captures.
+pub(crate) fn capture_error(error: CaptureError) -> PyErr {
+    match error {
+        CaptureError::Io(error) | CaptureError::Samples(OfflineError::Io(error)) => io_error(error),
         other => refused(other),
     }
 }

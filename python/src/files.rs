@@ -1,23 +1,16 @@
 //! Recordings from files, as `fuse` and `measure` of the command line read them.
 
 use crate::bank::Bank;
-use crate::errors::{refused, warn};
+use crate::errors::{capture_error, io_error, refused, warn};
 use crate::sources;
-use hybank::bank::{self, FrameLayout};
-use hybank::io::{
-    Coding, LostSamples, MAX_LOST, MultiReader, OfflineSamples, ReadOptions, StreamHeader, TimeInterleaving,
-    Until, is_same_rate,
-};
-use hybank::messages::{Number, Quoted};
-use hybank::pipeline::matching::{self, InputMismatch};
+use hybank::captures::{CaptureError, Captures, ChannelSamples, Converters, FileFormat};
+use hybank::io::{LostSamples, MAX_LOST, MultiReader, OfflineError, ReadOptions, TimeInterleaving, Until};
+use hybank::pipeline::matching;
 use hybank::quantity::{self, FullScale};
-use hybank::spec::Spec;
-use hybank::units::FastPeriods;
 use numpy::{Complex64, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 /// Samples of a channel that are read at most: an array of more is 32 GiB.
 const MOST: usize = 1 << 32;
@@ -36,46 +29,19 @@ pub(crate) struct Options {
     longest: bool,
 }
 
-/// What recordings are for: a bank, or a spec.
-struct Wanted {
-    bank: Option<Arc<bank::Bank>>,
-    /// Of anything but a bank.
-    spec: Option<Spec>,
-    delays: Vec<FastPeriods>,
-    layout: FrameLayout,
+/// What `work` makes of the converters of a bank, or of a spec.
+fn with_converters<T>(
+    source: &Bound<'_, PyAny>,
+    work: impl FnOnce(&Converters<'_>) -> PyResult<T>,
+) -> PyResult<T> {
+    match source.cast::<Bank>() {
+        Ok(bank) => work(&Converters::from(&*bank.get().bank)),
+        Err(_) => work(&Converters::from(&sources::spec(source)?)),
+    }
 }
 
-impl Wanted {
-    fn new(source: &Bound<'_, PyAny>) -> PyResult<Self> {
-        if let Ok(bank) = source.cast::<Bank>() {
-            let bank = Arc::clone(&bank.get().bank);
-            let (delays, layout) = (bank.delays_in_fast_periods(), bank.layout());
-            return Ok(Self { bank: Some(bank), spec: None, delays, layout });
-        }
-        let spec = sources::spec(source)?;
-        let (delays, layout) = (spec.delays_in_fast_periods(), spec.layout());
-        Ok(Self { bank: None, spec: Some(spec), delays, layout })
-    }
-
-    fn turns(&self, converters: usize) -> PyResult<TimeInterleaving> {
-        let turns = matching::interleaving(converters, &self.delays, &self.layout);
-        turns.map_err(|problem| refused(format!("interleaved: {problem}")))
-    }
-
-    fn full_scale(&self) -> Option<FullScale> {
-        let of_bank = self.bank.as_ref().and_then(|bank| bank.spec.as_ref());
-        of_bank.or(self.spec.as_ref()).and_then(|spec| spec.full_scale)
-    }
-
-    /// The rate of the output of a bank, in hertz, if the recordings fit.
-    fn check(&self, reader: &MultiReader) -> Result<Option<f64>, InputMismatch> {
-        if let Some(spec) = &self.spec {
-            matching::check_rate(spec, reader)?;
-        }
-        let Some(bank) = &self.bank else { return Ok(None) };
-        matching::check_channels(bank, "the bank", reader)?;
-        matching::output_rate(bank, reader).map(Some)
-    }
+fn in_turn(of: &Converters<'_>, converters: usize) -> PyResult<TimeInterleaving> {
+    of.interleaving(converters).map_err(|problem| refused(format!("interleaved: {problem}")))
 }
 
 /// The channels of recordings, a list of arrays, with what the files say: the rate of the recordings in
@@ -87,60 +53,69 @@ pub(crate) fn read<'py>(
     options: Options,
     source: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let wanted = source.map(Wanted::new).transpose()?;
-    let turns = options.interleaved.zip(wanted.as_ref());
-    let turns = turns.map(|(converters, wanted)| wanted.turns(converters)).transpose()?;
-    let coding: Coding = options.format.parse().map_err(|error| refused(format!("format: {error}")))?;
-    let lost = options.lost.as_deref().map(LostSamples::read).transpose().map_err(refused)?;
-    let layout = wanted.as_ref().map(|wanted| &wanted.layout);
-    let usual = layout.map_or(1, |layout| matching::channels_of_raw(layout, files.len()));
+    match source {
+        Some(source) => {
+            with_converters(source, |converters| read_for(py, &files, &options, Some(converters)))
+        }
+        None => read_for(py, &files, &options, None),
+    }
+}
+
+fn read_for<'py>(
+    py: Python<'py>,
+    files: &[PathBuf],
+    options: &Options,
+    converters: Option<&Converters<'_>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let turns = options.interleaved.zip(converters);
+    let turns = turns.map(|(count, converters)| in_turn(converters, count)).transpose()?;
+    let lost = options.lost.as_deref().map(LostSamples::read).transpose().map_err(io_error)?;
+    let format = options.format()?;
+    let own = match converters {
+        Some(converters) => converters.options(format, files.len(), turns.as_ref()),
+        None => format.options(files.len(), 1),
+    };
     let read_options = ReadOptions {
-        coding,
-        channels: options.channels.unwrap_or(usual),
-        only: options.channel.map(|channel| channel.saturating_sub(1)),
-        full_scale: full_scale(options.full_scale.as_deref())?
-            .or(wanted.as_ref().and_then(Wanted::full_scale)),
-        interleaving: turns.as_ref(),
-        samples_per_frame: layout.map_or(&[], |of| matching::samples_per_frame(of, files.len())),
         lost: lost.as_ref(),
         max_lost: options.max_lost.unwrap_or(MAX_LOST),
         until: if options.longest { Until::Longest } else { Until::Shortest },
-        ..ReadOptions::files()
+        ..own
     };
-    let read = py.detach(|| -> Result<_, String> {
-        let started = MultiReader::start(&files, read_options, crossbeam_channel::never());
-        let mut reader = started.map_err(|error| error.to_string())?.ok_or("interrupted")?;
-        let rate = reader.headers().find_map(|(_, header)| header.rate);
-        let other = wanted.is_none().then(|| other_rate(&reader)).flatten();
-        let output_rate = wanted.as_ref().map(|wanted| wanted.check(&reader)).transpose();
-        let output_rate = output_rate.map_err(|error| error.to_string())?.flatten();
-        let whole = OfflineSamples::read_parts(&mut reader, MOST).map_err(|error| error.to_string())?;
-        Ok((whole, reader.is_complex(), rate, output_rate, reader.warnings(), other))
+    let read = py.detach(|| {
+        let mut reader = start(files, read_options)?;
+        let output_rate = converters.map(|converters| converters.check("the bank", &reader));
+        let output_rate = output_rate.transpose()?.flatten();
+        // No bank is there to say whether it takes all rates.
+        let other = if converters.is_none() { matching::common_rate(reader.headers()).err() } else { None };
+        Ok((Captures::read(&mut reader, MOST)?, output_rate, reader.warnings(), other))
     });
-    let (whole, is_complex, rate, output_rate, warnings, other) = read.map_err(refused)?;
-    other.iter().try_for_each(|text| warn(py, text))?;
+    let (captures, output_rate, warnings, other) = read.map_err(capture_error)?;
+    let unequal = other.map(|mismatch| format!("{mismatch}; give bank=, which says whether it takes both"));
+    unequal.iter().try_for_each(|text| warn(py, text))?;
     warnings.iter().try_for_each(|warning| warn(py, warning))?;
     let found = PyDict::new(py);
-    found.set_item("channels", arrays(py, whole.channels, is_complex))?;
-    found.set_item("rate", rate)?;
+    found.set_item("rate", captures.rate.map(|rate| rate.0))?;
     found.set_item("output_rate", output_rate)?;
+    let arrays: Vec<_> = captures.channels.into_iter().map(|channel| array(py, channel)).collect();
+    found.set_item("channels", arrays)?;
     Ok(found)
 }
 
-/// Names the first input of another rate than that of the inputs before it; no bank is there to say whether
-/// it takes both.
-fn other_rate(reader: &MultiReader) -> Option<String> {
-    let mut rated = reader.headers().filter_map(|(name, header)| Some((name, header, header.rate?)));
-    let (first, of_first, wanted): (_, &StreamHeader, _) = rated.next()?;
-    let error = |header: &StreamHeader| header.rate_error.max(of_first.rate_error);
-    let (name, _, rate) = rated.find(|&(_, header, rate)| !is_same_rate(rate, wanted, error(header)))?;
-    Some(format!(
-        "{}: the sample rate is {} Hz, but {} has {} Hz; give bank=, which says whether the bank takes both",
-        Quoted(name),
-        Number(rate),
-        Quoted(first),
-        Number(wanted)
-    ))
+/// A reader of the headers of all files.
+fn start(files: &[PathBuf], options: ReadOptions<'_>) -> Result<MultiReader, CaptureError> {
+    let started = MultiReader::start(files, options, crossbeam_channel::never())?;
+    started.ok_or(CaptureError::Samples(OfflineError::Stopped))
+}
+
+impl Options {
+    fn format(&self) -> PyResult<FileFormat> {
+        Ok(FileFormat {
+            coding: self.format.parse().map_err(|error| refused(format!("format: {error}")))?,
+            channels: self.channels,
+            only: self.channel.map(|channel| channel.saturating_sub(1)),
+            full_scale: full_scale(self.full_scale.as_deref())?,
+        })
+    }
 }
 
 fn full_scale(given: Option<&str>) -> PyResult<Option<FullScale>> {
@@ -148,27 +123,24 @@ fn full_scale(given: Option<&str>) -> PyResult<Option<FullScale>> {
     scale.map_err(|error| refused(format!("full_scale: {error}")))
 }
 
-/// An array for each channel; of complex samples both parts are one.
-fn arrays(py: Python<'_>, channels: Vec<Vec<f64>>, is_complex: bool) -> Vec<Bound<'_, PyAny>> {
-    if !is_complex {
-        return channels.into_iter().map(|channel| PyArray1::from_vec(py, channel).into_any()).collect();
-    }
-    let both = |parts: &[Vec<f64>]| {
-        let pairs = parts[0].iter().zip(&parts[1]);
-        PyArray1::from_iter(py, pairs.map(|(&re, &im)| Complex64::new(re, im))).into_any()
+/// Of complex samples both parts are one.
+fn array(py: Python<'_>, channel: ChannelSamples) -> Bound<'_, PyAny> {
+    let Some(imaginary) = channel.imaginary else {
+        return PyArray1::from_vec(py, channel.samples).into_any();
     };
-    channels.chunks_exact(2).map(both).collect()
+    let pairs = channel.samples.iter().zip(&imaginary);
+    PyArray1::from_iter(py, pairs.map(|(&re, &im)| Complex64::new(re, im))).into_any()
 }
 
 /// For one recording in which the converters of a bank or a spec take turns: the channel, from 0, of each
 /// converter in turn.
 #[pyfunction]
 pub(crate) fn turns(source: &Bound<'_, PyAny>, interleaved: usize) -> PyResult<Vec<usize>> {
-    Ok(Wanted::new(source)?.turns(interleaved)?.channels().to_vec())
+    with_converters(source, |converters| Ok(in_turn(converters, interleaved)?.channels().to_vec()))
 }
 
 /// The samples of a frame of a bank or a spec.
 #[pyfunction]
 pub(crate) fn frame_samples(source: &Bound<'_, PyAny>) -> PyResult<usize> {
-    Wanted::new(source).map(|wanted| wanted.layout.count())
+    with_converters(source, |converters| Ok(converters.layout().count()))
 }

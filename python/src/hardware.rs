@@ -109,7 +109,9 @@ pub(crate) fn fuse<'py>(
     let mut model = BitTrue::new(bank, words).map_err(refused)?;
     // A power of two: the product is the integer itself.
     let full_scale = f64::from(bits - 1).exp2();
-    let mut frames: Vec<i32> = held.doubles(0)?.iter().map(|x| (x * full_scale) as i32).collect();
+    let channels = held.captures()?.channels;
+    let frame = |k: usize| channels.iter().map(move |channel| (channel.samples[k] * full_scale) as i32);
+    let mut frames: Vec<i32> = (0..held.frames()).flat_map(frame).collect();
     let skip = if keep_latency { 0 } else { bank.output_delay() };
     let wanted = held.frames() * bank.ratio;
     frames.extend(model.resting().repeat(skip.div_ceil(bank.ratio)));

@@ -5,7 +5,7 @@ use crate::background;
 use crate::errors::{choose, refused, warn};
 use crate::results::{Made, record};
 use crate::values::frequencies;
-use hybank::io::rails_of;
+use hybank::captures::ChannelSamples;
 use hybank::measure::{self as quality, Measurement, Settings, Warning, Window};
 use hybank::overview::{Figure, causes, column};
 use hybank::units::{Decibels, Hertz};
@@ -28,19 +28,11 @@ impl Request {
         Ok(Self { rate: Hertz(rate), window: choose("window", window, &WINDOWS)?, skip })
     }
 
-    /// One part of a record, without its ends.
-    fn samples(&self, held: &Held<'_>, part: usize) -> PyResult<Vec<f64>> {
-        let (skip, count) = (self.skip, held.frames());
-        if 2 * skip >= count && skip > 0 {
-            let most = count.div_ceil(2);
-            return Err(refused(format!(
-                "skip: {skip} leaves nothing of {count} samples; skip fewer than {most}"
-            )));
-        }
-        let mut samples = held.doubles(part)?;
-        samples.truncate(count - skip);
-        samples.drain(..skip);
-        Ok(samples)
+    /// The only channel of an array, without its ends.
+    fn channel(&self, y: &Bound<'_, PyAny>) -> PyResult<ChannelSamples> {
+        let captures = Held::new(y, Shape { axis: -1, channels: 1 })?.captures()?;
+        let channel = captures.channels.into_iter().next().unwrap_or_default();
+        channel.trimmed(self.skip).map_err(|error| refused(format!("skip: {error}")))
     }
 }
 
@@ -66,17 +58,8 @@ pub(crate) fn measure(
         window: request.window,
         ..Settings::default()
     };
-    let held = Held::new(y, Shape { axis: -1, channels: 1 })?;
-    let (real, rate) = (request.samples(&held, 0)?, request.rate);
-    let imaginary = if held.format.complex { Some(request.samples(&held, 1)?) } else { None };
-    let full_scale = if held.format.number.is_float() { full_scale } else { 1.0 };
-    let all = real.iter().chain(imaginary.iter().flatten()).map(|x| x / full_scale);
-    let (low, high) = rails_of(all, held.rails()).unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
-    let settings = Settings { rails: (low * full_scale, high * full_scale), ..settings };
-    let found = background::run(y.py(), None, move |_| match imaginary {
-        Some(imaginary) => quality::measure_complex(&real, &imaginary, rate, &settings),
-        None => quality::measure(&real, rate, &settings),
-    })?;
+    let (channel, rate) = (request.channel(y)?, request.rate);
+    let found = background::run(y.py(), None, move |_| channel.measured(rate, &settings))?;
     result(y.py(), &found.map_err(refused)?)
 }
 
@@ -92,13 +75,13 @@ pub(crate) fn compare(
 ) -> PyResult<(Py<PyAny>, Spectrum)> {
     let (py, request) = (y.py(), Request::new(rate, window, skip)?);
     let part = |x: &Bound<'_, PyAny>| -> PyResult<Vec<f64>> {
-        let held = Held::new(x, Shape { axis: -1, channels: 1 })?;
-        if held.format.complex {
+        let channel = request.channel(x)?;
+        if channel.imaginary.is_some() {
             return Err(refused(
                 "ref: complex samples, and only real ones are compared; give the real or the imaginary parts of both",
             ));
         }
-        request.samples(&held, 0)
+        Ok(channel.samples)
     };
     let (own, other) = (part(y)?, part(reference)?);
     let Request { rate, window, .. } = request;

@@ -6,6 +6,7 @@ use crate::errors::refused;
 use crate::results::Made;
 use crate::sources;
 use crate::values::{numbers, shares, times};
+use hybank::captures::ChannelSamples;
 use hybank::design::Problem;
 use hybank::simulate::{
     Analog, ComplexSource, ConverterErrors, Delivered, Recording, RefusedError, Signal, Source,
@@ -117,14 +118,10 @@ fn part(spec: &Spec, signal: &Bound<'_, PyAny>, rate: Option<f64>) -> PyResult<S
         return Err(refused(format!("rate: {} is no sample rate; give samples per second", rate.0)));
     }
     let held = Held::new(signal, Shape { axis: -1, channels: 1 })?;
-    let part = |part| -> PyResult<Analog> {
-        let samples = held.doubles(part)?;
-        if let Some(n) = samples.iter().position(|x| !x.is_finite()) {
-            return Err(refused(format!("sample {n} of the signal is {}; give finite samples", samples[n])));
-        }
-        Ok(Analog::Recorded(Recording::new(&samples, FastPeriods(fast / rate))))
-    };
-    Ok(Signal { real: part(0)?, imaginary: if held.format.complex { Some(part(1)?) } else { None } })
+    let channel = held.captures()?.channels.into_iter().next().unwrap_or_default();
+    let ChannelSamples { samples, imaginary, .. } = channel.finite().map_err(refused)?;
+    let part = |samples: &[f64]| Analog::Recorded(Recording::new(samples, FastPeriods(fast / rate)));
+    Ok(Signal { real: part(&samples), imaginary: imaginary.as_deref().map(part) })
 }
 
 /// An array with a row for each converter; a list of arrays where these have rates of their own.

@@ -112,9 +112,11 @@ def test_sources_and_sinks(fir, tmp_path):
     np.save(tmp_path / "frames.npy", np.ascontiguousarray(x.T))
     for i in range(2):
         write_wav(tmp_path / f"{i}.wav", x[i], 24000)
-        meta = {"core:datatype": "ri16_le", "core:version": "1.0.0", "core:num_channels": 1}
+        # The samples of the second recording end before its file does.
+        more = {"core:trailing_bytes": 7 * i}
+        meta = {"core:datatype": "ri16_le", "core:version": "1.0.0", "core:num_channels": 1, **more}
         (tmp_path / f"{i}.sigmf-meta").write_text(json.dumps({"global": meta, "captures": [], "annotations": []}))
-        x[i].astype("<i2").tofile(tmp_path / f"{i}.sigmf-data")
+        (tmp_path / f"{i}.sigmf-data").write_bytes(x[i].astype("<i2").tobytes() + b"trailer"[: 7 * i])
     wav, sigmf = ([tmp_path / f"{i}.{kind}" for i in range(2)] for kind in ("wav", "sigmf-meta"))
     sources = [(tmp_path / "rows.npy", -1), (tmp_path / "frames.npy", 0), (wav, -1), (sigmf, -1)]
     sinks = [tmp_path / "out.npy"]
@@ -134,6 +136,7 @@ def test_sources_and_sinks(fir, tmp_path):
     file = hb.Recording(tmp_path / "0.wav")
     assert (file.frames, file.channels, file.rate, file.dtype) == (FRAMES, 1, 24000.0, "f4")
     np.testing.assert_array_equal(file.read(FRAMES - 3, 10), x[:1, -3:].T / np.float32(32768))
+    assert hb.Recording(tmp_path / "1.sigmf-meta").frames == FRAMES
 
 
 def test_a_dataset_of_hdf5_is_a_source(fir, tmp_path):

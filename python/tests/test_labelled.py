@@ -35,6 +35,11 @@ def test_a_data_array_keeps_its_dimensions_and_coordinates(fir, x):
         fir.fuse(xarray.DataArray(np.zeros((2, 2, 9)), dims=("p", "q", "time")))
 
 
+def test_a_list_of_series_is_a_list_of_channels(fir, x):
+    pandas = pytest.importorskip("pandas")
+    np.testing.assert_array_equal(fir.fuse([pandas.Series(row) for row in x]), fir.fuse(x))
+
+
 def test_a_data_frame_keeps_its_index(fir, x):
     pandas = pytest.importorskip("pandas")
     for index, want in [

@@ -67,7 +67,7 @@ pub use warning::Warning;
 
 pub use crate::spec::{Cutoff, Fitting, UnknownFitting};
 
-use crate::spec::Spec;
+use crate::spec::{Spec, UncertaintySpec};
 use crate::units::{FastPeriods, Hertz};
 use estimates::Fitted;
 
@@ -102,6 +102,11 @@ pub struct Settings {
     pub fit: Fit,
     /// The reference channel, from 0.
     pub reference: usize,
+}
+
+/// The reference channel, from 0, where none is named: that of the spec's uncertainty, or the first.
+pub fn usual_reference(spec: &Spec) -> usize {
+    spec.uncertainty.as_ref().and_then(UncertaintySpec::reference_channel).unwrap_or(0)
 }
 
 /// Calibrates the channels of `spec` by `records`, one per channel in the order of the spec, whose samples
@@ -188,6 +193,9 @@ fn undetermined(channels: &[ChannelEstimate]) -> Option<(usize, FastPeriods)> {
 pub(crate) fn check_parts(records: &[Record], signal: &CalibrationSignal) -> Result<(), CalibrateError> {
     let complex = records.iter().filter(|record| record.imaginary.is_some()).count();
     match signal {
+        CalibrationSignal::Tones(tones) if tones.iter().any(|tone| !tone.0.is_normal()) => {
+            Err(CalibrateError::NoFrequency)
+        }
         CalibrationSignal::Tones(_) if complex == records.len() => Ok(()),
         CalibrationSignal::Tones(tones) if complex == 0 => match tones.iter().find(|tone| tone.0 < 0.0) {
             Some(&tone) => Err(CalibrateError::NegativeTone { tone }),

@@ -1,6 +1,7 @@
 //! Analysis of a bank: the norm of its error system, its mean-square error and its noise gain, with the
 //! delays it was designed for or with others; and the scale of its gamma, what the simplest banks reach.
 
+use super::normalise::input_scale;
 use super::plant::LiftedPlant;
 use super::problem::Problem;
 use super::prove::resolved_norm;
@@ -38,7 +39,7 @@ pub struct MeanAnalysis {
     /// `sqrt(sum_i ||f_i||^2 / M)`.
     pub noise_gain: f64,
     /// RMS of the output noise for the noise of the converters as the spec gives it, relative to full scale:
-    /// `sqrt(sum_i sigma_i^2 ||f_i||^2 / M)`.
+    /// `sqrt(sum_i sigma_i^2 ||f_i||^2 / M)`. Jitter counts for a signal of the rms of the spec.
     pub output_noise: f64,
 }
 
@@ -122,7 +123,10 @@ pub fn noise_gain(bank: &Bank) -> Result<f64, DesignError> {
 fn mean_of(bank: &Bank, plant: &LiftedPlant) -> Result<MeanAnalysis, DesignError> {
     let filters = filters::lifted(&bank.filters, bank.ratio);
     let error = plant.error_system(&filters);
-    let noise_rms: Vec<f64> = plant.problem().noise.iter().map(|power| power.sqrt()).collect();
+    let Problem { noise, signal, front_ends, target, .. } = plant.problem();
+    // The noise of the problem is relative to an input of unit density.
+    let scale = bank.spec.as_ref().map(|spec| input_scale(spec, signal.as_ref(), &front_ends[*target]));
+    let noise_rms: Vec<f64> = noise.iter().map(|power| (power / scale.unwrap_or(1.0)).sqrt()).collect();
     let per_sample = (bank.ratio as f64).sqrt();
     Ok(MeanAnalysis {
         rms_error: h2_norm(&error)? / per_sample,

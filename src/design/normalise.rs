@@ -97,7 +97,7 @@ impl Problem {
 
 /// The power of an input of unit density at the target, over that of the signal in full scale: with it the
 /// noise of the converters and the signal have one scale.
-fn input_scale(spec: &Spec, signal: Option<&StableFilter>, target: &StrictlyProper) -> f64 {
+pub(super) fn input_scale(spec: &Spec, signal: Option<&StableFilter>, target: &StrictlyProper) -> f64 {
     let Some((signal, table)) = signal.zip(spec.signal.as_ref()) else { return 1.0 };
     signal.power_through(target) / (table.rms * table.rms)
 }

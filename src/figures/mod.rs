@@ -5,14 +5,15 @@
 //! A tone at the analog frequency w gives the samples `g_i Phi_i(j w) e^{-j w D_i} e^{j w k M}` (h = 1), and
 //! the bank answers with tones at w + 2 pi k / M ([`Tone`]). The one for k = 0 against the target's is the
 //! error of gain and phase; the others are images. The largest image over a band predicts the spurious-free
-//! dynamic range.
+//! dynamic range. Delays and gains within the spec's `[uncertainty]` count as the mean over Gaussian errors
+//! whose 95 % intervals are the stated ones, constant for each converter.
 //!
 //! # Signal-to-noise ratio
 //! Variance of the target over the variance of the error, averaged over time, in decibels. For white noise
 //! in the band of the spec's `[signal]`; for the spectrum |W|^2 where that is a filter; without the table
 //! for white noise at all frequencies, as in the thesis. The front ends stand before the samples in any
-//! case. The parts are the error from the signal, the noise of the converters, and what delays that are off
-//! add ([`Snr`]). All are integrals of amplitudes over frequency, so 200 dB are resolved.
+//! case. The parts are the error from the signal, the noise of the converters, and what delays, gains and
+//! offsets that are off add ([`Snr`]). All are integrals of amplitudes over frequency, so 200 dB are resolved.
 //!
 //! # Simple ways
 //! One channel alone with its Wiener filter, plain interleaving, and the cubic spline through all samples,
@@ -29,6 +30,7 @@ mod signal;
 mod simple;
 mod snr;
 mod spline;
+mod spread;
 #[cfg(test)]
 mod tests;
 mod tones;
@@ -45,6 +47,7 @@ use crate::design::{DesignError, LiftedPlant, Problem};
 use crate::spec::{Band, Spec};
 use crate::units::{CyclesPerFastPeriod, Decibels, Hertz};
 use snr::Setting;
+use spread::Spread;
 use tones::{ToneResponse, Worst};
 
 /// By how many decibels a bank must beat the simple ways to be worth its trouble.
@@ -104,7 +107,7 @@ impl Figures {
         let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
         let plain = without_signal(spec, bank.latency)?;
         let band = FigureBand::new(spec, &plain);
-        let tones = ToneResponse::new(plain.clone(), FilterResponse::new(bank)?);
+        let tones = ToneResponse::new(plain.clone(), FilterResponse::new(bank)?, Spread::of_bank(bank, spec));
         let Worst { image, gain_error, vanishes } = tones.worst(band.cycles(spec));
         let setting = Setting::of(bank, spec, &band)?;
         let ways = simple::ways(setting.problem());
@@ -173,7 +176,8 @@ pub fn tone_curve(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Tone)>, Desi
     let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
     let plain = without_signal(spec, bank.latency)?;
     let band = FigureBand::new(spec, &plain).cycles(spec);
-    let tones = ToneResponse::new(plain, FilterResponse::new(bank)?).curve(band, points);
+    let tones =
+        ToneResponse::new(plain, FilterResponse::new(bank)?, Spread::of_bank(bank, spec)).curve(band, points);
     let hertz = |CyclesPerFastPeriod(f): CyclesPerFastPeriod| Hertz(f / spec.fast_period.0);
     Ok(tones.into_iter().map(|tone| (hertz(tone.frequency), tone)).collect())
 }

@@ -1,11 +1,11 @@
 //! Mean squares of the errors of reconstructions: from the signal, from the noise of the converters, and
-//! from delays that are not known exactly.
+//! from delays, gains and offsets that are not known exactly.
 
 use super::integral::mean_over_circle;
 use super::reconstruction::Reconstruction;
 use super::signal::{Columns, Signal};
+use super::spread::Spread;
 use crate::linalg::{CMat, Complex};
-use crate::units::FastPeriods;
 use std::ops::Range;
 
 /// Multiply-adds that an integral may take, about: a second or two.
@@ -19,8 +19,8 @@ pub(super) struct Conditions<'a> {
     pub(super) signal: &'a Signal,
     /// s_i^2 of each channel, in the scale of the signal's unit density.
     pub(super) noise: Vec<f64>,
-    /// Deviation of each delay from the one in the spec: constant while a recording lasts, Gaussian.
-    pub(super) spread: Vec<FastPeriods>,
+    /// How far each converter is from the spec.
+    pub(super) spread: Vec<Spread>,
 }
 
 /// Mean squares per fast sample.
@@ -29,11 +29,13 @@ pub(super) struct Powers {
     /// Of the error from the signal.
     pub(super) signal: f64,
     /// The same, as a mean over the uncertain delays.
-    pub(super) uncertain: f64,
+    pub(super) late: f64,
+    /// What the uncertain gains add to it.
+    pub(super) gains: f64,
+    /// Of the uncertain offsets at the output.
+    pub(super) offsets: f64,
     /// Of the noise at the output.
     pub(super) noise: f64,
-    /// Of the noise at the output for noise of unit power on every channel: the square of the noise gain.
-    pub(super) unit_noise: f64,
 }
 
 /// The mean square of the target.
@@ -57,80 +59,87 @@ impl Conditions<'_> {
             even_and(self.signal.breaks().into_iter().chain(ways.iter().flat_map(Reconstruction::breaks)));
         let means = mean_over_circle(&breaks, angles(work), &mut |theta| {
             let columns = self.signal.at(theta);
-            let late = self.is_uncertain().then(|| self.late(&columns));
+            let late = self.late(&columns);
             ways.iter().flat_map(|way| self.at(way, theta, &columns, late.as_ref())).collect()
         });
         let per_sample = 1.0 / problem.ratio as f64;
-        let powers = |p: &[f64]| Powers {
+        let powers = |(way, p): (&Reconstruction, &[f64])| Powers {
             signal: p[0] * per_sample,
-            uncertain: p[1] * per_sample,
-            noise: p[2] * per_sample,
-            unit_noise: p[3] * per_sample,
+            late: p[1] * per_sample,
+            gains: p[2] * per_sample,
+            offsets: self.offsets(way) * per_sample,
+            noise: p[3] * per_sample,
         };
-        means.chunks_exact(4).map(powers).collect()
+        ways.iter().zip(means.chunks_exact(4)).map(powers).collect()
     }
 
-    /// Whether some delay is.
-    pub(super) fn is_uncertain(&self) -> bool {
-        self.spread.iter().any(|spread| spread.0 > 0.0)
+    /// The power of uncertain offsets over the M phases: what the filters make of constants.
+    fn offsets(&self, way: &Reconstruction) -> f64 {
+        if self.spread.iter().all(|spread| spread.offset == 0.0) {
+            return 0.0;
+        }
+        let filters = way.at(0.0, &self.signal.at(0.0), &self.noise);
+        let constant = CMat::from_element(filters.ncols(), 1, Complex::ONE);
+        self.of_converters(|spread, samples| spread.offset.powi(2) * power(&filters, &constant, samples))
     }
 
-    /// The four mean squares of [`Powers`] at an angle, summed over the M phases.
+    /// The sum over the converters, whose errors are independent.
+    fn of_converters(&self, of: impl Fn(&Spread, Range<usize>) -> f64) -> f64 {
+        let converters = self.signal.problem().converters().into_iter();
+        self.spread.iter().zip(converters).map(|(spread, samples)| of(spread, samples)).sum()
+    }
+
+    /// The mean squares of [`Powers`] at an angle without the offsets, summed over the M phases.
     fn at(&self, way: &Reconstruction, theta: f64, columns: &Columns, late: Option<&Late>) -> [f64; 4] {
         let filters = way.at(theta, columns, &self.noise);
-        let per_channel: Vec<f64> = filters.column_iter().map(|column| column.norm_squared()).collect();
         let signal = error(columns, &filters, &columns.measurement);
-        let uncertain = match late.filter(|_| way.knows_delays()) {
-            Some(late) => {
-                let spread = |samples: &Range<usize>| match samples.len() {
-                    1 => per_channel[samples.start] * late.spread[samples.start],
-                    _ => late.spread_of(&filters, samples),
-                };
-                error(columns, &filters, &late.mean) + late.converters.iter().map(spread).sum::<f64>()
+        let late = late.filter(|_| way.is_relative()).map_or(signal, |late| {
+            let beside = self.of_converters(|_, samples| power(&filters, &late.rest, samples));
+            error(columns, &filters, &late.mean) + beside
+        });
+        let gains = self.of_converters(|spread, samples| match spread.gain {
+            gain if gain > 0.0 && way.is_relative() => {
+                gain * gain * power(&filters, &columns.measurement, samples)
             }
-            None => signal,
-        };
-        let noise = per_channel.iter().zip(&self.noise).map(|(gain, power)| gain * power).sum();
-        [signal, uncertain, noise, per_channel.iter().sum()]
+            _ => 0.0,
+        });
+        let noise =
+            filters.column_iter().zip(&self.noise).map(|(column, power)| column.norm_squared() * power);
+        [signal, late, gains, noise.sum()]
     }
 
-    /// A delay that is late by a Gaussian error of deviation s turns a sample of the frequency w by a
-    /// random phase. Its mean is the sample times chi = e^{-(w s)^2 / 2}, and the rest has the power 1 -
-    /// chi^2; it is coherent in one converter, and independent between converters.
-    fn late(&self, columns: &Columns) -> Late {
-        let mut mean = columns.measurement.clone();
-        let converters = self.signal.problem().converters();
-        let mut rest = mean.clone();
-        let mut spread = vec![0.0; mean.nrows()];
-        for (samples, s) in converters.iter().zip(&self.spread) {
-            for i in samples.clone() {
-                for (k, w) in columns.frequencies.iter().enumerate() {
-                    let exponent = -(w * s.0).powi(2);
-                    spread[i] -= mean[(i, k)].norm_sqr() * exponent.exp_m1();
-                    rest[(i, k)] *= (-exponent.exp_m1()).sqrt();
-                    mean[(i, k)] *= (0.5 * exponent).exp();
-                }
+    /// The samples of delays that are off; `None` where all are exact.
+    fn late(&self, columns: &Columns) -> Option<Late> {
+        if self.spread.iter().all(|spread| spread.delay.0 == 0.0) {
+            return None;
+        }
+        let (mut mean, mut rest) = (columns.measurement.clone(), columns.measurement.clone());
+        for (spread, samples) in self.spread.iter().zip(self.signal.problem().converters()) {
+            for (k, &w) in columns.frequencies.iter().enumerate() {
+                let (chi, beside) = (spread.mean_phase(w), spread.phase_power(w).sqrt());
+                samples.clone().for_each(|i| {
+                    mean[(i, k)] *= chi;
+                    rest[(i, k)] *= beside;
+                });
             }
         }
-        Late { mean, rest, spread, converters }
+        Some(Late { mean, rest })
     }
 }
 
-/// Measurements with delays that are not known exactly.
+/// Samples of delays that are not known exactly.
 struct Late {
     mean: CMat,
-    /// What each sample has beside its mean at each frequency, and its power.
+    /// What each sample has beside its mean at each frequency.
     rest: CMat,
-    spread: Vec<f64>,
-    /// The samples of each converter.
-    converters: Vec<Range<usize>>,
 }
 
-impl Late {
-    /// The power of the sum of what the samples of a converter have beside their means: they turn together.
-    fn spread_of(&self, filters: &CMat, samples: &Range<usize>) -> f64 {
-        let (first, count) = (samples.start, samples.len());
-        (filters.columns(first, count) * self.rest.rows(first, count)).norm_squared()
+/// The power at the output of what the samples of a converter have in common.
+fn power(filters: &CMat, of: &CMat, samples: Range<usize>) -> f64 {
+    let (first, count) = (samples.start, samples.len());
+    match count {
+        1 => filters.column(first).norm_squared() * of.row(first).norm_squared(),
+        _ => (filters.columns(first, count) * of.rows(first, count)).norm_squared(),
     }
 }
 

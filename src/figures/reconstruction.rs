@@ -50,8 +50,8 @@ impl Reconstruction {
         if let Self::Bank(filters) = self { filters.breaks() } else { Vec::new() }
     }
 
-    /// Whether an error of a delay counts: a channel alone has nothing to be late against.
-    pub(super) fn knows_delays(&self) -> bool {
+    /// Whether an error of a delay or a gain counts: they are relative to other channels.
+    pub(super) fn is_relative(&self) -> bool {
         !matches!(self, Self::OneChannel { .. })
     }
 }

@@ -4,12 +4,13 @@ use super::band::FigureBand;
 use super::powers::{Conditions, Powers, target_power};
 use super::reconstruction::Reconstruction;
 use super::signal::Signal;
+use super::spread::Spread;
 use super::without_signal;
 use crate::bank::Bank;
 use crate::design::filters::FilterResponse;
 use crate::design::{DesignError, Problem};
 use crate::spec::{SignalSpectrum, Spec, USUAL_RMS};
-use crate::units::{Decibels, FastPeriods, Seconds};
+use crate::units::Decibels;
 use std::f64::consts::TAU;
 
 /// Variance of the rounding to 16 bits of a full scale from -1 to 1: step^2 / 12.
@@ -27,6 +28,10 @@ pub struct Snr {
     /// Gaussian errors whose 95 % intervals are the stated ones, constant for each converter. `None` where
     /// all delays are exact, or where the taps follow them.
     pub delays_db: Option<Decibels>,
+    /// The same of the gains.
+    pub gains_db: Option<Decibels>,
+    /// The same of the offsets.
+    pub offsets_db: Option<Decibels>,
 }
 
 /// The ratios of one way.
@@ -52,10 +57,10 @@ pub(super) struct Setting {
     /// Of the converters, in the scale of the signal: as the spec says, or that of 16 bits.
     noise: Vec<f64>,
     noise_is_stated: bool,
-    /// Deviations of the delays of the converters.
-    spread: Vec<FastPeriods>,
-    /// Those that the bank does not follow.
-    not_followed: Vec<FastPeriods>,
+    /// Of the converters; offsets are in the scale of the signal.
+    spread: Vec<Spread>,
+    /// Of the converters of the bank itself.
+    of_bank: Vec<Spread>,
 }
 
 impl Setting {
@@ -64,18 +69,18 @@ impl Setting {
     /// # Errors
     /// As [`Problem::new`].
     pub(super) fn of(bank: &Bank, spec: &Spec, band: &FigureBand) -> Result<Self, DesignError> {
-        let follows = |i: usize| bank.tap_slopes.as_ref().is_some_and(|slopes| slopes.follows(i));
-        Self::new(spec, bank.latency, &follows, band)
+        Self::new(spec, bank.latency, Spread::of_bank(bank, spec), band)
     }
 
-    /// Of any filters for a spec with this latency, which follow the delays of some channels.
+    /// Of any filters for a spec with this latency; the delays and gains of the bank itself are off by
+    /// `of_bank`.
     ///
     /// # Errors
     /// As [`Problem::new`].
     pub(super) fn new(
         spec: &Spec,
         latency: usize,
-        follows: &dyn Fn(usize) -> bool,
+        of_bank: Vec<Spread>,
         band: &FigureBand,
     ) -> Result<Self, DesignError> {
         let plain = without_signal(spec, latency)?;
@@ -94,22 +99,21 @@ impl Setting {
         let rms = spec.signal.as_ref().map(|signal| signal.rms);
         let noise_is_stated = stated.iter().chain(&jitter).any(|power| *power > 0.0);
         let scale = |rms: f64| target / (rms * rms);
+        // Without a signal stated noise counts relative to unit density, as in the design.
+        let full_scale = match rms {
+            None if noise_is_stated => 1.0,
+            rms => scale(rms.unwrap_or(USUAL_RMS)),
+        };
         let noise = if noise_is_stated {
-            // Without a signal the noise counts relative to unit density, as in the design.
-            let own = stated.into_iter().map(|power| power * rms.map_or(1.0, scale));
+            let own = stated.into_iter().map(|power| power * full_scale);
             own.zip(jitter).map(|(power, share)| power + share * target).collect()
         } else {
-            vec![ROUNDING_16_BITS * scale(rms.unwrap_or(USUAL_RMS)); stated.len()]
+            vec![ROUNDING_16_BITS * full_scale; stated.len()]
         };
-        let channels = spec.channels.len();
-        let deviations = spec.uncertainty.as_ref().map(|table| table.delay_deviations(channels));
-        let deviations = deviations.unwrap_or_else(|| vec![Seconds(0.0); channels]);
-        let spread: Vec<FastPeriods> =
-            deviations.into_iter().map(|time| time.in_fast_periods(spec.fast_period)).collect();
-        let known =
-            |(i, deviation): (usize, &FastPeriods)| if follows(i) { FastPeriods(0.0) } else { *deviation };
-        let not_followed = spread.iter().enumerate().map(known).collect();
-        Ok(Self { signal, target, noise, noise_is_stated, spread, not_followed })
+        let scaled = |spread: Spread| Spread { offset: spread.offset * full_scale.sqrt(), ..spread };
+        let spread = Spread::of_spec(spec).into_iter().map(scaled).collect();
+        let of_bank = of_bank.into_iter().map(scaled).collect();
+        Ok(Self { signal, target, noise, noise_is_stated, spread, of_bank })
     }
 
     /// The front ends, with the spectrum of the signal where it is a filter.
@@ -124,28 +128,33 @@ impl Setting {
 
     /// The ratio of the bank itself, whose taps may follow the delays.
     pub(super) fn ratio_of_bank(&self, bank: FilterResponse) -> Ratios {
-        self.ratios_for(&[Reconstruction::Bank(bank)], &self.not_followed).pop().unwrap_or_default()
+        self.ratios_for(&[Reconstruction::Bank(bank)], &self.of_bank).pop().unwrap_or_default()
     }
 
-    fn ratios_for(&self, ways: &[Reconstruction], spread: &[FastPeriods]) -> Vec<Ratios> {
+    fn ratios_for(&self, ways: &[Reconstruction], spread: &[Spread]) -> Vec<Ratios> {
         let conditions =
             Conditions { signal: &self.signal, noise: self.noise.clone(), spread: spread.to_vec() };
-        let uncertain = conditions.is_uncertain();
-        conditions.powers(ways).into_iter().map(|powers| self.ratio(&powers, uncertain)).collect()
+        conditions.powers(ways).iter().map(|powers| self.ratio(powers, spread)).collect()
     }
 
-    fn ratio(&self, powers: &Powers, uncertain: bool) -> Ratios {
-        let Powers { signal, uncertain: all_delays, noise, .. } = *powers;
+    fn ratio(&self, powers: &Powers, spread: &[Spread]) -> Ratios {
+        let Powers { signal, late, gains, offsets, noise, .. } = *powers;
         let db = |power: f64| Decibels::of_power(self.target / power);
+        let of = |error: fn(&Spread) -> f64, power: f64| {
+            spread.iter().any(|spread| error(spread) > 0.0).then(|| db(power.max(0.0)))
+        };
+        let all = late + gains + offsets;
         let stated = if self.noise_is_stated { noise } else { 0.0 };
         Ratios {
             snr: Snr {
-                total_db: db(all_delays + stated),
+                total_db: db(all + stated),
                 signal_db: db(signal),
                 noise_db: self.noise_is_stated.then(|| db(noise)),
-                delays_db: uncertain.then(|| db((all_delays - signal).max(0.0))),
+                delays_db: of(|spread| spread.delay.0, late - signal),
+                gains_db: of(|spread| spread.gain, gains),
+                offsets_db: of(|spread| spread.offset, offsets),
             },
-            with_16_bits: (!self.noise_is_stated).then(|| db(all_delays + noise)),
+            with_16_bits: (!self.noise_is_stated).then(|| db(all + noise)),
         }
     }
 }

@@ -1,10 +1,12 @@
 //! What a bank makes of a tone: its images and its error of gain and phase.
 
+use super::spread::Spread;
 use crate::design::Problem;
 use crate::design::filters::FilterResponse;
-use crate::linalg::{Complex, fourier};
+use crate::linalg::{CMat, Complex, fourier};
 use crate::units::{CyclesPerFastPeriod, RadiansPerFastPeriod};
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// Grid points for each peak that filters of a given length may have in a band.
 const PER_PEAK: f64 = 8.0;
@@ -28,7 +30,8 @@ const VANISHING: f64 = 1e-6;
 /// Y_k = (1 / M) sum_i F_i(e^{j (w + 2 pi k / M)}) g_i Phi_i(j w) e^{-j w D_i}
 /// ```
 ///
-/// is the amplitude at w + 2 pi k / M: the tone for k = 0, an image for k = 1 .. M - 1.
+/// is the amplitude at w + 2 pi k / M: the tone for k = 0, an image for k = 1 .. M - 1. Where delays or gains
+/// are uncertain, the figures are root mean squares over their errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tone {
     /// w / (2 pi).
@@ -45,12 +48,15 @@ pub struct Tone {
 pub(super) struct ToneResponse {
     problem: Problem,
     filters: FilterResponse,
+    /// Of the converters.
+    spread: Vec<Spread>,
 }
 
 impl ToneResponse {
-    /// Of the `filters` of a bank after the front ends of `problem`, without the spectrum of a signal.
-    pub(super) fn new(problem: Problem, filters: FilterResponse) -> Self {
-        Self { problem, filters }
+    /// Of the `filters` of a bank after the front ends of `problem`, without the spectrum of a signal, for
+    /// converters that are off by so much.
+    pub(super) fn new(problem: Problem, filters: FilterResponse, spread: Vec<Spread>) -> Self {
+        Self { problem, filters, spread }
     }
 
     /// The output at w / (2 pi) = `frequency`.
@@ -59,17 +65,30 @@ impl ToneResponse {
         let w = TAU * frequency;
         let passed: Vec<Complex<f64>> =
             front_ends.iter().map(|filter| filter.response(RadiansPerFastPeriod(w))).collect();
-        let samples = channels.iter().map(|channel| {
-            passed[channel.front_end]
-                * Complex::from_polar(channel.gain, -w * channel.delay.in_fast_periods().0)
-        });
-        let phases =
-            self.filters.at(w * *ratio as f64) * nalgebra::DVector::from_iterator(channels.len(), samples);
-        let turned = phases.iter().enumerate().map(|(p, y)| y * Complex::from_polar(1.0, -w * p as f64));
-        let outputs = fourier::spectrum(turned.collect());
-        let image = outputs.iter().skip(1).map(|y| y.norm()).fold(0.0, f64::max) / outputs[0].norm();
+        let samples: Vec<Complex<f64>> = channels
+            .iter()
+            .map(|channel| {
+                let delay = channel.delay.in_fast_periods().0;
+                passed[channel.front_end] * Complex::from_polar(channel.gain, -w * delay)
+            })
+            .collect();
+        let filters = self.filters.at(w * *ratio as f64);
+        let mean = |i: usize| samples[i] * self.spread[channels[i].converter].mean_phase(w);
+        let outputs = answer(&filters, 0..samples.len(), w, mean);
+        // The powers of what the outputs have beside their means.
+        let mut beside = vec![0.0; *ratio];
+        for (spread, one) in self.spread.iter().zip(self.problem.converters()) {
+            let power = spread.power(w);
+            if power > 0.0 {
+                let own = answer(&filters, one, w, |i| samples[i]);
+                beside.iter_mut().zip(own).for_each(|(sum, y)| *sum += power * y.norm_sqr());
+            }
+        }
+        let images = outputs.iter().zip(&beside).skip(1).map(|(y, beside)| y.norm().hypot(beside.sqrt()));
+        let image = images.fold(0.0, f64::max) / outputs[0].norm();
         let wanted = passed[*target] * Complex::from_polar(1.0, -w * *latency as f64);
         let gain_error = (outputs[0] / *ratio as f64 / wanted - 1.0).norm();
+        let gain_error = gain_error.hypot(beside[0].sqrt() / (*ratio as f64 * wanted.norm()));
         Tone { frequency: CyclesPerFastPeriod(frequency), target: wanted.norm(), image, gain_error }
     }
 
@@ -146,6 +165,20 @@ impl ToneResponse {
         }
         best
     }
+}
+
+/// M Y_k of some channels, k = 0 .. M - 1, at the frequency w.
+fn answer(
+    filters: &CMat,
+    channels: Range<usize>,
+    w: f64,
+    sample: impl Fn(usize) -> Complex<f64>,
+) -> Vec<Complex<f64>> {
+    let phases = filters.row_iter().enumerate().map(|(p, row)| {
+        let sum: Complex<f64> = channels.clone().map(|i| row[i] * sample(i)).sum();
+        sum * Complex::from_polar(1.0, -w * p as f64)
+    });
+    fourier::spectrum(phases.collect())
 }
 
 /// The worst tones of a band.

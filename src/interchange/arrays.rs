@@ -1,10 +1,8 @@
-//! Arrays for NumPy and MATLAB.
+//! Arrays for MATLAB and SciPy.
 
 use super::ExportError;
 use super::layout::PolyphaseTaps;
 use crate::bank::{Bank, SynthesisFilters};
-use npyz::WriterBuilder;
-use std::io::{Cursor, Write};
 
 /// A named array of doubles, row-major.
 struct Array {
@@ -43,20 +41,6 @@ fn arrays(bank: &Bank) -> Vec<Array> {
     all
 }
 
-/// A NumPy archive, not compressed.
-pub(super) fn npz(bank: &Bank) -> Result<Vec<u8>, ExportError> {
-    let failed = |error: &dyn std::fmt::Display| ExportError::Archive(error.to_string());
-    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
-    let stored = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
-    for Array { name, shape, values } in arrays(bank) {
-        archive.start_file(format!("{name}.npy"), stored).map_err(|error| failed(&error))?;
-        let options = npyz::WriteOptions::new().default_dtype().shape(&shape);
-        let mut writer = options.writer(&mut archive).begin_nd().map_err(|error| failed(&error))?;
-        writer.extend(values).and_then(|()| writer.finish()).map_err(|error| failed(&error))?;
-    }
-    archive.finish().map(Cursor::into_inner).map_err(|error| failed(&error))
-}
-
 /// A MATLAB file, level 4: for each variable a header of five integers, its name, and its columns.
 ///
 /// Source: MathWorks, *MAT-File Format*, "Level 4 MAT-files".
@@ -67,7 +51,7 @@ pub(super) fn mat(bank: &Bank) -> Result<Vec<u8>, ExportError> {
         let columns = shape[1..].iter().product::<u64>();
         // Type 0: doubles, little endian, a full matrix.
         for number in [0, rows, columns, 0, name.len() as u64 + 1] {
-            let number = u32::try_from(number).map_err(|error| ExportError::Archive(error.to_string()))?;
+            let number = u32::try_from(number).map_err(|_| ExportError::TooLarge { name, rows, columns })?;
             bytes.extend(number.to_le_bytes());
         }
         bytes.extend(name.bytes().chain([0]));
@@ -76,6 +60,5 @@ pub(super) fn mat(bank: &Bank) -> Result<Vec<u8>, ExportError> {
             column.for_each(|value| bytes.extend(value.to_le_bytes()));
         }
     }
-    bytes.flush().map_err(|error| ExportError::Archive(error.to_string()))?;
     Ok(bytes)
 }

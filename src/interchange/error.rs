@@ -106,7 +106,14 @@ pub enum ExportError {
          has not; take one clock for each frame, or inferred multipliers"
     )]
     ShiftAddRom,
-    /// The archive could not be put together.
-    #[error("the archive cannot be written: {0}")]
-    Archive(String),
+    /// MATLAB's files count rows and columns in 32 bits.
+    #[error("\"{name}\" has {rows} x {columns} numbers, more than a .mat file can hold; write a table (csv)")]
+    TooLarge {
+        /// The array.
+        name: &'static str,
+        /// Its rows.
+        rows: u64,
+        /// Its columns.
+        columns: u64,
+    },
 }

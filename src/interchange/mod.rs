@@ -1,5 +1,5 @@
-//! Banks for other tools (C99, Verilog, tables, memory images of FPGAs, NumPy and MATLAB files), and taps
-//! of other tools.
+//! Banks for other tools (C99, Verilog, tables, memory images of FPGAs, MATLAB files), and taps of other
+//! tools.
 //!
 //! The order of FIR taps is the same in every format: channel, then phase p of the output, then lag j in
 //! slow periods. Entry (i, p, j) is the tap `f_i[p + j M]`, so
@@ -51,9 +51,7 @@ pub enum Format {
     C99,
     /// Comma-separated values, one coefficient per line
     Csv,
-    /// A NumPy archive
-    Npz,
-    /// A MATLAB file (level 4)
+    /// A MATLAB file (level 4), which SciPy reads too
     Mat,
     /// A coefficient file of Xilinx tools
     Coe,
@@ -94,7 +92,6 @@ pub fn export(
             Ok(Verilog::new(bank, name, &options)?.text.into_bytes())
         }
         Format::Csv => Ok(tables::csv(bank).into_bytes()),
-        Format::Npz => arrays::npz(bank),
         Format::Mat => arrays::mat(bank),
         Format::Coe => tables::coe(bank, input_bits).map(String::into_bytes),
         Format::Mem => tables::mem(bank, input_bits).map(String::into_bytes),

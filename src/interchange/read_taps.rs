@@ -30,7 +30,7 @@ pub enum TapsError {
     Broken(String),
     /// An array of another shape.
     #[error(
-        "the array has the shape {}; give (channels, taps), or (channels, phases, lags) as export writes it",
+        "the array has the shape {}; give (channels, taps), or (channels, phases, lags)",
         Quoted(format!("{:?}", .shape))
     )]
     Shape {

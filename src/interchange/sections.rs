@@ -52,11 +52,11 @@ impl Section {
 /// another.
 pub fn sections(bank: &Bank) -> Result<Vec<Section>, ExportError> {
     let SynthesisFilters::StateSpace(block) = &bank.filters else {
-        return Err(ExportError::NoSections("this bank has no poles; csv and npz hold its taps"));
+        return Err(ExportError::NoSections("this bank has no poles; csv and mat hold its taps"));
     };
     let lines = DelayLines::new(block);
     let poles = pole_blocks(&lines).ok_or(ExportError::NoSections(
-        "some of its poles nearly coincide, so that no sections side by side have its accuracy; npz and mat hold its \
+        "some of its poles nearly coincide, so that no sections side by side have its accuracy; mat holds its \
          matrices, and a design with order has fewer poles",
     ))?;
     let mut all = Vec::new();

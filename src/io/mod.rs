@@ -34,6 +34,7 @@ mod csv;
 mod error;
 #[cfg(feature = "flac")]
 mod flac;
+mod frame_file;
 mod frames;
 mod full_scale;
 mod grouped;
@@ -57,7 +58,6 @@ mod stall;
 mod stdin_reader;
 mod stream_header;
 pub(crate) mod table;
-mod tar;
 mod timestamps;
 pub mod wav;
 
@@ -65,12 +65,13 @@ pub use crate::runtime::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout
 pub use array::{ArrayHeader, ArrayReader};
 pub use csv::CsvReader;
 pub use error::{InputFault, InputWarning, IoError};
+pub use frame_file::FrameFile;
 pub use lost::{LiveLost, LostSamples};
 pub use mat::{mat_variable, open_mat};
 pub use multi_reader::{Arrival, MultiReader};
 pub use notes::{OutputNotes, Placement};
 pub use npy::npy_header;
-pub use offline::{OfflineError, OfflineSamples, WORK_BYTES};
+pub use offline::{OfflineError, OfflineSamples, check_real};
 pub use open::is_self_describing;
 pub use pipe::{Stdout, is_pipe};
 pub use rails::rails_of;
@@ -79,5 +80,4 @@ pub use sample_writer::{Container, OutputHeader, SampleWriter};
 pub use sigmf::{SigmfAnnotation, SigmfCapture, SigmfGlobal, SigmfMeta, is_sigmf, sigmf_files};
 pub use stall::{Stall, StallWatch};
 pub use stream_header::{Coding, StreamHeader, is_same_rate};
-pub use tar::{TarFile, tar_files};
 pub use timestamps::{MAX_LOST, MAX_LOST_AT_ONCE};

@@ -1,15 +1,10 @@
-//! NumPy arrays (.npy): captures, and the header of any other.
-//!
-//! Source: NumPy, *NEP 1: a simple file format for NumPy arrays*, versions 1 to 3. Integers have the full
-//! scale 1.0, as in every other format of captures.
+//! Captures in NumPy arrays (.npy). Integers have the full scale 1.0, as in every other format of captures.
 
 use super::array::{ArrayHeader, ArrayReader};
 use super::{IoError, PcmFormat};
 use crate::messages::Quoted;
-use std::io::{self, Read, Seek};
-
-/// Longest header; those of arrays of numbers have a hundred bytes.
-const LONGEST_HEADER: usize = 1 << 16;
+use crate::npy::NpyHeader;
+use std::io::{ErrorKind, Read, Seek};
 
 const KIND: &str = "a NumPy array of samples";
 
@@ -24,71 +19,20 @@ pub(super) fn open_npy<R: Read + Seek>(mut reader: R, file: &str) -> Result<Arra
 
 /// Reads the header of an array called `file`, up to its first number.
 ///
-/// ```
-/// use hybank::io::{PcmFormat, npy_header};
-/// let text = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }\n";
-/// let length = (text.len() as u16).to_le_bytes();
-/// let file = [b"\x93NUMPY\x01\x00", &length[..], text.as_bytes(), &[0; 24]].concat();
-/// let header = npy_header(&mut &file[..], "x.npy")?;
-/// assert_eq!((header.format, header.shape.as_slice()), (PcmFormat::F32Le, &[2, 3][..]));
-/// assert_eq!(header.offset as usize, file.len() - 6 * header.sample_bytes());
-/// # Ok::<(), hybank::io::IoError>(())
-/// ```
-///
 /// # Errors
 /// [`IoError::Malformed`] for other files and for arrays of anything but numbers.
 pub fn npy_header(reader: &mut impl Read, file: &str) -> Result<ArrayHeader, IoError> {
     let fault = || IoError::malformed(file, KIND);
-    let mut exact = |bytes: &mut [u8]| {
-        reader.read_exact(bytes).map_err(|error| match error.kind() {
-            io::ErrorKind::UnexpectedEof => fault()("it ends inside its header; copy it again".into()),
-            _ => IoError::system(file, "read the header")(error),
-        })
-    };
-    let mut start = [0; 8];
-    exact(&mut start)?;
-    if start[..6] != *b"\x93NUMPY" {
-        return Err(fault()("it does not begin with \\x93NUMPY; save it with numpy.save".into()));
-    }
-    let (version, size) = (start[6], if start[6] == 1 { 2 } else { 4 });
-    let mut length = [0; 4];
-    exact(&mut length[..size])?;
-    let length = u32::from_le_bytes(length) as usize;
-    if !(1..=3).contains(&version) || length > LONGEST_HEADER {
-        return Err(fault()(format!(
-            "version {version} with a header of {length} bytes is unknown; save it again"
-        )));
-    }
-    let mut text = vec![0; length];
-    exact(&mut text)?;
-    parse(&String::from_utf8_lossy(&text), (8 + size + length) as u64).map_err(fault())
-}
-
-/// From the text of the header, a Python dictionary.
-fn parse(text: &str, offset: u64) -> Result<ArrayHeader, String> {
-    let descr = quoted(value(text, "descr")?);
+    let header = NpyHeader::read(reader).map_err(|error| match error.kind() {
+        ErrorKind::InvalidData => fault()(error.to_string()),
+        _ => IoError::system(file, "read the header")(error),
+    })?;
     // Complex numbers of 8 bytes are two of 4.
     let parts = [("<c8", "<f4"), (">c8", ">f4"), ("<c16", "<f8"), (">c16", ">f8")];
-    let part = parts.iter().find(|(complex, _)| *complex == descr).map(|(_, part)| *part);
-    let is_column_major = match value(text, "fortran_order")? {
-        order if order.starts_with("True") => true,
-        order if order.starts_with("False") => false,
-        _ => return Err("its 'fortran_order' is neither True nor False; save it with numpy.save".to_owned()),
-    };
-    let (format, is_complex) = (format(part.unwrap_or(descr))?, part.is_some());
-    Ok(ArrayHeader { format, is_complex, shape: shape(value(text, "shape")?)?, is_column_major, offset })
-}
-
-/// What follows a key of the dictionary.
-fn value<'a>(text: &'a str, key: &str) -> Result<&'a str, String> {
-    let missing = || format!("its header has no '{key}'; save it with numpy.save");
-    let (_, rest) = text.split_once(&format!("'{key}'")).ok_or_else(missing)?;
-    rest.trim_start().strip_prefix(':').map(str::trim_start).ok_or_else(missing)
-}
-
-/// The text in quotes at the beginning, or all of it.
-fn quoted(text: &str) -> &str {
-    text.strip_prefix('\'').and_then(|rest| rest.split('\'').next()).unwrap_or(text)
+    let part = parts.iter().find(|(complex, _)| *complex == header.descr).map(|(_, part)| *part);
+    let format = format(part.unwrap_or(&header.descr)).map_err(fault())?;
+    let NpyHeader { shape, is_column_major, offset, .. } = header;
+    Ok(ArrayHeader { format, is_complex: part.is_some(), shape, is_column_major, offset })
 }
 
 fn format(descr: &str) -> Result<PcmFormat, String> {
@@ -109,16 +53,6 @@ fn format(descr: &str) -> Result<PcmFormat, String> {
             Quoted(other)
         )),
     }
-}
-
-fn shape(text: &str) -> Result<Vec<u64>, String> {
-    let inside = text.strip_prefix('(').and_then(|rest| rest.split_once(')')).map(|(inside, _)| inside);
-    let sizes = inside.ok_or("its header has no shape; save it with numpy.save")?.split(',');
-    let sizes = sizes.map(str::trim).filter(|size| !size.is_empty());
-    let size = |size: &str| {
-        size.parse().map_err(|_| format!("the size \"{}\" in its shape is no number", Quoted(size)))
-    };
-    sizes.map(size).collect()
 }
 
 #[cfg(test)]
@@ -174,10 +108,5 @@ mod tests {
         }
         let garbage = open("<f4", "maybe", "(2, 9)").unwrap_err();
         assert!(garbage.contains("neither True nor False"), "{garbage}");
-        for bytes in
-            [&b"RIFFxxxx"[..], b"\x93NUM", b"\x93NUMPY\x01\x00\x40\x00{'descr'", b"\x93NUMPY\x09\x00\0\0\0\0"]
-        {
-            assert!(npy_header(&mut { bytes }, "x.npy").is_err());
-        }
     }
 }

@@ -5,7 +5,7 @@ use crate::memory::{MemoryShortage, check_memory};
 use crate::messages::Quoted;
 
 /// Bytes of work memory for each sample of a recording: the sample, its spectrum and a copy of both.
-pub const WORK_BYTES: f64 = 64.0;
+const WORK_BYTES: f64 = 64.0;
 
 /// Recordings that are not read.
 #[derive(Debug, thiserror::Error)]
@@ -48,39 +48,16 @@ pub struct OfflineSamples {
 }
 
 impl OfflineSamples {
-    /// At most `most` samples of each channel; real ones only.
-    ///
-    /// # Errors
-    /// [`OfflineError`].
-    pub fn read(reader: &mut MultiReader, most: usize) -> Result<Self, OfflineError> {
-        if let Some((input, _)) = reader.headers().find(|(_, header)| header.is_complex) {
-            return Err(OfflineError::Complex { input: input.to_owned() });
-        }
-        Self::read_parts(reader, most)
-    }
-
     /// At most `most` samples of each channel.
     ///
     /// # Errors
     /// [`OfflineError`].
-    pub fn read_parts(reader: &mut MultiReader, most: usize) -> Result<Self, OfflineError> {
-        Self::read_parts_with(reader, most, WORK_BYTES)
-    }
-
-    /// The same for work that takes so many bytes of memory for each sample.
-    ///
-    /// # Errors
-    /// [`OfflineError`].
-    pub fn read_parts_with(
-        reader: &mut MultiReader,
-        most: usize,
-        bytes_per_sample: f64,
-    ) -> Result<Self, OfflineError> {
+    pub fn read(reader: &mut MultiReader, most: usize) -> Result<Self, OfflineError> {
         let parts = if reader.is_complex() { 2 } else { 1 };
         let mut channels = vec![Vec::new(); parts * reader.channels()];
         let promised = reader.promised_frames().and_then(|frames| usize::try_from(frames).ok());
         let mut checked = promised.unwrap_or_default().min(most);
-        check_work(bytes_per_sample, checked, channels.len())?;
+        check_work(checked, channels.len())?;
         loop {
             match reader.wait()? {
                 Arrival::Frames(count) => {
@@ -88,7 +65,7 @@ impl OfflineSamples {
                     let room = most - known;
                     if known + count > checked {
                         checked = (checked + checked / 4).max(known + count).min(most);
-                        check_work(bytes_per_sample, checked, channels.len())?;
+                        check_work(checked, channels.len())?;
                     }
                     append(&reader.frames(), count.min(room), &mut channels);
                     reader.consume(count);
@@ -101,11 +78,29 @@ impl OfflineSamples {
             }
         }
     }
+
+    /// From frames in memory.
+    pub fn of_frames(frames: &[PcmFrames<'_>]) -> Self {
+        let mut channels = vec![Vec::new(); frames.iter().map(|part| part.channels).sum()];
+        append(frames, usize::MAX, &mut channels);
+        Self { channels, is_cut: false }
+    }
+}
+
+/// Refuses complex samples before they are read.
+///
+/// # Errors
+/// [`OfflineError::Complex`].
+pub fn check_real(reader: &MultiReader) -> Result<(), OfflineError> {
+    match reader.headers().find(|(_, header)| header.is_complex) {
+        Some((input, _)) => Err(OfflineError::Complex { input: input.to_owned() }),
+        None => Ok(()),
+    }
 }
 
 /// Refuses recordings whose work memory the system does not have.
-fn check_work(bytes_per_sample: f64, frames: usize, channels: usize) -> Result<(), OfflineError> {
-    let bytes = bytes_per_sample * frames as f64 * channels as f64;
+fn check_work(frames: usize, channels: usize) -> Result<(), OfflineError> {
+    let bytes = WORK_BYTES * frames as f64 * channels as f64;
     check_memory(bytes).map_err(|shortage| OfflineError::Memory { frames, channels, shortage })
 }
 

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Sigmf,
-    /// A SigMF recording in an archive.
+    /// A SigMF recording in an archive, which is not read.
     Archive,
     Csv,
     Npy,
@@ -57,7 +57,7 @@ impl Kind {
 }
 
 /// True for inputs that state their own format and channels whatever the [`Coding`] is: names of WAV
-/// files, SigMF recordings and archives, tables, arrays, and recordings that are decoded.
+/// files, SigMF recordings, tables, arrays, and recordings that are decoded.
 pub fn is_self_describing(path: &Path) -> bool {
     Kind::of(path, Coding::Raw(PcmFormat::U8)) != Kind::Raw
 }
@@ -110,7 +110,7 @@ impl InputSource {
         let (path, name) = (self.path.as_path(), self.name());
         Ok(match Kind::of(path, self.coding) {
             Kind::Sigmf => Box::new(SigmfReader::open(path)?),
-            Kind::Archive => Box::new(SigmfReader::open_archive(path)?),
+            Kind::Archive => return Err(unread(path, EXTRACT)),
             Kind::Csv => Box::new(CsvReader::new(self.stream()?, &name)?),
             Kind::Npy => Box::new(open_npy(open_file(path)?, &name)?),
             Kind::Mat => {
@@ -120,8 +120,8 @@ impl InputSource {
             #[cfg(feature = "flac")]
             Kind::Flac => Box::new(super::flac::FlacReader::open(open_file(path)?, &name)?),
             #[cfg(not(feature = "flac"))]
-            Kind::Flac => return Err(encoded(path)),
-            Kind::Encoded => return Err(encoded(path)),
+            Kind::Flac => return Err(unread(path, &decode(path))),
+            Kind::Encoded => return Err(unread(path, &decode(path))),
             Kind::Raw => Box::new(RawReader { source: self.clone(), bytes: None }),
             Kind::Wav => Box::new(WavReader::new(self.stream()?, &name)?),
         })
@@ -138,20 +138,23 @@ impl InputSource {
     }
 }
 
+/// Why archives are not read.
+const EXTRACT: &str = "it is an archive; extract the recording with tar -xf and give its .sigmf-meta";
+
 /// Why a recording that must be decoded is not read.
-fn encoded(path: &Path) -> IoError {
-    // A name that does not exist is the more useful message.
-    if let Err(error) = open_file(path) {
-        return error;
-    }
-    let file = path.display().to_string();
+fn decode(path: &Path) -> String {
     let flac = if cfg!(feature = "flac") { "" } else { "FLAC with the feature flac, " };
-    let problem = format!(
+    format!(
         "hybank does not decode it: lossy formats do not keep time to the picosecond; give PCM ({flac}WAV, or a \
          pipe: ffmpeg -i {} -f wav -c:a pcm_f32le - | hybank fuse BANK.json -)",
-        Quoted(&file)
-    );
-    IoError::Unfit { file, problem }
+        Quoted(path)
+    )
+}
+
+/// Refuses a recording, or a name that does not exist, which is the more useful message.
+fn unread(path: &Path, problem: &str) -> IoError {
+    let unfit = || IoError::unfit(&path.display().to_string())(problem.to_owned());
+    open_file(path).err().unwrap_or_else(unfit)
 }
 
 /// Raw samples. They are opened by the first read, since a FIFO waits for its writer.

@@ -1,15 +1,13 @@
-//! The samples of SigMF recordings, in two files or in an archive.
+//! The samples of SigMF recordings.
 
 use super::capture::{Capture, InputNotes, open_file};
-use super::sigmf::{META_FILE, SigmfMeta, file_pair, malformed};
-use super::tar::{TarFile, tar_files};
+use super::sigmf::{SigmfMeta, file_pair, malformed};
 use super::timestamps::Timestamps;
 use super::{IoError, StreamHeader};
-use crate::files::{bytes_of, text_in};
 use crate::messages::Quoted;
 use sha2::{Digest as _, Sha512};
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom, Take};
+use std::io::{self, Read, Take};
 use std::path::Path;
 
 /// A recording, which reads as its samples.
@@ -45,15 +43,6 @@ impl SigmfReader {
         let bytes = file.metadata().ok().filter(|data| data.is_file()).map(|data| data.len());
         // A file may grow while it is read.
         Self::new(meta, &meta_path.display().to_string(), file.take(u64::MAX), bytes)
-    }
-
-    /// Opens the only recording of an archive.
-    pub(super) fn open_archive(path: &Path) -> Result<Self, IoError> {
-        let (mut archive, file) = (open_file(path)?, path.display().to_string());
-        let (meta, name, data) = archived(&mut archive, &file)?;
-        let sought = archive.seek(SeekFrom::Start(data.offset));
-        sought.map_err(IoError::system(&file, "read the samples"))?;
-        Self::new(meta, &name, archive.take(data.size), Some(data.size))
     }
 
     /// Of `samples`, of `bytes` bytes if that is known, with their metadata, called `name`.
@@ -110,24 +99,4 @@ impl Capture for SigmfReader {
         found
             .is_some_and(|found| self.meta.sha512().is_some_and(|stated| !found.eq_ignore_ascii_case(stated)))
     }
-}
-
-/// The metadata of the only recording in an archive called `file`, the name of it for messages, and where
-/// the samples are.
-fn archived(archive: &mut (impl Read + Seek), file: &str) -> Result<(SigmfMeta, String, TarFile), IoError> {
-    let files = tar_files(archive, file)?;
-    let fault = |problem: String| malformed(file, problem);
-    let metas: Vec<_> = files.iter().filter(|file| file.name.ends_with(".sigmf-meta")).collect();
-    let [meta] = metas[..] else {
-        let count = metas.len();
-        return Err(fault(format!("it holds {count} recordings; extract the one that is meant (tar -xf)")));
-    };
-    let name = format!("{file} ({})", Quoted(&meta.name));
-    archive.seek(SeekFrom::Start(meta.offset)).map_err(IoError::system(file, "read it"))?;
-    let text = text_in(bytes_of(archive.take(meta.size), &name, META_FILE)?, &name)?;
-    let parsed = SigmfMeta::parse(&text, &name)?;
-    let (_, data) = file_pair(Path::new(&meta.name), Some(&parsed));
-    let found = files.iter().find(|file| Path::new(&file.name) == data);
-    let found = found.ok_or_else(|| fault(format!("{} is not in it; pack both files", Quoted(&data))))?;
-    Ok((parsed, name, found.clone()))
 }

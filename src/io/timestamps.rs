@@ -80,6 +80,12 @@ impl Timestamps {
         self.0.first().copied()
     }
 
+    /// True if frames are missing between the first and the last.
+    pub(super) fn has_losses(&self) -> bool {
+        let breaks = self.beginning().map(|origin| self.breaks(origin));
+        breaks.is_some_and(|breaks| breaks.is_ok_and(|all| all.iter().any(|one| one.lost > 0)))
+    }
+
     /// Index of the input's first frame, if there are timestamps.
     pub(super) fn beginning(&self) -> Option<u64> {
         self.first().and_then(Timestamp::beginning)

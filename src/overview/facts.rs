@@ -233,13 +233,14 @@ pub fn uselessness(bank: &Bank, scale: &GammaScale, figures: &Figures) -> Option
             100.0 * gamma / scale.zero_output
         ));
     }
-    let Snr { signal_db, delays_db, .. } = figures.snr;
+    let Snr { signal_db, delays_db, gains_db, offsets_db, .. } = figures.snr;
     let share = |db: Decibels| 10f64.powf(-0.1 * db.0);
-    let error = share(signal_db) + delays_db.map_or(0.0, share);
+    let uncertain = [delays_db, gains_db, offsets_db].into_iter().flatten();
+    let error = share(signal_db) + uncertain.map(share).sum::<f64>();
     (bank.spec.as_ref()?.signal.is_some() && error > share(LEAST_SNR)).then(|| {
         format!(
             "the SNR of the signal is {:.1} dB, without the noise of the converters: the channels do not hold its band, \
-             the taps or the latency are too few, or the delays too uncertain",
+             the taps or the latency are too few, or delays, gains or offsets too uncertain",
             -10.0 * error.log10() + 0.0
         )
     })

@@ -16,7 +16,6 @@
 
 mod facts;
 mod measured;
-#[cfg(feature = "page")]
 pub mod page;
 mod pictures;
 mod spur_chart;

@@ -12,7 +12,6 @@ use crate::quantity::readable;
 use crate::simulate::interleaved;
 use crate::spec::SpecProblem;
 use crate::units::{Decibels, Hertz};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// Frames of captures that are used; more would only make the lines denser.
 pub const MOST_FRAMES: usize = 1 << 20;
@@ -102,76 +101,49 @@ impl CapturesOnPage {
         Ok(Self { spectra: spectra?, measured })
     }
 
-    fn html(&self) -> Markup {
-        html! {
-            (self.spectra.html())
-            @if let Some(measured) = &self.measured {
-                (figures_before_after(measured))
-                (spurs_before_after(measured))
-            }
-        }
+    fn html(&self) -> String {
+        let measured = self.measured.as_ref();
+        let tables = measured.map(|measured| figures_before_after(measured) + &spurs_before_after(measured));
+        self.spectra.html() + &tables.unwrap_or_default()
     }
 }
 
 /// The tone and the figures of both.
-fn figures_before_after(measured: &BeforeAfter) -> Markup {
+fn figures_before_after(measured: &BeforeAfter) -> String {
     let BeforeAfter { before, after } = measured;
     let level = |measured: &Measurement| {
         measured.tones.first().map_or_else(String::new, |tone| format!("{:.2} dBFS", tone.level.0))
     };
     let tone = after.tones.first().map(|tone| readable(tone.frequency.value.0, "Hz")).unwrap_or_default();
-    html! {
-        table {
-            tr { th { "" } th { "interleaved" } th { "fused" } th { "" } }
-            tr {
-                th { "tone" }
-                td class="value" { (level(before)) }
-                td class="value" { (level(after)) }
-                td { "at " (tone) }
-            }
-            @for (own, fused) in column(before).iter().zip(column(after)) {
-                tr {
-                    th { (fused.name) }
-                    td class="value" { (own.value) " " (own.unit) }
-                    td class="value" { (fused.value) " " (fused.unit) }
-                    td { (fused.meaning) }
-                }
-            }
-            tr {
-                th { "offset" }
-                td class="value" { (format!("{:.2e}", before.offset.value)) }
-                td class="value" { (format!("{:.2e}", after.offset.value)) }
-                td { "the mean, of full scale" }
-            }
-        }
+    let mut rows = headings(&["", "interleaved", "fused", ""]);
+    rows += &row("tone", &[level(before), level(after)], &format!("at {tone}"));
+    for (own, fused) in column(before).iter().zip(column(after)) {
+        let values = [own, &fused].map(|figure| format!("{} {}", figure.value, figure.unit));
+        rows += &row(fused.name, &values, &fused.meaning);
     }
+    let offsets = [before, after].map(|measured| format!("{:.2e}", measured.offset.value));
+    rows += &row("offset", &offsets, "the mean, of full scale");
+    table(&rows)
 }
 
 /// Most lines of the table of spurs.
 const MOST_SPURS: usize = 24;
 
 /// The spurs of both, the largest of the captures first.
-fn spurs_before_after(measured: &BeforeAfter) -> Markup {
+fn spurs_before_after(measured: &BeforeAfter) -> String {
     let BeforeAfter { before, after } = measured;
     let level = |spur: &Spur| {
         let noise = if spur.above_noise { "" } else { " (noise)" };
         format!("{:.2} dBc{noise}", spur.level.0)
     };
     let same = |spur: &Spur| after.spurs.iter().find(|other| other.causes == spur.causes);
-    let rows = before.spurs.iter().filter(|spur| spur.causes != [Cause::Unknown]).take(MOST_SPURS);
-    html! {
-        table {
-            tr { th { "spur" } th { "frequency" } th { "interleaved" } th { "fused" } }
-            @for spur in rows {
-                tr {
-                    th { (causes(spur)) }
-                    td class="value" { (readable(spur.frequency.0, "Hz")) }
-                    td class="value" { (level(spur)) }
-                    td class="value" { (same(spur).map(level).unwrap_or_default()) }
-                }
-            }
-        }
+    let spurs = before.spurs.iter().filter(|spur| spur.causes != [Cause::Unknown]).take(MOST_SPURS);
+    let mut rows = headings(&["spur", "frequency", "interleaved", "fused", ""]);
+    for spur in spurs {
+        let frequency = readable(spur.frequency.0, "Hz");
+        rows += &row(&causes(spur), &[frequency, level(spur), same(spur).map(level).unwrap_or_default()], "");
     }
+    table(&rows)
 }
 
 const STYLE: &str = "
@@ -201,13 +173,9 @@ impl Figure {
         Ok(Self { svg: chart.to_svg()?, caption: caption.to_owned() })
     }
 
-    fn html(&self) -> Markup {
-        html! {
-            figure {
-                div { (PreEscaped(&self.svg)) }
-                figcaption { (self.caption) }
-            }
-        }
+    fn html(&self) -> String {
+        let Self { svg, caption } = self;
+        format!("<figure><div>{svg}</div><figcaption>{}</figcaption></figure>\n", escaped(caption))
     }
 }
 
@@ -237,71 +205,90 @@ impl Page {
     /// A document that loads nothing; `commands` lead to what it shows.
     pub fn html(&self, commands: &[String]) -> String {
         let Facts { title, understood, error, cost, channels } = &self.facts;
-        let page = html! {
-            (DOCTYPE)
-            html lang="en" {
-                head {
-                    meta charset="utf-8";
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    link rel="icon" href="data:,";
-                    title { (title) " - hybank" }
-                    style { (PreEscaped(STYLE)) }
-                }
-                body {
-                    h1 { (title) }
-                    p class="understood" { (understood) }
-                    h2 { "Error" }
-                    (facts(error))
-                    h2 { "Cost" }
-                    (facts(cost))
-                    h2 { "Channels" }
-                    (channel_table(channels))
-                    @if let Some(captures) = &self.captures {
-                        h2 { "Captures" }
-                        (captures.html())
-                    }
-                    h2 { "Pictures" }
-                    @for figure in &self.figures { (figure.html()) }
-                    h2 { "Spec" }
-                    pre { (self.spec) }
-                    h2 { "Commands" }
-                    pre { (commands.join("\n")) }
-                    p class="understood" { "hybank " (env!("CARGO_PKG_VERSION")) }
-                }
-            }
-        };
-        page.into_string() + "\n"
+        let captures = self.captures.as_ref();
+        let captures = captures.map(|captures| format!("<h2>Captures</h2>\n{}", captures.html()));
+        format!(
+            "<!DOCTYPE html>
+<html lang=\"en\">
+<head>
+<meta charset=\"utf-8\">
+<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">
+<link rel=\"icon\" href=\"data:,\">
+<title>{title} - hybank</title>
+<style>{STYLE}</style>
+</head>
+<body>
+<h1>{title}</h1>
+<p class=\"understood\">{understood}</p>
+<h2>Error</h2>
+{error}<h2>Cost</h2>
+{cost}<h2>Channels</h2>
+{channels}{captures}<h2>Pictures</h2>
+{pictures}<h2>Spec</h2>
+<pre>{spec}</pre>
+<h2>Commands</h2>
+<pre>{commands}</pre>
+<p class=\"understood\">hybank {version}</p>
+</body>
+</html>
+",
+            title = escaped(title),
+            understood = escaped(understood),
+            error = facts(error),
+            cost = facts(cost),
+            channels = channel_table(channels),
+            captures = captures.unwrap_or_default(),
+            pictures = self.figures.iter().map(Figure::html).collect::<String>(),
+            spec = escaped(&self.spec),
+            commands = escaped(&commands.join("\n")),
+            version = env!("CARGO_PKG_VERSION"),
+        )
     }
 }
 
-fn facts(facts: &[Fact]) -> Markup {
-    html! {
-        table class="facts" {
-            @for fact in facts {
-                tr { th { (fact.name) } td class="value" { (fact.value) } td { (fact.meaning) } }
-            }
-        }
-    }
+fn facts(facts: &[Fact]) -> String {
+    let rows = facts.iter().map(|fact| row(fact.name, std::slice::from_ref(&fact.value), &fact.meaning));
+    table(&rows.collect::<String>()).replace("<table>", "<table class=\"facts\">")
 }
 
-fn channel_table(channels: &[ChannelFact]) -> Markup {
-    html! {
-        table {
-            tr { th { "channel" } th { "delay" } th { "gain" } th { "offset" } th { "gamma, if the delay is 0.001 samples longer" } }
-            @for (channel, number) in channels.iter().zip(1..) {
-                tr {
-                    td { (number) }
-                    td class="value" { (channel.delay) }
-                    td class="value" { (channel.gain) }
-                    td class="value" { (channel.offset) }
-                    td class="value" {
-                        @match channel.sensitivity {
-                            Some(share) => { (change(share)) }
-                            None => "no derivative",
-                        }
-                    }
-                }
-            }
-        }
+fn channel_table(channels: &[ChannelFact]) -> String {
+    let last = "gamma, if the delay is 0.001 samples longer";
+    let mut rows = headings(&["channel", "delay", "gain", "offset", last, ""]);
+    for (ChannelFact { delay, gain, offset, sensitivity, .. }, number) in channels.iter().zip(1..) {
+        let sensitivity = sensitivity.map_or_else(|| "no derivative".to_owned(), change);
+        rows += &row(&number.to_string(), &[delay.clone(), gain.clone(), offset.clone(), sensitivity], "");
+    }
+    table(&rows)
+}
+
+fn table(rows: &str) -> String {
+    format!("<table>\n{rows}</table>\n")
+}
+
+fn headings(names: &[&str]) -> String {
+    let cells: String = names.iter().map(|name| format!("<th>{name}</th>")).collect();
+    format!("<tr>{cells}</tr>\n")
+}
+
+/// A row of a table: a name, numbers, and what they mean.
+fn row(name: &str, values: &[String], meaning: &str) -> String {
+    let value = |value: &String| format!("<td class=\"value\">{}</td>", escaped(value));
+    let values: String = values.iter().map(value).collect();
+    format!("<tr><th>{}</th>{values}<td>{}</td></tr>\n", escaped(name), escaped(meaning))
+}
+
+/// Text in which nothing is read as markup.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_no_markup() {
+        let want = "<tr><th>a&lt;b</th><td class=\"value\">&amp;lt;</td><td>&lt;td&gt;</td></tr>\n";
+        assert_eq!(row("a<b", &["&lt;".to_owned()], "<td>"), want);
     }
 }

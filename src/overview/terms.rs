@@ -21,6 +21,8 @@ pub(super) fn fact(name: &'static str, value: impl Into<String>, meaning: impl I
     Fact { name, value: value.into(), meaning: meaning.into() }
 }
 
+const CUTOFFS: &str = "; uncertain cut-offs not counted";
+
 /// Ratios above this are rounding errors of double precision.
 const EXACT: Decibels = Decibels(270.0);
 
@@ -91,7 +93,7 @@ impl Words<'_> {
     fn snr(&self) -> String {
         let Figures { snr, snr_16_bits_db, band: FigureBand { source, .. }, any_input, setup, .. } =
             self.figures;
-        let Snr { signal_db, noise_db, delays_db, .. } = *snr;
+        let Snr { signal_db, noise_db, delays_db, gains_db, offsets_db, .. } = *snr;
         let input = match (source, any_input) {
             (BandSource::Signal, _) => format!("for white noise in {}", self.band()),
             (BandSource::Target, Some(_)) => "for the spectrum of the spec's signal".to_owned(),
@@ -100,18 +102,31 @@ impl Words<'_> {
             }
         };
         let parts: Vec<String> = [
-            ("the signal", noise_db.or(delays_db).map(|_| signal_db)),
             ("the converters' noise", noise_db),
             ("uncertain delays", delays_db),
+            ("uncertain gains", gains_db),
+            ("uncertain offsets", offsets_db),
         ]
         .into_iter()
-        .filter_map(|(part, db)| db.map(|db| format!("{part} {}", ratio(db))))
+        .filter_map(|(part, db)| db.map(|db| format!(", {part} {}", ratio(db))))
         .collect();
-        let parts = if parts.is_empty() { String::new() } else { format!("; from {}", parts.join(", ")) };
+        let parts = match parts.is_empty() {
+            true => String::new(),
+            false => format!("; from the signal {}{}", ratio(signal_db), parts.concat()),
+        };
         let bits =
             snr_16_bits_db.map_or_else(String::new, |db| format!("; {} with 16-bit converters", rounded(db)));
-        let cutoffs = if setup.has_uncertain_cutoffs { "; uncertain cut-offs not counted" } else { "" };
+        let cutoffs = if setup.has_uncertain_cutoffs { CUTOFFS } else { "" };
         format!("{input}{parts}{bits}{cutoffs}")
+    }
+
+    /// What of the spec's uncertainty is in the figures of a tone, and what is not.
+    fn uncertainty_of_tones(&self) -> String {
+        let Snr { delays_db, gains_db, offsets_db, .. } = self.figures.snr;
+        let counted = delays_db.or(gains_db).map(|_| "; rms over uncertain delays and gains");
+        let offsets = offsets_db.map(|_| "; uncertain offsets not counted");
+        let cutoffs = self.figures.setup.has_uncertain_cutoffs.then_some(CUTOFFS);
+        [counted, offsets, cutoffs].into_iter().flatten().collect()
     }
 
     fn image(&self) -> Fact {
@@ -139,7 +154,8 @@ impl Words<'_> {
             let meaning = format!("below the rounding of double precision in {}{left_out}", self.band());
             return fact(name, "none", meaning);
         }
-        fact(name, rounded(db), format!("{what} in {}, at {}{left_out}", self.band(), self.hertz(hertz)))
+        let (band, uncertainty) = (self.band(), self.uncertainty_of_tones());
+        fact(name, rounded(db), format!("{what} in {band}, at {}{uncertainty}{left_out}", self.hertz(hertz)))
     }
 
     /// The bank beside the best simple way, and the other ways.
@@ -197,7 +213,7 @@ mod tests {
     use super::*;
 
     fn snr(total: f64) -> Snr {
-        Snr { total_db: Decibels(total), signal_db: Decibels(total), noise_db: None, delays_db: None }
+        Snr { total_db: Decibels(total), signal_db: Decibels(total), ..Snr::default() }
     }
 
     fn figures(total: f64, spline: f64) -> Figures {
@@ -312,12 +328,17 @@ mod tests {
     #[test]
     fn parts_are_named_and_missing_tones_are_said() {
         let mut figures = figures(60.0, 48.0);
-        figures.snr = Snr { noise_db: Some(Decibels(61.0)), delays_db: Some(Decibels(70.0)), ..figures.snr };
+        let [noise_db, delays_db, offsets_db] = [61.0, 70.0, 65.0].map(|db| Some(Decibels(db)));
+        figures.snr = Snr { noise_db, delays_db, offsets_db, ..figures.snr };
         figures.snr_16_bits_db = None;
+        let uncertain = lines(&figures).remove(1);
+        let counted = "at 8.5 kHz; rms over uncertain delays and gains; uncertain offsets not counted";
+        assert!(uncertain.ends_with(counted), "{uncertain}");
         figures.image = None;
         figures.target_vanishes = true;
         let lines = lines(&figures);
-        let parts = "; from the signal 60.0 dB, the converters' noise 61.0 dB, uncertain delays 70.0 dB";
+        let parts = "; from the signal 60.0 dB, the converters' noise 61.0 dB, uncertain delays 70.0 dB, \
+                     uncertain offsets 65.0 dB";
         assert!(lines[0].ends_with(parts), "{}", lines[0]);
         assert_eq!(lines[1], "image: none, some tone in 0 to 9 kHz does not come through at all");
         assert!(lines[2].ends_with("left out"), "{}", lines[2]);

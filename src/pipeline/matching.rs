@@ -9,7 +9,7 @@
 //! let options = ReadOptions { coding: Coding::Raw(PcmFormat::S16Le), ..ReadOptions::files() };
 //! let reader = MultiReader::start(&[path.clone()], options, crossbeam_channel::never())?;
 //! let bank = Bank::bare(SynthesisFilters::Fir(vec![vec![1.0], vec![0.5]]), 2);
-//! let refused = check_channels(&bank, "bank.json", &reader.ok_or("stopped")?);
+//! let refused = check_channels(&bank.layout(), "bank.json", &reader.ok_or("stopped")?);
 //! assert!(matches!(refused, Err(InputMismatch::Channels { wanted: 2, given: 1, .. })));
 //! # std::fs::remove_file(path)?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -31,11 +31,11 @@ pub enum InputMismatch {
     /// Another number of channels.
     #[error(
         "{} has {there}, but the input has {given} ({files}); give one mono recording per channel or one of {there}{}",
-        Quoted(.bank), in_turn(*.given, *.wanted), there = counted(.wanted, "channel")
+        Quoted(.name), in_turn(*.given, *.wanted), there = counted(.wanted, "channel")
     )]
     Channels {
-        /// The name of the bank.
-        bank: String,
+        /// The name of the bank or the spec.
+        name: String,
         /// Its channels.
         wanted: usize,
         /// Channels of the inputs.
@@ -47,11 +47,11 @@ pub enum InputMismatch {
     #[error(
         "{} has {converters} converters with rates of their own and {wanted} samples per frame, but the input has {given} \
          ({files}); give one mono recording per converter, or one of whole frames with {wanted} channels",
-        Quoted(.bank)
+        Quoted(.name)
     )]
     Samples {
-        /// The name of the bank.
-        bank: String,
+        /// The name of the bank or the spec.
+        name: String,
         /// Its converters.
         converters: usize,
         /// Samples of a frame.
@@ -219,23 +219,23 @@ pub fn channels_of_raw(layout: &FrameLayout, inputs: usize) -> usize {
     if inputs == 1 && samples_per_frame(layout, inputs).is_empty() { layout.count() } else { 1 }
 }
 
-/// The inputs together have the N channels of the bank called `name`.
+/// The inputs together have the N channels of the bank or the spec called `name`, whose frames are these.
 ///
 /// # Errors
 /// [`InputMismatch::Channels`] or [`InputMismatch::Samples`].
-pub fn check_channels(bank: &Bank, name: &str, reader: &MultiReader) -> Result<(), InputMismatch> {
-    let (given, wanted) = (reader.channels(), bank.frame_samples());
+pub fn check_channels(layout: &FrameLayout, name: &str, reader: &MultiReader) -> Result<(), InputMismatch> {
+    let (given, wanted) = (reader.channels(), layout.count());
     if given == wanted {
         return Ok(());
     }
     let files: Vec<_> =
         reader.headers().map(|(name, header)| format!("{}: {}", Quoted(name), header.channels)).collect();
-    let (bank_name, files) = (name.to_owned(), files.join(", "));
-    if bank.layout().is_plain() {
-        return Err(InputMismatch::Channels { bank: bank_name, wanted, given, files });
+    let (name, files) = (name.to_owned(), files.join(", "));
+    if layout.is_plain() {
+        return Err(InputMismatch::Channels { name, wanted, given, files });
     }
-    let converters = bank.channel_count();
-    Err(InputMismatch::Samples { bank: bank_name, converters, wanted, given, files })
+    let converters = layout.samples().len();
+    Err(InputMismatch::Samples { name, converters, wanted, given, files })
 }
 
 /// The rate of the output in hertz: the bank's own, or that of the inputs for a bank in normalised time.
@@ -295,15 +295,9 @@ fn input_rate<'a>(
     if samples.iter().any(|&samples| samples > 1) {
         return rate_of_frames(bank, inputs);
     }
-    let mut inputs = inputs.map(|(name, header, rate, _)| (name, header, rate));
-    let Some((first, header, rate)) = inputs.next() else {
-        return Ok(None);
-    };
-    let differs = |other: f64, error: f64| !is_same_rate(other, rate, error.max(header.rate_error));
-    if let Some((name, _, other_rate)) = inputs.find(|(_, other, rate)| differs(*rate, other.rate_error)) {
-        let (input, other) = (name.to_owned(), first.to_owned());
-        return Err(InputMismatch::Rates { input, rate: other_rate, other, other_rate: rate });
-    }
+    let inputs: Vec<_> = inputs.map(|(name, header, ..)| (name, header)).collect();
+    let Some(rate) = common_rate(inputs.iter().copied())? else { return Ok(None) };
+    let (first, header) = inputs[0];
     let wanted = 1.0 / bank.slow_period().0;
     if !bank.is_normalised() && header.other_rate(wanted).is_some() {
         // Without the rounding of the periods: it would be shown.
@@ -311,6 +305,25 @@ fn input_rate<'a>(
         return Err(InputMismatch::Rate { input: first.to_owned(), rate, wanted });
     }
     Ok(Some(rate))
+}
+
+/// The rate of the inputs that state one.
+///
+/// # Errors
+/// [`InputMismatch::Rates`].
+pub fn common_rate<'a>(
+    inputs: impl Iterator<Item = (&'a str, &'a StreamHeader)>,
+) -> Result<Option<f64>, InputMismatch> {
+    let mut rated = inputs.filter_map(|(name, header)| Some((name, header, header.rate?)));
+    let Some((first, of_first, common)) = rated.next() else { return Ok(None) };
+    let error = |header: &StreamHeader| header.rate_error.max(of_first.rate_error);
+    match rated.find(|&(_, header, rate)| !is_same_rate(rate, common, error(header))) {
+        Some((input, _, rate)) => {
+            let (input, other) = (input.to_owned(), first.to_owned());
+            Err(InputMismatch::Rates { input, rate, other, other_rate: common })
+        }
+        None => Ok(Some(common)),
+    }
 }
 
 /// As [`input_rate`], for converters with rates of their own; each input comes with its samples per frame.

@@ -3,7 +3,6 @@
 use super::axis::{AxisScale, Labels, extent, widened};
 use super::labels::{MARK_FONT, RADIUS, Room};
 use super::legend::{Dashes, Entry, Legend, Look, OVERSIZE, letters};
-use crate::memory::MemoryShortage;
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
@@ -12,7 +11,7 @@ use std::ops::Range;
 const WIDTH: u32 = 960;
 const HEIGHT: u32 = 450;
 /// The size of the drawing.
-pub(super) const ENLARGED: (u32, u32) = (WIDTH * OVERSIZE, HEIGHT * OVERSIZE);
+const ENLARGED: (u32, u32) = (WIDTH * OVERSIZE, HEIGHT * OVERSIZE);
 /// Pixels left and right of all.
 const SIDE: u32 = 10;
 /// Curves that differ by less than this share of their values are drawn as level.
@@ -54,9 +53,9 @@ pub struct Marks {
 type Axes<'a, B, X> = ChartContext<'a, B, Cartesian2d<X, RangedCoordf64>>;
 
 /// The ranges of both axes.
-pub(super) type Ranges = (Range<f64>, Range<f64>);
+type Ranges = (Range<f64>, Range<f64>);
 
-pub(super) type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
+type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 
 /// Curves over a common axis.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -85,9 +84,6 @@ pub enum PlotError {
         /// Title of the chart.
         title: String,
     },
-    /// Its pixels are more than this process may use.
-    #[error("the chart takes {0}; write it as .svg, or allow more memory")]
-    Memory(#[from] MemoryShortage),
     /// The drawing library failed.
     #[error("the chart `{title}` could not be drawn: {reason}")]
     Drawing {
@@ -108,11 +104,11 @@ impl Chart {
         Ok(scale_by_view_box(&svg))
     }
 
-    pub(super) fn failed(&self, error: &dyn std::fmt::Display) -> PlotError {
+    fn failed(&self, error: &dyn std::fmt::Display) -> PlotError {
         PlotError::Drawing { title: self.title.clone(), reason: error.to_string() }
     }
 
-    pub(super) fn ranges(&self) -> Result<Ranges, PlotError> {
+    fn ranges(&self) -> Result<Ranges, PlotError> {
         let marked = || self.marks.iter().flat_map(|m| &m.points).map(|(x, y, _)| (*x, *y));
         let drawn = || self.series.iter().flat_map(|s| &s.points).copied().chain(marked());
         let points = || drawn().filter(|(x, y)| self.is_drawn(*x, *y));
@@ -164,7 +160,7 @@ impl Chart {
         })
     }
 
-    pub(super) fn draw<B: DrawingBackend>(&self, backend: B, (x, y): Ranges) -> Drawn<B> {
+    fn draw<B: DrawingBackend>(&self, backend: B, (x, y): Ranges) -> Drawn<B> {
         let root = backend.into_drawing_area();
         root.fill(&WHITE)?;
         let looks = self.looks(y.end - y.start);

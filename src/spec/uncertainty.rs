@@ -142,6 +142,11 @@ impl UncertaintySpec {
         self.delays(channels).into_iter().map(|half| half * (1.0 / HALF_WIDTH)).collect()
     }
 
+    /// Standard deviations of all `channels` offsets.
+    pub fn offset_deviations(&self, channels: usize) -> Vec<f64> {
+        self.offsets(channels).into_iter().map(|half| half / HALF_WIDTH).collect()
+    }
+
     /// Standard deviations of all `channels` gains.
     pub fn gain_deviations(&self, channels: usize) -> Vec<f64> {
         self.gains(channels).into_iter().map(|half| half / HALF_WIDTH).collect()

@@ -181,19 +181,17 @@ fn c_of_recursive_banks_has_the_bits_of_its_definition() {
 }
 
 #[test]
-fn numpy_and_scipy_read_the_arrays() {
+fn scipy_reads_the_arrays() {
     let desk = Desk::with_spec(THESIS);
     desk.good(&["design", "spec.toml", "-o", "b.json", "--method", "iir"]);
-    for format in ["npz", "mat"] {
-        desk.good(&["export", "b.json", "--format", format, "-o", &format!("b.{format}")]);
-    }
+    desk.good(&["export", "b.json", "-o", "b.mat"]);
     let script = "\
 import json, numpy as np, scipy.io
 b = json.load(open('b.json'))['state_space']
-z, m = np.load('b.npz'), scipy.io.loadmat('b.mat')
+m = scipy.io.loadmat('b.mat')
 for key in 'abcd':
-    assert np.array_equal(z[key], b[key]) and np.array_equal(m[key], b[key]), key
-assert z['ratio'].item() == m['ratio'].item() == 2
+    assert np.array_equal(m[key], b[key]), key
+assert m['ratio'].item() == 2
 ";
     desk.write("read.py", script);
     let probe = Command::new("python3").args(["-c", "import numpy, scipy"]).output();
@@ -301,6 +299,6 @@ fn sections_are_the_bank_and_carry_its_gamma() {
     desk.refused(
         1,
         &["export", "b.json", "--format", "sos", "-o", "s.csv"],
-        &["b.json", "no poles", "csv and npz"],
+        &["b.json", "no poles", "csv and mat"],
     );
 }

@@ -2,7 +2,6 @@
 
 use crate::support::{Desk, THESIS, bytes, channel, floats, frames, fused, text, wav};
 use serde_json::{Value, json};
-use std::process::Command;
 
 /// A recording of one channel: three samples are lost before its sample 40.
 fn meta(more: &str, annotations: &str) -> String {
@@ -96,45 +95,22 @@ fn sigmf_keeps_what_it_is_for() {
 }
 
 #[test]
-fn recordings_in_archives_are_read() {
+fn a_recording_without_a_rate_is_noted_and_an_archive_is_to_be_extracted() {
     let desk = Desk::new();
     let input = frames(200);
-    let name = "a-recording-with-a-name-that-does-not-fit-the-hundred-bytes-that-the-head-of-a-file-in-an-archive-has-for-it";
     let meta =
         r#"{ "global": { "core:datatype": "rf32_le", "core:num_channels": 2, "core:version": "1.0.0" } }"#;
-    let tar = |archive: &str, more: &[&str]| {
-        let tar = Command::new("tar").current_dir(desk.path("")).args(["-cf", archive]).args(more).status();
-        assert!(tar.unwrap().success());
-    };
-    for (short, format) in [("both", "ustar"), (name, "gnu"), (name, "pax")] {
-        let [meta_name, data_name] = ["meta", "data"].map(|end| format!("{short}.sigmf-{end}"));
-        desk.write(&meta_name, meta);
-        desk.write(&data_name, bytes(&input));
-        let archive = format!("{format}.sigmf");
-        tar(&archive, &["--format", format, &meta_name, &data_name]);
-        let output = desk.run(&["stream", "bank.json", "--input", &archive], &[]);
-        assert!(output.status.success() && floats(&output.stdout) == fused(&input), "{format}: {output:?}");
-        // No rate is stated, so the run says which one it takes.
-        let message = text(&output.stderr);
-        assert!(message.contains("states no core:sample_rate") && message.lines().count() == 1, "{message}");
-        let strict = ["fuse", "bank.json", &archive, "-o", "no.wav", "--strict"];
-        desk.refused(1, &strict, &[&archive, "core:sample_rate", "--strict"]);
-    }
-    desk.write("two.sigmf-meta", meta);
-    tar("two.sigmf", &["two.sigmf-meta", "both.sigmf-meta"]);
-    tar("half.sigmf", &["both.sigmf-meta"]);
-    desk.write("cut.sigmf", &desk.read("ustar.sigmf")[..2000]);
-    desk.write("text.sigmf", "hello, world".repeat(100));
-    for (archive, parts) in [
-        ("two.sigmf", ["holds 2 recordings", "extract"]),
-        ("half.sigmf", ["both.sigmf-data is not in it", "pack both files"]),
-        ("cut.sigmf", ["byte 1024", "copy it again"]),
-        ("text.sigmf", ["byte 0", "tar"]),
-    ] {
-        desk.refused(1, &["fuse", "bank.json", archive, "-o", "no.wav"], &[&[archive][..], &parts].concat());
-    }
-    let both = ["fuse", "bank.json", "ustar.sigmf", "-o", "ustar.sigmf", "--force"];
-    desk.refused(1, &both, &["ustar.sigmf", "also the input"]);
+    desk.write("both.sigmf-meta", meta);
+    desk.write("both.sigmf-data", bytes(&input));
+    let output = desk.run(&["stream", "bank.json", "--input", "both.sigmf-meta"], &[]);
+    assert!(output.status.success() && floats(&output.stdout) == fused(&input), "{output:?}");
+    let message = text(&output.stderr);
+    assert!(message.contains("states no core:sample_rate") && message.lines().count() == 1, "{message}");
+    let strict = ["fuse", "bank.json", "both.sigmf-meta", "-o", "no.wav", "--strict"];
+    desk.refused(1, &strict, &["both.sigmf-meta", "core:sample_rate", "--strict"]);
+    desk.write("both.sigmf", "both.sigmf-meta".repeat(100));
+    let archive = ["fuse", "bank.json", "both.sigmf", "-o", "no.wav"];
+    desk.refused(1, &archive, &["both.sigmf", "an archive", "tar -xf"]);
 }
 
 /// A chunk with its pad byte.

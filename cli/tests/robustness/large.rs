@@ -23,7 +23,7 @@ const SIMULATE: &str = "simulate large.toml --source step@3 --samples 50 -o capt
 const IMPORT: &str = "import spec.toml large.csv -o imported.json --force";
 
 /// Everything that the readers count.
-pub(crate) const LARGE: [Large; 23] = [
+pub(crate) const LARGE: [Large; 22] = [
     Large { parts: "lists before fmt", file: "large.wav", line: FUSE_WAV, make: |n| wav(b"LIST", n, 0) },
     Large { parts: "notes before fmt", file: "large.wav", line: FUSE_WAV, make: |n| wav(b"iXML", n, 0) },
     Large { parts: "unknown chunks", file: "large.wav", line: FUSE_WAV, make: |n| wav(b"what", n, 0) },
@@ -66,12 +66,6 @@ pub(crate) const LARGE: [Large; 23] = [
         file: "large.mat",
         line: "fuse bank.json large.mat -o out.wav --force",
         make: variables,
-    },
-    Large {
-        parts: "files of an archive",
-        file: "large.sigmf",
-        line: "fuse bank.json large.sigmf -o out.wav --force",
-        make: |n| archive(n.min(60_000)),
     },
     Large { parts: "taps", file: "large.json", line: VERIFY, make: |n| bank(2, n / 2) },
     Large { parts: "channels of a bank", file: "large.json", line: VERIFY, make: |n| bank(n, 1) },
@@ -173,24 +167,6 @@ fn variables(n: usize) -> Vec<u8> {
     header.resize(124, b' ');
     header.extend([0, 1, b'I', b'M']);
     [header, (0..n).flat_map(number).collect()].concat()
-}
-
-/// Empty files.
-fn archive(n: usize) -> Vec<u8> {
-    let file = |k: usize| {
-        let mut head = [0; 512];
-        let name = format!("file{k}");
-        head[..name.len()].copy_from_slice(name.as_bytes());
-        head[100..108].copy_from_slice(b"0000644\0");
-        head[124..136].copy_from_slice(b"00000000000\0");
-        head[148..156].fill(b' ');
-        head[156] = b'0';
-        head[257..265].copy_from_slice(b"ustar\x0000");
-        let sum: u32 = head.iter().map(|&byte| u32::from(byte)).sum();
-        head[148..156].copy_from_slice(format!("{sum:06o}\0 ").as_bytes());
-        head
-    };
-    (0..n).flat_map(file).chain([0; 1024]).collect()
 }
 
 pub(crate) fn bank(channels: usize, taps: usize) -> Vec<u8> {

@@ -6,7 +6,7 @@ use hybank::analog::fit::{MeasuredResponse, vector_fit};
 use hybank::bank::Bank;
 use hybank::interchange::{taps_of_csv, taps_of_npy};
 use hybank::io::wav::WavReader;
-use hybank::io::{CsvReader, LostSamples, SigmfMeta, npy_header, open_mat, tar_files};
+use hybank::io::{CsvReader, LostSamples, SigmfMeta, npy_header, open_mat};
 use hybank::messages::shown;
 use hybank::spec::Spec;
 use std::fs;
@@ -126,19 +126,6 @@ fn arrays_of_matlab() {
         }
     });
     assert!(answers > 1000 && refusals > 1000, "{answers} {refusals}");
-}
-
-#[test]
-fn archives() {
-    let (mut answers, mut refusals) = (0, 0);
-    damaged("tar", |bytes| match answered(tar_files(&mut Cursor::new(bytes), "seed")) {
-        None => refusals += 1,
-        Some(files) => {
-            answers += 1;
-            assert!(files.iter().all(|file| file.offset + file.size <= bytes.len() as u64));
-        }
-    });
-    assert!(answers > 100 && refusals > 1000, "{answers} {refusals}");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use super::source::Source;
 use crate::files::InputError;
 use exr::meta::MetaData;
 use exr::prelude::{ReadChannels, ReadLayers, read};
-use npyz::{Deserialize, NpyFile, Order};
+use hybank::npy::{self, NpyHeader};
 use std::io::Cursor;
 use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
@@ -20,7 +20,7 @@ pub(super) fn is_exr(bytes: &[u8]) -> bool {
 }
 
 pub(super) fn is_npy(bytes: &[u8]) -> bool {
-    bytes.starts_with(b"\x93NUMPY")
+    bytes.starts_with(npy::MAGIC)
 }
 
 fn is_tiff(bytes: &[u8]) -> bool {
@@ -96,53 +96,56 @@ pub(super) fn tiff(file: &Source<'_>) -> Result<Option<Image>, InputError> {
 
 /// A NumPy array of rows and columns, of any real numbers; dimensions of one are left out.
 pub(super) fn npy(file: &Source<'_>) -> Decoded {
-    let wrong = |e: std::io::Error| file.wrong(e.to_string());
-    let array = NpyFile::new(file.bytes).map_err(wrong)?;
-    let shape = array.shape().to_vec();
-    let sides: Vec<usize> = shape.iter().filter(|side| **side != 1).map(|side| *side as usize).collect();
-    let (height, width) = match (&sides[..], &shape[..]) {
-        ([height, width], _) => (*height, *width),
-        (_, [height, width]) => (*height as usize, *width as usize),
-        _ => return Err(file.wrong(format!("the array has the shape {shape:?}; a map has rows and columns"))),
-    };
+    let header = NpyHeader::read(&mut { file.bytes }).map_err(|error| file.wrong(error.to_string()))?;
+    let (width, height) = columns_and_rows(&header.shape).ok_or_else(|| {
+        file.wrong(format!("the array has the shape {:?}; a map has rows and columns", header.shape))
+    })?;
     file.check_size(width, height)?;
-    let is_by_columns = array.order() == Order::Fortran;
-    let numbers = floats::<f32>(array, |v| v)
-        .or_else(|array| floats::<f64>(array, |v| v as f32))
-        .or_else(|array| floats::<u8>(array, f32::from))
-        .or_else(|array| floats::<u16>(array, f32::from))
-        .or_else(|array| floats::<i16>(array, f32::from))
-        .or_else(|array| floats::<u32>(array, |v| v as f32))
-        .or_else(|array| floats::<i32>(array, |v| v as f32))
-        .or_else(|array| floats::<i64>(array, |v| v as f32));
-    let numbers = match numbers {
-        Ok(numbers) => numbers.map_err(wrong)?,
-        Err(array) => {
-            return Err(file.wrong(format!("numbers of the type {} are not read", array.dtype().descr())));
-        }
-    };
+    let numbers = numbers(&header.descr, &file.bytes[header.offset as usize..])
+        .ok_or_else(|| file.wrong(format!("numbers of the type {} are not read", header.descr)))?;
     if numbers.is_empty() || numbers.len() != width * height {
         return Err(file.wrong(format!("it has {} values for {width} x {height} pixels", numbers.len())));
     }
-    let at = |p: usize| if is_by_columns { numbers[p % width * height + p / width] } else { numbers[p] };
-    Ok(Image::from_values((width, height), 1, (0..numbers.len()).map(at).collect()))
+    let place = |p: usize| if header.is_column_major { p % width * height + p / width } else { p };
+    Ok(Image::from_values((width, height), 1, (0..numbers.len()).map(|p| numbers[place(p)]).collect()))
 }
 
-type Bytes<'a> = NpyFile<&'a [u8]>;
+/// Of two axes, or of the two that are longer than one.
+fn columns_and_rows(shape: &[u64]) -> Option<(usize, usize)> {
+    let sides: Vec<u64> = shape.iter().copied().filter(|side| *side != 1).collect();
+    let [height, width] = *<&[u64; 2]>::try_from(&sides[..]).or_else(|_| shape.try_into()).ok()?;
+    Some((usize::try_from(width).ok()?, usize::try_from(height).ok()?))
+}
 
-/// The numbers of an array of this type, or the array again if its numbers have another one.
-fn floats<'a, T: Deserialize>(
-    array: Bytes<'a>,
-    float: impl Fn(T) -> f32,
-) -> Result<std::io::Result<Vec<f32>>, Bytes<'a>> {
-    Ok(array.try_data::<T>()?.map(|number| number.map(&float)).collect())
+/// The numbers of the type `descr`, of NumPy.
+fn numbers(descr: &str, bytes: &[u8]) -> Option<Vec<f32>> {
+    let kind = descr.trim_start_matches(['<', '>', '|']);
+    let size = kind.get(1..)?.parse().ok().filter(|size| (1..=8).contains(size))?;
+    let little_endian = |number: &[u8]| match descr.starts_with('>') {
+        true => number.iter().rev().copied().collect(),
+        false => number.to_vec(),
+    };
+    bytes.chunks_exact(size).map(|bytes| number(kind, &little_endian(bytes))).collect()
+}
+
+fn number(kind: &str, bytes: &[u8]) -> Option<f32> {
+    Some(match kind {
+        "f4" => f32::from_le_bytes(bytes.try_into().ok()?),
+        "f8" => f64::from_le_bytes(bytes.try_into().ok()?) as f32,
+        "u1" => f32::from(*bytes.first()?),
+        "u2" => f32::from(u16::from_le_bytes(bytes.try_into().ok()?)),
+        "i2" => f32::from(i16::from_le_bytes(bytes.try_into().ok()?)),
+        "u4" => u32::from_le_bytes(bytes.try_into().ok()?) as f32,
+        "i4" => i32::from_le_bytes(bytes.try_into().ok()?) as f32,
+        "i8" => i64::from_le_bytes(bytes.try_into().ok()?) as f32,
+        _ => return None,
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use crate::image::{MOST_PIXELS, read_image, read_map};
     use exr::prelude::{WritableImage, *};
-    use npyz::WriterBuilder;
     use std::path::Path;
 
     const VALUES: [f32; 6] = [1.5, -2.0, 0.25, 1e6, f32::INFINITY, 7.0];
@@ -158,13 +161,17 @@ mod tests {
         Image::from_layer(layer).write().to_file(path).unwrap();
     }
 
-    fn write_npy(path: &Path, shape: &[u64], order: npyz::Order, values: &[f32]) {
-        let mut bytes = Vec::new();
-        let options = npyz::WriteOptions::new().default_dtype().shape(shape).order(order);
-        let mut writer = options.writer(&mut bytes).begin_nd().unwrap();
-        writer.extend(values.iter().copied()).unwrap();
-        writer.finish().unwrap();
-        std::fs::write(path, bytes).unwrap();
+    /// An array as NumPy writes it.
+    fn write_npy(path: &Path, shape: &str, fortran_order: &str, descr: &str, numbers: &[u8]) {
+        let header =
+            format!("{{'descr': '{descr}', 'fortran_order': {fortran_order}, 'shape': {shape}, }}\n");
+        let length = u16::try_from(header.len()).unwrap().to_le_bytes();
+        std::fs::write(path, [b"\x93NUMPY\x01\x00", &length[..], header.as_bytes(), numbers].concat())
+            .unwrap();
+    }
+
+    fn floats(values: [f32; 6]) -> Vec<u8> {
+        values.iter().flat_map(|value| value.to_le_bytes()).collect()
     }
 
     #[test]
@@ -183,13 +190,40 @@ mod tests {
         encoder.write_image::<tiff::encoder::colortype::Gray32Float>(3, 2, &VALUES).unwrap();
         std::fs::write(at("a.tiff"), bytes.into_inner()).unwrap();
         is_read("a.tiff");
-        write_npy(&at("a.npy"), &[2, 3], npyz::Order::C, &VALUES);
+        write_npy(&at("a.npy"), "(2, 3)", "False", "<f4", &floats(VALUES));
         is_read("a.npy");
-        write_npy(&at("a.npy"), &[1, 2, 3, 1], npyz::Order::C, &VALUES);
+        write_npy(&at("a.npy"), "(1, 2, 3, 1)", "False", "<f4", &floats(VALUES));
         is_read("a.npy");
         let [a, b, c, d, e, f] = VALUES;
-        write_npy(&at("a.npy"), &[2, 3], npyz::Order::Fortran, &[a, d, b, e, c, f]);
+        write_npy(&at("a.npy"), "(2, 3)", "True", "<f4", &floats([a, d, b, e, c, f]));
         is_read("a.npy");
+    }
+
+    /// The bytes of -2 or 254, and of 258, as each type of NumPy stores them.
+    #[test]
+    fn every_type_of_numbers_is_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.npy");
+        let [doubles, big] =
+            [[-2.0_f64, 258.0].map(f64::to_le_bytes), [-2.0_f64, 258.0].map(f64::to_be_bytes)];
+        for (descr, bytes, want) in [
+            ("<f8", doubles.concat(), [-2.0, 258.0]),
+            (">f8", big.concat(), [-2.0, 258.0]),
+            ("|u1", vec![254, 2], [254.0, 2.0]),
+            ("<u2", vec![254, 255, 2, 1], [65534.0, 258.0]),
+            (">i2", vec![255, 254, 1, 2], [-2.0, 258.0]),
+            ("<u4", vec![254, 0, 0, 0, 2, 1, 0, 0], [254.0, 258.0]),
+            (">i4", vec![255, 255, 255, 254, 0, 0, 1, 2], [-2.0, 258.0]),
+            ("<i8", [-2_i64, 258].map(i64::to_le_bytes).concat(), [-2.0, 258.0]),
+        ] {
+            write_npy(&path, "(1, 2)", "False", descr, &bytes);
+            assert_eq!(read_map(&path, MOST_PIXELS).unwrap(), (2, 1, want.to_vec()), "{descr}");
+        }
+        for descr in ["<c8", "|S3", "<f99", "<é"] {
+            write_npy(&path, "(1, 2)", "False", descr, &[0; 16]);
+            let message = read_map(&path, MOST_PIXELS).unwrap_err().to_string();
+            assert!(message.contains("are not read"), "{message}");
+        }
     }
 
     #[test]
@@ -208,7 +242,7 @@ mod tests {
         let message = |name: &str| read_map(&at(name), MOST_PIXELS).unwrap_err().to_string();
         write_exr(&at("a.exr"), &["U", "V"]);
         assert!(message("a.exr").contains("the channels are U, V"), "{}", message("a.exr"));
-        write_npy(&at("a.npy"), &[6], npyz::Order::C, &VALUES);
+        write_npy(&at("a.npy"), "(6,)", "False", "<f4", &floats(VALUES));
         assert!(message("a.npy").contains("shape [6]"), "{}", message("a.npy"));
         for (name, start) in
             [("b.exr", &[0x76, 0x2f, 0x31, 0x01][..]), ("b.npy", b"\x93NUMPY\x01"), ("b.tif", b"II*\0")]

@@ -1,0 +1,57 @@
+//! How far converters are from their spec.
+
+use crate::bank::Bank;
+use crate::spec::Spec;
+use crate::units::FastPeriods;
+
+/// Standard deviations of the errors of a converter, which are Gaussian and constant while a recording
+/// lasts.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Spread {
+    pub(super) delay: FastPeriods,
+    /// As a share of the gain.
+    pub(super) gain: f64,
+    /// Of full scale, or in the scale of a signal.
+    pub(super) offset: f64,
+}
+
+impl Spread {
+    /// Of the converters of a spec, by its `[uncertainty]`.
+    pub(super) fn of_spec(spec: &Spec) -> Vec<Self> {
+        let count = spec.channels.len();
+        let Some(table) = &spec.uncertainty else { return vec![Self::default(); count] };
+        let (delays, gains) = (table.delay_deviations(count), table.gain_deviations(count));
+        let offsets = table.offset_deviations(count);
+        let of = |i: usize| {
+            let delay = delays[i].in_fast_periods(spec.fast_period);
+            Self { delay, gain: gains[i], offset: offsets[i] }
+        };
+        (0..count).map(of).collect()
+    }
+
+    /// The same without the delays that the taps of `bank` follow.
+    pub(super) fn of_bank(bank: &Bank, spec: &Spec) -> Vec<Self> {
+        let follows = |i: usize| bank.tap_slopes.as_ref().is_some_and(|slopes| slopes.follows(i));
+        let known = |(i, spread): (usize, Self)| match follows(i) {
+            true => Self { delay: FastPeriods(0.0), ..spread },
+            false => spread,
+        };
+        Self::of_spec(spec).into_iter().enumerate().map(known).collect()
+    }
+
+    /// A delay that is off by a Gaussian error of deviation s turns a sample of the frequency w by a random
+    /// phase, whose mean is chi = e^{-(w s)^2 / 2}.
+    pub(super) fn mean_phase(&self, w: f64) -> f64 {
+        (-0.5 * (w * self.delay.0).powi(2)).exp()
+    }
+
+    /// 1 - chi^2, the power of what the random phase has beside its mean.
+    pub(super) fn phase_power(&self, w: f64) -> f64 {
+        -(-(w * self.delay.0).powi(2)).exp_m1()
+    }
+
+    /// The power of what a sample has beside its mean, relative to the sample without errors.
+    pub(super) fn power(&self, w: f64) -> f64 {
+        self.phase_power(w) + self.gain * self.gain
+    }
+}
