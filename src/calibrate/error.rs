@@ -20,9 +20,6 @@ pub enum CalibrateError {
         /// All records.
         records: usize,
     },
-    /// A frequency that no tone has.
-    #[error("a tone has a finite frequency other than 0, in hertz")]
-    NoFrequency,
     /// A tone of complex captures at the negative of the frequency given.
     #[error("the tone is not at {tone}, but at minus that: complex samples tell the sign of a frequency")]
     OtherSign {

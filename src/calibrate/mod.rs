@@ -193,9 +193,6 @@ fn undetermined(channels: &[ChannelEstimate]) -> Option<(usize, FastPeriods)> {
 pub(crate) fn check_parts(records: &[Record], signal: &CalibrationSignal) -> Result<(), CalibrateError> {
     let complex = records.iter().filter(|record| record.imaginary.is_some()).count();
     match signal {
-        CalibrationSignal::Tones(tones) if tones.iter().any(|tone| !tone.0.is_normal()) => {
-            Err(CalibrateError::NoFrequency)
-        }
         CalibrationSignal::Tones(_) if complex == records.len() => Ok(()),
         CalibrationSignal::Tones(tones) if complex == 0 => match tones.iter().find(|tone| tone.0 < 0.0) {
             Some(&tone) => Err(CalibrateError::NegativeTone { tone }),

@@ -12,10 +12,11 @@ use crate::design::{Options, analyze_mean, design, filters};
 use crate::linalg::{self, Mat};
 use crate::random::Random;
 use crate::simulate::{Analog, Source, Tone as SourceTone, capture};
-use crate::spec::{HALF_WIDTH, PerChannel, UncertaintySpec};
-use crate::units::{FastPeriods, RadiansPerFastPeriod, Seconds};
+use crate::units::{FastPeriods, RadiansPerFastPeriod};
 use std::f64::consts::TAU;
 use std::fmt::Write;
+
+mod uncertain;
 
 /// A system in normalised time: front ends that are all alike, delays, and a band.
 struct System {
@@ -271,87 +272,6 @@ fn one_channel_is_not_compared_with_itself() {
     }
 }
 
-/// An error of a normal law with the half-width of its 95 % interval.
-fn drawn(half_width: f64, random: &mut Random) -> f64 {
-    let size = (-2.0 * (1.0 - random.part()).ln()).sqrt();
-    half_width / HALF_WIDTH * size * (TAU * random.part()).cos()
-}
-
-/// Delay, gain and offset of two converters that are off; the first one is the reference, whose offset alone
-/// is.
-fn moved(problem: &Problem, [delay, gain, offset]: [f64; 3], random: &mut Random) -> (Problem, [f64; 2]) {
-    let mut problem = problem.clone();
-    let channel = &mut problem.channels[1];
-    channel.delay = channel.delay.moved_by(FastPeriods(drawn(delay, random)));
-    channel.gain *= 1.0 + drawn(gain, random);
-    (problem, [drawn(offset, random), drawn(offset, random)])
-}
-
-/// What `[uncertainty]` adds, against virtual converters whose errors are drawn: tones that fill the band
-/// for the SNR, and one tone for image and gain.
-#[test]
-fn uncertain_delays_gains_and_offsets_count_as_drawn_ones_do() {
-    let (frames, settled, draws, rms) = (211, 14, 300, 0.25);
-    for errors in [[0.0, 0.01, 0.0], [0.0, 0.0, 0.005], [0.02, 0.0, 0.0], [0.01, 0.02, 0.002]] {
-        let mut spec = System { band: 0.3, ..THESIS }.spec(FIR_24);
-        spec.signal.as_mut().unwrap().rms = rms;
-        let [delay, gain, offset] = errors;
-        spec.uncertainty = Some(UncertaintySpec {
-            delay: Some(PerChannel::Same(Seconds(delay))),
-            gain: Some(PerChannel::Same(gain)),
-            offset: Some(PerChannel::Same(offset)),
-            ..UncertaintySpec::default()
-        });
-        let bank = design(&spec, &Options::without_proof()).unwrap().bank;
-        let SynthesisFilters::Fir(taps) = &bank.filters else { panic!("FIR") };
-        let plain = without_signal(&spec, bank.latency).unwrap();
-        let figures = Figures::new(&bank).unwrap();
-        let mut random = Random(7);
-        let run = |bins: &[usize], random: &mut Random| {
-            let tone = |&bin: &usize| SourceTone {
-                omega: RadiansPerFastPeriod(TAU * bin as f64 / (2 * frames) as f64),
-                amplitude: 1.0,
-                phase: TAU * random.part(),
-            };
-            let signal = Analog::Known(Source::Tones(bins.iter().map(tone).collect()));
-            let (problem, offsets) = moved(&plain, errors, random);
-            let mut captured = capture(&problem, &signal, frames + settled);
-            let target = captured.target.split_off(2 * settled);
-            let scale = (power(target.iter().copied()) / target.len() as f64).sqrt() / rms;
-            for (channel, offset) in captured.channels.iter_mut().zip(offsets) {
-                channel.iter_mut().for_each(|x| *x += scale * offset);
-            }
-            (fused(taps, 2, &captured.channels).split_off(2 * settled), target)
-        };
-        let (mut error, mut wanted) = (0.0, 0.0);
-        for _ in 0..draws {
-            let tones = orthogonal_tones(&mut random, [0.0, 0.3], 2, frames);
-            let (output, target) = run(&tones, &mut random);
-            error += power(output.iter().zip(&target).map(|(y, z)| y - z));
-            wanted += power(target.into_iter());
-        }
-        let (found, told) = (Decibels::of_power(wanted / error), figures.snr.total_db);
-        println!("{errors:?}: SNR {:.2} dB drawn, {:.2} dB predicted", found.0, told.0);
-        assert!((found - told).0.abs() < 0.5, "{errors:?}: {found:?} {told:?}");
-        let bin = 57;
-        let (mut image, mut gains) = (0.0, 0.0);
-        for _ in 0..draws {
-            let (output, target) = run(&[bin], &mut random);
-            let [output, target] = [output, target].map(|x| linalg::fourier::real_spectrum(&x));
-            image += output[frames - bin].norm_sqr() / output[bin].norm_sqr();
-            gains += (output[bin] / target[bin] - 1.0).norm_sqr();
-        }
-        let spread = Spread::of_spec(&spec);
-        let tones = ToneResponse::new(plain.clone(), FilterResponse::new(&bank).unwrap(), spread);
-        let there = tones.at(bin as f64 / (2 * frames) as f64);
-        for (sum, told) in [(image, there.image), (gains, there.gain_error)] {
-            let (found, told) = ((sum / f64::from(draws)).sqrt(), told);
-            println!("{errors:?}: {found:.3e} drawn, {told:.3e} predicted");
-            assert!((found / told - 1.0).abs() < 0.06, "{errors:?}: {found} {told}");
-        }
-    }
-}
-
 /// The output of an FIR bank by its definition.
 fn fused(taps: &[Vec<f64>], ratio: usize, captured: &[Vec<f64>]) -> Vec<f64> {
     let sample = |n: usize| {
@@ -450,8 +370,9 @@ fn check_image(
     let beside = lines.iter().enumerate().filter(|(k, _)| *k != folded).map(|(_, x)| *x).fold(0.0, f64::max);
     let measured = Decibels::of_amplitude(beside / lines[folded]).0;
     let plain = without_signal(bank.spec.as_ref().unwrap(), bank.latency).unwrap();
-    let there = ToneResponse::new(plain, FilterResponse::new(bank).unwrap(), Vec::new())
-        .at(bin as f64 / length as f64);
+    let exact = vec![Spread::default(); bank.channel_count()];
+    let tones = ToneResponse::new(plain, FilterResponse::new(bank).unwrap(), exact);
+    let there = tones.at(bin as f64 / length as f64);
     let predicted = Decibels::of_amplitude(there.image).0;
     println!("seed {seed}: image {measured:.3} dB, predicted {predicted:.3} dB");
     assert!((measured - predicted).abs() < 0.01, "seed {seed}: {measured} dB, predicted {predicted} dB");

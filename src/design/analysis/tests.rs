@@ -2,7 +2,8 @@ use super::*;
 use crate::bank::SynthesisFilters;
 use crate::design::{Options, design};
 use crate::linalg::{self, Complex};
-use crate::spec::Spec;
+use crate::runtime::{Precision, Stream};
+use crate::spec::{Band, SignalSpec, Spec};
 use crate::units::Seconds;
 use proptest::prelude::*;
 use std::f64::consts::PI;
@@ -39,6 +40,26 @@ fn noise_gains_are_sums_of_squared_taps() {
     assert!((mean.noise_gain - want).abs() < 1e-13, "{} {want}", mean.noise_gain);
     let want = 0.25 * (power(&taps[1]) / 2.0).sqrt();
     assert!((mean.output_noise - want).abs() < 1e-13, "{} {want}", mean.output_noise);
+}
+
+/// The noise at the output of the running bank, whatever the rms of the signal that the spec states.
+#[test]
+fn the_output_noise_is_that_of_the_running_bank() {
+    let mut random = crate::random::Random(3);
+    // Of unit power.
+    let noise: Vec<f64> = (0..40_000).map(|_| 3f64.sqrt() * random.sample()).collect();
+    let frames: Vec<f64> = noise.iter().flat_map(|x| [0.0, 0.25 * x]).collect();
+    let options = crate::runtime::Options { precision: Precision::Double, ..Default::default() };
+    for rms in [None, Some(0.05), Some(0.5)] {
+        let mut bank = bank();
+        let spec = bank.spec.as_mut().unwrap();
+        spec.signal = rms.map(|rms| SignalSpec { rms, ..SignalSpec::in_band(Band::up_to(Hertz(0.4))) });
+        let mut output = vec![0.0; 2 * noise.len()];
+        Stream::new(&bank.plan(options).unwrap()).process(&frames, &mut output).unwrap();
+        let measured = (power(&output) / output.len() as f64).sqrt();
+        let told = analyze_mean(&bank).unwrap().output_noise;
+        assert!((told / measured - 1.0).abs() < 0.02, "{rms:?}: {told} {measured}");
+    }
 }
 
 /// The mean square over time is that over frequencies (Parseval), and the worst case is no smaller than any
