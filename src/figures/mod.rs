@@ -106,7 +106,7 @@ impl Figures {
         let band = FigureBand::new(spec, &plain);
         let tones = ToneResponse::new(plain.clone(), FilterResponse::new(bank)?);
         let Worst { image, gain_error, vanishes } = tones.worst(band.cycles(spec));
-        let setting = Setting::of(bank, spec, &band)?;
+        let setting = Setting::new(spec, bank.latency, &band)?;
         let ways = simple::ways(setting.problem());
         let ratios = setting.ratios(&ways);
         let own = setting.ratio_of_bank(FilterResponse::new(bank)?);
@@ -147,7 +147,7 @@ impl Figures {
 pub fn snr(bank: &Bank) -> Result<Snr, DesignError> {
     let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
     let band = FigureBand::new(spec, &without_signal(spec, bank.latency)?);
-    Ok(Setting::of(bank, spec, &band)?.ratio_of_bank(FilterResponse::new(bank)?).snr)
+    Ok(Setting::new(spec, bank.latency, &band)?.ratio_of_bank(FilterResponse::new(bank)?).snr)
 }
 
 /// A band for the signal of a spec that has none: what the target passes, with a tenth of the resolved band

@@ -5,7 +5,6 @@ use super::powers::{Conditions, Powers, target_power};
 use super::reconstruction::Reconstruction;
 use super::signal::Signal;
 use super::without_signal;
-use crate::bank::Bank;
 use crate::design::filters::FilterResponse;
 use crate::design::{DesignError, Problem};
 use crate::spec::{SignalSpectrum, Spec, USUAL_RMS};
@@ -25,7 +24,7 @@ pub struct Snr {
     pub noise_db: Option<Decibels>,
     /// What delays within the spec's `[uncertainty]` add to the error from the signal: the mean over
     /// Gaussian errors whose 95 % intervals are the stated ones, constant for each converter. `None` where
-    /// all delays are exact, or where the taps follow them.
+    /// all delays are exact.
     pub delays_db: Option<Decibels>,
 }
 
@@ -54,30 +53,14 @@ pub(super) struct Setting {
     noise_is_stated: bool,
     /// Deviations of the delays of the converters.
     spread: Vec<FastPeriods>,
-    /// Those that the bank does not follow.
-    not_followed: Vec<FastPeriods>,
 }
 
 impl Setting {
-    /// Of a bank with its spec.
+    /// Of any filters for a spec with this latency.
     ///
     /// # Errors
     /// As [`Problem::new`].
-    pub(super) fn of(bank: &Bank, spec: &Spec, band: &FigureBand) -> Result<Self, DesignError> {
-        let follows = |i: usize| bank.tap_slopes.as_ref().is_some_and(|slopes| slopes.follows(i));
-        Self::new(spec, bank.latency, &follows, band)
-    }
-
-    /// Of any filters for a spec with this latency, which follow the delays of some channels.
-    ///
-    /// # Errors
-    /// As [`Problem::new`].
-    pub(super) fn new(
-        spec: &Spec,
-        latency: usize,
-        follows: &dyn Fn(usize) -> bool,
-        band: &FigureBand,
-    ) -> Result<Self, DesignError> {
+    pub(super) fn new(spec: &Spec, latency: usize, band: &FigureBand) -> Result<Self, DesignError> {
         let plain = without_signal(spec, latency)?;
         let stated: Vec<f64> = spec.channels.iter().map(|channel| channel.sample_noise().powi(2)).collect();
         let stated = spec.layout().each(&stated);
@@ -106,10 +89,7 @@ impl Setting {
         let deviations = deviations.unwrap_or_else(|| vec![Seconds(0.0); channels]);
         let spread: Vec<FastPeriods> =
             deviations.into_iter().map(|time| time.in_fast_periods(spec.fast_period)).collect();
-        let known =
-            |(i, deviation): (usize, &FastPeriods)| if follows(i) { FastPeriods(0.0) } else { *deviation };
-        let not_followed = spread.iter().enumerate().map(known).collect();
-        Ok(Self { signal, target, noise, noise_is_stated, spread, not_followed })
+        Ok(Self { signal, target, noise, noise_is_stated, spread })
     }
 
     /// The front ends, with the spectrum of the signal where it is a filter.
@@ -117,19 +97,15 @@ impl Setting {
         self.signal.problem()
     }
 
-    /// The ratios of ways with filters that stay as they are.
-    pub(super) fn ratios(&self, ways: &[Reconstruction]) -> Vec<Ratios> {
-        self.ratios_for(ways, &self.spread)
-    }
-
-    /// The ratio of the bank itself, whose taps may follow the delays.
+    /// The ratio of the bank itself.
     pub(super) fn ratio_of_bank(&self, bank: FilterResponse) -> Ratios {
-        self.ratios_for(&[Reconstruction::Bank(bank)], &self.not_followed).pop().unwrap_or_default()
+        self.ratios(&[Reconstruction::Bank(bank)]).pop().unwrap_or_default()
     }
 
-    fn ratios_for(&self, ways: &[Reconstruction], spread: &[FastPeriods]) -> Vec<Ratios> {
+    /// The ratios of several ways.
+    pub(super) fn ratios(&self, ways: &[Reconstruction]) -> Vec<Ratios> {
         let conditions =
-            Conditions { signal: &self.signal, noise: self.noise.clone(), spread: spread.to_vec() };
+            Conditions { signal: &self.signal, noise: self.noise.clone(), spread: self.spread.clone() };
         let uncertain = conditions.is_uncertain();
         conditions.powers(ways).into_iter().map(|powers| self.ratio(&powers, uncertain)).collect()
     }
