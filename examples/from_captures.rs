@@ -11,7 +11,7 @@ use hybank::runtime::{Options, Planar};
 use hybank::simulate::{Analog, Source, capture};
 use hybank::spec::Spec;
 use hybank::units::{Hertz, Seconds};
-use hybank::verify::uncertainty::{ErrorBox, Taps};
+use hybank::verify::uncertainty::ErrorBox;
 use hybank::verify::verify;
 use std::error::Error;
 
@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let bank = design(&measured, &Default::default())?.bank;
     let proven = verify(&bank)?;
     let errors = ErrorBox { delays: vec![Seconds(1e-9); 2], ..ErrorBox::none(2) };
-    let worst = hybank::design::uncertainty::worst_case(&bank, &errors, Taps::Fixed, 0.05)?;
+    let worst = hybank::design::uncertainty::worst_case(&bank, &errors, 0.05)?;
     println!("gamma at most {:.4e}, with delays 1 ns off {:.4e}", proven.upper, worst.upper);
 
     let mut tone = captured(&built, "tones:3.1kHz")?;

@@ -30,7 +30,7 @@ const NORMALISED_RATE: f64 = 48_000.0;
 ///
 /// Finds by any signal (speech, music, noise) by how many samples each recording began before the others,
 /// how its clock drifts, its polarity, gain and offset, and writes the spec with these values. --trim writes
-/// the recordings from their first common sample on, and the delays that move for `hybank fuse --track`.
+/// the recordings from their first common sample on, and their delays over time.
 ///
 /// All is relative to a reference channel, whose clock is the time. The report says whether one recorder
 /// alone would do as well as all together.
@@ -39,7 +39,7 @@ const NORMALISED_RATE: f64 = 48_000.0;
 Examples:
   hybank align spec.toml left.wav right.wav -o aligned.toml --trim aligned
   hybank design aligned.toml -o bank.json
-  hybank fuse bank.json aligned/ch1.wav aligned/ch2.wav -o fused.wav --track aligned/drift.jsonl
+  hybank fuse bank.json aligned/ch1.wav aligned/ch2.wav -o fused.wav
   hybank align spec.toml a.wav b.wav -o aligned.toml --within 50ms --json
 
 Recordings of a tone or a loop agree at many lags; --within says how far apart they began at most.")]
@@ -54,7 +54,7 @@ pub(super) struct Args {
     #[arg(short, long)]
     output: PathBuf,
     /// Write the recordings from their first common sample on into this folder: ch1.wav, ch2.wav, .., and
-    /// drift.jsonl, their delays over time as `hybank fuse --track` reads them
+    /// drift.jsonl, their delays over time as JSON lines
     #[arg(long, value_name = "DIR")]
     trim: Option<PathBuf>,
     /// How far apart the recordings began at most, as 50ms or 2s

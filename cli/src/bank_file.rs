@@ -111,11 +111,7 @@ pub(super) fn load_spec_or_bank(path: &Path) -> Result<SpecFile, Failure> {
     Ok(SpecFile { spec: Spec { latency, ..spec }, measurements: beside(path) })
 }
 
-/// The text of a file; `-` is standard input.
-pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
-    files::text_in(read_file(path)?, &name(path)).map_err(failed)
-}
-
+/// The bytes of a file; `-` is standard input.
 fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
     let bytes = if is_dash(path) {
         let check = StandardStream::Input.check();

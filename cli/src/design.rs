@@ -77,9 +77,6 @@ pub(super) struct Args {
     /// With --loss-db: taps of the fewest canonical signed digits, for multiplication by shifts and adders
     #[arg(long, requires = "loss_db")]
     digits: bool,
-    /// Delay-scheduled taps, optimal over the delays of the spec's [uncertainty] (method fir)
-    #[arg(long, value_parser = ["affine"])]
-    tracking: Option<String>,
     /// Use at most this many states (methods iir and h2)
     #[arg(long)]
     order: Option<usize>,
@@ -116,7 +113,6 @@ fn overrides(args: &Args) -> DesignOverrides {
         fraction_bits: args.fraction_bits,
         loss_db: args.loss_db,
         digits: args.digits,
-        tracking: args.tracking.is_some(),
         reduction: args.order.map(Reduction::Order).or(args.reduction_loss_db.map(Reduction::Loss)),
     }
 }

@@ -1,10 +1,9 @@
 //! The report of `hybank design` and `hybank import` on a finished bank, as text and as JSON.
 
-use super::design_studies::{BandHint, Words, known, number, order_text, robust_text, tracking_text};
+use super::design_studies::{BandHint, Words, known, number, order_text, robust_text};
 use hybank::bank::{Bank, Gamma, SynthesisFilters};
 use hybank::design::{
-    Design, DesignError, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, TrackingStudy, Unfinished,
-    analyze_mean,
+    Design, DesignError, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, Unfinished, analyze_mean,
 };
 use hybank::figures::Figures;
 use hybank::messages::{Quoted, counted};
@@ -41,9 +40,6 @@ pub(super) struct Report<'a> {
     /// For a spec with `[uncertainty]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     robust: Option<&'a RobustStudy>,
-    /// For delay-scheduled taps.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    tracking: Option<&'a TrackingStudy>,
     #[serde(flatten)]
     judged: Judged,
     /// Hertz, at the slow rate to which all frequencies alias.
@@ -159,7 +155,6 @@ impl<'a> Report<'a> {
             gamma: &bank.gamma,
             words: Words::of(design),
             robust: design.robust.as_ref(),
-            tracking: design.tracking.as_ref(),
             judged,
             peak_hertz: design.peak_frequency.in_hertz(bank.slow_period()),
             is_normalised: bank.is_normalised(),
@@ -189,9 +184,6 @@ impl<'a> Report<'a> {
             self.reduction.map(|reduction| order_text(reduction, self.method)).unwrap_or_default(),
             self.robust
                 .map(|study| robust_text(study, self.gamma.worst_case, self.proof.of_box()))
-                .unwrap_or_default(),
-            self.tracking
-                .map(|study| tracking_text(study, self.gamma.tracked, self.proof.of_box()))
                 .unwrap_or_default(),
             format!("designed in {:.1} ms, {}\n", self.seconds * 1e3, counted(self.iterations, "iteration")),
             self.proof.text(),

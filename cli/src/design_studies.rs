@@ -2,9 +2,7 @@
 
 use hybank::bank::{Bank, FixedPoint};
 use hybank::design::quantise::WordStudy;
-use hybank::design::{
-    Design, DesignError, Options, OrderErrorPoint, OrderReduction, RobustStudy, TrackingStudy, design,
-};
+use hybank::design::{Design, DesignError, Options, OrderErrorPoint, OrderReduction, RobustStudy, design};
 use hybank::figures::{snr, target_band};
 use hybank::messages::counted;
 use hybank::overview::{band, decibels_of};
@@ -104,36 +102,6 @@ pub(super) fn robust_text(study: &RobustStudy, proven: Option<f64>, unproven: Op
         number(nominal.nominal),
         number(*lower),
     )
-}
-
-/// Delay-scheduled and fixed taps over the spec's uncertainty.
-pub(super) fn tracking_text(study: &TrackingStudy, proven: Option<f64>, unproven: Option<&str>) -> String {
-    let TrackingStudy { tracked, fixed, redesigned, ratio, least_ratio, .. } = study;
-    let [worst, of_fixed, redesigned_worst] =
-        [tracked.largest_found, fixed.largest_found, *redesigned].map(number);
-    let bound = match *least_ratio > 1.0 {
-        true => format!("; no affine taps: below {}", above(*least_ratio)),
-        false => String::new(),
-    };
-    format!(
-        "tracked    {worst} is the largest gain found over the spec's uncertainty ({}), {} without errors\n\
-         redesigned {redesigned_worst} for the delays where that was found: tracked is {} above it\n\
-         \x20          at all delays at most {} above what is within reach there{bound}\n\
-         fixed      {of_fixed} is the largest found for the best fixed taps\n",
-        at_most(proven, unproven),
-        number(tracked.nominal),
-        above(1.0 + study.excess()),
-        above(*ratio),
-    )
-}
-
-/// How far a ratio is above 1: in per cent, or in decibels where it is far.
-fn above(ratio: f64) -> String {
-    if ratio < 2.0 {
-        format!("{:.3} %", 100.0 * (ratio - 1.0))
-    } else {
-        format!("{:.1} dB", 20.0 * ratio.log10())
-    }
 }
 
 /// What is proven of the box, or why nothing is.

@@ -32,7 +32,6 @@ Examples:
   hybank fuse bank.json capture.wav -o fused.wav --interleaved 4
   hybank fuse bank.json tone1.wav tone2.wav -o fused.wav --measure --plot spectra.svg
   hybank fuse fixed.json ch1.wav ch2.wav -o fused.wav --bit-true --accumulator 40
-  hybank fuse bank.json ch1.wav ch2.wav -o fused.wav --track blind --track-log delays.jsonl
   sox capture.flac -t wav - | hybank fuse bank.json - -o - | play -t wav -")]
 pub(super) struct Args {
     /// The bank (JSON), as `hybank design` writes it

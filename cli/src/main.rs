@@ -34,7 +34,6 @@ mod run;
 mod simulate;
 mod stream;
 mod texts;
-mod track;
 mod verify;
 mod virtual_converters;
 mod virtual_signal;

@@ -85,13 +85,7 @@ const LENGTHS: [f64; 8] = [0.25, 0.35, 0.5, 0.7, 0.85, 1.0, 1.4, 2.0];
 /// channels.
 fn sweeps(bank: &Bank) -> Result<Vec<Picture>, DesignError> {
     let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
-    let design = DesignSpec {
-        bits: None,
-        fraction_bits: None,
-        tracking: false,
-        reduction: None,
-        ..spec.design.clone()
-    };
+    let design = DesignSpec { bits: None, fraction_bits: None, reduction: None, ..spec.design.clone() };
     let plain = Spec { latency: Some(bank.latency), uncertainty: None, design, ..spec.clone() };
     let mut pictures = vec![Picture {
         name: "latency",

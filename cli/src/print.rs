@@ -13,7 +13,7 @@ use hybank::pipeline::PipelineError;
 pub(super) use hybank::program::{Failure, is_dash, print, print_bytes, say};
 use hybank::program::{Program, put};
 use hybank::spec::Spec;
-use hybank::track::{AlignError, TrackError};
+use hybank::track::AlignError;
 use hybank::verify::VerifyError;
 use std::any::Any;
 use std::fmt::Display;
@@ -171,10 +171,6 @@ fn option(error: &dyn Any) -> Option<&'static str> {
         .or_else(|| match error.downcast_ref()? {
             AlignError::Ambiguous { .. } => Some("--within says so"),
             AlignError::Spec(error) => of_calibration(error),
-            _ => None,
-        })
-        .or_else(|| match error.downcast_ref()? {
-            TrackError::NoTapSlopes => Some("`hybank design --tracking affine` designs such taps"),
             _ => None,
         })
 }

@@ -8,7 +8,6 @@ use super::interrupt::interrupts;
 use super::observer::{ObserverArgs, RunObserver};
 use super::output::{begin_samples, check_files};
 use super::print::{Failure, check_strict, failed, stopped, warn, with_remains};
-use super::track::{TrackArgs, TrackRecord, Tracked};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hybank::bank::Bank;
 use hybank::captures::{Converters, FileFormat};
@@ -24,16 +23,14 @@ use std::path::{Path, PathBuf};
 /// Options of the commands that fuse.
 #[derive(Debug, clap::Args)]
 pub(super) struct RunArgs {
-    /// Algorithm of FIR filters; auto is the fastest for the bank, and direct with --gaps, with --track, and
-    /// in `stream`, because overlap-save adds latency (--json says how much)
+    /// Algorithm of FIR filters; auto is the fastest for the bank, and direct with --gaps and in
+    /// `stream`, because overlap-save adds latency (--json says how much)
     #[arg(long, value_parser = algorithms(), default_value_t = Algorithm::Auto)]
     algorithm: Algorithm,
     #[command(flatten)]
     pub(super) interleaved: InterleavedArgs,
     #[command(flatten)]
     pub(super) gaps: GapArgs,
-    #[command(flatten)]
-    track: TrackArgs,
     /// Threads that filter (FIR banks only), 0 for one per processor. The result has the same bits with any
     /// number. More than one thread helps with many taps or channels; otherwise reading and writing take
     /// longer than filtering
@@ -93,10 +90,9 @@ impl RunArgs {
         self.gaps.check()?;
         self.interleaved.check(inputs.len())?;
         self.observer.check(output, self.json || prints)?;
-        self.track.check(self.algorithm)?;
         let inputs = inputs.iter().map(PathBuf::as_path).chain([bank]);
-        let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).chain(self.track.input()).collect();
-        let others = self.gaps.mask().into_iter().chain(self.observer.report()).chain(self.track.log());
+        let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).collect();
+        let others = self.gaps.mask().into_iter().chain(self.observer.report());
         check_files(output, container, &others.collect::<Vec<&Path>>(), &inputs)
     }
 }
@@ -162,7 +158,7 @@ impl Job<'_> {
 
     fn settings(&self) -> Settings<'static> {
         let Self { args, dropped, .. } = *self;
-        Settings { dropped, gaps: args.gaps.policy(), is_retuned: args.track.is_wanted(), workers: None }
+        Settings { dropped, gaps: args.gaps.policy(), workers: None }
     }
 
     fn options(&self) -> Options {
@@ -193,17 +189,12 @@ impl Job<'_> {
         let (rate, is_complex) = (self.output_rate(reader)?, reader.is_complex());
         let workers = self.args.workers()?;
         let settings = Settings { workers: workers.as_ref(), ..self.settings() };
-        let mut pipeline = Pipeline::new(self.bank, plan, settings, self.format, is_complex);
-        let tracked = self.args.track.begin(self.args.force, observer.events())?;
-        if let Some(follower) = self.args.track.follower(self.bank, self.bank_path, rate)? {
-            let retuner = tracked.retuner(follower, self.bank, self.options()).map_err(stopped)?;
-            pipeline = pipeline.retuned_by(retuner).map_err(stopped)?;
-        }
+        let pipeline = Pipeline::new(self.bank, plan, settings, self.format, is_complex);
         let mut outputs = self.outputs(rate, is_complex)?;
         // What is recorded live cannot be recorded again.
         let kept = if self.is_live { outputs.keep() } else { Vec::new() };
-        observer.check_captures(self.bank, !is_complex && !self.args.track.is_wanted(), self.is_live);
-        let finished = self.record(pipeline, reader, outputs, tracked, observer, each);
+        observer.check_captures(self.bank, !is_complex, self.is_live);
+        let finished = self.record(pipeline, reader, outputs, observer, each);
         finished.map_err(|failure| with_remains(failure, &kept))
     }
 
@@ -213,7 +204,6 @@ impl Job<'_> {
         mut pipeline: Pipeline<'_>,
         reader: &mut MultiReader,
         mut outputs: FileOutputs,
-        tracked: Tracked,
         observer: &mut RunObserver,
         each: &dyn Fn(u64),
     ) -> Result<Finished, Failure> {
@@ -221,18 +211,17 @@ impl Job<'_> {
         let latency = pipeline.plan().latency();
         let dropped = self.dropped.samples(pipeline.plan());
         let outcome = self.drain(pipeline, reader.consumed(), &mut outputs)?;
-        let TrackRecord { log, warnings, .. } = tracked.take();
         let checked = observer.checked();
         // A frame may hold several samples of a converter.
         let outcome = Outcome { channels: self.bank.channel_count(), ..outcome };
         let report = RunReport::new(outcome, self.tolerated(reader), self.lossless);
-        let report = report.with(checked.warnings, self.is_live, warnings);
+        let report = report.with(checked.warnings, self.is_live);
         let shift = (latency - dropped) as u64;
         let (ratio, samples) = (self.bank.ratio as u64, report.outcome.samples);
         let placement = Placement { ratio, per_frame: 1, shift, samples };
         outputs.annotate(self.notes(reader, &report, placement)?);
         let peak = outputs.peak();
-        self.complete(outputs.with_log(log), &report, observer)?;
+        self.complete(outputs, &report, observer)?;
         let frames = reader.consumed();
         Ok(Finished { report, frames, is_interrupted, dropped, peak, captures: checked.verdict })
     }
@@ -281,7 +270,7 @@ impl Job<'_> {
         if self.flush {
             pipeline.flush(samples, &mut |block| outputs.write(block)).map_err(stopped)?;
         }
-        pipeline.finish().map_err(stopped)
+        Ok(pipeline.finish())
     }
 
     fn tolerated(&self, reader: &MultiReader) -> Vec<Warning> {
@@ -377,11 +366,10 @@ impl RunReport {
         Self { outcome, warnings, reported: 0 }
     }
 
-    /// With those of the captures, and with those that were reported during the run.
-    fn with(mut self, captures: Vec<String>, are_reported: bool, reported: Vec<String>) -> Self {
-        self.reported = reported.len() + if are_reported { captures.len() } else { 0 };
+    /// With those of the captures.
+    fn with(mut self, captures: Vec<String>, are_reported: bool) -> Self {
+        self.reported = if are_reported { captures.len() } else { 0 };
         self.warnings.extend(captures);
-        self.warnings.extend(reported);
         self
     }
 }

@@ -56,12 +56,6 @@ struct Report {
     /// No errors within the spec's uncertainty make gamma larger.
     #[serde(skip_serializing_if = "Option::is_none")]
     worst_case: Option<f64>,
-    /// No delays within the spec's uncertainty make gamma larger while the taps follow them.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    tracked: Option<f64>,
-    /// The file has tap slopes and states nothing that could be proven of them.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    unproven_slopes: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
@@ -79,8 +73,6 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         taps: taps(&bank),
         words: words(&bank),
         worst_case: bank.gamma.worst_case,
-        tracked: bank.gamma.tracked,
-        unproven_slopes: bank.tap_slopes.is_some() && bank.gamma.tracked.is_none(),
         bank: file,
         verified,
         digest,
@@ -117,19 +109,6 @@ impl Report {
         }
     }
 
-    fn tracked_line(&self) -> String {
-        match self.tracked {
-            Some(bound) => {
-                format!("tracked    {}   no delays within it do while the taps follow them\n", number(bound))
-            }
-            None if self.unproven_slopes => {
-                "tracked    not proven: the file states no gamma.tracked, so its tap_slopes may be anything\n"
-                    .to_owned()
-            }
-            None => String::new(),
-        }
-    }
-
     fn text(&self) -> String {
         let Verified { lower, upper, attained, noncausal, states, .. } = self.verified;
         let origin = if self.certificate_in_file { "from the file" } else { "found now, the file has none" };
@@ -142,7 +121,7 @@ impl Report {
              attained   {}   this bank's own gain at one frequency\n\
              lower      {}   {}\n\
              noncausal  {}   no bank at all is better\n\
-             {}{}{}digest     {digest}\n",
+             {}{}digest     {digest}\n",
             Quoted(&self.bank),
             number(lower),
             number(upper),
@@ -157,7 +136,6 @@ impl Report {
                     number(bound)
                 )
             }),
-            self.tracked_line(),
             self.words,
         )
     }

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Tables of what `hybank` does with virtual converters and recorders, beside the simple ways.
+"""Tables of what `hybank` does with virtual converters, beside the simple ways.
 
-    python3 examples/tables/tables.py [quad|four|if|rates|recorders ...]
+    python3 examples/tables/tables.py [quad|four|if|rates ...]
 
 Every step is a command of `hybank`, which must be in PATH; `--show` prints the commands. What this script does
-itself: it writes codes in turn into one table as a capture board does, makes music and noise for the recorders,
-and computes the simple ways (simple.py). It needs numpy and scipy.
+itself: it writes codes in turn into one table as a capture board does, makes noise, and
+computes the simple ways (simple.py). It needs numpy and scipy.
 """
 
 import json
@@ -343,96 +343,7 @@ def write_wav(path, samples, rate):
     Path(path).write_bytes(b"RIFF" + len(body).to_bytes(4, "little") + body)
 
 
-# 5. Two recorders, started by hand.
-
-PAIR = """fast_rate = "48 kS/s"
-ratio = 1
-latency = 16
-[target]
-filter = {{ family = "butterworth", order = 4, cutoff = "8 kHz" }}
-{channels}
-[design]
-method = "fir"
-taps = 32
-noise = 1e-3
-{rest}
-"""
-RECORDER = """[[channel]]
-delay = 0
-filter = { family = "butterworth", order = 4, cutoff = "16 kHz" }
-"""
-FOLLOWED = """tracking = "affine"
-[uncertainty]
-delay_samples = 0.55
-"""
-
-
-def event(kind, count, dice):
-    """Noise below 5 kHz whose level changes, or plucked notes of a scale."""
-    t = np.arange(count) / 48e3
-    if kind == "noise":
-        white = np.fft.rfft(dice.standard_normal(count))
-        white[int(5e3 * count / 48e3) :] = 0
-        return 0.2 * np.fft.irfft(white, count) / 0.45 * (1.2 + np.sin(2 * np.pi * 1.3 * t)) / 2
-    samples = np.zeros(count)
-    for _ in range(count // 6000):
-        begin = dice.integers(count)
-        pitch = 110 * 2 ** (dice.integers(24) / 12)
-        s = t[: min(40_000, count - begin)]
-        for n in range(1, 8):
-            samples[begin : begin + s.size] += 0.1 / n * np.sin(2 * np.pi * pitch * n * s) * np.exp(-2 * n * s)
-    return samples
-
-
-def ratio(found, wanted):
-    """Signal-to-noise ratio in dB, without the ends. `align` adds a fast period to all delays where one would be
-    negative, and says so; the output is earlier by it."""
-    count = min(found.size, wanted.size) - 400
-    wanted = wanted[400:count]
-    of = lambda late: np.mean(wanted**2) / np.mean((found[400 + late : count + late] - wanted) ** 2)
-    return 10 * np.log10(max(of(0), of(-1)))
-
-
-def recorders():
-    Path("pair.toml").write_text(PAIR.format(channels=RECORDER * 2, rest=FOLLOWED))
-    Path("alone.toml").write_text(PAIR.format(channels=RECORDER, rest=""))
-    hybank("design", "alone.toml", "-o", "alone.json", "--force")
-    print("\nSNR in dB, relative to the sound at the recorders; each delivers 12 s of the same sound.\n")
-    head("sound", "ppm", "second begins after", "first alone", "second alone", "fused", "drift found, ppm")
-    worst = np.inf
-    for kind in ("noise", "notes"):
-        for ppm in (1, 10, 100):
-            for late in (0.05, 1.0, 10.0):
-                dice = np.random.default_rng(int(1000 * late) + ppm)
-                count = int((12 + late) * 48e3)
-                write_wav("event.wav", event(kind, count, dice), 48e3)
-                def record(spec, folder, seed, *more):
-                    hybank("simulate", spec, "--source", "event.wav", "--samples", count, "--noise", 1e-3, "--seed", seed,
-                           *more, "-o", folder, "--force")
-                record("pair.toml", "cap", 1, "--drift", f"0,{ppm}", "--delay-error", "0,7.3us")
-                # The second recorder by its own clock, for the comparison.
-                record("alone.toml", "own", 2)
-                start = int(late * 48e3)
-                for i, first in ((1, 0), (2, start)):
-                    write_wav(f"{'ab'[i - 1]}.wav", wav(f"cap/ch{i}.wav")[first:], 48e3)
-                found = hybank("align", "pair.toml", "a.wav", "b.wav", "-o", "aligned.toml", "--trim", "cut", "--force",
-                               report=True)
-                hybank("design", "aligned.toml", "-o", "pair.json", "--force")
-                hybank("fuse", "pair.json", "cut/ch1.wav", "cut/ch2.wav", "-o", "y.wav", "--track", "cut/drift.jsonl",
-                       "--force")
-                hybank("fuse", "alone.json", "cut/ch1.wav", "-o", "one.wav", "--force")
-                hybank("fuse", "alone.json", "own/ch1.wav", "-o", "two.wav", "--force")
-                skip = found["channels"][0]["skip"]
-                wanted, own = wav("cap/target.wav")[skip:], wav("own/target.wav")[skip:]
-                ratios = [ratio(wav("one.wav"), wanted), ratio(wav("two.wav")[skip:], own), ratio(wav("y.wav"), wanted)]
-                drift = found["channels"][1]["drift_ppm"]
-                worst = min(worst, ratios[2] - max(ratios[:2]))
-                row(kind, ppm, f"{late} s", *(f"{x:.1f}" for x in ratios),
-                    f"{drift['value']:.3f} ± {drift['half_width']:.3f}")
-    print(f"\nFused above the better recorder: {worst:.1f} dB at least.")
-
-
-TABLES = {"quad": quad, "four": four, "if": intermediate, "rates": rates, "recorders": recorders}
+TABLES = {"quad": quad, "four": four, "if": intermediate, "rates": rates}
 
 
 def main():

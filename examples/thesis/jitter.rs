@@ -5,7 +5,7 @@ use crate::{Figure, Outcome};
 use hybank::bank::Bank;
 use hybank::design::uncertainty::norm_at;
 use hybank::units::Seconds;
-use hybank::verify::uncertainty::{ErrorPoint, Taps};
+use hybank::verify::uncertainty::ErrorPoint;
 
 /// Largest error of a delay, in fast samples, which are seconds here.
 const LARGEST: f64 = 0.1;
@@ -15,7 +15,7 @@ const HALF: i32 = 10;
 pub(super) fn figure(bank: &Bank) -> Outcome<Figure> {
     let gamma = |first: f64, second: f64| -> Outcome<f64> {
         let delays = vec![Seconds(first), Seconds(second)];
-        Ok(norm_at(bank, &ErrorPoint { delays, ..ErrorPoint::none(bank.channel_count()) }, Taps::Fixed)?.0)
+        Ok(norm_at(bank, &ErrorPoint { delays, ..ErrorPoint::none(bank.channel_count()) })?.0)
     };
     let mut curves = Vec::new();
     let mut worst: f64 = 0.0;

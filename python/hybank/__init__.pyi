@@ -72,7 +72,6 @@ _Quantity: TypeAlias = float | str | np.number[Any]
 _Cutoff: TypeAlias = _Quantity | Sequence[_Quantity] | NDArray[Any]
 _Values: TypeAlias = _Quantity | Sequence[_Quantity] | NDArray[Any]
 _Files: TypeAlias = _Path | Sequence[_Path]
-_Readings: TypeAlias = str | PathLike[str] | Sequence[Mapping[str, Any] | Record]
 _Algorithm: TypeAlias = Literal["auto", "direct", "overlap-save"]
 _Matrix: TypeAlias = NDArray[np.float64]
 
@@ -178,9 +177,6 @@ class Bank:
         algorithm: _Algorithm = "auto",
         keep_latency: bool = False,
         interleaved: int | None = None,
-        track: _Readings | None = None,
-        track_frames: int = 2048,
-        track_wander: float = 1.0,
         rate: float | None = None,
         full_output: Literal[False] = False,
     ) -> NDArray[Any]: ...
@@ -196,9 +192,6 @@ class Bank:
         algorithm: _Algorithm = "auto",
         keep_latency: bool = False,
         interleaved: int | None = None,
-        track: _Readings | None = None,
-        track_frames: int = 2048,
-        track_wander: float = 1.0,
         rate: float | None = None,
         full_output: Literal[True],
     ) -> tuple[NDArray[Any], FuseReport]: ...
@@ -213,10 +206,6 @@ class Bank:
         algorithm: _Algorithm = "auto",
         state: bytes | None = None,
         gaps: Literal["hold", "zero"] | None = None,
-        track: _Readings | None = None,
-        track_frames: int = 2048,
-        track_wander: float = 1.0,
-        rate: float | None = None,
     ) -> Stream: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __copy__(self) -> Bank: ...
@@ -252,8 +241,6 @@ class Stream:
     def gaps(self) -> list[tuple[int, int, int]] | None: ...
     @property
     def mask(self) -> NDArray[np.bool_] | None: ...
-    @property
-    def track(self) -> list[Record] | None: ...
     @property
     def state(self) -> bytes: ...
     def agrees(self, state: bytes) -> bool: ...
@@ -325,7 +312,6 @@ def design(
     order: int | np.integer[Any] | None = None,
     reduction_loss_db: float | np.number[Any] | None = None,
     noise: float | np.number[Any] | None = None,
-    tracking: Literal["affine"] | None = None,
     proof: bool = True,
     limits: bool = True,
     progress: Callable[[str, float], object] | None = None,

@@ -342,7 +342,7 @@ def _fuse_lazily(bank, x, axis, keywords):
 
     from hybank.dask import _plan
 
-    wrong = [name for name in ("gaps", "track", "full_output") if keywords[name]]
+    wrong = [name for name in ("gaps", "full_output") if keywords[name]]
     if wrong:
         raise HybankError(f"{wrong[0]}: a lazy array is fused block by block; compute it first, or leave {wrong[0]} out")
     x = x.T if axis in (0, -2) and x.ndim == 2 else x

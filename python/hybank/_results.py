@@ -50,17 +50,6 @@ def result(name, text):
     return globals()[name](**fields)
 
 
-def lines(readings):
-    """Readings of delays, mappings or records, as JSON lines."""
-    return "\n".join(json.dumps(dict(reading), default=_plain) for reading in readings)
-
-
-def _plain(value):
-    if isinstance(value, Record):
-        return dict(value)
-    return value.tolist()
-
-
 class Comparison(Record):
     """A record against a reference: ``record[n] = gain * reference(n - lag) + offset + error``.
 
@@ -130,8 +119,6 @@ class Gamma:
         A lower bound for all banks.
     worst_case
         An upper bound over all errors that the spec allows for.
-    tracked
-        The same while the taps follow the delays; None for a bank whose taps do not.
     """
 
     norm: float | None
@@ -139,7 +126,6 @@ class Gamma:
     lower: float | None
     noncausal: float | None
     worst_case: float | None = None
-    tracked: float | None = None
 
     def __repr__(self):
         return f"Gamma(norm={self.norm}, upper={self.upper}, lower={self.lower}, noncausal={self.noncausal})"
@@ -228,8 +214,6 @@ class FuseReport:
         Missing samples, and the gaps (channel from 1, first frame, length); None unless gaps were filled.
     mask
         True where a missing sample affects the output; None unless gaps were filled.
-    track
-        What was known of the delays, a record per measurement; None unless they were followed.
     """
 
     plan: Record
@@ -249,7 +233,6 @@ class FuseReport:
     missing: int | None
     gaps: list[tuple[int, int, int]] | None
     mask: NDArray[np.bool_] | None
-    track: list[Record] | None = None
 
     def __repr__(self):
         names = ("latency_dropped", "peak", "clipped", "replaced")
@@ -280,10 +263,6 @@ class Verified:
         The certificate came with the bank; otherwise it was found now.
     worst_case
         No errors within the uncertainty of the spec make gamma larger; None if the bank states nothing of them.
-    tracked
-        No delays within it make gamma larger while the taps follow them; None if the bank states nothing of them.
-    unproven_slopes
-        The bank has tap slopes and states nothing that could be proven of them.
     """
 
     lower: float
@@ -295,8 +274,6 @@ class Verified:
     digest: bool | None
     certificate_in_file: bool
     worst_case: float | None = None
-    tracked: float | None = None
-    unproven_slopes: bool = False
 
     def __repr__(self):
         return f"Verified(lower={self.lower}, upper={self.upper}, lower_banks={self.lower_banks!r})"
@@ -398,7 +375,7 @@ class Alignment:
     gain, offset
         Gain and offset of each channel.
     track
-        The delays over time as JSON lines: what `hybank fuse --track` reads.
+        The delays over time as JSON lines.
     alone
         The best ``channel`` alone, its ``snr_db``, and ``together_db`` of all, whatever the filters are.
     one_suffices

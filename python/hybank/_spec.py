@@ -7,7 +7,7 @@ from hybank._keywords import checked
 
 _DESIGN_KEYS = (
     "method", "taps", "target_snr_db", "gamma_margin", "bits", "fraction_bits", "loss_db", "digits", "order",
-    "reduction_loss_db", "noise", "tracking",
+    "reduction_loss_db", "noise",
 )
 # Every form of a filter has one of these keys.
 _FILTER_KEYS = ("family", "num", "den", "zeros", "poles", "a", "cascade")
@@ -22,7 +22,7 @@ def design(
     source=None, /, *, name=None, fast_rate=None, fast_period=None, ratio=None, latency=None, target=None, channels=None,
     channel=None, signal=None, uncertainty=None, full_scale=None, fit=None, design=None, method=None, taps=None,
     target_snr_db=None, gamma_margin=None, bits=None, fraction_bits=None, loss_db=None, digits=None, order=None,
-    reduction_loss_db=None, noise=None, tracking=None, replace=None, proof=True, limits=True, progress=None
+    reduction_loss_db=None, noise=None, replace=None, proof=True, limits=True, progress=None
 ):
     """Design the bank of a spec: a path, a TOML text of several lines, a mapping, or keywords.
 
@@ -76,8 +76,6 @@ def design(
         The fewest states whose error is at most so many decibels above that of the full bank.
     noise : float, optional
         Noise of all converters.
-    tracking : {"affine"}, optional
-        Delay-scheduled taps.
     replace : dict, optional
         With `source`: `latency` and the keys from `method` on, in place of those of the spec.
     proof : bool

@@ -9,7 +9,6 @@ use crate::outputs::write_file;
 use crate::pictures;
 use crate::responses::{self, Matrices, Row, Rows};
 use crate::results::{FiguresReport, of_report, record};
-use crate::running::{Extras, Follow};
 use crate::sources;
 use crate::stream::Stream;
 use hybank::bank::{self, SynthesisFilters};
@@ -262,10 +261,9 @@ impl Bank {
     #[pyo3(
         signature = (
             x, *, axis = -1, dtype = None, threads = 1, gaps = None, algorithm = "auto", keep_latency = false,
-            interleaved = None, track = None, track_frames = 2048, track_wander = 1.0, rate = None,
-            full_output = false
+            interleaved = None, rate = None, full_output = false
         ),
-        text_signature = "($self, x, *, axis=-1, dtype=None, threads=1, gaps=None, algorithm='auto', keep_latency=False, interleaved=None, track=None, track_frames=2048, track_wander=1.0, rate=None, full_output=False)"
+        text_signature = "($self, x, *, axis=-1, dtype=None, threads=1, gaps=None, algorithm='auto', keep_latency=False, interleaved=None, rate=None, full_output=False)"
     )]
     #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
     fn fuse<'py>(
@@ -278,9 +276,6 @@ impl Bank {
         algorithm: &str,
         keep_latency: bool,
         interleaved: Option<usize>,
-        track: Option<Bound<'py, PyAny>>,
-        track_frames: usize,
-        track_wander: f64,
         rate: Option<f64>,
         full_output: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
@@ -293,19 +288,15 @@ impl Bank {
             keywords.set_item("gaps", gaps)?;
             keywords.set_item("algorithm", algorithm)?;
             keywords.set_item("keep_latency", keep_latency)?;
-            keywords.set_item("track", track)?;
-            keywords.set_item("track_frames", track_frames)?;
-            keywords.set_item("track_wander", track_wander)?;
             keywords.set_item("rate", rate)?;
             keywords.set_item("full_output", full_output)?;
             return py.import("hybank._inputs")?.call_method("fuse", (slf, x, interleaved), Some(&keywords));
         }
         let bank = &slf.get().bank;
         let (frames, shape) = framed(x, &bank.layout(), axis, false)?;
-        let follow = Follow::new(bank, track.as_ref(), track_frames, track_wander, rate)?;
         let request = Request {
             workers: fuse::workers(threads)?,
-            extras: Extras { gaps: parse_gaps(gaps)?, follow },
+            gaps: parse_gaps(gaps)?,
             algorithm: parse_algorithm(algorithm)?,
             keep_latency,
             is_reported: full_output,
@@ -337,13 +328,9 @@ impl Bank {
 
     #[doc = include_str!("docs/Bank.stream.rst")]
     #[pyo3(
-        signature = (
-            *, axis = -1, dtype = None, algorithm = "auto", state = None, gaps = None, track = None,
-            track_frames = 2048, track_wander = 1.0, rate = None
-        ),
-        text_signature = "($self, *, axis=-1, dtype=None, algorithm='auto', state=None, gaps=None, track=None, track_frames=2048, track_wander=1.0, rate=None)"
+        signature = (*, axis = -1, dtype = None, algorithm = "auto", state = None, gaps = None),
+        text_signature = "($self, *, axis=-1, dtype=None, algorithm='auto', state=None, gaps=None)"
     )]
-    #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
     fn stream(
         slf: &Bound<'_, Self>,
         axis: isize,
@@ -351,15 +338,9 @@ impl Bank {
         algorithm: &str,
         state: Option<&[u8]>,
         gaps: Option<&str>,
-        track: Option<&Bound<'_, PyAny>>,
-        track_frames: usize,
-        track_wander: f64,
-        rate: Option<f64>,
     ) -> PyResult<Stream> {
         let bank = &slf.get().bank;
-        let follow = Follow::new(bank, track, track_frames, track_wander, rate)?;
-        let extras = Extras { gaps: parse_gaps(gaps)?, follow };
-        Stream::new(bank, axis, dtype.as_ref(), algorithm, extras)?.resumed(state)
+        Stream::new(bank, axis, dtype.as_ref(), algorithm, parse_gaps(gaps)?)?.resumed(state)
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {

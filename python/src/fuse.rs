@@ -6,12 +6,9 @@ use crate::errors::{choose, refused, warn};
 use crate::formats::Format;
 use crate::outputs::NewArray;
 use crate::results::Made;
-use crate::running::{Extras, Running};
 use hybank::bank::Bank;
 use hybank::calibrate::{Record, agreement, comparable, frames_for_agreement};
-use hybank::pipeline::{
-    self, DroppedLatency, GapPolicy, GapSummary, Outcome, PipelineError, Settings, Warning,
-};
+use hybank::pipeline::{self, DroppedLatency, GapPolicy, GapSummary, Outcome, Settings, Warning};
 use hybank::runtime::{Algorithm, Frames, Input, Isa, Options, PcmFormat, Plan, Precision, ThreadPool};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
@@ -20,13 +17,10 @@ use std::time::Instant;
 /// Most threads: more than any processor has, and as many as start at once.
 const MOST_THREADS: i64 = 1024;
 
-/// Frames that are filtered between two looks for signals while delays are followed.
-const PIECE: usize = 1 << 16;
-
 /// How an array is to be fused.
 pub(crate) struct Request {
     pub(crate) workers: Option<ThreadPool>,
-    pub(crate) extras: Extras,
+    pub(crate) gaps: Option<GapPolicy>,
     pub(crate) algorithm: Algorithm,
     pub(crate) keep_latency: bool,
     /// A report is wanted, and so is what the captures say of the spec of the bank.
@@ -36,7 +30,7 @@ pub(crate) struct Request {
 impl Request {
     fn settings(&self) -> Settings<'_> {
         let dropped = if self.keep_latency { DroppedLatency::Added } else { DroppedLatency::All };
-        Settings { dropped, workers: self.workers.as_ref(), ..self.extras.settings() }
+        Settings { dropped, gaps: self.gaps, workers: self.workers.as_ref() }
     }
 }
 
@@ -82,8 +76,8 @@ struct Captures {
 }
 
 impl Captures {
-    fn new(bank: &Bank, held: &Held<'_>, is_followed: bool) -> PyResult<Self> {
-        let spec = match comparable(bank.spec.as_ref(), !held.format.complex && !is_followed) {
+    fn new(bank: &Bank, held: &Held<'_>) -> PyResult<Self> {
+        let spec = match comparable(bank.spec.as_ref(), !held.format.complex) {
             Ok(spec) => spec.clone(),
             Err(reason) => return Ok(Self { verdict: reason.to_string(), ..Self::default() }),
         };
@@ -112,8 +106,6 @@ pub(crate) struct Fused<'py> {
     seconds: f64,
     /// The number type of the outputs.
     number: PcmFormat,
-    /// What is known of the delays, if they were followed.
-    track: Option<Py<PyAny>>,
 }
 
 /// Output samples of a run, and what it tells.
@@ -121,7 +113,6 @@ struct Run<'py> {
     y: Bound<'py, PyAny>,
     outcome: Outcome,
     latency_dropped: usize,
-    track: Option<Py<PyAny>>,
 }
 
 /// The output samples of an array.
@@ -135,19 +126,16 @@ pub(crate) fn fuse<'py>(
     let (py, begin) = (x.py(), Instant::now());
     let held = Held::new(x, shape)?;
     let format = Format::of_output(held.format, dtype)?;
-    let Run { y, outcome, latency_dropped, track } = match request.extras.follow {
-        Some(_) => followed(bank, &held, format, request)?,
-        None => filtered(bank, &held, format, request)?,
-    };
+    let Run { y, outcome, latency_dropped } = filtered(bank, &held, format, request)?;
     // A frame may hold several samples of a converter.
     let outcome = Outcome { channels: bank.channel_count(), ..outcome };
     let seconds = begin.elapsed().as_secs_f64();
     let captures = match request.is_reported {
-        true => Captures::new(bank, &held, request.extras.follow.is_some())?,
+        true => Captures::new(bank, &held)?,
         false => Captures::default(),
     };
     let (frames, number) = (held.frames(), format.number);
-    let fused = Fused { y, outcome, captures, frames, latency_dropped, seconds, number, track };
+    let fused = Fused { y, outcome, captures, frames, latency_dropped, seconds, number };
     fused.warnings().iter().try_for_each(|text| warn(py, text))?;
     Ok(fused)
 }
@@ -164,35 +152,7 @@ fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Reques
     let outcome = outcome.map_err(|error| signals.into_error().unwrap_or_else(|| refused(error)))?;
     let outcome = Outcome { clipped: room.clipped, ..outcome };
     let (y, latency_dropped) = (array.finish()?, settings.dropped.samples(&plan));
-    Ok(Run { y, outcome, latency_dropped, track: None })
-}
-
-/// As [`filtered`], with filters that follow the delays.
-fn followed<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Request) -> PyResult<Run<'py>> {
-    let py = held.py();
-    let settings = request.settings();
-    let mut running = Running::new(bank, format, request.algorithm, &request.extras, settings)?;
-    let (tracks, latency_dropped) = (running.tracks(), settings.dropped.samples(running.pipeline.plan()));
-    let (recordings, frames, signals) = (held.recordings()?, held.frames(), Signals::new());
-    let done = py.detach(|| {
-        for first in (0..frames).step_by(PIECE) {
-            if signals.raised() {
-                return Err(PipelineError::Stopped);
-            }
-            let end = frames.min(first + PIECE);
-            let piece: Vec<_> = recordings.iter().map(|all| all.range(first..end)).collect();
-            running.push(&piece, end - first)?;
-        }
-        running.flush((frames * bank.ratio) as u64)?;
-        Ok((running.outputs, running.pipeline.finish()?))
-    });
-    let done = done.map_err(|error| signals.into_error().unwrap_or_else(|| refused(error)));
-    let (outputs, outcome) = done?;
-    tracks.warn(py)?;
-    let y = PyArray1::from_vec(py, outputs.samples).call_method1("view", (format.name(),))?;
-    let mask = outcome.gaps.is_some().then_some(outputs.mask);
-    let (outcome, track) = (Outcome { mask, ..outcome }, Some(tracks.log(py)?));
-    Ok(Run { y, outcome, latency_dropped, track })
+    Ok(Run { y, outcome, latency_dropped })
 }
 
 impl Fused<'_> {
@@ -207,7 +167,7 @@ impl Fused<'_> {
 
     /// The report of a run with so many output samples per second, as that of the command line.
     pub(crate) fn report<'py>(&self, py: Python<'py>, rate: f64) -> PyResult<Bound<'py, PyAny>> {
-        let Self { y, outcome, captures, frames, latency_dropped, seconds, number, track } = self;
+        let Self { y, outcome, captures, frames, latency_dropped, seconds, number } = self;
         let bytes = y.call_method1("view", ("u1",))?;
         let bytes = bytes.cast::<PyArray1<u8>>()?.try_readonly().map_err(refused)?;
         let list = |gaps: &GapSummary| -> Vec<_> {
@@ -224,7 +184,6 @@ impl Fused<'_> {
             .with("missing", outcome.gaps.as_ref().map(|gaps| gaps.missing))?
             .with("gaps", outcome.gaps.as_ref().map(list))?
             .with("mask", outcome.mask.as_ref().map(|mask| marks(py, mask)))?
-            .with("track", track.as_ref().map(|track| track.clone_ref(py)))?
             .object()
     }
 }

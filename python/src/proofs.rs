@@ -23,14 +23,8 @@ pub(crate) fn verify<'py>(bank: &Bound<'py, PyAny>, search: bool) -> PyResult<Bo
     let verified = background::run(bank.py(), None, move |_| proven(&bank_in, search))?;
     let verified = verified.map_err(|error| refused_in(&given.name, error))?;
     let bank_in = &given.bank;
-    let report = Report {
-        verified,
-        digest: given.digest,
-        certificate_in_file,
-        worst_case: bank_in.gamma.worst_case,
-        tracked: bank_in.gamma.tracked,
-        unproven_slopes: bank_in.tap_slopes.is_some() && bank_in.gamma.tracked.is_none(),
-    };
+    let report =
+        Report { verified, digest: given.digest, certificate_in_file, worst_case: bank_in.gamma.worst_case };
     of_report(bank.py(), "Verified", &report)
 }
 
@@ -42,8 +36,6 @@ struct Report {
     digest: Option<bool>,
     certificate_in_file: bool,
     worst_case: Option<f64>,
-    tracked: Option<f64>,
-    unproven_slopes: bool,
 }
 
 fn proven(bank: &bank::Bank, search: bool) -> Result<checker::Verified, String> {

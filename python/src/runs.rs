@@ -1,11 +1,10 @@
-//! How a stream filters its frames: by streams of the runtime, or by a run that fills gaps or follows
-//! delays.
+//! How a stream filters its frames: by streams of the runtime, or by a run that fills gaps.
 
 use crate::errors::refused;
 use crate::formats::Format;
-use crate::running::{Extras, Outputs, Running, Tracks};
+use crate::running::{Outputs, Running};
 use hybank::bank::Bank;
-use hybank::pipeline::{DroppedLatency, PipelineError, Settings};
+use hybank::pipeline::{DroppedLatency, GapPolicy, PipelineError, Settings};
 use hybank::runtime::{self, Algorithm, Output, PcmFrames, PcmOutput, Plan, STATE_COUNTS, StateError};
 use pyo3::prelude::*;
 
@@ -19,8 +18,8 @@ pub(crate) struct State {
 pub(crate) enum Runs {
     /// By one stream for real samples, by two for the parts of complex ones.
     Streams { streams: Vec<runtime::Stream>, clipped: u64 },
-    /// With gaps that are filled, or filters that follow the delays.
-    Running(Box<Running<'static>>),
+    /// With gaps that are filled.
+    Running(Box<Running>),
 }
 
 impl State {
@@ -51,10 +50,10 @@ impl State {
         Ok(())
     }
 
-    /// A step of a stream that fills gaps or follows delays: its output samples.
+    /// A step of a stream that fills gaps: its output samples.
     pub(crate) fn step(
         &mut self,
-        step: impl FnOnce(&mut Running<'static>) -> Result<(), PipelineError>,
+        step: impl FnOnce(&mut Running) -> Result<(), PipelineError>,
     ) -> PyResult<Vec<u8>> {
         self.check_open()?;
         let Runs::Running(running) = &mut self.runs else { return Ok(Vec::new()) };
@@ -77,19 +76,15 @@ impl Runs {
         plan: &Plan,
         format: Format,
         algorithm: Algorithm,
-        extras: &Extras,
+        gaps: Option<GapPolicy>,
     ) -> PyResult<Self> {
-        if !extras.is_any() {
+        if gaps.is_none() {
             let streams = vec![runtime::Stream::new(plan); 1 + usize::from(format.complex)];
             return Ok(Self::Streams { streams, clipped: 0 });
         }
-        let settings = Settings { dropped: DroppedLatency::Nothing, ..extras.settings() };
-        let running = Running::new(bank, format, algorithm, extras, settings)?;
+        let settings = Settings { dropped: DroppedLatency::Nothing, gaps, ..Settings::default() };
+        let running = Running::new(bank, format, algorithm, settings)?;
         Ok(Self::Running(Box::new(running)))
-    }
-
-    pub(crate) fn tracks(&self) -> Option<Tracks> {
-        if let Self::Running(running) = self { Some(running.tracks()) } else { None }
     }
 
     /// The count of saturated samples, then the state of each part, all of one length.
@@ -128,7 +123,5 @@ fn parts(count: usize, bytes: &[u8]) -> Option<(u64, Vec<&[u8]>)> {
 }
 
 fn stateless() -> PyErr {
-    refused(
-        "a stream that fills gaps or follows delays cannot be copied, pickled or resumed; begin another one",
-    )
+    refused("a stream that fills gaps cannot be copied, pickled or resumed; begin another one")
 }

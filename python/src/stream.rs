@@ -6,9 +6,10 @@ use crate::errors::{no_others, refused};
 use crate::formats::Format;
 use crate::fuse::{marks, parse_algorithm, plan};
 use crate::outputs::NewArray;
-use crate::running::{Extras, Running};
+use crate::running::Running;
 use crate::runs::{Runs, State};
 use hybank::bank::Bank;
+use hybank::pipeline::{GapPolicy, Settings};
 use hybank::runtime::{self, Plan};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -26,7 +27,7 @@ pub(crate) struct Stream {
     plan: Plan,
     shape: Shape,
     format: Format,
-    extras: Extras,
+    gaps: Option<GapPolicy>,
     state: Mutex<State>,
 }
 
@@ -40,16 +41,16 @@ impl Stream {
         axis: isize,
         dtype: Option<&Bound<'_, PyAny>>,
         algorithm: &str,
-        extras: Extras,
+        gaps: Option<GapPolicy>,
     ) -> PyResult<Self> {
         let format = dtype.map_or(Ok(Format::F32), Format::of_dtype)?;
         let shape = Shape { axis, channels: bank.frame_samples() };
         shape.check()?;
         let algorithm_asked = parse_algorithm(algorithm)?.without_added_latency();
-        let plan = plan(bank, format, algorithm_asked, extras.settings())?;
-        let runs = Runs::new(bank, &plan, format, algorithm_asked, &extras)?;
+        let plan = plan(bank, format, algorithm_asked, Settings { gaps, ..Settings::default() })?;
+        let runs = Runs::new(bank, &plan, format, algorithm_asked, gaps)?;
         let state = Mutex::new(State { runs, closed: false });
-        Ok(Self { bank: Arc::clone(bank), asked: algorithm.to_owned(), plan, shape, format, extras, state })
+        Ok(Self { bank: Arc::clone(bank), asked: algorithm.to_owned(), plan, shape, format, gaps, state })
     }
 
     /// The same stream at the place of a state, if one is given.
@@ -72,9 +73,6 @@ impl Stream {
 
     /// The outputs of a step.
     fn collected<'py>(&self, py: Python<'py>, samples: Vec<u8>) -> PyResult<Bound<'py, PyAny>> {
-        if let Some(tracks) = self.read(py, Runs::tracks) {
-            tracks.warn(py)?;
-        }
         PyArray1::from_vec(py, samples).call_method1("view", (self.format.name(),))
     }
 }
@@ -92,9 +90,9 @@ impl Stream {
         let (frames, shape) = framed(x, &self.bank.layout(), self.shape.axis, true)?;
         let held = Held::new(&frames, shape)?;
         self.check_parts(held.format)?;
-        if self.extras.is_any() {
+        if self.gaps.is_some() {
             let (recordings, frames) = (held.recordings()?, held.frames());
-            let push = |running: &mut Running<'static>| running.push(&recordings, frames);
+            let push = |running: &mut Running| running.push(&recordings, frames);
             let samples = x.py().detach(|| self.lock().step(push))?;
             return self.collected(x.py(), samples);
         }
@@ -106,7 +104,7 @@ impl Stream {
 
     #[doc = include_str!("docs/Stream.flush.rst")]
     fn flush<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        if self.extras.is_any() {
+        if self.gaps.is_some() {
             let samples = py.detach(|| self.lock().step(Running::drain))?;
             return self.collected(py, samples);
         }
@@ -119,7 +117,7 @@ impl Stream {
     #[doc = include_str!("docs/Stream.reset.rst")]
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
         let algorithm = parse_algorithm(&self.asked)?.without_added_latency();
-        let runs = Runs::new(&self.bank, &self.plan, self.format, algorithm, &self.extras)?;
+        let runs = Runs::new(&self.bank, &self.plan, self.format, algorithm, self.gaps)?;
         py.detach(|| self.lock().runs = runs);
         Ok(())
     }
@@ -201,7 +199,7 @@ impl Stream {
     /// are filled.
     #[getter]
     fn gaps(&self, py: Python<'_>) -> Option<Vec<(usize, u64, u64)>> {
-        self.extras.gaps?;
+        self.gaps?;
         self.read(py, |runs| match runs {
             Runs::Streams { .. } => None,
             Runs::Running(running) => {
@@ -213,21 +211,12 @@ impl Stream {
     /// True where a missing sample affects the outputs of the last call. None unless gaps are filled.
     #[getter]
     fn mask(&self, py: Python<'_>) -> Option<Py<PyArray1<bool>>> {
-        self.extras.gaps?;
+        self.gaps?;
         let mask = self.read(py, |runs| match runs {
             Runs::Streams { .. } => Vec::new(),
             Runs::Running(running) => running.outputs.mask.clone(),
         });
         Some(marks(py, &mask))
-    }
-
-    /// What is known of the delays, a record per measurement. None unless they are followed.
-    #[getter]
-    fn track(&self, py: Python<'_>) -> PyResult<Option<Py<PyAny>>> {
-        if self.extras.follow.is_none() {
-            return Ok(None);
-        }
-        self.read(py, Runs::tracks).map(|tracks| tracks.log(py)).transpose()
     }
 
     /// The state as bytes: `bank.stream(state=..)` goes on from there with the same bits, in any process. A
@@ -309,8 +298,7 @@ impl Stream {
         state: &[u8],
         closed: bool,
     ) -> PyResult<Self> {
-        let stream =
-            Self::new(bank, axis, Some(dtype), algorithm, Extras::default())?.resumed(Some(state))?;
+        let stream = Self::new(bank, axis, Some(dtype), algorithm, None)?.resumed(Some(state))?;
         stream.state.lock().unwrap_or_else(PoisonError::into_inner).closed = closed;
         Ok(stream)
     }

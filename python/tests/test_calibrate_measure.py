@@ -219,14 +219,6 @@ def test_integers_are_fused_as_by_the_command_line(binary, filters, tmp_path):
         hb.load(filters / "thesis-fir.json").fuse_as_hardware(x)
 
 
-def test_tracking_is_a_key_of_a_design():
-    spec = {**plant([60e-9, 30e-9]), "uncertainty": {"delay": [0.0, 1e-10], "reference": 1}}
-    tracked = hb.design({**spec, "design": {"method": "fir", "taps": 8, "tracking": "affine"}})
-    plain = hb.design(spec)
-    assert plain.gamma.tracked is None
-    assert tracked.gamma.norm <= tracked.gamma.tracked < 1.05 * tracked.gamma.norm
-
-
 def test_recordings_are_aligned_by_any_signal():
     spec = {
         "fast_rate": 48e3, "ratio": 2, "target": {"filter": hb.butterworth(4, 9e3)},

@@ -16,16 +16,6 @@ target = { filter = { family = "butterworth", order = 4, cutoff = 9000.0 } }
 channel = [{ delay = 25e-6, gain = 1.01, offset = 0.001 }, { delay = 12.5e-6 }]
 design = { method = "fir", taps = 12 }
 """
-TRACKED = """\
-fast_rate = 96000.0
-ratio = 2
-latency = 12
-target = { filter = { family = "butterworth", order = 4, cutoff = 18000.0 } }
-channel = [{ delay_samples = 0.0 }, { delay_samples = 1.0 }]
-design = { method = "fir", taps = 24, tracking = "affine" }
-[uncertainty]
-delay_samples = 0.15
-"""
 
 
 def run(binary, folder, *arguments):
@@ -249,7 +239,7 @@ def test_a_stream_fills_gaps_as_fuse_does(bank, random):
         np.testing.assert_array_equal(np.concatenate(masks), report.mask)
         assert s.gaps == report.gaps == [(1, 50, 3), (2, 200, 1)] and s.position == 400
     plain = bank.stream()
-    assert plain.gaps is plain.mask is plain.track is None
+    assert plain.gaps is plain.mask is None
     with pytest.raises(hb.HybankError, match="cannot be copied"):
         bank.stream(gaps="hold").state  # noqa: B018
     again = bank.stream(gaps="zero")
@@ -260,62 +250,6 @@ def test_a_stream_fills_gaps_as_fuse_does(bank, random):
     c = x + 1j * x[::-1]
     y = bank.stream(gaps="hold", dtype="c8").process(c)
     np.testing.assert_array_equal(y, bank.fuse(c, gaps="hold", keep_latency=True))
-
-
-@pytest.fixture(scope="module")
-def tracked(folder):
-    hb.design(TRACKED, proof=False).save(folder / "tracked.json")
-    return hb.load(folder / "tracked.json")
-
-
-def test_delays_are_followed_as_by_the_command_line(folder, binary, tracked):
-    soundfile = pytest.importorskip("soundfile")
-    capture = hb.simulate(
-        tracked, "tones:3.1kHz,9.7kHz", samples=60000, drift=[0, 1.5], delay_error=["0", "0.3us"], noise=1e-4
-    )
-    for i, row in enumerate(capture.channels):
-        soundfile.write(folder / f"t{i}.wav", row, 48000, subtype="FLOAT")
-    track = ["--track", "pilot=3.1kHz", "--track-frames", "1024", "--track-log", "log.jsonl"]
-    run(binary, folder, "fuse", "tracked.json", "t0.wav", "t1.wav", "-o", "y.wav", "--force", *track)
-    x = capture.channels.astype("f4")
-    y, report = tracked.fuse(x, track="pilot=3.1kHz", track_frames=1024, full_output=True)
-    np.testing.assert_array_equal(y, floats(folder / "y.wav"))
-    np.testing.assert_array_equal(y, tracked.fuse(x, track="pilot=3.1kHz", track_frames=1024, threads=2))
-    log = [json.loads(line) for line in (folder / "log.jsonl").read_text().splitlines()]
-    assert json.loads(json.dumps(report.track, default=dict)) == log and len(log) > 10
-    error = lambda y: np.std((y - capture.target)[-20000:-200])  # noqa: E731
-    assert error(y) < 0.1 * error(tracked.fuse(x))
-    # The same through a stream, however it is cut, and with what was known before.
-    with tracked.stream(track="pilot=3.1kHz", track_frames=1024) as s:
-        parts = [s.process(x[:, first : first + 777]) for first in range(0, x.shape[1], 777)]
-        parts.append(s.flush())
-    whole = np.concatenate(parts)
-    np.testing.assert_array_equal(whole[tracked.latency :][: len(y)], y)
-    # The last measurement may still be under way.
-    assert len(s.track) in (len(log) - 1, len(log)) and dict(s.track[3])["frame"] == log[3]["frame"]
-    for readings in (folder / "log.jsonl", report.track, log):
-        again = tracked.fuse(x, track=readings)
-        assert error(again) < 0.1 * error(tracked.fuse(x))
-
-
-def test_what_cannot_be_followed_is_refused(bank, tracked):
-    x = np.zeros((2, 4000), "f4")
-    for given, words in [
-        ({"track": "loud"}, "^track: give pilot=F, blind"),
-        ({"track": "pilot=-3"}, "^track: a pilot has a positive frequency"),
-        ({"track": "blind", "track_frames": 9}, "^track_frames: at least 256"),
-        ({"track": "blind", "track_wander": 0}, "^track_wander: a positive number of ppm"),
-        ({"track": [{"frame": 3}]}, "^track: the readings: line 1: .*delay"),
-    ]:
-        for call in (lambda given=given: tracked.fuse(x, **given), lambda given=given: tracked.stream(**given)):
-            with pytest.raises(hb.HybankError, match=words):
-                call()
-    with pytest.raises(hb.HybankError, match="do not follow delays"):
-        bank.fuse(x, track="blind")
-    with pytest.raises(hb.HybankError, match="complex"):
-        tracked.fuse(x + 0j, track="blind")
-    with pytest.raises(FileNotFoundError):
-        tracked.fuse(x, track="nowhere.jsonl")
 
 
 def test_the_page_is_that_of_the_command_line(folder, binary, bank, random):

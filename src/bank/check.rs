@@ -8,7 +8,7 @@ use crate::units::Seconds;
 
 use super::{
     Bank, BankError, BankProblem, CausalWitness, Certificate, DualWitness, FixedPoint, Gamma, LowerProof,
-    StateSpace, SynthesisFilters, TapSlopes,
+    StateSpace, SynthesisFilters,
 };
 
 /// Largest m0 in a bank file. `fuse` appends as many zeros to a recording; 16 million are 3 minutes at 96
@@ -68,33 +68,9 @@ impl Bank {
             SynthesisFilters::Fir(taps) => self.check_taps(taps)?,
             SynthesisFilters::StateSpace(block) => check_block(block, self.ratio, self.frame_samples())?,
         }
-        self.tap_slopes.as_ref().map_or(Ok(()), |slopes| self.check_tap_slopes(slopes))?;
         self.fixed_point.as_ref().map_or(Ok(()), |words| self.check_fixed_point(words))?;
         self.check_proof()?;
         self.spec.as_ref().map_or(Ok(()), |spec| self.check_spec(spec))
-    }
-
-    /// There is a slope for each tap, or none for a delay.
-    fn check_tap_slopes(&self, slopes: &TapSlopes) -> Checked {
-        let SynthesisFilters::Fir(taps) = &self.filters else {
-            let (method, expected, found) = (self.method.name(), "state_space", "tap_slopes");
-            return refuse("channels", BankProblem::Filters { method, expected, found });
-        };
-        let check = |path: &str, found, expected, unit| {
-            let rule = "there is a slope for each tap of each channel, or none for the delay of a channel";
-            check_length(path, found, expected, unit, rule)
-        };
-        check("channels", slopes.by_delay.len(), self.channel_count(), "lists of tap slopes")?;
-        for (j, by_delay) in slopes.by_delay.iter().enumerate().filter(|(_, list)| !list.is_empty()) {
-            let path = format!("channels[{j}].tap_slopes");
-            check(&path, by_delay.len(), taps.len(), "lists of tap slopes")?;
-            for (i, list) in by_delay.iter().enumerate() {
-                let path = format!("{path}[{i}]");
-                check(&path, list.len(), taps[i].len(), "tap slopes")?;
-                check_sizes(&path, list)?;
-            }
-        }
-        Ok(())
     }
 
     /// The taps are the integers, and each integer fits its bits.
@@ -290,9 +266,8 @@ fn check_converters(
 
 fn check_gamma(gamma: &Gamma) -> Checked {
     let bounds = [("lower", gamma.lower), ("noncausal", gamma.noncausal)];
-    let norms = [("norm", gamma.norm), ("upper", gamma.upper)];
-    let worst = [("worst_case", gamma.worst_case), ("tracked", gamma.tracked)];
-    for (key, value) in norms.into_iter().chain(worst).chain(bounds) {
+    let norms = [("norm", gamma.norm), ("upper", gamma.upper), ("worst_case", gamma.worst_case)];
+    for (key, value) in norms.into_iter().chain(bounds) {
         if let Some(value) = value.filter(|x| !(0.0..=MAX_ENTRY).contains(x)) {
             let rule =
                 format!("a norm is zero or more, and at most {MAX_ENTRY:e}; null says that it is not known");

@@ -19,9 +19,9 @@ pub use check::MAX_BANK_LATENCY;
 pub use error::{BankError, BankProblem};
 pub use proof::{CausalWitness, Certificate, DualWitness, LowerProof, Proof};
 pub use read::check_digest;
+pub use taps::FixedPoint;
 #[cfg(feature = "design")]
 pub(crate) use taps::signed_digits;
-pub use taps::{FixedPoint, TapSlopes};
 
 pub use crate::runtime::StateSpace;
 pub use crate::spec::{FrameLayout, FrameSample};
@@ -60,8 +60,6 @@ pub struct Bank {
     pub offsets: Vec<f64>,
     /// The synthesis filters, one for each sample of a frame.
     pub filters: SynthesisFilters,
-    /// How the delays schedule the taps, for an FIR bank that was designed for it.
-    pub tap_slopes: Option<TapSlopes>,
     /// The integers of the taps, if the taps are fixed-point numbers.
     pub fixed_point: Option<FixedPoint>,
     /// The worst-case error gamma and its bounds.
@@ -101,10 +99,6 @@ pub struct Gamma {
     /// table `None`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub worst_case: Option<f64>,
-    /// No delays within the spec's `[uncertainty]` make the norm larger while the taps follow them by
-    /// [`Bank::tap_slopes`]. Proven by `verify`; `None` for a bank without.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tracked: Option<f64>,
 }
 
 impl Gamma {
@@ -127,7 +121,6 @@ impl Gamma {
             lower: Some(lower.min(norm)),
             noncausal: Some(noncausal.min(norm)),
             worst_case: None,
-            tracked: None,
         }
     }
 }
@@ -156,7 +149,6 @@ impl Bank {
             gains: vec![1.0; channels],
             offsets: vec![0.0; channels],
             filters,
-            tap_slopes: None,
             fixed_point: None,
             gamma: Gamma::default(),
             proof: None,

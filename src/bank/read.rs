@@ -10,7 +10,7 @@ use crate::units::Seconds;
 use super::digest::{digest, is_digest};
 use super::{
     Bank, BankError, BankProblem, CausalWitness, Certificate, DualWitness, FORMAT, FixedPoint, Gamma,
-    LowerProof, Proof, StateSpace, SynthesisFilters, TapSlopes, VERSION,
+    LowerProof, Proof, StateSpace, SynthesisFilters, VERSION,
 };
 
 const KEYS: [&str; 14] = [
@@ -29,7 +29,7 @@ const KEYS: [&str; 14] = [
     "digest",
     "meta",
 ];
-const CHANNEL_KEYS: [&str; 6] = ["delay", "samples", "gain", "offset", "taps", "tap_slopes"];
+const CHANNEL_KEYS: [&str; 5] = ["delay", "samples", "gain", "offset", "taps"];
 const REWRITE: &str = "a bank without it cannot be run; give a file written by `hybank design`";
 
 impl Bank {
@@ -112,7 +112,6 @@ fn read(document: &Value<'_>) -> Result<Bank, BankError> {
         gains: of_channels("gain", 1.0)?,
         offsets: of_channels("offset", 0.0)?,
         filters: filters(&top, &channels)?,
-        tap_slopes: tap_slopes(&channels)?,
         fixed_point: top.optional("fixed_point").map(|v| fixed_point(&v)).transpose()?,
         gamma: top.optional("gamma").map(|v| gamma(&v)).transpose()?.unwrap_or_default(),
         proof: top.optional("proof").map(|v| proof(&v)).transpose()?,
@@ -173,13 +172,6 @@ fn filters(top: &Fields<'_>, channels: &[Fields<'_>]) -> Result<SynthesisFilters
     }))
 }
 
-/// `None` unless a channel has some; of the others the delay is exact.
-fn tap_slopes(channels: &[Fields<'_>]) -> Result<Option<TapSlopes>, Fault> {
-    let of = |channel: &Fields<'_>| channel.optional("tap_slopes").map_or(Ok(Vec::new()), |v| v.matrix());
-    let by_delay = channels.iter().map(of).collect::<Result<Vec<_>, Fault>>()?;
-    Ok(by_delay.iter().any(|slopes| !slopes.is_empty()).then_some(TapSlopes { by_delay }))
-}
-
 fn fixed_point(value: &Value<'_>) -> Result<FixedPoint, Fault> {
     let fields = value.fields(&["bits", "fraction_bits", "integers"])?;
     let required = |key| fields.required(key, "integer taps are known by bits, fraction_bits and integers");
@@ -195,7 +187,7 @@ fn fixed_point(value: &Value<'_>) -> Result<FixedPoint, Fault> {
 }
 
 fn gamma(value: &Value<'_>) -> Result<Gamma, Fault> {
-    let fields = value.fields(&["norm", "upper", "lower", "noncausal", "worst_case", "tracked"])?;
+    let fields = value.fields(&["norm", "upper", "lower", "noncausal", "worst_case"])?;
     let bound = |key| fields.optional(key).map(|v| v.number()).transpose();
     Ok(Gamma {
         norm: bound("norm")?,
@@ -203,7 +195,6 @@ fn gamma(value: &Value<'_>) -> Result<Gamma, Fault> {
         lower: bound("lower")?,
         noncausal: bound("noncausal")?,
         worst_case: bound("worst_case")?,
-        tracked: bound("tracked")?,
     })
 }
 

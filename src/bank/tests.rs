@@ -30,10 +30,8 @@ fn fir() -> Bank {
             lower: None,
             noncausal: Some(0.03),
             worst_case: None,
-            tracked: None,
         },
         proof: None,
-        tap_slopes: None,
         fixed_point: None,
     }
 }
@@ -193,30 +191,6 @@ fn a_static_block_has_no_states() {
         StateSpace { a: vec![], b: vec![], c: vec![vec![], vec![]], d: vec![vec![1.0, 0.0], vec![0.0, 1.0]] };
     let bank = Bank { filters: SynthesisFilters::StateSpace(block), ..state_space() };
     assert_eq!(Bank::from_json(&bank.to_json().unwrap(), "b.json").unwrap(), bank);
-}
-
-#[test]
-fn tap_slopes_read_back_and_have_the_sizes_of_the_taps() {
-    let slopes =
-        TapSlopes { by_delay: vec![vec![], vec![vec![0.5, -1.0 / 3.0, 0.0], vec![1e-9, 2.0, -0.25]]] };
-    let gamma = Gamma { tracked: Some(0.041), ..fir().gamma };
-    let bank = Bank { tap_slopes: Some(slopes), gamma, ..fir() };
-    let text = bank.to_json().unwrap();
-    assert_eq!(Bank::from_json(&text, "b.json").unwrap(), bank);
-    assert_eq!(text.matches("tap_slopes").count(), 1, "{text}");
-    for (was, is, place, words) in [
-        ("[0.5, -0.3333333333333333, 0.0]", "[0.5, 1.0]", "channels[1].tap_slopes[0]", "2 tap slopes"),
-        ("[1e-9, 2.0, -0.25]", "[1e-9, null, 0]", "channels[1].tap_slopes[1][1]", "expected a number"),
-        (", [1e-9, 2.0, -0.25]", "", "channels[1].tap_slopes", "1 lists of tap slopes"),
-        ("\"tracked\": 0.041", "\"tracked\": -1", "gamma.tracked", "zero or more"),
-    ] {
-        assert!(text.contains(was), "{was} in {text}");
-        let error = refused(&text.replacen(was, is, 1));
-        assert_eq!(error.path(), place, "{error}");
-        assert!(error.to_string().contains(words), "{error}");
-    }
-    let states = Bank { tap_slopes: bank.tap_slopes.clone(), ..state_space() };
-    assert_eq!(states.check().unwrap_err().path(), "channels");
 }
 
 fn fixed_point() -> Bank {

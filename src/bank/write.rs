@@ -46,8 +46,6 @@ struct Channel<'a> {
     offset: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     taps: Option<Taps<'a>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    tap_slopes: Option<&'a [Vec<f64>]>,
 }
 
 /// The taps of a converter: one list, or one for each of several samples per frame.
@@ -90,17 +88,12 @@ impl Bank {
         };
         // What a reader takes for granted is left out.
         let unless = |value: f64, default: f64| (value != default).then_some(value);
-        let slopes_of = |j: usize| {
-            let slopes = self.tap_slopes.as_ref()?.by_delay.get(j)?;
-            (!slopes.is_empty()).then_some(slopes.as_slice())
-        };
         let channel = |i: usize| Channel {
             delay: self.delays[i],
             samples: (self.samples[i] != 1).then_some(self.samples[i]),
             gain: unless(self.gains[i], 1.0),
             offset: unless(self.offsets[i], 0.0),
             taps: taps_of(i),
-            tap_slopes: slopes_of(i),
         };
         Document {
             format: FORMAT,

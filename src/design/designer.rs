@@ -5,7 +5,6 @@ use super::effort;
 use super::limits::{Effort, Limits, Stage, Stop};
 use super::merging::Repeats;
 use super::methods::robust_fir::RobustStudy;
-use super::methods::scheduled_fir::TrackingStudy;
 use super::methods::{self, DualSolution, Settings, Synthesis};
 use super::plant::LiftedPlant;
 use super::problem::Problem;
@@ -17,7 +16,7 @@ use super::{DesignError, filters, prove, uncertainty};
 use crate::bank::{Bank, FixedPoint, Gamma, SynthesisFilters};
 use crate::spec::{DesignSpec, Method, Spec, SpecProblem};
 use crate::units::RadiansPerSlowPeriod;
-use crate::verify::uncertainty::{ErrorBox, Taps, certifies};
+use crate::verify::uncertainty::{ErrorBox, certifies};
 use crate::verify::{Verified, VerifyError};
 use std::time::{Duration, Instant};
 
@@ -43,8 +42,6 @@ pub struct Design {
     pub reduction: Option<OrderReduction>,
     /// The comparison with a nominal bank, if the spec has an `[uncertainty]`.
     pub robust: Option<RobustStudy>,
-    /// The comparison of delay-scheduled taps with fixed taps, if the spec asks for `tracking`.
-    pub tracking: Option<TrackingStudy>,
     /// The bounds that the bank's proof proves, or the reason why the bank carries no proof.
     pub proof: Result<Verified, DesignError>,
     /// Why the proof does not cover the box of the spec's `[uncertainty]`, if it does not.
@@ -195,7 +192,6 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
         gains: complete.channels.iter().map(|channel| channel.gain).collect(),
         offsets: complete.channels.iter().map(|channel| channel.offset).collect(),
         filters,
-        tap_slopes: synthesis.affine.as_ref().map(|affine| affine.slopes.clone()),
         gamma: Gamma::computed(peak.gain, rounding, synthesis.lower, synthesis.noncausal),
         proof: None,
         fixed_point,
@@ -210,7 +206,6 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
         words,
         reduction,
         robust: synthesis.robust.clone(),
-        tracking: synthesis.affine.as_ref().map(|affine| affine.study.clone()),
         proof: Err(DesignError::ProofSkipped),
         box_unproven: None,
         proof_time: Duration::ZERO,
@@ -258,7 +253,7 @@ impl Design {
     /// bank without any error leaves nothing open.
     fn close_search(&mut self) {
         let is_searched = self.words.is_none() && self.reduction.is_none();
-        let is_nominal = self.robust.is_none() && self.tracking.is_none();
+        let is_nominal = self.robust.is_none();
         if let (true, Ok(proven), Some(norm)) = (is_searched && is_nominal, &self.proof, self.bank.gamma.norm)
         {
             self.unfinished = self.unfinished.and_then(|left| left.unless_proven(proven.lower, norm));
@@ -270,21 +265,12 @@ impl Design {
 
     /// States the worst case over the box of the spec, or says why there is none.
     fn prove_worst_case(&mut self, stop: &Stop) {
-        let mut gamma = self.bank.gamma;
-        let proven = if stop.is_due() && (self.robust.is_some() || self.tracking.is_some()) {
-            Err(DesignError::Stopped)
-        } else if let Some(study) = &self.robust {
-            let proven = proven_worst_case(&self.bank, &study.errors, Taps::Fixed);
-            gamma.worst_case = proven.as_ref().ok().copied();
-            proven
-        } else if let Some(study) = &self.tracking {
-            let proven = proven_worst_case(&self.bank, &study.errors, Taps::Scheduled);
-            gamma.tracked = proven.as_ref().ok().copied();
-            proven
-        } else {
-            return;
+        let Some(study) = &self.robust else { return };
+        let proven = match stop.is_due() {
+            true => Err(DesignError::Stopped),
+            false => proven_worst_case(&self.bank, &study.errors),
         };
-        self.bank.gamma = gamma;
+        self.bank.gamma.worst_case = proven.as_ref().ok().copied();
         self.box_unproven = proven.err();
     }
 }
@@ -296,15 +282,14 @@ const STATED_ABOVE: f64 = 1e-9;
 /// A worst case over `errors` that `verify` proves.
 ///
 /// # Errors
-/// As [`uncertainty::worst_case`]; [`VerifyError::WorstCase`] or [`VerifyError::Tracked`] if `verify` does
-/// not prove the number that was found.
-fn proven_worst_case(bank: &Bank, errors: &ErrorBox, taps: Taps) -> Result<f64, DesignError> {
-    let found = uncertainty::worst_case(bank, errors, taps, WORST_CASE_ACCURACY)?;
+/// As [`uncertainty::worst_case`]; [`VerifyError::WorstCase`] if `verify` does not prove the number that was
+/// found.
+fn proven_worst_case(bank: &Bank, errors: &ErrorBox) -> Result<f64, DesignError> {
+    let found = uncertainty::worst_case(bank, errors, WORST_CASE_ACCURACY)?;
     let stated = found.upper * (1.0 + STATED_ABOVE);
-    match (certifies(bank, errors, taps, stated)?, taps) {
-        (true, _) => Ok(stated),
-        (false, Taps::Fixed) => Err(VerifyError::WorstCase { stated }.into()),
-        (false, Taps::Scheduled) => Err(VerifyError::Tracked { stated }.into()),
+    match certifies(bank, errors, stated)? {
+        true => Ok(stated),
+        false => Err(VerifyError::WorstCase { stated }.into()),
     }
 }
 

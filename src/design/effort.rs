@@ -34,6 +34,9 @@ const CERTIFICATES: Range = Range { least: 0.25, most: 1.5 };
 const ITERATIONS: Range = Range { least: 9.0, most: 75.0 };
 /// Sweeps over integer taps, all word lengths together.
 const SWEEPS: Range = Range { least: 5.0, most: 25.0 };
+/// Points on each side of a box of errors that count as scenarios of a robust design, and the most of all.
+const STEPS: [f64; 4] = [9.0, 5.0, 3.0, 2.0];
+const MOST_SCENARIOS: f64 = 64.0;
 /// Norms of each scenario of a robust design, and operations of the proof over its box: a limit holds for
 /// them.
 const NORMS_OF_SCENARIOS: Range = Range { least: 1.0, most: 4.0 };
@@ -54,6 +57,12 @@ const USUAL_FRAMES: usize = 24;
 const REAL_BYTES: f64 = 8.0;
 const COMPLEX_BYTES: f64 = 16.0;
 const BASE_BYTES: f64 = 10e6;
+
+/// Scenarios of a box with so many sides.
+fn scenarios(sides: usize) -> f64 {
+    let counts = STEPS.map(|steps| steps.powf(sides as f64));
+    counts.into_iter().find(|count| *count <= MOST_SCENARIOS).unwrap_or(MOST_SCENARIOS)
+}
 
 /// The effort of the design of a spec, whose latency and taps may still be to be chosen; with the search for
 /// a proof if `proving`, and with the scale of gamma that is reported.
@@ -114,9 +123,6 @@ pub fn remedy(spec: &Spec) -> &'static str {
     match spec.design.method {
         Method::Fir if spec.design.has_integers() => {
             "use fewer taps, leave out bits, take a smaller ratio or fewer channels"
-        }
-        Method::Fir if spec.design.tracking => {
-            "use fewer taps or channels, a smaller ratio, or leave out tracking"
         }
         Method::Fir if spec.uncertainty.is_some() => {
             "use fewer taps, a smaller ratio or fewer channels, or leave out [uncertainty]"
@@ -205,7 +211,7 @@ impl Sizes {
     /// The method itself.
     fn method(&self, spec: &Spec) -> Effort {
         match spec.design.method {
-            Method::Fir => self.exchange(RobustProblem::of(spec), spec.design.tracking),
+            Method::Fir => self.exchange(RobustProblem::of(spec)),
             Method::H2 if spec.is_fir() && Deviations::of(spec).is_some() => self.averaged(),
             Method::H2 if spec.is_fir() => self.smoother(2.0, self.lags(), self.ratio),
             Method::Iir | Method::H2 => {
@@ -213,24 +219,22 @@ impl Sizes {
                 Effort::of(RICCATI_OPERATIONS * order.powi(3), 20.0 * REAL_BYTES * order * order)
             }
             Method::Sinc => Effort::default(),
-            Method::Separation => self.exchange(None, false),
+            Method::Separation => self.exchange(None),
         }
     }
 
     /// An exchange of frequencies, or of pairs of a frequency and a scenario: blocks of order M + N at each
-    /// point, and the Newton matrix of the taps, which are affine in the errors of the channels if
-    /// `tracking`.
-    fn exchange(&self, robust: Option<RobustProblem>, tracking: bool) -> Effort {
-        let scenarios = robust.map_or(0.0, |problem| problem.scenario_count() as f64);
+    /// point, and the Newton matrix of the taps.
+    fn exchange(&self, robust: Option<RobustProblem>) -> Effort {
+        let scenarios = robust.map_or(0.0, |problem| scenarios(problem.errors.sides().len()));
         let (n, m, p) = (self.channels, self.ratio, self.outputs());
-        let functions = if tracking { n } else { 1.0 };
-        let (columns, unknowns) = (functions * n, functions * n * self.taps);
+        let unknowns = n * self.taps;
         let points = self.points();
         let blocks = BLOCK_OPERATIONS * points * p * p;
-        let products = points * (m.min(self.taps) * columns).powi(2) * (64.0 + 4.0 * self.lags());
+        let products = points * (m.min(self.taps) * n).powi(2) * (64.0 + 4.0 * self.lags());
         let iteration = blocks + products + unknowns.powi(3) / 12.0;
         // Scenarios take more rounds, on twice the points.
-        let rounds = if scenarios > 0.0 { 4.0 + functions } else { 1.0 };
+        let rounds = if scenarios > 0.0 { 5.0 } else { 1.0 };
         let fine = FINE as f64 * points * (1.0 + scenarios);
         let grid = fine * p * (12.0 * self.analog_states.powi(2) + GAIN_OPERATIONS * p);
         let norms =

@@ -1,9 +1,5 @@
-//! The error of FIR banks on fine grids of frequencies, one grid for each scenario. It gives a cheap
-//! estimate of gamma while the taps are still being optimised.
-//!
-//! A scenario is a plant and a rule for its filters: the taps are matrices F_0, F_1, .. side by side, and
-//! the filters of a scenario are `sum_k factors[k] F_k`. So its measurements are those of the plant times
-//! each factor, one below another. A bank for known channels has one scenario with the factor 1.
+//! The error of an FIR bank on a fine grid of frequencies. It gives a cheap estimate of gamma while the taps
+//! are still being optimised.
 //!
 //! The grid is uniform, with further points at the resonances of the plant: beside a narrow one the error
 //! may peak between two uniform points.
@@ -11,10 +7,9 @@
 use super::DesignError;
 use super::filters;
 use super::plant::LiftedPlant;
-use crate::linalg::{self, CMat, Complex, Mat};
+use crate::linalg::{self, CMat, Mat};
 use crate::lmi::sampled::{Point, Taps};
 use crate::lti::peak::{Peak, local_maxima, refine};
-use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::f64::consts::PI;
 use std::sync::OnceLock;
@@ -96,11 +91,11 @@ pub(super) fn coarse_intervals(lags: usize) -> usize {
     LEAST_POINTS.max(POINTS_PER_LAG * lags)
 }
 
-/// The errors of all scenarios at frequencies from 0 to pi. The plants' responses are computed when they are
-/// needed: in most scenarios the error is far below that of the worst one.
+/// The error at frequencies from 0 to pi. The plant's responses are computed when they are needed.
 pub(super) struct ErrorGrid<'a> {
-    scenarios: Vec<Scenario<'a>>,
+    plant: &'a LiftedPlant,
     frequencies: Frequencies,
+    points: Vec<OnceLock<Point>>,
 }
 
 /// Frequencies from 0 to pi.
@@ -135,103 +130,47 @@ impl Frequencies {
     }
 }
 
-/// A plant with the rule for its filters.
-pub(super) struct Scenario<'a> {
-    /// The plant.
-    pub(super) plant: Cow<'a, LiftedPlant>,
-    /// The factors of the unknowns.
-    pub(super) factors: Vec<f64>,
-    /// The error of this scenario counts times this.
-    pub(super) weight: f64,
-    points: Vec<OnceLock<Point>>,
-}
-
-/// Taps with their responses on the grid that all scenarios share, computed when they are needed.
+/// Taps with their responses on the grid, computed when they are needed.
 struct GridResponse<'t> {
     taps: &'t [Mat],
     values: Vec<OnceCell<CMat>>,
 }
 
-impl<'a> Scenario<'a> {
-    /// A scenario of a grid.
-    pub(super) fn new(plant: Cow<'a, LiftedPlant>, factors: Vec<f64>, weight: f64) -> Self {
-        Self { plant, factors, weight, points: Vec::new() }
-    }
-
-    /// The filters' response from that of the taps.
-    fn filters(&self, taps: &CMat) -> CMat {
-        let channels = taps.ncols() / self.factors.len();
-        let part = |k: usize| taps.columns(k * channels, channels) * Complex::from(self.factors[k]);
-        (1..self.factors.len()).fold(part(0), |sum, k| sum + part(k))
-    }
-
-    /// The measurements as the taps see them.
-    fn stacked(&self, h: &CMat) -> CMat {
-        let n = h.nrows();
-        CMat::from_fn(n * self.factors.len(), h.ncols(), |row, column| {
-            h[(row % n, column)] * Complex::from(self.weight * self.factors[row / n])
-        })
-    }
-}
-
 impl<'a> ErrorGrid<'a> {
-    /// One plant, for filters of `lags` slow lags.
+    /// The error of `plant`, for filters of `lags` slow lags.
     ///
     /// # Errors
-    /// As [`ErrorGrid::of_scenarios`].
+    /// [`DesignError::Lti`] if the plant is not stable.
     pub(super) fn new(plant: &'a LiftedPlant, lags: usize) -> Result<Self, DesignError> {
-        Self::of_scenarios(vec![Scenario::new(Cow::Borrowed(plant), vec![1.0], 1.0)], lags)
+        let frequencies = Frequencies::new(lags, plant.resonances()?);
+        let points = vec![OnceLock::new(); frequencies.all.len()];
+        Ok(Self { plant, frequencies, points })
     }
 
-    /// Several scenarios.
-    ///
-    /// # Errors
-    /// [`DesignError::Lti`] if a plant is not stable.
-    pub(super) fn of_scenarios(scenarios: Vec<Scenario<'a>>, lags: usize) -> Result<Self, DesignError> {
-        // Errors of delays and gains do not move the poles.
-        let frequencies = Frequencies::new(lags, scenarios[0].plant.resonances()?);
-        let mut grid = Self { scenarios: Vec::new(), frequencies };
-        scenarios.into_iter().for_each(|scenario| grid.add(scenario));
-        Ok(grid)
-    }
-
-    /// Adds a scenario.
-    pub(super) fn add(&mut self, scenario: Scenario<'a>) {
-        let points = vec![OnceLock::new(); self.frequencies.all.len()];
-        self.scenarios.push(Scenario { points, ..scenario });
-    }
-
-    /// The scenarios.
-    pub(super) fn scenarios(&self) -> &[Scenario<'a>] {
-        &self.scenarios
-    }
-
-    /// All points of the first scenario.
+    /// All points.
     pub(super) fn points(&self) -> Vec<Point> {
-        (0..self.frequencies.all.len()).map(|k| self.point(0, k).clone()).collect()
+        (0..self.frequencies.all.len()).map(|k| self.point(k).clone()).collect()
     }
 
-    /// The coarser points of a scenario that suffice for a mean square, as points of the exchange, with
-    /// their trapezoidal weights.
-    pub(super) fn coarse(&self, scenario: usize) -> (Vec<Point>, Vec<f64>) {
+    /// The coarser points that suffice for a mean square, with their trapezoidal weights.
+    pub(super) fn coarse(&self) -> (Vec<Point>, Vec<f64>) {
         let last = self.frequencies.uniform.len() / FINE;
-        let at =
-            |k: usize| self.of_exchange(scenario, self.point(scenario, self.frequencies.uniform[k * FINE]));
+        let at = |k: usize| self.point(self.frequencies.uniform[k * FINE]).clone();
         let mut weights = vec![1.0 / last as f64; last + 1];
         (weights[0], weights[last]) = (0.5 / last as f64, 0.5 / last as f64);
         ((0..=last).map(at).collect(), weights)
     }
 
-    /// The gain of the first scenario's error with `taps` at each point.
+    /// The gain of the error with `taps` at each point.
     pub(super) fn gains(&self, taps: &[Mat]) -> Result<Vec<f64>, DesignError> {
-        self.gains_about(0, &self.response(taps), 0.0)
+        self.gains_about(&self.response(taps), 0.0)
     }
 
-    /// The mean square of the first scenario's error per slow period, for white noise of unit density at the
-    /// analog input, by the trapezoidal rule on the equidistant frequencies.
+    /// The mean square of the error per slow period, for white noise of unit density at the analog input, by
+    /// the trapezoidal rule on the equidistant frequencies.
     pub(super) fn mean_square(&self, taps: &[Mat]) -> f64 {
         let (response, weights) = (self.response(taps), self.mean_weights());
-        let square = |k: usize| weights[k] * self.error(0, k, &response).norm_squared();
+        let square = |k: usize| weights[k] * self.error(k, &response).norm_squared();
         self.frequencies.uniform.iter().map(|&k| square(k)).sum()
     }
 
@@ -246,51 +185,40 @@ impl<'a> ErrorGrid<'a> {
         weights
     }
 
-    /// The peaks of the errors with `taps` above `level`. The estimate is that of gamma if gamma is above
-    /// the level; else it is at most the level.
-    pub(super) fn peaks(&self, taps: &[Mat], level: f64) -> Result<Peaks<usize>, DesignError> {
-        let mut all = Peaks { estimate: 0.0, peaks: Vec::new() };
-        let response = self.response(taps);
-        for (s, scenario) in self.scenarios.iter().enumerate() {
-            for peak in self.scenario_peaks(s, &response, level / scenario.weight)? {
-                let gain = scenario.weight * peak.gain;
-                all.estimate = all.estimate.max(gain);
-                if gain > level {
-                    let location = Location { frequency: peak.frequency, scenario: s };
-                    all.peaks.push(LocatedPeak { gain, location });
-                }
-            }
-        }
-        Ok(all)
+    /// The peaks of the error with `taps` above `level`. The estimate is that of gamma if gamma is above the
+    /// level; else it is at most the level.
+    pub(super) fn peaks(&self, taps: &[Mat], level: f64) -> Result<Peaks<()>, DesignError> {
+        let maxima = self.maxima(taps, level)?;
+        let estimate = maxima.iter().map(|peak| peak.gain).fold(0.0, f64::max);
+        let above = maxima.into_iter().filter(|peak| peak.gain > level);
+        let located = |Peak { gain, frequency }: Peak| LocatedPeak {
+            gain,
+            location: Location { frequency, scenario: () },
+        };
+        Ok(Peaks { estimate, peaks: above.map(located).collect() })
     }
 
     /// The local maxima above a share of `level`.
-    fn scenario_peaks(
-        &self,
-        s: usize,
-        taps: &GridResponse<'_>,
-        level: f64,
-    ) -> Result<Vec<Peak>, DesignError> {
-        let gains = self.gains_about(s, taps, level)?;
+    fn maxima(&self, taps: &[Mat], level: f64) -> Result<Vec<Peak>, DesignError> {
+        let gains = self.gains_about(&self.response(taps), level)?;
         let grid: Vec<Peak> = gains
             .into_iter()
             .zip(&self.frequencies.all)
             .map(|(gain, &frequency)| Peak { gain, frequency })
             .collect();
-        let scenario = &self.scenarios[s];
         let at = |frequency: f64| {
-            let filters = scenario.filters(&filters::response(taps.taps, frequency));
-            Ok(Peak { gain: gain(&scenario.plant.at(frequency).error(&filters))?, frequency })
+            let error = self.plant.at(frequency).error(&filters::response(taps, frequency));
+            Ok(Peak { gain: gain(&error)?, frequency })
         };
         let maxima = local_maxima(&grid).into_iter().filter(|[_, peak, _]| peak.gain >= PRUNE_LEVEL * level);
         maxima.map(|around| refine(at, around, FLAT_GAIN)).collect()
     }
 
     /// The gains near points with gains about `level` or more; elsewhere smaller numbers.
-    fn gains_about(&self, s: usize, taps: &GridResponse<'_>, level: f64) -> Result<Vec<f64>, DesignError> {
+    fn gains_about(&self, taps: &GridResponse<'_>, level: f64) -> Result<Vec<f64>, DesignError> {
         let mut gains = vec![0.0; self.frequencies.all.len()];
         for &k in &self.frequencies.first {
-            let error = self.error(s, k, taps);
+            let error = self.error(k, taps);
             // The Frobenius norm is no smaller than the gain and costs less.
             let bound = error.norm();
             gains[k] = if bound < PRUNE_LEVEL * level { bound } else { gain(&error)? };
@@ -299,7 +227,7 @@ impl<'a> ErrorGrid<'a> {
             if gains[pair[0]].max(gains[pair[1]]) >= PRUNE_LEVEL * level {
                 let between = pair[0] + 1..pair[1];
                 for (k, known) in between.clone().zip(&mut gains[between]) {
-                    *known = gain(&self.error(s, k, taps))?;
+                    *known = gain(&self.error(k, taps))?;
                 }
             }
         }
@@ -310,39 +238,26 @@ impl<'a> ErrorGrid<'a> {
         GridResponse { taps, values: vec![OnceCell::new(); self.frequencies.all.len()] }
     }
 
-    fn error(&self, s: usize, k: usize, taps: &GridResponse<'_>) -> CMat {
+    fn error(&self, k: usize, taps: &GridResponse<'_>) -> CMat {
         let response = taps.values[k].get_or_init(|| filters::response(taps.taps, self.frequencies.all[k]));
-        self.point(s, k).error(&self.scenarios[s].filters(response))
+        self.point(k).error(response)
     }
 
-    fn point(&self, s: usize, k: usize) -> &Point {
-        let scenario = &self.scenarios[s];
-        scenario.points[k].get_or_init(|| scenario.plant.at(self.frequencies.all[k]))
-    }
-
-    /// A point of a scenario among those of all, with columns of zeros where a scenario with coinciding
-    /// instants has fewer.
-    fn of_exchange(&self, s: usize, point: &Point) -> Point {
-        let scenario = &self.scenarios[s];
-        let inputs = scenario.plant.channels() + scenario.plant.ratio();
-        let pad = |m: CMat| m.resize_horizontally(inputs, Default::default());
-        let (w, h) = (&point.w * Complex::from(scenario.weight), scenario.stacked(&point.h));
-        Point { omega: point.omega, w: pad(w), h: pad(h) }
+    fn point(&self, k: usize) -> &Point {
+        self.points[k].get_or_init(|| self.plant.at(self.frequencies.all[k]))
     }
 }
 
 impl AffineError for ErrorGrid<'_> {
-    type Scenario = usize;
+    type Scenario = ();
 
-    fn at(&self, location: &Location<usize>) -> Point {
-        let s = location.scenario;
-        self.of_exchange(s, &self.scenarios[s].plant.at(location.frequency))
+    fn at(&self, location: &Location<()>) -> Point {
+        self.plant.at(location.frequency)
     }
 
-    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<usize>, DesignError> {
-        // The estimate of a single scenario is compared with its norm, so it has to be one below the level
-        // too.
-        let found = self.peaks(taps, if self.scenarios.len() == 1 { 0.0 } else { level })?;
+    fn peaks(&self, taps: &Taps, gamma: f64, _level: f64) -> Result<Peaks<()>, DesignError> {
+        // The estimate is compared with the norm, so it has to be one below the level too.
+        let found = self.peaks(taps, 0.0)?;
         Ok(Peaks { estimate: found.estimate.max(gamma), ..found })
     }
 }

@@ -211,14 +211,6 @@ impl<E: AffineError> Exchange<E> {
         self.minimise_mean_square(least, tolerances)
     }
 
-    /// Unknowns with gamma within `accuracy` of the optimum, without the secondary objective.
-    ///
-    /// # Errors
-    /// As [`Exchange::optimise`].
-    pub(super) fn compare(&mut self, accuracy: f64) -> Result<Candidate<E::Scenario>, DesignError> {
-        self.minimise_gamma(Tolerances::steady(accuracy))
-    }
-
     /// What is left open by taps of the norm `gamma`, which `is_missed` if the peaks do not explain it.
     pub(super) fn unfinished_at(&self, gamma: f64, is_missed: bool, accuracy: f64) -> Option<Unfinished> {
         if !is_missed || self.stop.is_due() {

@@ -37,7 +37,6 @@ pub use error::DesignError;
 pub use limits::{Effort, Limits, Stage, Stop, TIME_LIMIT};
 pub use methods::robust_fir::RobustNorms;
 pub use methods::robust_fir::RobustStudy;
-pub use methods::scheduled_fir::TrackingStudy;
 pub use plant::LiftedPlant;
 pub use problem::Problem;
 pub use prove::{Certified, certify};

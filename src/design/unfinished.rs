@@ -27,8 +27,7 @@ pub struct Unfinished {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Objective {
-    /// Gamma; over uncertain channels the largest one, and with scheduled taps its ratio to what is within
-    /// reach.
+    /// Gamma; over uncertain channels the largest one.
     Gamma,
     /// The mean square of error and noise, among the banks within the margin of gamma.
     MeanSquare,

@@ -107,9 +107,9 @@ impl Figures {
         let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
         let plain = without_signal(spec, bank.latency)?;
         let band = FigureBand::new(spec, &plain);
-        let tones = ToneResponse::new(plain.clone(), FilterResponse::new(bank)?, Spread::of_bank(bank, spec));
+        let tones = ToneResponse::new(plain.clone(), FilterResponse::new(bank)?, Spread::of_spec(spec));
         let Worst { image, gain_error, vanishes } = tones.worst(band.cycles(spec));
-        let setting = Setting::of(bank, spec, &band)?;
+        let setting = Setting::new(spec, bank.latency, &band)?;
         let ways = simple::ways(setting.problem());
         let ratios = setting.ratios(&ways);
         let own = setting.ratio_of_bank(FilterResponse::new(bank)?);
@@ -150,7 +150,7 @@ impl Figures {
 pub fn snr(bank: &Bank) -> Result<Snr, DesignError> {
     let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
     let band = FigureBand::new(spec, &without_signal(spec, bank.latency)?);
-    Ok(Setting::of(bank, spec, &band)?.ratio_of_bank(FilterResponse::new(bank)?).snr)
+    Ok(Setting::new(spec, bank.latency, &band)?.ratio_of_bank(FilterResponse::new(bank)?).snr)
 }
 
 /// A band for the signal of a spec that has none: what the target passes, with a tenth of the resolved band
@@ -177,7 +177,7 @@ pub fn tone_curve(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Tone)>, Desi
     let plain = without_signal(spec, bank.latency)?;
     let band = FigureBand::new(spec, &plain).cycles(spec);
     let tones =
-        ToneResponse::new(plain, FilterResponse::new(bank)?, Spread::of_bank(bank, spec)).curve(band, points);
+        ToneResponse::new(plain, FilterResponse::new(bank)?, Spread::of_spec(spec)).curve(band, points);
     let hertz = |CyclesPerFastPeriod(f): CyclesPerFastPeriod| Hertz(f / spec.fast_period.0);
     Ok(tones.into_iter().map(|tone| (hertz(tone.frequency), tone)).collect())
 }

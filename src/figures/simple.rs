@@ -118,7 +118,7 @@ impl Alone {
     pub fn new(spec: &Spec) -> Result<Self, DesignError> {
         let spec = Spec { uncertainty: None, ..spec.clone() };
         let band = FigureBand::new(&spec, &without_signal(&spec, 0)?);
-        let setting = Setting::new(&spec, 0, Vec::new(), &band)?;
+        let setting = Setting::new(&spec, 0, &band)?;
         let channels = kinds(setting.problem());
         let way = |converter, samples| Reconstruction::OneChannel { converter, samples };
         let alone = channels.iter().map(|(converter, samples)| way(*converter, samples.clone()));

@@ -6,7 +6,6 @@ use super::reconstruction::Reconstruction;
 use super::signal::Signal;
 use super::spread::Spread;
 use super::without_signal;
-use crate::bank::Bank;
 use crate::design::filters::FilterResponse;
 use crate::design::{DesignError, Problem};
 use crate::spec::{SignalSpectrum, Spec, USUAL_RMS};
@@ -26,7 +25,7 @@ pub struct Snr {
     pub noise_db: Option<Decibels>,
     /// What delays within the spec's `[uncertainty]` add to the error from the signal: the mean over
     /// Gaussian errors whose 95 % intervals are the stated ones, constant for each converter. `None` where
-    /// all delays are exact, or where the taps follow them.
+    /// all delays are exact.
     pub delays_db: Option<Decibels>,
     /// The same of the gains.
     pub gains_db: Option<Decibels>,
@@ -59,30 +58,14 @@ pub(super) struct Setting {
     noise_is_stated: bool,
     /// Of the converters; offsets are in the scale of the signal.
     spread: Vec<Spread>,
-    /// Of the converters of the bank itself.
-    of_bank: Vec<Spread>,
 }
 
 impl Setting {
-    /// Of a bank with its spec.
+    /// Of any filters for a spec with this latency.
     ///
     /// # Errors
     /// As [`Problem::new`].
-    pub(super) fn of(bank: &Bank, spec: &Spec, band: &FigureBand) -> Result<Self, DesignError> {
-        Self::new(spec, bank.latency, Spread::of_bank(bank, spec), band)
-    }
-
-    /// Of any filters for a spec with this latency; the delays and gains of the bank itself are off by
-    /// `of_bank`.
-    ///
-    /// # Errors
-    /// As [`Problem::new`].
-    pub(super) fn new(
-        spec: &Spec,
-        latency: usize,
-        of_bank: Vec<Spread>,
-        band: &FigureBand,
-    ) -> Result<Self, DesignError> {
+    pub(super) fn new(spec: &Spec, latency: usize, band: &FigureBand) -> Result<Self, DesignError> {
         let plain = without_signal(spec, latency)?;
         let stated: Vec<f64> = spec.channels.iter().map(|channel| channel.sample_noise().powi(2)).collect();
         let stated = spec.layout().each(&stated);
@@ -112,8 +95,7 @@ impl Setting {
         };
         let scaled = |spread: Spread| Spread { offset: spread.offset * full_scale.sqrt(), ..spread };
         let spread = Spread::of_spec(spec).into_iter().map(scaled).collect();
-        let of_bank = of_bank.into_iter().map(scaled).collect();
-        Ok(Self { signal, target, noise, noise_is_stated, spread, of_bank })
+        Ok(Self { signal, target, noise, noise_is_stated, spread })
     }
 
     /// The front ends, with the spectrum of the signal where it is a filter.
@@ -121,27 +103,23 @@ impl Setting {
         self.signal.problem()
     }
 
-    /// The ratios of ways with filters that stay as they are.
-    pub(super) fn ratios(&self, ways: &[Reconstruction]) -> Vec<Ratios> {
-        self.ratios_for(ways, &self.spread)
-    }
-
-    /// The ratio of the bank itself, whose taps may follow the delays.
+    /// The ratio of the bank itself.
     pub(super) fn ratio_of_bank(&self, bank: FilterResponse) -> Ratios {
-        self.ratios_for(&[Reconstruction::Bank(bank)], &self.of_bank).pop().unwrap_or_default()
+        self.ratios(&[Reconstruction::Bank(bank)]).pop().unwrap_or_default()
     }
 
-    fn ratios_for(&self, ways: &[Reconstruction], spread: &[Spread]) -> Vec<Ratios> {
+    /// The ratios of several ways.
+    pub(super) fn ratios(&self, ways: &[Reconstruction]) -> Vec<Ratios> {
         let conditions =
-            Conditions { signal: &self.signal, noise: self.noise.clone(), spread: spread.to_vec() };
-        conditions.powers(ways).iter().map(|powers| self.ratio(powers, spread)).collect()
+            Conditions { signal: &self.signal, noise: self.noise.clone(), spread: self.spread.clone() };
+        conditions.powers(ways).iter().map(|powers| self.ratio(powers)).collect()
     }
 
-    fn ratio(&self, powers: &Powers, spread: &[Spread]) -> Ratios {
+    fn ratio(&self, powers: &Powers) -> Ratios {
         let Powers { signal, late, gains, offsets, noise, .. } = *powers;
         let db = |power: f64| Decibels::of_power(self.target / power);
         let of = |error: fn(&Spread) -> f64, power: f64| {
-            spread.iter().any(|spread| error(spread) > 0.0).then(|| db(power.max(0.0)))
+            self.spread.iter().any(|spread| error(spread) > 0.0).then(|| db(power.max(0.0)))
         };
         let all = late + gains + offsets;
         let stated = if self.noise_is_stated { noise } else { 0.0 };

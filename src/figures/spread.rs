@@ -1,6 +1,5 @@
 //! How far converters are from their spec.
 
-use crate::bank::Bank;
 use crate::spec::Spec;
 use crate::units::FastPeriods;
 
@@ -27,16 +26,6 @@ impl Spread {
             Self { delay, gain: gains[i], offset: offsets[i] }
         };
         (0..count).map(of).collect()
-    }
-
-    /// The same without the delays that the taps of `bank` follow.
-    pub(super) fn of_bank(bank: &Bank, spec: &Spec) -> Vec<Self> {
-        let follows = |i: usize| bank.tap_slopes.as_ref().is_some_and(|slopes| slopes.follows(i));
-        let known = |(i, spread): (usize, Self)| match follows(i) {
-            true => Self { delay: FastPeriods(0.0), ..spread },
-            false => spread,
-        };
-        Self::of_spec(spec).into_iter().enumerate().map(known).collect()
     }
 
     /// A delay that is off by a Gaussian error of deviation s turns a sample of the frequency w by a random

@@ -10,7 +10,7 @@ use crate::plot::{AxisScale, Chart, Series};
 use crate::quantity::scale_of;
 use crate::spec::FrameSample;
 use crate::units::{FastPeriods, Hertz};
-use crate::verify::uncertainty::{ErrorPoint, Taps};
+use crate::verify::uncertainty::ErrorPoint;
 use std::f64::consts::TAU;
 
 /// Frequencies of a curve.
@@ -308,7 +308,7 @@ fn delay_error(bank: &Bank) -> Result<Chart, DesignError> {
         let moved = |slope: &f64| (size * if *slope < 0.0 { -1.0 } else { 1.0 }).in_seconds(bank.fast_period);
         let delays = slopes.iter().map(moved).collect();
         let point = ErrorPoint { delays, ..ErrorPoint::none(bank.channel_count()) };
-        Ok((size.0, norm_at(bank, &point, Taps::Fixed)?.0))
+        Ok((size.0, norm_at(bank, &point)?.0))
     };
     Ok(Chart {
         title: "gamma with delays that are not those of the bank".into(),

@@ -4,8 +4,7 @@ use super::gaps::GapFiller;
 use super::{Gap, GapPolicy, Outcome};
 use crate::bank::Bank;
 use crate::runtime::{
-    Input, Interleaved, Isa, Options, Output, Plan, ProcessError, Sample, SplitOutput, Stream, SwapError,
-    ThreadPool,
+    Input, Interleaved, Isa, Options, Output, Plan, ProcessError, Sample, SplitOutput, Stream, ThreadPool,
 };
 use std::ops::Range;
 
@@ -16,8 +15,6 @@ pub struct Settings<'a> {
     pub dropped: DroppedLatency,
     /// Replacement of missing samples. With `None` the runtime replaces NaN and infinity by 0.
     pub gaps: Option<GapPolicy>,
-    /// The filters change on the way, see [`Pipeline::retuned_by`](super::Pipeline::retuned_by).
-    pub is_retuned: bool,
     /// Threads for filtering; `None` uses the calling thread.
     pub workers: Option<&'a ThreadPool>,
 }
@@ -46,13 +43,12 @@ impl DroppedLatency {
 }
 
 impl Settings<'_> {
-    /// `options` for a plan of such a run. Where gaps are filled or the filters change, `Auto` is the direct
-    /// algorithm: outputs that no gap affects have the bits that they have without gaps, and filters can
-    /// change at any frame.
+    /// `options` for a plan of such a run. Where gaps are filled, `Auto` is the direct algorithm: outputs that
+    /// no gap affects have the bits that they have without gaps.
     pub fn options(&self, options: Options) -> Options {
-        let needs_direct = self.gaps.is_some() || self.is_retuned;
         let asked = options.algorithm;
-        Options { algorithm: if needs_direct { asked.without_added_latency() } else { asked }, ..options }
+        let algorithm = if self.gaps.is_some() { asked.without_added_latency() } else { asked };
+        Options { algorithm, ..options }
     }
 }
 
@@ -66,8 +62,6 @@ pub(super) struct Fusion<'a> {
     skip: usize,
     /// The outputs of the last step that were not dropped.
     kept: Range<usize>,
-    /// Samples that streams replaced whose place others have taken.
-    replaced: u64,
     offsets: Vec<f64>,
 }
 
@@ -81,7 +75,6 @@ impl<'a> Fusion<'a> {
             workers: settings.workers,
             skip: settings.dropped.samples(plan),
             kept: 0..0,
-            replaced: 0,
             offsets: bank.layout().each(&bank.offsets),
         }
     }
@@ -103,7 +96,7 @@ impl<'a> Fusion<'a> {
 
     /// Numbers of the input so far that were NaN or infinite and became 0.
     pub(super) fn replaced(&self) -> u64 {
-        self.replaced + self.streams.iter().map(Stream::replaced).sum::<u64>()
+        self.streams.iter().map(Stream::replaced).sum::<u64>()
     }
 
     /// Times that the state of a recursion was not finite and became 0.
@@ -187,19 +180,6 @@ impl<'a> Fusion<'a> {
         self.gaps.as_ref().map(|gaps| gaps.marks(self.kept.clone()))
     }
 
-    /// Goes on by `next`, which takes over the history and the counts.
-    pub(super) fn continue_by(&mut self, mut next: Stream) -> Result<(), SwapError> {
-        next.continue_from(&self.streams[0])?;
-        self.streams[0] = next;
-        Ok(())
-    }
-
-    /// Goes on by `next`, which has a history of its own.
-    pub(super) fn replace(&mut self, next: Stream) {
-        self.replaced += self.streams[0].replaced();
-        self.streams[0] = next;
-    }
-
     /// Ends the open gaps; `samples` of the outputs were written, and `clipped` of them saturated.
     pub(super) fn finish(self, samples: u64, clipped: u64) -> Outcome {
         let stream = self.stream();
@@ -233,9 +213,9 @@ fn run(
 }
 
 /// Room for some of the outputs of a call; the others are dropped before they are encoded.
-pub(super) struct Kept<'a, O: ?Sized> {
-    pub(super) output: &'a mut O,
-    pub(super) range: Range<usize>,
+struct Kept<'a, O: ?Sized> {
+    output: &'a mut O,
+    range: Range<usize>,
 }
 
 impl<O: Output + ?Sized> Output for Kept<'_, O> {

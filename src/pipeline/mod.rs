@@ -6,9 +6,9 @@
 //!
 //! One loop (`fusion`) fills missing samples, runs the bank, drops the latency, and marks the samples that
 //! missing inputs affect. A [`Pipeline`] runs it on frames as they arrive and hands over encoded samples,
-//! for example to [`FileOutputs`]; a [`Retuner`] changes its filters on the way. [`fuse`] runs it on a
-//! signal in memory. Complex samples are two streams over the same frames; a sample with one part missing
-//! is missing. The result is an [`Outcome`] with counts and [`Warning`]s; nothing is printed.
+//! for example to [`FileOutputs`]. [`fuse`] runs it on a signal in memory. Complex samples are two streams
+//! over the same frames; a sample with one part missing is missing. The result is an [`Outcome`] with counts
+//! and [`Warning`]s; nothing is printed.
 //!
 //! ```
 //! use hybank::bank::{Bank, SynthesisFilters};
@@ -25,7 +25,7 @@
 //!     pipeline.push(&[recording], &mut |block: Block<'_>| Ok(output.extend_from_slice(block.samples)))?;
 //! }
 //! assert_eq!(output, [1, 0, 2, 0, 3, 0, 4, 0]);
-//! assert_eq!(pipeline.finish()?.samples, 4);
+//! assert_eq!(pipeline.finish().samples, 4);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -35,7 +35,6 @@ pub mod matching;
 mod offline;
 mod outcome;
 mod outputs;
-mod retune;
 mod streaming;
 
 pub use fusion::{DroppedLatency, Settings};
@@ -43,5 +42,4 @@ pub use gaps::{Gap, GapPolicy, GapSummary, LISTED_GAPS};
 pub use offline::{fuse, fused};
 pub use outcome::{Outcome, PipelineError, Warning};
 pub use outputs::{FileOutputs, peak};
-pub use retune::{Change, Retuner};
 pub use streaming::{Block, Pipeline};

@@ -4,7 +4,7 @@ use super::GapSummary;
 use crate::files::FileError;
 use crate::io::{InputWarning, IoError};
 use crate::messages::counted;
-use crate::runtime::{BuildError, PlanSummary, ProcessError, SwapError};
+use crate::runtime::{BuildError, PlanSummary, ProcessError};
 
 /// Counts and settings of a finished run.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -77,24 +77,12 @@ pub enum PipelineError {
     /// The frames do not fit the bank.
     #[error(transparent)]
     Process(#[from] ProcessError),
-    /// A stream cannot go on with other filters.
-    #[error(transparent)]
-    Swap(#[from] SwapError),
     /// An input cannot be read, or an output written.
     #[error(transparent)]
     Io(#[from] IoError),
     /// An output file cannot be created or renamed to its final name.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The thread that prepares changes of the filters cannot be started.
-    #[error("no thread for the changes of the filters: {0}")]
-    Thread(std::io::Error),
-    /// The thread that prepares changes of the filters ended before its work was done.
-    #[error("the thread that follows the delays has died; the outputs would be those of old delays")]
-    RetunerDied,
-    /// Filters cannot change for complex samples.
-    #[error("delays are measured in real samples; these are complex")]
-    RetunedComplex,
     /// The caller of [`fuse`](super::fuse) stopped it.
     #[error("the fusion was stopped")]
     Stopped,

@@ -26,7 +26,6 @@ use std::path::PathBuf;
 pub struct FileOutputs {
     samples: SampleWriter,
     mask: Option<AtomicFile>,
-    log: Option<AtomicFile>,
     format: PcmFormat,
     /// The largest magnitude so far, of full scale.
     peak: f64,
@@ -35,7 +34,7 @@ pub struct FileOutputs {
 impl FileOutputs {
     /// Writes samples, encoded as `format`, to `samples`, and the mask to `mask` if given.
     pub fn new(samples: SampleWriter, mask: Option<AtomicFile>, format: PcmFormat) -> Self {
-        Self { samples, mask, log: None, format, peak: 0.0 }
+        Self { samples, mask, format, peak: 0.0 }
     }
 
     /// From now on what was written stays, under the hidden names that this gives, if the files get no
@@ -52,11 +51,6 @@ impl FileOutputs {
     /// What is to accompany the samples.
     pub fn annotate(&mut self, notes: OutputNotes) {
         self.samples.annotate(notes);
-    }
-
-    /// The same outputs with a log beside them, which is whole.
-    pub fn with_log(self, log: Option<AtomicFile>) -> Self {
-        Self { log, ..self }
     }
 
     /// Takes the next samples.
@@ -84,7 +78,6 @@ impl FileOutputs {
     pub fn finish(self) -> Result<(), PipelineError> {
         let mut files = self.samples.finish()?;
         files.extend(self.mask);
-        files.extend(self.log);
         Ok(commit_all(files)?)
     }
 }

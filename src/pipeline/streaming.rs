@@ -1,7 +1,6 @@
 //! A bank that runs on frames as they arrive.
 
 use super::fusion::Fusion;
-use super::retune::Retuner;
 use super::{Gap, Outcome, PipelineError, Settings};
 use crate::bank::Bank;
 use crate::io::{IoError, PcmFormat, PcmFrames};
@@ -28,7 +27,6 @@ type Write<'w> = &'w mut dyn FnMut(Block<'_>) -> Result<(), IoError>;
 #[derive(Debug)]
 pub struct Pipeline<'a> {
     fusion: Fusion<'a>,
-    retuner: Option<Retuner>,
     format: PcmFormat,
     /// Frames of a step, at most.
     step: usize,
@@ -51,18 +49,7 @@ impl<'a> Pipeline<'a> {
         let fusion = Fusion::new(bank, plan, 1 + usize::from(is_complex), settings);
         let steps = if settings.workers.is_some() { PARALLEL_STEPS } else { 1 };
         let step = (steps * STEP_BYTES / plan.ratio() / format.bytes()).max(1);
-        Self { fusion, retuner: None, format, step, samples: 0, clipped: 0, buffer: Vec::new() }
-    }
-
-    /// The same pipeline, whose filters change as `retuner` says. Its plan adds no latency.
-    ///
-    /// # Errors
-    /// [`PipelineError::RetunedComplex`]: delays are measured in real samples.
-    pub fn retuned_by(self, retuner: Retuner) -> Result<Self, PipelineError> {
-        match self.fusion.parts() {
-            1 => Ok(Self { retuner: Some(retuner), ..self }),
-            _ => Err(PipelineError::RetunedComplex),
-        }
+        Self { fusion, format, step, samples: 0, clipped: 0, buffer: Vec::new() }
     }
 
     /// The plan.
@@ -105,10 +92,6 @@ impl<'a> Pipeline<'a> {
     /// # Errors
     /// [`PipelineError::Process`] if the channels do not match the bank, and the errors of `write`.
     pub fn push(&mut self, recordings: &[PcmFrames<'_>], write: Write<'_>) -> Result<(), PipelineError> {
-        if let Some(retuner) = &mut self.retuner {
-            retuner.push(recordings)?;
-            return self.run_retuned(write);
-        }
         if self.fusion.parts() == 1 {
             return self.run(&[recordings], write);
         }
@@ -121,13 +104,8 @@ impl<'a> Pipeline<'a> {
     /// have been written since the beginning.
     ///
     /// # Errors
-    /// The errors of the output, and of a [`Retuner`].
+    /// The errors of the output.
     pub fn flush(&mut self, samples: u64, write: Write<'_>) -> Result<(), PipelineError> {
-        if let Some(retuner) = &mut self.retuner {
-            retuner.end();
-            // What is no signal says nothing of the filters.
-            self.run_retuned(write)?;
-        }
         while self.samples < samples {
             let most = usize::try_from(samples - self.samples).unwrap_or(usize::MAX);
             let frames = self.fusion.flush_frames(most).min(self.step);
@@ -140,12 +118,8 @@ impl<'a> Pipeline<'a> {
     }
 
     /// Ends the open gaps and returns the outcome. Of complex samples the counts are those of both parts.
-    ///
-    /// # Errors
-    /// The errors of a [`Retuner`] in the last block.
-    pub fn finish(self) -> Result<Outcome, PipelineError> {
-        self.retuner.map_or(Ok(()), Retuner::finish)?;
-        Ok(self.fusion.finish(self.samples, self.clipped))
+    pub fn finish(self) -> Outcome {
+        self.fusion.finish(self.samples, self.clipped)
     }
 
     /// All frames of all parts, step by step.
@@ -158,27 +132,6 @@ impl<'a> Pipeline<'a> {
             self.step(&step, write)?;
             first = end;
         }
-        Ok(())
-    }
-
-    /// The frames that can be made of the samples so far, with filters that change on the way.
-    fn run_retuned(&mut self, write: Write<'_>) -> Result<(), PipelineError> {
-        let Some(mut retuner) = self.retuner.take() else { return Ok(()) };
-        loop {
-            if let Some(stream) = retuner.due() {
-                self.fusion.continue_by(stream)?;
-            }
-            let count = retuner.ready(self.step);
-            if count == 0 {
-                break;
-            }
-            if let Some(stream) = retuner.shifted()? {
-                self.fusion.replace(stream);
-            }
-            self.step(&[retuner.next(count)], write)?;
-            retuner.passed(count)?;
-        }
-        self.retuner = Some(retuner);
         Ok(())
     }
 

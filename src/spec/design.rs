@@ -4,7 +4,7 @@ use super::error::{KeyProblem, blame};
 use super::limits;
 use super::word_lengths::{WordLengths, check_fraction_bits};
 use super::{FrameLayout, SpecProblem, UncertaintySpec};
-use serde::{Deserialize, Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
 /// How the synthesis filters are designed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -51,20 +51,9 @@ pub struct DesignTable<M> {
     /// Whether `loss_db` asks for few signed digits, not for few bits.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub digits: bool,
-    /// Delay-scheduled taps of the method `fir`, for delays that change while the bank runs: affine
-    /// functions of the delays, optimal over the box of the `[uncertainty]` table.
-    #[serde(skip_serializing_if = "std::ops::Not::not", serialize_with = "as_affine")]
-    pub tracking: bool,
     /// Order reduction, for recursive methods.
     #[serde(flatten)]
     pub reduction: Option<Reduction>,
-}
-
-/// The schedule of delay-scheduled taps, in spec files.
-pub(super) const AFFINE: &str = "affine";
-
-fn as_affine<S: Serializer>(_: &bool, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(AFFINE)
 }
 
 /// A `[design]` table with its defaults filled in.
@@ -94,7 +83,7 @@ struct Key {
 }
 
 /// The keys that not every method reads.
-const KEYS: [Key; 10] = {
+const KEYS: [Key; 9] = {
     use Method::{Fir, H2, Iir, Separation, Sinc};
     [
         Key { name: "taps", methods: &[Fir, H2, Sinc, Separation], advised: "fir or h2" },
@@ -104,7 +93,6 @@ const KEYS: [Key; 10] = {
         Key { name: "fraction_bits", methods: &[Fir], advised: "fir" },
         Key { name: "loss_db", methods: &[Fir], advised: "fir" },
         Key { name: "digits", methods: &[Fir], advised: "fir" },
-        Key { name: "tracking", methods: &[Fir], advised: "fir" },
         Key { name: "order", methods: &[Iir, H2], advised: "iir or h2" },
         Key { name: "reduction_loss_db", methods: &[Iir, H2], advised: "iir or h2" },
     ]
@@ -159,7 +147,6 @@ impl<M> DesignTable<M> {
             fraction_bits: self.fraction_bits,
             loss_db: self.loss_db,
             digits: self.digits,
-            tracking: self.tracking,
             reduction: self.reduction,
         }
     }
@@ -174,7 +161,6 @@ impl<M> DesignTable<M> {
             ("fraction_bits", self.fraction_bits.is_some()),
             ("loss_db", self.loss_db.is_some()),
             ("digits", self.digits),
-            ("tracking", self.tracking),
         ];
         keys.into_iter()
             .filter(|(_, given)| *given)
@@ -255,12 +241,8 @@ impl DesignSpec {
             return blame("fraction_bits", Err(SpecProblem::MissingKey { key: "bits", remedy }));
         }
         blame("target_snr_db", self.target_snr_db.map_or(Ok(()), limits::check_target_snr))?;
-        // Delay-scheduled taps are functions of all delays but one.
-        let functions = if self.tracking { layout.samples().len() } else { 1 };
         match (self.method, self.taps) {
-            (Method::Fir, Some(taps)) => {
-                blame("taps", limits::check_optimised_taps(taps, layout.count().saturating_mul(functions)))
-            }
+            (Method::Fir, Some(taps)) => blame("taps", limits::check_optimised_taps(taps, layout.count())),
             _ => Ok(()),
         }
     }
@@ -282,11 +264,6 @@ impl DesignSpec {
         let conflict =
             |first, second, remedy| Some((second, SpecProblem::Conflict { first, second, remedy }));
         match self.reduction {
-            _ if self.has_integers() && self.tracking => conflict(
-                if self.bits.is_some() { "bits" } else { "loss_db" },
-                "tracking",
-                "delay-scheduled taps are no integers; leave out one of the two",
-            ),
             _ if self.loss_db.is_some() && self.fraction_bits.is_some() => conflict(
                 "loss_db",
                 "fraction_bits",
@@ -316,16 +293,7 @@ impl DesignSpec {
             let remedy = "h2 averages over uncertain delays and gains with FIR filters, which have no order; leave out one of the two";
             return blame(reduction.key(), conflict(reduction.key(), remedy));
         }
-        let remedy = match uncertainty {
-            _ if !self.tracking => return Ok(()),
-            Some(table) if table.has_delays(channels) => return Ok(()),
-            None => "tracking needs to know how far the delays may move: give [uncertainty] delay",
-            Some(_) => {
-                "no delay moves: the delay of the reference is the origin, and [uncertainty] delay is 0 for all others; \
-                 give a delay above 0 for a channel that is not the reference, or leave tracking out"
-            }
-        };
-        blame("tracking", Err(SpecProblem::MissingKey { key: "delay", remedy }))
+        Ok(())
     }
 }
 
@@ -348,7 +316,6 @@ impl DesignOverrides {
             fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| keeps("fraction_bits"))),
             loss_db: self.loss_db.or(file.loss_db.filter(|_| keeps("loss_db"))),
             digits: self.digits || file.digits && keeps("digits"),
-            tracking: self.tracking || file.tracking && keeps("tracking"),
             reduction: self.reduction.or(file.reduction.filter(|_| keeps("order"))),
         }
     }

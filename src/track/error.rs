@@ -9,27 +9,14 @@ use crate::units::Hertz;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrackError {
-    /// The taps are fixed.
-    #[error(
-        "the taps of this bank do not follow delays; design it with tracking = \"affine\" in [design] and with [uncertainty] delay in its spec"
-    )]
-    NoTapSlopes,
+    /// No delay may move.
+    #[error("no delay of this spec may move: give [uncertainty] delay for a channel beside the reference")]
+    NoUncertainDelay,
     /// Converters with rates of their own.
     #[error(
-        "the converters of this bank have sample rates of their own, and delays are followed only for converters of one rate"
+        "the converters of this spec have sample rates of their own, and delays are followed only for converters of one rate"
     )]
     OwnRates,
-    /// The filters are recursive.
-    #[error(
-        "this bank is recursive: its states belong to its coefficients, so it cannot follow delays; design an FIR bank with \
-         method = \"fir\" and tracking = \"affine\""
-    )]
-    Recursive,
-    /// The front ends are unknown.
-    #[error(
-        "this bank carries no spec (\"spec\": null): its front ends are unknown, so no delay can be measured"
-    )]
-    NoSpec,
     /// A filter of the spec is not a valid front end.
     #[error(transparent)]
     Model(#[from] CalibrateError),
@@ -48,21 +35,20 @@ pub enum TrackError {
         /// Half the slow rate.
         half: Hertz,
     },
-    /// A text that names no source of delays.
-    #[error("{reason}")]
-    Source {
-        /// Why, and what names one.
-        reason: String,
-    },
     /// Too few frames of a measurement.
-    #[error("at least {least}")]
+    #[error("a measurement of delays takes at least {least} frames, not {given}")]
     Frames {
+        /// As given.
+        given: usize,
         /// Least frames.
         least: usize,
     },
-    /// A clock wanders by a positive share.
-    #[error("a positive number of ppm")]
-    Wander,
+    /// A rate that no clock has.
+    #[error("a clock wanders by a positive number of ppm below 1e6 in a second, not by {given}")]
+    Wander {
+        /// As given.
+        given: f64,
+    },
     /// A line of a file of delays.
     #[error("{}: line {line}: {problem}", Quoted(.file))]
     Reading {

@@ -16,8 +16,6 @@ pub struct Logged {
     pub time: Seconds,
     /// D_i; the reference has that of the spec.
     pub delay: Vec<Seconds>,
-    /// s_i: frames hold sample k + s_i of the channel.
-    pub shift: Vec<i64>,
     /// Half-widths of their 95 % intervals; zero where a delay counts as exact.
     pub half_width: Vec<Seconds>,
     /// By how much the delays err at most between readings that are known beforehand: if each reading is
@@ -44,7 +42,6 @@ impl Logged {
             frame: frame as u64,
             time: period * frame,
             delay: spec.channels.iter().map(|channel| channel.delay).collect(),
-            shift: vec![0; count],
             half_width: vec![Seconds(0.0); count],
             bound: None,
             rate_ppm: vec![0.0; count],
@@ -84,25 +81,6 @@ pub enum TrackWarning {
         /// The frame.
         frame: u64,
     },
-    /// A delay leaves the box for which the taps were designed; the taps stay at its end.
-    #[error(
-        "the delay of channel {channel} leaves the ± {:e} s for which the taps were designed, at frame {frame}; the taps \
-         stay at the end of that range: design with a larger [uncertainty] delay {}",
-        half.0, .enough.map_or_else(
-            || "or cut the recordings there and fuse the rest with a bank for its delays".to_owned(),
-            |enough| format!("(from ± {:e} s on no delay leaves it)", enough.0),
-        )
-    )]
-    OutsideTheBox {
-        /// From 1.
-        channel: usize,
-        /// Half-width of the box.
-        half: Seconds,
-        /// The frame.
-        frame: u64,
-        /// Half-width of a box that no delay leaves, if taps can be designed for one.
-        enough: Option<Seconds>,
-    },
     /// No curve through the readings of a channel was found, so a filter follows them, which knows the past
     /// only.
     #[error(
@@ -133,7 +111,6 @@ impl TrackWarning {
     pub(super) fn is_like(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Lost { channel: a, .. }, Self::Lost { channel: b, .. }) => a == b,
-            (Self::OutsideTheBox { channel: a, .. }, Self::OutsideTheBox { channel: b, .. }) => a == b,
             (Self::Coincidence { channels: a, .. }, Self::Coincidence { channels: b, .. }) => a == b,
             _ => false,
         }

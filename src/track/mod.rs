@@ -1,14 +1,13 @@
-//! Delays that drift, followed while a bank runs.
+//! Delays that drift.
 //!
 //! Each channel's delay relative to the reference changes, and the rate at which it changes walks at random
 //! (two free-running clocks). A [`DelayFilter`] is the Kalman filter of one delay and its rate: measurements
 //! of block fits enter with their variance, silence lets the variance grow. A tracker per channel refuses
 //! measurements that contradict the filter, and says whether it is locked. A warning comes ahead of
-//! delays that come together, where no bank recovers the signal. A [`Follower`] measures the delays of a
-//! bank's channels block by block, by a pilot tone or by any signal, and says how taps that are affine in
-//! the delays are to change. Delays measured before are known on both sides of every instant: a smoothing
-//! spline of [`crate::sampling`] goes through them. [`align`] measures them so for whole recordings, which
-//! may have begun at any time.
+//! delays that come together, where no bank recovers the signal. A [`Follower`] measures the delays of the
+//! channels block by block, by a pilot tone or by any signal. Delays measured before are known on both sides
+//! of every instant: a smoothing spline of [`crate::sampling`] goes through them. [`align`] measures them so
+//! for whole recordings, which may have begun at any time.
 //!
 //! ```
 //! use hybank::track::{DelayFilter, DelayMeasurement, DelayState};
@@ -29,7 +28,6 @@ mod align;
 mod error;
 mod filter;
 mod follower;
-mod frame_shift;
 mod log;
 mod readings;
 mod source;
@@ -42,7 +40,7 @@ mod tracking;
 pub use align::{AlignError, AlignSettings, AlignWarning, AlignedChannel, Alignment, RATE_WALK, align};
 pub use error::{ReadingProblem, TrackError};
 pub use filter::{DelayFilter, DelayMeasurement, DelayState, Innovation};
-pub use follower::Follower;
+pub use follower::{Followed, Follower};
 pub use log::{Logged, TrackWarning};
 pub use readings::Reading;
 pub use source::DelaySource;

@@ -11,20 +11,6 @@ const GATE_SIGMAS: f64 = 5.0;
 /// measurement.
 const MOST_REFUSED: u32 = 5;
 
-/// How delays are followed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct FollowSettings {
-    /// Frames of a block: of one measurement.
-    pub block_frames: usize,
-    /// Variance by which a rate walks in a second, in (s/s)^2 / s.
-    pub rate_walk: f64,
-    /// Standard deviation of the rates at the beginning, seconds per second.
-    pub rate_deviation: f64,
-    /// By how much a rate changes in a second at most, for the bound of the error between readings; it
-    /// changes nothing else.
-    pub rate_change: f64,
-}
-
 /// Whether a channel's delay is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -50,8 +36,6 @@ pub(super) enum Taken {
 pub(super) struct DelayTracker {
     /// The channel, from 0.
     pub(super) channel: usize,
-    /// How far its delay may be off.
-    pub(super) half: Seconds,
     filter: DelayFilter,
     /// With readings enough, what they say takes the place of the filter.
     timeline: Option<Timeline>,
@@ -60,13 +44,8 @@ pub(super) struct DelayTracker {
 }
 
 impl DelayTracker {
-    pub(super) fn new(
-        channel: usize,
-        half: Seconds,
-        filter: DelayFilter,
-        timeline: Option<Timeline>,
-    ) -> Self {
-        Self { channel, half, filter, timeline, refused: 0 }
+    pub(super) fn new(channel: usize, filter: DelayFilter, timeline: Option<Timeline>) -> Self {
+        Self { channel, filter, timeline, refused: 0 }
     }
 
     /// What is known now.
@@ -93,15 +72,6 @@ impl DelayTracker {
     pub(super) fn look_up(&mut self, time: Seconds) {
         if let Some(timeline) = &self.timeline {
             self.filter = self.filter.restarted(timeline.at(time));
-        }
-    }
-
-    /// What is expected at a time, `elapsed` from now.
-    pub(super) fn ahead(&self, time: Seconds, elapsed: Seconds) -> DelayState {
-        let state = self.state();
-        match &self.timeline {
-            Some(timeline) => timeline.at(time),
-            None => DelayState { delay: state.delay + elapsed * state.rate, ..state },
         }
     }
 
@@ -133,7 +103,7 @@ mod tests {
 
     fn tracker() -> DelayTracker {
         let filter = DelayFilter::new(DelayState::known(Seconds(1.0), 0.1, 0.01), 0.0);
-        DelayTracker::new(0, Seconds(1.0), filter, None)
+        DelayTracker::new(0, filter, None)
     }
 
     fn measured(delay: f64) -> DelayMeasurement {

@@ -117,15 +117,6 @@ pub enum VerifyError {
         /// The number in the file.
         stated: f64,
     },
-    /// The stated worst case of delay-scheduled taps is not proven.
-    #[error(
-        "gamma.tracked: it is not proven that delay-scheduled taps keep gamma within {stated} over spec.uncertainty: a \
-         tap, a slope, the spec or the number was altered; design the bank again"
-    )]
-    Tracked {
-        /// The number in the file.
-        stated: f64,
-    },
     /// A box of errors that does not fit the bank.
     #[error("the box of errors cannot be judged: {rule}")]
     ErrorBox {

@@ -62,7 +62,6 @@ fn bank(
         filters: SynthesisFilters::Fir((0..delays.len()).map(made_up).collect()),
         gamma: Gamma::default(),
         proof: None,
-        tap_slopes: None,
         fixed_point: None,
     }
 }

@@ -7,7 +7,7 @@ use hybank::design::uncertainty::{norm_at, worst_case};
 use hybank::design::{Design, Options, analyze_mean, design};
 use hybank::spec::Spec;
 use hybank::units::Seconds;
-use hybank::verify::uncertainty::{ErrorBox, ErrorPoint, Taps, certifies};
+use hybank::verify::uncertainty::{ErrorBox, ErrorPoint, certifies};
 use hybank::verify::verify;
 
 /// 24 kHz and 16 kHz into 48 kHz in fast periods, latency 12, with a `[design]` table.
@@ -86,9 +86,9 @@ fn the_samples_of_a_converter_share_its_errors() {
         gains: vec![0.02, 0.0],
         cutoffs: vec![0.0, 0.01],
     };
-    let found = worst_case(&bank, &errors, Taps::Fixed, 0.01).unwrap();
+    let found = worst_case(&bank, &errors, 0.01).unwrap();
     assert!(found.upper <= found.lower * 1.0101, "{found:?}");
-    assert!(certifies(&bank, &errors, Taps::Fixed, found.upper * 1.0001).unwrap());
+    assert!(certifies(&bank, &errors, found.upper * 1.0001).unwrap());
     let mut random = Random(4);
     let mut most = 0.0f64;
     for trial in 0..60 {
@@ -103,7 +103,7 @@ fn the_samples_of_a_converter_share_its_errors() {
             gains: vec![draw(1, 0.02), 0.0],
             cutoffs: vec![0.0, draw(2, 0.01)],
         };
-        most = most.max(norm_at(&bank, &point, Taps::Fixed).unwrap().0);
+        most = most.max(norm_at(&bank, &point).unwrap().0);
     }
     assert!(most <= found.upper * (1.0 + 1e-9) && most > 0.98 * found.lower, "{most} {found:?}");
     // The same box with an error for each sample.
@@ -121,35 +121,22 @@ fn the_samples_of_a_converter_share_its_errors() {
         gains: vec![0.02, 0.02, 0.02, 0.0, 0.0],
         cutoffs: vec![0.0, 0.0, 0.0, 0.01, 0.01],
     };
-    let [tied, looser] = [(&bank, &errors), (&untied, &each)]
-        .map(|(bank, errors)| worst_case(bank, errors, Taps::Fixed, 0.001).unwrap());
+    let [tied, looser] =
+        [(&bank, &errors), (&untied, &each)].map(|(bank, errors)| worst_case(bank, errors, 0.001).unwrap());
     assert!(looser.lower > tied.upper, "{looser:?} {tied:?}");
 }
 
 /// Designs for errors are better at their worst than those that do not know of them, and prove it.
 #[test]
-fn robust_and_tracked_designs_know_one_error_per_converter() {
+fn robust_designs_know_one_error_per_converter() {
     let box_of = "uncertainty = { delay = [0, 0.1], reference = 1 }\n";
     let nominal = designed(&spec("design = { method = \"fir\", taps = 12 }"), &Options::without_proof()).bank;
     let errors = ErrorBox { delays: vec![Seconds(0.0), Seconds(0.1)], ..ErrorBox::none(2) };
-    let careless = worst_case(&nominal, &errors, Taps::Fixed, 0.01).unwrap();
+    let careless = worst_case(&nominal, &errors, 0.01).unwrap();
     let robust =
         designed(&spec(&format!("{box_of}design = {{ method = \"fir\", taps = 12 }}")), &Options::default());
     let stated = robust.bank.gamma.worst_case.unwrap_or_else(|| panic!("{:?}", robust.box_unproven));
     assert!(stated < careless.lower, "{stated} {careless:?}");
-    let tracked = designed(
-        &spec(&format!("{box_of}design = {{ method = \"fir\", taps = 12, tracking = \"affine\" }}")),
-        &Options::default(),
-    );
-    let followed = tracked.bank.gamma.tracked.unwrap_or_else(|| panic!("{:?}", tracked.box_unproven));
-    assert!(followed < stated, "{followed} {stated}");
-    let slopes = tracked.bank.tap_slopes.as_ref().unwrap();
-    assert_eq!(slopes.by_delay.iter().map(Vec::len).collect::<Vec<_>>(), [0, 5]);
-    for delay in [-0.1, -0.04, 0.07, 0.1] {
-        let point = ErrorPoint { delays: vec![Seconds(0.0), Seconds(delay)], ..ErrorPoint::none(2) };
-        let norm = norm_at(&tracked.bank, &point, Taps::Scheduled).unwrap().0;
-        assert!(norm <= followed, "{delay}: {norm} {followed}");
-    }
 }
 
 /// The mean over Gaussian errors of one delay, which the samples of its converter share, by the rule of

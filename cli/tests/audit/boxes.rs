@@ -12,10 +12,9 @@ use serde_json::{Value, json};
 use std::f64::consts::PI;
 
 const SEED: u64 = 0xA0D1_B000;
-/// Boxes, robust designs and tracked designs of the short form.
+/// Boxes and robust designs of the short form.
 const BOXES: usize = 2;
 const ROBUST: usize = 1;
-const TRACKED: usize = 1;
 /// Frequencies that are looked at for each point of a box.
 const FREQUENCIES: usize = 16;
 /// Vertices that are looked at, and points within.
@@ -54,7 +53,6 @@ fn vertices(half: &[f64], most: usize, dice: &mut Random) -> Vec<Vec<f64>> {
 struct Search<'a> {
     bank: &'a Value,
     half: &'a Errors,
-    follows: bool,
     library: Library,
 }
 
@@ -83,7 +81,7 @@ impl Errors {
 
 impl Search<'_> {
     fn judge(&mut self, errors: &Errors) -> Judge {
-        Judge::off_by(self.bank, errors, self.follows, &mut self.library)
+        Judge::off_by(self.bank, errors, &mut self.library)
     }
 
     /// The best frequency of a list.
@@ -197,8 +195,8 @@ fn boxed(seed: u64) -> Tally {
     let case = &report["worst_case"];
     let (lower, upper) = (at(case, "/lower").unwrap_or(f64::NAN), at(case, "/upper").unwrap_or(f64::NAN));
     let (point, omega) = (errors_of(&case["point"], 1.0), at(case, "/frequency").unwrap_or(0.0));
-    let attained = Judge::off_by(&bank, &point, false, &mut Library::default()).gain(omega);
-    let mut search = Search { bank: &bank, half: &half, follows: false, library: Library::default() };
+    let attained = Judge::off_by(&bank, &point, &mut Library::default()).gain(omega);
+    let mut search = Search { bank: &bank, half: &half, library: Library::default() };
     let found = search.run(Some((point, omega)), &mut dice);
     if lower > attained * (1.0 + 1e-12) {
         tally.refuted.push(format!("{name}, {half:?}: lower end {lower:e}, there {attained:e}"));
@@ -233,9 +231,9 @@ fn robust_taps(bank: &Value, half: &Errors, count: usize, dice: &mut Random) -> 
     Some(other)
 }
 
-/// A robust or a tracked design.
-fn uncertain(seed: u64, follows: bool) -> Tally {
-    let mut dice = Random(SEED + 0x800 * (1 + u64::from(follows)) + seed);
+/// A robust design.
+fn uncertain(seed: u64) -> Tally {
+    let mut dice = Random(SEED + 0x800 + seed);
     let mut spec = plant(&mut dice);
     let channels = spec["channel"].as_array().map_or(1, Vec::len);
     let size = 0.005 * 30f64.powf(dice.part());
@@ -248,19 +246,14 @@ fn uncertain(seed: u64, follows: bool) -> Tally {
         }
     };
     let mut table = json!({ "delay_samples": widths(&mut dice, size), "reference": dice.below(2) });
-    if follows {
-        spec["design"]["tracking"] = "affine".into();
-    } else {
-        if dice.part() < 0.5 {
-            table["gain"] = widths(&mut dice, 0.3 * size);
-        }
-        if dice.part() < 0.3 {
-            table["cutoff"] = widths(&mut dice, 0.2 * size);
-        }
+    if dice.part() < 0.5 {
+        table["gain"] = widths(&mut dice, 0.3 * size);
+    }
+    if dice.part() < 0.3 {
+        table["cutoff"] = widths(&mut dice, 0.2 * size);
     }
     spec["uncertainty"] = table;
-    let kind = if follows { "tracked" } else { "robust" };
-    let name = format!("{kind} {seed}: {spec}");
+    let name = format!("robust {seed}: {spec}");
     let desk = Desk::empty();
     let (bank, report) = match designed(&desk, &spec) {
         Outcome::Bank { bank, report } => (bank, report),
@@ -274,11 +267,11 @@ fn uncertain(seed: u64, follows: bool) -> Tally {
     tally.widths.clear();
     tally.excesses.clear();
     tally.notes.clear();
-    let study = &report[if follows { "tracking" } else { "robust" }];
+    let study = &report["robust"];
     let half = errors_of(&study["errors"], 1.0);
-    let mut search = Search { bank: &bank, half: &half, follows, library: Library::default() };
+    let mut search = Search { bank: &bank, half: &half, library: Library::default() };
     let found = search.run(None, &mut dice);
-    let stated = at(&bank, if follows { "/gamma/tracked" } else { "/gamma/worst_case" });
+    let stated = at(&bank, "/gamma/worst_case");
     match stated {
         None => tally.unproven.push(format!("{name}: no worst case is stated; found {:e}", found.gain)),
         Some(stated) => {
@@ -290,7 +283,7 @@ fn uncertain(seed: u64, follows: bool) -> Tally {
             }
         }
     }
-    let printed = at(study, if follows { "/tracked/largest_found" } else { "/robust/largest_found" });
+    let printed = at(study, "/robust/largest_found");
     if let Some(printed) = printed
         && found.gain > printed * (1.0 + SEARCH)
     {
@@ -299,8 +292,8 @@ fn uncertain(seed: u64, follows: bool) -> Tally {
             .push(format!("{name}: printed {printed:e}, found {:e} at {:?}", found.gain, found.errors));
     }
     let count = bank["channels"][0]["taps"].as_array().map_or(0, Vec::len);
-    if !follows && let Some(other) = robust_taps(&bank, &half, count, &mut dice) {
-        let mut search = Search { bank: &other, half: &half, follows, library: Library::default() };
+    if let Some(other) = robust_taps(&bank, &half, count, &mut dice) {
+        let mut search = Search { bank: &other, half: &half, library: Library::default() };
         let reachable = search.run(Some((found.errors, found.omega)), &mut dice).gain;
         tally.excesses.push(found.gain / reachable - 1.0);
         if found.gain > reachable * 1.01 {
@@ -317,12 +310,7 @@ fn no_worst_case_over_a_box_is_exceeded() {
 
 #[test]
 fn no_worst_case_of_a_robust_bank_is_exceeded() {
-    campaign(ROBUST, "robust banks", |seed| uncertain(seed, false));
-}
-
-#[test]
-fn no_worst_case_of_a_tracked_bank_is_exceeded() {
-    campaign(TRACKED, "tracked banks", |seed| uncertain(seed, true));
+    campaign(ROBUST, "robust banks", uncertain);
 }
 
 /// The worst cases of the example of the thesis with both delays off, in docs/uncertainty.md and
@@ -335,9 +323,7 @@ fn the_worst_cases_in_the_docs_are_true() {
         let half = Errors { delays: vec![size; 2], ..Errors::none(2) };
         let mut dice = Random(SEED);
         let mut worst = |bank: &Value| {
-            Search { bank, half: &half, follows: false, library: Library::default() }
-                .run(None, &mut dice)
-                .gain
+            Search { bank, half: &half, library: Library::default() }.run(None, &mut dice).gain
         };
         let found = worst(&bank);
         assert!((found / nominal - 1.0).abs() < 1e-5, "{size}: {found}");

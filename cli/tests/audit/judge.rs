@@ -49,9 +49,8 @@ pub(crate) fn on_circle(omega: f64) -> Complex {
 }
 
 impl Filters {
-    /// The taps or matrices of a bank file. With `moved` delays (fast periods) the taps follow by their
-    /// slopes.
-    pub(crate) fn read(bank: &Value, moved: Option<&[f64]>) -> Self {
+    /// The taps or matrices of a bank file.
+    pub(crate) fn read(bank: &Value) -> Self {
         if let Some(block) = bank.get("state_space").filter(|block| block.is_object()) {
             let rows =
                 |key: &str| block[key].as_array().expect("rows").iter().map(numbers).collect::<Vec<_>>();
@@ -60,14 +59,7 @@ impl Filters {
         }
         let channels = bank["channels"].as_array().expect("channels");
         let of = |list: &Value| numbers(list).into_iter().map(real).collect::<Vec<_>>();
-        let mut taps: Vec<Vec<Real>> = channels.iter().map(|channel| of(&channel["taps"])).collect();
-        for (j, shift) in moved.unwrap_or_default().iter().enumerate() {
-            let Some(slopes) = channels[j].get("tap_slopes").and_then(Value::as_array) else { continue };
-            for (taps, slopes) in taps.iter_mut().zip(slopes) {
-                taps.iter_mut().zip(of(slopes)).for_each(|(tap, slope)| *tap += slope * real(*shift));
-            }
-        }
-        Self::Taps(taps)
+        Self::Taps(channels.iter().map(|channel| of(&channel["taps"])).collect())
     }
 
     /// Taps that were found elsewhere.
@@ -138,14 +130,14 @@ impl Judge {
     /// A bank as its file says.
     pub(crate) fn of(bank: &Value) -> Self {
         let channels = bank["channels"].as_array().expect("channels").len();
-        Self::off_by(bank, &Errors::none(channels), false, &mut Library::default())
+        Self::off_by(bank, &Errors::none(channels), &mut Library::default())
     }
 
-    /// The same with channels that are off by `errors`, and with delay-scheduled taps if asked.
-    pub(crate) fn off_by(bank: &Value, errors: &Errors, follows: bool, library: &mut Library) -> Self {
+    /// The same with channels that are off by `errors`.
+    pub(crate) fn off_by(bank: &Value, errors: &Errors, library: &mut Library) -> Self {
         let latency = bank["latency"].as_u64().expect("a latency") as usize;
         let plant = Plant::new(&bank["spec"], latency, errors, library);
-        Self { plant, filters: Filters::read(bank, follows.then_some(&errors.delays[..])) }
+        Self { plant, filters: Filters::read(bank) }
     }
 
     /// K K* at z, every cancellation done in all digits.

@@ -72,7 +72,7 @@ const fn timed(channels: usize, ratio: usize, latency: usize, design: &'static s
 
 /// `hybank design --no-limit` of a release build on one core of an Intel Xeon (family 6, model 207) that is
 /// shared with other work, 2026-11-26; the last ones on an AMD EPYC (Zen 4), 2026-11-22.
-const TIMED: [Timed; 41] = [
+const TIMED: [Timed; 40] = [
     timed(2, 2, 10, "method = \"iir\"", 0.08),
     timed(2, 2, 32, "method = \"iir\"", 0.28),
     timed(2, 2, 100, "method = \"iir\"", 2.5),
@@ -100,7 +100,6 @@ const TIMED: [Timed; 41] = [
     timed(2, 2, 32, "taps = 64\n[uncertainty]\ndelay_samples = 0.1", 2.7),
     timed(4, 4, 12, "taps = 24\n[uncertainty]\ndelay_samples = 0.1", 2.5),
     timed(2, 2, 10, "taps = 22\n[uncertainty]\ndelay_samples = 0.1\ncutoff = 0.01", 5.9),
-    timed(2, 2, 10, "taps = 22\ntracking = \"affine\"\n[uncertainty]\ndelay_samples = 0.1", 1.1),
     timed(2, 2, 100, "method = \"iir\"", 1.0),
     timed(2, 2, 200, "method = \"h2\"", 6.8),
     timed(2, 2, 32, "taps = 64", 0.11),

@@ -41,8 +41,6 @@ mod simulate;
 mod snapshots;
 #[cfg(unix)]
 mod stream;
-mod track;
-mod two_clocks;
 mod understanding;
 mod usage;
 mod verify;

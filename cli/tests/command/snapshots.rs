@@ -130,7 +130,6 @@ fn reports_are_what_they_were() {
     desk.write("audio.toml", AUDIO);
     desk.write("taps.csv", "ch1,ch2\n0.1,0.2\n0.5,0.9\n0.4,-0.2\n");
     desk.write("lost.jsonl", "{\"channel\": 2, \"first\": 40, \"length\": 3}\n");
-    desk.write("drift.toml", format!("{THESIS}\n[uncertainty]\ndelay_samples = 0.1\n"));
     for (name, args) in [
         ("design-fir", &["design", "spec.toml", "-o", "fir.json"][..]),
         ("design-fir-verbose", &["design", "spec.toml", "-o", "fir.json", "--verbose", "--force"]),
@@ -155,11 +154,6 @@ fn reports_are_what_they_were() {
         ),
         ("design-robust", &["design", "robust.toml", "-o", "robust.json", "--verbose"]),
         ("verify-robust", &["verify", "robust.json"]),
-        (
-            "design-tracking",
-            &["design", "drift.toml", "-o", "drift.json", "--tracking", "affine", "--verbose"],
-        ),
-        ("verify-tracking", &["verify", "drift.json"]),
         ("verify-fir", &["verify", "fir.json"]),
         ("verify-iir", &["verify", "iir.json"]),
         ("simulate", &["simulate", "spec.toml", "--source", "step@0.3", "-o", "cap"]),

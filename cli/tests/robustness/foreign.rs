@@ -192,7 +192,6 @@ fn foreign_names_and_arguments_are_quoted_and_bounded() {
             &["fuse", "bank.json", "a.wav", "b.wav", "-o", text],
             &["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--gaps", "zero", "--lost", text],
             &["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--gaps", text],
-            &["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--track", text],
             &["stream", "bank.json", "--input", text, "-o", "out"],
             &["stream", "bank.json", "--format", text],
             &["measure", text],

@@ -53,7 +53,7 @@ fn the_highest_peak_is_that_of_the_whole_grid() {
         let grid = ErrorGrid::new(&plant, lags).unwrap();
         for _ in 0..8 {
             let taps: Taps = (0..lags).map(|_| Mat::from_fn(2, 2, |_, _| random.sample())).collect();
-            let highest = |peaks: &Peaks<usize>| {
+            let highest = |peaks: &Peaks<()>| {
                 peaks.peaks.iter().cloned().max_by(|a, b| a.gain.total_cmp(&b.gain)).unwrap()
             };
             let all = grid.peaks(&taps, 0.0).unwrap();

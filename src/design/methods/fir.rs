@@ -48,24 +48,15 @@ pub(super) fn taps_of_least_gamma(
     Ok(least_gamma(plant, settings.taps, &mut exchange(plant, settings)?)?.taps)
 }
 
-/// The least gamma of `taps` taps per channel within `accuracy` (relative), on the grid of the exchange.
-///
-/// # Errors
-/// As [`synthesise`].
-pub(super) fn estimate(plant: &LiftedPlant, taps: usize, accuracy: f64) -> Result<f64, DesignError> {
-    let mut exchange = exchange(plant, &Settings { taps, ..Settings::default() })?;
-    Ok(exchange.compare(accuracy)?.peaks.estimate)
-}
-
 fn exchange<'a>(plant: &'a LiftedPlant, settings: &Settings) -> Result<Exchange<ErrorGrid<'a>>, DesignError> {
     let lags = tap_lags(plant.ratio(), settings.taps);
     let grid = ErrorGrid::new(plant, lags[0])?;
-    let (points, weights) = grid.coarse(0);
+    let (points, weights) = grid.coarse();
     let noise = plant.problem().noise.clone();
     let margin = settings.gamma_margin.unwrap_or_else(|| usual_margin(&noise));
     let objective = MeanSquareObjective { weights, noise };
     let problem = Problem::new(points, lags);
-    let mut exchange = Exchange::new(grid, problem, std::iter::repeat(0), objective, margin);
+    let mut exchange = Exchange::new(grid, problem, std::iter::repeat(()), objective, margin);
     exchange.stop = settings.stop.clone();
     Ok(exchange)
 }
@@ -101,7 +92,7 @@ fn least_gamma(
     for _ in 0..MISSED_PEAK_LIMIT {
         if !best.is_missed()
             || exchange.stop.is_due()
-            || !exchange.add(&[Location { frequency: best.peak.frequency, scenario: 0 }])
+            || !exchange.add(&[Location { frequency: best.peak.frequency, scenario: () }])
         {
             break;
         }

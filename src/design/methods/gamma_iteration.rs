@@ -302,7 +302,6 @@ impl<'a> GammaIteration<'a> {
             unfinished: None,
             iterations: self.trials,
             robust: None,
-            affine: None,
         }
     }
 }

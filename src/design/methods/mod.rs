@@ -20,7 +20,6 @@ pub(crate) mod iir;
 mod mean_square_fir;
 mod precise_filtering;
 pub(crate) mod robust_fir;
-pub(crate) mod scheduled_fir;
 
 use super::DesignError;
 pub(crate) use super::exchange::{DualPoint, DualSolution, GAMMA_ACCURACY};
@@ -102,8 +101,6 @@ pub(crate) struct Synthesis {
     pub(crate) iterations: usize,
     /// For a robust design.
     pub(crate) robust: Option<robust_fir::RobustStudy>,
-    /// For delay-scheduled taps; `filters` are those without errors.
-    pub(crate) affine: Option<scheduled_fir::AffineDesign>,
 }
 
 impl Synthesis {
@@ -130,7 +127,6 @@ impl Synthesis {
             unfinished: None,
             iterations: 0,
             robust: None,
-            affine: None,
         })
     }
 }
@@ -150,10 +146,7 @@ pub(crate) fn synthesise(
     settings: &Settings,
 ) -> Result<Synthesis, DesignError> {
     if let (Method::Fir, Some(problem)) = (method, &settings.robust) {
-        return match problem.spec.design.tracking {
-            true => scheduled_fir::synthesise(plant, settings, problem),
-            false => robust_fir::synthesise(plant, settings, problem),
-        };
+        return robust_fir::synthesise(plant, settings, problem);
     }
     match method {
         Method::Fir => fir::synthesise(plant, settings),

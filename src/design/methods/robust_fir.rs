@@ -4,24 +4,22 @@
 //! taps, and a scenario is nothing but more frequencies, so the exchange of [`crate::design::exchange`]
 //! solves it: it adds pairs of a frequency and a combination where the error peaks, as the search of
 //! [`crate::design::uncertainty::search`] finds them, and its dual stays a lower bound for all banks of that
-//! length over the box. Here the taps are fixed; `scheduled_fir` has taps that are scheduled by the delays.
+//! length over the box.
 
 use super::{Filters, Settings, Synthesis, fir, tap_lags};
 use crate::design::DesignError;
 use crate::design::error_grid::{AffineError, ErrorGrid, Location, Peaks};
 use crate::design::exchange::{Exchange, Tolerances};
-use crate::design::filters::{impulse_responses, polyphase};
+use crate::design::filters::{FilterResponse, impulse_responses, polyphase};
 use crate::design::plant::LiftedPlant;
-use crate::design::problem::Problem;
 use crate::design::uncertainty::box_plant::{BoxPlant, Combination};
-use crate::design::uncertainty::moving_filters::MovingFilters;
 use crate::design::uncertainty::search::BoxSearch;
 use crate::design::unfinished::Unfinished;
 use crate::linalg::{self, CMat};
 use crate::lmi::sampled::{MeanSquareObjective, Point, Problem as SampledProblem, Taps};
 use crate::lti::peak::Peak;
 use crate::spec::{Method, Spec};
-use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Side};
+use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
 
 /// A nominal bank whose largest gain is within this of a lower bound is kept.
 const NO_GAIN: f64 = 1e-3;
@@ -87,7 +85,6 @@ pub(crate) fn synthesise(
         peak: found.peak,
         dual: nominal.dual,
         robust,
-        affine: None,
     })
 }
 
@@ -108,14 +105,14 @@ fn study_of(nominal: &Synthesis, taps: &[Vec<f64>], search: &BoxSearch) -> Resul
 }
 
 /// Errors with the norm of some taps.
-pub(super) struct WorstErrors {
+struct WorstErrors {
     point: ErrorPoint,
-    pub(super) peak: Peak,
+    peak: Peak,
 }
 
 /// The largest norm found of the taps over the box.
-pub(super) fn worst_of(search: &BoxSearch, taps: &[Vec<f64>]) -> Result<WorstErrors, DesignError> {
-    let filters = MovingFilters::fixed(polyphase(taps, search.plant().ratio()));
+fn worst_of(search: &BoxSearch, taps: &[Vec<f64>]) -> Result<WorstErrors, DesignError> {
+    let filters = FilterResponse::Polynomial(polyphase(taps, search.plant().ratio()));
     let norm = |point: ErrorPoint| {
         let peak = search.plant().moved(&point)?.fir_norm(taps)?;
         Ok::<_, DesignError>(WorstErrors { point, peak })
@@ -197,7 +194,7 @@ impl AffineError for BoxError {
     }
 
     fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<Combination>, DesignError> {
-        let found = self.search.peaks(&MovingFilters::fixed(taps.clone()), level)?;
+        let found = self.search.peaks(&FilterResponse::Polynomial(taps.clone()), level)?;
         Ok(Peaks { estimate: found.estimate.max(gamma), ..found })
     }
 }
@@ -208,7 +205,7 @@ fn exchange(
     settings: &Settings,
 ) -> Result<Exchange<BoxError>, DesignError> {
     let lags = tap_lags(plant.ratio(), settings.taps);
-    let (points, weights) = ErrorGrid::new(plant, lags[0])?.coarse(0);
+    let (points, weights) = ErrorGrid::new(plant, lags[0])?.coarse();
     let noise = plant.problem().noise.clone();
     let margin = settings.gamma_margin.unwrap_or(NORM_MARGIN).max(NORM_MARGIN);
     let problem = SampledProblem::new(points, lags);
@@ -221,9 +218,9 @@ fn exchange(
 }
 
 /// Relative width of the interval of the worst norm over the scenarios.
-pub(super) const NORM_ACCURACY: f64 = 1e-4;
+const NORM_ACCURACY: f64 = 1e-4;
 /// Relative margin of that norm for the least mean square without errors.
-pub(super) const NORM_MARGIN: f64 = 2e-4;
+const NORM_MARGIN: f64 = 2e-4;
 
 /// The norms of a bank, computed (h = 1).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -235,12 +232,7 @@ pub struct RobustNorms {
 }
 
 /// Limit on the number of times that an exchange is repeated with errors that it did not know.
-pub(super) const MISSED_ERROR_LIMIT: usize = 8;
-
-/// Most scenarios to begin with.
-pub(super) const MAX_SCENARIOS: usize = 64;
-/// Points on each side of the box that are tried, most first.
-const STEPS: [usize; 4] = [9, 5, 3, 2];
+const MISSED_ERROR_LIMIT: usize = 8;
 
 /// What a robust design is made for.
 #[derive(Debug, Clone)]
@@ -259,75 +251,14 @@ impl RobustProblem {
         is_robust.then(|| Self { spec: spec.clone(), errors })
     }
 
-    /// The number of points with a plant of their own.
-    pub(crate) fn scenario_count(&self) -> usize {
-        scenarios(&self.errors).len()
-    }
-
     /// The search for the worst errors of filters with so many taps; `plant` is the one without errors.
     ///
     /// # Errors
     /// As [`Problem::with_errors`].
-    pub(super) fn search(&self, plant: &LiftedPlant, taps: usize) -> Result<BoxSearch, DesignError> {
+    fn search(&self, plant: &LiftedPlant, taps: usize) -> Result<BoxSearch, DesignError> {
         let front_ends = BoxPlant::new(&self.spec, plant.problem().latency, &self.errors)?;
         BoxSearch::new(front_ends, tap_lags(plant.ratio(), taps)[0], &[])
     }
-
-    /// The scenarios with their plants; `plant` is the one without errors.
-    pub(super) fn moved_plants(&self, plant: &LiftedPlant) -> Result<Vec<MovedPlant>, DesignError> {
-        let moved = |point: ErrorPoint| {
-            let problem = Problem::with_errors(&self.spec, plant.problem().latency, &point)?;
-            Ok(MovedPlant { plant: LiftedPlant::new(&problem), point })
-        };
-        scenarios(&self.errors).into_iter().map(moved).collect()
-    }
-}
-
-/// A point of the box with its plant.
-pub(super) struct MovedPlant {
-    pub(super) point: ErrorPoint,
-    pub(super) plant: LiftedPlant,
-}
-
-/// Points of the box: a lattice over all sides, or its ends where there are many, or its most different
-/// corners where there are very many.
-pub(super) fn scenarios(errors: &ErrorBox) -> Vec<ErrorPoint> {
-    let sides = errors.sides();
-    // The error is affine in the gains: only their ends matter.
-    let steps = |side: &Side, most: usize| if matches!(side, Side::Gain(_)) { 2 } else { most };
-    let count = |most: usize| sides.iter().fold(1usize, |all, side| all.saturating_mul(steps(side, most)));
-    match STEPS.into_iter().find(|&most| count(most) <= MAX_SCENARIOS) {
-        Some(most) => {
-            let per_side: Vec<usize> = sides.iter().map(|side| steps(side, most)).collect();
-            (0..count(most)).map(|index| lattice_point(errors, &sides, &per_side, index)).collect()
-        }
-        None => corners(errors, &sides),
-    }
-}
-
-fn lattice_point(errors: &ErrorBox, sides: &[Side], per_side: &[usize], index: usize) -> ErrorPoint {
-    let mut rest = index;
-    let shares: Vec<f64> = per_side
-        .iter()
-        .map(|&count| {
-            let step = rest % count;
-            rest /= count;
-            2.0 * step as f64 / (count - 1) as f64 - 1.0
-        })
-        .collect();
-    errors.point_at(sides, &shares)
-}
-
-/// Rows of a Hadamard matrix and their opposites: corners that differ from each other in half of the sides.
-fn corners(errors: &ErrorBox, sides: &[Side]) -> Vec<ErrorPoint> {
-    let sign = |row: usize, side: usize| if (row & side).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 };
-    (0..MAX_SCENARIOS)
-        .map(|corner| {
-            let (row, opposite) = (corner / 2, if corner % 2 == 0 { 1.0 } else { -1.0 });
-            let shares: Vec<f64> = (0..sides.len()).map(|side| opposite * sign(row, side)).collect();
-            errors.point_at(sides, &shares)
-        })
-        .collect()
 }
 
 #[cfg(test)]

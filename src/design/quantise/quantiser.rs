@@ -307,7 +307,7 @@ fn zero_output(error: &TapError<'_>) -> f64 {
 /// `None` if gamma is zero up to rounding: no cap lies above it.
 fn under_cap(error: &TapError<'_>, cap: f64) -> Result<Option<SmallerTaps>, DesignError> {
     let (length, channels) = (error.problem.taps[0].len(), error.problem.taps.len());
-    let (points, mut weights) = error.grid.coarse(0);
+    let (points, mut weights) = error.grid.coarse();
     weights.iter_mut().for_each(|weight| *weight *= ERROR_WEIGHT);
     let lags = tap_lags(error.ratio, length);
     let problem = Problem::new(points, lags);

@@ -5,7 +5,6 @@
 //! with one input for all. Errors of gains are factors of rows. No other plant is lifted while the worst
 //! combination is searched.
 
-use super::moving_filters::FiltersAt;
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::design::problem::Problem;
@@ -256,9 +255,8 @@ impl BoxPlant {
     }
 
     /// K of a combination.
-    pub(super) fn error(&self, response: &BoxResponse, filters: &FiltersAt, combination: &[usize]) -> CMat {
-        let moved = filters.moved(|j| self.options[j][combination[j]].delay.0);
-        &response.references - moved * self.measurements(response, combination)
+    pub(super) fn error(&self, response: &BoxResponse, filters: &CMat, combination: &[usize]) -> CMat {
+        &response.references - filters * self.measurements(response, combination)
     }
 
     /// The rows of a node's samples.

@@ -23,7 +23,6 @@
 pub(super) mod box_plant;
 mod derivatives;
 mod floor;
-pub(super) mod moving_filters;
 pub(super) mod search;
 mod study;
 #[cfg(test)]
@@ -41,27 +40,22 @@ use super::DesignError;
 use super::plant::LiftedPlant;
 use super::problem::Problem;
 use crate::bank::Bank;
-use crate::verify::uncertainty::{ErrorBox, Taps, WorstCase, certifies, worst_case as proven_worst_case};
+use crate::verify::uncertainty::{ErrorBox, WorstCase, certifies, worst_case as proven_worst_case};
 
 /// Doublings of the box in the search for the largest one that is affordable.
 const MAX_DOUBLINGS: usize = 24;
 /// Relative width at which the bisection ends.
 const FACTOR_ACCURACY: f64 = 0.01;
 
-/// The worst case of `bank` over `errors`, with fixed or with delay-scheduled taps, proven from both sides,
-/// at most `accuracy` (relative) apart where the work allows.
+/// The worst case of `bank` over `errors`, proven from both sides, at most `accuracy` (relative) apart where
+/// the work allows.
 ///
 /// # Errors
 /// As [`super::analyze`]; [`DesignError::Verify`] as [`crate::verify::uncertainty::worst_case`].
-pub fn worst_case(
-    bank: &Bank,
-    errors: &ErrorBox,
-    taps: Taps,
-    accuracy: f64,
-) -> Result<WorstCase, DesignError> {
+pub fn worst_case(bank: &Bank, errors: &ErrorBox, accuracy: f64) -> Result<WorstCase, DesignError> {
     errors.check(bank.channel_count())?;
-    let candidates = search::candidates(bank, errors, taps)?;
-    Ok(proven_worst_case(bank, errors, taps, accuracy, &candidates)?)
+    let candidates = search::candidates(bank, errors)?;
+    Ok(proven_worst_case(bank, errors, accuracy, &candidates)?)
 }
 
 /// The largest factor t for which errors in t times the box are proven to cost at most `loss` (relative to
@@ -76,7 +70,7 @@ pub fn affordable(bank: &Bank, errors: &ErrorBox, loss: f64) -> Result<f64, Desi
     let is_certified = |factor: f64| -> Result<bool, DesignError> {
         let scaled = errors.scaled(factor);
         // Gains and cut-offs of 50 % are out of the range of the proof.
-        Ok(scaled.check(bank.channel_count()).is_ok() && certifies(bank, &scaled, Taps::Fixed, allowed)?)
+        Ok(scaled.check(bank.channel_count()).is_ok() && certifies(bank, &scaled, allowed)?)
     };
     let is_whole = is_certified(1.0)?;
     let (mut within, mut beyond) = if is_whole { (1.0, f64::INFINITY) } else { (0.0, 1.0) };

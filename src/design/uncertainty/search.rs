@@ -9,16 +9,16 @@
 //! So what is found is attained. That nothing larger was missed is not proven; `verify` has an upper bound.
 
 use super::box_plant::{BoxPlant, BoxResponse, Combination};
-use super::moving_filters::{FiltersAt, MovingFilters};
 use crate::bank::Bank;
 use crate::design::DesignError;
 use crate::design::error_grid::{Frequencies, LocatedPeak, Location, PRUNE_LEVEL, Peaks};
+use crate::design::filters::FilterResponse;
 use crate::design::plant::LiftedPlant;
 use crate::design::problem::Problem;
 use crate::linalg::{self, CMat, Complex};
 use crate::lti::peak::{Peak, local_maxima, refine};
 use crate::units::RadiansPerSlowPeriod;
-use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Taps};
+use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
 use std::cell::OnceCell;
 
 /// Steps of a climb; two or three suffice.
@@ -37,17 +37,12 @@ const NEAR_WORST: f64 = 0.9;
 /// is flat at its peak.
 const HALVINGS: i32 = 6;
 
-/// The norm of `bank` with the errors of `point`, and the frequency of its peak, with fixed or with
-/// delay-scheduled taps.
+/// The norm of `bank` with the errors of `point`, and the frequency of its peak.
 ///
 /// # Errors
 /// As [`super::super::analyze`].
-pub fn norm_at(
-    bank: &Bank,
-    point: &ErrorPoint,
-    taps: Taps,
-) -> Result<(f64, RadiansPerSlowPeriod), DesignError> {
-    let peak = LiftedPlant::new(&moved(bank, point)?).bank_norm(&taps.filters(bank, point))?;
+pub fn norm_at(bank: &Bank, point: &ErrorPoint) -> Result<(f64, RadiansPerSlowPeriod), DesignError> {
+    let peak = LiftedPlant::new(&moved(bank, point)?).bank_norm(&bank.filters)?;
     Ok((peak.gain, RadiansPerSlowPeriod(peak.frequency)))
 }
 
@@ -63,14 +58,13 @@ pub(super) fn moved(bank: &Bank, point: &ErrorPoint) -> Result<Problem, DesignEr
 pub(super) fn candidates(
     bank: &Bank,
     errors: &ErrorBox,
-    taps: Taps,
 ) -> Result<Vec<(ErrorPoint, RadiansPerSlowPeriod)>, DesignError> {
     let plant = BoxPlant::new(bank.spec.as_ref().ok_or(DesignError::NoSpec)?, bank.latency, errors)?;
-    let filters = MovingFilters::of(bank, taps)?;
-    let search = BoxSearch::new(plant, filters.nominal.lags(), filters.nominal.resonances())?;
+    let filters = FilterResponse::new(bank)?;
+    let search = BoxSearch::new(plant, filters.lags(), filters.resonances())?;
     let mut points = search.worst_points(&filters)?;
     points.push(ErrorPoint::none(bank.channel_count()));
-    let norm = |point: ErrorPoint| Ok((norm_at(bank, &point, taps)?.1, point));
+    let norm = |point: ErrorPoint| Ok((norm_at(bank, &point)?.1, point));
     let found = points.into_iter().map(norm).collect::<Result<Vec<_>, DesignError>>()?;
     Ok(found.into_iter().map(|(frequency, point)| (point, frequency)).collect())
 }
@@ -126,7 +120,7 @@ impl BoxSearch {
     /// [`DesignError::Linalg`] if a decomposition does not converge.
     pub(in crate::design) fn peaks(
         &self,
-        filters: &MovingFilters,
+        filters: &FilterResponse,
         level: f64,
     ) -> Result<Peaks<Combination>, DesignError> {
         let found = self.sweep(filters, PRUNE_LEVEL * level)?;
@@ -137,7 +131,7 @@ impl BoxSearch {
     fn peaks_among(
         &self,
         found: &[Vec<Found>],
-        filters: &MovingFilters,
+        filters: &FilterResponse,
         level: f64,
     ) -> Result<Peaks<Combination>, DesignError> {
         let grid: Vec<Peak> = found
@@ -162,7 +156,7 @@ impl BoxSearch {
 
     /// The combinations found at each frequency, the worst first. Where the gains are below `level` some
     /// frequencies are left out.
-    fn sweep(&self, filters: &MovingFilters, level: f64) -> Result<Vec<Vec<Found>>, DesignError> {
+    fn sweep(&self, filters: &FilterResponse, level: f64) -> Result<Vec<Vec<Found>>, DesignError> {
         let mut all: Vec<Vec<Found>> = vec![Vec::new(); self.frequencies.all.len()];
         let mut carried = vec![vec![0; self.plant.options().len()]];
         for &k in &self.frequencies.first {
@@ -186,11 +180,7 @@ impl BoxSearch {
     }
 
     /// Some corners of the box: those of the largest gains among [`BoxPlant::corners`].
-    fn worst_corners(
-        &self,
-        response: &BoxResponse,
-        filters: &FiltersAt,
-    ) -> Result<Vec<Combination>, DesignError> {
+    fn worst_corners(&self, response: &BoxResponse, filters: &CMat) -> Result<Vec<Combination>, DesignError> {
         let found = |corner: &Combination| {
             Ok(Found { gain: self.gain(response, filters, corner)?, combination: corner.clone() })
         };
@@ -200,12 +190,7 @@ impl BoxSearch {
     }
 
     /// Where the climbs from `starts` end, the worst first.
-    fn climbed(
-        &self,
-        starts: Vec<Combination>,
-        k: usize,
-        filters: &FiltersAt,
-    ) -> Result<Vec<Found>, DesignError> {
+    fn climbed(&self, starts: Vec<Combination>, k: usize, filters: &CMat) -> Result<Vec<Found>, DesignError> {
         let mut all: Vec<Found> = Vec::new();
         for start in starts {
             let found = climb(&self.plant, self.response(k), filters, start)?;
@@ -223,7 +208,7 @@ impl BoxSearch {
         &self,
         found: &[Found],
         k: usize,
-        filters: &MovingFilters,
+        filters: &FilterResponse,
     ) -> Result<Vec<Found>, DesignError> {
         let (response, at) = (self.response(k), filters.at(self.frequencies.all[k]));
         let mut starts = Vec::new();
@@ -248,7 +233,7 @@ impl BoxSearch {
     fn gain(
         &self,
         response: &BoxResponse,
-        filters: &FiltersAt,
+        filters: &CMat,
         combination: &[usize],
     ) -> Result<f64, DesignError> {
         Ok(linalg::largest_singular_value(&self.plant.error(response, filters, combination))?)
@@ -259,7 +244,7 @@ impl BoxSearch {
         &self,
         combination: &[usize],
         around: [Peak; 3],
-        filters: &MovingFilters,
+        filters: &FilterResponse,
     ) -> Result<Peak, DesignError> {
         let at = |frequency: f64| {
             let response = self.plant.response(frequency);
@@ -281,7 +266,7 @@ impl BoxSearch {
     /// As [`BoxSearch::peaks`].
     pub(in crate::design) fn worst_points(
         &self,
-        filters: &MovingFilters,
+        filters: &FilterResponse,
     ) -> Result<Vec<ErrorPoint>, DesignError> {
         let found = self.sweep(filters, 0.0)?;
         let most = found.iter().map(|found| highest(found)).fold(0.0, f64::max);
@@ -302,7 +287,7 @@ impl BoxSearch {
         &self,
         mut point: ErrorPoint,
         frequency: f64,
-        filters: &MovingFilters,
+        filters: &FilterResponse,
     ) -> Result<ErrorPoint, DesignError> {
         let at = filters.at(frequency);
         for halving in 2..2 + HALVINGS {
@@ -318,7 +303,7 @@ impl BoxSearch {
 fn climb(
     plant: &BoxPlant,
     response: &BoxResponse,
-    filters: &FiltersAt,
+    filters: &CMat,
     mut combination: Combination,
 ) -> Result<Found, DesignError> {
     let mut gain = 0.0;
@@ -329,11 +314,7 @@ fn climb(
         }
         gain = svd.s[0];
         let (left, right) = (svd.u.columns(0, 1).into_owned(), svd.v.columns(0, 1).into_owned());
-        let direction = Direction {
-            samples: &response.nodes * right,
-            nominal: left.ad_mul(&filters.nominal),
-            slopes: filters.slopes.iter().map(|(j, slope)| (*j, left.ad_mul(slope))).collect(),
-        };
+        let direction = Direction { samples: &response.nodes * right, filters: left.ad_mul(filters) };
         if !direction.improve(plant, &mut combination) {
             break;
         }
@@ -355,10 +336,8 @@ fn combinations(found: &[Found]) -> Vec<Combination> {
 struct Direction {
     /// Of all nodes.
     samples: CMat,
-    /// u* F without errors of the delays.
-    nominal: CMat,
-    /// Its change per second of each delay that the taps follow.
-    slopes: Vec<(usize, CMat)>,
+    /// u* F.
+    filters: CMat,
 }
 
 impl Direction {
@@ -386,12 +365,7 @@ impl Direction {
         let chosen = |i: usize| plant.options()[i][combination[i]];
         let term = |i: usize| {
             let gain = Complex::from(1.0 + chosen(i).gain);
-            let of = |(column, row): (usize, usize)| {
-                let slope = |(j, slope): &(usize, CMat)| slope[column] * Complex::from(chosen(*j).delay.0);
-                let filter =
-                    self.slopes.iter().map(slope).fold(self.nominal[column], |sum, slope| sum + slope);
-                (filter * self.samples[row] * gain).re
-            };
+            let of = |(column, row): (usize, usize)| (self.filters[column] * self.samples[row] * gain).re;
             plant.columns(i).zip(plant.rows(chosen(i).node)).map(of).sum::<f64>()
         };
         (0..combination.len()).map(term).sum()

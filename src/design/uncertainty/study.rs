@@ -4,7 +4,7 @@ use super::{DelayDerivatives, Floor, affordable, delay_derivatives, floor, norm_
 use crate::bank::Bank;
 use crate::design::DesignError;
 use crate::units::{Hertz, Seconds};
-use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Slopes, Taps, WorstCase, slopes};
+use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Slopes, WorstCase, slopes};
 
 /// Relative distance of the two ends that is asked for.
 const BOUND_ACCURACY: f64 = 0.01;
@@ -113,7 +113,7 @@ impl BoxStudy {
     fn new(bank: &Bank, errors: ErrorBox, loss: Option<f64>) -> Result<Self, DesignError> {
         let accuracy =
             if bank.channel_count() <= FEW_CHANNELS { BOUND_ACCURACY } else { BOUND_ACCURACY_OF_MANY };
-        let case = worst_case(bank, &errors, Taps::Fixed, accuracy)?;
+        let case = worst_case(bank, &errors, accuracy)?;
         let floor = floor(bank, &errors, &case.point)?;
         let affordable = loss.map(|loss| {
             let factor = affordable(bank, &errors, loss)?;
@@ -166,7 +166,7 @@ impl Sweep {
             let gamma = |share: &f64| {
                 let delays = delays.iter().map(|&delay| delay * *share).collect();
                 let point = ErrorPoint { delays, ..ErrorPoint::none(bank.channel_count()) };
-                norm_at(bank, &point, Taps::Fixed).map(|(gamma, _)| gamma)
+                norm_at(bank, &point).map(|(gamma, _)| gamma)
             };
             Ok(SweepCurve { label, gammas: shares.iter().map(gamma).collect::<Result<_, _>>()? })
         };

@@ -2,7 +2,7 @@ use super::*;
 use crate::design::{Options, design};
 use crate::spec::Spec;
 use crate::units::Seconds;
-use crate::verify::uncertainty::{ErrorPoint, Taps};
+use crate::verify::uncertainty::ErrorPoint;
 
 fn bank(name: &str) -> Bank {
     match name {
@@ -34,7 +34,7 @@ fn derivatives_are_those_of_differences() {
             let at = |shift: f64| {
                 let mut point = ErrorPoint::none(2);
                 point.delays[i] = Seconds(shift);
-                norm_at(&bank, &point, Taps::Fixed).unwrap().0
+                norm_at(&bank, &point).unwrap().0
             };
             let h = 2e-3;
             let difference = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
@@ -67,7 +67,7 @@ fn floors_are_those_of_a_common_shift() {
 fn ten_picoseconds_cost_what_no_bank_can_save() {
     let bank = bank("interleaved");
     let errors = ErrorBox { delays: vec![Seconds(10e-12); 4], ..ErrorBox::none(4) };
-    let found = worst_case(&bank, &errors, Taps::Fixed, 0.01).unwrap();
+    let found = worst_case(&bank, &errors, 0.01).unwrap();
     assert!(found.lower >= 0.01190 && found.upper <= 1.0101 * found.lower, "{found:?}");
     let floor = floor(&bank, &errors, &found.point).unwrap();
     assert!(floor.value() <= found.upper && floor.value() > 0.99 * found.lower, "{floor:?}");
@@ -78,9 +78,9 @@ fn ten_picoseconds_cost_what_no_bank_can_save() {
 fn gains_are_worst_at_a_vertex() {
     let bank = bank("thesis");
     let errors = ErrorBox { gains: vec![0.02; 2], ..ErrorBox::none(2) };
-    let found = worst_case(&bank, &errors, Taps::Fixed, 0.001).unwrap();
+    let found = worst_case(&bank, &errors, 0.001).unwrap();
     let at = |gains: [f64; 2]| {
-        norm_at(&bank, &ErrorPoint { gains: gains.to_vec(), ..ErrorPoint::none(2) }, Taps::Fixed).unwrap().0
+        norm_at(&bank, &ErrorPoint { gains: gains.to_vec(), ..ErrorPoint::none(2) }).unwrap().0
     };
     let most =
         [[0.02, 0.02], [0.02, -0.02], [-0.02, 0.02], [-0.02, -0.02]].map(at).into_iter().fold(0.0, f64::max);
@@ -92,8 +92,8 @@ fn the_affordable_box_costs_what_was_granted() {
     let bank = bank("thesis");
     let errors = ErrorBox { delays: vec![Seconds(0.1); 2], ..ErrorBox::none(2) };
     let factor = affordable(&bank, &errors, 0.02).unwrap();
-    let nominal = norm_at(&bank, &ErrorPoint::none(2), Taps::Fixed).unwrap().0;
-    let worst = |factor: f64| worst_case(&bank, &errors.scaled(factor), Taps::Fixed, 0.002).unwrap();
+    let nominal = norm_at(&bank, &ErrorPoint::none(2)).unwrap().0;
+    let worst = |factor: f64| worst_case(&bank, &errors.scaled(factor), 0.002).unwrap();
     assert!(worst(factor).lower <= 1.02 * nominal, "{factor}");
     assert!(worst(1.15 * factor).upper > 1.02 * nominal, "{factor}");
     assert!(factor > 0.05 && factor < 0.9, "{factor}");

@@ -51,7 +51,7 @@ fn command(
     };
     pipeline.push(recordings, &mut write).unwrap();
     pipeline.flush((recordings.frames() * bank.ratio) as u64, &mut write).unwrap();
-    (written, pipeline.finish().unwrap())
+    (written, pipeline.finish())
 }
 
 #[test]

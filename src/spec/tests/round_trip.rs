@@ -83,9 +83,8 @@ prop_compose! {
             ..UncertaintySpec::default()
         });
         let moves = uncertainty.as_ref().is_some_and(|table| table.delays(channels.len()).iter().any(|d| d.0 > 0.0));
-        let follows = method.reads("tracking") && bits.is_none() && moves;
         let is_sized = method.has_taps() || (method == Method::H2 && reduction.is_none());
-        let by_loss = method.reads("loss_db") && !follows && fraction_bits.is_none() && ratio % 2 == 0;
+        let by_loss = method.reads("loss_db") && fraction_bits.is_none() && ratio % 2 == 0;
         let by_snr = method.reads("target_snr_db") && ratio % 3 == 0;
         Spec {
             name, fast_period, ratio, latency, target,
@@ -103,7 +102,6 @@ prop_compose! {
                 fraction_bits: fraction_bits.filter(|_| method.reads("bits") && bits.is_some()),
                 loss_db: by_loss.then_some(0.25),
                 digits: by_loss && ratio % 4 == 0,
-                tracking: follows,
                 reduction: reduction.filter(|_| method.reads("order") && !(method == Method::H2 && moves)),
             },
         }

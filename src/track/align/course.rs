@@ -1,6 +1,5 @@
 //! The delays over the time that all recordings have in common, and the spec for them.
 
-use super::super::frame_shift::least_half;
 use super::super::timeline::Timeline;
 use super::super::{DelayState, Reading};
 use super::pieces::PieceEstimate;
@@ -15,9 +14,8 @@ use crate::units::{FastPeriods, Seconds};
 const LEAST_DEVIATION: f64 = 1e-6;
 /// Instants at which the extremes of a delay are sought.
 const INSTANTS: u32 = 128;
-/// Half the box of a delay that passes through more than a slow period, in slow periods: taps for all delays
-/// of one, with room for the shifts of frames.
-const WHOLE_PERIOD: f64 = 0.55;
+/// Half the box of a delay that passes through more than a slow period, in slow periods: all delays of one.
+const WHOLE_PERIOD: f64 = 0.5;
 /// Median of the absolute values of a normal law, in its deviations.
 const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 /// Misfits on each side that say how far a reading scatters: sounds change after some pieces.
@@ -110,7 +108,7 @@ impl<'a> Course<'a> {
         let slow = self.slow_period();
         let early = |i: usize| {
             let Extent { middle, half } = self.extent(i);
-            let is_long = half > least_half(slow);
+            let is_long = half > slow * WHOLE_PERIOD;
             let delay = if is_long { self.at(i, self.first).delay } else { middle };
             ((delay - self.spec.channels[i].delay) / slow).round() as i64
         };
@@ -182,9 +180,7 @@ impl<'a> Course<'a> {
             let moved = (self.extent(i).half * 2.0).in_fast_periods(h);
             (moved.0 > NEGLIGIBLE_DELAY_CHANGE).then_some(AlignWarning::FixedTaps { channel: i + 1, moved })
         };
-        if !spec.design.tracking {
-            warnings.extend((0..channels.len()).filter_map(moves));
-        }
+        warnings.extend((0..channels.len()).filter_map(moves));
         (spec, raised)
     }
 
@@ -194,7 +190,7 @@ impl<'a> Course<'a> {
         let (h, slow) = (self.spec.fast_period, self.slow_period());
         let Extent { mut middle, mut half } = self.extent(i);
         middle = middle - self.cut(i, skips);
-        if half > least_half(slow) {
+        if half > slow * WHOLE_PERIOD {
             let channels = self.spec.channels.len();
             let stated = self.spec.uncertainty.as_ref().map_or(0.0, |table| table.delays(channels)[i].0);
             (middle, half) = (self.spec.channels[i].delay, Seconds((slow.0 * WHOLE_PERIOD).max(stated)));

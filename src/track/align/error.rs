@@ -92,8 +92,8 @@ pub enum AlignError {
 pub enum AlignWarning {
     /// A delay moves, and the taps are fixed.
     #[error(
-        "the delay of channel {channel} moves by {:.3} fast periods while the recordings last, and the taps of this spec \
-         are fixed; give [design] tracking = \"affine\", so that taps can follow the table of delays",
+        "the delay of channel {channel} moves by {:.3} fast periods while the recordings last, and the taps of a bank are \
+         fixed; align and fuse shorter pieces, each with a bank for its own delays",
         moved.0
     )]
     FixedTaps {

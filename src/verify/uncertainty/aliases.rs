@@ -19,9 +19,6 @@ use std::f64::consts::{PI, TAU};
 /// K to begin with, and the most.
 const ALIASES: [usize; 2] = [24, 1 << 14];
 
-/// 9 sqrt 3, from below.
-const PARABOLA: f64 = 15.588457268119893;
-
 /// The weight m(nu) of an alias.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Weight {
@@ -32,12 +29,6 @@ pub(super) enum Weight {
     /// min(nu^2 d^2 / 2, 2): the distance of e^{-j nu t}, |t| <= d, from the chord between its ends. (A
     /// function with second derivative at most nu^2 lies within (2 d)^2 nu^2 / 8 of its chord.)
     Chord(f64),
-    /// min(|nu|^3 d^3 / (9 sqrt 3), 9/4): the distance of e^{-j nu t}, |t| <= d, from the parabola through
-    /// its values at -d, 0 and d. (The error is the third derivative over 6 times |t (t^2 - d^2)|, which is
-    /// at most 2 d^3 / (3 sqrt 3); and the parabola is at most 5/4.)
-    Parabola(f64),
-    /// min(|nu| s, 2): the distance of e^{-j nu t} from e^{-j nu (t + s)}.
-    Shift(f64),
 }
 
 /// The moduli of a channel's response at the aliases of a frequency, those of the least |k| first.
@@ -171,8 +162,6 @@ impl Weight {
             Self::One => 1.0,
             Self::Slope => nu,
             Self::Chord(d) => (0.5 * nu * nu * d * d).min(2.0),
-            Self::Parabola(d) => ((nu * d).powi(3) / PARABOLA).min(2.25),
-            Self::Shift(s) => (nu * s).min(2.0),
         }
     }
 
@@ -182,8 +171,6 @@ impl Weight {
             Self::One => return plain(e, far),
             Self::Slope => return plain(e - power, far),
             Self::Chord(d) => Bent { power: 2, bend: 2.0 / d, limit: 2.0 },
-            Self::Parabola(d) => Bent { power: 3, bend: (2.25 * PARABOLA).cbrt() / d, limit: 2.25 },
-            Self::Shift(s) => Bent { power: 1, bend: 2.0 / s, limit: 2.0 },
         };
         bent.far(e, power, far)
     }
@@ -254,7 +241,7 @@ mod tests {
         let filter = FilterSpec::TransferFunction { num: vec![0.1, 0.2, 1.0], den: vec![1.0, 0.9, 1.0] };
         let signal = Transfer::new(&enclosed(None, &filter, Seconds(1.0)).unwrap(), Ball::from(1.0));
         let shaped = FrontEnd { signal: Some(&signal), ..alone(&front_end) };
-        for weight in [Weight::One, Weight::Chord(0.1), Weight::Shift(1e-3)] {
+        for weight in [Weight::One, Weight::Chord(0.1)] {
             let bound = aliases(shaped, 2.0, 3).norm(weight);
             let value = |k: i32| {
                 let nu = (2.0 + TAU * f64::from(k)) / 3.0;
@@ -272,16 +259,8 @@ mod tests {
             [(&[1.0][..], &[1.0, 0.7][..]), (&[0.25], &[1.0, 1.0, 0.25]), (&[1.0], &[1.0, 2.0, 2.0, 1.0])]
         {
             let transfer = transfer(num, den);
-            let weights = [
-                Weight::One,
-                Weight::Slope,
-                Weight::Chord(0.1),
-                Weight::Chord(1e-3),
-                Weight::Chord(0.0),
-                Weight::Parabola(0.1),
-                Weight::Parabola(0.01),
-                Weight::Shift(1e-3),
-            ];
+            let weights =
+                [Weight::One, Weight::Slope, Weight::Chord(0.1), Weight::Chord(1e-3), Weight::Chord(0.0)];
             for weight in weights {
                 if weight == Weight::Slope && den.len() == 2 {
                     continue;
@@ -310,7 +289,7 @@ mod tests {
         let of = |list: &[f64], nu: f64| -> f64 {
             list.iter().enumerate().map(|(p, a)| a * nu.powi(-(p as i32))).sum()
         };
-        for weight in [Weight::One, Weight::Chord(0.1), Weight::Chord(1e-3), Weight::Parabola(0.02)] {
+        for weight in [Weight::One, Weight::Chord(0.1), Weight::Chord(1e-3)] {
             let value = |k: i32| {
                 let nu = far.from + TAU * f64::from(k) / 3.0;
                 2.0 * of(&a, nu) * of(&b, nu) * weight.at(nu) / 3.0

@@ -5,7 +5,7 @@ use super::angle::{cosine_below, outward};
 use super::at_frequency::Verdict;
 use super::judge::Judge;
 use super::memory::{Lags, Memory};
-use super::{ErrorBox, ErrorPoint, Taps, WorstCase};
+use super::{ErrorBox, ErrorPoint, WorstCase};
 use crate::bank::Bank;
 use crate::units::RadiansPerSlowPeriod;
 use std::f64::consts::PI;
@@ -89,13 +89,9 @@ impl Polynomial {
 impl<'a> Cover<'a> {
     /// # Errors
     /// See [`super::worst_case`].
-    pub(super) fn new(bank: &'a Bank, errors: &'a ErrorBox, taps: Taps) -> Result<Self, VerifyError> {
-        let (judge, reference) = Judge::new(bank, errors, taps)?;
-        let mut lags = Lags::new(&bank.filters, bank.ratio, FILTER_TAIL).ok_or(VerifyError::LongMemory)?;
-        for (slope, half) in judge.slopes() {
-            let moving = Lags::new(slope, bank.ratio, FILTER_TAIL).ok_or(VerifyError::LongMemory)?;
-            lags.widen(&moving, half.magnitude());
-        }
+    pub(super) fn new(bank: &'a Bank, errors: &'a ErrorBox) -> Result<Self, VerifyError> {
+        let (judge, reference) = Judge::new(bank, errors)?;
+        let lags = Lags::new(&bank.filters, bank.ratio, FILTER_TAIL).ok_or(VerifyError::LongMemory)?;
         Ok(Self { ratio: bank.ratio, judge, reference, lags, goal: None, accuracy: 0.0 })
     }
 

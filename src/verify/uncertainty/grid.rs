@@ -6,7 +6,7 @@ use super::super::VerifyError;
 use super::super::front_ends::FrontEnds;
 use super::super::slow_period::SlowPeriod;
 use super::super::timeline::{SamplingInstant, timeline};
-use super::{ErrorBox, ErrorPoint, Side, Taps};
+use super::{ErrorBox, ErrorPoint, Side};
 use crate::bank::Bank;
 use crate::units::Seconds;
 use std::ops::Range;
@@ -58,12 +58,6 @@ pub(super) fn halved(side: Side, halvings: &[Halvings]) -> Vec<Halvings> {
         Side::Gain(_) => {}
     }
     finer
-}
-
-/// The halvings of a grid: where the taps depend on the delays, a part has its ends and its middle.
-pub(super) fn on_grid(halvings: &[Halvings], taps: Taps) -> Vec<Halvings> {
-    let middle = u32::from(taps == Taps::Scheduled);
-    halvings.iter().map(|at| Halvings { delay: at.delay + middle, ..*at }).collect()
 }
 
 impl Grid {

@@ -2,20 +2,18 @@
 //! that decides.
 
 use super::super::VerifyError;
-use super::super::ball::Ball;
-use super::super::spectrum::{self, ComplexMatrix};
+use super::super::spectrum;
 use super::aliases::{Aliases, FrontEnd};
 use super::angle::Frequency;
 use super::at_frequency::{AtFrequency, Attained, Mix, Verdict, Work};
 use super::channel::{Channel, Memories, column_norm, sampled_transfer, signal_transfer};
-use super::grid::{Grid, Halvings, halved, on_grid};
+use super::grid::{Grid, Halvings, halved};
 use super::memory::Memory;
 use super::quick::lower_gain;
 use super::remainder::Remainders;
-use super::scheduled::{self, Scheduled, moved};
 use super::transfer::Transfer;
-use super::{ErrorBox, ErrorPoint, Side, Taps};
-use crate::bank::{Bank, SynthesisFilters};
+use super::{ErrorBox, ErrorPoint, Side};
+use crate::bank::Bank;
 use crate::units::{RadiansPerSlowPeriod, Seconds};
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -36,11 +34,6 @@ const MANY_CONVERTERS: usize = 5;
 pub(super) struct Judge<'a> {
     bank: &'a Bank,
     errors: &'a ErrorBox,
-    taps: Taps,
-    /// S_j by converter, where the taps depend on its delay.
-    slopes: Vec<Option<SynthesisFilters>>,
-    /// Half-widths of the delays in fast periods.
-    halves: Vec<Ball>,
     /// Made when needed, each finer than the one before.
     grids: Vec<(Vec<Halvings>, Grid)>,
     /// The converter of each sample of a frame.
@@ -75,13 +68,9 @@ impl<'a> Judge<'a> {
     ///
     /// # Errors
     /// See [`super::worst_case`].
-    pub(super) fn new(
-        bank: &'a Bank,
-        errors: &'a ErrorBox,
-        taps: Taps,
-    ) -> Result<(Self, Memory), VerifyError> {
+    pub(super) fn new(bank: &'a Bank, errors: &'a ErrorBox) -> Result<(Self, Memory), VerifyError> {
         let halvings = Halvings::none(bank.channel_count());
-        let grid = Grid::new(bank, errors, &on_grid(&halvings, taps))?;
+        let grid = Grid::new(bank, errors, &halvings)?;
         let memories = Memories::new(&grid, errors)?;
         let fast_period = fast_period(bank);
         let owners = bank.layout().owners();
@@ -93,9 +82,6 @@ impl<'a> Judge<'a> {
         let mut judge = Self {
             bank,
             errors,
-            taps,
-            slopes: slopes(bank, taps),
-            halves: errors.delays.iter().map(|half| fast_periods(half.0, fast_period.0)).collect(),
             grids: vec![(halvings, grid)],
             owners,
             channels,
@@ -125,11 +111,6 @@ impl<'a> Judge<'a> {
         FrontEnd { transfer: &self.target, signal: self.signal.as_ref(), cutoff: 0.0 }
     }
 
-    /// The slopes of the taps, each with the half-width of its delay.
-    pub(super) fn slopes(&self) -> impl Iterator<Item = (&SynthesisFilters, Ball)> {
-        self.slopes.iter().zip(&self.halves).filter_map(|(slope, half)| Some((slope.as_ref()?, *half)))
-    }
-
     /// For each sample, the slow periods by which it is late.
     pub(super) fn delay_periods(&self) -> &[usize] {
         &self.grids[0].1.period.delay_periods
@@ -150,12 +131,7 @@ impl<'a> Judge<'a> {
     ) -> Result<(), VerifyError> {
         let grid = Grid::at(self.bank, point)?;
         let near = Frequency::near(frequency.0);
-        let mut at = self.plain(&grid, &near);
-        let fast_period = fast_period(self.bank);
-        let deltas: Vec<Ball> =
-            point.delays.iter().map(|delay| fast_periods(delay.0, fast_period.0)).collect();
-        at.filters = moved(&at.filters, &self.slopes_at(&near), &deltas);
-        let lower = lower_gain(&at.square(&mixes_at(&grid, point)));
+        let lower = lower_gain(&self.plain(&grid, &near).square(&mixes_at(&grid, point)));
         self.offer(Best { lower, point: point.clone(), frequency: frequency.0 });
         Ok(())
     }
@@ -201,7 +177,7 @@ impl<'a> Judge<'a> {
         near: &Frequency,
         threshold: f64,
     ) -> Result<Option<Attained>, VerifyError> {
-        if self.taps == Taps::Scheduled || self.errors.delays.len() < MANY_CONVERTERS {
+        if self.errors.delays.len() < MANY_CONVERTERS {
             return Ok(None);
         }
         let Some(point) = self.best.as_ref().map(|best| best.point.clone()) else { return Ok(None) };
@@ -232,10 +208,9 @@ impl<'a> Judge<'a> {
         }
         let rows = self.channels.iter().zip(responses).map(|(channel, response)| channel.row(response));
         let filters = spectrum::filter_response(&self.bank.filters, self.bank.ratio, &near.z);
-        let fixed: Vec<f64> = (0..self.channels.len()).map(|i| column_norm(&filters, i)).collect();
-        let columns = scheduled::columns(&fixed, &self.slopes_at(near), &self.halves);
+        let columns = (0..self.channels.len()).map(|i| column_norm(&filters, i)).collect();
         let (reference, owners) = (response(self.reference())?, self.owners.clone());
-        Ok(Remainders::new(rows.collect(), &reference, columns, owners, self.bank.ratio, self.taps))
+        Ok(Remainders::new(rows.collect(), &reference, columns, owners, self.bank.ratio))
     }
 
     /// The verdict on one grid, the work that it took and the largest gain seen.
@@ -249,11 +224,7 @@ impl<'a> Judge<'a> {
         let at = self.plain(grid, near);
         let limit = (self.limit - self.operations).max(0.0);
         let mut work = Work { gains: 0, operations: 0.0, limit, per_gain: self.cost_of_gain() };
-        let verdict = match self.taps {
-            Taps::Fixed => at.compare(remainders, threshold, &mut work),
-            Taps::Scheduled => Scheduled::new(at, self.slopes_at(near), &self.halves)
-                .compare(remainders, threshold, &mut work),
-        };
+        let verdict = at.compare(remainders, threshold, &mut work);
         let best = match &verdict {
             Verdict::Below => None,
             Verdict::Above(attained) | Verdict::Open(attained) => best_of(grid, attained),
@@ -264,10 +235,7 @@ impl<'a> Judge<'a> {
     /// Operations for one gain, and for the Gram matrix of a grid.
     fn cost_of_gain(&self) -> f64 {
         let (m, n) = (self.bank.ratio as f64, self.channels.len() as f64);
-        let rows = match self.taps {
-            Taps::Fixed => 1.5 * n,
-            Taps::Scheduled => 2.5 * n,
-        };
+        let rows = 1.5 * n;
         4.0 * m * (m + rows) * (2.0 * m + rows)
     }
 
@@ -299,7 +267,7 @@ impl<'a> Judge<'a> {
             return false;
         }
         // A grid that is too large is as good as none.
-        let Ok(grid) = Grid::new(self.bank, self.errors, &on_grid(&finer, self.taps)) else { return false };
+        let Ok(grid) = Grid::new(self.bank, self.errors, &finer) else { return false };
         self.operations +=
             GRID_OPERATIONS * grid.period.samples() as f64 * (grid.period.order() as f64).powi(3);
         self.grids.push((finer, grid));
@@ -313,13 +281,7 @@ impl<'a> Judge<'a> {
             let samples = self.bank.samples[i];
             samples * points(self.errors.delays[i].0, at.delay) * points(self.errors.cutoffs[i], at.cutoff)
         };
-        self.bank.ratio + on_grid(halvings, self.taps).iter().enumerate().map(of).sum::<usize>()
-    }
-
-    /// S_j at a frequency.
-    fn slopes_at(&self, near: &Frequency) -> Vec<Option<ComplexMatrix>> {
-        let at = |slope: &SynthesisFilters| spectrum::filter_response(slope, self.bank.ratio, &near.z);
-        self.slopes.iter().map(|slope| slope.as_ref().map(at)).collect()
+        self.bank.ratio + halvings.iter().enumerate().map(of).sum::<usize>()
     }
 
     /// The Gram matrix and the filters at a frequency.
@@ -364,21 +326,8 @@ fn mixes_at(grid: &Grid, point: &ErrorPoint) -> Vec<Mix> {
     grid.converters.iter().zip(&point.gains).flat_map(mix).collect()
 }
 
-/// The slopes of the taps by converter; `None` where they do not depend on its delay.
-fn slopes(bank: &Bank, taps: Taps) -> Vec<Option<SynthesisFilters>> {
-    let of = |j: usize| {
-        let slopes = bank.tap_slopes.as_ref().filter(|slopes| slopes.follows(j))?;
-        (taps == Taps::Scheduled).then(|| SynthesisFilters::Fir(slopes.by_delay[j].clone()))
-    };
-    (0..bank.channel_count()).map(of).collect()
-}
-
 fn fast_period(bank: &Bank) -> Seconds {
     bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period)
-}
-
-fn fast_periods(seconds: f64, fast_period: f64) -> Ball {
-    Ball::from(seconds) / Ball::from(fast_period)
 }
 
 /// The errors at a vertex of `grid`; `None` without a vertex.

@@ -162,15 +162,6 @@ impl Lags {
         Some(Self { beyond: taps.iter().map(lags).collect() })
     }
 
-    /// Also holds these filters plus others times factors of at most `most` in size.
-    pub(super) fn widen(&mut self, others: &Self, most: f64) {
-        for (own, other) in self.beyond.iter_mut().zip(&others.beyond) {
-            let length = own.len().max(other.len());
-            let at = |list: &[f64], kept: usize| list[kept.min(list.len() - 1)];
-            *own = (0..length).map(|kept| outward(at(own, kept) + most * at(other, kept))).collect();
-        }
-    }
-
     /// Number of lags that are known one by one.
     pub(super) fn count(&self) -> usize {
         self.beyond.iter().map(|list| list.len() - 1).max().unwrap_or(0)

@@ -26,9 +26,6 @@
 //! ```
 //!
 //! Only the frequencies near the peak need narrow cells and small boxes, and no norm is computed.
-//!
-//! With [`Taps::Scheduled`] the taps are those of the bank moved to the delays at hand. K_delta is then no
-//! longer affine in the rows, and its bound at a frequency is that of `scheduled`; the rest is the same.
 
 mod aliases;
 mod angle;
@@ -41,7 +38,6 @@ mod memory;
 mod multipliers;
 mod quick;
 mod remainder;
-mod scheduled;
 mod slopes;
 #[cfg(test)]
 mod tests;
@@ -51,7 +47,7 @@ mod vertex_tree;
 pub use slopes::{Slopes, slopes};
 
 use super::VerifyError;
-use crate::bank::{Bank, SynthesisFilters};
+use crate::bank::Bank;
 use crate::spec::UncertaintySpec;
 use crate::units::{RadiansPerSlowPeriod, Seconds};
 
@@ -84,27 +80,6 @@ pub(crate) enum Side {
     Delay(usize),
     Gain(usize),
     Cutoff(usize),
-}
-
-/// Whether the taps are fixed or scheduled by the delays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Taps {
-    /// The taps of the bank, whatever the delays.
-    Fixed,
-    /// The taps of [`Bank::filters_at`] for the delays at hand, by the bank's tap slopes.
-    Scheduled,
-}
-
-impl Taps {
-    /// The filters at a point of the box, rounded.
-    pub fn filters(self, bank: &Bank, point: &ErrorPoint) -> SynthesisFilters {
-        let h = bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period);
-        let errors: Vec<_> = point.delays.iter().map(|delay| delay.in_fast_periods(h)).collect();
-        match self {
-            Self::Fixed => bank.filters.clone(),
-            Self::Scheduled => bank.filters_at(&errors),
-        }
-    }
 }
 
 /// The worst case over a box, proven from both sides (h = 1).
@@ -153,19 +128,6 @@ impl ErrorBox {
         let gains = channels.clone().filter(|&i| self.gains[i] > 0.0).map(Side::Gain);
         let cutoffs = channels.filter(|&i| self.cutoffs[i] > 0.0).map(Side::Cutoff);
         delays.chain(gains).chain(cutoffs).collect()
-    }
-
-    /// The point with these shares, from -1 to 1, of the half-widths of `sides`.
-    pub(crate) fn point_at(&self, sides: &[Side], shares: &[f64]) -> ErrorPoint {
-        let mut point = ErrorPoint::none(self.delays.len());
-        for (side, &share) in sides.iter().zip(shares) {
-            match *side {
-                Side::Delay(i) => point.delays[i] = self.delays[i] * share,
-                Side::Gain(i) => point.gains[i] = self.gains[i] * share,
-                Side::Cutoff(i) => point.cutoffs[i] = self.cutoffs[i] * share,
-            }
-        }
-        point
     }
 
     /// The box with all sides multiplied by `factor`.
@@ -222,12 +184,11 @@ impl ErrorPoint {
 pub fn worst_case(
     bank: &Bank,
     errors: &ErrorBox,
-    taps: Taps,
     accuracy: f64,
     candidates: &[(ErrorPoint, RadiansPerSlowPeriod)],
 ) -> Result<WorstCase, VerifyError> {
     errors.check(bank.channel_count())?;
-    let mut cover = cover::Cover::new(bank, errors, taps)?;
+    let mut cover = cover::Cover::new(bank, errors)?;
     // A first lower end, so that the accuracy has a meaning.
     if candidates.is_empty() {
         cover.try_point(&ErrorPoint::none(bank.channel_count()), RadiansPerSlowPeriod(0.0))?;
@@ -243,31 +204,21 @@ pub fn worst_case(
 ///
 /// # Errors
 /// As [`worst_case`], without [`VerifyError::WideBox`].
-pub fn certifies(bank: &Bank, errors: &ErrorBox, taps: Taps, gamma: f64) -> Result<bool, VerifyError> {
+pub fn certifies(bank: &Bank, errors: &ErrorBox, gamma: f64) -> Result<bool, VerifyError> {
     errors.check(bank.channel_count())?;
-    cover::Cover::new(bank, errors, taps)?.certifies(gamma)
+    cover::Cover::new(bank, errors)?.certifies(gamma)
 }
 
-/// Proves the worst cases that the bank states for its spec's `[uncertainty]`: with fixed and with
-/// delay-scheduled taps.
+/// Proves the worst case that the bank states for its spec's `[uncertainty]`.
 ///
 /// # Errors
-/// [`VerifyError::WorstCase`] or [`VerifyError::Tracked`] if one is not proven or there is no such table;
-/// else as [`worst_case`].
+/// [`VerifyError::WorstCase`] if it is not proven or there is no such table; else as [`worst_case`].
 pub(crate) fn check_stated(bank: &Bank) -> Result<(), VerifyError> {
+    let Some(stated) = bank.gamma.worst_case else { return Ok(()) };
     let table = bank.spec.as_ref().and_then(|spec| spec.uncertainty.as_ref());
     let errors = table.map(|table| ErrorBox::of(table, bank.channel_count()));
-    let is_proven =
-        |taps, stated| errors.as_ref().map_or(Ok(false), |errors| certifies(bank, errors, taps, stated));
-    if let Some(stated) = bank.gamma.worst_case
-        && !is_proven(Taps::Fixed, stated)?
-    {
-        return Err(VerifyError::WorstCase { stated });
-    }
-    match bank.gamma.tracked {
-        Some(stated) if bank.tap_slopes.is_none() || !is_proven(Taps::Scheduled, stated)? => {
-            Err(VerifyError::Tracked { stated })
-        }
-        _ => Ok(()),
+    match errors.map_or(Ok(false), |errors| certifies(bank, &errors, stated))? {
+        true => Ok(()),
+        false => Err(VerifyError::WorstCase { stated }),
     }
 }

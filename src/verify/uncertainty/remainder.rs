@@ -1,8 +1,8 @@
 //! What the rows between the points of a grid may add to the gains at its points.
 //!
 //! Over a part of the box each row h_i is a mix of its rows at the ends of the part plus a remainder r_i,
-//! which is bounded alias by alias ([`super::aliases`]): in the delay by a chord or a parabola, in the
-//! cut-off by a chord. So K = K_mix - sum_i F_i r_i, and for a direction u of length 1
+//! which is bounded alias by alias ([`super::aliases`]): in the delay and in the cut-off by a chord. So
+//! K = K_mix - sum_i F_i r_i, and for a direction u of length 1
 //!
 //! ```text
 //! |u* sum_i F_i r_i| <= R_k = sum_i |F_i| |r_i|   at the alias k.
@@ -14,11 +14,11 @@
 //! alias k,
 //!
 //! ```text
-//! |u* K|^2 <= (|u* K_mix| + A)^2 + (1/M) sum over the far k of (2 kappa_k R_k + e R_k^2).
+//! |u* K|^2 <= (|u* K_mix| + A)^2 + (1/M) sum over the far k of (2 kappa_k R_k + R_k^2).
 //! ```
 //!
-//! kappa_k also bounds K_mix where the mix is convex (e = 1); else K_mix is within R of some K (e = 3). Any
-//! division is valid, and the best one is taken. For the near aliases
+//! The mix is convex, so kappa_k also bounds K_mix. Any division is valid, and the best one is taken. For the
+//! near aliases
 //!
 //! ```text
 //! A^2 = the largest eigenvalue of sum_i (c_i^2 / w_i) F_i F_i*,   w_i = |F_i| c_i / sum_j |F_j| c_j,
@@ -29,7 +29,6 @@
 
 use super::super::ball::{Ball, Matrix};
 use super::super::spectrum::ComplexMatrix;
-use super::Taps;
 use super::aliases::{Aliases, FarAliases, Weight};
 use super::angle::outward;
 use super::grid::Halvings;
@@ -57,7 +56,6 @@ pub(super) struct Remainders {
     columns: Vec<f64>,
     /// The converter of each row.
     owners: Vec<usize>,
-    taps: Taps,
     /// kappa_k at the near aliases, and as a decay over the far ones.
     sizes: Vec<f64>,
     decay: Vec<f64>,
@@ -86,18 +84,10 @@ impl UncertainRow {
         self.half == 0.0 && self.cutoff == 0.0
     }
 
-    /// The weights of the aliases between two points of the grid, each with its factor.
-    fn weights(&self, taps: Taps, halvings: u32) -> Vec<(f64, Weight)> {
-        if self.half == 0.0 {
-            return Vec::new();
-        }
+    /// The weight of the aliases between two points of the grid; `None` if the delay is certain.
+    fn weight(&self, halvings: u32) -> Option<Weight> {
         let half = self.half / f64::from(1u32 << halvings) + self.rounding;
-        match taps {
-            Taps::Fixed => vec![(1.0, Weight::Chord(half))],
-            // The parabola goes through the rows of the rounded points, so its own weights (5/4 in all)
-            // times the distance of these rows from those of the points come in addition.
-            Taps::Scheduled => vec![(1.0, Weight::Parabola(half)), (1.25, Weight::Shift(self.rounding))],
-        }
+        (self.half > 0.0).then_some(Weight::Chord(half))
     }
 
     /// The chord over 2 x of a function with the second derivative b is within x^2 b / 2 of it. The factors
@@ -110,13 +100,13 @@ impl UncertainRow {
     }
 
     /// |r| at the near aliases.
-    fn near(&self, taps: Taps, at: Halvings) -> Vec<f64> {
+    fn near(&self, at: Halvings) -> Vec<f64> {
         if self.is_certain() {
             return vec![0.0; self.response.near.len()];
         }
-        let (weights, bend) = (self.weights(taps, at.delay), self.bend(at.cutoff));
+        let (weight, bend) = (self.weight(at.delay), self.bend(at.cutoff));
         let aliases = self.response.frequencies.iter().zip(&self.response.near);
-        let between = |nu: f64| weights.iter().map(|(factor, weight)| factor * weight.at(nu)).sum::<f64>();
+        let between = |nu: f64| weight.map_or(0.0, |weight| weight.at(nu));
         let r = |(&nu, moduli): (&f64, &super::transfer::Moduli)| {
             outward(self.gain * (moduli.value * between(nu) + bend * moduli.curvature))
         };
@@ -124,18 +114,17 @@ impl UncertainRow {
     }
 
     /// The sum over the far aliases that `of` makes of their parts, each a decay with a weight.
-    fn far(&self, taps: Taps, at: Halvings, of: impl Fn(&FarAliases, &[f64], Weight) -> f64) -> f64 {
+    fn far(&self, at: Halvings, of: impl Fn(&FarAliases, &[f64], Weight) -> f64) -> f64 {
         if self.is_certain() {
             return 0.0;
         }
         let far = &self.response.far;
-        let between = self.weights(taps, at.delay);
-        let between = between.iter().map(|&(factor, weight)| factor * of(far, &far.decay, weight));
+        let between = self.weight(at.delay).map_or(0.0, |weight| of(far, &far.decay, weight));
         let bend = match self.bend(at.cutoff) {
             0.0 => 0.0,
             bend => bend * of(far, &far.curvature, Weight::One),
         };
-        outward(self.gain * (between.sum::<f64>() + bend))
+        outward(self.gain * (between + bend))
     }
 }
 
@@ -147,7 +136,6 @@ impl Remainders {
         columns: Vec<f64>,
         owners: Vec<usize>,
         outputs: usize,
-        taps: Taps,
     ) -> Self {
         let of_reference = (reference, (outputs as f64).sqrt());
         let of_rows = rows.iter().zip(&columns).map(|(row, column)| (&*row.response, row.gain * column));
@@ -161,7 +149,7 @@ impl Remainders {
         let longest = all.iter().map(|(aliases, _)| aliases.far.decay.len()).max().unwrap_or(0);
         let sizes = (0..reference.near.len()).map(near).collect();
         let decay = (0..longest).map(far).collect();
-        Self { rows, columns, owners, taps, sizes, decay }
+        Self { rows, columns, owners, sizes, decay }
     }
 
     /// The gain up to which K_mix may go, so that K does not exceed `threshold` after these halvings; not
@@ -181,9 +169,8 @@ impl Remainders {
 
     fn bounds(&self, halvings: &[Halvings]) -> Bounds {
         let rows = || self.rows.iter().zip(self.owners.iter().map(|&converter| halvings[converter]));
-        let taps = self.taps;
         let crossed = |far: &FarAliases, decay: &[f64], weight| far.inner(&self.decay, decay, weight);
-        let near: Vec<Vec<f64>> = rows().map(|(row, at)| row.near(taps, at)).collect();
+        let near: Vec<Vec<f64>> = rows().map(|(row, at)| row.near(at)).collect();
         let squares = |r: &Vec<f64>| -> Vec<f64> {
             let sums = r.iter().scan(0.0, |sum, r| {
                 *sum += r * r;
@@ -194,8 +181,8 @@ impl Remainders {
         Bounds {
             squares: near.iter().map(squares).collect(),
             near,
-            far: rows().map(|(row, at)| row.far(taps, at, FarAliases::norm)).collect(),
-            crossed: rows().map(|(row, at)| row.far(taps, at, crossed)).collect(),
+            far: rows().map(|(row, at)| row.far(at, FarAliases::norm)).collect(),
+            crossed: rows().map(|(row, at)| row.far(at, crossed)).collect(),
         }
     }
 
@@ -219,7 +206,6 @@ impl Remainders {
 
     fn best_division(&self, bounds: &Bounds, threshold: f64) -> Division {
         let (known, ratio) = (self.sizes.len(), self.ratio());
-        let convex = if self.taps == Taps::Fixed { 1.0 } else { 3.0 };
         let weighed = |values: &[f64]| -> f64 {
             self.columns.iter().zip(values).map(|(column, value)| column * value).sum()
         };
@@ -231,11 +217,11 @@ impl Remainders {
         if self.rows.iter().all(UncertainRow::is_certain) {
             return best;
         }
-        let mut others = 2.0 * weighed(&bounds.crossed) + convex * weighed(&bounds.far).powi(2);
+        let mut others = 2.0 * weighed(&bounds.crossed) + weighed(&bounds.far).powi(2);
         for near in (0..=known).rev() {
             if near < known {
                 let r: f64 = self.columns.iter().zip(&bounds.near).map(|(column, r)| column * r[near]).sum();
-                others += (2.0 * self.sizes[near] + convex * r) * r / ratio;
+                others += (2.0 * self.sizes[near] + r) * r / ratio;
             }
             let other = value(near, outward(others));
             if other.value > best.value {
@@ -249,7 +235,7 @@ impl Remainders {
     fn joint(&self, filters: &ComplexMatrix, norms: &[f64]) -> f64 {
         let terms = self.columns.iter().zip(norms).map(|(column, c)| column * c);
         let sum = outward(terms.sum());
-        if norms.len() < 2 || sum == 0.0 || !sum.is_finite() || self.taps != Taps::Fixed {
+        if norms.len() < 2 || sum == 0.0 || !sum.is_finite() {
             return sum;
         }
         // c_i^2 / w_i = c_i sum / |F_i|; channels without taps add nothing.

@@ -57,11 +57,11 @@ fn the_ends_are_those_of_the_table() {
     for (half, lower, unsplit) in
         [(0.05, 0.0421799, 0.04408), (0.1, 0.0478338, 0.05509), (0.2, 0.0682090, 0.08993)]
     {
-        let found = worst_case(&thesis(), &square_box(half), Taps::Fixed, 0.01, &[]).unwrap();
+        let found = worst_case(&thesis(), &square_box(half), 0.01, &[]).unwrap();
         assert!(found.lower > lower * (1.0 - 1e-3) && found.upper < 1.0101 * lower, "{half}: {found:?}");
         assert!(found.upper >= lower * (1.0 - 1e-6) && found.upper < unsplit && found.lower <= found.upper);
         // A loose accuracy costs less work and stays above.
-        let loose = worst_case(&thesis(), &square_box(half), Taps::Fixed, 0.3, &[]).unwrap();
+        let loose = worst_case(&thesis(), &square_box(half), 0.3, &[]).unwrap();
         assert!(
             loose.upper >= lower * (1.0 - 1e-6) && loose.gains_computed < found.gains_computed,
             "{loose:?}"
@@ -83,7 +83,7 @@ fn boxes_are_proven_behind_resonant_front_ends_and_signals() {
         );
         let spec = crate::spec::Spec::from_toml(&text, "spec.toml").unwrap();
         let bank = crate::design::design(&spec, &crate::design::Options::without_proof()).unwrap().bank;
-        let found = worst_case(&bank, &square_box(1e-9), Taps::Fixed, 0.01, &[]).unwrap();
+        let found = worst_case(&bank, &square_box(1e-9), 0.01, &[]).unwrap();
         let norm = bank.gamma.norm.unwrap();
         assert!(found.upper <= found.lower * 1.0101, "{filters}: {found:?}");
         assert!(found.upper >= norm && found.lower <= norm * 1.001, "{filters}: {found:?} {norm}");
@@ -94,14 +94,8 @@ fn boxes_are_proven_behind_resonant_front_ends_and_signals() {
 #[test]
 fn a_candidate_is_proven() {
     let point = ErrorPoint { delays: vec![Seconds(0.1), Seconds(0.1)], ..ErrorPoint::none(2) };
-    let found = worst_case(
-        &thesis(),
-        &square_box(0.1),
-        Taps::Fixed,
-        0.01,
-        &[(point.clone(), RadiansPerSlowPeriod(0.0))],
-    )
-    .unwrap();
+    let found =
+        worst_case(&thesis(), &square_box(0.1), 0.01, &[(point.clone(), RadiansPerSlowPeriod(0.0))]).unwrap();
     assert!(
         (gain(&thesis(), 0.0, &point) / found.lower - 1.0).abs() < 1e-3 || found.point != point,
         "{found:?}"
@@ -125,7 +119,7 @@ fn no_random_point_is_above_the_upper_end() {
     ];
     let mut random = Random(7);
     for errors in boxes {
-        let found = worst_case(&bank, &errors, Taps::Fixed, 0.02, &[]).unwrap();
+        let found = worst_case(&bank, &errors, 0.02, &[]).unwrap();
         let mut most: f64 = gain(&bank, found.frequency.0, &found.point);
         assert!((most / found.lower - 1.0).abs() < 1e-4, "{most} {found:?}");
         for trial in 0..2500 {
@@ -146,9 +140,9 @@ fn no_random_point_is_above_the_upper_end() {
 /// A gamma is certified from the worst case on, and none below it.
 #[test]
 fn gammas_are_certified_from_the_worst_case_on() {
-    let found = worst_case(&thesis(), &square_box(0.1), Taps::Fixed, 0.01, &[]).unwrap();
-    assert!(certifies(&thesis(), &square_box(0.1), Taps::Fixed, found.upper).unwrap());
-    assert!(!certifies(&thesis(), &square_box(0.1), Taps::Fixed, found.lower * (1.0 - 1e-6)).unwrap());
+    let found = worst_case(&thesis(), &square_box(0.1), 0.01, &[]).unwrap();
+    assert!(certifies(&thesis(), &square_box(0.1), found.upper).unwrap());
+    assert!(!certifies(&thesis(), &square_box(0.1), found.lower * (1.0 - 1e-6)).unwrap());
 }
 
 #[test]
@@ -160,10 +154,7 @@ fn boxes_that_do_not_fit_are_refused() {
         ErrorBox { cutoffs: vec![f64::NAN; 2], ..ErrorBox::none(2) },
     ] {
         assert!(
-            matches!(
-                worst_case(&thesis(), &errors, Taps::Fixed, 0.01, &[]),
-                Err(VerifyError::ErrorBox { .. })
-            ),
+            matches!(worst_case(&thesis(), &errors, 0.01, &[]), Err(VerifyError::ErrorBox { .. })),
             "{errors:?}"
         );
     }
@@ -240,59 +231,6 @@ fn no_jitter_adds_more_than_its_bound() {
 #[test]
 fn recursive_banks_have_a_worst_case() {
     let bank = Bank::from_json(include_str!("../../../filters/thesis-iir.json"), "thesis-iir.json").unwrap();
-    let found = worst_case(&bank, &square_box(0.05), Taps::Fixed, 0.02, &[]).unwrap();
+    let found = worst_case(&bank, &square_box(0.05), 0.02, &[]).unwrap();
     assert!(found.lower > 0.0399 && found.upper <= 1.0201 * found.lower, "{found:?}");
-}
-
-/// Slopes of any kind: the bound holds for bad banks as for good ones.
-fn scheduled() -> Bank {
-    let mut bank = thesis();
-    let SynthesisFilters::Fir(taps) = &bank.filters else { panic!("taps") };
-    let made_up = |j: usize, i: usize| -> Vec<f64> {
-        let change = |n: usize| 0.4 * (((5 * n + 3 * i + j) % 7) as f64 / 7.0 - 0.4);
-        (0..taps[i].len()).map(change).collect()
-    };
-    let by_delay = (0..2).map(|j| (0..2).map(|i| made_up(j, i)).collect()).collect();
-    bank.tap_slopes = Some(crate::bank::TapSlopes { by_delay });
-    bank
-}
-
-#[test]
-fn no_random_point_is_above_the_upper_end_of_delay_scheduled_taps() {
-    let bank = scheduled();
-    let boxes = [
-        square_box(0.1),
-        ErrorBox { delays: vec![Seconds(0.0), Seconds(0.3)], ..ErrorBox::none(2) },
-        ErrorBox { gains: vec![0.0, 0.02], cutoffs: vec![0.01, 0.0], ..square_box(0.02) },
-    ];
-    let mut random = Random(8);
-    for errors in boxes {
-        let found = worst_case(&bank, &errors, Taps::Scheduled, 0.05, &[]).unwrap();
-        let at = |omega: f64, point: &ErrorPoint| {
-            let moved = Bank { filters: Taps::Scheduled.filters(&bank, point), ..bank.clone() };
-            gain(&moved, omega, point)
-        };
-        let mut most = at(found.frequency.0, &found.point);
-        assert!((most / found.lower - 1.0).abs() < 1e-4, "{most} {found:?}");
-        for trial in 0..400 {
-            let mut draw = |half: f64| half * random.sample();
-            let point = ErrorPoint {
-                delays: errors.delays.iter().map(|half| Seconds(draw(half.0))).collect(),
-                gains: errors.gains.iter().map(|&half| draw(half)).collect(),
-                cutoffs: errors.cutoffs.iter().map(|&half| draw(half)).collect(),
-            };
-            let omega = if trial % 2 == 0 { found.frequency.0 } else { PI * random.part() };
-            most = most.max(at(omega, &point));
-        }
-        assert!(most <= found.upper, "{most} {found:?}");
-        assert!(found.upper <= 1.0501 * found.lower, "{found:?}");
-    }
-}
-
-/// Without slopes, delay-scheduled taps are fixed.
-#[test]
-fn without_slopes_both_kinds_have_one_worst_case() {
-    let fixed = worst_case(&thesis(), &square_box(0.03), Taps::Fixed, 0.05, &[]).unwrap();
-    let scheduled = worst_case(&thesis(), &square_box(0.03), Taps::Scheduled, 0.05, &[]).unwrap();
-    assert!(scheduled.lower <= fixed.upper && fixed.lower <= scheduled.upper, "{fixed:?} {scheduled:?}");
 }

@@ -1,12 +1,11 @@
 //! Robust optima against a semidefinite program, and the worst case that the file states.
 
-use crate::design::methods::robust_fir::{MAX_SCENARIOS, scenarios};
 use crate::design::uncertainty::norm_at;
 use crate::design::{Options, design};
 use crate::random::Random;
 use crate::spec::Spec;
 use crate::units::Seconds;
-use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Taps};
+use crate::verify::uncertainty::ErrorPoint;
 
 /// The thesis example with 22 taps and delays that are off by up to `half`, all of them.
 fn thesis(half: f64) -> Spec {
@@ -56,7 +55,7 @@ fn flat_optima_are_reached_and_random_points_are_no_worse() {
         for _ in 0..8 {
             let delays = vec![Seconds(0.0), Seconds(half * random.sample())];
             let point = ErrorPoint { delays, ..ErrorPoint::none(2) };
-            let (norm, _) = norm_at(&designed.bank, &point, Taps::Fixed).unwrap();
+            let (norm, _) = norm_at(&designed.bank, &point).unwrap();
             assert!(norm <= study.robust.largest_found * (1.0 + 1e-3), "{point:?}: {norm} {study:?}");
         }
     }
@@ -82,116 +81,6 @@ fn a_table_without_errors_changes_nothing() {
         design(&plain, &Options::without_proof()).unwrap(),
     );
     assert_eq!((with.bank.filters, with.robust), (without.bank.filters, None));
-}
-
-#[test]
-fn scenarios_reach_the_ends_of_every_side() {
-    let none = ErrorBox::none(8);
-    let two = ErrorBox { delays: [vec![Seconds(0.1); 2], vec![Seconds(0.0); 6]].concat(), ..none.clone() };
-    let both = ErrorBox { gains: vec![0.01; 8], ..two.clone() };
-    for (errors, count) in [(none.clone(), 1), (two, 25), (both, MAX_SCENARIOS)] {
-        let points = scenarios(&errors);
-        assert_eq!(points.len(), count);
-        for i in 0..8 {
-            let (delay, gain) = (errors.delays[i], errors.gains[i]);
-            assert!(points.iter().any(|point| point.delays[i] == delay && point.gains[i] == gain));
-            assert!(points.iter().any(|point| point.delays[i] == -delay || delay.0 == 0.0));
-            assert!(
-                points.iter().all(|point| point.delays[i].0.abs() <= delay.0 && point.gains[i].abs() <= gain)
-            );
-        }
-    }
-}
-
-/// The thesis example with taps that both delays schedule.
-fn following(half: f64) -> Spec {
-    let mut spec = thesis(half);
-    spec.design.tracking = true;
-    spec
-}
-
-/// The norm of the bank's taps for delays that are off, and the least norm of all banks for these delays.
-fn norm_and_redesign(bank: &crate::bank::Bank, errors: [f64; 2]) -> (f64, f64) {
-    let point = ErrorPoint { delays: errors.map(Seconds).to_vec(), ..ErrorPoint::none(2) };
-    let (norm, _) = norm_at(bank, &point, Taps::Scheduled).unwrap();
-    let mut spec = Spec { uncertainty: None, ..bank.spec.clone().unwrap() };
-    spec.design.tracking = false;
-    spec.channels.iter_mut().zip(errors).for_each(|(channel, error)| channel.delay += Seconds(error));
-    let redesign = design(&spec, &Options::without_proof()).unwrap();
-    (norm, redesign.bank.gamma.norm.unwrap())
-}
-
-/// Redesigns at points of the box are the oracle: no taps are better than they, and at worst the affine taps
-/// are hardly worse.
-#[test]
-fn taps_that_follow_the_delays_are_nearly_as_good_as_a_redesign() {
-    let designed = design(&following(0.1), &Options::without_proof()).unwrap();
-    let study = designed.tracking.unwrap();
-    let (mut most, mut most_redesigned) = (0.0f64, 0.0f64);
-    for errors in [[0.1, 0.1], [-0.1, 0.1], [0.1, -0.1], [0.04, -0.07], [0.0, 0.0]] {
-        let (norm, redesigned) = norm_and_redesign(&designed.bank, errors);
-        assert!(norm > redesigned * (1.0 - 1e-6), "{errors:?}: {norm} {redesigned}");
-        assert!(norm < 1.02 * redesigned, "{errors:?}: {norm} {redesigned}");
-        most = most.max(norm);
-        most_redesigned = most_redesigned.max(redesigned);
-    }
-    assert!(most <= study.tracked.largest_found * (1.0 + 1e-3), "{most} {study:?}");
-    assert!(most < 1.01 * most_redesigned, "{most} {most_redesigned}");
-    assert!(
-        study.excess() < 0.01 && study.tracked.largest_found < 0.95 * study.fixed.largest_found,
-        "{study:?}"
-    );
-    assert!(study.least_ratio <= study.ratio && study.least_ratio > study.ratio * (1.0 - 1e-3), "{study:?}");
-}
-
-/// The file states a worst case of the delay-scheduled taps, which `verify` proves; it refuses a smaller
-/// one, and a slope that was changed.
-#[test]
-fn the_worst_case_of_taps_that_follow_is_stated_and_proven() {
-    let mut spec = following(0.05);
-    spec.uncertainty.as_mut().unwrap().reference = Some(1);
-    let designed = design(&spec, &Options::default()).unwrap();
-    let (mut bank, study) = (designed.bank, designed.tracking.unwrap());
-    let stated = bank.gamma.tracked.unwrap();
-    assert!(
-        stated >= study.tracked.largest_found * (1.0 - 1e-9) && stated < 1.05 * study.tracked.largest_found,
-        "{stated} {study:?}"
-    );
-    assert_eq!(bank.gamma.worst_case, None);
-    let read = crate::bank::Bank::from_json(&bank.to_json().unwrap(), "bank.json").unwrap();
-    assert_eq!(read, bank);
-    assert!(crate::verify::verify(&bank).is_ok());
-    let mut altered = bank.clone();
-    altered.tap_slopes.as_mut().unwrap().by_delay[1][1][10] += 1.0;
-    assert_eq!(crate::verify::verify(&altered).unwrap_err(), crate::verify::VerifyError::Tracked { stated });
-    bank.gamma.tracked = Some(0.98 * study.tracked.largest_found);
-    let refused = crate::verify::verify(&bank).unwrap_err();
-    assert_eq!(refused, crate::verify::VerifyError::Tracked { stated: 0.98 * study.tracked.largest_found });
-}
-
-/// Four interleaved converters, with HYBANK_SLOW set: within 0.2 % of a redesign for delays within 10 ps,
-/// and within 3 % for 50 ps.
-#[test]
-fn interleaved_converters_are_followed() {
-    if !crate::trials::is_slow("four interleaved converters that are followed") {
-        return;
-    }
-    for (half, excess) in [(10e-12, 0.002), (50e-12, 0.03)] {
-        let text = include_str!("../../../../filters/interleaved-4x250M.toml");
-        let text = format!("{text}tracking = \"affine\"\n[uncertainty]\ndelay = {half}\nreference = 4\n");
-        // For inputs of any frequency, as the figures in docs/ say.
-        let spec = Spec { signal: None, ..Spec::from_toml(&text, "spec.toml").unwrap() };
-        let designed = design(&spec, &Options::default()).unwrap();
-        let study = designed.tracking.unwrap();
-        println!(
-            "{half}: {:?} {study:?} excess {} in {:?}",
-            designed.bank.gamma,
-            study.excess(),
-            designed.proof_time
-        );
-        assert!(study.excess() < excess && study.ratio < 1.0 + excess, "{study:?}");
-        assert!(designed.bank.gamma.tracked.is_some());
-    }
 }
 
 /// Beside narrow resonances the error peaks between the points of a uniform grid. The least worst case of
@@ -242,7 +131,7 @@ fn no_corner_is_worse_than_what_was_found() {
             cutoffs: (0..3).map(|i| errors.cutoffs[i] * share(6 + i)).collect(),
         };
         for (bank, found) in [(&robust.bank, study.robust), (&nominal.bank, study.nominal)] {
-            let (norm, _) = norm_at(bank, &point, Taps::Fixed).unwrap();
+            let (norm, _) = norm_at(bank, &point).unwrap();
             assert!(norm <= found.largest_found * (1.0 + 1e-4), "{point:?}: {norm} {found:?}");
         }
     }

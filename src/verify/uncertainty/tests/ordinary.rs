@@ -71,8 +71,7 @@ fn gain(bank: &Bank, omega: f64, point: &ErrorPoint) -> f64 {
 /// Proves the box from candidates at its centre, and compares it with random points.
 fn check(bank: &Bank, errors: &ErrorBox, accuracy: f64, points: usize) -> WorstCase {
     let centre = ErrorPoint::none(bank.channel_count());
-    let found =
-        worst_case(bank, errors, Taps::Fixed, accuracy, &[(centre, RadiansPerSlowPeriod(1.0))]).unwrap();
+    let found = worst_case(bank, errors, accuracy, &[(centre, RadiansPerSlowPeriod(1.0))]).unwrap();
     assert!(found.upper <= found.lower * (1.0 + accuracy) * (1.0 + 1e-9), "{errors:?} {found:?}");
     let mut random = Random(9);
     for trial in 0..points {
