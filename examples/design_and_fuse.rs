@@ -31,7 +31,7 @@ const BLOCK: usize = 64;
 fn main() -> Result<(), Box<dyn Error>> {
     let spec = Spec::from_toml(SPEC, "spec")?;
     let bank = design(&spec, &Default::default())?.bank;
-    println!("gamma between {:?} and {:?}", bank.gamma.lower, bank.gamma.upper);
+    println!("gamma at most {:?}, of any such bank at least {:?}", bank.gamma.upper, bank.gamma.lower);
 
     let source: Source = "tones:440Hz,3kHz".parse()?;
     let signal = Analog::Known(source.normalised(spec.fast_period));

@@ -41,7 +41,7 @@ use std::f64::consts::TAU;
 use std::fmt;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
-pub use grid_time::GridTime;
+pub use grid_time::{Fraction, GridTime};
 #[cfg(feature = "design")]
 pub(crate) use timeline::Timeline;
 

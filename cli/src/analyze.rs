@@ -22,7 +22,8 @@ use std::path::{Path, PathBuf};
 
 /// Computes the gamma of a bank, with the delays of its spec or with others
 ///
-/// gamma is the worst-case gain from the analog input to the error. The command builds the error system from
+/// gamma is the worst-case gain from the signal's source w to the error; without [signal] w is the analog
+/// input. The command builds the error system from
 /// the coefficients and the spec in the bank file and computes its H-infinity norm (relative error about
 /// 1e-9, more where large coefficients of opposite sign cancel). The gammas that the file states are not
 /// used.
@@ -163,12 +164,12 @@ impl Report {
         });
         let noncausal = noncausal.map_or_else(
             || "unknown       delays of like channels lie closer together than doubles resolve".to_owned(),
-            |bound| format!("{}   no bank at all is better", number(bound)),
+            |bound| format!("{}   computed lower bound for any bank", number(bound)),
         );
         let MeanAnalysis { rms_error, noise_gain, output_noise } = mean;
         format!(
             "{}\n{}\
-             gamma        {}   worst-case gain from the analog input to the error (h = 1)\n\
+             gamma        {}   worst-case gain from the signal's source w to the error (h = 1)\n\
              scale        {}, {}\n{proof}\
              worst at     {} modulo the slow rate\n\
              noncausal    {noncausal}\n\

@@ -26,10 +26,10 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// Designs the synthesis filters for a spec
 ///
 /// The bank file holds the filters, the spec with all defaults filled in, and gamma, the worst-case gain
-/// from the analog input to the error. Four values of gamma are stated, in normalised time: the computed
-/// norm of this bank, an upper bound of its true norm, a lower bound for all banks of that method and size
-/// (lower), and a lower bound for all banks of any latency (noncausal). If a proof of these values was
-/// found, the file holds it too, for `hybank verify`.
+/// from the signal's source w to the error; without [signal] w is the analog input. Four values of gamma are
+/// stated, in normalised time: the computed norm of this bank, an upper bound of its true norm, and computed
+/// lower bounds for all banks of that method and size (lower) and for all banks of any latency (noncausal).
+/// If a proof of the upper bound was found, the file holds it too, for `hybank verify`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:

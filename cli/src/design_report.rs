@@ -12,7 +12,7 @@ use hybank::overview::{
 };
 use hybank::spec::Method;
 use hybank::units::Hertz;
-use hybank::verify::{BoundedBanks, Verified};
+use hybank::verify::Verified;
 
 /// Width of the interval of the least gamma, over gamma, of a design that was far from its end: 0.09 dB.
 const FAR_FROM_FINISHED: f64 = 0.01;
@@ -120,9 +120,9 @@ impl ProofReport {
 
     fn text(&self) -> String {
         match (&self.proven, &self.unproven) {
-            (Some(Verified { lower, upper, .. }), _) => format!(
+            (Some(Verified { attained, upper, .. }), _) => format!(
                 "proven     [{}, {}] in {:.1} ms (see hybank verify)\n",
-                number(*lower),
+                number(*attained),
                 number(*upper),
                 self.seconds * 1e3
             ),
@@ -232,10 +232,12 @@ impl Report<'_> {
             (_, Some(_)) => "computed, not proven; --verbose says why".to_owned(),
             _ => "computed".to_owned(),
         };
-        let any = self.judged.figures.any_input;
-        let any = any.map_or_else(String::new, |gamma| format!("; any input: {}", six_digits(gamma)));
+        let (input, any) = match self.judged.figures.any_input {
+            Some(gamma) => ("the signal's source w", format!("; any input: {}", six_digits(gamma))),
+            None => ("the input", String::new()),
+        };
         format!(
-            "gamma      {} (worst-case gain from the input to the error; {proof}{any})\n",
+            "gamma      {} (worst-case gain from {input} to the error; {proof}{any})\n",
             known(self.gamma.norm)
         )
     }
@@ -251,7 +253,7 @@ impl Report<'_> {
         }
     }
 
-    /// The worst case, with its scale and its bounds.
+    /// The worst case, with its scale and the bounds of other banks.
     fn gamma_text(&self) -> String {
         let Gamma { norm, lower, noncausal, .. } = *self.gamma;
         format!(
@@ -264,31 +266,19 @@ impl Report<'_> {
             known(lower),
             self.lower_meaning(),
             known(noncausal),
-            if noncausal.is_none() { UNRESOLVED } else { "no latency is better" },
+            if noncausal.is_none() { UNRESOLVED } else { "computed lower bound for any latency" },
         )
     }
 
-    fn lower_meaning(&self) -> &'static str {
-        match (self.method, self.lower_banks()) {
-            _ if self.gamma.lower.is_none() => UNRESOLVED,
-            (Method::Fir, _) => "no bank of this length is better",
-            (Method::Iir, _) => "no causal bank is better",
-            (_, BoundedBanks::Any) => "no bank at all is better; this method does not aim at gamma",
-            (_, BoundedBanks::Causal) => "no causal bank is better; this method does not aim at gamma",
-            (_, BoundedBanks::FirOfThisLength) => {
-                "no bank of this length is better; this method does not aim at gamma"
-            }
-        }
-    }
-
-    /// The banks for which the lower bound holds. Without a proof, what exceeds the noncausal bound is due
-    /// to causality.
-    fn lower_banks(&self) -> BoundedBanks {
-        match self.proof.proven {
-            Some(proven) => proven.lower_banks,
-            None if self.gamma.lower > self.gamma.noncausal => BoundedBanks::Causal,
-            None => BoundedBanks::Any,
-        }
+    fn lower_meaning(&self) -> String {
+        let banks = match (self.method, self.taps) {
+            _ if self.gamma.lower.is_none() => return UNRESOLVED.to_owned(),
+            (Method::Fir, _) => "FIR banks of this length",
+            (Method::Iir, _) => "causal banks of this latency",
+            (_, Some(_)) => "FIR banks of this length; this method does not aim at gamma",
+            (_, None) => "causal banks of this latency; this method does not aim at gamma",
+        };
+        format!("computed lower bound for {banks}")
     }
 
     /// What is to be expected of signals and noise that are not the worst ones.

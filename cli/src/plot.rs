@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 ///
 /// Writes nine pictures: tones, front-ends, analysis, filters, phase, group-delay, impulse-responses, error
 /// and delay-error. The first one shows the largest image and the error of gain of a tone, by its
-/// frequency. The error is the largest gain from the analog input to the error, by frequency modulo the
+/// frequency. The error is the largest gain from the signal's source to the error, by frequency modulo the
 /// slow rate; its maximum is gamma.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\

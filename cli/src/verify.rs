@@ -1,21 +1,22 @@
-//! `hybank verify`: proves a bank's gammas from its file alone.
+//! `hybank verify`: proves a bank's gamma from its file alone.
 
 use super::bank_file::read_kind;
 use super::file_kind::FileKind;
 use super::print::{Failure, InFile, failed, name, show};
-use hybank::bank::{Bank, FixedPoint, SynthesisFilters, check_digest};
+use hybank::bank::{Bank, FixedPoint, check_digest};
 use hybank::design;
-use hybank::messages::{Quoted, counted};
-use hybank::verify::{BoundedBanks, Verified, verify};
+use hybank::messages::Quoted;
+use hybank::verify::{Verified, verify};
 use std::path::PathBuf;
 
-/// Proves the gammas in a bank file, from the file alone
+/// Proves the gamma in a bank file, from the file alone
 ///
 /// Rebuilds the error system from the spec and the coefficients in the file. It uses nothing of the design,
-/// its solvers or its norms, and bounds every rounding error. It proves an upper and a lower bound of gamma
-/// with the certificate and the witnesses in the file. Each gamma that the file states must be proven. A
-/// file with an altered coefficient, gamma or matrix is refused: its digest does not match, or the proof
-/// fails. A bank without a proof is refused at once; --search looks for one.
+/// its solvers or its norms, and bounds every rounding error. It proves that gamma is at most gamma.upper,
+/// with the certificate in the file, and at least the bank's own gain at one frequency. A file with an
+/// altered coefficient, norm, upper end or matrix is refused: its digest does not match, or the proof fails.
+/// A bank without a proof is refused at once; --search looks for one. Lower bounds for other banks,
+/// gamma.lower and gamma.noncausal, are computed by the design and not proven.
 ///
 /// The front ends are the filters as the spec writes them: their roots and state equations are enclosed.
 #[derive(Debug, clap::Args)]
@@ -23,7 +24,7 @@ use std::path::PathBuf;
 Examples:
   hybank verify bank.json
   hybank design spec.toml -o - | hybank verify -
-  hybank verify bank.json --json | jq '[.lower, .upper]'
+  hybank verify bank.json --json | jq '[.attained, .upper]'
   hybank verify elsewhere.json --search
 
 Exit codes: 0 proven; 1 refused, with the reason; 2 wrong usage.")]
@@ -48,8 +49,6 @@ struct Report {
     digest: bool,
     /// The certificate came with the file; otherwise it was found now.
     certificate_in_file: bool,
-    #[serde(skip)]
-    taps: usize,
     /// Word lengths of integer taps.
     #[serde(skip)]
     words: String,
@@ -63,14 +62,13 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let text = read_kind(&args.bank, FileKind::Bank)?;
     let bank = Bank::from_json(&text, &file).map_err(failed)?;
     let digest = check_digest(&text, &file).map_err(failed)?;
-    let certificate_in_file = bank.has_certificate();
+    let certificate_in_file = bank.proof.is_some();
     let verified = if args.search && !certificate_in_file {
         design::prove(&bank).in_file(&args.bank)?.1
     } else {
         verify(&bank).in_file(&args.bank)?
     };
     let report = Report {
-        taps: taps(&bank),
         words: words(&bank),
         worst_case: bank.gamma.worst_case,
         bank: file,
@@ -79,14 +77,6 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         certificate_in_file,
     };
     show(&report, args.json, Report::text)
-}
-
-/// Taps per channel; zero for recursive filters.
-fn taps(bank: &Bank) -> usize {
-    match &bank.filters {
-        SynthesisFilters::Fir(taps) => taps[0].len(),
-        SynthesisFilters::StateSpace(_) => 0,
-    }
 }
 
 /// The word lengths as text; reading has checked them.
@@ -98,38 +88,22 @@ fn words(bank: &Bank) -> String {
 }
 
 impl Report {
-    /// The class of banks for which the lower bound holds.
-    fn scope(&self) -> String {
-        match self.verified.lower_banks {
-            BoundedBanks::Any => "no bank at all is better".to_owned(),
-            BoundedBanks::Causal => "no causal bank of this latency is better".to_owned(),
-            BoundedBanks::FirOfThisLength => {
-                format!("no FIR bank of {} per channel is better", counted(self.taps, "tap"))
-            }
-        }
-    }
-
     fn text(&self) -> String {
-        let Verified { lower, upper, attained, noncausal, states, .. } = self.verified;
+        let Verified { upper, attained, states } = self.verified;
         let origin = if self.certificate_in_file { "from the file" } else { "found now, the file has none" };
         let digest =
             if self.digest { "matches" } else { "the file has none: only what breaks the proof shows" };
-        let width = if upper > 0.0 { (upper - lower) / upper } else { 0.0 };
+        let width = if upper > 0.0 { (upper - attained) / upper } else { 0.0 };
         format!(
             "{}: proven, gamma in [{}, {}] (h = 1), relative width {width:.1e}\n\
              upper      {}   bounded-real lemma, P of order {states} {origin}\n\
              attained   {}   this bank's own gain at one frequency\n\
-             lower      {}   {}\n\
-             noncausal  {}   no bank at all is better\n\
              {}{}digest     {digest}\n",
             Quoted(&self.bank),
-            number(lower),
+            number(attained),
             number(upper),
             number(upper),
             number(attained),
-            number(lower),
-            self.scope(),
-            number(noncausal),
             self.worst_case.map_or_else(String::new, |bound| {
                 format!(
                     "worst case {}   no errors within the spec's uncertainty make gamma larger\n",

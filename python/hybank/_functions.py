@@ -33,7 +33,7 @@ def load(path):
 
 @checked
 def verify(bank, *, search=False):
-    """Prove the gammas of a bank, from its spec and its coefficients alone.
+    """Prove the gamma of a bank, from its spec and its coefficients alone.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def verify(bank, *, search=False):
     Examples
     --------
     >>> proof = hb.verify("thesis-fir.json")
-    >>> proof.lower <= proof.upper, proof.digest
+    >>> proof.attained <= proof.upper, proof.digest
     (True, True)
     """
     return _hybank.verify(bank, search)

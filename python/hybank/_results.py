@@ -114,9 +114,9 @@ class Gamma:
     upper
         An upper bound of the true norm.
     lower
-        A lower bound for all banks of this method and size.
+        Computed lower bound for all banks of this method and size; None if unknown.
     noncausal
-        A lower bound for all banks.
+        Computed lower bound for all banks, of any latency; None if unknown.
     worst_case
         An upper bound over all errors that the spec allows for.
     """
@@ -247,14 +247,10 @@ class Verified:
 
     Attributes
     ----------
-    lower, lower_banks
-        No bank of the class `lower_banks` has a smaller gamma.
     upper
         Gamma of this bank is at most this.
     attained
         Gamma of this bank is at least this.
-    noncausal
-        No bank has a smaller gamma.
     states
         Order of the certificate.
     digest
@@ -265,18 +261,15 @@ class Verified:
         No errors within the uncertainty of the spec make gamma larger; None if the bank states nothing of them.
     """
 
-    lower: float
-    lower_banks: Literal["any", "causal", "fir_of_this_length"]
     upper: float
     attained: float
-    noncausal: float
     states: int
     digest: bool | None
     certificate_in_file: bool
     worst_case: float | None = None
 
     def __repr__(self):
-        return f"Verified(lower={self.lower}, upper={self.upper}, lower_banks={self.lower_banks!r})"
+        return f"Verified(attained={self.attained}, upper={self.upper})"
 
 
 @final

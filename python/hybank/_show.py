@@ -20,13 +20,17 @@ def plot(bank, ax=None, picture="error"):
         return _picture(bank, ax, picture)
     frequency, gain = bank.error_response(512)
     ax.plot(frequency, gain, label="error")
-    names = {"upper": "upper bound of gamma", "lower": "lower bound, this method and size", "noncausal": "lower bound, any bank"}
+    names = {
+        "upper": "upper bound of gamma",
+        "lower": "computed lower bound, this method and size",
+        "noncausal": "computed lower bound, any bank",
+    }
     for (name, label), style in zip(names.items(), ("-.", "--", ":")):
         level = getattr(bank.gamma, name)
         if level is not None:
             ax.axhline(level, linestyle=style, linewidth=1, color="gray", label=f"{label}: {level:.4g}")
     ax.set_xlabel("frequency modulo the slow rate, Hz")
-    ax.set_ylabel("largest gain from input to error")
+    ax.set_ylabel("largest gain from the signal's source to the error")
     ax.set_ylim(bottom=0)
     ax.legend(fontsize="small")
     return ax
@@ -85,8 +89,8 @@ def html(bank):
         ("delays", ", ".join(f"{delay:.6g} s" for delay in bank.delays)),
         ("latency", f"{bank.latency} fast samples"),
         ("gamma", f"{number(gamma.upper)} ({'proven' if bank.proven else 'computed'})"),
-        ("no bank of this size below", number(gamma.lower)),
-        ("no bank at all below", number(gamma.noncausal)),
+        ("lower bound for this size (computed)", number(gamma.lower)),
+        ("lower bound for any bank (computed)", number(gamma.noncausal)),
     ])
 
 

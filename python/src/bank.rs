@@ -153,7 +153,7 @@ impl Bank {
     /// True if the bank carries a proof of its gamma.
     #[getter]
     fn proven(&self) -> bool {
-        self.bank.has_certificate()
+        self.bank.proof.is_some()
     }
 
     /// The spec with all defaults filled in, as TOML; None for a bank made elsewhere.

@@ -14,11 +14,11 @@ use hybank::verify as checker;
 use pyo3::prelude::*;
 use std::sync::Arc;
 
-/// Proves the gammas of a bank, from a path or a bank in memory.
+/// Proves the gamma of a bank, from a path or a bank in memory.
 #[pyfunction]
 pub(crate) fn verify<'py>(bank: &Bound<'py, PyAny>, search: bool) -> PyResult<Bound<'py, PyAny>> {
     let given = Given::new(bank)?;
-    let certificate_in_file = given.bank.has_certificate();
+    let certificate_in_file = given.bank.proof.is_some();
     let (bank_in, search) = (Arc::clone(&given.bank), search && !certificate_in_file);
     let verified = background::run(bank.py(), None, move |_| proven(&bank_in, search))?;
     let verified = verified.map_err(|error| refused_in(&given.name, error))?;

@@ -59,6 +59,13 @@ impl<F: Number> From<Ball<F>> for ComplexBall<F> {
     }
 }
 
+impl<F: Number> From<f64> for ComplexBall<F> {
+    #[inline]
+    fn from(re: f64) -> Self {
+        Ball::from(re).into()
+    }
+}
+
 impl<T: Field> Neg for Cartesian<T> {
     type Output = Self;
     #[inline]

@@ -68,7 +68,7 @@ pub(crate) fn solve<F: Number>(m: &Matrix<F>, rhs: &Matrix<F>) -> Option<Matrix<
             subtract_row(&mut right, i, factor, k, 0);
         }
     }
-    Some(back_substituted(right, |k, i| left[(k, i)]))
+    Some(back_substituted(&left, right))
 }
 
 /// Row i minus factor times row k, from column `from` on.
@@ -82,11 +82,11 @@ fn subtract_row<F: Number>(m: &mut Matrix<F>, i: usize, factor: F, k: usize, fro
 }
 
 /// U^-1 rhs for an upper triangular U.
-fn back_substituted<F: Number>(mut rhs: Matrix<F>, upper: impl Fn(usize, usize) -> F) -> Matrix<F> {
+fn back_substituted<F: Number>(upper: &Matrix<F>, mut rhs: Matrix<F>) -> Matrix<F> {
     for k in (0..rhs.nrows()).rev() {
         for j in 0..rhs.ncols() {
-            let known = (k + 1..rhs.nrows()).fold(rhs[(k, j)], |sum, i| sum - upper(k, i) * rhs[(i, j)]);
-            rhs[(k, j)] = known / upper(k, k);
+            let known = (k + 1..rhs.nrows()).fold(rhs[(k, j)], |sum, i| sum - upper[(k, i)] * rhs[(i, j)]);
+            rhs[(k, j)] = known / upper[(k, k)];
         }
     }
     rhs
@@ -124,11 +124,6 @@ pub(crate) fn cholesky<F: Number>(m: &Matrix<F>) -> Option<Matrix<F>> {
         }
     }
     Some(upper.transpose())
-}
-
-/// (L L')^-1 rhs.
-pub(crate) fn solve_factored<F: Number>(lower: &Matrix<F>, rhs: &Matrix<F>) -> Matrix<F> {
-    back_substituted(solve_lower(lower, rhs), |k, i| lower[(i, k)])
 }
 
 /// The pivots of the elimination without pivoting, in their order. By Sylvester's law a symmetric matrix has

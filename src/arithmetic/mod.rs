@@ -43,4 +43,4 @@ macro_rules! assignments {
     )*};
 }
 
-assignments!([] DoubleDouble, [const WORDS: usize] BigFloat<WORDS>, [F: Number] Ball<F>);
+assignments!([] DoubleDouble, [const WORDS: usize] BigFloat<WORDS>, [F: Number] Ball<F>, [F: Number] ComplexBall<F>);

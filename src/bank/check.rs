@@ -7,8 +7,8 @@ use crate::spec::{
 use crate::units::Seconds;
 
 use super::{
-    Bank, BankError, BankProblem, CausalWitness, Certificate, DualWitness, FixedPoint, Gamma, LowerProof,
-    StateSpace, SynthesisFilters,
+    Bank, BankError, BankProblem, Certificate, FixedPoint, GainWitness, Gamma, Proof, StateSpace,
+    SynthesisFilters,
 };
 
 /// Largest m0 in a bank file. `fuse` appends as many zeros to a recording; 16 million are 3 minutes at 96
@@ -155,23 +155,9 @@ impl Bank {
     }
 
     fn check_proof(&self) -> Checked {
-        let Some(proof) = &self.proof else { return Ok(()) };
-        let check =
-            |path: &str, witness: &DualWitness, measured| check_witness(path, witness, self.ratio, measured);
-        if let Some(certificate) = &proof.upper {
-            check_certificate(certificate)?;
-            check("proof.upper.peak", &certificate.peak, 0)?;
-        }
-        match &proof.lower {
-            Some(LowerProof::Fir(witnesses)) => {
-                for (k, witness) in witnesses.iter().enumerate() {
-                    check(&format!("proof.lower[{k}]"), witness, self.frame_samples())?;
-                }
-            }
-            Some(LowerProof::Causal(witness)) => check_causal(witness)?,
-            None => {}
-        }
-        proof.noncausal.as_ref().map_or(Ok(()), |witness| check("proof.noncausal", witness, 0))
+        let Some(Proof { upper }) = &self.proof else { return Ok(()) };
+        check_certificate(upper)?;
+        check_witness("proof.upper.peak", &upper.peak, self.ratio)
     }
 
     fn check_scalars(&self) -> Checked {
@@ -340,34 +326,20 @@ fn check_triangle(path: &str, rows: &[Vec<f64>]) -> Checked {
     Ok(())
 }
 
-fn check_causal(witness: &CausalWitness) -> Checked {
-    check_norm("proof.lower.gamma", witness.gamma)?;
-    if !(1..=CausalWitness::MAX_PERIODS).contains(&witness.periods) {
-        let rule = format!("the recursion runs for 1 to {} slow periods", CausalWitness::MAX_PERIODS);
-        return out_of_range("proof.lower.periods", witness.periods as f64, "slow periods", rule);
-    }
-    Ok(())
-}
-
-fn check_witness(path: &str, witness: &DualWitness, reference: usize, measured: usize) -> Checked {
+fn check_witness(path: &str, witness: &GainWitness, reference: usize) -> Checked {
     check_sizes(&format!("{path}.half"), &witness.half)?;
     if witness.half == [0.0; 2] {
         let rule = "half is about cos(w/2), sin(w/2); both cannot be zero";
         return out_of_range(format!("{path}.half"), 0.0, "", rule);
     }
-    for (key, list, expected) in
-        [("reference", &witness.reference, reference), ("measured", &witness.measured, measured)]
-    {
-        let path = format!("{path}.{key}");
-        let rule = "a witness has one weight for each sample of a slow period";
-        check_length(&path, list.len(), expected, "weights", rule)?;
-        for (i, pair) in list.iter().enumerate() {
-            check_sizes(&format!("{path}[{i}]"), pair)?;
-        }
+    let path = format!("{path}.reference");
+    let rule = "a witness has one weight for each reference sample of a slow period";
+    check_length(&path, witness.reference.len(), reference, "weights", rule)?;
+    for (i, pair) in witness.reference.iter().enumerate() {
+        check_sizes(&format!("{path}[{i}]"), pair)?;
     }
     if witness.reference.iter().flatten().all(|&x| x == 0.0) {
-        let rule = "a witness of weight zero shows nothing";
-        return out_of_range(format!("{path}.reference"), 0.0, "", rule);
+        return out_of_range(path, 0.0, "", "a witness of weight zero shows nothing");
     }
     Ok(())
 }

@@ -4,7 +4,7 @@
 //! Every number reads back to the same bits. Unknown keys are refused by name, except `meta`, which is not
 //! read: other programs may store anything there.
 //!
-//! A file may carry a [`Proof`] of its gammas and a digest of its content. Reading ignores the digest, so
+//! A file may carry a [`Proof`] of its gamma and a digest of its content. Reading ignores the digest, so
 //! that an edited bank can be run; [`check_digest`] compares the digest with the content.
 
 mod check;
@@ -17,7 +17,7 @@ mod write;
 
 pub use check::MAX_BANK_LATENCY;
 pub use error::{BankError, BankProblem};
-pub use proof::{CausalWitness, Certificate, DualWitness, LowerProof, Proof};
+pub use proof::{Certificate, GainWitness, Proof};
 pub use read::check_digest;
 pub use taps::FixedPoint;
 #[cfg(feature = "design")]
@@ -64,7 +64,7 @@ pub struct Bank {
     pub fixed_point: Option<FixedPoint>,
     /// The worst-case error gamma and its bounds.
     pub gamma: Gamma,
-    /// The proof of `gamma`, if the file carries one.
+    /// The proof of `gamma.upper`, if the file carries one.
     pub proof: Option<Proof>,
 }
 
@@ -91,9 +91,9 @@ pub struct Gamma {
     /// An upper bound of the true norm of these coefficients: proven if the bank carries a proof, else the
     /// computed norm plus its stated error.
     pub upper: Option<f64>,
-    /// A lower bound for all banks of this method and size.
+    /// Computed lower bound for all banks of this method and size; it is not proven.
     pub lower: Option<f64>,
-    /// A lower bound for all banks, of any latency.
+    /// Computed lower bound for all banks, of any latency; it is not proven.
     pub noncausal: Option<f64>,
     /// No errors within the spec's `[uncertainty]` make the norm larger. Proven by `verify`; without such a
     /// table `None`.
@@ -123,14 +123,16 @@ impl Gamma {
             worst_case: None,
         }
     }
+
+    /// The same with lower bounds that do not exceed the norm.
+    #[must_use]
+    pub fn with_bounds_below_the_norm(self) -> Self {
+        let below = |bound: Option<f64>| bound.map(|x| self.norm.map_or(x, |norm| x.min(norm)));
+        Self { lower: below(self.lower), noncausal: below(self.noncausal), ..self }
+    }
 }
 
 impl Bank {
-    /// Whether the bank carries a certificate of its gamma.
-    pub fn has_certificate(&self) -> bool {
-        self.proof.as_ref().is_some_and(|proof| proof.upper.is_some())
-    }
-
     /// A bank of filters that were designed elsewhere: h = 1, no latency, no delays, gains of one, no
     /// offsets, unknown front ends and gammas.
     pub fn bare(filters: SynthesisFilters, ratio: usize) -> Self {

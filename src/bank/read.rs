@@ -9,8 +9,8 @@ use crate::units::Seconds;
 
 use super::digest::{digest, is_digest};
 use super::{
-    Bank, BankError, BankProblem, CausalWitness, Certificate, DualWitness, FORMAT, FixedPoint, Gamma,
-    LowerProof, Proof, StateSpace, SynthesisFilters, VERSION,
+    Bank, BankError, BankProblem, Certificate, FORMAT, FixedPoint, GainWitness, Gamma, Proof, StateSpace,
+    SynthesisFilters, VERSION,
 };
 
 const KEYS: [&str; 14] = [
@@ -201,23 +201,8 @@ fn gamma(value: &Value<'_>) -> Result<Gamma, Fault> {
 const WITNESS: &str = "a proof without it proves nothing; leave the proof out, or take the whole of it";
 
 fn proof(value: &Value<'_>) -> Result<Proof, Fault> {
-    let fields = value.fields(&["upper", "lower", "noncausal"])?;
-    Ok(Proof {
-        upper: fields.optional("upper").map(|v| certificate(&v)).transpose()?,
-        lower: fields.optional("lower").map(|v| lower_proof(&v)).transpose()?,
-        noncausal: fields.optional("noncausal").map(|v| witness(&v)).transpose()?,
-    })
-}
-
-/// A list of witnesses for FIR banks, or a table with gamma and periods for causal ones.
-fn lower_proof(value: &Value<'_>) -> Result<LowerProof, Fault> {
-    if let Ok(list) = value.items("a list of witnesses") {
-        return Ok(LowerProof::Fir(list.iter().map(witness).collect::<Result<_, _>>()?));
-    }
-    let fields = value.fields(&["gamma", "periods"])?;
-    let gamma = fields.required("gamma", WITNESS)?.number()?;
-    let periods = fields.required("periods", WITNESS)?.count("slow periods")?;
-    Ok(LowerProof::Causal(CausalWitness { gamma, periods }))
+    let fields = value.fields(&["upper"])?;
+    Ok(Proof { upper: certificate(&fields.required("upper", WITNESS)?)? })
 }
 
 fn certificate(value: &Value<'_>) -> Result<Certificate, Fault> {
@@ -230,13 +215,11 @@ fn certificate(value: &Value<'_>) -> Result<Certificate, Fault> {
     })
 }
 
-fn witness(value: &Value<'_>) -> Result<DualWitness, Fault> {
-    let fields = value.fields(&["half", "reference", "measured"])?;
-    let measured = fields.optional("measured").map(|v| pairs(&v)).transpose()?;
-    Ok(DualWitness {
+fn witness(value: &Value<'_>) -> Result<GainWitness, Fault> {
+    let fields = value.fields(&["half", "reference"])?;
+    Ok(GainWitness {
         half: pair(&fields.required("half", WITNESS)?)?,
         reference: pairs(&fields.required("reference", WITNESS)?)?,
-        measured: measured.unwrap_or_default(),
     })
 }
 

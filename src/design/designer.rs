@@ -5,7 +5,7 @@ use super::effort;
 use super::limits::{Effort, Limits, Stage, Stop};
 use super::merging::Repeats;
 use super::methods::robust_fir::RobustStudy;
-use super::methods::{self, DualSolution, Settings, Synthesis};
+use super::methods::{self, Settings, Synthesis};
 use super::plant::LiftedPlant;
 use super::problem::Problem;
 use super::quantise::WordStudy;
@@ -127,7 +127,7 @@ fn designed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
         return Ok(Design { proof: Err(DesignError::Stopped), ..judged });
     }
     (options.observer)(Stage::Proof, effort);
-    Ok(judged.proved(&synthesis.dual, options.proof, &stop))
+    Ok(judged.proved(options.proof, &stop))
 }
 
 /// Judges FIR filters that were designed elsewhere, `taps[i][n]` = `f_i[n]`, with the front ends, the delays
@@ -154,11 +154,8 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
     let filters = SynthesisFilters::Fir(taps);
     let rounding = plant.rounding(&filters::lifted(&filters, problem.ratio))?;
     let realised = Realised { filters, peak: synthesis.peak, rounding, reduction: None, integers: None };
-    Ok(judge(&complete, complete.clone(), realised, &synthesis).without_unresolved_bounds(&problem).proved(
-        &DualSolution::default(),
-        search,
-        &Stop::default(),
-    ))
+    let judged = judge(&complete, complete.clone(), realised, &synthesis);
+    Ok(judged.without_unresolved_bounds(&problem).proved(search, &Stop::default()))
 }
 
 /// The spec with all defaults filled in, its problem in normalised time, and the estimate of its design.
@@ -223,8 +220,7 @@ fn with_chosen_words(mut spec: Spec, words: Option<&FixedPoint>) -> Spec {
 }
 
 impl Design {
-    /// Leaves out the bounds that rest on differences which doubles do not resolve. `verify` may still prove
-    /// some.
+    /// Leaves out the bounds that rest on differences which doubles do not resolve.
     fn without_unresolved_bounds(mut self, problem: &Problem) -> Self {
         if !problem.resolves_delays() {
             self.bank.gamma = Gamma { lower: None, noncausal: None, ..self.bank.gamma };
@@ -233,15 +229,18 @@ impl Design {
     }
 
     /// Adds the proof to the bank, if `search` asks for one and it is found.
-    fn proved(mut self, dual: &DualSolution, search: ProofSearch, stop: &Stop) -> Self {
+    fn proved(mut self, search: ProofSearch, stop: &Stop) -> Self {
         if search == ProofSearch::Run {
             let begin = Instant::now();
-            self.proof = prove::attach_proof(&mut self.bank, dual, stop);
+            self.proof = prove::attach_proof(&mut self.bank, stop);
             if self.proof.is_ok() {
                 // `verify` proves it only with the rest.
                 self.prove_worst_case(stop);
             }
-            self.close_search();
+            if self.unfinished.is_some() && self.robust.is_none() && prove::has_no_error(&self.bank) {
+                // A bank without any error leaves nothing open.
+                self.unfinished = None;
+            }
             self.proof_time = begin.elapsed();
         }
         self
@@ -249,20 +248,6 @@ impl Design {
 }
 
 impl Design {
-    /// Where the searched bank is the finished one, its proof may show more than the bounds of the search. A
-    /// bank without any error leaves nothing open.
-    fn close_search(&mut self) {
-        let is_searched = self.words.is_none() && self.reduction.is_none();
-        let is_nominal = self.robust.is_none();
-        if let (true, Ok(proven), Some(norm)) = (is_searched && is_nominal, &self.proof, self.bank.gamma.norm)
-        {
-            self.unfinished = self.unfinished.and_then(|left| left.unless_proven(proven.lower, norm));
-        }
-        if is_nominal && self.unfinished.is_some() && prove::has_no_error(&self.bank) {
-            self.unfinished = None;
-        }
-    }
-
     /// States the worst case over the box of the spec, or says why there is none.
     fn prove_worst_case(&mut self, stop: &Stop) {
         let Some(study) = &self.robust else { return };

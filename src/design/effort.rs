@@ -12,7 +12,7 @@ use super::limits::{Effort, Limits, MAX_LONG_STATES, Range};
 use super::merging::Repeats;
 use super::methods::{Deviations, robust_fir::RobustProblem};
 use super::problem::{Problem, common_delay};
-use super::prove::{MAX_SEARCHED_STATES, max_witnesses};
+use super::prove::MAX_SEARCHED_STATES;
 use crate::memory::available_memory;
 use crate::spec::{Method, Reduction, Spec};
 
@@ -73,7 +73,7 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
     let sizes = Sizes::of(spec)?;
     let mut effort = sizes.method(spec).then(sizes.norms());
     if proving {
-        effort = effort.then(sizes.proof(spec.design.method));
+        effort = effort.then(sizes.proof());
     }
     if spec.design.has_integers() {
         // For a loss, more word lengths, and taps left out.
@@ -265,21 +265,17 @@ impl Sizes {
         Effort::of(3.0 * NORM_OPERATIONS.at(states), 20.0 * REAL_BYTES * states * states)
     }
 
-    /// The search for a proof, which may need 512 bits where they are tried, and for FIR banks of least
-    /// gamma all directions.
-    fn proof(&self, method: Method) -> Effort {
+    /// The search for a proof, which may need 512 bits where they are tried.
+    fn proof(&self) -> Effort {
         let states = self.error_states();
         if states > MAX_SEARCHED_STATES as f64 {
             return Effort::default();
         }
         let long =
             if states > MAX_LONG_STATES as f64 { 0.0 } else { LONG_CERTIFICATE_OPERATIONS * states.powi(3) };
-        let taps = if method == Method::Fir { self.channels * self.taps } else { 0.0 };
-        let rows = 2.0 * max_witnesses(taps as usize) as f64 * self.channels;
-        let witnesses = 4.0 * rows * taps * rows.min(taps);
-        let bytes = REAL_BYTES * (30.0 * states * states + 5.0 * rows * taps);
+        let bytes = REAL_BYTES * 30.0 * states * states;
         let certificates = Effort::of(CERTIFICATE_OPERATIONS.at(states), bytes).times(CERTIFICATES);
-        certificates.perhaps(Effort::of(long + witnesses, 0.0))
+        certificates.perhaps(Effort::of(long, 0.0))
     }
 
     /// Integer taps of five word lengths: lattice points close to the optimum, then single steps, each

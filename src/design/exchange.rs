@@ -24,7 +24,7 @@ use super::DesignError;
 use super::error_grid::{AffineError, Location, Peaks};
 use super::limits::Stop;
 use super::unfinished::{EndOfSearch, Unfinished};
-use crate::linalg::{self, CMat};
+use crate::linalg;
 use crate::lmi::sampled::{self, Covered, LowerBound, MeanSquareObjective, Point, Problem, Taps};
 use crate::lmi::{FINEST_GAP, Outcome};
 
@@ -99,24 +99,7 @@ struct Round<S> {
     outcome: Outcome,
 }
 
-/// What an exchange says of all unknowns.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct DualSolution {
-    pub(crate) points: Vec<DualPoint>,
-    /// The lower bound that they give, for unknowns of any size that matters.
-    pub(crate) bound: f64,
-}
-
-/// A frequency with the dual matrix of the error there.
-#[derive(Debug, Clone)]
-pub(crate) struct DualPoint {
-    /// Radians per slow period.
-    pub(crate) omega: f64,
-    /// M x q; its left singular vectors are the binding directions.
-    pub(crate) weight: CMat,
-}
-
-/// The state of the exchange: the points so far and the lower bound that they prove.
+/// The state of the exchange: the points so far and the lower bound that they give.
 #[derive(Debug)]
 pub(super) struct Exchange<E: AffineError> {
     error: E,
@@ -130,8 +113,6 @@ pub(super) struct Exchange<E: AffineError> {
     pub(super) lower: f64,
     /// The largest lower bound for all unknowns, however large.
     pub(super) lower_for_all: f64,
-    /// The dual matrices that prove `lower`.
-    pub(super) dual: Vec<DualPoint>,
     /// Ends the exchange with the best unknowns so far.
     pub(super) stop: Stop,
     /// What the last search for the least gamma left open, or that for the least mean square after it,
@@ -167,7 +148,6 @@ impl<E: AffineError> Exchange<E> {
             gamma_margin,
             lower: 0.0,
             lower_for_all: 0.0,
-            dual: Vec::new(),
             stop: Stop::default(),
             unfinished: None,
             rounds: 0,
@@ -270,7 +250,7 @@ impl<E: AffineError> Exchange<E> {
     fn round(&mut self, tolerances: Tolerances, tolerance: f64) -> Result<Round<E::Scenario>, DesignError> {
         let solution = sampled::minimise(&self.problem, tolerance, &|| self.stop.is_due())?;
         self.count_round(solution.iterations);
-        self.raise_lower_bound(solution.lower, solution.dual);
+        self.raise_lower_bound(solution.lower);
         // The optimum lies anywhere between the two.
         let optimum = if tolerance > tolerances.finest() { self.lower } else { solution.gamma };
         let level = optimum * (1.0 + PEAK_EXCESS * tolerances.accuracy);
@@ -357,15 +337,11 @@ impl<E: AffineError> Exchange<E> {
         Ok(Candidate { taps, peaks })
     }
 
-    fn raise_lower_bound(&mut self, lower: LowerBound, dual: Vec<CMat>) {
+    fn raise_lower_bound(&mut self, lower: LowerBound) {
         if lower.covered == Covered::All {
             self.lower_for_all = self.lower_for_all.max(lower.value);
         }
-        if lower.value > self.lower {
-            self.lower = lower.value;
-            let weights = self.problem.points().iter().zip(dual);
-            self.dual = weights.map(|(point, weight)| DualPoint { omega: point.omega, weight }).collect();
-        }
+        self.lower = self.lower.max(lower.value);
     }
 
     fn count_round(&mut self, iterations: usize) {

@@ -49,14 +49,13 @@ use crate::bank::{Bank, Proof};
 use crate::verify::Verified;
 use crate::verify::uncertainty::check_stated;
 
-/// Searches for a proof of the gammas of a bank that was designed elsewhere or earlier. [`design`] also
-/// knows the dual solution of its optimum, so it may prove a larger lower bound.
+/// Searches for a proof of the gamma of a bank that was designed elsewhere or earlier.
 ///
 /// # Errors
 /// As [`analyze`]; [`DesignError::NotCertified`] if no certificate was found; [`DesignError::Verify`] for a
 /// worst case that the bank states and that is not proven.
 pub fn prove(bank: &Bank) -> Result<(Proof, Verified), DesignError> {
-    let found = prove::prove(bank, &bank.gamma, &methods::DualSolution::default(), &Stop::default())?;
+    let found = prove::prove(bank, &bank.gamma, &Stop::default())?;
     check_stated(bank)?;
     Ok(found)
 }

@@ -6,8 +6,6 @@ use std::fmt;
 
 /// Multiple of the accuracy that a search aims at beyond which its bounds count as apart.
 const NOTICEABLE_ACCURACIES: f64 = 20.0;
-/// Relative distance of a norm from its proven lower end at which nothing is left open.
-const MET_DISTANCE: f64 = 1e-5;
 /// The same of a mean square, relative to it: 0.04 dB, less than a measured SNR shows.
 const NOTICEABLE_SQUARE: f64 = 0.01;
 
@@ -74,17 +72,6 @@ impl Unfinished {
         })
     }
 
-    /// What is left of it for a bank of the norm `gamma` where it is proven that no bank has less than
-    /// `lower`.
-    pub(super) fn unless_proven(self, lower: f64, gamma: f64) -> Option<Self> {
-        let proven = gamma / lower - 1.0;
-        match self.objective {
-            Objective::Gamma if proven <= MET_DISTANCE => None,
-            Objective::Gamma if proven < self.width => Some(Self { width: proven, ..self }),
-            _ => Some(self),
-        }
-    }
-
     /// Of the bounds `lower` and `square` of a search for the least mean square.
     pub(super) fn of_mean_square(lower: f64, square: f64, reason: EndOfSearch) -> Option<Self> {
         let width = square / lower - 1.0;
@@ -129,9 +116,6 @@ mod tests {
         let open = of(0.5).unwrap();
         assert_eq!((open.width, open.reason), (1.0, EndOfSearch::Rounds));
         assert!(open.to_string().contains("gamma may lie up to 1.00e2 % above the least"), "{open}");
-        assert_eq!(open.unless_proven(1.0 - 1e-6, 1.0), None);
-        assert_eq!(open.unless_proven(0.8, 1.0).unwrap().width, 0.25);
-        assert_eq!(open.unless_proven(0.0, 1.0), Some(open));
         let square = |lower: f64| Unfinished::of_mean_square(lower, 1.0, EndOfSearch::Rounding);
         assert_eq!(square(0.995), None);
         assert!(

@@ -11,7 +11,7 @@ use crate::quantity::readable;
 use crate::runtime::Options;
 use crate::spec::{Method, Spec};
 use crate::units::Decibels;
-use crate::verify::{BoundedBanks, verify};
+use crate::verify::verify;
 
 /// The error of a delay, fast samples, for which the change of gamma is stated.
 const SMALL_ERROR: f64 = 1e-3;
@@ -88,7 +88,7 @@ fn error_facts(bank: &Bank, scale: &GammaScale, mean: &MeanAnalysis) -> Vec<Fact
             "gamma",
             six_digits(gamma),
             format!(
-                "worst-case gain from the analog input to the error (h = 1, computed): {} against zero output, {} \
+                "worst-case gain from the signal's source to the error (h = 1, computed): {} against zero output, {} \
                  against plain interleaving",
                 below(scale.zero_output),
                 below(scale.interleaving)
@@ -98,20 +98,13 @@ fn error_facts(bank: &Bank, scale: &GammaScale, mean: &MeanAnalysis) -> Vec<Fact
     facts.push(match verify(bank) {
         Ok(proven) => fact(
             "proven",
-            interval(proven.lower, proven.upper),
-            format!(
-                "this bank has at most the larger value, and {} has less than the smaller one; proven for this page",
-                match proven.lower_banks {
-                    BoundedBanks::Any => "no bank at all",
-                    BoundedBanks::Causal => "no causal bank of this latency",
-                    BoundedBanks::FirOfThisLength => "no FIR bank of this length",
-                }
-            ),
+            interval(proven.attained, proven.upper),
+            "gamma of this bank lies between these values; proven for this page",
         ),
         Err(error) => fact("proven", "nothing", format!("the bounds of the file were not proven: {error}")),
     });
     if let Some(noncausal) = bank.gamma.noncausal {
-        facts.push(fact("noncausal", six_digits(noncausal), "no latency makes gamma smaller"));
+        facts.push(fact("noncausal", six_digits(noncausal), "no latency makes gamma smaller (computed lower bound)"));
     }
     facts.push(fact("noise gain", six_digits(mean.noise_gain), noise(mean)));
     facts

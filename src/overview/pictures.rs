@@ -75,8 +75,8 @@ pub fn pictures(bank: &Bank) -> Result<Vec<Picture>, DesignError> {
         ),
         picture(
             "error",
-            "The largest gain from the analog input to the error. Its maximum is gamma; no bank of the class goes \
-             below the lower bound everywhere.",
+            "The largest gain from the signal's source to the error. Its maximum is gamma; the lower bound is \
+             computed for banks of this method and size.",
             error(bank)?,
         ),
         picture(
@@ -281,13 +281,13 @@ fn error(bank: &Bank) -> Result<Chart, DesignError> {
         points: response.iter().map(|(f, gain)| (f.0 * factor, decibels(*gain))).collect(),
     }];
     let ends = [Hertz(0.0), Hertz(0.5 / bank.slow_period().0)];
-    for (label, bound) in [("gamma, upper bound", bank.gamma.upper), ("lower bound", bank.gamma.lower)] {
+    for (label, bound) in [("gamma, upper bound", bank.gamma.upper), ("computed lower bound", bank.gamma.lower)] {
         series.extend(bound.filter(|bound| *bound > 0.0).map(|bound| Series {
             label: label.into(),
             points: ends.iter().map(|f| (f.0 * factor, decibels(bound))).collect(),
         }));
     }
-    let title = "Largest gain from the analog input to the error".to_owned();
+    let title = "Largest gain from the signal's source to the error".to_owned();
     Ok(Chart {
         title,
         x_label: x_label + ", modulo the slow rate",

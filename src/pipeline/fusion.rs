@@ -43,8 +43,8 @@ impl DroppedLatency {
 }
 
 impl Settings<'_> {
-    /// `options` for a plan of such a run. Where gaps are filled, `Auto` is the direct algorithm: outputs that
-    /// no gap affects have the bits that they have without gaps.
+    /// `options` for a plan of such a run. Where gaps are filled, `Auto` is the direct algorithm: outputs
+    /// that no gap affects have the bits that they have without gaps.
     pub fn options(&self, options: Options) -> Options {
         let asked = options.algorithm;
         let algorithm = if self.gaps.is_some() { asked.without_added_latency() } else { asked };

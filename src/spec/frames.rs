@@ -12,7 +12,7 @@
 
 use super::limits::{self, range};
 use super::{ChannelSpec, SpecProblem};
-use crate::units::{FastPeriods, GridTime, Hertz, Seconds};
+use crate::units::{Fraction, GridTime, Hertz, Seconds};
 use std::ops::Range;
 
 /// Rounding of a rate and of the fast period in a file, relative to their product.
@@ -93,15 +93,11 @@ impl FrameLayout {
     /// D_ij of each sample of a frame, from the delays of the converters.
     pub fn delays(&self, delays: &[GridTime]) -> Vec<GridTime> {
         let of = |FrameSample { converter, number }: FrameSample| {
-            // j P / L_i fast periods: the whole part is exact.
+            // j P / L_i fast periods, exact.
             let (steps, samples) = (number * self.ratio, self.samples[converter]);
             let (whole, part) = (steps / samples, steps % samples);
             let earlier = delays.get(converter)?.later_by(-(whole as f64));
-            Some(if part == 0 {
-                earlier
-            } else {
-                earlier.moved_by(FastPeriods(-(part as f64) / samples as f64))
-            })
+            Some(earlier.earlier_by(Fraction { numerator: part as u32, denominator: samples as u32 }))
         };
         self.iter().filter_map(of).collect()
     }
@@ -282,6 +278,7 @@ pub(super) fn of_channels(fast_period: Seconds, ratio: usize, channels: &[Channe
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::FastPeriods;
 
     fn made(fast: f64, rates: &[f64]) -> FrameLayout {
         let rates: Vec<Hertz> = rates.iter().copied().map(Hertz).collect();

@@ -21,12 +21,8 @@ impl Timeline {
         let period = ratio as f64;
         let latest = times.iter().copied().max_by(|a, b| a.compare(*b));
         let latest = latest.unwrap_or(GridTime::fast_sample(0.0, Seconds(1.0)));
-        let late = |time: &GridTime| {
-            let apart = latest.whole() - time.whole();
-            let periods = (apart / period).floor();
-            if apart == periods * period && time.rest() > latest.rest() { periods - 1.0 } else { periods }
-        };
-        let delay_periods: Vec<f64> = times.iter().map(late).collect();
+        let delay_periods: Vec<f64> =
+            times.iter().map(|time| latest.whole_periods_since(*time, ratio)).collect();
         let folded = |(time, periods): (&GridTime, &f64)| time.later_by(periods * period);
         let folded: Vec<GridTime> = times.iter().zip(&delay_periods).map(folded).collect();
         let mut instants = folded.clone();

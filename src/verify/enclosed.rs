@@ -1,23 +1,15 @@
 //! An enclosure of the error system of a bank. It is built once and serves to check any number of
-//! witnesses.
+//! certificates.
 
 use super::ball::{self, Ball, Matrix};
-use super::causal::{CausalPlant, Precision, Recursion};
-use super::covariance::{Covariance, TapSamples};
 use super::error_system::{self, BlockForm, ErrorSystem};
 use super::front_ends::FrontEnds;
 use super::slow_period::SlowPeriod;
-use super::spectrum::{self, ComplexMatrix};
 use super::timeline::{SamplingInstant, delay_periods, timeline};
-use super::{
-    BoundedBanks, MAX_STATES, Strictness, Verified, VerifyError, fir_length, lower, positive, statements,
-    upper,
-};
-use crate::arithmetic::{DoubleDouble, Float512, Number};
-use crate::bank::{
-    Bank, CausalWitness, Certificate, DualWitness, Gamma, LowerProof, Proof, SynthesisFilters,
-};
-use crate::linalg::{CMat, Mat};
+use super::{MAX_STATES, Strictness, Verified, VerifyError, gain, positive, statements, upper};
+use crate::arithmetic::{ComplexBall, Float512, Number};
+use crate::bank::{Bank, Certificate, GainWitness, Gamma};
+use crate::linalg::{CMat, Complex, Mat};
 use crate::units::Timeline;
 use nalgebra::DMatrix;
 use std::sync::OnceLock;
@@ -40,8 +32,6 @@ pub struct EnclosedErrorSystem<'a> {
     equations: ErrorSystem,
     long_equations: OnceLock<ErrorSystem<Float512>>,
     long_period: OnceLock<SlowPeriod<Float512>>,
-    short: OnceLock<Option<CausalPlant<DoubleDouble>>>,
-    long: OnceLock<Option<CausalPlant<Float512>>>,
 }
 
 /// Midpoints of the enclosed error system, for the search for a certificate: xi+ = a xi + b w, e = c xi + d
@@ -84,8 +74,6 @@ impl<'a> EnclosedErrorSystem<'a> {
             equations,
             long_equations: OnceLock::new(),
             long_period: OnceLock::new(),
-            short: OnceLock::new(),
-            long: OnceLock::new(),
         })
     }
 
@@ -101,52 +89,6 @@ impl<'a> EnclosedErrorSystem<'a> {
         (n..n + self.bank.ratio).map(|i| self.period.gram[(i, i)].nearest()).sum::<f64>().sqrt()
     }
 
-    /// Whole slow periods by which sample `j` is taken before sample `i`, if the two are multiples of each
-    /// other up to that delay.
-    fn periods_between(&self, i: usize, j: usize) -> Option<f64> {
-        let (a, b) = (self.samples[i], self.samples[j]);
-        let periods = a.time.periods_since(b.time, self.bank.ratio);
-        periods.filter(|_| a.filter == b.filter)
-    }
-
-    /// Whether two samples are always multiples of each other.
-    fn same(&self, i: usize, j: usize) -> bool {
-        self.periods_between(i, j) == Some(0.0)
-    }
-
-    /// Whether two samples are multiples of each other up to a delay by whole slow periods.
-    fn same_later(&self, i: usize, j: usize) -> bool {
-        self.periods_between(i, j).is_some()
-    }
-
-    /// The channels that are not `equal` to one that is kept before them.
-    fn first_channels(&self, equal: impl Fn(usize, usize) -> bool) -> Vec<usize> {
-        let m = self.bank.ratio;
-        let mut kept: Vec<usize> = Vec::new();
-        for i in 0..self.bank.frame_samples() {
-            if kept.iter().all(|&j| !equal(m + i, m + j)) {
-                kept.push(i);
-            }
-        }
-        kept
-    }
-
-    /// Rows of the measured samples that a causal bank needs: of samples that are multiples of each other up
-    /// to whole slow periods, only the newest.
-    fn newest_samples(&self) -> Vec<usize> {
-        let mut rows: Vec<usize> = (self.bank.ratio..self.samples.len()).collect();
-        let time = |s: usize| self.samples[s].time;
-        rows.sort_by(|&i, &j| time(j).compare(time(i)));
-        let mut kept: Vec<usize> = Vec::new();
-        for row in rows {
-            if kept.iter().all(|&newer| !self.same_later(newer, row)) {
-                kept.push(row);
-            }
-        }
-        kept.sort_unstable();
-        kept
-    }
-
     /// Whether `certificate` proves its gamma. Only one with a correction is tried in 512 bits.
     pub fn certifies(&self, certificate: &Certificate) -> bool {
         let long = !certificate.correction.is_empty() && self.states() <= MAX_CORRECTED_STATES;
@@ -155,81 +97,37 @@ impl<'a> EnclosedErrorSystem<'a> {
     }
 
     /// The error system in 512 bits.
-    pub(super) fn long_equations(&self) -> &ErrorSystem<Float512> {
+    fn long_equations(&self) -> &ErrorSystem<Float512> {
         self.long_equations.get_or_init(|| {
             ErrorSystem::new(self.long_period(), &BlockForm::new(&self.bank.filters, self.bank.ratio))
         })
     }
 
     /// A proven lower bound of ||K||, from the gain at a frequency; in 512 bits where 106 do not resolve it.
-    pub fn attains(&self, witness: &DualWitness) -> Option<f64> {
+    pub fn attains(&self, witness: &GainWitness) -> Option<f64> {
         self.gain_at(witness).0
     }
 
     /// The gain at a frequency, rounded down; `None` where neither arithmetic resolves it.
-    pub(crate) fn resolved_gain(&self, witness: &DualWitness) -> Option<f64> {
+    pub(crate) fn resolved_gain(&self, witness: &GainWitness) -> Option<f64> {
         let (gain, is_resolved) = self.gain_at(witness);
         gain.filter(|_| is_resolved)
     }
 
     /// A lower bound of the gain at a frequency, and whether it is the gain up to rounding.
-    fn gain_at(&self, witness: &DualWitness) -> (Option<f64>, bool) {
+    fn gain_at(&self, witness: &GainWitness) -> (Option<f64>, bool) {
         let (filters, ratio) = (&self.bank.filters, self.bank.ratio);
-        let short = lower::square_of_gain(&self.period, filters, ratio, witness);
+        let short = gain::square_of_gain(&self.period, filters, ratio, witness);
         if is_resolved(&short) || self.states() > MAX_CORRECTED_STATES {
-            return (lower::root(short), is_resolved(&short));
+            return (gain::root(short), is_resolved(&short));
         }
-        let long = lower::square_of_gain(self.long_period(), filters, ratio, witness);
-        (lower::root(long), is_resolved(&long))
-    }
-
-    /// A proven lower bound for any bank on these front ends, causal or not.
-    pub fn noncausal_bound(&self, witness: &DualWitness) -> Option<f64> {
-        let channels = self.first_channels(|i, j| self.same_later(i, j));
-        lower::unexplained(&self.period, self.bank.ratio, &channels, witness)
-    }
-
-    /// The channels that are not multiples of one before them.
-    pub(crate) fn distinct_channels(&self) -> Vec<usize> {
-        self.first_channels(|i, j| self.same(i, j))
-    }
-
-    /// A proven lower bound for FIR banks as long as this one.
-    pub fn fir_bound(&self, witnesses: &[DualWitness]) -> Option<f64> {
-        let SynthesisFilters::Fir(taps) = &self.bank.filters else { return None };
-        let channels = self.distinct_channels();
-        let (ratio, length) = (self.bank.ratio, taps[0].len());
-        let short = || fir_length::of_length(&self.period, ratio, &channels, length, witnesses);
-        let long = || fir_length::of_length(self.long_period(), ratio, &channels, length, witnesses);
-        if witnesses.is_empty() { None } else { short().or_else(long) }
+        let long = gain::square_of_gain(self.long_period(), filters, ratio, witness);
+        (gain::root(long), is_resolved(&long))
     }
 
     /// The slow period in 512 bits.
-    pub(super) fn long_period(&self) -> &SlowPeriod<Float512> {
+    fn long_period(&self) -> &SlowPeriod<Float512> {
         self.long_period.get_or_init(|| SlowPeriod::new(&self.front_ends, &self.timeline, &self.samples))
-    }
-
-    /// Runs the recursion for causal banks at `gamma` over `periods` slow periods.
-    pub fn causal_recursion(&self, gamma: f64, periods: usize, precision: Precision) -> Recursion {
-        let (m, measured) = (self.bank.ratio, || self.newest_samples());
-        match precision {
-            Precision::Short => {
-                let plant = self.short.get_or_init(|| CausalPlant::new(&self.period, m, &measured()));
-                plant.as_ref().map_or(Recursion::Undecided, |plant| plant.recursion(gamma, periods))
-            }
-            Precision::Long => {
-                let plant = self.long.get_or_init(|| CausalPlant::new(self.long_period(), m, &measured()));
-                plant.as_ref().map_or(Recursion::Undecided, |plant| plant.recursion(gamma, periods))
-            }
-        }
-    }
-
-    /// Whether the recursion refutes `gamma` for causal banks within `periods` slow periods.
-    fn refuted(&self, gamma: f64, periods: usize) -> bool {
-        let shown = |precision| self.causal_recursion(gamma, periods, precision);
-        [Precision::Short, Precision::Long]
-            .into_iter()
-            .any(|precision| matches!(shown(precision), Recursion::Refuted { .. }))
     }
 
     /// The error system in double precision; `None` if the Gram matrix of its inputs has no root, which
@@ -252,34 +150,33 @@ impl<'a> EnclosedErrorSystem<'a> {
     /// systems in 512 bits where 106 do not resolve it.
     pub(crate) fn error_gram(&self, half: [f64; 2]) -> CMat {
         let (filters, ratio) = (&self.bank.filters, self.bank.ratio);
-        let short = lower::error_gram(&self.period, filters, ratio, half);
-        if short.is_resolved(UNRESOLVED) || self.states() > MAX_LONG_GRAM_STATES {
-            return short.nearest();
+        let short = gain::error_gram(&self.period, filters, ratio, half);
+        if is_gram_resolved(&short) || self.states() > MAX_LONG_GRAM_STATES {
+            return nearest(&short);
         }
-        lower::error_gram(self.long_period(), filters, ratio, half).nearest()
+        nearest(&gain::error_gram(self.long_period(), filters, ratio, half))
     }
 
-    /// Computes the bounds that the witnesses of `proof` prove, and compares the stated `gamma` with them.
+    /// The bounds that `certificate` proves, compared with the stated `gamma`.
     ///
     /// # Errors
     /// [`VerifyError`] naming the first mismatch.
     pub(crate) fn judge(
         &self,
         gamma: &Gamma,
-        proof: &Proof,
+        certificate: &Certificate,
         strictness: Strictness,
     ) -> Result<Verified, VerifyError> {
-        let proven = self.proven(proof)?;
+        let proven = self.proven(certificate)?;
         statements::compare(gamma, &proven, self.scale(), strictness)?;
         Ok(proven)
     }
 
-    /// The bounds that the witnesses of `proof` prove.
+    /// The bounds that `certificate` proves.
     ///
     /// # Errors
-    /// [`VerifyError`] naming the witness that does not prove its bound.
-    pub fn proven(&self, proof: &Proof) -> Result<Verified, VerifyError> {
-        let certificate = proof.upper.as_ref().ok_or(VerifyError::NoCertificate)?;
+    /// [`VerifyError`] naming the part that does not prove its bound.
+    pub fn proven(&self, certificate: &Certificate) -> Result<Verified, VerifyError> {
         let (found, states, upper) = (certificate.factor.len(), self.states(), certificate.gamma);
         if found != states {
             return Err(VerifyError::CertificateSize { found, states });
@@ -289,43 +186,26 @@ impl<'a> EnclosedErrorSystem<'a> {
         if !self.certifies(certificate) {
             return Err(VerifyError::NotProven { gamma: upper });
         }
-        let noncausal = match &proof.noncausal {
-            Some(witness) => {
-                self.noncausal_bound(witness).ok_or(VerifyError::Void { place: "proof.noncausal" })?
-            }
-            None => 0.0,
-        };
-        let (bound, banks) = self.lower_bound(proof.lower.as_ref())?;
-        let (lower, lower_banks) =
-            if bound > noncausal { (bound, banks) } else { (noncausal, BoundedBanks::Any) };
-        Ok(Verified { lower, lower_banks, upper, attained, noncausal, states })
+        Ok(Verified { upper, attained, states })
     }
+}
 
-    fn lower_bound(&self, proof: Option<&LowerProof>) -> Result<(f64, BoundedBanks), VerifyError> {
-        match proof {
-            None => Ok((0.0, BoundedBanks::Any)),
-            Some(LowerProof::Fir(witnesses)) => {
-                let bound = self.fir_bound(witnesses).ok_or(VerifyError::Void { place: "proof.lower" })?;
-                Ok((bound, BoundedBanks::FirOfThisLength))
-            }
-            Some(LowerProof::Causal(CausalWitness { gamma, periods })) => {
-                if self.refuted(*gamma, *periods) {
-                    Ok((*gamma, BoundedBanks::Causal))
-                } else {
-                    Err(VerifyError::NotRefuted { gamma: *gamma, periods: *periods })
-                }
-            }
-        }
-    }
+/// Whether the radii stay below the share [`UNRESOLVED`] of the largest entry.
+fn is_gram_resolved<F: Number>(m: &DMatrix<ComplexBall<F>>) -> bool {
+    let parts = || m.iter().flat_map(|x| [x.re, x.im]);
+    let largest = parts().map(|x| x.nearest().abs()).fold(0.0, f64::max);
+    parts().all(|x| x.radius() <= UNRESOLVED * largest)
+}
+
+/// The nearest doubles to the midpoints.
+fn nearest<F: Number>(m: &DMatrix<ComplexBall<F>>) -> CMat {
+    m.map(|x| Complex::new(x.re.nearest(), x.im.nearest()))
 }
 
 /// Whether the square of a gain is known to [`UNRESOLVED`].
 fn is_resolved<F: Number>(square: &Ball<F>) -> bool {
     square.radius() <= UNRESOLVED * square.nearest()
 }
-
-/// Real and imaginary part.
-pub(crate) type ComplexParts = [DMatrix<Float512>; 2];
 
 /// An error system xi+ = A xi + J u, e = C xi + L u with the Gram matrix S of u.
 pub(crate) struct PreciseErrorSystem {
@@ -335,38 +215,12 @@ pub(crate) struct PreciseErrorSystem {
     pub(crate) input_gram: DMatrix<Float512>,
 }
 
-/// The error system and second moments of its samples in 512 bits, for the search for certificates and for
-/// witnesses of long filters. Only their midpoints: the proof does not use them.
 impl EnclosedErrorSystem<'_> {
-    /// The error system in 512 bits.
+    /// The error system in 512 bits, for the search for certificates. Only its midpoints: the proof does not
+    /// use them.
     pub(crate) fn in_512_bits(&self) -> PreciseErrorSystem {
         let error = self.long_equations();
         PreciseErrorSystem { system: midpoints(&error.system), input_gram: midpoints(&error.input_gram()) }
-    }
-
-    /// The point z of the unit circle that `half` names, 1 x 1, and the Gram matrix at it: that of the M
-    /// reference samples and the samples of the `channels`.
-    pub(crate) fn precise_gram(&self, half: [f64; 2], channels: &[usize]) -> [ComplexParts; 2] {
-        let m = self.bank.ratio;
-        let z = ComplexMatrix::unit(half);
-        let rows: Vec<usize> = (0..m).chain(channels.iter().map(|i| m + i)).collect();
-        let gram = spectrum::gram(self.long_period(), &z).select(&rows, &rows);
-        [&z, &gram].map(|of| [midpoints(&of.re), midpoints(&of.im)])
-    }
-
-    /// Covariance of the samples of the `channels` over `lags` slow periods, for white noise of unit density
-    /// at the input, the channels of the latest period first; and the correlations of the M reference
-    /// samples (rows) with these.
-    pub(crate) fn precise_covariance(
-        &self,
-        channels: &[usize],
-        lags: usize,
-    ) -> Option<[DMatrix<Float512>; 2]> {
-        let (period, ratio) = (self.long_period(), self.bank.ratio);
-        let covariance = Covariance::new(period)?;
-        let samples = TapSamples { ratio, channels, lags };
-        let own = covariance.of_taps(period, samples);
-        Some([own, covariance.with_reference(period, samples)].map(|m| midpoints(&m)))
     }
 }
 

@@ -83,17 +83,6 @@ pub enum VerifyError {
         /// Proven from above.
         upper: f64,
     },
-    /// The recursion does not refute the gamma that the file states.
-    #[error(
-        "proof.lower: {periods} slow periods do not refute gamma = {gamma} for causal banks; the file was altered, design the \
-         bank again"
-    )]
-    NotRefuted {
-        /// The gamma that, according to the file, no causal bank achieves.
-        gamma: f64,
-        /// The number T of slow periods.
-        periods: usize,
-    },
     /// A stated number contradicts the proven bound or claims more than it.
     #[error(
         "{place}: the file states {stated}, but {relation} {proven} is proven; the file was altered, design the bank again"

@@ -101,13 +101,13 @@ pub(super) struct ErrorSystem<F = DoubleDouble> {
 }
 
 /// The index ranges of the parts of the state.
-pub(super) struct Layout {
+struct Layout {
     lines: Vec<Range<usize>>,
     filter: Range<usize>,
 }
 
 impl Layout {
-    pub(super) fn new<F: Number>(period: &SlowPeriod<F>, filter_states: usize) -> Self {
+    fn new<F: Number>(period: &SlowPeriod<F>, filter_states: usize) -> Self {
         let mut next = period.order();
         let mut take = |count: usize| {
             next += count;
@@ -118,7 +118,7 @@ impl Layout {
     }
 
     /// Number of states.
-    pub(super) fn order(&self) -> usize {
+    fn order(&self) -> usize {
         self.filter.end
     }
 }
@@ -138,9 +138,9 @@ pub(super) fn order(
 }
 
 /// Linear maps from the state xi and the inputs u, row by row.
-pub(super) struct Rows<F> {
-    pub(super) state: Matrix<F>,
-    pub(super) input: Matrix<F>,
+struct Rows<F> {
+    state: Matrix<F>,
+    input: Matrix<F>,
 }
 
 impl<F: Number> Rows<F> {
@@ -167,7 +167,7 @@ impl<F: Number> Rows<F> {
 
 /// The analog side with its delay lines: xi+ (with `more` rows of zeros below), and the samples that are
 /// counted in this period.
-pub(super) fn sampled<F: Number>(period: &SlowPeriod<F>, layout: &Layout, more: usize) -> (Rows<F>, Rows<F>) {
+fn sampled<F: Number>(period: &SlowPeriod<F>, layout: &Layout, more: usize) -> (Rows<F>, Rows<F>) {
     let (n, order, inputs) = (period.order(), layout.order(), period.order() + period.samples());
     let mut next = Rows::zeros(order + more, order, inputs);
     next.state.view_mut((0, 0), (n, n)).copy_from(&period.transition);

@@ -1,22 +1,19 @@
-//! Proves a bank's gammas from its file alone, in arithmetic that bounds every rounding error.
+//! Proves a bank's gamma from its file alone, in arithmetic that bounds every rounding error.
 //!
 //! This module uses nothing of the design, its solvers or its norms: it neither searches nor optimises; it
 //! checks. It shares front ends, instants and the arithmetic with the designer. The file holds the
-//! certificate and the witnesses of the proof ([`Proof`]). How they were found does not matter.
+//! certificate of the proof ([`Proof`](crate::bank::Proof)). How it was found does not matter.
 //!
 //! # What is proven
 //! For the error system K of the bank's own coefficients (thesis Props. 5.1-5.3), in normalised time (h =
 //! 1):
 //!
 //! - `attained <= ||K|| <= upper`: from below by the gain at one frequency, from above by the bounded-real
-//!   lemma with the certificate P = R R'; the same certificate proves that the bank is stable;
-//! - no FIR bank of this length has a gamma below `lower`, by dual witnesses that together bind all taps; or
-//! - no causal bank has a gamma below `lower`, by the inertia of a finite-horizon Riccati recursion
-//!   ([`Recursion`]);
-//! - no bank at all, causal or not, has a gamma below `noncausal`, by one dual witness.
+//!   lemma with the certificate P = R R'; the same certificate proves that the bank is stable.
 //!
-//! Each gamma that the file states is compared with these bounds. A file that states more than they prove
-//! is refused.
+//! The norm and the upper end that the file states are compared with these. A file that states more than
+//! they prove is refused. The lower bounds for other banks that a file states are computed by the design and
+//! not proven.
 //!
 //! # Assumptions
 //! The proof starts from the doubles in the file: the filters as the spec writes them, the delays and the
@@ -27,20 +24,14 @@
 //! double-double arithmetic shows positive definiteness (Rump, 2006). Everything else is computed in
 //! intervals of 106 or 512 bits.
 //!
-//! For the lower bounds, samples of proportional filters count as one if their instants agree, or lie whole
-//! slow periods apart, within 4 eps (1 + D_1 / h + D_2 / h) fast periods: the rounding of the delays.
-//!
 //! Not proven: that the spec describes the hardware.
 //!
 //! ```
 //! use hybank::bank::Bank;
-//! use hybank::verify::{EnclosedErrorSystem, Precision, Recursion, verify};
+//! use hybank::verify::verify;
 //! let mut bank = Bank::from_json(include_str!("../../filters/thesis-fir.json"), "thesis-fir.json")?;
 //! let proven = verify(&bank)?;
-//! assert!(proven.lower <= proven.attained && proven.attained <= proven.upper && proven.upper < 0.039933);
-//! // No causal bank has half of this gamma: 12 slow periods prove it.
-//! let found = EnclosedErrorSystem::new(&bank)?.causal_recursion(0.5 * proven.lower, 12, Precision::Short);
-//! assert!(matches!(found, Recursion::Refuted { .. }));
+//! assert!(proven.attained <= proven.upper && proven.upper < 0.039933);
 //! // A file that states more than is true is refused.
 //! bank.gamma.upper = Some(0.99 * proven.attained);
 //! assert!(verify(&bank).is_err());
@@ -48,14 +39,12 @@
 //! ```
 
 mod ball;
-mod causal;
 mod covariance;
 pub(crate) mod enclosed;
 mod error;
 mod error_system;
-mod fir_length;
 mod front_ends;
-mod lower;
+mod gain;
 mod positive;
 mod slow_period;
 mod spectrum;
@@ -67,13 +56,12 @@ mod timeline;
 pub mod uncertainty;
 mod upper;
 
-pub use self::causal::{Precision, Recursion};
 pub use self::enclosed::EnclosedErrorSystem;
 pub(crate) use self::enclosed::Midpoint;
 pub use self::error::VerifyError;
 pub(crate) use self::statements::{Strictness, ZERO_NORM};
 
-use crate::bank::{Bank, Proof};
+use crate::bank::Bank;
 
 /// Maximum number of states of an error system that can be proven: its matrices are dense.
 pub const MAX_STATES: usize = 2048;
@@ -83,47 +71,27 @@ pub const MAX_ANALOG_STATES: usize = 128;
 /// computing.
 const MAX_WORK: usize = 100_000_000;
 
-/// The class of banks for which a lower bound holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum BoundedBanks {
-    /// All banks on these front ends, causal or not.
-    Any,
-    /// All causal banks of this latency.
-    Causal,
-    /// All FIR banks with as many taps.
-    FirOfThisLength,
-}
-
 /// The proven bounds of a bank, in normalised time (h = 1).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Verified {
-    /// No bank of the class `lower_banks` has a smaller gamma.
-    pub lower: f64,
-    /// The class of banks for which `lower` holds.
-    pub lower_banks: BoundedBanks,
     /// ||K|| of this bank is at most this.
     pub upper: f64,
     /// ||K|| of this bank is at least this.
     pub attained: f64,
-    /// No bank, causal or not, has a smaller gamma.
-    pub noncausal: f64,
     /// Order of P.
     pub states: usize,
 }
 
-/// Proves the gammas of a bank with the certificate and the witnesses that it carries.
+/// Proves the gamma of a bank with the certificate that it carries.
 ///
 /// # Errors
 /// [`VerifyError`] naming what does not fit; [`VerifyError::NoCertificate`] at once for a bank that carries
 /// no proof.
 pub fn verify(bank: &Bank) -> Result<Verified, VerifyError> {
-    let none = Proof::default();
-    let proof = bank.proof.as_ref().unwrap_or(&none);
-    if proof.upper.is_none() {
+    let Some(proof) = &bank.proof else {
         return Err(if bank.spec.is_none() { VerifyError::NoSpec } else { VerifyError::NoCertificate });
-    }
-    let verified = EnclosedErrorSystem::new(bank)?.judge(&bank.gamma, proof, Strictness::Proven)?;
+    };
+    let verified = EnclosedErrorSystem::new(bank)?.judge(&bank.gamma, &proof.upper, Strictness::Proven)?;
     uncertainty::check_stated(bank)?;
     Ok(verified)
 }

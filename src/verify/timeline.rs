@@ -3,7 +3,7 @@
 use super::VerifyError;
 use super::ball::Ball;
 use crate::arithmetic::{Float512, Number};
-use crate::units::{GridTime, Timeline};
+use crate::units::{Fraction, GridTime, Timeline};
 
 /// Maximum number of periods by which a sample may be late; the limit keeps the count exact in doubles.
 const MAX_PERIODS_LATE: f64 = (1u64 << 40) as f64;
@@ -41,8 +41,15 @@ pub(super) fn between<F: Number>(earlier: GridTime, later: GridTime) -> Ball<F> 
     if earlier == later {
         return Ball::ZERO;
     }
+    let part = |time: GridTime| {
+        let Fraction { numerator, denominator } = time.part();
+        Ball::from(f64::from(numerator)) / Ball::from(f64::from(denominator))
+    };
     let rest = Ball::from(later.rest().0) - Ball::from(earlier.rest().0);
-    rest / Ball::from(later.fast_period().0) + Ball::from(later.whole() - earlier.whole())
+    let whole = Ball::from(later.whole() - earlier.whole());
+    // A fraction of zero would only widen the enclosure.
+    let parts = if later.part() == earlier.part() { Ball::ZERO } else { part(later) - part(earlier) };
+    rest / Ball::from(later.fast_period().0) + whole + parts
 }
 
 #[cfg(test)]

@@ -10,7 +10,6 @@ mod equivalence;
 mod examples;
 mod extremes;
 mod filters;
-mod fir_bounds;
 mod gains;
 mod golden;
 mod hard_designs;

@@ -5,7 +5,6 @@ use crate::support::random::Random;
 use crate::support::specs::{alike, low_pass, with_taps};
 use hybank::design::{Design, Options, analyze, design};
 use hybank::spec::{Family, FilterSpec, Method, Spec};
-use hybank::verify::{EnclosedErrorSystem, Precision, Recursion};
 use std::f64::consts::TAU;
 
 /// A low-pass with its cutoff in cycles per fast sample.
@@ -15,24 +14,6 @@ fn filter(family: Family, order: usize, cutoff: f64) -> FilterSpec {
 
 fn norm(design: &Design) -> f64 {
     design.bank.gamma.norm.unwrap()
-}
-
-/// Relative distance of the norm from the largest gamma that the recursion of `verify` refutes, in 106 or
-/// 512 bits: at most this much is lost.
-fn loss(design: &Design) -> f64 {
-    let error = EnclosedErrorSystem::new(&design.bank).unwrap();
-    let refuted = |gamma: f64| {
-        [Precision::Short, Precision::Long].into_iter().any(|precision| {
-            matches!(error.causal_recursion(gamma, 512, precision), Recursion::Refuted { .. })
-        })
-    };
-    let noncausal = design.bank.gamma.noncausal.unwrap();
-    let losses = [1e-6, 3e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
-    let bounded = |loss: &f64| {
-        let gamma = norm(design) * (1.0 - loss);
-        gamma <= noncausal || refuted(gamma)
-    };
-    losses.into_iter().find(bounded).unwrap_or(1.0)
 }
 
 #[test]
@@ -49,24 +30,6 @@ fn a_sample_just_inside_the_period_costs_nothing() {
     assert!((rms / 0.000500 - 1.0).abs() < 2e-3, "{rms}");
 }
 
-#[test]
-fn one_steep_channel_is_optimal_at_every_delay() {
-    let front_end = filter(Family::Chebyshev1, 8, 0.1);
-    for delay in [2.2, 2.3, 2.5, 2.7, 3.0, 3.5] {
-        let bank = design(&alike(&front_end, 4, 2, &[delay]), &Options::without_proof()).unwrap();
-        assert!(loss(&bank) <= 1e-5, "delay {delay}: {:e}", loss(&bank));
-    }
-}
-
-#[test]
-fn four_steep_channels_are_optimal() {
-    for (family, order) in [(Family::Butterworth, 8), (Family::Bessel, 6), (Family::Chebyshev1, 8)] {
-        let spec = alike(&filter(family, order, 0.1), 4, 2, &[0.0, 1.3, 2.1, 2.95]);
-        let bank = design(&spec, &Options::without_proof()).unwrap();
-        assert!(loss(&bank) <= 1e-5, "{family:?} {order}: {:e}", loss(&bank));
-    }
-}
-
 fn plant(seed: u64) -> Spec {
     let mut dice = Random(seed);
     let family = dice.of(&[Family::Butterworth, Family::Bessel, Family::Chebyshev1, Family::Elliptic]);
@@ -78,20 +41,15 @@ fn plant(seed: u64) -> Spec {
 }
 
 #[test]
-fn no_causal_bank_does_better_than_iir() {
-    let seeds = trials::trials(10);
-    let (mut worst, mut beyond) = (0.0_f64, Vec::new());
-    for seed in seeds.clone() {
-        let begin = std::time::Instant::now();
-        let bank =
-            design(&plant(seed), &Options::without_proof()).unwrap_or_else(|error| panic!("{seed}: {error}"));
-        let (time, loss) = (begin.elapsed(), loss(&bank));
-        println!("plant {seed}: norm {:e}, loss at most {loss:e}, {time:?}", norm(&bank));
-        worst = worst.max(loss);
-        if loss > 1e-5 {
-            beyond.push((seed, loss));
-        }
-    }
-    println!("plants {seeds:?}, worst {worst:e}, beyond 1e-5: {beyond:?}");
+fn no_taps_do_better_than_iir() {
+    let excess = |seed| {
+        let design = |spec: Spec| {
+            design(&spec, &Options::without_proof()).unwrap_or_else(|error| panic!("{seed}: {error}"))
+        };
+        let spec = plant(seed);
+        norm(&design(spec.clone())) / norm(&design(with_taps(spec, 32))) - 1.0
+    };
+    let beyond: Vec<_> =
+        trials::trials(10).map(|seed| (seed, excess(seed))).filter(|(_, excess)| *excess > 1e-5).collect();
     assert!(beyond.is_empty(), "{beyond:?}");
 }

@@ -52,8 +52,8 @@ fn noncausal_gain(plant: &Plant, omega: f64) -> f64 {
 }
 
 /// The largest of these over all frequencies: no bank has a smaller norm.
-pub(crate) fn noncausal(plant: &Plant, more: &[f64]) -> Peak {
-    peaks(&|omega| noncausal_gain(plant, omega), &plant.resonances(), more)[0]
+pub(crate) fn noncausal(plant: &Plant) -> Peak {
+    peaks(&|omega| noncausal_gain(plant, omega), &plant.resonances(), &[])[0]
 }
 
 /// A sample of a row: e^{p t} for the poles of its front end, and for each front end the factors that e^{p

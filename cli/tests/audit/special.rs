@@ -85,6 +85,29 @@ fn verdict(name: &str, spec: &Value) -> Tally {
     tally
 }
 
+/// Gamma as small as the rounding of the instants: what is proven holds for the delays of the file, in
+/// seconds.
+#[test]
+fn a_tiny_gamma_is_that_of_the_delays_in_the_file() {
+    let filter =
+        |order: u32, cutoff: f64| json!({ "family": "butterworth", "order": order, "cutoff": cutoff });
+    let spec = json!({ "fast_rate": 44_100.0, "ratio": 1, "latency": 1,
+        "target": { "filter": filter(4, 5_962.986_950_303_371_5) },
+        "channel": [
+            { "delay_samples": 0.999_999_979_345_919_1 },
+            { "delay_samples": 0.999_999_993_385_549_1, "filter": filter(2, 4_149.794_117_256_607) },
+            { "delay_samples": 9.629_698_492_389_24e-5 },
+        ],
+        "design": { "method": "fir", "taps": 12 } });
+    let desk = Desk::empty();
+    let Outcome::Bank { bank, .. } = designed(&desk, &spec) else { panic!("no bank") };
+    let proven = verified(&desk).expect("a proof");
+    let [attained, upper] = ["/attained", "/upper"].map(|key| at(&proven, key).expect("a bound"));
+    let norm = Judge::of(&bank).norm(&[]).gain;
+    assert!(attained <= norm * (1.0 + 1e-9) && norm <= upper, "{norm:e} {proven}");
+    assert!(norm < 1e-14, "{norm:e}");
+}
+
 /// What is printed of a reduced bank; without states against the best taps that see one frame.
 fn reduced(seed: u64) -> Tally {
     let mut dice = Random(SEED + 0x400 + seed);

@@ -137,8 +137,7 @@ pub(crate) fn judged(name: &str, bank: &Value, proven: Option<&Value>) -> Tally 
     let judge = Judge::of(bank);
     let peak: Vec<f64> = witness(bank, "/proof/upper/peak/half").into_iter().collect();
     let norm = judge.norm(&peak).gain;
-    let least: Vec<f64> = witness(bank, "/proof/noncausal/half").into_iter().collect();
-    let any = noncausal(&judge.plant, &least).gain;
+    let any = noncausal(&judge.plant).gain;
     let mut claim = |is_true: bool, what: &str, stated: f64, truth: f64| {
         if !is_true {
             tally.refuted.push(format!("{name}: {what} {stated:.12e}, true {truth:.12e}"));
@@ -163,13 +162,13 @@ pub(crate) fn judged(name: &str, bank: &Value, proven: Option<&Value>) -> Tally 
         }
     }
     let Some(proven) = proven else { return tally };
-    let (lower, upper) = (at(proven, "/lower").unwrap_or(0.0), at(proven, "/upper").unwrap_or(f64::NAN));
-    let best = reachable(bank, &judge, proven["lower_banks"].as_str(), any);
-    if let Some(best) = best {
-        claim(lower <= best * (1.0 + SETTLED), "verify: lower", lower, best);
+    let [attained, upper] = ["/attained", "/upper"].map(|key| at(proven, key).unwrap_or(f64::NAN));
+    let best = reachable(bank, &judge, any);
+    if let (Some(best), Some(lower)) = (best, at(bank, "/gamma/lower")) {
+        claim(lower <= best * (1.0 + SETTLED), "file: lower", lower, best);
         tally.excesses.push(norm / best - 1.0);
     }
-    tally.widths.push(upper / lower - 1.0);
+    tally.widths.push(upper / attained - 1.0);
     let far = |list: &[f64]| list.iter().any(|x| *x > NOTEWORTHY);
     if far(&tally.widths) || far(&tally.excesses) {
         let Tally { widths, excesses, .. } = &tally;
@@ -180,12 +179,12 @@ pub(crate) fn judged(name: &str, bank: &Value, proven: Option<&Value>) -> Tally 
     tally
 }
 
-/// The least norm of the class of banks of a lower bound, up to [`SETTLED`] or above it; `None` where the
+/// The least norm of the banks of this method and size, up to [`SETTLED`] or above it; `None` where the
 /// judge does not find it.
-fn reachable(bank: &Value, judge: &Judge, class: Option<&str>, any: f64) -> Option<f64> {
+fn reachable(bank: &Value, judge: &Judge, any: f64) -> Option<f64> {
     let plant = &judge.plant;
-    match class? {
-        "fir_of_this_length" => {
+    match bank["method"].as_str()? {
+        "fir" => {
             let count = bank["channels"][0]["taps"].as_array()?.len();
             let latency = bank["latency"].as_u64()? as usize;
             let own =
@@ -195,7 +194,7 @@ fn reachable(bank: &Value, judge: &Judge, class: Option<&str>, any: f64) -> Opti
                 .flatten()
                 .map(|best| best.norm)
         }
-        "causal" => {
+        "iir" => {
             let [half, whole] = [PERIODS / 2, PERIODS].map(|periods| causal(plant, periods).max(any));
             // Front ends that remember for longer leave it open.
             (whole <= half * (1.0 + SETTLED)).then_some(whole)

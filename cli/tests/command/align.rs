@@ -126,7 +126,7 @@ const ALIGN: [&str; 8] = ["align", "spec.toml", "a.wav", "b.wav", "-o", "aligned
 /// The report on the recordings of a case; `None` without its recordings.
 fn aligned(case: Case, dice: &mut Random) -> Option<Value> {
     let samples = case.event.samples((case.seconds * RATE) as usize, dice)?;
-    Some(desk(case, "1e-3", &samples).json(&[&ALIGN[..], &["--json"]].concat()))
+    Some(desk(case, "1e-3", &samples).report(&ALIGN))
 }
 
 #[test]

@@ -6,16 +6,16 @@
 
 use crate::support::random::Random;
 use crate::support::{Desk, THESIS};
-use hybank::bank::{Bank, Proof, check_digest};
+use hybank::bank::{Bank, check_digest};
 use hybank::design::{Options, analyze, design, prove};
 use hybank::spec::Spec;
-use hybank::verify::{BoundedBanks, verify};
+use hybank::verify::verify;
 use serde_json::Value;
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// The thesis example with so little latency that gamma lies above the noncausal bound.
+/// The thesis example with little latency and few taps.
 fn hurried() -> String {
     THESIS.replace("latency = 10", "latency = 1").replace("taps = 22", "taps = 12")
 }
@@ -177,7 +177,7 @@ fn what_the_proof_alone_lets_pass_is_true() {
                     let gamma = analyze(&bank, &[]).unwrap().gamma;
                     let holds =
                         proven.attained <= gamma * (1.0 + 1e-9) && gamma <= proven.upper * (1.0 + 1e-12);
-                    assert!(holds && proven.lower <= gamma * (1.0 + 1e-9), "{gamma} {proven:?}");
+                    assert!(holds, "{gamma} {proven:?}");
                     let stated = bank.gamma.norm.unwrap_or(gamma);
                     assert!((stated / gamma - 1.0).abs() < 1e-6, "{stated} {gamma}");
                 }
@@ -194,25 +194,9 @@ fn the_intervals_of_the_ready_banks_are_narrow_and_hold_their_gamma() {
         let bank = Bank::from_json(&text, &name).unwrap();
         let proven = verify(&bank).unwrap_or_else(|error| panic!("{name}: {error}"));
         let gamma = analyze(&bank, &[]).unwrap().gamma;
-        assert!(proven.lower <= gamma && gamma <= proven.upper, "{name}: {gamma} {proven:?}");
-        // More taps would help these, so the bound of all banks lies lower.
-        let is_short = ["interleaved-4x250M", "vibration-3x"].iter().any(|short| name.contains(short));
-        let banks = match name.as_str() {
-            _ if is_short => BoundedBanks::FirOfThisLength,
-            "fir" => BoundedBanks::FirOfThisLength,
-            "iir" | "reduced" => BoundedBanks::Causal,
-            _ => BoundedBanks::Any,
-        };
-        assert_eq!(proven.lower_banks, banks, "{name}: {proven:?}");
-        // A reduced bank is no optimal one, and the bound of one length is not sharp to the last digits.
-        let slack = if name == "reduced" {
-            1.0
-        } else if is_short {
-            1e-3
-        } else {
-            1e-5
-        };
-        assert!(proven.upper - proven.lower < slack * proven.upper, "{name}: {proven:?}");
+        let is_inside = proven.attained <= gamma * (1.0 + 1e-9) && gamma <= proven.upper;
+        assert!(is_inside, "{name}: {gamma} {proven:?}");
+        assert!(proven.upper - proven.attained < 1e-5 * proven.upper, "{name}: {proven:?}");
     }
 }
 
@@ -222,16 +206,14 @@ fn a_bank_made_elsewhere_is_proven_afresh() {
     let is_slow = trials::is_slow("banks of more than 32 states, proven afresh");
     for (name, text) in files() {
         let bank = Bank::from_json(&text, &name).unwrap();
-        let states = bank.proof.as_ref().and_then(|proof| proof.upper.as_ref()).map_or(0, |p| p.factor.len());
+        let states = bank.proof.as_ref().map_or(0, |proof| proof.upper.factor.len());
         if states > 32 && !is_slow {
             continue;
         }
         let known = verify(&bank).unwrap();
         let bare = Bank { proof: None, ..bank };
-        let (proof, found) = prove(&bare).unwrap();
-        let agree = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-6;
-        assert!(agree(found.upper, known.upper) && agree(found.noncausal, known.noncausal), "{name}");
-        assert!(proof != Proof::default());
+        let (_, found) = prove(&bare).unwrap();
+        assert!((found.upper / known.upper - 1.0).abs() < 1e-6, "{name}");
     }
 }
 
@@ -261,18 +243,13 @@ fn pretty(value: &Value) -> String {
 fn a_designed_bank_verifies() {
     let desk = desk();
     let out = desk.good(&["verify", "bank.json"]);
-    for part in [
-        "proven, gamma in [0.0694",
-        "from the file",
-        "no FIR bank of 12 taps per channel",
-        "digest     matches",
-    ] {
+    for part in ["proven, gamma in [0.0694", "from the file", "digest     matches"] {
         assert!(out.contains(part), "{part} in {out}");
     }
     let report = desk.json(&["verify", "bank.json", "--json"]);
     let bank = desk.read_json("bank.json");
     let norm = bank["gamma"]["norm"].as_f64().unwrap();
-    assert!(report["lower"].as_f64() <= Some(norm) && report["upper"].as_f64() >= Some(norm), "{report}");
+    assert!(report["attained"].as_f64() <= Some(norm) && report["upper"].as_f64() >= Some(norm), "{report}");
     assert_eq!(report["upper"], bank["gamma"]["upper"]);
     assert_eq!((&report["digest"], &report["certificate_in_file"]), (&Value::Bool(true), &Value::Bool(true)));
     assert!(desk.good(&["verify", "--help"]).contains("Examples:"));
@@ -295,7 +272,6 @@ fn altered_files_are_refused_with_the_place() {
     };
     let tap = bank["channels"][0]["taps"][3].as_f64().unwrap();
     let upper = bank["gamma"]["upper"].as_f64().unwrap();
-    let lower = bank["gamma"]["lower"].as_f64().unwrap();
     refused(
         &desk,
         &change("/channels/0/taps/3", (tap * (1.0 + 1e-15)).into(), true),
@@ -304,7 +280,7 @@ fn altered_files_are_refused_with_the_place() {
     refused(&desk, &change("/channels/0/taps/3", (tap + 1e-3).into(), false), &["proof.upper: "]);
     refused(&desk, &change("/gamma/upper", (upper * (1.0 - 1e-7)).into(), false), &["gamma.upper: "]);
     refused(&desk, &change("/gamma/norm", (upper * (1.0 - 1e-6)).into(), false), &["gamma.norm: "]);
-    refused(&desk, &change("/gamma/lower", (lower * 1.001).into(), false), &["gamma.lower: "]);
+    refused(&desk, &change("/gamma/lower", (upper * 1.001).into(), false), &["gamma.lower: "]);
     refused(&desk, &change("/proof/upper/gamma", (upper * 0.9999).into(), false), &["proof.upper: "]);
     refused(
         &desk,
@@ -320,11 +296,6 @@ fn altered_files_are_refused_with_the_place() {
         &desk,
         &change("/proof/upper/peak/half", json("[0.0, 0.0]"), false),
         &["proof.upper.peak.half: "],
-    );
-    refused(
-        &desk,
-        &change("/proof/lower/0/measured", json("[[0.0, 1.0]]"), false),
-        &["proof.lower[0].measured: "],
     );
     refused(&desk, &change("/digest", "sha256:12".into(), true), &["digest: ", "64 hexadecimal"]);
     refused(&desk, &change("/spec", Value::Null, false), &["spec: ", "null"]);

@@ -19,12 +19,10 @@ const ORACLE: f64 = 1e-6;
 /// The bank whose proof needs more than doubles.
 const CORRECTED: &str = "recursive after a steep filter, latency 1";
 
-/// A proven bank as a document, with its true norm.
+/// A proven bank as a document.
 struct Example {
     name: &'static str,
-    bank: Bank,
     document: Value,
-    norm: f64,
 }
 
 fn examples() -> Vec<Example> {
@@ -55,10 +53,10 @@ fn examples() -> Vec<Example> {
     let example = |(name, spec): (&'static str, Spec)| {
         let bank = design(&spec, &Options::default()).unwrap().bank;
         verify(&bank).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let proof = bank.proof.as_ref().unwrap().upper.as_ref().unwrap();
+        let proof = &bank.proof.as_ref().unwrap().upper;
         assert_eq!(name == CORRECTED, !proof.correction.is_empty(), "{name}");
         let document = serde_json::from_str(&bank.to_json().unwrap()).unwrap();
-        Example { name, norm: norm(&bank), bank, document }
+        Example { name, document }
     };
     list.into_iter().map(example).collect()
 }
@@ -68,24 +66,15 @@ fn read(document: &Value) -> Option<Bank> {
     Bank::from_json(&sealed(document)?, "forged").ok()
 }
 
-/// Everything that was proven or stated is true of the forged bank.
-fn check(example: &Example, forged: &Bank, proven: &Verified, what: &str) {
+/// What was proven, and norm and upper end as stated, is true of the forged bank.
+fn check(forged: &Bank, proven: &Verified, what: &str) {
     let true_norm = norm(forged);
     let what = format!("{what}: norm {true_norm:e}, {proven:?}, {:?}", forged.gamma);
     let (above, below) = (true_norm * (1.0 + ORACLE) + 1e-9, true_norm * (1.0 - ORACLE) - 1e-9);
     assert!(proven.attained <= above && below <= proven.upper, "{what}");
-    assert!(proven.lower <= above && proven.noncausal <= above, "{what}");
-    // On the same front ends and with as many taps the original is a bank of the class that the bounds speak
-    // of.
-    let same_class = |a: &Bank, b: &Bank| a.spec == b.spec && a.latency == b.latency;
-    if same_class(&example.bank, forged) {
-        assert!(proven.lower <= example.norm * (1.0 + ORACLE), "{what}");
-    }
     let stated = forged.gamma;
     assert!(stated.norm.is_none_or(|norm| below <= norm && norm <= above), "{what}");
     assert!(stated.upper.is_none_or(|upper| below <= upper && proven.upper <= upper), "{what}");
-    assert!(stated.lower.is_none_or(|lower| lower <= proven.lower), "{what}");
-    assert!(stated.noncausal.is_none_or(|noncausal| noncausal <= proven.noncausal), "{what}");
 }
 
 #[test]
@@ -112,7 +101,7 @@ fn what_verify_proves_of_forged_banks_is_true() {
                 Err(_) => refused += 1,
                 Ok(proven) => {
                     true_ones += 1;
-                    check(&example, &bank, &proven, &format!("{}, trial {trial}", example.name));
+                    check(&bank, &proven, &format!("{}, trial {trial}", example.name));
                 }
             }
         }

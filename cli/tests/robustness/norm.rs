@@ -32,7 +32,7 @@ pub(crate) fn norm(bank: &Bank) -> f64 {
 
 /// The frequency at which the bank's file says that its gain is greatest, so that no narrow peak is missed.
 fn proven_peak(bank: &Bank) -> Option<f64> {
-    let [c, s] = bank.proof.as_ref()?.upper.as_ref()?.peak.half;
+    let [c, s] = bank.proof.as_ref()?.upper.peak.half;
     Some(2.0 * s.atan2(c)).filter(|omega| omega.is_finite())
 }
 

@@ -1,6 +1,6 @@
 use super::*;
 use crate::design::error_grid::LocatedPeak;
-use crate::linalg::{self, Complex, Mat};
+use crate::linalg::{self, CMat, Complex};
 use std::f64::consts::PI;
 
 /// `W = gain / (1 - a e^{-i omega})` repeated down the diagonal, and channels that measure the white input
@@ -150,34 +150,6 @@ fn the_exchange_ends_where_a_dense_grid_does() {
             dense.gamma
         );
         assert!(exchange.locations().len() < 60, "{}", exchange.locations().len());
-    }
-}
-
-/// The dual matrices prove the bound: no unknowns have a smaller `sum <Y, K>` over the sum of nuclear norms.
-#[test]
-fn the_dual_points_prove_the_bound() {
-    let mut exchange = exchange(geometric(0.6, 1.0, &[1.0]), 2, 0.0);
-    exchange.optimise().unwrap();
-    let error = exchange.error();
-    let nuclear: f64 = exchange.dual.iter().map(|p| linalg::singular_values(&p.weight).unwrap()[0]).sum();
-    let inner = |taps: &Taps| -> f64 {
-        let at = |p: &DualPoint| {
-            let point = error.point(p.omega);
-            let f = taps.iter().enumerate().fold(CMat::zeros(1, 1), |sum, (j, f)| {
-                sum + linalg::to_complex(f) * Complex::from_polar(1.0, -p.omega * j as f64)
-            });
-            (p.weight.adjoint() * (&point.w - f * &point.h))[(0, 0)].re
-        };
-        exchange.dual.iter().map(at).sum::<f64>() / nuclear
-    };
-    for seed in 0..20 {
-        let taps: Taps = (0..2).map(|j| Mat::from_element(1, 1, f64::from(7 * seed + 3 * j).sin())).collect();
-        assert!(
-            (inner(&taps) / exchange.lower - 1.0).abs() < 1e-5,
-            "{seed}: {} {}",
-            inner(&taps),
-            exchange.lower
-        );
     }
 }
 

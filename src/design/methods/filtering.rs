@@ -17,7 +17,7 @@ const INNOVATION_FLOOR: f64 = 1e-12;
 /// The result "impossible" is accepted up to this residual of the Riccati equation, in coordinates in which
 /// the mean-square covariance is the identity. The result is exact for a plant that differs by no more than
 /// that.
-const RESIDUAL_OF_PROOF: f64 = 1e-7;
+const CONCLUSIVE_RESIDUAL: f64 = 1e-7;
 /// Least share of the largest error variance with which a direction is scaled.
 const BALANCING_FLOOR: f64 = 1e-13;
 /// Rounding does not move an eigenvalue of a semidefinite matrix this far (relative) below zero.
@@ -263,15 +263,15 @@ impl Innovations {
 
     /// gamma is achieved iff P >= 0 and C1 P+ C1' < E with the a-posteriori covariance P+. As gamma
     /// decreases through the optimum, that margin closes, and an eigenvalue of P goes through infinity and
-    /// becomes negative. Only such an eigenvalue counts as a proof that gamma is impossible. Rounding
+    /// becomes negative. Only such an eigenvalue shows that gamma is impossible. Rounding
     /// errors affect the margin, so the caller computes the norm of the error system of the filter.
     fn evaluate(&self, solution: &RiccatiSolution) -> Trial {
         let p = &solution.x + &self.p0;
         let Ok(eigenvalues) = linalg::hermitian_eigenvalues(&p) else { return Trial::Unresolved };
         let largest = eigenvalues.iter().fold(0.0_f64, |m, e| m.max(e.abs()));
         if eigenvalues.first().is_some_and(|&least| least < -CLEARLY_NEGATIVE * largest) {
-            let proven = solution.residual < RESIDUAL_OF_PROOF && self.conclusive;
-            return if proven { Trial::Impossible } else { Trial::Unresolved };
+            let is_shown = solution.residual < CONCLUSIVE_RESIDUAL && self.conclusive;
+            return if is_shown { Trial::Impossible } else { Trial::Unresolved };
         }
         self.filter(&p).map_or(Trial::Unresolved, Trial::Achieved)
     }

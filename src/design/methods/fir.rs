@@ -9,7 +9,7 @@
 use super::{GAMMA_ACCURACY, Settings, Synthesis, tap_lags};
 use crate::design::DesignError;
 use crate::design::error_grid::{ErrorGrid, Location};
-use crate::design::exchange::{DualSolution, Exchange, LEAST_MARGIN};
+use crate::design::exchange::{Exchange, LEAST_MARGIN};
 use crate::design::filters::impulse_responses;
 use crate::design::plant::LiftedPlant;
 use crate::lmi::sampled::{MeanSquareObjective, Problem};
@@ -33,8 +33,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
     let best = least_gamma(plant, settings.taps, &mut exchange)?;
     let unfinished = exchange.unfinished_at(best.peak.gain, best.is_missed(), GAMMA_ACCURACY);
     let found = Synthesis::of_least_gamma(plant, best.taps, best.peak, exchange.lower_for_all)?;
-    let dual = DualSolution { points: exchange.dual, bound: exchange.lower };
-    Ok(Synthesis { dual, unfinished, iterations: exchange.iterations, ..found })
+    Ok(Synthesis { unfinished, iterations: exchange.iterations, ..found })
 }
 
 /// The taps of [`synthesise`] alone.

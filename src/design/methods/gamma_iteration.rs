@@ -298,7 +298,6 @@ impl<'a> GammaIteration<'a> {
             peak,
             lower: self.lower.min(peak.gain),
             noncausal: self.noncausal.gain.min(peak.gain),
-            dual: super::DualSolution::default(),
             unfinished: None,
             iterations: self.trials,
             robust: None,

@@ -22,7 +22,7 @@ mod precise_filtering;
 pub(crate) mod robust_fir;
 
 use super::DesignError;
-pub(crate) use super::exchange::{DualPoint, DualSolution, GAMMA_ACCURACY};
+pub(crate) use super::exchange::GAMMA_ACCURACY;
 use super::limits::Stop;
 use super::plant::LiftedPlant;
 use super::problem::Problem;
@@ -92,9 +92,6 @@ pub(crate) struct Synthesis {
     pub(crate) lower: f64,
     /// Lower bound of the norm over all filters of any latency. At most `peak.gain`.
     pub(crate) noncausal: f64,
-    /// For `fir` the dual solution, else empty. Its bound may be above `lower`, but taps of any size are not
-    /// covered then: `verify` decides.
-    pub(crate) dual: DualSolution,
     /// What the search for the least gamma, or for the least mean square beside it, left open.
     pub(crate) unfinished: Option<Unfinished>,
     /// Number of interior-point iterations or of Riccati equations solved.
@@ -123,7 +120,6 @@ impl Synthesis {
             lower: lower.min(peak.gain).max(noncausal),
             peak,
             noncausal,
-            dual: DualSolution::default(),
             unfinished: None,
             iterations: 0,
             robust: None,

@@ -83,7 +83,6 @@ pub(crate) fn synthesise(
         unfinished: found.unfinished,
         filters: Filters::Fir(found.taps),
         peak: found.peak,
-        dual: nominal.dual,
         robust,
     })
 }

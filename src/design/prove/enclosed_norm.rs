@@ -1,7 +1,7 @@
 //! The norm of a bank in the arithmetic of `verify`, where double precision does not resolve the error.
 
 use super::{frequency, half, leading_direction, witness};
-use crate::bank::{Bank, DualWitness, Gamma, LowerProof, Proof};
+use crate::bank::{Bank, GainWitness, Gamma};
 use crate::design::DesignError;
 use crate::design::limits::MAX_LONG_STATES;
 use crate::linalg::{self, CMat, Complex};
@@ -34,7 +34,7 @@ pub(in crate::design) fn resolved_norm(bank: &Bank, computed: Peak) -> Result<Pe
     if !differs || is_zero(computed.gain, &error) {
         return Ok(computed);
     }
-    let found = gains.peak(bank.proof.as_ref().unwrap_or(&Proof::default()))?;
+    let found = gains.peak(bank.proof.as_ref().map(|proof| frequency(&proof.upper.peak)))?;
     Ok(found.map_or(computed, |(gain, peak)| Peak { gain, frequency: frequency(&peak) }))
 }
 
@@ -42,10 +42,10 @@ pub(in crate::design) fn resolved_norm(bank: &Bank, computed: Peak) -> Result<Pe
 pub(super) struct EnclosedGains<'a>(pub(super) &'a EnclosedErrorSystem<'a>);
 
 impl EnclosedGains<'_> {
-    /// The largest gain with its witness. Double precision and the witnesses of `proof` suggest frequencies;
-    /// in systems that are not large every gain is enclosed. `None` if the gain at the peak in double
-    /// precision is not resolved.
-    pub(super) fn peak(&self, proof: &Proof) -> Result<Option<(f64, DualWitness)>, DesignError> {
+    /// The largest gain with its witness. Double precision and a `hint` suggest frequencies; in systems that
+    /// are not large every gain is enclosed. `None` if the gain at the peak in double precision is not
+    /// resolved.
+    pub(super) fn peak(&self, hint: Option<f64>) -> Result<Option<(f64, GainWitness)>, DesignError> {
         let Some(Midpoint { a, b, c, d }) = self.0.midpoint() else { return Ok(None) };
         let system = StateSpace::new(a, b, c, d);
         let computed = hinf_norm(&system)?.frequency;
@@ -53,14 +53,14 @@ impl EnclosedGains<'_> {
         if self.0.states() > MAX_LONG_STATES {
             return Ok(Some(there));
         }
-        let grid = grid(&system, computed, proof)?;
+        let grid = grid(&system, computed, hint)?;
         let found = hinf_norm_with_response(&system, &|frequency| self.response(frequency), grid)?;
         let other = self.at(found.frequency)?;
         Ok(other.filter(|(gain, _)| *gain > there.0).or(Some(there)))
     }
 
     /// The gain at a frequency, rounded down, with its witness; `None` where it is zero or not resolved.
-    fn at(&self, frequency: f64) -> Result<Option<(f64, DualWitness)>, DesignError> {
+    fn at(&self, frequency: f64) -> Result<Option<(f64, GainWitness)>, DesignError> {
         let peak = witness(frequency, &leading_direction(&self.response(frequency))?);
         let gain = self.0.resolved_gain(&peak).filter(|gain| *gain > 0.0);
         Ok(gain.map(|gain| (gain, peak)))
@@ -75,16 +75,10 @@ impl EnclosedGains<'_> {
 }
 
 /// Frequencies that show all peaks: the level sets of small gains are rounding errors.
-fn grid(system: &StateSpace, computed: f64, proof: &Proof) -> Result<Vec<f64>, DesignError> {
-    let below = match &proof.lower {
-        Some(LowerProof::Fir(witnesses)) => &witnesses[..],
-        _ => &[],
-    };
-    let peak = proof.upper.as_ref().map(|certificate| &certificate.peak);
+fn grid(system: &StateSpace, computed: f64, hint: Option<f64>) -> Result<Vec<f64>, DesignError> {
     let beside = PEAK_OFFSETS.iter().flat_map(|distance| [computed - distance, computed + distance]);
     let mut frequencies = resonances(&stable_poles(system)?);
-    frequencies.extend(below.iter().chain(&proof.noncausal).chain(peak).map(frequency));
-    frequencies.extend(beside.chain([computed]).filter(|frequency| (0.0..=PI).contains(frequency)));
+    frequencies.extend(beside.chain([computed]).chain(hint).filter(|frequency| (0.0..=PI).contains(frequency)));
     frequencies.sort_by(f64::total_cmp);
     let split = |ends: &[f64]| {
         let part = 0.25 * (ends[1] - ends[0]);

@@ -9,7 +9,7 @@ use super::enclosed_norm::EnclosedGains;
 use super::{leading_direction, witness};
 use crate::arithmetic::dense::{cholesky, product, riccati_limit, select, solve, symmetric};
 use crate::arithmetic::{BigFloat, Float512, Number};
-use crate::bank::{Bank, Certificate, DualWitness, Proof};
+use crate::bank::{Bank, Certificate, GainWitness};
 use crate::design::DesignError;
 use crate::design::limits::{MAX_LONG_STATES, Stop};
 use crate::linalg::{self, Complex, Mat, power_of_two};
@@ -79,7 +79,7 @@ pub(super) fn certificate(
     let shown = error.attains(&peak_witness).unwrap_or(0.0) / units.reference;
     if norm > floor
         && (shown - norm).abs() > RESOLVED_NORM_GAP * norm
-        && let Some((gain, enclosed)) = EnclosedGains(error).peak(&Proof::default())?
+        && let Some((gain, enclosed)) = EnclosedGains(error).peak(None)?
     {
         (norm, peak_witness) = (gain / units.reference, enclosed);
     }
@@ -139,7 +139,7 @@ struct Search<'a> {
     units: &'a Units,
     /// The system in these units.
     middle: &'a Midpoint,
-    peak: DualWitness,
+    peak: GainWitness,
 }
 
 impl Search<'_> {

@@ -21,13 +21,11 @@ const CUTS: [f64; 3] = [1e-14, 1e-12, 1e-9];
 /// Where the data do not confine the taps: up to this many times the size of the solution (or of unit
 /// gain) they are covered by the bound.
 const RADIUS_FACTOR: f64 = 1e3;
-/// Safety on a radius that was computed in floating point from the data.
-const RADIUS_SAFETY: f64 = 1.01;
-/// Rounding errors per operation of a sum, in units of the machine precision, in addition to its length:
-/// products, phases, singular values.
+/// An estimate of the rounding errors of a sum beside its length, in units of the machine precision:
+/// products, phases, singular values. It keeps bounds of rounding errors alone from being taken for bounds.
 const ROUNDING_PER_OPERATION: f64 = 16.0;
 
-/// A proven lower bound.
+/// A lower bound, computed in doubles and not proven.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LowerBound {
     /// `gamma(F) >= value` for all taps covered; never negative.
@@ -55,9 +53,9 @@ impl LowerBound {
     }
 }
 
-/// Proves a lower bound on the optimum of `problem` from any dual matrices, one for each point (each M x
-/// q), for all taps within `radius` (see [`Covered`]). Uses nothing but the data and the inequality in the
-/// module's text; the rounding errors of the sums are included.
+/// A lower bound on the optimum of `problem` from any dual matrices, one for each point (each M x q), for
+/// all taps within `radius` (see [`Covered`]). Uses nothing but the data and the inequality in the module's
+/// text, less an estimate of the rounding errors of the sums.
 pub(crate) fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Result<LowerBound, LinalgError> {
     let points = problem.points();
     let mut nuclear = 0.0;
@@ -70,8 +68,8 @@ pub(crate) fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Resu
         ROUNDING_PER_OPERATION + (problem.rows() * problem.inputs()) as f64 + (points.len() as f64).log2();
     let residual = residual_norm(problem, dual);
     let charged = value - residual * radius - depth * f64::EPSILON * moduli;
-    let proven = charged / (nuclear * (1.0 + (ROUNDING_PER_OPERATION + points.len() as f64) * f64::EPSILON));
-    let value = if proven.is_finite() { proven.max(0.0) } else { 0.0 };
+    let bound = charged / (nuclear * (1.0 + (ROUNDING_PER_OPERATION + points.len() as f64) * f64::EPSILON));
+    let value = if bound.is_finite() { bound.max(0.0) } else { 0.0 };
     Ok(LowerBound { value, residual, covered: Covered::Within(radius) })
 }
 
@@ -88,7 +86,7 @@ fn re_inner(a: &CMat, b: &CMat) -> f64 {
     a.iter().zip(b.iter()).map(|(x, y)| x.re * y.re + x.im * y.im).sum()
 }
 
-/// Norm of `r_{p,i,j} / s_i` plus a bound of its rounding error.
+/// Norm of `r_{p,i,j} / s_i` plus an estimate of its rounding error.
 fn residual_norm(problem: &Problem, dual: &[CMat]) -> f64 {
     let (m, lags) = (problem.rows(), problem.max_lags());
     if lags == 0 {
@@ -134,7 +132,7 @@ fn size(problem: &Problem, taps: &Taps) -> f64 {
     taps.iter().map(square).sum::<f64>().sqrt()
 }
 
-/// The radius for which the bound is proved. Taps with a worst case below `gamma` satisfy `sum_l ||F
+/// The radius for which the bound is computed. Taps with a worst case below `gamma` satisfy `sum_l ||F
 /// H_l||_F^2 <= sum_l (||W_l||_F + sqrt(M) gamma)^2`, which confines them if the map from taps to responses
 /// is injective: then no others matter. Otherwise, or if that radius is very large, the radius is a large
 /// multiple of the taps found and of unit gain.
@@ -148,7 +146,7 @@ pub(super) fn cover(
     let stated = RADIUS_FACTOR * size(problem, taps).max(reference);
     let spread = (problem.rows() as f64).sqrt() * gamma;
     let image = problem.points().iter().map(|p| (p.w.norm() + spread).powi(2)).sum::<f64>().sqrt();
-    let confined = RADIUS_SAFETY * image * basis.inverse_norm() * mix_norm(problem, reduced)?;
+    let confined = image * basis.inverse_norm() * mix_norm(problem, reduced)?;
     Ok(if confined < stated { (confined, Covered::All) } else { (stated, Covered::Within(stated)) })
 }
 
@@ -183,7 +181,7 @@ pub(super) fn from_iterate(
     Ok(best)
 }
 
-/// Dual matrices that prove nothing.
+/// Dual matrices that give no bound.
 pub(super) fn zero_dual(problem: &Problem) -> Vec<CMat> {
     vec![CMat::zeros(problem.rows(), problem.inputs()); problem.points().len()]
 }

@@ -21,7 +21,7 @@
 //! solved by a primal-dual predictor-corrector iteration in the HKM direction. Its Newton matrix is Toeplitz
 //! plus Hankel in the lags for each pair of taps, so it is summed at the cost of one product per pair of
 //! rows. The data are shifted and scaled by the least-squares solution first, which makes `t` of order one
-//! whatever the size of gamma. The dual iterate is then turned into a lower bound that is proved from the
+//! whatever the size of gamma. The dual iterate is then turned into a lower bound that is computed from the
 //! original data alone (`lower_bound`).
 //!
 //! Sources: Vandenberghe and Boyd, "Semidefinite programming", SIAM Review 38 (1996); Helmberg,

@@ -24,7 +24,7 @@ pub struct Solution {
     pub gamma: f64,
     /// Lower bound on gamma for all taps of the same lags, rounding errors subtracted.
     pub lower: LowerBound,
-    /// The matrices `Y_l` (M x q) that prove it through `lower_bound`.
+    /// The matrices `Y_l` (M x q) that give it through `lower_bound`.
     pub dual: Vec<CMat>,
     /// Number of steps.
     pub iterations: usize,
@@ -130,7 +130,7 @@ impl Run<'_> {
 
 impl Iterate for Run<'_> {
     /// A quarter of the complementarity gap and of the residual: from there on, the gap of the bound that
-    /// the dual matrices prove is usually within the tolerance.
+    /// the dual matrices give is usually within the tolerance.
     fn gap(&mut self) -> f64 {
         let engine = &self.engine;
         0.25 * (engine.cone.gap() / engine.cone.t + norm(engine.dual_residual()))

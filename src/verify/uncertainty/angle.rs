@@ -1,9 +1,9 @@
-//! Points of the unit circle with their angles enclosed. A point is rational (see [`ComplexMatrix::unit`]),
+//! Points of the unit circle with their angles enclosed. A point is rational (see [`unit`]),
 //! so its angle is not exactly the double that was asked for.
 
 use super::super::ball::Ball;
-use super::super::spectrum::ComplexMatrix;
-use crate::arithmetic::DoubleDouble;
+use super::super::spectrum::unit;
+use crate::arithmetic::{ComplexBall, DoubleDouble};
 
 /// Terms of the series of sine and cosine: 2^60 / 60! = 1e-64.
 const TERMS: usize = 30;
@@ -12,7 +12,7 @@ const TERMS: usize = 30;
 #[derive(Debug, Clone)]
 pub(super) struct Frequency {
     /// e^{j omega}.
-    pub(super) z: ComplexMatrix,
+    pub(super) z: ComplexBall<DoubleDouble>,
     /// omega.
     pub(super) angle: Ball,
 }
@@ -28,7 +28,7 @@ impl Frequency {
         let off = (cross / radius).magnitude();
         // asin x <= 1.01 x for small x; written so that NaN is refused too.
         let off = if off < 0.1 { 2.02 * off } else { f64::INFINITY };
-        Self { z: ComplexMatrix::unit([c, s]), angle: Ball::from(omega).widened(off) }
+        Self { z: unit([c, s]), angle: Ball::from(omega).widened(off) }
     }
 }
 
@@ -75,7 +75,7 @@ mod tests {
             let omega = std::f64::consts::PI * f64::from(k) / 64.0;
             let at = Frequency::near(omega);
             assert!(at.angle.radius() < 1e-15, "{omega}: {:?}", at.angle);
-            assert!((at.z.re[(0, 0)].nearest() - omega.cos()).abs() < 1e-15);
+            assert!((at.z.re.nearest() - omega.cos()).abs() < 1e-15);
         }
     }
 

@@ -8,7 +8,7 @@
 //! halved along the side that matters most (`vertex_tree`).
 
 use super::super::ball::{self, Ball, Matrix};
-use super::super::spectrum::ComplexMatrix;
+use super::complex_matrix::ComplexMatrix;
 use super::grid::{ChannelGrid, Halvings};
 use super::remainder::Remainders;
 use std::collections::HashMap;

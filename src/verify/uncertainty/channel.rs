@@ -3,7 +3,7 @@
 
 use super::super::VerifyError;
 use super::super::ball::{self, Ball, Matrix};
-use super::super::covariance::Covariance;
+use super::super::covariance::covariance;
 use super::super::front_ends::FrontEnds;
 use super::ErrorBox;
 use super::aliases::{Aliases, FrontEnd};
@@ -35,7 +35,7 @@ pub(super) struct Channel {
 /// The memories of all rows of a grid.
 pub(super) struct Memories<'a> {
     grid: &'a Grid,
-    covariance: Covariance,
+    covariance: Matrix,
     growth: f64,
 }
 
@@ -49,7 +49,7 @@ impl<'a> Memories<'a> {
                         box, or the table out of the spec";
             return Err(VerifyError::ErrorBox { rule: rule.into() });
         }
-        let covariance = Covariance::new(&grid.period).ok_or(VerifyError::LongMemory)?;
+        let covariance = covariance(&grid.period).ok_or(VerifyError::LongMemory)?;
         let growth = growth(&grid.period.transition).ok_or(VerifyError::LongMemory)?;
         Ok(Self { grid, covariance, growth })
     }
@@ -72,7 +72,7 @@ impl<'a> Memories<'a> {
     }
 
     fn of_row(&self, row: &Matrix) -> Memory {
-        Memory::new(row, &self.grid.period.transition, &self.covariance.state, self.growth)
+        Memory::new(row, &self.grid.period.transition, &self.covariance, self.growth)
     }
 }
 
@@ -149,7 +149,7 @@ impl Channel {
 }
 
 /// A bound of |F_i| from the column of the response.
-pub(super) fn column_norm(filters: &super::super::spectrum::ComplexMatrix, i: usize) -> f64 {
+pub(super) fn column_norm(filters: &super::complex_matrix::ComplexMatrix, i: usize) -> f64 {
     let add = |sum: Ball, &x: &Ball| sum + x * x;
     let square = filters.re.column(i).iter().chain(filters.im.column(i).iter()).fold(Ball::ZERO, add);
     square.upper().max(0.0).sqrt() * (1.0 + 1e-15)

@@ -207,7 +207,7 @@ impl<'a> Judge<'a> {
             responses.push(known.map_or_else(|| response(channel.front_end()), Ok)?);
         }
         let rows = self.channels.iter().zip(responses).map(|(channel, response)| channel.row(response));
-        let filters = spectrum::filter_response(&self.bank.filters, self.bank.ratio, &near.z);
+        let filters = spectrum::filter_response(&self.bank.filters, self.bank.ratio, near.z).into();
         let columns = (0..self.channels.len()).map(|i| column_norm(&filters, i)).collect();
         let (reference, owners) = (response(self.reference())?, self.owners.clone());
         Ok(Remainders::new(rows.collect(), &reference, columns, owners, self.bank.ratio))
@@ -286,9 +286,9 @@ impl<'a> Judge<'a> {
 
     /// The Gram matrix and the filters at a frequency.
     fn plain<'b>(&'b self, grid: &'b Grid, near: &Frequency) -> AtFrequency<'b> {
-        let filters = spectrum::filter_response(&self.bank.filters, self.bank.ratio, &near.z);
+        let filters = spectrum::filter_response(&self.bank.filters, self.bank.ratio, near.z).into();
         AtFrequency {
-            gram: spectrum::gram(&grid.period, &near.z),
+            gram: spectrum::gram(&grid.period, near.z).into(),
             columns: (0..self.channels.len()).map(|i| column_norm(&filters, i)).collect(),
             filters,
             channels: &grid.channels,

@@ -31,6 +31,7 @@ mod aliases;
 mod angle;
 mod at_frequency;
 mod channel;
+mod complex_matrix;
 mod cover;
 mod grid;
 mod judge;

@@ -32,8 +32,8 @@
 
 use super::super::ball::{Ball, Matrix};
 use super::super::positive;
-use super::super::spectrum::ComplexMatrix;
 use super::at_frequency::{AtFrequency, Vertex};
+use super::complex_matrix::ComplexMatrix;
 use crate::linalg::{self, CMat, Complex, Mat};
 
 /// Steps of the descent.
@@ -128,7 +128,7 @@ impl Problem {
             re: part(&self.gram.re, &weighed.re, 1.0),
             im: part(&self.gram.im, &weighed.im, 0.0),
         };
-        positive::exceeds(&matrix.realified(), 0.0)
+        positive::is_positive_definite(&matrix.realified())
     }
 }
 

@@ -10,7 +10,7 @@
 
 use super::super::ball::{self, Ball, Matrix};
 use super::super::positive;
-use super::super::spectrum::ComplexMatrix;
+use super::complex_matrix::ComplexMatrix;
 use crate::linalg;
 
 /// Relative rounding error of an operation.
@@ -296,7 +296,7 @@ pub(super) fn upper_gain(square: &ComplexMatrix, wanted: f64) -> f64 {
             let entry = -real[(i, j)];
             if i == j { entry + Ball::from(bound) } else { entry }
         });
-        positive::exceeds(&shifted, 0.0)
+        positive::is_positive_definite(&shifted)
     };
     let tight = wanted * wanted * (1.0 - 1e-14);
     let tried = MARGINS.iter().map(|margin| largest * (1.0 + margin) + f64::MIN_POSITIVE);

@@ -17,8 +17,8 @@
 //! |u* K|^2 <= (|u* K_mix| + A)^2 + (1/M) sum over the far k of (2 kappa_k R_k + R_k^2).
 //! ```
 //!
-//! The mix is convex, so kappa_k also bounds K_mix. Any division is valid, and the best one is taken. For the
-//! near aliases
+//! The mix is convex, so kappa_k also bounds K_mix. Any division is valid, and the best one is taken. For
+//! the near aliases
 //!
 //! ```text
 //! A^2 = the largest eigenvalue of sum_i (c_i^2 / w_i) F_i F_i*,   w_i = |F_i| c_i / sum_j |F_j| c_j,
@@ -28,9 +28,9 @@
 //! sum_i |F_i| c_i, and for columns F_i that are far from parallel much smaller.
 
 use super::super::ball::{Ball, Matrix};
-use super::super::spectrum::ComplexMatrix;
 use super::aliases::{Aliases, FarAliases, Weight};
 use super::angle::outward;
+use super::complex_matrix::ComplexMatrix;
 use super::grid::Halvings;
 use super::quick::upper_gain;
 use std::rc::Rc;

@@ -101,7 +101,7 @@ fn of_channel(
     let cut = [outward(filter * tail + filter_tail * factor * whole), filter_tail, tail];
     let degrees = [periods + last, last, periods];
     let values = |near: &Frequency| {
-        let filters = spectrum::filter_response(&bank.filters, bank.ratio, &near.z);
+        let filters = spectrum::filter_response(&bank.filters, bank.ratio, near.z).into();
         let column = column_norm(&filters, i);
         let steep = Aliases::new(&front_end, near.angle, bank.ratio, count)?.norm(Weight::Slope);
         Some([column * steep, column, steep])

@@ -146,7 +146,7 @@ fn shifted<F: Number>(p: &[Ball<F>], u: f64) -> Vec<ComplexBall<F>> {
     for m in 0..terms.len().saturating_sub(1) {
         for k in (m..terms.len() - 1).rev() {
             let next = terms[k + 1];
-            terms[k] = terms[k] + ComplexBall::new(-(u * next.im), u * next.re);
+            terms[k] += ComplexBall::new(-(u * next.im), u * next.re);
         }
     }
     terms
