@@ -1,10 +1,11 @@
 //! The proof in a bank file: the certificate and the witnesses with which [`crate::verify`] proves the
 //! gammas from the file alone.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Witnesses for the gammas of a bank. Each part may be missing; its bound is then not proven.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Proof {
     /// For `gamma.upper`, from above and from below.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -19,7 +20,8 @@ pub struct Proof {
 }
 
 /// The witnesses of a lower bound.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 #[serde(untagged)]
 #[non_exhaustive]
 pub enum LowerProof {
@@ -31,7 +33,8 @@ pub enum LowerProof {
 
 /// A gamma that no causal bank achieves: the finite-horizon filtering recursion breaks down within
 /// `periods` slow periods.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct CausalWitness {
     /// No causal bank has a smaller norm (h = 1).
     pub gamma: f64,
@@ -46,7 +49,8 @@ impl CausalWitness {
 
 /// Certificate that the norm of a bank is below a gamma, and a frequency at which its gain is close to that
 /// gamma.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Certificate {
     /// ||K|| is less than this (h = 1); `gamma.upper`, some 1e-8 above `gamma.norm`.
     pub gamma: f64,
@@ -56,7 +60,7 @@ pub struct Certificate {
     /// [`crate::verify`].
     pub factor: Vec<Vec<f64>>,
     /// A triangle that is added to `factor` where R needs more digits than a double has; empty elsewhere.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub correction: Vec<Vec<f64>>,
 }
 
@@ -64,13 +68,14 @@ pub struct Certificate {
 /// per slow period.
 ///
 /// A witness of weight zero proves nothing and is refused.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct DualWitness {
     /// `[c, s]`, about cos(w/2) and sin(w/2).
     pub half: [f64; 2],
     /// Weights of the M reference samples of a slow period, `[re, im]`.
     pub reference: Vec<[f64; 2]>,
     /// Weights of the N measured samples of a slow period; empty if they follow from the other numbers.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub measured: Vec<[f64; 2]>,
 }
