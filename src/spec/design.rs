@@ -203,8 +203,8 @@ impl DesignSpec {
     /// Checks the numbers, and that the method reads every key.
     pub(super) fn check(&self, layout: &FrameLayout) -> Result<(), SpecError> {
         self.check_clashes()?;
-        self.check_keys()?;
         self.check_numbers()?;
+        self.check_keys()?;
         match (self.method, self.taps) {
             (Method::Fir, Some(taps)) => limits::check_optimised_taps(taps, layout.count()).at("taps"),
             _ => Ok(()),

@@ -176,7 +176,10 @@ fn layout(fast_period: Seconds, rates: &[Hertz]) -> Result<FrameLayout, SpecErro
         let (most, samples) = (limits::MAX_RATIO, limits::MAX_CHANNELS);
         let rule =
             format!("at most {most} fast samples and {samples} samples of the converters make a frame");
-        return Err(Refusal::new("channel", long_frame(fast_period, rates, ratio, &rule)));
+        return Err(Refusal::new(
+            "channel",
+            long_frame(ratio, &samples, &rule, &near_rates(fast_period, rates)),
+        ));
     }
     let samples = samples.into_iter().map(|samples| samples as usize).collect();
     Ok(FrameLayout::new(ratio as usize, samples))
@@ -290,17 +293,17 @@ pub(super) fn check_size(
     }
     let rate = |&samples: &usize| Hertz(samples as f64 / (layout.ratio as f64 * fast_period.0));
     let rates: Vec<Hertz> = layout.samples.iter().map(rate).collect();
-    Err(long_frame(fast_period, &rates, layout.ratio as u64, &rule))
+    let samples: Vec<u64> = layout.samples.iter().map(|&samples| samples as u64).collect();
+    Err(long_frame(layout.ratio as u64, &samples, &rule, &near_rates(fast_period, &rates)))
 }
 
-/// Rates whose frames are too long.
-fn long_frame(fast_period: Seconds, rates: &[Hertz], ratio: u64, rule: &str) -> SpecProblem {
-    let near = near_rates(fast_period, rates);
-    range(
-        ratio as f64,
-        "fast samples per frame",
-        format!("{rule}; rates near these with short frames are {near}"),
-    )
+/// Rates whose frames are too long; `near` are rates with short ones.
+fn long_frame(ratio: u64, samples: &[u64], rule: &str, near: &str) -> SpecProblem {
+    let samples = samples.iter().map(u64::to_string).collect::<Vec<_>>().join(" and ");
+    let rule = format!(
+        "it has {samples} samples of the converters; {rule}; rates near these with short frames are {near}"
+    );
+    range(ratio as f64, "fast samples per frame", rule)
 }
 
 /// The frames of checked channels.
