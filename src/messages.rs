@@ -91,6 +91,24 @@ pub fn of_json(message: &str) -> String {
     }
 }
 
+/// A key or a name that a document does not have.
+pub struct Unknown<'a> {
+    /// "key" or "name".
+    pub what: &'static str,
+    /// As it is written.
+    pub name: &'a str,
+    /// Those that it has.
+    pub known: Vec<&'a str>,
+}
+
+/// The key or the name that is unknown, if a message of serde says so.
+pub fn unknown(message: &str) -> Option<Unknown<'_>> {
+    let kinds = [("key", "unknown field `"), ("name", "unknown variant `")];
+    let (what, rest) = kinds.iter().find_map(|(what, words)| Some((*what, message.strip_prefix(words)?)))?;
+    let (name, known) = rest.rsplit_once("`, expected ")?;
+    Some(Unknown { what, name, known: known.split('`').skip(1).step_by(2).collect() })
+}
+
 /// What a message of serde says about a document of any format, in plain words and without its place.
 pub fn of_document(message: &str) -> String {
     let (_, message) = place_of(message);
@@ -102,10 +120,15 @@ pub fn of_document(message: &str) -> String {
     if let Some(rest) = after("duplicate field `") {
         return format!("the key {} is given twice; keep one of them", key(rest));
     }
-    if let Some((unknown, known)) = after("unknown field `").and_then(|rest| rest.split_once("`, expected "))
+    if let Some(Unknown { what, name, known }) = unknown(message) {
+        return format!("unknown {what} \"{}\"; the {what}s here are {}", Quoted(name), known.join(", "));
+    }
+    if let Some((found, expected)) = after("invalid length ").and_then(|rest| rest.split_once(", expected "))
     {
-        let known: Vec<&str> = known.split('`').skip(1).step_by(2).collect();
-        return format!("unknown key \"{}\"; the keys here are {}", Quoted(unknown), known.join(", "));
+        return format!(
+            "{found} entries, but {} is needed",
+            expected.replace("an array of length", "a list of")
+        );
     }
     let wrong = after("invalid type: ").or(after("invalid value: "));
     if let Some((found, expected)) = wrong.and_then(|rest| rest.rsplit_once(", expected ")) {
@@ -120,14 +143,14 @@ pub fn of_document(message: &str) -> String {
         control if control.starts_with("control character") => {
             "a text has a line break or another control character; write \\n or \\u and four digits".into()
         }
-        "trailing characters" => "there is more text after the end of the document".into(),
+        "trailing characters" => "there is more text after the end of a list or of the document".into(),
         "key must be a string" => "a key must be a text in double quotes".into(),
         "expected value" | "expected ident" => "a value is missing or not one of JSON".into(),
         _ => match after("EOF while parsing ") {
             Some(part) => {
                 format!("the text ends inside {}", if part == "an object" { "a table" } else { part })
             }
-            None => Quoted(message).to_string(),
+            None => shown(message),
         },
     }
 }
@@ -135,8 +158,10 @@ pub fn of_document(message: &str) -> String {
 /// The type that serde expected.
 fn expected_type(name: &str) -> String {
     match name {
-        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, zero or more".into(),
-        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number".into(),
+        "u8" | "u16" | "u32" | "u64" | "usize" => {
+            "a whole number, zero or more, without point and exponent".into()
+        }
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number without point and exponent".into(),
         "f32" | "f64" => "a number".into(),
         "a string" | "string" | "str" => "a text".into(),
         "path string" => "the name of a file".into(),
@@ -160,6 +185,8 @@ fn found_value(found: &str) -> String {
         ("boolean", word) => word.trim_matches('`').to_owned(),
         ("map", _) => "a table".into(),
         ("sequence", _) => "a list".into(),
+        // serde_json and others write NaN and infinity as null.
+        ("null", _) => "null (perhaps written for NaN or infinity)".into(),
         _ => Quoted(found).to_string(),
     }
 }

@@ -16,6 +16,11 @@ use crate::units::{FastPeriods, Hertz, Seconds};
 use std::fmt;
 use std::ops::RangeInclusive;
 
+#[cfg(feature = "runtime")]
+mod document;
+#[cfg(feature = "runtime")]
+pub(crate) use document::{Rate, Share};
+
 /// A time as it is written: in seconds, or in units of the fast period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Time {

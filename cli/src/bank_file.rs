@@ -8,7 +8,7 @@ use hybank::design::filters;
 use hybank::files::{self, FileError, SPEC_OR_BANK, StandardStream};
 use hybank::memory::check_memory;
 use hybank::runtime::{Options, Plan};
-use hybank::spec::{DesignOverrides, Spec, SpecProblem, with_measurements_renamed};
+use hybank::spec::{DesignOverrides, Spec, SpecError, SpecProblem, with_measurements_renamed};
 use std::path::{Path, PathBuf};
 
 /// Reads a bank file; `-` is standard input.
@@ -48,12 +48,7 @@ impl SpecFile {
 
     /// The `text` of this file with the values of `changed`, as [`Spec::to_toml_like`] writes it, for the
     /// file `output`. In another folder it names the measurements by their whole paths.
-    pub(super) fn with_values(
-        &self,
-        text: &str,
-        changed: &Spec,
-        output: &Path,
-    ) -> Result<String, SpecProblem> {
+    pub(super) fn with_values(&self, text: &str, changed: &Spec, output: &Path) -> Result<String, SpecError> {
         let written = changed.to_toml_like(text, &|wanted| self.measurements.model(wanted))?;
         let whole = |folder: &Path| Path::new(".").join(folder).canonicalize().ok();
         let from = whole(self.measurements.folder());
@@ -98,17 +93,16 @@ pub(super) fn bad_flag(key: &str, problem: &SpecProblem) -> Failure {
     Failure::Input(format!("--{flag}: {problem}"))
 }
 
-/// The spec of a spec file, or the one that a bank file carries (with the bank's latency).
+/// The spec of a spec file, or the one that a bank file carries, with the bank's sizes.
 pub(super) fn load_spec_or_bank(path: &Path) -> Result<SpecFile, Failure> {
     if path.extension().is_none_or(|extension| extension != "json") {
         return load_spec(path, DesignOverrides::default());
     }
     let bank = load(path)?;
-    let latency = Some(bank.latency);
-    let spec = bank.spec.ok_or_else(|| {
+    let spec = bank.sized_spec().ok_or_else(|| {
         failed_at(path, "this bank carries no spec, so its front ends are unknown; give the spec file")
     })?;
-    Ok(SpecFile { spec: Spec { latency, ..spec }, measurements: beside(path) })
+    Ok(SpecFile { spec, measurements: beside(path) })
 }
 
 /// The bytes of a file; `-` is standard input.

@@ -246,7 +246,7 @@ impl Args {
     fn settings(&self, spec: &Spec) -> Result<Settings, Failure> {
         Spec { fit: self.fit.clone(), ..spec.clone() }
             .check()
-            .map_err(|problem| bad_flag("fit", &problem))?;
+            .map_err(|error| bad_flag("fit", error.problem()))?;
         let given = if self.fit.is_empty() { &spec.fit } else { &self.fit };
         let fit = if given.is_empty() { Fit::default() } else { given.iter().copied().collect() };
         let reference = reference(self.reference, spec)?;

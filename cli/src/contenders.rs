@@ -6,7 +6,7 @@ use hybank::bank::Bank;
 use hybank::design::{self, Problem};
 use hybank::pipeline::{DroppedLatency, Settings, fused};
 use hybank::simulate::{Captured, interleaved};
-use hybank::spec::{Method, Spec};
+use hybank::spec::{DesignSpec, Method, Spec};
 use hybank::units::{Decibels, FastPeriods};
 
 /// Fast samples at the beginning that the error does not include, while the history of the filters fills.
@@ -107,7 +107,7 @@ pub(super) fn contend(spec: &Spec, problem: &Problem, parts: &Parts) -> Result<V
 
 fn designed(spec: &Spec, method: Method, knows_the_band: bool) -> Result<Bank, Failure> {
     let mut variant = spec.clone();
-    variant.design = spec.design.with_method(method, &spec.layout()).map_err(failed)?;
+    variant.design = DesignSpec::new(method, spec.design.taps.filter(|_| method.has_taps()));
     variant.signal = variant.signal.filter(|_| knows_the_band);
     Ok(design::design(&variant, &design::Options::without_proof()).map_err(failed)?.bank)
 }

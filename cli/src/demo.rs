@@ -43,7 +43,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let folder = args.folder()?;
     let spec = Spec::from_toml(SPEC, "filters/speech-2x.toml").map_err(failed)?;
-    let problem = Problem::new(&spec, design::latency(&spec).map_err(failed)?).map_err(failed)?;
+    let problem = Problem::new(&spec, design::Sizing::of(&spec).map_err(failed)?.latency).map_err(failed)?;
     let frames = (DURATION / (spec.fast_period * spec.ratio as f64)) as usize;
     let captured =
         |source: Source| capture(&problem, &Analog::Known(source.normalised(spec.fast_period)), frames);

@@ -12,7 +12,7 @@ use super::written::{check_output, write_text};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use hybank::design::{self, DesignError, Effort, Limits, Options, Stage};
 use hybank::messages::Quoted;
-use hybank::spec::{DesignOverrides, Method, Reduction, Spec, WordLengths};
+use hybank::spec::{DesignOverrides, Method, Spec, WordLengths};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -113,7 +113,9 @@ fn overrides(args: &Args) -> DesignOverrides {
         fraction_bits: args.fraction_bits,
         loss_db: args.loss_db,
         digits: args.digits,
-        reduction: args.order.map(Reduction::Order).or(args.reduction_loss_db.map(Reduction::Loss)),
+        order: args.order,
+        reduction_loss_db: args.reduction_loss_db,
+        noise: None,
     }
 }
 
@@ -123,7 +125,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let mut spec = load_spec(&args.spec, overrides(args))?.for_outputs(&[&args.output])?;
     spec.latency = args.latency.or(spec.latency);
     // Everything else was checked on reading.
-    spec.check().map_err(|problem| bad_flag("latency", &problem))?;
+    spec.check().map_err(|error| bad_flag("latency", error.problem()))?;
     say_understood(Some(&spec));
     warn_or_refuse(&spec_warnings(&spec, &args.spec), args.strict)?;
     let begin = Instant::now();

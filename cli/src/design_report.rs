@@ -142,14 +142,14 @@ impl<'a> Report<'a> {
         };
         Self {
             bank: output,
-            understood: bank.spec.as_ref().map(understood).unwrap_or_default(),
+            understood: bank.sized_spec().as_ref().map(understood).unwrap_or_default(),
             method: bank.method,
             channels: bank.channel_count(),
             ratio: bank.ratio,
             latency: bank.latency,
-            latency_chosen: design.latency_chosen,
+            latency_chosen: design.sizing.latency_chosen,
             taps,
-            taps_chosen: design.taps_chosen,
+            taps_chosen: design.sizing.taps_chosen,
             states,
             reduction: design.reduction.as_ref(),
             gamma: &bank.gamma,

@@ -179,12 +179,12 @@ impl BandHint {
     /// # Errors
     /// [`DesignError`] of the figures; a second design that fails is no hint.
     pub(super) fn new(found: &Design, seconds: f64) -> Result<Option<Self>, DesignError> {
-        let Some(spec) = found.bank.spec.as_ref().filter(|spec| spec.signal.is_none()) else {
+        let Some(spec) = found.bank.sized_spec().filter(|spec| spec.signal.is_none()) else {
             return Ok(None);
         };
-        let Some(band) = target_band(spec)?.filter(|_| seconds < MOST_HINT_SECONDS) else { return Ok(None) };
+        let Some(band) = target_band(&spec)?.filter(|_| seconds < MOST_HINT_SECONDS) else { return Ok(None) };
         let signal = Some(SignalSpec::in_band(band));
-        let wanted = Spec { signal, latency: Some(found.bank.latency), ..spec.clone() };
+        let wanted = Spec { signal, ..spec };
         let Ok(other) = design(&wanted, &Options::without_proof()) else { return Ok(None) };
         let instead_of_db = snr(&Bank { spec: Some(wanted), ..found.bank.clone() })?.total_db;
         let snr_db = snr(&other.bank)?.total_db;

@@ -84,9 +84,15 @@ const LENGTHS: [f64; 8] = [0.25, 0.35, 0.5, 0.7, 0.85, 1.0, 1.4, 2.0];
 /// gamma of the best banks of other latencies, and for FIR banks of other lengths, as real taps for exact
 /// channels.
 fn sweeps(bank: &Bank) -> Result<Vec<Picture>, DesignError> {
-    let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
-    let design = DesignSpec { bits: None, fraction_bits: None, reduction: None, ..spec.design.clone() };
-    let plain = Spec { latency: Some(bank.latency), uncertainty: None, design, ..spec.clone() };
+    let spec = bank.sized_spec().ok_or(DesignError::NoSpec)?;
+    let design = DesignSpec {
+        bits: None,
+        fraction_bits: None,
+        order: None,
+        reduction_loss_db: None,
+        ..spec.design.clone()
+    };
+    let plain = Spec { uncertainty: None, design, ..spec.clone() };
     let mut pictures = vec![Picture {
         name: "latency",
         caption: "gamma of the best bank of each latency. More latency lets the filters see later samples.",

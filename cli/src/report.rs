@@ -3,7 +3,7 @@
 use super::bank_file::load;
 use super::capture_args::{CaptureArgs, InterleavedArgs, output_rate};
 use super::capture_file::{start, unread};
-use super::print::{Failure, failed, failed_at, is_dash, name, stopped, warn};
+use super::print::{Failure, failed, failed_at, is_dash, name, shell_word, stopped, warn};
 use super::written::{check_output, write_text};
 use hybank::bank::Bank;
 use hybank::captures::{Captures, Converters};
@@ -74,8 +74,8 @@ fn of_page(path: &Path, error: PageError) -> Failure {
 impl Args {
     /// The command lines that lead to what the page shows.
     fn commands(&self) -> Vec<String> {
-        let bank = self.bank.display();
-        let inputs: String = self.inputs.iter().map(|path| format!(" {}", path.display())).collect();
+        let bank = shell_word(&self.bank);
+        let inputs: String = self.inputs.iter().map(|path| format!(" {}", shell_word(path))).collect();
         let inputs = inputs + &self.reading.typed() + &self.interleaved.typed();
         let mut commands = vec![
             "hybank design spec.toml -o bank.json  # the spec above, saved as spec.toml".to_owned(),
@@ -86,7 +86,7 @@ impl Args {
         if !self.inputs.is_empty() {
             commands.push(format!("hybank fuse {bank}{inputs} -o fused.wav"));
         }
-        commands.push(format!("hybank report {bank}{inputs} -o {}", self.output.display()));
+        commands.push(format!("hybank report {bank}{inputs} -o {}", shell_word(&self.output)));
         commands
     }
 

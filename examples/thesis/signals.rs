@@ -4,7 +4,7 @@ use crate::filters::chart;
 use crate::page::Row;
 use crate::{Banks, Figure, Outcome, spec};
 use hybank::bank::Bank;
-use hybank::design::{Problem, latency};
+use hybank::design::{Problem, Sizing};
 use hybank::pipeline::{DroppedLatency, Settings, fuse};
 use hybank::runtime::{Options, Planar, Precision};
 use hybank::simulate::{Analog, Captured, Source, capture};
@@ -29,7 +29,7 @@ impl Signal {
         let spec = spec()?;
         let source: Source = source.parse()?;
         let signal = Analog::Known(source.normalised(Seconds(1.0)));
-        Ok(Self { captured: capture(&Problem::new(&spec, latency(&spec)?)?, &signal, FRAMES) })
+        Ok(Self { captured: capture(&Problem::new(&spec, Sizing::of(&spec)?.latency)?, &signal, FRAMES) })
     }
 
     /// y_0.

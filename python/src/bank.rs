@@ -156,7 +156,7 @@ impl Bank {
         self.bank.proof.is_some()
     }
 
-    /// The spec with all defaults filled in, as TOML; None for a bank made elsewhere.
+    /// The spec as it was asked, with all defaults filled in, as TOML; None for a bank made elsewhere.
     #[getter]
     fn spec(&self) -> PyResult<Option<String>> {
         self.bank.spec.as_ref().map(|spec| spec.to_toml().map_err(refused)).transpose()

@@ -2,7 +2,7 @@
 
 use crate::background;
 use crate::bank::Bank;
-use crate::errors::{refused, spec_error, spec_problem, warn};
+use crate::errors::{refused, spec_error, warn};
 use crate::{sources, values};
 use hybank::design::{Design, DesignError, Effort, Limits, Options, ProofSearch, judge_taps, warnings};
 use hybank::spec::DesignOverrides;
@@ -56,7 +56,7 @@ pub(crate) fn import_taps(
 
 fn finished(py: Python<'_>, found: Result<Design, DesignError>, proof: ProofSearch) -> PyResult<Bank> {
     let Design { bank, proof: proven, .. } = found.map_err(|error| match &error {
-        DesignError::Spec(problem) => spec_problem(py, problem),
+        DesignError::Spec(error) => spec_error(py, error),
         _ => refused(error),
     })?;
     if let Err(reason) = proven

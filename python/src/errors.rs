@@ -47,23 +47,14 @@ pub(crate) fn choose<T: Copy>(keyword: &str, name: &str, known: &[(&str, T)]) ->
 
 /// A spec that was refused, with its place.
 pub(crate) fn spec_error(py: Python<'_>, error: &spec::SpecError) -> PyErr {
-    let place = error.location().map(|location| (location.line, location.column));
-    with_place(py, SpecError::new_err(shown(&error.to_string())), error.path(), place)
-}
-
-/// A rule for specs that a design found broken.
-pub(crate) fn spec_problem(py: Python<'_>, problem: &spec::SpecProblem) -> PyErr {
-    with_place(py, SpecError::new_err(shown(&problem.to_string())), "", None)
-}
-
-fn with_place(py: Python<'_>, error: PyErr, path: &str, place: Option<(usize, usize)>) -> PyErr {
-    let value = error.value(py);
-    let (line, column) = place.unzip();
+    let refused = SpecError::new_err(shown(&error.to_string()));
+    let value = refused.value(py);
+    let (line, column) = error.location().map(|location| (location.line, location.column)).unzip();
     let set = value
-        .setattr("path", path)
+        .setattr("path", error.path())
         .and_then(|()| value.setattr("line", line))
         .and_then(|()| value.setattr("column", column));
-    set.err().unwrap_or(error)
+    set.err().unwrap_or(refused)
 }
 
 /// A fault of a file: what the system refuses is an `OSError` of its kind.

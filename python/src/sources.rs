@@ -12,7 +12,7 @@ use pyo3::types::{PyList, PyString, PyTuple};
 use std::path::{Path, PathBuf};
 
 /// The spec that `source` is, names or carries: a path, a TOML text of several lines, a mapping, or a bank.
-/// A bank stands for its spec with the latency of the bank.
+/// A bank stands for its spec with the sizes of the bank.
 pub(crate) fn spec(source: &Bound<'_, PyAny>) -> PyResult<Spec> {
     spec_with(source, DesignOverrides::default())
 }
@@ -50,10 +50,9 @@ fn spec_in(py: Python<'_>, text: &str, path: &Path, keys: DesignOverrides) -> Py
 }
 
 fn spec_of_bank(bank: &bank::Bank, name: &str) -> PyResult<Spec> {
-    let spec = bank.spec.clone().ok_or_else(|| {
+    bank.sized_spec().ok_or_else(|| {
         refused_in(name, "this bank carries no spec, so its front ends are unknown; give the spec")
-    })?;
-    Ok(Spec { latency: Some(bank.latency), ..spec })
+    })
 }
 
 /// A path, as text or as an object of `pathlib`.

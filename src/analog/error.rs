@@ -1,7 +1,7 @@
 //! What can be wrong with an analog filter.
 
 use crate::linalg::LinalgError;
-use crate::spec::FilterProblem;
+use crate::spec::SpecError;
 use crate::units::{RadiansPerFastPeriod, Seconds};
 
 use super::{MAX_GAIN, MAX_NORMALISED_POLE, MIN_DAMPING_RATIO, MIN_GAIN, MIN_NORMALISED_POLE};
@@ -18,7 +18,7 @@ pub enum AnalogError {
     },
     /// The written form violates a rule that does not concern its poles.
     #[error(transparent)]
-    Spec(#[from] FilterProblem),
+    Spec(#[from] SpecError),
     /// A pole in the right half plane or on the imaginary axis.
     #[error(
         "the filter is unstable: its pole {re:e} {im:+e}j rad/s must lie in the left half plane, with a negative \

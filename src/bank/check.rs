@@ -1,7 +1,7 @@
 //! The invariants of every bank, read or designed.
 
 use crate::spec::{
-    FrameSample, MAX_CHANNELS, MAX_ENTRY, MAX_RATIO, Spec, SpecProblem, check_fast_period,
+    At, FrameSample, MAX_CHANNELS, MAX_ENTRY, MAX_RATIO, Refusal, Spec, SpecProblem, check_fast_period,
     check_fraction_bits, check_gain, check_offset,
 };
 use crate::units::Seconds;
@@ -22,11 +22,11 @@ const SPEC_TOLERANCE: f64 = 1e-9;
 type Checked = Result<(), BankError>;
 
 fn refuse(path: impl Into<String>, problem: impl Into<BankProblem>) -> Checked {
-    Err(BankError::new("", path.into(), problem))
+    Err(Refusal::new(path, problem))
 }
 
 fn out_of_range(path: impl Into<String>, value: f64, unit: &'static str, rule: impl Into<String>) -> Checked {
-    refuse(path, BankProblem::Range { value, unit, rule: rule.into() })
+    refuse(path, SpecProblem::Range { value, unit, rule: rule.into() })
 }
 
 /// A list at `path` has `expected` entries, counted in `unit`.
@@ -79,9 +79,8 @@ impl Bank {
             let (method, expected, found) = (self.method.name(), "state_space", "fixed_point");
             return refuse("fixed_point", BankProblem::Filters { method, expected, found });
         };
-        let inside = |key: &str, problem| BankError::new("", format!("fixed_point.{key}"), problem);
-        words.bits.check(None).map_err(|problem: SpecProblem| inside("bits", problem))?;
-        check_fraction_bits(words.fraction_bits).map_err(|problem| inside("fraction_bits", problem))?;
+        words.bits.check(None).at("fixed_point.bits")?;
+        check_fraction_bits(words.fraction_bits).at("fixed_point.fraction_bits")?;
         let check = |found, expected, unit| {
             check_length("fixed_point.integers", found, expected, unit, "there is an integer for each tap")
         };
@@ -161,7 +160,7 @@ impl Bank {
     }
 
     fn check_scalars(&self) -> Checked {
-        check_fast_period(self.fast_period).or_else(|problem| refuse("fast_period", problem))?;
+        check_fast_period(self.fast_period).at("fast_period")?;
         if !(1..=MAX_RATIO).contains(&self.ratio) {
             let rule =
                 format!("ratio counts the fast samples for each slow one and must be 1 to {MAX_RATIO}");
@@ -185,8 +184,7 @@ impl Bank {
     }
 
     fn check_spec(&self, spec: &Spec) -> Checked {
-        let inside = |problem: SpecProblem| BankError::new("", "spec".into(), problem);
-        spec.check().map_err(inside)?;
+        spec.check().map_err(|error| error.inside("spec"))?;
         agree("spec.fast_period", self.fast_period.0, spec.fast_period.0, self.fast_period.0)?;
         agree("spec.ratio", self.ratio as f64, spec.ratio as f64, 0.0)?;
         if let Some(latency) = spec.latency {
@@ -204,10 +202,15 @@ impl Bank {
             agree(path("offset"), self.offsets[i], channel.offset, channel.offset.abs())?;
         }
         match (&self.fixed_point, &spec.design.bits) {
-            (Some(FixedPoint { bits, .. }), Some(asked)) if bits != asked => refuse(
-                "spec.design.bits",
-                BankProblem::WordsDiffer { bank: bits.clone(), spec: asked.clone() },
-            ),
+            // Of a loss they are the most.
+            (Some(FixedPoint { bits, .. }), Some(asked))
+                if bits != asked && spec.design.loss_db.is_none() =>
+            {
+                refuse(
+                    "spec.design.bits",
+                    BankProblem::WordsDiffer { bank: bits.clone(), spec: asked.clone() },
+                )
+            }
             _ => Ok(()),
         }
     }
@@ -245,7 +248,7 @@ fn check_converters(
     let rule = "every channel has a gain and an offset";
     check_length("channels", values.len(), channels, "gains or offsets", rule)?;
     for (i, &value) in values.iter().enumerate() {
-        check(value).or_else(|problem| refuse(format!("channels[{i}].{key}"), problem))?;
+        check(value).at(key).map_err(|error| error.inside(&format!("channels[{i}]")))?;
     }
     Ok(())
 }

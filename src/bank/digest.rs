@@ -10,45 +10,72 @@
 
 use sha2::{Digest as _, Sha256};
 
-use crate::spec::document::{Kind, Node};
+use serde::Deserialize;
+use serde_json::Value;
+
+use super::{BankError, BankProblem};
+use crate::messages::of_json;
+use crate::spec::Refusal;
 
 /// In front of the digits.
 const ALGORITHM: &str = "sha256:";
 
+/// Compares the digest of a bank file with its content. Returns false if the file has no digest.
+///
+/// # Errors
+/// [`BankError`] if the text is not JSON, the digest is malformed, or the digest does not match the
+/// content.
+pub fn check_digest(text: &str, file_name: &str) -> Result<bool, BankError> {
+    checked(text.trim_start_matches('\u{feff}')).map_err(|error| error.in_file(file_name))
+}
+
+fn checked(text: &str) -> Result<bool, BankError> {
+    let syntax = |error: serde_json::Error| -> BankError {
+        Refusal::new("", BankProblem::Syntax { message: of_json(&error.to_string()) })
+    };
+    let document: Value = serde_json::from_str(text).map_err(syntax)?;
+    let stated = Option::<String>::deserialize(&document["digest"]).map_err(syntax)?;
+    let Some(stated) = stated else { return Ok(false) };
+    check_form(&stated)?;
+    if stated == digest(&document) { Ok(true) } else { Err(Refusal::new("digest", BankProblem::Altered)) }
+}
+
 /// The digest of a document as the file writes it.
-pub(super) fn digest(document: &Node) -> String {
+pub(super) fn digest(document: &Value) -> String {
     let mut hasher = Sha256::new();
     absorb(&mut hasher, document, &["digest", "meta"]);
     let digits = hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect::<String>();
     ALGORITHM.to_owned() + &digits
 }
 
-/// Whether a text has the form of a digest.
-pub(super) fn is_digest(text: &str) -> bool {
+/// Refuses a text that has not the form of a digest.
+pub(super) fn check_form(text: &str) -> Result<(), BankError> {
     let digits = text.strip_prefix(ALGORITHM).unwrap_or_default();
-    digits.len() == 64 && digits.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
+    if digits.len() == 64 && digits.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f')) {
+        return Ok(());
+    }
+    Err(Refusal::new("digest", BankProblem::Digest { found: text.to_owned() }))
 }
 
-fn absorb(hasher: &mut Sha256, node: &Node, left_out: &[&str]) {
-    match &node.kind {
-        Kind::Null | Kind::Date => {}
-        Kind::Boolean(value) => hasher.update(if *value { b"t" } else { b"f" }),
-        Kind::Integer(value) => number(hasher, *value as f64),
-        Kind::Number(value) => number(hasher, *value),
-        Kind::Text(value) => text(hasher, value),
-        Kind::List(items) => {
+fn absorb(hasher: &mut Sha256, value: &Value, left_out: &[&str]) {
+    match value {
+        Value::Null => {}
+        Value::Bool(value) => hasher.update(if *value { b"t" } else { b"f" }),
+        Value::Number(value) => number(hasher, value.as_f64().unwrap_or_default()),
+        Value::String(value) => text(hasher, value),
+        Value::Array(items) => {
             hasher.update(b"[");
             items.iter().for_each(|item| absorb(hasher, item, &[]));
             hasher.update(b"]");
         }
-        Kind::Table(entries) => {
-            let counts = |key: &str, value: &Node| value.kind != Kind::Null && !left_out.contains(&key);
-            let mut entries: Vec<_> = entries.iter().filter(|e| counts(&e.key, &e.value)).collect();
-            entries.sort_by(|a, b| a.key.as_bytes().cmp(b.key.as_bytes()));
+        Value::Object(entries) => {
+            let mut entries = Vec::from_iter(entries);
+            entries.retain(|(key, value)| !value.is_null() && !left_out.contains(&key.as_str()));
+            entries.sort_by(|a, b| a.0.as_bytes().cmp(b.0.as_bytes()));
             hasher.update(b"{");
-            for entry in entries {
-                text(hasher, &entry.key);
-                absorb(hasher, &entry.value, &[]);
+            for (key, value) in entries {
+                text(hasher, key);
+                absorb(hasher, value, &[]);
             }
             hasher.update(b"}");
         }

@@ -1,26 +1,12 @@
-//! Errors of a bank: the location and the problem.
-
-use std::fmt;
+//! Errors of a bank.
 
 use crate::messages::{Number, Quoted};
-use crate::spec::{SpecProblem, WordLengths, shown_path};
+use crate::spec::{Refusal, SpecError, SpecProblem, WordLengths};
 
 use super::{FORMAT, VERSION};
 
-/// A bank that was refused: the file (empty for a bank in memory), the JSON place, the problem.
-///
-/// Displays as `file: place: problem`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BankError {
-    inner: Box<Inner>,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-struct Inner {
-    file: String,
-    path: String,
-    problem: BankProblem,
-}
+/// A bank that was refused.
+pub type BankError = Refusal<BankProblem>;
 
 /// The rule that a bank breaks, with the offending value and the remedy.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -68,16 +54,6 @@ pub enum BankProblem {
     NotFinite {
         /// The offending value.
         value: f64,
-    },
-    /// A number out of its range.
-    #[error("{} {unit} is out of range: {rule}", Number(*.value))]
-    Range {
-        /// The offending value.
-        value: f64,
-        /// Its unit.
-        unit: &'static str,
-        /// The rule and the remedy.
-        rule: String,
     },
     /// A list of the wrong length.
     #[error("{found} {unit}, but there must be {expected}: {rule}")]
@@ -136,43 +112,8 @@ pub enum BankProblem {
     },
 }
 
-impl BankError {
-    pub(super) fn new(file: &str, path: String, problem: impl Into<BankProblem>) -> Self {
-        Self { inner: Box::new(Inner { file: file.to_owned(), path, problem: problem.into() }) }
-    }
-
-    /// The same error with the name of the file.
-    pub(super) fn in_file(mut self, file: &str) -> Self {
-        self.inner.file = file.to_owned();
-        self
-    }
-
-    /// The file name as it was given; empty for a bank in memory.
-    pub fn file(&self) -> &str {
-        &self.inner.file
-    }
-
-    /// The JSON place, such as `channels[1].taps[3]`; empty for the whole file.
-    pub fn path(&self) -> &str {
-        &self.inner.path
-    }
-
-    /// What is wrong.
-    pub fn problem(&self) -> &BankProblem {
-        &self.inner.problem
-    }
-}
-
-impl std::error::Error for BankError {}
-
-impl fmt::Display for BankError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Inner { file, path, problem } = &*self.inner;
-        for part in [file, &shown_path(path)] {
-            if !part.is_empty() {
-                write!(f, "{}: ", Quoted(part))?;
-            }
-        }
-        write!(f, "{problem}")
+impl From<SpecError> for BankError {
+    fn from(error: SpecError) -> Self {
+        error.map(BankProblem::Value)
     }
 }

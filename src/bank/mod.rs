@@ -10,15 +10,15 @@
 mod check;
 mod digest;
 mod error;
+mod file;
+mod layout;
 mod proof;
-mod read;
 mod taps;
-mod write;
 
 pub use check::MAX_BANK_LATENCY;
+pub use digest::check_digest;
 pub use error::{BankError, BankProblem};
 pub use proof::{Certificate, GainWitness, Proof};
-pub use read::check_digest;
 pub use taps::FixedPoint;
 #[cfg(feature = "design")]
 pub(crate) use taps::signed_digits;
@@ -39,7 +39,9 @@ pub const VERSION: usize = 1;
 /// N synthesis filters with the data to run them. `design` writes a bank, and the other commands read it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bank {
-    /// The spec it was designed for, with all defaults filled in; `None` for a bank made elsewhere.
+    /// The spec it was designed for, with all defaults filled in. What it leaves to the designer is open here:
+    /// what was chosen is [`latency`](Self::latency), [`filters`](Self::filters) and
+    /// [`fixed_point`](Self::fixed_point). `None` for a bank made elsewhere.
     pub spec: Option<Spec>,
     /// The fast period h.
     pub fast_period: Seconds,
@@ -155,6 +157,21 @@ impl Bank {
             gamma: Gamma::default(),
             proof: None,
         }
+    }
+
+    /// The spec with the sizes of this bank where it leaves them to the designer: the latency, the number of
+    /// taps and their bits.
+    pub fn sized_spec(&self) -> Option<Spec> {
+        let mut spec = self.spec.clone()?;
+        spec.latency = Some(self.latency);
+        if let SynthesisFilters::Fir(taps) = &self.filters {
+            (spec.design.taps, spec.design.target_snr_db) = (taps.first().map(Vec::len), None);
+        }
+        if let Some(words) = self.fixed_point.as_ref().filter(|_| spec.design.loss_db.is_some()) {
+            (spec.design.bits, spec.design.loss_db) = (Some(words.bits.clone()), None);
+            spec.design.digits = false;
+        }
+        Some(spec)
     }
 
     /// The number of converters.

@@ -1,10 +1,11 @@
 //! The proof in a bank file: the certificate with which [`crate::verify`] proves the gamma from the file
 //! alone.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The proof of the gammas of a bank.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Proof {
     /// For `gamma.upper`, from above and from below.
     pub upper: Certificate,
@@ -12,7 +13,8 @@ pub struct Proof {
 
 /// Certificate that the norm of a bank is below a gamma, and a frequency at which its gain is close to that
 /// gamma.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Certificate {
     /// ||K|| is less than this (h = 1); `gamma.upper`, some 1e-8 above `gamma.norm`.
     pub gamma: f64,
@@ -22,7 +24,7 @@ pub struct Certificate {
     /// [`crate::verify`].
     pub factor: Vec<Vec<f64>>,
     /// A triangle that is added to `factor` where R needs more digits than a double has; empty elsewhere.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub correction: Vec<Vec<f64>>,
 }
 
@@ -30,7 +32,8 @@ pub struct Certificate {
 /// w in radians per slow period: the gain there is a lower bound of the norm.
 ///
 /// A witness of weight zero proves nothing and is refused.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct GainWitness {
     /// `[c, s]`, about cos(w/2) and sin(w/2).
     pub half: [f64; 2],

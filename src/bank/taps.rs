@@ -1,11 +1,12 @@
-//! Taps that are fixed-point integers.
+//! Taps that are fixed-point numbers.
 
 use crate::spec::WordLengths;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Taps that are integers times 2^-`fraction_bits`, `f_i[n] = integers[i][n] * 2^-fraction_bits`, in two's
 /// complement with the given word lengths.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FixedPoint {
     /// Bits of each tap.
     pub bits: WordLengths,

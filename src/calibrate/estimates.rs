@@ -5,7 +5,7 @@ use super::model::{Model, Point};
 use super::warning::Warning;
 use crate::linalg::Mat;
 use crate::sine_fit::Estimate;
-use crate::spec::{Cutoff, HALF_WIDTH, PerChannel, Spec, UncertaintySpec};
+use crate::spec::{Cutoff, HALF_WIDTH, OneOrEach, Spec, UncertaintySpec};
 use crate::units::{FastPeriods, Hertz, Seconds};
 
 /// Largest condition of an information matrix with unit diagonal. Beyond it two parameters have the same
@@ -172,14 +172,14 @@ pub fn applied(spec: &Spec, calibration: &Calibration) -> (Spec, Vec<Warning>) {
 /// The half-widths that were found, 0 for a channel without one; those of before if none was found.
 fn half_widths<T: Default>(
     channels: &[ChannelEstimate],
-    before: Option<PerChannel<T>>,
+    before: Option<OneOrEach<T>>,
     of: impl Fn(&ChannelEstimate) -> Option<T>,
-) -> Option<PerChannel<T>> {
+) -> Option<OneOrEach<T>> {
     let found: Vec<Option<T>> = channels.iter().map(of).collect();
     if found.iter().all(Option::is_none) {
         return before;
     }
-    Some(PerChannel::Each(found.into_iter().map(Option::unwrap_or_default).collect()))
+    Some(OneOrEach::Each(found.into_iter().map(Option::unwrap_or_default).collect()))
 }
 
 /// Adds the whole fast periods that make all delays positive, if there must be any.

@@ -1,6 +1,5 @@
 //! The steps from a spec to a finished bank.
 
-use super::choices::{Comparison, completed, settings, with_taps};
 use super::effort;
 use super::limits::{Effort, Limits, Stage, Stop};
 use super::merging::Repeats;
@@ -11,10 +10,12 @@ use super::problem::Problem;
 use super::quantise::WordStudy;
 use super::realise::{Realised, realise};
 use super::reduction::OrderReduction;
+use super::sizing::{Comparison, Sizing, settings};
 use super::unfinished::Unfinished;
 use super::{DesignError, filters, prove, uncertainty};
-use crate::bank::{Bank, FixedPoint, Gamma, SynthesisFilters};
-use crate::spec::{DesignSpec, Method, Spec, SpecProblem};
+use crate::analog::SignalFilter;
+use crate::bank::{Bank, Gamma, SynthesisFilters};
+use crate::spec::{At, DesignSpec, Method, Spec, SpecProblem};
 use crate::units::RadiansPerSlowPeriod;
 use crate::verify::uncertainty::{ErrorBox, certifies};
 use crate::verify::{Verified, VerifyError};
@@ -25,10 +26,8 @@ use std::time::{Duration, Instant};
 pub struct Design {
     /// The finished bank. It carries its proof if one was found.
     pub bank: Bank,
-    /// The latency was left to the designer.
-    pub latency_chosen: bool,
-    /// The number of taps was left to the designer.
-    pub taps_chosen: bool,
+    /// Latency and taps, and which of them the designer chose.
+    pub sizing: Sizing,
     /// Frequency of the worst case.
     pub peak_frequency: RadiansPerSlowPeriod,
     /// What the search for the least gamma, or for the least mean square beside it, left open; `None` also
@@ -102,17 +101,30 @@ impl Options<'_> {
 /// [`DesignError::StoppedWithoutBank`]. A bank without a proof is not an error: see [`Design::proof`].
 pub fn design(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
     spec.check()?;
-    designed(spec, options).map_err(|error| match error {
+    designed(&filled_in(spec), options).map_err(|error| match error {
         DesignError::Stopped => DesignError::StoppedWithoutBank { remedy: effort::remedy(spec) },
         other => other,
     })
 }
 
+/// The spec with the floor of its signal, if that follows from the noise of the converters.
+fn filled_in(spec: &Spec) -> Spec {
+    let mut filled = spec.clone();
+    if let Some((signal, filter)) = filled.signal.as_mut().zip(SignalFilter::of(spec)) {
+        signal.floor_db = signal.floor_db.or(filter.floor_db);
+    }
+    filled
+}
+
 fn designed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
     let stop = options.stop.within(options.limits);
-    let (complete, problem, effort) = complete(spec, options, &stop)?;
+    let problem = Problem::before_sizing(spec)?;
+    let effort = effort::check(spec, options.proof == ProofSearch::Run, options.limits)?;
+    let observer = |designs| (options.observer)(Stage::Latency { designs }, effort);
+    let sizing = Sizing::new(spec, &problem, Comparison { observer: &observer, stop: &stop })?;
+    let problem = Problem { latency: sizing.latency, ..problem };
     (options.observer)(Stage::Filters, effort);
-    let settings = Settings { stop: stop.clone(), ..settings(&complete)? };
+    let settings = Settings { stop: stop.clone(), ..settings(spec, sizing.taps)? };
     let merged = if settings.robust.is_some() || settings.deviations.is_some() {
         problem.merge_channels(Repeats::Never)
     } else {
@@ -121,8 +133,8 @@ fn designed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
     let plant = LiftedPlant::new(&merged.problem);
     let synthesis = methods::synthesise(spec.design.method, &plant, &settings)?;
     (options.observer)(Stage::Realisation, effort);
-    let realised = realise(&complete, &problem, &merged, &plant, &synthesis, &stop)?;
-    let judged = judge(spec, complete, realised, &synthesis).without_unresolved_bounds(&problem);
+    let realised = realise(spec, &problem, &merged, &plant, &synthesis, &stop)?;
+    let judged = judge(spec, sizing, realised, &synthesis).without_unresolved_bounds(&problem);
     if stop.is_due() {
         return Ok(Design { proof: Err(DesignError::Stopped), ..judged });
     }
@@ -140,10 +152,9 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
     let length = taps.first().map_or(0, Vec::len);
     let complete = Spec { design: DesignSpec::new(Method::Fir, Some(length)), ..spec.clone() };
     complete.check()?;
-    let latency = spec.latency.ok_or(SpecProblem::MissingKey {
-        key: "latency",
-        remedy: "filters that are not designed here have one; give it",
-    })?;
+    let remedy = "filters that are not designed here have one; give it";
+    let missing = SpecProblem::MissingKey { key: "latency", remedy };
+    let latency = spec.latency.ok_or(missing).at("")?;
     let problem = Problem::new(&complete, latency)?;
     let channels = problem.channels.len();
     if taps.len() != channels || taps.iter().any(|list| list.len() != length) {
@@ -154,49 +165,32 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
     let filters = SynthesisFilters::Fir(taps);
     let rounding = plant.rounding(&filters::lifted(&filters, problem.ratio))?;
     let realised = Realised { filters, peak: synthesis.peak, rounding, reduction: None, integers: None };
-    let judged = judge(&complete, complete.clone(), realised, &synthesis);
-    Ok(judged.without_unresolved_bounds(&problem).proved(search, &Stop::default()))
+    let sizing = Sizing { latency, taps: length, latency_chosen: false, taps_chosen: false };
+    let judged = judge(&complete, sizing, realised, &synthesis).without_unresolved_bounds(&problem);
+    Ok(judged.proved(search, &Stop::default()))
 }
 
-/// The spec with all defaults filled in, its problem in normalised time, and the estimate of its design.
-/// The effort is checked before the latency is chosen, and again with that latency.
-fn complete(spec: &Spec, options: &Options<'_>, stop: &Stop) -> Result<(Spec, Problem, Effort), DesignError> {
-    let checked = |spec: &Spec| effort::check(spec, options.proof == ProofSearch::Run, options.limits);
-    let open = with_taps(spec)?;
-    let mut effort = checked(&open)?;
-    let observer = |designs| (options.observer)(Stage::Latency { designs }, effort);
-    let complete = completed(&open, Comparison { observer: &observer, stop })?;
-    if complete != open {
-        effort = checked(&complete)?;
-    }
-    let problem = Problem::new(&complete, complete.latency.unwrap_or_default())?;
-    Ok((complete, problem, effort))
-}
-
-/// The bank with its complete spec and with the norm of its final coefficients. No lower bound exceeds that
-/// norm.
-fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis) -> Design {
+/// The bank with the norm of its final coefficients. No lower bound exceeds that norm.
+fn judge(spec: &Spec, sizing: Sizing, realised: Realised, synthesis: &Synthesis) -> Design {
     let Realised { filters, peak, rounding, reduction, integers } = realised;
     let (fixed_point, words) = integers.unzip();
-    let complete = with_chosen_words(complete, fixed_point.as_ref());
     let bank = Bank {
-        fast_period: complete.fast_period,
-        ratio: complete.ratio,
-        latency: complete.latency.unwrap_or_default(),
-        method: complete.design.method,
-        samples: complete.layout().samples().to_vec(),
-        delays: complete.channels.iter().map(|channel| channel.delay).collect(),
-        gains: complete.channels.iter().map(|channel| channel.gain).collect(),
-        offsets: complete.channels.iter().map(|channel| channel.offset).collect(),
+        fast_period: spec.fast_period,
+        ratio: spec.ratio,
+        latency: sizing.latency,
+        method: spec.design.method,
+        samples: spec.layout().samples().to_vec(),
+        delays: spec.channels.iter().map(|channel| channel.delay).collect(),
+        gains: spec.channels.iter().map(|channel| channel.gain).collect(),
+        offsets: spec.channels.iter().map(|channel| channel.offset).collect(),
         filters,
         gamma: Gamma::computed(peak.gain, rounding, synthesis.lower, synthesis.noncausal),
         proof: None,
         fixed_point,
-        spec: Some(complete),
+        spec: Some(spec.clone()),
     };
     Design {
-        latency_chosen: spec.latency.is_none(),
-        taps_chosen: spec.is_fir() && spec.design.taps.is_none(),
+        sizing,
         peak_frequency: RadiansPerSlowPeriod(peak.frequency),
         unfinished: synthesis.unfinished.filter(|_| synthesis.peak.gain > rounding),
         iterations: synthesis.iterations,
@@ -208,15 +202,6 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
         proof_time: Duration::ZERO,
         bank,
     }
-}
-
-/// The spec with the bits that were chosen for a loss.
-fn with_chosen_words(mut spec: Spec, words: Option<&FixedPoint>) -> Spec {
-    if spec.design.loss_db.take().is_some() {
-        spec.design.bits = words.map(|words| words.bits.clone());
-        spec.design.digits = false;
-    }
-    spec
 }
 
 impl Design {

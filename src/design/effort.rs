@@ -14,7 +14,7 @@ use super::methods::{Deviations, robust_fir::RobustProblem};
 use super::problem::{Problem, common_delay};
 use super::prove::MAX_SEARCHED_STATES;
 use crate::memory::available_memory;
-use crate::spec::{Method, Reduction, Spec};
+use crate::spec::{Method, Spec};
 
 /// Operations at that rate for an interior-point block, relative to the square of its order, and for a gain
 /// of such a block: cubes, but the rate of complex decompositions grows with the order.
@@ -83,12 +83,12 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
     if proving && RobustProblem::of(spec).is_some() {
         effort = effort.then(Effort::of(1.0, 0.0).times(BOX_PROOF_OPERATIONS));
     }
-    if spec.design.reduction.is_some() {
+    if spec.design.reduction().is_some() {
         // A norm for each order that is visited, and the refinement of its poles.
         let norms = sizes.norms().times(Range { least: 2.0, most: 2.0 * sizes.states.min(40.0) });
         effort = effort.then(norms).perhaps(Effort::of(POLE_REFINEMENT_OPERATIONS, 0.0));
     }
-    if matches!(spec.design.reduction, Some(Reduction::Order(_))) && spec.latency.is_none() {
+    if spec.design.order.is_some() && spec.latency.is_none() {
         // The banks of some slow periods of latency are compared.
         effort = effort.times(Range { least: 1.0, most: PERIODS_COMPARED * sizes.ratio });
     }
@@ -127,7 +127,7 @@ pub fn remedy(spec: &Spec) -> &'static str {
         Method::Fir if spec.uncertainty.is_some() => {
             "use fewer taps, a smaller ratio or fewer channels, or leave out [uncertainty]"
         }
-        Method::Iir | Method::H2 if spec.design.reduction.is_some() => {
+        Method::Iir | Method::H2 if spec.design.reduction().is_some() => {
             "use a shorter latency, leave out the order reduction, or use the method fir"
         }
         Method::Iir | Method::H2 => {

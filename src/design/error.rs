@@ -8,7 +8,7 @@ use crate::linalg::LinalgError;
 use crate::lti::LtiError;
 use crate::messages::Number;
 use crate::sampling::SamplingError;
-use crate::spec::{SpecProblem, WordLengths};
+use crate::spec::{SpecError, WordLengths};
 use crate::units::FastPeriods;
 use crate::verify::VerifyError;
 use std::time::Duration;
@@ -19,7 +19,7 @@ use std::time::Duration;
 pub enum DesignError {
     /// The spec breaks a rule for specs.
     #[error(transparent)]
-    Spec(#[from] SpecProblem),
+    Spec(#[from] SpecError),
     /// A filter of the spec is not a valid front end.
     #[error("{place}: {source}")]
     Analog {

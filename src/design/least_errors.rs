@@ -9,7 +9,7 @@ use super::DesignError;
 use super::history_errors::HistoryErrors;
 use super::merging::Repeats;
 use super::problem::Problem;
-use crate::spec::MAX_LATENCY;
+use crate::spec::{MAX_ERROR_STATES, MAX_LATENCY};
 use std::ops::RangeInclusive;
 
 /// A longer latency is chosen only if it lowers the whole error by more than 0.1 dB: less than the error of
@@ -25,6 +25,9 @@ const MOST_STATES: usize = 128;
 /// Slow periods of latency beyond the longest delay at which causal banks are compared, at first and at
 /// most.
 const PERIODS: RangeInclusive<usize> = 8..=512;
+/// Fast samples of latency beyond the longest delay for which the matrices of a recursive design fit: the
+/// plant and the filters have as many states each.
+const MOST_BEYOND: usize = MAX_ERROR_STATES / 4;
 /// Frames of history that stand for all past samples, for each of these periods.
 const HISTORY: usize = 6;
 /// Share of [`WORTHWHILE_DB`] that latencies beyond the search may gain: too little to be seen.
@@ -84,7 +87,8 @@ impl LeastErrors {
         loop {
             let latency = problem.longest_delay().0.ceil() as usize + periods * problem.ratio;
             let frames = latency.div_ceil(problem.ratio) + HISTORY * periods;
-            let errors = Self::new(problem, frames * problem.ratio, problem.wait..=latency.min(MAX_LATENCY))?;
+            let most = MAX_LATENCY.min(problem.longest_delay().0.ceil() as usize + MOST_BEYOND);
+            let errors = Self::new(problem, frames * problem.ratio, problem.wait..=latency.min(most))?;
             if errors.least() <= errors.lasting * worthwhile(LEFT_BEYOND) || periods >= *PERIODS.end() {
                 return Ok(errors);
             }

@@ -2,7 +2,6 @@
 //! system ([`LiftedPlant`]); an IIR, H2 or FIR method finds the filters; a certificate proves their error.
 
 pub mod analysis;
-mod choices;
 pub(crate) mod covariances;
 mod designer;
 pub mod effort;
@@ -24,13 +23,13 @@ pub mod quantise;
 mod realise;
 mod reduction;
 pub mod responses;
+mod sizing;
 pub mod uncertainty;
 mod unfinished;
 mod warnings;
 
 pub use analysis::{Analysis, GammaScale, MeanAnalysis, analyze, analyze_mean, noise_gain};
 pub(crate) use analysis::{NearestSample, nearest_samples};
-pub use choices::latency;
 pub use designer::{Design, Options, ProofSearch, design, judge_taps};
 pub use effort::remedy;
 pub use error::DesignError;
@@ -42,6 +41,7 @@ pub use problem::Problem;
 pub use prove::{Certified, certify};
 pub use reduction::{OrderErrorPoint, OrderReduction};
 pub use responses::error_response;
+pub use sizing::Sizing;
 pub use unfinished::{EndOfSearch, Objective, Unfinished};
 pub use warnings::warnings;
 

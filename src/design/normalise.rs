@@ -34,17 +34,32 @@ impl Problem {
             Channel { front_end, gain, converter_gain, converter, delay }
         };
         let channels = layout.owners().into_iter().zip(layout.waited_delays(&delays)).map(channel).collect();
-        let scale = input_scale(spec, signal.as_ref(), &front_ends[target]);
-        let noise: Vec<f64> =
-            spec.channels.iter().map(|channel| channel.sample_noise().powi(2) * scale).collect();
-        let (fast_period, ratio) = (spec.fast_period, spec.ratio);
-        let (wait, noise) = (layout.wait(&delays), layout.each(&noise));
-        let mut problem =
-            Self { fast_period, ratio, latency, signal, front_ends, target, channels, wait, noise };
+        let (fast_period, ratio, wait) = (spec.fast_period, spec.ratio, layout.wait(&delays));
+        let mut problem = Self {
+            fast_period,
+            ratio,
+            latency,
+            signal,
+            front_ends,
+            target,
+            channels,
+            wait,
+            noise: Vec::new(),
+        };
         problem.check_size()?;
-        let jitter = problem.jitter_powers(spec)?;
-        problem.noise.iter_mut().zip(jitter).for_each(|(power, jitter)| *power += jitter);
+        problem.noise = problem.noise_powers(spec)?;
         Ok(problem)
+    }
+
+    /// Power of the noise that each channel adds, with the noise, bits and jitter of the converters of `spec`
+    /// and the front ends of this problem.
+    pub(super) fn noise_powers(&self, spec: &Spec) -> Result<Vec<f64>, DesignError> {
+        let scale = input_scale(spec, self.signal.as_ref(), &self.front_ends[self.target]);
+        let jitter = self.jitter_powers(spec)?;
+        let power = |(channel, jitter): (&Channel, f64)| {
+            spec.channels[channel.converter].sample_noise().powi(2) * scale + jitter
+        };
+        Ok(self.channels.iter().zip(jitter).map(power).collect())
     }
 
     /// Power of the noise by which the jitter of each channel of `spec` shows, relative to an input of unit

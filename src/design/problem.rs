@@ -4,13 +4,9 @@ use super::DesignError;
 use crate::analog::{StableFilter, StrictlyProper};
 use crate::bank::Bank;
 use crate::linalg::Complex;
-use crate::spec::Spec;
+use crate::spec::{MAX_ERROR_STATES, Spec};
 use crate::units::{FastPeriods, GridTime, RadiansPerFastPeriod, Seconds, Timeline};
 use std::ops::Range;
-
-/// Maximum number of states of the delay chains of the lifted system. Its matrices are dense: at this size
-/// one matrix takes 128 MiB. A norm needs several of them, and its time grows with the cube of the states.
-pub const MAX_CHAIN_STATES: usize = 4096;
 
 /// Slow periods of delay up to which latencies that predict are compared, too.
 const KEPT_PERIODS: usize = 16;
@@ -62,6 +58,15 @@ pub struct Channel {
 }
 
 impl Problem {
+    /// The problem of a spec whose latency may be open; it then has the latency that all delays have in
+    /// common.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub(super) fn before_sizing(spec: &Spec) -> Result<Self, DesignError> {
+        Self::new(spec, spec.latency.unwrap_or_else(|| common_delay(spec)))
+    }
+
     /// The same problem `fast_periods` earlier: a common shift of all delays and of the latency changes
     /// neither the error nor the filters.
     pub(super) fn earlier(mut self, fast_periods: usize) -> Self {
@@ -104,14 +109,14 @@ impl Problem {
     ///
     /// # Errors
     /// [`DesignError::TooLate`] if latency and delays lie so far apart that the chains between them have
-    /// more than [`MAX_CHAIN_STATES`] states.
+    /// more than [`MAX_ERROR_STATES`] states.
     pub fn check_size(&self) -> Result<(), DesignError> {
         let states = self.chain_states();
-        if states <= MAX_CHAIN_STATES as f64 {
+        if states <= MAX_ERROR_STATES as f64 {
             return Ok(());
         }
         let (latency, longest_delay) = (self.latency, self.longest_delay());
-        Err(DesignError::TooLate { latency, longest_delay, states, limit: MAX_CHAIN_STATES })
+        Err(DesignError::TooLate { latency, longest_delay, states, limit: MAX_ERROR_STATES })
     }
 
     /// The instants of the samples of one slow period: those of the channels, then those of the target.

@@ -110,7 +110,7 @@ impl Realisation<'_> {
     fn state_space(&self, system: &StateSpace, norm: f64) -> Result<Realised, DesignError> {
         let full = self.fastest_realisation(&system.map_inputs(&self.merged.shares()), norm)?;
         let (Some(reduction), SynthesisFilters::StateSpace(block)) =
-            (self.spec.design.reduction, &full.filters)
+            (self.spec.design.reduction(), &full.filters)
         else {
             return Ok(full);
         };

@@ -1,7 +1,7 @@
 //! Warnings about specs that are legal but probably not meant.
 
 use super::DesignError;
-use super::problem::{Problem, common_delay};
+use super::problem::Problem;
 use crate::analog::{SignalFilter, resolved_band};
 use crate::quantity::readable;
 use crate::spec::{Band, FilterSpec, Passband, Spec};
@@ -26,7 +26,7 @@ const NORMALISED_BANDWIDTHS: std::ops::RangeInclusive<f64> = 1e-3..=10.0;
 /// # Errors
 /// [`DesignError::Analog`] for a filter that is not stable or not strictly proper.
 pub fn warnings(spec: &Spec) -> Result<Vec<String>, DesignError> {
-    let problem = Problem::new(spec, spec.latency.unwrap_or_else(|| common_delay(spec)))?;
+    let problem = Problem::before_sizing(spec)?;
     let mut found: Vec<String> = band(spec, &problem, None).into_iter().collect();
     found.extend(signal_band(spec));
     let other = |i: &usize| spec.channels[*i].filter != spec.target;

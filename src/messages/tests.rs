@@ -57,15 +57,23 @@ fn the_words_of_serde_become_plain_ones() {
         ("missing field `global` at line 1 column 2", "line 1, column 2: the key global is missing"),
         (
             "invalid type: string \"a, expected b\", expected u64 at line 3 column 9",
-            "line 3, column 9: expected a whole number, zero or more, found the text \"a, expected b\"",
+            "line 3, column 9: expected a whole number, zero or more, without point and exponent, found the text \"a, expected b\"",
         ),
         ("invalid type: floating point `1e300.0`, expected a string", "expected a text, found 1e300.0"),
         (
             "invalid type: floating point `0.5`, expected usize",
-            "expected a whole number, zero or more, found 0.5",
+            "expected a whole number, zero or more, without point and exponent, found 0.5",
         ),
         ("invalid type: map, expected a sequence", "expected a list, found a table"),
-        ("invalid value: integer `-3`, expected u64", "expected a whole number, zero or more, found -3"),
+        (
+            "invalid value: integer `-3`, expected u64",
+            "expected a whole number, zero or more, without point and exponent, found -3",
+        ),
+        ("invalid length 1, expected an array of length 2", "1 entries, but a list of 2 is needed"),
+        (
+            "unknown variant `b`, expected `first` or `second`",
+            "unknown name \"b\"; the names here are first, second",
+        ),
         (
             "unknown field `b\u{1b}`, expected one of `first`, `length`",
             "unknown key \"b\\u{1b}\"; the keys here are first, length",

@@ -104,7 +104,11 @@ fn error_facts(bank: &Bank, scale: &GammaScale, mean: &MeanAnalysis) -> Vec<Fact
         Err(error) => fact("proven", "nothing", format!("the bounds of the file were not proven: {error}")),
     });
     if let Some(noncausal) = bank.gamma.noncausal {
-        facts.push(fact("noncausal", six_digits(noncausal), "no latency makes gamma smaller (computed lower bound)"));
+        facts.push(fact(
+            "noncausal",
+            six_digits(noncausal),
+            "no latency makes gamma smaller (computed lower bound)",
+        ));
     }
     facts.push(fact("noise gain", six_digits(mean.noise_gain), noise(mean)));
     facts

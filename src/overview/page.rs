@@ -10,7 +10,7 @@ use crate::pipeline::{PipelineError, Settings, fused};
 use crate::plot::{Chart, PlotError};
 use crate::quantity::readable;
 use crate::simulate::interleaved;
-use crate::spec::SpecProblem;
+use crate::spec::SpecError;
 use crate::units::{Decibels, Hertz};
 
 /// Frames of captures that are used; more would only make the lines denser.
@@ -35,7 +35,7 @@ pub enum PageError {
     Fuse(#[from] PipelineError),
     /// The spec cannot be written.
     #[error(transparent)]
-    Spec(#[from] SpecProblem),
+    Spec(#[from] SpecError),
     /// Captures without a spectrum.
     #[error("{frames} frames, and a spectrum needs {LEAST_FRAMES}; give longer captures, or none")]
     Short {

@@ -281,7 +281,9 @@ fn error(bank: &Bank) -> Result<Chart, DesignError> {
         points: response.iter().map(|(f, gain)| (f.0 * factor, decibels(*gain))).collect(),
     }];
     let ends = [Hertz(0.0), Hertz(0.5 / bank.slow_period().0)];
-    for (label, bound) in [("gamma, upper bound", bank.gamma.upper), ("computed lower bound", bank.gamma.lower)] {
+    for (label, bound) in
+        [("gamma, upper bound", bank.gamma.upper), ("computed lower bound", bank.gamma.lower)]
+    {
         series.extend(bound.filter(|bound| *bound > 0.0).map(|bound| Series {
             label: label.into(),
             points: ends.iter().map(|f| (f.0 * factor, decibels(bound))).collect(),

@@ -1,9 +1,10 @@
 //! The `[design]` table: defaults, overrides from the command line, and the keys of each method.
 
-use super::error::{KeyProblem, blame};
+use super::error::At;
 use super::limits;
+use super::tables::Pair;
 use super::word_lengths::{WordLengths, check_fraction_bits};
-use super::{FrameLayout, SpecProblem, UncertaintySpec};
+use super::{FrameLayout, Refusal, SpecError, SpecProblem, UncertaintySpec};
 use serde::{Deserialize, Serialize};
 
 /// How the synthesis filters are designed.
@@ -25,7 +26,8 @@ pub enum Method {
 }
 
 /// The keys of a `[design]` table. `M` is the [`Method`], or an option of it where it may be left out.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct DesignTable<M> {
     /// The method. If it overrides the method of a file, keys of the file that it does not read are dropped.
     pub method: M,
@@ -49,11 +51,17 @@ pub struct DesignTable<M> {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss_db: Option<f64>,
     /// Whether `loss_db` asks for few signed digits, not for few bits.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub digits: bool,
-    /// Order reduction, for recursive methods.
-    #[serde(flatten)]
-    pub reduction: Option<Reduction>,
+    /// For recursive methods, at most so many states, with the least error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub order: Option<usize>,
+    /// For recursive methods, the fewest states whose error is within this many decibels of the full bank's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reduction_loss_db: Option<f64>,
+    /// Noise of the channels that state none. In a spec the channels hold it, and this is `None`.
+    #[serde(skip_serializing)]
+    pub noise: Option<f64>,
 }
 
 /// A `[design]` table with its defaults filled in.
@@ -63,14 +71,12 @@ pub type DesignSpec = DesignTable<Method>;
 pub type DesignOverrides = DesignTable<Option<Method>>;
 
 /// By how much the order of a recursive bank is reduced.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Reduction {
     /// To at most this many states, with the least error.
-    #[serde(rename = "order")]
     Order(usize),
     /// To the fewest states whose error is within this many decibels of the full bank's.
-    #[serde(rename = "reduction_loss_db")]
     Loss(f64),
 }
 
@@ -125,16 +131,6 @@ impl Method {
     }
 }
 
-impl Reduction {
-    /// The key in spec files.
-    pub const fn key(self) -> &'static str {
-        match self {
-            Self::Order(_) => "order",
-            Self::Loss(_) => "reduction_loss_db",
-        }
-    }
-}
-
 impl<M> DesignTable<M> {
     /// The same keys with another method.
     fn with<N>(self, method: N) -> DesignTable<N> {
@@ -147,8 +143,15 @@ impl<M> DesignTable<M> {
             fraction_bits: self.fraction_bits,
             loss_db: self.loss_db,
             digits: self.digits,
-            reduction: self.reduction,
+            order: self.order,
+            reduction_loss_db: self.reduction_loss_db,
+            noise: self.noise,
         }
+    }
+
+    /// The order reduction that is asked for.
+    pub fn reduction(&self) -> Option<Reduction> {
+        self.order.map(Reduction::Order).or(self.reduction_loss_db.map(Reduction::Loss))
     }
 
     /// The keys that have a value, the method apart.
@@ -161,11 +164,11 @@ impl<M> DesignTable<M> {
             ("fraction_bits", self.fraction_bits.is_some()),
             ("loss_db", self.loss_db.is_some()),
             ("digits", self.digits),
+            ("order", self.order.is_some()),
+            ("reduction_loss_db", self.reduction_loss_db.is_some()),
+            ("noise", self.noise.is_some()),
         ];
-        keys.into_iter()
-            .filter(|(_, given)| *given)
-            .map(|(key, _)| key)
-            .chain(self.reduction.map(Reduction::key))
+        keys.into_iter().filter(|(_, given)| *given).map(|(key, _)| key)
     }
 
     /// Whether it has a value for `key`, which is not the method.
@@ -191,28 +194,6 @@ impl DesignSpec {
         DesignOverrides { taps, ..Default::default() }.with(method)
     }
 
-    /// The same design by another method; keys that it does not read are dropped.
-    ///
-    /// # Errors
-    /// [`SpecProblem`] if the method needs taps and there are none, or too many for frames of this `layout`.
-    pub fn with_method(&self, method: Method, layout: &FrameLayout) -> Result<Self, SpecProblem> {
-        self.overridden(DesignOverrides { method: Some(method), ..Default::default() }, layout)
-    }
-
-    /// The same design with another number of taps per channel, in place of a wanted SNR too.
-    ///
-    /// # Errors
-    /// [`SpecProblem`] if the method makes no FIR filters, or the number is out of range.
-    pub fn with_taps(&self, taps: usize, layout: &FrameLayout) -> Result<Self, SpecProblem> {
-        self.overridden(DesignOverrides { taps: Some(taps), ..Default::default() }, layout)
-    }
-
-    fn overridden(&self, overrides: DesignOverrides, layout: &FrameLayout) -> Result<Self, SpecProblem> {
-        let design = overrides.over(self.clone().with(Some(self.method))).resolved();
-        design.check(layout)?;
-        Ok(design)
-    }
-
     /// Whether the design couples all samples of a frame. The taps of the mean-square optimum are
     /// independent for each output sample.
     pub(super) fn is_coupled(&self) -> bool {
@@ -220,63 +201,77 @@ impl DesignSpec {
     }
 
     /// Checks the numbers, and that the method reads every key.
-    pub(super) fn check(&self, layout: &FrameLayout) -> Result<(), KeyProblem> {
+    pub(super) fn check(&self, layout: &FrameLayout) -> Result<(), SpecError> {
+        self.check_clashes()?;
+        self.check_numbers()?;
         self.check_keys()?;
-        blame("taps", self.taps.map_or(Ok(()), limits::check_taps))?;
-        blame("gamma_margin", self.gamma_margin.map_or(Ok(()), limits::check_gamma_margin))?;
-        match self.reduction {
-            Some(Reduction::Order(order)) => blame("order", limits::check_order(order))?,
-            Some(Reduction::Loss(db)) => blame("reduction_loss_db", limits::check_reduction_loss(db))?,
-            None => {}
-        }
-        blame("fraction_bits", self.fraction_bits.map_or(Ok(()), check_fraction_bits))?;
-        blame("bits", self.bits.as_ref().map_or(Ok(()), |bits| bits.check(self.taps)))?;
-        blame("loss_db", self.loss_db.map_or(Ok(()), limits::check_word_loss))?;
-        if self.digits && self.loss_db.is_none() {
-            let remedy = "digits are the fewest for a loss, for example loss_db = 0.1";
-            return blame("digits", Err(SpecProblem::MissingKey { key: "loss_db", remedy }));
-        }
-        if self.fraction_bits.is_some() && self.bits.is_none() {
-            let remedy = "fraction_bits sets the binary point of integer taps, whose word length bits gives, for example bits = 16";
-            return blame("fraction_bits", Err(SpecProblem::MissingKey { key: "bits", remedy }));
-        }
-        blame("target_snr_db", self.target_snr_db.map_or(Ok(()), limits::check_target_snr))?;
         match (self.method, self.taps) {
-            (Method::Fir, Some(taps)) => blame("taps", limits::check_optimised_taps(taps, layout.count())),
+            (Method::Fir, Some(taps)) => limits::check_optimised_taps(taps, layout.count()).at("taps"),
             _ => Ok(()),
         }
     }
 
-    fn check_keys(&self) -> Result<(), KeyProblem> {
-        if let Some((key, problem)) = self.clash() {
-            return blame(key, Err(problem));
-        }
-        match KEYS.iter().find(|key| self.gives(key.name) && !key.methods.contains(&self.method)) {
-            Some(&Key { name: key, advised: remedy, .. }) => {
-                blame(key, Err(SpecProblem::NeedlessKey { key, method: self.method.name(), remedy }))
-            }
-            None => Ok(()),
-        }
+    fn check_numbers(&self) -> Result<(), SpecError> {
+        self.taps.map_or(Ok(()), limits::check_taps).at("taps")?;
+        self.gamma_margin.map_or(Ok(()), limits::check_gamma_margin).at("gamma_margin")?;
+        self.order.map_or(Ok(()), limits::check_order).at("order")?;
+        self.reduction_loss_db.map_or(Ok(()), limits::check_reduction_loss).at("reduction_loss_db")?;
+        self.fraction_bits.map_or(Ok(()), check_fraction_bits).at("fraction_bits")?;
+        self.bits.as_ref().map_or(Ok(()), |bits| bits.check(self.taps)).at("bits")?;
+        self.loss_db.map_or(Ok(()), limits::check_word_loss).at("loss_db")?;
+        self.target_snr_db.map_or(Ok(()), limits::check_target_snr).at("target_snr_db")
     }
 
-    /// A key that excludes another one, whatever their values are.
-    fn clash(&self) -> Option<(&'static str, SpecProblem)> {
-        let conflict =
-            |first, second, remedy| Some((second, SpecProblem::Conflict { first, second, remedy }));
-        match self.reduction {
-            _ if self.loss_db.is_some() && self.fraction_bits.is_some() => conflict(
-                "loss_db",
-                "fraction_bits",
-                "the loss decides the step of the taps; leave out one of the two",
-            ),
-            _ if self.taps.is_some() && self.target_snr_db.is_some() => {
-                conflict("taps", "target_snr_db", "the SNR decides how many taps there are, keep one of them")
+    /// The keys that the method does not read, and those that need another one.
+    fn check_keys(&self) -> Result<(), SpecError> {
+        let needless = KEYS.iter().find(|key| self.gives(key.name) && !key.methods.contains(&self.method));
+        if let Some(&Key { name: key, advised: remedy, .. }) = needless {
+            return Err(Refusal::new(
+                key,
+                SpecProblem::NeedlessKey { key, method: self.method.name(), remedy },
+            ));
+        }
+        if self.digits && self.loss_db.is_none() {
+            let remedy = "digits are the fewest for a loss, for example loss_db = 0.1";
+            return Err(Refusal::new("digits", SpecProblem::MissingKey { key: "loss_db", remedy }));
+        }
+        if self.fraction_bits.is_some() && self.bits.is_none() {
+            let remedy = "fraction_bits sets the binary point of integer taps, whose word length bits gives, for example bits = 16";
+            return Err(Refusal::new("fraction_bits", SpecProblem::MissingKey { key: "bits", remedy }));
+        }
+        Ok(())
+    }
+
+    /// Keys that exclude each other, whatever their values are.
+    fn check_clashes(&self) -> Result<(), SpecError> {
+        let pairs = [
+            Pair {
+                first: "order",
+                second: "reduction_loss_db",
+                remedy: "each determines the other, keep one of them",
+            },
+            Pair {
+                first: "loss_db",
+                second: "fraction_bits",
+                remedy: "the loss decides the step of the taps; leave out one of the two",
+            },
+            Pair {
+                first: "taps",
+                second: "target_snr_db",
+                remedy: "the SNR decides how many taps there are, keep one of them",
+            },
+        ];
+        pairs.into_iter().try_for_each(|pair| {
+            let given = |key| self.gives(key).then_some(());
+            pair.only(given(pair.first), given(pair.second)).map(drop)
+        })?;
+        let reduced = ["order", "reduction_loss_db"].into_iter().find(|key| self.gives(key));
+        match reduced {
+            Some(key) if self.method == Method::H2 && self.is_fir() => {
+                let (method, remedy) = ("h2 with taps", "h2 without taps");
+                Err(Refusal::new(key, SpecProblem::NeedlessKey { key, method, remedy }))
             }
-            Some(reduction) if self.method == Method::H2 && self.is_fir() => {
-                let (key, method, remedy) = (reduction.key(), "h2 with taps", "h2 without taps");
-                Some((key, SpecProblem::NeedlessKey { key, method, remedy }))
-            }
-            _ => None,
+            _ => Ok(()),
         }
     }
 
@@ -285,15 +280,17 @@ impl DesignSpec {
         &self,
         uncertainty: Option<&UncertaintySpec>,
         channels: usize,
-    ) -> Result<(), KeyProblem> {
-        let conflict = |first, remedy| Err(SpecProblem::Conflict { first, second: "[uncertainty]", remedy });
-        if let (Some(reduction), Method::H2) = (self.reduction, self.method)
-            && uncertainty.is_some_and(|table| table.has_delays_or_gains(channels))
-        {
-            let remedy = "h2 averages over uncertain delays and gains with FIR filters, which have no order; leave out one of the two";
-            return blame(reduction.key(), conflict(reduction.key(), remedy));
+    ) -> Result<(), SpecError> {
+        let averages =
+            self.method == Method::H2 && uncertainty.is_some_and(|table| table.has_delays_or_gains(channels));
+        match ["order", "reduction_loss_db"].into_iter().find(|key| averages && self.gives(key)) {
+            Some(first) => {
+                let remedy = "h2 averages over uncertain delays and gains with FIR filters, which have no order; leave out one of the two";
+                let second = "[uncertainty]";
+                Err(Refusal::new(first, SpecProblem::Conflict { first, second, remedy }))
+            }
+            None => Ok(()),
         }
-        Ok(())
     }
 }
 
@@ -316,14 +313,26 @@ impl DesignOverrides {
             fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| keeps("fraction_bits"))),
             loss_db: self.loss_db.or(file.loss_db.filter(|_| keeps("loss_db"))),
             digits: self.digits || file.digits && keeps("digits"),
-            reduction: self.reduction.or(file.reduction.filter(|_| keeps("order"))),
+            order: self.order.or(file.order.filter(|_| keeps("order") && self.reduction_loss_db.is_none())),
+            reduction_loss_db: self
+                .reduction_loss_db
+                .or(file.reduction_loss_db.filter(|_| keeps("order") && self.order.is_none())),
+            noise: self.noise.or(file.noise),
         }
+    }
+
+    /// An error of a spec with these keys in place of its own: theirs, if one of them is the cause.
+    pub(super) fn blamed(&self, error: SpecError) -> SpecError {
+        let Some(key) = error.path().strip_prefix("design.").map(str::to_owned) else { return error };
+        let other_length = matches!(error.problem(), SpecProblem::Range { unit: "entries", .. });
+        let cause = if other_length && !self.gives(&key) { "taps" } else { &key };
+        if self.gives(cause) { error.of_override(cause) } else { error }
     }
 
     /// The default method is FIR if taps or an SNR are given, else IIR, which needs no size.
     pub(super) fn resolved(self) -> DesignSpec {
         let is_sized = self.taps.is_some() || self.target_snr_db.is_some();
         let method = self.method.unwrap_or(if is_sized { Method::Fir } else { Method::Iir });
-        self.with(method)
+        Self { noise: None, ..self }.with(method)
     }
 }

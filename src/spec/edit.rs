@@ -1,22 +1,16 @@
 //! New values in the text of a spec file, with everything else kept: comments, layout, units.
 
-use std::ops::Range;
+use toml_edit::visit_mut::{VisitMut, visit_table_like_kv_mut};
+use toml_edit::{Array, DocumentMut, Item, KeyMut, Table, TableLike, Value};
 
-use super::document::{Entry, Kind, Node};
 use super::{
-    ChannelSpec, DesignOverrides, FilterModel, FilterModels, MeasuredFilter, PerChannel, Spec, SpecError,
-    SpecProblem, UncertaintySpec,
+    ChannelSpec, DesignOverrides, FilterModel, FilterModels, FilterSpec, MeasuredFilter, OneOrEach, Spec,
+    SpecError, UncertaintySpec,
 };
 use crate::units::{Decibels, Seconds};
 
 /// Largest relative difference of two delays that differ only by the rounding of their unit.
 const DELAY_ROUNDING: f64 = 1e-12;
-
-/// Replacements of ranges of a text.
-struct Edits<'a> {
-    text: &'a str,
-    list: Vec<(Range<usize>, String)>,
-}
 
 impl Spec {
     /// The text of a spec file with the delays, gains, offsets and filters of the channels, the latency and
@@ -28,7 +22,7 @@ impl Spec {
     ///
     /// # Errors
     /// As [`Spec::to_toml`].
-    pub fn to_toml_like(&self, text: &str, models: &FilterModels<'_>) -> Result<String, SpecProblem> {
+    pub fn to_toml_like(&self, text: &str, models: &FilterModels<'_>) -> Result<String, SpecError> {
         self.check()?;
         let exact = |wanted: &MeasuredFilter| {
             models(wanted).map(|model| FilterModel { error: Decibels(0.0), ..model })
@@ -54,66 +48,101 @@ impl Spec {
     /// Whether `text` reads as this spec, up to the rounding of delays.
     fn is_what(&self, text: &str, models: &FilterModels<'_>) -> bool {
         let Ok(mut read) = read(text, models) else { return false };
-        if read.channels.len() != self.channels.len() {
-            return false;
-        }
         for (own, read) in self.channels.iter().zip(&mut read.channels) {
             read.delay = rounded_to(read.delay, own.delay);
         }
         if let (Some(own), Some(read)) = (&self.uncertainty, &mut read.uncertainty)
-            && let (Some(PerChannel::Each(own)), Some(PerChannel::Each(read))) = (&own.delay, &mut read.delay)
+            && let (Some(OneOrEach::Each(own)), Some(OneOrEach::Each(read))) = (&own.delay, &mut read.delay)
         {
             read.iter_mut().zip(own).for_each(|(read, own)| *read = rounded_to(*read, *own));
         }
         read == *self
     }
 
+    /// `None` where the text has other channels.
     fn edited(&self, text: &str, models: &FilterModels<'_>) -> Option<String> {
-        let document = Node::from_toml(text).ok()?;
-        let mut edits = Edits { text, list: Vec::new() };
-        let top = entries(&document)?;
+        let old = read(text, models).ok()?;
+        let mut document: DocumentMut = text.parse().ok()?;
         if let Some(latency) = self.latency {
-            edits.replace(find(top, "latency")?, latency.to_string());
+            set(document.as_table_mut(), "latency", i64::try_from(latency).ok()?.into());
         }
-        let channels = list(&find(top, "channel")?.value)?;
-        if channels.len() != self.channels.len() {
+        let tables = tables_in(document.get_mut("channel")?);
+        if tables.len() != self.channels.len() || old.channels.len() != self.channels.len() {
             return None;
         }
-        let in_samples = entries(channels.first()?).is_some_and(|keys| find(keys, "delay_samples").is_some());
-        let old = read(text, models).ok()?;
-        for ((node, channel), old) in channels.iter().zip(&self.channels).zip(&old.channels) {
-            edits.channel(self, node, old, channel)?;
+        // The unit of delays, and of their half-widths.
+        let h = tables.first()?.contains_key("delay_samples").then_some(self.fast_period);
+        for ((table, channel), old) in tables.into_iter().zip(&self.channels).zip(&old.channels) {
+            channel.write(table, old, self.fast_period)?;
         }
         if let Some(uncertainty) = &self.uncertainty {
-            let h = in_samples.then_some(self.fast_period);
-            edits.uncertainty(find(top, "uncertainty"), &lines(uncertainty, h))?;
+            let table = document.entry("uncertainty").or_insert(Item::Table(Table::new()));
+            uncertainty.write(table.as_table_like_mut()?, h);
         }
-        Some(edits.apply())
+        Some(document.to_string())
+    }
+}
+
+impl ChannelSpec {
+    /// Writes into the table what may have changed since `old`.
+    fn write(&self, table: &mut dyn TableLike, old: &Self, h: Seconds) -> Option<()> {
+        match table.contains_key("delay_samples") {
+            true => set(table, "delay_samples", number(self.delay / h)),
+            false => set(table, "delay", number(self.delay.0)),
+        }
+        for (key, new, old) in [("gain", self.gain, old.gain), ("offset", self.offset, old.offset)] {
+            if new != old {
+                set(table, key, number(new));
+            }
+        }
+        if self.filter != old.filter {
+            set(table, "filter", inline(&self.filter)?);
+        }
+        Some(())
+    }
+}
+
+impl UncertaintySpec {
+    /// Writes all keys into the table; delays in fast periods if the fast period `h` is given.
+    fn write(&self, table: &mut dyn TableLike, h: Option<Seconds>) {
+        let (key, other) = if h.is_some() { ("delay_samples", "delay") } else { ("delay", "delay_samples") };
+        table.remove(other);
+        let delay = |time: &Seconds| h.map_or(time.0, |h| *time / h);
+        let entries = [
+            (key, self.delay.as_ref().map(|list| written(&list.map(delay)))),
+            ("gain", self.gain.as_ref().map(written)),
+            ("offset", self.offset.as_ref().map(written)),
+            ("cutoff", self.cutoff.as_ref().map(written)),
+            ("reference", self.reference.map(|channel| (channel as i64).into())),
+        ];
+        for (key, value) in entries {
+            match value {
+                Some(value) => set(table, key, value),
+                None => drop(table.remove(key)),
+            }
+        }
     }
 }
 
 /// The text of a spec file with the names of measurements as `renamed` says; as it is where it says nothing,
 /// or where the text is no TOML.
 pub fn with_measurements_renamed(text: &str, renamed: impl Fn(&str) -> Option<String>) -> String {
-    let mut edits = Edits { text, list: Vec::new() };
-    let mut nodes = Vec::from_iter(Node::from_toml(text));
-    while let Some(node) = nodes.pop() {
-        match node.kind {
-            Kind::List(items) => nodes.extend(items),
-            Kind::Table(entries) => {
-                for entry in entries {
-                    if let ("touchstone" | "response", Kind::Text(path)) = (&*entry.key, &entry.value.kind)
-                        && let Some(path) = renamed(path)
-                    {
-                        edits.replace(&entry, toml::Value::from(path).to_string());
-                    }
-                    nodes.push(entry.value);
-                }
-            }
-            _ => {}
+    let Ok(mut document) = text.parse::<DocumentMut>() else { return text.to_owned() };
+    Renaming(renamed).visit_document_mut(&mut document);
+    document.to_string()
+}
+
+/// Renames measurements.
+struct Renaming<F>(F);
+
+impl<F: Fn(&str) -> Option<String>> VisitMut for Renaming<F> {
+    fn visit_table_like_kv_mut(&mut self, key: KeyMut<'_>, item: &mut Item) {
+        let is_measurement = matches!(key.get(), "touchstone" | "response");
+        match item.as_str().filter(|_| is_measurement).and_then(&self.0) {
+            Some(renamed) => replace(item, renamed.into()),
+            None => visit_table_like_kv_mut(self, key, item),
         }
     }
-    edits.apply()
 }
 
 fn read(text: &str, models: &FilterModels<'_>) -> Result<Spec, SpecError> {
@@ -124,114 +153,58 @@ fn rounded_to(read: Seconds, own: Seconds) -> Seconds {
     if (read.0 - own.0).abs() <= DELAY_ROUNDING * own.0.abs() { own } else { read }
 }
 
-fn entries(node: &Node) -> Option<&[Entry]> {
-    if let Kind::Table(entries) = &node.kind { Some(entries) } else { None }
-}
-
-fn list(node: &Node) -> Option<&[Node]> {
-    if let Kind::List(items) = &node.kind { Some(items) } else { None }
-}
-
-fn find<'a>(entries: &'a [Entry], key: &str) -> Option<&'a Entry> {
-    entries.iter().find(|entry| entry.key == key)
-}
-
-impl Edits<'_> {
-    fn replace(&mut self, entry: &Entry, value: String) {
-        if let Some(span) = &entry.value.span {
-            self.list.push((span.clone(), value));
+/// The tables of a list, each headed [[channel]] or inline.
+fn tables_in(item: &mut Item) -> Vec<&mut dyn TableLike> {
+    match item {
+        Item::ArrayOfTables(list) => list.iter_mut().map(|table| table as &mut dyn TableLike).collect(),
+        Item::Value(Value::Array(list)) => {
+            let tables = list.iter_mut().filter_map(Value::as_inline_table_mut);
+            tables.map(|table| table as &mut dyn TableLike).collect()
         }
-    }
-
-    fn channel(&mut self, spec: &Spec, node: &Node, old: &ChannelSpec, channel: &ChannelSpec) -> Option<()> {
-        let keys = entries(node)?;
-        let delay = match (find(keys, "delay"), find(keys, "delay_samples")) {
-            (Some(entry), _) => (entry, channel.delay.0),
-            (None, entry) => (entry?, channel.delay / spec.fast_period),
-        };
-        self.replace(delay.0, number(delay.1));
-        let before = delay.0.key_span.as_ref()?.start;
-        let is_inline = self.text.get(node.span.clone()?)?.starts_with('{');
-        let mut put = |key: &str, value: String, is_default: bool| match find(keys, key) {
-            Some(entry) => self.replace(entry, value),
-            None if is_default => {}
-            None => {
-                let end = if is_inline { ", " } else { "\n" };
-                self.list.push((before..before, format!("{key} = {value}{end}")));
-            }
-        };
-        put("gain", number(channel.gain), channel.gain == 1.0);
-        put("offset", number(channel.offset), channel.offset == 0.0);
-        if channel.filter != old.filter {
-            put("filter", toml::Value::try_from(&channel.filter).ok()?.to_string(), false);
-        }
-        Some(())
-    }
-
-    /// The table as `lines`, in the place of the old one or at the end.
-    fn uncertainty(&mut self, old: Option<&Entry>, lines: &[String]) -> Option<()> {
-        let Some(old) = old else {
-            let end = self.text.len();
-            let gap = if self.text.ends_with('\n') { "\n" } else { "\n\n" };
-            self.list.push((end..end, format!("{gap}[uncertainty]\n{}\n", lines.join("\n"))));
-            return Some(());
-        };
-        let span = old.value.span.clone()?;
-        if self.text.get(span.clone())?.starts_with('{') {
-            self.list.push((span, format!("{{ {} }}", lines.join(", "))));
-            return Some(());
-        }
-        let keys = entries(&old.value)?;
-        for (number, entry) in keys.iter().enumerate() {
-            let start = self.text[..entry.key_span.as_ref()?.start].rfind('\n').map_or(0, |at| at + 1);
-            let end = entry.value.span.as_ref()?.end;
-            let end = self.text[end..].find('\n').map_or(self.text.len(), |at| end + at + 1);
-            let new = if number == 0 { lines.join("\n") + "\n" } else { String::new() };
-            self.list.push((start..end, new));
-        }
-        (!keys.is_empty()).then_some(())
-    }
-
-    fn apply(mut self) -> String {
-        // A stable sort: insertions at one place keep their order.
-        self.list.sort_by_key(|(range, _)| range.start);
-        let mut text = self.text.to_owned();
-        for (range, new) in self.list.iter().rev() {
-            text.replace_range(range.clone(), new);
-        }
-        text
+        _ => Vec::new(),
     }
 }
 
-/// A number as TOML reads it back to the same bits.
-fn number(value: f64) -> String {
-    format!("{value:?}")
-}
-
-/// The keys of the table; delays in fast periods if the fast period `h` is given.
-fn lines(table: &UncertaintySpec, h: Option<Seconds>) -> Vec<String> {
-    let line =
-        |key: &str, value: Option<PerChannel<f64>>| value.map(|value| format!("{key} = {}", written(&value)));
-    let delay = match h {
-        Some(h) => line("delay_samples", table.delay.as_ref().map(|list| list.map(|time| *time / h))),
-        None => line("delay", table.delay.as_ref().map(|list| list.map(|time| time.0))),
-    };
-    let reference = table.reference.map(|reference| format!("reference = {reference}"));
-    let all = [
-        delay,
-        line("gain", table.gain.clone()),
-        line("offset", table.offset.clone()),
-        line("cutoff", table.cutoff.clone()),
-        reference,
-    ];
-    all.into_iter().flatten().collect()
-}
-
-fn written(value: &PerChannel<f64>) -> String {
-    match value {
-        PerChannel::Same(value) => number(*value),
-        PerChannel::Each(list) => {
-            format!("[{}]", list.iter().map(|x| number(*x)).collect::<Vec<_>>().join(", "))
-        }
+/// Sets the value of a key. One that is there keeps its place and its comment.
+fn set(table: &mut dyn TableLike, key: &str, value: Value) {
+    match table.get_mut(key) {
+        Some(item) => replace(item, value),
+        None => append(table, key, value),
     }
+}
+
+/// The space before the end of an inline table stays there.
+fn append(table: &mut dyn TableLike, key: &str, mut value: Value) {
+    let last = table.iter_mut().last().and_then(|(_, item)| item.as_value_mut());
+    if let Some(decor) = last.map(Value::decor_mut)
+        && let Some(space) =
+            decor.suffix().filter(|suffix| suffix.as_str().is_some_and(|text| text.trim().is_empty()))
+    {
+        value.decor_mut().set_suffix(space.clone());
+        decor.set_suffix("");
+    }
+    table.insert(key, Item::Value(value));
+}
+
+fn replace(item: &mut Item, mut value: Value) {
+    if let Some(old) = item.as_value() {
+        *value.decor_mut() = old.decor().clone();
+    }
+    *item = Item::Value(value);
+}
+
+/// A number as TOML reads it back to the same bits, with an exponent where there would be many zeros.
+fn number(value: f64) -> Value {
+    format!("{value:?}").parse().unwrap_or_else(|_| value.into())
+}
+
+fn written(values: &OneOrEach<f64>) -> Value {
+    match values {
+        OneOrEach::Same(value) => number(*value),
+        OneOrEach::Each(list) => list.iter().copied().map(number).collect::<Array>().into(),
+    }
+}
+
+fn inline(filter: &FilterSpec) -> Option<Value> {
+    toml::Value::try_from(filter).ok()?.to_string().parse().ok()
 }

@@ -1,80 +1,58 @@
-//! Errors of a spec: the location in the file and the problem.
+//! Refused documents: the location in the file and the problem.
 
 use std::fmt;
-use std::ops::Range;
 
-use super::FilterProblem;
 use crate::messages::{Location, Number, Quoted};
-use crate::quantity::QuantityError;
 
-/// The error of a spec that cannot be used: the file, the location in it, and the problem.
+/// A document that was refused: its file (empty for what is in memory), the place in it, and the problem.
 ///
-/// Displays as `file:line:column: path: problem` with the offending line below.
+/// Displays as `file:line:column: path: problem`, with the offending line below where it is known.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SpecError {
-    inner: Box<Inner>,
+pub struct Refusal<P> {
+    inner: Box<Inner<P>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-struct Inner {
+struct Inner<P> {
     file: String,
     path: String,
     location: Option<Location>,
-    problem: SpecProblem,
     overridden: bool,
+    problem: P,
 }
 
-/// A problem with its path and location.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Fault {
-    pub(crate) path: String,
-    pub(crate) span: Option<Range<usize>>,
-    /// Boxed to keep the result of every reading function small.
-    pub(crate) problem: Box<SpecProblem>,
-    /// The value is an override: `path` is its key, and the location in the document does not apply.
-    pub(crate) overridden: bool,
-}
-
-impl Fault {
-    /// A problem with the value that overrides the document's `key`.
-    pub(crate) fn overriding(key: &'static str, problem: SpecProblem) -> Self {
-        Self { path: key.to_owned(), span: None, problem: Box::new(problem), overridden: true }
-    }
-}
+/// A spec that was refused.
+pub type SpecError = Refusal<SpecProblem>;
 
 /// The rule that a spec violates, with the offending value and the remedy.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpecProblem {
-    /// The text is not TOML (or JSON) at all.
-    #[error("{}", Quoted(.message))]
-    Syntax {
-        /// The parser's message.
-        message: String,
-    },
-    /// A measurement that cannot be read or modelled.
+    /// A text that is not TOML, or a value that is not of its kind.
     #[error("{message}")]
-    Measurement {
-        /// File, reason and remedy.
+    Value {
+        /// What is wrong.
         message: String,
     },
-    /// A key that no table of this kind has.
+    /// A key that no table of this kind has, or a name that is not on the list.
     #[error(
-        "unknown key \"{}\"{}{}; the keys here are {}",
-        Quoted(.key),
+        "unknown {what} \"{}\"{}{}; the {what}s here are {}",
+        Quoted(.name),
         suggestion(.nearest),
         elsewhere(.homes),
         .known.join(", ")
     )]
-    UnknownKey {
-        /// The key as written.
-        key: String,
+    Unknown {
+        /// "key" or "name".
+        what: &'static str,
+        /// As it is written.
+        name: String,
+        /// A known one with a similar spelling.
+        nearest: Option<String>,
         /// The tables that have this very key.
         homes: Vec<&'static str>,
-        /// A known key with a similar spelling.
-        nearest: Option<&'static str>,
-        /// All known keys.
-        known: Vec<&'static str>,
+        /// All known ones.
+        known: Vec<String>,
     },
     /// A required key is missing.
     #[error("the key {key} is missing; {remedy}")]
@@ -83,26 +61,6 @@ pub enum SpecProblem {
         key: &'static str,
         /// What to write.
         remedy: &'static str,
-    },
-    /// A value of the wrong type.
-    #[error("expected {expected}, found {found}")]
-    WrongType {
-        /// The expected type.
-        expected: &'static str,
-        /// The type found.
-        found: &'static str,
-    },
-    /// A name that is not on the list.
-    #[error("unknown {what} \"{}\"{}; choose one of {}", Quoted(.name), suggestion(.nearest), .known.join(", "))]
-    UnknownName {
-        /// What the name stands for.
-        what: &'static str,
-        /// The name as written.
-        name: String,
-        /// A known name with a similar spelling.
-        nearest: Option<&'static str>,
-        /// All known names.
-        known: Vec<&'static str>,
     },
     /// Two keys that exclude each other.
     #[error("both {first} and {second} are given; {remedy}")]
@@ -134,88 +92,27 @@ pub enum SpecProblem {
         /// Names of methods that read the key.
         remedy: &'static str,
     },
-    /// A list of values to fit that cannot be.
-    #[error("{message}")]
-    Fit {
-        /// The rule and the remedy.
-        message: String,
-    },
-    /// One table where there is one for each converter.
-    #[error(
-        "[{key}] is a single table, and each converter has one of its own; head each with two brackets, [[{key}]]"
-    )]
-    SingleTable {
-        /// The key of the tables.
-        key: &'static str,
-    },
-    /// A filter table without any filter.
-    #[error(
-        "the filter is empty; give num and den, or poles and gain, or a, b and c, or family and cutoff, or cascade"
-    )]
-    EmptyFilter,
-    /// A sample rate in no simple ratio to the fast rate.
-    #[error(
-        "a rate of {} Hz is in no simple ratio to the fast rate of {} Hz, so that the instants of the samples \
-         do not repeat; a rate near it is {}", Number(*.rate), Number(*.fast), rates(.near)
-    )]
-    Rate {
-        /// The offending rate.
-        rate: f64,
-        /// The fast rate.
-        fast: f64,
-        /// A rate near it.
-        near: Vec<f64>,
-    },
-    /// Sample rates whose frames are too long.
-    #[error(
-        "the rates make frames of {ratio} fast samples, with {} samples of the converters; {rule}; rates near these \
-         with short frames are {}", list(.samples), rates(.near)
-    )]
-    Frame {
-        /// Fast samples per frame.
-        ratio: u64,
-        /// Samples of each converter per frame.
-        samples: Vec<u64>,
-        /// The limit and other remedies.
-        rule: String,
-        /// Rates near these, in hertz.
-        near: Vec<f64>,
-    },
-    /// A text that is not the quantity it should be.
-    #[error(transparent)]
-    Quantity(#[from] QuantityError),
-    /// A filter that violates a rule for filters.
-    #[error(transparent)]
-    Filter(#[from] FilterProblem),
 }
 
-/// A problem of a table, and the key that causes it.
-#[derive(Debug)]
-pub(super) struct KeyProblem {
-    pub(super) key: &'static str,
-    pub(super) problem: SpecProblem,
+/// Says at which path of keys a value breaks a rule.
+pub(crate) trait At<T> {
+    /// The same with the path in the error.
+    fn at(self, path: &str) -> Result<T, SpecError>;
 }
 
-impl From<KeyProblem> for SpecProblem {
-    fn from(of_key: KeyProblem) -> Self {
-        of_key.problem
+impl<T> At<T> for Result<T, SpecProblem> {
+    fn at(self, path: &str) -> Result<T, SpecError> {
+        self.map_err(|problem| Refusal::new(path, problem))
     }
 }
 
-pub(super) fn blame(key: &'static str, checked: Result<(), SpecProblem>) -> Result<(), KeyProblem> {
-    checked.map_err(|problem| KeyProblem { key, problem })
+/// A value that breaks a rule in words.
+pub(crate) fn refused(path: &str, rule: impl Into<String>) -> SpecError {
+    Refusal::new(path, SpecProblem::Value { message: rule.into() })
 }
 
-fn list(samples: &[u64]) -> String {
-    samples.iter().map(u64::to_string).collect::<Vec<_>>().join(" and ")
-}
-
-fn rates(near: &[f64]) -> String {
-    near.iter().map(|rate| format!("{} Hz", Number(*rate))).collect::<Vec<_>>().join(" and ")
-}
-
-fn suggestion(nearest: &Option<&'static str>) -> String {
-    nearest.map(|key| format!(", did you mean \"{key}\"?")).unwrap_or_default()
+fn suggestion(nearest: &Option<String>) -> String {
+    nearest.as_ref().map(|key| format!(", did you mean \"{key}\"?")).unwrap_or_default()
 }
 
 /// Where a key would be right.
@@ -228,7 +125,7 @@ fn elsewhere(homes: &[&str]) -> String {
 }
 
 /// A path of keys as people read it: channels count from 1, `channel[0].delay` is `channel 1.delay`.
-pub(crate) fn shown_path(path: &str) -> String {
+fn shown_path(path: &str) -> String {
     path.split('.')
         .map(|part| channel_from_one(part).unwrap_or_else(|| part.to_owned()))
         .collect::<Vec<_>>()
@@ -242,26 +139,42 @@ fn channel_from_one(part: &str) -> Option<String> {
     matches!(list, "channel" | "channels").then(|| format!("channel {}{rest}", index + 1))
 }
 
-impl SpecError {
-    /// A problem with the span of `text` that it is about.
-    pub(super) fn new(
-        file: &str,
-        text: &str,
-        span: Option<Range<usize>>,
-        path: String,
-        problem: SpecProblem,
-    ) -> Self {
-        let fault = Fault { path, span, problem: Box::new(problem), overridden: false };
-        Self::of(file, text, fault)
+impl<P> Refusal<P> {
+    /// A problem with the value at a path of keys.
+    pub(crate) fn new(path: impl Into<String>, problem: impl Into<P>) -> Self {
+        let (file, path, problem) = (String::new(), path.into(), problem.into());
+        Self { inner: Box::new(Inner { file, path, location: None, overridden: false, problem }) }
     }
 
-    /// A fault that was found in `text`.
-    pub(super) fn of(file: &str, text: &str, fault: Fault) -> Self {
-        let Fault { path, span, problem, overridden } = fault;
-        let location = span.map(|span| Location::find(text, span));
-        Self {
-            inner: Box::new(Inner { file: file.to_owned(), path, location, problem: *problem, overridden }),
-        }
+    /// The same problem, of a part of the value at `outer`.
+    pub(crate) fn inside(mut self, outer: &str) -> Self {
+        let parts = [outer, &self.inner.path].into_iter().filter(|part| !part.is_empty());
+        self.inner.path = parts.collect::<Vec<_>>().join(".");
+        self
+    }
+
+    /// The same problem, of the document of this name.
+    pub(crate) fn in_file(mut self, file: &str) -> Self {
+        self.inner.file = file.to_owned();
+        self
+    }
+
+    /// The same problem, at a known location.
+    pub(crate) fn located(mut self, location: Option<Location>) -> Self {
+        self.inner.location = location;
+        self
+    }
+
+    /// The same problem, of the value that overrides that of the file.
+    pub(super) fn of_override(mut self, key: &str) -> Self {
+        (self.inner.path, self.inner.overridden) = (key.to_owned(), true);
+        self
+    }
+
+    /// The same with another problem.
+    pub(crate) fn map<Q>(self, other: impl FnOnce(P) -> Q) -> Refusal<Q> {
+        let Inner { file, path, location, overridden, problem } = *self.inner;
+        Refusal { inner: Box::new(Inner { file, path, location, overridden, problem: other(problem) }) }
     }
 
     /// The key, such as `fraction_bits`, if the problem is a value that overrides the one in the file.
@@ -269,44 +182,45 @@ impl SpecError {
         self.inner.overridden.then_some(self.inner.path.as_str())
     }
 
-    /// The file name as it was given.
+    /// The file name as it was given; empty for what is in memory.
     pub fn file(&self) -> &str {
         &self.inner.file
     }
 
-    /// The path of keys to the value, such as `channel[1].filter.den`; empty for the whole file.
+    /// The path of keys to the value, such as `channel[1].filter.den`; empty for the whole document.
     pub fn path(&self) -> &str {
         &self.inner.path
     }
 
-    /// Line and column.
+    /// Line and column, where they are known.
     pub fn location(&self) -> Option<&Location> {
         self.inner.location.as_ref()
     }
 
     /// The rule that is violated.
-    pub fn problem(&self) -> &SpecProblem {
+    pub fn problem(&self) -> &P {
         &self.inner.problem
     }
 }
 
-impl std::error::Error for SpecError {}
+impl<P: fmt::Debug + fmt::Display> std::error::Error for Refusal<P> {}
 
-impl fmt::Display for SpecError {
+impl<P: fmt::Display> fmt::Display for Refusal<P> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Inner { file, path, location, problem, overridden } = &*self.inner;
-        let file = Quoted(file);
+        let Inner { file, path, location, overridden, problem } = &*self.inner;
         if *overridden {
-            return write!(f, "{file}: the {path} that overrides the file's: {problem}");
+            return write!(f, "{}: the {path} that overrides the file's: {problem}", Quoted(file));
         }
-        write!(f, "{file}:")?;
-        if let Some(location) = location {
-            write!(f, "{}:{}:", location.line, location.column)?;
+        let mut place = Quoted(file).to_string();
+        if let Some(Location { line, column, .. }) = location {
+            place += &format!(":{line}:{column}");
         }
-        if !path.is_empty() {
-            write!(f, " {}:", Quoted(shown_path(path)))?;
+        for part in [place, Quoted(shown_path(path)).to_string()] {
+            if !part.is_empty() {
+                write!(f, "{part}: ")?;
+            }
         }
-        write!(f, " {problem}")?;
+        write!(f, "{problem}")?;
         location.as_ref().map_or(Ok(()), |location| write!(f, "\n{location}"))
     }
 }

@@ -1,21 +1,25 @@
 //! The rules for what a filter is written with: sizes, finite numbers, family parameters.
 
+use super::error::{At, refused};
 use super::filter::{MAX_COEFFICIENT, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
-use super::filter_problem::MAX_ORDER;
-use super::limits::MAX_ENTRY;
-use super::{Family, FilterProblem, FilterSpec, Passband};
+use super::limits::{MAX_ENTRY, within};
+use super::{Family, FilterSpec, Passband, SpecError};
 use crate::messages::Number;
+
+/// Most poles of a filter. Real front ends have fewer than a dozen. The product of 32 poles, each of at
+/// most 1e9 rad per fast period, still fits a double.
+pub const MAX_ORDER: usize = 32;
 
 impl FilterSpec {
     /// Checks all rules that do not depend on the values of the poles.
     ///
     /// # Errors
-    /// The first [`FilterProblem`] found.
-    pub fn check(&self) -> Result<(), FilterProblem> {
+    /// [`SpecError`] with the key of the filter's table.
+    pub fn check(&self) -> Result<(), SpecError> {
         self.check_size()?;
         let (zeros, poles) = self.degrees();
         if zeros >= poles {
-            return Err(FilterProblem::NotStrictlyProper { zeros, poles, remedy: self.direct_term_remedy() });
+            return Err(not_strictly_proper(zeros, poles, &self.direct_term_remedy()));
         }
         Ok(())
     }
@@ -23,8 +27,8 @@ impl FilterSpec {
     /// As [`FilterSpec::check`], for a filter that may have a direct term.
     ///
     /// # Errors
-    /// The first [`FilterProblem`] found.
-    pub fn check_proper(&self) -> Result<(), FilterProblem> {
+    /// [`SpecError`] with the key of the filter's table.
+    pub fn check_proper(&self) -> Result<(), SpecError> {
         self.check_size()?;
         let (zeros, poles) = self.degrees();
         if zeros <= poles {
@@ -33,11 +37,11 @@ impl FilterSpec {
         let rule = format!(
             "the filter has {zeros} zeros and {poles} poles, so it grows with frequency; give it at least as many poles as zeros"
         );
-        Err(FilterProblem::Rule { key: None, rule })
+        Err(refused("", rule))
     }
 
     /// The entries, and the number of poles.
-    fn check_size(&self) -> Result<(), FilterProblem> {
+    fn check_size(&self) -> Result<(), SpecError> {
         self.check_parts()?;
         self.check_stages()?;
         let (key, (_, poles)) = (self.order_key(), self.degrees());
@@ -48,15 +52,15 @@ impl FilterSpec {
         }
     }
 
-    fn check_stages(&self) -> Result<(), FilterProblem> {
+    fn check_stages(&self) -> Result<(), SpecError> {
         let Self::Cascade { cascade } = self else { return Ok(()) };
         cascade.iter().enumerate().try_for_each(|(index, stage)| {
-            check_stage(stage).map_err(|p| FilterProblem::Stage { index, problem: Box::new(p) })
+            check_stage(stage).map_err(|error| error.inside(&format!("cascade[{index}]")))
         })
     }
 
     /// The checks on the single entries of the table.
-    fn check_parts(&self) -> Result<(), FilterProblem> {
+    fn check_parts(&self) -> Result<(), SpecError> {
         match self {
             Self::TransferFunction { num, den } => check_polynomials(num, den),
             Self::ZeroPoleGain { zeros, poles, gain } => check_zpk(zeros, poles, *gain),
@@ -97,58 +101,59 @@ impl FilterSpec {
     }
 }
 
-fn no_poles(key: &'static str) -> FilterProblem {
-    FilterProblem::of(key, "the filter has no pole, so it passes every frequency; give it at least one")
+fn not_strictly_proper(zeros: usize, poles: usize, remedy: &str) -> SpecError {
+    let rule = format!(
+        "the filter is not strictly proper: with {zeros} zeros against {poles} poles it passes arbitrarily high \
+         frequencies, and samples of a finite-energy signal are not defined; {remedy}"
+    );
+    refused("", rule)
 }
 
-fn order_too_high(key: &'static str, order: usize) -> FilterProblem {
+fn no_poles(key: &'static str) -> SpecError {
+    refused(key, "the filter has no pole, so it passes every frequency; give it at least one")
+}
+
+fn order_too_high(key: &'static str, order: usize) -> SpecError {
     let rule = format!(
         "the filter has {order} poles, but at most {MAX_ORDER} are supported; leave out stages that matter least"
     );
-    FilterProblem::of(key, rule)
+    refused(key, rule)
 }
 
-fn empty(key: &'static str, remedy: &str) -> FilterProblem {
-    FilterProblem::of(key, format!("{key} is empty; {remedy}"))
+fn empty(key: &'static str, remedy: &str) -> SpecError {
+    refused(key, format!("{key} is empty; {remedy}"))
 }
 
 /// A filter that is zero because `key` is.
-fn check_nonzero(key: &'static str, mut values: impl Iterator<Item = f64>) -> Result<(), FilterProblem> {
+fn check_nonzero(key: &'static str, mut values: impl Iterator<Item = f64>) -> Result<(), SpecError> {
     if values.any(|x| x != 0.0) {
         return Ok(());
     }
     let rule =
         format!("the filter is zero because {key} is, so its output carries no signal; make {key} nonzero");
-    Err(FilterProblem::of(key, rule))
+    Err(refused(key, rule))
 }
 
 /// A stage must be a valid filter by itself, but only the whole cascade has to be strictly proper.
-fn check_stage(stage: &FilterSpec) -> Result<(), FilterProblem> {
+fn check_stage(stage: &FilterSpec) -> Result<(), SpecError> {
     if matches!(stage, FilterSpec::Cascade { .. }) {
         let rule = "a cascade cannot hold another cascade; list all its stages in one";
-        return Err(FilterProblem::of("cascade", rule));
+        return Err(refused("cascade", rule));
     }
     stage.check_parts()?;
     let (zeros, poles) = stage.degrees();
     if zeros > poles {
-        let remedy = "give the stage at least as many poles as zeros".into();
-        return Err(FilterProblem::NotStrictlyProper { zeros, poles, remedy });
+        return Err(not_strictly_proper(zeros, poles, "give the stage at least as many poles as zeros"));
     }
     Ok(())
 }
 
-fn check_sizes(
-    key: &'static str,
-    values: impl IntoIterator<Item = f64>,
-    most: f64,
-) -> Result<(), FilterProblem> {
-    match values.into_iter().find(|x| !(0.0..=most).contains(&x.abs())) {
-        Some(value) => Err(FilterProblem::too_large(key, value, most)),
-        None => Ok(()),
-    }
+fn check_sizes(key: &'static str, values: impl IntoIterator<Item = f64>, most: f64) -> Result<(), SpecError> {
+    let rule = "it must be a finite number; check its unit";
+    values.into_iter().try_for_each(|value| within(value, -most..=most, "(coefficient)", rule)).at(key)
 }
 
-fn check_polynomials(num: &[f64], den: &[f64]) -> Result<(), FilterProblem> {
+fn check_polynomials(num: &[f64], den: &[f64]) -> Result<(), SpecError> {
     for (key, list) in [("num", num), ("den", den)] {
         if list.is_empty() {
             return Err(empty(key, "list its coefficients in descending powers of s"));
@@ -160,19 +165,19 @@ fn check_polynomials(num: &[f64], den: &[f64]) -> Result<(), FilterProblem> {
         let rule = format!(
             "den is zero ({count} coefficients, all 0); its highest power of s needs another coefficient"
         );
-        return Err(FilterProblem::of("den", rule));
+        return Err(refused("den", rule));
     }
     check_nonzero("num", num.iter().copied())
 }
 
-fn check_zpk(zeros: &[[f64; 2]], poles: &[[f64; 2]], gain: f64) -> Result<(), FilterProblem> {
+fn check_zpk(zeros: &[[f64; 2]], poles: &[[f64; 2]], gain: f64) -> Result<(), SpecError> {
     check_sizes("zeros", zeros.iter().flatten().copied(), MAX_ENTRY)?;
     check_sizes("poles", poles.iter().flatten().copied(), MAX_ENTRY)?;
     check_sizes("gain", [gain], MAX_COEFFICIENT)?;
     check_nonzero("gain", [gain].into_iter())
 }
 
-fn check_matrices(a: &[Vec<f64>], b: &[Vec<f64>], c: &[Vec<f64>]) -> Result<(), FilterProblem> {
+fn check_matrices(a: &[Vec<f64>], b: &[Vec<f64>], c: &[Vec<f64>]) -> Result<(), SpecError> {
     let n = a.len();
     if n == 0 {
         return Err(empty("a", "a filter needs at least one state"));
@@ -184,7 +189,7 @@ fn check_matrices(a: &[Vec<f64>], b: &[Vec<f64>], c: &[Vec<f64>]) -> Result<(), 
             let rule = format!(
                 "{key} is {found_rows} x {found_cols}, but a filter with one input, one output and {n} states needs {rows} x {cols}"
             );
-            return Err(FilterProblem::of(key, rule));
+            return Err(refused(key, rule));
         }
         check_sizes(key, matrix.iter().flatten().copied(), MAX_ENTRY)?;
     }
@@ -192,13 +197,13 @@ fn check_matrices(a: &[Vec<f64>], b: &[Vec<f64>], c: &[Vec<f64>]) -> Result<(), 
     check_nonzero("c", c.iter().flatten().copied())
 }
 
-fn check_order(family: Family, order: Option<usize>, passband: Passband) -> Result<(), FilterProblem> {
+fn check_order(family: Family, order: Option<usize>, passband: Passband) -> Result<(), SpecError> {
     let poles = |order: usize| order.saturating_mul(passband.poles_per_order());
     match (family, order) {
         (Family::Rc, None | Some(1)) => Ok(()),
         (Family::Rc, Some(order)) => {
             let rule = "an rc filter has one pole; remove order, or choose another family";
-            Err(FilterProblem::of("order", format!("order = {order}: {rule}")))
+            Err(refused("order", format!("order = {order}: {rule}")))
         }
         (_, None) => Err(missing(family, "order", "the number of poles")),
         (_, Some(0)) => Err(no_poles("order")),
@@ -207,12 +212,12 @@ fn check_order(family: Family, order: Option<usize>, passband: Passband) -> Resu
     }
 }
 
-fn missing(family: Family, key: &str, meaning: &str) -> FilterProblem {
+fn missing(family: Family, key: &str, meaning: &str) -> SpecError {
     let rule = format!("a {} filter needs {key} ({meaning})", family.name());
-    FilterProblem::Rule { key: None, rule }
+    refused("", rule)
 }
 
-fn check_ripples(family: Family, ripple: Option<f64>, attenuation: Option<f64>) -> Result<(), FilterProblem> {
+fn check_ripples(family: Family, ripple: Option<f64>, attenuation: Option<f64>) -> Result<(), SpecError> {
     check_decibels(family, "ripple_db", ripple)?;
     check_decibels(family, "attenuation_db", attenuation)?;
     match (ripple, attenuation) {
@@ -222,14 +227,14 @@ fn check_ripples(family: Family, ripple: Option<f64>, attenuation: Option<f64>) 
                 Number(attenuation),
                 Number(ripple)
             );
-            Err(FilterProblem::of("attenuation_db", rule))
+            Err(refused("attenuation_db", rule))
         }
         _ => Ok(()),
     }
 }
 
 /// The ripple or the attenuation of a family.
-fn check_decibels(family: Family, key: &'static str, value: Option<f64>) -> Result<(), FilterProblem> {
+fn check_decibels(family: Family, key: &'static str, value: Option<f64>) -> Result<(), SpecError> {
     let (is_read, meaning) = match key {
         "ripple_db" => (family.has_ripple(), "the ripple in the pass band in decibels"),
         _ => (family.has_attenuation(), "the attenuation in the stop band in decibels"),
@@ -247,5 +252,5 @@ fn check_decibels(family: Family, key: &'static str, value: Option<f64>) -> Resu
         }
         _ => return Ok(()),
     };
-    Err(FilterProblem::of(key, rule))
+    Err(refused(key, rule))
 }

@@ -3,10 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 
-use super::reader::Value;
-use super::{Fault, FilterSpec, SpecProblem};
+use super::{FilterSpec, SpecProblem};
 
 /// A value of a channel that can be fitted.
 ///
@@ -15,7 +14,8 @@ use super::{Fault, FilterSpec, SpecProblem};
 /// assert_eq!("cutoff:2".parse(), Ok(Fitting::Cutoff(Cutoff::Stage(1))));
 /// assert_eq!("phase".parse::<Fitting>(), Err(UnknownFitting));
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
 #[non_exhaustive]
 pub enum Fitting {
     /// The delay.
@@ -47,17 +47,6 @@ impl Cutoff {
     }
 }
 
-/// The list of a spec.
-pub(super) fn read(value: &Value<'_>) -> Result<Vec<Fitting>, Fault> {
-    let one = |item: &Value<'_>| {
-        item.text()?.parse().map_err(|error| item.fault(SpecProblem::Fit { message: format!("{error}") }))
-    };
-    let list = value.items("a list of names, as in [\"delay\", \"gain\", \"cutoff:2\"]")?;
-    let list = list.iter().map(one).collect::<Result<Vec<_>, _>>()?;
-    check(&list).map_err(|problem| value.fault(problem))?;
-    Ok(list)
-}
-
 /// One factor of each channel scales one part of its front end.
 pub(super) fn check(list: &[Fitting]) -> Result<(), SpecProblem> {
     let cutoffs: Vec<String> =
@@ -66,7 +55,7 @@ pub(super) fn check(list: &[Fitting]) -> Result<(), SpecProblem> {
         return Ok(());
     }
     let message = format!("{} have one factor for each channel; keep one of them", cutoffs.join(" and "));
-    Err(SpecProblem::Fit { message })
+    Err(SpecProblem::Value { message })
 }
 
 /// As it is written: `cutoff`, or `cutoff:2` for the second stage.
@@ -85,6 +74,14 @@ impl fmt::Display for Fitting {
 impl Serialize for Fitting {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
+    }
+}
+
+impl TryFrom<String> for Fitting {
+    type Error = UnknownFitting;
+
+    fn try_from(text: String) -> Result<Self, UnknownFitting> {
+        text.parse()
     }
 }
 

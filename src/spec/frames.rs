@@ -10,8 +10,9 @@
 //! the least whole number of fast periods for which none is negative. So the latency counts from the instant
 //! of a sample, the wait for the rest of its frame included. With equal rates L_i = 1 and S = 0.
 
+use super::error::At;
 use super::limits::{self, range};
-use super::{ChannelSpec, SpecProblem};
+use super::{ChannelSpec, Refusal, SpecError, SpecProblem};
 use crate::units::{Fraction, GridTime, Hertz, Seconds};
 use std::ops::Range;
 
@@ -142,17 +143,19 @@ impl Step {
 /// The frames of converters with these rates.
 ///
 /// # Errors
-/// [`SpecProblem::Rate`] for a rate that is in no simple ratio to the fast rate, [`SpecProblem::Frame`] for
-/// frames beyond [`limits::MAX_RATIO`] fast samples or [`limits::MAX_CHANNELS`] samples.
-pub(super) fn layout(fast_period: Seconds, rates: &[Hertz]) -> Result<FrameLayout, Refused> {
+/// [`SpecProblem::Range`] for a rate that is in no simple ratio to the fast rate, and for frames beyond [`limits::MAX_RATIO`] fast samples or [`limits::MAX_CHANNELS`] samples.
+fn layout(fast_period: Seconds, rates: &[Hertz]) -> Result<FrameLayout, SpecError> {
     let step = |(channel, &rate): (usize, &Hertz)| {
-        limits::check_fast_rate(rate).map_err(|_| {
-            let rule = "a sample rate is positive, between 1e-100 and 1e100 hertz";
-            Refused { channel: Some(channel), problem: range(rate.0, "Hz", rule) }
-        })?;
+        let path = format!("channel[{channel}].rate");
+        limits::check_rate(rate).at(&path)?;
         Step::of(rate, fast_period).ok_or_else(|| {
-            let (fast, near) = (fast_period.rate().0, near_rates(fast_period, &[rate]));
-            Refused { channel: Some(channel), problem: SpecProblem::Rate { rate: rate.0, fast, near } }
+            let rule = format!(
+                "it is in no simple ratio to the fast rate of {}, so that the instants of the samples do not repeat; a \
+                 rate near it is {}",
+                fast_period.rate(),
+                near_rates(fast_period, &[rate])
+            );
+            Refusal::new(path, range(rate.0, "Hz", rule))
         })
     };
     let steps: Vec<Step> = rates.iter().enumerate().map(step).collect::<Result<_, _>>()?;
@@ -166,26 +169,54 @@ pub(super) fn layout(fast_period: Seconds, rates: &[Hertz]) -> Result<FrameLayou
     let samples: Vec<u64> = steps.iter().map(samples).collect();
     let count = samples.iter().fold(0u64, |sum, &samples| sum.saturating_add(samples));
     if ratio > limits::MAX_RATIO as u64 || count > limits::MAX_CHANNELS as u64 {
-        let near = near_rates(fast_period, rates);
-        let rule = format!(
-            "at most {} fast samples and {} samples make a frame",
-            limits::MAX_RATIO,
-            limits::MAX_CHANNELS
-        );
-        return Err(Refused { channel: None, problem: SpecProblem::Frame { ratio, samples, rule, near } });
+        let (longest, most) = (limits::MAX_RATIO, limits::MAX_CHANNELS);
+        let rule =
+            format!("at most {longest} fast samples and {most} samples of the converters make a frame");
+        return Err(Refusal::new(
+            "channel",
+            long_frame(ratio, &samples, &rule, &near_rates(fast_period, rates)),
+        ));
     }
     let samples = samples.into_iter().map(|samples| samples as usize).collect();
     Ok(FrameLayout::new(ratio as usize, samples))
 }
 
-/// What is wrong with rates: that of a channel, from 0, or all together.
-pub(super) struct Refused {
-    pub(super) channel: Option<usize>,
-    pub(super) problem: SpecProblem,
+/// Fast samples per frame of channels as they are written. Channels without a rate get that of the `ratio`;
+/// where all have one rate, none keeps it.
+pub(super) fn common_ratio(
+    fast_period: Seconds,
+    ratio: Option<usize>,
+    channels: &mut [ChannelSpec],
+) -> Result<usize, SpecError> {
+    let with_rate = channels.iter().filter(|channel| channel.rate.is_some()).count();
+    if let (Some(ratio), 0) = (ratio, with_rate) {
+        return Ok(ratio);
+    }
+    if ratio.is_none() && with_rate < channels.len() || channels.is_empty() {
+        let remedy = "give M, the number of fast samples per slow sample, or the rate of every channel";
+        return Err(Refusal::new("", SpecProblem::MissingKey { key: "ratio", remedy }));
+    }
+    let common = ratio.map(|ratio| (fast_period * ratio as f64).rate());
+    let rates: Vec<Hertz> = channels.iter().filter_map(|channel| channel.rate.or(common)).collect();
+    let layout = layout(fast_period, &rates)?;
+    for (channel, rate) in channels.iter_mut().zip(rates) {
+        channel.rate = (!layout.is_plain()).then_some(rate);
+    }
+    match ratio.filter(|&ratio| with_rate == channels.len() && ratio != layout.ratio) {
+        Some(ratio) => Err(other_ratio(ratio, layout.ratio)),
+        None => Ok(layout.ratio),
+    }
 }
 
-/// Rates near these, in hertz, whose frames are short.
-pub(super) fn near_rates(fast_period: Seconds, rates: &[Hertz]) -> Vec<f64> {
+fn other_ratio(written: usize, ratio: usize) -> SpecError {
+    let rule = format!(
+        "every channel has a rate, and these make frames of {ratio} fast samples; leave ratio out of a file"
+    );
+    Refusal::new("ratio", range(written as f64, "fast samples", rule))
+}
+
+/// Rates near these whose frames are short, in words.
+fn near_rates(fast_period: Seconds, rates: &[Hertz]) -> String {
     let shares: Vec<f64> = rates.iter().map(|rate| rate.0 * fast_period.0).collect();
     let samples = |ratio: usize| {
         shares.iter().map(|share| (share * ratio as f64).round().max(1.0)).collect::<Vec<f64>>()
@@ -196,18 +227,18 @@ pub(super) fn near_rates(fast_period: Seconds, rates: &[Hertz]) -> Vec<f64> {
         off.map(|(samples, share)| (samples / (share * ratio as f64)).ln().abs()).fold(0.0, f64::max)
     };
     let best = (1..NEAR_FRAME).filter(fits).min_by(|&a, &b| farthest(a).total_cmp(&farthest(b)));
-    let Some(ratio) = best else { return Vec::new() };
+    let Some(ratio) = best else { return "none".to_owned() };
     // Twelve digits, so that 44 kHz are 44000 Hz.
     let rounded = |rate: f64| format!("{rate:.11e}").parse().unwrap_or(rate);
-    let rate = |samples: f64| samples / (ratio as f64 * fast_period.0);
-    samples(ratio).into_iter().map(rate).map(rounded).collect()
+    let rate = |samples: f64| Hertz(rounded(samples / (ratio as f64 * fast_period.0))).to_string();
+    samples(ratio).into_iter().map(rate).collect::<Vec<_>>().join(" and ")
 }
 
 fn greatest_common_divisor(a: u64, b: u64) -> u64 {
     if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
-/// The frames of the channels of a spec made in memory.
+/// The frames of the channels of a spec.
 ///
 /// # Errors
 /// As [`layout`]; [`SpecProblem::MissingKey`] if some channels have a rate and others have none, and
@@ -216,21 +247,17 @@ pub(super) fn checked(
     fast_period: Seconds,
     ratio: usize,
     channels: &[ChannelSpec],
-) -> Result<FrameLayout, SpecProblem> {
+) -> Result<FrameLayout, SpecError> {
     let rates: Vec<Hertz> = channels.iter().filter_map(|channel| channel.rate).collect();
     if rates.is_empty() {
         return Ok(of_channels(fast_period, ratio, channels));
     }
     if rates.len() < channels.len() {
         let remedy = "some channels have a rate of their own; give that of each, or none";
-        return Err(SpecProblem::MissingKey { key: "rate", remedy });
+        return Err(Refusal::new("channel", SpecProblem::MissingKey { key: "rate", remedy }));
     }
-    let layout = layout(fast_period, &rates).map_err(|refused| refused.problem)?;
-    if layout.ratio == ratio {
-        return Ok(layout);
-    }
-    let rule = format!("the rates of the channels make frames of {} fast samples", layout.ratio);
-    Err(range(ratio as f64, "fast samples", rule))
+    let layout = layout(fast_period, &rates)?;
+    if layout.ratio == ratio { Ok(layout) } else { Err(other_ratio(ratio, layout.ratio)) }
 }
 
 /// A latency is no shorter than the wait S for the last sample of a frame.
@@ -243,27 +270,36 @@ pub(super) fn check_latency(latency: Option<usize>, wait: usize) -> Result<(), S
     Err(range(latency as f64, "fast samples", rule))
 }
 
-/// A design that couples all samples of a frame takes no more than [`limits::MAX_COUPLED_FRAME`].
+/// The samples of a frame, of the output and of all converters, that a design takes.
 pub(super) fn check_size(
     layout: &FrameLayout,
     is_coupled: bool,
     fast_period: Seconds,
 ) -> Result<(), SpecProblem> {
-    if layout.is_plain() || !is_coupled || layout.ratio + layout.count() <= limits::MAX_COUPLED_FRAME {
+    let most = if is_coupled { limits::MAX_COUPLED_FRAME } else { limits::MAX_FRAME };
+    let all = layout.ratio + layout.count();
+    if all <= most {
         return Ok(());
+    }
+    let more = if is_coupled { ", and the method h2 with taps takes more" } else { "" };
+    let rule =
+        format!("this design takes at most {most} fast samples and samples of the converters together{more}");
+    if layout.is_plain() {
+        return Err(range(all as f64, "samples per frame", rule));
     }
     let rate = |&samples: &usize| Hertz(samples as f64 / (layout.ratio as f64 * fast_period.0));
     let rates: Vec<Hertz> = layout.samples.iter().map(rate).collect();
+    let samples: Vec<u64> = layout.samples.iter().map(|&samples| samples as u64).collect();
+    Err(long_frame(layout.ratio as u64, &samples, &rule, &near_rates(fast_period, &rates)))
+}
+
+/// Rates whose frames are too long; `near` are rates with short ones.
+fn long_frame(ratio: u64, samples: &[u64], rule: &str, near: &str) -> SpecProblem {
+    let samples = samples.iter().map(u64::to_string).collect::<Vec<_>>().join(" and ");
     let rule = format!(
-        "this design takes at most {} of both together, and the method h2 with taps takes more",
-        limits::MAX_COUPLED_FRAME
+        "it has {samples} samples of the converters; {rule}; rates near these with short frames are {near}"
     );
-    Err(SpecProblem::Frame {
-        ratio: layout.ratio as u64,
-        samples: layout.samples.iter().map(|&samples| samples as u64).collect(),
-        rule,
-        near: near_rates(fast_period, &rates),
-    })
+    range(ratio as f64, "fast samples per frame", rule)
 }
 
 /// The frames of checked channels.
@@ -282,7 +318,7 @@ mod tests {
 
     fn made(fast: f64, rates: &[f64]) -> FrameLayout {
         let rates: Vec<Hertz> = rates.iter().copied().map(Hertz).collect();
-        layout(Hertz(fast).period(), &rates).map_err(|refused| refused.problem).unwrap()
+        layout(Hertz(fast).period(), &rates).unwrap()
     }
 
     /// Against the definition: the instants of all samples in three frames.
@@ -324,9 +360,7 @@ mod tests {
 
     #[test]
     fn near_rates_have_short_frames() {
-        let near = near_rates(Hertz(96e3).period(), &[Hertz(44.1e3), Hertz(48e3)]);
-        assert!((near[0] / 44e3 - 1.0).abs() < 1e-12 && (near[1] / 48e3 - 1.0).abs() < 1e-12, "{near:?}");
-        let near = near_rates(Hertz(48e3).period(), &[Hertz(16_000.5)]);
-        assert!((near[0] / 16e3 - 1.0).abs() < 1e-12, "{near:?}");
+        assert_eq!(near_rates(Hertz(96e3).period(), &[Hertz(44.1e3), Hertz(48e3)]), "44000 Hz and 48000 Hz");
+        assert_eq!(near_rates(Hertz(48e3).period(), &[Hertz(16_000.5)]), "16000 Hz");
     }
 }

@@ -11,18 +11,22 @@ pub const MAX_RATIO: usize = 1024;
 /// Largest number of channels N; see [`MAX_RATIO`].
 pub const MAX_CHANNELS: usize = 1024;
 
-/// Most fast samples and samples of the converters per frame, together, of converters with rates of their
-/// own, except for mean-square taps: a minimax design couples all of them.
-pub(super) const MAX_COUPLED_FRAME: usize = 128;
+/// Most fast samples and samples of the converters per frame, together: the time and the matrices of a design
+/// grow with their square.
+pub(super) const MAX_FRAME: usize = 1024;
+
+/// The same for designs that couple all samples of a frame, which are all but mean-square taps: they keep
+/// their responses at hundreds of frequencies, up to 4 GiB.
+pub(super) const MAX_COUPLED_FRAME: usize = 384;
 
 /// Most taps per channel, for every FIR method.
 pub const MAX_TAPS: usize = 65_536;
 
-/// Most taps of all channels together for the method `fir`: the Hessian of its solver is dense, 2 GiB at
-/// this size.
-pub const MAX_OPTIMISED_TAPS: usize = 16_384;
+/// Most taps of all channels together for the method `fir`: the Hessian of its solver is dense, 512 MiB at
+/// this size, and there are three of them.
+pub const MAX_OPTIMISED_TAPS: usize = 8192;
 
-/// Largest latency and largest delay in fast periods: each period costs a state of the lifted system.
+/// Largest latency and largest delay in fast periods.
 pub const MAX_LATENCY: usize = 65_536;
 
 /// Largest order of a spec; banks of the designer have fewer states.
@@ -78,9 +82,9 @@ pub(crate) fn check_fast_period(h: Seconds) -> Result<(), SpecProblem> {
     within(h.0, FAST_PERIODS, "s", "the fast period must be positive, between 1e-100 and 1e100 seconds")
 }
 
-/// 1/h, by the same rule.
-pub(crate) fn check_fast_rate(rate: Hertz) -> Result<(), SpecProblem> {
-    within(rate.0, FAST_PERIODS, "Hz", "the fast rate must be positive, between 1e-100 and 1e100 hertz")
+/// The sample rate of a converter.
+pub(super) fn check_rate(rate: Hertz) -> Result<(), SpecProblem> {
+    within(rate.0, FAST_PERIODS, "Hz", "a sample rate is positive, between 1e-100 and 1e100 hertz")
 }
 
 /// M.
@@ -97,18 +101,18 @@ pub(crate) fn check_latency(latency: usize) -> Result<(), SpecProblem> {
     within(latency as f64, 0.0..=MAX_LATENCY as f64, "fast samples", rule)
 }
 
-/// D_i in fast periods; `written` is the number in the file, in `unit`.
-pub(crate) fn check_delay(delay: FastPeriods, written: f64, unit: &'static str) -> Result<(), SpecProblem> {
-    let rule = match delay.0 {
-        periods if (0.0..=MAX_LATENCY as f64).contains(&periods) => return Ok(()),
-        periods if periods < 0.0 => {
+/// D_i, in seconds and in fast periods.
+pub(crate) fn check_delay(delay: Seconds, periods: FastPeriods) -> Result<(), SpecProblem> {
+    if (0.0..=MAX_LATENCY as f64).contains(&periods.0) {
+        return Ok(());
+    }
+    let rule = match periods.0 < 0.0 {
+        true => {
             "a delay cannot be negative; add the same whole number of fast periods to the delays of all channels and to the latency".to_owned()
         }
-        periods => {
-            format!("the delay is {periods:e} fast periods, at most {MAX_LATENCY} are supported; check its unit")
-        }
+        false => format!("at most {MAX_LATENCY} fast periods are supported; check its unit"),
     };
-    Err(range(written, unit, rule))
+    Err(range(delay.0, "s", format!("it is {}; {rule}", periods)))
 }
 
 /// N.

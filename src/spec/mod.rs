@@ -3,60 +3,64 @@
 //! Everything here is plain data in SI units; [`crate::analog`] turns a [`FilterSpec`] into a
 //! checked realisation and [`crate::design`] turns a [`Spec`] into a bank.
 
-pub(crate) mod decode;
 mod design;
-pub(crate) mod document;
 mod edit;
 mod error;
 mod filter;
-mod filter_problem;
-mod filter_reader;
 mod filter_rules;
+mod filter_table;
 mod fitting;
 mod frames;
 mod limits;
+mod one_or_each;
 mod passband;
-pub(crate) mod reader;
+mod reading;
 mod signal;
+mod sizes;
+mod table;
+mod tables;
 mod uncertainty;
-pub(crate) mod word_lengths;
+mod word_lengths;
 
 pub use crate::messages::Location;
 pub use design::{DesignOverrides, DesignSpec, DesignTable, Method, Reduction};
 pub use edit::with_measurements_renamed;
-pub(crate) use error::{Fault, shown_path};
-pub use error::{SpecError, SpecProblem};
+pub(crate) use error::{At, refused};
+pub use error::{Refusal, SpecError, SpecProblem};
 pub(crate) use filter::no_models;
 pub use filter::{
     Family, FilterModel, FilterModels, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB, MeasuredFilter, Measurement,
 };
-pub use filter_problem::{FilterProblem, MAX_ORDER};
+pub use filter_rules::MAX_ORDER;
 pub use fitting::{Cutoff, Fitting, UnknownFitting};
 pub use frames::{FrameLayout, FrameSample};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS};
 pub(crate) use limits::{MAX_ENTRY, check_fast_period, check_gain};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES, MAX_TARGET_SNR_DB};
 pub use limits::{check_noise, check_offset, within};
+pub use one_or_each::OneOrEach;
 pub use passband::Passband;
+pub(crate) use reading::refusal;
 pub use signal::{Band, SignalSpec, SignalSpectrum, USUAL_RMS};
-pub use uncertainty::{
-    ChannelCount, HALF_WIDTH, PerChannel, UncertaintySpec, check_delay_half_width, for_channels,
-};
+pub use sizes::{MAX_ERROR_STATES, MAX_FRONT_END_STATES};
+pub(crate) use table::Table;
+pub(crate) use tables::SpecTable;
+pub use uncertainty::{ChannelCount, HALF_WIDTH, UncertaintySpec, check_delay_half_width, for_channels};
 pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
-use crate::messages::of_document;
 use crate::quantity::{self, FullScale};
 use crate::units::{FastPeriods, GridTime, Hertz, Seconds};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use std::ops::Range;
+use serde::{Deserializer, Serialize, Serializer};
+use std::collections::BTreeMap;
 
 /// A spec with the units resolved (seconds) and the omitted channel filters filled in.
 ///
 /// Serialised with serde (or [`Spec::to_toml`]) it is a valid spec file in SI units.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spec {
     /// Name for reports; free text.
+    #[serde(skip_serializing_if = "String::is_empty")]
     pub name: String,
     /// h, the period of the fast samples.
     pub fast_period: Seconds,
@@ -65,18 +69,25 @@ pub struct Spec {
     pub ratio: usize,
     /// m0, the latency in fast samples, with the [wait](FrameLayout::wait) for the rest of a frame; `None`
     /// lets the designer choose.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub latency: Option<usize>,
-    /// Phi_0, the filter of the ideal fast converter.
-    pub target: FilterSpec,
     /// Full scale of captures whose format does not say it, such as tables; 1 if `None`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub full_scale: Option<FullScale>,
     /// What a calibration fits unless the command line says otherwise; empty for delays, gains and offsets.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub fit: Vec<Fitting>,
+    /// Phi_0, the filter of the ideal fast converter.
+    #[serde(serialize_with = "as_table")]
+    pub target: FilterSpec,
     /// The real channels, in the order of the recordings.
+    #[serde(rename = "channel")]
     pub channels: Vec<ChannelSpec>,
     /// What the analog signal is; `None` weighs every frequency alike.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub signal: Option<SignalSpec>,
     /// How well the values of the channels are known, if the spec says so.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<UncertaintySpec>,
     /// The design settings.
     pub design: DesignSpec,
@@ -126,6 +137,17 @@ impl ChannelSpec {
         }
     }
 
+    /// Checks the numbers, for the fast period `h`.
+    fn check(&self, h: Seconds) -> Result<(), SpecError> {
+        limits::check_delay(self.delay, self.delay.in_fast_periods(h)).at("delay")?;
+        self.filter.check().map_err(|error| error.inside("filter"))?;
+        limits::check_noise(self.noise).at("noise")?;
+        self.bits.map_or(Ok(()), limits::check_converter_bits).at("bits")?;
+        limits::check_jitter(self.jitter.in_fast_periods(h), self.jitter.0).at("jitter")?;
+        check_gain(self.gain).at("gain")?;
+        check_offset(self.offset).at("offset")
+    }
+
     /// Rms of the noise and of the rounding together, relative to full scale: a step of 2^(1 - bits) is an
     /// error of step / sqrt(12).
     pub fn sample_noise(&self) -> f64 {
@@ -144,16 +166,6 @@ fn is_zero(value: &f64) -> bool {
 
 fn is_one(gain: &f64) -> bool {
     *gain == 1.0
-}
-
-/// The problem of a text that is no TOML, and where it is. A second heading [channel] is one.
-fn unparsed(text: &str, error: &toml::de::Error) -> (SpecProblem, Option<Range<usize>>) {
-    let (message, span) = document::syntax(error, text);
-    let place = error.span().and_then(|span| text.get(span)).unwrap_or_default();
-    let is_channel = place.trim_matches(['[', ']', ' ']) == "channel";
-    let is_second = is_channel && error.message().contains("duplicate");
-    let single = SpecProblem::SingleTable { key: "channel" };
-    (if is_second { single } else { SpecProblem::Syntax { message } }, span)
 }
 
 impl Spec {
@@ -179,12 +191,10 @@ impl Spec {
         overrides: DesignOverrides,
         models: &FilterModels<'_>,
     ) -> Result<Self, SpecError> {
-        let document = document::Node::from_toml(text).map_err(|error| {
-            let (problem, span) = unparsed(text, &error);
-            SpecError::new(file_name, text, span, String::new(), problem)
-        })?;
-        decode::spec(&reader::Value::root(&document), overrides, models)
-            .map_err(|fault| SpecError::of(file_name, text, fault))
+        let table: Result<SpecTable, SpecError> = reading::of_toml(text);
+        table
+            .and_then(|table| table.spec(overrides, models))
+            .map_err(|error| reading::in_text(error, file_name, text))
     }
 
     /// As [`Spec::from_toml_and_files`], of data that have no text: the tables and lists of another
@@ -198,49 +208,67 @@ impl Spec {
         overrides: DesignOverrides,
         models: &FilterModels<'_>,
     ) -> Result<Self, SpecError> {
-        read_data(data, name, |document| decode::spec(document, overrides, models))
+        let table: Result<Table<SpecTable>, SpecError> = reading::of_data(data);
+        table.and_then(|Table(table)| table.spec(overrides, models)).map_err(|error| error.in_file(name))
     }
 
     /// The spec as a TOML file that reads back equal.
     ///
     /// # Errors
-    /// [`SpecProblem`] as [`Spec::check`]; NaN and infinity in particular are refused.
-    pub fn to_toml(&self) -> Result<String, SpecProblem> {
+    /// As [`Spec::check`]; NaN and infinity in particular are refused.
+    pub fn to_toml(&self) -> Result<String, SpecError> {
         self.check()?;
-        toml::to_string(self).map_err(|error| SpecProblem::Syntax { message: error.to_string() })
+        toml::to_string(self)
+            .map_err(|error| Refusal::new("", SpecProblem::Value { message: error.to_string() }))
     }
 
-    /// Checks a spec built in memory by the rules for spec files.
+    /// Checks a spec, whether it was read or built in memory.
     ///
     /// # Errors
-    /// The first [`SpecProblem`] found.
-    pub fn check(&self) -> Result<(), SpecProblem> {
-        limits::check_fast_period(self.fast_period)?;
-        limits::check_ratio(self.ratio)?;
-        self.latency.map_or(Ok(()), limits::check_latency)?;
+    /// [`SpecError`] with the path of keys for the first thing that is wrong.
+    pub fn check(&self) -> Result<(), SpecError> {
+        limits::check_fast_period(self.fast_period).at("fast_period")?;
+        limits::check_ratio(self.ratio).at("ratio")?;
+        self.latency.map_or(Ok(()), limits::check_latency).at("latency")?;
         // A full scale is right if what is written of it is.
-        self.full_scale.map_or(Ok(()), |scale| quantity::full_scale(&scale.to_string()).map(drop))?;
-        fitting::check(&self.fit)?;
-        self.target.check()?;
-        limits::check_channel_count(self.channels.len())?;
-        for channel in &self.channels {
-            limits::check_delay(channel.delay.in_fast_periods(self.fast_period), channel.delay.0, "s")?;
-            channel.filter.check()?;
-            limits::check_noise(channel.noise)?;
-            channel.bits.map_or(Ok(()), limits::check_converter_bits)?;
-            limits::check_jitter(channel.jitter.in_fast_periods(self.fast_period), channel.jitter.0)?;
-            limits::check_gain(channel.gain)?;
-            limits::check_offset(channel.offset)?;
+        let full_scale =
+            self.full_scale.map_or(Ok(()), |scale| quantity::full_scale(&scale.to_string()).map(drop));
+        full_scale.map_err(|error| SpecProblem::Value { message: error.to_string() }).at("full_scale")?;
+        fitting::check(&self.fit).at("fit")?;
+        self.target.check().map_err(|error| error.inside("target.filter"))?;
+        limits::check_channel_count(self.channels.len()).at("channel")?;
+        for (i, channel) in self.channels.iter().enumerate() {
+            let inside = |error: SpecError| error.inside(&format!("channel[{i}]"));
+            channel.check(self.fast_period).map_err(inside)?;
         }
-        self.signal.as_ref().map_or(Ok(()), SignalSpec::check)?;
+        self.signal.as_ref().map_or(Ok(()), SignalSpec::check).map_err(|error| error.inside("signal"))?;
         let layout = frames::checked(self.fast_period, self.ratio, &self.channels)?;
-        frames::check_latency(self.latency, layout.wait(&self.delays()))?;
+        frames::check_latency(self.latency, layout.wait(&self.delays())).at("latency")?;
         if let Some(uncertainty) = &self.uncertainty {
-            uncertainty.check(self.channels.len(), self.fast_period)?;
+            let checked = uncertainty.check(self.channels.len(), self.fast_period);
+            checked.map_err(|error| error.inside("uncertainty"))?;
         }
-        self.design.check(&layout)?;
-        frames::check_size(&layout, self.design.is_coupled(), self.fast_period)?;
-        Ok(self.design.check_beside(self.uncertainty.as_ref(), self.channels.len())?)
+        let design = self.design.check(&layout);
+        let design =
+            design.and_then(|()| self.design.check_beside(self.uncertainty.as_ref(), self.channels.len()));
+        design.map_err(|error| error.inside("design"))?;
+        self.check_cutoffs()?;
+        self.check_sizes(&layout)
+    }
+
+    /// The proof of a robust design does not cover uncertain cut-offs behind the filter of a signal.
+    fn check_cutoffs(&self) -> Result<(), SpecError> {
+        let uncertain =
+            |table: &UncertaintySpec| table.cutoffs(self.channels.len()).iter().any(|half| *half > 0.0);
+        if self.design.method == Method::Fir
+            && self.signal.is_some()
+            && self.uncertainty.as_ref().is_some_and(uncertain)
+        {
+            let (first, second) = ("[signal]", "cutoff");
+            let remedy = "the method fir is proven for uncertain cut-offs without a signal only; leave one of the two out";
+            return Err(Refusal::new("uncertainty.cutoff", SpecProblem::Conflict { first, second, remedy }));
+        }
+        Ok(())
     }
 
     /// Whether the filters are FIR: by the method, by its taps, or because `h2` averages over uncertain
@@ -303,70 +331,14 @@ impl DesignOverrides {
     /// # Errors
     /// As [`Spec::from_data`].
     pub fn from_data<'de, D: Deserializer<'de>>(data: D, name: &str) -> Result<Self, SpecError> {
-        read_data(data, name, decode::design_keys)
+        let table: Result<Table<Self>, SpecError> = reading::of_data(data);
+        table.map(|Table(keys)| keys).map_err(|error| error.in_file(name))
     }
 }
 
-/// Reads data that have no text; the path of keys says where a fault is.
-fn read_data<'de, D: Deserializer<'de>, T>(
-    data: D,
-    name: &str,
-    read: impl FnOnce(&reader::Value<'_>) -> Result<T, Fault>,
-) -> Result<T, SpecError> {
-    let document = document::Node::deserialize(data).map_err(|error| {
-        let problem = SpecProblem::Syntax { message: of_document(&error.to_string()) };
-        SpecError::new(name, "", None, String::new(), problem)
-    })?;
-    read(&reader::Value::root(&document))
-        .map_err(|fault| SpecError::of(name, "", Fault { span: None, ..fault }))
-}
-
-/// The written form of a [`Spec`], with all times in seconds and all defaults filled in.
-#[derive(Serialize)]
-struct Document<'a> {
-    #[serde(skip_serializing_if = "str::is_empty")]
-    name: &'a str,
-    fast_period: Seconds,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    ratio: Option<usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    latency: Option<usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    full_scale: Option<FullScale>,
-    #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    fit: &'a [Fitting],
-    target: Target<'a>,
-    channel: &'a [ChannelSpec],
-    #[serde(skip_serializing_if = "Option::is_none")]
-    signal: Option<&'a SignalSpec>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    uncertainty: Option<&'a UncertaintySpec>,
-    design: &'a DesignSpec,
-}
-
-#[derive(Serialize)]
-struct Target<'a> {
-    filter: &'a FilterSpec,
-}
-
-impl Serialize for Spec {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        Document {
-            name: &self.name,
-            fast_period: self.fast_period,
-            // The rates say it.
-            ratio: self.layout().is_plain().then_some(self.ratio),
-            latency: self.latency,
-            full_scale: self.full_scale,
-            fit: &self.fit,
-            target: Target { filter: &self.target },
-            channel: &self.channels,
-            signal: self.signal.as_ref(),
-            uncertainty: self.uncertainty.as_ref(),
-            design: &self.design,
-        }
-        .serialize(serializer)
-    }
+/// The target's table.
+fn as_table<S: Serializer>(filter: &FilterSpec, serializer: S) -> Result<S::Ok, S::Error> {
+    BTreeMap::from([("filter", filter)]).serialize(serializer)
 }
 
 #[cfg(test)]

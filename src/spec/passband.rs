@@ -2,10 +2,14 @@
 
 use serde::{Serialize, Serializer};
 
-use super::FilterProblem;
-use super::limits::MAX_ENTRY;
+use super::SpecError;
+use super::error::{At, refused};
+use super::limits::{MAX_ENTRY, within};
 use crate::messages::Number;
 use crate::units::Hertz;
+
+/// The least positive number.
+const ABOVE_ZERO: f64 = f64::from_bits(1);
 
 /// The edges of a family member, with scipy.signal's meaning for the family. Written as the key `cutoff` or
 /// as the key `band`.
@@ -64,51 +68,34 @@ impl Passband {
     }
 
     /// Checks the order of the edges.
-    pub(super) fn check(self) -> Result<(), FilterProblem> {
+    pub(super) fn check(self) -> Result<(), SpecError> {
         match self {
-            Self::LowPass { cutoff } if is_too_large(cutoff) => {
-                Err(FilterProblem::too_large("cutoff", cutoff.0, MAX_ENTRY))
+            Self::LowPass { cutoff } => {
+                let rule = "the cutoff must be a positive frequency in hertz";
+                within(cutoff.0, ABOVE_ZERO..=MAX_ENTRY, "Hz", rule).at("cutoff")
             }
-            Self::LowPass { cutoff } if cutoff.0 <= 0.0 => {
-                Err(refused("cutoff", cutoff, "the cutoff must be a positive frequency in hertz".into()))
-            }
-            Self::LowPass { .. } => Ok(()),
             Self::BandPass { low, high } => check_band(low, high),
         }
     }
 }
 
-/// True for NaN too.
-fn is_too_large(frequency: Hertz) -> bool {
-    !(0.0..=MAX_ENTRY).contains(&frequency.0.abs())
-}
-
-fn check_band(low: Hertz, high: Hertz) -> Result<(), FilterProblem> {
-    if let Some(edge) = [low, high].into_iter().find(|&edge| is_too_large(edge)) {
-        return Err(FilterProblem::too_large("band", edge.0, MAX_ENTRY));
-    }
-    if low.0 <= 0.0 {
-        let rule = format!(
-            "a band-pass begins above 0 Hz; for the low-pass from 0 to {high} Hz write cutoff = {high}",
-            high = Number(high.0)
-        );
-        return Err(refused("band", low, rule));
-    }
+fn check_band(low: Hertz, high: Hertz) -> Result<(), SpecError> {
+    let rule = format!(
+        "a band-pass begins above 0 Hz; for the low-pass from 0 to {high} Hz write cutoff = {high}",
+        high = Number(high.0)
+    );
+    within(low.0, ABOVE_ZERO..=MAX_ENTRY, "Hz", rule).at("band")?;
+    within(high.0, ABOVE_ZERO..=MAX_ENTRY, "Hz", "a band ends at a finite frequency").at("band")?;
     if low == high {
-        let rule = "both edges of the band are at this frequency; give two, as in band = [60e6, 80e6]".into();
-        return Err(refused("band", high, rule));
+        return Err(refused("band", "both edges are at one frequency; give two, as in band = [60e6, 80e6]"));
     }
     if high < low {
         let rule = format!(
-            "the upper edge is below the lower one, {low} Hz; write band = [{high}, {low}]",
+            "the upper edge is below the lower one; write band = [{high}, {low}]",
             low = Number(low.0),
             high = Number(high.0)
         );
-        return Err(refused("band", high, rule));
+        return Err(refused("band", rule));
     }
     Ok(())
-}
-
-fn refused(key: &'static str, value: Hertz, rule: String) -> FilterProblem {
-    FilterProblem::of(key, format!("{key} = {value} Hz: {rule}", value = Number(value.0)))
 }

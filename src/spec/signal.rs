@@ -1,9 +1,8 @@
 //! The `[signal]` table: what the analog signal is.
 
-use super::filter_reader::proper_filter;
+use super::error::At;
 use super::limits::{range, within};
-use super::reader::{Either, Fields, Value};
-use super::{Fault, FilterSpec, SpecProblem};
+use super::{FilterSpec, SpecError, SpecProblem};
 use crate::messages::Number;
 use crate::units::Hertz;
 use serde::ser::{Serialize, SerializeMap, Serializer};
@@ -81,63 +80,20 @@ impl SignalSpec {
     /// Checks the rules of the table.
     ///
     /// # Errors
-    /// The first [`SpecProblem`] found.
-    pub fn check(&self) -> Result<(), SpecProblem> {
-        check_rms(self.rms)?;
+    /// [`SpecError`] for the first thing that is wrong.
+    pub fn check(&self) -> Result<(), SpecError> {
+        check_rms(self.rms).at("rms")?;
         match &self.spectrum {
             SignalSpectrum::Band(band) => {
-                check_band(*band)?;
-                self.floor_db.map_or(Ok(()), check_floor)
+                check_band(*band).at("band")?;
+                self.floor_db.map_or(Ok(()), check_floor).at("floor_db")
             }
             SignalSpectrum::Filter(filter) => {
-                filter.check_proper()?;
-                self.floor_db.map_or(Ok(()), |_| Err(needless_floor()))
+                filter.check_proper().map_err(|error| error.inside("filter"))?;
+                self.floor_db.map_or(Ok(()), |_| Err(needless_floor())).at("floor_db")
             }
         }
     }
-}
-
-/// The keys of the table.
-pub(super) const KEYS: [&str; 4] = ["band", "filter", "floor_db", "rms"];
-
-/// Reads the table.
-pub(super) fn read(item: &Value<'_>) -> Result<SignalSpec, Fault> {
-    let fields = item.fields(&KEYS)?;
-    let spectrum = spectrum(&fields)?;
-    let floor_db = fields.read("floor_db", |v| match &spectrum {
-        SignalSpectrum::Filter(_) => Err(v.fault(needless_floor())),
-        SignalSpectrum::Band(_) => v.number_in(check_floor),
-    })?;
-    Ok(SignalSpec {
-        spectrum,
-        floor_db,
-        rms: fields.read("rms", |v| v.number_in(check_rms))?.unwrap_or(USUAL_RMS),
-    })
-}
-
-fn spectrum(fields: &Fields<'_>) -> Result<SignalSpectrum, Fault> {
-    match fields.either("band", "filter", "each is the spectrum of the signal, keep one of them")? {
-        Either::First(band) => {
-            let read = band_of(&band)?;
-            check_band(read).map_err(|problem| band.fault(problem))?;
-            Ok(SignalSpectrum::Band(read))
-        }
-        Either::Second(filter) => proper_filter(&filter).map(SignalSpectrum::Filter),
-        Either::Neither => {
-            let remedy = "say which frequencies the signal occupies, as in band = \"8 kHz\" or band = [\"60 MHz\", \"80 MHz\"]";
-            Err(fields.whole().fault(SpecProblem::MissingKey { key: "band", remedy }))
-        }
-    }
-}
-
-/// One frequency, the end of a band that begins at 0, or two.
-fn band_of(value: &Value<'_>) -> Result<Band, Fault> {
-    if !value.is_list() {
-        return Ok(Band::up_to(value.frequency()?));
-    }
-    let [low, high] = value.frequencies("a frequency, or a list of two")?;
-    // A band from -0.0 begins at 0.0.
-    Ok(Band { low: Hertz(low.0 + 0.0), high })
 }
 
 impl Serialize for SignalSpec {

@@ -2,15 +2,19 @@
 
 use serde::Serialize;
 
-use super::SpecProblem;
-use super::error::{KeyProblem, blame};
+use super::error::At;
 use super::limits::{range, within};
+use super::{OneOrEach, SpecError, SpecProblem};
 use crate::units::{FastPeriods, Seconds};
 
 /// Half-width of the 95 % interval of a normal law over its standard deviation.
 pub const HALF_WIDTH: f64 = 1.959_963_984_540_054;
 /// Largest half-width of a delay in fast periods; nothing is known of a delay that may be off by more.
 const MAX_DELAY: f64 = 1024.0;
+/// Largest half-width of a gain or a cut-off: the proof of a worst case takes less than 50 %.
+const MAX_SHARE: f64 = 0.49;
+/// Largest half-width of an offset, of full scale.
+const MAX_OFFSET: f64 = 1.0;
 
 /// How well the values of the channels are known: half-widths of 95 % intervals beside the values of the
 /// `[[channel]]` tables.
@@ -21,59 +25,21 @@ const MAX_DELAY: f64 = 1024.0;
 pub struct UncertaintySpec {
     /// Half-width of D_i in seconds.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub delay: Option<PerChannel<Seconds>>,
+    pub delay: Option<OneOrEach<Seconds>>,
     /// Half-width of g_i, as a factor: 0.01 for a gain of 1 that may be 0.99 or 1.01.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub gain: Option<PerChannel<f64>>,
+    pub gain: Option<OneOrEach<f64>>,
     /// Half-width of o_i relative to full scale.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub offset: Option<PerChannel<f64>>,
+    pub offset: Option<OneOrEach<f64>>,
     /// Half-width of the cut-off frequency as a share of it: 0.02 is 2 %. Phi_i(s) may be Phi_i(s / (1 + x))
     /// for all |x| up to it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub cutoff: Option<PerChannel<f64>>,
+    pub cutoff: Option<OneOrEach<f64>>,
     /// The channel to which delays, gains and cut-offs are relative, from 1; 0 if every channel has an error
     /// of its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reference: Option<usize>,
-}
-
-/// One value for every channel, or one value each.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(untagged)]
-pub enum PerChannel<T> {
-    /// The same for all.
-    Same(T),
-    /// One each, in the order of the channels.
-    Each(Vec<T>),
-}
-
-impl<T: Copy + Default> PerChannel<T> {
-    /// The value of channel `i`, from 0; zero beyond the end of a list.
-    pub fn of(&self, i: usize) -> T {
-        match self {
-            Self::Same(value) => *value,
-            Self::Each(list) => list.get(i).copied().unwrap_or_default(),
-        }
-    }
-}
-
-impl<T> PerChannel<T> {
-    /// The values that were written.
-    pub fn values(&self) -> &[T] {
-        match self {
-            Self::Same(value) => std::slice::from_ref(value),
-            Self::Each(list) => list,
-        }
-    }
-
-    /// The same list with other values.
-    pub(super) fn map<U>(&self, other: impl Fn(&T) -> U) -> PerChannel<U> {
-        match self {
-            Self::Same(value) => PerChannel::Same(other(value)),
-            Self::Each(list) => PerChannel::Each(list.iter().map(other).collect()),
-        }
-    }
 }
 
 /// A list that has neither one value nor one per channel.
@@ -152,37 +118,39 @@ impl UncertaintySpec {
         self.gains(channels).into_iter().map(|half| half / HALF_WIDTH).collect()
     }
 
-    fn relative<T: Copy + Default>(&self, written: Option<&PerChannel<T>>, channels: usize) -> Vec<T> {
+    fn relative<T: Copy + Default>(&self, written: Option<&OneOrEach<T>>, channels: usize) -> Vec<T> {
         let exact = self.reference_channel();
         let of = |i| written.filter(|_| exact != Some(i)).map_or_else(T::default, |value| value.of(i));
         (0..channels).map(of).collect()
     }
 
     /// Checks all numbers for a spec of `channels` channels.
-    pub(super) fn check(&self, channels: usize, h: Seconds) -> Result<(), KeyProblem> {
+    pub(super) fn check(&self, channels: usize, h: Seconds) -> Result<(), SpecError> {
         let time = |value: &Seconds| check_delay_half_width(value.in_fast_periods(h), *value);
-        blame("delay", check_list(self.delay.as_ref(), channels, time))?;
-        let shares =
-            [("gain", &self.gain, 1e6), ("offset", &self.offset, 1.0), ("cutoff", &self.cutoff, 0.5)];
-        for (key, shares, most) in shares {
+        check_list(self.delay.as_ref(), channels, time).at("delay")?;
+        for (key, shares, most) in [
+            ("gain", &self.gain, MAX_SHARE),
+            ("offset", &self.offset, MAX_OFFSET),
+            ("cutoff", &self.cutoff, MAX_SHARE),
+        ] {
             let rule = format!("a half-width is zero or more and here at most {most}; 0.01 is one per cent");
             let share = |value: &f64| within(*value, 0.0..=most, "(half-width)", rule.as_str());
-            blame(key, check_list(shares.as_ref(), channels, share))?;
+            check_list(shares.as_ref(), channels, share).at(key)?;
         }
         let rule = format!("the reference is one of the channels 1 to {channels}, or 0 for none");
         let reference = self.reference.unwrap_or(0) as f64;
-        blame("reference", within(reference, 0.0..=channels as f64, "(channel)", rule))
+        within(reference, 0.0..=channels as f64, "(channel)", rule).at("reference")
     }
 }
 
 /// A list has one entry per channel.
 fn check_list<T>(
-    written: Option<&PerChannel<T>>,
+    written: Option<&OneOrEach<T>>,
     channels: usize,
     check: impl Fn(&T) -> Result<(), SpecProblem>,
 ) -> Result<(), SpecProblem> {
     let Some(written) = written else { return Ok(()) };
-    if let PerChannel::Each(list) = written
+    if let OneOrEach::Each(list) = written
         && list.len() != channels
     {
         let rule = format!("give one number for all channels or a list with one for each of the {channels}");

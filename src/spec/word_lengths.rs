@@ -1,10 +1,9 @@
 //! Word lengths of taps in two's complement.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::limits::{range, within};
-use super::reader::Value;
-use super::{Fault, SpecProblem};
+use super::{OneOrEach, SpecProblem};
 use crate::messages::Quoted;
 
 /// Most bits of a tap. Such integers are exact in a double and far finer than the error of any bank.
@@ -13,13 +12,22 @@ pub const MAX_BITS: u32 = 32;
 pub const MAX_FRACTION_BITS: i32 = 256;
 
 /// Bits of the taps of a channel as they are stored, sign included.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-#[serde(untagged)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged, from = "OneOrEach<u32>")]
 pub enum WordLengths {
     /// The same for all taps, 2 or more.
     Same(u32),
     /// One for each tap, the same list for every channel. A tap of 0 bits is 0.
     PerTap(Vec<u32>),
+}
+
+impl From<OneOrEach<u32>> for WordLengths {
+    fn from(bits: OneOrEach<u32>) -> Self {
+        match bits {
+            OneOrEach::Same(bits) => Self::Same(bits),
+            OneOrEach::Each(list) => Self::PerTap(list),
+        }
+    }
 }
 
 impl WordLengths {
@@ -138,25 +146,6 @@ pub(crate) fn check_fraction_bits(fraction_bits: i32) -> Result<(), SpecProblem>
     );
     let most = f64::from(MAX_FRACTION_BITS);
     within(fraction_bits.into(), -most..=most, "bits", rule)
-}
-
-/// One number of bits, or a list of them. The length of the list is checked where that of the filters is
-/// known.
-pub(crate) fn word_lengths(value: &Value<'_>) -> Result<WordLengths, Fault> {
-    let words = match value.items("a number of bits, or a list of them") {
-        Ok(items) => WordLengths::PerTap(items.iter().map(Value::bits).collect::<Result<_, _>>()?),
-        Err(_) => WordLengths::Same(value.bits()?),
-    };
-    words.check_numbers().map_err(|problem| value.fault(problem))?;
-    Ok(words)
-}
-
-/// The exponent of the finest step.
-pub(crate) fn fraction_bits(value: &Value<'_>) -> Result<i32, Fault> {
-    let bits = value.integer("bits")?;
-    let bits = i32::try_from(bits).unwrap_or(if bits < 0 { i32::MIN } else { i32::MAX });
-    check_fraction_bits(bits).map_err(|problem| value.fault(problem))?;
-    Ok(bits)
 }
 
 #[cfg(test)]

@@ -4,8 +4,8 @@
 
 use crate::support::random::Random;
 use crate::support::specs::{butterworth, low_pass};
-use hybank::design::{DesignError, Options, analyze_mean, design, latency};
-use hybank::spec::{ChannelSpec, DesignSpec, Family, Method, Reduction, Spec};
+use hybank::design::{DesignError, Options, Sizing, analyze_mean, design};
+use hybank::spec::{ChannelSpec, DesignSpec, Family, Method, Spec};
 use hybank::units::Seconds;
 use std::f64::consts::TAU;
 use std::time::{Duration, Instant};
@@ -15,6 +15,11 @@ const WORTHWHILE: f64 = 0.01158;
 const COMPARED: f64 = 2e-4;
 /// Rms of the rounding to 16 bits.
 const ROUNDING: f64 = 8.809_7e-6;
+
+/// The latency that is chosen for a spec.
+fn latency(spec: &Spec) -> Result<usize, DesignError> {
+    Sizing::of(spec).map(|sizing| sizing.latency)
+}
 
 fn plant(seed: u64, method: Method) -> Spec {
     let mut dice = Random(seed);
@@ -52,7 +57,7 @@ fn error(spec: &Spec, latency: usize) -> f64 {
     spec.channels.iter_mut().for_each(|channel| channel.noise = ROUNDING);
     if matches!(spec.design.method, Method::Fir | Method::Iir) {
         spec.design =
-            DesignSpec { reduction: spec.design.reduction, ..DesignSpec::new(Method::H2, spec.design.taps) };
+            DesignSpec { order: spec.design.order, ..DesignSpec::new(Method::H2, spec.design.taps) };
     }
     match design(&spec, &Options::without_proof()) {
         Ok(found) => {
@@ -138,8 +143,7 @@ fn reduced_banks_take_the_shortest_latency_that_is_almost_the_best() {
     for seed in trials::trials(1) {
         let order = Random(seed + 0x5eed).count(0, 6);
         let reduced = |method: Method| {
-            let design =
-                DesignSpec { reduction: Some(Reduction::Order(order)), ..DesignSpec::new(method, None) };
+            let design = DesignSpec { order: Some(order), ..DesignSpec::new(method, None) };
             Spec { design, ..plant(seed, Method::H2) }
         };
         let chosen = latency(&reduced(Method::H2)).unwrap();

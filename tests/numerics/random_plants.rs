@@ -6,7 +6,7 @@ use crate::support::random::Random;
 use crate::support::sweep::each;
 use hybank::bank::SynthesisFilters;
 use hybank::design::{DesignError, Options, analyze, design};
-use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, Reduction, Spec};
+use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, Spec};
 use hybank::units::{RadiansPerSecond, Seconds};
 
 /// A low-pass of order 1 to 6 with its cutoff between 0.03 and 3 radians a fast sample.
@@ -39,7 +39,8 @@ fn plant(seed: u64) -> Spec {
     if spec.design.method == Method::Iir && dice.part() < 0.5 {
         let (order, db) = (dice.count(0, 12), 6.0 * dice.part());
         let by_order = dice.part() < 0.7;
-        spec.design.reduction = Some(if by_order { Reduction::Order(order) } else { Reduction::Loss(db) });
+        spec.design.order = by_order.then_some(order);
+        spec.design.reduction_loss_db = (!by_order).then_some(db);
     }
     spec
 }
@@ -91,9 +92,7 @@ fn end_of(seed: u64) -> End {
         Ok(found) => found,
         Err(refusal) => return refused(seed, &refusal, End::Refused),
     };
-    if let (Some(Reduction::Order(order)), SynthesisFilters::StateSpace(block)) =
-        (spec.design.reduction, &found.bank.filters)
-    {
+    if let (Some(order), SynthesisFilters::StateSpace(block)) = (spec.design.order, &found.bank.filters) {
         assert!(block.a.len() <= order, "plant {seed}: {} states of {order}", block.a.len());
     }
     let gamma = &found.bank.gamma;

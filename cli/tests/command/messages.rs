@@ -285,7 +285,7 @@ fn errors_of_json_are_in_plain_words() {
     for (global, words) in [
         (
             r#"{"core:datatype": "rf32_le", "core:num_channels": "two"}"#,
-            "expected a whole number, zero or more, found the text \"two\"",
+            "expected a whole number, zero or more, without point and exponent, found the text \"two\"",
         ),
         (r#"{"core:datatype": 3}"#, "expected a text, found 3"),
         ("{}", "the key core:datatype is missing"),
@@ -301,7 +301,7 @@ fn errors_of_json_are_in_plain_words() {
     desk.write("x.sigmf-meta", "{\"global\": {");
     desk.refused(1, &recording, &["the text ends inside a table"]);
     for (line, words) in [
-        (r#"{"first": "one", "length": 3}"#, "expected a whole number, zero or more, found the text \"one\""),
+        (r#"{"first": "one", "length": 3}"#, "expected a whole number, zero or more, without point"),
         (r#"{"frist": 1, "length": 3}"#, "unknown key \"frist\"; the keys here are channel, sample_start"),
         ("[1]", "expected a JSON object such as"),
     ] {

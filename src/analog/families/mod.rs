@@ -16,7 +16,7 @@ use super::polynomial::isolated;
 use super::roots::{Factors, RootSet};
 use super::{AnalogError, MIN_DAMPING_RATIO};
 use crate::arithmetic::{Ball, ComplexBall, Float512, Number, elementary};
-use crate::spec::{Family, FilterProblem, MAX_ORDER, Passband};
+use crate::spec::{Family, MAX_ORDER, Passband, refused};
 use crate::units::Seconds;
 use std::sync::OnceLock;
 
@@ -51,7 +51,7 @@ pub(super) fn placed(member: &Member, passband: Passband, h: Seconds) -> Result<
              precision; lower the order or set the ripples further apart",
             member.order
         );
-        return Err(FilterProblem::of("order", rule).into());
+        return Err(refused("order", rule).into());
     }
     let filter = passband::moved(&prototype, passband, h);
     match passband {
@@ -61,7 +61,7 @@ pub(super) fn placed(member: &Member, passband: Passband, h: Seconds) -> Result<
                  precision; widen the band or lower the order",
                 (high - low).0
             );
-            Err(FilterProblem::of("band", rule).into())
+            Err(refused("band", rule).into())
         }
         _ => Ok(filter),
     }

@@ -3,7 +3,6 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::spec::FilterProblem;
 
 fn refused(filter: &FilterSpec, h: f64) -> AnalogError {
     realise(filter, h).unwrap_err()
@@ -88,9 +87,15 @@ fn an_edge_sharper_than_a_double_is_refused_by_its_order() {
 fn direct_terms_are_refused_with_the_way_out() {
     for (kind, order) in [(Family::Chebyshev2, 4), (Family::Elliptic, 6)] {
         let error = refused(&family(kind, order, 1.0), 1e-3);
-        assert!(matches!(error, AnalogError::Spec(FilterProblem::NotStrictlyProper { .. })));
+        assert!(matches!(error, AnalogError::Spec(_)));
         let text = error.to_string();
-        for part in ["even-order", "direct term", "add the pole of the sampling switch", "cascade"] {
+        for part in [
+            "not strictly proper",
+            "even-order",
+            "direct term",
+            "add the pole of the sampling switch",
+            "cascade",
+        ] {
             assert!(text.contains(part), "{text}");
         }
         let with_switch =

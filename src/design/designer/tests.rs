@@ -37,15 +37,19 @@ fn taps_that_the_designer_chose_are_stated() {
     for method in ["sinc", "separation"] {
         let open = spec(&format!("method = \"{method}\""), THESIS);
         let found = design(&open, &Options::without_proof()).unwrap();
-        assert!(found.taps_chosen);
-        assert_eq!(found.bank.spec.as_ref().unwrap().design.taps, Some(23));
+        assert_eq!((found.sizing.taps, found.sizing.taps_chosen), (23, true));
+        // The bank says what was asked, and beside it what was chosen.
+        assert_eq!(found.bank.spec, Some(open));
         let SynthesisFilters::Fir(taps) = &found.bank.filters else { unreachable!() };
         assert!(taps.iter().all(|filter| filter.len() == 23));
-        // The spec in the bank gives the same bank again, with nothing left to choose.
-        let again = design(found.bank.spec.as_ref().unwrap(), &Options::without_proof()).unwrap();
-        assert_eq!((again.taps_chosen, &again.bank), (false, &found.bank));
+        // With nothing left to choose the bank is the same.
+        let sized = found.bank.sized_spec().unwrap();
+        let again = design(&sized, &Options::without_proof()).unwrap();
+        assert!(!again.sizing.taps_chosen && !again.sizing.latency_chosen);
+        assert_eq!(again.bank, Bank { spec: Some(sized), ..found.bank });
     }
-    assert!(!design(&spec("method = \"iir\"", THESIS), &Options::without_proof()).unwrap().taps_chosen);
+    let recursive = design(&spec("method = \"iir\"", THESIS), &Options::without_proof()).unwrap();
+    assert!(!recursive.sizing.taps_chosen && recursive.sizing.taps == 0);
 }
 
 #[test]

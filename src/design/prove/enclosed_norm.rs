@@ -78,7 +78,8 @@ impl EnclosedGains<'_> {
 fn grid(system: &StateSpace, computed: f64, hint: Option<f64>) -> Result<Vec<f64>, DesignError> {
     let beside = PEAK_OFFSETS.iter().flat_map(|distance| [computed - distance, computed + distance]);
     let mut frequencies = resonances(&stable_poles(system)?);
-    frequencies.extend(beside.chain([computed]).chain(hint).filter(|frequency| (0.0..=PI).contains(frequency)));
+    frequencies
+        .extend(beside.chain([computed]).chain(hint).filter(|frequency| (0.0..=PI).contains(frequency)));
     frequencies.sort_by(f64::total_cmp);
     let split = |ends: &[f64]| {
         let part = 0.25 * (ends[1] - ends[0]);

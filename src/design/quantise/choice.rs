@@ -40,7 +40,6 @@ pub(in crate::design) fn quantise_within(
     allowance: &Allowance,
 ) -> Result<(FixedPoint, WordStudy), DesignError> {
     let Allowance { loss_db, most, by_digits } = allowance;
-    most.check(None)?;
     let mut quantiser = Quantiser::new(problem)?;
     quantiser.most_mean_square = quantiser.error.real_mean_square * 10f64.powf(loss_db / 10.0);
     let lengths = Lengths::up_to(most);

@@ -100,16 +100,15 @@ fn decades(a: f64, b: f64) -> f64 {
 ///
 /// # Errors
 /// [`DesignError::Lti`] if the plant is not stable, [`DesignError::Linalg`] if a decomposition fails,
-/// [`DesignError::Spec`] if `bits` are out of their range, [`DesignError::AllZero`] if all taps are zero
-/// at the given scale, and [`DesignError::TinyTaps`] if they are no better there than zero taps. Without a
-/// given scale all taps may be zero, too: see [`FixedPoint::is_zero`].
+/// [`DesignError::AllZero`] if all taps are zero at the given scale, and [`DesignError::TinyTaps`] if they
+/// are no better there than zero taps. Without a given scale all taps may be zero, too: see
+/// [`FixedPoint::is_zero`].
 pub(super) fn quantise(
     problem: QuantisationProblem<'_>,
     real_gamma: f64,
     bits: &WordLengths,
     fraction_bits: Option<i32>,
 ) -> Result<(FixedPoint, WordStudy), DesignError> {
-    bits.check(None)?;
     let quantiser = Quantiser::new(problem)?;
     let all: Vec<WordLengths> = NEIGHBOURS.into_iter().filter_map(|more| bits.widened(more)).collect();
     let mut found = quantiser.quantise_all(&all, fraction_bits)?;

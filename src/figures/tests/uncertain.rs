@@ -1,7 +1,7 @@
 //! What `[uncertainty]` adds to the figures, against virtual converters that are off.
 
 use super::*;
-use crate::spec::{HALF_WIDTH, PerChannel, UncertaintySpec};
+use crate::spec::{HALF_WIDTH, OneOrEach, UncertaintySpec};
 use crate::units::Seconds;
 
 const RMS: f64 = 0.25;
@@ -28,9 +28,9 @@ impl Case {
         let mut spec = System { band: 0.3, ..THESIS }.spec(FIR_24);
         spec.signal.as_mut().unwrap().rms = RMS;
         spec.uncertainty = Some(UncertaintySpec {
-            delay: Some(PerChannel::Same(Seconds(errors.delay))),
-            gain: Some(PerChannel::Same(errors.gain)),
-            offset: Some(PerChannel::Same(errors.offset)),
+            delay: Some(OneOrEach::Same(Seconds(errors.delay))),
+            gain: Some(OneOrEach::Same(errors.gain)),
+            offset: Some(OneOrEach::Same(errors.offset)),
             ..UncertaintySpec::default()
         });
         let bank = design(&spec, &Options::without_proof()).unwrap().bank;

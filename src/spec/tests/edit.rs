@@ -12,7 +12,7 @@ fn calibrated(text: &str) -> Spec {
     spec.channels[1].offset = -1e-3;
     let half_width = FastPeriods(1e-5).in_seconds(spec.fast_period);
     spec.uncertainty = Some(UncertaintySpec {
-        delay: Some(PerChannel::Each(vec![Seconds(0.0), half_width])),
+        delay: Some(OneOrEach::Each(vec![Seconds(0.0), half_width])),
         reference: Some(1),
         ..spec.uncertainty.unwrap_or_default()
     });
@@ -25,7 +25,10 @@ fn comments_and_layout_stay() {
     let edited = calibrated(&text).to_toml_like(&text, &no_models).unwrap();
     assert!(edited.contains("fast_period = 1.0          # h in seconds"), "{edited}");
     assert!(edited.contains("  delay = 1.234 # measured in spring\n"), "{edited}");
-    assert!(edited.contains("gain = 1.01\noffset = -0.001\ndelay = 0.30000000000000004\n"), "{edited}");
+    assert!(
+        edited.contains("delay = 0.30000000000000004\n") && edited.contains("gain = 1.01\noffset = -0.001\n"),
+        "{edited}"
+    );
     assert!(edited.ends_with("\n[uncertainty]\ndelay = [0.0, 1e-5]\nreference = 1\n"), "{edited}");
     assert_eq!(read(&edited), calibrated(&text));
     // Again, over the table that is there now.
@@ -52,7 +55,10 @@ fn inline_channels_and_filters_are_edited() {
     let edited = spec.to_toml_like(text, &no_models).unwrap();
     assert_eq!(read(&edited), spec);
     assert!(edited.contains("latency = 12 # samples\n"), "{edited}");
-    assert!(edited.contains("cutoff = 0.125") && edited.contains("gain = 1.01 }"), "{edited}");
+    assert!(
+        edited.contains("cutoff = 0.125") && edited.contains("gain = 1.01, offset = -0.001 }"),
+        "{edited}"
+    );
     assert!(edited.contains("cutoff = 0.001"), "{edited}");
 }
 

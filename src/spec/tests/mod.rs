@@ -9,6 +9,7 @@ mod overrides;
 mod reading;
 mod refusal;
 mod round_trip;
+mod sizes;
 
 const THESIS: &str = r#"
 name = "thesis example, FIR"

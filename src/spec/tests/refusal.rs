@@ -65,9 +65,9 @@ fn every_mistake_has_its_line_and_its_message() {
         ),
         ("fast_period = 1.0", "fast_period = 0", 3, "0 s is out of range"),
         ("fast_period = 1.0", "fast_period = -1e-6", 3, "must be positive"),
-        ("fast_period = 1.0", "fast_period = nan", 3, "must be finite"),
-        ("fast_period = 1.0", "fast_period = 1e999", 3, "must be finite"),
-        ("fast_period = 1.0", "fast_rate = inf", 3, "must be finite"),
+        ("fast_period = 1.0", "fast_period = nan", 3, "NaN s is out of range"),
+        ("fast_period = 1.0", "fast_period = 1e999", 3, "number overflowed"),
+        ("fast_period = 1.0", "fast_rate = inf", 3, "inf Hz is out of range"),
         ("fast_period = 1.0", "fast_rate = 0.0", 3, "0 Hz is out of range"),
         ("fast_period = 1.0", "fast_period = 1e-300", 3, "between 1e-100 and 1e100"),
         (
@@ -76,7 +76,12 @@ fn every_mistake_has_its_line_and_its_message() {
             3,
             "the unit \"Hz\", which is not known here; write a time",
         ),
-        ("fast_period = 1.0", "fast_period = \"1 us\"", 11, "1.2 s is out of range: the delay is 1.2e6 fast"),
+        (
+            "fast_period = 1.0",
+            "fast_period = \"1 us\"",
+            11,
+            "1.2 s is out of range: it is 1200000 fast periods",
+        ),
         (
             "fast_period = 1.0",
             "fast_period = true",
@@ -88,8 +93,8 @@ fn every_mistake_has_its_line_and_its_message() {
         ("ratio = 2", "ratio = 1_000_000", 4, "must be 1 to 1024"),
         ("ratio = 2", "ratio = -2", 4, "whole number, zero or more"),
         ("ratio = 2", "ratio = 2.0", 4, "without point"),
-        ("ratio = 2", "ratio = true", 4, "found true or false"),
-        ("ratio = 2", "ratio = 1979-05-27", 4, "found a date"),
+        ("ratio = 2", "ratio = true", 4, "found true"),
+        ("ratio = 2", "ratio = 1979-05-27", 4, "expected a whole number"),
         ("ratio = 2", "ratio = 2\nratio = 3", 5, "duplicate key"),
         ("ratio = 2", "ratio = 99999999999999999999", 4, "whole number"),
         ("latency = 10", "latency = 1e3", 5, "without point"),
@@ -103,12 +108,12 @@ fn every_mistake_has_its_line_and_its_message() {
         ("delay = 1.2", "delay = 1.2\ndelay_samples = 1.2", 12, "both delay and delay_samples"),
         ("delay = 1.2", "", 10, "the key delay is missing"),
         ("delay = 1.2", "delay = -0.1", 11, "cannot be negative; add the same whole number"),
-        ("delay = 1.2", "delay = nan", 11, "must be finite"),
+        ("delay = 1.2", "delay = nan", 11, "NaN s is out of range"),
         ("delay = 1.2", "delay = 1e6", 11, "check its unit"),
-        ("delay = 1.2", "delay_samples = -3", 11, "-3 fast periods is out of range"),
+        ("delay = 1.2", "delay_samples = -3", 11, "-3 s is out of range: it is -3 fast periods"),
         ("delay = 1.2", "delay = 1.2\ngain = 0", 12, "gain is the factor of the converter's samples"),
         ("delay = 1.2", "delay = 1.2\ngain = -1e7", 12, "1e-6 to 1e6 in size"),
-        ("delay = 1.2", "delay = 1.2\ngain = inf", 12, "must be finite"),
+        ("delay = 1.2", "delay = 1.2\ngain = inf", 12, "inf (factor) is out of range"),
         ("delay = 1.2", "delay = 1.2\noffset = 5", 12, "5 steps of a 12-bit converter are 5 / 2048"),
         ("delay = 1.2", "delay = 1.2\noffest = 0.1", 12, "did you mean \"offset\""),
         (
@@ -122,19 +127,26 @@ fn every_mistake_has_its_line_and_its_message() {
         ("[design]", "[uncertainty]\ndelay_samples = 2e3\n[design]", 17, "at most 1024 fast periods"),
         ("[design]", "[uncertainty]\ndelay = 1\ndelay_samples = 1\n[design]", 18, "the same meaning"),
         ("[design]", "[uncertainty]\ngain = [0.1]\n[design]", 17, "one for each of the 2"),
-        ("[design]", "[uncertainty]\ncutoff = 2\n[design]", 17, "0.01 is one per cent"),
+        ("[design]", "[uncertainty]\ncutoff = 0.5\n[design]", 17, "0.01 is one per cent"),
+        ("[design]", "[uncertainty]\ngain = [0, 0.5]\n[design]", 17, "at most 0.49"),
+        (
+            "[design]",
+            "[signal]\nband = 0.1\n[uncertainty]\ncutoff = 0.01\n[design]",
+            19,
+            "leave one of the two out",
+        ),
         ("[design]", "[uncertainty]\nreference = 3\n[design]", 17, "one of the channels 1 to 2"),
         ("[design]", "[uncertainty]\ndely = 0.1\n[design]", 17, "did you mean \"delay\""),
         // Design.
         ("method = \"fir\"", "method = \"fri\"", 17, "did you mean \"fir\""),
-        ("method = \"fir\"", "method = \"kalman\"", 17, "choose one of fir, iir, h2, sinc, separation"),
+        ("method = \"fir\"", "method = \"kalman\"", 17, "the names here are fir, iir, h2, sinc, separation"),
         ("taps = 22", "taps = 22\ntarget_snr_db = 90", 19, "the SNR decides how many taps there are"),
         ("taps = 22", "target_snr_db = -1", 18, "target_snr_db is the ratio of the signal"),
         ("\"fir\"\ntaps = 22", "\"iir\"\ntarget_snr_db = 90", 18, "fir or h2"),
         ("\"fir\"\ntaps = 22", "\"h2\"\ntaps = 22\norder = 4", 19, "h2 with taps"),
         ("taps = 22", "taps = 0", 18, "1 to 65536 taps"),
         ("taps = 22", "taps = 65537", 18, "1 to 65536 taps"),
-        ("taps = 22", "taps = 10_000", 18, "taps times channels is at most 16384"),
+        ("taps = 22", "taps = 10_000", 18, "taps times channels is at most 8192"),
         ("taps = 22", "taps = 22\ngamma_margin = -0.1", 19, "gamma_margin is the share"),
         ("method = \"fir\"\ntaps = 22", "method = \"iir\"\nbits = 12", 18, "choose the method fir"),
         ("taps = 22", "taps = 22\nbits = 1", 19, "2 to 32 bits"),
@@ -144,7 +156,7 @@ fn every_mistake_has_its_line_and_its_message() {
         ("taps = 22", "taps = 22\nbits = []", 19, "list of bits is empty; give one entry for each of the 22"),
         ("taps = 22", "taps = 4\nbits = [1, 0, 1, 0]", 19, "at least one tap needs 2 bits"),
         ("taps = 22", "taps = 22\nbits = 8\nfraction_bits = 300", 20, "from -256 to 256"),
-        ("taps = 22", "taps = 22\nfraction_bits = 7", 16, "the key bits is missing"),
+        ("taps = 22", "taps = 22\nfraction_bits = 7", 19, "the key bits is missing"),
         ("method = \"fir\"\ntaps = 22", "method = \"iir\"\nbits = 8", 18, "choose the method fir"),
         ("method = \"fir\"", "method = \"iir\"", 18, "taps has no meaning for the method iir"),
         ("taps = 22", "tap = 22", 18, "did you mean \"taps\""),
@@ -153,11 +165,19 @@ fn every_mistake_has_its_line_and_its_message() {
         ("latency = 10", "full_scale = '8V'", 5, "\"V\""),
         ("latency = 10", "fit = ['delay', 'cutoff:0']", 5, "delay, gain, offset and cutoff can be fitted"),
         ("latency = 10", "fit = ['cutoff', 'cutoff:2']", 5, "cutoff and cutoff:2 have one factor for each"),
-        ("latency = 10", "fit = 'delay'", 5, "expected a list of names"),
+        ("latency = 10", "fit = 'delay'", 5, "expected a list, found the text \"delay\""),
     ] {
         refused(&thesis_with(from, to), line, words);
     }
     refused("", 1, "missing");
+    // serde reads a list as the values of a table, key by key.
+    refused(&thesis_with("[design]", "[[design]]"), 16, "expected a table of keys and values, found a list");
+    let target = thesis_with("[target]\nfilter", "target.filter = ['butterworth', 4, 9e3]\n[design]\nfilter");
+    assert!(
+        message(&target).contains("target.filter: expected a table of keys and values"),
+        "{}",
+        message(&target)
+    );
 }
 
 #[test]
@@ -182,13 +202,16 @@ fn every_mistake_in_a_filter_has_its_message() {
         ("{ num = [1], den = [0, 0.0] }", "den is zero"),
         ("{ num = [1], den = [0, 3.0] }", "no pole"),
         ("{ num = [1, 0], den = [1, 3.0] }", "not strictly proper: with 1 zeros against 1 poles"),
-        ("{ num = [1], den = [1, inf] }", "den[1]: inf"),
-        ("{ num = [1], den = [1, \"2\"] }", "den[1]: expected a number, found a text"),
-        ("{ num = 1, den = [1, 2] }", "expected a list of numbers"),
+        (
+            "{ num = [1], den = [1, inf] }",
+            "den: inf (coefficient) is out of range: it must be a finite number",
+        ),
+        ("{ num = [1], den = [1, \"2\"] }", "den[1]: expected a number, found the text \"2\""),
+        ("{ num = 1, den = [1, 2] }", "expected a list, found 1"),
         ("{ poles = [[-1, 0]] }", "the key gain is missing"),
         ("{ zeros = [[1, 0]], gain = 1 }", "the key poles is missing"),
         ("{ poles = [[-1, 0, 0]], gain = 1 }", "expected a pair [re, im]"),
-        ("{ poles = [[-1, nan]], gain = 1 }", "must be finite"),
+        ("{ poles = [[-1, nan]], gain = 1 }", "poles: NaN (coefficient) is out of range"),
         ("{ poles = [], gain = 1 }", "no pole"),
         ("{ poles = [-1], gain = 0.0 }", "the filter is zero because gain is"),
         ("{ a = [[-1, 0]], b = [[1]], c = [[1]] }", "a is 1 x 2"),
@@ -203,26 +226,23 @@ fn every_mistake_in_a_filter_has_its_message() {
         ("{ family = 'butterwort', order = 3, cutoff = 1 }", "did you mean \"butterworth\""),
         (
             "{ family = 'gauss', order = 3, cutoff = 1 }",
-            "unknown filter family \"gauss\"; choose one of butterworth",
+            "unknown name \"gauss\"; the names here are butterworth",
         ),
         ("{ family = 'butterworth', cutoff = 1 }", "a butterworth filter needs order (the number of poles)"),
         ("{ family = 'butterworth', order = 3 }", "the key cutoff is missing; give the cutoff in hertz"),
         ("{ family = 'butterworth', order = 0, cutoff = 1 }", "no pole"),
         ("{ family = 'butterworth', order = 33, cutoff = 1 }", "33 poles, but at most 32"),
-        ("{ family = 'butterworth', order = 3, cutoff = -1 }", "cutoff = -1 Hz"),
+        ("{ family = 'butterworth', order = 3, cutoff = -1 }", "-1 Hz is out of range: the cutoff must be"),
         ("{ family = 'butterworth', order = 3, cutoff = 1, band = [1, 2] }", "keep one of them"),
         ("{ family = 'butterworth', order = 17, band = [1, 2] }", "34 poles, but at most 32"),
         (
             "{ family = 'butterworth', order = 3, band = [0, 2] }",
-            "band = 0 Hz: a band-pass begins above 0 Hz",
+            "0 Hz is out of range: a band-pass begins above 0 Hz",
         ),
         ("{ family = 'butterworth', order = 3, band = [2, 1] }", "write band = [1, 2]"),
-        (
-            "{ family = 'butterworth', order = 3, band = [2, 2] }",
-            "both edges of the band are at this frequency",
-        ),
+        ("{ family = 'butterworth', order = 3, band = [2, 2] }", "both edges are at one frequency"),
         ("{ family = 'butterworth', order = 3, band = [1] }", "a list of two frequencies, as in [\"60 MHz\""),
-        ("{ family = 'butterworth', order = 3, band = 7 }", "a list of two frequencies"),
+        ("{ family = 'butterworth', order = 3, band = 7 }", "expected a list, found 7"),
         (
             "{ family = 'elliptic', order = 4, band = [1, 2], ripple_db = 1, attenuation_db = 60 }",
             "or choose the odd order 5",

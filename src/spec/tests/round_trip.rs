@@ -61,9 +61,8 @@ prop_compose! {
         gamma_margin in prop::option::of(0.0..0.1f64),
         bits in prop::option::of((2..33u32).prop_map(WordLengths::Same)),
         fraction_bits in prop::option::of(-256..257i32),
-        reduction in prop::option::of(prop_oneof![
-            (0usize..99).prop_map(Reduction::Order), (0.0..9.0f64).prop_map(Reduction::Loss)
-        ]),
+        order in prop::option::of(0usize..99),
+        loss in prop::option::of(0.0..9.0f64),
         uncertainty in prop::option::of((0.0..1.0f64, 0usize..2, prop::bool::ANY)),
         signal in prop::option::of((written_filter(), 0.1..9.0f64, 0usize..3, 0.01..1.0f64)),
     ) -> Spec {
@@ -77,14 +76,15 @@ prop_compose! {
             rms,
         });
         let uncertainty = uncertainty.map(|(x, reference, each)| UncertaintySpec {
-            delay: Some(if each { PerChannel::Each(vec![fast_period * x; channels.len()]) } else { PerChannel::Same(fast_period * x) }),
-            cutoff: (x < 0.5).then_some(PerChannel::Same(x)),
+            delay: Some(if each { OneOrEach::Each(vec![fast_period * x; channels.len()]) } else { OneOrEach::Same(fast_period * x) }),
+            cutoff: (x < 0.49 && !(method == Method::Fir && signal.is_some())).then_some(OneOrEach::Same(x)),
             reference: Some(reference),
             ..UncertaintySpec::default()
         });
         let moves = uncertainty.as_ref().is_some_and(|table| table.delays(channels.len()).iter().any(|d| d.0 > 0.0));
-        let is_sized = method.has_taps() || (method == Method::H2 && reduction.is_none());
+        let is_sized = method.has_taps() || (method == Method::H2 && order.is_none() && loss.is_none());
         let by_loss = method.reads("loss_db") && fraction_bits.is_none() && ratio % 2 == 0;
+        let is_reduced = method.reads("order") && !(method == Method::H2 && moves);
         let by_snr = method.reads("target_snr_db") && ratio % 3 == 0;
         Spec {
             name, fast_period, ratio, latency, target,
@@ -102,7 +102,9 @@ prop_compose! {
                 fraction_bits: fraction_bits.filter(|_| method.reads("bits") && bits.is_some()),
                 loss_db: by_loss.then_some(0.25),
                 digits: by_loss && ratio % 4 == 0,
-                reduction: reduction.filter(|_| method.reads("order") && !(method == Method::H2 && moves)),
+                order: order.filter(|_| is_reduced),
+                reduction_loss_db: loss.filter(|_| is_reduced && order.is_none()),
+                ..DesignSpec::new(method, None)
             },
         }
     }

@@ -27,7 +27,7 @@ use crate::{BuildError, Isa};
 /// A filter in state space, one step per frame: x+ = a x + b u, y = c x + d u; u the N samples of a frame, y
 /// its M output samples. Row-major lists of rows.
 #[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct StateSpace {
     /// n x n.
     pub a: Vec<Vec<f64>>,

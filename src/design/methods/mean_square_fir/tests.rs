@@ -11,7 +11,7 @@ use crate::design::{Design, LiftedPlant, Options, analyze_mean, design};
 use crate::linalg::Complex;
 use crate::lti::gramian::h2_norm;
 use crate::spec::{
-    ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, PerChannel, Spec, UncertaintySpec,
+    ChannelSpec, DesignSpec, Family, FilterSpec, Method, OneOrEach, Passband, Spec, UncertaintySpec,
 };
 use crate::units::{FastPeriods, Hertz, Seconds};
 use std::f64::consts::PI;
@@ -281,7 +281,7 @@ fn uncertain(noise: f64, deviations: [f64; 2]) -> Design {
     let mut spec = thesis(noise, Some(22)).spec();
     let halves = deviations.map(|deviation| Seconds(1.959963984540054 * deviation));
     spec.uncertainty = Some(UncertaintySpec {
-        delay: Some(PerChannel::Each(halves.to_vec())),
+        delay: Some(OneOrEach::Each(halves.to_vec())),
         reference: Some(0),
         ..UncertaintySpec::default()
     });
@@ -322,9 +322,9 @@ fn uncertain_delays_are_averaged_over() {
 fn uncertain_delays_make_h2_fir() {
     let mut spec = thesis(1e-3, None).spec();
     spec.uncertainty =
-        Some(UncertaintySpec { delay: Some(PerChannel::Same(Seconds(0.1))), ..UncertaintySpec::default() });
+        Some(UncertaintySpec { delay: Some(OneOrEach::Same(Seconds(0.1))), ..UncertaintySpec::default() });
     let design = design(&spec, &Options::without_proof()).unwrap();
-    assert!(design.taps_chosen && matches!(design.bank.filters, SynthesisFilters::Fir(_)));
-    spec.design.reduction = Some(crate::spec::Reduction::Order(3));
+    assert!(design.sizing.taps_chosen && matches!(design.bank.filters, SynthesisFilters::Fir(_)));
+    spec.design.order = Some(3);
     assert!(spec.check().is_err());
 }

@@ -8,10 +8,9 @@
 //! instant lies in the middle of the samples that their taps see.
 
 use super::DesignError;
-use super::effort;
 use super::filters;
 use super::least_errors::{LeastErrors, candidates, check_reach, is_almost, manageable, shortest};
-use super::limits::{Limits, Stop};
+use super::limits::Stop;
 use super::merging::Repeats;
 use super::methods::robust_fir::RobustProblem;
 use super::methods::{self, Deviations, Filters, Settings};
@@ -21,7 +20,7 @@ use super::realise::realise;
 use crate::analog::SignalFilter;
 use crate::lti::StateSpace;
 use crate::lti::gramian::h2_norm;
-use crate::spec::{MAX_OPTIMISED_TAPS, Method, Reduction, Spec};
+use crate::spec::{MAX_ERROR_STATES, MAX_OPTIMISED_TAPS, Method, Spec};
 use crate::units::Seconds;
 
 /// Bits of a converter of which nothing is said.
@@ -63,81 +62,98 @@ impl Comparison<'_> {
     }
 }
 
-/// What a spec that leaves something open gets; no taps for recursive filters.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+/// Latency and number of taps of a bank: those of its spec, and what was chosen where the spec leaves them
+/// open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sizing {
+    /// m0, in fast samples.
+    pub latency: usize,
+    /// Taps per channel at the fast rate; 0 for recursive filters.
+    pub taps: usize,
+    /// The latency was left to the designer.
+    pub latency_chosen: bool,
+    /// The number of taps was left to the designer.
+    pub taps_chosen: bool,
+}
+
+/// Latency and taps while they are chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Choice {
     taps: usize,
     latency: usize,
 }
 
-/// The spec with the number of taps that the comparison methods use, and with a latency that these taps
-/// reach or none. The taps of `fir` and `h2` may still be open.
-///
-/// # Errors
-/// [`DesignError::OutOfReach`] for a latency that the taps do not reach; [`DesignError`] if the spec has no
-/// [`Problem`].
-pub(super) fn with_taps(spec: &Spec) -> Result<Spec, DesignError> {
-    let mut complete = spec.clone();
-    if matches!(spec.design.method, Method::Sinc | Method::Separation) {
-        // 23 for M = 2, as in the thesis.
-        complete.design.taps = Some(spec.design.taps.unwrap_or(12 * spec.ratio - 1));
+impl Sizing {
+    /// The sizes of the bank that `spec` asks for.
+    ///
+    /// # Errors
+    /// As [`design`](super::design).
+    pub fn of(spec: &Spec) -> Result<Self, DesignError> {
+        let comparison = Comparison { observer: &|_| (), stop: &Stop::default() };
+        Self::new(spec, &Problem::before_sizing(spec)?, comparison)
     }
-    if let (Some(taps), Some(latency)) = (complete.design.taps, spec.latency) {
-        check_reach(Problem::new(spec, latency)?, taps)?;
-    }
-    Ok(complete)
-}
 
-/// The spec of [`with_taps`] with nothing left open: a latency and a number of taps as well. `comparison`
-/// follows and ends the designs that are compared.
-///
-/// # Errors
-/// As [`latency`]; [`DesignError::SnrOutOfReach`] or [`DesignError::SnrMissed`] if no number of taps has the
-/// SNR that the spec asks for; [`DesignError::Stopped`].
-pub(super) fn completed(spec: &Spec, comparison: Comparison<'_>) -> Result<Spec, DesignError> {
-    let mut complete = spec.clone();
-    let are_taps_open = spec.is_fir() && spec.design.taps.is_none();
-    if are_taps_open || spec.latency.is_none() {
-        let Choice { taps, latency } = choose(spec, comparison)?;
-        complete.latency = Some(latency);
-        if are_taps_open {
-            (complete.design.taps, complete.design.target_snr_db) = (Some(taps), None);
+    /// The sizes for `spec` and its `problem`. `comparison` follows and ends the designs that are compared.
+    ///
+    /// # Errors
+    /// [`DesignError::OutOfReach`] for a latency that the taps do not reach; [`DesignError::SnrOutOfReach`] or
+    /// [`DesignError::SnrMissed`] if no number of taps has the SNR that the spec asks for;
+    /// [`DesignError::Stopped`].
+    pub(super) fn new(
+        spec: &Spec,
+        problem: &Problem,
+        comparison: Comparison<'_>,
+    ) -> Result<Self, DesignError> {
+        let taps = spec.design.taps.or(usual_taps(spec));
+        let Choice { taps, latency } = match (taps, spec.latency) {
+            (Some(taps), Some(latency)) => {
+                check_reach(problem.clone(), taps)?;
+                Choice { taps, latency }
+            }
+            (None, Some(latency)) if !spec.is_fir() => Choice { taps: 0, latency },
+            _ => choose(spec, taps, problem, comparison)?,
+        };
+        let taps_chosen = spec.is_fir() && spec.design.taps.is_none();
+        let sizing = Self { latency, taps, latency_chosen: spec.latency.is_none(), taps_chosen };
+        // The delays may ask for more than the longest latency.
+        sizing.applied_to(spec).check()?;
+        Ok(sizing)
+    }
+
+    /// The spec with these sizes and nothing left open.
+    pub(super) fn applied_to(&self, spec: &Spec) -> Spec {
+        let mut sized = Spec { latency: Some(self.latency), ..spec.clone() };
+        if self.taps_chosen {
+            (sized.design.taps, sized.design.target_snr_db) = (Some(self.taps), None);
         }
+        sized
     }
-    if let Some((signal, filter)) = complete.signal.as_mut().zip(SignalFilter::of(spec)) {
-        signal.floor_db = filter.floor_db;
-    }
-    // The delays may ask for more than the longest latency.
-    complete.check()?;
-    Ok(complete)
 }
 
-/// The latency m0 of a spec in fast samples: the number in the spec, or the designer's choice.
-///
-/// # Errors
-/// If it is to be chosen: [`DesignError`] if the spec has no [`Problem`]; [`DesignError::TooLong`] or
-/// [`DesignError::TooLarge`] if the design cannot be made.
-pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
-    if let Some(latency) = spec.latency {
-        return Ok(latency);
-    }
-    let open = with_taps(spec)?;
-    effort::check(&open, false, Limits::Enforced)?;
-    Ok(choose(&open, Comparison { observer: &|_| (), stop: &Stop::default() })?.latency)
+/// The number of taps of the comparison methods: 23 for M = 2, as in the thesis.
+fn usual_taps(spec: &Spec) -> Option<usize> {
+    let compares = matches!(spec.design.method, Method::Sinc | Method::Separation);
+    compares.then(|| 12 * spec.ratio - 1)
 }
 
 /// Taps and latency where at least one of them is open.
-fn choose(spec: &Spec, comparison: Comparison<'_>) -> Result<Choice, DesignError> {
+fn choose(
+    spec: &Spec,
+    taps: Option<usize>,
+    problem: &Problem,
+    comparison: Comparison<'_>,
+) -> Result<Choice, DesignError> {
     comparison.after(0)?;
     // Delays that all channels have only add to the latency.
     let common = if spec.latency.is_some() { 0 } else { common_delay(spec) };
     let wanted = spec.design.target_snr_db;
     // A wanted SNR is that of the noise which the spec states; without one the usual rounding limits it.
     let noisy = if wanted.is_some() { with_uncertain_instants(spec) } else { with_usual_noise(spec) };
-    let whole = Problem::new(&noisy, spec.latency.unwrap_or(common))?.earlier(common);
+    let noise = problem.noise_powers(&noisy)?;
+    let whole = Problem { noise, ..problem.clone() }.earlier(common);
     let merged = whole.merge_channels(Repeats::of(spec)).of_unit_size()?.problem;
     let problem = if wanted.is_some() { merged.clone() } else { manageable(merged.clone()) };
-    let mut chosen = match (spec.design.method, spec.design.taps) {
+    let mut chosen = match (spec.design.method, taps) {
         (Method::Sinc | Method::Separation, taps) => middle(&problem, taps.unwrap_or_default()),
         (_, Some(taps)) => {
             let errors = LeastErrors::new(&problem, taps, candidates(&problem, taps))?;
@@ -146,9 +162,9 @@ fn choose(spec: &Spec, comparison: Comparison<'_>) -> Result<Choice, DesignError
         (_, None) if spec.is_fir() => fewest_taps(spec, &problem)?,
         (_, None) => {
             let errors = LeastErrors::causal(&problem)?;
-            let latency = match spec.design.reduction {
-                Some(Reduction::Order(_)) => latency_of_order(&noisy, &whole, &errors, comparison)?,
-                _ => errors.shortest(),
+            let latency = match spec.design.order {
+                Some(_) => latency_of_order(spec, &whole, &errors, comparison)?,
+                None => errors.shortest(),
             };
             Choice { taps: 0, latency }
         }
@@ -246,7 +262,7 @@ fn error_of_order(spec: &Spec, problem: &Problem, stop: &Stop) -> Result<f64, De
     spec.design.method = Method::H2;
     let merged = problem.merge_channels(Repeats::of(&spec)).of_unit_size()?;
     let plant = LiftedPlant::new(&merged.problem);
-    let settings = Settings { stop: stop.clone(), ..settings(&spec)? };
+    let settings = Settings { stop: stop.clone(), ..settings(&spec, 0)? };
     let synthesis = methods::synthesise(Method::H2, &plant, &settings)?;
     let realised = realise(&spec, problem, &merged, &plant, &synthesis, stop)?;
     let system = filters::lifted(&realised.filters, problem.ratio);
@@ -266,7 +282,7 @@ fn fewest_taps(spec: &Spec, problem: &Problem) -> Result<Choice, DesignError> {
         Method::Fir => MAX_OPTIMISED_TAPS / (spec.layout().count() * ratio),
         _ => MOST_FRAMES,
     };
-    let most = most.clamp(1, MOST_FRAMES) * ratio;
+    let most = most.min(MAX_ERROR_STATES / 2 / spec.layout().count()).clamp(1, MOST_FRAMES) * ratio;
     let oldest = given.map_or(0, |latency| latency + problem.longest_delay().0.ceil() as usize);
     let mut taps = ((oldest / ratio + FIRST_FRAMES) * ratio).min(most);
     let mut best = errors(taps)?;
@@ -320,7 +336,7 @@ fn lengthened(
             latency = LeastErrors::new(problem, taps, candidates(problem, taps))?.shortest();
         }
         comparison.after(designs)?;
-        let settings = Settings { taps, stop: comparison.stop.clone(), ..settings(spec)? };
+        let settings = Settings { stop: comparison.stop.clone(), ..settings(spec, taps)? };
         let plant = LiftedPlant::new(&Problem { latency, ..problem.clone() });
         let error = whole_error(&plant, &methods::synthesise(Method::Fir, &plant, &settings)?.filters)?;
         comparison.go_on()?;
@@ -336,11 +352,11 @@ fn lengthened(
     Err(DesignError::SnrMissed { wanted, best, taps })
 }
 
-/// The settings of the method, from a spec with nothing left open.
+/// The settings of the method, with so many taps.
 ///
 /// # Errors
 /// [`DesignError`] if the spec has no [`Problem`] at the slow rate.
-pub(super) fn settings(spec: &Spec) -> Result<Settings, DesignError> {
+pub(super) fn settings(spec: &Spec, taps: usize) -> Result<Settings, DesignError> {
     let at_slow_rate = || {
         let signal = SignalFilter::written_out(spec);
         let slow = Spec { fast_period: spec.fast_period * spec.ratio as f64, signal, ..spec.per_sample() };
@@ -350,7 +366,7 @@ pub(super) fn settings(spec: &Spec) -> Result<Settings, DesignError> {
     };
     let separate = spec.design.method == Method::Separation;
     Ok(Settings {
-        taps: spec.design.taps.unwrap_or_default(),
+        taps,
         robust: RobustProblem::of(spec),
         deviations: Deviations::of(spec),
         gamma_margin: spec.design.gamma_margin,
