@@ -2,7 +2,7 @@
 
 use super::real::Field;
 use super::{Ball, Float512, Number};
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// A complex number by its parts.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -56,6 +56,27 @@ impl<F: Number> From<Ball<F>> for ComplexBall<F> {
     #[inline]
     fn from(re: Ball<F>) -> Self {
         Self { re, im: Ball::ZERO }
+    }
+}
+
+impl<F: Number> From<f64> for ComplexBall<F> {
+    #[inline]
+    fn from(re: f64) -> Self {
+        Ball::from(re).into()
+    }
+}
+
+impl<T: Field> AddAssign for Cartesian<T> {
+    #[inline]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl<T: Field> SubAssign for Cartesian<T> {
+    #[inline]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
     }
 }
 

@@ -7,8 +7,8 @@ use crate::spec::{
 use crate::units::Seconds;
 
 use super::{
-    Bank, BankError, BankProblem, CausalWitness, Certificate, DualWitness, FixedPoint, Gamma, LowerProof,
-    StateSpace, SynthesisFilters,
+    Bank, BankError, BankProblem, BoxProof, CausalWitness, Certificate, DualWitness, FixedPoint, Gamma,
+    LowerProof, NormBound, StateSpace, SynthesisFilters,
 };
 
 /// Largest m0 in a bank file. `fuse` appends as many zeros to a recording; 16 million are 3 minutes at 96
@@ -171,7 +171,8 @@ impl Bank {
             Some(LowerProof::Causal(witness)) => check_causal(witness)?,
             None => {}
         }
-        proof.noncausal.as_ref().map_or(Ok(()), |witness| check("proof.noncausal", witness, 0))
+        proof.noncausal.as_ref().map_or(Ok(()), |witness| check("proof.noncausal", witness, 0))?;
+        proof.worst_case.as_ref().map_or(Ok(()), check_box_proof)
     }
 
     fn check_scalars(&self) -> Checked {
@@ -328,6 +329,16 @@ fn check_certificate(certificate: &Certificate) -> Checked {
     let (rows, rule) = (certificate.factor.len(), "the correction has as many rows as the factor");
     check_length("proof.upper.correction", certificate.correction.len(), rows, "rows", rule)?;
     check_triangle("proof.upper.correction", &certificate.correction)
+}
+
+fn check_box_proof(proof: &BoxProof) -> Checked {
+    check_sizes("proof.worst_case.scales", &proof.scales)?;
+    for (key, NormBound { norm, factor }) in [("filters", &proof.filters), ("slopes", &proof.slopes)] {
+        let path = format!("proof.worst_case.{key}");
+        check_norm(&format!("{path}.norm"), *norm)?;
+        check_triangle(&format!("{path}.factor"), factor)?;
+    }
+    Ok(())
 }
 
 fn check_triangle(path: &str, rows: &[Vec<f64>]) -> Checked {

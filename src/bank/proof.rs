@@ -16,6 +16,31 @@ pub struct Proof {
     /// samples least.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noncausal: Option<DualWitness>,
+    /// For `gamma.worst_case`, beside `upper`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub worst_case: Option<BoxProof>,
+}
+
+/// Bounds of what the errors of the spec's `[uncertainty]` change: of the filters over D, and of D times the
+/// uncertain rows. `verify` multiplies them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BoxProof {
+    /// D: a positive number for each uncertain delay, gain and cut-off of each sample of a frame, in this
+    /// order.
+    pub scales: Vec<f64>,
+    /// Of the filters.
+    pub filters: NormBound,
+    /// Of the rows.
+    pub slopes: NormBound,
+}
+
+/// Certificate that a norm is below a number.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NormBound {
+    /// The number.
+    pub norm: f64,
+    /// Lower triangular R, row by row, with P = R R' of the bounded-real lemma.
+    pub factor: Vec<Vec<f64>>,
 }
 
 /// The witnesses of a lower bound.

@@ -9,8 +9,8 @@ use crate::units::Seconds;
 
 use super::digest::{digest, is_digest};
 use super::{
-    Bank, BankError, BankProblem, CausalWitness, Certificate, DualWitness, FORMAT, FixedPoint, Gamma,
-    LowerProof, Proof, StateSpace, SynthesisFilters, VERSION,
+    Bank, BankError, BankProblem, BoxProof, CausalWitness, Certificate, DualWitness, FORMAT, FixedPoint,
+    Gamma, LowerProof, NormBound, Proof, StateSpace, SynthesisFilters, VERSION,
 };
 
 const KEYS: [&str; 14] = [
@@ -201,12 +201,28 @@ fn gamma(value: &Value<'_>) -> Result<Gamma, Fault> {
 const WITNESS: &str = "a proof without it proves nothing; leave the proof out, or take the whole of it";
 
 fn proof(value: &Value<'_>) -> Result<Proof, Fault> {
-    let fields = value.fields(&["upper", "lower", "noncausal"])?;
+    let fields = value.fields(&["upper", "lower", "noncausal", "worst_case"])?;
     Ok(Proof {
         upper: fields.optional("upper").map(|v| certificate(&v)).transpose()?,
         lower: fields.optional("lower").map(|v| lower_proof(&v)).transpose()?,
         noncausal: fields.optional("noncausal").map(|v| witness(&v)).transpose()?,
+        worst_case: fields.optional("worst_case").map(|v| box_proof(&v)).transpose()?,
     })
+}
+
+fn box_proof(value: &Value<'_>) -> Result<BoxProof, Fault> {
+    let fields = value.fields(&["scales", "filters", "slopes"])?;
+    Ok(BoxProof {
+        scales: fields.required("scales", WITNESS)?.numbers()?,
+        filters: norm_bound(&fields.required("filters", WITNESS)?)?,
+        slopes: norm_bound(&fields.required("slopes", WITNESS)?)?,
+    })
+}
+
+fn norm_bound(value: &Value<'_>) -> Result<NormBound, Fault> {
+    let fields = value.fields(&["norm", "factor"])?;
+    let norm = fields.required("norm", WITNESS)?.number()?;
+    Ok(NormBound { norm, factor: fields.required("factor", WITNESS)?.matrix()? })
 }
 
 /// A list of witnesses for FIR banks, or a table with gamma and periods for causal ones.

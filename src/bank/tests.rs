@@ -116,7 +116,10 @@ fn with_proof() -> Bank {
     let correction = vec![vec![1e-18], vec![-3e-18, 0.0], vec![0.0, 2e-17, 1e-17]];
     let upper = Some(Certificate { gamma: 0.04, peak: witness(vec![]), factor, correction });
     let lower = Some(LowerProof::Fir(vec![witness(vec![[0.5, 0.0], [1.5e-300, 2.0]])]));
-    Bank { proof: Some(Proof { upper, lower, noncausal: Some(witness(vec![])) }), ..fir() }
+    let norm = |norm: f64| NormBound { norm, factor: vec![vec![0.5], vec![-1.0 / 3.0, 2.0]] };
+    let worst_case = Some(BoxProof { scales: vec![0.25, 1e-9], filters: norm(1.5), slopes: norm(0.1) });
+    let proof = Proof { upper, lower, noncausal: Some(witness(vec![])), worst_case };
+    Bank { proof: Some(proof), ..fir() }
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::measured::{BeforeAfter, causes, column};
 use super::spur_chart::before_after;
-use super::{ChannelFact, Fact, Facts, change, pictures, spectra};
+use super::{ChannelFact, Fact, Facts, key_figures, pictures, spectra};
 use crate::bank::Bank;
 use crate::design::DesignError;
 use crate::measure::{Cause, Measurement, Spur};
@@ -287,19 +287,14 @@ fn facts(facts: &[Fact]) -> Markup {
 fn channel_table(channels: &[ChannelFact]) -> Markup {
     html! {
         table {
-            tr { th { "channel" } th { "delay" } th { "gain" } th { "offset" } th { "gamma, if the delay is 0.001 samples longer" } }
+            tr { th { "channel" } th { "delay" } th { "gain" } th { "offset" } th { "if this delay is 0.001 samples longer" } }
             @for (channel, number) in channels.iter().zip(1..) {
                 tr {
                     td { (number) }
                     td class="value" { (channel.delay) }
                     td class="value" { (channel.gain) }
                     td class="value" { (channel.offset) }
-                    td class="value" {
-                        @match channel.sensitivity {
-                            Some(share) => { (change(share)) }
-                            None => "no derivative",
-                        }
-                    }
+                    td class="value" { (key_figures(channel.later)) }
                 }
             }
         }

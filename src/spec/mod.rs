@@ -8,6 +8,7 @@ mod design;
 pub(crate) mod document;
 mod edit;
 mod error;
+mod error_box;
 mod filter;
 mod filter_problem;
 mod filter_reader;
@@ -26,6 +27,7 @@ pub use design::{DesignOverrides, DesignSpec, DesignTable, Method, Reduction};
 pub use edit::with_measurements_renamed;
 pub(crate) use error::{Fault, shown_path};
 pub use error::{SpecError, SpecProblem};
+pub use error_box::{ConverterErrors, ErrorBox, ErrorPoint};
 pub(crate) use filter::no_models;
 pub use filter::{
     Family, FilterModel, FilterModels, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB, MeasuredFilter, Measurement,

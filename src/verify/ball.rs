@@ -1,13 +1,16 @@
 //! Matrices of enclosed numbers.
 
-use crate::arithmetic::{DoubleDouble, Float512, Number, OUTWARD};
+use crate::arithmetic::{ComplexBall, DoubleDouble, Entry, Float512, Number, OUTWARD};
 use nalgebra::DMatrix;
 
 pub(super) use crate::arithmetic::Ball;
-pub(super) use crate::arithmetic::dense::{congruence, identity, product, symmetric, zeros};
+pub(super) use crate::arithmetic::dense::{congruence, identity, product, select, symmetric, zeros};
 
 /// Matrix of enclosed numbers.
 pub(super) type Matrix<F = DoubleDouble> = DMatrix<Ball<F>>;
+
+/// Matrix of enclosed complex numbers.
+pub(super) type ComplexMatrix<F = DoubleDouble> = DMatrix<ComplexBall<F>>;
 
 /// The matrix of exactly these doubles.
 pub(super) fn exact<F: Number>(m: &DMatrix<f64>) -> Matrix<F> {
@@ -26,6 +29,12 @@ pub(super) fn scaled<F: Number>(a: &Matrix<F>, by: Ball<F>) -> Matrix<F> {
 /// a b'.
 pub(super) fn product_transposed<F: Number>(a: &Matrix<F>, b: &Matrix<F>) -> Matrix<F> {
     product(a, &b.transpose())
+}
+
+/// a, and b below it.
+pub(super) fn above<T: Entry>(a: &DMatrix<T>, b: &DMatrix<T>) -> DMatrix<T> {
+    let entry = |i: usize, j: usize| if i < a.nrows() { a[(i, j)] } else { b[(i - a.nrows(), j)] };
+    DMatrix::from_fn(a.nrows() + b.nrows(), a.ncols(), entry)
 }
 
 /// A bound on the largest sum of moduli in a row.

@@ -26,28 +26,34 @@ const REMAINDER_OUTWARD: f64 = 1.01;
 /// Second moments of the samples for white noise of unit density at the input.
 pub(super) struct Covariance<F = DoubleDouble> {
     /// Of the analog state.
-    pub(super) state: Matrix<F>,
+    state: Matrix<F>,
     /// e^{A M}.
     transition: Matrix<F>,
 }
 
+/// X = E X E' + G by doubling; the remainder after 2^k steps is at most ||E^(2^k)||^2 of the whole.
+/// `None` if E is not seen to be stable.
+pub(super) fn steady_state<F: Number>(transition: &Matrix<F>, gramian: &Matrix<F>) -> Option<Matrix<F>> {
+    let (mut state, mut power) = (gramian.clone(), transition.clone());
+    for _ in 0..DOUBLINGS {
+        let size = ball::row_sum(&power) * ball::row_sum(&power.transpose());
+        if size < F::ROUNDING * NEGLIGIBLE_REMAINDER {
+            let rest = REMAINDER_OUTWARD * ball::row_sum(&state) * size;
+            return Some(state.map(|x| x.widened(rest)));
+        }
+        state += ball::congruence(&power, &state);
+        power = ball::product(&power, &power);
+    }
+    None
+}
+
 impl<F: Number> Covariance<F> {
-    /// X = E X E' + G by doubling; the remainder after 2^k steps is at most ||E^(2^k)||^2 of the whole.
+    /// `None` if the front ends are not seen to be stable.
     pub(super) fn new(period: &SlowPeriod<F>) -> Option<Self> {
         let n = period.order();
-        let mut state = period.gram.view((0, 0), (n, n)).into_owned();
-        let mut power = period.transition.clone();
-        for _ in 0..DOUBLINGS {
-            let size = ball::row_sum(&power) * ball::row_sum(&power.transpose());
-            if size < F::ROUNDING * NEGLIGIBLE_REMAINDER {
-                let rest = REMAINDER_OUTWARD * ball::row_sum(&state) * size;
-                let state = state.map(|x| x.widened(rest));
-                return Some(Self { state, transition: period.transition.clone() });
-            }
-            state += ball::congruence(&power, &state);
-            power = ball::product(&power, &power);
-        }
-        None
+        let gramian = period.gram.view((0, 0), (n, n)).into_owned();
+        let state = steady_state(&period.transition, &gramian)?;
+        Some(Self { state, transition: period.transition.clone() })
     }
 
     /// E s_a[k + lag] s_b[k], samples counted at the period in which they are taken.

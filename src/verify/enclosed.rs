@@ -1,23 +1,23 @@
 //! An enclosure of the error system of a bank. It is built once and serves to check any number of
 //! witnesses.
 
-use super::ball::{self, Ball, Matrix};
+use super::ball::{self, Ball};
 use super::causal::{CausalPlant, Precision, Recursion};
 use super::covariance::{Covariance, TapSamples};
-use super::error_system::{self, BlockForm, ErrorSystem};
+use super::error_system::{self, BlockForm, error_system};
 use super::front_ends::FrontEnds;
 use super::slow_period::SlowPeriod;
-use super::spectrum::{self, ComplexMatrix};
+use super::spectrum;
+use super::system::{EnclosedSystem, Midpoint};
 use super::timeline::{SamplingInstant, delay_periods, timeline};
 use super::{
-    BoundedBanks, MAX_STATES, Strictness, Verified, VerifyError, fir_length, lower, positive, statements,
-    upper,
+    BoundedBanks, MAX_STATES, Strictness, Verified, VerifyError, fir_length, lower, statements, upper,
 };
 use crate::arithmetic::{DoubleDouble, Float512, Number};
 use crate::bank::{
     Bank, CausalWitness, Certificate, DualWitness, Gamma, LowerProof, Proof, SynthesisFilters,
 };
-use crate::linalg::{CMat, Mat};
+use crate::linalg::CMat;
 use crate::units::Timeline;
 use nalgebra::DMatrix;
 use std::sync::OnceLock;
@@ -37,25 +37,11 @@ pub struct EnclosedErrorSystem<'a> {
     samples: Vec<SamplingInstant>,
     timeline: Timeline,
     pub(super) period: SlowPeriod,
-    equations: ErrorSystem,
-    long_equations: OnceLock<ErrorSystem<Float512>>,
+    equations: EnclosedSystem,
+    long_equations: OnceLock<EnclosedSystem<Float512>>,
     long_period: OnceLock<SlowPeriod<Float512>>,
     short: OnceLock<Option<CausalPlant<DoubleDouble>>>,
     long: OnceLock<Option<CausalPlant<Float512>>>,
-}
-
-/// Midpoints of the enclosed error system, for the search for a certificate: xi+ = a xi + b w, e = c xi + d
-/// w with w white.
-#[derive(Debug, Clone)]
-pub(crate) struct Midpoint {
-    /// n x n.
-    pub(crate) a: Mat,
-    /// n x m.
-    pub(crate) b: Mat,
-    /// M x n.
-    pub(crate) c: Mat,
-    /// M x m.
-    pub(crate) d: Mat,
 }
 
 impl<'a> EnclosedErrorSystem<'a> {
@@ -74,7 +60,7 @@ impl<'a> EnclosedErrorSystem<'a> {
             return Err(VerifyError::TooLarge { states });
         }
         let period = SlowPeriod::new(&front_ends, &timeline, &samples);
-        let equations = ErrorSystem::new(&period, &BlockForm::new(&bank.filters, bank.ratio));
+        let equations = error_system(&period, &BlockForm::new(&bank.filters, bank.ratio));
         Ok(Self {
             bank,
             front_ends,
@@ -150,14 +136,15 @@ impl<'a> EnclosedErrorSystem<'a> {
     /// Whether `certificate` proves its gamma. Only one with a correction is tried in 512 bits.
     pub fn certifies(&self, certificate: &Certificate) -> bool {
         let long = !certificate.correction.is_empty() && self.states() <= MAX_CORRECTED_STATES;
-        upper::proves(&self.equations, certificate)
-            || long && upper::proves(self.long_equations(), certificate)
+        let factor = [&certificate.factor[..], &certificate.correction[..]];
+        upper::proves(&self.equations, certificate.gamma, factor)
+            || long && upper::proves(self.long_equations(), certificate.gamma, factor)
     }
 
     /// The error system in 512 bits.
-    pub(super) fn long_equations(&self) -> &ErrorSystem<Float512> {
+    pub(super) fn long_equations(&self) -> &EnclosedSystem<Float512> {
         self.long_equations.get_or_init(|| {
-            ErrorSystem::new(self.long_period(), &BlockForm::new(&self.bank.filters, self.bank.ratio))
+            error_system(self.long_period(), &BlockForm::new(&self.bank.filters, self.bank.ratio))
         })
     }
 
@@ -232,20 +219,9 @@ impl<'a> EnclosedErrorSystem<'a> {
             .any(|precision| matches!(shown(precision), Recursion::Refuted { .. }))
     }
 
-    /// The error system in double precision; `None` if the Gram matrix of its inputs has no root, which
-    /// does not happen.
+    /// The error system in double precision, as [`EnclosedSystem::midpoint`].
     pub(crate) fn midpoint(&self) -> Option<Midpoint> {
-        let root = positive::root(&self.equations.gram)?;
-        let (n, m) = (self.equations.order(), self.equations.outputs);
-        let system = ball::nearest(&self.equations.system);
-        let inputs: Matrix = ball::product(&self.equations.inputs, &root);
-        let inputs = ball::nearest(&inputs);
-        Some(Midpoint {
-            a: system.rows(0, n).into_owned(),
-            b: inputs.rows(0, n).into_owned(),
-            c: system.rows(n, m).into_owned(),
-            d: inputs.rows(n, m).into_owned(),
-        })
+        self.equations.midpoint()
     }
 
     /// K K* at a point of the unit circle, rounded to double precision after every cancellation; of small
@@ -253,10 +229,10 @@ impl<'a> EnclosedErrorSystem<'a> {
     pub(crate) fn error_gram(&self, half: [f64; 2]) -> CMat {
         let (filters, ratio) = (&self.bank.filters, self.bank.ratio);
         let short = lower::error_gram(&self.period, filters, ratio, half);
-        if short.is_resolved(UNRESOLVED) || self.states() > MAX_LONG_GRAM_STATES {
-            return short.nearest();
+        if spectrum::is_resolved(&short, UNRESOLVED) || self.states() > MAX_LONG_GRAM_STATES {
+            return spectrum::nearest(&short);
         }
-        lower::error_gram(self.long_period(), filters, ratio, half).nearest()
+        spectrum::nearest(&lower::error_gram(self.long_period(), filters, ratio, half))
     }
 
     /// Computes the bounds that the witnesses of `proof` prove, and compares the stated `gamma` with them.
@@ -348,10 +324,10 @@ impl EnclosedErrorSystem<'_> {
     /// reference samples and the samples of the `channels`.
     pub(crate) fn precise_gram(&self, half: [f64; 2], channels: &[usize]) -> [ComplexParts; 2] {
         let m = self.bank.ratio;
-        let z = ComplexMatrix::unit(half);
+        let z = spectrum::unit(half);
         let rows: Vec<usize> = (0..m).chain(channels.iter().map(|i| m + i)).collect();
-        let gram = spectrum::gram(self.long_period(), &z).select(&rows, &rows);
-        [&z, &gram].map(|of| [midpoints(&of.re), midpoints(&of.im)])
+        let gram = ball::select(&spectrum::gram(self.long_period(), z), &rows, &rows);
+        [DMatrix::from_element(1, 1, z), gram].map(|of| [of.map(|x| x.re.mid()), of.map(|x| x.im.mid())])
     }
 
     /// Covariance of the samples of the `channels` over `lags` slow periods, for white noise of unit density

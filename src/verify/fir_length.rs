@@ -17,11 +17,11 @@
 //! C is the mean of Gamma_hh over all frequencies. So q is tiny even if C has eigenvalues far below 1e-30,
 //! as for long filters; then numbers of 512 bits are needed to see that C is positive definite.
 
-use super::ball::{self, Ball, Matrix};
+use super::ball::{self, Ball, ComplexMatrix, Matrix};
 use super::covariance::{Covariance, TapSamples};
 use super::positive;
 use super::slow_period::SlowPeriod;
-use super::spectrum::{self, ComplexMatrix};
+use super::spectrum;
 use crate::arithmetic::Number;
 use crate::bank::DualWitness;
 
@@ -108,17 +108,18 @@ impl<F: Number> BindingSums<F> {
     }
 
     fn add(&mut self, period: &SlowPeriod<F>, witness: &DualWitness) {
-        let z = ComplexMatrix::unit(witness.half);
-        let a = ComplexMatrix::column(&witness.reference);
-        let b = a.above(&ComplexMatrix::column(&witness.measured));
-        let image = spectrum::gram_times(period, &z, &b);
-        self.value += a.inner(&image.rows(0, self.ratio));
-        self.size += (a.square() * b.inner(&image)).sqrt();
+        let z = spectrum::unit(witness.half);
+        let a: ComplexMatrix<F> = spectrum::column(&witness.reference);
+        let b = ball::above(&a, &spectrum::column(&witness.measured));
+        let image = spectrum::gram_times(period, z, &b);
+        self.value += spectrum::inner(&a, &image.rows(0, self.ratio).into_owned());
+        self.size += (spectrum::square(&a) * spectrum::inner(&b, &image)).sqrt();
         // a_p conj((Gamma b)_i) z^j is the conjugate of what r sums; its real part is the same.
-        let mut turned = a.product(&image.select(&self.measured, &[0]).adjoint());
+        let samples = ball::select(&image, &self.measured, &[0]);
+        let mut turned = ball::product(&a, &spectrum::adjoint(&samples));
         for lag in &mut self.residual {
-            *lag += &turned.re;
-            turned = turned.times(&z);
+            *lag += turned.map(|x| x.re);
+            turned = turned.map(|x| x * z);
         }
     }
 }

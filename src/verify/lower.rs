@@ -15,11 +15,11 @@
 //!
 //! [`super::fir_length`] binds the taps of all banks of one length.
 
-use super::ball::{self, Ball, Matrix};
+use super::ball::{self, Ball, ComplexMatrix, Matrix};
 use super::positive;
 use super::slow_period::SlowPeriod;
-use super::spectrum::{self, ComplexMatrix};
-use crate::arithmetic::{DoubleDouble, Number, dense};
+use super::spectrum;
+use crate::arithmetic::{ComplexBall, DoubleDouble, Number, dense};
 use crate::bank::{DualWitness, SynthesisFilters};
 use std::ops::Range;
 
@@ -31,20 +31,21 @@ pub(super) fn square_of_gain<F: Number>(
     ratio: usize,
     witness: &DualWitness,
 ) -> Ball<F> {
-    let z = ComplexMatrix::unit(witness.half);
-    let reference = ComplexMatrix::column(&witness.reference);
-    energy(&spectrum::gram(period, &z), &error_samples(filters, ratio, &z, &reference)) / reference.square()
+    let z = spectrum::unit(witness.half);
+    let reference = spectrum::column(&witness.reference);
+    let error = error_samples(filters, ratio, z, &reference);
+    energy(&spectrum::gram(period, z), &error) / spectrum::square(&reference)
 }
 
 /// [a; -F* a], the combination of all samples that makes a* e.
 fn error_samples<F: Number>(
     filters: &SynthesisFilters,
     ratio: usize,
-    z: &ComplexMatrix<F>,
+    z: ComplexBall<F>,
     a: &ComplexMatrix<F>,
 ) -> ComplexMatrix<F> {
-    let through = spectrum::filter_response(filters, ratio, z).adjoint().product(a);
-    a.above(&ComplexMatrix::zeros(through.re.nrows(), through.re.ncols()).minus(&through))
+    let response = spectrum::filter_response(filters, ratio, z);
+    ball::above(a, &ball::product(&spectrum::adjoint(&response), a).map(|x| -x))
 }
 
 /// K K* = [I, -F] Gamma [I, -F]* of this bank.
@@ -54,14 +55,14 @@ pub(super) fn error_gram<F: Number>(
     ratio: usize,
     half: [f64; 2],
 ) -> ComplexMatrix<F> {
-    let z = ComplexMatrix::unit(half);
-    let all = error_samples(filters, ratio, &z, &ComplexMatrix::real(ball::identity(ratio)));
-    all.adjoint().product(&spectrum::gram_times(period, &z, &all))
+    let z = spectrum::unit(half);
+    let all = error_samples(filters, ratio, z, &ball::identity(ratio));
+    ball::product(&spectrum::adjoint(&all), &spectrum::gram_times(period, z, &all))
 }
 
 /// b* Gamma b.
 fn energy<F: Number>(gram: &ComplexMatrix<F>, b: &ComplexMatrix<F>) -> Ball<F> {
-    b.inner(&gram.product(b))
+    spectrum::inner(b, &ball::product(gram, b))
 }
 
 /// A lower bound of the root of `square`; `None` if it is unknown.
@@ -80,24 +81,25 @@ pub(super) fn unexplained(
     channels: &[usize],
     witness: &DualWitness,
 ) -> Option<f64> {
-    let gram = spectrum::gram(period, &ComplexMatrix::unit(witness.half));
+    let gram = spectrum::gram(period, spectrum::unit(witness.half));
     let measured: Vec<usize> = channels.iter().map(|i| ratio + i).collect();
-    let all: Vec<usize> = (0..ratio).chain(measured.iter().copied()).collect();
-    let reference = ComplexMatrix::column(&witness.reference);
-    let known = gram.select(&measured, &measured).realified();
-    let cross = gram.select(&measured, &(0..ratio).collect::<Vec<_>>()).product(&reference);
+    let references: Vec<usize> = (0..ratio).collect();
+    let all = [&references[..], &measured].concat();
+    let reference = spectrum::column(&witness.reference);
+    let known = spectrum::realified(&ball::select(&gram, &measured, &measured));
+    let cross = ball::product(&ball::select(&gram, &measured, &references), &reference);
     let units = positive::scales(&known);
     let least = least_eigenvalue(&positive::scaled(&known, &units))?;
     let factor = dense::cholesky(&known.map(Ball::mid))?;
-    let solution = dense::solve_factored(&factor, &cross.stacked().map(|x| (-x).mid()));
+    let solution = dense::solve_factored(&factor, &spectrum::stacked(&cross).map(|x| (-x).mid()));
     let n = measured.len();
-    let part = |start: usize| solution.rows(start, n).map(Ball::exactly);
-    let b = reference.above(&ComplexMatrix { re: part(0), im: part(n) });
-    let gram = gram.select(&all, &all);
+    let b = ball::above(&reference, &spectrum::unstacked(&solution.map(Ball::exactly)));
+    let gram = ball::select(&gram, &all, &all);
     // The optimal b_h has less energy than the b_h found, by r* Gamma_hh^-1 r with the residual r.
-    let residual = gram.product(&b).rows(ratio, n).with_rows_scaled(&units[..n]).square();
-    let missed = residual / Ball::from(least);
-    root((energy(&gram, &b) - missed) / reference.square())
+    let residual = ball::product(&gram, &b).rows(ratio, n).into_owned();
+    let residual = residual.map_with_location(|i, _, x| x.scaled(Ball::from(units[i])));
+    let missed = spectrum::square(&residual) / Ball::from(least);
+    root((energy(&gram, &b) - missed) / spectrum::square(&reference))
 }
 
 /// Powers of ten down to which a least eigenvalue is looked for: 106 bits resolve no smaller ones.

@@ -1,7 +1,7 @@
 //! Tests of the enclosed error system against the designer's lifted plant, which it does not use, and of
 //! proofs that must be refused.
 
-use super::spectrum::{self, ComplexMatrix};
+use super::ball::ComplexMatrix;
 use super::*;
 use crate::bank::{Certificate, Gamma, LowerProof, StateSpace, SynthesisFilters};
 use crate::design::{LiftedPlant, Problem, filters};
@@ -108,14 +108,11 @@ fn designers(bank: &Bank, omega: f64) -> CMat {
 
 /// The same from the enclosed period and the filters' response.
 fn enclosed(error: &EnclosedErrorSystem<'_>, half: [f64; 2]) -> ComplexMatrix {
-    let (bank, z) = (error.bank, ComplexMatrix::unit(half));
-    let through = spectrum::filter_response(&bank.filters, bank.ratio, &z);
-    let (m, n) = (bank.ratio, bank.channel_count());
-    let mut combine = ComplexMatrix::zeros(m, m + n);
-    (0..m).for_each(|p| combine.re[(p, p)] = ball::Ball::from(1.0));
-    combine.re.columns_mut(m, n).copy_from(&through.re.map(|x| -x));
-    combine.im.columns_mut(m, n).copy_from(&through.im.map(|x| -x));
-    combine.product(&spectrum::gram(&error.period, &z)).product(&combine.adjoint())
+    let (bank, z) = (error.bank, spectrum::unit(half));
+    let through = spectrum::filter_response(&bank.filters, bank.ratio, z).map(|x| -x);
+    let combine = ball::above(&ball::identity(bank.ratio), &through.transpose()).transpose();
+    let gram = spectrum::gram(&error.period, z);
+    ball::product(&ball::product(&combine, &gram), &spectrum::adjoint(&combine))
 }
 
 #[test]
@@ -127,12 +124,10 @@ fn the_error_system_is_the_designers() {
             let ours = enclosed(&error, [c, s]);
             let theirs = designers(&bank, omega);
             let size = theirs.norm();
-            let gap = ours.re.zip_zip_map(&ours.im, &theirs, |re, im, z| {
-                (re.nearest() - z.re).hypot(im.nearest() - z.im) / size
-            });
+            let gap = (spectrum::nearest(&ours) - theirs).map(|z| z.norm() / size);
             // Of K K*: half as much, 1e-10, of K.
             assert!(gap.max() < 2e-10, "{name} at {omega}: {:e} of {size:e}", gap.max());
-            let radius = ours.re.iter().chain(&ours.im).map(|x| x.radius()).fold(0.0, f64::max);
+            let radius = ours.iter().map(|x| x.re.radius().max(x.im.radius())).fold(0.0, f64::max);
             assert!(radius < 1e-13 * size, "{name} at {omega}: radius {radius:e} of {size:e}");
         }
     }

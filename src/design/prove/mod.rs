@@ -1,6 +1,7 @@
 //! Searches for certificates and witnesses that prove a bank's gammas. They prove nothing by themselves:
 //! [`crate::verify`] checks them.
 
+mod box_bound;
 mod enclosed_norm;
 mod lower;
 mod normal_equations;
@@ -16,6 +17,7 @@ use crate::bank::{Bank, DualWitness, Gamma, LowerProof, Proof};
 use crate::linalg::{self, CMat};
 use crate::lti::FrequencyResponse;
 use crate::verify::{EnclosedErrorSystem, Strictness, Verified};
+pub(super) use box_bound::{attach_box_proof, worst_case};
 pub(super) use enclosed_norm::resolved_norm;
 use enclosed_norm::{EnclosedGains, is_zero};
 use lower::lower_proof;
@@ -64,6 +66,13 @@ pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {
     Ok(Certified { gamma: upper, attained, states })
 }
 
+/// A proven lower bound of the norm of `bank`, its gain at a frequency in radians per slow period; `None`
+/// where no arithmetic resolves it.
+pub(super) fn proven_gain(bank: &Bank, frequency: f64) -> Result<Option<f64>, DesignError> {
+    let error = EnclosedErrorSystem::new(bank)?;
+    Ok(EnclosedGains(&error).at(frequency)?.map(|(gain, _)| gain))
+}
+
 /// Whether the norm of a bank is zero up to rounding, so that no search can make it less.
 pub(super) fn has_no_error(bank: &Bank) -> bool {
     let is_zero = |error: EnclosedErrorSystem<'_>| bank.gamma.norm.is_some_and(|norm| is_zero(norm, &error));
@@ -106,7 +115,7 @@ fn lower_ends(
     let above = noncausal.unwrap_or(0.0);
     // Nothing of interest lies below a norm that is zero up to rounding.
     if bank.gamma.norm.is_some_and(|norm| is_zero(norm, error)) {
-        return Ok(Proof { upper: None, lower: None, noncausal: noncausal.map(|_| witness) });
+        return Ok(Proof { noncausal: noncausal.map(|_| witness), ..Proof::default() });
     }
     // What the noncausal bound does not explain is looked for.
     let wanted = bank.gamma.lower.map(|stated| stated.max(dual.bound) * (1.0 - PROVEN_SHORTFALL));
@@ -116,7 +125,7 @@ fn lower_ends(
     if stop.is_due() {
         return Err(DesignError::Stopped);
     }
-    Ok(Proof { upper: None, lower, noncausal: noncausal.map(|_| witness) })
+    Ok(Proof { lower, noncausal: noncausal.map(|_| witness), ..Proof::default() })
 }
 
 /// Adds a proof to `bank` and sets the gammas to the proven bounds. A computed norm outside of the proven
