@@ -204,10 +204,9 @@ fn boxed(seed: u64) -> Tally {
         tally.refuted.push(format!("{name}, {half:?}: attained {lower:e}, there {attained:e}"));
     }
     if found.gain > upper {
-        tally.refuted.push(format!(
-            "{name}, {half:?}: bound {upper:e}, found {:e} at {:?}",
-            found.gain, found.errors
-        ));
+        tally
+            .refuted
+            .push(format!("{name}, {half:?}: bound {upper:e}, found {:e} at {:?}", found.gain, found.errors));
     }
     tally.widths.push(upper / lower - 1.0);
     tally.excesses.push(found.gain / lower - 1.0);

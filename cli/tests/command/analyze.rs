@@ -21,7 +21,10 @@ fn the_worst_case_has_a_bound_and_is_attained() {
         desk.json(&["analyze", "bank.json", "--delay-box", "0.1samples", "--reference", "none", "--json"]);
     let case = &all["worst_case"];
     let (attained, upper) = (number(&case["attained"]), number(&case["upper"]));
-    assert!((attained / 0.0478338 - 1.0).abs() < 1e-3 && upper > attained && upper <= 1.5 * attained, "{case}");
+    assert!(
+        (attained / 0.0478338 - 1.0).abs() < 1e-3 && upper > attained && upper <= 1.5 * attained,
+        "{case}"
+    );
     assert_eq!(case["point"]["delays"].as_array().unwrap().len(), 2);
     let one = desk.json(&["analyze", "bank.json", "--delay-box", "0.1samples", "--json"]);
     assert_eq!(one["worst_case"]["errors"]["delays"], serde_json::json!([0.0, 0.1]));

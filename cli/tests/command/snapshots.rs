@@ -138,17 +138,7 @@ fn reports_are_what_they_were() {
         ("design-reduced", &["design", "iir.toml", "-o", "two.json", "--order", "2", "--verbose"]),
         ("analyze", &["analyze", "fir.json"]),
         ("analyze-certify", &["analyze", "fir.json", "--certify"]),
-        (
-            "analyze-box",
-            &[
-                "analyze",
-                "fir.json",
-                "--delay-box",
-                "0.05samples",
-                "--gain-box",
-                "0,1%",
-            ],
-        ),
+        ("analyze-box", &["analyze", "fir.json", "--delay-box", "0.05samples", "--gain-box", "0,1%"]),
         ("design-robust", &["design", "robust.toml", "-o", "robust.json", "--verbose"]),
         ("verify-robust", &["verify", "robust.json"]),
         ("verify-fir", &["verify", "fir.json"]),

@@ -86,7 +86,7 @@ fn check(bank: &Bank, errors: &ErrorBox, points: usize, most: f64) -> BoxStudy {
 /// Errors of both delays of the thesis bank: what is attained are the digits of branch and bound.
 #[test]
 fn boxes_of_the_thesis_bank_have_their_known_worst_cases() {
-    for (half, attained, most) in [(0.05, 0.0421799, 1.3), (0.1, 0.0478338, 1.5), (0.2, 0.0682090, 2.0)] {
+    for (half, attained, most) in [(0.05, 0.0421799, 1.52), (0.1, 0.0478338, 1.95), (0.2, 0.0682090, 2.5)] {
         let found = check(&thesis(), &delays(half), 200, most);
         assert!((found.attained / attained - 1.0).abs() < 1e-5, "{found:?}");
     }
@@ -119,7 +119,7 @@ fn samples_of_one_converter_share_their_error() {
         &bank,
         &ErrorBox { delays: vec![FastPeriods(0.0), FastPeriods(0.02)], ..ErrorBox::none(2) },
         100,
-        1.5,
+        1.7,
     );
 }
 

@@ -18,7 +18,7 @@ use super::super::covariance::steady_state;
 use super::super::front_ends::{Equations, FrontEnds};
 use super::super::state_transition::{StateTransition, state_transition};
 use super::super::timeline::SamplingInstant;
-use crate::arithmetic::Float512;
+use crate::arithmetic::{DoubleDouble, Float512, Number};
 use crate::units::{FastPeriods, GridTime, Seconds};
 
 /// C of the module's page. `the_pade_form_leaves_at_most_its_remainder` proves it.
@@ -27,9 +27,11 @@ pub(super) const PADE_REMAINDER: f64 = 1.26;
 /// remainder is below 1e-17, and 106 bits resolve it.
 const LEAST_HALF_WIDTH: FastPeriods = FastPeriods(1e-9);
 /// Powers of the transition are small from this row sum on, so that the sum over all of them is known.
-const SMALL_POWER: f64 = 1e-6;
+const SMALL_POWER: f64 = 1e-9;
 /// Doublings of the number of slow periods until then.
 const DOUBLINGS: usize = 20;
+/// Radii and the rest of a sum over it up to which it is resolved.
+const RESOLVED: f64 = 1e-2;
 /// Makes up for the roundings of a sum of bounds in double precision.
 const SUM_OUTWARD: f64 = 1.001;
 
@@ -79,9 +81,9 @@ pub(super) fn cutoff_slope(filter: &Equations) -> Equations {
     }
 }
 
-/// A bound on the norm of the row of one sample per slow period of `filter` behind that of the signal:
-/// with the autocorrelation r of its output for white noise, the square of the norm at an angle w is the
-/// sum over n of r(n M) e^{-i w n}, at most that of |r(n M)|. Infinite if the filters are not seen to be
+/// A bound on the norm of the row of one sample per slow period of `filter` after that of the signal: with
+/// the autocorrelation r of its output for white noise, the square of the norm at an angle w is the sum over
+/// n of r(n M) e^{-i w n}, at most that of |r(n M)|. Infinite if 512 bits do not show that the filters are
 /// stable.
 pub(super) fn row_norm(signal: Option<&Equations>, filter: Equations, ratio: usize) -> f64 {
     let mut front_ends = FrontEnds::driven_by(signal.cloned());
@@ -91,36 +93,44 @@ pub(super) fn row_norm(signal: Option<&Equations>, filter: Equations, ratio: usi
         converter_gain: 1.0,
         time: GridTime::fast_sample(0.0, Seconds(1.0)),
     };
-    let (a, b) = front_ends.dynamics();
-    let StateTransition { transition, gramian } = state_transition(&a, &b, Ball::from(ratio as f64));
-    let row: Matrix = front_ends.output(&sample);
-    let square = steady_state(&transition, &gramian)
-        .and_then(|state| absolute_sum(&row, &transition, &ball::product_transposed(&state, &row)));
+    let short = square_of_row::<DoubleDouble>(&front_ends, &sample, ratio);
+    let square = short.or_else(|| square_of_row::<Float512>(&front_ends, &sample, ratio));
     square.map_or(f64::INFINITY, |square| square.sqrt() * SUM_OUTWARD)
 }
 
-/// A bound on |c x| + 2 sum over n > 0 of |c E^n x|.
-fn absolute_sum(row: &Matrix, transition: &Matrix, x: &Matrix) -> Option<f64> {
+/// A bound on the sum of |r(n M)|; `None` if the precision of F does not suffice.
+fn square_of_row<F: Number>(front_ends: &FrontEnds, sample: &SamplingInstant, ratio: usize) -> Option<f64> {
+    let (a, b) = front_ends.dynamics::<F>();
+    let StateTransition { transition, gramian } = state_transition(&a, &b, Ball::from(ratio as f64));
+    let row = front_ends.output(sample);
+    let state = steady_state(&transition, &gramian)?;
+    absolute_sum(&row, &transition, &ball::product_transposed(&state, &row))
+}
+
+/// A bound on |c x| + 2 sum over n > 0 of |c E^n x|; `None` if that is not resolved.
+fn absolute_sum<F: Number>(row: &Matrix<F>, transition: &Matrix<F>, x: &Matrix<F>) -> Option<f64> {
     let (mut power, mut periods) = (transition.clone(), 1);
-    let is_small = |power: &Matrix| ball::row_sum(power) < SMALL_POWER;
+    let is_small = |power: &Matrix<F>| ball::row_sum(power) < SMALL_POWER;
     while !is_small(&power) {
         if periods >> DOUBLINGS > 0 {
             return None;
         }
         (power, periods) = (ball::product(&power, &power), 2 * periods);
     }
-    let value = |row: &Matrix| ball::product(row, x)[(0, 0)].magnitude();
-    let (mut later, mut sum, mut rows) = (row.clone(), value(row), 0.0);
+    let value = |row: &Matrix<F>| ball::product(row, x)[(0, 0)];
+    let first = value(row);
+    let (mut sum, mut radii, mut rows) = (first.magnitude(), first.radius(), 0.0);
+    let mut later = row.clone();
     for _ in 0..periods {
         later = ball::product(&later, transition);
-        sum += 2.0 * value(&later);
+        let next = value(&later);
+        (sum, radii) = (sum + 2.0 * next.magnitude(), radii + 2.0 * next.radius());
         rows += ball::row_sum(&later);
     }
     // What is left are the same rows times powers of E^periods.
     let largest = x.iter().map(|x| x.magnitude()).fold(0.0, ball::nan_max);
     let rest = 4.0 * SMALL_POWER * rows * largest;
-    let sum = (sum + rest) * SUM_OUTWARD;
-    sum.is_finite().then_some(sum)
+    (radii + rest <= RESOLVED * sum).then_some((sum + rest) * SUM_OUTWARD)
 }
 
 #[cfg(test)]
