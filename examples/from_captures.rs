@@ -4,14 +4,14 @@
 //! `cargo run --release --example from_captures`
 
 use hybank::calibrate::{self, CalibrationSignal, Record, applied, calibrate};
+use hybank::design::uncertainty::BoxStudy;
 use hybank::design::{Problem, design};
 use hybank::measure::{self, measure};
 use hybank::pipeline::{self, GapPolicy, fuse};
 use hybank::runtime::{Options, Planar};
 use hybank::simulate::{Analog, Source, capture};
-use hybank::spec::Spec;
+use hybank::spec::{ErrorBox, Spec};
 use hybank::units::{Hertz, Seconds};
-use hybank::verify::uncertainty::ErrorBox;
 use hybank::verify::verify;
 use std::error::Error;
 
@@ -52,8 +52,9 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let bank = design(&measured, &Default::default())?.bank;
     let proven = verify(&bank)?;
-    let errors = ErrorBox { delays: vec![Seconds(1e-9); 2], ..ErrorBox::none(2) };
-    let worst = hybank::design::uncertainty::worst_case(&bank, &errors, 0.05)?;
+    let late = Seconds(1e-9).in_fast_periods(bank.fast_period);
+    let errors = ErrorBox { delays: vec![late; 2], ..ErrorBox::none(2) };
+    let worst = BoxStudy::new(&bank, &errors)?;
     println!("gamma at most {:.4e}, with delays 1 ns off {:.4e}", proven.upper, worst.upper);
 
     let mut tone = captured(&built, "tones:3.1kHz")?;

@@ -200,7 +200,6 @@ fn of_proof(error: &VerifyError) -> Option<&'static str> {
         VerifyError::NoCertificate => {
             Some("`hybank design` writes one, and `hybank verify --search` searches for one")
         }
-        VerifyError::WideBox => Some("the box is that of --delay-box, --gain-box and --cutoff-box"),
         _ => None,
     }
 }

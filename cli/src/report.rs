@@ -80,7 +80,7 @@ impl Args {
         let mut commands = vec![
             "hybank design spec.toml -o bank.json  # the spec above, saved as spec.toml".to_owned(),
             format!("hybank verify {bank}"),
-            format!("hybank analyze {bank} --sensitivity"),
+            format!("hybank analyze {bank} --delay-box 0.001samples"),
             format!("hybank plot {bank} -o pictures"),
         ];
         if !self.inputs.is_empty() {

@@ -3,19 +3,19 @@
 use crate::filters::chart;
 use crate::{Figure, Outcome};
 use hybank::bank::Bank;
-use hybank::design::uncertainty::norm_at;
-use hybank::units::Seconds;
-use hybank::verify::uncertainty::ErrorPoint;
+use hybank::design::norm_at;
+use hybank::spec::ErrorPoint;
+use hybank::units::FastPeriods;
 
-/// Largest error of a delay, in fast samples, which are seconds here.
+/// Largest error of a delay, in fast samples.
 const LARGEST: f64 = 0.1;
 /// Points of a curve on either side of zero.
 const HALF: i32 = 10;
 
 pub(super) fn figure(bank: &Bank) -> Outcome<Figure> {
     let gamma = |first: f64, second: f64| -> Outcome<f64> {
-        let delays = vec![Seconds(first), Seconds(second)];
-        Ok(norm_at(bank, &ErrorPoint { delays, ..ErrorPoint::none(bank.channel_count()) })?.0)
+        let delays = vec![FastPeriods(first), FastPeriods(second)];
+        Ok(norm_at(bank, &ErrorPoint::of_delays(delays))?)
     };
     let mut curves = Vec::new();
     let mut worst: f64 = 0.0;

@@ -341,11 +341,7 @@ def analyze(
     delay_box: _Values | None = None,
     gain_box: _Values | None = None,
     cutoff_box: _Values | None = None,
-    jitter: _Values | None = None,
     reference: int | Literal["none"] | None = None,
-    accuracy: float | str | None = None,
-    sensitivity: bool = False,
-    sweep: bool = False,
 ) -> Analysis: ...
 def align(
     x: Sequence[ArrayLike] | ArrayLike | _Files | Captures,

@@ -63,8 +63,7 @@ def verify(bank, *, search=False):
 
 @checked
 def analyze(
-    bank, *, delay_error=None, certify=False, delay_box=None, gain_box=None, cutoff_box=None, jitter=None, reference=None,
-    accuracy=None, sensitivity=False, sweep=False
+    bank, *, delay_error=None, certify=False, delay_box=None, gain_box=None, cutoff_box=None, reference=None
 ):
     """The error of a bank, with its own delays or with others, and its worst case over boxes of errors.
 
@@ -77,18 +76,10 @@ def analyze(
     certify : bool
         Also prove an upper bound of gamma.
     delay_box, gain_box, cutoff_box : float or str or list, optional
-        Prove the worst case over delays (seconds or "10ps"), gains and cut-offs (0.01 or "1%") that are off by up to
+        Bound the worst case over delays (seconds or "10ps"), gains and cut-offs (0.01 or "1%") that are off by up to
         this much, one value for all channels but the reference or one per channel.
-    jitter : float or str or list, optional
-        Bound what instants that jitter by up to this much may add.
     reference : int or "none", optional
         The channel, from 1, to which the errors are relative; the first one where one value is given for all.
-    accuracy : float or str, optional
-        Find the largest part of the box that costs at most this share of gamma.
-    sensitivity : bool
-        Also the derivatives of gamma with respect to the delays.
-    sweep : bool
-        Also gamma along the delays of the box.
 
     Returns
     -------
@@ -96,15 +87,11 @@ def analyze(
 
     Examples
     --------
-    >>> found = hb.analyze(bank, delay_box=0.01, sensitivity=True)
-    >>> found.worst_case.lower <= found.worst_case.upper
+    >>> found = hb.analyze(bank, delay_box=0.01)
+    >>> found.gamma <= found.worst_case.attained <= found.worst_case.upper
     True
-    >>> len(found.sensitivity.per_second)
-    2
     """
-    return _hybank.analyze(
-        bank, delay_error, certify, delay_box, gain_box, cutoff_box, jitter, reference, accuracy, sensitivity, sweep
-    )
+    return _hybank.analyze(bank, delay_error, certify, delay_box, gain_box, cutoff_box, reference)
 
 
 @checked

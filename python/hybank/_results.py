@@ -294,17 +294,13 @@ class Analysis:
     scale
         gamma of zero output and of plain interleaving, and the rms of the reference.
     figures
-        The figures of the bank; None with other delays than its own.
+        The figures of the bank with its own delays.
+    with_errors
+        The signal-to-noise ratio and the largest image with the delays that are given; None without any.
     certified
         A proven upper bound of gamma; None unless asked for, as all below.
     worst_case
-        The worst case over the box of errors, proven from both sides.
-    sensitivity
-        The derivatives of gamma with respect to the delays.
-    jitter
-        What jitter adds to gamma at most.
-    sweep
-        gamma along the delays of the box.
+        A proven bound of gamma over the box of errors, and the largest gamma found.
     """
 
     gamma: float
@@ -314,12 +310,10 @@ class Analysis:
     noise_gain: float
     output_noise: float
     scale: Record
-    figures: Figures | None = None
+    figures: Figures
+    with_errors: Record | None = None
     certified: Record | None = None
     worst_case: Record | None = None
-    sensitivity: Record | None = None
-    jitter: Record | None = None
-    sweep: Record | None = None
 
     def __repr__(self):
         names = ("gamma", "peak_hertz", "noncausal", "rms_error", "noise_gain", "output_noise")

@@ -64,7 +64,7 @@ pub(crate) fn page(
     let mut commands = vec![
         "bank = hybank.design(\"spec.toml\")  # the spec above, saved as spec.toml".to_owned(),
         "hybank.verify(bank)".to_owned(),
-        "hybank.analyze(bank, sensitivity=True)".to_owned(),
+        "hybank.analyze(bank, delay_box=\"0.001samples\")".to_owned(),
     ];
     commands.push(match given {
         None => format!("bank.report({:?})", path.display().to_string()),

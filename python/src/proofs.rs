@@ -7,8 +7,10 @@ use crate::results::{FiguresReport, of_report};
 use crate::sources;
 use crate::values::{shares, times};
 use hybank::bank::{self, check_digest};
-use hybank::design::uncertainty::{BoxWidths, ErrorStudy, Questions, ReferenceChannel, RefusedBox, Sweep};
+use hybank::design::uncertainty::{BoxStudy, BoxWidths, ReferenceChannel, RefusedBox};
 use hybank::design::{self, DesignError};
+use hybank::figures::KeyFigures;
+use hybank::spec::ErrorBox;
 use hybank::units::Seconds;
 use hybank::verify as checker;
 use pyo3::prelude::*;
@@ -48,7 +50,6 @@ fn proven(bank: &bank::Bank, search: bool) -> Result<checker::Verified, String> 
 
 /// The error of a bank, with the delays of its spec or with others, and over boxes of errors.
 #[pyfunction]
-#[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
 pub(crate) fn analyze<'py>(
     bank: &Bound<'py, PyAny>,
     delay_error: Option<&Bound<'py, PyAny>>,
@@ -56,11 +57,7 @@ pub(crate) fn analyze<'py>(
     delay_box: Option<&Bound<'py, PyAny>>,
     gain_box: Option<&Bound<'py, PyAny>>,
     cutoff_box: Option<&Bound<'py, PyAny>>,
-    jitter: Option<&Bound<'py, PyAny>>,
     reference: Option<&Bound<'py, PyAny>>,
-    accuracy: Option<&Bound<'py, PyAny>>,
-    sensitivity: bool,
-    sweep: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = bank.py();
     let given = Given::new(bank)?;
@@ -68,34 +65,19 @@ pub(crate) fn analyze<'py>(
         delay_box: times("delay_box", delay_box)?,
         gain_box: shares("gain_box", gain_box)?,
         cutoff_box: shares("cutoff_box", cutoff_box)?,
-        jitter: times("jitter", jitter)?,
         reference: reference.map(reference_channel).transpose()?,
     };
     let bad = |refused_box: RefusedBox| refused(format!("{}: {refused_box}", refused_box.field));
     let own = times("delay_error", delay_error)?;
     let own: Vec<Seconds> = own.iter().map(|error| error.in_seconds(given.bank.fast_period)).collect();
-    let questions = Questions {
-        errors: widths.error_box(&given.bank).map_err(bad)?,
-        jitter: widths.jitter_of(&given.bank).map_err(bad)?,
-        sensitivity,
-        loss: shares("accuracy", accuracy)?.first().copied(),
-    };
-    let is_asked = certify || sensitivity || questions.errors.is_some() || questions.jitter.is_some();
-    if is_asked && !own.is_empty() {
+    let errors = widths.error_box(&given.bank).map_err(bad)?;
+    if (certify || errors.is_some()) && !own.is_empty() {
         return Err(refused(
             "delay_error: proofs and boxes are those of the bank's own delays; leave it out",
         ));
     }
-    if (sweep || questions.loss.is_some()) && questions.errors.is_none() {
-        return Err(refused(
-            "accuracy and sweep need a box of errors; give delay_box, gain_box or cutoff_box",
-        ));
-    }
-    if questions.loss.is_some_and(|loss| loss.is_nan() || loss <= 0.0 || loss > 100.0) {
-        return Err(refused("accuracy: the loss is a share of gamma above 0, such as 0.01 or \"1%\""));
-    }
     let bank_in = Arc::clone(&given.bank);
-    let found = background::run(py, None, move |_| Studied::new(&bank_in, &own, certify, questions, sweep))?;
+    let found = background::run(py, None, move |_| Studied::new(&bank_in, &own, certify, errors.as_ref()))?;
     of_report(py, "Analysis", &found.map_err(|error| refused_in(&given.name, error))?)
 }
 
@@ -114,11 +96,10 @@ struct Studied {
     #[serde(flatten)]
     analysis: design::Analysis,
     scale: design::GammaScale,
-    figures: Option<FiguresReport>,
+    figures: FiguresReport,
+    with_errors: Option<KeyFigures>,
     certified: Option<design::Certified>,
-    #[serde(flatten)]
-    study: ErrorStudy,
-    sweep: Option<Sweep>,
+    worst_case: Option<BoxStudy>,
 }
 
 impl Studied {
@@ -126,19 +107,17 @@ impl Studied {
         bank: &bank::Bank,
         delay_errors: &[Seconds],
         certify: bool,
-        questions: Questions,
-        sweep: bool,
+        errors: Option<&ErrorBox>,
     ) -> Result<Self, DesignError> {
-        let study = ErrorStudy::new(bank, questions)?;
-        let swept = study.worst_case.as_ref().filter(|_| sweep);
-        let sweep = swept.map(|worst| Sweep::new(bank, &worst.errors, &worst.case.point)).transpose()?;
+        let point = design::delay_point(bank, delay_errors)?;
+        let with_errors = (!delay_errors.is_empty()).then(|| KeyFigures::new(&bank.with_errors(&point)));
         Ok(Self {
             analysis: design::analyze(bank, delay_errors)?,
             scale: design::GammaScale::new(bank, delay_errors)?,
-            figures: delay_errors.is_empty().then(|| FiguresReport::new(bank)).transpose()?,
+            figures: FiguresReport::new(bank)?,
+            with_errors: with_errors.transpose()?,
             certified: certify.then(|| design::certify(bank)).transpose()?,
-            study,
-            sweep,
+            worst_case: errors.map(|errors| BoxStudy::new(bank, errors)).transpose()?,
         })
     }
 }

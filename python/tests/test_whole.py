@@ -96,22 +96,17 @@ def test_an_imaginary_part_is_the_other_half_of_a_complex_signal(bank):
 
 
 def test_worst_cases_over_boxes_are_those_of_the_command_line(folder, binary):
-    flags = ["--delay-box", "0.02samples", "--gain-box", "0.2%", "--accuracy", "5%", "--sensitivity", "--jitter", "1ns"]
+    flags = ["--delay-box", "0.02samples", "--gain-box", "0.2%"]
     want = json.loads(run(binary, folder, "analyze", "bank.json", *flags, "--certify", "--json"))
-    found = hb.analyze(
-        folder / "bank.json", delay_box="0.02samples", gain_box=0.002, accuracy="5%", sensitivity=True, jitter=1e-9,
-        certify=True, sweep=True,
-    )
+    found = hb.analyze(folder / "bank.json", delay_box="0.02samples", gain_box=0.002, certify=True)
     as_json = lambda value: json.loads(json.dumps(value, default=lambda record: dict(record)))  # noqa: E731
-    for name in ("worst_case", "sensitivity", "jitter", "certified", "scale"):
+    for name in ("worst_case", "certified", "scale"):
         assert as_json(getattr(found, name)) == want[name], name
-    assert found.gamma == want["gamma"] <= found.worst_case.lower <= found.worst_case.upper
-    # The curve through the worst point has the gamma of the bank in its middle, and the worst case at an end.
-    sweep = found.sweep
-    assert sweep.shares[20] == 0.0 and sweep.curves[-1].gammas[20] == pytest.approx(found.gamma, rel=1e-6)
-    assert max(sweep.curves[-1].gammas) <= found.worst_case.upper
+    assert found.gamma == want["gamma"] <= found.worst_case.attained <= found.worst_case.upper
     plain = hb.analyze(folder / "bank.json")
-    assert plain.worst_case is plain.sensitivity is plain.jitter is plain.certified is plain.sweep is None
+    assert plain.worst_case is plain.certified is plain.with_errors is None
+    moved = hb.analyze(folder / "bank.json", delay_error="0.02samples")
+    assert moved.with_errors.snr_db < plain.figures.snr.total_db
     own = hb.analyze(folder / "bank.json", delay_box=[0, "0.02samples"])
     assert own.worst_case.errors.delays[0] == 0 < own.worst_case.errors.delays[1]
 
@@ -122,11 +117,7 @@ def test_wrong_boxes_name_their_keyword(bank):
         ({"gain_box": "60%"}, "^gain_box: .*50%"),
         ({"delay_box": 1e-9, "reference": 3}, "^reference: .*2 channels"),
         ({"delay_box": 1e-9, "reference": "all"}, "^reference: .*none"),
-        ({"sweep": True}, "delay_box"),
-        ({"accuracy": "1%"}, "delay_box"),
-        ({"delay_box": 1e-9, "accuracy": 0}, "^accuracy: "),
         ({"delay_box": 1e-9, "delay_error": 1e-9}, "^delay_error: "),
-        ({"jitter": [1e-9] * 3}, "^jitter: 3 values"),
     ]:
         with pytest.raises(hb.HybankError, match=words):
             hb.analyze(bank, **given)

@@ -22,6 +22,7 @@
 //! Finally every state is scaled by a power of two so that its impulse response has unit energy up to
 //! rounding to that power: no state is large only because its pole is fast.
 
+mod cutoff;
 mod error;
 mod families;
 pub mod fit;
@@ -36,6 +37,7 @@ mod signal;
 mod square_free;
 mod strictly_proper;
 
+pub(crate) use cutoff::CutoffRemainder;
 pub(crate) use proportion::proportion;
 pub(crate) use section::Realisation;
 pub(crate) use signal::{SignalFilter, resolved_band, signal};

@@ -153,6 +153,17 @@ impl<T: Written> Chain<T> {
         Self { gain: T::from(1.0), blocks: vec![Block::State(state)] }
     }
 
+    /// H(s / factor), a positive number.
+    pub(super) fn stretched(&self, factor: T) -> Self {
+        let stretched = |block: &Block<T>| match block {
+            Block::Section(Section { poles, zeros }) => {
+                Block::Section(Section { poles: poles.scaled(factor), zeros: zeros.scaled(factor) })
+            }
+            Block::State(state) => Block::State(state.stretched(factor)),
+        };
+        Self { gain: self.gain, blocks: self.blocks.iter().map(stretched).collect() }
+    }
+
     /// The blocks in series. The gain is applied at the output, so that states keep their size.
     pub(super) fn realise(&self) -> Realisation<T> {
         self.blocks

@@ -84,6 +84,16 @@ impl<T: Real> Roots<T> {
         }
     }
 
+    /// Each root times a positive number.
+    pub(super) fn scaled(self, by: T) -> Self {
+        match self {
+            Self::None => Self::None,
+            Self::One(r) => Self::One(r * by),
+            Self::Two(r1, r2) => Self::Two(r1 * by, r2 * by),
+            Self::Conjugate { re, im } => Self::Conjugate { re: re * by, im: im * by },
+        }
+    }
+
     /// Quality factor of a pole pair; 1/2 and below for real ones.
     pub(super) fn quality(self) -> f64 {
         match self {

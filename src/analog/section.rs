@@ -100,7 +100,7 @@ impl<T: Real> Realisation<T> {
     }
 
     /// `self` followed by `next`.
-    pub(super) fn then(&self, next: &Self) -> Self {
+    pub(crate) fn then(&self, next: &Self) -> Self {
         let (n, k) = (self.a.nrows(), next.a.nrows());
         let mut a = DMatrix::from_element(n + k, n + k, T::from(0.0));
         a.view_mut((0, 0), (n, n)).copy_from(&self.a);
@@ -111,6 +111,11 @@ impl<T: Real> Realisation<T> {
         let passed = self.c.map(|x| x * next.d);
         let c = DMatrix::from_iterator(1, n + k, passed.iter().chain(&next.c).copied());
         Self { a, b, c, d: self.d * next.d }
+    }
+
+    /// H(s / factor).
+    pub(super) fn stretched(&self, factor: T) -> Self {
+        Self { a: self.a.map(|x| x * factor), b: self.b.map(|x| x * factor), ..self.clone() }
     }
 
     /// The output times `gain`.

@@ -166,6 +166,16 @@ impl StrictlyProper {
         filter.check()?;
         StableFilter::driven_by(signal, filter, fast_period).map(Self)
     }
+
+    /// Phi(s / `factor`): every pole and zero times a positive number.
+    pub(crate) fn with_cutoff_scaled(&self, factor: f64) -> Self {
+        let Self(StableFilter { chain, poles, realisation }) = self;
+        Self(StableFilter {
+            chain: chain.stretched(factor),
+            poles: poles.iter().map(|pole| pole * factor).collect(),
+            realisation: realisation.stretched(factor),
+        })
+    }
 }
 
 /// The state equations of a written filter that has been realised as a [`StableFilter`], enclosed: those of

@@ -22,7 +22,7 @@ pub(crate) use big_float::{BigFloat, Float512};
 pub(crate) use cartesian::{Cartesian, ComplexBall};
 pub(crate) use double_double::DoubleDouble;
 pub(crate) use number::Number;
-pub(crate) use real::Real;
+pub(crate) use real::{Entry, Real};
 
 use std::ops::{AddAssign, SubAssign};
 

@@ -7,8 +7,8 @@ use crate::spec::{
 use crate::units::Seconds;
 
 use super::{
-    Bank, BankError, BankProblem, Certificate, FixedPoint, GainWitness, Gamma, Proof, StateSpace,
-    SynthesisFilters,
+    Bank, BankError, BankProblem, BoxProof, Certificate, FixedPoint, GainWitness, Gamma, NormBound, Proof,
+    StateSpace, SynthesisFilters,
 };
 
 /// Largest m0 in a bank file. `fuse` appends as many zeros to a recording; 16 million are 3 minutes at 96
@@ -154,9 +154,10 @@ impl Bank {
     }
 
     fn check_proof(&self) -> Checked {
-        let Some(Proof { upper }) = &self.proof else { return Ok(()) };
+        let Some(Proof { upper, worst_case }) = &self.proof else { return Ok(()) };
         check_certificate(upper)?;
-        check_witness("proof.upper.peak", &upper.peak, self.ratio)
+        check_witness("proof.upper.peak", &upper.peak, self.ratio)?;
+        worst_case.as_ref().map_or(Ok(()), check_box_proof)
     }
 
     fn check_scalars(&self) -> Checked {
@@ -317,6 +318,16 @@ fn check_certificate(certificate: &Certificate) -> Checked {
     let (rows, rule) = (certificate.factor.len(), "the correction has as many rows as the factor");
     check_length("proof.upper.correction", certificate.correction.len(), rows, "rows", rule)?;
     check_triangle("proof.upper.correction", &certificate.correction)
+}
+
+fn check_box_proof(proof: &BoxProof) -> Checked {
+    check_sizes("proof.worst_case.scales", &proof.scales)?;
+    for (key, NormBound { norm, factor }) in [("filters", &proof.filters), ("slopes", &proof.slopes)] {
+        let path = format!("proof.worst_case.{key}");
+        check_norm(&format!("{path}.norm"), *norm)?;
+        check_triangle(&format!("{path}.factor"), factor)?;
+    }
+    Ok(())
 }
 
 fn check_triangle(path: &str, rows: &[Vec<f64>]) -> Checked {

@@ -18,7 +18,7 @@ mod taps;
 pub use check::MAX_BANK_LATENCY;
 pub use digest::check_digest;
 pub use error::{BankError, BankProblem};
-pub use proof::{Certificate, GainWitness, Proof};
+pub use proof::{BoxProof, Certificate, GainWitness, NormBound, Proof};
 pub use taps::FixedPoint;
 #[cfg(feature = "design")]
 pub(crate) use taps::signed_digits;
@@ -27,7 +27,7 @@ pub use crate::runtime::StateSpace;
 pub use crate::spec::{FrameLayout, FrameSample};
 
 use crate::runtime::{BuildError, Options, Plan, Shape};
-use crate::spec::{Method, Spec};
+use crate::spec::{ErrorPoint, Method, Spec};
 use crate::units::{FastPeriods, GridTime, Seconds};
 
 /// `format` of a bank file.
@@ -172,6 +172,21 @@ impl Bank {
             spec.design.digits = false;
         }
         Some(spec)
+    }
+
+    /// The same filters after converters with these errors; their gammas are unknown.
+    #[must_use]
+    pub fn with_errors(&self, point: &ErrorPoint) -> Self {
+        let delay = |(delay, error): (&Seconds, &FastPeriods)| *delay + error.in_seconds(self.fast_period);
+        let gain = |(gain, error): (&f64, &f64)| gain * (1.0 + error);
+        Self {
+            spec: self.spec.as_ref().map(|spec| spec.with_errors(point)),
+            delays: self.delays.iter().zip(&point.delays).map(delay).collect(),
+            gains: self.gains.iter().zip(&point.gains).map(gain).collect(),
+            gamma: Gamma::default(),
+            proof: None,
+            ..self.clone()
+        }
     }
 
     /// The number of converters.

@@ -9,6 +9,33 @@ use serde::{Deserialize, Serialize};
 pub struct Proof {
     /// For `gamma.upper`, from above and from below.
     pub upper: Certificate,
+    /// For `gamma.worst_case`, beside `upper`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub worst_case: Option<BoxProof>,
+}
+
+/// Bounds of what the errors of the spec's `[uncertainty]` change: of the filters over D, and of D times the
+/// uncertain rows. `verify` multiplies them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoxProof {
+    /// D: a positive number for each uncertain delay, gain and cut-off of each sample of a frame, in this
+    /// order.
+    pub scales: Vec<f64>,
+    /// Of the filters.
+    pub filters: NormBound,
+    /// Of the rows.
+    pub slopes: NormBound,
+}
+
+/// Certificate that a norm is below a number.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NormBound {
+    /// The number.
+    pub norm: f64,
+    /// Lower triangular R, row by row, with P = R R' of the bounded-real lemma.
+    pub factor: Vec<Vec<f64>>,
 }
 
 /// Certificate that the norm of a bank is below a gamma, and a frequency at which its gain is close to that

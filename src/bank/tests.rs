@@ -105,7 +105,9 @@ fn with_proof() -> Bank {
     let factor = vec![vec![0.1], vec![0.2, 1.0 / 3.0], vec![1e-9, -2.5, 7.0]];
     let correction = vec![vec![1e-18], vec![-3e-18, 0.0], vec![0.0, 2e-17, 1e-17]];
     let upper = Certificate { gamma: 0.04, peak, factor, correction };
-    Bank { proof: Some(Proof { upper }), ..fir() }
+    let norm = |norm: f64| NormBound { norm, factor: vec![vec![0.5], vec![-1.0 / 3.0, 2.0]] };
+    let worst_case = Some(BoxProof { scales: vec![0.25, 1e-9], filters: norm(1.5), slopes: norm(0.1) });
+    Bank { proof: Some(Proof { upper, worst_case }), ..fir() }
 }
 
 #[test]

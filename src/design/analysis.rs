@@ -10,8 +10,8 @@ use crate::bank::Bank;
 use crate::linalg::Mat;
 use crate::lti::StateSpace;
 use crate::lti::gramian::h2_norm;
+use crate::spec::ErrorPoint;
 use crate::units::{FastPeriods, Hertz, RadiansPerSlowPeriod, Seconds};
-use std::borrow::Cow;
 
 /// The error of a bank with given front ends and delays.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -60,10 +60,12 @@ pub struct MeanAnalysis {
 /// one error per channel, [`DesignError::TooLate`] for delays that need too many delay-chain states,
 /// [`DesignError::Lti`] for unstable filters.
 pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, DesignError> {
-    let shifted = shifted(bank, delay_errors)?;
-    let plant = LiftedPlant::new(&shifted);
-    let peak = resolved_norm(&moved_by(bank, delay_errors), plant.bank_norm(&bank.filters)?)?;
-    let noncausal = if shifted.resolves_delays() { Some(plant.noncausal_bound()?.gain) } else { None };
+    let point = delay_point(bank, delay_errors)?;
+    let problem = perturbed(bank, &point)?;
+    let plant = LiftedPlant::new(&problem);
+    let moved = delay_errors.iter().any(|error| error.0 != 0.0).then(|| bank.with_errors(&point));
+    let peak = resolved_norm(moved.as_ref().unwrap_or(bank), plant.bank_norm(&bank.filters)?)?;
+    let noncausal = if problem.resolves_delays() { Some(plant.noncausal_bound()?.gain) } else { None };
     Ok(Analysis {
         gamma: peak.gain,
         peak_hertz: RadiansPerSlowPeriod(peak.frequency).in_hertz(bank.slow_period()),
@@ -72,33 +74,35 @@ pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, Design
     })
 }
 
-/// The problem of the bank with `delay_errors[i]` added to its delays.
-fn shifted(bank: &Bank, delay_errors: &[Seconds]) -> Result<Problem, DesignError> {
-    let problem = Problem::of_bank(bank)?;
-    let count = bank.channel_count();
-    if !delay_errors.is_empty() && delay_errors.len() != count {
-        return Err(DesignError::DelayErrorCount { given: delay_errors.len(), channels: count });
+/// The errors of the delays alone; an empty slice means none.
+///
+/// # Errors
+/// [`DesignError::DelayErrorCount`] unless there is one per channel.
+pub fn delay_point(bank: &Bank, delay_errors: &[Seconds]) -> Result<ErrorPoint, DesignError> {
+    let (given, channels) = (delay_errors.len(), bank.channel_count());
+    if given == 0 {
+        return Ok(ErrorPoint::none(channels));
     }
-    let mut errors = vec![FastPeriods(0.0); count];
-    for (error, given) in errors.iter_mut().zip(delay_errors) {
-        *error = given.in_fast_periods(bank.fast_period);
+    if given != channels {
+        return Err(DesignError::DelayErrorCount { given, channels });
     }
-    let shifted = problem.with_delay_errors(&errors);
-    shifted.check_size()?;
-    Ok(shifted)
+    let delays = delay_errors.iter().map(|error| error.in_fast_periods(bank.fast_period)).collect();
+    Ok(ErrorPoint::of_delays(delays))
 }
 
-/// The bank with `delay_errors[i]` added to its delays.
-fn moved_by<'a>(bank: &'a Bank, delay_errors: &[Seconds]) -> Cow<'a, Bank> {
-    if delay_errors.iter().all(|error| error.0 == 0.0) {
-        return Cow::Borrowed(bank);
-    }
-    let mut moved = Bank { proof: None, ..bank.clone() };
-    let channels = moved.spec.iter_mut().flat_map(|spec| &mut spec.channels);
-    let delays = channels.map(|channel| &mut channel.delay);
-    let pairs = delays.zip(delay_errors).chain(moved.delays.iter_mut().zip(delay_errors));
-    pairs.for_each(|(delay, error)| delay.0 += error.0);
-    Cow::Owned(moved)
+/// The problem of the bank with these errors.
+fn perturbed(bank: &Bank, point: &ErrorPoint) -> Result<Problem, DesignError> {
+    let problem = Problem::of_bank(bank)?.perturbed(point);
+    problem.check_size()?;
+    Ok(problem)
+}
+
+/// The norm of `bank` with the errors of `point`, in double precision.
+///
+/// # Errors
+/// As [`analyze`].
+pub fn norm_at(bank: &Bank, point: &ErrorPoint) -> Result<f64, DesignError> {
+    Ok(LiftedPlant::new(&perturbed(bank, point)?).bank_norm(&bank.filters)?.gain)
 }
 
 /// Only the averages of [`analyze`], with the bank's own front ends and delays. For a large bank this takes
@@ -155,7 +159,7 @@ impl GammaScale {
     /// As [`analyze`].
     pub fn new(bank: &Bank, delay_errors: &[Seconds]) -> Result<Self, DesignError> {
         let problem = Problem::of_bank(bank)?;
-        let plant = LiftedPlant::new(&shifted(bank, delay_errors)?);
+        let plant = LiftedPlant::new(&perturbed(bank, &delay_point(bank, delay_errors)?)?);
         let zero = StateSpace::gain(Mat::zeros(problem.ratio, problem.channels.len()));
         let reference = plant.reference();
         Ok(Self {

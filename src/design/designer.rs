@@ -12,13 +12,12 @@ use super::realise::{Realised, realise};
 use super::reduction::OrderReduction;
 use super::sizing::{Comparison, Sizing, settings};
 use super::unfinished::Unfinished;
-use super::{DesignError, filters, prove, uncertainty};
+use super::{DesignError, filters, prove};
 use crate::analog::SignalFilter;
 use crate::bank::{Bank, Gamma, SynthesisFilters};
 use crate::spec::{At, DesignSpec, Method, Spec, SpecProblem};
 use crate::units::RadiansPerSlowPeriod;
-use crate::verify::uncertainty::{ErrorBox, certifies};
-use crate::verify::{Verified, VerifyError};
+use crate::verify::Verified;
 use std::time::{Duration, Instant};
 
 /// A bank with the record of its design.
@@ -233,33 +232,11 @@ impl Design {
 }
 
 impl Design {
-    /// States the worst case over the box of the spec, or says why there is none.
+    /// States the worst case over the box of the spec of a robust bank, or says why there is none.
     fn prove_worst_case(&mut self, stop: &Stop) {
-        let Some(study) = &self.robust else { return };
-        let proven = match stop.is_due() {
-            true => Err(DesignError::Stopped),
-            false => proven_worst_case(&self.bank, &study.errors),
-        };
-        self.bank.gamma.worst_case = proven.as_ref().ok().copied();
-        self.box_unproven = proven.err();
-    }
-}
-
-/// Accuracy of the proven end of the worst case, and the margin for the rounding of its number.
-const WORST_CASE_ACCURACY: f64 = 0.005;
-const STATED_ABOVE: f64 = 1e-9;
-
-/// A worst case over `errors` that `verify` proves.
-///
-/// # Errors
-/// As [`uncertainty::worst_case`]; [`VerifyError::WorstCase`] if `verify` does not prove the number that was
-/// found.
-fn proven_worst_case(bank: &Bank, errors: &ErrorBox) -> Result<f64, DesignError> {
-    let found = uncertainty::worst_case(bank, errors, WORST_CASE_ACCURACY)?;
-    let stated = found.upper * (1.0 + STATED_ABOVE);
-    match certifies(bank, errors, stated)? {
-        true => Ok(stated),
-        false => Err(VerifyError::WorstCase { stated }.into()),
+        if self.robust.is_some() {
+            self.box_unproven = prove::attach_box_proof(&mut self.bank, stop).err();
+        }
     }
 }
 

@@ -37,10 +37,8 @@ const SWEEPS: Range = Range { least: 5.0, most: 25.0 };
 /// Points on each side of a box of errors that count as scenarios of a robust design, and the most of all.
 const STEPS: [f64; 4] = [9.0, 5.0, 3.0, 2.0];
 const MOST_SCENARIOS: f64 = 64.0;
-/// Norms of each scenario of a robust design, and operations of the proof over its box: a limit holds for
-/// them.
+/// Norms of each scenario of a robust design.
 const NORMS_OF_SCENARIOS: Range = Range { least: 1.0, most: 4.0 };
-const BOX_PROOF_OPERATIONS: Range = Range { least: 3e9, most: 1e11 };
 /// Operations of the refinement of poles, likewise.
 const POLE_REFINEMENT_OPERATIONS: f64 = 1.5e11;
 /// Histories through which the smoother passes for an open number of taps, whose lengths are doubled and
@@ -81,7 +79,8 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
         effort = effort.then(sizes.integers().times(Range { least: 1.0, most }));
     }
     if proving && RobustProblem::of(spec).is_some() {
-        effort = effort.then(Effort::of(1.0, 0.0).times(BOX_PROOF_OPERATIONS));
+        // The norm of the filters over the box has a certificate like that of gamma.
+        effort = effort.then(sizes.proof());
     }
     if spec.design.reduction().is_some() {
         // A norm for each order that is visited, and the refinement of its poles.
@@ -226,7 +225,7 @@ impl Sizes {
     /// An exchange of frequencies, or of pairs of a frequency and a scenario: blocks of order M + N at each
     /// point, and the Newton matrix of the taps.
     fn exchange(&self, robust: Option<RobustProblem>) -> Effort {
-        let scenarios = robust.map_or(0.0, |problem| scenarios(problem.errors.sides().len()));
+        let scenarios = robust.map_or(0.0, |problem| scenarios(problem.errors.sides()));
         let (n, m, p) = (self.channels, self.ratio, self.outputs());
         let unknowns = n * self.taps;
         let points = self.points();

@@ -42,8 +42,6 @@ struct Sample {
     gain: f64,
     /// Index of its instant.
     instant: usize,
-    /// Whether the derivative with respect to time is sampled.
-    slope: bool,
 }
 
 /// The exactly equivalent lifted system of `problem`.
@@ -61,27 +59,11 @@ pub(super) fn lift(problem: &Problem) -> Lifted {
     Lifted { system, chains, undelayed: undelayed.compress_inputs(), delays }
 }
 
-/// The outputs [y; y'; z] without their delays by whole periods, and these delays. y' are the derivatives of
-/// the measurements with respect to time, so -y' those with respect to the delays. Front ends of relative
-/// degree 1 have none: their slope contains the input itself, which is left out here.
-pub(super) fn lift_with_slopes(problem: &Problem) -> (StateSpace, Vec<usize>) {
-    let timeline = problem.timeline();
-    let mut samples = samples(problem, &timeline);
-    let slopes: Vec<Sample> =
-        samples[..problem.channels.len()].iter().map(|&sample| Sample { slope: true, ..sample }).collect();
-    let mut delays = delays(&timeline);
-    let at = problem.channels.len();
-    delays.splice(at..at, delays[..at].to_vec());
-    samples.splice(at..at, slopes);
-    (follow_state(problem, &timeline, &samples).compress_inputs(), delays)
-}
-
 /// The samples of all outputs, the measurements first.
 fn samples(problem: &Problem, timeline: &Timeline) -> Vec<Sample> {
     let measured = problem.channels.iter().map(|channel| (channel.front_end, channel.gain));
     let references = (0..problem.ratio).map(|_| (problem.target, 1.0));
-    let sample =
-        |(index, (front_end, gain))| Sample { front_end, gain, instant: timeline.of(index), slope: false };
+    let sample = |(index, (front_end, gain))| Sample { front_end, gain, instant: timeline.of(index) };
     measured.chain(references).enumerate().map(sample).collect()
 }
 
@@ -102,8 +84,7 @@ fn follow_state(problem: &Problem, timeline: &Timeline, samples: &[Sample]) -> S
         (state, input) = joint.advance(&state, &input, now.since(before).0);
         before = now;
         for (row, sample) in rows.iter_mut().zip(samples).filter(|(_, sample)| sample.instant == instant) {
-            let outputs = if sample.slope { &joint.slopes } else { &joint.c };
-            let output = outputs.rows(sample.front_end, 1) * sample.gain;
+            let output = joint.c.rows(sample.front_end, 1) * sample.gain;
             *row = (&output * &state, &output * &input);
         }
     }

@@ -28,7 +28,9 @@ pub mod uncertainty;
 mod unfinished;
 mod warnings;
 
-pub use analysis::{Analysis, GammaScale, MeanAnalysis, analyze, analyze_mean, noise_gain};
+pub use analysis::{
+    Analysis, GammaScale, MeanAnalysis, analyze, analyze_mean, delay_point, noise_gain, norm_at,
+};
 pub(crate) use analysis::{NearestSample, nearest_samples};
 pub use designer::{Design, Options, ProofSearch, design, judge_taps};
 pub use effort::remedy;
@@ -46,8 +48,7 @@ pub use unfinished::{EndOfSearch, Objective, Unfinished};
 pub use warnings::warnings;
 
 use crate::bank::{Bank, Proof};
-use crate::verify::Verified;
-use crate::verify::uncertainty::check_stated;
+use crate::verify::{Verified, VerifyError};
 
 /// Searches for a proof of the gamma of a bank that was designed elsewhere or earlier.
 ///
@@ -55,7 +56,13 @@ use crate::verify::uncertainty::check_stated;
 /// As [`analyze`]; [`DesignError::NotCertified`] if no certificate was found; [`DesignError::Verify`] for a
 /// worst case that the bank states and that is not proven.
 pub fn prove(bank: &Bank) -> Result<(Proof, Verified), DesignError> {
-    let found = prove::prove(bank, &bank.gamma, &Stop::default())?;
-    check_stated(bank)?;
-    Ok(found)
+    let stop = Stop::default();
+    let (proof, verified) = prove::prove(bank, &bank.gamma, &stop)?;
+    let Some(stated) = bank.gamma.worst_case else { return Ok((proof, verified)) };
+    let mut found = Bank { proof: Some(proof), ..bank.clone() };
+    prove::attach_box_proof(&mut found, &stop)?;
+    match found.proof.filter(|_| found.gamma.worst_case.is_some_and(|proven| proven <= stated)) {
+        Some(proof) => Ok((proof, verified)),
+        None => Err(VerifyError::WorstCase { stated }.into()),
+    }
 }

@@ -4,9 +4,8 @@ use super::DesignError;
 use super::covariances::Covariances;
 use super::problem::{Channel, Problem};
 use crate::analog::{StableFilter, StrictlyProper, signal};
-use crate::spec::{FilterSpec, Spec};
+use crate::spec::{ConverterErrors, ErrorPoint, FilterSpec, Spec};
 use crate::units::GridTime;
-use crate::verify::uncertainty::ErrorPoint;
 
 impl Problem {
     /// Normalises `spec` with the given latency (fast samples).
@@ -87,26 +86,33 @@ impl Problem {
         Ok(problem.jitter_powers(spec)?.into_iter().map(|jitter| jitter / power).collect())
     }
 
-    /// The problem of `spec` with errors of its converters; the delays may become negative.
-    ///
-    /// # Errors
-    /// As [`Problem::new`].
-    pub fn with_errors(spec: &Spec, latency: usize, point: &ErrorPoint) -> Result<Self, DesignError> {
-        let mut moved = spec.clone();
-        for (channel, cutoff) in moved.channels.iter_mut().zip(&point.cutoffs) {
-            if *cutoff != 0.0 {
-                channel.filter = channel.filter.with_cutoff_scaled(1.0 + cutoff);
-            }
+    /// The same problem with errors of its converters; the delays may become negative.
+    pub(crate) fn perturbed(&self, point: &ErrorPoint) -> Self {
+        let mut moved = self.clone();
+        let perturbed = |channel: &Channel| moved.perturb(*channel, point.of(channel.converter));
+        let channels = self.channels.iter().map(perturbed).collect();
+        Self { channels, ..moved }
+    }
+
+    /// `channel` with these errors; a front end that is not there is added.
+    pub(super) fn perturb(&mut self, channel: Channel, errors: ConverterErrors) -> Channel {
+        let (front_end, proportion) = self.with_cutoff(channel.front_end, 1.0 + errors.cutoff);
+        Channel {
+            front_end,
+            gain: channel.gain * proportion * (1.0 + errors.gain),
+            converter_gain: channel.converter_gain * (1.0 + errors.gain),
+            delay: channel.delay.moved_by(errors.delay),
+            converter: channel.converter,
         }
-        let mut problem = Self::new(&moved, latency)?;
-        for channel in &mut problem.channels {
-            let (delay, gain) = (point.delays[channel.converter], point.gains[channel.converter]);
-            channel.delay = channel.delay.moved_by(delay.in_fast_periods(spec.fast_period));
-            channel.gain *= 1.0 + gain;
-            channel.converter_gain *= 1.0 + gain;
+    }
+
+    /// The front end to which `front_end` with its cut-off times `factor` is proportional, and the factor.
+    fn with_cutoff(&mut self, front_end: usize, factor: f64) -> (usize, f64) {
+        if factor == 1.0 {
+            return (front_end, 1.0);
         }
-        problem.check_size()?;
-        Ok(problem)
+        let scaled = self.front_ends[front_end].with_cutoff_scaled(factor);
+        intern(&mut self.front_ends, scaled)
     }
 }
 

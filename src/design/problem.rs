@@ -145,15 +145,6 @@ impl Problem {
         })
     }
 
-    /// The same problem with `errors[i]` added to the delay of converter i.
-    pub fn with_delay_errors(&self, errors: &[FastPeriods]) -> Self {
-        let mut moved = self.clone();
-        for channel in &mut moved.channels {
-            channel.delay = channel.delay.moved_by(errors[channel.converter]);
-        }
-        moved
-    }
-
     /// The problem that a bank solves.
     ///
     /// # Errors

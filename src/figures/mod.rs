@@ -153,6 +153,31 @@ pub fn snr(bank: &Bank) -> Result<Snr, DesignError> {
     Ok(Setting::new(spec, bank.latency, &band)?.ratio_of_bank(FilterResponse::new(bank)?).snr)
 }
 
+/// The two figures that errors of the channels change most.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct KeyFigures {
+    /// The signal-to-noise ratio, all parts together.
+    pub snr_db: Decibels,
+    /// The largest image relative to its tone; `None` where the bank loses a tone of the band altogether.
+    pub image_db: Option<Decibels>,
+}
+
+impl KeyFigures {
+    /// Those of the [`Figures`] of `bank`.
+    ///
+    /// # Errors
+    /// As [`Figures::new`].
+    pub fn new(bank: &Bank) -> Result<Self, DesignError> {
+        let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
+        let plain = without_signal(spec, bank.latency)?;
+        let band = FigureBand::new(spec, &plain).cycles(spec);
+        let Worst { image, .. } =
+            ToneResponse::new(plain, FilterResponse::new(bank)?, Spread::of_spec(spec)).worst(band);
+        let image_db = image.map(|tone| Decibels::of_amplitude(tone.image));
+        Ok(Self { snr_db: snr(bank)?.total_db, image_db })
+    }
+}
+
 /// A band for the signal of a spec that has none: what the target passes, with a tenth of the resolved band
 /// to spare where the target passes more.
 ///

@@ -4,17 +4,16 @@ use super::terms::{Fact, fact, figure_facts};
 use super::text::{decibels, six_digits};
 use super::understood::understood;
 use crate::bank::{Bank, FixedPoint, SynthesisFilters};
-use crate::design::uncertainty::{DelayDerivatives, delay_derivatives};
 use crate::design::{DesignError, GammaScale, MeanAnalysis, analyze_mean};
-use crate::figures::{Figures, Snr};
+use crate::figures::{Figures, KeyFigures, Snr};
 use crate::quantity::readable;
 use crate::runtime::Options;
-use crate::spec::{Method, Spec};
-use crate::units::Decibels;
+use crate::spec::{ErrorPoint, Method, Spec};
+use crate::units::{Decibels, FastPeriods};
 use crate::verify::verify;
 
-/// The error of a delay, fast samples, for which the change of gamma is stated.
-const SMALL_ERROR: f64 = 1e-3;
+/// The error of a delay for which figures are stated.
+const SMALL_ERROR: FastPeriods = FastPeriods(1e-3);
 
 /// A channel and what an error of its delay does.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -25,8 +24,8 @@ pub struct ChannelFact {
     pub gain: String,
     /// Of full scale.
     pub offset: String,
-    /// Relative change of gamma per thousandth of a fast sample; none where gamma has no derivative.
-    pub sensitivity: Option<f64>,
+    /// The figures of the bank if this delay alone is a thousandth of a fast sample longer.
+    pub later: KeyFigures,
 }
 
 /// All figures.
@@ -75,7 +74,9 @@ impl Facts {
                 .chain(error_facts(bank, &GammaScale::new(bank, &[])?, &analyze_mean(bank)?))
                 .collect(),
             cost: cost_facts(bank),
-            channels: channel_facts(bank, spec, &delay_derivatives(bank)?),
+            channels: (0..spec.channels.len())
+                .map(|i| channel_fact(bank, spec, i))
+                .collect::<Result<_, _>>()?,
         })
     }
 }
@@ -168,22 +169,18 @@ fn recursion(bank: &Bank) -> f64 {
     }
 }
 
-fn channel_facts(bank: &Bank, spec: &Spec, derivatives: &DelayDerivatives) -> Vec<ChannelFact> {
-    let gamma = bank.gamma.norm.filter(|gamma| *gamma > 0.0);
-    let delays = bank.delays_in_fast_periods();
-    let channels = spec.channels.iter().zip(&delays).zip(&derivatives.per_fast_period);
-    channels
-        .map(|((channel, delay), slope)| {
-            let time = readable(channel.delay.0, "s");
-            let samples = format!("{} samples", six_digits(delay.0));
-            ChannelFact {
-                delay: if spec.is_normalised() { samples } else { format!("{samples} = {time}") },
-                gain: six_digits(channel.gain),
-                offset: six_digits(channel.offset),
-                sensitivity: gamma.map(|gamma| slope * SMALL_ERROR / gamma).filter(|share| share.is_finite()),
-            }
-        })
-        .collect()
+fn channel_fact(bank: &Bank, spec: &Spec, i: usize) -> Result<ChannelFact, DesignError> {
+    let channel = &spec.channels[i];
+    let time = readable(channel.delay.0, "s");
+    let samples = format!("{} samples", six_digits(bank.delays_in_fast_periods()[i].0));
+    let mut point = ErrorPoint::none(spec.channels.len());
+    point.delays[i] = SMALL_ERROR;
+    Ok(ChannelFact {
+        delay: if spec.is_normalised() { samples } else { format!("{samples} = {time}") },
+        gain: six_digits(channel.gain),
+        offset: six_digits(channel.offset),
+        later: KeyFigures::new(&bank.with_errors(&point))?,
+    })
 }
 
 /// Warning for a bank whose taps are all zero.

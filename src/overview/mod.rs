@@ -27,6 +27,6 @@ pub use facts::{ChannelFact, Facts, uselessness, warnings};
 pub use measured::{BeforeAfter, Figure, Unmeasured, causes, column};
 pub use pictures::{Picture, pictures};
 pub use spur_chart::{Drawn, before_after, spectra, spur_chart};
-pub use terms::{Fact, band, figure_facts, rounded as decibels_of};
-pub use text::{change, decibels, frequency, six_digits};
+pub use terms::{Fact, band, figure_facts, key_figures, rounded as decibels_of};
+pub use text::{decibels, frequency, six_digits};
 pub use understood::understood;

@@ -2,7 +2,7 @@
 
 use super::measured::{BeforeAfter, causes, column};
 use super::spur_chart::before_after;
-use super::{ChannelFact, Fact, Facts, change, pictures, spectra};
+use super::{ChannelFact, Fact, Facts, key_figures, pictures, spectra};
 use crate::bank::Bank;
 use crate::design::DesignError;
 use crate::measure::{Cause, Measurement, Spur};
@@ -252,11 +252,11 @@ fn facts(facts: &[Fact]) -> String {
 }
 
 fn channel_table(channels: &[ChannelFact]) -> String {
-    let last = "gamma, if the delay is 0.001 samples longer";
-    let mut rows = headings(&["channel", "delay", "gain", "offset", last, ""]);
-    for (ChannelFact { delay, gain, offset, sensitivity, .. }, number) in channels.iter().zip(1..) {
-        let sensitivity = sensitivity.map_or_else(|| "no derivative".to_owned(), change);
-        rows += &row(&number.to_string(), &[delay.clone(), gain.clone(), offset.clone(), sensitivity], "");
+    let mut rows =
+        headings(&["channel", "delay", "gain", "offset", "if this delay is 0.001 samples longer", ""]);
+    for (ChannelFact { delay, gain, offset, later }, number) in channels.iter().zip(1..) {
+        let values = [delay.clone(), gain.clone(), offset.clone(), key_figures(*later)];
+        rows += &row(&number.to_string(), &values, "");
     }
     table(&rows)
 }

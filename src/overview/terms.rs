@@ -1,7 +1,9 @@
 //! The figures of a bank in the user's terms, in words.
 
 use super::text::frequency;
-use crate::figures::{BandSource, FigureBand, Figures, Setup, SimpleFigure, SimpleWay, Snr, ToneFigure};
+use crate::figures::{
+    BandSource, FigureBand, Figures, KeyFigures, Setup, SimpleFigure, SimpleWay, Snr, ToneFigure,
+};
 use crate::spec::Method;
 use crate::units::{Decibels, Hertz};
 
@@ -36,6 +38,13 @@ pub fn figure_facts(figures: &Figures, is_normalised: bool) -> [Fact; 4] {
         words.tone("gain error", figures.gain_error, "largest error of gain and phase of a tone"),
         words.comparison(),
     ]
+}
+
+/// The signal-to-noise ratio and the largest image.
+pub fn key_figures(KeyFigures { snr_db, image_db }: KeyFigures) -> String {
+    let image =
+        image_db.map_or_else(|| "a tone is lost".to_owned(), |image| format!("image {}", rounded(image)));
+    format!("SNR {}, {image}", ratio(snr_db))
 }
 
 /// Decibels with one digit after the point; "exact" where only rounding is left.

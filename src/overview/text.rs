@@ -29,32 +29,9 @@ pub fn frequency(hertz: Hertz, is_normalised: bool) -> String {
     if is_normalised { format!("{:.4} of the output rate", hertz.0) } else { readable(hertz.0, "Hz") }
 }
 
-/// A relative change: per cent, or a factor above 1000 %. What would be below zero is no number: a slope
-/// holds for small changes only.
-pub fn change(share: f64) -> String {
-    match share {
-        _ if share > 10.0 => format!("{:.0} times", 1.0 + share),
-        _ if share < -1.0 => "smaller; the slope holds for smaller errors only".to_owned(),
-        _ => format!("{:+.2} %", 100.0 * share),
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{change, six_digits};
-
-    #[test]
-    fn changes_are_per_cent_or_factors() {
-        for (share, text) in [
-            (0.0123, "+1.23 %"),
-            (-0.5, "-50.00 %"),
-            (10.0, "+1000.00 %"),
-            (87.0, "88 times"),
-            (-88.0, "smaller; the slope holds for smaller errors only"),
-        ] {
-            assert_eq!(change(share), text);
-        }
-    }
+    use super::six_digits;
 
     #[test]
     fn numbers_have_six_digits_at_most() {

@@ -6,6 +6,7 @@
 mod design;
 mod edit;
 mod error;
+mod error_box;
 mod filter;
 mod filter_rules;
 mod filter_table;
@@ -27,6 +28,7 @@ pub use design::{DesignOverrides, DesignSpec, DesignTable, Method, Reduction};
 pub use edit::with_measurements_renamed;
 pub(crate) use error::{At, refused};
 pub use error::{Refusal, SpecError, SpecProblem};
+pub use error_box::{ConverterErrors, ErrorBox, ErrorPoint};
 pub(crate) use filter::no_models;
 pub use filter::{
     Family, FilterModel, FilterModels, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB, MeasuredFilter, Measurement,

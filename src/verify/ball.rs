@@ -1,6 +1,6 @@
 //! Matrices of enclosed numbers.
 
-use crate::arithmetic::{DoubleDouble, Float512, Number, OUTWARD};
+use crate::arithmetic::{DoubleDouble, Entry, Float512, Number, OUTWARD};
 use nalgebra::DMatrix;
 
 pub(super) use crate::arithmetic::Ball;
@@ -26,6 +26,12 @@ pub(super) fn scaled<F: Number>(a: &Matrix<F>, by: Ball<F>) -> Matrix<F> {
 /// a b'.
 pub(super) fn product_transposed<F: Number>(a: &Matrix<F>, b: &Matrix<F>) -> Matrix<F> {
     product(a, &b.transpose())
+}
+
+/// a, and b below it.
+pub(super) fn above<T: Entry>(a: &DMatrix<T>, b: &DMatrix<T>) -> DMatrix<T> {
+    let entry = |i: usize, j: usize| if i < a.nrows() { a[(i, j)] } else { b[(i - a.nrows(), j)] };
+    DMatrix::from_fn(a.nrows() + b.nrows(), a.ncols(), entry)
 }
 
 /// A bound on the largest sum of moduli in a row.

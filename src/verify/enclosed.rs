@@ -1,15 +1,16 @@
 //! An enclosure of the error system of a bank. It is built once and serves to check any number of
 //! certificates.
 
-use super::ball::{self, Ball, Matrix};
-use super::error_system::{self, BlockForm, ErrorSystem};
+use super::ball::{self, Ball};
+use super::error_system::{self, BlockForm, error_system};
 use super::front_ends::FrontEnds;
 use super::slow_period::SlowPeriod;
+use super::system::{EnclosedSystem, Midpoint};
 use super::timeline::{SamplingInstant, delay_periods, timeline};
-use super::{MAX_STATES, Strictness, Verified, VerifyError, gain, positive, statements, upper};
+use super::{MAX_STATES, Strictness, Verified, VerifyError, gain, statements, upper};
 use crate::arithmetic::{ComplexBall, Float512, Number};
 use crate::bank::{Bank, Certificate, GainWitness, Gamma};
-use crate::linalg::{CMat, Complex, Mat};
+use crate::linalg::{CMat, Complex};
 use crate::units::Timeline;
 use nalgebra::DMatrix;
 use std::sync::OnceLock;
@@ -29,23 +30,9 @@ pub struct EnclosedErrorSystem<'a> {
     samples: Vec<SamplingInstant>,
     timeline: Timeline,
     pub(super) period: SlowPeriod,
-    equations: ErrorSystem,
-    long_equations: OnceLock<ErrorSystem<Float512>>,
+    equations: EnclosedSystem,
+    long_equations: OnceLock<EnclosedSystem<Float512>>,
     long_period: OnceLock<SlowPeriod<Float512>>,
-}
-
-/// Midpoints of the enclosed error system, for the search for a certificate: xi+ = a xi + b w, e = c xi + d
-/// w with w white.
-#[derive(Debug, Clone)]
-pub(crate) struct Midpoint {
-    /// n x n.
-    pub(crate) a: Mat,
-    /// n x m.
-    pub(crate) b: Mat,
-    /// M x n.
-    pub(crate) c: Mat,
-    /// M x m.
-    pub(crate) d: Mat,
 }
 
 impl<'a> EnclosedErrorSystem<'a> {
@@ -64,7 +51,7 @@ impl<'a> EnclosedErrorSystem<'a> {
             return Err(VerifyError::TooLarge { states });
         }
         let period = SlowPeriod::new(&front_ends, &timeline, &samples);
-        let equations = ErrorSystem::new(&period, &BlockForm::new(&bank.filters, bank.ratio));
+        let equations = error_system(&period, &BlockForm::new(&bank.filters, bank.ratio));
         Ok(Self {
             bank,
             front_ends,
@@ -92,14 +79,15 @@ impl<'a> EnclosedErrorSystem<'a> {
     /// Whether `certificate` proves its gamma. Only one with a correction is tried in 512 bits.
     pub fn certifies(&self, certificate: &Certificate) -> bool {
         let long = !certificate.correction.is_empty() && self.states() <= MAX_CORRECTED_STATES;
-        upper::proves(&self.equations, certificate)
-            || long && upper::proves(self.long_equations(), certificate)
+        let factor = [&certificate.factor[..], &certificate.correction[..]];
+        upper::proves(&self.equations, certificate.gamma, factor)
+            || long && upper::proves(self.long_equations(), certificate.gamma, factor)
     }
 
     /// The error system in 512 bits.
-    fn long_equations(&self) -> &ErrorSystem<Float512> {
+    fn long_equations(&self) -> &EnclosedSystem<Float512> {
         self.long_equations.get_or_init(|| {
-            ErrorSystem::new(self.long_period(), &BlockForm::new(&self.bank.filters, self.bank.ratio))
+            error_system(self.long_period(), &BlockForm::new(&self.bank.filters, self.bank.ratio))
         })
     }
 
@@ -130,20 +118,9 @@ impl<'a> EnclosedErrorSystem<'a> {
         self.long_period.get_or_init(|| SlowPeriod::new(&self.front_ends, &self.timeline, &self.samples))
     }
 
-    /// The error system in double precision; `None` if the Gram matrix of its inputs has no root, which
-    /// does not happen.
+    /// The error system in double precision, as [`EnclosedSystem::midpoint`].
     pub(crate) fn midpoint(&self) -> Option<Midpoint> {
-        let root = positive::root(&self.equations.gram)?;
-        let (n, m) = (self.equations.order(), self.equations.outputs);
-        let system = ball::nearest(&self.equations.system);
-        let inputs: Matrix = ball::product(&self.equations.inputs, &root);
-        let inputs = ball::nearest(&inputs);
-        Some(Midpoint {
-            a: system.rows(0, n).into_owned(),
-            b: inputs.rows(0, n).into_owned(),
-            c: system.rows(n, m).into_owned(),
-            d: inputs.rows(n, m).into_owned(),
-        })
+        self.equations.midpoint()
     }
 
     /// K K* at a point of the unit circle, rounded to double precision after every cancellation; of small

@@ -112,17 +112,6 @@ pub enum VerifyError {
         /// What is wrong with it, and the rule.
         rule: String,
     },
-    /// The error system remembers its input for too long to be judged frequency by frequency.
-    #[error(
-        "the front ends or the filters remember their input for more slow periods than the proof of a worst case follows; \
-         use an FIR bank, or front ends with more damping"
-    )]
-    LongMemory,
-    /// No upper end was proven.
-    #[error(
-        "no upper end of the worst case was proven: the box is too wide for the work that is allowed; give smaller errors"
-    )]
-    WideBox,
     /// A witness proves nothing.
     #[error("{place}: this witness proves nothing; the file was altered, design the bank again")]
     Void {

@@ -1,5 +1,5 @@
-//! The error system K = W - F H of a bank in state-space form: xi+ = A xi + J u, e = C xi + L u, where u
-//! has the Gram matrix of a [`SlowPeriod`].
+//! The error system K = W - F H of a bank as an [`EnclosedSystem`], whose input has the Gram matrix of a
+//! [`SlowPeriod`].
 //!
 //! The state xi is, in this order: the analog state at the beginning of the period (the distinct filters in
 //! the order target, channels); the delay line, latest first, of each sample that is counted whole periods
@@ -9,6 +9,7 @@
 
 use super::ball::{self, Ball, Matrix};
 use super::slow_period::SlowPeriod;
+use super::system::EnclosedSystem;
 use crate::arithmetic::{DoubleDouble, Number};
 use crate::bank::{StateSpace, SynthesisFilters};
 use crate::linalg;
@@ -85,19 +86,6 @@ impl<F: Number> BlockForm<F> {
             d: matrix(&block.d, ratio, channels),
         }
     }
-}
-
-/// `[xi+; e] = system xi + inputs u`, rows of the state first.
-#[derive(Debug, Clone)]
-pub(super) struct ErrorSystem<F = DoubleDouble> {
-    /// [A; C], (n + M) x n.
-    pub(super) system: Matrix<F>,
-    /// [J; L], (n + M) x (number of u).
-    pub(super) inputs: Matrix<F>,
-    /// Gram matrix of u.
-    pub(super) gram: Matrix<F>,
-    /// M.
-    pub(super) outputs: usize,
 }
 
 /// The index ranges of the parts of the state.
@@ -185,30 +173,19 @@ fn sampled<F: Number>(period: &SlowPeriod<F>, layout: &Layout, more: usize) -> (
     (next, delivered)
 }
 
-impl<F: Number> ErrorSystem<F> {
-    pub(super) fn new(period: &SlowPeriod<F>, filters: &BlockForm<F>) -> Self {
-        let outputs = filters.d.nrows();
-        let layout = Layout::new(period, filters.a.nrows());
-        let order = layout.order();
-        let (mut whole, delivered) = sampled(period, &layout, outputs);
-        let (reference, measured) = (0..outputs, outputs..period.samples());
-        let own = layout.filter;
-        whole.state.view_mut((own.start, own.start), (own.len(), own.len())).copy_from(&filters.a);
-        whole.subtract(own.start, &filters.b.map(|x| -x), &delivered, measured.clone());
-        // e = reference - c eta - d measured.
-        whole.state.view_mut((order, own.start), (outputs, own.len())).copy_from(&filters.c.map(|x| -x));
-        whole.subtract(order, &ball::identity(outputs).map(|x: Ball<F>| -x), &delivered, reference);
-        whole.subtract(order, &filters.d, &delivered, measured);
-        Self { system: whole.state, inputs: whole.input, gram: period.gram.clone(), outputs }
-    }
-
-    /// [J; L] S [J; L]', the energy of the input.
-    pub(super) fn input_gram(&self) -> Matrix<F> {
-        ball::congruence(&self.inputs, &self.gram)
-    }
-
-    /// n, the number of states.
-    pub(super) fn order(&self) -> usize {
-        self.system.ncols()
-    }
+/// The error system of a bank with these filters.
+pub(super) fn error_system<F: Number>(period: &SlowPeriod<F>, filters: &BlockForm<F>) -> EnclosedSystem<F> {
+    let outputs = filters.d.nrows();
+    let layout = Layout::new(period, filters.a.nrows());
+    let order = layout.order();
+    let (mut whole, delivered) = sampled(period, &layout, outputs);
+    let (reference, measured) = (0..outputs, outputs..period.samples());
+    let own = layout.filter;
+    whole.state.view_mut((own.start, own.start), (own.len(), own.len())).copy_from(&filters.a);
+    whole.subtract(own.start, &filters.b.map(|x| -x), &delivered, measured.clone());
+    // e = reference - c eta - d measured.
+    whole.state.view_mut((order, own.start), (outputs, own.len())).copy_from(&filters.c.map(|x| -x));
+    whole.subtract(order, &ball::identity(outputs).map(|x: Ball<F>| -x), &delivered, reference);
+    whole.subtract(order, &filters.d, &delivered, measured);
+    EnclosedSystem { system: whole.state, inputs: whole.input, gram: period.gram.clone(), outputs }
 }

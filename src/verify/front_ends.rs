@@ -28,9 +28,6 @@ struct FrontEnd {
     /// Index of the first state.
     start: usize,
     equations: Equations,
-    /// The filter whose cut-off is multiplied by `speed`: Phi(s / x) has the state equations x a, x b, c.
-    of: usize,
-    speed: f64,
 }
 
 impl FrontEnds {
@@ -47,7 +44,7 @@ impl FrontEnds {
         let written = SignalFilter::of(spec).map(|w| w.filter);
         let signal = written.map(|w| enclosed(None, &w, h)).transpose();
         let signal = signal.map_err(refused("spec.signal.filter".to_owned()))?;
-        let mut all = Self { signal, filters: Vec::new() };
+        let mut all = Self::driven_by(signal);
         let mut seen: Vec<FilterSpec> = Vec::new();
         let mut index = |filter: &FilterSpec, name: &dyn Fn() -> String| {
             let known = seen.iter().enumerate().find_map(|(i, other)| Some((i, proportion(filter, other)?)));
@@ -57,8 +54,7 @@ impl FrontEnds {
             StrictlyProper::driven_by(checked.as_ref(), filter, h).map_err(refused(name()))?;
             let equations = enclosed(all.signal.as_ref(), filter, h).map_err(refused(name()))?;
             seen.push(filter.clone());
-            all.push(equations, seen.len() - 1, 1.0);
-            Ok((seen.len() - 1, Ball::from(1.0)))
+            Ok((all.push(equations), Ball::from(1.0)))
         };
         let (target, gain) = index(&spec.target, &|| "spec.target.filter".to_owned())?;
         let reference = |p: usize| GridTime::fast_sample(p as f64 - bank.latency as f64, h);
@@ -82,9 +78,15 @@ impl FrontEnds {
         Ok((all, samples))
     }
 
-    /// Appends a filter.
-    fn push(&mut self, equations: Equations, of: usize, speed: f64) {
-        self.filters.push(FrontEnd { start: self.order(), equations, of, speed });
+    /// No filters after that of the signal.
+    pub(super) fn driven_by(signal: Option<Equations>) -> Self {
+        Self { signal, filters: Vec::new() }
+    }
+
+    /// Appends a filter, and returns its index.
+    pub(super) fn push(&mut self, equations: Equations) -> usize {
+        self.filters.push(FrontEnd { start: self.order(), equations });
+        self.filters.len() - 1
     }
 
     /// Number of states.
@@ -98,7 +100,7 @@ impl FrontEnds {
         self.signal.as_ref()
     }
 
-    /// The filter with this index; see [`FrontEnds::with_speed`] for the factor of its cut-off.
+    /// The filter with this index.
     pub(super) fn filter(&self, index: usize) -> &Equations {
         &self.filters[index].equations
     }
@@ -111,17 +113,6 @@ impl FrontEnds {
             gain if sample.gain == Ball::from(1.0) => Ball::from(gain),
             gain => sample.gain * Ball::from(gain),
         }
-    }
-
-    /// Index of the filter `index` with its cut-off multiplied by `speed`, which is added if it is not
-    /// there.
-    pub(super) fn with_speed(&mut self, index: usize, speed: f64) -> usize {
-        let of = self.filters[index].of;
-        if let Some(known) = self.filters.iter().position(|known| known.of == of && known.speed == speed) {
-            return known;
-        }
-        self.push(self.filters[of].equations.clone(), of, speed);
-        self.filters.len() - 1
     }
 
     /// Checks that the matrices of a slow period with `samples` samples are not too large.
@@ -144,18 +135,15 @@ impl FrontEnds {
             a.view_mut((0, 0), signal.a.shape()).copy_from(&signal.a);
             b.rows_mut(0, signal.order()).copy_from(&signal.b);
         }
-        for FrontEnd { start, equations, speed, .. } in &self.filters {
-            let fast = |m: &Matrix<Float512>| {
-                if *speed == 1.0 { m.clone() } else { ball::scaled(m, Ball::from(*speed)) }
-            };
-            let input = fast(&equations.b);
-            a.view_mut((*start, *start), equations.a.shape()).copy_from(&fast(&equations.a));
+        for FrontEnd { start, equations } in &self.filters {
+            let input = &equations.b;
+            a.view_mut((*start, *start), equations.a.shape()).copy_from(&equations.a);
             match &self.signal {
-                None => b.rows_mut(*start, equations.order()).copy_from(&input),
+                None => b.rows_mut(*start, equations.order()).copy_from(input),
                 Some(signal) => {
                     let shape = (equations.order(), signal.order());
-                    a.view_mut((*start, 0), shape).copy_from(&ball::product(&input, &signal.c));
-                    b.rows_mut(*start, equations.order()).copy_from(&ball::scaled(&input, signal.d));
+                    a.view_mut((*start, 0), shape).copy_from(&ball::product(input, &signal.c));
+                    b.rows_mut(*start, equations.order()).copy_from(&ball::scaled(input, signal.d));
                 }
             }
         }
@@ -164,7 +152,7 @@ impl FrontEnds {
 
     /// The row that reads a sample from the joint state.
     pub(super) fn output<F: Number>(&self, sample: &SamplingInstant) -> Matrix<F> {
-        let FrontEnd { start, equations, .. } = &self.filters[sample.filter];
+        let FrontEnd { start, equations } = &self.filters[sample.filter];
         let mut row = ball::zeros(1, self.order());
         let gain = Self::gain(sample);
         let own =

@@ -50,16 +50,18 @@ mod slow_period;
 mod spectrum;
 mod state_transition;
 mod statements;
+mod system;
 #[cfg(test)]
 mod tests;
 mod timeline;
-pub mod uncertainty;
+mod uncertainty;
 mod upper;
 
 pub use self::enclosed::EnclosedErrorSystem;
-pub(crate) use self::enclosed::Midpoint;
 pub use self::error::VerifyError;
 pub(crate) use self::statements::{Strictness, ZERO_NORM};
+pub(crate) use self::system::{EnclosedSystem, Midpoint};
+pub(crate) use self::uncertainty::{EnclosedBox, worst_case};
 
 use crate::bank::Bank;
 

@@ -9,7 +9,7 @@ use super::statements::{Outcome, Tally, at, campaign, designed, judged, verified
 use crate::support::Desk;
 use crate::support::random::Random;
 use serde_json::{Value, json};
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 const SEED: u64 = 0xA0D1_B000;
 /// Boxes and robust designs of the short form.
@@ -193,19 +193,20 @@ fn boxed(seed: u64) -> Tally {
         return tally;
     };
     let case = &report["worst_case"];
-    let (lower, upper) = (at(case, "/lower").unwrap_or(f64::NAN), at(case, "/upper").unwrap_or(f64::NAN));
-    let (point, omega) = (errors_of(&case["point"], 1.0), at(case, "/frequency").unwrap_or(0.0));
+    let number = |key: &str| at(case, key).unwrap_or(f64::NAN);
+    let (lower, upper) = (number("/attained"), number("/upper"));
+    let omega = TAU * number("/peak_hertz") * spec["ratio"].as_f64().unwrap_or(1.0);
+    let point = errors_of(&case["point"], 1.0);
     let attained = Judge::off_by(&bank, &point, &mut Library::default()).gain(omega);
     let mut search = Search { bank: &bank, half: &half, library: Library::default() };
     let found = search.run(Some((point, omega)), &mut dice);
     if lower > attained * (1.0 + 1e-12) {
-        tally.refuted.push(format!("{name}, {half:?}: lower end {lower:e}, there {attained:e}"));
+        tally.refuted.push(format!("{name}, {half:?}: attained {lower:e}, there {attained:e}"));
     }
     if found.gain > upper {
-        tally.refuted.push(format!(
-            "{name}, {half:?}: upper end {upper:e}, found {:e} at {:?}",
-            found.gain, found.errors
-        ));
+        tally
+            .refuted
+            .push(format!("{name}, {half:?}: bound {upper:e}, found {:e} at {:?}", found.gain, found.errors));
     }
     tally.widths.push(upper / lower - 1.0);
     tally.excesses.push(found.gain / lower - 1.0);

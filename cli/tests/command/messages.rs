@@ -80,8 +80,6 @@ fn negative_values_are_refused_by_their_rule() {
         (&analyze[..], "--delay-box", "-1"),
         (&analyze, "--delay-box", "-10ps"),
         (&analyze, "--gain-box", "-1%"),
-        (&analyze, "--jitter", "-1ps"),
-        (&analyze, "--accuracy", "-1%"),
         (&design, "--gamma-margin", "-1"),
         (&design, "--taps", "-1"),
         (&design, "--latency", "-1"),
@@ -127,17 +125,6 @@ fn a_box_that_is_too_wide_is_named() {
     let args = ["analyze", "bank.json", "--delay-error", "1e300,0"];
     let said = desk.refused(1, &args, &["delay chains of", "check the unit of the delays"]);
     assert!(said.len() < 300, "{said}");
-}
-
-/// A jitter of seconds between samples of microseconds had a result, a gain of billions.
-#[test]
-fn jitter_that_leaves_no_order_is_refused() {
-    let desk = desk();
-    desk.write("spec.toml", THESIS);
-    desk.report(&["design", "spec.toml", "-o", "designed.json"]);
-    let args = |jitter| ["analyze", "designed.json", "--jitter", jitter];
-    desk.refused(2, &args("2"), &["--jitter", "a sample every 2 s", "no order"]);
-    assert!(desk.run(&args("1.9"), &[]).status.success());
 }
 
 /// "It has 1 channels", and a rate that no file has: 249999999.99999997 Hz.
@@ -240,7 +227,6 @@ fn an_output_that_cannot_be_is_refused_before_the_work() {
         &["report", "nothing", "-o"],
         &["calibrate", "spec.toml", "nothing", "--blind", "-o"],
         &["measure", "nothing", "--plot"],
-        &["analyze", "nothing", "--delay-box", "1ps", "--sweep"],
     ] {
         for (output, words) in [("none/out", "its folder is not there"), ("taken", "the file exists")] {
             desk.refused(1, &[run, &[output]].concat(), &[output, words]);

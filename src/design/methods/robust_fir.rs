@@ -13,13 +13,13 @@ use crate::design::exchange::{Exchange, Tolerances};
 use crate::design::filters::{FilterResponse, impulse_responses, polyphase};
 use crate::design::plant::LiftedPlant;
 use crate::design::uncertainty::box_plant::{BoxPlant, Combination};
-use crate::design::uncertainty::search::BoxSearch;
+use crate::design::uncertainty::search::{BoxSearch, WorstErrors};
 use crate::design::unfinished::Unfinished;
 use crate::linalg::{self, CMat};
 use crate::lmi::sampled::{MeanSquareObjective, Point, Problem as SampledProblem, Taps};
 use crate::lti::peak::Peak;
-use crate::spec::{Method, Spec};
-use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
+use crate::spec::{ErrorBox, Method, Spec};
+use crate::units::Seconds;
 
 /// A nominal bank whose largest gain is within this of a lower bound is kept.
 const NO_GAIN: f64 = 1e-3;
@@ -28,7 +28,7 @@ const NO_GAIN: f64 = 1e-3;
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct RobustStudy {
     /// The box.
-    pub errors: ErrorBox,
+    pub errors: ErrorBox<Seconds>,
     /// Of this bank.
     pub robust: RobustNorms,
     /// Of the bank that is optimal without errors.
@@ -63,7 +63,8 @@ pub(crate) fn synthesise(
 ) -> Result<Synthesis, DesignError> {
     let nominal = fir::synthesise(plant, settings)?;
     let Filters::Fir(taps) = &nominal.filters else { return Ok(nominal) };
-    let search = problem.search(plant, settings.taps)?;
+    let front_ends = BoxPlant::new(plant.problem(), &problem.errors)?;
+    let search = BoxSearch::new(front_ends, tap_lags(plant.ratio(), settings.taps)[0], &[])?;
     let study = study_of(&nominal, taps, &search)?;
     if study.nominal.largest_found <= study.lower * (1.0 + NO_GAIN) {
         return Ok(Synthesis { robust: Some(study), ..nominal });
@@ -91,10 +92,11 @@ pub(crate) fn synthesise(
 fn study_of(nominal: &Synthesis, taps: &[Vec<f64>], search: &BoxSearch) -> Result<RobustStudy, DesignError> {
     let worst = worst_of(search, taps)?;
     // Whatever the taps, each combination of errors alone has the error that no bank avoids.
-    let unavoidable = search.plant().moved(&worst.point)?.noncausal_bound()?.gain;
+    let unavoidable = search.plant().moved(&worst.point).noncausal_bound()?.gain;
     let norms = RobustNorms { nominal: nominal.peak.gain, largest_found: worst.peak.gain };
+    let errors = search.plant().errors.in_seconds(search.plant().fast_period());
     Ok(RobustStudy {
-        errors: search.plant().errors.clone(),
+        errors,
         robust: norms,
         nominal: norms,
         lower: nominal.lower.max(unavoidable).min(norms.largest_found),
@@ -103,24 +105,10 @@ fn study_of(nominal: &Synthesis, taps: &[Vec<f64>], search: &BoxSearch) -> Resul
     })
 }
 
-/// Errors with the norm of some taps.
-struct WorstErrors {
-    point: ErrorPoint,
-    peak: Peak,
-}
-
 /// The largest norm found of the taps over the box.
 fn worst_of(search: &BoxSearch, taps: &[Vec<f64>]) -> Result<WorstErrors, DesignError> {
     let filters = FilterResponse::Polynomial(polyphase(taps, search.plant().ratio()));
-    let norm = |point: ErrorPoint| {
-        let peak = search.plant().moved(&point)?.fir_norm(taps)?;
-        Ok::<_, DesignError>(WorstErrors { point, peak })
-    };
-    let without_errors = norm(ErrorPoint::none(search.plant().errors.delays.len()))?;
-    search.worst_points(&filters)?.into_iter().try_fold(without_errors, |worst, point| {
-        let other = norm(point)?;
-        Ok(if other.peak.gain > worst.peak.gain { other } else { worst })
-    })
+    search.worst(&filters, |plant| plant.fir_norm(taps))
 }
 
 /// Taps of least norm over the box.
@@ -155,7 +143,7 @@ fn least_worst_norm(
         if !is_missed || rounds == MISSED_ERROR_LIMIT || exchange.stop.is_due() {
             break (taps, worst.peak.gain, is_missed);
         }
-        let scenario = exchange.error_mut().search.include(&worst.point)?;
+        let scenario = exchange.error_mut().search.include(&worst.point);
         if !exchange.add(&[Location { frequency: worst.peak.frequency, scenario }]) {
             break (taps, worst.peak.gain, is_missed);
         }
@@ -236,8 +224,6 @@ const MISSED_ERROR_LIMIT: usize = 8;
 /// What a robust design is made for.
 #[derive(Debug, Clone)]
 pub(crate) struct RobustProblem {
-    /// The spec with all defaults.
-    pub(crate) spec: Spec,
     /// The box.
     pub(crate) errors: ErrorBox,
 }
@@ -245,18 +231,9 @@ pub(crate) struct RobustProblem {
 impl RobustProblem {
     /// The problem of a spec whose bank is to be robust: FIR for channels with errors.
     pub(crate) fn of(spec: &Spec) -> Option<Self> {
-        let errors = ErrorBox::of(spec.uncertainty.as_ref()?, spec.channels.len());
-        let is_robust = spec.design.method == Method::Fir && !errors.is_point();
-        is_robust.then(|| Self { spec: spec.clone(), errors })
-    }
-
-    /// The search for the worst errors of filters with so many taps; `plant` is the one without errors.
-    ///
-    /// # Errors
-    /// As [`Problem::with_errors`].
-    fn search(&self, plant: &LiftedPlant, taps: usize) -> Result<BoxSearch, DesignError> {
-        let front_ends = BoxPlant::new(&self.spec, plant.problem().latency, &self.errors)?;
-        BoxSearch::new(front_ends, tap_lags(plant.ratio(), taps)[0], &[])
+        let errors = spec.error_box()?;
+        let is_robust = spec.design.method == Method::Fir && errors.sides() > 0;
+        is_robust.then_some(Self { errors })
     }
 }
 

@@ -60,7 +60,7 @@ impl EnclosedGains<'_> {
     }
 
     /// The gain at a frequency, rounded down, with its witness; `None` where it is zero or not resolved.
-    fn at(&self, frequency: f64) -> Result<Option<(f64, GainWitness)>, DesignError> {
+    pub(super) fn at(&self, frequency: f64) -> Result<Option<(f64, GainWitness)>, DesignError> {
         let peak = witness(frequency, &leading_direction(&self.response(frequency))?);
         let gain = self.0.resolved_gain(&peak).filter(|gain| *gain > 0.0);
         Ok(gain.map(|gain| (gain, peak)))

@@ -1,6 +1,7 @@
 //! Searches for the certificate that proves a bank's gamma. It proves nothing by itself: [`crate::verify`]
 //! checks it.
 
+mod box_bound;
 mod enclosed_norm;
 mod upper;
 
@@ -9,6 +10,7 @@ use super::limits::Stop;
 use crate::bank::{Bank, Certificate, GainWitness, Gamma, Proof};
 use crate::linalg::{self, CMat};
 use crate::verify::{EnclosedErrorSystem, Strictness, Verified};
+pub(super) use box_bound::{attach_box_proof, worst_case};
 pub(super) use enclosed_norm::resolved_norm;
 use enclosed_norm::{EnclosedGains, is_zero};
 pub(super) use upper::MAX_SEARCHED_STATES;
@@ -46,6 +48,13 @@ pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {
     Ok(Certified { gamma: upper, attained, states })
 }
 
+/// A proven lower bound of the norm of `bank`, its gain at a frequency in radians per slow period; `None`
+/// where no arithmetic resolves it.
+pub(super) fn proven_gain(bank: &Bank, frequency: f64) -> Result<Option<f64>, DesignError> {
+    let error = EnclosedErrorSystem::new(bank)?;
+    Ok(EnclosedGains(&error).at(frequency)?.map(|(gain, _)| gain))
+}
+
 /// Whether the norm of a bank is zero up to rounding, so that no search can make it less.
 pub(super) fn has_no_error(bank: &Bank) -> bool {
     let is_zero = |error: EnclosedErrorSystem<'_>| bank.gamma.norm.is_some_and(|norm| is_zero(norm, &error));
@@ -63,7 +72,7 @@ pub(crate) fn prove(bank: &Bank, stated: &Gamma, stop: &Stop) -> Result<(Proof, 
     let error = EnclosedErrorSystem::new(bank)?;
     let upper = certificate(&error, bank, stop)?;
     let verified = error.judge(stated, &upper, Strictness::NotRefuted)?;
-    Ok((Proof { upper }, verified))
+    Ok((Proof { upper, worst_case: None }, verified))
 }
 
 /// Adds a proof to `bank` and sets norm and upper end to the proven bounds. A computed norm outside of the

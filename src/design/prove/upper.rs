@@ -22,7 +22,7 @@ use nalgebra::DMatrix as Matrix;
 
 /// Relative excesses over the computed norm at which the search tries to find a certificate, smallest
 /// first.
-const EXCESSES: [f64; 8] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
+pub(super) const EXCESSES: [f64; 8] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
 /// The relative excesses that are tried in double precision before more bits are used.
 const FINE_EXCESSES: usize = 3;
 /// Words of 64 bits of the numbers that are tried: 256 bits, and 512.
@@ -116,14 +116,14 @@ pub(super) fn certificate(
 
 /// A gamma that is tried.
 #[derive(Debug, Clone, Copy)]
-struct Level {
-    norm: f64,
-    excess: f64,
+pub(super) struct Level {
+    pub(super) norm: f64,
+    pub(super) excess: f64,
 }
 
 impl Level {
     /// The gamma that is proven.
-    fn gamma(self) -> f64 {
+    pub(super) fn gamma(self) -> f64 {
         self.norm + self.excess
     }
 
@@ -152,13 +152,7 @@ impl Search<'_> {
     }
 
     fn in_doubles(&self, level: Level) -> Result<Option<Certificate>, DesignError> {
-        let noise = STATE_NOISE * (level.excess * level.gamma()).sqrt();
-        let riccati = Riccati::new(self.middle, noise)?;
-        let tried = |weight: &f64| {
-            let factor = riccati.factor(level.middle(), weight * level.excess)?;
-            DIGITS.iter().find_map(|&digits| self.passes(level, rounded(&factor, digits), Vec::new()))
-        };
-        Ok(STATE_WEIGHTS.iter().find_map(tried))
+        in_doubles(self.middle, level, |factor| self.passes(level, factor, Vec::new()))
     }
 
     /// `None` for many states.
@@ -178,6 +172,21 @@ impl Search<'_> {
         let corrected = || CORRECTION_DIGITS.iter().find_map(|&digits| passes(rounded(&correction, digits)));
         passes(Vec::new()).or_else(corrected)
     }
+}
+
+/// What `passes` makes of the first rows of R for `middle` that it accepts.
+pub(super) fn in_doubles<T>(
+    middle: &Midpoint,
+    level: Level,
+    passes: impl Fn(Vec<Vec<f64>>) -> Option<T>,
+) -> Result<Option<T>, DesignError> {
+    let noise = STATE_NOISE * (level.excess * level.gamma()).sqrt();
+    let riccati = Riccati::new(middle, noise)?;
+    let tried = |weight: &f64| {
+        let factor = riccati.factor(level.middle(), weight * level.excess)?;
+        DIGITS.iter().find_map(|&digits| passes(rounded(&factor, digits)))
+    };
+    Ok(STATE_WEIGHTS.iter().find_map(tried))
 }
 
 /// Rows with so many significant digits.
@@ -299,10 +308,10 @@ impl<const WORDS: usize> LongRiccati<WORDS> {
 ///
 /// With xi = T eta, T diagonal, and e counted in units of s, a P that proves ||K|| <= gamma for [A, J; C,
 /// L] is T Q T' where Q proves ||K|| / s <= gamma / s for [T^-1 A T, T^-1 J; C T / s, L / s].
-struct Units {
+pub(super) struct Units {
     states: Vec<f64>,
     /// Unit of the reference samples, and so of gamma.
-    reference: f64,
+    pub(super) reference: f64,
 }
 
 impl Units {
@@ -310,14 +319,14 @@ impl Units {
     ///
     /// # Errors
     /// [`LtiError::IterationLimit`] if the system is not stable.
-    fn of(system: &Midpoint, scale: f64) -> Result<Self, LtiError> {
+    pub(super) fn of(system: &Midpoint, scale: f64) -> Result<Self, LtiError> {
         let root = controllability_root(&system.a, &system.b)?;
         let states = root.row_iter().map(|row| power_of_two(row.norm())).collect();
         Ok(Self { states, reference: power_of_two(scale) })
     }
 
     /// The system in these units.
-    fn of_one(&self, system: &Midpoint) -> Midpoint {
+    pub(super) fn of_one(&self, system: &Midpoint) -> Midpoint {
         let entry = |m: &Mat, row: &dyn Fn(usize) -> f64, column: &dyn Fn(usize) -> f64| {
             Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / row(i) * column(j))
         };
@@ -332,7 +341,7 @@ impl Units {
     }
 
     /// Converts rows of R from these units to those of the file.
-    fn factor(&self, rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    pub(super) fn factor(&self, rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         let scaled = |(row, unit): (Vec<f64>, &f64)| row.into_iter().map(|x| x * unit).collect();
         rows.into_iter().zip(&self.states).map(scaled).collect()
     }

@@ -9,9 +9,8 @@ use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::design::problem::Problem;
 use crate::linalg::{CMat, Complex};
-use crate::spec::Spec;
-use crate::units::Seconds;
-use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
+use crate::spec::{ConverterErrors, ErrorBox, ErrorPoint};
+use crate::units::{FastPeriods, Seconds};
 use std::ops::Range;
 
 /// Errors of a channel as shares of the half-width, beside none: of the delay and of the cut-off. The
@@ -32,14 +31,13 @@ pub(in crate::design) type Combination = Vec<usize>;
 /// All front ends of a box.
 #[derive(Debug)]
 pub(in crate::design) struct BoxPlant {
-    spec: Spec,
-    latency: usize,
+    problem: Problem,
     pub(in crate::design) errors: ErrorBox,
     /// Its measurements are the samples of the nodes.
     plant: LiftedPlant,
     nodes: Vec<Node>,
-    /// Samples of each converter per frame.
-    samples: Vec<usize>,
+    /// The samples of each converter in a frame.
+    converters: Vec<Range<usize>>,
     /// For each converter.
     options: Vec<Vec<ChannelError>>,
 }
@@ -48,7 +46,7 @@ pub(in crate::design) struct BoxPlant {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Node {
     channel: usize,
-    delay: Seconds,
+    delay: FastPeriods,
     cutoff: f64,
 }
 
@@ -59,7 +57,6 @@ pub(super) struct ChannelError {
     pub(super) node: usize,
     /// Relative to the channel's own gain.
     pub(super) gain: f64,
-    pub(super) delay: Seconds,
 }
 
 /// The responses of all nodes and of the references at one frequency.
@@ -69,77 +66,67 @@ pub(in crate::design) struct BoxResponse {
 }
 
 impl BoxPlant {
-    /// The front ends of `spec` over `errors`: without errors, at the ends of each side, and between them.
+    /// The front ends of `problem` over `errors`: without errors, at the ends of each side, and between
+    /// them.
     ///
     /// # Errors
-    /// As [`Problem::with_errors`].
-    pub(in crate::design) fn new(
-        spec: &Spec,
-        latency: usize,
-        errors: &ErrorBox,
-    ) -> Result<Self, DesignError> {
-        let centre = ErrorPoint::none(spec.channels.len());
+    /// As [`Problem::check_size`].
+    pub(in crate::design) fn new(problem: &Problem, errors: &ErrorBox) -> Result<Self, DesignError> {
+        let channels = errors.delays.len();
+        let centre = ErrorPoint::none(channels);
+        for sign in [-1.0, 1.0] {
+            let delays = errors.delays.iter().map(|&half| half * sign).collect();
+            problem.perturbed(&ErrorPoint { delays, ..ErrorPoint::none(channels) }).check_size()?;
+        }
         let nodes = nodes(errors, &centre, &OFFSETS);
         let nodes = if nodes.len() > MAX_NODES { self::nodes(errors, &centre, &ENDS) } else { nodes };
-        Self::with_nodes(spec, latency, errors, &centre, nodes)
+        Ok(Self::with_nodes(problem, errors, &centre, nodes))
     }
 
     /// The same front ends near one point: there, and `share` of the half-widths beside it.
-    ///
-    /// # Errors
-    /// As [`BoxPlant::new`].
-    pub(super) fn near(&self, point: &ErrorPoint, share: f64) -> Result<Self, DesignError> {
+    pub(super) fn near(&self, point: &ErrorPoint, share: f64) -> Self {
         let nodes = nodes(&self.errors, point, &[-share, share]);
-        Self::with_nodes(&self.spec, self.latency, &self.errors, point, nodes)
+        Self::with_nodes(&self.problem, &self.errors, point, nodes)
     }
 
     /// The first option of each channel has the errors of `centre`.
-    fn with_nodes(
-        spec: &Spec,
-        latency: usize,
-        errors: &ErrorBox,
-        centre: &ErrorPoint,
-        nodes: Vec<Node>,
-    ) -> Result<Self, DesignError> {
-        let plant = lifted(spec, latency, &nodes)?;
-        let options = (0..spec.channels.len())
+    fn with_nodes(problem: &Problem, errors: &ErrorBox, centre: &ErrorPoint, nodes: Vec<Node>) -> Self {
+        let converters = problem.converters();
+        let options = (0..converters.len())
             .map(|i| {
                 let of_channel = (0..nodes.len()).filter(|&node| nodes[node].channel == i);
-                let option = |node: usize, gain| ChannelError { node, gain, delay: nodes[node].delay };
                 let half = errors.gains[i];
                 let gains = if half > 0.0 { vec![-half, half] } else { vec![0.0] };
-                let all = of_channel.flat_map(|node| gains.iter().map(move |&gain| option(node, gain)));
+                let all =
+                    of_channel.flat_map(|node| gains.iter().map(move |&gain| ChannelError { node, gain }));
                 let all: Vec<ChannelError> = all.collect();
                 let first = ChannelError { gain: centre.gains[i], ..all[0] };
                 let others = all.into_iter().filter(|other| *other != first);
                 std::iter::once(first).chain(others).collect()
             })
             .collect();
-        let (spec, errors, samples) = (spec.clone(), errors.clone(), spec.layout().samples().to_vec());
-        Ok(Self { spec, latency, errors, plant, nodes, samples, options })
+        let plant = lifted(problem, &nodes);
+        Self { problem: problem.clone(), errors: errors.clone(), plant, nodes, converters, options }
     }
 
     /// Makes the errors of `point` a combination. All other combinations stay what they are.
-    ///
-    /// # Errors
-    /// As [`BoxPlant::new`].
-    pub(in crate::design) fn include(&mut self, point: &ErrorPoint) -> Result<Combination, DesignError> {
+    pub(in crate::design) fn include(&mut self, point: &ErrorPoint) -> Combination {
         let mut combination = Combination::new();
         let lifted = self.nodes.len();
         for channel in 0..self.options.len() {
-            let (delay, cutoff, gain) = (point.delays[channel], point.cutoffs[channel], point.gains[channel]);
+            let ConverterErrors { delay, cutoff, gain } = point.of(channel);
             let node = self.node_at(Node { channel, delay, cutoff });
             let options = &mut self.options[channel];
             let known = options.iter().position(|option| option.node == node && option.gain == gain);
             if known.is_none() {
-                options.push(ChannelError { node, gain, delay: self.nodes[node].delay });
+                options.push(ChannelError { node, gain });
             }
             combination.push(known.unwrap_or(options.len() - 1));
         }
         if self.nodes.len() > lifted {
-            self.plant = self::lifted(&self.spec, self.latency, &self.nodes)?;
+            self.plant = self::lifted(&self.problem, &self.nodes);
         }
-        Ok(combination)
+        combination
     }
 
     /// The index of a node, which is added unless there is one like it.
@@ -202,6 +189,11 @@ impl BoxPlant {
         (0..options.len()).filter(|&choice| is_end(&options[choice])).collect()
     }
 
+    /// h.
+    pub(in crate::design) fn fast_period(&self) -> Seconds {
+        self.problem.fast_period
+    }
+
     /// M.
     pub(in crate::design) fn ratio(&self) -> usize {
         self.plant.ratio()
@@ -219,18 +211,16 @@ impl BoxPlant {
     pub(in crate::design) fn point(&self, combination: &[usize]) -> ErrorPoint {
         let mut point = ErrorPoint::none(self.options.len());
         for (i, &choice) in combination.iter().enumerate() {
-            let ChannelError { node, gain, delay } = self.options[i][choice];
-            (point.delays[i], point.gains[i], point.cutoffs[i]) = (delay, gain, self.nodes[node].cutoff);
+            let ChannelError { node, gain } = self.options[i][choice];
+            let Node { delay, cutoff, .. } = self.nodes[node];
+            (point.delays[i], point.gains[i], point.cutoffs[i]) = (delay, gain, cutoff);
         }
         point
     }
 
     /// The plant with the errors of `point`.
-    ///
-    /// # Errors
-    /// As [`Problem::with_errors`].
-    pub(in crate::design) fn moved(&self, point: &ErrorPoint) -> Result<LiftedPlant, DesignError> {
-        Ok(LiftedPlant::new(&Problem::with_errors(&self.spec, self.latency, point)?))
+    pub(in crate::design) fn moved(&self, point: &ErrorPoint) -> LiftedPlant {
+        LiftedPlant::new(&self.problem.perturbed(point))
     }
 
     /// All responses at a frequency in radians per slow period.
@@ -261,27 +251,28 @@ impl BoxPlant {
 
     /// The rows of a node's samples.
     pub(super) fn rows(&self, node: usize) -> Range<usize> {
-        let count = |node: &Node| self.samples[node.channel];
+        let count = |node: &Node| self.converters[node.channel].len();
         let first = self.nodes[..node].iter().map(count).sum();
         first..first + count(&self.nodes[node])
     }
 
     /// The columns of the filters of a converter.
     pub(super) fn columns(&self, converter: usize) -> Range<usize> {
-        let first = self.samples[..converter].iter().sum();
-        first..first + self.samples[converter]
+        self.converters[converter].clone()
     }
 }
 
 /// The plant whose measurements are the samples of the nodes.
-fn lifted(spec: &Spec, latency: usize, nodes: &[Node]) -> Result<LiftedPlant, DesignError> {
-    let channels = nodes.iter().map(|node| spec.channels[node.channel].clone()).collect();
-    let errors = ErrorPoint {
-        delays: nodes.iter().map(|node| node.delay).collect(),
-        gains: vec![0.0; nodes.len()],
-        cutoffs: nodes.iter().map(|node| node.cutoff).collect(),
-    };
-    Ok(LiftedPlant::new(&Problem::with_errors(&Spec { channels, ..spec.clone() }, latency, &errors)?))
+fn lifted(problem: &Problem, nodes: &[Node]) -> LiftedPlant {
+    let (mut all, converters) = (problem.clone(), problem.converters());
+    let mut channels = Vec::new();
+    for &Node { channel, delay, cutoff } in nodes {
+        let errors = ConverterErrors { delay, cutoff, gain: 0.0 };
+        let own = &problem.channels[converters[channel].clone()];
+        channels.extend(own.iter().map(|sample| all.perturb(*sample, errors)));
+    }
+    all.noise = vec![0.0; channels.len()];
+    LiftedPlant::new(&Problem { channels, ..all })
 }
 
 /// The nodes of all channels: at `centre`, and `offsets` of the half-widths beside it. The first node of
@@ -290,7 +281,7 @@ fn nodes(errors: &ErrorBox, centre: &ErrorPoint, offsets: &[f64]) -> Vec<Node> {
     let of_channel = |channel: usize| {
         let delays = side(centre.delays[channel].0, errors.delays[channel].0, offsets);
         let cutoffs = side(centre.cutoffs[channel], errors.cutoffs[channel], offsets);
-        let node = |delay: f64, cutoff: f64| Node { channel, delay: Seconds(delay), cutoff };
+        let node = |delay: f64, cutoff: f64| Node { channel, delay: FastPeriods(delay), cutoff };
         let all: Vec<Node> = delays
             .into_iter()
             .flat_map(|delay| cutoffs.iter().map(move |&cutoff| node(delay, cutoff)))

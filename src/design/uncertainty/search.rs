@@ -9,16 +9,13 @@
 //! So what is found is attained. That nothing larger was missed is not proven; `verify` has an upper bound.
 
 use super::box_plant::{BoxPlant, BoxResponse, Combination};
-use crate::bank::Bank;
 use crate::design::DesignError;
 use crate::design::error_grid::{Frequencies, LocatedPeak, Location, PRUNE_LEVEL, Peaks};
 use crate::design::filters::FilterResponse;
 use crate::design::plant::LiftedPlant;
-use crate::design::problem::Problem;
 use crate::linalg::{self, CMat, Complex};
 use crate::lti::peak::{Peak, local_maxima, refine};
-use crate::units::RadiansPerSlowPeriod;
-use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
+use crate::spec::ErrorPoint;
 use std::cell::OnceCell;
 
 /// Steps of a climb; two or three suffice.
@@ -37,36 +34,10 @@ const NEAR_WORST: f64 = 0.9;
 /// is flat at its peak.
 const HALVINGS: i32 = 6;
 
-/// The norm of `bank` with the errors of `point`, and the frequency of its peak.
-///
-/// # Errors
-/// As [`super::super::analyze`].
-pub fn norm_at(bank: &Bank, point: &ErrorPoint) -> Result<(f64, RadiansPerSlowPeriod), DesignError> {
-    let peak = LiftedPlant::new(&moved(bank, point)?).bank_norm(&bank.filters)?;
-    Ok((peak.gain, RadiansPerSlowPeriod(peak.frequency)))
-}
-
-/// The problem of `bank` with the errors of `point`.
-pub(super) fn moved(bank: &Bank, point: &ErrorPoint) -> Result<Problem, DesignError> {
-    Problem::with_errors(bank.spec.as_ref().ok_or(DesignError::NoSpec)?, bank.latency, point)
-}
-
-/// Points of the box that may be the worst ones, with their peak frequencies; the centre among them.
-///
-/// # Errors
-/// As [`super::super::analyze`].
-pub(super) fn candidates(
-    bank: &Bank,
-    errors: &ErrorBox,
-) -> Result<Vec<(ErrorPoint, RadiansPerSlowPeriod)>, DesignError> {
-    let plant = BoxPlant::new(bank.spec.as_ref().ok_or(DesignError::NoSpec)?, bank.latency, errors)?;
-    let filters = FilterResponse::new(bank)?;
-    let search = BoxSearch::new(plant, filters.lags(), filters.resonances())?;
-    let mut points = search.worst_points(&filters)?;
-    points.push(ErrorPoint::none(bank.channel_count()));
-    let norm = |point: ErrorPoint| Ok((norm_at(bank, &point)?.1, point));
-    let found = points.into_iter().map(norm).collect::<Result<Vec<_>, DesignError>>()?;
-    Ok(found.into_iter().map(|(frequency, point)| (point, frequency)).collect())
+/// Errors with their norm.
+pub(in crate::design) struct WorstErrors {
+    pub(in crate::design) point: ErrorPoint,
+    pub(in crate::design) peak: Peak,
 }
 
 /// A combination with its gain at some frequency.
@@ -105,13 +76,30 @@ impl BoxSearch {
     }
 
     /// Makes the errors of `point` a combination; see [`BoxPlant::include`].
+    pub(in crate::design) fn include(&mut self, point: &ErrorPoint) -> Combination {
+        let combination = self.plant.include(point);
+        self.responses.fill_with(OnceCell::new);
+        combination
+    }
+
+    /// The errors of the largest `norm` found over the box; no errors are among those that are tried.
     ///
     /// # Errors
-    /// As [`BoxPlant::include`].
-    pub(in crate::design) fn include(&mut self, point: &ErrorPoint) -> Result<Combination, DesignError> {
-        let combination = self.plant.include(point)?;
-        self.responses.fill_with(OnceCell::new);
-        Ok(combination)
+    /// As [`BoxSearch::peaks`], and those of `norm`.
+    pub(in crate::design) fn worst(
+        &self,
+        filters: &FilterResponse,
+        norm: impl Fn(&LiftedPlant) -> Result<Peak, DesignError>,
+    ) -> Result<WorstErrors, DesignError> {
+        let at = |point: ErrorPoint| {
+            let peak = norm(&self.plant.moved(&point))?;
+            Ok::<_, DesignError>(WorstErrors { point, peak })
+        };
+        let without_errors = at(ErrorPoint::none(self.plant.options().len()))?;
+        self.worst_points(filters)?.into_iter().try_fold(without_errors, |worst, point| {
+            let other = at(point)?;
+            Ok(if other.peak.gain > worst.peak.gain { other } else { worst })
+        })
     }
 
     /// The peaks over the frequencies above `level`, each with the combination of errors that attains it.
@@ -264,10 +252,7 @@ impl BoxSearch {
     ///
     /// # Errors
     /// As [`BoxSearch::peaks`].
-    pub(in crate::design) fn worst_points(
-        &self,
-        filters: &FilterResponse,
-    ) -> Result<Vec<ErrorPoint>, DesignError> {
+    fn worst_points(&self, filters: &FilterResponse) -> Result<Vec<ErrorPoint>, DesignError> {
         let found = self.sweep(filters, 0.0)?;
         let most = found.iter().map(|found| highest(found)).fold(0.0, f64::max);
         let mut peaks = self.peaks_among(&found, filters, NEAR_WORST * most)?.peaks;
@@ -291,7 +276,7 @@ impl BoxSearch {
     ) -> Result<ErrorPoint, DesignError> {
         let at = filters.at(frequency);
         for halving in 2..2 + HALVINGS {
-            let near = self.plant.near(&point, 0.5f64.powi(halving))?;
+            let near = self.plant.near(&point, 0.5f64.powi(halving));
             let found = climb(&near, &near.response(frequency), &at, vec![0; point.delays.len()])?;
             point = near.point(&found.combination);
         }

@@ -1,10 +1,9 @@
 //! A box of errors as it is asked for: half-widths, of one channel for all or of each.
 
 use crate::bank::Bank;
-use crate::quantity::{Time, readable};
-use crate::spec::{ChannelCount, SpecProblem, check_delay_half_width, for_channels};
-use crate::units::Seconds;
-use crate::verify::uncertainty::ErrorBox;
+use crate::quantity::Time;
+use crate::spec::{ChannelCount, ErrorBox, SpecProblem, check_delay_half_width, for_channels};
+use crate::units::{FastPeriods, Seconds};
 use std::str::FromStr;
 
 /// Shares of this size and more are out of the range of the proof.
@@ -15,7 +14,7 @@ const MOST_SHARE: f64 = 0.5;
 #[derive(Debug, Clone, Default, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct BoxWidths {
-    /// Prove the worst case over delays that are off by up to this much (10ps, 0.01samples, or seconds): one
+    /// Bound the worst case over delays that are off by up to this much (10ps, 0.01samples, or seconds): one
     /// value for all channels but the reference, or one per channel
     #[cfg_attr(feature = "clap", arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = crate::quantity::time))]
     pub delay_box: Vec<Time>,
@@ -25,9 +24,6 @@ pub struct BoxWidths {
     /// Also cut-offs that are off by up to this share; values as for --delay-box
     #[cfg_attr(feature = "clap", arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = crate::quantity::relative))]
     pub cutoff_box: Vec<f64>,
-    /// Also bound what instants that jitter by up to this much may add: one value, or one per channel
-    #[cfg_attr(feature = "clap", arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = crate::quantity::time))]
-    pub jitter: Vec<Time>,
     /// The channel to which delays, gains and cut-offs are relative, from 1, or none if every channel has an
     /// error of its own [default: 1 where one value is given for all channels]
     #[cfg_attr(feature = "clap", arg(long, value_name = "CHANNEL|none"))]
@@ -88,9 +84,6 @@ pub enum BoxRule {
     /// A width below 0.
     #[error("the box reaches as far in both directions; give the positive half-width")]
     Negative,
-    /// Jitter with which samples are not in their order.
-    #[error("a converter takes a sample every {}; instants that are off by as much have no order, give less", readable(.0.0, "s"))]
-    Disorder(Seconds),
     /// A share that is too large for the proof.
     #[error("shares of 50% and more are not supported")]
     Share,
@@ -121,9 +114,8 @@ impl BoxWidths {
         {
             return of("reference", Err(BoxRule::NoChannel { channel, channels }));
         }
-        let delays = of("delay_box", in_seconds(&self.delay_box, bank))?;
-        let check = |delay: &Seconds| check_delay_half_width(delay.in_fast_periods(bank.fast_period), *delay);
-        of("delay_box", delays.iter().try_for_each(check))?;
+        let delays = self.delay_box.iter().map(|time| checked(time.in_seconds(bank.fast_period), bank));
+        let delays = of("delay_box", delays.collect::<Result<Vec<FastPeriods>, BoxRule>>())?;
         of("gain_box", self.gain_box.iter().try_for_each(check_share))?;
         of("cutoff_box", self.cutoff_box.iter().try_for_each(check_share))?;
         let is_given = !(delays.is_empty() && self.gain_box.is_empty() && self.cutoff_box.is_empty());
@@ -133,19 +125,6 @@ impl BoxWidths {
             cutoffs: of("cutoff_box", self.relative(&self.cutoff_box, channels))?,
         };
         Ok(is_given.then_some(errors))
-    }
-
-    /// The jitter of each channel; `None` if none is given.
-    ///
-    /// # Errors
-    /// [`RefusedBox`] of `jitter`.
-    pub fn jitter_of(&self, bank: &Bank) -> Result<Option<Vec<Seconds>>, RefusedBox> {
-        let (jitter, period) = (of("jitter", in_seconds(&self.jitter, bank))?, bank.slow_period());
-        if jitter.iter().any(|jitter| jitter.0 >= period.0) {
-            return of("jitter", Err(BoxRule::Disorder(period)));
-        }
-        let all = of("jitter", for_channels(&jitter, bank.channel_count()))?;
-        Ok((!jitter.is_empty()).then_some(all))
     }
 
     /// Values of all channels, 0 for the reference.
@@ -164,12 +143,13 @@ impl BoxWidths {
     }
 }
 
-fn in_seconds(times: &[Time], bank: &Bank) -> Result<Vec<Seconds>, BoxRule> {
-    let seconds = |time: &Time| match time.in_seconds(bank.fast_period) {
-        time if time.0 >= 0.0 => Ok(time),
-        _ => Err(BoxRule::Negative),
-    };
-    times.iter().map(seconds).collect()
+fn checked(delay: Seconds, bank: &Bank) -> Result<FastPeriods, BoxRule> {
+    if delay.0 < 0.0 {
+        return Err(BoxRule::Negative);
+    }
+    let periods = delay.in_fast_periods(bank.fast_period);
+    check_delay_half_width(periods, delay)?;
+    Ok(periods)
 }
 
 fn check_share(share: &f64) -> Result<(), BoxRule> {

@@ -1,225 +1,168 @@
-//! Proven bounds of the worst case over a box of errors: delays, gains and cut-offs that are not what the
-//! spec says.
+//! A bound of the worst case over a box of errors, from two norms: delays, gains and cut-offs that are
+//! not what the spec says.
 //!
-//! The filters F are fixed. For errors delta of the channels let K_delta = W - F H_delta be the error
-//! system. [`worst_case`] proves
-//!
-//! ```text
-//! lower <= max over the box of ||K_delta|| <= upper.
-//! ```
-//!
-//! The lower end is the gain of one K_delta at one frequency. The upper end rests on two facts.
-//!
-//! *Over the errors, at a fixed frequency* (`at_frequency`): each channel's row is a convex mix of its
-//! rows at the ends of the box plus a remainder that falls with the width (`remainder`), so the gain is at
-//! most the largest gain at a vertex plus what the remainders add. Where that is too much, the box is
-//! halved. Many vertices are bounded at once (`multipliers`).
-//!
-//! *Between frequencies, for fixed errors*: with its memory cut off after J slow periods (`memory`) K is a
-//! polynomial in z^-1, and |a* K|^2 is a nonnegative trigonometric polynomial p of some degree d for every
-//! direction a. By M. Riesz's lemma, p(omega + t) >= max p cos^2(d t / 2) around its maximum, |t| <= pi / d.
-//! (P. Borwein, T. Erdelyi, *Polynomials and Polynomial Inequalities*, 1995, lemma E.3 of section 5.1, for
-//! p - max p / 2.) So if every frequency lies within y of one that was evaluated,
+//! The filters F are fixed. The errors of a converter change its own rows of H only. For errors t_s,
+//! |t_s| <= delta_s, of its delay, gain and cut-off they are
 //!
 //! ```text
-//! ||K_delta|| <= max over these frequencies of (sigma(K_delta) + tail) / cos(d y / 2) + tail.
+//! h_i(t) = h_i + sum over the errors s of sample i of t_s h'_s  +  r_i(t)
 //! ```
 //!
-//! Only the frequencies near the peak need narrow cells and small boxes, and no norm is computed.
+//! with fixed rows h'_s ([`slopes`]) and a remainder r_i(t), whose norm over the unit circle is at most
+//! rho_i ([`rows`]). Let H' hold all rows delta_s h'_s, D be a positive diagonal matrix with a number for
+//! each, and L diagonal with L_i^2 the sum of 1 / D_s^2 over the errors of sample i. Then K(t) = K - F
+//! (H(t) - H), and
+//!
+//! ```text
+//! ||K(t)|| <= ||K|| + ||F L|| ( ||D H'|| + [ sum over i of rho_i^2 / L_i^2 ]^(1/2) ).
+//! ```
+//!
+//! For the first-order part is the product of the columns F_i / D_s, a diagonal matrix of the shares t_s
+//! / delta_s, and D H'; the columns together have the Gram matrix of F L. D commutes with the shares, so
+//! that the samples of one converter in a frame may share an error. The phases of r_i are unknown, so the
+//! rows r_i / L_i together have at most the root of the sum of their squares.
+//!
+//! F L is a digital system and D H' the lifted form of an analog one; both norms are bounded by the
+//! bounded-real lemma, with certificates in the file ([`crate::bank::BoxProof`]). Nothing is searched
+//! here.
+//!
+//! The bound is close where the columns of F and the rows of H' are nearly orthogonal, since the norm of
+//! their product is then nearly that of its largest term, and where either ||K|| or what the errors add
+//! is small.
 
-mod aliases;
-mod angle;
-mod at_frequency;
-mod channel;
-mod complex_matrix;
-mod cover;
-mod grid;
-mod judge;
-mod memory;
-mod multipliers;
-mod quick;
-mod remainder;
+mod rows;
 mod slopes;
-#[cfg(test)]
-mod tests;
-mod transfer;
-mod vertex_tree;
 
-pub use slopes::{Slopes, slopes};
-
+use self::rows::UncertainRows;
 use super::VerifyError;
-use crate::bank::Bank;
-use crate::spec::UncertaintySpec;
-use crate::units::{RadiansPerSlowPeriod, Seconds};
+use super::error_system::BlockForm;
+use super::slow_period::SlowPeriod;
+use super::system::EnclosedSystem;
+use super::timeline::timeline;
+use crate::arithmetic::Ball;
+use crate::bank::{Bank, BoxProof, Certificate};
+use crate::spec::{ErrorBox, Spec};
 
-/// How far the channels may be off, in both directions. All lists have one entry per channel. A delay in
-/// seconds lies between the doubles nearest to its ends.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct ErrorBox {
-    /// Largest error of each delay, zero or more.
-    pub delays: Vec<Seconds>,
-    /// Largest relative error of each gain, from 0 to below 1.
-    pub gains: Vec<f64>,
-    /// Largest relative error of each cut-off, from 0 to below 1: Phi_i(s / (1 + x)) for all |x| up to it.
-    pub cutoffs: Vec<f64>,
+/// Makes up for the roundings of sums of up to a thousand terms in double precision.
+const OUTWARD: f64 = 1.0 + 1e-12;
+
+/// What errors of a box change, enclosed.
+pub(crate) struct EnclosedBox {
+    filters: BlockForm,
+    /// Its samples are the rows of H'.
+    slopes: SlowPeriod,
+    /// The sample of a frame that each row belongs to.
+    samples: Vec<usize>,
+    /// rho, for each sample of a frame.
+    remainders: Vec<f64>,
 }
 
-/// Errors of the channels. All lists have one entry per channel.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct ErrorPoint {
-    /// True delay minus the one in the bank.
-    pub delays: Vec<Seconds>,
-    /// True gain over the one in the bank, minus one.
-    pub gains: Vec<f64>,
-    /// True cut-off over the one in the bank, minus one.
-    pub cutoffs: Vec<f64>,
-}
-
-/// One uncertain number of a channel, a side of the box.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Side {
-    Delay(usize),
-    Gain(usize),
-    Cutoff(usize),
-}
-
-/// The worst case over a box, proven from both sides (h = 1).
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct WorstCase {
-    /// The norm at `point` is at least this.
-    pub lower: f64,
-    /// No norm in the box is larger.
-    pub upper: f64,
-    /// The worst errors found.
-    pub point: ErrorPoint,
-    /// The frequency of `lower`.
-    pub frequency: RadiansPerSlowPeriod,
-    /// Number of gains computed.
-    pub gains_computed: usize,
-}
-
-impl ErrorBox {
-    /// No errors at all.
-    pub fn none(channels: usize) -> Self {
-        Self {
-            delays: vec![Seconds(0.0); channels],
-            gains: vec![0.0; channels],
-            cutoffs: vec![0.0; channels],
-        }
-    }
-
-    /// The box of a spec's `[uncertainty]`, for `channels` channels.
-    pub fn of(table: &UncertaintySpec, channels: usize) -> Self {
-        Self {
-            delays: table.delays(channels),
-            gains: table.gains(channels),
-            cutoffs: table.cutoffs(channels),
-        }
-    }
-
-    /// Whether there are no errors.
-    pub fn is_point(&self) -> bool {
-        self.delays.iter().all(|x| x.0 == 0.0) && self.gains.iter().chain(&self.cutoffs).all(|x| *x == 0.0)
-    }
-
-    /// The sides that have a length: delays, then gains, then cut-offs.
-    pub(crate) fn sides(&self) -> Vec<Side> {
-        let channels = 0..self.delays.len();
-        let delays = channels.clone().filter(|&i| self.delays[i].0 > 0.0).map(Side::Delay);
-        let gains = channels.clone().filter(|&i| self.gains[i] > 0.0).map(Side::Gain);
-        let cutoffs = channels.filter(|&i| self.cutoffs[i] > 0.0).map(Side::Cutoff);
-        delays.chain(gains).chain(cutoffs).collect()
-    }
-
-    /// The box with all sides multiplied by `factor`.
-    pub fn scaled(&self, factor: f64) -> Self {
-        let times = |list: &[f64]| list.iter().map(|x| x * factor).collect();
-        Self {
-            delays: self.delays.iter().map(|&x| x * factor).collect(),
-            gains: times(&self.gains),
-            cutoffs: times(&self.cutoffs),
-        }
-    }
-
-    /// Checks the lists and their numbers.
+impl EnclosedBox {
+    /// Encloses what the errors of `errors` change in the error system of `bank`.
     ///
     /// # Errors
-    /// [`VerifyError::ErrorBox`].
-    pub fn check(&self, channels: usize) -> Result<(), VerifyError> {
-        let lists =
-            [("delays", self.delays.len()), ("gains", self.gains.len()), ("cut-offs", self.cutoffs.len())];
-        if let Some((what, given)) = lists.into_iter().find(|(_, given)| *given != channels) {
-            let rule = format!("{given} {what} for {channels} channels: give one for each");
-            return Err(VerifyError::ErrorBox { rule });
+    /// As [`super::EnclosedErrorSystem::new`]; [`VerifyError::ErrorBox`] for a box that does not fit the
+    /// bank.
+    pub(crate) fn new(bank: &Bank, errors: &ErrorBox) -> Result<Self, VerifyError> {
+        check(errors, bank.channel_count())?;
+        let UncertainRows { front_ends, rows, samples, remainders } = UncertainRows::new(bank, errors)?;
+        front_ends.check_work(rows.len())?;
+        let slopes = SlowPeriod::new(&front_ends, &timeline(&rows, bank.ratio)?, &rows);
+        Ok(Self { filters: BlockForm::new(&bank.filters, bank.ratio), slopes, samples, remainders })
+    }
+
+    /// The sample of a frame, from 0, of each row of H'.
+    pub(crate) fn samples(&self) -> &[usize] {
+        &self.samples
+    }
+
+    /// D H'.
+    pub(crate) fn slopes(&self, scales: &[f64]) -> EnclosedSystem {
+        EnclosedSystem::of_samples(&self.slopes, scales)
+    }
+
+    /// F L.
+    pub(crate) fn filters(&self, scales: &[f64]) -> EnclosedSystem {
+        EnclosedSystem::of_filters(&self.filters, &self.powers(scales))
+    }
+
+    /// L^2.
+    fn powers(&self, scales: &[f64]) -> Vec<Ball> {
+        let mut powers = vec![Ball::ZERO; self.remainders.len()];
+        for (&sample, &scale) in self.samples.iter().zip(scales) {
+            powers[sample] += Ball::from(1.0) / (Ball::from(scale) * Ball::from(scale));
         }
-        let refuse = |what: &str, value: f64| {
-            let rule = format!("{what} of {value}: zero or more, and gains and cut-offs below 0.5 (50 %)");
-            Err(VerifyError::ErrorBox { rule })
-        };
-        if let Some(delay) = self.delays.iter().find(|x| !(x.0 >= 0.0 && x.0.is_finite())) {
-            return refuse("a delay error", delay.0);
+        powers
+    }
+
+    /// A proven bound of what the errors add to the norm; `None` if `proof` does not prove one.
+    pub(crate) fn increase(&self, proof: &BoxProof) -> Option<f64> {
+        let BoxProof { scales, filters, slopes } = proof;
+        let fits = scales.len() == self.samples.len() && scales.iter().all(|scale| *scale > 0.0);
+        if !fits || !self.filters(scales).certifies(filters) || !self.slopes(scales).certifies(slopes) {
+            return None;
         }
-        match self.gains.iter().chain(&self.cutoffs).find(|x| !(0.0..0.5).contains(*x)) {
-            Some(&share) => refuse("a relative error", share),
-            None => Ok(()),
-        }
+        let rest =
+            |(power, &bound): (Ball, &f64)| if bound > 0.0 { bound * bound / power.lower() } else { 0.0 };
+        let rest: f64 = self.powers(scales).into_iter().zip(&self.remainders).map(rest).sum();
+        let increase = filters.norm * (slopes.norm + rest.sqrt()) * OUTWARD;
+        increase.is_finite().then_some(increase)
     }
 }
 
-impl ErrorPoint {
-    /// No errors.
-    pub fn none(channels: usize) -> Self {
-        let ErrorBox { delays, gains, cutoffs } = ErrorBox::none(channels);
-        Self { delays, gains, cutoffs }
+/// Checks the lists of a box and their numbers.
+fn check(errors: &ErrorBox, channels: usize) -> Result<(), VerifyError> {
+    let refuse = |rule: String| Err(VerifyError::ErrorBox { rule });
+    let lists = [errors.delays.len(), errors.gains.len(), errors.cutoffs.len()];
+    if let Some(given) = lists.into_iter().find(|given| *given != channels) {
+        return refuse(format!("{given} half-widths for {channels} channels: give one for each"));
+    }
+    let sizes = errors.delays.iter().map(|delay| delay.0).chain(errors.gains.iter().copied());
+    if let Some(value) = sizes.clone().find(|x| !(x.is_finite() && *x >= 0.0)) {
+        return refuse(format!("a half-width of {value}: it is zero or more"));
+    }
+    if errors.sides() == 0 {
+        return refuse("all its half-widths are zero".to_owned());
+    }
+    match errors.cutoffs.iter().find(|x| !(0.0..0.5).contains(*x)) {
+        Some(value) => refuse(format!("a cut-off off by {value}: the share is from 0 to below 0.5 (50 %)")),
+        None => Ok(()),
     }
 }
 
-/// Proves the two ends of the worst case of `bank` over `errors`, at most `accuracy` (relative) apart if the
-/// work allows. `candidates` are points that may be the worst, with the frequency of their peak; they only
-/// save work.
+/// The bound of the norm over the box `errors`, from a certificate of the norm without errors and the
+/// proof of what they add; `None` if that is not proven. The certificate is one that passed.
 ///
 /// # Errors
-/// As [`super::EnclosedErrorSystem::new`]; [`VerifyError::ErrorBox`] for a box that does not fit the bank;
-/// [`VerifyError::LongMemory`] if the filters or front ends remember for too long; [`VerifyError::WideBox`]
-/// if no upper end was proven.
-pub fn worst_case(
+/// As [`EnclosedBox::new`].
+pub(crate) fn worst_case(
     bank: &Bank,
     errors: &ErrorBox,
-    accuracy: f64,
-    candidates: &[(ErrorPoint, RadiansPerSlowPeriod)],
-) -> Result<WorstCase, VerifyError> {
-    errors.check(bank.channel_count())?;
-    let mut cover = cover::Cover::new(bank, errors)?;
-    // A first lower end, so that the accuracy has a meaning.
-    if candidates.is_empty() {
-        cover.try_point(&ErrorPoint::none(bank.channel_count()), RadiansPerSlowPeriod(0.0))?;
-    }
-    for (point, frequency) in candidates {
-        cover.try_point(point, *frequency)?;
-    }
-    cover.prove(accuracy)
+    nominal: &Certificate,
+    proof: &BoxProof,
+) -> Result<Option<f64>, VerifyError> {
+    let increase = EnclosedBox::new(bank, errors)?.increase(proof);
+    Ok(increase.map(|increase| (nominal.gamma + increase) * OUTWARD))
 }
 
-/// Whether it is proven that ||K_delta|| <= `gamma` for all errors in the box. It may hold without a proof
-/// where the worst case is less than a per cent below `gamma`.
+/// Proves the worst case that the bank states for the box of its spec's `[uncertainty]`. The certificate of
+/// `gamma.upper` has passed.
 ///
 /// # Errors
-/// As [`worst_case`], without [`VerifyError::WideBox`].
-pub fn certifies(bank: &Bank, errors: &ErrorBox, gamma: f64) -> Result<bool, VerifyError> {
-    errors.check(bank.channel_count())?;
-    cover::Cover::new(bank, errors)?.certifies(gamma)
-}
-
-/// Proves the worst case that the bank states for its spec's `[uncertainty]`.
-///
-/// # Errors
-/// [`VerifyError::WorstCase`] if it is not proven or there is no such table; else as [`worst_case`].
-pub(crate) fn check_stated(bank: &Bank) -> Result<(), VerifyError> {
+/// [`VerifyError::WorstCase`] if it is not proven; else as [`EnclosedBox::new`].
+pub(super) fn check_stated(bank: &Bank) -> Result<(), VerifyError> {
     let Some(stated) = bank.gamma.worst_case else { return Ok(()) };
-    let table = bank.spec.as_ref().and_then(|spec| spec.uncertainty.as_ref());
-    let errors = table.map(|table| ErrorBox::of(table, bank.channel_count()));
-    match errors.map_or(Ok(false), |errors| certifies(bank, &errors, stated))? {
-        true => Ok(()),
-        false => Err(VerifyError::WorstCase { stated }),
+    let errors = bank.spec.as_ref().and_then(Spec::error_box);
+    let proofs = bank
+        .proof
+        .as_ref()
+        .and_then(|proof| proof.worst_case.as_ref().map(|box_proof| (&proof.upper, box_proof)));
+    let proven = match errors.zip(proofs) {
+        Some((errors, (nominal, proof))) => worst_case(bank, &errors, nominal, proof)?,
+        None => None,
+    };
+    match proven {
+        Some(proven) if proven <= stated => Ok(()),
+        _ => Err(VerifyError::WorstCase { stated }),
     }
 }

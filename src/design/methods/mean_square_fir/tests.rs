@@ -11,7 +11,8 @@ use crate::design::{Design, LiftedPlant, Options, analyze_mean, design};
 use crate::linalg::Complex;
 use crate::lti::gramian::h2_norm;
 use crate::spec::{
-    ChannelSpec, DesignSpec, Family, FilterSpec, Method, OneOrEach, Passband, Spec, UncertaintySpec,
+    ChannelSpec, DesignSpec, ErrorPoint, Family, FilterSpec, Method, OneOrEach, Passband, Spec,
+    UncertaintySpec,
 };
 use crate::units::{FastPeriods, Hertz, Seconds};
 use std::f64::consts::PI;
@@ -252,7 +253,8 @@ fn no_other_taps_are_better() {
 
 /// The mean square of error and noise of a bank whose delays are off by so much, by its error system.
 fn square_at(design: &Design, errors: [f64; 2]) -> f64 {
-    let problem = Problem::of_bank(&design.bank).unwrap().with_delay_errors(&errors.map(FastPeriods));
+    let point = ErrorPoint::of_delays(errors.map(FastPeriods).to_vec());
+    let problem = Problem::of_bank(&design.bank).unwrap().perturbed(&point);
     let plant = LiftedPlant::new(&problem).with_noise();
     let filters = lifted(&design.bank.filters, 2);
     h2_norm(&plant.error_system(&filters)).unwrap().powi(2) / 2.0
