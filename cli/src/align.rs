@@ -6,7 +6,6 @@ use super::calibrate_report::{Interval, interval, periods, shown};
 use super::capture_args::{CaptureArgs, check_stdin};
 use super::capture_file::start;
 use super::file_kind::FileKind;
-use super::interrupt::interrupts;
 use super::print::{Failure, check_json, failed, failed_at, is_dash, say_understood, show, warn};
 use super::written::{Mono, begin_file, begin_recording, check_outputs, write_text, write_together};
 use hybank::calibrate::{CalibrateError, Record};
@@ -23,8 +22,6 @@ use std::fmt::Write as _;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Bytes of memory for each sample: the sample, whether it is kept, and room to grow.
-const BYTES_PER_SAMPLE: f64 = 20.0;
 /// Hertz of recordings that state no rate, for a spec in normalised time.
 const NORMALISED_RATE: f64 = 48_000.0;
 
@@ -145,7 +142,7 @@ impl Args {
         let options = ReadOptions { full_scale: options.full_scale.or(spec.full_scale), ..options };
         let (mut all, mut formats, mut common) = (Vec::new(), Vec::new(), None);
         for path in &self.captures {
-            let mut reader = start(std::slice::from_ref(path), options, interrupts())?;
+            let mut reader = start(std::slice::from_ref(path), options)?;
             self.reading.scale.check(&reader)?;
             check_rate(spec, &reader).map_err(failed)?;
             let Some((_, header)) = reader.headers().next() else { continue };
@@ -161,7 +158,7 @@ impl Args {
                 )));
             }
             let format = header.layout.format;
-            let records = records(&mut reader, usize::MAX, BYTES_PER_SAMPLE, None, warnings)?;
+            let records = records(&mut reader, usize::MAX, None, warnings)?;
             formats.resize(formats.len() + records.len(), format);
             all.extend(records);
         }

@@ -5,7 +5,6 @@ use super::calibrate_report::Report;
 use super::capture_args::{CaptureArgs, InterleavedArgs, check_stdin};
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, start, unread};
 use super::file_kind::FileKind;
-use super::interrupt::interrupts;
 use super::measure::{ToneArg, tone, tones};
 use super::print::{Failure, check_json, explained, failed, say_understood, warn};
 use super::written::{check_output, write_text};
@@ -13,7 +12,7 @@ use hybank::calibrate::{
     Acquisition, CalibrateError, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning,
     applied, calibrate_pooled,
 };
-use hybank::io::{MultiReader, OfflineSamples, WORK_BYTES, rails_of};
+use hybank::io::{MultiReader, OfflineSamples, rails_of};
 use hybank::messages::Quoted;
 use hybank::pipeline::matching::check_rate;
 use hybank::spec::{DesignOverrides, Spec};
@@ -213,7 +212,7 @@ impl Args {
         if !first.is_file() {
             return Ok(paths.len());
         }
-        let reader = start(std::slice::from_ref(first), self.reading.options(2, 1), interrupts())?;
+        let reader = start(std::slice::from_ref(first), self.reading.options(2, 1))?;
         let files = spec.channels.len() / reader.channels().max(1);
         Ok(if files > 0 && paths.len().is_multiple_of(files) { files } else { paths.len() })
     }
@@ -230,12 +229,12 @@ impl Args {
         let interleaving = self.interleaved.by_delay(&spec.delays_in_fast_periods(), &layout, &self.spec)?;
         let captures =
             self.reading.of_converters(paths.len(), &layout, interleaving.as_ref(), spec.full_scale);
-        let mut reader = start(paths, captures, interrupts())?;
+        let mut reader = start(paths, captures)?;
         self.reading.scale.check(&reader)?;
         check_channels(spec, &reader)?;
         check_rate(spec, &reader).map_err(failed)?;
         let name = reader.headers().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
-        let mut records = records(&mut reader, most, WORK_BYTES, self.clip, warnings)?;
+        let mut records = records(&mut reader, most, self.clip, warnings)?;
         if !layout.is_plain() {
             records =
                 layout.ranges().into_iter().map(|samples| Record::in_a_row(&records[samples])).collect();
@@ -303,12 +302,10 @@ pub(super) fn reference(given: Option<usize>, spec: &Spec) -> Result<usize, Fail
     }
 }
 
-/// All channels of a reader, each within its rails or `clip`, for work that takes so many bytes for each
-/// sample; what was tolerated joins the `warnings`.
+/// All channels of a reader, each within its rails or `clip`; what was tolerated joins the `warnings`.
 pub(super) fn records(
     reader: &mut MultiReader,
     most: usize,
-    bytes_per_sample: f64,
     clip: Option<f64>,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Record>, Failure> {
@@ -320,8 +317,7 @@ pub(super) fn records(
     });
     let rails: Vec<_> = rails.collect();
     let name = reader.headers().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
-    let OfflineSamples { channels, is_cut } =
-        OfflineSamples::read_parts_with(reader, most, bytes_per_sample).map_err(unread)?;
+    let OfflineSamples { channels, is_cut } = OfflineSamples::read_parts(reader, most).map_err(unread)?;
     warnings.extend(reader.warnings().iter().map(ToString::to_string));
     if is_cut {
         warnings.push(format!("{}: only the first {most} frames are used", Quoted(&name)));

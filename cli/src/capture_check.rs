@@ -82,7 +82,7 @@ impl CaptureCheck {
         let judge = move || {
             let found = judged(&spec, samples);
             if let Some(events) = events {
-                found.warnings.iter().for_each(|text| events.report(Event::Warning { text: text.clone() }));
+                found.warnings.iter().for_each(|text| events.tell(&Event::Warning { text: text.clone() }));
             }
             found
         };

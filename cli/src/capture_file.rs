@@ -3,7 +3,6 @@
 use super::capture_args::check_scale;
 use super::file_kind::unreadable;
 use super::print::{Failure, failed, failed_at, is_dash, name, warn};
-use crossbeam_channel::Receiver;
 use hybank::io::{MultiReader, OfflineError, OfflineSamples, ReadOptions};
 use hybank::measure::{Spectrum, Window};
 use hybank::messages::Quoted;
@@ -60,7 +59,7 @@ impl CaptureFile {
         reading: Reading,
         whole: fn(&mut MultiReader, usize) -> Result<OfflineSamples, OfflineError>,
     ) -> Result<Self, Failure> {
-        let mut reader = start(&[path.to_owned()], reading.options, crossbeam_channel::never())?;
+        let mut reader = start(&[path.to_owned()], reading.options)?;
         check_scale(reading.options.full_scale, &reader)?;
         let channels = reader.channels();
         if channels != 1 {
@@ -128,25 +127,16 @@ impl CaptureFile {
 }
 
 /// A reader of the headers of all inputs.
-pub(super) fn start(
-    inputs: &[PathBuf],
-    options: ReadOptions<'_>,
-    stop: Receiver<()>,
-) -> Result<MultiReader, Failure> {
-    MultiReader::start(inputs, options, stop).map_err(unreadable)?.ok_or_else(interrupted)
+pub(super) fn start(inputs: &[PathBuf], options: ReadOptions<'_>) -> Result<MultiReader, Failure> {
+    MultiReader::start(inputs, options).map_err(unreadable)
 }
 
 /// Why samples could not be read.
 pub(super) fn unread(error: OfflineError) -> Failure {
     match error {
         OfflineError::Io(error) => failed(error),
-        OfflineError::Stopped => interrupted(),
         error => failed(error),
     }
-}
-
-fn interrupted() -> Failure {
-    failed("interrupted; nothing was written")
 }
 
 /// Refuses what cannot be read twice.

@@ -96,7 +96,7 @@ impl Args {
         let layout = bank.layout();
         let captures =
             self.reading.of_converters(self.inputs.len(), &layout, interleaving.as_ref(), full_scale);
-        let mut reader = start(&self.inputs, captures, crossbeam_channel::never())?;
+        let mut reader = start(&self.inputs, captures)?;
         self.reading.scale.check(&reader)?;
         let rate = Hertz(output_rate(bank, &self.bank, &reader)?);
         let OfflineSamples { channels, is_cut } =

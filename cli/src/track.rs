@@ -125,7 +125,7 @@ impl Tracked {
         let (record, events) = (Arc::clone(&self.record), self.events.clone());
         follower.retuner(bank, options, move |log, warnings| {
             let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
-            warnings.iter().for_each(|text| events.report(Event::Warning { text: text.clone() }));
+            warnings.iter().for_each(|text| events.tell(&Event::Warning { text: text.clone() }));
             Ok(locked(&record).add(&log, warnings)?)
         })
     }

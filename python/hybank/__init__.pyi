@@ -293,8 +293,8 @@ def design(
     *,
     replace: Mapping[str, Any] | None = None,
     proof: bool = True,
-    limits: bool = True,
-    progress: Callable[[str, float], object] | None = None,
+    limit: bool = True,
+    progress: Callable[[str], object] | None = None,
 ) -> Bank: ...
 @overload
 def design(
@@ -327,8 +327,8 @@ def design(
     noise: float | np.number[Any] | None = None,
     tracking: Literal["affine"] | None = None,
     proof: bool = True,
-    limits: bool = True,
-    progress: Callable[[str, float], object] | None = None,
+    limit: bool = True,
+    progress: Callable[[str], object] | None = None,
 ) -> Bank: ...
 def import_taps(spec: Bank | _Spec, taps: ArrayLike, *, latency: int | None = None, proof: bool = True) -> Bank: ...
 def load(path: _Path) -> Bank: ...

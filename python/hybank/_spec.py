@@ -22,7 +22,7 @@ def design(
     source=None, /, *, name=None, fast_rate=None, fast_period=None, ratio=None, latency=None, target=None, channels=None,
     channel=None, signal=None, uncertainty=None, full_scale=None, fit=None, design=None, method=None, taps=None,
     target_snr_db=None, gamma_margin=None, bits=None, fraction_bits=None, loss_db=None, digits=None, order=None,
-    reduction_loss_db=None, noise=None, tracking=None, replace=None, proof=True, limits=True, progress=None
+    reduction_loss_db=None, noise=None, tracking=None, replace=None, proof=True, limit=True, progress=None
 ):
     """Design the bank of a spec: a path, a TOML text of several lines, a mapping, or keywords.
 
@@ -82,10 +82,10 @@ def design(
         With `source`: `latency` and the keys from `method` on, in place of those of the spec.
     proof : bool
         Search a proof of gamma.
-    limits : bool
-        Refuse designs of more than ten minutes or more memory than there is.
+    limit : bool
+        End the design after ten minutes with the best bank so far.
     progress : callable, optional
-        ``progress(step, seconds)`` is called for every step, with the estimated seconds of the whole design.
+        ``progress(step)`` is called for every step.
 
     Returns
     -------
@@ -103,7 +103,7 @@ def design(
     given = dict(locals())
     keywords = {
         key: value for key, value in given.items()
-        if value is not None and key not in ("source", "replace", "proof", "limits", "progress")
+        if value is not None and key not in ("source", "replace", "proof", "limit", "progress")
     }
     replaced = dict(replace or {})
     latency = replaced.pop("latency", None)
@@ -115,7 +115,7 @@ def design(
         raise TypeError(
             f"give a spec or keywords, not both: {', '.join(keywords)}; replace={{..}} changes keys of [design]"
         )
-    return _design(source, replaced, latency, proof, limits, progress)
+    return _design(source, replaced, latency, proof, limit, progress)
 
 
 def _of_keywords(keywords):

@@ -3,7 +3,6 @@
 use crate::errors::refused;
 use crate::formats::Format;
 use hybank::bank::FrameLayout;
-use hybank::memory::available_memory;
 use hybank::runtime::{Input, Isa, PcmFrames, SampleLayout};
 use numpy::ndarray::Axis;
 use numpy::{
@@ -13,10 +12,6 @@ use numpy::{
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PySlice, PyTuple};
-
-/// Lists of doubles that a computation on samples holds at once, about: the samples, those of each channel,
-/// transforms and spectra.
-const WORK: usize = 8;
 
 /// What an array of samples must look like.
 #[derive(Debug, Clone, Copy)]
@@ -139,16 +134,13 @@ impl<'py> Held<'py> {
 
     /// Frame after frame as doubles: the samples, or the real (0) or imaginary (1) parts of complex ones.
     ///
-    /// Raises `MemoryError` if there is no memory for [`WORK`] such lists.
+    /// Raises `MemoryError` if there is no memory for them.
     pub(crate) fn doubles(&self, part: usize) -> PyResult<Vec<f64>> {
         let count = self.layout.frames.saturating_mul(self.layout.channels);
-        let bytes = count.saturating_mul(WORK * size_of::<f64>());
-        if available_memory().is_some_and(|memory| bytes as f64 > memory) {
-            let text =
-                format!("{count} samples need about {:.0} GB of memory; give fewer", bytes as f64 / 1e9);
-            return Err(PyMemoryError::new_err(text));
-        }
-        let mut frames = vec![0.0; count];
+        let mut frames = Vec::new();
+        let refused = |_| PyMemoryError::new_err(format!("{count} samples do not fit in memory; give fewer"));
+        frames.try_reserve_exact(count).map_err(refused)?;
+        frames.resize(count, 0.0);
         self.part(part)?[..].load(Isa::detect(), 0, &mut frames);
         Ok(frames)
     }

@@ -108,8 +108,7 @@ pub(crate) fn read<'py>(
         ..ReadOptions::files()
     };
     let read = py.detach(|| -> Result<_, String> {
-        let started = MultiReader::start(&files, read_options, crossbeam_channel::never());
-        let mut reader = started.map_err(|error| error.to_string())?.ok_or("interrupted")?;
+        let mut reader = MultiReader::start(&files, read_options).map_err(|error| error.to_string())?;
         let rate = reader.headers().find_map(|(_, header)| header.rate);
         let other = wanted.is_none().then(|| other_rate(&reader)).flatten();
         let output_rate = wanted.as_ref().map(|wanted| wanted.check(&reader)).transpose();

@@ -234,18 +234,6 @@ impl Bank {
         };
         plan?.with_offsets(&self.layout().each(&self.offsets))
     }
-
-    /// Bytes of memory that the plan of an FIR bank and so many of its streams take, about; 0 for recursive
-    /// banks.
-    ///
-    /// # Errors
-    /// As [`Bank::plan`].
-    pub fn plan_bytes(&self, options: Options, streams: usize) -> Result<f64, BuildError> {
-        match &self.filters {
-            SynthesisFilters::Fir(taps) => Plan::bytes_of_taps(taps, self.ratio, options, streams),
-            SynthesisFilters::StateSpace(_) => Ok(0.0),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -8,10 +8,9 @@
 //! instant lies in the middle of the samples that their taps see.
 
 use super::DesignError;
-use super::effort;
 use super::filters;
 use super::least_errors::{LeastErrors, candidates, check_reach, is_almost, manageable, shortest};
-use super::limits::{Limits, Stop};
+use super::limits::Stop;
 use super::merging::Repeats;
 use super::methods::robust_fir::RobustProblem;
 use super::methods::{self, Deviations, Filters, Settings};
@@ -115,14 +114,12 @@ pub(super) fn completed(spec: &Spec, comparison: Comparison<'_>) -> Result<Spec,
 /// The latency m0 of a spec in fast samples: the number in the spec, or the designer's choice.
 ///
 /// # Errors
-/// If it is to be chosen: [`DesignError`] if the spec has no [`Problem`]; [`DesignError::TooLong`] or
-/// [`DesignError::TooLarge`] if the design cannot be made.
+/// If it is to be chosen: [`DesignError`] if the spec has no [`Problem`].
 pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
     if let Some(latency) = spec.latency {
         return Ok(latency);
     }
     let open = with_taps(spec)?;
-    effort::check(&open, false, Limits::Enforced)?;
     Ok(choose(&open, Comparison { observer: &|_| (), stop: &Stop::default() })?.latency)
 }
 

@@ -1,8 +1,7 @@
 //! The steps from a spec to a finished bank.
 
 use super::choices::{Comparison, completed, settings, with_taps};
-use super::effort;
-use super::limits::{Effort, Limits, Stage, Stop};
+use super::limits::{Stage, Stop, TIME_LIMIT, remedy};
 use super::merging::Repeats;
 use super::methods::robust_fir::RobustStudy;
 use super::methods::scheduled_fir::TrackingStudy;
@@ -12,7 +11,6 @@ use super::problem::Problem;
 use super::quantise::WordStudy;
 use super::realise::{Realised, realise};
 use super::reduction::OrderReduction;
-use super::unfinished::Unfinished;
 use super::{DesignError, filters, prove, uncertainty};
 use crate::bank::{Bank, FixedPoint, Gamma, SynthesisFilters};
 use crate::spec::{DesignSpec, Method, Spec, SpecProblem};
@@ -32,9 +30,6 @@ pub struct Design {
     pub taps_chosen: bool,
     /// Frequency of the worst case.
     pub peak_frequency: RadiansPerSlowPeriod,
-    /// What the search for the least gamma, or for the least mean square beside it, left open; `None` also
-    /// for methods that do not minimise gamma and for a gamma of zero up to rounding.
-    pub unfinished: Option<Unfinished>,
     /// Number of Riccati equations solved, or of interior-point iterations.
     pub iterations: usize,
     /// For integer taps, the increase of the error that they cause.
@@ -68,19 +63,19 @@ pub enum ProofSearch {
 pub struct Options<'a> {
     /// Whether a proof is searched.
     pub proof: ProofSearch,
-    /// Whether a design that takes too long or needs too much memory is refused, or ended when it has.
-    pub limits: Limits,
-    /// Called with the step that begins and the estimate of the whole design.
-    pub observer: &'a dyn Fn(Stage, Effort),
+    /// The time after which the design ends with what it has.
+    pub time_limit: Option<Duration>,
+    /// Called with the step that begins.
+    pub observer: &'a dyn Fn(Stage),
     /// Ends the design.
     pub stop: Stop,
 }
 
 impl Default for Options<'_> {
-    /// With the search for a proof, limited and unobserved.
+    /// With the search for a proof, limited to [`TIME_LIMIT`] and unobserved.
     fn default() -> Self {
-        let (proof, limits, stop) = (ProofSearch::Run, Limits::Enforced, Stop::default());
-        Self { proof, limits, observer: &|_, _| (), stop }
+        let (proof, time_limit, stop) = (ProofSearch::Run, Some(TIME_LIMIT), Stop::default());
+        Self { proof, time_limit, observer: &|_| (), stop }
     }
 }
 
@@ -100,21 +95,23 @@ impl Options<'_> {
 ///
 /// # Errors
 /// [`DesignError`] if the spec breaks a rule of [`Spec::check`], a filter of the spec is not a valid front
-/// end, a comparison method does not apply, the design would take longer than its limit or more memory than
-/// there is, no bank was found for numerical reasons, or the design was ended before there was one:
-/// [`DesignError::StoppedWithoutBank`]. A bank without a proof is not an error: see [`Design::proof`].
+/// end, a comparison method does not apply, no bank was found for numerical reasons, or the design was ended
+/// before there was one: [`DesignError::StoppedWithoutBank`]. A bank without a proof is not an error: see
+/// [`Design::proof`].
 pub fn design(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
     spec.check()?;
     designed(spec, options).map_err(|error| match error {
-        DesignError::Stopped => DesignError::StoppedWithoutBank { remedy: effort::remedy(spec) },
+        DesignError::Stopped => DesignError::StoppedWithoutBank { remedy: remedy(spec) },
         other => other,
     })
 }
 
 fn designed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
-    let stop = options.stop.within(options.limits);
-    let (complete, problem, effort) = complete(spec, options, &stop)?;
-    (options.observer)(Stage::Filters, effort);
+    let stop = options.stop.within(options.time_limit);
+    let observer = |designs| (options.observer)(Stage::Latency { designs });
+    let complete = completed(&with_taps(spec)?, Comparison { observer: &observer, stop: &stop })?;
+    let problem = Problem::new(&complete, complete.latency.unwrap_or_default())?;
+    (options.observer)(Stage::Filters);
     let settings = Settings { stop: stop.clone(), ..settings(&complete)? };
     let merged = if settings.robust.is_some() || settings.deviations.is_some() {
         problem.merge_channels(Repeats::Never)
@@ -123,13 +120,13 @@ fn designed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
     };
     let plant = LiftedPlant::new(&merged.problem);
     let synthesis = methods::synthesise(spec.design.method, &plant, &settings)?;
-    (options.observer)(Stage::Realisation, effort);
+    (options.observer)(Stage::Realisation);
     let realised = realise(&complete, &problem, &merged, &plant, &synthesis, &stop)?;
     let judged = judge(spec, complete, realised, &synthesis).without_unresolved_bounds(&problem);
     if stop.is_due() {
         return Ok(Design { proof: Err(DesignError::Stopped), ..judged });
     }
-    (options.observer)(Stage::Proof, effort);
+    (options.observer)(Stage::Proof);
     Ok(judged.proved(&synthesis.dual, options.proof, &stop))
 }
 
@@ -164,21 +161,6 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
     ))
 }
 
-/// The spec with all defaults filled in, its problem in normalised time, and the estimate of its design.
-/// The effort is checked before the latency is chosen, and again with that latency.
-fn complete(spec: &Spec, options: &Options<'_>, stop: &Stop) -> Result<(Spec, Problem, Effort), DesignError> {
-    let checked = |spec: &Spec| effort::check(spec, options.proof == ProofSearch::Run, options.limits);
-    let open = with_taps(spec)?;
-    let mut effort = checked(&open)?;
-    let observer = |designs| (options.observer)(Stage::Latency { designs }, effort);
-    let complete = completed(&open, Comparison { observer: &observer, stop })?;
-    if complete != open {
-        effort = checked(&complete)?;
-    }
-    let problem = Problem::new(&complete, complete.latency.unwrap_or_default())?;
-    Ok((complete, problem, effort))
-}
-
 /// The bank with its complete spec and with the norm of its final coefficients. No lower bound exceeds that
 /// norm.
 fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis) -> Design {
@@ -205,7 +187,6 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
         latency_chosen: spec.latency.is_none(),
         taps_chosen: spec.is_fir() && spec.design.taps.is_none(),
         peak_frequency: RadiansPerSlowPeriod(peak.frequency),
-        unfinished: synthesis.unfinished.filter(|_| synthesis.peak.gain > rounding),
         iterations: synthesis.iterations,
         words,
         reduction,
@@ -246,7 +227,6 @@ impl Design {
                 // `verify` proves it only with the rest.
                 self.prove_worst_case(stop);
             }
-            self.close_search();
             self.proof_time = begin.elapsed();
         }
         self
@@ -254,20 +234,6 @@ impl Design {
 }
 
 impl Design {
-    /// Where the searched bank is the finished one, its proof may show more than the bounds of the search. A
-    /// bank without any error leaves nothing open.
-    fn close_search(&mut self) {
-        let is_searched = self.words.is_none() && self.reduction.is_none();
-        let is_nominal = self.robust.is_none() && self.tracking.is_none();
-        if let (true, Ok(proven), Some(norm)) = (is_searched && is_nominal, &self.proof, self.bank.gamma.norm)
-        {
-            self.unfinished = self.unfinished.and_then(|left| left.unless_proven(proven.lower, norm));
-        }
-        if is_nominal && self.unfinished.is_some() && prove::has_no_error(&self.bank) {
-            self.unfinished = None;
-        }
-    }
-
     /// States the worst case over the box of the spec, or says why there is none.
     fn prove_worst_case(&mut self, stop: &Stop) {
         let mut gamma = self.bank.gamma;

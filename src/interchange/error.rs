@@ -1,6 +1,5 @@
 //! Why a bank cannot be exported.
 
-use crate::memory::MemoryShortage;
 use crate::messages::Quoted;
 
 /// A format that cannot hold a bank.
@@ -23,9 +22,6 @@ pub enum ExportError {
         /// At most so many.
         most: u32,
     },
-    /// The texts are more than this process may use.
-    #[error("the testbench takes {0}; ask for fewer random frames, or allow more memory")]
-    Memory(#[from] MemoryShortage),
     /// Integer code needs the full scale to which an offset is relative.
     #[error(
         "channel {channel} has the offset {offset} of full scale, and integers need the bits of the samples to \

@@ -3,7 +3,6 @@
 use super::axis::{AxisScale, Labels, extent, widened};
 use super::labels::{MARK_FONT, RADIUS, Room};
 use super::legend::{Dashes, Entry, Legend, Look, OVERSIZE, letters};
-use crate::memory::MemoryShortage;
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
@@ -85,9 +84,6 @@ pub enum PlotError {
         /// Title of the chart.
         title: String,
     },
-    /// Its pixels are more than this process may use.
-    #[error("the chart takes {0}; write it as .svg, or allow more memory")]
-    Memory(#[from] MemoryShortage),
     /// The drawing library failed.
     #[error("the chart `{title}` could not be drawn: {reason}")]
     Drawing {

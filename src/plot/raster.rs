@@ -6,21 +6,16 @@
 
 use super::chart::{Chart, ENLARGED, PlotError};
 use super::legend::OVERSIZE;
-use crate::memory::check_memory;
 use plotters_backend::{BackendColor, BackendCoord, BackendStyle, DrawingBackend, DrawingErrorKind};
 use std::convert::Infallible;
 
 /// Pixels of a PNG file per pixel of an SVG that is not enlarged.
 const FINENESS: u32 = 2;
 
-/// Bytes for each pixel that is drawn: three of it, and those of the smaller picture and its file.
-const BYTES: f64 = 5.0;
-
 impl Chart {
     /// The chart as a PNG file of 1920 by 900 pixels.
     pub fn to_png(&self) -> Result<Vec<u8>, PlotError> {
         let ranges = self.ranges()?;
-        check_memory(BYTES * f64::from(ENLARGED.0) * f64::from(ENLARGED.1))?;
         let mut pixels = Pixels::white(ENLARGED.0 as usize, ENLARGED.1 as usize);
         self.draw(Canvas(&mut pixels), ranges).map_err(|error| self.failed(&error))?;
         pixels.reduced((OVERSIZE / FINENESS) as usize).png().map_err(|error| self.failed(&error))

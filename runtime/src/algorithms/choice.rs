@@ -75,14 +75,6 @@ impl Precision {
         use PcmFormat::{F64Be, F64Le, S32Be, S32Le};
         if matches!(format, F64Be | F64Le | S32Be | S32Le) { Self::Double } else { Self::Single }
     }
-
-    /// Bytes of a number.
-    pub(crate) fn bytes(self) -> f64 {
-        match self {
-            Self::Single => 4.0,
-            Self::Double => 8.0,
-        }
-    }
 }
 
 /// The algorithm that a bank runs by.
@@ -162,22 +154,6 @@ impl Algorithm {
             },
             Self::Auto => Ok(size.fastest()),
         }
-    }
-}
-
-impl ChosenAlgorithm {
-    /// Bytes of the coefficients, and of the states of a plan and of so many streams, about.
-    pub(crate) fn bytes(self, taps: &[Vec<f64>], ratio: usize, precision: Precision, streams: usize) -> f64 {
-        let size = Size::new(taps, ratio, precision);
-        let (coefficients, state) = match self {
-            Self::OverlapSave(len) => size.shape(len).numbers(),
-            // The filters of all phases and the history, both rounded up to whole vectors.
-            Self::Direct => {
-                let history = 2.0 * (size.phase_taps * size.channels) as f64;
-                (history * size.ratio as f64, history)
-            }
-        };
-        (coefficients + (1 + streams) as f64 * state) * precision.bytes()
     }
 }
 

@@ -27,7 +27,6 @@ pub(crate) use super::exchange::{DualPoint, DualSolution, GAMMA_ACCURACY};
 use super::limits::Stop;
 use super::plant::LiftedPlant;
 use super::problem::Problem;
-use super::unfinished::Unfinished;
 use crate::lti::StateSpace;
 use crate::lti::peak::Peak;
 use crate::spec::{Method, Spec};
@@ -96,8 +95,6 @@ pub(crate) struct Synthesis {
     /// For `fir` the dual solution, else empty. Its bound may be above `lower`, but taps of any size are not
     /// covered then: `verify` decides.
     pub(crate) dual: DualSolution,
-    /// What the search for the least gamma, or for the least mean square beside it, left open.
-    pub(crate) unfinished: Option<Unfinished>,
     /// Number of interior-point iterations or of Riccati equations solved.
     pub(crate) iterations: usize,
     /// For a robust design.
@@ -127,7 +124,6 @@ impl Synthesis {
             peak,
             noncausal,
             dual: DualSolution::default(),
-            unfinished: None,
             iterations: 0,
             robust: None,
             affine: None,

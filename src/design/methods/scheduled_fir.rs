@@ -120,7 +120,6 @@ pub(crate) fn synthesise(
         lower: fixed.lower.min(peak.gain),
         noncausal: fixed.noncausal.min(peak.gain),
         iterations: fixed.iterations + exchange.iterations,
-        unfinished: exchange.unfinished_at(found.ratio, found.is_missed, NORM_ACCURACY),
         dual: fixed.dual,
         robust: None,
         affine: Some(AffineDesign { slopes: found.slopes, study }),
@@ -165,9 +164,6 @@ struct Scheduled {
     worst: usize,
     /// The largest ratio of a norm to what is within reach.
     ratio: f64,
-    /// Whether the exchange ended at errors or frequencies for which the taps are worse than for those that
-    /// it knows.
-    is_missed: bool,
 }
 
 /// The delays that move.
@@ -231,10 +227,9 @@ impl Sides {
                     exchange.error_mut().add(scenario);
                 }
             }
-            let mut scheduled = self.judged(exchange.error().scenarios(), taps, slopes)?;
-            scheduled.is_missed = scheduled.ratio > enough;
+            let scheduled = self.judged(exchange.error().scenarios(), taps, slopes)?;
             rounds += 1;
-            if !scheduled.is_missed || rounds == MISSED_ERROR_LIMIT || exchange.stop.is_due() {
+            if scheduled.ratio <= enough || rounds == MISSED_ERROR_LIMIT || exchange.stop.is_due() {
                 return Ok(scheduled);
             }
             let missed: Vec<Location<usize>> = exchange
@@ -265,7 +260,7 @@ impl Sides {
         let worst = (0..peaks.len()).max_by(|&a, &b| peaks[a].gain.total_cmp(&peaks[b].gain)).unwrap_or(0);
         let ratios = peaks.iter().zip(scenarios).map(|(peak, scenario)| peak.gain * scenario.weight);
         let ratio = ratios.fold(0.0, f64::max);
-        Ok(Scheduled { taps, slopes, peaks, worst, ratio, is_missed: false })
+        Ok(Scheduled { taps, slopes, peaks, worst, ratio })
     }
 
     /// F_0 as taps per channel, and the slopes per fast period.

@@ -137,7 +137,7 @@ fn long_witnesses(
 }
 
 /// Maximum number of witnesses for so many taps of all channels.
-pub(in crate::design) fn max_witnesses(taps: usize) -> usize {
+fn max_witnesses(taps: usize) -> usize {
     if taps <= MOST_LONG_TAPS { MAX_WITNESSES } else { MAX_WITNESSES_OF_MANY }
 }
 

@@ -19,8 +19,6 @@ use crate::verify::{EnclosedErrorSystem, Strictness, Verified};
 pub(super) use enclosed_norm::resolved_norm;
 use enclosed_norm::{EnclosedGains, is_zero};
 use lower::lower_proof;
-pub(super) use lower::max_witnesses;
-pub(super) use upper::MAX_SEARCHED_STATES;
 use upper::certificate;
 
 /// Relative distance below the designer's bound at which a proven bound still counts as its proof.
@@ -62,12 +60,6 @@ pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {
     let Verified { upper, attained, states, .. } =
         error.judge(&bank.gamma, &proof, Strictness::NotRefuted)?;
     Ok(Certified { gamma: upper, attained, states })
-}
-
-/// Whether the norm of a bank is zero up to rounding, so that no search can make it less.
-pub(super) fn has_no_error(bank: &Bank) -> bool {
-    let is_zero = |error: EnclosedErrorSystem<'_>| bank.gamma.norm.is_some_and(|norm| is_zero(norm, &error));
-    EnclosedErrorSystem::new(bank).is_ok_and(is_zero)
 }
 
 /// Searches for witnesses of the bank's gammas. Returns the proof and the bounds that it proves,

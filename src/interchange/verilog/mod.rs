@@ -151,8 +151,7 @@ impl Verilog {
     /// that make the largest and the least sum of each phase, and `random` random ones.
     ///
     /// # Errors
-    /// [`ExportError::Frames`] for more random frames than [`MOST_RANDOM_FRAMES`], and
-    /// [`ExportError::Memory`].
+    /// [`ExportError::Frames`] for more random frames than [`MOST_RANDOM_FRAMES`].
     pub fn testbench(&self, random: u32) -> Result<Vec<(String, String)>, ExportError> {
         testbench::files(self, random)
     }

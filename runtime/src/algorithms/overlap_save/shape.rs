@@ -60,16 +60,6 @@ impl Shape {
         lanes / (self.batch() * self.ratio) as f64
     }
 
-    /// Numbers of the coefficients, with the factors of the transform, and of a state.
-    pub(crate) fn numbers(&self) -> (f64, f64) {
-        let [len, channels, ratio, batch] =
-            [self.len, self.channels, self.ratio, self.batch()].map(|x| x as f64);
-        let [inputs, outputs] = [self.inputs(), self.outputs()].map(|x| x as f64);
-        let row = (2 * self.depth * self.segments) as f64;
-        let samples = (self.history as f64 + batch) * channels + batch * ratio;
-        (0.5 * len * outputs * channels * row + 3.0 * len, (inputs + outputs) * len * row + samples)
-    }
-
     /// False if the spectra would take gigabytes.
     pub(crate) fn spectra_fit(&self) -> bool {
         let rows = (self.len / 2 + 1) as f64 * (self.outputs() * self.channels) as f64;
