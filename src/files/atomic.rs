@@ -59,7 +59,7 @@ impl AtomicFile {
         let mut files = unfinished();
         let begun = begin_beside(&target, known.as_ref());
         let (file, hidden) = begun.map_err(FileError::system(&name, CREATE))?;
-        let hidden_name = hidden.to_path_buf();
+        let hidden_name = target.with_file_name(hidden.file_name().unwrap_or_default());
         files.insert(hidden_name.clone());
         let (file, hidden) = (Some(file), Some(hidden));
         Ok(Self { file, hidden, hidden_name, target, name, replace, is_unique: false })
