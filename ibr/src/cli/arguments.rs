@@ -298,7 +298,7 @@ const LARGEST: usize = 1 << 28;
 fn pixels(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(count) if (1..=LARGEST).contains(&count) => Ok(count),
-        _ => Err(format!("\"{}\" is not a number from 1 to {LARGEST}", Quoted(text))),
+        _ => Err(format!("it must be a whole number from 1 to {LARGEST}")),
     }
 }
 
