@@ -38,8 +38,6 @@ const SWEEPS: Range = Range { least: 5.0, most: 25.0 };
 /// them.
 const NORMS_OF_SCENARIOS: Range = Range { least: 1.0, most: 4.0 };
 const BOX_PROOF_OPERATIONS: Range = Range { least: 3e9, most: 1e11 };
-/// Operations of the refinement of poles, likewise.
-const POLE_REFINEMENT_OPERATIONS: f64 = 1.5e11;
 /// Histories through which the smoother passes for an open number of taps, whose lengths are doubled and
 /// then halved, and for an open latency.
 const HISTORIES: [f64; 2] = [24.0, 2.0];
@@ -75,9 +73,9 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
         effort = effort.then(Effort::of(1.0, 0.0).times(BOX_PROOF_OPERATIONS));
     }
     if spec.design.reduction.is_some() {
-        // A norm for each order that is visited, and the refinement of its poles.
+        // A norm for each order that is visited.
         let norms = sizes.norms().times(Range { least: 2.0, most: 2.0 * sizes.states.min(40.0) });
-        effort = effort.then(norms).perhaps(Effort::of(POLE_REFINEMENT_OPERATIONS, 0.0));
+        effort = effort.then(norms);
     }
     if matches!(spec.design.reduction, Some(Reduction::Order(_))) && spec.latency.is_none() {
         // The banks of some slow periods of latency are compared.
