@@ -38,7 +38,6 @@ Examples:
   hybank design spec.toml -o bank.json --method h2 --snr 90
   hybank design spec.toml -o fixed.json --taps 64 --bits 14
   hybank design spec.toml -o fixed.json --loss-db 0.1
-  hybank design spec.toml -o digits.json --loss-db 0.1 --digits
   hybank design spec.toml -o small.json --method iir --order 6
   hybank design spec.toml -o small.json --method iir --reduction-loss-db 0.5
   hybank design spec.toml -o - --taps 64 | hybank analyze -")]
@@ -74,9 +73,6 @@ pub(super) struct Args {
     /// lose at most this many decibels of SNR relative to the real taps
     #[arg(long, value_name = "DB", conflicts_with = "fraction_bits")]
     loss_db: Option<f64>,
-    /// With --loss-db: taps of the fewest canonical signed digits, for multiplication by shifts and adders
-    #[arg(long, requires = "loss_db")]
-    digits: bool,
     /// Delay-scheduled taps, optimal over the delays of the spec's [uncertainty] (method fir)
     #[arg(long, value_parser = ["affine"])]
     tracking: Option<String>,
@@ -116,7 +112,6 @@ fn overrides(args: &Args) -> DesignOverrides {
         bits: args.bits.clone(),
         fraction_bits: args.fraction_bits,
         loss_db: args.loss_db,
-        digits: args.digits,
         tracking: args.tracking.is_some(),
         reduction: args.order.map(Reduction::Order).or(args.reduction_loss_db.map(Reduction::Loss)),
     }

@@ -152,8 +152,8 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
     let plant = LiftedPlant::new(&problem);
     let synthesis = Synthesis::of_taps(&plant, taps.clone())?;
     let filters = SynthesisFilters::Fir(taps);
-    let rounding = plant.rounding(&filters::lifted(&filters, problem.ratio))?;
-    let realised = Realised { filters, peak: synthesis.peak, rounding, reduction: None, integers: None };
+    let norm_error = plant.norm_error(synthesis.peak.gain, &filters::lifted(&filters, problem.ratio))?;
+    let realised = Realised { filters, peak: synthesis.peak, norm_error, reduction: None, integers: None };
     Ok(judge(&complete, complete.clone(), realised, &synthesis).without_unresolved_bounds(&problem).proved(
         &DualSolution::default(),
         search,
@@ -164,7 +164,7 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
 /// The bank with its complete spec and with the norm of its final coefficients. No lower bound exceeds that
 /// norm.
 fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis) -> Design {
-    let Realised { filters, peak, rounding, reduction, integers } = realised;
+    let Realised { filters, peak, norm_error, reduction, integers } = realised;
     let (fixed_point, words) = integers.unzip();
     let complete = with_chosen_words(complete, fixed_point.as_ref());
     let bank = Bank {
@@ -178,7 +178,7 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
         offsets: complete.channels.iter().map(|channel| channel.offset).collect(),
         filters,
         tap_slopes: synthesis.affine.as_ref().map(|affine| affine.slopes.clone()),
-        gamma: Gamma::computed(peak.gain, rounding, synthesis.lower, synthesis.noncausal),
+        gamma: Gamma::computed(peak.gain, norm_error, synthesis.lower, synthesis.noncausal),
         proof: None,
         fixed_point,
         spec: Some(complete),
@@ -203,7 +203,6 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
 fn with_chosen_words(mut spec: Spec, words: Option<&FixedPoint>) -> Spec {
     if spec.design.loss_db.take().is_some() {
         spec.design.bits = words.map(|words| words.bits.clone());
-        spec.design.digits = false;
     }
     spec
 }

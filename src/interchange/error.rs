@@ -96,12 +96,6 @@ pub enum ExportError {
     /// Code of which the words are the ports needs the bits of the samples.
     #[error("the bits of the samples are the widths of the ports, and no channel of the spec states them")]
     NoInputBits,
-    /// Shift-and-add has no coefficients that a ROM could hold.
-    #[error(
-        "with several clocks for a frame the multipliers take their coefficients from a ROM, which shift-and-add \
-         has not; take one clock for each frame, or inferred multipliers"
-    )]
-    ShiftAddRom,
     /// The archive could not be put together.
     #[error("the archive cannot be written: {0}")]
     Archive(String),

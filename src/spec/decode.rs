@@ -30,7 +30,7 @@ const TOP_KEYS: [&str; 12] = [
 const TARGET_KEYS: [&str; 1] = ["filter"];
 const CHANNEL_KEYS: [&str; 9] =
     ["delay", "delay_samples", "rate", "filter", "noise", "bits", "jitter", "gain", "offset"];
-const DESIGN_KEYS: [&str; 12] = [
+const DESIGN_KEYS: [&str; 11] = [
     "method",
     "taps",
     "target_snr_db",
@@ -38,7 +38,6 @@ const DESIGN_KEYS: [&str; 12] = [
     "bits",
     "fraction_bits",
     "loss_db",
-    "digits",
     "tracking",
     "order",
     "reduction_loss_db",
@@ -367,7 +366,6 @@ fn written(table: &Fields<'_>) -> Result<DesignOverrides, Fault> {
         bits: table.read("bits", |v| word_lengths(&v))?,
         fraction_bits: table.read("fraction_bits", |v| fraction_bits(&v))?,
         loss_db: table.read("loss_db", |v| v.number_in(limits::check_word_loss))?.map(|db| db + 0.0),
-        digits: table.read("digits", |v| v.boolean())?.unwrap_or(false),
         tracking: table.read("tracking", |v| v.name("tracking", &[(AFFINE, true)]))?.unwrap_or(false),
         reduction: match table.either(
             "order",

@@ -48,9 +48,6 @@ pub struct DesignTable<M> {
     /// Integer taps of the fewest bits that lose at most so many decibels of SNR, in place of `bits`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss_db: Option<f64>,
-    /// Whether `loss_db` asks for few signed digits, not for few bits.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub digits: bool,
     /// Delay-scheduled taps of the method `fir`, for delays that change while the bank runs: affine
     /// functions of the delays, optimal over the box of the `[uncertainty]` table.
     #[serde(skip_serializing_if = "std::ops::Not::not", serialize_with = "as_affine")]
@@ -94,7 +91,7 @@ struct Key {
 }
 
 /// The keys that not every method reads.
-const KEYS: [Key; 10] = {
+const KEYS: [Key; 9] = {
     use Method::{Fir, H2, Iir, Separation, Sinc};
     [
         Key { name: "taps", methods: &[Fir, H2, Sinc, Separation], advised: "fir or h2" },
@@ -103,7 +100,6 @@ const KEYS: [Key; 10] = {
         Key { name: "bits", methods: &[Fir], advised: "fir" },
         Key { name: "fraction_bits", methods: &[Fir], advised: "fir" },
         Key { name: "loss_db", methods: &[Fir], advised: "fir" },
-        Key { name: "digits", methods: &[Fir], advised: "fir" },
         Key { name: "tracking", methods: &[Fir], advised: "fir" },
         Key { name: "order", methods: &[Iir, H2], advised: "iir or h2" },
         Key { name: "reduction_loss_db", methods: &[Iir, H2], advised: "iir or h2" },
@@ -158,7 +154,6 @@ impl<M> DesignTable<M> {
             bits: self.bits,
             fraction_bits: self.fraction_bits,
             loss_db: self.loss_db,
-            digits: self.digits,
             tracking: self.tracking,
             reduction: self.reduction,
         }
@@ -173,7 +168,6 @@ impl<M> DesignTable<M> {
             ("bits", self.bits.is_some()),
             ("fraction_bits", self.fraction_bits.is_some()),
             ("loss_db", self.loss_db.is_some()),
-            ("digits", self.digits),
             ("tracking", self.tracking),
         ];
         keys.into_iter()
@@ -246,10 +240,6 @@ impl DesignSpec {
         blame("fraction_bits", self.fraction_bits.map_or(Ok(()), check_fraction_bits))?;
         blame("bits", self.bits.as_ref().map_or(Ok(()), |bits| bits.check(self.taps)))?;
         blame("loss_db", self.loss_db.map_or(Ok(()), limits::check_word_loss))?;
-        if self.digits && self.loss_db.is_none() {
-            let remedy = "digits are the fewest for a loss, for example loss_db = 0.1";
-            return blame("digits", Err(SpecProblem::MissingKey { key: "loss_db", remedy }));
-        }
         if self.fraction_bits.is_some() && self.bits.is_none() {
             let remedy = "fraction_bits sets the binary point of integer taps, whose word length bits gives, for example bits = 16";
             return blame("fraction_bits", Err(SpecProblem::MissingKey { key: "bits", remedy }));
@@ -347,7 +337,6 @@ impl DesignOverrides {
             bits: self.bits.or(file.bits.filter(|_| keeps("bits"))),
             fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| keeps("fraction_bits"))),
             loss_db: self.loss_db.or(file.loss_db.filter(|_| keeps("loss_db"))),
-            digits: self.digits || file.digits && keeps("digits"),
             tracking: self.tracking || file.tracking && keeps("tracking"),
             reduction: self.reduction.or(file.reduction.filter(|_| keeps("order"))),
         }

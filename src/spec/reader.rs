@@ -135,14 +135,6 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// True or false.
-    pub(crate) fn boolean(&self) -> Result<bool, Fault> {
-        match self.node.kind {
-            Kind::Boolean(value) => Ok(value),
-            _ => Err(self.wrong_type("true or false")),
-        }
-    }
-
     /// A text.
     pub(crate) fn text(&self) -> Result<&'a str, Fault> {
         match &self.node.kind {

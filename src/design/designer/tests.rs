@@ -190,3 +190,33 @@ fn the_proven_lower_end_uses_all_directions_that_bind_the_taps() {
         design(&Spec::from_toml(text, "spec.toml").unwrap(), &Options::default()).unwrap().proof.unwrap();
     assert!(proven.upper <= proven.lower * (1.0 + 1e-5), "{proven:?}");
 }
+
+/// Other units of the converters' samples and of the output change no relative figure, whether the error is
+/// as large as the target or a small difference.
+#[test]
+fn the_stated_accuracy_does_not_depend_on_units() {
+    // The slow rate is all but enough for the second target.
+    for (numerator, denominator) in [(0.25, "[1.0, 1.0, 0.25]"), (1.0, "[4e11, 1.2e6, 1.0]")] {
+        let figures = |input: f64, output: f64| {
+            let filter = |gain: f64| format!("{{ num = [{:e}], den = {denominator} }}", numerator * gain);
+            let channel = |delay: f64| format!("{{ delay = {delay}, filter = {} }}", filter(input));
+            let text = format!(
+                "fast_period = 1.0\nratio = 2\nlatency = 4\ntarget = {{ filter = {} }}\n\
+                 channel = [{}, {}]\ndesign = {{ method = \"iir\" }}",
+                filter(output),
+                channel(1.2),
+                channel(0.6),
+            );
+            let found = design(&Spec::from_toml(&text, "spec.toml").unwrap(), &Options::without_proof());
+            let gamma = found.unwrap().bank.gamma;
+            (gamma.norm.unwrap() / output, gamma.upper.unwrap() / gamma.norm.unwrap())
+        };
+        let plain = figures(1.0, 1.0);
+        for (input, output) in [(1e-9, 1.0), (1e9, 1.0), (1.0, 1e6), (1.0, 1e9), (1.0, 1e-9), (1e9, 1e-9)] {
+            let scaled = figures(input, output);
+            println!("{input:e} {output:e}: {scaled:?} {plain:?}");
+            assert!((scaled.0 / plain.0 - 1.0).abs() < plain.1 - 1.0 + 1e-9, "{scaled:?} {plain:?}");
+            assert!(((scaled.1 - 1.0) / (plain.1 - 1.0) - 1.0).abs() < 0.01, "{scaled:?} {plain:?}");
+        }
+    }
+}

@@ -186,7 +186,8 @@ fn without_certificate(bank: &Bank, dual: &DualSolution, stop: &Stop) -> Result<
     };
     // Without a witness nothing but zero is known to be below.
     let [lower, noncausal] = [lower, noncausal].map(|proven| Some(proven.map_or(0.0, stated)));
-    let computed = Gamma::computed(norm, 0.0, 0.0, 0.0).upper;
+    let accuracy = LiftedPlant::new(&Problem::of_bank(bank)?).accuracy(norm)?;
+    let computed = Some(norm * (1.0 + accuracy));
     let upper = [computed, bank.gamma.upper, lower, noncausal].into_iter().flatten().reduce(f64::max);
     Ok(Gamma { norm: Some(norm), upper, lower, noncausal, ..bank.gamma })
 }

@@ -102,7 +102,6 @@ prop_compose! {
                 bits: bits.clone().filter(|_| method.reads("bits")),
                 fraction_bits: fraction_bits.filter(|_| method.reads("bits") && bits.is_some()),
                 loss_db: by_loss.then_some(0.25),
-                digits: by_loss && ratio % 4 == 0,
                 tracking: follows,
                 reduction: reduction.filter(|_| method.reads("order") && !(method == Method::H2 && moves)),
             },
