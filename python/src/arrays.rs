@@ -149,7 +149,7 @@ impl<'py> Held<'py> {
             return Err(PyMemoryError::new_err(text));
         }
         let mut frames = vec![0.0; count];
-        self.part(part)?[..].load(Isa::detect(), 0, &mut frames);
+        self.part(part)?.as_slice().load_f64(Isa::detect(), 0, &mut frames);
         Ok(frames)
     }
 
