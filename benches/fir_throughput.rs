@@ -176,7 +176,7 @@ impl Table {
         self.row(name, m * FRAMES, (n * taps) as f64 / m as f64, || {
             let frames = PcmFrames { layout, channels: n, bytes: black_box(&bytes) };
             let mut output = PcmOutput::packed(PcmFormat::S16Le, &mut out);
-            stream.run(&[frames][..], &mut output).unwrap();
+            stream.run(&[frames].as_slice(), &mut output).unwrap();
         });
     }
 
@@ -200,7 +200,7 @@ impl Table {
             one = one.min(start.elapsed());
             let start = Instant::now();
             let frames = Interleaved::new(black_box(&x), n).unwrap();
-            stream.run_parallel(&frames, &mut y[..], &pool).unwrap();
+            stream.run_parallel(&frames, &mut y.as_mut_slice(), &pool).unwrap();
             two = two.min(start.elapsed());
         }
         let (one, two) = (one.as_secs_f64(), two.as_secs_f64());

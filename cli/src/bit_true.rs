@@ -159,7 +159,7 @@ impl Run {
     fn process(&mut self, recordings: &[PcmFrames<'_>]) -> Result<(), Failure> {
         let channels = recordings.channels();
         let mut numbers = vec![0.0f64; recordings.frames() * channels];
-        recordings.load(Isa::detect(), 0, &mut numbers);
+        recordings.load_f64(Isa::detect(), 0, &mut numbers);
         // A power of two: the product is the integer itself.
         let frames: Vec<i32> = numbers.iter().map(|x| (x * self.full_scale()) as i32).collect();
         let fast = self.filtered(&frames, channels);

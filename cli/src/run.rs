@@ -57,9 +57,7 @@ fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
         PossibleValue::new(algorithm.name()).help(match algorithm {
             Algorithm::Auto => "The fastest algorithm that suits the command",
             Algorithm::Direct => "Computes every product; adds no latency",
-            Algorithm::OverlapSave { .. } => {
-                "Fourier transforms of blocks; faster for long filters, adds latency"
-            }
+            Algorithm::OverlapSave => "Fourier transforms of blocks; faster for long filters, adds latency",
             _ => "",
         })
     });

@@ -41,7 +41,7 @@ impl TrackArgs {
     pub(super) fn check(&self, algorithm: Algorithm) -> Result<(), Failure> {
         let usage = |message: String| Err(Failure::Usage(message));
         let Some(text) = self.track.as_deref() else { return Ok(()) };
-        if matches!(algorithm, Algorithm::OverlapSave { .. }) {
+        if algorithm == Algorithm::OverlapSave {
             let message = "--track changes the filters at single frames, and overlap-save filters in blocks; use direct";
             return usage(message.into());
         }

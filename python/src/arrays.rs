@@ -141,7 +141,7 @@ impl<'py> Held<'py> {
         let refused = |_| PyMemoryError::new_err(format!("{count} samples do not fit in memory; give fewer"));
         frames.try_reserve_exact(count).map_err(refused)?;
         frames.resize(count, 0.0);
-        self.part(part)?[..].load(Isa::detect(), 0, &mut frames);
+        self.part(part)?.as_slice().load_f64(Isa::detect(), 0, &mut frames);
         Ok(frames)
     }
 

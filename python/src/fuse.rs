@@ -157,7 +157,9 @@ fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Reques
     let plan = plan(bank, format, request.algorithm, settings)?;
     let mut array = NewArray::new(py, frames * bank.ratio, format)?;
     let (parts, mut room) = (held.parts()?, array.room()?);
-    let parts: Vec<_> = parts.iter().map(|part| Frames::new(&part[..], 0..frames)).collect();
+    let parts: Vec<_> = parts.iter().map(Vec::as_slice).collect();
+    let parts: Vec<_> = parts.iter().map(|part| Frames::new(part, 0..frames)).collect();
+    let parts: Vec<&dyn Input> = parts.iter().map(|part| part as _).collect();
     let signals = Signals::new();
     let stop = || signals.raised();
     let outcome = py.detach(|| pipeline::fuse(bank, &plan, &parts, &mut room, settings, &stop));

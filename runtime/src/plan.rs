@@ -229,9 +229,7 @@ impl ChosenAlgorithm {
     fn filter<T: Sample>(self, taps: &[Vec<f64>], ratio: usize, isa: Isa) -> Result<Fir<T>, BuildError> {
         Ok(match self {
             Self::Direct => Fir::Direct(Running::new(Direct::new(taps, ratio, isa)?)),
-            Self::OverlapSave(len) => {
-                Fir::OverlapSave(Running::new(OverlapSave::new(taps, ratio, len, isa)?))
-            }
+            Self::OverlapSave(shape) => Fir::OverlapSave(Running::new(OverlapSave::new(taps, shape, isa)?)),
         })
     }
 }

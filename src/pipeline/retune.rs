@@ -126,13 +126,13 @@ impl Retuner {
     }
 
     /// Takes samples of the inputs.
-    pub(super) fn push(&mut self, input: &(impl Input + ?Sized)) -> Result<(), ProcessError> {
+    pub(super) fn push(&mut self, input: &dyn Input) -> Result<(), ProcessError> {
         let (n, given, frames) = (self.channels.len(), input.channels(), input.frames());
         if given != n {
             return Err(ProcessError::Channels { given, wanted: n });
         }
         let mut samples = vec![0.0; frames * n];
-        input.load(Isa::detect(), 0, &mut samples);
+        input.load_f64(Isa::detect(), 0, &mut samples);
         for (i, channel) in self.channels.iter_mut().enumerate() {
             channel.samples.extend(samples.iter().skip(i).step_by(n));
         }
@@ -168,7 +168,7 @@ impl Retuner {
         let Some(mut stream) = self.shifted.take() else { return Ok(None) };
         let count = stream.plan().history().unwrap_or(0);
         let history = self.frames(self.position - count as i64, count, true);
-        stream.run(&history, &mut Kept { output: &mut [0.0; 0][..], range: 0..0 })?;
+        stream.run(&history, &mut Kept { output: &mut [0.0; 0].as_mut_slice(), range: 0..0 })?;
         Ok(Some(stream))
     }
 
@@ -261,6 +261,19 @@ impl Channel {
     }
 }
 
+impl ShiftedFrames<'_> {
+    fn load<T: Sample>(&self, first: usize, samples: &mut [T]) {
+        for (frame, slots) in (self.first + first as i64..).zip(samples.chunks_exact_mut(self.channels.len()))
+        {
+            for (slot, channel) in slots.iter_mut().zip(self.channels) {
+                let sample = channel.sample(frame + channel.shift);
+                let is_unknown = self.is_history && !sample.is_finite();
+                *slot = T::from_f64(if is_unknown { channel.offset } else { sample });
+            }
+        }
+    }
+}
+
 impl Input for ShiftedFrames<'_> {
     fn channels(&self) -> usize {
         self.channels.len()
@@ -270,15 +283,12 @@ impl Input for ShiftedFrames<'_> {
         self.count
     }
 
-    fn load<T: Sample>(&self, _: Isa, first: usize, samples: &mut [T]) {
-        for (frame, slots) in (self.first + first as i64..).zip(samples.chunks_exact_mut(self.channels.len()))
-        {
-            for (slot, channel) in slots.iter_mut().zip(self.channels) {
-                let sample = channel.sample(frame + channel.shift);
-                let is_unknown = self.is_history && !sample.is_finite();
-                *slot = T::from_f64(if is_unknown { channel.offset } else { sample });
-            }
-        }
+    fn load_f32(&self, _: Isa, first: usize, samples: &mut [f32]) {
+        self.load(first, samples);
+    }
+
+    fn load_f64(&self, _: Isa, first: usize, samples: &mut [f64]) {
+        self.load(first, samples);
     }
 }
 
