@@ -92,7 +92,7 @@ impl Captures {
         let mut numbers = vec![0.0; frames * channels];
         // There is nothing to load from no frames.
         for part in held.parts()?.iter().filter(|_| frames > 0) {
-            Frames::new(&part[..], 0..frames).load(Isa::detect(), 0, &mut numbers);
+            part.as_slice().load_f64(Isa::detect(), 0, &mut numbers);
         }
         let channel = |i| Record::new(numbers.iter().skip(i).step_by(channels).copied().collect());
         let records: Vec<Record> = (0..channels).map(channel).collect();

@@ -122,10 +122,10 @@ impl Recording {
         bytes: &[u8],
     ) -> PyResult<Bound<'py, PyAny>> {
         let columns = self.header.columns();
-        let frames = PcmFrames { layout: self.header.layout, channels: columns, bytes };
-        let (count, input) = (frames.frames(), &[frames].as_slice() as &dyn Input);
+        let frames = [PcmFrames { layout: self.header.layout, channels: columns, bytes }];
+        let count = frames[0].frames();
         let mut numbers = vec![T::default(); count * columns];
-        py.detach(|| input.load(Isa::detect(), 0, &mut numbers));
+        py.detach(|| (&frames.as_slice() as &dyn Input).load(Isa::detect(), 0, &mut numbers));
         let array: Bound<'py, PyArray2<T>> = PyArray1::from_vec(py, numbers).reshape([count, columns])?;
         if self.header.is_complex {
             array.call_method1("view", (self.dtype(),))

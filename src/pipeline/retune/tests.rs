@@ -247,7 +247,7 @@ fn shift(retuner: &mut Retuner, shifts: [i64; 2]) {
 
 fn loaded(frames: &ShiftedFrames<'_>) -> Vec<[f64; 2]> {
     let mut numbers = vec![0.0; 2 * frames.frames()];
-    frames.load(Isa::detect(), 0, &mut numbers);
+    frames.load(0, &mut numbers);
     numbers.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
 }
 
@@ -308,6 +308,6 @@ fn old_samples_are_forgotten() {
     }
     assert!(retuner.channels[0].samples.len() < 4 * KEPT as usize);
     let mut recent = [0.0; 2];
-    retuner.frames(retuner.position - 2, 2, true).load(Isa::detect(), 0, &mut recent);
+    retuner.frames(retuner.position - 2, 2, true).load(0, &mut recent);
     assert_eq!(recent, [4094.0, 4095.0]);
 }

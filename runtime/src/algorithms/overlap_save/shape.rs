@@ -64,6 +64,7 @@ impl Shape {
         // A butterfly of radix 4 with its factors takes 34 operations: for four rows, of two levels.
         let transforms = (self.inputs() + self.outputs()) as f64 * 4.25 * f64::from(self.len.ilog2());
         let products = (4 * self.channels * self.outputs()) as f64;
-        (self.len * self.depth * self.segments) as f64 * (transforms + products) / (self.batch() * self.ratio) as f64
+        (self.len * self.depth * self.segments) as f64 * (transforms + products)
+            / (self.batch() * self.ratio) as f64
     }
 }
