@@ -145,16 +145,13 @@ impl Table {
 
     /// Overlap-save; the products are those of the direct algorithm.
     fn blocks(&self, name: &str, n: usize, m: usize, taps: usize) {
-        for len in [None, Some(64), Some(128), Some(256)] {
-            let options = Options { algorithm: Algorithm::OverlapSave { transform: len }, ..self.options() };
-            let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
-            let x = input(n, FRAMES);
-            let mut y = vec![0.0; m * FRAMES];
-            let name = format!("{name} {}", len.map_or("best".into(), |len| len.to_string()));
-            self.row(&name, m * FRAMES, (n * taps) as f64 / m as f64, || {
-                stream.process(black_box(&x), &mut y).unwrap();
-            });
-        }
+        let options = Options { algorithm: Algorithm::OverlapSave, ..self.options() };
+        let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
+        let x = input(n, FRAMES);
+        let mut y = vec![0.0; m * FRAMES];
+        self.row(name, m * FRAMES, (n * taps) as f64 / m as f64, || {
+            stream.process(black_box(&x), &mut y).unwrap();
+        });
     }
 
     /// In and out as f64; the peak in f64 is half the one printed.
